@@ -1,0 +1,56 @@
+//! Image-space correction of an RPC's pointing.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ImagePoint;
+
+/// An affine map in image space, applied after the RPC: `corrected = p + t + D (p − centre)`.
+///
+/// The translation is given at `centre`, so that a small linear part does not turn into a huge translation
+/// for crops far from the origin of their coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ImageCorrection {
+    /// Shift at `centre`, pixels (sample, line).
+    pub translation_px: [f64; 2],
+    /// Linear part minus the identity, row-major (sample row, line row), pixels per pixel.
+    pub linear: [[f64; 2]; 2],
+    /// The point about which the linear part acts.
+    pub centre: ImagePoint,
+}
+
+impl ImageCorrection {
+    /// No correction.
+    pub const IDENTITY: Self =
+        Self { translation_px: [0.0; 2], linear: [[0.0; 2]; 2], centre: ImagePoint::new(0.0, 0.0) };
+
+    /// A shift of `sample` columns and `line` rows.
+    pub const fn translation(sample: f64, line: f64) -> Self {
+        Self { translation_px: [sample, line], ..Self::IDENTITY }
+    }
+
+    /// The corrected position of a point that the RPC projected.
+    pub fn apply(&self, p: ImagePoint) -> ImagePoint {
+        let (ds, dl) = (p.sample - self.centre.sample, p.line - self.centre.line);
+        let t = self.translation_px;
+        ImagePoint {
+            sample: p.sample + t[0] + self.linear[0][0] * ds + self.linear[0][1] * dl,
+            line: p.line + t[1] + self.linear[1][0] * ds + self.linear[1][1] * dl,
+        }
+    }
+
+    /// The RPC's own position for a point observed in the image; `None` when the linear part is singular.
+    pub fn invert(&self, q: ImagePoint) -> Option<ImagePoint> {
+        let [[a, b], [c, d]] = self.linear;
+        let (m00, m11) = (1.0 + a, 1.0 + d);
+        let det = m00 * m11 - b * c;
+        if det.abs() < 1e-9 || !det.is_finite() {
+            return None;
+        }
+        let x = q.sample - self.centre.sample - self.translation_px[0];
+        let y = q.line - self.centre.line - self.translation_px[1];
+        Some(ImagePoint {
+            sample: self.centre.sample + (m11 * x - b * y) / det,
+            line: self.centre.line + (m00 * y - c * x) / det,
+        })
+    }
+}

@@ -1,0 +1,39 @@
+//! Affine map from raster cells to map coordinates.
+
+use serde::{Deserialize, Serialize};
+
+/// GDAL's six coefficients: `x = c0 + (col + 0.5) c1 + (row + 0.5) c2`, `y = c3 + (col + 0.5) c4 + (row + 0.5) c5`,
+/// where (col, row) follow this crate's convention (cell centres are integers).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GeoTransform(pub [f64; 6]);
+
+impl GeoTransform {
+    /// A north-up grid whose upper-left *corner* is at (`x_min`, `y_max`), with square cells of `cell` map units.
+    pub const fn north_up(x_min: f64, y_max: f64, cell: f64) -> Self {
+        Self([x_min, cell, 0.0, y_max, 0.0, -cell])
+    }
+
+    /// Map coordinates of a (fractional) cell position.
+    pub fn map_from_cell(&self, column: f64, row: f64) -> (f64, f64) {
+        let c = &self.0;
+        let (u, v) = (column + 0.5, row + 0.5);
+        (c[0] + u * c[1] + v * c[2], c[3] + u * c[4] + v * c[5])
+    }
+
+    /// Fractional cell position of map coordinates; `None` when the transform is singular.
+    pub fn cell_from_map(&self, x: f64, y: f64) -> Option<(f64, f64)> {
+        let c = &self.0;
+        let det = c[1] * c[5] - c[2] * c[4];
+        if det == 0.0 || !det.is_finite() {
+            return None;
+        }
+        let (dx, dy) = (x - c[0], y - c[3]);
+        Some(((dx * c[5] - dy * c[2]) / det - 0.5, (dy * c[1] - dx * c[4]) / det - 0.5))
+    }
+
+    /// Side lengths of a cell along columns and rows, in map units.
+    pub fn cell_size(&self) -> (f64, f64) {
+        let c = &self.0;
+        (c[1].hypot(c[4]), c[2].hypot(c[5]))
+    }
+}

@@ -1,0 +1,15 @@
+//! Rasters in memory: grids, geotransforms, windows, masks, pyramids and resampling.
+//!
+//! One pixel convention everywhere: the centre of the upper-left pixel is at (0, 0). GDAL's corner convention
+//! (centre at 0.5, 0.5) is met in [`GeoTransform`] and in the readers, and nowhere else.
+
+mod geotransform;
+mod grid;
+mod window;
+
+pub use geotransform::GeoTransform;
+pub use grid::Grid;
+pub use window::Window;
+
+/// The no-data value of every float raster that the toolkit writes, unless told otherwise.
+pub const NO_DATA: f32 = -32768.0;
