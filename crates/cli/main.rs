@@ -1,2 +1,70 @@
 //! The `skysweep` command: arguments in, exit code out; all work is in the crates.
-fn main() {}
+//!
+//! One module per subcommand, each with an `Args` struct and a `run` that returns an [`Outcome`].
+//! Results go to standard output; log lines and errors go to standard error.
+//! Exit codes: 0 complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
+
+mod error;
+mod log;
+mod rpc;
+
+use std::process::ExitCode;
+
+use clap::{ArgAction, Parser, Subcommand};
+
+/// Satellite surface models from RPC images.
+#[derive(Debug, Parser)]
+#[command(name = "skysweep", version, about, propagate_version = true, arg_required_else_help = true)]
+struct Cli {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Options that every subcommand takes.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(crate) struct Global {
+    /// Print errors only.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Print more: -v says what is done, -vv everything.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Show, use and convert RPC camera models.
+    Rpc(rpc::Args),
+}
+
+#[allow(dead_code, reason = "constructed by the commands that are landing")]
+/// How a command ended that was not stopped by an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// All that was asked for is done.
+    Complete,
+    /// Parts failed, or a requested threshold was missed; the user has been told which.
+    Partial,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    log::init(cli.global);
+    match run(&cli) {
+        Ok(Outcome::Complete) => ExitCode::SUCCESS,
+        Ok(Outcome::Partial) => ExitCode::from(1),
+        Err(e) if error::is_closed_pipe(&e) => ExitCode::SUCCESS,
+        Err(e) => {
+            error::report(&e);
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(cli: &Cli) -> anyhow::Result<Outcome> {
+    match &cli.command {
+        Command::Rpc(args) => rpc::run(args),
+    }
+}
