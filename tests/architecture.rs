@@ -1,0 +1,213 @@
+//! Holds the rules of `crates/README.md`: the floors, the homes of GDAL and PROJ, where files are touched, and that every
+//! source file says what it does.
+//!
+//! The dependencies are read from `cargo metadata --no-deps`, so no network is needed. The sources are scanned as text:
+//! comments do not count, and neither does what follows the first `#[cfg(test)]` of a file.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use cargo_metadata::{Metadata, MetadataCommand, Package};
+
+/// The floor of every crate, those to come included, so that a new crate lands where the design has it.
+const FLOORS: [(&str, u8); 15] = [
+    ("skysweep-geodesy", 0),
+    ("skysweep-raster", 0),
+    ("skysweep-mesh", 0),
+    ("skysweep-camera", 1),
+    ("skysweep-bvh", 1),
+    ("skysweep-sweep", 2),
+    ("skysweep-priors", 2),
+    ("skysweep-bev", 2),
+    ("skysweep-eval", 2),
+    ("skysweep-simulate", 2),
+    ("skysweep-io", 3),
+    ("skysweep-pipeline", 4),
+    ("skysweep-report", 4),
+    ("skysweep", 5),
+    ("skysweep-python", 5),
+];
+
+/// Foreign packages that only one crate may use: (package, its home).
+const HOMES: [(&str, &str); 4] = [
+    ("gdal", "skysweep-io"),
+    ("gdal-sys", "skysweep-io"),
+    ("proj", "skysweep-geodesy"),
+    ("proj-sys", "skysweep-geodesy"),
+];
+
+/// Folders under `crates/` whose sources may touch the file system.
+const FILE_CRATES: [&str; 3] = ["io", "pipeline", "cli"];
+
+/// The two crates of floor 0 that may know each other: a grid's georeference is a CRS of `geodesy`.
+const SAME_FLOOR: [(&str, &str); 1] = [("skysweep-raster", "skysweep-geodesy")];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn metadata() -> Metadata {
+    MetadataCommand::new().manifest_path(root().join("Cargo.toml")).no_deps().exec().expect("cargo metadata runs")
+}
+
+fn floors() -> BTreeMap<&'static str, u8> {
+    FLOORS.into_iter().collect()
+}
+
+/// What an arrow from one crate to another breaks, if anything.
+fn broken_arrow(floors: &BTreeMap<&str, u8>, from: &str, to: &str) -> Option<String> {
+    let (&above, &below) = (floors.get(from)?, floors.get(to)?);
+    if below < above || SAME_FLOOR.contains(&(from, to)) {
+        return None;
+    }
+    Some(format!(
+        "{from} (floor {above}) depends on {to} (floor {below}): an arrow goes only to a lower floor; \
+         move the shared type down, or do the joining in pipeline or cli"
+    ))
+}
+
+/// Rust sources of the project below `folder`.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        if path.is_dir() && !path.ends_with("target") {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+fn all_sources() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for folder in ["crates", "tests", "benches"] {
+        sources(&root().join(folder), &mut found);
+    }
+    assert!(found.len() > 8, "only {} sources found: is the test run from a checkout?", found.len());
+    found.sort();
+    found
+}
+
+/// Whether a path of `crates/` is only compiled for tests, benches or examples.
+fn is_test_source(path: &Path) -> bool {
+    let in_folder = path.components().any(|part| {
+        matches!(part.as_os_str().to_str(), Some("tests" | "benches" | "examples")) || part.as_os_str() == "testing"
+    });
+    in_folder || path.file_stem().is_some_and(|stem| stem == "tests" || stem == "testing")
+}
+
+/// Whether the code of a source (no comments, nothing after the first `#[cfg(test)]`) names `std::fs`.
+fn names_std_fs(text: &str) -> bool {
+    let product = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let code: String = product
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .flat_map(|line| line.chars().filter(|c| !c.is_whitespace()))
+        .collect();
+    let grouped = code.match_indices("std::{").any(|(start, head)| {
+        let group = &code[start + head.len()..];
+        let group = &group[..group.find(';').unwrap_or(group.len())];
+        group.split([',', '{', '}']).any(|item| item == "fs" || item.starts_with("fs::"))
+    });
+    code.contains("std::fs") || grouped
+}
+
+fn report(broken: &[String]) {
+    assert!(broken.is_empty(), "{} broken:\n{}", broken.len(), broken.join("\n"));
+}
+
+#[test]
+fn dependencies_go_only_to_lower_floors() {
+    let floors = floors();
+    let mut broken = Vec::new();
+    for package in metadata().workspace_packages() {
+        if !floors.contains_key(package.name.as_str()) {
+            broken.push(format!("{}: give the new crate a floor in tests/architecture.rs", package.name));
+        }
+        broken.extend(package.dependencies.iter().filter_map(|d| broken_arrow(&floors, &package.name, &d.name)));
+    }
+    report(&broken);
+}
+
+#[test]
+fn gdal_and_proj_stay_in_their_homes() {
+    let strayed = |package: &Package| -> Vec<String> {
+        let misplaced = |name: &str| HOMES.iter().find(|(p, home)| *p == name && *home != package.name.as_str());
+        package
+            .dependencies
+            .iter()
+            .filter_map(|d| misplaced(&d.name))
+            .map(|(p, home)| {
+                format!("{} depends on {p}: it lives in {home} only; add what is missing there", package.name)
+            })
+            .collect()
+    };
+    report(&metadata().workspace_packages().into_iter().flat_map(strayed).collect::<Vec<_>>());
+}
+
+#[test]
+fn plain_cargo_test_covers_every_crate() {
+    let metadata = metadata();
+    let mut members: Vec<_> = metadata.workspace_members.clone();
+    let mut defaults: Vec<_> = metadata.workspace_default_members.to_vec();
+    members.sort();
+    defaults.sort();
+    assert_eq!(members, defaults, "list every member under default-members in Cargo.toml");
+}
+
+#[test]
+fn the_architecture_document_names_every_crate() {
+    let document = fs::read_to_string(root().join("crates/README.md")).expect("crates/README.md is there");
+    let missing: Vec<String> = fs::read_dir(root().join("crates"))
+        .expect("crates/ is there")
+        .flatten()
+        .filter(|entry| entry.path().is_dir())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| !document.contains(&format!("| `{name}` |")))
+        .map(|name| format!("crates/README.md has no row for `{name}`: say in one line what it holds"))
+        .collect();
+    report(&missing);
+}
+
+#[test]
+fn files_are_touched_only_where_files_live() {
+    let may = |path: &Path| FILE_CRATES.iter().any(|name| path.starts_with(root().join("crates").join(name)));
+    let broken: Vec<String> = all_sources()
+        .iter()
+        .filter(|path| path.starts_with(root().join("crates")) && !may(path))
+        .filter(|path| !is_test_source(path.strip_prefix(root()).unwrap_or(path)))
+        .filter(|path| names_std_fs(&fs::read_to_string(path).expect("a source is readable")))
+        .map(|path| format!("{}: std::fs is for io, pipeline and cli; take bytes or a grid instead", path.display()))
+        .collect();
+    report(&broken);
+}
+
+#[test]
+fn every_source_says_what_it_does() {
+    let broken: Vec<String> = all_sources()
+        .iter()
+        .filter(|path| !fs::read_to_string(path).expect("a source is readable").starts_with("//!"))
+        .map(|path| format!("{}: open with `//!`: what it does, formula or paper, units, frames", path.display()))
+        .collect();
+    report(&broken);
+}
+
+#[test]
+fn the_scan_sees_every_spelling() {
+    assert!(names_std_fs("use std::fs::File;"));
+    assert!(names_std_fs("use std::{\n    fs,\n    io,\n};"));
+    assert!(names_std_fs("use std::{io, fs::File};"));
+    assert!(names_std_fs("let t = ::std::fs::read(path);"));
+    assert!(!names_std_fs("// std::fs is not for this crate\nuse std::{fmt, io};"));
+    assert!(!names_std_fs("fn f() {}\n#[cfg(test)]\nmod tests { use std::fs; }"));
+}
+
+#[test]
+fn arrows_up_and_sideways_are_found() {
+    let floors = floors();
+    assert!(broken_arrow(&floors, "skysweep-camera", "skysweep-io").is_some());
+    assert!(broken_arrow(&floors, "skysweep-sweep", "skysweep-eval").is_some());
+    assert!(broken_arrow(&floors, "skysweep-io", "skysweep-camera").is_none());
+    assert!(broken_arrow(&floors, "skysweep-camera", "serde").is_none());
+}
