@@ -1,0 +1,246 @@
+//! The identity of a coordinate reference system: an EPSG code on the ground and a vertical datum.
+//!
+//! Automatic choice: the UTM zone of the longitude (WGS 84, EPSG:326zz north, 327zz south) between 80° S and 84° N,
+//! universal polar stereographic (EPSG:5041 north, 5042 south, axes east, north) beyond. The zone exceptions for
+//! Norway (32V) and Svalbard (31X to 37X) are not applied: they serve map sheets, and the regular zone is as accurate.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{GeodesyError, wrap_lon};
+
+/// What heights are measured from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum VerticalDatum {
+    /// The WGS 84 ellipsoid, as inside the program.
+    #[default]
+    Ellipsoid,
+    /// The EGM96 geoid (EPSG:5773).
+    Egm96,
+    /// The EGM2008 geoid (EPSG:3855).
+    Egm2008,
+    /// Another vertical CRS by its EPSG code.
+    Epsg(u32),
+}
+
+impl VerticalDatum {
+    /// EPSG code of the vertical CRS; `None` for ellipsoidal heights, which have none of their own.
+    pub fn epsg(&self) -> Option<u32> {
+        match *self {
+            Self::Ellipsoid => None,
+            Self::Egm96 => Some(5773),
+            Self::Egm2008 => Some(3855),
+            Self::Epsg(code) => Some(code),
+        }
+    }
+
+    /// The datum of a vertical CRS's EPSG code.
+    pub fn from_epsg(code: u32) -> Self {
+        match code {
+            5773 => Self::Egm96,
+            3855 => Self::Egm2008,
+            other => Self::Epsg(other),
+        }
+    }
+}
+
+impl fmt::Display for VerticalDatum {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ellipsoid => f.write_str("ellipsoid"),
+            Self::Egm96 => f.write_str("egm96"),
+            Self::Egm2008 => f.write_str("egm2008"),
+            Self::Epsg(code) => write!(f, "EPSG:{code}"),
+        }
+    }
+}
+
+impl FromStr for VerticalDatum {
+    type Err = GeodesyError;
+
+    /// Reads `ellipsoid`, `egm96`, `egm2008`, `EPSG:5773` or `5773`, in any letter case.
+    fn from_str(text: &str) -> Result<Self, GeodesyError> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "ellipsoid" | "ellipsoidal" | "wgs84" => Ok(Self::Ellipsoid),
+            "egm96" => Ok(Self::Egm96),
+            "egm2008" | "egm08" => Ok(Self::Egm2008),
+            other => epsg_code(other)
+                .map(Self::from_epsg)
+                .ok_or_else(|| GeodesyError::UnknownVerticalDatum { text: text.to_owned() }),
+        }
+    }
+}
+
+impl From<VerticalDatum> for String {
+    fn from(datum: VerticalDatum) -> Self {
+        datum.to_string()
+    }
+}
+
+impl TryFrom<String> for VerticalDatum {
+    type Error = GeodesyError;
+
+    fn try_from(text: String) -> Result<Self, GeodesyError> {
+        text.parse()
+    }
+}
+
+/// A horizontal CRS and what heights in it are measured from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Crs {
+    /// EPSG code of the projected or geographic horizontal CRS.
+    pub horizontal: u32,
+    /// Datum of the heights.
+    pub vertical: VerticalDatum,
+}
+
+impl Crs {
+    /// A CRS with heights above the ellipsoid.
+    pub const fn ellipsoidal(horizontal: u32) -> Self {
+        Self { horizontal, vertical: VerticalDatum::Ellipsoid }
+    }
+
+    /// PROJ's and GDAL's name for the horizontal part, `EPSG:32617`.
+    pub fn horizontal_definition(&self) -> String {
+        format!("EPSG:{}", self.horizontal)
+    }
+}
+
+impl fmt::Display for Crs {
+    /// `EPSG:32617` for ellipsoidal heights, else the compound `EPSG:32617+5773`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.vertical.epsg() {
+            None => write!(f, "EPSG:{}", self.horizontal),
+            Some(vertical) => write!(f, "EPSG:{}+{vertical}", self.horizontal),
+        }
+    }
+}
+
+/// A CRS as the user asks for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum CrsRequest {
+    /// The UTM or polar zone of the scene (`auto` or `utm`).
+    #[default]
+    Auto,
+    /// A code, and a vertical datum where the text names one (`EPSG:32617+5773`).
+    Epsg {
+        /// EPSG code of the horizontal CRS.
+        horizontal: u32,
+        /// Vertical datum, if named.
+        vertical: Option<VerticalDatum>,
+    },
+}
+
+impl CrsRequest {
+    /// EPSG code of the horizontal CRS for a scene centred at a position in degrees.
+    ///
+    /// # Errors
+    /// [`GeodesyError::InvalidPosition`] when the choice is automatic and the position is none.
+    pub fn horizontal_at(&self, lon_deg: f64, lat_deg: f64) -> Result<u32, GeodesyError> {
+        match *self {
+            Self::Auto => utm_epsg(lon_deg, lat_deg),
+            Self::Epsg { horizontal, .. } => Ok(horizontal),
+        }
+    }
+}
+
+impl FromStr for CrsRequest {
+    type Err = GeodesyError;
+
+    /// Reads `auto`, `utm`, `EPSG:32617`, `32617` or `EPSG:32617+5773`, in any letter case.
+    fn from_str(text: &str) -> Result<Self, GeodesyError> {
+        let lower = text.trim().to_ascii_lowercase();
+        if lower == "auto" || lower == "utm" {
+            return Ok(Self::Auto);
+        }
+        let unknown = || GeodesyError::UnknownCrs { text: text.to_owned() };
+        let (ground, height) = match lower.split_once('+') {
+            Some((ground, height)) => (ground, Some(height)),
+            None => (lower.as_str(), None),
+        };
+        let horizontal = epsg_code(ground).ok_or_else(unknown)?;
+        let vertical = height.map(|h| epsg_code(h).map(VerticalDatum::from_epsg).ok_or_else(unknown)).transpose()?;
+        Ok(Self::Epsg { horizontal, vertical })
+    }
+}
+
+/// EPSG code of the UTM zone at a position in degrees, or of the polar zone beyond 84° N and 80° S.
+///
+/// # Errors
+/// [`GeodesyError::InvalidPosition`] for non-finite numbers and latitudes beyond the poles.
+pub fn utm_epsg(lon_deg: f64, lat_deg: f64) -> Result<u32, GeodesyError> {
+    if !lon_deg.is_finite() || !lat_deg.is_finite() || lat_deg.abs() > 90.0 {
+        return Err(GeodesyError::InvalidPosition { lon_deg, lat_deg });
+    }
+    if !(-80.0..84.0).contains(&lat_deg) {
+        return Ok(ups_epsg(lat_deg));
+    }
+    let lon = wrap_lon(lon_deg);
+    // The antimeridian belongs to zone 1, whose western edge it is.
+    let zone = if lon == 180.0 { 1 } else { ((lon + 180.0) / 6.0).floor() as u32 + 1 };
+    Ok(if lat_deg >= 0.0 { 32600 + zone } else { 32700 + zone })
+}
+
+/// EPSG code of the universal polar stereographic zone of a hemisphere (axes east, north).
+pub fn ups_epsg(lat_deg: f64) -> u32 {
+    if lat_deg >= 0.0 { 5041 } else { 5042 }
+}
+
+/// The code in `epsg:1234` or `1234` (lower case).
+fn epsg_code(text: &str) -> Option<u32> {
+    let digits = text.strip_prefix("epsg:").unwrap_or(text);
+    let plain = !digits.is_empty() && digits.len() <= 7 && digits.bytes().all(|b| b.is_ascii_digit());
+    plain.then(|| digits.parse().ok()).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zones_follow_longitude_and_hemisphere() {
+        for (lon, lat, code) in [
+            (-81.66, 30.34, 32617),
+            (55.6, -21.1, 32740),
+            (180.0, 0.0, 32601),
+            (-180.0, -1.0, 32701),
+            (179.999, 10.0, 32660),
+            (365.0, 10.0, 32631),
+            (20.0, 85.0, 5041),
+            (20.0, -85.0, 5042),
+            (20.0, 83.99, 32634),
+        ] {
+            assert_eq!(utm_epsg(lon, lat), Ok(code), "{lon} {lat}");
+        }
+        assert!(utm_epsg(f64::NAN, 0.0).is_err() && utm_epsg(0.0, 91.0).is_err());
+    }
+
+    #[test]
+    fn user_text_is_read_in_all_its_forms() {
+        let plain = CrsRequest::Epsg { horizontal: 32617, vertical: None };
+        assert_eq!("EPSG:32617".parse(), Ok(plain));
+        assert_eq!(" 32617".parse(), Ok(plain));
+        assert_eq!("UTM".parse(), Ok(CrsRequest::Auto));
+        assert_eq!(
+            "epsg:32617+5773".parse(),
+            Ok(CrsRequest::Epsg { horizontal: 32617, vertical: Some(VerticalDatum::Egm96) })
+        );
+        for bad in ["", "EPSG:", "mars", "32617+", "-4326", "EPSG:99999999999"] {
+            assert!(matches!(bad.parse::<CrsRequest>(), Err(GeodesyError::UnknownCrs { .. })), "{bad}");
+        }
+    }
+
+    #[test]
+    fn vertical_datums_survive_text() {
+        for datum in [VerticalDatum::Ellipsoid, VerticalDatum::Egm96, VerticalDatum::Egm2008, VerticalDatum::Epsg(5703)]
+        {
+            assert_eq!(datum.to_string().parse(), Ok(datum));
+        }
+        assert_eq!("EPSG:3855".parse(), Ok(VerticalDatum::Egm2008));
+        assert!("sea level".parse::<VerticalDatum>().is_err());
+        assert_eq!(Crs { horizontal: 32617, vertical: VerticalDatum::Egm96 }.to_string(), "EPSG:32617+5773");
+    }
+}

@@ -1,0 +1,261 @@
+//! The one place where PROJ's C interface is called.
+//!
+//! A [`Transformation`] owns its PROJ context, so it may move between threads but not be shared; a [`Pool`] hands
+//! transformations out to any number of threads and makes more as needed. Network access is off and PROJ's log is
+//! silent: what it has to say is in the error. Axis order is longitude, latitude and east, north.
+#![allow(unsafe_code)]
+
+use std::ffi::{CStr, CString, c_char};
+use std::ptr;
+use std::sync::{Mutex, PoisonError};
+
+use proj_sys::{
+    PJ, PJ_CONTEXT, PJ_DIRECTION, PJ_DIRECTION_PJ_FWD, PJ_DIRECTION_PJ_INV, PJ_LOG_LEVEL_PJ_LOG_NONE,
+    PJ_TYPE_PJ_TYPE_COMPOUND_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS,
+    proj_context_create, proj_context_destroy, proj_context_errno, proj_context_errno_string,
+    proj_context_set_enable_network, proj_create, proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D,
+    proj_crs_get_coordinate_system, proj_crs_get_sub_crs, proj_cs_get_axis_info, proj_destroy, proj_get_type,
+    proj_log_level, proj_normalize_for_visualization, proj_trans_generic,
+};
+
+/// How to make a transformation.
+#[derive(Debug, Clone)]
+pub(crate) enum Recipe {
+    /// Between the horizontal parts of two CRSs.
+    Horizontal { source: String, target: String },
+    /// Between two CRSs with heights.
+    Spatial { source: String, target: String },
+    /// A pipeline in PROJ's own words.
+    Pipeline(String),
+}
+
+/// Which way through a transformation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Direction {
+    Forward,
+    Inverse,
+}
+
+impl Direction {
+    fn raw(self) -> PJ_DIRECTION {
+        match self {
+            Self::Forward => PJ_DIRECTION_PJ_FWD,
+            Self::Inverse => PJ_DIRECTION_PJ_INV,
+        }
+    }
+}
+
+/// A PROJ context; destroyed last.
+struct Context(*mut PJ_CONTEXT);
+
+impl Context {
+    fn new() -> Self {
+        // SAFETY: a fresh context, used by this value only; the calls only set flags on it.
+        unsafe {
+            let raw = proj_context_create();
+            proj_log_level(raw, PJ_LOG_LEVEL_PJ_LOG_NONE);
+            proj_context_set_enable_network(raw, 0);
+            Self(raw)
+        }
+    }
+
+    /// PROJ's words for the last failure.
+    fn reason(&self) -> String {
+        // SAFETY: the context is alive; the returned text belongs to it and is copied at once.
+        unsafe {
+            let text = match proj_context_errno(self.0) {
+                0 => ptr::null(),
+                code => proj_context_errno_string(self.0, code),
+            };
+            if text.is_null() {
+                return "PROJ knows no definition or no operation".to_owned();
+            }
+            CStr::from_ptr(text).to_string_lossy().into_owned()
+        }
+    }
+
+    /// Takes a PROJ object made in this context, or says why there is none.
+    fn own(&self, raw: *mut PJ) -> Result<Object, String> {
+        if raw.is_null() { Err(self.reason()) } else { Ok(Object(raw)) }
+    }
+
+    fn create(&self, definition: &str) -> Result<Object, String> {
+        let text = CString::new(definition).map_err(|_| "the definition holds a zero byte".to_owned())?;
+        // SAFETY: context and text are alive during the call; the result is owned by `Object`.
+        self.own(unsafe { proj_create(self.0, text.as_ptr()) })
+    }
+
+    /// The two-dimensional horizontal part of a CRS.
+    fn horizontal(&self, definition: &str) -> Result<Object, String> {
+        let mut crs = self.create(definition)?;
+        // SAFETY: all objects belong to this context and are alive; results are owned by `Object`.
+        unsafe {
+            if proj_get_type(crs.0) == PJ_TYPE_PJ_TYPE_COMPOUND_CRS {
+                crs = self.own(proj_crs_get_sub_crs(self.0, crs.0, 0))?;
+            }
+            self.own(proj_crs_demote_to_2D(self.0, ptr::null(), crs.0))
+        }
+    }
+
+    /// The transformation between two CRSs, best first; never a ballpark one, which would be silently wrong.
+    fn between(&self, source: &Object, target: &Object) -> Result<Object, String> {
+        let options: [*const c_char; 2] = [c"ALLOW_BALLPARK=NO".as_ptr(), ptr::null()];
+        // SAFETY: objects and options are alive; the option list ends with a null pointer.
+        let raw =
+            unsafe { proj_create_crs_to_crs_from_pj(self.0, source.0, target.0, ptr::null_mut(), options.as_ptr()) };
+        let operation = self.own(raw)?;
+        // SAFETY: the operation belongs to this context.
+        self.own(unsafe { proj_normalize_for_visualization(self.0, operation.0) })
+    }
+}
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        // SAFETY: created by `proj_context_create`, destroyed once.
+        unsafe { proj_context_destroy(self.0) };
+    }
+}
+
+/// An owned PROJ object.
+struct Object(*mut PJ);
+
+impl Drop for Object {
+    fn drop(&mut self) {
+        // SAFETY: created by PROJ, destroyed once.
+        unsafe { proj_destroy(self.0) };
+    }
+}
+
+/// A coordinate transformation with its own context. Fields drop in order: the object before its context.
+pub(crate) struct Transformation {
+    operation: Object,
+    _context: Context,
+}
+
+// SAFETY: PROJ contexts and objects are bound to no thread, only barred from simultaneous use; this value owns
+// both, lends neither, and needs `&mut self` to transform.
+unsafe impl Send for Transformation {}
+
+impl Transformation {
+    /// Makes the transformation, or says in PROJ's words why there is none.
+    pub(crate) fn new(recipe: &Recipe) -> Result<Self, String> {
+        let context = Context::new();
+        let operation = match recipe {
+            Recipe::Horizontal { source, target } => {
+                context.between(&context.horizontal(source)?, &context.horizontal(target)?)?
+            }
+            Recipe::Spatial { source, target } => {
+                context.between(&context.create(source)?, &context.create(target)?)?
+            }
+            Recipe::Pipeline(definition) => context.create(definition)?,
+        };
+        Ok(Self { operation, _context: context })
+    }
+
+    /// Transforms in place and returns how many points failed; all coordinates of those become NaN.
+    ///
+    /// The slices have equal lengths (checked by the callers); `z` may be empty.
+    pub(crate) fn apply(&mut self, direction: Direction, x: &mut [f64], y: &mut [f64], z: &mut [f64]) -> usize {
+        let n = x.len().min(y.len());
+        let step = size_of::<f64>();
+        let nz = if z.is_empty() { 0 } else { z.len().min(n) };
+        let z_pointer = if nz == 0 { ptr::null_mut() } else { z.as_mut_ptr() };
+        // SAFETY: each pointer is valid for its count of f64 at the stride of one f64; absent coordinates are null
+        // with count 0, which PROJ takes as "none".
+        unsafe {
+            proj_trans_generic(
+                self.operation.0,
+                direction.raw(),
+                x.as_mut_ptr(),
+                step,
+                n,
+                y.as_mut_ptr(),
+                step,
+                n,
+                z_pointer,
+                step,
+                nz,
+                ptr::null_mut(),
+                0,
+                0,
+            );
+        }
+        mark_failures(x, y, z)
+    }
+}
+
+/// Sets every point with a non-finite coordinate to NaN and counts them.
+fn mark_failures(x: &mut [f64], y: &mut [f64], z: &mut [f64]) -> usize {
+    let mut failed = 0;
+    for i in 0..x.len().min(y.len()) {
+        let height_fails = z.get(i).is_some_and(|h| !h.is_finite());
+        if !x[i].is_finite() || !y[i].is_finite() || height_fails {
+            failed += 1;
+            x[i] = f64::NAN;
+            y[i] = f64::NAN;
+            if let Some(h) = z.get_mut(i) {
+                *h = f64::NAN;
+            }
+        }
+    }
+    failed
+}
+
+/// Transformations of one recipe, for any number of threads.
+pub(crate) struct Pool {
+    recipe: Recipe,
+    idle: Mutex<Vec<Transformation>>,
+}
+
+impl Pool {
+    /// A pool with one transformation made, so that a recipe that cannot work fails here.
+    pub(crate) fn new(recipe: Recipe) -> Result<Self, String> {
+        let first = Transformation::new(&recipe)?;
+        Ok(Self { recipe, idle: Mutex::new(vec![first]) })
+    }
+
+    /// Another pool of the same recipe.
+    pub(crate) fn duplicate(&self) -> Self {
+        Self { recipe: self.recipe.clone(), idle: Mutex::new(Vec::new()) }
+    }
+
+    /// Transforms in place with a transformation of this thread's own; see [`Transformation::apply`].
+    pub(crate) fn apply(
+        &self,
+        direction: Direction,
+        x: &mut [f64],
+        y: &mut [f64],
+        z: &mut [f64],
+    ) -> Result<usize, String> {
+        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut transformation = idle.map_or_else(|| Transformation::new(&self.recipe), Ok)?;
+        let failed = transformation.apply(direction, x, y, z);
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(transformation);
+        Ok(failed)
+    }
+}
+
+impl std::fmt::Debug for Pool {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Pool").field(&self.recipe).finish()
+    }
+}
+
+/// Metres per map unit of a CRS's horizontal axes; `None` when they are angles.
+pub(crate) fn metres_per_unit(definition: &str) -> Result<Option<f64>, String> {
+    let context = Context::new();
+    let crs = context.horizontal(definition)?;
+    let mut factor = 0.0;
+    // SAFETY: objects belong to the context and are alive; the one output pointer is valid, the others may be null.
+    let (kind, found) = unsafe {
+        let axes = context.own(proj_crs_get_coordinate_system(context.0, crs.0))?;
+        let null = ptr::null_mut();
+        let found = proj_cs_get_axis_info(context.0, axes.0, 0, null, null, null, &mut factor, null, null, null);
+        (proj_get_type(crs.0), found)
+    };
+    if found == 0 {
+        return Err(context.reason());
+    }
+    let angular = kind == PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS || kind == PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS;
+    Ok((!angular).then_some(factor))
+}
