@@ -1,0 +1,119 @@
+//! Coarse to fine: the heights of every view.
+//!
+//! The coarsest level covers the scene's whole range; each finer one searches, per pixel, around what the coarser one
+//! found there and next to it.
+
+use rayon::prelude::*;
+use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
+use sweep::cost::{Aggregation, SourceLevel};
+use sweep::ranges::Ranges;
+use sweep::{HeightMap, LevelConfig, SweepError, View, sweep_level};
+
+/// What the sweep needs to know of the scene.
+#[derive(Debug, Clone)]
+pub struct SweepPlan {
+    /// Heights to search, metres above the ellipsoid.
+    pub range_m: (f64, f64),
+    /// Metres between hypotheses at full resolution; each coarser level doubles it.
+    pub step_m: f64,
+    /// The coarsest pyramid level used.
+    pub top_level: usize,
+    /// For each view, the views it is compared with.
+    pub sources: Vec<Vec<usize>>,
+    /// How many of the best sources count, at most.
+    pub best_of: usize,
+    /// Cost, penalties and read-out.
+    pub level: LevelConfig,
+}
+
+/// Heights of all views at full resolution, and how many hypotheses were evaluated for them.
+#[derive(Debug, Clone)]
+pub struct SceneHeights {
+    /// One map per view.
+    pub maps: Vec<HeightMap>,
+    /// Pixel × hypothesis pairs over all views and levels.
+    pub evaluations: u64,
+}
+
+/// Sweeps all views from the coarsest level down. `done` is told after each view and level.
+///
+/// # Errors
+/// Those of [`sweep_level`].
+pub fn sweep_scene(views: &[View], plan: &SweepPlan, done: &(dyn Fn() + Sync)) -> Result<SceneHeights, SweepError> {
+    let origin_m = 0.5 * (plan.range_m.0 + plan.range_m.1);
+    let mut maps: Vec<HeightMap> = Vec::new();
+    let mut evaluations = 0;
+    for level in (0..=plan.top_level).rev() {
+        let swept: Vec<(HeightMap, u64)> = (0..views.len())
+            .into_par_iter()
+            .map(|i| {
+                let out = sweep_view(views, plan, i, level, maps.get(i), origin_m);
+                done();
+                out
+            })
+            .collect::<Result<_, SweepError>>()?;
+        evaluations += swept.iter().map(|(_, n)| n).sum::<u64>();
+        maps = swept.into_iter().map(|(m, _)| m).collect();
+        if level > 0 {
+            maps = drop_lone_heights(views, plan, &maps, level as u32)?;
+        }
+    }
+    Ok(SceneHeights { maps, evaluations })
+}
+
+fn source_level(views: &[View], index: usize, level: usize) -> SourceLevel<'_> {
+    let v = &views[index];
+    SourceLevel { index, image: &v.levels[level], camera: &v.camera, noise: v.noise_at(level) }
+}
+
+fn sweep_view(
+    views: &[View],
+    plan: &SweepPlan,
+    index: usize,
+    level: usize,
+    coarser: Option<&HeightMap>,
+    origin_m: f64,
+) -> Result<(HeightMap, u64), SweepError> {
+    let reference = source_level(views, index, level);
+    let (w, h) = (reference.image.width(), reference.image.height());
+    let step = plan.step_m * f64::from(1u32 << level);
+    let ranges = match coarser {
+        None => Ranges::uniform(w, h, step, plan.range_m),
+        Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, plan.range_m),
+    };
+    let sources: Vec<SourceLevel<'_>> = plan.sources[index].iter().map(|&s| source_level(views, s, level)).collect();
+    let mut config = plan.level;
+    config.cost.aggregation = match sources.len() {
+        0..=2 => Aggregation::Variance,
+        n => Aggregation::BestOf(plan.best_of.min(n)),
+    };
+    let map = sweep_level(reference, level as u32, &sources, &ranges, origin_m, &config)?;
+    Ok((map, ranges.evaluations()))
+}
+
+/// On a coarse level, a height that no other view shares is forgotten, unless nothing around it is known either.
+fn drop_lone_heights(
+    views: &[View],
+    plan: &SweepPlan,
+    maps: &[HeightMap],
+    level: u32,
+) -> Result<Vec<HeightMap>, SweepError> {
+    // Two pixels: coarse heights are rough, and a wrong deletion costs more than a wide range.
+    let config = ConsistencyConfig { tolerance_px: 2.0, ..ConsistencyConfig::default() };
+    let heights: Vec<Heights<'_>> =
+        maps.iter().enumerate().map(|(index, map)| Heights { index, view: &views[index], map }).collect();
+    heights
+        .par_iter()
+        .map(|h| {
+            let others: Vec<Heights<'_>> = plan.sources[h.index].iter().map(|&s| heights[s]).collect();
+            let counts = count_agreeing(*h, &others, level, &config)?;
+            let mut out = h.map.clone();
+            for (height, n) in out.height_m.data_mut().iter_mut().zip(counts.data()) {
+                if *n == 0 {
+                    *height = f32::NAN;
+                }
+            }
+            Ok(out)
+        })
+        .collect()
+}

@@ -1,0 +1,86 @@
+//! Tie points over the pairs of views, the joint correction, and the height range that they show.
+
+use std::collections::BTreeMap;
+
+use camera::ImagePoint;
+use sweep::View;
+use sweep::pointing::{AdjustConfig, Adjustment, Tie, TieConfig, Track, adjust, match_pair};
+
+/// Ties of one pair of views.
+#[derive(Debug, Clone)]
+pub struct PairTies {
+    /// The view whose corners were searched.
+    pub reference: usize,
+    /// The view they were searched in.
+    pub source: usize,
+    /// What was found.
+    pub ties: Vec<Tie>,
+}
+
+/// Fewer ties than this on a pair do not tell a height range.
+const TIES_MIN: usize = 12;
+
+/// Matches the pairs, given best first. The first one with enough ties narrows the height range of the rest.
+pub fn match_pairs(
+    views: &[View],
+    pairs: &[(usize, usize)],
+    range_m: (f64, f64),
+    config: &TieConfig,
+    done: &(dyn Fn() + Sync),
+) -> Vec<PairTies> {
+    let mut range = range_m;
+    let mut out = Vec::with_capacity(pairs.len());
+    for &(reference, source) in pairs {
+        let ties = match_pair(&views[reference], &views[source], range, config);
+        let found = PairTies { reference, source, ties };
+        if range == range_m
+            && let Some(seen) = heights_seen(views, &found)
+        {
+            // Everything may lie as far outside what the first pair saw as that pair's own spread, and 100 m more.
+            let margin = (seen.1 - seen.0) + 100.0;
+            range = ((seen.0 - margin).max(range_m.0), (seen.1 + margin).min(range_m.1));
+        }
+        out.push(found);
+        done();
+    }
+    out
+}
+
+/// The span of the heights of one pair's ties, the outliers left out.
+fn heights_seen(views: &[View], pair: &PairTies) -> Option<(f64, f64)> {
+    if pair.ties.len() < TIES_MIN {
+        return None;
+    }
+    let adjustment = adjust_views(views, std::slice::from_ref(pair), &AdjustConfig::default()).0;
+    span_of(&adjustment, TIES_MIN)
+}
+
+/// Least and greatest height of an adjustment's inliers, when there are at least `min` of them.
+pub fn span_of(adjustment: &Adjustment, min: usize) -> Option<(f64, f64)> {
+    let mut heights: Vec<f64> = adjustment.ground.iter().flatten().map(|g| g.height_m).collect();
+    if heights.len() < min {
+        return None;
+    }
+    heights.sort_by(f64::total_cmp);
+    // One tie in a hundred may still be wrong at each end.
+    let cut = heights.len() / 100;
+    Some((heights[cut], heights[heights.len() - 1 - cut]))
+}
+
+/// Joins the pairs' ties to tracks (one corner of a reference, seen in all its sources) and adjusts all views.
+pub fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
+    let mut by_corner: BTreeMap<(usize, u64, u64), Track> = BTreeMap::new();
+    for pair in pairs {
+        for tie in &pair.ties {
+            let [s, l] = tie.reference;
+            let track = by_corner
+                .entry((pair.reference, s.to_bits(), l.to_bits()))
+                .or_insert_with(|| vec![(pair.reference, ImagePoint::new(s, l))]);
+            track.push((pair.source, ImagePoint::new(tie.source[0], tie.source[1])));
+        }
+    }
+    let tracks: Vec<Track> = by_corner.into_values().collect();
+    let cameras: Vec<_> = views.iter().map(|v| v.camera.clone()).collect();
+    let sizes: Vec<_> = views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect();
+    (adjust(&cameras, &sizes, &tracks, config), tracks)
+}

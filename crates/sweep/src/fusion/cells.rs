@@ -1,0 +1,87 @@
+//! One height per cell from several views' heights.
+
+use raster::Grid;
+
+use super::mesh::ViewSurface;
+
+/// Parameters of the fusion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FusionConfig {
+    /// Heights closer than this belong to one surface, metres.
+    pub same_surface_m: f32,
+}
+
+/// The fused surface.
+#[derive(Debug, Clone)]
+pub struct Surface {
+    /// Height above the origin, metres; NaN in voids.
+    pub height_m: Grid<f32>,
+    /// Standard deviation, metres; NaN in voids.
+    pub sigma_m: Grid<f32>,
+    /// Number of views behind each height.
+    pub views: Grid<u8>,
+}
+
+/// Fuses the views' surfaces, which share one grid and one origin.
+pub fn fuse(surfaces: &[ViewSurface], config: &FusionConfig) -> Surface {
+    let (w, h) = surfaces.first().map_or((0, 0), |s| (s.height_m.width(), s.height_m.height()));
+    let mut out = Surface {
+        height_m: Grid::filled(w, h, f32::NAN),
+        sigma_m: Grid::filled(w, h, f32::NAN),
+        views: Grid::filled(w, h, 0),
+    };
+    let mut samples = Vec::with_capacity(surfaces.len());
+    for i in 0..w * h {
+        samples.clear();
+        let held = surfaces.iter().map(|s| (s.height_m.data()[i], s.sigma_m.data()[i]));
+        samples.extend(held.filter(|(height, _)| !height.is_nan()));
+        if let Some((height, sigma, views)) = fuse_cell(&mut samples, config.same_surface_m) {
+            out.height_m.data_mut()[i] = height;
+            out.sigma_m.data_mut()[i] = sigma;
+            out.views.data_mut()[i] = views;
+        }
+    }
+    out
+}
+
+/// Height, deviation and support of the best supported surface among (height, deviation) samples.
+fn fuse_cell(samples: &mut [(f32, f32)], same_surface_m: f32) -> Option<(f32, f32, u8)> {
+    samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut best, mut from) = (0..0, 0);
+    for to in 1..=samples.len() {
+        while samples[to - 1].0 - samples[from].0 > same_surface_m {
+            from += 1;
+        }
+        // ≥: in a tie the upper surface wins.
+        if to - from >= best.len() {
+            best = from..to;
+        }
+    }
+    let mode = &samples[best];
+    let middle = median(mode)?;
+    // The median is robust within the mode; the deviation is that of the mean of its members, as they are independent.
+    let information: f32 = mode.iter().map(|(_, s)| 1.0 / s.max(1e-3).powi(2)).sum();
+    Some((middle, information.sqrt().recip(), mode.len().min(255) as u8))
+}
+
+fn median(sorted: &[(f32, f32)]) -> Option<f32> {
+    let n = sorted.len();
+    let (low, high) = (sorted.get((n.max(1) - 1) / 2)?, sorted.get(n / 2)?);
+    Some(0.5 * (low.0 + high.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_surfaces_in_a_cell_give_the_better_supported_one_and_the_upper_in_a_tie() {
+        let cell = |heights: &[f32]| {
+            let mut s: Vec<(f32, f32)> = heights.iter().map(|h| (*h, 0.1)).collect();
+            fuse_cell(&mut s, 1.0)
+        };
+        assert_eq!(cell(&[10.0, 30.0]).map(|c| (c.0, c.2)), Some((30.0, 1)));
+        assert_eq!(cell(&[10.2, 30.0, 10.0]).map(|c| (c.0, c.2)), Some((10.1, 2)));
+        assert_eq!(cell(&[]), None);
+    }
+}

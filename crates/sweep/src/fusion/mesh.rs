@@ -1,0 +1,189 @@
+//! One view's heights on the map grid.
+
+use geodesy::LonLatHeight;
+use raster::{GeoTransform, Grid, Window};
+use rayon::prelude::*;
+
+use crate::SweepError;
+use crate::consistency::{Heights, height_span};
+use crate::geometry::{TileMap, full_from_level};
+use crate::level::tiles;
+
+/// The output grid: its placement, size, and the map projection.
+pub struct GridFrame<'a> {
+    /// Placement of the cells.
+    pub geotransform: GeoTransform,
+    /// Number of columns and rows.
+    pub size: (usize, usize),
+    /// Map coordinates of a ground point; `None` where the projection has none.
+    pub map_from_ground: &'a (dyn Fn(LonLatHeight) -> Option<[f64; 2]> + Sync),
+}
+
+/// One view's surface on the grid.
+#[derive(Debug, Clone)]
+pub struct ViewSurface {
+    /// Height above the map's origin, metres; NaN where the view has none.
+    pub height_m: Grid<f32>,
+    /// Standard deviation, metres.
+    pub sigma_m: Grid<f32>,
+}
+
+/// Side of the tiles in which image → map is replaced by a local map.
+const TILE: usize = 64;
+/// A facet steeper than this (height over ground) is a tear, not a surface: about 70°.
+const TEAR_SLOPE: f32 = 2.75;
+
+/// A pixel on the grid: column, row, height, deviation.
+#[derive(Clone, Copy)]
+struct Vertex {
+    x: f32,
+    y: f32,
+    h: f32,
+    sigma: f32,
+}
+
+/// Samples one view's heights at the grid's cells. `keep` says which pixels to use.
+///
+/// # Errors
+/// A camera that fails inside the scene.
+pub fn rasterise_view(
+    heights: Heights<'_>,
+    level: u32,
+    keep: &Grid<bool>,
+    frame: &GridFrame<'_>,
+) -> Result<ViewSurface, SweepError> {
+    let vertices = place(heights, level, keep, frame)?;
+    let cell = frame.geotransform.cell_size().0 as f32;
+    let tear = TEAR_SLOPE * cell;
+    let (cols, rows) = frame.size;
+    let mut out = ViewSurface {
+        height_m: Grid::filled(cols, rows, f32::NAN),
+        sigma_m: Grid::filled(cols, rows, f32::NAN),
+    };
+    for y in 0..vertices.height() {
+        for x in 0..vertices.width() {
+            let a = vertices[(x, y)];
+            if a.h.is_nan() {
+                continue;
+            }
+            out.put((a.x + 0.5).floor(), (a.y + 0.5).floor(), a.h, a.sigma);
+            let corner = |dx, dy| vertices.get(x + dx, y + dy).copied().filter(|v: &Vertex| !v.h.is_nan());
+            if let Some(c) = corner(1, 1) {
+                for b in [corner(1, 0), corner(0, 1)].into_iter().flatten() {
+                    out.facet([a, b, c], tear);
+                }
+            } else if let (Some(b), Some(c)) = (corner(1, 0), corner(0, 1)) {
+                out.facet([a, b, c], tear);
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// All kept pixels in grid coordinates.
+fn place(heights: Heights<'_>, level: u32, keep: &Grid<bool>, frame: &GridFrame<'_>) -> Result<Grid<Vertex>, SweepError> {
+    let map = heights.map;
+    let (width, height) = (map.height_m.width(), map.height_m.height());
+    let none = Vertex { x: 0.0, y: 0.0, h: f32::NAN, sigma: f32::NAN };
+    let windows = tiles(Window::whole(width, height), TILE);
+    let parts: Vec<Vec<Vertex>> = windows
+        .par_iter()
+        .map(|w| place_tile(heights, level, *w, keep, frame, none))
+        .collect::<Result<_, SweepError>>()?;
+    let mut out = Grid::filled(width, height, none);
+    for (w, part) in windows.iter().zip(&parts) {
+        for y in 0..w.height {
+            let row = &mut out.row_mut(w.y as usize + y)[w.x as usize..][..w.width];
+            row.copy_from_slice(&part[y * w.width..][..w.width]);
+        }
+    }
+    Ok(out)
+}
+
+fn place_tile(
+    heights: Heights<'_>,
+    level: u32,
+    w: Window,
+    keep: &Grid<bool>,
+    frame: &GridFrame<'_>,
+    none: Vertex,
+) -> Result<Vec<Vertex>, SweepError> {
+    let mut out = vec![none; w.width * w.height];
+    let map = heights.map;
+    let Some(range) = height_span(map, w) else { return Ok(out) };
+    let exact = |[u, v]: [f64; 2], h: f64| {
+        let at = camera::ImagePoint::new(full_from_level(u, level), full_from_level(v, level));
+        let ground = heights.view.camera.localize(at, h)?;
+        let [x, y] = (frame.map_from_ground)(ground).ok_or(camera::CameraError::NotFinite)?;
+        let (column, row) = frame.geotransform.cell_from_map(x, y).ok_or(camera::CameraError::NotFinite)?;
+        Ok([column, row])
+    };
+    let corners = [w.x as f64, w.y as f64, (w.x + w.width as i64 - 1) as f64, (w.y + w.height as i64 - 1) as f64];
+    let failed = |source| SweepError::Camera { view: heights.index, source };
+    let local = TileMap::fit(corners, range, exact).map_err(failed)?;
+    // A twentieth of a cell is invisible in the result; a tile over it is placed exactly.
+    let fits = local.max_error_px <= 0.05;
+    for y in 0..w.height {
+        for x in 0..w.width {
+            let at = (w.x as usize + x, w.y as usize + y);
+            let h = map.height_m[at];
+            if h.is_nan() || !keep[at] {
+                continue;
+            }
+            let (p, height_m) = ([at.0 as f64, at.1 as f64], map.origin_m + f64::from(h));
+            let [cx, cy] = if fits { local.at(p, height_m) } else { exact(p, height_m).map_err(failed)? };
+            out[y * w.width + x] = Vertex { x: cx as f32, y: cy as f32, h, sigma: map.sigma_m[at] };
+        }
+    }
+    Ok(out)
+}
+
+impl ViewSurface {
+    /// Puts a height into a cell unless a higher one is there.
+    fn put(&mut self, column: f32, row: f32, h: f32, sigma: f32) {
+        if column < 0.0 || row < 0.0 {
+            return;
+        }
+        let at = (column as usize, row as usize);
+        if at.0 >= self.height_m.width() || at.1 >= self.height_m.height() {
+            return;
+        }
+        let own = &mut self.height_m[at];
+        // A NaN compares false: the first height always goes in.
+        if !(*own >= h) {
+            *own = h;
+            self.sigma_m[at] = sigma;
+        }
+    }
+
+    /// Samples a triangle at the centres of the cells it covers.
+    fn facet(&mut self, [a, b, c]: [Vertex; 3], tear: f32) {
+        let least = a.h.min(b.h).min(c.h);
+        let greatest = a.h.max(b.h).max(c.h);
+        if greatest - least > tear {
+            return;
+        }
+        let det = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
+        if det.abs() < 1e-6 {
+            return;
+        }
+        let inv = 1.0 / det;
+        let (x0, x1) = (a.x.min(b.x).min(c.x).ceil(), a.x.max(b.x).max(c.x).floor());
+        let (y0, y1) = (a.y.min(b.y).min(c.y).ceil(), a.y.max(b.y).max(c.y).floor());
+        let mut y = y0;
+        while y <= y1 {
+            let mut x = x0;
+            while x <= x1 {
+                let (dx, dy) = (x - a.x, y - a.y);
+                let s = (dx * (c.y - a.y) - dy * (c.x - a.x)) * inv;
+                let t = (dy * (b.x - a.x) - dx * (b.y - a.y)) * inv;
+                if s >= -1e-4 && t >= -1e-4 && s + t <= 1.0 + 1e-4 {
+                    let mix = |p: f32, q: f32, r: f32| p + s * (q - p) + t * (r - p);
+                    self.put(x, y, mix(a.h, b.h, c.h), mix(a.sigma, b.sigma, c.sigma));
+                }
+                x += 1.0;
+            }
+            y += 1.0;
+        }
+    }
+}

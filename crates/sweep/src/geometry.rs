@@ -1,0 +1,124 @@
+//! The chain reference pixel → ground at a height → source pixel, exact and as a checked local map.
+//!
+//! Inside a tile the exact RPC chain is replaced by `x = c(h) + A (p − centre)` with `c` quadratic in the height: for
+//! a fixed tile the source image then only shifts as the height changes, which is what makes the cost kernels fast.
+//! The map is compared with the exact chain at the tile's corners and heights; a tile over the bound is divided.
+
+use camera::{CameraError, ImagePoint, RpcCamera};
+
+/// Position on pyramid level `level` of a full-resolution position (both with the first pixel's centre at 0).
+pub fn level_from_full(x: f64, level: u32) -> f64 {
+    (x + 0.5) / f64::from(1u32 << level) - 0.5
+}
+
+/// Full-resolution position of a position on a pyramid level.
+pub(crate) fn full_from_level(x: f64, level: u32) -> f64 {
+    (x + 0.5) * f64::from(1u32 << level) - 0.5
+}
+
+/// Where the point seen at `(u, v)` of the reference, at `height_m`, is in the source; both on pyramid level `level`.
+///
+/// # Errors
+/// Those of the two cameras.
+pub fn source_from_reference(
+    reference: &RpcCamera,
+    source: &RpcCamera,
+    level: u32,
+    [u, v]: [f64; 2],
+    height_m: f64,
+) -> Result<[f64; 2], CameraError> {
+    let at = ImagePoint::new(full_from_level(u, level), full_from_level(v, level));
+    let p = source.project(reference.localize(at, height_m)?)?;
+    Ok([level_from_full(p.sample, level), level_from_full(p.line, level)])
+}
+
+/// A local map from a tile of the reference and a height to the source: see the module's text.
+#[derive(Debug, Clone, Copy)]
+pub struct TileMap {
+    centre: [f64; 2],
+    linear: [[f64; 2]; 2],
+    mid_height_m: f64,
+    /// Source position of the tile's centre: constant, per metre, per square metre; for column and row.
+    by_height: [[f64; 3]; 2],
+    /// Largest distance to the exact chain over the check points, pixels.
+    pub max_error_px: f64,
+}
+
+impl TileMap {
+    /// Fits the map on the box `[x0, x1] × [y0, y1]` (pixel centres) and the height range, and measures its error.
+    ///
+    /// # Errors
+    /// Those of the exact chain.
+    pub fn fit(
+        [x0, y0, x1, y1]: [f64; 4],
+        (h_lo, h_hi): (f64, f64),
+        exact: impl Fn([f64; 2], f64) -> Result<[f64; 2], CameraError>,
+    ) -> Result<Self, CameraError> {
+        let centre = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
+        let mid_height_m = 0.5 * (h_lo + h_hi);
+        // Half a metre keeps the quadratic well defined when the range is a single plane.
+        let half = (0.5 * (h_hi - h_lo)).max(0.5);
+        let (rx, ry) = ((0.5 * (x1 - x0)).max(1.0), (0.5 * (y1 - y0)).max(1.0));
+        let mid = exact(centre, mid_height_m)?;
+        let (low, high) = (exact(centre, mid_height_m - half)?, exact(centre, mid_height_m + half)?);
+        let (left, right) =
+            (exact([centre[0] - rx, centre[1]], mid_height_m)?, exact([centre[0] + rx, centre[1]], mid_height_m)?);
+        let (up, down) =
+            (exact([centre[0], centre[1] - ry], mid_height_m)?, exact([centre[0], centre[1] + ry], mid_height_m)?);
+        let axis = |i: usize| {
+            [mid[i], (high[i] - low[i]) / (2.0 * half), (high[i] - 2.0 * mid[i] + low[i]) / (2.0 * half * half)]
+        };
+        let row = |i: usize| [(right[i] - left[i]) / (2.0 * rx), (down[i] - up[i]) / (2.0 * ry)];
+        let mut map =
+            Self { centre, linear: [row(0), row(1)], mid_height_m, by_height: [axis(0), axis(1)], max_error_px: 0.0 };
+        for h in [mid_height_m - half, mid_height_m - 0.5 * half, mid_height_m + 0.5 * half, mid_height_m + half] {
+            for p in [[x0, y0], [x1, y0], [x0, y1], [x1, y1]] {
+                let (e, m) = (exact(p, h)?, map.at(p, h));
+                map.max_error_px = map.max_error_px.max((e[0] - m[0]).hypot(e[1] - m[1]));
+            }
+        }
+        Ok(map)
+    }
+
+    /// The source position of a reference position at a height.
+    pub fn at(&self, p: [f64; 2], height_m: f64) -> [f64; 2] {
+        let c = self.centre_at(height_m);
+        let d = [p[0] - self.centre[0], p[1] - self.centre[1]];
+        [
+            c[0] + self.linear[0][0] * d[0] + self.linear[0][1] * d[1],
+            c[1] + self.linear[1][0] * d[0] + self.linear[1][1] * d[1],
+        ]
+    }
+
+    /// How far, in *reference* pixels, the source image laid over the reference at the middle height must be shifted
+    /// to lie over it at `height_m`; `None` when the linear part is singular.
+    pub fn shift_at(&self, height_m: f64) -> Option<[f64; 2]> {
+        let (c, m) = (self.centre_at(height_m), self.centre_at(self.mid_height_m));
+        self.solve([c[0] - m[0], c[1] - m[1]])
+    }
+
+    /// The reference vector that the linear part turns into a source vector.
+    fn solve(&self, d: [f64; 2]) -> Option<[f64; 2]> {
+        let [[a, b], [e, f]] = self.linear;
+        let det = a * f - b * e;
+        (det.abs() > 1e-9).then(|| [(f * d[0] - b * d[1]) / det, (a * d[1] - e * d[0]) / det])
+    }
+
+    /// The reference position that is seen at a source position, at the middle height; `None` when the map is singular.
+    pub(crate) fn reference_from_source(&self, q: [f64; 2]) -> Option<[f64; 2]> {
+        let c = self.centre_at(self.mid_height_m);
+        let [dx, dy] = self.solve([q[0] - c[0], q[1] - c[1]])?;
+        Some([self.centre[0] + dx, self.centre[1] + dy])
+    }
+
+    /// The height about which [`Self::shift_at`] counts.
+    pub fn mid_height_m(&self) -> f64 {
+        self.mid_height_m
+    }
+
+    fn centre_at(&self, height_m: f64) -> [f64; 2] {
+        let t = height_m - self.mid_height_m;
+        let f = |c: [f64; 3]| c[0] + t * (c[1] + t * c[2]);
+        [f(self.by_height[0]), f(self.by_height[1])]
+    }
+}

@@ -1,0 +1,200 @@
+//! One view on one pyramid level: costs, aggregation and read-out, block by block.
+//!
+//! Blocks lie on a fixed lattice of the image and overlap by a margin over which the aggregation settles; they are
+//! part of the method, so the result does not depend on tiles, memory or threads.
+
+use raster::{Grid, Window};
+use rayon::prelude::*;
+
+use crate::SweepError;
+use crate::cost::{COST_MAX, CostConfig, SourceLevel, TileScratch, sweep_tile};
+use crate::cost::{BlockCosts, Reference};
+use crate::ranges::Ranges;
+use crate::readout::soft_argmin;
+use crate::semiglobal::{Penalties, Volume, aggregate};
+
+/// Side of a block's core, pixels.
+const BLOCK: usize = 1024;
+/// Overlap of a block on each side: a path forgets its start within a few tens of pixels.
+const BLOCK_MARGIN: usize = 48;
+
+/// Parameters of a level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelConfig {
+    /// The cost volume.
+    pub cost: CostConfig,
+    /// The aggregation's penalties.
+    pub penalties: Penalties,
+    /// Temperature of the soft-argmin, relative to the sum of eight worst costs.
+    pub temperature: f32,
+}
+
+/// Heights of one view on one level, with their reliability.
+#[derive(Debug, Clone)]
+pub struct HeightMap {
+    /// What `height_m` counts from, metres above the ellipsoid.
+    pub origin_m: f64,
+    /// Height per pixel minus the origin, metres; NaN where there is none.
+    pub height_m: Grid<f32>,
+    /// Standard deviation of the height by the spread of its mode, metres.
+    pub sigma_m: Grid<f32>,
+    /// 0 (a second height is as good) to 1.
+    pub confidence: Grid<f32>,
+}
+
+/// Sweeps one view against its sources.
+///
+/// # Errors
+/// A camera that fails inside the scene, or is not smooth at the scale of a tile.
+pub fn sweep_level(
+    reference: SourceLevel<'_>,
+    level: u32,
+    sources: &[SourceLevel<'_>],
+    ranges: &Ranges,
+    origin_m: f64,
+    config: &LevelConfig,
+) -> Result<HeightMap, SweepError> {
+    let (width, height) = (reference.image.width(), reference.image.height());
+    let cores = tiles(Window::whole(width, height), BLOCK);
+    let input = Reference { view: reference, level, ranges };
+    let parts: Vec<HeightMap> =
+        cores.par_iter().map(|core| sweep_block(input, sources, *core, origin_m, config)).collect::<Result<_, _>>()?;
+    let mut out = HeightMap::empty(width, height, origin_m);
+    for (core, part) in cores.iter().zip(&parts) {
+        out.put(*core, part);
+    }
+    Ok(out)
+}
+
+/// The windows of side `side` that cover `area`, row after row; the last ones may be smaller.
+pub(crate) fn tiles(area: Window, side: usize) -> Vec<Window> {
+    let mut out = Vec::new();
+    for y in (0..area.height).step_by(side) {
+        for x in (0..area.width).step_by(side) {
+            out.push(Window {
+                x: area.x + x as i64,
+                y: area.y + y as i64,
+                width: side.min(area.width - x),
+                height: side.min(area.height - y),
+            });
+        }
+    }
+    out
+}
+
+fn sweep_block(
+    reference: Reference<'_>,
+    sources: &[SourceLevel<'_>],
+    core: Window,
+    origin_m: f64,
+    config: &LevelConfig,
+) -> Result<HeightMap, SweepError> {
+    let image = reference.view.image;
+    let whole = Window::whole(image.width(), image.height());
+    let window = core.grown(BLOCK_MARGIN).intersection(&whole).unwrap_or(core);
+    let (low, offsets) = layout(reference.ranges, window);
+    let mut costs = vec![COST_MAX; offsets.last().map_or(0, |&n| n as usize)];
+    let mut scratch = TileScratch::default();
+    let mut block = BlockCosts { window, offsets: &offsets, costs: &mut costs };
+    for tile in tiles(window, config.cost.tile) {
+        sweep_tile(reference, sources, tile, &config.cost, &mut scratch, &mut block)?;
+    }
+    let edges = edge_strength(image, window, reference.view.noise);
+    let volume =
+        Volume { width: window.width, height: window.height, low: &low, offsets: &offsets, costs: &costs, edges: &edges };
+    let mut sums = Vec::new();
+    aggregate(&volume, config.penalties, &mut sums);
+    Ok(read_out(&volume, &sums, window, core, reference, origin_m, config))
+}
+
+/// First hypotheses and cost offsets of a window's pixels.
+fn layout(ranges: &Ranges, window: Window) -> (Vec<i32>, Vec<u32>) {
+    let area = window.width * window.height;
+    let (mut low, mut offsets) = (Vec::with_capacity(area), Vec::with_capacity(area + 1));
+    let mut next = 0u32;
+    offsets.push(next);
+    for y in 0..window.height {
+        for x in 0..window.width {
+            let at = (window.x as usize + x, window.y as usize + y);
+            low.push(ranges.low[at]);
+            next += u32::from(ranges.count[at]);
+            offsets.push(next);
+        }
+    }
+    (low, offsets)
+}
+
+/// How strong an edge each pixel is, 0 to 255: its gradient against the block's typical one and the noise.
+fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
+    let mut gradient = Vec::with_capacity(w.width * w.height);
+    for y in 0..w.height {
+        for x in 0..w.width {
+            let (gx, gy) = (w.x as usize + x, w.y as usize + y);
+            let here = image[(gx, gy)];
+            let right = image.get(gx + 1, gy).copied().unwrap_or(here);
+            let below = image.get(gx, gy + 1).copied().unwrap_or(here);
+            let g = (right - here).abs().max((below - here).abs());
+            gradient.push(if g.is_finite() { g } else { 0.0 });
+        }
+    }
+    let mut sorted = gradient.clone();
+    let middle = sorted.len() / 2;
+    let typical = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+    // Gradients up to twice the typical one are texture; from eight times on they are edges.
+    let unit = typical.max(noise).max(f32::MIN_POSITIVE);
+    gradient.iter().map(|g| (((g / unit - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as u8).collect()
+}
+
+fn read_out(
+    volume: &Volume<'_>,
+    sums: &[u16],
+    window: Window,
+    core: Window,
+    reference: Reference<'_>,
+    origin_m: f64,
+    config: &LevelConfig,
+) -> HeightMap {
+    let scale = 8.0 * f32::from(COST_MAX);
+    let step = reference.ranges.step_m;
+    let mut out = HeightMap::empty(core.width, core.height, origin_m);
+    for y in 0..core.height {
+        for x in 0..core.width {
+            let (gx, gy) = (core.x as usize + x, core.y as usize + y);
+            if reference.view.image[(gx, gy)].is_nan() {
+                continue;
+            }
+            let p = (gy - window.y as usize) * window.width + gx - window.x as usize;
+            let own = &sums[volume.offsets[p] as usize..volume.offsets[p + 1] as usize];
+            if let Some(e) = soft_argmin(own, scale, config.temperature) {
+                let height_m = (f64::from(volume.low[p]) + f64::from(e.index)) * step;
+                out.height_m[(x, y)] = (height_m - origin_m) as f32;
+                out.sigma_m[(x, y)] = e.spread * step as f32;
+                out.confidence[(x, y)] = e.margin;
+            }
+        }
+    }
+    out
+}
+
+impl HeightMap {
+    /// A map without any height.
+    pub fn empty(width: usize, height: usize, origin_m: f64) -> Self {
+        Self {
+            origin_m,
+            height_m: Grid::filled(width, height, f32::NAN),
+            sigma_m: Grid::filled(width, height, f32::NAN),
+            confidence: Grid::filled(width, height, 0.0),
+        }
+    }
+
+    fn put(&mut self, at: Window, part: &Self) {
+        let copy = |to: &mut Grid<f32>, from: &Grid<f32>| {
+            for y in 0..at.height {
+                to.row_mut(at.y as usize + y)[at.x as usize..][..at.width].copy_from_slice(from.row(y));
+            }
+        };
+        copy(&mut self.height_m, &part.height_m);
+        copy(&mut self.sigma_m, &part.sigma_m);
+        copy(&mut self.confidence, &part.confidence);
+    }
+}

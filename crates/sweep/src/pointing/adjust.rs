@@ -1,0 +1,287 @@
+//! Joint adjustment of all views' pointing from tie points.
+//!
+//! Each track gives the residuals of its best ground point, which know nothing of where the ground is: with `J` the
+//! Jacobian of the track's projections, `N` a basis of the null space of `Jᵀ`, and `B` the design of the corrections,
+//! `Nᵀ (r − B x) = 0`. Solved by iteratively reweighted least squares (Cauchy weights on a robust scale). What the ties
+//! cannot see (a common shift of all views) is held by a weak prior, so the mean correction stays as small as it can.
+//! The order of the corrections is the least that the Bayesian information criterion justifies.
+
+use camera::{CameraError, ImageCorrection, ImagePoint, RpcCamera};
+use geodesy::LonLatHeight;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+/// One ground point seen in two or more views: (view, position in full-resolution pixels).
+pub type Track = Vec<(usize, ImagePoint)>;
+
+/// How much a correction may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ModelOrder {
+    /// The RPCs are used as they are.
+    None,
+    /// One shift per view.
+    Translation,
+    /// One affine map per view.
+    Affine,
+}
+
+impl ModelOrder {
+    const fn parameters(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Translation => 2,
+            Self::Affine => 6,
+        }
+    }
+}
+
+/// Parameters of the adjustment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdjustConfig {
+    /// The largest order to consider.
+    pub max_order: ModelOrder,
+    /// Standard deviation of the raw pointing, pixels: the weak prior that fixes what the ties cannot see.
+    pub prior_px: f64,
+}
+
+impl Default for AdjustConfig {
+    /// Ten pixels is several metres, what providers state for unadjusted products.
+    fn default() -> Self {
+        Self { max_order: ModelOrder::Affine, prior_px: 10.0 }
+    }
+}
+
+/// What an adjustment found.
+#[derive(Debug, Clone)]
+pub struct Adjustment {
+    /// The order chosen.
+    pub order: ModelOrder,
+    /// One correction per view.
+    pub corrections: Vec<ImageCorrection>,
+    /// Robust standard deviation of the residuals before and after, pixels.
+    pub residual_px: (f64, f64),
+    /// Root mean square of the inliers' residuals after, pixels.
+    pub rms_px: f64,
+    /// For each track, its ground point under the corrections, or `None` for an outlier.
+    pub ground: Vec<Option<LonLatHeight>>,
+}
+
+/// Rounds of re-triangulation and reweighting; the problem is nearly linear, so the weights settle within these.
+const ROUNDS: usize = 8;
+/// Residuals beyond this many robust deviations are outliers.
+const OUTLIER: f64 = 4.0;
+/// Matching is not better than this, pixels: keeps the robust scale from collapsing.
+const SCALE_MIN_PX: f64 = 0.05;
+
+/// The reduced residuals of one track and their derivatives with respect to all parameters.
+struct Reduced {
+    residual: DVector<f64>,
+    design: DMatrix<f64>,
+}
+
+/// Adjusts `cameras` so that the tracks meet. `sizes` are the images' (width, height).
+pub fn adjust(cameras: &[RpcCamera], sizes: &[(usize, usize)], tracks: &[Track], config: &AdjustConfig) -> Adjustment {
+    let orders = [ModelOrder::None, ModelOrder::Translation, ModelOrder::Affine];
+    let fits = orders.iter().filter(|o| **o <= config.max_order).map(|&o| fit(cameras, sizes, tracks, o, config));
+    let mut best: Option<(f64, Adjustment)> = None;
+    let mut before = f64::NAN;
+    for (bic, mut fit) in fits {
+        if fit.order == ModelOrder::None {
+            before = fit.residual_px.1;
+        }
+        fit.residual_px.0 = before;
+        if best.as_ref().is_none_or(|(b, _)| bic < *b) {
+            best = Some((bic, fit));
+        }
+    }
+    best.map(|(_, fit)| fit).unwrap_or_else(|| unadjusted(cameras.len(), tracks.len()))
+}
+
+fn unadjusted(views: usize, tracks: usize) -> Adjustment {
+    Adjustment {
+        order: ModelOrder::None,
+        corrections: vec![ImageCorrection::IDENTITY; views],
+        residual_px: (f64::NAN, f64::NAN),
+        rms_px: f64::NAN,
+        ground: vec![None; tracks],
+    }
+}
+
+/// One order's fit with its information criterion.
+fn fit(
+    cameras: &[RpcCamera],
+    sizes: &[(usize, usize)],
+    tracks: &[Track],
+    order: ModelOrder,
+    config: &AdjustConfig,
+) -> (f64, Adjustment) {
+    let n = order.parameters() * cameras.len();
+    let mut x = DVector::zeros(n);
+    let mut scale = f64::INFINITY;
+    let rounds = if order == ModelOrder::None { 1 } else { ROUNDS };
+    for _ in 0..rounds {
+        let current = corrected(cameras, sizes, &x, order);
+        let reduced: Vec<Reduced> =
+            tracks.iter().filter_map(|t| reduce(&current, sizes, t, order).map(|(r, _)| r)).collect();
+        scale = robust_scale(reduced.iter().map(|r| norm_px(&r.residual)));
+        if n > 0 {
+            x += solve(&reduced, &x, scale, config);
+        }
+    }
+    let current = corrected(cameras, sizes, &x, order);
+    let found: Vec<Option<(Reduced, LonLatHeight)>> = tracks.iter().map(|t| reduce(&current, sizes, t, order)).collect();
+    let norms: Vec<f64> = found.iter().flatten().map(|(r, _)| norm_px(&r.residual)).collect();
+    scale = if norms.is_empty() { scale } else { robust_scale(norms.iter().copied()) };
+    let limit = OUTLIER * scale;
+    let inliers: Vec<f64> = norms.iter().copied().filter(|r| *r <= limit).collect();
+    let rms_px = (inliers.iter().map(|r| r * r).sum::<f64>() / inliers.len().max(1) as f64).sqrt();
+    let ground = found
+        .into_iter()
+        .map(|f| f.filter(|(r, _)| norm_px(&r.residual) <= limit).map(|(_, ground)| ground))
+        .collect();
+    let corrections = current.into_iter().map(|c| c.correction).collect();
+    let fit = Adjustment { order, corrections, residual_px: (f64::NAN, scale), rms_px, ground };
+    (information(&norms, scale, n), fit)
+}
+
+/// Bayesian information criterion of a Cauchy likelihood: robust against the outliers that all orders share.
+fn information(residuals: &[f64], scale: f64, parameters: usize) -> f64 {
+    let n = residuals.len() as f64;
+    let loss: f64 = residuals.iter().map(|r| (1.0 + (r / scale).powi(2)).ln()).sum();
+    2.0 * (n * scale.ln() + loss) + parameters as f64 * n.max(1.0).ln()
+}
+
+/// Root mean square of a track's reduced residual: pixels per degree of freedom.
+fn norm_px(r: &DVector<f64>) -> f64 {
+    (r.norm_squared() / r.len().max(1) as f64).sqrt()
+}
+
+fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = residuals.collect();
+    if all.is_empty() {
+        return SCALE_MIN_PX;
+    }
+    let middle = all.len() / 2;
+    // The median of |r| of a normal deviate is 0.6745 of its deviation.
+    (all.select_nth_unstable_by(middle, f64::total_cmp).1.to_owned() / 0.6745).max(SCALE_MIN_PX)
+}
+
+/// The step that brings the reweighted reduced residuals to their least, with the prior about zero.
+fn solve(reduced: &[Reduced], x: &DVector<f64>, scale: f64, config: &AdjustConfig) -> DVector<f64> {
+    let n = x.len();
+    let weight = 1.0 / (config.prior_px * config.prior_px);
+    let mut normal = DMatrix::<f64>::identity(n, n) * weight;
+    let mut right = -x * weight;
+    for r in reduced {
+        let w = 1.0 / (1.0 + (norm_px(&r.residual) / scale).powi(2)) / (scale * scale);
+        normal += r.design.transpose() * &r.design * w;
+        right += r.design.transpose() * &r.residual * w;
+    }
+    normal.cholesky().map_or_else(|| DVector::zeros(n), |c| c.solve(&right))
+}
+
+/// The cameras under the parameters. An affine map acts about the image's centre, in units of its half size, so that
+/// every parameter is in pixels and one prior serves all.
+fn corrected(cameras: &[RpcCamera], sizes: &[(usize, usize)], x: &DVector<f64>, order: ModelOrder) -> Vec<RpcCamera> {
+    let m = order.parameters();
+    let one = |(i, c): (usize, &RpcCamera)| {
+        let p = &x.as_slice()[i * m..(i + 1) * m];
+        let (centre, half) = frame(sizes[i]);
+        let mut correction = ImageCorrection::IDENTITY;
+        if m >= 2 {
+            correction = ImageCorrection { translation_px: [p[0], p[1]], centre, ..correction };
+        }
+        if m == 6 {
+            correction.linear = [[p[2] / half, p[3] / half], [p[4] / half, p[5] / half]];
+        }
+        RpcCamera { rpc: c.rpc.clone(), correction }
+    };
+    cameras.iter().enumerate().map(one).collect()
+}
+
+fn frame((width, height): (usize, usize)) -> (ImagePoint, f64) {
+    let centre = ImagePoint::new(0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
+    (centre, 0.5 * width.max(height) as f64)
+}
+
+/// Derivatives of a view's corrected position with respect to its own parameters: rows sample, line.
+fn own_design(p: ImagePoint, size: (usize, usize), order: ModelOrder) -> Vec<[f64; 2]> {
+    let (centre, half) = frame(size);
+    let (s, l) = ((p.sample - centre.sample) / half, (p.line - centre.line) / half);
+    let all = [[1.0, 0.0], [0.0, 1.0], [s, 0.0], [l, 0.0], [0.0, s], [0.0, l]];
+    all[..order.parameters()].to_vec()
+}
+
+/// A track's best ground point, and its residuals with the ground point's freedom taken out.
+fn reduce(cameras: &[RpcCamera], sizes: &[(usize, usize)], track: &Track, order: ModelOrder) -> Option<(Reduced, LonLatHeight)> {
+    let (ground, residual, jacobian) = triangulate(cameras, track).ok()??;
+    let rows = residual.len();
+    let m = order.parameters();
+    let mut design = DMatrix::zeros(rows, m * cameras.len());
+    for (i, (view, p)) in track.iter().enumerate() {
+        for (k, [s, l]) in own_design(*p, sizes[*view], order).into_iter().enumerate() {
+            design[(2 * i, view * m + k)] = s;
+            design[(2 * i + 1, view * m + k)] = l;
+        }
+    }
+    // The last columns of the full U span the null space of Jᵀ: from the projector's eigenvectors of eigenvalue 1.
+    let inverse = (jacobian.transpose() * &jacobian).try_inverse()?;
+    let projector = DMatrix::identity(rows, rows) - &jacobian * inverse * jacobian.transpose();
+    let eigen = projector.symmetric_eigen();
+    let kept: Vec<usize> = (0..rows).filter(|&i| eigen.eigenvalues[i] > 0.5).collect();
+    let null = eigen.eigenvectors.select_columns(&kept).transpose();
+    Some((Reduced { residual: &null * residual, design: &null * design }, ground))
+}
+
+type Triangulated = Option<(LonLatHeight, DVector<f64>, DMatrix<f64>)>;
+
+/// The ground point nearest to all rays in image space, the residuals observed − projected, and their Jacobian with
+/// respect to metres east, north and up; `None` when the rays do not meet.
+fn triangulate(cameras: &[RpcCamera], track: &Track) -> Result<Triangulated, CameraError> {
+    let Some(&(first, at)) = track.first() else { return Ok(None) };
+    let mut ground = cameras[first].localize(at, cameras[first].rpc.height_off)?;
+    let (mut residual, mut jacobian) = (DVector::zeros(0), DMatrix::zeros(0, 0));
+    for _ in 0..6 {
+        (residual, jacobian) = linearised(cameras, track, ground)?;
+        let normal: Matrix3<f64> = (jacobian.transpose() * &jacobian).fixed_view::<3, 3>(0, 0).into();
+        let right: Vector3<f64> = (jacobian.transpose() * &residual).fixed_rows::<3>(0).into();
+        let Some(step) = normal.try_inverse().map(|n| n * right) else { return Ok(None) };
+        ground = moved(ground, step);
+        // A tenth of a millimetre: far below any residual.
+        if step.norm() < 1e-4 {
+            break;
+        }
+    }
+    Ok(ground.height_m.is_finite().then_some((ground, residual, jacobian)))
+}
+
+/// Metres per degree are good enough here: they scale the unknowns, and the iteration takes care of the rest.
+const METRES_PER_DEGREE: f64 = 111_320.0;
+
+fn moved(g: LonLatHeight, east_north_up: Vector3<f64>) -> LonLatHeight {
+    let lon_scale = METRES_PER_DEGREE * g.lat_deg.to_radians().cos().max(1e-3);
+    LonLatHeight::new(
+        g.lon_deg + east_north_up[0] / lon_scale,
+        g.lat_deg + east_north_up[1] / METRES_PER_DEGREE,
+        g.height_m + east_north_up[2],
+    )
+}
+
+fn linearised(cameras: &[RpcCamera], track: &Track, ground: LonLatHeight) -> Result<(DVector<f64>, DMatrix<f64>), CameraError> {
+    let rows = 2 * track.len();
+    let (mut residual, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, 3));
+    for (i, (view, observed)) in track.iter().enumerate() {
+        let camera = &cameras[*view];
+        let p = camera.project(ground)?;
+        residual[2 * i] = observed.sample - p.sample;
+        residual[2 * i + 1] = observed.line - p.line;
+        for axis in 0..3 {
+            let mut d = Vector3::zeros();
+            // A metre: the cameras are linear at that scale.
+            d[axis] = 1.0;
+            let q = camera.project(moved(ground, d))?;
+            jacobian[(2 * i, axis)] = q.sample - p.sample;
+            jacobian[(2 * i + 1, axis)] = q.line - p.line;
+        }
+    }
+    Ok((residual, jacobian))
+}

@@ -1,0 +1,180 @@
+//! Tie points of two views: corners of one, searched along the height trajectory in the other.
+//!
+//! On a coarse pyramid level every height of the range is tried, with a band across the trajectory for the pointing
+//! error; a match must be better than any other place by a margin. It is then followed down the pyramid, located to a
+//! fraction of a pixel, and kept when the search back from the source returns to where it came from.
+
+use camera::{CameraError, RpcCamera};
+use raster::Grid;
+use rayon::prelude::*;
+
+use super::coarse::Coarse;
+use super::interest::corners;
+use super::patch::{Patch, parabola_peak};
+use crate::geometry::{full_from_level, source_from_reference};
+use crate::view::View;
+
+/// One correspondence, in full-resolution image coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tie {
+    /// Position in the reference (sample, line).
+    pub reference: [f64; 2],
+    /// Position in the source (sample, line).
+    pub source: [f64; 2],
+    /// Correlation of the two patches at full resolution.
+    pub correlation: f32,
+}
+
+/// Parameters of the tie-point search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TieConfig {
+    /// Corners tried per pair of views.
+    pub points: usize,
+    /// Half width of the patches, pixels of the level.
+    pub radius: i32,
+    /// Largest pointing error across the trajectory, full-resolution pixels.
+    pub band_px: f64,
+    /// Least correlation on the coarse level and at full resolution.
+    pub correlation: f32,
+    /// By how much the best place on the coarse level must beat every other one.
+    pub margin: f32,
+    /// The coarse level has at least this many pixels on its shorter side.
+    pub coarse_side: usize,
+}
+
+impl Default for TieConfig {
+    /// `radius` 7 is 15 × 15 pixels, the usual compromise of uniqueness against relief. `band_px` covers what
+    /// providers state for pointing (CE90 of several metres) several times over.
+    fn default() -> Self {
+        Self { points: 600, radius: 7, band_px: 24.0, correlation: 0.7, margin: 0.08, coarse_side: 160 }
+    }
+}
+
+/// How far the search back may end from where it started, pixels.
+const RETURN_PX: f64 = 1.0;
+
+/// Two views, and the levels on which they are matched.
+pub(crate) struct Pair<'a> {
+    pub(crate) reference: &'a View,
+    pub(crate) source: &'a View,
+}
+
+/// Tie points of a pair; heights in `range_m` are considered.
+pub fn match_pair(reference: &View, source: &View, range_m: (f64, f64), config: &TieConfig) -> Vec<Tie> {
+    let top = coarse_level(reference, config).min(source.levels.len() - 1);
+    let image = &reference.levels[top];
+    let cell = ((image.width() * image.height()) as f64 / config.points as f64).sqrt().ceil().max(4.0) as usize;
+    let points = corners(image, cell, config.radius as usize + 2, reference.noise_at(top));
+    let pair = Pair { reference, source };
+    let Some(coarse) = Coarse::prepare(&pair, top, range_m, config) else { return Vec::new() };
+    points.par_iter().filter_map(|&p| pair.follow(p, top, &coarse, config)).collect()
+}
+
+fn coarse_level(view: &View, config: &TieConfig) -> usize {
+    let enough = |g: &&Grid<f32>| g.width().min(g.height()) >= config.coarse_side;
+    view.levels.iter().take_while(enough).count().saturating_sub(1)
+}
+
+impl Pair<'_> {
+    fn follow(&self, p: [usize; 2], top: usize, coarse: &Coarse, config: &TieConfig) -> Option<Tie> {
+        let at = [p[0] as f64, p[1] as f64];
+        let own = Patch::around(&self.reference.levels[top], at, config.radius, self.reference.noise_at(top))?;
+        let (height_m, place) = coarse.search(p, &own, config)?;
+        let predicted = self.chain(at, top, height_m).ok()?;
+        let top_scale = f64::from(1u32 << top);
+        let mut offset = [(place[0] - predicted[0]) * top_scale, (place[1] - predicted[1]) * top_scale];
+        let full = [full_from_level(at[0], top as u32), full_from_level(at[1], top as u32)];
+        let mut correlation = 0.0;
+        for level in (0..=top).rev() {
+            let scale = f64::from(1u32 << level);
+            let at = [crate::level_from_full(full[0], level as u32), crate::level_from_full(full[1], level as u32)];
+            let start = [offset[0] / scale, offset[1] / scale];
+            let (refined, c) = self.refine(at, level, height_m, start, config)?;
+            offset = [refined[0] * scale, refined[1] * scale];
+            correlation = c;
+        }
+        if correlation < config.correlation {
+            return None;
+        }
+        let predicted = self.chain(full, 0, height_m).ok()?;
+        let found = [predicted[0] + offset[0], predicted[1] + offset[1]];
+        let back = Pair { reference: self.source, source: self.reference };
+        let back_predicted = back.chain(found, 0, height_m).ok()?;
+        let start = [full[0] - back_predicted[0], full[1] - back_predicted[1]];
+        let (end, _) = back.refine(found, 0, height_m, start, config)?;
+        ((end[0] - start[0]).hypot(end[1] - start[1]) < RETURN_PX)
+            .then_some(Tie { reference: full, source: found, correlation })
+    }
+
+    pub(crate) fn chain(&self, at: [f64; 2], level: usize, height_m: f64) -> Result<[f64; 2], CameraError> {
+        source_from_reference(&self.reference.camera, &self.source.camera, level as u32, at, height_m)
+    }
+
+    /// The offset of best correlation within two pixels of `start`, to a fraction of a pixel.
+    fn refine(
+        &self,
+        at: [f64; 2],
+        level: usize,
+        height_m: f64,
+        start: [f64; 2],
+        config: &TieConfig,
+    ) -> Option<([f64; 2], f32)> {
+        const REACH: i32 = 2;
+        const SIDE: usize = 2 * REACH as usize + 1;
+        let own = Patch::around(&self.reference.levels[level], at, config.radius, self.reference.noise_at(level))?;
+        let image = &self.source.levels[level];
+        let noise = self.source.noise_at(level);
+        let frame = LocalFrame::at(&self.reference.camera, &self.source.camera, level, at, height_m).ok()?;
+        let centre = self.chain(at, level, height_m).ok()?;
+        let mut scores = [[-1.0f32; SIDE]; SIDE];
+        let mut best = (-1.0f32, 0usize, 0usize);
+        for (j, row) in scores.iter_mut().enumerate() {
+            for (i, score) in row.iter_mut().enumerate() {
+                let place = [
+                    centre[0] + start[0] + f64::from(i as i32 - REACH),
+                    centre[1] + start[1] + f64::from(j as i32 - REACH),
+                ];
+                let other = Patch::sampled(image, config.radius, noise, |a, b| frame.place(place, a, b));
+                *score = other.map_or(-1.0, |o| own.correlation(&o));
+                if *score > best.0 {
+                    best = (*score, i, j);
+                }
+            }
+        }
+        let (score, i, j) = best;
+        // A best place on the rim is a slope, not a peak.
+        if !(1..SIDE - 1).contains(&i) || !(1..SIDE - 1).contains(&j) {
+            return None;
+        }
+        let dx = parabola_peak(scores[j][i - 1], score, scores[j][i + 1]);
+        let dy = parabola_peak(scores[j - 1][i], score, scores[j + 1][i]);
+        let offset = |base: f64, i: usize, d: f64| base + f64::from(i as i32 - REACH) + d;
+        Some(([offset(start[0], i, dx), offset(start[1], j, dy)], score))
+    }
+}
+
+/// How the source's pixels lie to the reference's around a point.
+struct LocalFrame([[f64; 2]; 2]);
+
+impl LocalFrame {
+    fn at(
+        reference: &RpcCamera,
+        source: &RpcCamera,
+        level: usize,
+        [u, v]: [f64; 2],
+        height_m: f64,
+    ) -> Result<Self, CameraError> {
+        let chain = |p| source_from_reference(reference, source, level as u32, p, height_m);
+        // Eight pixels: wide enough for differences to be exact, narrow enough to be local.
+        let d = 8.0;
+        let (l, r, t, b) = (chain([u - d, v])?, chain([u + d, v])?, chain([u, v - d])?, chain([u, v + d])?);
+        let row = |i: usize| [(r[i] - l[i]) / (2.0 * d), (b[i] - t[i]) / (2.0 * d)];
+        Ok(Self([row(0), row(1)]))
+    }
+
+    fn place(&self, centre: [f64; 2], i: i32, j: i32) -> [f64; 2] {
+        let (i, j) = (f64::from(i), f64::from(j));
+        let [[a, b], [c, d]] = self.0;
+        [centre[0] + a * i + b * j, centre[1] + c * i + d * j]
+    }
+}

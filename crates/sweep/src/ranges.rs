@@ -1,0 +1,133 @@
+//! Which height hypotheses each pixel is given.
+//!
+//! Heights live on the lattice `k · step_m`. A pixel searches `[low, low + count)`; its hypotheses are stored one
+//! after the other, so cost and memory follow the scene's content and not its height range.
+
+use raster::Grid;
+
+/// The hypotheses of every pixel of an image level.
+#[derive(Debug, Clone)]
+pub struct Ranges {
+    /// Metres between neighbouring hypotheses.
+    pub step_m: f64,
+    /// First hypothesis of each pixel.
+    pub low: Grid<i32>,
+    /// Number of hypotheses of each pixel, at least one.
+    pub count: Grid<u16>,
+}
+
+/// Steps that a finer level searches beyond what the coarser one found: one coarse step is two fine ones, and the
+/// coarser height is itself off by up to a step.
+const MARGIN_STEPS: f64 = 3.0;
+
+impl Ranges {
+    /// The same range of heights for every pixel.
+    pub fn uniform(width: usize, height: usize, step_m: f64, (lo_m, hi_m): (f64, f64)) -> Self {
+        let (low, count) = span(lo_m, hi_m, step_m);
+        Self { step_m, low: Grid::filled(width, height, low), count: Grid::filled(width, height, count) }
+    }
+
+    /// Ranges of a level from the heights of the next coarser one (metres, NaN where unknown): the least and greatest
+    /// height among the 3 × 3 coarse neighbours, with a margin. Where all of them are unknown, the nearest known ones
+    /// around count (two pixels away, four, …); `full` where the whole map is unknown.
+    pub fn from_coarser(width: usize, height: usize, step_m: f64, coarse: &Grid<f32>, origin_m: f64, full: (f64, f64)) -> Self {
+        let (least, greatest) = known_extremes(coarse);
+        let mut out = Self::uniform(width, height, step_m, full);
+        let margin = MARGIN_STEPS * step_m;
+        for y in 0..height {
+            let cy = (y / 2).min(coarse.height() - 1);
+            for x in 0..width {
+                let c = (( x / 2).min(coarse.width() - 1), cy);
+                let (lo, hi) = (f64::from(least[c]), f64::from(greatest[c]));
+                if lo <= hi {
+                    let (low, count) = span(
+                        (origin_m + lo - margin).max(full.0),
+                        (origin_m + hi + margin).min(full.1),
+                        step_m,
+                    );
+                    out.low[(x, y)] = low;
+                    out.count[(x, y)] = count;
+                }
+            }
+        }
+        out
+    }
+
+    /// Number of pixel × hypothesis pairs.
+    pub fn evaluations(&self) -> u64 {
+        self.count.data().iter().map(|&n| u64::from(n)).sum()
+    }
+}
+
+/// Lattice indices that cover a height interval: first, and how many.
+fn span(lo_m: f64, hi_m: f64, step_m: f64) -> (i32, u16) {
+    let low = (lo_m / step_m).floor() as i32;
+    let high = (hi_m / step_m).ceil() as i32;
+    (low, (high - low + 1).clamp(1, i32::from(u16::MAX)) as u16)
+}
+
+/// Least and greatest known height around every cell: of its 3 × 3 neighbours or, where all are unknown, of the
+/// smallest of the squares twice, four times… as wide that holds a known one. (+inf, −inf) when there is none at all.
+fn known_extremes(g: &Grid<f32>) -> (Grid<f32>, Grid<f32>) {
+    let (mut least, mut greatest) =
+        (extremes(g, f32::INFINITY, f32::min, 1), extremes(g, f32::NEG_INFINITY, f32::max, 1));
+    let mut reach = 2;
+    let (mut wide_least, mut wide_greatest) = (least.clone(), greatest.clone());
+    while reach < g.width().max(g.height()) && least.data().iter().any(|v| v.is_infinite()) {
+        wide_least = extremes(&wide_least, f32::INFINITY, f32::min, reach);
+        wide_greatest = extremes(&wide_greatest, f32::NEG_INFINITY, f32::max, reach);
+        let known = |out: &mut Grid<f32>, wide: &Grid<f32>| {
+            out.data_mut().iter_mut().zip(wide.data()).filter(|(o, _)| o.is_infinite()).for_each(|(o, w)| *o = *w);
+        };
+        known(&mut least, &wide_least);
+        known(&mut greatest, &wide_greatest);
+        reach *= 2;
+    }
+    (least, greatest)
+}
+
+/// `pick` over the square of half width `reach` around every cell, NaN cells left out.
+fn extremes(g: &Grid<f32>, start: f32, pick: impl Fn(f32, f32) -> f32, reach: usize) -> Grid<f32> {
+    let (w, h) = (g.width(), g.height());
+    let mut rows = Grid::filled(w, h, start);
+    for y in 0..h {
+        for x in 0..w {
+            let span = &g.row(y)[x.saturating_sub(reach)..(x + reach + 1).min(w)];
+            // `f32::min` and `max` return the other operand for a NaN.
+            rows[(x, y)] = span.iter().copied().fold(start, &pick);
+        }
+    }
+    let mut out = Grid::filled(w, h, start);
+    for y in 0..h {
+        for v in y.saturating_sub(reach)..(y + reach + 1).min(h) {
+            for x in 0..w {
+                out[(x, y)] = pick(out[(x, y)], rows[(x, v)]);
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thin_tower_widens_the_range_around_it_and_nowhere_else() {
+        let mut coarse = Grid::filled(20, 20, 0.0f32);
+        coarse[(10, 10)] = 130.0;
+        let r = Ranges::from_coarser(40, 40, 0.5, &coarse, 100.0, (0.0, 400.0));
+        assert_eq!((r.low[(2, 2)], r.count[(2, 2)]), (197, 7));
+        assert_eq!((r.low[(19, 19)], r.count[(19, 19)]), (197, 267));
+    }
+
+    #[test]
+    fn an_unknown_stretch_takes_what_is_known_next_to_it() {
+        let mut coarse = Grid::filled(30, 30, f32::NAN);
+        (0..30).for_each(|y| coarse[(0, y)] = 7.0);
+        let r = Ranges::from_coarser(60, 60, 1.0, &coarse, 0.0, (-100.0, 100.0));
+        assert_eq!((r.low[(50, 30)], r.count[(50, 30)]), (4, 7));
+        let none = Ranges::from_coarser(4, 4, 1.0, &Grid::filled(2, 2, f32::NAN), 0.0, (-100.0, 100.0));
+        assert_eq!((none.low[(0, 0)], none.count[(0, 0)]), (-100, 201));
+    }
+}
