@@ -118,8 +118,8 @@ impl Scene {
     pub(crate) fn in_shadow(&self, point: &Vector3<f64>, normal: &Vector3<f64>, to_sun: &Vector3<f64>) -> bool {
         let ray = Ray { origin: point + normal * LIFT_M, direction: *to_sun };
         let t_max = ((self.height_range_m.1 - point.z) / to_sun.z).max(0.0) + LIFT_M;
-        let mut blocks = self.index.between(&ray.origin, &ray.at(t_max));
-        blocks.any(|i| self.solids[i].enter(&ray, t_max).is_some())
+        let end = ray.at(t_max);
+        self.index.between(&ray.origin, &end).any(|i| self.solids[i].enter(&ray, t_max).is_some())
     }
 }
 

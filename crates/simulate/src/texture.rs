@@ -32,7 +32,7 @@ impl Texture {
     }
 
     fn ground(&self, x: f64, y: f64) -> f64 {
-        let [u, v] = STREETS.from_scene(x, y);
+        let [u, v] = STREETS.street_from_scene(x, y);
         let (across_u, across_v) = (from_nearest_line(u), from_nearest_line(v));
         let grain = detail(self.seed, x, y);
         let street = across_u.abs().min(across_v.abs());

@@ -23,12 +23,12 @@ pub(crate) struct Streets {
 
 impl Streets {
     /// Street coordinates (along the first family, along the second) of a position, metres.
-    pub(crate) fn from_scene(&self, x: f64, y: f64) -> [f64; 2] {
+    pub(crate) fn street_from_scene(&self, x: f64, y: f64) -> [f64; 2] {
         let (sin, cos) = self.turn_deg.to_radians().sin_cos();
         [cos * x + sin * y, cos * y - sin * x]
     }
 
-    fn to_scene(self, u: f64, v: f64) -> [f64; 2] {
+    fn scene_from_street(self, u: f64, v: f64) -> [f64; 2] {
         let (sin, cos) = self.turn_deg.to_radians().sin_cos();
         [cos * u - sin * v, sin * u + cos * v]
     }
@@ -50,7 +50,7 @@ pub(crate) fn build(seed: u64, reach_m: f64, mean_height_m: f64) -> Scene {
     for j in -count..=count {
         for i in -count..=count {
             let centre = [(i as f64 + 0.5) * STREETS.spacing_m, (j as f64 + 0.5) * STREETS.spacing_m];
-            let [x, y] = STREETS.to_scene(centre[0], centre[1]);
+            let [x, y] = STREETS.scene_from_street(centre[0], centre[1]);
             if x.abs().max(y.abs()) > reach_m {
                 continue;
             }
@@ -73,30 +73,35 @@ fn tower(terrain: &Terrain, centre: [f64; 2], blocks: &mut Vec<Block>) {
     }
 }
 
-/// What stands between four streets.
+/// What stands between four streets: nothing (a park), a hall, two rows or up to four houses.
 fn quarter(terrain: &Terrain, centre: [f64; 2], stream: &mut Stream, blocks: &mut Vec<Block>) {
     let kind = stream.uniform(0.0, 1.0);
-    if kind < 0.12 {
-        return; // A park.
-    } else if kind < 0.40 {
+    if (0.12..0.40).contains(&kind) {
         let half_size = [stream.uniform(12.0, 20.0), stream.uniform(8.0, 16.0)];
         let lot = Lot { centre, half_size, turn_deg: stream.uniform(-4.0, 4.0) };
         blocks.push(flat(terrain, &lot, stream.uniform(6.0, 22.0)));
-    } else if kind < 0.60 {
-        for side in [-1.0, 1.0] {
-            let centre = [centre[0], centre[1] + side * 13.0];
-            let lot = Lot { centre, half_size: [stream.uniform(14.0, 20.0), stream.uniform(5.0, 6.5)], turn_deg: 0.0 };
-            blocks.push(row(terrain, &lot, stream));
+    } else if (0.40..0.60).contains(&kind) {
+        rows(terrain, centre, stream, blocks);
+    } else if kind >= 0.60 {
+        houses(terrain, centre, stream, blocks);
+    }
+}
+
+fn rows(terrain: &Terrain, [u, v]: [f64; 2], stream: &mut Stream, blocks: &mut Vec<Block>) {
+    for side in [-1.0, 1.0] {
+        let half_size = [stream.uniform(14.0, 20.0), stream.uniform(5.0, 6.5)];
+        blocks.push(row(terrain, &Lot { centre: [u, v + side * 13.0], half_size, turn_deg: 0.0 }, stream));
+    }
+}
+
+fn houses(terrain: &Terrain, [u, v]: [f64; 2], stream: &mut Stream, blocks: &mut Vec<Block>) {
+    for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
+        if stream.chance(0.15) {
+            continue;
         }
-    } else {
-        for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
-            if stream.chance(0.15) {
-                continue;
-            }
-            let centre = [centre[0] + a * stream.uniform(11.0, 13.5), centre[1] + b * stream.uniform(11.0, 13.5)];
-            let half_size = [stream.uniform(5.0, 8.0), stream.uniform(4.0, 5.5)];
-            blocks.push(house(terrain, &Lot { centre, half_size, turn_deg: stream.uniform(-8.0, 8.0) }, stream));
-        }
+        let centre = [u + a * stream.uniform(11.0, 13.5), v + b * stream.uniform(11.0, 13.5)];
+        let half_size = [stream.uniform(5.0, 8.0), stream.uniform(4.0, 5.5)];
+        blocks.push(house(terrain, &Lot { centre, half_size, turn_deg: stream.uniform(-8.0, 8.0) }, stream));
     }
 }
 
@@ -125,7 +130,7 @@ fn gabled(terrain: &Terrain, lot: &Lot, walls_m: f64, stream: &mut Stream) -> Bl
 }
 
 fn block(terrain: &Terrain, lot: &Lot, roof: impl Fn(f64) -> Roof) -> Block {
-    let centre_m = STREETS.to_scene(lot.centre[0], lot.centre[1]);
+    let centre_m = STREETS.scene_from_street(lot.centre[0], lot.centre[1]);
     let ground_m = terrain.height(centre_m[0], centre_m[1]);
     let direction_deg = STREETS.turn_deg + lot.turn_deg;
     Block { centre_m, half_size_m: lot.half_size, direction_deg, ground_m, roof: roof(ground_m) }
