@@ -53,4 +53,34 @@ impl ImageCorrection {
             line: self.centre.line + (m00 * y - c * x) / det,
         })
     }
+
+    /// This correction followed by `next`, as one correction about this one's centre.
+    #[must_use]
+    pub fn then(&self, next: &Self) -> Self {
+        let ([[a, b], [c, d]], [[e, f], [g, h]]) = (self.linear, next.linear);
+        let at_centre = next.apply(self.apply(self.centre));
+        Self {
+            translation_px: [at_centre.sample - self.centre.sample, at_centre.line - self.centre.line],
+            linear: [[e + a + e * a + f * c, f + b + e * b + f * d], [g + c + g * a + h * c, h + d + g * b + h * d]],
+            centre: self.centre,
+        }
+    }
+
+    /// The same correction in the coordinates of the image cut at `origin`.
+    #[must_use]
+    pub fn cropped(&self, origin: ImagePoint) -> Self {
+        let centre = ImagePoint::new(self.centre.sample - origin.sample, self.centre.line - origin.line);
+        Self { centre, ..*self }
+    }
+
+    /// The same correction in the coordinates of the image resampled by `factor`.
+    #[must_use]
+    pub fn rescaled(&self, factor: f64) -> Self {
+        let at = |x: f64| (x + 0.5) * factor - 0.5;
+        Self {
+            translation_px: self.translation_px.map(|t| t * factor),
+            linear: self.linear,
+            centre: ImagePoint::new(at(self.centre.sample), at(self.centre.line)),
+        }
+    }
 }

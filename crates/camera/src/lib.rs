@@ -2,11 +2,26 @@
 //!
 //! Image coordinates are [`ImagePoint`]s: (sample, line) = (column, row), f64, with the centre of the upper-left pixel
 //! at (0, 0). Ground coordinates are [`geodesy::LonLatHeight`]: degrees, and metres above the WGS 84 ellipsoid.
+//!
+//! - [`Rpc`] projects and localises, [`RpcPlane`] does so at one height, [`RpcCamera`] adds an [`ImageCorrection`].
+//! - [`Rpc::validate`] tells coefficients that can be a camera from those that cannot, [`Rpc::domain`] where they hold.
 
+mod camera;
 mod correction;
+mod domain;
+mod error;
+mod jacobian;
+mod localize;
+mod plane;
 mod point;
+mod polynomial;
 mod rpc;
 
+pub use camera::RpcCamera;
 pub use correction::ImageCorrection;
+pub use domain::ValidityDomain;
+pub use error::{CameraError, Key, RpcError};
+pub use jacobian::ImageFromGroundJacobian;
+pub use plane::{EXTRAPOLATION_MAX, RpcPlane};
 pub use point::ImagePoint;
-pub use rpc::{CameraError, Rpc, RpcCamera};
+pub use rpc::Rpc;

@@ -1,0 +1,173 @@
+//! An RPC at one height: each cubic loses its height terms (20 → 10), exactly.
+//!
+//! A sweep asks for many points on one height plane, and localisation searches on one: both use this form.
+//! Heights are metres above the ellipsoid; points whose normalised longitude or latitude exceeds
+//! [`EXTRAPOLATION_MAX`] and points at a pole are errors.
+
+use geodesy::LonLatHeight;
+
+use crate::polynomial::{PlaneCubic, at_height, plane_gradient, plane_value};
+use crate::{CameraError, ImagePoint, Rpc};
+
+/// Denominators smaller than this are poles: real sensors keep them within a few percent of 1.
+pub(crate) const DENOMINATOR_MIN: f64 = 1e-6;
+
+/// Largest normalised longitude or latitude that is projected or returned. The polynomials are fitted on [−1, 1];
+/// crops and tall scenes reach somewhat beyond it, and nothing sensible lies past several half-widths.
+pub const EXTRAPOLATION_MAX: f64 = 8.0;
+
+/// An RPC restricted to one height.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RpcPlane {
+    pub(crate) height_m: f64,
+    pub(crate) long_off: f64,
+    pub(crate) long_scale: f64,
+    pub(crate) lat_off: f64,
+    pub(crate) lat_scale: f64,
+    pub(crate) samp: PlaneRatio,
+    pub(crate) line: PlaneRatio,
+}
+
+/// One image coordinate on a plane: `off + scale · num / den`.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PlaneRatio {
+    pub(crate) off: f64,
+    pub(crate) scale: f64,
+    pub(crate) num: PlaneCubic,
+    pub(crate) den: PlaneCubic,
+}
+
+/// Image position with its derivatives by normalised (L, P), and which way the denominators and the Jacobian point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PlaneSample {
+    pub(crate) image: ImagePoint,
+    /// Rows sample, line; columns L, P; pixels.
+    pub(crate) jacobian: [[f64; 2]; 2],
+    /// Determinant of the Jacobian, pixels².
+    pub(crate) determinant: f64,
+    /// Signs of the sample denominator, the line denominator and the determinant. Two points of a plane between which
+    /// one of them changes are separated by a pole or a fold of the model.
+    pub(crate) orientation: [bool; 3],
+}
+
+impl Rpc {
+    /// The model at one height, metres above the ellipsoid.
+    pub fn plane(&self, height_m: f64) -> RpcPlane {
+        let h = (height_m - self.height_off) / self.height_scale;
+        let ratio = |off, scale, num, den| PlaneRatio {
+            off,
+            scale,
+            num: at_height::<false>(num, h),
+            den: at_height::<false>(den, h),
+        };
+        RpcPlane {
+            height_m,
+            long_off: self.long_off,
+            long_scale: self.long_scale,
+            lat_off: self.lat_off,
+            lat_scale: self.lat_scale,
+            samp: ratio(self.samp_off, self.samp_scale, &self.samp_num, &self.samp_den),
+            line: ratio(self.line_off, self.line_scale, &self.line_num, &self.line_den),
+        }
+    }
+}
+
+impl RpcPlane {
+    /// The plane's height, metres above the ellipsoid.
+    pub fn height_m(&self) -> f64 {
+        self.height_m
+    }
+
+    /// The image position of the point of the plane at a longitude and latitude, degrees.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite, a point far outside the domain, or one at a pole of the model.
+    pub fn project(&self, lon_deg: f64, lat_deg: f64) -> Result<ImagePoint, CameraError> {
+        let [l, p] = self.normalised(lon_deg, lat_deg);
+        check_reach(l, p)?;
+        Ok(ImagePoint { sample: self.samp.value(l, p)?, line: self.line.value(l, p)? })
+    }
+
+    /// Normalised longitude and latitude; the longitude difference is taken the short way round.
+    pub(crate) fn normalised(&self, lon_deg: f64, lat_deg: f64) -> [f64; 2] {
+        [short_way(lon_deg - self.long_off) / self.long_scale, (lat_deg - self.lat_off) / self.lat_scale]
+    }
+
+    /// The ground point at a normalised position.
+    pub(crate) fn ground(&self, l: f64, p: f64) -> LonLatHeight {
+        LonLatHeight::new(self.long_off + self.long_scale * l, self.lat_off + self.lat_scale * p, self.height_m)
+    }
+
+    /// Image position and derivatives at a normalised position.
+    pub(crate) fn sample(&self, l: f64, p: f64) -> Result<PlaneSample, CameraError> {
+        let (sample, row_s, den_s) = self.samp.gradient(l, p)?;
+        let (line, row_l, den_l) = self.line.gradient(l, p)?;
+        let determinant = row_s[0] * row_l[1] - row_s[1] * row_l[0];
+        Ok(PlaneSample {
+            image: ImagePoint { sample, line },
+            jacobian: [row_s, row_l],
+            determinant,
+            orientation: [den_s > 0.0, den_l > 0.0, determinant > 0.0],
+        })
+    }
+}
+
+impl PlaneSample {
+    /// Whether the Jacobian can be inverted: its rows are neither zero nor parallel, up to rounding.
+    pub(crate) fn is_regular(&self) -> bool {
+        let [s, l] = self.jacobian;
+        self.determinant.abs() > 1e-9 * s[0].hypot(s[1]) * l[0].hypot(l[1])
+    }
+}
+
+impl PlaneRatio {
+    fn value(&self, l: f64, p: f64) -> Result<f64, CameraError> {
+        let n = plane_value::<false>(&self.num, l, p);
+        let d = plane_value::<false>(&self.den, l, p);
+        check_ratio(n, d)?;
+        Ok(self.off + self.scale * (n / d))
+    }
+
+    /// Value, derivatives by L and P, denominator.
+    fn gradient(&self, l: f64, p: f64) -> Result<(f64, [f64; 2], f64), CameraError> {
+        let [n, n_l, n_p] = plane_gradient::<false>(&self.num, l, p);
+        let [d, d_l, d_p] = plane_gradient::<false>(&self.den, l, p);
+        check_ratio(n, d)?;
+        let r = n / d;
+        Ok((self.off + self.scale * r, [self.scale * (n_l - r * d_l) / d, self.scale * (n_p - r * d_p) / d], d))
+    }
+}
+
+/// A longitude difference brought into ±180°, for longitudes given within ±360°.
+#[inline(always)]
+pub(crate) fn short_way(d_lon: f64) -> f64 {
+    let shift = if d_lon > 180.0 {
+        -360.0
+    } else if d_lon < -180.0 {
+        360.0
+    } else {
+        0.0
+    };
+    d_lon + shift
+}
+
+pub(crate) fn check_ratio(n: f64, d: f64) -> Result<(), CameraError> {
+    if !(n.is_finite() && d.is_finite()) {
+        return Err(CameraError::NotFinite);
+    }
+    if d.abs() < DENOMINATOR_MIN {
+        return Err(CameraError::Denominator { denominator: d.abs() });
+    }
+    Ok(())
+}
+
+pub(crate) fn check_reach(l: f64, p: f64) -> Result<(), CameraError> {
+    let normalised = l.abs().max(p.abs());
+    if !(l.is_finite() && p.is_finite()) {
+        return Err(CameraError::NotFinite);
+    }
+    if normalised > EXTRAPOLATION_MAX {
+        return Err(CameraError::OutsideDomain { normalised, limit: EXTRAPOLATION_MAX });
+    }
+    Ok(())
+}
