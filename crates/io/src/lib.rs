@@ -1,1 +1,6 @@
-//! Placeholder head: replaced when the crate gets its content.
+//! Every file format, in and out. GDAL lives here and nowhere else.
+//!
+//! Readers convert to the toolkit's one convention (centre of the upper-left pixel at 0, 0; metres above the ellipsoid)
+//! and say so; writers put a file under its name only when it is complete.
+
+pub mod rpc;

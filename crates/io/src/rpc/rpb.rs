@@ -1,0 +1,95 @@
+//! DigitalGlobe's `.RPB`: `key = value;` statements in the group IMAGE, lists in parentheses.
+
+use super::Parsed;
+use super::draft::{Draft, Entry, Field, Names};
+use super::error::Fault;
+
+const NAMES: Names = Names {
+    scalars: [
+        "lineOffset",
+        "sampOffset",
+        "latOffset",
+        "longOffset",
+        "heightOffset",
+        "lineScale",
+        "sampScale",
+        "latScale",
+        "longScale",
+        "heightScale",
+        "errBias",
+        "errRand",
+    ],
+    polys: ["lineNumCoef", "lineDenCoef", "sampNumCoef", "sampDenCoef"],
+    index: ("_", 1),
+};
+
+/// Whether the text has one of RPB's own entries, which RPC00B names differently.
+pub(super) fn recognise(text: &str) -> bool {
+    let is_ours = |key: &str| NAMES.polys.contains(&key) || matches!(key, "sampOffset" | "latOffset" | "longOffset");
+    text.lines().filter_map(|l| l.split_once('=')).any(|(key, _)| is_ours(key.trim()))
+}
+
+/// Reads the RPC.
+pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
+    let mut draft = Draft::default();
+    let mut lines = text.lines().enumerate();
+    while let Some((i, content)) = lines.next() {
+        let line = Some(i + 1);
+        let Some((key, value)) = content.split_once('=') else {
+            if matches!(content.trim().trim_end_matches(';'), "" | "END") {
+                continue;
+            }
+            return Err(Fault::Syntax { what: "expected key = value;".to_owned(), line });
+        };
+        let (key, value) = (key.trim(), value.trim());
+        let entry = Entry { key, text: value.trim_end_matches(';'), line };
+        check_kind(entry)?;
+        match NAMES.field(key) {
+            Field::List(poly) => {
+                let list = list(key, value, i + 1, &mut lines)?;
+                let values = Entry { text: &list, ..entry }.numbers(true)?;
+                draft.set_list(poly, values, entry)?;
+            }
+            _ => {
+                draft.take(&NAMES, entry)?;
+            }
+        }
+    }
+    Ok(Parsed { rpc: draft.finish(&NAMES)?, warnings: Vec::new() })
+}
+
+fn check_kind(entry: Entry<'_>) -> Result<(), Fault> {
+    let kind = entry.text.trim().trim_matches('"');
+    if entry.key.eq_ignore_ascii_case("SpecId") && kind != "RPC00B" {
+        return Err(Fault::Unsupported { what: format!("SpecId is {kind:?}, expected RPC00B") });
+    }
+    Ok(())
+}
+
+/// The text between the parentheses that open in `first` or on a line after it.
+fn list<'a>(
+    key: &str,
+    first: &'a str,
+    line: usize,
+    rest: &mut impl Iterator<Item = (usize, &'a str)>,
+) -> Result<String, Fault> {
+    let mut list = first.to_owned();
+    while !list.contains(')') {
+        let Some((_, more)) = rest.next() else {
+            let what = format!("the list {key} does not end: expected ')'");
+            return Err(Fault::Syntax { what, line: Some(line) });
+        };
+        list.push(' ');
+        // Only the new piece can hold the end of the list: a scan of the whole would be quadratic.
+        if let Some((last, _)) = more.split_once(')') {
+            list.push_str(last);
+            break;
+        }
+        list.push_str(more);
+    }
+    let inner = list
+        .trim_start()
+        .strip_prefix('(')
+        .ok_or_else(|| Fault::Syntax { what: format!("the list {key} does not begin with '('"), line: Some(line) })?;
+    Ok(inner.split(')').next().unwrap_or_default().to_owned())
+}
