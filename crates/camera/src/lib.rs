@@ -4,12 +4,14 @@
 //! at (0, 0). Ground coordinates are [`geodesy::LonLatHeight`]: degrees, and metres above the WGS 84 ellipsoid.
 //!
 //! - [`Rpc`] projects and localises, [`RpcPlane`] does so at one height, [`RpcCamera`] adds an [`ImageCorrection`].
+//! - [`TileInterpolant`] replaces a chain of cameras on a tile, with a measured error.
 //! - [`Rpc::validate`] tells coefficients that can be a camera from those that cannot, [`Rpc::domain`] where they hold.
 
 mod camera;
 mod correction;
 mod domain;
 mod error;
+mod interpolant;
 mod jacobian;
 mod localize;
 mod plane;
@@ -21,6 +23,7 @@ pub use camera::RpcCamera;
 pub use correction::ImageCorrection;
 pub use domain::ValidityDomain;
 pub use error::{CameraError, Key, RpcError};
+pub use interpolant::{DEFAULT_TOLERANCE_PX, InterpolantError, RowInterpolant, TileExtent, TileInterpolant};
 pub use jacobian::ImageFromGroundJacobian;
 pub use plane::{EXTRAPOLATION_MAX, RpcPlane};
 pub use point::ImagePoint;
