@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::SweepError;
 use crate::geometry::{TileMap, source_from_reference};
-use crate::level::{HeightMap, tiles};
+use crate::level::{HeightMap, paste, tiles};
 use crate::view::View;
 
 /// Parameters of the check.
@@ -54,10 +54,10 @@ pub fn count_agreeing(
     let map = reference.map;
     let (width, height) = (map.height_m.width(), map.height_m.height());
     let windows = tiles(Window::whole(width, height), config.tile);
-    let parts: Vec<Vec<u8>> = windows
+    let parts: Vec<Grid<u8>> = windows
         .par_iter()
         .map(|w| {
-            let mut counts = vec![0; w.width * w.height];
+            let mut counts = Grid::filled(w.width, w.height, 0);
             for s in sources {
                 count_in_tile(reference, *s, level, *w, config, &mut counts)?;
             }
@@ -66,10 +66,7 @@ pub fn count_agreeing(
         .collect::<Result<_, SweepError>>()?;
     let mut out = Grid::filled(width, height, 0u8);
     for (w, part) in windows.iter().zip(&parts) {
-        for y in 0..w.height {
-            let row = &mut out.row_mut(w.y as usize + y)[w.x as usize..][..w.width];
-            row.copy_from_slice(&part[y * w.width..][..w.width]);
-        }
+        paste(&mut out, *w, part);
     }
     Ok(out)
 }
@@ -80,7 +77,7 @@ fn count_in_tile(
     level: u32,
     w: Window,
     config: &ConsistencyConfig,
-    counts: &mut [u8],
+    counts: &mut Grid<u8>,
 ) -> Result<(), SweepError> {
     let Some(range) = height_span(reference.map, w) else { return Ok(()) };
     let corners = [w.x as f64, w.y as f64, (w.x + w.width as i64 - 1) as f64, (w.y + w.height as i64 - 1) as f64];
@@ -101,7 +98,7 @@ fn count_in_tile(
             let p = [at.0 as f64, at.1 as f64];
             let q = if fits { map.at(p, height_m) } else { exact(p, height_m).map_err(failed)? };
             if agrees(source.map, q, height_m, tolerance_m) {
-                counts[y * w.width + x] += 1;
+                counts[(x, y)] += 1;
             }
         }
     }

@@ -7,8 +7,8 @@ use raster::{Grid, Window};
 use rayon::prelude::*;
 
 use crate::SweepError;
-use crate::cost::{COST_MAX, CostConfig, SourceLevel, TileScratch, sweep_tile};
 use crate::cost::{BlockCosts, Reference};
+use crate::cost::{COST_MAX, CostConfig, SourceLevel, TileScratch, sweep_tile};
 use crate::ranges::Ranges;
 use crate::readout::soft_argmin;
 use crate::semiglobal::{Penalties, Volume, aggregate};
@@ -100,8 +100,14 @@ fn sweep_block(
         sweep_tile(reference, sources, tile, &config.cost, &mut scratch, &mut block)?;
     }
     let edges = edge_strength(image, window, reference.view.noise);
-    let volume =
-        Volume { width: window.width, height: window.height, low: &low, offsets: &offsets, costs: &costs, edges: &edges };
+    let volume = Volume {
+        width: window.width,
+        height: window.height,
+        low: &low,
+        offsets: &offsets,
+        costs: &costs,
+        edges: &edges,
+    };
     let mut sums = Vec::new();
     aggregate(&volume, config.penalties, &mut sums);
     Ok(read_out(&volume, &sums, window, core, reference, origin_m, config))
@@ -188,13 +194,15 @@ impl HeightMap {
     }
 
     fn put(&mut self, at: Window, part: &Self) {
-        let copy = |to: &mut Grid<f32>, from: &Grid<f32>| {
-            for y in 0..at.height {
-                to.row_mut(at.y as usize + y)[at.x as usize..][..at.width].copy_from_slice(from.row(y));
-            }
-        };
-        copy(&mut self.height_m, &part.height_m);
-        copy(&mut self.sigma_m, &part.sigma_m);
-        copy(&mut self.confidence, &part.confidence);
+        paste(&mut self.height_m, at, &part.height_m);
+        paste(&mut self.sigma_m, at, &part.sigma_m);
+        paste(&mut self.confidence, at, &part.confidence);
+    }
+}
+
+/// Copies `part` into `whole` at the window `at`, which lies inside.
+pub(crate) fn paste<T: Copy>(whole: &mut Grid<T>, at: Window, part: &Grid<T>) {
+    for y in 0..at.height {
+        whole.row_mut(at.y as usize + y)[at.x as usize..][..at.width].copy_from_slice(part.row(y));
     }
 }

@@ -30,21 +30,25 @@ impl Ranges {
     /// Ranges of a level from the heights of the next coarser one (metres, NaN where unknown): the least and greatest
     /// height among the 3 × 3 coarse neighbours, with a margin. Where all of them are unknown, the nearest known ones
     /// around count (two pixels away, four, …); `full` where the whole map is unknown.
-    pub fn from_coarser(width: usize, height: usize, step_m: f64, coarse: &Grid<f32>, origin_m: f64, full: (f64, f64)) -> Self {
+    pub fn from_coarser(
+        width: usize,
+        height: usize,
+        step_m: f64,
+        coarse: &Grid<f32>,
+        origin_m: f64,
+        full: (f64, f64),
+    ) -> Self {
         let (least, greatest) = known_extremes(coarse);
         let mut out = Self::uniform(width, height, step_m, full);
         let margin = MARGIN_STEPS * step_m;
         for y in 0..height {
             let cy = (y / 2).min(coarse.height() - 1);
             for x in 0..width {
-                let c = (( x / 2).min(coarse.width() - 1), cy);
+                let c = ((x / 2).min(coarse.width() - 1), cy);
                 let (lo, hi) = (f64::from(least[c]), f64::from(greatest[c]));
                 if lo <= hi {
-                    let (low, count) = span(
-                        (origin_m + lo - margin).max(full.0),
-                        (origin_m + hi + margin).min(full.1),
-                        step_m,
-                    );
+                    let (low, count) =
+                        span((origin_m + lo - margin).max(full.0), (origin_m + hi + margin).min(full.1), step_m);
                     out.low[(x, y)] = low;
                     out.count[(x, y)] = count;
                 }

@@ -110,11 +110,9 @@ fn step(
     let jump = jump_penalty(penalties, v.edges[p], v.edges[q]);
     let shift = v.low[p] - v.low[q];
     let (q_paths, q_least, paths) = match from {
-        Some(row) => (
-            &row.paths[q_place..q_place + q_n + 2 * PAD],
-            row.least[qx],
-            &mut to.paths[place..place + n + 2 * PAD],
-        ),
+        Some(row) => {
+            (&row.paths[q_place..q_place + q_n + 2 * PAD], row.least[qx], &mut to.paths[place..place + n + 2 * PAD])
+        }
         None => {
             let least = to.least[qx];
             // The previous pixel of the same row lies wholly before or wholly behind this one.
@@ -201,7 +199,14 @@ mod tests {
     use super::*;
 
     /// The recurrence as it is written in the module's text, over a full lattice, without ranges or guards.
-    fn reference(width: usize, height: usize, low: &[i32], counts: &[usize], costs: &[Vec<u8>], p: Penalties) -> Vec<Vec<u32>> {
+    fn reference(
+        width: usize,
+        height: usize,
+        low: &[i32],
+        counts: &[usize],
+        costs: &[Vec<u8>],
+        p: Penalties,
+    ) -> Vec<Vec<u32>> {
         let mut sums: Vec<Vec<u32>> = counts.iter().map(|&n| vec![0; n]).collect();
         for (dx, dy) in [(1i64, 0i64), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)] {
             let mut paths: Vec<Vec<u32>> = vec![Vec::new(); width * height];

@@ -3,6 +3,9 @@
 use camera::RpcCamera;
 use raster::Grid;
 
+/// The pyramid stops when a side would fall below this: a handful of patches.
+const SIDE_MIN: usize = 32;
+
 /// One image of the scene. Invalid pixels (no-data, masked) are NaN on every level.
 #[derive(Debug, Clone)]
 pub struct View {
@@ -15,8 +18,98 @@ pub struct View {
 }
 
 impl View {
+    /// A view of an image, NaN where invalid.
+    pub fn new(camera: RpcCamera, image: Grid<f32>) -> Self {
+        let noise = noise_deviation(&image);
+        let mut levels = vec![image];
+        while let Some(next) = levels.last().and_then(halved) {
+            levels.push(next);
+        }
+        Self { camera, levels, noise }
+    }
+
     /// The noise to expect on a level: averaging four pixels halves it, quantisation apart.
     pub fn noise_at(&self, level: usize) -> f32 {
         self.noise / (1 << level) as f32
+    }
+}
+
+/// The next coarser level: means of 2 × 2 pixels over their valid ones, invalid where fewer than two are. `None` when
+/// it would be too small. A level's pixel p covers level 0 around `(p + 0.5) · 2^level − 0.5`.
+fn halved(g: &Grid<f32>) -> Option<Grid<f32>> {
+    let (w, h) = (g.width() / 2, g.height() / 2);
+    if w.min(h) < SIDE_MIN {
+        return None;
+    }
+    let mut out = Grid::filled(w, h, f32::NAN);
+    for y in 0..h {
+        let (above, below) = (g.row(2 * y), g.row(2 * y + 1));
+        for (x, o) in out.row_mut(y).iter_mut().enumerate() {
+            let four = [above[2 * x], above[2 * x + 1], below[2 * x], below[2 * x + 1]];
+            let valid = four.iter().filter(|v| !v.is_nan());
+            let (sum, n) = valid.fold((0.0, 0), |(s, n), v| (s + v, n + 1));
+            if n >= 2 {
+                *o = sum / n as f32;
+            }
+        }
+    }
+    Some(out)
+}
+
+/// Standard deviation of the noise: of the response to Immerkær's mask (1996), which smooth and straight structures do
+/// not excite, the lower quartile, which texture hardly reaches. 0 for an image without valid neighbourhoods.
+fn noise_deviation(g: &Grid<f32>) -> f32 {
+    let (w, h) = (g.width(), g.height());
+    // Every ninth pixel of at most a few million: the quartile does not need more.
+    let step = 3.max(((w * h) as f64 / 4e6).sqrt() as usize);
+    let mut responses = Vec::new();
+    for y in (1..h.saturating_sub(1)).step_by(step) {
+        for x in (1..w.saturating_sub(1)).step_by(step) {
+            let at = |i: usize, j: usize| g[(x + i - 1, y + j - 1)];
+            let corners = at(0, 0) + at(2, 0) + at(0, 2) + at(2, 2);
+            let sides = at(1, 0) + at(0, 1) + at(2, 1) + at(1, 2);
+            let response = (corners - 2.0 * sides + 4.0 * at(1, 1)).abs() / 6.0;
+            if response.is_finite() {
+                responses.push(response);
+            }
+        }
+    }
+    let quarter = responses.len() / 4;
+    if responses.is_empty() {
+        return 0.0;
+    }
+    // A quarter of a normal deviate lies within 0.3186 of its deviation.
+    *responses.select_nth_unstable_by(quarter, f32::total_cmp).1 / 0.3186
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_noise_of_a_noisy_ramp_is_found() {
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1u64 << 24) as f32
+        };
+        // The sum of twelve uniform deviates minus six is close to a normal one.
+        let values = (0..300 * 300).map(|i| {
+            let normal: f32 = (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
+            (i % 300) as f32 * 0.5 + 3.0 * normal
+        });
+        let g = Grid::from_vec(300, 300, values.collect()).unwrap();
+        let found = noise_deviation(&g);
+        assert!((found - 3.0).abs() < 0.3, "{found}");
+    }
+
+    #[test]
+    fn invalid_pixels_do_not_spread_up_the_pyramid() {
+        let mut g = Grid::filled(64, 64, 5.0f32);
+        g[(10, 10)] = f32::NAN;
+        (20..24).for_each(|x| (20..24).for_each(|y| g[(x, y)] = f32::NAN));
+        let half = halved(&g).unwrap();
+        assert_eq!((half[(5, 5)], half[(9, 10)]), (5.0, 5.0));
+        assert!(half[(10, 10)].is_nan() && half[(11, 11)].is_nan());
     }
 }

@@ -4,9 +4,9 @@ use raster::{Grid, Window};
 
 use super::kernels::{self, Picture, Side};
 use super::{Aggregation, COST_MAX, CostConfig, SourceLevel};
+use crate::SweepError;
 use crate::geometry::{TileMap, source_from_reference};
 use crate::ranges::Ranges;
-use crate::SweepError;
 
 /// A tile is not divided below this side: an RPC that is not smooth over eight pixels is broken.
 const TILE_MIN: usize = 8;
@@ -145,8 +145,8 @@ fn fit_maps(
     let mut maps = Vec::with_capacity(sources.len());
     for s in sources {
         let exact = |p, h| source_from_reference(reference.view.camera, s.camera, reference.level, p, h);
-        let map = TileMap::fit(corners, heights, exact)
-            .map_err(|source| SweepError::Camera { view: s.index, source })?;
+        let map =
+            TileMap::fit(corners, heights, exact).map_err(|source| SweepError::Camera { view: s.index, source })?;
         if map.max_error_px > config.map_tolerance_px {
             if tile.width.min(tile.height) / 2 >= TILE_MIN {
                 return Ok(None);
@@ -298,10 +298,8 @@ impl Laid {
         let (fx, fy) = (dx.floor(), dy.floor());
         let x0 = fx as i64 - 1 - self.origin[0];
         let y0 = fy as i64 - 1 - self.origin[1];
-        let inside = x0 >= 0
-            && y0 >= 0
-            && x0 as usize + width + 3 <= self.stride
-            && y0 as usize + height + 3 <= self.rows;
+        let inside =
+            x0 >= 0 && y0 >= 0 && x0 as usize + width + 3 <= self.stride && y0 as usize + height + 3 <= self.rows;
         if !inside {
             self.plane.tile.fill(f32::NAN);
             return;

@@ -1,14 +1,20 @@
 //! One height per cell from several views' heights.
 
-use raster::Grid;
+use raster::{Grid, Window};
+use rayon::prelude::*;
 
-use super::mesh::ViewSurface;
+use super::mesh::{PlacedView, ViewSurface};
+use crate::level::{paste, tiles};
 
 /// Parameters of the fusion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FusionConfig {
     /// Heights closer than this belong to one surface, metres.
     pub same_surface_m: f32,
+    /// Neighbouring pixels further apart in height than this are not joined, metres.
+    pub tear_m: f32,
+    /// Side of the tiles that are fused at a time, cells: memory and parallelism, never the result.
+    pub tile: usize,
 }
 
 /// The fused surface.
@@ -22,20 +28,44 @@ pub struct Surface {
     pub views: Grid<u8>,
 }
 
-/// Fuses the views' surfaces, which share one grid and one origin.
-pub fn fuse(surfaces: &[ViewSurface], config: &FusionConfig) -> Surface {
-    let (w, h) = surfaces.first().map_or((0, 0), |s| (s.height_m.width(), s.height_m.height()));
-    let mut out = Surface {
-        height_m: Grid::filled(w, h, f32::NAN),
-        sigma_m: Grid::filled(w, h, f32::NAN),
-        views: Grid::filled(w, h, 0),
-    };
+/// Fuses the views on a grid of `size` (columns, rows), tile by tile.
+pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionConfig) -> Surface {
+    let windows = tiles(Window::whole(size.0, size.1), config.tile.max(1));
+    let parts: Vec<Surface> = windows
+        .par_iter()
+        .map(|w| {
+            let surfaces: Vec<ViewSurface> = views.iter().map(|v| v.rasterise(*w, config.tear_m)).collect();
+            fuse(&surfaces, (w.width, w.height), config.same_surface_m)
+        })
+        .collect();
+    let mut out = Surface::empty(size);
+    for (w, part) in windows.iter().zip(&parts) {
+        paste(&mut out.height_m, *w, &part.height_m);
+        paste(&mut out.sigma_m, *w, &part.sigma_m);
+        paste(&mut out.views, *w, &part.views);
+    }
+    out
+}
+
+impl Surface {
+    fn empty((columns, rows): (usize, usize)) -> Self {
+        Self {
+            height_m: Grid::filled(columns, rows, f32::NAN),
+            sigma_m: Grid::filled(columns, rows, f32::NAN),
+            views: Grid::filled(columns, rows, 0),
+        }
+    }
+}
+
+/// Fuses the views' surfaces on one window of the grid.
+fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> Surface {
+    let mut out = Surface::empty(size);
     let mut samples = Vec::with_capacity(surfaces.len());
-    for i in 0..w * h {
+    for i in 0..size.0 * size.1 {
         samples.clear();
         let held = surfaces.iter().map(|s| (s.height_m.data()[i], s.sigma_m.data()[i]));
         samples.extend(held.filter(|(height, _)| !height.is_nan()));
-        if let Some((height, sigma, views)) = fuse_cell(&mut samples, config.same_surface_m) {
+        if let Some((height, sigma, views)) = fuse_cell(&mut samples, same_surface_m) {
             out.height_m.data_mut()[i] = height;
             out.sigma_m.data_mut()[i] = sigma;
             out.views.data_mut()[i] = views;

@@ -116,7 +116,8 @@ mod tests {
         let filled = fill_holes(&mut g, &config);
         assert!((g[(7, 7)] - 0.7).abs() < 1e-3 && (g[(8, 7)] - 0.8).abs() < 1e-3);
         assert_eq!(filled.data().iter().filter(|f| **f).count(), 2);
-        let mut wall = Grid::from_vec(20, 20, (0..400).map(|i| if i % 20 < 10 { 30.0 } else { 2.0 }).collect()).unwrap();
+        let mut wall =
+            Grid::from_vec(20, 20, (0..400).map(|i| if i % 20 < 10 { 30.0 } else { 2.0 }).collect()).unwrap();
         wall[(10, 5)] = f32::NAN;
         wall[(11, 5)] = f32::NAN;
         fill_holes(&mut wall, &config);

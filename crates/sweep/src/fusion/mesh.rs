@@ -7,14 +7,12 @@ use rayon::prelude::*;
 use crate::SweepError;
 use crate::consistency::{Heights, height_span};
 use crate::geometry::{TileMap, full_from_level};
-use crate::level::tiles;
+use crate::level::{paste, tiles};
 
-/// The output grid: its placement, size, and the map projection.
+/// The output grid: its placement and the map projection.
 pub struct GridFrame<'a> {
     /// Placement of the cells.
     pub geotransform: GeoTransform,
-    /// Number of columns and rows.
-    pub size: (usize, usize),
     /// Map coordinates of a ground point; `None` where the projection has none.
     pub map_from_ground: &'a (dyn Fn(LonLatHeight) -> Option<[f64; 2]> + Sync),
 }
@@ -22,6 +20,8 @@ pub struct GridFrame<'a> {
 /// One view's surface on the grid.
 #[derive(Debug, Clone)]
 pub struct ViewSurface {
+    /// Grid column and row of the first cell.
+    origin: [f32; 2],
     /// Height above the map's origin, metres; NaN where the view has none.
     pub height_m: Grid<f32>,
     /// Standard deviation, metres.
@@ -30,11 +30,8 @@ pub struct ViewSurface {
 
 /// Side of the tiles in which image → map is replaced by a local map.
 const TILE: usize = 64;
-/// A facet steeper than this (height over ground) is a tear, not a surface: about 70°.
-const TEAR_SLOPE: f32 = 2.75;
-
 /// A pixel on the grid: column, row, height, deviation.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 struct Vertex {
     x: f32,
     y: f32,
@@ -42,60 +39,103 @@ struct Vertex {
     sigma: f32,
 }
 
-/// Samples one view's heights at the grid's cells. `keep` says which pixels to use.
+/// One view's kept pixels in grid coordinates.
+#[derive(Debug, Clone)]
+pub struct PlacedView {
+    vertices: Grid<Vertex>,
+    /// Windows of the image, each with the grid cells that its pixels and facets reach: x0, y0, x1, y1.
+    extents: Vec<(Window, [f32; 4])>,
+}
+
+/// Puts one view's heights on the grid. `keep` says which pixels to use.
 ///
 /// # Errors
 /// A camera that fails inside the scene.
-pub fn rasterise_view(
+pub fn place_view(
     heights: Heights<'_>,
     level: u32,
     keep: &Grid<bool>,
     frame: &GridFrame<'_>,
-) -> Result<ViewSurface, SweepError> {
+) -> Result<PlacedView, SweepError> {
     let vertices = place(heights, level, keep, frame)?;
-    let cell = frame.geotransform.cell_size().0 as f32;
-    let tear = TEAR_SLOPE * cell;
-    let (cols, rows) = frame.size;
-    let mut out = ViewSurface {
-        height_m: Grid::filled(cols, rows, f32::NAN),
-        sigma_m: Grid::filled(cols, rows, f32::NAN),
-    };
-    for y in 0..vertices.height() {
-        for x in 0..vertices.width() {
-            let a = vertices[(x, y)];
-            if a.h.is_nan() {
-                continue;
-            }
-            out.put((a.x + 0.5).floor(), (a.y + 0.5).floor(), a.h, a.sigma);
-            let corner = |dx, dy| vertices.get(x + dx, y + dy).copied().filter(|v: &Vertex| !v.h.is_nan());
-            if let Some(c) = corner(1, 1) {
-                for b in [corner(1, 0), corner(0, 1)].into_iter().flatten() {
-                    out.facet([a, b, c], tear);
-                }
-            } else if let (Some(b), Some(c)) = (corner(1, 0), corner(0, 1)) {
-                out.facet([a, b, c], tear);
+    let windows = tiles(Window::whole(vertices.width(), vertices.height()), TILE);
+    let extents = windows.into_iter().filter_map(|w| Some((w, extent(&vertices, w)?))).collect();
+    Ok(PlacedView { vertices, extents })
+}
+
+/// The cells that the window's pixels fall into, widened by a cell for the facets to the next window.
+fn extent(vertices: &Grid<Vertex>, w: Window) -> Option<[f32; 4]> {
+    let mut e = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
+    // One more row and column: facets belong to the window of their upper-left pixel.
+    let (x1, y1) = (w.x as usize + w.width + 1, w.y as usize + w.height + 1);
+    for y in w.y as usize..y1.min(vertices.height()) {
+        for v in &vertices.row(y)[w.x as usize..x1.min(vertices.width())] {
+            if !v.h.is_nan() {
+                e = [e[0].min(v.x), e[1].min(v.y), e[2].max(v.x), e[3].max(v.y)];
             }
         }
     }
-    Ok(out)
+    (e[0] <= e[2]).then(|| [e[0] - 1.0, e[1] - 1.0, e[2] + 1.0, e[3] + 1.0])
+}
+
+impl PlacedView {
+    /// Samples the view's surface at the cells of a window of the grid.
+    pub fn rasterise(&self, cells: Window, tear: f32) -> ViewSurface {
+        let mut out = ViewSurface {
+            origin: [cells.x as f32, cells.y as f32],
+            height_m: Grid::filled(cells.width, cells.height, f32::NAN),
+            sigma_m: Grid::filled(cells.width, cells.height, f32::NAN),
+        };
+        let (x1, y1) = ((cells.x + cells.width as i64) as f32, (cells.y + cells.height as i64) as f32);
+        for (w, e) in &self.extents {
+            if e[0] < x1 && e[1] < y1 && e[2] >= cells.x as f32 && e[3] >= cells.y as f32 {
+                self.rasterise_window(*w, tear, &mut out);
+            }
+        }
+        out
+    }
+
+    fn rasterise_window(&self, w: Window, tear: f32, out: &mut ViewSurface) {
+        for y in w.y as usize..w.y as usize + w.height {
+            for x in w.x as usize..w.x as usize + w.width {
+                let a = self.vertices[(x, y)];
+                let corner = |dx, dy| self.vertices.get(x + dx, y + dy).copied().filter(|v| !v.h.is_nan());
+                let (right, below, across) = (corner(1, 0), corner(0, 1), corner(1, 1));
+                if !a.h.is_nan() {
+                    out.put((a.x + 0.5).floor(), (a.y + 0.5).floor(), a.h, a.sigma);
+                    match (right, below, across) {
+                        (Some(b), Some(c), None) => out.facet([a, b, c], tear),
+                        (_, _, Some(c)) => {
+                            [right, below].into_iter().flatten().for_each(|b| out.facet([a, b, c], tear))
+                        }
+                        _ => {}
+                    }
+                } else if let (Some(b), Some(c), Some(d)) = (right, below, across) {
+                    out.facet([b, c, d], tear);
+                }
+            }
+        }
+    }
 }
 
 /// All kept pixels in grid coordinates.
-fn place(heights: Heights<'_>, level: u32, keep: &Grid<bool>, frame: &GridFrame<'_>) -> Result<Grid<Vertex>, SweepError> {
+fn place(
+    heights: Heights<'_>,
+    level: u32,
+    keep: &Grid<bool>,
+    frame: &GridFrame<'_>,
+) -> Result<Grid<Vertex>, SweepError> {
     let map = heights.map;
     let (width, height) = (map.height_m.width(), map.height_m.height());
     let none = Vertex { x: 0.0, y: 0.0, h: f32::NAN, sigma: f32::NAN };
     let windows = tiles(Window::whole(width, height), TILE);
-    let parts: Vec<Vec<Vertex>> = windows
+    let parts: Vec<Grid<Vertex>> = windows
         .par_iter()
         .map(|w| place_tile(heights, level, *w, keep, frame, none))
         .collect::<Result<_, SweepError>>()?;
     let mut out = Grid::filled(width, height, none);
     for (w, part) in windows.iter().zip(&parts) {
-        for y in 0..w.height {
-            let row = &mut out.row_mut(w.y as usize + y)[w.x as usize..][..w.width];
-            row.copy_from_slice(&part[y * w.width..][..w.width]);
-        }
+        paste(&mut out, *w, part);
     }
     Ok(out)
 }
@@ -107,8 +147,8 @@ fn place_tile(
     keep: &Grid<bool>,
     frame: &GridFrame<'_>,
     none: Vertex,
-) -> Result<Vec<Vertex>, SweepError> {
-    let mut out = vec![none; w.width * w.height];
+) -> Result<Grid<Vertex>, SweepError> {
+    let mut out = Grid::filled(w.width, w.height, none);
     let map = heights.map;
     let Some(range) = height_span(map, w) else { return Ok(out) };
     let exact = |[u, v]: [f64; 2], h: f64| {
@@ -132,7 +172,7 @@ fn place_tile(
             }
             let (p, height_m) = ([at.0 as f64, at.1 as f64], map.origin_m + f64::from(h));
             let [cx, cy] = if fits { local.at(p, height_m) } else { exact(p, height_m).map_err(failed)? };
-            out[y * w.width + x] = Vertex { x: cx as f32, y: cy as f32, h, sigma: map.sigma_m[at] };
+            out[(x, y)] = Vertex { x: cx as f32, y: cy as f32, h, sigma: map.sigma_m[at] };
         }
     }
     Ok(out)
@@ -141,6 +181,7 @@ fn place_tile(
 impl ViewSurface {
     /// Puts a height into a cell unless a higher one is there.
     fn put(&mut self, column: f32, row: f32, h: f32, sigma: f32) {
+        let (column, row) = (column - self.origin[0], row - self.origin[1]);
         if column < 0.0 || row < 0.0 {
             return;
         }

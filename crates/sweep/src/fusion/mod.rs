@@ -10,7 +10,7 @@ mod fill;
 mod mesh;
 mod speckle;
 
-pub use cells::{FusionConfig, Surface, fuse};
+pub use cells::{FusionConfig, Surface, fuse_views};
 pub use fill::{FillConfig, fill_holes};
-pub use mesh::{GridFrame, ViewSurface, rasterise_view};
+pub use mesh::{GridFrame, PlacedView, place_view};
 pub use speckle::remove_speckle;

@@ -128,16 +128,15 @@ fn fit(
         }
     }
     let current = corrected(cameras, sizes, &x, order);
-    let found: Vec<Option<(Reduced, LonLatHeight)>> = tracks.iter().map(|t| reduce(&current, sizes, t, order)).collect();
+    let found: Vec<Option<(Reduced, LonLatHeight)>> =
+        tracks.iter().map(|t| reduce(&current, sizes, t, order)).collect();
     let norms: Vec<f64> = found.iter().flatten().map(|(r, _)| norm_px(&r.residual)).collect();
     scale = if norms.is_empty() { scale } else { robust_scale(norms.iter().copied()) };
     let limit = OUTLIER * scale;
     let inliers: Vec<f64> = norms.iter().copied().filter(|r| *r <= limit).collect();
     let rms_px = (inliers.iter().map(|r| r * r).sum::<f64>() / inliers.len().max(1) as f64).sqrt();
-    let ground = found
-        .into_iter()
-        .map(|f| f.filter(|(r, _)| norm_px(&r.residual) <= limit).map(|(_, ground)| ground))
-        .collect();
+    let ground =
+        found.into_iter().map(|f| f.filter(|(r, _)| norm_px(&r.residual) <= limit).map(|(_, ground)| ground)).collect();
     let corrections = current.into_iter().map(|c| c.correction).collect();
     let fit = Adjustment { order, corrections, residual_px: (f64::NAN, scale), rms_px, ground };
     (information(&norms, scale, n), fit)
@@ -212,7 +211,12 @@ fn own_design(p: ImagePoint, size: (usize, usize), order: ModelOrder) -> Vec<[f6
 }
 
 /// A track's best ground point, and its residuals with the ground point's freedom taken out.
-fn reduce(cameras: &[RpcCamera], sizes: &[(usize, usize)], track: &Track, order: ModelOrder) -> Option<(Reduced, LonLatHeight)> {
+fn reduce(
+    cameras: &[RpcCamera],
+    sizes: &[(usize, usize)],
+    track: &Track,
+    order: ModelOrder,
+) -> Option<(Reduced, LonLatHeight)> {
     let (ground, residual, jacobian) = triangulate(cameras, track).ok()??;
     let rows = residual.len();
     let m = order.parameters();
@@ -266,7 +270,11 @@ fn moved(g: LonLatHeight, east_north_up: Vector3<f64>) -> LonLatHeight {
     )
 }
 
-fn linearised(cameras: &[RpcCamera], track: &Track, ground: LonLatHeight) -> Result<(DVector<f64>, DMatrix<f64>), CameraError> {
+fn linearised(
+    cameras: &[RpcCamera],
+    track: &Track,
+    ground: LonLatHeight,
+) -> Result<(DVector<f64>, DMatrix<f64>), CameraError> {
     let rows = 2 * track.len();
     let (mut residual, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, 3));
     for (i, (view, observed)) in track.iter().enumerate() {

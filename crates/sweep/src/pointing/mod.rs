@@ -8,5 +8,5 @@ mod interest;
 mod patch;
 mod ties;
 
-pub use adjust::{Adjustment, AdjustConfig, ModelOrder, Track, adjust};
+pub use adjust::{AdjustConfig, Adjustment, ModelOrder, Track, adjust};
 pub use ties::{Tie, TieConfig, match_pair};

@@ -102,8 +102,11 @@ impl Pair<'_> {
         let back_predicted = back.chain(found, 0, height_m).ok()?;
         let start = [full[0] - back_predicted[0], full[1] - back_predicted[1]];
         let (end, _) = back.refine(found, 0, height_m, start, config)?;
-        ((end[0] - start[0]).hypot(end[1] - start[1]) < RETURN_PX)
-            .then_some(Tie { reference: full, source: found, correlation })
+        ((end[0] - start[0]).hypot(end[1] - start[1]) < RETURN_PX).then_some(Tie {
+            reference: full,
+            source: found,
+            correlation,
+        })
     }
 
     pub(crate) fn chain(&self, at: [f64; 2], level: usize, height_m: f64) -> Result<[f64; 2], CameraError> {
