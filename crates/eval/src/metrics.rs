@@ -1,0 +1,98 @@
+//! Accuracy and completeness of one set of reference cells.
+//!
+//! Three of the four things that the field calls completeness, by name, t in metres:
+//! `completeness_<t>`: share of the reference's valid cells that are estimated with |error| < t (voids are failures);
+//! `pag_<t>`: share of the cells valid in both with |error| < t;
+//! `valid_ratio`: share of the reference's valid cells with any value.
+
+use crate::statistics::ErrorStatistics;
+
+/// What was measured on one set of cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Metrics {
+    /// Valid cells of the reference.
+    pub reference_cells: usize,
+    /// Cells valid in both.
+    pub n: usize,
+    /// Errors over the cells valid in both; `None` when there are none.
+    pub errors: Option<ErrorStatistics>,
+    /// For each threshold (metres), the number of cells with |error| below it.
+    pub below: Vec<(f64, usize)>,
+}
+
+impl Metrics {
+    /// The metrics of finite `errors` (metres, their order is lost) on `reference_cells` valid cells of the reference.
+    pub fn of(errors: &mut [f64], reference_cells: usize, thresholds_m: &[f64]) -> Self {
+        let below = thresholds_m.iter().map(|&t| (t, errors.iter().filter(|e| e.abs() < t).count())).collect();
+        Self { reference_cells, n: errors.len(), errors: ErrorStatistics::of(errors), below }
+    }
+
+    /// Share of the reference's valid cells with any value, 0 to 1; `None` without reference cells.
+    pub fn valid_ratio(&self) -> Option<f64> {
+        share(self.n, self.reference_cells)
+    }
+
+    /// Share of the reference's valid cells with an error below `threshold_m`; `None` when it is not among the thresholds.
+    pub fn completeness(&self, threshold_m: f64) -> Option<f64> {
+        share(self.count_below(threshold_m)?, self.reference_cells)
+    }
+
+    /// Share of the cells valid in both with an error below `threshold_m`; `None` when it is not among the thresholds.
+    pub fn pag(&self, threshold_m: f64) -> Option<f64> {
+        share(self.count_below(threshold_m)?, self.n)
+    }
+
+    /// Every metric by its name, in a fixed order; what cannot be computed is `None`.
+    pub fn named(&self) -> Vec<(String, Option<f64>)> {
+        let mut all = vec![
+            ("reference_cells".to_owned(), Some(self.reference_cells as f64)),
+            ("n".to_owned(), Some(self.n as f64)),
+            ("valid_ratio".to_owned(), self.valid_ratio()),
+        ];
+        let values = self.errors.map(|errors| errors.values());
+        let named = ErrorStatistics::NAMES.iter().enumerate();
+        all.extend(named.map(|(i, name)| ((*name).to_owned(), values.map(|values| values[i]))));
+        all.extend(
+            self.below.iter().map(|&(t, count)| (format!("completeness_{t}"), share(count, self.reference_cells))),
+        );
+        all.extend(self.below.iter().map(|&(t, count)| (format!("pag_{t}"), share(count, self.n))));
+        all
+    }
+
+    fn count_below(&self, threshold_m: f64) -> Option<usize> {
+        self.below.iter().find(|(t, _)| *t == threshold_m).map(|&(_, count)| count)
+    }
+}
+
+fn share(part: usize, whole: usize) -> Option<f64> {
+    (whole > 0).then(|| part as f64 / whole as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn voids_are_failures_of_completeness_and_not_of_pag() {
+        let metrics = Metrics::of(&mut [0.5, -0.9, 1.0, -3.0], 8, &[1.0, 2.5]);
+        assert_eq!(metrics.completeness(1.0), Some(0.25));
+        assert_eq!(metrics.pag(1.0), Some(0.5));
+        assert_eq!(metrics.pag(2.5), Some(0.75));
+        assert_eq!(metrics.valid_ratio(), Some(0.5));
+        assert_eq!(metrics.completeness(7.5), None);
+    }
+
+    #[test]
+    fn names_are_the_same_with_and_without_cells() {
+        let names = |m: &Metrics| m.named().into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+        let (full, empty) = (Metrics::of(&mut [1.0], 1, &[0.5, 1.0]), Metrics::of(&mut [], 0, &[0.5, 1.0]));
+        assert_eq!(names(&full), names(&empty));
+        assert!(names(&full).ends_with(&[
+            "completeness_0.5".into(),
+            "completeness_1".into(),
+            "pag_0.5".into(),
+            "pag_1".into()
+        ]));
+        assert!(empty.named().iter().skip(2).all(|(_, value)| value.is_none()));
+    }
+}

@@ -1,0 +1,91 @@
+//! Reading a grid between its cells.
+//!
+//! A position has a value exactly where its *nearest* cell has one, and the value is the bilinear mean over those of the four
+//! neighbours that are valid, their weights scaled to one. So no-data never enters a mean, and voids neither grow nor shrink
+//! when a surface is shifted by part of a cell: coverage and completeness do not depend on the phase of the two grids.
+
+use raster::Grid;
+
+/// The height at a fractional cell position, or `None` where the nearest cell is void or outside.
+pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
+    let (left, top) = (column.floor(), row.floor());
+    let (u, v) = (column - left, row - top);
+    let (nearest_right, nearest_low) = (u >= 0.5, v >= 0.5);
+    let (left, top) = (whole(left)?, whole(top)?);
+    let corner = |right: bool, low: bool| finite(grid, left + i64::from(right), top + i64::from(low));
+    let nearest = corner(nearest_right, nearest_low)?;
+    let mut sum = 0.0;
+    let mut weights = 0.0;
+    for (right, low) in [(false, false), (true, false), (false, true), (true, true)] {
+        let weight = if right { u } else { 1.0 - u } * if low { v } else { 1.0 - v };
+        if let Some(value) = corner(right, low) {
+            // Relative to the nearest cell: a constant surface comes back exactly.
+            sum += weight * (value - nearest);
+            weights += weight;
+        }
+    }
+    Some(nearest + sum / weights)
+}
+
+/// The cell nearest to a fractional position, or `None` outside the grid. Halves go to the higher index.
+pub fn nearest<T: Copy>(grid: &Grid<T>, column: f64, row: f64) -> Option<T> {
+    let (column, row) = (whole((column + 0.5).floor())?, whole((row + 0.5).floor())?);
+    grid.get(usize::try_from(column).ok()?, usize::try_from(row).ok()?).copied()
+}
+
+/// A whole-valued float as an index; `None` for NaN and for what no grid can hold.
+fn whole(value: f64) -> Option<i64> {
+    (value.abs() < 1e15).then_some(value as i64)
+}
+
+fn finite(grid: &Grid<f32>, column: i64, row: i64) -> Option<f64> {
+    let value = *grid.get(usize::try_from(column).ok()?, usize::try_from(row).ok()?)?;
+    value.is_finite().then_some(f64::from(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn plane(width: usize, height: usize) -> Grid<f32> {
+        let cells = (0..width * height).map(|i| (i % width) as f32 * 2.0 - (i / width) as f32 * 0.5 + 7.0).collect();
+        Grid::from_vec(width, height, cells).unwrap()
+    }
+
+    #[test]
+    fn no_data_stays_out_of_the_mean_and_keeps_its_cell() {
+        let mut grid = Grid::filled(3, 3, 10.0f32);
+        grid[(1, 1)] = f32::NAN;
+        assert_eq!(bilinear(&grid, 0.4, 0.4), Some(10.0));
+        assert_eq!(bilinear(&grid, 0.6, 0.6), None);
+        assert_eq!(bilinear(&grid, 1.4, 1.4), None);
+        assert_eq!(bilinear(&grid, 1.5, 1.5), Some(10.0));
+    }
+
+    #[test]
+    fn positions_outside_have_no_value() {
+        let grid = plane(4, 3);
+        for (column, row) in [(-0.6, 0.0), (3.5, 0.0), (0.0, 2.5), (f64::NAN, 0.0), (1e300, 0.0), (0.0, -1e300)] {
+            assert_eq!(bilinear(&grid, column, row), None, "at {column}, {row}");
+            assert_eq!(nearest(&grid, column, row), None, "at {column}, {row}");
+        }
+        assert!(bilinear(&grid, -0.5, 2.4).is_some());
+    }
+
+    proptest! {
+        #[test]
+        fn a_plane_is_reproduced(column in 0.0..7.0f64, row in 0.0..5.0f64) {
+            let value = bilinear(&plane(8, 6), column, row).unwrap();
+            prop_assert!((value - (2.0 * column - 0.5 * row + 7.0)).abs() < 1e-9);
+        }
+
+        #[test]
+        fn a_value_exists_where_the_nearest_cell_has_one(column in -2.0..10.0f64, row in -2.0..8.0f64, hole in 0usize..48) {
+            let mut grid = plane(8, 6);
+            grid.data_mut()[hole] = f32::NAN;
+            let by_nearest = nearest(&grid, column, row).is_some_and(f32::is_finite);
+            prop_assert_eq!(bilinear(&grid, column, row).is_some(), by_nearest);
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Statistics of a set of height errors, in metres.
+//!
+//! Percentiles are NumPy's `linear` ones: the p-th of n sorted values stands at the index p/100 · (n − 1), and values between
+//! two indices are interpolated. The standard deviation is that of the population (divided by n). NMAD = 1.4826 · median of
+//! |e − median(e)| (Höhle and Höhle 2009, ISPRS J. 64, 398-406) equals the standard deviation for normal errors. LE*p* is the
+//! p-th percentile of |e|, without any assumption about the distribution.
+
+use serde::Serialize;
+
+/// What makes the median absolute deviation an estimate of a normal distribution's standard deviation.
+pub const NMAD_FACTOR: f64 = 1.4826;
+
+/// Errors in metres (test − reference), summarised.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ErrorStatistics {
+    /// Bias.
+    pub mean: f64,
+    /// Median.
+    pub median: f64,
+    /// Mean of |e|.
+    pub mae: f64,
+    /// Root of the mean of e².
+    pub rmse: f64,
+    /// Standard deviation of the population.
+    pub std: f64,
+    /// 1.4826 times the median of |e − median|.
+    pub nmad: f64,
+    /// 68th percentile of |e|.
+    pub le68: f64,
+    /// 90th percentile of |e|.
+    pub le90: f64,
+    /// 95th percentile of |e|.
+    pub le95: f64,
+    /// Lowest error.
+    pub min: f64,
+    /// Highest error.
+    pub max: f64,
+}
+
+impl ErrorStatistics {
+    /// The summary of finite errors, whose order is lost; `None` when there are none.
+    pub fn of(errors: &mut [f64]) -> Option<Self> {
+        if errors.is_empty() {
+            return None;
+        }
+        let n = errors.len() as f64;
+        let mean = errors.iter().sum::<f64>() / n;
+        let mae = errors.iter().map(|e| e.abs()).sum::<f64>() / n;
+        let rmse = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+        let std = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n).sqrt();
+        let (min, max) = errors.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), &e| (lo.min(e), hi.max(e)));
+        let median = percentile(errors, 50.0)?;
+        let mut absolute: Vec<f64> = errors.iter().map(|e| (e - median).abs()).collect();
+        let nmad = NMAD_FACTOR * percentile(&mut absolute, 50.0)?;
+        absolute.iter_mut().zip(errors.iter()).for_each(|(a, e)| *a = e.abs());
+        let mut le = |p| percentile(&mut absolute, p);
+        Some(Self { mean, median, mae, rmse, std, nmad, le68: le(68.0)?, le90: le(90.0)?, le95: le(95.0)?, min, max })
+    }
+
+    /// The names of the statistics, in the order of [`values`](Self::values).
+    pub const NAMES: [&'static str; 11] =
+        ["mean", "median", "mae", "rmse", "std", "nmad", "le68", "le90", "le95", "min", "max"];
+
+    /// The statistics in the order of [`NAMES`](Self::NAMES).
+    pub fn values(&self) -> [f64; 11] {
+        let s = self;
+        [s.mean, s.median, s.mae, s.rmse, s.std, s.nmad, s.le68, s.le90, s.le95, s.min, s.max]
+    }
+}
+
+/// The `p`-th percentile (0 to 100) with linear interpolation, in linear time; the order of `values` is lost.
+/// `None` when there are no values.
+pub fn percentile(values: &mut [f64], p: f64) -> Option<f64> {
+    let last = values.len().checked_sub(1)?;
+    let at = (p / 100.0).clamp(0.0, 1.0) * last as f64;
+    let low = (at.floor() as usize).min(last);
+    let (_, &mut below, above) = values.select_nth_unstable_by(low, f64::total_cmp);
+    let next = above.iter().copied().min_by(f64::total_cmp).unwrap_or(below);
+    Some(below + (at - low as f64) * (next - below))
+}
+
+/// The NMAD of single-precision differences (of which the order is lost), for the search of a shift; `None` without values.
+/// For an even count the higher of the two middle values is taken: the criterion needs no interpolation.
+pub(crate) fn quick_nmad(differences: &mut [f32]) -> Option<f64> {
+    let middle = differences.len() / 2;
+    let median = upper_median(differences, middle)?;
+    differences.iter_mut().for_each(|d| *d = (*d - median).abs());
+    Some(NMAD_FACTOR * f64::from(upper_median(differences, middle)?))
+}
+
+fn upper_median(values: &mut [f32], middle: usize) -> Option<f32> {
+    if values.is_empty() {
+        return None;
+    }
+    Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn percentiles_of_four_values_are_those_of_numpy() {
+        // numpy.percentile([4, 1, 3, 2], p)
+        for (p, expected) in [(0.0, 1.0), (25.0, 1.75), (50.0, 2.5), (90.0, 3.7), (100.0, 4.0)] {
+            let found = percentile(&mut [4.0, 1.0, 3.0, 2.0], p).unwrap();
+            assert!((found - expected).abs() < 1e-12, "{p}: {found}");
+        }
+        assert_eq!(percentile(&mut [], 50.0), None);
+        assert_eq!(percentile(&mut [5.0], 90.0), Some(5.0));
+    }
+
+    #[test]
+    fn nothing_has_no_statistics() {
+        assert_eq!(ErrorStatistics::of(&mut []), None);
+    }
+
+    proptest! {
+        #[test]
+        fn a_constant_moves_the_bias_and_leaves_the_spread(
+            mut errors in prop::collection::vec(-50.0..50.0f64, 1..200), constant in -20.0..20.0f64,
+        ) {
+            let mut moved: Vec<f64> = errors.iter().map(|e| e + constant).collect();
+            let (a, b) = (ErrorStatistics::of(&mut errors).unwrap(), ErrorStatistics::of(&mut moved).unwrap());
+            prop_assert!((b.mean - a.mean - constant).abs() < 1e-9);
+            prop_assert!((b.median - a.median - constant).abs() < 1e-9);
+            prop_assert!((b.std - a.std).abs() < 1e-6);
+            prop_assert!((b.nmad - a.nmad).abs() < 1e-9);
+        }
+
+        #[test]
+        fn the_statistics_are_ordered(mut errors in prop::collection::vec(-50.0..50.0f64, 1..200)) {
+            let s = ErrorStatistics::of(&mut errors).unwrap();
+            prop_assert!(s.min <= s.median && s.median <= s.max);
+            prop_assert!(s.mae <= s.rmse + 1e-12 && s.std <= s.rmse + 1e-12);
+            prop_assert!(s.le68 <= s.le90 && s.le90 <= s.le95 && s.le95 <= s.max.abs().max(s.min.abs()));
+        }
+
+        #[test]
+        fn the_quick_nmad_is_the_nmad_for_odd_counts(half in prop::collection::vec(-50.0..50.0f32, 0..100), one in -1.0..1.0f32) {
+            let mut values: Vec<f32> = half.iter().chain(&half).copied().chain([one]).collect();
+            let mut wide: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
+            let expected = ErrorStatistics::of(&mut wide).unwrap().nmad;
+            prop_assert!((quick_nmad(&mut values).unwrap() - expected).abs() < 1e-4);
+        }
+    }
+}
