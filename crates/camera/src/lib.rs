@@ -7,17 +7,20 @@
 //! - [`TileInterpolant`] replaces a chain of cameras on a tile, with a measured error.
 //! - [`Rpc::validate`] tells coefficients that can be a camera from those that cannot, [`Rpc::domain`] where they hold.
 
+mod batch;
 mod camera;
 mod correction;
 mod domain;
 mod error;
 mod interpolant;
 mod jacobian;
+mod kernel;
 mod localize;
 mod plane;
 mod point;
 mod polynomial;
 mod rpc;
+mod view;
 
 pub use camera::RpcCamera;
 pub use correction::ImageCorrection;
@@ -28,3 +31,4 @@ pub use jacobian::ImageFromGroundJacobian;
 pub use plane::{EXTRAPOLATION_MAX, RpcPlane};
 pub use point::ImagePoint;
 pub use rpc::Rpc;
+pub use view::{GroundSamplingDistance, ViewDirection};

@@ -169,3 +169,36 @@ fn validation_names_the_entry() {
         assert!(found.to_string().starts_with(expected), "{found}");
     }
 }
+
+/// The direction against the chord between two heights of the same image point, in Earth-centred coordinates.
+#[test]
+fn the_view_direction_is_the_chord_between_heights() {
+    let camera = RpcCamera { rpc: moved(pushbroom(), 12.0, 85.0), correction: tilted() };
+    let ground = camera.rpc.domain().at([0.3, -0.4, 0.1]);
+    let image = camera.project(ground).unwrap();
+    let frame = geodesy::EnuFrame::new(ground);
+    let at = |h: f64| frame.enu_from_ground(camera.localize(image, ground.height_m + h).unwrap());
+    let (a, b) = (at(-5.0), at(5.0));
+    let (e, n, u) = (b.east - a.east, b.north - a.north, b.up - a.up);
+    let size = (e * e + n * n + u * u).sqrt();
+    let d = camera.view_direction(ground).unwrap();
+    for (chord, tangent) in [(e, d.east), (n, d.north), (u, d.up)] {
+        assert!((chord / size - tangent).abs() < 1e-6, "{chord} {tangent}");
+    }
+}
+
+/// One pixel to the right and one down, localised on the same plane, are one GSD away.
+#[test]
+fn the_gsd_is_the_ground_distance_of_one_pixel() {
+    let camera = RpcCamera::new(pushbroom());
+    let (p, h) = (ImagePoint::new(15_000.0, 24_000.0), 250.0);
+    let ground = camera.localize(p, h).unwrap();
+    let frame = geodesy::EnuFrame::new(ground);
+    let distance_to = |p| {
+        let at = frame.enu_from_ground(camera.localize(p, h).unwrap());
+        at.east.hypot(at.north)
+    };
+    let gsd = camera.gsd_at(p, h).unwrap();
+    assert!((distance_to(ImagePoint::new(15_001.0, 24_000.0)) - gsd.sample_m).abs() < 1e-5);
+    assert!((distance_to(ImagePoint::new(15_000.0, 24_001.0)) - gsd.line_m).abs() < 1e-5);
+}
