@@ -17,9 +17,9 @@ pub enum SimulateError {
         high: f64,
     },
     /// A pixel has no line of sight.
-    #[error("the simulated camera does not see the ground: {0}")]
+    #[error("the simulated camera does not see the ground")]
     Camera(#[from] camera::CameraError),
     /// The scene lies where there is no map.
-    #[error("the scene's place cannot be mapped: {0}")]
+    #[error("the scene's place cannot be mapped")]
     Geodesy(#[from] geodesy::GeodesyError),
 }

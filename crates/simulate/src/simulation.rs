@@ -225,11 +225,14 @@ fn camera(config: &SimulationConfig, frame: &SceneFrame, look: &Look) -> Result<
     let half = config.size_m / 2.0;
     let ground = |x, y| frame.ground_from_scene(Vector3::new(x, y, config.ground_height_m));
     let centre = ground(0.0, 0.0)?;
-    let of_a_pixel = look.rpc(centre, 1, 1);
+    // The scale of a camera does not depend on its image's size: any that holds the area measures the corners.
+    let roughly = (1.5 * config.size_m / config.gsd_m) as usize;
+    let measuring = look.rpc(centre, roughly, roughly);
     let mut reach = ImagePoint::default();
     for (x, y) in [(-half, -half), (half, -half), (-half, half), (half, half)] {
-        let corner = of_a_pixel.project(ground(x, y)?)?;
-        reach = ImagePoint::new(reach.sample.max(corner.sample.abs()), reach.line.max(corner.line.abs()));
+        let corner = measuring.project(ground(x, y)?)?;
+        let (sample, line) = (corner.sample - measuring.samp_off, corner.line - measuring.line_off);
+        reach = ImagePoint::new(reach.sample.max(sample.abs()), reach.line.max(line.abs()));
     }
     let pixels = |reach: f64| 2 * (reach + MARGIN_PX).ceil() as usize;
     let size = (pixels(reach.sample), pixels(reach.line));
