@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{GeodesyError, wrap_lon};
+use crate::{GeodesyError, proj_handle, wrap_lon};
 
 /// What heights are measured from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -103,6 +103,15 @@ impl Crs {
         Self { horizontal, vertical: VerticalDatum::Ellipsoid }
     }
 
+    /// WKT2:2019 of the whole: a compound CRS, or for ellipsoidal heights the horizontal CRS with a height axis.
+    ///
+    /// # Errors
+    /// [`GeodesyError::NoTransformation`] when PROJ does not know a code.
+    pub fn wkt(&self) -> Result<String, GeodesyError> {
+        proj_handle::wkt(&self.to_string(), self.vertical == VerticalDatum::Ellipsoid)
+            .map_err(|reason| unknown(self, reason))
+    }
+
     /// PROJ's and GDAL's name for the horizontal part, `EPSG:32617`.
     pub fn horizontal_definition(&self) -> String {
         format!("EPSG:{}", self.horizontal)
@@ -117,6 +126,34 @@ impl fmt::Display for Crs {
             Some(vertical) => write!(f, "EPSG:{}+{vertical}", self.horizontal),
         }
     }
+}
+
+/// What a definition met in a file (WKT, `EPSG:n`, PROJJSON) is in terms of EPSG codes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CrsIdentity {
+    /// Name in the definition.
+    pub name: String,
+    /// EPSG code of the horizontal part, if it carries one or PROJ is sure of one.
+    pub horizontal: Option<u32>,
+    /// Datum of the heights; `None` when the definition does not say.
+    pub vertical: Option<VerticalDatum>,
+}
+
+impl CrsIdentity {
+    /// Takes a definition apart.
+    ///
+    /// # Errors
+    /// [`GeodesyError::NoTransformation`] when PROJ does not read the definition as a CRS.
+    pub fn of(definition: &str) -> Result<Self, GeodesyError> {
+        let codes = proj_handle::codes(definition).map_err(|reason| unknown(&"the definition in the file", reason))?;
+        let ellipsoidal = codes.three_dimensional.then_some(VerticalDatum::Ellipsoid);
+        let vertical = codes.vertical.map(VerticalDatum::from_epsg).or(ellipsoidal);
+        Ok(Self { name: codes.name, horizontal: codes.horizontal, vertical })
+    }
+}
+
+fn unknown(what: &dyn fmt::Display, reason: String) -> GeodesyError {
+    GeodesyError::NoTransformation { source_crs: "EPSG:4979".to_owned(), target_crs: what.to_string(), reason }
 }
 
 /// A CRS as the user asks for it.
@@ -231,6 +268,21 @@ mod tests {
         for bad in ["", "EPSG:", "mars", "32617+", "-4326", "EPSG:99999999999"] {
             assert!(matches!(bad.parse::<CrsRequest>(), Err(GeodesyError::UnknownCrs { .. })), "{bad}");
         }
+    }
+
+    #[test]
+    fn identities_survive_wkt() {
+        for vertical in [VerticalDatum::Ellipsoid, VerticalDatum::Egm96, VerticalDatum::Egm2008] {
+            for horizontal in [32617, 5041, 4326] {
+                let crs = Crs { horizontal, vertical };
+                let found = CrsIdentity::of(&crs.wkt().unwrap()).unwrap();
+                assert_eq!((found.horizontal, found.vertical), (Some(horizontal), Some(vertical)), "{crs}");
+            }
+        }
+        let flat = CrsIdentity::of("EPSG:32617").unwrap();
+        assert_eq!((flat.horizontal, flat.vertical), (Some(32617), None));
+        assert!(CrsIdentity::of("nothing").is_err());
+        assert!(Crs::ellipsoidal(1).wkt().is_err());
     }
 
     #[test]

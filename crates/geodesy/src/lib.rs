@@ -13,7 +13,7 @@ mod proj_handle;
 mod projection;
 mod vertical;
 
-pub use crs::{Crs, CrsRequest, VerticalDatum, ups_epsg, utm_epsg};
+pub use crs::{Crs, CrsIdentity, CrsRequest, VerticalDatum, ups_epsg, utm_epsg};
 pub use ellipsoid::{
     EcefPoint, WGS84_A, WGS84_B, WGS84_E2, WGS84_F, ecef_from_ground, ground_from_ecef, lon_near, meridian_radius_m,
     prime_vertical_radius_m, wrap_lon,

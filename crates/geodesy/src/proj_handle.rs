@@ -11,11 +11,14 @@ use std::sync::{Mutex, PoisonError};
 
 use proj_sys::{
     PJ, PJ_CONTEXT, PJ_DIRECTION, PJ_DIRECTION_PJ_FWD, PJ_DIRECTION_PJ_INV, PJ_LOG_LEVEL_PJ_LOG_NONE,
-    PJ_TYPE_PJ_TYPE_COMPOUND_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS,
-    proj_context_create, proj_context_destroy, proj_context_errno, proj_context_errno_string,
-    proj_context_set_enable_network, proj_create, proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D,
-    proj_crs_get_coordinate_system, proj_crs_get_sub_crs, proj_cs_get_axis_info, proj_destroy, proj_get_type,
-    proj_log_level, proj_normalize_for_visualization, proj_trans_generic,
+    PJ_TYPE_PJ_TYPE_BOUND_CRS, PJ_TYPE_PJ_TYPE_COMPOUND_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS,
+    PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS, PJ_WKT_TYPE_PJ_WKT2_2019, proj_as_wkt, proj_context_create,
+    proj_context_destroy, proj_context_errno, proj_context_errno_string, proj_context_set_enable_network, proj_create,
+    proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D, proj_crs_get_coordinate_system, proj_crs_get_sub_crs,
+    proj_crs_promote_to_3D, proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_id_auth_name,
+    proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify, proj_int_list_destroy,
+    proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_level, proj_normalize_for_visualization,
+    proj_trans_generic,
 };
 
 /// How to make a transformation.
@@ -94,6 +97,37 @@ impl Context {
                 crs = self.own(proj_crs_get_sub_crs(self.0, crs.0, 0))?;
             }
             self.own(proj_crs_demote_to_2D(self.0, ptr::null(), crs.0))
+        }
+    }
+
+    /// EPSG code of a CRS: the one it carries, else the one that PROJ recognises with at least 90 % confidence.
+    fn epsg(&self, crs: &Object) -> Option<u32> {
+        // SAFETY: the object belongs to this context; texts are copied at once, lists are released below.
+        unsafe {
+            if text_of(proj_get_id_auth_name(crs.0, 0)).as_deref() == Some("EPSG") {
+                return text_of(proj_get_id_code(crs.0, 0))?.parse().ok();
+            }
+            let mut confidence = ptr::null_mut();
+            let list = proj_identify(self.0, crs.0, c"EPSG".as_ptr(), ptr::null(), &mut confidence);
+            if list.is_null() {
+                return None;
+            }
+            let sure = proj_list_get_count(list) > 0 && !confidence.is_null() && *confidence >= 90;
+            let best = sure.then(|| self.own(proj_list_get(self.0, list, 0)).ok()).flatten();
+            proj_int_list_destroy(confidence);
+            proj_list_destroy(list);
+            text_of(proj_get_id_code(best?.0, 0))?.parse().ok()
+        }
+    }
+
+    fn axis_count(&self, crs: &Object) -> Result<i32, String> {
+        // SAFETY: objects belong to this context and are alive.
+        unsafe {
+            if proj_get_type(crs.0) == PJ_TYPE_PJ_TYPE_COMPOUND_CRS {
+                return Ok(3);
+            }
+            let axes = self.own(proj_crs_get_coordinate_system(self.0, crs.0))?;
+            Ok(proj_cs_get_axis_count(self.0, axes.0))
         }
     }
 
@@ -239,6 +273,65 @@ impl std::fmt::Debug for Pool {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_tuple("Pool").field(&self.recipe).finish()
     }
+}
+
+/// The EPSG codes found in a CRS.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Codes {
+    pub(crate) name: String,
+    pub(crate) horizontal: Option<u32>,
+    pub(crate) vertical: Option<u32>,
+    /// Heights are an axis of the CRS itself, above its ellipsoid.
+    pub(crate) three_dimensional: bool,
+}
+
+/// Takes a CRS apart into its codes.
+pub(crate) fn codes(definition: &str) -> Result<Codes, String> {
+    let context = Context::new();
+    let mut crs = context.create(definition)?;
+    // SAFETY: all objects belong to this context and are alive; results are owned by `Object`.
+    unsafe {
+        if proj_get_type(crs.0) == PJ_TYPE_PJ_TYPE_BOUND_CRS {
+            crs = context.own(proj_get_source_crs(context.0, crs.0))?;
+        }
+        let name = text_of(proj_get_name(crs.0)).unwrap_or_default();
+        let (mut ground, mut vertical) = (context.own(proj_crs_demote_to_2D(context.0, ptr::null(), crs.0))?, None);
+        if proj_get_type(crs.0) == PJ_TYPE_PJ_TYPE_COMPOUND_CRS {
+            ground = context.own(proj_crs_get_sub_crs(context.0, crs.0, 0))?;
+            let height = context.own(proj_crs_get_sub_crs(context.0, crs.0, 1))?;
+            vertical = context.epsg(&height);
+        }
+        let axes = context.axis_count(&crs)?;
+        Ok(Codes {
+            name,
+            horizontal: context.epsg(&ground),
+            vertical,
+            three_dimensional: vertical.is_none() && axes == 3,
+        })
+    }
+}
+
+/// WKT2:2019 of a CRS, with an ellipsoidal height axis added when `promote` is set.
+pub(crate) fn wkt(definition: &str, promote: bool) -> Result<String, String> {
+    let context = Context::new();
+    let mut crs = context.create(definition)?;
+    // SAFETY: all objects belong to this context and are alive; the text belongs to `crs` and is copied at once.
+    unsafe {
+        if promote {
+            crs = context.own(proj_crs_promote_to_3D(context.0, ptr::null(), crs.0))?;
+        }
+        let text = proj_as_wkt(context.0, crs.0, PJ_WKT_TYPE_PJ_WKT2_2019, ptr::null());
+        text_of(text).ok_or_else(|| context.reason())
+    }
+}
+
+/// Copies a text of PROJ's.
+///
+/// # Safety
+/// `text` is null or a zero-terminated string that is alive.
+unsafe fn text_of(text: *const c_char) -> Option<String> {
+    // SAFETY: promised by the caller.
+    (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())
 }
 
 /// Metres per map unit of a CRS's horizontal axes; `None` when they are angles.
