@@ -31,6 +31,13 @@ impl GeoTransform {
         Some(((dx * c[5] - dy * c[2]) / det - 0.5, (dy * c[1] - dx * c[4]) / det - 0.5))
     }
 
+    /// The transform of a part whose first cell is at (`column`, `row`) of this grid.
+    pub fn shifted(&self, column: f64, row: f64) -> Self {
+        let c = &self.0;
+        let (x, y) = (c[0] + column * c[1] + row * c[2], c[3] + column * c[4] + row * c[5]);
+        Self([x, c[1], c[2], y, c[4], c[5]])
+    }
+
     /// Side lengths of a cell along columns and rows, in map units.
     pub fn cell_size(&self) -> (f64, f64) {
         let c = &self.0;

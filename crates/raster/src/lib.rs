@@ -5,10 +5,12 @@
 
 mod geotransform;
 mod grid;
+mod mask;
 mod window;
 
 pub use geotransform::GeoTransform;
 pub use grid::Grid;
+pub use mask::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, Flags, is_missing};
 pub use window::Window;
 
 /// The no-data value of every float raster that the toolkit writes, unless told otherwise.

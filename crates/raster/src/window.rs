@@ -25,14 +25,25 @@ impl Window {
     pub fn intersection(&self, other: &Self) -> Option<Self> {
         let x0 = self.x.max(other.x);
         let y0 = self.y.max(other.y);
-        let x1 = (self.x + self.width as i64).min(other.x + other.width as i64);
-        let y1 = (self.y + self.height as i64).min(other.y + other.height as i64);
+        let x1 = end(self.x, self.width).min(end(other.x, other.width));
+        let y1 = end(self.y, self.height).min(end(other.y, other.height));
         (x1 > x0 && y1 > y0).then(|| Self { x: x0, y: y0, width: (x1 - x0) as usize, height: (y1 - y0) as usize })
     }
 
     /// The window grown by `margin` pixels on every side.
     pub fn grown(&self, margin: usize) -> Self {
         let m = margin as i64;
-        Self { x: self.x - m, y: self.y - m, width: self.width + 2 * margin, height: self.height + 2 * margin }
+        let grown = |side: usize| side.saturating_add(margin.saturating_mul(2));
+        Self {
+            x: self.x.saturating_sub(m),
+            y: self.y.saturating_sub(m),
+            width: grown(self.width),
+            height: grown(self.height),
+        }
     }
+}
+
+/// One past the last pixel; windows at the edge of the number range stay there.
+fn end(start: i64, length: usize) -> i64 {
+    start.saturating_add(i64::try_from(length).unwrap_or(i64::MAX))
 }

@@ -1,0 +1,24 @@
+//! Rasters in files: images and surface models read through GDAL, Cloud-Optimised GeoTIFFs and PNGs written.
+//!
+//! GDAL's pixel corners are met here and in `raster::GeoTransform`: windows and images follow this toolkit's
+//! convention (the centre of the upper-left pixel is 0, 0). Only local files are read, and nothing that a file names
+//! on a network is fetched. A file appears under its final name when it is complete.
+
+mod atomic;
+mod dem;
+mod error;
+mod gdal_setup;
+mod geotiff;
+mod luma;
+mod png;
+mod source;
+
+pub use dem::{Dem, read_dem, read_dem_window};
+pub use error::RasterError;
+pub use geotiff::{Band, BandData, CogRaster, Sampling, write_cog, write_image_with_rpc};
+pub use luma::{LumaRule, LumaTile};
+pub use png::{write_png_gray, write_png_rgb};
+pub use source::{ImageInfo, ImageSource, SampleType};
+
+pub(crate) use atomic::write_whole;
+pub(crate) use gdal_setup::{open_dataset, with_gdal};

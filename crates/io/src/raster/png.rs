@@ -1,0 +1,44 @@
+//! Pictures for people: 8-bit PNG, grey or RGB.
+
+use std::path::Path;
+
+use image::{ExtendedColorType, ImageFormat};
+use raster::Grid;
+
+use super::{RasterError, write_whole};
+
+/// Writes a grey picture.
+///
+/// # Errors
+/// [`RasterError::Exists`] without `overwrite`, [`RasterError::Unwritable`].
+pub fn write_png_gray(path: impl AsRef<Path>, picture: &Grid<u8>, overwrite: bool) -> Result<(), RasterError> {
+    write(path.as_ref(), picture.data(), picture.width(), picture.height(), ExtendedColorType::L8, overwrite)
+}
+
+/// Writes a colour picture; pixels are red, green, blue.
+///
+/// # Errors
+/// [`RasterError::Exists`] without `overwrite`, [`RasterError::Unwritable`].
+pub fn write_png_rgb(path: impl AsRef<Path>, picture: &Grid<[u8; 3]>, overwrite: bool) -> Result<(), RasterError> {
+    let bytes = picture.data().as_flattened();
+    write(path.as_ref(), bytes, picture.width(), picture.height(), ExtendedColorType::Rgb8, overwrite)
+}
+
+fn write(
+    path: &Path,
+    bytes: &[u8],
+    width: usize,
+    height: usize,
+    colour: ExtendedColorType,
+    overwrite: bool,
+) -> Result<(), RasterError> {
+    let too_large = |_| RasterError::unwritable(path, "a PNG has at most 2^32 - 1 columns and rows");
+    let (width, height) = (u32::try_from(width).map_err(too_large)?, u32::try_from(height).map_err(too_large)?);
+    if width == 0 || height == 0 {
+        return Err(RasterError::unwritable(path, "the picture has no pixels"));
+    }
+    write_whole(path, overwrite, |made| {
+        image::save_buffer_with_format(made, bytes, width, height, colour, ImageFormat::Png)
+            .map_err(|error| RasterError::unwritable(path, error))
+    })
+}

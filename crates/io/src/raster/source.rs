@@ -1,0 +1,213 @@
+//! An image opened through GDAL, read by windows.
+//!
+//! An [`ImageSource`] is `Send` and not `Sync`, as GDAL's datasets are: give each thread its own with
+//! [`ImageSource::reopen`].
+
+use std::path::{Path, PathBuf};
+
+use gdal::raster::{GdalDataType, RasterBand};
+use gdal::{Dataset, Metadata};
+use raster::{GeoTransform, Grid, Window};
+
+use super::luma::{self, LumaRule, LumaTile};
+use super::{RasterError, open_dataset, with_gdal};
+
+/// How samples are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum SampleType {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    F32,
+    F64,
+}
+
+impl SampleType {
+    /// The largest value that a saturated detector can give, for integer samples.
+    pub(crate) fn maximum(self, bits: Option<u32>) -> Option<f32> {
+        let full = match self {
+            Self::U8 => 8,
+            Self::U16 => 16,
+            Self::I8 => 7,
+            Self::I16 => 15,
+            // 32-bit samples hold computed values, not detector counts.
+            Self::U32 | Self::I32 | Self::F32 | Self::F64 => return None,
+        };
+        let used = bits.filter(|&b| b > 0 && b < full).unwrap_or(full);
+        Some(((1_u32 << used) - 1) as f32)
+    }
+}
+
+/// What is known of an image without reading its pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageInfo {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Number of bands, alpha included.
+    pub bands: usize,
+    /// Sample type of the first band.
+    pub sample: SampleType,
+    /// Significant bits per sample where the file says (11 for most satellite images).
+    pub bits: Option<u32>,
+    /// GDAL's name for the format.
+    pub driver: String,
+    /// CRS as WKT, if the file has one.
+    pub crs_wkt: Option<String>,
+    /// Affine georeference, if the file has one.
+    pub geotransform: Option<GeoTransform>,
+    /// No-data value of the first band, if declared.
+    pub no_data: Option<f64>,
+    /// How one luma value is made of the bands.
+    pub luma: LumaRule,
+}
+
+/// An open image.
+pub struct ImageSource {
+    path: PathBuf,
+    dataset: Dataset,
+    info: ImageInfo,
+}
+
+impl ImageSource {
+    /// Opens a local raster of any GDAL format.
+    ///
+    /// # Errors
+    /// [`RasterError::Unreadable`], [`RasterError::NotLocal`], [`RasterError::NotARaster`], and
+    /// [`RasterError::Unsupported`] for rasters without bands and complex samples.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, RasterError> {
+        let path = path.as_ref().to_owned();
+        let dataset = open_dataset(&path)?;
+        let info = describe(&path, &dataset)?;
+        Ok(Self { path, dataset, info })
+    }
+
+    /// A handle of its own on the same file, for another thread.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn reopen(&self) -> Result<Self, RasterError> {
+        Self::open(&self.path)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Size, type, georeference.
+    pub fn info(&self) -> &ImageInfo {
+        &self.info
+    }
+
+    /// The window of the whole image.
+    pub fn window(&self) -> Window {
+        Window::whole(self.info.width, self.info.height)
+    }
+
+    /// Metadata of a GDAL domain (`""`, `"RPC"`, `"IMD"`, …) as key and value.
+    pub fn metadata(&self, domain: &str) -> Vec<(String, String)> {
+        let items = self.dataset.metadata_domain(domain).unwrap_or_default();
+        items.iter().filter_map(|item| item.split_once('=')).map(|(k, v)| (k.to_owned(), v.to_owned())).collect()
+    }
+
+    /// One grey value per pixel of a window, with what is known against each pixel. The window may reach outside the
+    /// image; nothing is resampled. See [`LumaRule`] for the bands and [`LumaTile`] for the flags.
+    ///
+    /// # Errors
+    /// [`RasterError::Damaged`] when GDAL cannot decode the pixels.
+    pub fn read_luma(&self, window: Window) -> Result<LumaTile, RasterError> {
+        luma::read(self, window)
+    }
+
+    /// One band (counted from 1) over a window inside the image, as f32 and untouched.
+    pub(crate) fn read_band(&self, band: usize, inside: Window) -> Result<Grid<f32>, RasterError> {
+        read_as(&self.path, &self.dataset, band, inside)
+    }
+
+    /// GDAL's validity mask of a band over a window inside the image (0 is invalid); `None` when all is valid.
+    pub(crate) fn read_mask(&self, band: usize, inside: Window) -> Result<Option<Grid<u8>>, RasterError> {
+        let fails = |reason: String| RasterError::damaged(&self.path, reason);
+        let flags = with_gdal(|| self.dataset.rasterband(band)?.mask_flags()).map_err(fails)?;
+        if flags.is_all_valid() {
+            return Ok(None);
+        }
+        let buffer =
+            with_gdal(|| read_buffer(&self.dataset.rasterband(band)?.open_mask_band()?, inside)).map_err(fails)?;
+        grid_of(&self.path, inside, buffer).map(Some)
+    }
+}
+
+/// One band over a window inside a dataset.
+pub(super) fn read_as<T: Copy + gdal::raster::GdalType>(
+    path: &Path,
+    dataset: &Dataset,
+    band: usize,
+    inside: Window,
+) -> Result<Grid<T>, RasterError> {
+    let buffer = with_gdal(|| read_buffer(&dataset.rasterband(band)?, inside))
+        .map_err(|reason| RasterError::damaged(path, reason))?;
+    grid_of(path, inside, buffer)
+}
+
+fn read_buffer<T: Copy + gdal::raster::GdalType>(
+    band: &RasterBand<'_>,
+    inside: Window,
+) -> Result<Vec<T>, gdal::errors::GdalError> {
+    let size = (inside.width, inside.height);
+    let buffer = band.read_as::<T>((inside.x as isize, inside.y as isize), size, size, None)?;
+    Ok(buffer.into_shape_and_vec().1)
+}
+
+fn grid_of<T>(path: &Path, inside: Window, data: Vec<T>) -> Result<Grid<T>, RasterError> {
+    Grid::from_vec(inside.width, inside.height, data)
+        .ok_or_else(|| RasterError::damaged(path, "GDAL returned another number of pixels than asked for"))
+}
+
+fn describe(path: &Path, dataset: &Dataset) -> Result<ImageInfo, RasterError> {
+    let unsupported = |found: String, expected| RasterError::Unsupported { path: path.to_owned(), found, expected };
+    let (width, height) = dataset.raster_size();
+    let bands = dataset.raster_count();
+    if bands == 0 || width == 0 || height == 0 {
+        return Err(unsupported(format!("{width} x {height} pixels in {bands} bands"), "at least one band of pixels"));
+    }
+    let first = with_gdal(|| dataset.rasterband(1)).map_err(|reason| RasterError::damaged(path, reason))?;
+    let sample = sample_type(first.band_type()).ok_or_else(|| {
+        unsupported("complex or 64-bit integer samples".to_owned(), "8 to 32-bit integer or float samples")
+    })?;
+    let geotransform = with_gdal(|| dataset.geo_transform()).ok().map(GeoTransform);
+    let crs_wkt = Some(dataset.projection()).filter(|wkt| !wkt.is_empty());
+    let bits = first.metadata_item("NBITS", "IMAGE_STRUCTURE").and_then(|text| text.trim().parse().ok());
+    let info = ImageInfo {
+        width,
+        height,
+        bands,
+        sample,
+        bits,
+        driver: dataset.driver().short_name(),
+        crs_wkt,
+        geotransform,
+        no_data: first.no_data_value(),
+        luma: LumaRule::of(dataset),
+    };
+    Ok(info)
+}
+
+fn sample_type(gdal: GdalDataType) -> Option<SampleType> {
+    Some(match gdal {
+        GdalDataType::UInt8 => SampleType::U8,
+        GdalDataType::UInt16 => SampleType::U16,
+        GdalDataType::Int16 => SampleType::I16,
+        GdalDataType::UInt32 => SampleType::U32,
+        GdalDataType::Int32 => SampleType::I32,
+        GdalDataType::Float32 => SampleType::F32,
+        GdalDataType::Float64 => SampleType::F64,
+        _ => return None,
+    })
+}
