@@ -1,5 +1,7 @@
 //! Rasters through files: what is written reads back, what is damaged is refused with a reason, real images open.
 
+#![allow(clippy::print_stdout)]
+
 use std::path::{Path, PathBuf};
 
 use camera::Rpc;
