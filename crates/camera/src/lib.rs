@@ -5,6 +5,7 @@
 //!
 //! - [`Rpc`] projects and localises, [`RpcPlane`] does so at one height, [`RpcCamera`] adds an [`ImageCorrection`].
 //! - [`TileInterpolant`] replaces a chain of cameras on a tile, with a measured error.
+//! - [`RpcFit`] fits an RPC to correspondences or to any camera.
 //! - [`Rpc::validate`] tells coefficients that can be a camera from those that cannot, [`Rpc::domain`] where they hold.
 
 mod batch;
@@ -12,6 +13,7 @@ mod camera;
 mod correction;
 mod domain;
 mod error;
+mod fit;
 mod interpolant;
 mod jacobian;
 mod kernel;
@@ -26,6 +28,7 @@ pub use camera::RpcCamera;
 pub use correction::ImageCorrection;
 pub use domain::ValidityDomain;
 pub use error::{CameraError, Key, RpcError};
+pub use fit::{Correspondence, FitError, RpcFit};
 pub use interpolant::{DEFAULT_TOLERANCE_PX, InterpolantError, RowInterpolant, TileExtent, TileInterpolant};
 pub use jacobian::ImageFromGroundJacobian;
 pub use plane::{EXTRAPOLATION_MAX, RpcPlane};

@@ -64,7 +64,6 @@ pub(crate) fn derivative_by_height(c: &[f64; 20], l: f64, p: f64, h: f64) -> f64
         + h * (2.0 * (c[9] + l * c[13] + p * c[16]) + 3.0 * h * c[19])
 }
 
-#[cfg(test)]
 /// The twenty terms themselves, in RPC00B order.
 pub(crate) fn terms(l: f64, p: f64, h: f64) -> [f64; 20] {
     [
