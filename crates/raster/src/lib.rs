@@ -3,14 +3,22 @@
 //! One pixel convention everywhere: the centre of the upper-left pixel is at (0, 0). GDAL's corner convention
 //! (centre at 0.5, 0.5) is met in [`GeoTransform`] and in the readers, and nowhere else.
 
+mod gaussian;
 mod geotransform;
 mod grid;
 mod mask;
+mod pyramid;
+mod relief;
+mod resample;
 mod window;
 
+pub use gaussian::gaussian;
 pub use geotransform::GeoTransform;
 pub use grid::Grid;
 pub use mask::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, Flags, is_missing};
+pub use pyramid::{Pyramid, level_from_level0, level0_from_level, reduce};
+pub use relief::{Light, coloured_relief, height_percentiles, hillshade};
+pub use resample::{Interpolation, bicubic, bilinear, resample, sample};
 pub use window::Window;
 
 /// The no-data value of every float raster that the toolkit writes, unless told otherwise.

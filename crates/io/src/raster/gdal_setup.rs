@@ -70,9 +70,17 @@ thread_local! {
     static MESSAGES: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
+/// Makes GDAL quiet and local; every other use of GDAL in this crate comes after. Cheap when done already.
+///
+/// The handler is set once for the life of the process: replacing it would free the old one while another thread may be
+/// inside it.
+pub(crate) fn prepare_gdal() {
+    READY.call_once(prepare);
+}
+
 /// Runs something that calls GDAL, and turns a failure into GDAL's own words.
 pub(crate) fn with_gdal<T>(call: impl FnOnce() -> Result<T, GdalError>) -> Result<T, String> {
-    READY.call_once(prepare);
+    prepare_gdal();
     MESSAGES.with_borrow_mut(Vec::clear);
     call().map_err(|error| {
         let messages = MESSAGES.with_borrow_mut(std::mem::take);

@@ -21,4 +21,4 @@ pub use png::{write_png_gray, write_png_rgb};
 pub use source::{ImageInfo, ImageSource, SampleType};
 
 pub(crate) use atomic::write_whole;
-pub(crate) use gdal_setup::{open_dataset, with_gdal};
+pub(crate) use gdal_setup::{open_dataset, prepare_gdal, with_gdal};

@@ -1,0 +1,165 @@
+//! Values between pixel centres: bilinear and bicubic.
+//!
+//! Bicubic is Keys' convolution with a = −1/2 (IEEE Trans. ASSP 29, 1981; Catmull–Rom), exact for quadratics. No-data
+//! (NaN) never bleeds: a bilinear value exists where every pixel with a non-zero weight does, and is NaN elsewhere;
+//! bicubic falls back to bilinear where its 4 × 4 neighbourhood is not complete. Positions outside
+//! [0, width − 1] × [0, height − 1] have no value: nothing is extrapolated.
+
+use rayon::prelude::*;
+
+use crate::Grid;
+
+/// Interpolation between pixel centres.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Interpolation {
+    /// Four pixels.
+    Bilinear,
+    /// Sixteen pixels, four where they are not all there.
+    #[default]
+    Bicubic,
+}
+
+/// The value at a position, or NaN where there is none.
+pub fn sample(grid: &Grid<f32>, column: f64, row: f64, interpolation: Interpolation) -> f32 {
+    match interpolation {
+        Interpolation::Bilinear => bilinear(grid, column, row),
+        Interpolation::Bicubic => bicubic(grid, column, row),
+    }
+}
+
+/// The bilinear value at a position, or NaN where there is none.
+pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
+    let (Some((c, u)), Some((r, v))) = (split(column, grid.width()), split(row, grid.height())) else {
+        return f32::NAN;
+    };
+    let top = along(grid.row(r), c, u);
+    if v == 0.0 { top } else { mix(top, along(grid.row(r + 1), c, u), v) }
+}
+
+/// The bicubic value at a position, the bilinear one where the 4 × 4 pixels around it are not all there, or NaN.
+pub fn bicubic(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
+    let (Some((c, u)), Some((r, v))) = (split(column, grid.width()), split(row, grid.height())) else {
+        return f32::NAN;
+    };
+    if c < 1 || r < 1 || c + 2 >= grid.width() || r + 2 >= grid.height() {
+        return bilinear(grid, column, row);
+    }
+    let (wu, wv) = (cubic_weights(u), cubic_weights(v));
+    let mut value = 0.0;
+    for (j, weight) in wv.iter().enumerate() {
+        let pixels = &grid.row(r - 1 + j)[c - 1..c + 3];
+        value += weight * (wu[0] * pixels[0] + wu[1] * pixels[1] + wu[2] * pixels[2] + wu[3] * pixels[3]);
+    }
+    if value.is_finite() { value } else { bilinear(grid, column, row) }
+}
+
+/// A grid filled from another through a map of positions, rows in parallel.
+///
+/// `source_from_target` gives the (column, row) in `source` of a target cell; cells without a value become NaN.
+pub fn resample(
+    source: &Grid<f32>,
+    width: usize,
+    height: usize,
+    interpolation: Interpolation,
+    source_from_target: impl Fn(f64, f64) -> (f64, f64) + Sync,
+) -> Grid<f32> {
+    let mut target = Grid::filled(width, height, f32::NAN);
+    if width > 0 {
+        target.data_mut().par_chunks_mut(width).enumerate().for_each(|(row, cells)| {
+            for (column, cell) in cells.iter_mut().enumerate() {
+                let (x, y) = source_from_target(column as f64, row as f64);
+                *cell = sample(source, x, y, interpolation);
+            }
+        });
+    }
+    target
+}
+
+/// Whole and fractional part of a position in `[0, length − 1]`.
+fn split(position: f64, length: usize) -> Option<(usize, f32)> {
+    if length == 0 || !(position >= 0.0 && position <= (length - 1) as f64) {
+        return None;
+    }
+    let whole = position as usize;
+    let fraction = (position - whole as f64) as f32;
+    // A fraction that rounds to 1 belongs to the next pixel.
+    Some(if fraction == 1.0 { (whole + 1, 0.0) } else { (whole, fraction) })
+}
+
+fn along(row: &[f32], column: usize, fraction: f32) -> f32 {
+    if fraction == 0.0 { row[column] } else { mix(row[column], row[column + 1], fraction) }
+}
+
+fn mix(a: f32, b: f32, fraction: f32) -> f32 {
+    a + (b - a) * fraction
+}
+
+/// Weights of the pixels at −1, 0, 1, 2 for a fraction in [0, 1).
+fn cubic_weights(t: f32) -> [f32; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [0.5 * (-t3 + 2.0 * t2 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (-3.0 * t3 + 4.0 * t2 + t), 0.5 * (t3 - t2)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn field(f: impl Fn(f64, f64) -> f64) -> Grid<f32> {
+        let data = (0..12 * 9).map(|i| f((i % 12) as f64, (i / 12) as f64) as f32).collect();
+        Grid::from_vec(12, 9, data).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn planes_are_exact_for_bilinear_and_quadratics_for_bicubic(x in 0.0..=11.0f64, y in 0.0..=8.0f64) {
+            let plane = |x: f64, y: f64| 3.0 - 0.5 * x + 0.25 * y;
+            prop_assert!((f64::from(bilinear(&field(plane), x, y)) - plane(x, y)).abs() < 1e-5);
+            let bowl = |x: f64, y: f64| 0.1 * x * x - 0.2 * x * y + 0.05 * y * y;
+            if (1.0..10.0).contains(&x) && (1.0..7.0).contains(&y) {
+                prop_assert!((f64::from(bicubic(&field(bowl), x, y)) - bowl(x, y)).abs() < 1e-4);
+            }
+        }
+
+        #[test]
+        fn a_hole_never_bleeds(x in -1.0..12.0f64, y in -1.0..9.0f64) {
+            let mut grid = field(|_, _| 7.0);
+            grid[(5, 4)] = f32::NAN;
+            for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
+                let value = sample(&grid, x, y, interpolation);
+                let inside = (0.0..=11.0).contains(&x) && (0.0..=8.0).contains(&y);
+                let near = (x - 5.0).abs() < 1.0 && (y - 4.0).abs() < 1.0;
+                if inside && !near {
+                    prop_assert!((value - 7.0).abs() < 1e-5);
+                } else {
+                    prop_assert!(value.is_nan());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_and_edges_are_kept() {
+        let grid = field(|x, y| x * 10.0 + y);
+        for (c, r) in [(0, 0), (11, 0), (0, 8), (11, 8), (10, 7), (5, 4)] {
+            assert_eq!(bicubic(&grid, c as f64, r as f64), grid[(c, r)]);
+            assert_eq!(bilinear(&grid, c as f64, r as f64), grid[(c, r)]);
+        }
+        for (x, y) in [(-1e-9, 0.0), (11.0 + 1e-9, 0.0), (f64::NAN, 1.0), (0.0, f64::INFINITY)] {
+            assert!(bilinear(&grid, x, y).is_nan() && bicubic(&grid, x, y).is_nan());
+        }
+        assert!(bilinear(&Grid::filled(0, 0, 1.0), 0.0, 0.0).is_nan());
+        let lone = Grid::filled(1, 1, 4.0);
+        assert_eq!(bicubic(&lone, 0.0, 0.0), 4.0);
+    }
+
+    #[test]
+    fn resampling_by_the_identity_copies() {
+        let grid = field(|x, y| (x * 1.7 + y).sin());
+        assert_eq!(resample(&grid, 12, 9, Interpolation::Bicubic, |x, y| (x, y)), grid);
+        let shifted = resample(&grid, 12, 9, Interpolation::Bilinear, |x, y| (x + 1.0, y));
+        assert_eq!(shifted[(3, 3)], grid[(4, 3)]);
+        assert!(shifted[(11, 3)].is_nan());
+        assert_eq!(resample(&grid, 0, 4, Interpolation::Bilinear, |x, y| (x, y)).data().len(), 0);
+    }
+}
