@@ -6,10 +6,11 @@
 //! them with 15 digits; where they differ (GDAL prefers files beside the image), GDAL's are, with a warning.
 
 use std::path::Path;
-use std::sync::Once;
 
 use camera::Rpc;
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, Metadata};
+
+use crate::raster::prepare_gdal;
 
 use super::draft::{Draft, Entry, RPC00B};
 use super::error::{Attempt, Fault};
@@ -46,14 +47,9 @@ const FOLLOWS_REFERENCES: [&str; 24] = [
 /// What GDAL's answer may differ by from the tag it was printed from.
 const PRINTED_TOLERANCE: f64 = 1e-13;
 
-static LOG_ERRORS: Once = Once::new();
-
 /// Opens an image read-only; the attempt says why it cannot be.
 pub(super) fn open(path: &Path) -> Result<Dataset, Attempt> {
-    // GDAL writes to standard error by itself; that belongs to the program that calls us.
-    LOG_ERRORS.call_once(|| {
-        gdal::config::set_error_handler(|_, number, message| tracing::debug!("GDAL {number}: {message}"));
-    });
+    prepare_gdal();
     let names: Vec<String> = DriverManager::all().map(|d| d.short_name()).collect();
     let is_allowed = |n: &&str| !FOLLOWS_REFERENCES.iter().any(|f| f.eq_ignore_ascii_case(n));
     let allowed: Vec<&str> = names.iter().map(String::as_str).filter(is_allowed).collect();
