@@ -54,7 +54,7 @@ pub enum GeodesyError {
     },
     /// A geoid grid is needed and not installed.
     #[error(
-        "heights above {datum} need one of the geoid grids {candidates}, and none was found: put one into a folder named by PROJ_DATA, or give its path"
+        "heights above {datum} need one of the geoid grids {candidates}, and none was found: put one into ~/.local/share/proj or into PROJ's own folder, or give its path (PROJ_DATA replaces the folders that PROJ searches: list its own there too)"
     )]
     MissingGrid {
         /// The datum asked for.

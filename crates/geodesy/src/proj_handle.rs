@@ -5,7 +5,7 @@
 //! silent: what it has to say is in the error. Axis order is longitude, latitude and east, north.
 #![allow(unsafe_code)]
 
-use std::ffi::{CStr, CString, c_char};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr;
 use std::sync::{Mutex, PoisonError};
 
@@ -17,8 +17,8 @@ use proj_sys::{
     proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D, proj_crs_get_coordinate_system, proj_crs_get_sub_crs,
     proj_crs_promote_to_3D, proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_id_auth_name,
     proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify, proj_int_list_destroy,
-    proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_level, proj_normalize_for_visualization,
-    proj_trans_generic,
+    proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_func, proj_log_level,
+    proj_normalize_for_visualization, proj_trans_generic,
 };
 
 /// How to make a transformation.
@@ -48,6 +48,9 @@ impl Direction {
     }
 }
 
+/// Where PROJ's log goes: some messages are printed whatever the level.
+unsafe extern "C" fn ignore(_data: *mut c_void, _level: c_int, _message: *const c_char) {}
+
 /// A PROJ context; destroyed last.
 struct Context(*mut PJ_CONTEXT);
 
@@ -57,6 +60,7 @@ impl Context {
         unsafe {
             let raw = proj_context_create();
             proj_log_level(raw, PJ_LOG_LEVEL_PJ_LOG_NONE);
+            proj_log_func(raw, ptr::null_mut(), Some(ignore));
             proj_context_set_enable_network(raw, 0);
             Self(raw)
         }
@@ -71,7 +75,7 @@ impl Context {
                 code => proj_context_errno_string(self.0, code),
             };
             if text.is_null() {
-                return "PROJ knows no definition or no operation".to_owned();
+                return "PROJ knows no such system, or no operation with the grids that are installed".to_owned();
             }
             CStr::from_ptr(text).to_string_lossy().into_owned()
         }
