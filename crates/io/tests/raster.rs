@@ -246,16 +246,22 @@ fn a_description_that_names_the_network_fetches_nothing() {
     listener.set_nonblocking(true).unwrap();
     let address = listener.local_addr().unwrap();
     let vrt = folder.path().join("trap.vrt");
-    let source = format!("/vsicurl/http://{address}/a.tif");
-    let band = format!(
-        r#"<VRTRasterBand dataType="Byte" band="1"><SimpleSource><SourceFilename>{source}</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand>"#
-    );
-    std::fs::write(&vrt, format!(r#"<VRTDataset rasterXSize="4" rasterYSize="4">{band}</VRTDataset>"#)).unwrap();
+    for source in [
+        format!("/vsicurl/http://{address}/a.tif"),
+        format!("NETCDF:&quot;http://{address}/a.nc&quot;:z"),
+        format!("http://{address}/a.tif"),
+        format!("/vsis3/bucket/a.tif?endpoint={address}"),
+    ] {
+        let band = format!(
+            r#"<VRTRasterBand dataType="Byte" band="1"><SimpleSource><SourceFilename>{source}</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand>"#
+        );
+        std::fs::write(&vrt, format!(r#"<VRTDataset rasterXSize="4" rasterYSize="4">{band}</VRTDataset>"#)).unwrap();
+        assert!(ImageSource::open(&vrt).and_then(|s| s.read_luma(s.window())).is_err(), "{source}");
+    }
     let wms = folder.path().join("trap.xml");
     let service =
         format!("<GDAL_WMS><Service name=\"TMS\"><ServerUrl>http://{address}/${{z}}</ServerUrl></Service></GDAL_WMS>");
     std::fs::write(&wms, service).unwrap();
-    assert!(ImageSource::open(&vrt).and_then(|s| s.read_luma(s.window())).is_err());
     assert!(ImageSource::open(&wms).is_err());
     assert!(listener.accept().is_err(), "something connected");
 }

@@ -13,8 +13,9 @@ use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, config};
 
 use super::RasterError;
 
-/// Drivers that reach a network or a data base from a description or a connection string.
-const NETWORK_DRIVERS: [&str; 27] = [
+/// Drivers that reach a network or a data base from a description or a connection string. NetCDF is among them: a VRT may
+/// name `NETCDF:"http://…"`, which its library fetches by itself.
+const NETWORK_DRIVERS: [&str; 31] = [
     "WMS",
     "WMTS",
     "WCS",
@@ -42,6 +43,10 @@ const NETWORK_DRIVERS: [&str; 27] = [
     "MySQL",
     "MongoDBv3",
     "GeoRaster",
+    "netCDF",
+    "DODS",
+    "ECW",
+    "JPIPKAK",
 ];
 
 /// Beginnings of names that lead off this machine.

@@ -25,10 +25,12 @@ const CHUNK_ROWS: usize = 256;
 
 /// The cells of one band.
 #[derive(Debug, Clone, Copy)]
-#[allow(missing_docs)]
 pub enum BandData<'a> {
+    /// Heights and other quantities; NaN is no-data.
     F32(&'a Grid<f32>),
+    /// Masks, classes, pictures.
     U8(&'a Grid<u8>),
+    /// Image samples, counts.
     U16(&'a Grid<u16>),
 }
 

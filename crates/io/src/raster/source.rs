@@ -15,15 +15,20 @@ use super::{RasterError, open_dataset, with_gdal};
 /// How samples are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-#[allow(missing_docs)]
 pub enum SampleType {
+    /// 8 bits, unsigned.
     U8,
-    I8,
+    /// 16 bits, unsigned.
     U16,
+    /// 16 bits, signed.
     I16,
+    /// 32 bits, unsigned.
     U32,
+    /// 32 bits, signed.
     I32,
+    /// Single precision.
     F32,
+    /// Double precision; read as single.
     F64,
 }
 
@@ -33,7 +38,6 @@ impl SampleType {
         let full = match self {
             Self::U8 => 8,
             Self::U16 => 16,
-            Self::I8 => 7,
             Self::I16 => 15,
             // 32-bit samples hold computed values, not detector counts.
             Self::U32 | Self::I32 | Self::F32 | Self::F64 => return None,
