@@ -4,8 +4,11 @@
 //! Results go to standard output; log lines and errors go to standard error.
 //! Exit codes: 0 complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
 
+mod dsm;
 mod error;
 mod log;
+mod print;
+mod progress;
 mod rpc;
 
 use std::process::ExitCode;
@@ -33,8 +36,17 @@ pub(crate) struct Global {
     verbose: u8,
 }
 
+impl Global {
+    /// Whether only errors are to be printed.
+    pub(crate) fn is_quiet(self) -> bool {
+        self.quiet
+    }
+}
+
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Make a surface model from satellite images.
+    Dsm(Box<dsm::Args>),
     /// Show, use and convert RPC camera models.
     Rpc(rpc::Args),
 }
@@ -65,6 +77,7 @@ fn main() -> ExitCode {
 
 fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
+        Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Rpc(args) => rpc::run(args),
     }
 }

@@ -1,7 +1,7 @@
 //! How the views see the scene: directions, intersection angles, overlaps, parallax.
 
 use camera::{CameraError, ImagePoint, RpcCamera};
-use geo::{Area, BooleanOps, ConvexHull, LineString, MultiPoint, Point, Polygon};
+use geo::{Area, BooleanOps, ConvexHull, MultiPoint, Point, Polygon};
 use geodesy::{EnuFrame, LonLatHeight};
 use sweep::source_from_reference;
 
@@ -20,49 +20,37 @@ pub struct PairGeometry {
 ///
 /// # Errors
 /// Those of localisation.
-pub fn footprint(
+pub(crate) fn footprint(
     camera: &RpcCamera,
     (width, height): (usize, usize),
     height_m: f64,
 ) -> Result<Vec<LonLatHeight>, CameraError> {
     let (w, h) = (width as f64 - 1.0, height as f64 - 1.0);
     // Corners and the middles of the sides: outlines of pushbroom images are slightly bent.
-    let outline = [
-        [0.0, 0.0], [0.5 * w, 0.0], [w, 0.0], [w, 0.5 * h], [w, h], [0.5 * w, h], [0.0, h], [0.0, 0.5 * h],
-    ];
+    let outline = [[0.0, 0.0], [0.5 * w, 0.0], [w, 0.0], [w, 0.5 * h], [w, h], [0.5 * w, h], [0.0, h], [0.0, 0.5 * h]];
     outline.iter().map(|[x, y]| camera.localize(ImagePoint::new(*x, *y), height_m)).collect()
 }
 
 /// A footprint as a polygon in metres of a local frame.
-pub fn local_polygon(footprint: &[LonLatHeight], frame: &EnuFrame) -> Polygon<f64> {
+pub(crate) fn local_polygon(footprint: &[LonLatHeight], frame: &EnuFrame) -> Polygon<f64> {
     let points: MultiPoint<f64> = footprint
         .iter()
         .map(|p| {
             let q = frame.enu_from_ground(*p);
-            Point::new(q.east_m, q.north_m)
+            Point::new(q.east, q.north)
         })
         .collect();
     points.convex_hull()
 }
 
 /// Common ground of two outlines as a share of the smaller one.
-pub fn overlap_share(a: &Polygon<f64>, b: &Polygon<f64>) -> f64 {
+pub(crate) fn overlap_share(a: &Polygon<f64>, b: &Polygon<f64>) -> f64 {
     let smaller = a.unsigned_area().min(b.unsigned_area());
     if smaller > 0.0 { a.intersection(b).unsigned_area() / smaller } else { 0.0 }
 }
 
-/// The common ground of all outlines, or `None` when they have none.
-pub fn common_ground(outlines: &[Polygon<f64>]) -> Option<Polygon<f64>> {
-    let (first, rest) = outlines.split_first()?;
-    let mut common = geo::MultiPolygon::new(vec![first.clone()]);
-    for other in rest {
-        common = common.intersection(&geo::MultiPolygon::new(vec![other.clone()]));
-    }
-    common.0.into_iter().max_by(|a, b| a.unsigned_area().total_cmp(&b.unsigned_area()))
-}
-
 /// The ground that at least two of the outlines share, as one hull.
-pub fn shared_ground(outlines: &[Polygon<f64>]) -> Option<Polygon<f64>> {
+pub(crate) fn shared_ground(outlines: &[Polygon<f64>]) -> Option<Polygon<f64>> {
     let mut points: Vec<Point<f64>> = Vec::new();
     for (i, a) in outlines.iter().enumerate() {
         for b in &outlines[..i] {
@@ -74,24 +62,18 @@ pub fn shared_ground(outlines: &[Polygon<f64>]) -> Option<Polygon<f64>> {
     (hull.unsigned_area() > 0.0).then_some(hull)
 }
 
-/// A rectangle as a polygon.
-pub fn rectangle([x0, y0, x1, y1]: [f64; 4]) -> Polygon<f64> {
-    Polygon::new(LineString::from(vec![(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), Vec::new())
-}
-
 /// Geometry of a pair of views at a ground point.
 ///
 /// # Errors
 /// Those of the cameras at that point.
-pub fn pair_geometry(
+pub(crate) fn pair_geometry(
     a: &RpcCamera,
     b: &RpcCamera,
     centre: LonLatHeight,
     overlap: f64,
 ) -> Result<PairGeometry, CameraError> {
     let (p, q) = (a.project(centre)?, b.project(centre)?);
-    let (u, v) = (a.rpc_view_direction(centre)?, b.rpc_view_direction(centre)?);
-    let cosine: f64 = u.iter().zip(v).map(|(x, y)| x * y).sum();
+    let angle_deg = a.view_direction(centre)?.intersection_angle_deg(&b.view_direction(centre)?);
     let (lo, hi) = (centre.height_m - 5.0, centre.height_m + 5.0);
     let move_px = |r: &RpcCamera, s: &RpcCamera, at: ImagePoint| {
         let place = |h| source_from_reference(r, s, 0, [at.sample, at.line], h);
@@ -99,5 +81,5 @@ pub fn pair_geometry(
         Ok::<f64, CameraError>((to[0] - from[0]).hypot(to[1] - from[1]) / (hi - lo))
     };
     let parallax_px_per_m = move_px(a, b, p)?.max(move_px(b, a, q)?);
-    Ok(PairGeometry { angle_deg: cosine.clamp(-1.0, 1.0).acos().to_degrees(), overlap, parallax_px_per_m })
+    Ok(PairGeometry { angle_deg, overlap, parallax_px_per_m })
 }

@@ -11,35 +11,35 @@ use sweep::{HeightMap, LevelConfig, SweepError, View, sweep_level};
 
 /// What the sweep needs to know of the scene.
 #[derive(Debug, Clone)]
-pub struct SweepPlan {
+pub(crate) struct SweepPlan {
     /// Heights to search, metres above the ellipsoid.
-    pub range_m: (f64, f64),
+    pub(crate) range_m: (f64, f64),
     /// Metres between hypotheses at full resolution; each coarser level doubles it.
-    pub step_m: f64,
+    pub(crate) step_m: f64,
     /// The coarsest pyramid level used.
-    pub top_level: usize,
+    pub(crate) top_level: usize,
     /// For each view, the views it is compared with.
-    pub sources: Vec<Vec<usize>>,
+    pub(crate) sources: Vec<Vec<usize>>,
     /// How many of the best sources count, at most.
-    pub best_of: usize,
+    pub(crate) best_of: usize,
     /// Cost, penalties and read-out.
-    pub level: LevelConfig,
+    pub(crate) level: LevelConfig,
 }
 
 /// Heights of all views at full resolution, and how many hypotheses were evaluated for them.
 #[derive(Debug, Clone)]
-pub struct SceneHeights {
+pub(crate) struct SceneHeights {
     /// One map per view.
-    pub maps: Vec<HeightMap>,
+    pub(crate) maps: Vec<HeightMap>,
     /// Pixel × hypothesis pairs over all views and levels.
-    pub evaluations: u64,
+    pub(crate) evaluations: u64,
 }
 
 /// Sweeps all views from the coarsest level down. `done` is told after each view and level.
 ///
 /// # Errors
 /// Those of [`sweep_level`].
-pub fn sweep_scene(views: &[View], plan: &SweepPlan, done: &(dyn Fn() + Sync)) -> Result<SceneHeights, SweepError> {
+pub(crate) fn sweep_scene(views: &[View], plan: &SweepPlan, done: &(dyn Fn() + Sync)) -> Result<SceneHeights, SweepError> {
     let origin_m = 0.5 * (plan.range_m.0 + plan.range_m.1);
     let mut maps: Vec<HeightMap> = Vec::new();
     let mut evaluations = 0;

@@ -1,1 +1,21 @@
-//! Placeholder head: replaced when the crate gets its content.
+//! The jobs of the toolkit, from files to files: configuration, scene set-up, the DSM run, its report.
+
+pub mod config;
+mod dem;
+mod dsm;
+mod error;
+pub mod geometry;
+mod heights;
+mod memory;
+mod output;
+mod pointing;
+pub mod progress;
+pub mod report;
+mod scene;
+mod setup;
+
+pub use config::{DsmConfig, Preset};
+pub use dsm::run_dsm;
+pub use error::PipelineError;
+pub use progress::{Choice, Progress, Silent};
+pub use report::DsmReport;

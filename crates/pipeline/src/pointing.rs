@@ -8,20 +8,20 @@ use sweep::pointing::{AdjustConfig, Adjustment, Tie, TieConfig, Track, adjust, m
 
 /// Ties of one pair of views.
 #[derive(Debug, Clone)]
-pub struct PairTies {
+pub(crate) struct PairTies {
     /// The view whose corners were searched.
-    pub reference: usize,
+    pub(crate) reference: usize,
     /// The view they were searched in.
-    pub source: usize,
+    pub(crate) source: usize,
     /// What was found.
-    pub ties: Vec<Tie>,
+    pub(crate) ties: Vec<Tie>,
 }
 
 /// Fewer ties than this on a pair do not tell a height range.
 const TIES_MIN: usize = 12;
 
 /// Matches the pairs, given best first. The first one with enough ties narrows the height range of the rest.
-pub fn match_pairs(
+pub(crate) fn match_pairs(
     views: &[View],
     pairs: &[(usize, usize)],
     range_m: (f64, f64),
@@ -56,7 +56,7 @@ fn heights_seen(views: &[View], pair: &PairTies) -> Option<(f64, f64)> {
 }
 
 /// Least and greatest height of an adjustment's inliers, when there are at least `min` of them.
-pub fn span_of(adjustment: &Adjustment, min: usize) -> Option<(f64, f64)> {
+pub(crate) fn span_of(adjustment: &Adjustment, min: usize) -> Option<(f64, f64)> {
     let mut heights: Vec<f64> = adjustment.ground.iter().flatten().map(|g| g.height_m).collect();
     if heights.len() < min {
         return None;
@@ -68,7 +68,7 @@ pub fn span_of(adjustment: &Adjustment, min: usize) -> Option<(f64, f64)> {
 }
 
 /// Joins the pairs' ties to tracks (one corner of a reference, seen in all its sources) and adjusts all views.
-pub fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
+pub(crate) fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
     let mut by_corner: BTreeMap<(usize, u64, u64), Track> = BTreeMap::new();
     for pair in pairs {
         for tie in &pair.ties {

@@ -41,6 +41,11 @@ impl Pyramid {
         &self.levels
     }
 
+    /// The levels by themselves, finest first.
+    pub fn into_levels(self) -> Vec<Grid<f32>> {
+        self.levels
+    }
+
     /// A level by number, 0 the finest.
     pub fn level(&self, level: usize) -> Option<&Grid<f32>> {
         self.levels.get(level)

@@ -95,7 +95,7 @@ fn mix(a: f32, b: f32, fraction: f32) -> f32 {
 }
 
 /// Weights of the pixels at −1, 0, 1, 2 for a fraction in [0, 1).
-fn cubic_weights(t: f32) -> [f32; 4] {
+pub fn cubic_weights(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [0.5 * (-t3 + 2.0 * t2 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (-3.0 * t3 + 4.0 * t2 + t), 0.5 * (t3 - t2)]
 }

@@ -5,16 +5,7 @@
 //! The map is compared with the exact chain at the tile's corners and heights; a tile over the bound is divided.
 
 use camera::{CameraError, ImagePoint, RpcCamera};
-
-/// Position on pyramid level `level` of a full-resolution position (both with the first pixel's centre at 0).
-pub fn level_from_full(x: f64, level: u32) -> f64 {
-    (x + 0.5) / f64::from(1u32 << level) - 0.5
-}
-
-/// Full-resolution position of a position on a pyramid level.
-pub(crate) fn full_from_level(x: f64, level: u32) -> f64 {
-    (x + 0.5) * f64::from(1u32 << level) - 0.5
-}
+use raster::{level_from_level0, level0_from_level};
 
 /// Where the point seen at `(u, v)` of the reference, at `height_m`, is in the source; both on pyramid level `level`.
 ///
@@ -27,9 +18,9 @@ pub fn source_from_reference(
     [u, v]: [f64; 2],
     height_m: f64,
 ) -> Result<[f64; 2], CameraError> {
-    let at = ImagePoint::new(full_from_level(u, level), full_from_level(v, level));
+    let at = ImagePoint::new(level0_from_level(u, level), level0_from_level(v, level));
     let p = source.project(reference.localize(at, height_m)?)?;
-    Ok([level_from_full(p.sample, level), level_from_full(p.line, level)])
+    Ok([level_from_level0(p.sample, level), level_from_level0(p.line, level)])
 }
 
 /// A local map from a tile of the reference and a height to the source: see the module's text.

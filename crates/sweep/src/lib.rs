@@ -17,7 +17,7 @@ mod readout;
 pub mod semiglobal;
 pub mod view;
 
-pub use geometry::{TileMap, level_from_full, source_from_reference};
+pub use geometry::{TileMap, source_from_reference};
 pub use level::{HeightMap, LevelConfig, sweep_level};
 pub use view::View;
 

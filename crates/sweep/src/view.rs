@@ -1,7 +1,7 @@
 //! A view: an image pyramid with its camera.
 
 use camera::RpcCamera;
-use raster::Grid;
+use raster::{Grid, Pyramid};
 
 /// The pyramid stops when a side would fall below this: a handful of patches.
 const SIDE_MIN: usize = 32;
@@ -21,39 +21,14 @@ impl View {
     /// A view of an image, NaN where invalid.
     pub fn new(camera: RpcCamera, image: Grid<f32>) -> Self {
         let noise = noise_deviation(&image);
-        let mut levels = vec![image];
-        while let Some(next) = levels.last().and_then(halved) {
-            levels.push(next);
-        }
-        Self { camera, levels, noise }
+        // Sixteen levels reach from the largest image there is to a pixel.
+        Self { camera, levels: Pyramid::new(image, 16, SIDE_MIN).into_levels(), noise }
     }
 
     /// The noise to expect on a level: averaging four pixels halves it, quantisation apart.
     pub fn noise_at(&self, level: usize) -> f32 {
         self.noise / (1 << level) as f32
     }
-}
-
-/// The next coarser level: means of 2 × 2 pixels over their valid ones, invalid where fewer than two are. `None` when
-/// it would be too small. A level's pixel p covers level 0 around `(p + 0.5) · 2^level − 0.5`.
-fn halved(g: &Grid<f32>) -> Option<Grid<f32>> {
-    let (w, h) = (g.width() / 2, g.height() / 2);
-    if w.min(h) < SIDE_MIN {
-        return None;
-    }
-    let mut out = Grid::filled(w, h, f32::NAN);
-    for y in 0..h {
-        let (above, below) = (g.row(2 * y), g.row(2 * y + 1));
-        for (x, o) in out.row_mut(y).iter_mut().enumerate() {
-            let four = [above[2 * x], above[2 * x + 1], below[2 * x], below[2 * x + 1]];
-            let valid = four.iter().filter(|v| !v.is_nan());
-            let (sum, n) = valid.fold((0.0, 0), |(s, n), v| (s + v, n + 1));
-            if n >= 2 {
-                *o = sum / n as f32;
-            }
-        }
-    }
-    Some(out)
 }
 
 /// Standard deviation of the noise: of the response to Immerkær's mask (1996), which smooth and straight structures do
@@ -101,15 +76,5 @@ mod tests {
         let g = Grid::from_vec(300, 300, values.collect()).unwrap();
         let found = noise_deviation(&g);
         assert!((found - 3.0).abs() < 0.3, "{found}");
-    }
-
-    #[test]
-    fn invalid_pixels_do_not_spread_up_the_pyramid() {
-        let mut g = Grid::filled(64, 64, 5.0f32);
-        g[(10, 10)] = f32::NAN;
-        (20..24).for_each(|x| (20..24).for_each(|y| g[(x, y)] = f32::NAN));
-        let half = halved(&g).unwrap();
-        assert_eq!((half[(5, 5)], half[(9, 10)]), (5.0, 5.0));
-        assert!(half[(10, 10)].is_nan() && half[(11, 11)].is_nan());
     }
 }

@@ -4,12 +4,6 @@
 
 use multiversion::multiversion;
 
-/// Catmull–Rom (Keys, a = −1/2) weights of the four samples around a position `t` in [0, 1) past the second one.
-pub(crate) fn cubic_weights(t: f32) -> [f32; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [-0.5 * t + t2 - 0.5 * t3, 1.0 - 2.5 * t2 + 1.5 * t3, 0.5 * t + 2.0 * t2 - 1.5 * t3, -0.5 * t2 + 0.5 * t3]
-}
-
 /// A picture of `width` columns per row, read from an offset on.
 #[derive(Clone, Copy)]
 pub(crate) struct Picture<'a> {
@@ -172,17 +166,6 @@ pub(crate) fn quantise(v: &[f32], scale: f32, out: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn cubic_weights_sum_to_one_and_reproduce_a_parabola() {
-        for i in 0..10 {
-            let t = i as f32 / 10.0;
-            let w = cubic_weights(t);
-            assert!((w.iter().sum::<f32>() - 1.0).abs() < 1e-6);
-            let parabola: f32 = w.iter().zip([-1.0f32, 0.0, 1.0, 2.0]).map(|(w, x)| w * x * x).sum();
-            assert!((parabola - t * t).abs() < 1e-5, "{parabola} at {t}");
-        }
-    }
 
     #[test]
     fn identical_patches_cost_nothing_whatever_gain_and_offset() {

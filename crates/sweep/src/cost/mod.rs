@@ -13,7 +13,7 @@ pub(crate) use kernels::patch_moments;
 mod tile;
 
 pub use tile::TileScratch;
-pub(crate) use tile::{BlockCosts, Reference, sample_bicubic, sweep_tile};
+pub(crate) use tile::{BlockCosts, Reference, sweep_tile};
 
 use raster::Grid;
 

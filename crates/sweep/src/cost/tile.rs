@@ -1,6 +1,6 @@
 //! One tile of the reference: all height planes, all sources.
 
-use raster::{Grid, Window};
+use raster::{Grid, Window, bicubic, cubic_weights};
 
 use super::kernels::{self, Picture, Side};
 use super::{Aggregation, COST_MAX, CostConfig, SourceLevel};
@@ -284,7 +284,7 @@ impl Laid {
             for x in 0..self.stride {
                 let p = [(padded.x + first[0] + x as i64) as f64, (padded.y + first[1] + y as i64) as f64];
                 let [u, v] = map.at(p, map.mid_height_m());
-                self.picture[y * self.stride + x] = sample_bicubic(image, u, v);
+                self.picture[y * self.stride + x] = bicubic(image, u, v);
             }
         }
         remove_mean(&mut self.picture);
@@ -304,30 +304,11 @@ impl Laid {
             self.plane.tile.fill(f32::NAN);
             return;
         }
-        let weights = (kernels::cubic_weights((dx - fx) as f32), kernels::cubic_weights((dy - fy) as f32));
+        let weights = (cubic_weights((dx - fx) as f32), cubic_weights((dy - fy) as f32));
         let picture = Picture { data: &self.picture, stride: self.stride };
         let at = (x0 as usize, y0 as usize);
         kernels::shift_bicubic(picture, at, weights, (width, height), rows, &mut self.plane.tile);
     }
-}
-
-/// Cubic convolution at a fractional position; NaN when one of the sixteen samples is missing.
-pub(crate) fn sample_bicubic(image: &Grid<f32>, u: f64, v: f64) -> f32 {
-    let (fu, fv) = (u.floor(), v.floor());
-    let inside = fu >= 1.0 && fv >= 1.0 && fu + 3.0 <= image.width() as f64 && fv + 3.0 <= image.height() as f64;
-    if !inside {
-        return f32::NAN;
-    }
-    let (x, y) = (fu as usize - 1, fv as usize - 1);
-    let (wx, wy) = (kernels::cubic_weights((u - fu) as f32), kernels::cubic_weights((v - fv) as f32));
-    let data = image.data();
-    let mut sum = 0.0;
-    for (j, w) in wy.iter().enumerate() {
-        let at = (y + j) * image.width() + x;
-        let s = &data[at..at + 4];
-        sum += w * (wx[0] * s[0] + wx[1] * s[1] + wx[2] * s[2] + wx[3] * s[3]);
-    }
-    sum
 }
 
 /// Copies a window that may reach outside the image; NaN there.

@@ -1,12 +1,12 @@
 //! One view's heights on the map grid.
 
 use geodesy::LonLatHeight;
-use raster::{GeoTransform, Grid, Window};
+use raster::{GeoTransform, Grid, Window, level0_from_level};
 use rayon::prelude::*;
 
 use crate::SweepError;
 use crate::consistency::{Heights, height_span};
-use crate::geometry::{TileMap, full_from_level};
+use crate::geometry::TileMap;
 use crate::level::{paste, tiles};
 
 /// The output grid: its placement and the map projection.
@@ -152,7 +152,7 @@ fn place_tile(
     let map = heights.map;
     let Some(range) = height_span(map, w) else { return Ok(out) };
     let exact = |[u, v]: [f64; 2], h: f64| {
-        let at = camera::ImagePoint::new(full_from_level(u, level), full_from_level(v, level));
+        let at = camera::ImagePoint::new(level0_from_level(u, level), level0_from_level(v, level));
         let ground = heights.view.camera.localize(at, h)?;
         let [x, y] = (frame.map_from_ground)(ground).ok_or(camera::CameraError::NotFinite)?;
         let (column, row) = frame.geotransform.cell_from_map(x, y).ok_or(camera::CameraError::NotFinite)?;
@@ -190,8 +190,7 @@ impl ViewSurface {
             return;
         }
         let own = &mut self.height_m[at];
-        // A NaN compares false: the first height always goes in.
-        if !(*own >= h) {
+        if own.is_nan() || *own < h {
             *own = h;
             self.sigma_m[at] = sigma;
         }

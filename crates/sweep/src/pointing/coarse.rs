@@ -3,11 +3,11 @@
 //! The source is laid over the reference once, so that every height is a shift, and the moments of all its patches are
 //! known before the first is compared.
 
-use raster::Grid;
+use raster::{Grid, bicubic};
 
 use super::patch::Patch;
 use super::ties::{Pair, TieConfig};
-use crate::cost::{patch_moments, sample_bicubic};
+use crate::cost::patch_moments;
 use crate::geometry::TileMap;
 
 /// A source laid over the reference, ready to be searched.
@@ -111,7 +111,7 @@ fn lay_over(source: &Grid<f32>, map: &TileMap) -> Option<([i64; 2], Grid<f32>)> 
         for x in 0..out.width() {
             let p = [(origin[0] + x as i64) as f64, (origin[1] + y as i64) as f64];
             let [u, v] = map.at(p, map.mid_height_m());
-            out[(x, y)] = sample_bicubic(source, u, v);
+            out[(x, y)] = bicubic(source, u, v);
         }
     }
     Some((origin, out))

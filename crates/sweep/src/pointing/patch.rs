@@ -1,8 +1,6 @@
 //! A patch of one image searched for in another, bent by the local map between them.
 
-use raster::Grid;
-
-use crate::cost::sample_bicubic;
+use raster::{Grid, bicubic};
 
 /// A zero-mean, unit-norm patch of `2 · radius + 1` pixels.
 pub(crate) struct Patch {
@@ -27,7 +25,7 @@ impl Patch {
         for j in -radius..=radius {
             for i in -radius..=radius {
                 let [u, v] = place(i, j);
-                let value = sample_bicubic(image, u, v);
+                let value = bicubic(image, u, v);
                 if value.is_nan() {
                     return None;
                 }

@@ -5,13 +5,13 @@
 //! fraction of a pixel, and kept when the search back from the source returns to where it came from.
 
 use camera::{CameraError, RpcCamera};
-use raster::Grid;
+use raster::{Grid, level_from_level0, level0_from_level};
 use rayon::prelude::*;
 
 use super::coarse::Coarse;
 use super::interest::corners;
 use super::patch::{Patch, parabola_peak};
-use crate::geometry::{full_from_level, source_from_reference};
+use crate::geometry::source_from_reference;
 use crate::view::View;
 
 /// One correspondence, in full-resolution image coordinates.
@@ -83,11 +83,11 @@ impl Pair<'_> {
         let predicted = self.chain(at, top, height_m).ok()?;
         let top_scale = f64::from(1u32 << top);
         let mut offset = [(place[0] - predicted[0]) * top_scale, (place[1] - predicted[1]) * top_scale];
-        let full = [full_from_level(at[0], top as u32), full_from_level(at[1], top as u32)];
+        let full = [level0_from_level(at[0], top as u32), level0_from_level(at[1], top as u32)];
         let mut correlation = 0.0;
         for level in (0..=top).rev() {
             let scale = f64::from(1u32 << level);
-            let at = [crate::level_from_full(full[0], level as u32), crate::level_from_full(full[1], level as u32)];
+            let at = [level_from_level0(full[0], level as u32), level_from_level0(full[1], level as u32)];
             let start = [offset[0] / scale, offset[1] / scale];
             let (refined, c) = self.refine(at, level, height_m, start, config)?;
             offset = [refined[0] * scale, refined[1] * scale];

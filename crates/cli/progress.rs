@@ -1,0 +1,92 @@
+//! Progress on stderr: bars for people, JSON lines for programs.
+
+use std::sync::Mutex;
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
+use pipeline::{Choice, Progress};
+
+use crate::Global;
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum ProgressStyle {
+    /// A bar per stage, where stderr is a terminal.
+    Bar,
+    /// One JSON object per line.
+    Json,
+    /// Nothing.
+    None,
+}
+
+/// Shows a job's progress.
+pub(crate) struct Watcher {
+    style: ProgressStyle,
+    quiet: bool,
+    bar: ProgressBar,
+    stage: Mutex<(String, Instant)>,
+}
+
+impl Watcher {
+    pub(crate) fn new(style: ProgressStyle, global: Global) -> Self {
+        let quiet = global.is_quiet();
+        let bar = ProgressBar::new(0);
+        let shown = style == ProgressStyle::Bar && !quiet;
+        bar.set_draw_target(if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() });
+        if let Ok(look) = BarStyle::with_template("{msg:22} {bar:30} {pos}/{len}") {
+            bar.set_style(look);
+        }
+        Self { style, quiet, bar, stage: Mutex::new((String::new(), Instant::now())) }
+    }
+
+    pub(crate) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn line(&self, value: &serde_json::Value) {
+        if self.style == ProgressStyle::Json {
+            self.say(&value.to_string());
+        }
+    }
+
+    #[allow(clippy::print_stderr, reason = "this is the command's own channel to the user")]
+    fn say(&self, text: &str) {
+        self.bar.suspend(|| eprintln!("{text}"));
+    }
+}
+
+impl Progress for Watcher {
+    fn begin(&self, stage: &str, steps: usize) {
+        self.bar.set_length(steps as u64);
+        self.bar.set_position(0);
+        self.bar.set_message(stage.to_owned());
+        if let Ok(mut current) = self.stage.lock() {
+            *current = (stage.to_owned(), Instant::now());
+        }
+        self.line(&serde_json::json!({ "event": "stage", "stage": stage, "steps": steps }));
+    }
+
+    fn step(&self) {
+        self.bar.inc(1);
+        if let Ok(current) = self.stage.lock() {
+            let seconds = current.1.elapsed().as_secs_f64();
+            self.line(&serde_json::json!({ "event": "step", "stage": current.0, "done": self.bar.position(), "seconds": seconds }));
+        }
+    }
+
+    fn choice(&self, choice: &Choice) {
+        if self.style == ProgressStyle::Json {
+            self.line(&serde_json::json!({ "event": "choice", "name": choice.name, "value": choice.value, "reason": choice.reason }));
+        } else if !self.quiet {
+            self.say(&format!("{:<13} {} ({})", choice.name, choice.value, choice.reason));
+        }
+    }
+
+    fn warn(&self, text: &str) {
+        if self.style == ProgressStyle::Json {
+            self.line(&serde_json::json!({ "event": "warning", "text": text }));
+        } else {
+            self.say(&format!("warning: {text}"));
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What a DSM run is asked for.
+
+use std::path::PathBuf;
+
+use geodesy::VerticalDatum;
+use serde::{Deserialize, Serialize};
+use sweep::LevelConfig;
+use sweep::cost::CostConfig;
+use sweep::semiglobal::Penalties;
+
+/// Speed against accuracy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// Half the resolution in parallax, two sources per view.
+    Fast,
+    /// The default.
+    #[default]
+    Balanced,
+    /// Every useful source.
+    Accurate,
+}
+
+/// A rectangle on the map: x_min, y_min, x_max, y_max.
+pub type Bounds = [f64; 4];
+
+/// A DSM run. Everything that is `None` is chosen from the scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DsmConfig {
+    /// The images, two or more.
+    pub images: Vec<PathBuf>,
+    /// The folder for the results.
+    pub output: PathBuf,
+    /// Cell size of the DSM, metres (units of the CRS).
+    pub gsd_m: Option<f64>,
+    /// EPSG code of the horizontal CRS.
+    pub crs_epsg: Option<u32>,
+    /// The area, in the DSM's CRS.
+    pub bounds: Option<Bounds>,
+    /// Least and greatest height to search, metres above the ellipsoid.
+    pub height_range_m: Option<(f64, f64)>,
+    /// A coarse elevation model that tells the height range.
+    pub dem: Option<PathBuf>,
+    /// What the DSM's heights are measured from.
+    pub vertical: VerticalDatum,
+    /// Speed against accuracy.
+    pub preset: Preset,
+    /// The pairs of images to match, by position in `images`; all useful ones when `None`.
+    pub pairs: Option<Vec<(usize, usize)>>,
+    /// The images to compute heights for, by position; all when `None`.
+    pub references: Option<Vec<usize>>,
+    /// Whether the RPCs' pointing is corrected.
+    pub pointing: bool,
+    /// Worker threads; all cores when `None`.
+    pub threads: Option<usize>,
+    /// Memory to stay under, megabytes.
+    pub memory_mb: Option<u64>,
+    /// Side of the output tiles that are fused at a time, cells.
+    pub tile: usize,
+    /// Whether existing results may be replaced.
+    pub overwrite: bool,
+}
+
+impl DsmConfig {
+    /// A run with every choice left to the program.
+    pub fn new(images: Vec<PathBuf>, output: PathBuf) -> Self {
+        Self {
+            images,
+            output,
+            gsd_m: None,
+            crs_epsg: None,
+            bounds: None,
+            height_range_m: None,
+            dem: None,
+            vertical: VerticalDatum::Ellipsoid,
+            preset: Preset::default(),
+            pairs: None,
+            references: None,
+            pointing: true,
+            threads: None,
+            memory_mb: None,
+            tile: 1024,
+            overwrite: false,
+        }
+    }
+}
+
+/// The parameters that a preset stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tuning {
+    /// Parallax between neighbouring hypotheses in the pair that sees most of it, pixels.
+    pub(crate) step_px: f64,
+    /// Sources per view, at most.
+    pub(crate) sources: usize,
+    /// How many of the best sources count at a pixel: half of them see it even beside a wall.
+    pub(crate) best_of: usize,
+    /// Cost, penalties and read-out.
+    pub(crate) level: LevelConfig,
+}
+
+impl Preset {
+    pub(crate) fn tuning(self) -> Tuning {
+        let (step_px, sources) = match self {
+            Self::Fast => (1.0, 2),
+            Self::Balanced => (0.5, 4),
+            Self::Accurate => (0.5, 8),
+        };
+        // The penalties are a quarter (P1) and once (P2) the cost difference of clearly right and wrong patches,
+        // the proportions of census 5 × 5 with P1 8, P2 32 in CARS and S2P.
+        let penalties = Penalties { step: 8, jump: 48, jump_at_edge: 24 };
+        let level = LevelConfig { cost: CostConfig::default(), penalties, temperature: 0.02 };
+        Tuning { step_px, sources, best_of: sources.div_ceil(2), level }
+    }
+}
