@@ -10,6 +10,7 @@ mod log;
 mod print;
 mod progress;
 mod rpc;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -49,6 +50,8 @@ enum Command {
     Dsm(Box<dsm::Args>),
     /// Show, use and convert RPC camera models.
     Rpc(rpc::Args),
+    /// Make a small town seen through RPC cameras, with its exact surface.
+    Simulate(simulate::Args),
 }
 
 #[allow(dead_code, reason = "constructed by the commands that are landing")]
@@ -79,5 +82,6 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Rpc(args) => rpc::run(args),
+        Command::Simulate(args) => simulate::run(args),
     }
 }
