@@ -2,8 +2,6 @@
 //! chosen at run time. A point's result depends on nothing but the point: not on its place in a slice nor on its
 //! neighbours. Machines with fused multiply-add differ from those without in the last bits.
 
-#![allow(unsafe_code)] // The dispatcher's calls to the functions that were compiled for a detected instruction set.
-
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
