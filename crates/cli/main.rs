@@ -6,6 +6,7 @@
 
 mod dsm;
 mod error;
+mod eval;
 mod log;
 mod print;
 mod progress;
@@ -48,6 +49,8 @@ impl Global {
 enum Command {
     /// Make a surface model from satellite images.
     Dsm(Box<dsm::Args>),
+    /// Measure how far a surface model is from a reference.
+    Eval(Box<eval::Args>),
     /// Show, use and convert RPC camera models.
     Rpc(rpc::Args),
     /// Make a small town seen through RPC cameras, with its exact surface.
@@ -81,6 +84,7 @@ fn main() -> ExitCode {
 fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Dsm(args) => dsm::run(args, cli.global),
+        Command::Eval(args) => eval::run(args),
         Command::Rpc(args) => rpc::run(args),
         Command::Simulate(args) => simulate::run(args),
     }

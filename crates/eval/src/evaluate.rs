@@ -93,7 +93,7 @@ pub fn evaluate(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Evaluation
     let (dx_m, dy_m) = input.metres_from_cells.apply(cells.0, cells.1);
     let mut shift = Shift { dx_m, dy_m, dz_m: 0.0 };
     if config.alignment != Alignment::None {
-        shift.dz_m = -offset;
+        shift.dz_m = 0.0 - offset;
         errors.data_mut().iter_mut().for_each(|e| *e -= offset);
     }
     Ok(Evaluation {

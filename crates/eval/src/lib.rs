@@ -17,6 +17,7 @@ mod resample;
 mod search;
 mod smooth;
 mod statistics;
+mod vertical;
 
 pub use align::{Alignment, MetresFromCells, Shift};
 pub use cell_map::CellMap;
@@ -26,3 +27,4 @@ pub use metrics::Metrics;
 pub use resample::{bilinear, nearest};
 pub use search::SearchSummary;
 pub use statistics::{ErrorStatistics, NMAD_FACTOR, percentile};
+pub use vertical::convert_heights;

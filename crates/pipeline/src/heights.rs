@@ -39,7 +39,11 @@ pub(crate) struct SceneHeights {
 ///
 /// # Errors
 /// Those of [`sweep_level`].
-pub(crate) fn sweep_scene(views: &[View], plan: &SweepPlan, done: &(dyn Fn() + Sync)) -> Result<SceneHeights, SweepError> {
+pub(crate) fn sweep_scene(
+    views: &[View],
+    plan: &SweepPlan,
+    done: &(dyn Fn() + Sync),
+) -> Result<SceneHeights, SweepError> {
     let origin_m = 0.5 * (plan.range_m.0 + plan.range_m.1);
     let mut maps: Vec<HeightMap> = Vec::new();
     let mut evaluations = 0;

@@ -1,0 +1,226 @@
+//! `skysweep eval` from files to exit code: grids, coordinate systems, datums, classes, thresholds and refusals.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use geodesy::{Crs, HeightConverter, MapProjection, VerticalDatum};
+use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
+use predicates::prelude::PredicateBooleanExt;
+use predicates::str::contains;
+use raster::{GeoTransform, Grid};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const WEST: f64 = 436_078.0;
+const NORTH: f64 = 3_357_752.0;
+
+/// Rolling ground with askew blocks, at UTM 17N coordinates.
+fn surface(x: f64, y: f64) -> f64 {
+    let (x, y) = (x - WEST, y - NORTH);
+    let (u, v) = (0.956 * x + 0.292 * y, 0.956 * y - 0.292 * x);
+    let block = u.rem_euclid(19.0) < 8.0 && v.rem_euclid(23.0) < 11.0;
+    20.0 + 3.0 * (x / 31.0).sin() + 2.0 * (y / 23.0).cos() + if block { 7.0 } else { 0.0 }
+}
+
+fn sampled(size: (usize, usize), geotransform: &GeoTransform, f: impl Fn(f64, f64) -> f64) -> Grid<f32> {
+    let cell = |i: usize| {
+        let (x, y) = geotransform.map_from_cell((i % size.0) as f64, (i / size.0) as f64);
+        f(x, y) as f32
+    };
+    Grid::from_vec(size.0, size.1, (0..size.0 * size.1).map(cell).collect()).unwrap()
+}
+
+fn write(folder: &TempDir, name: &str, data: BandData<'_>, geotransform: GeoTransform, crs: Crs) -> PathBuf {
+    let path = folder.path().join(name);
+    let bands = [Band { description: "height_m", data }];
+    write_cog(&path, &CogRaster::new(&bands, geotransform, crs), false).unwrap();
+    path
+}
+
+fn grid() -> GeoTransform {
+    GeoTransform::north_up(WEST, NORTH, 0.5)
+}
+
+/// The surface in UTM 17N above a datum that is only named, not applied.
+fn reference(folder: &TempDir, vertical: VerticalDatum) -> PathBuf {
+    let heights = sampled((200, 180), &grid(), surface);
+    write(folder, "reference.tif", BandData::F32(&heights), grid(), Crs { horizontal: 32617, vertical })
+}
+
+fn skysweep(arguments: &[&str], test: &Path, reference: &Path) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("skysweep").unwrap().arg("eval").args([test, reference]).args(arguments).assert()
+}
+
+fn json(arguments: &[&str], test: &Path, reference: &Path) -> Value {
+    let output = skysweep(&[arguments, &["--json"]].concat(), test, reference).success().get_output().stdout.clone();
+    serde_json::from_slice(&output).unwrap()
+}
+
+fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} in {value}"))
+}
+
+#[test]
+fn a_moved_copy_is_brought_back() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    let heights = sampled((200, 180), &grid(), |x, y| surface(x, y) - 4.1);
+    let moved = GeoTransform::north_up(WEST - 3.3, NORTH + 2.7, 0.5);
+    let test = write(&folder, "test.tif", BandData::F32(&heights), moved, Crs::ellipsoidal(32617));
+    let found = json(&[], &test, &reference);
+    for (axis, expected) in [("dx_m", 3.3), ("dy_m", -2.7), ("dz_m", 4.1)] {
+        assert!((number(&found, &format!("/shift/{axis}")) - expected).abs() < 0.05, "{found}");
+    }
+    let unaligned = json(&["--align", "z"], &test, &reference);
+    assert_eq!(number(&unaligned, "/shift/dx_m"), 0.0);
+    assert!(number(&unaligned, "/metrics/mae") > 5.0 * number(&found, "/metrics/mae"), "{unaligned} {found}");
+}
+
+#[test]
+fn another_coordinate_system_and_datum_are_met() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    let (utm17, utm16) = (MapProjection::from_epsg(32617).unwrap(), MapProjection::from_epsg(32616).unwrap());
+    let egm96 = HeightConverter::new(VerticalDatum::Egm96).unwrap();
+    let lonlat = |x: f64, y: f64| utm17.lonlat_from_map(x, y).unwrap();
+    let (lon, lat) = lonlat(WEST, NORTH);
+    let corner = utm16.map_from_lonlat(lon, lat).unwrap();
+    // Larger than the reference by 30 m all around, turned against it by the convergence of the meridians.
+    let there = GeoTransform::north_up(corner.x - 30.0, corner.y + 30.0, 0.4);
+    let heights = sampled((420, 400), &there, |x, y| {
+        let (lon, lat) = utm16.lonlat_from_map(x, y).unwrap();
+        let point = utm17.map_from_lonlat(lon, lat).unwrap();
+        egm96.datum_from_ellipsoid(lon, lat, surface(point.x, point.y)).unwrap()
+    });
+    let crs = Crs { horizontal: 32616, vertical: VerticalDatum::Egm96 };
+    let test = write(&folder, "test.tif", BandData::F32(&heights), there, crs);
+    let found = json(&["--align", "none"], &test, &reference);
+    assert_eq!(number(&found, "/metrics/valid_ratio"), 1.0);
+    assert!(number(&found, "/metrics/median").abs() < 0.01, "{found}");
+    assert!(number(&found, "/metrics/nmad") < 0.02, "{found}");
+    let aligned = json(&[], &test, &reference);
+    assert!(number(&aligned, "/shift/dx_m").hypot(number(&aligned, "/shift/dy_m")) < 0.05, "{aligned}");
+}
+
+#[test]
+fn datums_that_may_differ_are_refused_until_they_are_named() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Egm96);
+    let heights = sampled((200, 180), &grid(), surface);
+    let stated = write(&folder, "stated.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    let converted = json(&["--align", "none"], &stated, &reference);
+    assert!(number(&converted, "/metrics/median").abs() > 10.0, "{converted}");
+    let named = json(&["--align", "none", "--test-vertical", "egm96"], &stated, &reference);
+    assert_eq!(number(&named, "/metrics/mae"), 0.0);
+    // An ASCII grid names no coordinate system at all.
+    let bare = folder.path().join("bare.asc");
+    let south = NORTH - 20.0 * 0.5;
+    let text =
+        format!("ncols 20\nnrows 20\nxllcorner {WEST}\nyllcorner {south}\ncellsize 0.5\n{}", "21.5 ".repeat(400));
+    std::fs::write(&bare, text).unwrap();
+    skysweep(&[], &bare, &reference).code(2).stderr(contains("above egm96").and(contains("--test-vertical")));
+    skysweep(&[], &reference, &bare).code(2).stderr(contains("above egm96").and(contains("--ref-vertical")));
+    let named = json(&["--align", "none", "--test-vertical", "egm96"], &bare, &reference);
+    assert_eq!(number(&named, "/metrics/n"), 400.0);
+    assert!(named.to_string().contains("no coordinate system"), "{named}");
+    let assumed = json(&["--align", "none"], &bare, &stated);
+    assert!(assumed.to_string().contains("taken as the ellipsoid"), "{assumed}");
+    skysweep(&["--test-vertical", "sea"], &bare, &reference).code(2);
+}
+
+#[test]
+fn classes_are_counted_apart_and_skipped() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    // Wrong by 5 m on the west half, which is class 9, on a grid of its own.
+    let heights = sampled((200, 180), &grid(), |x, y| surface(x, y) + if x < WEST + 50.0 { 5.0 } else { 0.25 });
+    let test = write(&folder, "test.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    let class_grid = GeoTransform::north_up(WEST, NORTH, 2.0);
+    let classes = sampled((50, 45), &class_grid, |x, _| if x < WEST + 50.0 { 9.0 } else { 2.0 }).map(|&c| c as u8);
+    let classes = write(&folder, "classes.tif", BandData::U8(&classes), class_grid, Crs::ellipsoidal(32617));
+    let classes = classes.to_str().unwrap();
+    let all = json(&["--align", "none", "--classes", classes], &test, &reference);
+    assert!((number(&all, "/classes/9/mae") - 5.0).abs() < 1e-5);
+    assert!((number(&all, "/classes/2/mae") - 0.25).abs() < 1e-5);
+    assert_eq!(number(&all, "/metrics/completeness_1"), 0.5);
+    let skipped = json(&["--align", "none", "--classes", classes, "--skip", "9"], &test, &reference);
+    assert_eq!(number(&skipped, "/metrics/completeness_1"), 1.0);
+    assert_eq!(number(&skipped, "/protocol/skipped_cells"), 18_000.0);
+    assert!(skipped.pointer("/classes/9").is_none());
+    let table = skysweep(&["--align", "none", "--classes", classes], &test, &reference).success();
+    table.stdout(contains("2 ground")).stdout(contains("9 water")).stdout(contains("completeness_1 %"));
+}
+
+#[test]
+fn requirements_decide_the_exit_code() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    let heights = sampled((200, 180), &grid(), |x, y| surface(x, y) + 0.75);
+    let test = write(&folder, "test.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    skysweep(&["--align", "none", "--max-mae", "0.8", "--min-completeness", "1"], &test, &reference).code(0);
+    skysweep(&["--align", "none", "--max-mae", "0.7"], &test, &reference).code(1).stderr(contains("mae is 0.750 m"));
+    let missed = skysweep(&["--align", "none", "--min-completeness", "0.6=0.5"], &test, &reference).code(1);
+    missed.stderr(contains("completeness_0.6 is 0.0000"));
+}
+
+#[test]
+fn the_error_map_holds_the_errors_and_is_not_replaced_unasked() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    let heights = sampled((200, 180), &grid(), |x, y| if x < WEST + 10.0 { f64::NAN } else { surface(x, y) + 0.75 });
+    let test = write(&folder, "test.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    let map = folder.path().join("errors.tif");
+    let arguments = ["--align", "none", "--error-map", map.to_str().unwrap()];
+    skysweep(&arguments, &test, &reference).success();
+    let errors = read_dem(&map).unwrap();
+    assert!((errors.heights[(100, 90)] - 0.75).abs() < 1e-5 && errors.heights[(10, 10)].is_nan());
+    assert_eq!(errors.geotransform, grid());
+    skysweep(&arguments, &test, &reference).code(2);
+    skysweep(&[&arguments[..], &["--overwrite"]].concat(), &test, &reference).success();
+}
+
+#[test]
+fn bad_input_is_refused_in_one_message() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    let far = GeoTransform::north_up(WEST + 10_000.0, NORTH, 0.5);
+    let heights = Grid::filled(30, 30, 1.0f32);
+    let elsewhere = write(&folder, "far.tif", BandData::F32(&heights), far, Crs::ellipsoidal(32617));
+    let text = folder.path().join("text.tif");
+    std::fs::write(&text, "no raster").unwrap();
+    skysweep(&["--align", "none"], &elsewhere, &reference).code(2).stderr(contains("share no valid cell"));
+    skysweep(&[], &elsewhere, &reference).code(2).stderr(contains("error:"));
+    skysweep(&[], &text, &reference).code(2).stderr(contains("text.tif"));
+    skysweep(&[], &reference, &folder.path().join("missing.tif")).code(2).stderr(contains("missing.tif"));
+    skysweep(&["--search-m", "0"], &reference, &reference).code(2).stderr(contains("search radius"));
+    skysweep(&["--search-m", "1e9"], &reference, &reference).code(2).stderr(contains("smaller radius"));
+    skysweep(&["--search-m", "nan"], &reference, &reference).code(2);
+    skysweep(&["--thresholds", "1,-2"], &reference, &reference).code(2).stderr(contains("threshold"));
+    skysweep(&["--skip", "9"], &reference, &reference).code(2).stderr(contains("--classes"));
+    skysweep(&["--min-completeness", "62"], &reference, &reference).code(2).stderr(contains("share"));
+}
+
+/// The LiDAR surface of Jacksonville, moved by its geotransform alone, and its classes, which carry no georeference.
+#[test]
+fn the_lidar_truth_is_brought_back_too() {
+    let truth = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/stereo/jax_068/truth");
+    let (reference, classes) = (truth.join("JAX_068_DSM_georef.tif"), truth.join("JAX_068_CLS.tif"));
+    if !reference.exists() {
+        eprintln!("skipped: {} is absent", reference.display());
+        return;
+    }
+    let folder = TempDir::new().unwrap();
+    let dem = read_dem(&reference).unwrap();
+    let mut moved = dem.geotransform;
+    moved.0[0] -= 3.3;
+    moved.0[3] += 2.7;
+    let lowered = dem.heights.map(|h| h - 4.1);
+    let test = write(&folder, "test.tif", BandData::F32(&lowered), moved, Crs::ellipsoidal(32617));
+    let found = json(&["--classes", classes.to_str().unwrap()], &test, &reference);
+    for (axis, expected) in [("dx_m", 3.3), ("dy_m", -2.7), ("dz_m", 4.1)] {
+        assert!((number(&found, &format!("/shift/{axis}")) - expected).abs() < 0.05, "{found}");
+    }
+    assert_eq!(number(&found, "/metrics/reference_cells"), 512.0 * 512.0);
+    assert!(found.to_string().contains("the class raster has no georeference"));
+    assert!(found.pointer("/classes/6/mae").is_some());
+}
