@@ -1,5 +1,7 @@
 //! `skysweep eval` from files to exit code: grids, coordinate systems, datums, classes, thresholds and refusals.
 
+#![allow(clippy::print_stderr, reason = "a test that skips says so")]
+
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;

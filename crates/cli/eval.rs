@@ -3,7 +3,6 @@
 mod inputs;
 mod report;
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
@@ -11,7 +10,7 @@ use eval::{Alignment, EvalConfig, EvalInput, Evaluation, evaluate};
 use geodesy::{Crs, VerticalDatum};
 use io::raster::{Band, BandData, CogRaster, write_cog};
 
-use crate::Outcome;
+use crate::{Outcome, print};
 use inputs::Inputs;
 
 /// Arguments of `skysweep eval`.
@@ -124,7 +123,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     let run = report::Run { args, config: &config, inputs: &inputs, found: &found, missed: &missed };
     let text = if args.json { run.json()? } else { run.table() };
-    std::io::stdout().write_all(text.as_bytes())?;
+    print::text(&text)?;
     missed.iter().for_each(|line| tracing::error!("{line}"));
     Ok(if missed.is_empty() { Outcome::Complete } else { Outcome::Partial })
 }

@@ -57,7 +57,6 @@ enum Command {
     Simulate(simulate::Args),
 }
 
-#[allow(dead_code, reason = "constructed by the commands that are landing")]
 /// How a command ended that was not stopped by an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outcome {
