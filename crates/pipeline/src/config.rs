@@ -109,7 +109,7 @@ impl Preset {
         // The penalties are a quarter (P1) and once (P2) the cost difference of clearly right and wrong patches,
         // the proportions of census 5 × 5 with P1 8, P2 32 in CARS and S2P.
         let penalties = Penalties { step: 8, jump: 48, jump_at_edge: 24 };
-        let level = LevelConfig { cost: CostConfig::default(), penalties, temperature: 0.02 };
+        let level = LevelConfig { cost: CostConfig::default(), penalties, cost_noise: 0.02 };
         Tuning { step_px, sources, best_of: sources.div_ceil(2), level }
     }
 }

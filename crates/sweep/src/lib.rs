@@ -15,6 +15,8 @@ pub mod pointing;
 pub mod ranges;
 mod readout;
 pub mod semiglobal;
+#[cfg(test)]
+mod testing;
 pub mod view;
 
 pub use geometry::{TileMap, source_from_reference};

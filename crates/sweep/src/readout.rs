@@ -2,13 +2,17 @@
 //!
 //! The weights are `exp(−(S − min S) / T)` inside a window around the best hypothesis, so that a second mode does not pull
 //! the mean; the minimum is subtracted first, so the exponent is never positive whatever the costs are.
+//!
+//! The temperature follows the mode: for costs `a (k − k₀)²` the weights are a normal density of deviation `√(T / 2a)`,
+//! and its mean over whole hypotheses is k₀ to a thousandth only if that deviation is near a step. A fixed temperature
+//! is too cold for sharp modes and locks heights to the lattice.
 
 /// What a pixel's aggregated costs say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Estimate {
     /// Position of the height, in hypotheses from the first.
     pub(crate) index: f32,
-    /// Spread of the mode, in hypotheses.
+    /// Standard deviation of the position, in hypotheses.
     pub(crate) spread: f32,
     /// How much worse the best hypothesis outside the window is, relative to the cost scale, 0 to 1.
     pub(crate) margin: f32,
@@ -16,29 +20,33 @@ pub(crate) struct Estimate {
 
 /// Hypotheses on each side of the best that belong to its mode.
 const WINDOW: usize = 3;
+/// Deviation of the weights for a parabolic mode, hypotheses: the least that keeps the mean unbiased, so that the
+/// window holds all of it.
+const DEVIATION: f32 = 0.8;
 
-/// Reads one pixel's sums; `scale` is the sum that a worst-cost hypothesis would have, `temperature` relative to it.
-pub(crate) fn soft_argmin(sums: &[u16], scale: f32, temperature: f32) -> Option<Estimate> {
+/// Reads one pixel's sums. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the deviation of a
+/// cost relative to it, which turns the mode's curvature into the deviation of its position.
+pub(crate) fn soft_argmin(sums: &[u16], scale: f32, noise: f32) -> Option<Estimate> {
     let (best, &least) = sums.iter().enumerate().min_by_key(|&(_, s)| *s)?;
-    let (from, to) = (best.saturating_sub(WINDOW), (best + WINDOW + 1).min(sums.len()));
-    // A window cut on one side by the range's end would pull the mean inward: cut the other side alike.
-    let reach = (best - from).min(to - 1 - best);
+    let reach = WINDOW.min(best).min(sums.len() - 1 - best);
+    // A window cut on one side by the range's end would pull the mean inward: both sides are cut alike.
     let (from, to) = (best - reach, best + reach + 1);
-    let (mut weight, mut first, mut second) = (0.0f32, 0.0f32, 0.0f32);
-    for (i, &s) in sums.iter().enumerate().take(to).skip(from) {
-        let w = (-f32::from(s - least) / (scale * temperature)).exp();
-        let d = i as f32 - best as f32;
-        weight += w;
-        first += w * d;
-        second += w * d * d;
-    }
-    let mean = first / weight;
+    let above = |i: usize| f32::from(sums[i] - least);
+    let curvature = if reach == 0 { 0.0 } else { 0.5 * (above(best - 1) + above(best + 1)) };
     let outside = sums[..from].iter().chain(&sums[to..]).min().map_or(scale, |&s| f32::from(s - least));
-    Some(Estimate {
-        index: best as f32 + mean,
-        spread: (second / weight - mean * mean).max(0.0).sqrt(),
-        margin: (outside / scale).min(1.0),
-    })
+    let margin = (outside / scale).min(1.0);
+    if curvature == 0.0 {
+        return Some(Estimate { index: best as f32, spread: WINDOW as f32, margin });
+    }
+    let cold = 1.0 / (2.0 * curvature * DEVIATION * DEVIATION);
+    let (mut weight, mut first) = (0.0f32, 0.0f32);
+    for i in from..to {
+        let w = (-above(i) * cold).exp();
+        weight += w;
+        first += w * (i as f32 - best as f32);
+    }
+    let spread = (noise * scale / (2.0 * curvature)).sqrt().min(WINDOW as f32);
+    Some(Estimate { index: best as f32 + first / weight, spread, margin })
 }
 
 #[cfg(test)]
@@ -48,8 +56,18 @@ mod tests {
     #[test]
     fn equal_costs_have_a_finite_answer_and_no_margin() {
         let e = soft_argmin(&[500; 9], 1016.0, 0.05).unwrap();
-        assert!(e.index.is_finite() && e.spread.is_finite());
-        assert_eq!(e.margin, 0.0_f32.max(e.margin.min(0.0)));
+        assert!(e.index.is_finite() && e.spread == WINDOW as f32);
+        assert_eq!(e.margin, 0.0);
+    }
+
+    #[test]
+    fn a_parabola_is_read_between_hypotheses_without_locking() {
+        for tenth in -5..=5 {
+            let truth = 10.0 + f32::from(tenth as i8) / 10.0;
+            let sums: Vec<u16> = (0..21).map(|k| (60.0 * (k as f32 - truth).powi(2)).min(900.0) as u16).collect();
+            let e = soft_argmin(&sums, 1016.0, 0.02).unwrap();
+            assert!((e.index - truth).abs() < 0.03, "{} for {truth}", e.index);
+        }
     }
 
     #[test]

@@ -293,3 +293,54 @@ fn linearised(
     }
     Ok((residual, jacobian))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::leaning_camera;
+
+    const SIZE: usize = 400;
+
+    /// Tracks of a lattice of ground points as cameras see them whose pointing is off by `shifts`.
+    fn tracks(cameras: &[RpcCamera], shifts: &[[f64; 2]]) -> Vec<Track> {
+        let point = |i: usize| {
+            let (e, n) = ((i % 12) as f64 / 12.0 - 0.45, (i / 12) as f64 / 12.0 - 0.45);
+            LonLatHeight::new(e * 1.6e-3, n * 1.6e-3, ((i * 37) % 50) as f64 - 10.0)
+        };
+        let seen = |g: LonLatHeight| {
+            let one = |(view, camera): (usize, &RpcCamera)| {
+                let p = camera.project(g).unwrap();
+                (view, ImagePoint::new(p.sample + shifts[view][0], p.line + shifts[view][1]))
+            };
+            cameras.iter().enumerate().map(one).collect()
+        };
+        (0..144).map(|i| seen(point(i))).collect()
+    }
+
+    fn three_cameras() -> [RpcCamera; 3] {
+        [[0.0, 0.02], [0.5, 0.1], [-0.3, 0.4]].map(|p| leaning_camera(SIZE, p))
+    }
+
+    #[test]
+    fn planted_shifts_are_taken_out_among_outliers() {
+        let cameras = three_cameras();
+        let mut tracks = tracks(&cameras, &[[3.0, -4.0], [-1.0, 2.0], [0.5, 5.0]]);
+        for (i, track) in tracks.iter_mut().enumerate().filter(|(i, _)| i % 7 == 0) {
+            track[1].1.line += 9.0 + (i % 5) as f64;
+        }
+        let found = adjust(&cameras, &[(SIZE, SIZE); 3], &tracks, &AdjustConfig::default());
+        assert_eq!(found.order, ModelOrder::Translation);
+        assert!(found.rms_px < 0.02, "{}", found.rms_px);
+        let outliers = found.ground.iter().filter(|g| g.is_none()).count();
+        assert_eq!(outliers, tracks.len().div_ceil(7));
+    }
+
+    #[test]
+    fn good_pointing_is_left_alone_and_no_ties_change_nothing() {
+        let cameras = three_cameras();
+        let found = adjust(&cameras, &[(SIZE, SIZE); 3], &tracks(&cameras, &[[0.0; 2]; 3]), &AdjustConfig::default());
+        assert_eq!(found.order, ModelOrder::None);
+        let found = adjust(&cameras, &[(SIZE, SIZE); 3], &[], &AdjustConfig::default());
+        assert!(found.corrections.iter().all(|c| *c == ImageCorrection::IDENTITY));
+    }
+}
