@@ -309,7 +309,7 @@ fn set_once(slot: &mut Option<f64>, value: f64, entry: Entry<'_>) -> Result<(), 
     }
 }
 
-/// What can be said about the values without knowing the scene.
+/// What can be said about the values without knowing the scene; the scales under the format's own names.
 fn check(rpc: &Rpc, names: &Names) -> Result<(), Fault> {
     let scales = [
         (Scalar::LineScale, rpc.line_scale),
@@ -321,15 +321,5 @@ fn check(rpc: &Rpc, names: &Names) -> Result<(), Fault> {
     if let Some((s, _)) = scales.iter().find(|(_, value)| *value == 0.0) {
         return Err(Fault::ZeroScale { key: names.scalar(*s).to_owned() });
     }
-    for (s, value, limit) in [(Scalar::LatOff, rpc.lat_off, 90.0), (Scalar::LongOff, rpc.long_off, 360.0)] {
-        if value.abs() > limit {
-            return Err(Fault::OutOfRange { key: names.scalar(s).to_owned(), value, limit });
-        }
-    }
-    for (p, den) in [(Poly::LineDen, &rpc.line_den), (Poly::SampDen, &rpc.samp_den)] {
-        if den.iter().all(|c| *c == 0.0) {
-            return Err(Fault::ZeroDenominator { key: names.poly(p).to_owned() });
-        }
-    }
-    Ok(())
+    rpc.validate().map_err(Fault::NoCamera)
 }

@@ -67,22 +67,9 @@ pub enum Fault {
         /// The entry.
         key: String,
     },
-    /// A latitude or longitude that is not on Earth.
-    #[error("{key} is {value} degrees, expected a value within ±{limit}")]
-    OutOfRange {
-        /// The entry.
-        key: String,
-        /// The value, degrees.
-        value: f64,
-        /// The largest magnitude, degrees.
-        limit: f64,
-    },
-    /// A denominator whose coefficients are all zero.
-    #[error("all coefficients of {key} are zero: the RPC divides by them")]
-    ZeroDenominator {
-        /// The polynomial.
-        key: String,
-    },
+    /// All entries are there and are numbers, and together they are no camera.
+    #[error("{0}")]
+    NoCamera(camera::RpcError),
     /// A list of coefficients of the wrong length.
     #[error("{key} has {found} values{}, expected {expected}", At(.line))]
     Count {

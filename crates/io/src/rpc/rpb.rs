@@ -73,23 +73,21 @@ fn list<'a>(
     line: usize,
     rest: &mut impl Iterator<Item = (usize, &'a str)>,
 ) -> Result<String, Fault> {
-    let mut list = first.to_owned();
-    while !list.contains(')') {
-        let Some((_, more)) = rest.next() else {
-            let what = format!("the list {key} does not end: expected ')'");
-            return Err(Fault::Syntax { what, line: Some(line) });
-        };
+    let mut list = String::new();
+    let mut piece = first;
+    // Each piece is searched once: a scan of the whole list per line would be quadratic.
+    while !piece.contains(')') {
+        list.push_str(piece);
         list.push(' ');
-        // Only the new piece can hold the end of the list: a scan of the whole would be quadratic.
-        if let Some((last, _)) = more.split_once(')') {
-            list.push_str(last);
-            break;
-        }
-        list.push_str(more);
+        piece = rest.next().map(|(_, more)| more).ok_or_else(|| Fault::Syntax {
+            what: format!("the list {key} does not end: expected ')'"),
+            line: Some(line),
+        })?;
     }
+    list.push_str(piece.split(')').next().unwrap_or_default());
     let inner = list
         .trim_start()
         .strip_prefix('(')
         .ok_or_else(|| Fault::Syntax { what: format!("the list {key} does not begin with '('"), line: Some(line) })?;
-    Ok(inner.split(')').next().unwrap_or_default().to_owned())
+    Ok(inner.to_owned())
 }
