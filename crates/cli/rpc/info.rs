@@ -1,15 +1,14 @@
 //! `skysweep rpc info`: what an RPC says about its image.
 //!
-//! The ground sampling distance and the viewing angles are those at the centre of the RPC's domain: one pixel along
-//! the sample and the line at the height offset, and the line of sight through two heights. The incidence is the
-//! angle at the ground between the vertical and the sensor, the azimuth the direction to the sensor, clockwise from north.
+//! The ground sampling distance and the viewing angles are those at the centre of the RPC's domain, at the height offset.
+//! The incidence is the angle at the ground between the vertical and the sensor, the azimuth the direction to the sensor,
+//! clockwise from north.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 
-use camera::{CameraError, ImagePoint, Rpc};
-use geodesy::{EnuFrame, EnuPoint, LonLatHeight};
+use camera::{CameraError, ImagePoint, Rpc, RpcCamera};
+use geodesy::LonLatHeight;
 use io::rpc::{RpcFile, RpcFormat};
 use serde::Serialize;
 
@@ -73,8 +72,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         validity: validity(&file.rpc),
         centre: centre.ok(),
     };
-    let text = if args.json { format!("{}\n", serde_json::to_string_pretty(&info)?) } else { text(&info, &file) };
-    std::io::stdout().write_all(text.as_bytes())?;
+    if args.json {
+        crate::print::json(&info)?;
+    } else {
+        crate::print::text(&text(&info, &file))?;
+    }
     Ok(Outcome::Complete)
 }
 
@@ -90,22 +92,15 @@ fn validity(rpc: &Rpc) -> Validity {
 
 fn centre(rpc: &Rpc) -> Result<Centre, CameraError> {
     let ground = rpc.domain().centre;
-    let image = rpc.project(ground)?;
-    let frame = EnuFrame::new(ground);
-    let seen = |sample: f64, line: f64, height_m: f64| {
-        let at = ImagePoint::new(image.sample + sample, image.line + line);
-        rpc.localize(at, height_m).map(|g| frame.enu_from_ground(g))
-    };
-    let length = |p: EnuPoint| p.east.hypot(p.north).hypot(p.up);
-    // A tenth of the height scale keeps both points inside the domain and far enough apart for the angle.
-    let up = seen(0.0, 0.0, ground.height_m + 0.1 * rpc.height_scale.abs())?;
+    let camera = RpcCamera::new(rpc.clone());
+    let (gsd, view) = (camera.gsd(ground)?, camera.view_direction(ground)?);
     Ok(Centre {
         ground,
-        image,
-        gsd_sample_m: length(seen(1.0, 0.0, ground.height_m)?),
-        gsd_line_m: length(seen(0.0, 1.0, ground.height_m)?),
-        incidence_deg: up.east.hypot(up.north).atan2(up.up).to_degrees(),
-        azimuth_deg: up.east.atan2(up.north).to_degrees().rem_euclid(360.0),
+        image: camera.project(ground)?,
+        gsd_sample_m: gsd.sample_m,
+        gsd_line_m: gsd.line_m,
+        incidence_deg: view.incidence_deg(),
+        azimuth_deg: view.azimuth_deg(),
     })
 }
 

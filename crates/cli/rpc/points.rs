@@ -107,7 +107,7 @@ fn one(
 ) -> anyhow::Result<Outcome> {
     let answer = answer(point).with_context(|| format!("no answer for the point {point:?}"))?;
     let text = if json { answer.json.to_string() } else { answer.text };
-    writeln!(std::io::stdout(), "{text}")?;
+    crate::print::text(&(text + "\n"))?;
     Ok(Outcome::Complete)
 }
 

@@ -55,7 +55,7 @@ fn read_bytes(name: &str, bytes: &[u8]) -> Result<camera::Rpc, RpcReadError> {
 /// The fault in a recognised file.
 fn fault(name: &str, content: &str) -> Fault {
     match read_bytes(name, content.as_bytes()) {
-        Err(RpcReadError::Invalid { fault, .. }) => fault,
+        Err(RpcReadError::Invalid { fault, .. }) => *fault,
         other => panic!("expected a fault, found {other:?}"),
     }
 }

@@ -1,7 +1,7 @@
 //! Why no RPC came out of a file, or none went into one.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::RpcFormat;
 
@@ -166,10 +166,16 @@ pub enum RpcReadError {
         /// The format.
         format: RpcFormat,
         /// What is wrong.
-        fault: Fault,
+        fault: Box<Fault>,
         /// The formats that were ruled out before this one.
         tried: Vec<Attempt>,
     },
+}
+
+impl RpcReadError {
+    pub(super) fn invalid(path: &Path, format: RpcFormat, fault: Fault, tried: Vec<Attempt>) -> Self {
+        Self::Invalid { path: path.to_owned(), format, fault: Box::new(fault), tried }
+    }
 }
 
 /// The list of attempts in one line.

@@ -10,39 +10,15 @@ use std::path::Path;
 use camera::Rpc;
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, Metadata};
 
-use crate::raster::prepare_gdal;
+use crate::raster::{prepare_gdal, with_gdal};
 
 use super::draft::{Draft, Entry, RPC00B};
 use super::error::{Attempt, Fault};
 use super::{Parsed, RpcFile, RpcFormat, RpcReadError, tiff_tag};
 
-/// Drivers that open what a file names, or a service.
-const FOLLOWS_REFERENCES: [&str; 24] = [
-    "VRT",
-    "DERIVED",
-    "GTI",
-    "WMS",
-    "WMTS",
-    "WCS",
-    "OGCAPI",
-    "HTTP",
-    "STACTA",
-    "STACIT",
-    "PLMOSAIC",
-    "PLSCENES",
-    "EEDA",
-    "EEDAI",
-    "DAAS",
-    "NGW",
-    "PostGISRaster",
-    "GeoRaster",
-    "RasterLite",
-    "SQLite",
-    "TileDB",
-    "PDF",
-    "KMLSUPEROVERLAY",
-    "RPFTOC",
-];
+/// Drivers that open other files or collections that a file names; those of networks are taken out by [`with_gdal`].
+const FOLLOWS_REFERENCES: [&str; 10] =
+    ["VRT", "DERIVED", "GTI", "RasterLite", "SQLite", "GPKG", "TileDB", "PDF", "KMLSUPEROVERLAY", "RPFTOC"];
 
 /// What GDAL's answer may differ by from the tag it was printed from.
 const PRINTED_TOLERANCE: f64 = 1e-13;
@@ -58,14 +34,13 @@ pub(super) fn open(path: &Path) -> Result<Dataset, Attempt> {
         allowed_drivers: Some(&allowed),
         ..DatasetOptions::default()
     };
-    Dataset::open_ex(path, options)
-        .map_err(|_| Attempt::new(RpcFormat::GdalMetadata, "GDAL does not open it as an image"))
+    with_gdal(|| Dataset::open_ex(path, options)).map_err(|reason| Attempt::new(RpcFormat::GdalMetadata, reason))
 }
 
 /// The RPC of an opened image; `None` when it has none.
 pub(super) fn read(path: &Path, dataset: &Dataset) -> Result<Option<RpcFile>, RpcReadError> {
     let tag = if path.is_file() { tiff_tag::read(path)? } else { None };
-    let invalid = |format, fault| RpcReadError::Invalid { path: path.to_owned(), format, fault, tried: Vec::new() };
+    let invalid = |format, fault| RpcReadError::invalid(path, format, fault, Vec::new());
     let file = |format, parsed: Parsed| RpcFile::new(path, format, parsed);
     let metadata = dataset.metadata_domain("RPC").filter(|items| !items.is_empty());
     let Some(items) = metadata else {

@@ -159,12 +159,9 @@ fn read_raw_image(path: &Path, mut tried: Vec<Attempt>) -> Result<RpcFile, RpcRe
 
 fn finish(path: &Path, found: Found) -> Result<RpcFile, RpcReadError> {
     let Found { format, result, tried } = found;
-    result.map(|parsed| RpcFile::new(path, format, parsed)).map_err(|fault| RpcReadError::Invalid {
-        path: path.to_owned(),
-        format,
-        fault,
-        tried,
-    })
+    result
+        .map(|parsed| RpcFile::new(path, format, parsed))
+        .map_err(|fault| RpcReadError::invalid(path, format, fault, tried))
 }
 
 fn not_rpc(path: &Path, tried: Vec<Attempt>) -> RpcReadError {
