@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use camera::Rpc;
 use io::rpc::{RpcReadError, read};
 
+#[allow(clippy::print_stderr, reason = "the line says why nothing was tested")]
 fn shared(folder: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(folder);
     if !path.is_dir() {
