@@ -46,10 +46,10 @@ pub(crate) fn evaluate(dsm: &Path, truth: &Path, vertical: Option<&str>) -> anyh
     let output = command.output()?;
     ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout)?;
-    let all = report["all"].as_object().context("the evaluation has no member \"all\"")?;
+    let all = report["metrics"].as_object().context("the evaluation has no member \"metrics\"")?;
     let mut out: Vec<(String, f64)> = all.iter().filter_map(|(k, v)| Some((k.clone(), v.as_f64()?))).collect();
     // The alignment takes the median out, so the median of |error| is the MAD.
-    let nmad = all.get("NMAD").and_then(Value::as_f64).context("the evaluation has no NMAD")?;
+    let nmad = all.get("nmad").and_then(Value::as_f64).context("the evaluation has no nmad")?;
     out.push(("median_abs".to_owned(), nmad / 1.4826));
     Ok(out)
 }

@@ -23,16 +23,16 @@ pub(crate) struct Scene {
 
 const INF: f64 = f64::INFINITY;
 /// `jax_068`, all seven views.
-const SEVEN: [(&str, f64, f64); 3] = [("MAE", 0.0, 1.5), ("completeness_1", 0.62, 1.0), ("valid_ratio", 0.90, 1.0)];
+const SEVEN: [(&str, f64, f64); 3] = [("mae", 0.0, 1.5), ("completeness_1", 0.62, 1.0), ("valid_ratio", 0.90, 1.0)];
 /// `jax_068`, two views.
-const PAIR: [(&str, f64, f64); 2] = [("MAE", 0.0, 1.2), ("completeness_1", 0.58, 1.0)];
+const PAIR: [(&str, f64, f64); 2] = [("mae", 0.0, 1.2), ("completeness_1", 0.58, 1.0)];
 /// Against S2P's own DSM.
 const S2P: [(&str, f64, f64); 2] = [("median_abs", 0.0, 0.35), ("valid_ratio", 0.90, 1.0)];
 /// Khufu: the faces' slope and the height of the apex over the base.
 const KHUFU: [(&str, f64, f64); 4] =
     [("east_deg", 50.84, 52.84), ("south_deg", 50.84, 52.84), ("west_deg", 50.84, 52.84), ("height_m", 144.0, 148.0)];
 /// Measured only.
-const NONE: [(&str, f64, f64); 1] = [("MAE", 0.0, INF)];
+const NONE: [(&str, f64, f64); 1] = [("mae", 0.0, INF)];
 
 /// All scenes under `data` (`../shared/data/stereo`).
 pub(crate) fn all(data: &Path) -> Vec<Scene> {

@@ -24,8 +24,10 @@ use crate::setup::{self, Choices, OutputGrid};
 
 /// Pixels read around what the bounds ask for, full resolution: patches, aggregation and pointing errors reach out.
 const WINDOW_MARGIN: usize = 96;
-/// Isolated patches of less ground than this are speckle, in cells: a car, a chimney are larger in any useful grid.
-const SPECKLE_CELLS: usize = 25;
+/// Isolated patches of less ground than a square of this side are speckle: smaller than a house, metres.
+const SPECKLE_SIDE_M: f64 = 5.0;
+/// … and never of fewer cells than this, whatever the grid.
+const SPECKLE_CELLS_MIN: usize = 9;
 /// Holes up to this many metres across are closed: the shadow side of a house.
 const FILL_SIDE_M: f64 = 10.0;
 /// A facet steeper than this (rise over run) is a tear, not a surface: about 70°.
@@ -169,7 +171,7 @@ impl<'a> Job<'a> {
     /// The heights among which tie points are searched.
     fn first_range(&self, images: &[Opened]) -> Result<(f64, f64), PipelineError> {
         let valid = setup::validity_range(images);
-        if !(valid.0 < valid.1) {
+        if valid.0 >= valid.1 {
             return Err(PipelineError::Value {
                 name: "the RPCs' height validity",
                 found: format!("{:.0} to {:.0} m", valid.0, valid.1),
@@ -287,7 +289,7 @@ impl<'a> Job<'a> {
         let mut placed = Vec::with_capacity(all.len());
         let mut kept = Vec::with_capacity(all.len());
         for own in &all {
-            let keep = agreeing(*own, &all, heights_alone(&all))?;
+            let keep = agreeing(*own, &all)?;
             kept.push(keep.data().iter().filter(|k| **k).count() as f64 / keep.data().len().max(1) as f64);
             placed.push(place_view(*own, 0, &keep, &frame)?);
             self.progress.step();
@@ -308,7 +310,8 @@ impl<'a> Job<'a> {
         let same_surface_m = (2.0 * plan.step_m).max(1.5 * gsd) as f32;
         let fusion = FusionConfig { same_surface_m, tear_m: (TEAR_SLOPE * gsd) as f32, tile: self.config.tile };
         let mut fused = fuse_views(placed, grid.size, &fusion);
-        let removed = remove_speckle(&mut fused.height_m, (2.0 * plan.step_m).max(2.0 * gsd) as f32, SPECKLE_CELLS);
+        let speckle_cells = ((SPECKLE_SIDE_M / gsd).powi(2) as usize).max(SPECKLE_CELLS_MIN);
+        let removed = remove_speckle(&mut fused.height_m, (2.0 * plan.step_m).max(2.0 * gsd) as f32, speckle_cells);
         let observed = fused.height_m.data().iter().filter(|h| !h.is_nan()).count();
         if observed == 0 {
             return Err(PipelineError::NoSurface { range: plan.range_m });
@@ -330,19 +333,16 @@ impl<'a> Job<'a> {
     }
 }
 
-/// A single reference view has nobody to agree with: its heights then stand by themselves.
-fn heights_alone(all: &[Heights<'_>]) -> bool {
-    all.len() < 2
-}
-
-/// Which pixels at least one other view agrees with.
-fn agreeing(own: Heights<'_>, all: &[Heights<'_>], alone: bool) -> Result<Grid<bool>, PipelineError> {
-    if alone {
+/// Which pixels enough other views agree with: a third of all views, so that a chance agreement of two among many does
+/// not put a height on the map, and at least one. A single reference view has nobody to agree with: its heights stand.
+fn agreeing(own: Heights<'_>, all: &[Heights<'_>]) -> Result<Grid<bool>, PipelineError> {
+    if all.len() < 2 {
         return Ok(own.map.height_m.map(|h| !h.is_nan()));
     }
     let others: Vec<Heights<'_>> = all.iter().copied().filter(|h| h.index != own.index).collect();
     let counts = count_agreeing(own, &others, 0, &ConsistencyConfig::default())?;
-    Ok(counts.map(|n| *n > 0))
+    let needed = (all.len() / 3).clamp(1, usize::from(u8::MAX)) as u8;
+    Ok(counts.map(|n| *n >= needed))
 }
 
 fn pair_names(pairs: &[(usize, usize)]) -> String {

@@ -23,7 +23,7 @@ pub enum PipelineError {
     Image(#[from] io::raster::RasterError),
     /// An image has no usable RPC.
     #[error("no usable RPC for an image")]
-    Rpc(#[from] io::rpc::RpcReadError),
+    Rpc(#[source] Box<io::rpc::RpcReadError>),
     /// An RPC has no ground under its image.
     #[error("the RPC has no ground under the image; is it the RPC of this image? {}: {source}", path.display())]
     Camera {
@@ -140,4 +140,11 @@ pub enum PipelineError {
         /// What the pool said.
         reason: String,
     },
+}
+
+impl From<io::rpc::RpcReadError> for PipelineError {
+    fn from(e: io::rpc::RpcReadError) -> Self {
+        // Boxed: it is several times larger than the other variants.
+        Self::Rpc(Box::new(e))
+    }
 }

@@ -43,8 +43,10 @@ pub struct CostConfig {
 }
 
 impl Default for CostConfig {
+    /// 3 × 3 patches, as MicMac uses in cities: the aggregation brings the support that they lack, and roofs keep their
+    /// edges (the simulated town and the LiDAR truth of JAX_068 agree; 5 × 5 loses a point of completeness on both).
     fn default() -> Self {
-        Self { patch_radius: 2, aggregation: Aggregation::BestOf(2), tile: 64, map_tolerance_px: 0.02 }
+        Self { patch_radius: 1, aggregation: Aggregation::BestOf(2), tile: 64, map_tolerance_px: 0.02 }
     }
 }
 
