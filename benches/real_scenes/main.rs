@@ -4,6 +4,8 @@
 //! as a user would, and writes `benches/results/real_scenes.{json,md}`: accuracy by `skysweep eval`, processor seconds
 //! (user) of the whole command, wall seconds, and peak memory. Medians of `RUNS` runs.
 
+#![allow(clippy::print_stdout, reason = "a bench tells its results")]
+
 mod pyramid;
 mod run;
 mod scenes;

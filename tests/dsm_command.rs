@@ -1,0 +1,200 @@
+//! `skysweep dsm` end to end on the sample town: its accuracy, its independence of threads and tiles, what it writes,
+//! and what it refuses.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use serde_json::Value;
+
+fn skysweep() -> Command {
+    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
+}
+
+fn town(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
+}
+
+fn views() -> [PathBuf; 3] {
+    ["view_1.tif", "view_2.tif", "view_3.tif"].map(town)
+}
+
+/// `skysweep dsm` on two views and a small part of the town, which takes a second.
+fn small(output: &Path) -> Command {
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(output).args(["-q", "--gsd", "1"]);
+    command
+}
+
+#[test]
+fn the_town_is_found_where_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    skysweep().arg("dsm").args(views()).arg("-o").arg(&out).assert().code(0).stderr(predicate::str::contains("height range"));
+    for file in ["dsm/dsm.tif", "dsm/sigma.tif", "dsm/views.tif", "dsm/filled.tif", "dsm/hillshade.png", "used_config.toml"] {
+        assert!(out.join(file).is_file(), "{file} is missing");
+    }
+    let report: Value = serde_json::from_slice(&std::fs::read(out.join("report/report.json")).unwrap()).unwrap();
+    assert_eq!(report["pointing"]["order"], "translation", "the town's pointing errors are shifts");
+    let after = report["pointing"]["rms_px"].as_f64().unwrap();
+    assert!(after < 0.2, "pointing residuals of {after} px are left");
+    let evaluation = skysweep()
+        .arg("eval")
+        .arg(out.join("dsm/dsm.tif"))
+        .arg(town("truth/dsm.tif"))
+        .args(["--align", "xyz", "--json"])
+        .output()
+        .unwrap();
+    let evaluation: Value = serde_json::from_slice(&evaluation.stdout).unwrap();
+    let metric = |name: &str| evaluation["metrics"][name].as_f64().unwrap();
+    assert!(metric("completeness_1") > 0.94, "completeness {}", metric("completeness_1"));
+    assert!(metric("nmad") < 0.1, "NMAD {}", metric("nmad"));
+    assert!(metric("mae") < 0.5, "MAE {}", metric("mae"));
+}
+
+#[test]
+fn threads_and_tiles_do_not_change_a_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |name: &str, options: &[&str]| {
+        let out = folder.path().join(name);
+        small(&out).args(options).assert().code(0);
+        ["dsm/dsm.tif", "dsm/sigma.tif", "dsm/views.tif", "dsm/filled.tif"].map(|f| std::fs::read(out.join(f)).unwrap())
+    };
+    let one = run("one", &["--threads", "1"]);
+    assert!(one == run("two", &["--threads", "2"]), "two threads give other bytes than one");
+    assert!(one == run("tiles", &["--threads", "2", "--tile", "77"]), "tiles of 77 cells give other bytes than of 1024");
+}
+
+#[test]
+fn options_are_obeyed() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = folder.path().join("first");
+    small(&first).assert().code(0);
+    let dem = io::raster::read_dem(first.join("dsm/dsm.tif")).unwrap();
+    let (x, y) = dem.geotransform.map_from_cell(50.5, 60.5);
+    let bounds = [x, y - 90.0, x + 120.0, y].map(|v| v.to_string());
+    let out = folder.path().join("part");
+    small(&out)
+        .arg("--bounds")
+        .args(&bounds)
+        .args(["--vertical", "egm96", "--height-range", "20", "160", "--preset", "fast", "--progress", "json"])
+        .assert()
+        .code(0)
+        .stderr(predicate::str::contains("\"event\":\"stage\""));
+    let part = io::raster::read_dem(out.join("dsm/dsm.tif")).unwrap();
+    assert_eq!((part.heights.width(), part.heights.height()), (120, 90));
+    assert_eq!(part.vertical, Some(geodesy::VerticalDatum::Egm96));
+    // The same ground above another datum: they differ by the undulation, the same one everywhere.
+    let mut differences = Vec::new();
+    for row in 0..part.heights.height() {
+        for column in 0..part.heights.width() {
+            let d = dem.heights[(column + 51, row + 61)] - part.heights[(column, row)];
+            if d.is_finite() {
+                differences.push(f64::from(d));
+            }
+        }
+    }
+    differences.sort_by(f64::total_cmp);
+    let undulation = differences[differences.len() / 2];
+    let converter = geodesy::HeightConverter::new(geodesy::VerticalDatum::Egm96).unwrap();
+    let projection = geodesy::MapProjection::from_epsg(dem.horizontal_epsg.unwrap()).unwrap();
+    let (lon, lat) = projection.lonlat_from_map(x, y).unwrap();
+    let expected = converter.ellipsoid_from_datum(lon, lat, 0.0).unwrap();
+    // Pairs of views leave the common height to the weak prior on pointing; half a metre is its size here.
+    assert!((undulation - expected).abs() < 0.5, "{undulation} instead of {expected}");
+}
+
+/// Runs that must end with exit 2, one clear message, and nothing written.
+fn refused(mut command: Command, output: &Path, message: &str) {
+    command.assert().code(2).stdout("").stderr(predicate::str::contains(message));
+    assert!(!output.exists(), "{} was left behind", output.display());
+}
+
+#[test]
+fn too_few_images_and_the_same_image_twice_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg("-o").arg(&out);
+    refused(command, &out, "expected at least 2");
+    let mut command = skysweep();
+    command.arg("dsm").args([town("view_1.tif"), town("view_1.tif")]).arg("-o").arg(&out);
+    refused(command, &out, "given twice");
+}
+
+#[test]
+fn copies_of_one_image_have_no_parallax() {
+    let folder = tempfile::tempdir().unwrap();
+    let (copy, out) = (folder.path().join("copy.tif"), folder.path().join("out"));
+    std::fs::copy(town("view_1.tif"), &copy).unwrap();
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(&copy).arg("-o").arg(&out);
+    refused(command, &out, "no parallax");
+}
+
+#[test]
+fn images_without_rpc_and_damaged_ones_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let plain = folder.path().join("plain.png");
+    io::raster::write_png_gray(&plain, &raster::Grid::filled(64, 64, 7), false).unwrap();
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(&plain).arg("-o").arg(&out);
+    refused(command, &out, "RPC");
+    let damaged = folder.path().join("damaged.tif");
+    let bytes = std::fs::read(town("view_2.tif")).unwrap();
+    std::fs::write(&damaged, &bytes[..bytes.len() / 2]).unwrap();
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(&damaged).arg("-o").arg(&out);
+    refused(command, &out, "damaged.tif");
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(folder.path().join("missing.tif")).arg("-o").arg(&out);
+    refused(command, &out, "missing.tif");
+}
+
+#[test]
+fn images_of_different_places_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (far, out) = (folder.path().join("far.tif"), folder.path().join("out"));
+    let mut rpc = io::rpc::read_for_image(town("view_3.tif")).unwrap().rpc;
+    rpc.long_off += 0.5;
+    let pixels = raster::Grid::filled(722, 752, 100u16);
+    let bands = [io::raster::Band { description: "pan", data: io::raster::BandData::U16(&pixels) }];
+    io::raster::write_image_with_rpc(&far, &bands, &rpc, None, false).unwrap();
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(&far).arg("-o").arg(&out);
+    refused(command, &out, "share no ground");
+}
+
+#[test]
+fn a_height_range_or_bounds_that_miss_the_scene_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut command = small(&out);
+    command.args(["--height-range", "5000", "5200"]);
+    refused(command, &out, "misses the scene");
+    let mut command = small(&out);
+    command.args(["--height-range", "60", "50"]);
+    refused(command, &out, "--height-range");
+    let mut command = small(&out);
+    command.args(["--bounds", "0", "0", "10", "10"]);
+    refused(command, &out, "share no ground");
+    let mut command = small(&out);
+    command.args(["--memory", "10"]);
+    refused(command, &out, "--memory");
+}
+
+#[test]
+fn results_are_not_replaced_unasked_and_places_that_cannot_be_written_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    std::fs::create_dir_all(out.join("dsm")).unwrap();
+    std::fs::write(out.join("dsm/dsm.tif"), "precious").unwrap();
+    small(&out).assert().code(2).stderr(predicate::str::contains("--overwrite"));
+    assert_eq!(std::fs::read(out.join("dsm/dsm.tif")).unwrap(), b"precious");
+    assert!(!out.join(".skysweep-partial").exists());
+    let file = folder.path().join("file");
+    std::fs::write(&file, "not a folder").unwrap();
+    small(&file.join("out")).assert().code(2).stderr(predicate::str::contains("cannot write the output"));
+    assert_eq!(std::fs::read(&file).unwrap(), b"not a folder");
+}
