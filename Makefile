@@ -47,7 +47,7 @@ demo: $(SKYSWEEP) ## a surface model of the sample town, its accuracy and its pi
 	$(SKYSWEEP) eval $(DEMO)/dsm/dsm.tif $(TOWN)/truth/dsm.tif --align xyz
 	echo
 	echo "surface model  $(DEMO)/dsm/dsm.tif"
-	echo "picture        $(DEMO)/dsm/hillshade.png"
+	echo "picture        $(DEMO)/dsm/relief.png"
 	echo "report         $(DEMO)/report/report.json"
 
 test: setup ## unit, property, integration and documentation tests

@@ -16,6 +16,7 @@ const AGREEMENT_PX: f64 = 1e-9;
 /// Agreement of an image position with itself after localisation and projection, pixels.
 const ROUND_TRIP_PX: f64 = 1e-6;
 
+#[allow(clippy::print_stderr, reason = "the line says why nothing was tested")]
 fn shared() -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     if !path.is_dir() {

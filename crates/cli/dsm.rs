@@ -126,8 +126,9 @@ impl Args {
 
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let watcher = Watcher::new(args.progress, global);
-    let report = pipeline::run_dsm(&args.config(), &watcher).context("no DSM was made")?;
+    let outcome = pipeline::run_dsm(&args.config(), &watcher);
     watcher.finish();
+    let report = outcome.context("no DSM was made")?;
     if args.json {
         crate::print::json(&report)?;
     } else if !global.is_quiet() {
@@ -147,7 +148,7 @@ fn summary(args: &Args, report: &DsmReport) -> String {
         share(s.observed),
         share(s.filled),
         share(s.void),
-        args.output.join("dsm/hillshade.png").display(),
+        args.output.join("dsm/relief.png").display(),
         args.output.join("report/report.json").display(),
     )
 }

@@ -85,7 +85,7 @@ impl Progress for Watcher {
     fn warn(&self, text: &str) {
         if self.style == ProgressStyle::Json {
             self.line(&serde_json::json!({ "event": "warning", "text": text }));
-        } else {
+        } else if !self.quiet {
             self.say(&format!("warning: {text}"));
         }
     }

@@ -32,7 +32,7 @@ pub struct DsmConfig {
     pub images: Vec<PathBuf>,
     /// The folder for the results.
     pub output: PathBuf,
-    /// Cell size of the DSM, metres (units of the CRS).
+    /// Cell size of the DSM, metres.
     pub gsd_m: Option<f64>,
     /// EPSG code of the horizontal CRS.
     pub crs_epsg: Option<u32>,

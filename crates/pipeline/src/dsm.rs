@@ -20,7 +20,7 @@ use crate::pointing::{PairTies, adjust_views, match_pairs};
 use crate::progress::Progress;
 use crate::report::{DsmReport, ImageReport, PairReport, PointingReport, StageTime, SurfaceReport};
 use crate::scene::{Geometry, Opened, open, read_views};
-use crate::setup::{self, Choices, OutputGrid};
+use crate::setup::{self, Choices, EARTH_RANGE_M, OutputGrid};
 
 /// Pixels read around what the bounds ask for, full resolution: patches, aggregation and pointing errors reach out.
 const WINDOW_MARGIN: usize = 96;
@@ -28,6 +28,8 @@ const WINDOW_MARGIN: usize = 96;
 const SPECKLE_SIDE_M: f64 = 5.0;
 /// … and never of fewer cells than this, whatever the grid.
 const SPECKLE_CELLS_MIN: usize = 9;
+/// Smaller output tiles cost more to manage than to fill, cells.
+const TILE_MIN: usize = 64;
 /// Holes up to this many metres across are closed: the shadow side of a house.
 const FILL_SIDE_M: f64 = 10.0;
 /// A facet steeper than this (rise over run) is a tear, not a surface: about 70°.
@@ -66,18 +68,21 @@ fn validate(config: &DsmConfig) -> Result<(), PipelineError> {
         return value("--gsd", gsd.to_string(), "a positive cell size in metres");
     }
     if let Some((lo, hi)) = config.height_range_m
-        && !(lo.is_finite() && hi.is_finite() && lo < hi)
+        && !(EARTH_RANGE_M.0 <= lo && lo < hi && hi <= EARTH_RANGE_M.1)
     {
         return value(
             "--height-range",
             format!("{lo} {hi}"),
-            "two heights in metres above the ellipsoid, the lower first",
+            "two heights of the Earth's surface in metres above the ellipsoid, the lower first",
         );
     }
     if let Some(b) = config.bounds
         && !(b.iter().all(|v| v.is_finite()) && b[0] < b[2] && b[1] < b[3])
     {
         return value("--bounds", format!("{b:?}"), "x_min y_min x_max y_max in the DSM's CRS");
+    }
+    if config.tile < TILE_MIN {
+        return value("--tile", config.tile.to_string(), "64 or more cells");
     }
     if config.threads == Some(0) {
         return value("--threads", "0".to_owned(), "1 or more");
@@ -114,10 +119,11 @@ impl<'a> Job<'a> {
         let config = self.config;
         let tuning = config.preset.tuning();
         let mut images = open(&config.images)?;
-        let guess = images.iter().map(|o| o.mid_height_m).sum::<f64>() / images.len() as f64;
+        let guess = images.iter().map(|o| o.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
         let search = self.first_range(&images)?;
         let first = Geometry::at(&images, guess.clamp(search.0, search.1))?;
-        let pairs = self.pairs(&first)?;
+        let useful = first.useful_pairs()?;
+        let pairs = self.pairs(&useful)?;
         let windows = self.windows(&images, &first, search)?;
         memory::check(config, &images, &windows)?;
         self.progress.begin("reading images", images.len());
@@ -128,17 +134,17 @@ impl<'a> Job<'a> {
         let tie_config = TieConfig::default();
         let ties = match_pairs(&views, &pairs, search, &tie_config, &|| self.progress.step());
         let (adjustment, tracks) = adjust_views(&views, &ties, &AdjustConfig::default());
-        self.point(&mut images, &mut views, &windows, &adjustment);
+        let pointed = self.point(&mut images, &mut views, &windows, &adjustment);
         self.lap("pointing");
 
         let dem_span = self.dem_span(&first)?;
         let range = setup::height_range(config, dem_span, &adjustment, &mut self.choices)?;
         let middle = setup::middle_height(&adjustment, range);
         let geometry = Geometry::at(&images, middle)?;
-        let gsds: Vec<f64> = images.iter().filter_map(|o| setup::ground_sampling(o, geometry.centre)).collect();
-        let coarsest = gsds.iter().copied().fold(0.0, f64::max);
+        let gsds: Vec<Option<f64>> = images.iter().map(|o| setup::ground_sampling(o, geometry.centre)).collect();
+        let coarsest = gsds.iter().flatten().copied().fold(0.0, f64::max);
         let grid = setup::choose_grid(config, &geometry, coarsest, &mut self.choices)?;
-        let sources = setup::choose_sources(config, &geometry, &pairs, &ties, &tuning, &mut self.choices);
+        let sources = setup::choose_sources(config, &geometry, &pairs, &ties, &tuning, &mut self.choices)?;
         let sides = setup::smallest_sides(&views);
         let plan = setup::plan_sweep(range, sources, &geometry, &sides, &tuning, &mut self.choices);
 
@@ -146,7 +152,7 @@ impl<'a> Job<'a> {
         let heights = sweep_scene(&views, &plan, &|| self.progress.step())?;
         self.lap("sweep");
         let evaluations = heights.evaluations;
-        let (product, surface) = self.surface(&views, &plan, heights, &grid)?;
+        let (product, surface) = self.surface(&views, &plan, &useful, heights, &grid)?;
         self.lap("fusion");
 
         self.progress.begin("writing", 1);
@@ -154,7 +160,7 @@ impl<'a> Job<'a> {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             images: image_reports(&images, &gsds, &geometry, &adjustment),
             pairs: pair_reports(&geometry, &ties),
-            pointing: PointingReport::new(&adjustment, tracks.len(), config.pointing),
+            pointing: PointingReport::new(&adjustment, tracks.len(), pointed),
             height_range_m: range,
             hypotheses: evaluations,
             surface,
@@ -182,20 +188,26 @@ impl<'a> Job<'a> {
     }
 
     /// The pairs to match: all useful ones, or those of them that were asked for.
-    fn pairs(&mut self, geometry: &Geometry) -> Result<Vec<(usize, usize)>, PipelineError> {
-        let useful = geometry.useful_pairs()?;
+    fn pairs(&mut self, useful: &[(usize, usize)]) -> Result<Vec<(usize, usize)>, PipelineError> {
+        let ordered = |p: &(usize, usize)| (p.0.min(p.1), p.0.max(p.1));
         let pairs: Vec<(usize, usize)> = match &self.config.pairs {
-            None => useful.clone(),
+            None => useful.to_vec(),
             Some(asked) => {
-                let wanted = |p: &(usize, usize)| asked.iter().any(|a| (a.0.min(a.1), a.0.max(a.1)) == *p);
-                useful.iter().copied().filter(wanted).collect()
+                for pair in asked.iter().filter(|p| !useful.contains(&ordered(p))) {
+                    self.choices.warn(format!(
+                        "the pair {}-{} is left out: it shares too little ground or looks along the same line",
+                        pair.0 + 1,
+                        pair.1 + 1
+                    ));
+                }
+                useful.iter().copied().filter(|p| asked.iter().any(|a| ordered(a) == *p)).collect()
             }
         };
         if pairs.is_empty() {
             return Err(PipelineError::Value {
                 name: "--pairs",
                 found: "no pair that shares ground under a useful angle".to_owned(),
-                expected: format!("some of {}", pair_names(&useful)),
+                expected: format!("some of {}", pair_names(useful)),
             });
         }
         let reason = match self.config.pairs {
@@ -223,24 +235,34 @@ impl<'a> Job<'a> {
         let range = self.config.height_range_m.unwrap_or(search);
         let window = |o: &Opened| {
             let w = setup::image_window(o, &grid, range, WINDOW_MARGIN)?;
-            w.map(Some).ok_or(PipelineError::NoOverlap { share_percent: 0.0 })
+            w.map(Some).ok_or_else(|| PipelineError::Value {
+                name: "--bounds",
+                found: format!("an area that an image does not see: {}", o.path.display()),
+                expected: "an area that every image sees, or only the images that see it".to_owned(),
+            })
         };
         images.iter().map(window).collect()
     }
 
-    /// Puts the corrections into the cameras, unless pointing is off or the ties are too few.
-    fn point(&mut self, images: &mut [Opened], views: &mut [View], windows: &[Option<Window>], found: &Adjustment) {
+    /// Puts the corrections into the cameras, unless pointing is off or the ties are too few; says whether it did.
+    fn point(
+        &mut self,
+        images: &mut [Opened],
+        views: &mut [View],
+        windows: &[Option<Window>],
+        found: &Adjustment,
+    ) -> bool {
         let ties = found.ground.iter().flatten().count();
         if !self.config.pointing {
             self.choices.tell("pointing", "as given".to_owned(), "--no-pointing");
-            return;
+            return false;
         }
         if ties < setup::TIES_MIN {
             self.choices.warn(format!(
                 "the pointing of the RPCs is not corrected: {ties} tie points found, {} needed",
                 setup::TIES_MIN
             ));
-            return;
+            return false;
         }
         let order = match found.order {
             ModelOrder::None => "none needed",
@@ -260,6 +282,7 @@ impl<'a> Job<'a> {
             let origin = window.map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(-w.x as f64, -w.y as f64));
             image.camera = view.camera.cropped(origin);
         }
+        true
     }
 
     /// The span of the DEM's heights over the scene, above the ellipsoid.
@@ -272,6 +295,7 @@ impl<'a> Job<'a> {
         &mut self,
         views: &[View],
         plan: &SweepPlan,
+        useful: &[(usize, usize)],
         heights: SceneHeights,
         grid: &OutputGrid,
     ) -> Result<(Product, SurfaceReport), PipelineError> {
@@ -289,7 +313,7 @@ impl<'a> Job<'a> {
         let mut placed = Vec::with_capacity(all.len());
         let mut kept = Vec::with_capacity(all.len());
         for own in &all {
-            let keep = agreeing(*own, &all)?;
+            let keep = agreeing(*own, &all, useful)?;
             kept.push(keep.data().iter().filter(|k| **k).count() as f64 / keep.data().len().max(1) as f64);
             placed.push(place_view(*own, 0, &keep, &frame)?);
             self.progress.step();
@@ -333,15 +357,17 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Which pixels enough other views agree with: a third of all views, so that a chance agreement of two among many does
-/// not put a height on the map, and at least one. A single reference view has nobody to agree with: its heights stand.
-fn agreeing(own: Heights<'_>, all: &[Heights<'_>]) -> Result<Grid<bool>, PipelineError> {
-    if all.len() < 2 {
+/// Which pixels enough other views agree with: a third of the views that see this one's ground from another direction,
+/// so that a chance agreement of two among many does not put a height on the map, and at least one. A single reference
+/// view has nobody to agree with: its heights stand.
+fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[(usize, usize)]) -> Result<Grid<bool>, PipelineError> {
+    let partner = |h: &Heights<'_>| useful.contains(&(own.index.min(h.index), own.index.max(h.index)));
+    let others: Vec<Heights<'_>> = all.iter().copied().filter(partner).collect();
+    if others.is_empty() {
         return Ok(own.map.height_m.map(|h| !h.is_nan()));
     }
-    let others: Vec<Heights<'_>> = all.iter().copied().filter(|h| h.index != own.index).collect();
     let counts = count_agreeing(own, &others, 0, &ConsistencyConfig::default())?;
-    let needed = (all.len() / 3).clamp(1, usize::from(u8::MAX)) as u8;
+    let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
     Ok(counts.map(|n| *n >= needed))
 }
 
@@ -349,12 +375,12 @@ fn pair_names(pairs: &[(usize, usize)]) -> String {
     pairs.iter().map(|(i, j)| format!("{}-{}", i + 1, j + 1)).collect::<Vec<_>>().join(" ")
 }
 
-fn image_reports(images: &[Opened], gsds: &[f64], geometry: &Geometry, found: &Adjustment) -> Vec<ImageReport> {
+fn image_reports(images: &[Opened], gsds: &[Option<f64>], geometry: &Geometry, found: &Adjustment) -> Vec<ImageReport> {
     let one = |(i, o): (usize, &Opened)| ImageReport {
         path: o.path.clone(),
         rpc: o.rpc_format.clone(),
         size: o.size,
-        gsd_m: gsds.get(i).copied(),
+        gsd_m: gsds.get(i).copied().flatten(),
         incidence_deg: o.camera.view_direction(geometry.centre).ok().map(|v| v.incidence_deg()),
         correction: found.corrections.get(i).copied(),
     };

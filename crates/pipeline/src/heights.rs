@@ -80,11 +80,15 @@ fn sweep_view(
 ) -> Result<(HeightMap, u64), SweepError> {
     let reference = source_level(views, index, level);
     let (w, h) = (reference.image.width(), reference.image.height());
+    if plan.sources[index].is_empty() {
+        return Ok((HeightMap::empty(w, h, origin_m), 0));
+    }
     let step = plan.step_m * f64::from(1u32 << level);
     let ranges = match coarser {
         None => Ranges::uniform(w, h, step, plan.range_m),
         Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, plan.range_m),
-    };
+    }
+    .without_voids(reference.image);
     let sources: Vec<SourceLevel<'_>> = plan.sources[index].iter().map(|&s| source_level(views, s, level)).collect();
     let mut config = plan.level;
     config.cost.aggregation = match sources.len() {
@@ -109,7 +113,12 @@ fn drop_lone_heights(
     heights
         .par_iter()
         .map(|h| {
-            let others: Vec<Heights<'_>> = plan.sources[h.index].iter().map(|&s| heights[s]).collect();
+            let own_heights = |s: &&usize| !plan.sources[**s].is_empty();
+            let others: Vec<Heights<'_>> =
+                plan.sources[h.index].iter().filter(own_heights).map(|&s| heights[s]).collect();
+            if others.is_empty() {
+                return Ok(h.map.clone());
+            }
             let counts = count_agreeing(*h, &others, level, &config)?;
             let mut out = h.map.clone();
             for (height, n) in out.height_m.data_mut().iter_mut().zip(counts.data()) {

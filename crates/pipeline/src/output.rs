@@ -14,14 +14,16 @@ use crate::report::DsmReport;
 use crate::setup::OutputGrid;
 
 /// The files of a run, relative to its folder.
-const FILES: [&str; 7] = [
+const FILES: [&str; 8] = [
     "dsm/dsm.tif",
     "dsm/sigma.tif",
     "dsm/views.tif",
     "dsm/filled.tif",
     "dsm/hillshade.png",
-    "report/report.json",
+    "dsm/relief.png",
     "used_config.toml",
+    // The last to appear: a folder with a report is complete.
+    "report/report.json",
 ];
 /// Where files are made before they are moved to their names.
 const PARTIAL: &str = ".skysweep-partial";
@@ -83,7 +85,7 @@ fn clean(config: &DsmConfig, created: bool) {
     }
 }
 
-/// Writes everything; on failure nothing stays behind.
+/// Writes everything beside its place, then moves it there; when writing fails nothing stays behind.
 pub(crate) fn write(
     config: &DsmConfig,
     grid: &OutputGrid,
@@ -127,6 +129,10 @@ fn write_rasters(
     let heights = absolute_heights(grid, vertical, product)?;
     let shade = raster::hillshade(&heights, (grid.gsd_m, grid.gsd_m), raster::Light::default());
     io::raster::write_png_gray(folder.join("hillshade.png"), &shade, false)?;
+    // The extreme hundredths are left out, so that one mast does not take the colours from the rest.
+    let (low, high) = raster::height_percentiles(&heights, 1.0, 99.0).unwrap_or((0.0, 1.0));
+    let relief = raster::coloured_relief(&heights, &shade, low, high);
+    io::raster::write_png_rgb(folder.join("relief.png"), &relief, false)?;
     let cog = |name: &str, description: &str, data: BandData<'_>, no_data: f64| {
         let bands = [Band { description, data }];
         let raster = CogRaster { no_data: Some(no_data), ..CogRaster::new(&bands, grid.geotransform, crs) };

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use camera::ImagePoint;
 use sweep::View;
+
+use crate::setup::TIES_MIN;
 use sweep::pointing::{AdjustConfig, Adjustment, Tie, TieConfig, Track, adjust, match_pair};
 
 /// Ties of one pair of views.
@@ -16,9 +18,6 @@ pub(crate) struct PairTies {
     /// What was found.
     pub(crate) ties: Vec<Tie>,
 }
-
-/// Fewer ties than this on a pair do not tell a height range.
-const TIES_MIN: usize = 12;
 
 /// Matches the pairs, given best first. The first one with enough ties narrows the height range of the rest.
 pub(crate) fn match_pairs(

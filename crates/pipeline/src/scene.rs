@@ -19,8 +19,6 @@ pub(crate) struct Opened {
     pub(crate) camera: RpcCamera,
     /// Width and height, pixels.
     pub(crate) size: (usize, usize),
-    /// Height of the scene's middle as far as the RPC tells, metres.
-    pub(crate) mid_height_m: f64,
 }
 
 /// Two lines of sight closer than this give no height: at the noise of matching (a fifth of a pixel) it is off by
@@ -39,13 +37,11 @@ pub(crate) fn open(paths: &[PathBuf]) -> Result<Vec<Opened>, PipelineError> {
 fn open_one(path: &Path) -> Result<Opened, PipelineError> {
     let source = io::raster::ImageSource::open(path)?;
     let file = io::rpc::read_for_image(path)?;
-    let mid_height_m = file.rpc.height_off;
     Ok(Opened {
         path: path.to_owned(),
         rpc_format: file.format.to_string(),
         size: (source.info().width, source.info().height),
         camera: RpcCamera::new(file.rpc),
-        mid_height_m,
     })
 }
 
@@ -74,7 +70,7 @@ pub(crate) fn read_views(
 
 /// Geometry of all pairs of images at a height; `None` for a pair that shares no ground.
 pub(crate) struct Geometry {
-    /// Middle of the ground that the images share.
+    /// Middle of the ground that the first overlapping pair shares: a place that is surely in the scene.
     pub(crate) centre: LonLatHeight,
     /// A local frame there.
     pub(crate) frame: EnuFrame,
@@ -104,9 +100,11 @@ impl Geometry {
                 let Some(middle) = middle_of_both(&outlines[i], &outlines[j]) else { continue };
                 let ground = LonLatHeight { height_m, ..frame.ground_from_enu(middle) };
                 centre.get_or_insert(ground);
-                let pair = pair_geometry(&images[i].camera, &images[j].camera, ground, share).map_err(failed(i))?;
-                pairs[(i, j)] = Some(pair);
-                pairs[(j, i)] = Some(pair);
+                // A camera that fails there belongs to a pair that cannot be matched.
+                if let Ok(pair) = pair_geometry(&images[i].camera, &images[j].camera, ground, share) {
+                    pairs[(i, j)] = Some(pair);
+                    pairs[(j, i)] = Some(pair);
+                }
             }
         }
         let Some(centre) = centre else { return Err(PipelineError::NoOverlap { share_percent: 0.0 }) };

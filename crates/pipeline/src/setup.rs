@@ -17,7 +17,7 @@ use crate::scene::{Geometry, Opened, angle_merit};
 /// Fewer tie points than this do not tell the scene's heights.
 pub(crate) const TIES_MIN: usize = 12;
 /// Heights of the Earth's surface above the ellipsoid: the Dead Sea's shore and Everest, rounded outward.
-const EARTH_RANGE_M: (f64, f64) = (-500.0, 9000.0);
+pub(crate) const EARTH_RANGE_M: (f64, f64) = (-500.0, 9000.0);
 /// Tie points seldom lie at the bottom of a pit or courtyard: searched below the lowest at least.
 const MARGIN_BELOW_M: f64 = 20.0;
 /// … nor on top of a mast or tower: searched above the highest at least.
@@ -75,6 +75,13 @@ pub(crate) fn height_range(
         }
         (given, "given".to_owned())
     } else if let Some(span) = dem_span {
+        if span.0 < EARTH_RANGE_M.0 || span.1 > EARTH_RANGE_M.1 {
+            return Err(PipelineError::Value {
+                name: "--dem",
+                found: format!("heights from {:.0} to {:.0} m", span.0, span.1),
+                expected: "heights of the Earth's surface; is its no-data value declared?".to_owned(),
+            });
+        }
         let reason = format!("the DEM's {:.0} to {:.0} m with margins", span.0, span.1);
         (with_margins(span), reason)
     } else {
@@ -101,7 +108,7 @@ pub(crate) fn choose_sources(
     ties: &[PairTies],
     tuning: &Tuning,
     choices: &mut Choices<'_>,
-) -> Vec<Vec<usize>> {
+) -> Result<Vec<Vec<usize>>, PipelineError> {
     let found: BTreeMap<(usize, usize), usize> =
         ties.iter().map(|t| ((t.reference.min(t.source), t.reference.max(t.source)), t.ties.len())).collect();
     let merit = |i: usize, j: usize| {
@@ -121,7 +128,14 @@ pub(crate) fn choose_sources(
     }
     let text: Vec<String> = sources.iter().enumerate().map(|(i, s)| format!("{}←{}", i + 1, list(s))).collect();
     choices.tell("sources", text.join(" "), format!("at most {} per view, by tie points and angle", tuning.sources));
-    sources
+    if sources.iter().all(Vec::is_empty) {
+        return Err(PipelineError::Value {
+            name: "--reference",
+            found: "only images that no other one can be matched with".to_owned(),
+            expected: "at least one image that shares ground with another under a useful angle".to_owned(),
+        });
+    }
+    Ok(sources)
 }
 
 fn list(views: &[usize]) -> String {
@@ -189,11 +203,11 @@ pub(crate) fn choose_grid(
     let why = if config.crs_epsg.is_some() { "given" } else { "the UTM (or polar) zone of the scene's centre" };
     choices.tell("crs", format!("EPSG:{epsg}, heights above {}", config.vertical), why);
     let projection = MapProjection::from_epsg(epsg)?;
-    if projection.metres_per_unit().is_none() {
+    if projection.metres_per_unit() != Some(1.0) {
         return Err(PipelineError::Value {
             name: "--crs",
-            found: format!("EPSG:{epsg}, whose units are degrees"),
-            expected: "a projected CRS; a cell has one size in metres".to_owned(),
+            found: format!("EPSG:{epsg}, whose units are not metres"),
+            expected: "a projected CRS in metres; a cell has one size".to_owned(),
         });
     }
     let gsd_m = match config.gsd_m {

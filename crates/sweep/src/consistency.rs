@@ -82,8 +82,9 @@ fn count_in_tile(
     let Some(range) = height_span(reference.map, w) else { return Ok(()) };
     let corners = [w.x as f64, w.y as f64, (w.x + w.width as i64 - 1) as f64, (w.y + w.height as i64 - 1) as f64];
     let exact = |p, h| source_from_reference(&reference.view.camera, &source.view.camera, level, p, h);
+    // A source whose camera does not reach the tile has nothing to say there.
+    let Ok(map) = TileMap::fit(corners, range, exact) else { return Ok(()) };
     let failed = |e| SweepError::Camera { view: source.index, source: e };
-    let map = TileMap::fit(corners, range, exact).map_err(failed)?;
     let fits = map.max_error_px <= config.map_tolerance_px;
     let parallax = parallax_per_metre(&map);
     let tolerance_m = config.tolerance_px / parallax.max(f64::MIN_POSITIVE);
@@ -98,7 +99,7 @@ fn count_in_tile(
             let p = [at.0 as f64, at.1 as f64];
             let q = if fits { map.at(p, height_m) } else { exact(p, height_m).map_err(failed)? };
             if agrees(source.map, q, height_m, tolerance_m) {
-                counts[(x, y)] += 1;
+                counts[(x, y)] = counts[(x, y)].saturating_add(1);
             }
         }
     }
@@ -109,7 +110,6 @@ fn count_in_tile(
 fn parallax_per_metre(map: &TileMap) -> f64 {
     let h = map.mid_height_m();
     let (a, b) = (map.at([0.0, 0.0], h - 0.5), map.at([0.0, 0.0], h + 0.5));
-    // Where the source moves with the ground below both views the reference's own motion is taken out by the map.
     (b[0] - a[0]).hypot(b[1] - a[1])
 }
 

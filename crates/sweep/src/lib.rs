@@ -35,6 +35,12 @@ pub enum SweepError {
         /// What the camera said.
         source: camera::CameraError,
     },
+    /// The range of heights is too wide for the memory of one block.
+    #[error("a block of the image has more than {limit} height hypotheses; give a narrower --height-range")]
+    TooManyHypotheses {
+        /// The most that a block may have.
+        limit: u32,
+    },
     /// The local map between two images could not be brought under its error bound.
     #[error(
         "the map from view {reference} to view {source_view} is off by {error_px:.3} px on the smallest tile; \

@@ -16,6 +16,8 @@ pub struct Ranges {
     pub count: Grid<u16>,
 }
 
+/// Squares of unknown heights wider than about four times this take the whole map's heights.
+const REACH_MAX: usize = 16;
 /// Steps that a finer level searches beyond what the coarser one found: one coarse step is two fine ones, and the
 /// coarser height is itself off by up to a step.
 const MARGIN_STEPS: f64 = 3.0;
@@ -29,7 +31,7 @@ impl Ranges {
 
     /// Ranges of a level from the heights of the next coarser one (metres, NaN where unknown): the least and greatest
     /// height among the 3 × 3 coarse neighbours, with a margin. Where all of them are unknown, the nearest known ones
-    /// around count (two pixels away, four, …); `full` where the whole map is unknown.
+    /// around count; `full` where the whole map is unknown.
     pub fn from_coarser(
         width: usize,
         height: usize,
@@ -57,6 +59,15 @@ impl Ranges {
         out
     }
 
+    /// One hypothesis, which is never looked at, for the pixels where the image has no value.
+    #[must_use]
+    pub fn without_voids(mut self, image: &Grid<f32>) -> Self {
+        for (n, _) in self.count.data_mut().iter_mut().zip(image.data()).filter(|(_, v)| v.is_nan()) {
+            *n = 1;
+        }
+        self
+    }
+
     /// Number of pixel × hypothesis pairs.
     pub fn evaluations(&self) -> u64 {
         self.count.data().iter().map(|&n| u64::from(n)).sum()
@@ -71,13 +82,14 @@ fn span(lo_m: f64, hi_m: f64, step_m: f64) -> (i32, u16) {
 }
 
 /// Least and greatest known height around every cell: of its 3 × 3 neighbours or, where all are unknown, of the
-/// smallest of the squares twice, four times… as wide that holds a known one. (+inf, −inf) when there is none at all.
+/// smallest of a few growing squares that holds a known one, or else of the whole map. (+inf, −inf) when nothing is.
 fn known_extremes(g: &Grid<f32>) -> (Grid<f32>, Grid<f32>) {
     let (mut least, mut greatest) =
         (extremes(g, f32::INFINITY, f32::min, 1), extremes(g, f32::NEG_INFINITY, f32::max, 1));
+    // Each round adds its reach to that of the rounds before it.
     let mut reach = 2;
     let (mut wide_least, mut wide_greatest) = (least.clone(), greatest.clone());
-    while reach < g.width().max(g.height()) && least.data().iter().any(|v| v.is_infinite()) {
+    while reach <= REACH_MAX && least.data().iter().any(|v| v.is_infinite()) {
         wide_least = extremes(&wide_least, f32::INFINITY, f32::min, reach);
         wide_greatest = extremes(&wide_greatest, f32::NEG_INFINITY, f32::max, reach);
         let known = |out: &mut Grid<f32>, wide: &Grid<f32>| {
@@ -87,6 +99,11 @@ fn known_extremes(g: &Grid<f32>) -> (Grid<f32>, Grid<f32>) {
         known(&mut greatest, &wide_greatest);
         reach *= 2;
     }
+    let known = |v: &&f32| v.is_finite();
+    let all_least = g.data().iter().filter(known).copied().fold(f32::INFINITY, f32::min);
+    let all_greatest = g.data().iter().filter(known).copied().fold(f32::NEG_INFINITY, f32::max);
+    least.data_mut().iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = all_least);
+    greatest.data_mut().iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = all_greatest);
     (least, greatest)
 }
 

@@ -24,7 +24,7 @@ const WINDOW: usize = 3;
 /// window holds all of it.
 const DEVIATION: f32 = 0.8;
 
-/// Reads one pixel's sums. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the deviation of a
+/// Reads one pixel's sums; `None` where all hypotheses are as good, which says nothing. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the deviation of a
 /// cost relative to it, which turns the mode's curvature into the deviation of its position.
 pub(crate) fn soft_argmin(sums: &[u16], scale: f32, noise: f32) -> Option<Estimate> {
     let (best, &least) = sums.iter().enumerate().min_by_key(|&(_, s)| *s)?;
@@ -35,6 +35,9 @@ pub(crate) fn soft_argmin(sums: &[u16], scale: f32, noise: f32) -> Option<Estima
     let curvature = if reach == 0 { 0.0 } else { 0.5 * (above(best - 1) + above(best + 1)) };
     let outside = sums[..from].iter().chain(&sums[to..]).min().map_or(scale, |&s| f32::from(s - least));
     let margin = (outside / scale).min(1.0);
+    if curvature == 0.0 && margin == 0.0 {
+        return None;
+    }
     if curvature == 0.0 {
         return Some(Estimate { index: best as f32, spread: WINDOW as f32, margin });
     }
@@ -54,10 +57,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_costs_have_a_finite_answer_and_no_margin() {
-        let e = soft_argmin(&[500; 9], 1016.0, 0.05).unwrap();
-        assert!(e.index.is_finite() && e.spread == WINDOW as f32);
-        assert_eq!(e.margin, 0.0);
+    fn equal_costs_say_nothing() {
+        assert_eq!(soft_argmin(&[500; 9], 1016.0, 0.05), None);
+        let at_the_end = soft_argmin(&[100, 500, 500], 1016.0, 0.05).unwrap();
+        assert!(at_the_end.index == 0.0 && at_the_end.spread == WINDOW as f32);
     }
 
     #[test]

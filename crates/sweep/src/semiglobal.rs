@@ -139,7 +139,7 @@ fn guard(paths: &mut [u16], n: usize) {
 /// The jump penalty between two pixels: lowered by the stronger of their edges.
 #[inline(always)]
 fn jump_penalty(p: Penalties, a: u8, b: u8) -> u16 {
-    let range = u32::from(p.jump - p.jump_at_edge);
+    let range = u32::from(p.jump.saturating_sub(p.jump_at_edge));
     p.jump - ((range * u32::from(a.max(b))) / 255) as u16
 }
 

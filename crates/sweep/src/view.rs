@@ -25,7 +25,7 @@ impl View {
         Self { camera, levels: Pyramid::new(image, 16, SIDE_MIN).into_levels(), noise }
     }
 
-    /// The noise to expect on a level: averaging four pixels halves it, quantisation apart.
+    /// The most noise to expect on a level: each reduction at least halves it.
     pub fn noise_at(&self, level: usize) -> f32 {
         self.noise / (1 << level) as f32
     }

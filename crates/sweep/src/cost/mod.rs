@@ -2,7 +2,7 @@
 //!
 //! With zero-mean, unit-norm patch features `f_i` the variance over N views is `1 − ‖mean f_i‖²`
 //! `= (1 − 1/N) (1 − mean over pairs of ρ_ij)` with ρ the zero-mean normalised cross-correlation. The cost stored is
-//! `1 − mean ρ`, truncated to [0, 1]: anti-correlation says no more than no correlation. The robust form averages
+//! `1 − ρ`, each pair truncated to [0, 1], averaged: anti-correlation says no more than no correlation. The robust form averages
 //! only the best K of the reference–source pairs, so that occluded and changed views do not outvote the rest.
 //!
 //! Work goes by tiles of the reference: each source is laid over the tile once ([`crate::TileMap`]), and each height
@@ -13,11 +13,11 @@ pub(crate) use kernels::patch_moments;
 mod tile;
 
 pub use tile::TileScratch;
-pub(crate) use tile::{BlockCosts, Reference, sweep_tile};
+pub(crate) use tile::{BlockCosts, Reference, VARIANCE_FLOOR, remove_mean, sweep_tile};
 
 use raster::Grid;
 
-/// Costs are stored as integers 0 to this; 127 keeps a path cost of the aggregation in eight bits.
+/// Costs are stored as integers 0 to this: finer than the noise of any correlation, and sums of eight paths fit 16 bits.
 pub const COST_MAX: u8 = 127;
 
 /// How the pairs of views are combined into one cost.

@@ -11,7 +11,7 @@ use crate::ranges::Ranges;
 /// A tile is not divided below this side: an RPC that is not smooth over eight pixels is broken.
 const TILE_MIN: usize = 8;
 /// Variance that an 8-bit quantisation alone leaves in a patch.
-const VARIANCE_FLOOR: f32 = 1.0 / 12.0;
+pub(crate) const VARIANCE_FLOOR: f32 = 1.0 / 12.0;
 
 /// The reference on the level being swept.
 #[derive(Clone, Copy)]
@@ -87,7 +87,7 @@ pub(crate) fn sweep_tile(
         fit_maps(reference, sources, tile, planes, config)?
     };
     let Some(maps) = maps else {
-        for part in quarters(tile) {
+        for part in halves(tile) {
             sweep_tile(reference, sources, part, config, scratch, block)?;
         }
         return Ok(());
@@ -115,9 +115,9 @@ fn plane_span(ranges: &Ranges, tile: Window) -> (i32, i32) {
 }
 
 /// Whether the tile would be swept through far more planes than its pixels ask for, as at a wall between two roofs.
-/// Its quarters cost their margins again: below 16 pixels these outweigh the gain.
+/// Its parts cost their margins again: below 16 pixels these outweigh the gain.
 fn is_wasteful(ranges: &Ranges, tile: Window, planes: (i32, i32)) -> bool {
-    if tile.width.min(tile.height) < 32 {
+    if tile.width.max(tile.height) < 32 {
         return false;
     }
     let rows = tile.y as usize..tile.y as usize + tile.height;
@@ -126,14 +126,15 @@ fn is_wasteful(ranges: &Ranges, tile: Window, planes: (i32, i32)) -> bool {
     swept > 2 * asked.sum::<u64>()
 }
 
-/// The local maps to all sources, or `None` when one is over the bound and the tile must be divided.
+/// The local maps to all sources, or `None` when one is over the bound and the tile must be divided. A source whose
+/// camera does not reach the tile has no map: it sees nothing there.
 fn fit_maps(
     reference: Reference<'_>,
     sources: &[SourceLevel<'_>],
     tile: Window,
     planes: (i32, i32),
     config: &CostConfig,
-) -> Result<Option<Vec<TileMap>>, SweepError> {
+) -> Result<Option<Vec<Option<TileMap>>>, SweepError> {
     let step = reference.ranges.step_m;
     let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
     let corners = [
@@ -145,10 +146,12 @@ fn fit_maps(
     let mut maps = Vec::with_capacity(sources.len());
     for s in sources {
         let exact = |p, h| source_from_reference(reference.view.camera, s.camera, reference.level, p, h);
-        let map =
-            TileMap::fit(corners, heights, exact).map_err(|source| SweepError::Camera { view: s.index, source })?;
+        let Ok(map) = TileMap::fit(corners, heights, exact) else {
+            maps.push(None);
+            continue;
+        };
         if map.max_error_px > config.map_tolerance_px {
-            if tile.width.min(tile.height) / 2 >= TILE_MIN {
+            if tile.width.max(tile.height) / 2 >= TILE_MIN {
                 return Ok(None);
             }
             return Err(SweepError::NotSmooth {
@@ -158,19 +161,20 @@ fn fit_maps(
                 bound_px: config.map_tolerance_px,
             });
         }
-        maps.push(map);
+        maps.push(Some(map));
     }
     Ok(Some(maps))
 }
 
-fn quarters(t: Window) -> [Window; 4] {
-    let (w, h) = (t.width / 2, t.height / 2);
-    [
-        Window { width: w, height: h, ..t },
-        Window { x: t.x + w as i64, width: t.width - w, height: h, ..t },
-        Window { y: t.y + h as i64, width: w, height: t.height - h, ..t },
-        Window { x: t.x + w as i64, y: t.y + h as i64, width: t.width - w, height: t.height - h },
-    ]
+/// The two halves of a tile across its longer side.
+fn halves(t: Window) -> [Window; 2] {
+    if t.width >= t.height {
+        let w = t.width / 2;
+        [Window { width: w, ..t }, Window { x: t.x + w as i64, width: t.width - w, ..t }]
+    } else {
+        let h = t.height / 2;
+        [Window { height: h, ..t }, Window { y: t.y + h as i64, height: t.height - h, ..t }]
+    }
 }
 
 impl TileScratch {
@@ -178,7 +182,7 @@ impl TileScratch {
         &mut self,
         reference: Reference<'_>,
         sources: &[SourceLevel<'_>],
-        maps: &[TileMap],
+        maps: &[Option<TileMap>],
         tile: Window,
         planes: (i32, i32),
         config: &CostConfig,
@@ -199,7 +203,8 @@ impl TileScratch {
         for ((laid, source), map) in self.sources.iter_mut().zip(sources).zip(maps) {
             laid.plane.resize(area, core);
             laid.floor = source.noise.powi(2).max(VARIANCE_FLOOR);
-            laid.lay_over(source.image, *map, padded, (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step));
+            laid.map = *map;
+            laid.lay_over(source.image, padded, (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step));
         }
         let pairs = match config.aggregation {
             Aggregation::Variance => sources.len() * (sources.len() + 1) / 2,
@@ -263,7 +268,8 @@ fn moments(p: &mut Patches, width: usize, side: usize, floor: f32, line: &mut [f
 
 impl Laid {
     /// Resamples the source over the padded tile at the map's middle height, wide enough for all heights.
-    fn lay_over(&mut self, image: &Grid<f32>, map: TileMap, padded: Window, (h_lo, h_hi): (f64, f64)) {
+    fn lay_over(&mut self, image: &Grid<f32>, padded: Window, (h_lo, h_hi): (f64, f64)) {
+        let Some(map) = self.map else { return };
         let mut span = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         for h in [h_lo, 0.5 * (h_lo + h_hi), h_hi] {
             if let Some(shift) = map.shift_at(h) {
@@ -272,13 +278,16 @@ impl Laid {
                 }
             }
         }
+        if !span.iter().flatten().all(|v| v.is_finite()) {
+            self.map = None;
+            return;
+        }
         // One pixel before and two after for the cubic, one more at each side for the curvature between the heights.
         let first = [span[0][0].floor() as i64 - 2, span[1][0].floor() as i64 - 2];
         let extent = |i: usize| (span[i][1].ceil() as i64 + 3 - first[i]) as usize;
         self.stride = padded.width + extent(0);
         self.rows = padded.height + extent(1);
         self.origin = first;
-        self.map = Some(map);
         self.picture.resize(self.stride * self.rows, 0.0);
         for y in 0..self.rows {
             for x in 0..self.stride {
@@ -323,7 +332,7 @@ fn copy_window(image: &Grid<f32>, w: Window, out: &mut [f32]) {
 }
 
 /// Subtracts the mean of the valid samples: keeps f32 sums of squares well conditioned.
-fn remove_mean(v: &mut [f32]) {
+pub(crate) fn remove_mean(v: &mut [f32]) {
     let (mut sum, mut n) = (0.0f64, 0u32);
     for x in v.iter().filter(|x| x.is_finite()) {
         sum += f64::from(*x);

@@ -79,39 +79,42 @@ fn extent(vertices: &Grid<Vertex>, w: Window) -> Option<[f32; 4]> {
 }
 
 impl PlacedView {
-    /// Samples the view's surface at the cells of a window of the grid.
+    /// Samples the view's surface at the cells of a window of the grid: facets at the cells' centres; where none covers
+    /// a centre, the highest pixel that falls into the cell.
     pub fn rasterise(&self, cells: Window, tear: f32) -> ViewSurface {
-        let mut out = ViewSurface {
-            origin: [cells.x as f32, cells.y as f32],
-            height_m: Grid::filled(cells.width, cells.height, f32::NAN),
-            sigma_m: Grid::filled(cells.width, cells.height, f32::NAN),
-        };
+        let (mut facets, mut points) = (ViewSurface::empty(cells), ViewSurface::empty(cells));
         let (x1, y1) = ((cells.x + cells.width as i64) as f32, (cells.y + cells.height as i64) as f32);
         for (w, e) in &self.extents {
             if e[0] < x1 && e[1] < y1 && e[2] >= cells.x as f32 && e[3] >= cells.y as f32 {
-                self.rasterise_window(*w, tear, &mut out);
+                self.rasterise_window(*w, tear, &mut facets, &mut points);
             }
         }
-        out
+        let cells = facets.height_m.data_mut().iter_mut().zip(facets.sigma_m.data_mut());
+        for ((h, sigma), (point, point_sigma)) in cells.zip(points.height_m.data().iter().zip(points.sigma_m.data())) {
+            if h.is_nan() {
+                (*h, *sigma) = (*point, *point_sigma);
+            }
+        }
+        facets
     }
 
-    fn rasterise_window(&self, w: Window, tear: f32, out: &mut ViewSurface) {
+    fn rasterise_window(&self, w: Window, tear: f32, facets: &mut ViewSurface, points: &mut ViewSurface) {
         for y in w.y as usize..w.y as usize + w.height {
             for x in w.x as usize..w.x as usize + w.width {
                 let a = self.vertices[(x, y)];
                 let corner = |dx, dy| self.vertices.get(x + dx, y + dy).copied().filter(|v| !v.h.is_nan());
                 let (right, below, across) = (corner(1, 0), corner(0, 1), corner(1, 1));
                 if !a.h.is_nan() {
-                    out.put((a.x + 0.5).floor(), (a.y + 0.5).floor(), a.h, a.sigma);
+                    points.put((a.x + 0.5).floor(), (a.y + 0.5).floor(), a.h, a.sigma);
                     match (right, below, across) {
-                        (Some(b), Some(c), None) => out.facet([a, b, c], tear),
+                        (Some(b), Some(c), None) => facets.facet([a, b, c], tear),
                         (_, _, Some(c)) => {
-                            [right, below].into_iter().flatten().for_each(|b| out.facet([a, b, c], tear))
+                            [right, below].into_iter().flatten().for_each(|b| facets.facet([a, b, c], tear));
                         }
                         _ => {}
                     }
                 } else if let (Some(b), Some(c), Some(d)) = (right, below, across) {
-                    out.facet([b, c, d], tear);
+                    facets.facet([b, c, d], tear);
                 }
             }
         }
@@ -179,6 +182,14 @@ fn place_tile(
 }
 
 impl ViewSurface {
+    fn empty(cells: Window) -> Self {
+        Self {
+            origin: [cells.x as f32, cells.y as f32],
+            height_m: Grid::filled(cells.width, cells.height, f32::NAN),
+            sigma_m: Grid::filled(cells.width, cells.height, f32::NAN),
+        }
+    }
+
     /// Puts a height into a cell unless a higher one is there.
     fn put(&mut self, column: f32, row: f32, h: f32, sigma: f32) {
         let (column, row) = (column - self.origin[0], row - self.origin[1]);

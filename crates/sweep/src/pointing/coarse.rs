@@ -7,7 +7,7 @@ use raster::{Grid, bicubic};
 
 use super::patch::Patch;
 use super::ties::{Pair, TieConfig};
-use crate::cost::patch_moments;
+use crate::cost::{VARIANCE_FLOOR, patch_moments, remove_mean};
 use crate::geometry::TileMap;
 
 /// A source laid over the reference, ready to be searched.
@@ -43,7 +43,8 @@ impl Coarse {
         let along = [to[0] - from[0], to[1] - from[1]];
         let length = along[0].hypot(along[1]);
         let across = if length > 0.0 { [-along[1] / length, along[0] / length] } else { [0.0, 1.0] };
-        let (origin, picture) = lay_over(source, &map)?;
+        let (origin, mut picture) = lay_over(source, &map)?;
+        remove_mean(picture.data_mut());
         let inverse_deviation = deviations(&picture, config.radius as usize, pair.source.noise_at(level));
         let band = (config.band_px / f64::from(1u32 << level)).ceil() as i32;
         Some(Self { map, range_m, origin, picture, inverse_deviation, steps: length.ceil() as usize, across, band })
@@ -101,11 +102,12 @@ fn lay_over(source: &Grid<f32>, map: &TileMap) -> Option<([i64; 2], Grid<f32>)> 
         }
     }
     let origin = [span[0][0].floor() as i64, span[1][0].floor() as i64];
-    let extent = |i: usize| (span[i][1].ceil() as i64 - origin[i] + 1) as usize;
     // A map that blows the picture up is not one between two views of the same ground.
-    if (extent(0) * extent(1)) as f64 > 16.0 * (w + 1.0) * (h + 1.0) {
+    let area = (span[0][1] - span[0][0] + 2.0) * (span[1][1] - span[1][0] + 2.0);
+    if !area.is_finite() || area > 16.0 * (w + 1.0) * (h + 1.0) {
         return None;
     }
+    let extent = |i: usize| (span[i][1].ceil() as i64 - origin[i] + 1) as usize;
     let mut out = Grid::filled(extent(0), extent(1), f32::NAN);
     for y in 0..out.height() {
         for x in 0..out.width() {
@@ -127,7 +129,7 @@ fn deviations(picture: &Grid<f32>, radius: usize, noise: f32) -> Grid<f32> {
     let mut mean = vec![0.0; w * h];
     let mut out = Grid::filled(w, h, f32::NAN);
     let mut line = vec![0.0; 2 * picture.width()];
-    patch_moments(picture.data(), picture.width(), side, f32::MIN_POSITIVE, &mut line, &mut mean, out.data_mut());
+    patch_moments(picture.data(), picture.width(), side, VARIANCE_FLOOR, &mut line, &mut mean, out.data_mut());
     out.data_mut().iter_mut().filter(|v| **v * noise >= 1.0).for_each(|v| *v = f32::NAN);
     out
 }
