@@ -49,7 +49,11 @@ fn measure(scene: &scenes::Scene) -> anyhow::Result<table::Row> {
     let dsm = out.join("dsm/dsm.tif");
     let results = match &scene.truth {
         scenes::Truth::Raster { path, test_vertical } => run::evaluate(&dsm, path, *test_vertical)?,
-        scenes::Truth::Pyramid => pyramid::measure(&dsm)?,
+        scenes::Truth::Pyramid { peer } => {
+            let mut both = pyramid::measure(&dsm)?;
+            both.extend(pyramid::measure(peer)?.into_iter().map(|(name, value)| (format!("s2p_{name}"), value)));
+            both
+        }
     };
     Ok(table::Row::new(scene, &runs, results))
 }

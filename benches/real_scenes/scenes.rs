@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Truth {
     /// A surface model; `test_vertical` names the datum of a reference that does not say its own.
     Raster { path: PathBuf, test_vertical: Option<&'static str> },
-    /// The pyramid of Khufu.
-    Pyramid,
+    /// The pyramid of Khufu; `peer` is S2P's surface model of it, measured in the same way.
+    Pyramid { peer: PathBuf },
 }
 
 /// One run of the bench.
@@ -56,7 +56,7 @@ pub(crate) fn all(data: &Path) -> Vec<Scene> {
         scene(
             "phr_gizeh",
             vec![data.join("phr_gizeh/img1_rpc.tif"), data.join("phr_gizeh/img2_rpc.tif")],
-            Truth::Pyramid,
+            Truth::Pyramid { peer: data.join("peers/s2p_gizeh_0.5m.tif") },
             &KHUFU,
             Some(19.0),
         ),
