@@ -33,7 +33,7 @@ pub(crate) struct Args {
     /// Classes that are left out of everything, the alignment too (water is often 9).
     #[arg(long, value_name = "N", value_delimiter = ',', requires = "classes", allow_negative_numbers = true)]
     skip: Vec<i32>,
-    /// Thresholds of completeness_<t> and pag_<t>, in metres.
+    /// Thresholds of completeness_T and pag_T, in metres.
     #[arg(long, value_name = "METRES", value_delimiter = ',', default_value = "0.5,1,2.5,7.5")]
     thresholds: Vec<f64>,
     /// What TEST's heights are above, where the file does not say or is wrong: ellipsoid, egm96, egm2008 or EPSG:n.

@@ -224,7 +224,7 @@ mod tests {
                         let k = low[at] + d as i32;
                         let path = |k: i32| {
                             let i = k - low[q];
-                            (i >= 0 && (i as usize) < counts[q]).then(|| paths[q][i as usize]).unwrap_or(1 << 20)
+                            if i >= 0 && (i as usize) < counts[q] { paths[q][i as usize] } else { 1 << 20 }
                         };
                         let least = *paths[q].iter().min().unwrap();
                         let smooth = path(k).min(path(k - 1) + u32::from(p.step)).min(path(k + 1) + u32::from(p.step));
