@@ -12,7 +12,7 @@ use sweep::semiglobal::Penalties;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// Half the resolution in parallax, two sources per view.
+    /// Half the images' resolution, two sources per view.
     Fast,
     /// The default.
     #[default]
@@ -91,6 +91,8 @@ impl DsmConfig {
 pub(crate) struct Tuning {
     /// Parallax between neighbouring hypotheses in the pair that sees most of it, pixels.
     pub(crate) step_px: f64,
+    /// The finest pyramid level whose heights are computed.
+    pub(crate) finest_level: usize,
     /// Sources per view, at most.
     pub(crate) sources: usize,
     /// How many of the best sources count at a pixel: half of them see it even beside a wall.
@@ -101,16 +103,16 @@ pub(crate) struct Tuning {
 
 impl Preset {
     pub(crate) fn tuning(self) -> Tuning {
-        let (step_px, sources) = match self {
-            Self::Fast => (1.0, 2),
-            Self::Balanced => (0.5, 4),
-            Self::Accurate => (0.5, 8),
+        let (finest_level, sources) = match self {
+            Self::Fast => (1, 2),
+            Self::Balanced => (0, 4),
+            Self::Accurate => (0, 8),
         };
         // In units of the worst cost, 127. Measured on the simulated town and the LiDAR truth of JAX_068: a step costs
         // about a fifth, so that noise does not ripple a roof; a jump most of it, half of that across an image edge,
         // where roofs end. The proportions are those of CARS and S2P (8 to 32 of 24 bits of census).
         let penalties = Penalties { step: 24, jump: 100, jump_at_edge: 50 };
         let level = LevelConfig { cost: CostConfig::default(), penalties, cost_noise: 0.02 };
-        Tuning { step_px, sources, best_of: sources.div_ceil(2), level }
+        Tuning { step_px: 0.5, finest_level, sources, best_of: sources.div_ceil(2), level }
     }
 }

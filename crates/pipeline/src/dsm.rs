@@ -148,7 +148,7 @@ impl<'a> Job<'a> {
         let sides = setup::smallest_sides(&views);
         let plan = setup::plan_sweep(range, sources, &geometry, &sides, &tuning, &mut self.choices);
 
-        self.progress.begin("sweeping heights", views.len() * (plan.top_level + 1));
+        self.progress.begin("sweeping heights", views.len() * (plan.top_level - plan.bottom_level + 1));
         let heights = sweep_scene(&views, &plan, &|| self.progress.step())?;
         self.lap("sweep");
         let evaluations = heights.evaluations;
@@ -310,12 +310,13 @@ impl<'a> Job<'a> {
         let lonlat =
             |g: geodesy::LonLatHeight| grid.projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok().map(|p| [p.x, p.y]);
         let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &lonlat };
+        let level = plan.bottom_level as u32;
         let mut placed = Vec::with_capacity(all.len());
         let mut kept = Vec::with_capacity(all.len());
         for own in &all {
-            let keep = agreeing(*own, &all, useful)?;
+            let keep = agreeing(*own, &all, useful, level)?;
             kept.push(keep.data().iter().filter(|k| **k).count() as f64 / keep.data().len().max(1) as f64);
-            placed.push(place_view(*own, 0, &keep, &frame)?);
+            placed.push(place_view(*own, level, &keep, &frame)?);
             self.progress.step();
         }
         let (product, surface) = self.fuse(&placed, plan, grid, heights.maps[0].origin_m)?;
@@ -331,11 +332,15 @@ impl<'a> Job<'a> {
         origin_m: f64,
     ) -> Result<(Product, SurfaceReport), PipelineError> {
         let gsd = grid.gsd_m;
-        let same_surface_m = (2.0 * plan.step_m).max(1.5 * gsd) as f32;
-        let fusion = FusionConfig { same_surface_m, tear_m: (TEAR_SLOPE * gsd) as f32, tile: self.config.tile };
+        // Heights and their places are as coarse as the level that they come from.
+        let coarser = f64::from(1u32 << plan.bottom_level);
+        let step_m = plan.step_m * coarser;
+        let same_surface_m = (2.0 * step_m).max(1.5 * gsd) as f32;
+        let fusion =
+            FusionConfig { same_surface_m, tear_m: (TEAR_SLOPE * gsd * coarser) as f32, tile: self.config.tile };
         let mut fused = fuse_views(placed, grid.size, &fusion);
         let speckle_cells = ((SPECKLE_SIDE_M / gsd).powi(2) as usize).max(SPECKLE_CELLS_MIN);
-        let removed = remove_speckle(&mut fused.height_m, (2.0 * plan.step_m).max(2.0 * gsd) as f32, speckle_cells);
+        let removed = remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd) as f32, speckle_cells);
         let observed = fused.height_m.data().iter().filter(|h| !h.is_nan()).count();
         if observed == 0 {
             return Err(PipelineError::NoSurface { range: plan.range_m });
@@ -360,13 +365,18 @@ impl<'a> Job<'a> {
 /// Which pixels enough other views agree with: a third of the views that see this one's ground from another direction,
 /// so that a chance agreement of two among many does not put a height on the map, and at least one. A single reference
 /// view has nobody to agree with: its heights stand.
-fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[(usize, usize)]) -> Result<Grid<bool>, PipelineError> {
+fn agreeing(
+    own: Heights<'_>,
+    all: &[Heights<'_>],
+    useful: &[(usize, usize)],
+    level: u32,
+) -> Result<Grid<bool>, PipelineError> {
     let partner = |h: &Heights<'_>| useful.contains(&(own.index.min(h.index), own.index.max(h.index)));
     let others: Vec<Heights<'_>> = all.iter().copied().filter(partner).collect();
     if others.is_empty() {
         return Ok(own.map.height_m.map(|h| !h.is_nan()));
     }
-    let counts = count_agreeing(own, &others, 0, &ConsistencyConfig::default())?;
+    let counts = count_agreeing(own, &others, level, &ConsistencyConfig::default())?;
     let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
     Ok(counts.map(|n| *n >= needed))
 }

@@ -18,6 +18,8 @@ pub(crate) struct SweepPlan {
     pub(crate) step_m: f64,
     /// The coarsest pyramid level used.
     pub(crate) top_level: usize,
+    /// The finest pyramid level used: 0 is the full resolution.
+    pub(crate) bottom_level: usize,
     /// For each view, the views it is compared with.
     pub(crate) sources: Vec<Vec<usize>>,
     /// How many of the best sources count, at most.
@@ -26,7 +28,7 @@ pub(crate) struct SweepPlan {
     pub(crate) level: LevelConfig,
 }
 
-/// Heights of all views at full resolution, and how many hypotheses were evaluated for them.
+/// Heights of all views on the finest level used, and how many hypotheses were evaluated for them.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneHeights {
     /// One map per view.
@@ -47,7 +49,7 @@ pub(crate) fn sweep_scene(
     let origin_m = 0.5 * (plan.range_m.0 + plan.range_m.1);
     let mut maps: Vec<HeightMap> = Vec::new();
     let mut evaluations = 0;
-    for level in (0..=plan.top_level).rev() {
+    for level in (plan.bottom_level..=plan.top_level).rev() {
         let swept: Vec<(HeightMap, u64)> = (0..views.len())
             .into_par_iter()
             .map(|i| {
@@ -58,7 +60,7 @@ pub(crate) fn sweep_scene(
             .collect::<Result<_, SweepError>>()?;
         evaluations += swept.iter().map(|(_, n)| n).sum::<u64>();
         maps = swept.into_iter().map(|(m, _)| m).collect();
-        if level > 0 {
+        if level > plan.bottom_level {
             maps = drop_lone_heights(views, plan, &maps, level as u32)?;
         }
     }

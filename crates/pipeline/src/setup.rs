@@ -162,16 +162,17 @@ pub(crate) fn plan_sweep(
     );
     let deepest = smallest_sides.iter().filter(|s| **s >= TOP_SIDE_MIN).count().saturating_sub(1);
     let too_many = |level: &usize| (range_m.1 - range_m.0) / (step_m * f64::from(1u32 << *level)) > TOP_HYPOTHESES;
-    let top_level = (0..deepest).take_while(too_many).count();
+    let bottom_level = tuning.finest_level.min(deepest);
+    let top_level = (0..deepest).take_while(too_many).count().max(bottom_level);
     choices.tell(
         "pyramid",
-        format!("{} levels", top_level + 1),
+        format!("{} levels", top_level - bottom_level + 1),
         format!(
             "{:.0} hypotheses over the whole range on the coarsest",
             (range_m.1 - range_m.0) / (step_m * f64::from(1u32 << top_level))
         ),
     );
-    SweepPlan { range_m, step_m, top_level, sources, best_of: tuning.best_of, level: tuning.level }
+    SweepPlan { range_m, step_m, top_level, bottom_level, sources, best_of: tuning.best_of, level: tuning.level }
 }
 
 /// The output grid.
