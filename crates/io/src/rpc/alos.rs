@@ -34,7 +34,7 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
         start += width;
         field
     };
-    for (scalar, width) in REQUIRED.into_iter().zip(WIDTHS) {
+    for (scalar, width) in REQUIRED.iter().copied().zip(WIDTHS) {
         let entry = Entry { key: RPC00B.scalar(scalar), text: column(width), line: Some(1) };
         draft.set(scalar, entry.number()?, entry)?;
     }

@@ -35,18 +35,7 @@ pub(super) enum Poly {
 }
 
 /// The scalars that every RPC has, in the order of RPC00B and of the fixed-width formats.
-pub(super) const REQUIRED: [Scalar; 10] = [
-    Scalar::LineOff,
-    Scalar::SampOff,
-    Scalar::LatOff,
-    Scalar::LongOff,
-    Scalar::HeightOff,
-    Scalar::LineScale,
-    Scalar::SampScale,
-    Scalar::LatScale,
-    Scalar::LongScale,
-    Scalar::HeightScale,
-];
+pub(super) const REQUIRED: &[Scalar] = SCALARS.split_at(10).0;
 
 /// The polynomials in the order of RPC00B.
 pub(super) const POLYS: [Poly; 4] = [Poly::LineNum, Poly::LineDen, Poly::SampNum, Poly::SampDen];
@@ -93,6 +82,7 @@ pub(super) enum Field {
     Unknown,
 }
 
+/// All scalars in the order of [`Names::scalars`]; the two optional ones are last.
 const SCALARS: [Scalar; 12] = [
     Scalar::LineOff,
     Scalar::SampOff,

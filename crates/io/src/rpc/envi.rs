@@ -35,7 +35,7 @@ pub(super) fn from_slice(values: &[f64], entry: Entry<'_>) -> Result<Draft, Faul
     let mut draft = Draft::default();
     let mut values = values.iter();
     let mut next = || values.next().copied().ok_or_else(|| Fault::Missing { key: entry.key.to_owned() });
-    for scalar in REQUIRED {
+    for &scalar in REQUIRED {
         draft.set(scalar, next()?, Entry { key: RPC00B.scalar(scalar), ..entry })?;
     }
     for poly in POLYS {

@@ -4,7 +4,8 @@ use super::Parsed;
 use super::draft::{Draft, Entry, Field, Names};
 use super::error::Fault;
 
-const NAMES: Names = Names {
+/// The names of the RPB format, for reading and writing.
+pub(super) const NAMES: Names = Names {
     scalars: [
         "lineOffset",
         "sampOffset",

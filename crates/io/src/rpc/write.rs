@@ -10,9 +10,9 @@ use std::path::Path;
 use camera::Rpc;
 use serde_json::{Map, Value};
 
-use super::draft::{POLYS, Poly, RPC00B};
+use super::draft::{POLYS, Poly, REQUIRED, RPC00B};
 use super::error::RpcWriteError;
-use super::{RpcFormat, json};
+use super::{RpcFormat, json, rpb};
 
 /// What to do with a file that is already there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,26 +123,14 @@ fn unit(key: &str) -> &'static str {
 }
 
 fn rpb(rpc: &Rpc) -> String {
-    let names = [
-        "lineOffset",
-        "sampOffset",
-        "latOffset",
-        "longOffset",
-        "heightOffset",
-        "lineScale",
-        "sampScale",
-        "latScale",
-        "longScale",
-        "heightScale",
-    ];
     let mut text = String::from("satId = \"????\";\nbandId = \"?\";\nSpecId = \"RPC00B\";\nBEGIN_GROUP = IMAGE\n");
     // The format requires both errors; 0 is what providers write for unknown ones.
     let _ = writeln!(text, "\terrBias = {};", rpc.err_bias_m.unwrap_or(0.0));
     let _ = writeln!(text, "\terrRand = {};", rpc.err_rand_m.unwrap_or(0.0));
-    for (name, value) in names.iter().zip(scalars(rpc).iter().flatten()) {
+    for (name, value) in rpb::NAMES.scalars.iter().zip(scalars(rpc).iter().flatten()).take(REQUIRED.len()) {
         let _ = writeln!(text, "\t{name} = {value};");
     }
-    for (name, poly) in ["lineNumCoef", "lineDenCoef", "sampNumCoef", "sampDenCoef"].iter().zip(POLYS) {
+    for (name, poly) in rpb::NAMES.polys.iter().zip(POLYS) {
         let values: Vec<String> = coefficients(rpc, poly).iter().map(|c| format!("\t\t\t{c:e}")).collect();
         let _ = writeln!(text, "\t{name} = (\n{});", values.join(",\n"));
     }
