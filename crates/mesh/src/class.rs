@@ -1,0 +1,97 @@
+//! What a surface is: the semantics of CityGML's boundary surfaces.
+
+use std::fmt;
+
+/// The class of a surface, with a stable number for class maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+#[repr(u8)]
+#[non_exhaustive]
+pub enum SurfaceClass {
+    /// The file does not say.
+    #[default]
+    Unclassified = 0,
+    /// The building's bottom.
+    Ground = 1,
+    /// Roof.
+    Roof = 2,
+    /// Outer wall.
+    Wall = 3,
+    /// A virtual surface that closes a solid and is not built.
+    Closure = 4,
+    /// A ceiling seen from outside (below an oriel).
+    OuterCeiling = 5,
+    /// A floor walked on outside (a loggia).
+    OuterFloor = 6,
+    /// Window.
+    Window = 7,
+    /// Door.
+    Door = 8,
+    /// A wall, floor or ceiling inside the building.
+    Interior = 9,
+    /// A class that is none of a building's surfaces, such as a traffic area.
+    Other = 10,
+}
+
+/// Classes by their number, with the names of CityGML and CityJSON.
+const NAMES: [(SurfaceClass, &str); 11] = [
+    (SurfaceClass::Unclassified, "Unclassified"),
+    (SurfaceClass::Ground, "GroundSurface"),
+    (SurfaceClass::Roof, "RoofSurface"),
+    (SurfaceClass::Wall, "WallSurface"),
+    (SurfaceClass::Closure, "ClosureSurface"),
+    (SurfaceClass::OuterCeiling, "OuterCeilingSurface"),
+    (SurfaceClass::OuterFloor, "OuterFloorSurface"),
+    (SurfaceClass::Window, "Window"),
+    (SurfaceClass::Door, "Door"),
+    (SurfaceClass::Interior, "InteriorWallSurface"),
+    (SurfaceClass::Other, "Other"),
+];
+
+impl SurfaceClass {
+    /// Every class, in the order of the numbers.
+    pub fn all() -> impl Iterator<Item = Self> {
+        NAMES.iter().map(|&(class, _)| class)
+    }
+
+    /// The class of a CityGML or CityJSON name; names that are no building surface are [`SurfaceClass::Other`].
+    pub fn from_name(name: &str) -> Self {
+        match name {
+            "CeilingSurface" | "FloorSurface" => Self::Interior,
+            "WindowSurface" => Self::Window,
+            "DoorSurface" => Self::Door,
+            _ => NAMES.iter().find(|&&(_, known)| known == name).map_or(Self::Other, |&(class, _)| class),
+        }
+    }
+
+    /// The name in CityGML and CityJSON (`RoofSurface`).
+    pub fn name(self) -> &'static str {
+        NAMES[self as usize].1
+    }
+
+    /// The class of a number.
+    pub fn from_number(number: u8) -> Option<Self> {
+        NAMES.get(usize::from(number)).map(|&(class, _)| class)
+    }
+}
+
+impl fmt::Display for SurfaceClass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_names_lead_back() {
+        for (number, class) in SurfaceClass::all().enumerate() {
+            assert_eq!(class as usize, number);
+            assert_eq!(SurfaceClass::from_number(number as u8), Some(class));
+            assert_eq!(SurfaceClass::from_name(class.name()), class);
+        }
+        assert_eq!(SurfaceClass::from_number(11), None);
+        assert_eq!(SurfaceClass::from_name("TrafficArea"), SurfaceClass::Other);
+    }
+}

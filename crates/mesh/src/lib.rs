@@ -1,0 +1,23 @@
+//! City models: objects with surfaces and semantics, and the triangles made of them.
+//!
+//! A [`CityModel`] is what a file says: objects with an id, a kind and a parent, and per level of detail the polygons
+//! of their surfaces with a [`SurfaceClass`]. Coordinates are f64 in the reference system of the model (for every use in
+//! this toolkit: metres, east, north, up). Readers and writers are in the crate `io`.
+
+mod class;
+mod crs;
+mod error;
+mod kind;
+mod lod;
+mod model;
+mod point;
+mod pool;
+
+pub use class::SurfaceClass;
+pub use crs::CrsReference;
+pub use error::ModelError;
+pub use kind::{ObjectKind, Role};
+pub use lod::Lod;
+pub use model::{CityModel, CityObject, Geometry, GeometryKind, Surface};
+pub use point::ModelPoint;
+pub use pool::VertexPool;

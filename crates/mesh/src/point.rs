@@ -1,0 +1,35 @@
+//! Positions in the reference system of a city model.
+
+/// A position in the reference system of the model, f64: usually metres east, north and up.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ModelPoint {
+    /// First coordinate, usually easting.
+    pub x: f64,
+    /// Second coordinate, usually northing.
+    pub y: f64,
+    /// Third coordinate, the height above the model's vertical datum.
+    pub z: f64,
+}
+
+impl ModelPoint {
+    /// A position.
+    pub const fn new(x: f64, y: f64, z: f64) -> Self {
+        Self { x, y, z }
+    }
+
+    /// Whether no coordinate is NaN or infinite.
+    pub fn is_finite(self) -> bool {
+        self.x.is_finite() && self.y.is_finite() && self.z.is_finite()
+    }
+
+    /// The vector from `origin` to this position.
+    pub fn from_origin(self, origin: Self) -> [f64; 3] {
+        [self.x - origin.x, self.y - origin.y, self.z - origin.z]
+    }
+}
+
+impl From<[f64; 3]> for ModelPoint {
+    fn from([x, y, z]: [f64; 3]) -> Self {
+        Self { x, y, z }
+    }
+}
