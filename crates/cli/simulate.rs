@@ -5,55 +5,91 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::simulate::{Simulation, SimulationConfig};
+use ::simulate::{PRESETS, Simulation, SimulationConfig};
 use anyhow::{Context, bail};
 use geodesy::Crs;
 use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc};
 
 use crate::Outcome;
+use crate::print;
 
 /// Arguments of `skysweep simulate`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
+    /// Preset or parameter file (TOML): `--list` names the presets, `--template` prints one as a file.
+    #[arg(value_name = "PRESET|FILE.toml", default_value = "town")]
+    scene: String,
     /// Everything random follows from this number.
-    #[arg(long, value_name = "N", default_value_t = SimulationConfig::default().seed)]
-    seed: u64,
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     /// Side of the square area, metres.
-    #[arg(long, value_name = "M", default_value_t = SimulationConfig::default().size_m)]
-    size: f64,
+    #[arg(long, value_name = "M")]
+    size: Option<f64>,
     /// Ground sampling distance of the images and of the truth, metres.
-    #[arg(long, value_name = "M", default_value_t = SimulationConfig::default().gsd_m)]
-    gsd: f64,
+    #[arg(long, value_name = "M")]
+    gsd: Option<f64>,
     /// Number of views.
-    #[arg(long, value_name = "N", default_value_t = SimulationConfig::default().views)]
-    views: usize,
+    #[arg(long, value_name = "N")]
+    views: Option<usize>,
+    /// Number of dates that the views are shared out over: another sun, other vehicles, other radiometry on each.
+    #[arg(long, value_name = "N")]
+    dates: Option<usize>,
     /// Folder for the images and the truth.
-    #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
+    #[arg(short, long, value_name = "DIR", required_unless_present_any = ["list", "template"])]
+    output: Option<PathBuf>,
     /// Replace the files of an earlier simulation.
     #[arg(long)]
     overwrite: bool,
+    /// List the presets and stop.
+    #[arg(long)]
+    list: bool,
+    /// Print the parameters as a TOML file and stop.
+    #[arg(long)]
+    template: bool,
 }
 
 /// Runs `skysweep simulate`.
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let config = SimulationConfig {
-        seed: args.seed,
-        size_m: args.size,
-        gsd_m: args.gsd,
-        views: args.views,
-        ..SimulationConfig::default()
-    };
-    config.validate()?;
-    if !args.overwrite && fs::read_dir(&args.output).is_ok_and(|mut entries| entries.next().is_some()) {
-        bail!("the output folder is not empty: choose another or pass --overwrite: {}", args.output.display());
+    if args.list {
+        let lines = PRESETS.map(|(name, description)| format!("{name:18} {description}\n"));
+        print::text(&lines.concat())?;
+        return Ok(Outcome::Complete);
     }
-    let truth = args.output.join("truth");
+    let config = config(args)?;
+    match &args.output {
+        Some(output) if !args.template => made(config, output, args.overwrite),
+        _ => print::text(&config.to_toml()?).map(|()| Outcome::Complete),
+    }
+}
+
+/// The parameters: those of the preset or the file, with what the command line says instead.
+fn config(args: &Args) -> anyhow::Result<SimulationConfig> {
+    let is_file = Path::new(&args.scene).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    let mut config = if is_file { from_file(Path::new(&args.scene))? } else { SimulationConfig::preset(&args.scene)? };
+    config.seed = args.seed.unwrap_or(config.seed);
+    config.size_m = args.size.unwrap_or(config.size_m);
+    config.gsd_m = args.gsd.unwrap_or(config.gsd_m);
+    config.views = args.views.unwrap_or(config.views);
+    config.acquisition.dates = args.dates.unwrap_or(config.acquisition.dates);
+    config.validate()?;
+    Ok(config)
+}
+
+fn from_file(path: &Path) -> anyhow::Result<SimulationConfig> {
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read the file: {}", path.display()))?;
+    SimulationConfig::from_toml(&text).with_context(|| format!("in the parameter file: {}", path.display()))
+}
+
+fn made(config: SimulationConfig, output: &Path, overwrite: bool) -> anyhow::Result<Outcome> {
+    if !overwrite && fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_some()) {
+        bail!("the output folder is not empty: choose another or pass --overwrite: {}", output.display());
+    }
+    let truth = output.join("truth");
     fs::create_dir_all(&truth).with_context(|| format!("cannot make the output folder: {}", truth.display()))?;
     let simulation = Simulation::new(config)?;
-    write(&simulation, &args.output, args.overwrite)?;
+    write(&simulation, output, overwrite)?;
     let (buildings, views) = (simulation.scene.blocks().len(), simulation.views.len());
-    tracing::info!("{views} views of {buildings} building blocks in {}", args.output.display());
+    tracing::info!("{views} views of {buildings} building blocks in {}", output.display());
     Ok(Outcome::Complete)
 }
 

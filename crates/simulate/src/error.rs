@@ -1,5 +1,7 @@
 //! Why a scene cannot be made.
 
+use crate::presets::PRESETS;
+
 /// A configuration that makes no scene, or a place where none can be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -16,10 +18,29 @@ pub enum SimulateError {
         /// Largest permitted value.
         high: f64,
     },
+    /// No preset has this name.
+    #[error("no preset is called {found}: the presets are {}", names())]
+    UnknownPreset {
+        /// The name.
+        found: String,
+    },
+    /// A parameter file that cannot be read.
+    #[error("the parameters cannot be read: {text}")]
+    Parameters {
+        /// What is wrong, and where.
+        text: String,
+    },
     /// A pixel has no line of sight.
     #[error("the simulated camera does not see the ground")]
     Camera(#[from] camera::CameraError),
+    /// The camera has no RPC.
+    #[error("the simulated camera cannot be written as an RPC")]
+    Fit(#[from] camera::FitError),
     /// The scene lies where there is no map.
     #[error("the scene's place cannot be mapped")]
     Geodesy(#[from] geodesy::GeodesyError),
+}
+
+fn names() -> String {
+    PRESETS.map(|(name, _)| name).join(", ")
 }

@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn every_block_is_found_where_it_stands_and_none_far_away() {
-        let scene = town::build(2, 300.0, 50.0);
+        let scene = town::build(2, 300.0, 50.0, 35.0);
         let solids: Vec<Solid> = scene.blocks().map(|b| Solid::new(*b)).collect();
         let index = BlockIndex::new(&solids);
         for (i, solid) in solids.iter().enumerate() {

@@ -8,10 +8,14 @@
 //! Scene frame: x east, y north in metres of the map grid from the scene's centre, z metres above the WGS 84 ellipsoid.
 
 mod block;
+mod config;
+mod date;
 mod error;
 mod frame;
 mod index;
 mod noise;
+mod parameters;
+mod presets;
 mod pushbroom;
 mod random;
 mod ray;
@@ -25,13 +29,19 @@ mod texture;
 mod town;
 
 pub use block::{Block, Roof};
+pub use config::{
+    AcquisitionConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, QuarterWeights, SensorConfig,
+    SimulationConfig, SurfaceConfig, TerrainConfig, VegetationConfig, VehiclesConfig, ViewDirection,
+};
+pub use date::Date;
 pub use error::SimulateError;
 pub use frame::SceneFrame;
+pub use presets::PRESETS;
 pub use pushbroom::Look;
 pub use ray::Ray;
 pub use render::Sun;
 pub use scene::{Scene, SurfaceClass};
 pub use sensor::{DN_MAX, Sensor};
 pub use sight::Sight;
-pub use simulation::{SceneRecord, Simulation, SimulationConfig, Truth, View, ViewRecord};
+pub use simulation::{SceneRecord, Simulation, Truth, View, ViewRecord};
 pub use terrain::Terrain;

@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn rays_meet_what_a_brute_force_march_meets() {
-        let scene = town::build(11, 200.0, 120.0);
+        let scene = town::build(11, 200.0, 120.0, 35.0);
         let (low, high) = scene.height_range_m();
         let mut on_buildings = 0;
         for k in 0..400 {
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_wall_away_from_the_sun_is_in_its_own_shadow_and_the_roof_is_not() {
-        let scene = town::build(11, 200.0, 120.0);
+        let scene = town::build(11, 200.0, 120.0, 35.0);
         let to_sun = Vector3::new(0.4, -0.5, 0.77).normalize();
         let solid = scene.solids.iter().max_by(|a, b| a.block.top_m().total_cmp(&b.block.top_m())).expect("a tower");
         let [x, y] = solid.block.centre_m;

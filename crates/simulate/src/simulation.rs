@@ -3,55 +3,30 @@
 //! The views come seconds apart, so light and town are the same in all of them. Each view's RPC carries a planted pointing
 //! error of 1 to 3 pixels (a translation), as unadjusted RPCs do; the images are rendered through the true cameras.
 
-use camera::{ImagePoint, Rpc};
+use camera::{ImageCorrection, ImagePoint, Rpc, RpcCamera};
 use nalgebra::Vector3;
 use raster::{GeoTransform, Grid};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::block::Block;
+use crate::config::{SimulationConfig, ViewDirection};
+use crate::date::Date;
 use crate::error::SimulateError;
 use crate::frame::SceneFrame;
 use crate::pushbroom::Look;
 use crate::random::{Stream, derived};
-use crate::render::{LitScene, Sun};
+use crate::render::LitScene;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
 use crate::sight::Sight;
 use crate::texture::Texture;
 use crate::town;
 
-/// Direction of flight of the pass: a sun-synchronous orbit coming down.
-const HEADING_DEG: f64 = 190.0;
-/// Steepest along-track view at the two ends of the pass, degrees; base over height is twice its tangent.
-const PITCH_DEG: f64 = 16.5;
-/// Largest across-track view, degrees.
-const ROLL_DEG: f64 = 6.0;
 /// Pixels around the area of the truth, for what leans out of it and for the pointing error.
 const MARGIN_PX: f64 = 12.0;
 /// Town beyond the area, metres, so that its edge sees houses and shadows as its middle does.
 const SURROUNDINGS_M: f64 = 60.0;
-
-/// What to simulate.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SimulationConfig {
-    /// Everything random follows from it.
-    pub seed: u64,
-    /// Side of the square area whose truth is known, metres.
-    pub size_m: f64,
-    /// Sampling distance of the images and cell of the truth, metres.
-    pub gsd_m: f64,
-    /// Number of views.
-    pub views: usize,
-    /// Longitude of the centre, degrees.
-    pub lon_deg: f64,
-    /// Latitude of the centre, degrees.
-    pub lat_deg: f64,
-    /// Mean height of the ground above the ellipsoid, metres.
-    pub ground_height_m: f64,
-    /// Where the light comes from.
-    pub sun: Sun,
-}
 
 /// One simulated image.
 #[derive(Debug, Clone)]
@@ -60,6 +35,8 @@ pub struct View {
     pub image: Grid<u16>,
     /// The RPC that a user gets: the true one with the pointing error.
     pub rpc: Rpc,
+    /// The RPC of the camera through which the image was rendered.
+    pub true_rpc: Rpc,
     /// How it was taken.
     pub record: ViewRecord,
 }
@@ -69,10 +46,14 @@ pub struct View {
 pub struct ViewRecord {
     /// Geometry.
     pub look: Look,
+    /// When it was taken.
+    pub date: Date,
     /// Radiometry.
     pub sensor: Sensor,
-    /// What the given RPC projects too far, pixels (sample, line).
+    /// What the given RPC projects too far in the middle of the image, pixels (sample, line).
     pub pointing_error_px: [f64; 2],
+    /// The same everywhere: `given = pointing(true)`.
+    pub pointing: ImageCorrection,
 }
 
 /// The surface as rasters.
@@ -118,43 +99,6 @@ pub struct SceneRecord {
     pub blocks: Vec<Block>,
 }
 
-impl Default for SimulationConfig {
-    /// A forward, a near-nadir and a backward view of 320 m of town at 0.5 m.
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            size_m: 320.0,
-            gsd_m: 0.5,
-            views: 3,
-            lon_deg: 5.40,
-            lat_deg: 43.53,
-            ground_height_m: 180.0,
-            sun: Sun { elevation_deg: 52.0, azimuth_deg: 152.0 },
-        }
-    }
-}
-
-impl SimulationConfig {
-    /// Checks every number.
-    ///
-    /// # Errors
-    /// The first number outside its range.
-    pub fn validate(&self) -> Result<(), SimulateError> {
-        let within = |name, found: f64, low, high| match (low..=high).contains(&found) {
-            true => Ok(()),
-            false => Err(SimulateError::OutOfRange { name, found, low, high }),
-        };
-        within("the size in metres", self.size_m, 50.0, 3000.0)?;
-        within("the ground sampling distance in metres", self.gsd_m, 0.2, 5.0)?;
-        within("the number of views", self.views as f64, 2.0, 16.0)?;
-        within("the longitude", self.lon_deg, -180.0, 180.0)?;
-        within("the latitude", self.lat_deg, -80.0, 80.0)?;
-        within("the height of the ground in metres", self.ground_height_m, -400.0, 6000.0)?;
-        within("the sun's elevation in degrees", self.sun.elevation_deg, Sun::LOWEST_DEG, 90.0)?;
-        within("the sun's azimuth in degrees", self.sun.azimuth_deg, 0.0, 360.0)
-    }
-}
-
 impl Simulation {
     /// Builds the scene, renders the views and samples the truth.
     ///
@@ -163,7 +107,12 @@ impl Simulation {
     pub fn new(config: SimulationConfig) -> Result<Self, SimulateError> {
         config.validate()?;
         let frame = SceneFrame::new(config.lon_deg, config.lat_deg, config.gsd_m)?;
-        let scene = town::build(config.seed, config.size_m / 2.0 + SURROUNDINGS_M, config.ground_height_m);
+        let scene = town::build(
+            config.seed,
+            config.size_m / 2.0 + SURROUNDINGS_M,
+            config.ground_height_m,
+            config.buildings.landmark_height_m,
+        );
         let views = (0..config.views).map(|i| view(&config, &frame, &scene, i)).collect::<Result<_, _>>()?;
         let truth = truth(&config, &frame, &scene);
         Ok(Self { config, scene, frame, views, truth })
@@ -181,43 +130,58 @@ impl Simulation {
     }
 }
 
-impl View {
-    /// The RPC without the pointing error: the camera through which the image was rendered.
-    pub fn true_rpc(&self) -> Rpc {
-        let [sample, line] = self.record.pointing_error_px;
-        Rpc { samp_off: self.rpc.samp_off - sample, line_off: self.rpc.line_off - line, ..self.rpc.clone() }
-    }
-}
-
 fn view(config: &SimulationConfig, frame: &SceneFrame, scene: &Scene, index: usize) -> Result<View, SimulateError> {
     let mut stream = Stream::new(derived(config.seed, 1000 + index as u64));
     let look = look(config, index);
-    let (rpc, size) = camera(config, frame, &look)?;
+    let (true_rpc, size) = camera(config, frame, &look)?;
     let (low, high) = scene.height_range_m();
-    let sight = Sight::new(&rpc, frame, size, (low - 1.0, high + 1.0))?;
+    let sight = Sight::new(&true_rpc, frame, size, (low - 1.0, high + 1.0))?;
     let sensor = Sensor {
         gain: stream.uniform(2300.0, 2700.0),
         offset: stream.uniform(80.0, 140.0),
         electrons_per_dn: 12.0,
         read_noise: 2.0,
     };
-    let lit = LitScene::new(scene, Texture::new(config.seed), &config.sun);
+    let date = Date::new(config, index * config.acquisition.dates / config.views);
+    let lit = LitScene::new(scene, Texture::new(config.seed), &date.sun);
     let image = lit.image(&sight, &sensor, size, derived(config.seed, 2000 + index as u64));
-    let (length, direction) = (stream.uniform(1.0, 3.0), stream.uniform(0.0, std::f64::consts::TAU));
-    let pointing_error_px = [length * direction.cos(), length * direction.sin()];
-    let rpc =
-        Rpc { samp_off: rpc.samp_off + pointing_error_px[0], line_off: rpc.line_off + pointing_error_px[1], ..rpc };
-    Ok(View { image, rpc, record: ViewRecord { look, sensor, pointing_error_px } })
+    let pointing = pointing(config, &mut stream, size);
+    let rpc = RpcCamera { rpc: true_rpc.clone(), correction: pointing }.folded()?.rpc;
+    let record = ViewRecord { look, date, sensor, pointing_error_px: pointing.translation_px, pointing };
+    Ok(View { image, rpc, true_rpc, record })
 }
 
-/// The views of a pass: from the forward one to the backward one, weaving to both sides of the track.
+/// What the given RPC projects too far: a translation at the middle of the image, and a drift along its lines.
+fn pointing(config: &SimulationConfig, stream: &mut Stream, (width, height): (usize, usize)) -> ImageCorrection {
+    let a = &config.acquisition;
+    let mut vector = |length: f64| {
+        let direction = stream.uniform(0.0, std::f64::consts::TAU);
+        [length * direction.cos(), length * direction.sin()]
+    };
+    let drift = vector(a.pointing_drift_px).map(|px| px / (height as f64 - 1.0));
+    let [shortest, longest] = a.pointing_error_px;
+    let length = stream.uniform(shortest, longest);
+    let direction = stream.uniform(0.0, std::f64::consts::TAU);
+    ImageCorrection {
+        translation_px: [length * direction.cos(), length * direction.sin()],
+        linear: [[0.0, drift[0]], [0.0, drift[1]]],
+        centre: ImagePoint::new((width as f64 - 1.0) / 2.0, (height as f64 - 1.0) / 2.0),
+    }
+}
+
+/// The look of a view: as given, or one of a pass from the forward view to the backward one, weaving to both sides.
 fn look(config: &SimulationConfig, index: usize) -> Look {
-    let along = PITCH_DEG.to_radians().tan() * (1.0 - 2.0 * index as f64 / (config.views - 1) as f64);
-    let across = ROLL_DEG.to_radians().tan() * (std::f64::consts::FRAC_PI_2 * index as f64).sin();
+    let a = &config.acquisition;
+    let (heading_deg, gsd_m) = (a.heading_deg, config.gsd_m);
+    if let Some(ViewDirection { incidence_deg, azimuth_deg }) = a.looks.get(index).copied() {
+        return Look { incidence_deg, azimuth_deg, heading_deg, gsd_m };
+    }
+    let along = a.along_track_deg.to_radians().tan() * (1.0 - 2.0 * index as f64 / (config.views - 1) as f64);
+    let across = a.across_track_deg.to_radians().tan() * (std::f64::consts::FRAC_PI_2 * index as f64).sin();
     let incidence_deg = along.hypot(across).atan().to_degrees();
     // The first view is taken before the sensor passes: it looks ahead, and is seen from behind the heading.
-    let azimuth_deg = (HEADING_DEG + 180.0 + across.atan2(along).to_degrees()).rem_euclid(360.0);
-    Look { incidence_deg, azimuth_deg, heading_deg: HEADING_DEG, gsd_m: config.gsd_m }
+    let azimuth_deg = (heading_deg + 180.0 + across.atan2(along).to_degrees()).rem_euclid(360.0);
+    Look { incidence_deg, azimuth_deg, heading_deg, gsd_m }
 }
 
 /// The RPC and the size of an image that holds the whole area.
@@ -300,7 +264,7 @@ mod tests {
     fn sight(simulation: &Simulation, view: &View) -> Sight {
         let (low, high) = simulation.scene.height_range_m();
         let size = (view.image.width(), view.image.height());
-        Sight::new(&view.true_rpc(), &simulation.frame, size, (low - 1.0, high + 1.0)).unwrap()
+        Sight::new(&view.true_rpc, &simulation.frame, size, (low - 1.0, high + 1.0)).unwrap()
     }
 
     #[test]
@@ -308,7 +272,7 @@ mod tests {
         let simulation = Simulation::new(small()).unwrap();
         let (mut seen, mut hidden) = (0, 0);
         for view in &simulation.views {
-            let (rpc, sight) = (view.true_rpc(), sight(&simulation, view));
+            let (rpc, sight) = (view.true_rpc.clone(), sight(&simulation, view));
             for k in 0..400 {
                 let (x, y) = (f64::from(k % 20) * 5.9 - 57.0, f64::from(k / 20) * 5.7 - 55.0);
                 let point = Vector3::new(x, y, simulation.scene.surface(x, y).0);
@@ -332,11 +296,11 @@ mod tests {
         let simulation = Simulation::new(SimulationConfig { views: 5, ..small() }).unwrap();
         let tangent = |v: &View| v.record.look.towards_sensor() / v.record.look.towards_sensor().z;
         let base = (tangent(&simulation.views[0]) - tangent(&simulation.views[4])).norm();
-        assert!((base - 2.0 * PITCH_DEG.to_radians().tan()).abs() < 0.02, "base over height {base}");
+        assert!((base - 2.0 * 16.5_f64.to_radians().tan()).abs() < 0.02, "base over height {base}");
         for view in &simulation.views {
             let [sample, line] = view.record.pointing_error_px;
             assert!((1.0..=3.0).contains(&sample.hypot(line)));
-            assert!((view.rpc.samp_off - view.true_rpc().samp_off - sample).abs() < 1e-9);
+            assert!((view.rpc.samp_off - view.true_rpc.clone().samp_off - sample).abs() < 1e-9);
         }
     }
 

@@ -42,7 +42,7 @@ struct Lot {
 }
 
 /// The town of a seed, out to `reach_m` from its centre, on ground around `mean_height_m` above the ellipsoid.
-pub(crate) fn build(seed: u64, reach_m: f64, mean_height_m: f64) -> Scene {
+pub(crate) fn build(seed: u64, reach_m: f64, mean_height_m: f64, landmark_m: f64) -> Scene {
     let terrain = Terrain::new(seed, mean_height_m);
     let seed = derived(seed, 2);
     let count = (reach_m * std::f64::consts::SQRT_2 / STREETS.spacing_m).ceil() as i64;
@@ -57,7 +57,7 @@ pub(crate) fn build(seed: u64, reach_m: f64, mean_height_m: f64) -> Scene {
             // A quarter's seed follows from its place, so that a larger town contains the smaller one.
             let mut stream = Stream::new((lattice(seed, i, j) * (1u64 << 53) as f64) as u64);
             match (i, j) {
-                (0, 0) => tower(&terrain, centre, &mut blocks),
+                (0, 0) => tower(&terrain, centre, landmark_m, &mut blocks),
                 _ => quarter(&terrain, centre, &mut stream, &mut blocks),
             }
         }
@@ -66,8 +66,8 @@ pub(crate) fn build(seed: u64, reach_m: f64, mean_height_m: f64) -> Scene {
 }
 
 /// A podium, a tower on it and a penthouse on the tower: 9, 29 and 35 m above the ground.
-fn tower(terrain: &Terrain, centre: [f64; 2], blocks: &mut Vec<Block>) {
-    for (half_size, height) in [([20.0, 15.0], 9.0), ([11.0, 9.0], 29.0), ([5.0, 4.0], 35.0)] {
+fn tower(terrain: &Terrain, centre: [f64; 2], height_m: f64, blocks: &mut Vec<Block>) {
+    for (half_size, height) in [([20.0, 15.0], 9.0), ([11.0, 9.0], 0.83 * height_m), ([5.0, 4.0], height_m)] {
         let lot = Lot { centre, half_size, turn_deg: 0.0 };
         blocks.push(flat(terrain, &lot, height));
     }
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn a_town_has_what_a_dsm_must_cope_with() {
         for seed in 0..20 {
-            let scene = build(seed, 160.0, 100.0);
+            let scene = build(seed, 160.0, 100.0, 35.0);
             let heights: Vec<f64> = scene.blocks().map(|b| b.top_m() - b.ground_m).collect();
             assert!(heights.len() >= 15, "seed {seed}: {} blocks", heights.len());
             assert!(heights.iter().all(|h| (4.0..=35.0 + 1e-9).contains(h)), "seed {seed}: {heights:?}");
@@ -154,14 +154,14 @@ mod tests {
 
     #[test]
     fn a_larger_town_contains_the_smaller_one() {
-        let (small, large) = (build(4, 100.0, 0.0), build(4, 250.0, 0.0));
+        let (small, large) = (build(4, 100.0, 0.0, 35.0), build(4, 250.0, 0.0, 35.0));
         assert!(small.blocks().all(|b| large.blocks().any(|other| other == b)));
         assert!(large.blocks().len() > small.blocks().len());
     }
 
     #[test]
     fn no_wall_hangs_over_the_ground_and_no_roof_is_buried() {
-        let scene = build(1, 200.0, 100.0);
+        let scene = build(1, 200.0, 100.0, 35.0);
         for block in scene.blocks() {
             let [x, y] = block.centre_m;
             assert!((scene.terrain().height(x, y) - block.ground_m).abs() < 1e-9);

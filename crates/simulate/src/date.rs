@@ -1,0 +1,42 @@
+//! A date of acquisition: its light and its radiometry. The first date is as configured, the others differ within the
+//! configured spreads.
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::SimulationConfig;
+use crate::random::{Stream, derived};
+use crate::render::Sun;
+
+/// What all views of one date have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Date {
+    /// Which, from 0.
+    pub index: usize,
+    /// Where the light comes from.
+    pub sun: Sun,
+    /// Gain relative to the sensor's.
+    pub gain: f64,
+    /// Offset beyond the sensor's, as a share of its range.
+    pub offset: f64,
+    /// Exponent of the radiance.
+    pub gamma: f64,
+}
+
+impl Date {
+    /// The date of an index.
+    pub(crate) fn new(config: &SimulationConfig, index: usize) -> Self {
+        let a = &config.acquisition;
+        if index == 0 {
+            return Self { index, sun: a.sun, gain: 1.0, offset: 0.0, gamma: 1.0 };
+        }
+        let mut stream = Stream::new(derived(config.seed, 3000 + index as u64));
+        let mut differing = |spread: f64| stream.uniform(-spread, spread);
+        let [elevation, azimuth] = a.sun_spread_deg;
+        let elevation_deg = (a.sun.elevation_deg + differing(elevation)).clamp(Sun::LOWEST_DEG, 90.0);
+        let azimuth_deg = (a.sun.azimuth_deg + differing(azimuth)).rem_euclid(360.0);
+        let sun = Sun { elevation_deg, azimuth_deg };
+        let gain = 1.0 + differing(a.gain_spread);
+        let offset = differing(a.offset_spread).abs();
+        Self { index, sun, gain, offset, gamma: 1.0 + differing(a.gamma_spread) }
+    }
+}
