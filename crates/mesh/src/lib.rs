@@ -6,18 +6,24 @@
 
 mod class;
 mod crs;
+mod defect;
 mod error;
 mod kind;
 mod lod;
 mod model;
 mod point;
 mod pool;
+mod ring;
+mod triangulate;
+mod vector;
 
 pub use class::SurfaceClass;
 pub use crs::CrsReference;
+pub use defect::{Defect, DefectCode, Effect};
 pub use error::ModelError;
 pub use kind::{ObjectKind, Role};
 pub use lod::Lod;
 pub use model::{CityModel, CityObject, Geometry, GeometryKind, Surface};
 pub use point::ModelPoint;
 pub use pool::VertexPool;
+pub use triangulate::{Finding, Triangulation, triangulate};
