@@ -64,13 +64,13 @@ pub fn to_text(rpc: &Rpc, format: RpcFormat) -> Result<String, RpcWriteError> {
 
 /// Temporary files are private by default; a finished RPC file is as readable as any other.
 #[cfg(unix)]
-fn set_usual_permissions(builder: &mut tempfile::Builder<'_, '_>) {
+pub(crate) fn set_usual_permissions(builder: &mut tempfile::Builder<'_, '_>) {
     use std::os::unix::fs::PermissionsExt;
     builder.permissions(std::fs::Permissions::from_mode(0o666));
 }
 
 #[cfg(not(unix))]
-fn set_usual_permissions(_: &mut tempfile::Builder<'_, '_>) {}
+pub(crate) fn set_usual_permissions(_: &mut tempfile::Builder<'_, '_>) {}
 
 /// The scalars in the order of [`RPC00B`], the two errors only where they are known.
 fn scalars(rpc: &Rpc) -> [Option<f64>; 12] {

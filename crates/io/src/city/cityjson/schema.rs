@@ -1,0 +1,198 @@
+//! What is read of a CityJSON document, as serde sees it; everything else in it is passed over.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+
+/// A document (`CityJSON`) or a line of a sequence (`CityJSONFeature`).
+#[derive(Debug, serde::Deserialize)]
+pub(super) struct Document {
+    #[serde(rename = "type")]
+    pub(super) kind: Option<String>,
+    pub(super) version: Option<String>,
+    pub(super) transform: Option<Transform>,
+    pub(super) metadata: Option<Metadata>,
+    #[serde(rename = "CityObjects")]
+    pub(super) objects: Option<Pairs<Object>>,
+    #[serde(default)]
+    pub(super) vertices: Vec<[f64; 3]>,
+    #[serde(rename = "geometry-templates")]
+    pub(super) templates: Option<Templates>,
+}
+
+#[derive(Debug, Clone, Copy, serde::Deserialize)]
+pub(super) struct Transform {
+    pub(super) scale: [f64; 3],
+    pub(super) translate: [f64; 3],
+}
+
+#[derive(Debug, serde::Deserialize)]
+pub(super) struct Metadata {
+    #[serde(rename = "referenceSystem")]
+    pub(super) reference_system: Option<String>,
+}
+
+#[derive(Debug, serde::Deserialize)]
+pub(super) struct Object {
+    #[serde(rename = "type")]
+    pub(super) kind: Option<String>,
+    pub(super) parents: Option<Vec<String>>,
+    pub(super) geometry: Option<Vec<Shape>>,
+}
+
+/// A geometry, or an instance of a template.
+#[derive(Debug, serde::Deserialize)]
+pub(super) struct Shape {
+    #[serde(rename = "type")]
+    pub(super) kind: Option<String>,
+    pub(super) lod: Option<LodText>,
+    #[serde(default)]
+    pub(super) boundaries: Nested,
+    pub(super) semantics: Option<Semantics>,
+    pub(super) template: Option<u64>,
+    #[serde(rename = "transformationMatrix")]
+    pub(super) matrix: Option<Vec<f64>>,
+}
+
+#[derive(Debug, serde::Deserialize)]
+pub(super) struct Semantics {
+    #[serde(default)]
+    pub(super) surfaces: Vec<SemanticSurface>,
+    #[serde(default)]
+    pub(super) values: Nested,
+}
+
+#[derive(Debug, serde::Deserialize)]
+pub(super) struct SemanticSurface {
+    #[serde(rename = "type")]
+    pub(super) kind: Option<String>,
+}
+
+#[derive(Debug, serde::Deserialize)]
+pub(super) struct Templates {
+    #[serde(default)]
+    pub(super) templates: Vec<Shape>,
+    #[serde(default, rename = "vertices-templates")]
+    pub(super) vertices: Vec<[f64; 3]>,
+}
+
+/// A level of detail: text since version 1.1, a number before.
+#[derive(Debug, serde::Deserialize)]
+#[serde(untagged)]
+pub(super) enum LodText {
+    Text(String),
+    Number(f64),
+}
+
+impl fmt::Display for LodText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text(text) => f.write_str(text),
+            Self::Number(number) => write!(f, "{number}"),
+        }
+    }
+}
+
+/// The members of a JSON object in the order of the file, repeated names included.
+#[derive(Debug)]
+pub(super) struct Pairs<T>(pub(super) Vec<(String, T)>);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Pairs<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Members<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Members<T> {
+            type Value = Pairs<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+                let mut pairs = Vec::new();
+                while let Some(pair) = map.next_entry()? {
+                    pairs.push(pair);
+                }
+                Ok(Pairs(pairs))
+            }
+        }
+        deserializer.deserialize_map(Members(PhantomData))
+    }
+}
+
+/// Indices in nested arrays of any depth.
+#[derive(Debug, Default, PartialEq)]
+pub(super) enum Nested {
+    /// `null`, or nothing.
+    #[default]
+    Null,
+    /// An index.
+    Index(u64),
+    /// Something that is no index: a negative or broken number, text, an object.
+    Other,
+    /// An array.
+    List(Vec<Nested>),
+}
+
+impl Nested {
+    /// The elements; none where it is no array.
+    pub(super) fn list(&self) -> &[Nested] {
+        match self {
+            Self::List(list) => list,
+            _ => &[],
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Nested {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NestedVisitor)
+    }
+}
+
+struct NestedVisitor;
+
+impl<'de> Visitor<'de> for NestedVisitor {
+    type Value = Nested;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an index or an array")
+    }
+
+    fn visit_u64<E>(self, index: u64) -> Result<Nested, E> {
+        Ok(Nested::Index(index))
+    }
+
+    fn visit_i64<E>(self, _: i64) -> Result<Nested, E> {
+        Ok(Nested::Other)
+    }
+
+    fn visit_f64<E>(self, _: f64) -> Result<Nested, E> {
+        Ok(Nested::Other)
+    }
+
+    fn visit_bool<E>(self, _: bool) -> Result<Nested, E> {
+        Ok(Nested::Other)
+    }
+
+    fn visit_str<E>(self, _: &str) -> Result<Nested, E> {
+        Ok(Nested::Other)
+    }
+
+    fn visit_unit<E>(self) -> Result<Nested, E> {
+        Ok(Nested::Null)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Nested, A::Error> {
+        while map.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
+        Ok(Nested::Other)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Nested, A::Error> {
+        let mut list = Vec::new();
+        while let Some(element) = seq.next_element()? {
+            list.push(element);
+        }
+        Ok(Nested::List(list))
+    }
+}
