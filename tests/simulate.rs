@@ -1,28 +1,119 @@
-//! `skysweep simulate` end to end: the files it writes, and what it refuses.
+//! `skysweep simulate` end to end: the files it writes, the loop through `dsm` and `eval`, and what it refuses.
+
+use std::path::Path;
 
 use assert_cmd::Command;
 use predicates::prelude::*;
+use serde_json::Value;
 
 fn skysweep() -> Command {
     Command::cargo_bin("skysweep").expect("the binary is built with the tests")
 }
 
-const SMALL: [&str; 7] = ["simulate", "--size", "60", "--gsd", "1", "--views", "2"];
+const SMALL: [&str; 8] = ["simulate", "town", "--size", "60", "--gsd", "1", "--views", "2"];
+
+const FILES: [&str; 12] = [
+    "view_1.tif",
+    "view_2.tif",
+    "truth/dsm.tif",
+    "truth/dtm.tif",
+    "truth/classes.tif",
+    "truth/ortho.tif",
+    "truth/visibility.tif",
+    "truth/heights_1.tif",
+    "truth/heights_2.tif",
+    "truth/buildings.city.json",
+    "scene.toml",
+    "scene.json",
+];
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
 
 #[test]
 fn a_simulation_is_written_whole_and_the_same_each_time() {
     let folder = tempfile::tempdir().unwrap();
     let (first, second) = (folder.path().join("a"), folder.path().join("b"));
-    for output in [&first, &second] {
-        skysweep().args(SMALL).arg("-o").arg(output).assert().code(0);
-    }
-    for name in ["view_1.tif", "view_2.tif", "truth/dsm.tif", "truth/classes.tif", "scene.json"] {
+    skysweep().args(SMALL).arg("-o").arg(&first).assert().code(0);
+    // The parameters that were written make the same scene again.
+    skysweep().arg("simulate").arg(first.join("scene.toml")).arg("-o").arg(&second).assert().code(0);
+    for name in FILES {
         let bytes = std::fs::read(first.join(name)).unwrap();
         assert!(!bytes.is_empty() && bytes == std::fs::read(second.join(name)).unwrap(), "{name} differs");
     }
-    let record: serde_json::Value = serde_json::from_slice(&std::fs::read(first.join("scene.json")).unwrap()).unwrap();
+    let tifs = std::fs::read_dir(&first).unwrap().filter_map(Result::ok).map(|e| e.file_name().into_string().unwrap());
+    let mut tifs: Vec<String> = tifs.filter(|name| name.ends_with(".tif")).collect();
+    tifs.sort_unstable();
+    assert_eq!(tifs, ["view_1.tif", "view_2.tif"], "only views may be TIFFs at the top of a scene");
+    let record = json(&first.join("scene.json"));
     assert_eq!(record["views"].as_array().unwrap().len(), 2);
     assert_eq!(record["epsg"], 32631);
+    assert!(record["views"][0]["rpc_fit_error_px"].as_f64().unwrap() < 1e-3);
+}
+
+#[test]
+fn the_buildings_come_as_a_city_model_of_level_2() {
+    let folder = tempfile::tempdir().unwrap();
+    skysweep().args(SMALL).arg("-o").arg(folder.path()).assert().code(0);
+    let city = json(&folder.path().join("truth/buildings.city.json"));
+    assert_eq!((&city["type"], &city["version"]), (&Value::from("CityJSON"), &Value::from("2.0")));
+    assert!(city["metadata"]["referenceSystem"].as_str().unwrap().ends_with("32631"));
+    let objects = city["CityObjects"].as_object().unwrap();
+    let geometries: Vec<&Value> = objects.values().filter_map(|o| o["geometry"].get(0)).collect();
+    assert!(geometries.len() > 10);
+    for geometry in geometries {
+        assert_eq!((&geometry["type"], &geometry["lod"]), (&Value::from("Solid"), &Value::from("2")));
+        let classes: Vec<&str> = geometry["semantics"]["surfaces"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|surface| surface["type"].as_str().unwrap())
+            .collect();
+        for class in ["RoofSurface", "WallSurface", "GroundSurface"] {
+            assert!(classes.contains(&class), "{class} is missing in {classes:?}");
+        }
+    }
+}
+
+#[test]
+fn a_scene_goes_through_dsm_and_eval() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, out) = (folder.path().join("s"), folder.path().join("d"));
+    skysweep()
+        .args(["simulate", "town", "--size", "120", "-o"])
+        .arg(&scene)
+        .args(["--progress", "none"])
+        .assert()
+        .code(0);
+    let views = [1, 2, 3].map(|k| scene.join(format!("view_{k}.tif")));
+    skysweep().arg("dsm").args(views).arg("-o").arg(&out).arg("-q").assert().code(0);
+    let evaluation = skysweep()
+        .arg("eval")
+        .arg(out.join("dsm/dsm.tif"))
+        .arg(scene.join("truth/dsm.tif"))
+        .args(["--align", "xyz", "--json"])
+        .output()
+        .unwrap();
+    let evaluation: Value = serde_json::from_slice(&evaluation.stdout).unwrap();
+    let completeness = evaluation["metrics"]["completeness_1"].as_f64().unwrap();
+    assert!(completeness > 0.6, "completeness {completeness}");
+}
+
+#[test]
+fn a_template_is_a_parameter_file_and_presets_are_listed() {
+    let listed = skysweep().args(["simulate", "--list"]).output().unwrap();
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    let names: Vec<&str> = listed.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert_eq!(names.len(), 9);
+    let folder = tempfile::tempdir().unwrap();
+    for name in names {
+        let template = skysweep().args(["simulate", name, "--template", "--dates", "2"]).output().unwrap();
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, &template.stdout).unwrap();
+        let again = skysweep().arg("simulate").arg(&file).arg("--template").output().unwrap();
+        assert!(!template.stdout.is_empty() && template.stdout == again.stdout, "{name}");
+    }
 }
 
 #[test]
@@ -37,19 +128,23 @@ fn an_earlier_output_is_kept_unless_told_otherwise() {
 }
 
 #[test]
-fn bad_requests_name_the_number_and_write_nothing() {
+fn bad_requests_name_what_is_wrong_and_write_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out");
-    for (arguments, named) in [(["--size", "1e9"], "size"), (["--views", "1"], "views"), (["--gsd", "nan"], "sampling")]
-    {
-        skysweep()
-            .arg("simulate")
-            .args(arguments)
-            .arg("-o")
-            .arg(&output)
-            .assert()
-            .code(2)
-            .stderr(predicate::str::contains(named));
+    let file = folder.path().join("scene.toml");
+    std::fs::write(&file, "[terrain]\nsteepness = 3\n").unwrap();
+    let file = file.to_str().unwrap();
+    for (arguments, named) in [
+        (vec!["town", "--size", "1e9"], "size"),
+        (vec!["town", "--views", "1"], "views"),
+        (vec!["town", "--gsd", "nan"], "sampling"),
+        (vec!["town", "--dates", "9"], "dates"),
+        (vec!["village"], "high-rise"),
+        (vec![file], "steepness"),
+        (vec!["missing.toml"], "missing.toml"),
+    ] {
+        let refused = predicate::str::contains(named);
+        skysweep().arg("simulate").args(arguments).arg("-o").arg(&output).assert().code(2).stderr(refused);
         assert!(!output.exists());
     }
 }

@@ -53,7 +53,7 @@ enum Command {
     Eval(Box<eval::Args>),
     /// Show, use and convert RPC camera models.
     Rpc(rpc::Args),
-    /// Make a small town seen through RPC cameras, with its exact surface.
+    /// Make a scene seen through RPC cameras, with its exact surface.
     Simulate(simulate::Args),
 }
 
@@ -85,6 +85,6 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args),
         Command::Rpc(args) => rpc::run(args),
-        Command::Simulate(args) => simulate::run(args),
+        Command::Simulate(args) => simulate::run(args, cli.global),
     }
 }

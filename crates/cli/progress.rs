@@ -55,6 +55,16 @@ impl Watcher {
     }
 }
 
+impl simulate::Progress for Watcher {
+    fn begin(&self, stage: &str, steps: usize) {
+        Progress::begin(self, stage, steps);
+    }
+
+    fn step(&self) {
+        Progress::step(self);
+    }
+}
+
 impl Progress for Watcher {
     fn begin(&self, stage: &str, steps: usize) {
         self.bar.set_length(steps as u64);

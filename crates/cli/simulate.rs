@@ -1,17 +1,20 @@
-//! `skysweep simulate`: a seeded town seen through RPC cameras, with its exact surface beside.
+//! `skysweep simulate`: a seeded scene seen through RPC cameras, with its exact surface beside.
 //!
-//! Writes `view_1.tif` … (16 bits, RPC in the file), `truth/dsm.tif`, `truth/classes.tif` and `scene.json`.
+//! Writes `view_1.tif` … (RPC in the file), the record `scene.json`, the parameters `scene.toml`, and in `truth/` the
+//! rasters, the heights of every image and the buildings at LoD2.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::simulate::{PRESETS, Simulation, SimulationConfig};
+use ::simulate::{PRESETS, Simulation, SimulationConfig, View};
 use anyhow::{Context, bail};
 use geodesy::Crs;
+use io::city::{CityJsonOptions, write_cityjson};
 use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc};
 
-use crate::Outcome;
 use crate::print;
+use crate::progress::{ProgressStyle, Watcher};
+use crate::{Global, Outcome};
 
 /// Arguments of `skysweep simulate`.
 #[derive(Debug, clap::Args)]
@@ -40,6 +43,9 @@ pub(crate) struct Args {
     /// Replace the files of an earlier simulation.
     #[arg(long)]
     overwrite: bool,
+    /// How progress is shown.
+    #[arg(long, value_name = "STYLE", value_enum, default_value = "bar")]
+    progress: ProgressStyle,
     /// List the presets and stop.
     #[arg(long)]
     list: bool,
@@ -49,7 +55,7 @@ pub(crate) struct Args {
 }
 
 /// Runs `skysweep simulate`.
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if args.list {
         let lines = PRESETS.map(|(name, description)| format!("{name:18} {description}\n"));
         print::text(&lines.concat())?;
@@ -57,7 +63,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     let config = config(args)?;
     match &args.output {
-        Some(output) if !args.template => made(config, output, args.overwrite),
+        Some(output) if !args.template => made(config, args, output, global),
         _ => print::text(&config.to_toml()?).map(|()| Outcome::Complete),
     }
 }
@@ -80,41 +86,92 @@ fn from_file(path: &Path) -> anyhow::Result<SimulationConfig> {
     SimulationConfig::from_toml(&text).with_context(|| format!("in the parameter file: {}", path.display()))
 }
 
-fn made(config: SimulationConfig, output: &Path, overwrite: bool) -> anyhow::Result<Outcome> {
-    if !overwrite && fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_some()) {
+fn made(config: SimulationConfig, args: &Args, output: &Path, global: Global) -> anyhow::Result<Outcome> {
+    if !args.overwrite && fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_some()) {
         bail!("the output folder is not empty: choose another or pass --overwrite: {}", output.display());
     }
     let truth = output.join("truth");
     fs::create_dir_all(&truth).with_context(|| format!("cannot make the output folder: {}", truth.display()))?;
-    let simulation = Simulation::new(config)?;
-    write(&simulation, output, overwrite)?;
-    let (buildings, views) = (simulation.scene.blocks().len(), simulation.views.len());
-    tracing::info!("{views} views of {buildings} building blocks in {}", output.display());
+    let watcher = Watcher::new(args.progress, global);
+    let simulation = Simulation::with_progress(config, &watcher)?;
+    watcher.finish();
+    Folder { simulation: &simulation, path: output, overwrite: args.overwrite }.write()?;
+    let (record, views) = (simulation.record(), simulation.views.len());
+    tracing::info!(
+        "{views} views of {} buildings and {} trees in {}",
+        record.buildings,
+        record.trees,
+        output.display()
+    );
     Ok(Outcome::Complete)
 }
 
-fn write(simulation: &Simulation, folder: &Path, overwrite: bool) -> anyhow::Result<()> {
-    for (number, view) in (1..).zip(&simulation.views) {
-        let bands = [Band { description: "panchromatic", data: BandData::U16(&view.image) }];
-        write_image_with_rpc(folder.join(format!("view_{number}.tif")), &bands, &view.rpc, Some(0.0), overwrite)?;
-    }
-    let truth = &simulation.truth;
-    let raster = |name: &str, band: Band<'_>| {
-        let bands = [band];
-        let cog = CogRaster::new(&bands, truth.geotransform, Crs::ellipsoidal(truth.epsg));
-        write_cog(folder.join("truth").join(name), &cog, overwrite)
-    };
-    raster("dsm.tif", Band { description: "height_m", data: BandData::F32(&truth.dsm) })?;
-    raster("classes.tif", Band { description: "class", data: BandData::U8(&truth.classes) })?;
-    write_record(simulation, folder)
+/// Where a simulation is written to.
+struct Folder<'a> {
+    simulation: &'a Simulation,
+    path: &'a Path,
+    overwrite: bool,
 }
 
-/// Writes `scene.json` whole or not at all.
-fn write_record(simulation: &Simulation, folder: &Path) -> anyhow::Result<()> {
-    let path = folder.join("scene.json");
-    let part = folder.join(".scene.json.part");
-    let text = serde_json::to_string_pretty(&simulation.record())? + "\n";
-    fs::write(&part, text)
-        .and_then(|()| fs::rename(&part, &path))
-        .with_context(|| format!("cannot write the file: {}", path.display()))
+impl Folder<'_> {
+    fn write(&self) -> anyhow::Result<()> {
+        for (number, view) in (1..).zip(&self.simulation.views) {
+            self.write_view(number, view)?;
+        }
+        let truth = &self.simulation.truth;
+        self.map("dsm.tif", &[Band { description: "height_m", data: BandData::F32(&truth.dsm) }])?;
+        self.map("dtm.tif", &[Band { description: "height_m", data: BandData::F32(&truth.dtm) }])?;
+        self.map("classes.tif", &[Band { description: "class", data: BandData::U8(&truth.classes) }])?;
+        self.map("ortho.tif", &[Band { description: "reflectance_1e-4", data: BandData::U16(&truth.ortho) }])?;
+        let names: Vec<String> = (1..=truth.visibility.len()).map(|view| format!("seen_by_view_{view}")).collect();
+        let seen = names.iter().zip(&truth.visibility);
+        let seen = seen.map(|(name, grid)| Band { description: name, data: BandData::U8(grid) });
+        self.map("visibility.tif", &seen.collect::<Vec<_>>())?;
+        let options = CityJsonOptions { overwrite: self.overwrite, ..CityJsonOptions::default() };
+        write_cityjson(&self.path.join("truth/buildings.city.json"), &truth.buildings, &options)?;
+        let record = serde_json::to_string_pretty(&self.simulation.record())? + "\n";
+        self.write_text("scene.toml", &self.simulation.config.to_toml()?)?;
+        self.write_text("scene.json", &record)
+    }
+
+    fn write_view(&self, number: usize, view: &View) -> anyhow::Result<()> {
+        let bands = [Band { description: "panchromatic", data: BandData::U16(&view.image) }];
+        write_image_with_rpc(
+            self.path.join(format!("view_{number}.tif")),
+            &bands,
+            &view.rpc,
+            Some(0.0),
+            self.overwrite,
+        )?;
+        // Truth in the image's own grid keeps the true RPC: the height of a pixel with it gives the pixel's place.
+        let heights = [Band { description: "height_m", data: BandData::F32(&view.heights) }];
+        let path = |what: &str| self.path.join("truth").join(format!("{what}_{number}.tif"));
+        write_image_with_rpc(
+            path("heights"),
+            &heights,
+            &view.true_rpc,
+            Some(f64::from(raster::NO_DATA)),
+            self.overwrite,
+        )?;
+        if let Some(cover) = &view.clouds {
+            let bands = [Band { description: "cloud", data: BandData::U8(cover) }];
+            write_image_with_rpc(path("clouds"), &bands, &view.true_rpc, None, self.overwrite)?;
+        }
+        Ok(())
+    }
+
+    fn map(&self, name: &str, bands: &[Band<'_>]) -> anyhow::Result<()> {
+        let truth = &self.simulation.truth;
+        let cog = CogRaster::new(bands, truth.geotransform, Crs::ellipsoidal(truth.epsg));
+        Ok(write_cog(self.path.join("truth").join(name), &cog, self.overwrite)?)
+    }
+
+    /// Writes a text whole or not at all.
+    fn write_text(&self, name: &str, text: &str) -> anyhow::Result<()> {
+        let path = self.path.join(name);
+        let part = path.with_extension("part");
+        fs::write(&part, text)
+            .and_then(|()| fs::rename(&part, &path))
+            .with_context(|| format!("cannot write the file: {}", path.display()))
+    }
 }

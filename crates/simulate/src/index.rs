@@ -1,90 +1,168 @@
-//! Which blocks a ray can meet: square buckets of the plane, each with the blocks whose bounding box touches it.
+//! What a ray can meet, in the order in which it can: square buckets of the plane, walked along the ray (Amanatides and Woo
+//! 1987). Each knows the height under which everything in it lies, so that a ray passes over most of them.
 
-use nalgebra::Vector3;
+use crate::Ray;
 
-use crate::block::Solid;
+/// Side of a bucket, metres: a few trees, a part of a house.
+pub(crate) const BUCKET_M: f64 = 8.0;
 
-/// Side of a bucket, metres: about a building, and about the ground track of a ray between the highest roof and the ground.
-const BUCKET_M: f64 = 24.0;
-
-/// Buckets over the bounding box of all blocks.
-#[derive(Debug, Clone)]
-pub(crate) struct BlockIndex {
-    corner_m: [f64; 2],
-    shape: [usize; 2],
-    buckets: Vec<Vec<usize>>,
-    boxes: Vec<[f64; 4]>,
+/// The box of the plane that holds an object, and its highest point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Extent {
+    pub(crate) low: [f64; 2],
+    pub(crate) high: [f64; 2],
+    pub(crate) top_m: f64,
 }
 
-impl BlockIndex {
-    pub(crate) fn new(solids: &[Solid]) -> Self {
-        let boxes: Vec<[f64; 4]> = solids.iter().map(bounding_box).collect();
-        let low = |k: usize| boxes.iter().map(|b| b[k]).fold(f64::INFINITY, f64::min);
-        let high = |k: usize| boxes.iter().map(|b| b[k + 2]).fold(f64::NEG_INFINITY, f64::max);
-        let cells = |k: usize| if boxes.is_empty() { 0 } else { ((high(k) - low(k)) / BUCKET_M) as usize + 1 };
-        let shape = [cells(0), cells(1)];
-        let buckets = vec![Vec::new(); shape[0] * shape[1]];
-        let mut index = Self { corner_m: [low(0), low(1)], shape, buckets, boxes };
-        for block in 0..solids.len() {
-            let [x0, y0, x1, y1] = index.boxes[block];
-            for bucket in index.buckets_touching([x0, y0], [x1, y1]).collect::<Vec<_>>() {
-                index.buckets[bucket].push(block);
+/// A stretch of a ray over one bucket.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stretch {
+    pub(crate) bucket: usize,
+    pub(crate) t_in: f64,
+    pub(crate) t_out: f64,
+}
+
+/// Buckets over a square around the origin.
+#[derive(Debug, Clone)]
+pub(crate) struct Buckets {
+    corner_m: f64,
+    side: usize,
+    tops: Vec<f64>,
+    members: Vec<Vec<u32>>,
+}
+
+impl Buckets {
+    /// Buckets out to `reach_m` along both axes; `ground_top` gives the highest ground of a box.
+    pub(crate) fn new(reach_m: f64, ground_top: impl Fn([f64; 2], [f64; 2]) -> f64, extents: &[Extent]) -> Self {
+        let half = (reach_m / BUCKET_M).ceil();
+        let (side, corner_m) = (2 * half as usize, -half * BUCKET_M);
+        let low = |k: usize| [k % side, k / side].map(|c| corner_m + c as f64 * BUCKET_M);
+        let tops = (0..side * side).map(|k| ground_top(low(k), low(k).map(|c| c + BUCKET_M))).collect();
+        let mut buckets = Self { corner_m, side, tops, members: vec![Vec::new(); side * side] };
+        for (object, extent) in (0u32..).zip(extents) {
+            buckets.insert(object, extent);
+        }
+        buckets
+    }
+
+    pub(crate) fn insert(&mut self, object: u32, extent: &Extent) {
+        let [columns, rows] = [0, 1].map(|axis| self.along(extent.low[axis])..=self.along(extent.high[axis]));
+        for row in rows {
+            for column in columns.clone() {
+                let bucket = row * self.side + column;
+                self.members[bucket].push(object);
+                self.tops[bucket] = self.tops[bucket].max(extent.top_m);
             }
         }
-        index
     }
 
-    /// The blocks whose bounding box touches a box of the plane; a block may come more than once.
-    pub(crate) fn near(&self, low: [f64; 2], high: [f64; 2]) -> impl Iterator<Item = usize> {
-        let touches = move |i: &usize| {
-            let [x0, y0, x1, y1] = self.boxes[*i];
-            x0 <= high[0] && y0 <= high[1] && x1 >= low[0] && y1 >= low[1]
-        };
-        self.buckets_touching(low, high).flat_map(|bucket| self.buckets[bucket].iter().copied()).filter(touches)
+    /// The objects whose box touches a bucket.
+    pub(crate) fn members(&self, bucket: usize) -> &[u32] {
+        &self.members[bucket]
     }
 
-    /// The blocks that a segment can meet.
-    pub(crate) fn between(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> impl Iterator<Item = usize> {
-        self.near([a.x.min(b.x), a.y.min(b.y)], [a.x.max(b.x), a.y.max(b.y)])
+    /// The bucket of a position, the nearest one for a position beyond them all.
+    pub(crate) fn at(&self, x: f64, y: f64) -> usize {
+        self.along(y) * self.side + self.along(x)
     }
 
-    fn buckets_touching(&self, low: [f64; 2], high: [f64; 2]) -> impl Iterator<Item = usize> + use<> {
-        let columns = self.buckets_along(0, low[0], high[0]);
-        let rows = self.buckets_along(1, low[1], high[1]);
-        let width = self.shape[0];
-        rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
+    /// Visits the buckets in which a ray comes low enough to meet something, until `visit` gives a value.
+    pub(crate) fn walk<T>(&self, ray: &Ray, t_max: f64, mut visit: impl FnMut(Stretch) -> Option<T>) -> Option<T> {
+        let (mut t, end) = self.clipped(ray, t_max)?;
+        let start = ray.at(t);
+        let mut at = [self.along(start.x), self.along(start.y)];
+        let origin = [ray.origin.x, ray.origin.y];
+        let direction = [ray.direction.x, ray.direction.y];
+        let mut next: [f64; 2] = std::array::from_fn(|axis| {
+            let edge = self.corner_m + (at[axis] + usize::from(direction[axis] > 0.0)) as f64 * BUCKET_M;
+            if direction[axis] == 0.0 { f64::INFINITY } else { (edge - origin[axis]) / direction[axis] }
+        });
+        let stride = direction.map(|d| BUCKET_M / d.abs());
+        loop {
+            let axis = usize::from(next[1] < next[0]);
+            let t_out = next[axis].min(end);
+            let bucket = at[1] * self.side + at[0];
+            let lowest = (ray.origin.z + ray.direction.z * t).min(ray.origin.z + ray.direction.z * t_out);
+            if lowest <= self.tops[bucket] {
+                let found = visit(Stretch { bucket, t_in: t, t_out });
+                if found.is_some() {
+                    return found;
+                }
+            }
+            if next[axis] >= end {
+                return None;
+            }
+            t = t_out.max(t);
+            next[axis] += stride[axis];
+            at[axis] = match direction[axis] > 0.0 {
+                true if at[axis] + 1 < self.side => at[axis] + 1,
+                false if at[axis] > 0 => at[axis] - 1,
+                _ => return None,
+            };
+        }
     }
 
-    fn buckets_along(&self, axis: usize, low: f64, high: f64) -> std::ops::Range<usize> {
-        // Casts saturate: what lies before the first bucket ends at 0, what lies after the last starts at the end.
-        let first = ((low - self.corner_m[axis]) / BUCKET_M).floor().max(0.0) as usize;
-        let end = (((high - self.corner_m[axis]) / BUCKET_M).floor() + 1.0) as usize;
-        first..end.min(self.shape[axis])
+    /// The part of [0, `t_max`] in which a ray is over the buckets.
+    fn clipped(&self, ray: &Ray, t_max: f64) -> Option<(f64, f64)> {
+        let (low, high) = (self.corner_m, -self.corner_m);
+        let (mut enter, mut leave) = (0.0_f64, t_max);
+        for (origin, direction) in [(ray.origin.x, ray.direction.x), (ray.origin.y, ray.direction.y)] {
+            if direction == 0.0 {
+                if !(low..=high).contains(&origin) {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = ((low - origin) / direction, (high - origin) / direction);
+            (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+        }
+        (enter < leave).then_some((enter, leave))
     }
-}
 
-fn bounding_box(solid: &Solid) -> [f64; 4] {
-    let [x, y] = solid.block.centre_m;
-    let [dx, dy] = solid.half_extent();
-    [x - dx, y - dy, x + dx, y + dy]
+    fn along(&self, coordinate: f64) -> usize {
+        // The cast saturates: what lies before the first bucket is in it.
+        (((coordinate - self.corner_m) / BUCKET_M) as usize).min(self.side - 1)
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::town;
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
 
-    #[test]
-    fn every_block_is_found_where_it_stands_and_none_far_away() {
-        let scene = town::build(2, 300.0, 50.0, 35.0);
-        let solids: Vec<Solid> = scene.blocks().map(|b| Solid::new(*b)).collect();
-        let index = BlockIndex::new(&solids);
-        for (i, solid) in solids.iter().enumerate() {
-            let centre = solid.block.centre_m;
-            assert!(index.near(centre, centre).any(|found| found == i));
+    use super::*;
+
+    fn posts() -> (Vec<Extent>, Buckets) {
+        let post = |k: i32| {
+            let (x, y) = (f64::from(k % 9) * 11.0 - 44.0, f64::from(k / 9) * 11.0 - 44.0);
+            Extent { low: [x - 2.0, y - 1.0], high: [x + 2.0, y + 1.0], top_m: 5.0 + f64::from(k % 7) }
+        };
+        let extents: Vec<Extent> = (0..81).map(post).collect();
+        let buckets = Buckets::new(60.0, |_, _| 0.0, &extents);
+        (extents, buckets)
+    }
+
+    proptest! {
+        #[test]
+        fn a_walk_visits_every_box_that_the_ray_goes_through(
+            x in -70.0..70.0f64, y in -70.0..70.0f64, dx in -3.0..3.0f64, dy in -3.0..3.0f64,
+        ) {
+            let (extents, buckets) = posts();
+            let ray = Ray { origin: Vector3::new(x, y, 20.0), direction: Vector3::new(dx, dy, -1.0) };
+            let mut visited = std::collections::BTreeSet::new();
+            let mut last = 0.0;
+            buckets.walk(&ray, 20.0, |stretch| {
+                visited.extend(buckets.members(stretch.bucket).iter().copied());
+                assert!(stretch.t_in >= last && stretch.t_out >= stretch.t_in);
+                last = stretch.t_out;
+                None::<()>
+            });
+            for (k, extent) in extents.iter().enumerate() {
+                let through = (0..4000).map(|i| ray.at(f64::from(i) * 0.005)).any(|p| {
+                    p.z < extent.top_m && p.x > extent.low[0] && p.x < extent.high[0] && p.y > extent.low[1] && p.y < extent.high[1]
+                });
+                prop_assert!(!through || visited.contains(&(k as u32)), "box {k} is missed");
+            }
         }
-        assert_eq!(index.near([9e3, 9e3], [9e3, 9e3]).count(), 0);
-        assert_eq!(index.near([-9e3, 0.0], [-8e3, 0.0]).count(), 0);
-        assert_eq!(BlockIndex::new(&[]).near([0.0, 0.0], [1.0, 1.0]).count(), 0);
     }
 }

@@ -1,22 +1,33 @@
-//! Simulated acquisitions: a seeded town with its exact surface, seen through RPC cameras.
+//! Simulated acquisitions: seeded scenes with their exact surface, seen through RPC cameras.
 //!
-//! A [`Scene`] is a height function (smooth terrain, buildings with flat and gabled roofs) that rays meet exactly. A
-//! [`Simulation`] renders it through linear pushbroom cameras that are RPCs by construction, adds what a sensor adds (pixel
-//! box, photon and read noise, 11 bits, a pointing error in the RPC) and samples the truth on a map grid. What an algorithm
-//! gets wrong on it is the algorithm's error: geometry is exact to 0.1 mm.
+//! A [`Scene`] is terrain with buildings, trees and vehicles that rays meet exactly. A [`Simulation`] renders it through
+//! physical cameras (pushbroom or frame) to which RPCs are fitted, adds what light, air, optics and detector add (shadows,
+//! clouds, point spread, noise, quantisation, a pointing error in the RPC), and samples the truth: surface, terrain, classes, what
+//! each view sees, the height of every pixel, the scene from above, and the buildings as an LoD2 model. What an
+//! algorithm gets wrong on it is the algorithm's error.
+//!
+//! [`SimulationConfig`] is a parameter file with named presets ([`PRESETS`]). The same configuration gives the same bytes
+//! for any number of threads.
 //!
 //! Scene frame: x east, y north in metres of the map grid from the scene's centre, z metres above the WGS 84 ellipsoid.
 
-mod block;
+mod acquisition;
+mod building;
+mod camera_model;
+mod clouds;
 mod config;
+mod crown;
 mod date;
 mod error;
 mod frame;
 mod index;
+mod lod2;
 mod noise;
 mod parameters;
+mod planting;
 mod presets;
-mod pushbroom;
+mod prism;
+mod progress;
 mod random;
 mod ray;
 mod render;
@@ -24,11 +35,14 @@ mod scene;
 mod sensor;
 mod sight;
 mod simulation;
+mod streets;
 mod terrain;
 mod texture;
 mod town;
+mod truth;
 
-pub use block::{Block, Roof};
+pub use building::Building;
+pub use camera_model::Look;
 pub use config::{
     AcquisitionConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, QuarterWeights, SensorConfig,
     SimulationConfig, SurfaceConfig, TerrainConfig, VegetationConfig, VehiclesConfig, ViewDirection,
@@ -37,11 +51,13 @@ pub use date::Date;
 pub use error::SimulateError;
 pub use frame::SceneFrame;
 pub use presets::PRESETS;
-pub use pushbroom::Look;
+pub use prism::{Block, Roof};
+pub use progress::{Progress, Silent};
 pub use ray::Ray;
 pub use render::Sun;
 pub use scene::{Scene, SurfaceClass};
-pub use sensor::{DN_MAX, Sensor};
+pub use sensor::Sensor;
 pub use sight::Sight;
-pub use simulation::{SceneRecord, Simulation, Truth, View, ViewRecord};
+pub use simulation::{SceneRecord, Simulation, View, ViewRecord};
 pub use terrain::Terrain;
+pub use truth::{ORTHO_SCALE, Truth};

@@ -1,7 +1,7 @@
-//! One view of a scene: rays through the pixels, Lambertian shading with cast shadows, and the sensor.
+//! One view of a scene: rays through the pixels, Lambertian shading with cast shadows, and the point-spread function.
 //!
-//! Radiance = reflectance · (sky + (1 − sky) · max(0, n·s) · lit), averaged over a square of sub-pixel positions: the
-//! pixel's own box is the modulation transfer function. Every pixel depends on itself only, so that the image is the
+//! Radiance = reflectance · (sky + (1 − sky) · max(0, n·s) · lit), sampled on a regular lattice finer than the pixels and
+//! weighted by the point-spread function. Rows are worked on in bands whose edges are computed twice, so that the image is the
 //! same for any number of threads.
 
 use camera::ImagePoint;
@@ -10,18 +10,22 @@ use raster::Grid;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::sensor::Sensor;
+use crate::sensor::PointSpread;
 use crate::sight::Sight;
 use crate::texture::Texture;
 
 /// Share of the light that comes from the whole sky and reaches shadows too.
 const SKY: f64 = 0.3;
-/// Sub-pixel positions along each side of a pixel.
-const SUBPIXELS: usize = 3;
+/// Rows of a band.
+pub(crate) const BAND: usize = 32;
+/// Radiance where a line of sight leaves the scene.
+const BEYOND: f64 = 0.1;
 
 /// Where the light comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Sun {
     /// Height above the horizon, degrees; at least [`Sun::LOWEST_DEG`].
     pub elevation_deg: f64,
@@ -30,8 +34,8 @@ pub struct Sun {
 }
 
 impl Sun {
-    /// Below this elevation the terrain would throw shadows, which the renderer leaves out.
-    pub const LOWEST_DEG: f64 = 30.0;
+    /// Below this elevation shadows are longer than what surrounds the scene.
+    pub const LOWEST_DEG: f64 = 15.0;
 
     /// Unit vector towards the sun (east, north, up).
     pub fn direction(&self) -> Vector3<f64> {
@@ -54,53 +58,57 @@ impl<'a> LitScene<'a> {
         Self { scene, texture, to_sun: sun.direction() }
     }
 
-    /// The image of `width × height` pixels, in digital numbers; `seed` is that of the noise.
+    /// The radiance of `width × height` pixels, in units of a white surface under full light.
     pub(crate) fn image(
         &self,
         sight: &Sight,
-        sensor: &Sensor,
+        spread: &PointSpread,
         (width, height): (usize, usize),
-        seed: u64,
-    ) -> Grid<u16> {
-        let mut image = Grid::filled(width, height, 0u16);
-        image.data_mut().par_chunks_mut(width.max(1)).enumerate().for_each(|(row, line)| {
-            for (column, pixel) in line.iter_mut().enumerate() {
-                *pixel = sensor.quantise(self.pixel(sight, column, row), seed, column, row);
-            }
+        progress: &impl Progress,
+    ) -> Grid<f32> {
+        let mut image = Grid::filled(width, height, 0f32);
+        image.data_mut().par_chunks_mut(BAND * width).enumerate().for_each(|(band, rows)| {
+            self.band(sight, spread, width, band * BAND, rows);
+            progress.step();
         });
         image
     }
 
-    fn pixel(&self, sight: &Sight, column: usize, row: usize) -> f64 {
-        let offset = |k: usize| (k as f64 + 0.5) / SUBPIXELS as f64 - 0.5;
-        let mut sum = 0.0;
-        for j in 0..SUBPIXELS {
-            for i in 0..SUBPIXELS {
-                let at = ImagePoint::new(column as f64 + offset(i), row as f64 + offset(j));
-                sum += self.radiance(sight, at);
+    /// The rows from `first` on.
+    fn band(&self, sight: &Sight, spread: &PointSpread, width: usize, first: usize, rows: &mut [f32]) {
+        let (n, taps) = (spread.subpixels, spread.weights.len());
+        let at = |k: usize| (k as f64 - spread.reach as f64 + 0.5) / n as f64 - 0.5;
+        let count = rows.len() / width;
+        let mut samples = vec![0f64; n * width + 2 * spread.reach];
+        // Lines of samples, each already weighted along the line.
+        let mut lines = vec![0f64; (n * count + 2 * spread.reach) * width];
+        for (k, line) in lines.chunks_exact_mut(width).enumerate() {
+            let y = first as f64 + at(k);
+            for (i, sample) in samples.iter_mut().enumerate() {
+                *sample = self.radiance(sight, ImagePoint::new(at(i), y));
+            }
+            for (column, value) in line.iter_mut().enumerate() {
+                *value = weighted(&samples[column * n..column * n + taps], &spread.weights);
             }
         }
-        sum / (SUBPIXELS * SUBPIXELS) as f64
+        for (row, out) in rows.chunks_exact_mut(width).enumerate() {
+            for (column, pixel) in out.iter_mut().enumerate() {
+                let sum: f64 = (0..taps).map(|k| lines[(row * n + k) * width + column] * spread.weights[k]).sum();
+                *pixel = sum as f32;
+            }
+        }
     }
 
-    /// Radiance at an image position, in units of a white surface under full light.
+    /// Radiance at an image position.
     fn radiance(&self, sight: &Sight, at: ImagePoint) -> f64 {
-        let Some(hit) = self.scene.first_hit(&sight.ray(at), 1.0) else { return 0.0 };
-        let normal = self.scene.normal(&hit);
-        let facing = normal.dot(&self.to_sun);
-        let lit = facing > 0.0 && !self.scene.in_shadow(&hit.point, &normal, &self.to_sun);
+        let Some(hit) = self.scene.first_hit(&sight.ray(at), 1.0) else { return BEYOND };
+        let facing = hit.normal.dot(&self.to_sun);
+        let lit = facing > 0.0 && !self.scene.in_shadow(&hit.point, &hit.normal, &self.to_sun);
         let sunlight = if lit { facing } else { 0.0 };
         self.texture.reflectance(self.scene, &hit) * (SKY + (1.0 - SKY) * sunlight)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::terrain::Terrain;
-
-    #[test]
-    fn the_terrain_is_gentler_than_the_lowest_sun() {
-        assert!(Terrain::slope_bound() < Sun::LOWEST_DEG.to_radians().tan());
-    }
+fn weighted(samples: &[f64], weights: &[f64]) -> f64 {
+    samples.iter().zip(weights).map(|(s, w)| s * w).sum()
 }

@@ -1,59 +1,149 @@
-//! The surface of a scene: terrain with building blocks on it, as a height function and as something rays meet.
+//! The surface of a scene: terrain with buildings, trees and vehicles on it, as a height function and as something rays meet.
 //!
 //! Scene frame: x east, y north (metres of the map grid, from the scene's centre), z metres above the WGS 84 ellipsoid.
-//! The surface is the upper envelope, `max(terrain, roofs)`; there is nothing under it. Rays meet the blocks analytically and the
-//! terrain to 0.1 mm.
+//! The surface is the upper envelope of all solids and the ground; there is nothing under it. Rays meet everything
+//! analytically, so that "hidden" and "in shadow" are exact.
+
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
 use crate::Ray;
-use crate::block::{Block, Face, Solid};
-use crate::index::BlockIndex;
+use crate::building::Building;
+use crate::config::SimulationConfig;
+use crate::crown::Crown;
+use crate::index::{Buckets, Extent};
+use crate::planting;
+use crate::prism::{Block, Face, Prism};
+use crate::random::derived;
+use crate::streets::Streets;
 use crate::terrain::Terrain;
+use crate::town;
 
 /// What a point of the surface belongs to; the values are the ASPRS LAS classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum SurfaceClass {
     /// Bare ground.
     Ground = 2,
-    /// A building.
+    /// A tree.
+    Vegetation = 5,
+    /// A building's roof.
     Building = 6,
+    /// Water.
+    Water = 9,
+    /// The edge of a building's footprint: a raster cell that a façade goes through (LAS leaves 64 and above to users).
+    FootprintEdge = 64,
 }
 
-/// Terrain and buildings, known exactly.
+/// What a solid is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Material {
+    Building,
+    Tree,
+    Vehicle,
+}
+
+/// A solid's form.
+#[derive(Debug, Clone)]
+pub(crate) enum Shape {
+    Prism(Prism),
+    Crown(Crown),
+}
+
+/// Something on the ground.
+#[derive(Debug, Clone)]
+pub(crate) struct Solid {
+    pub(crate) shape: Shape,
+    pub(crate) material: Material,
+    /// Seed of its own colours.
+    pub(crate) paint: u64,
+}
+
+/// Terrain and what is on it, known exactly.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    terrain: Terrain,
+    terrain: Arc<Terrain>,
+    pub(crate) streets: Streets,
+    buildings: Arc<[Building]>,
     solids: Vec<Solid>,
-    index: BlockIndex,
+    buckets: Buckets,
     height_range_m: (f64, f64),
+    reach_m: f64,
 }
 
 /// The part of the surface that a ray met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
     Ground,
-    Building { solid: usize, face: Face },
+    Crown(usize),
+    Prism(usize, Face),
 }
 
 /// Where a ray met the surface.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hit {
     pub(crate) point: Vector3<f64>,
+    pub(crate) normal: Vector3<f64>,
     pub(crate) part: Part,
 }
 
-/// A ray towards the sun starts this far off the surface, metres: more than the terrain's tolerance, less than any detail.
+/// What is built within reach may stand out of it by this much, metres.
+const OVERHANG_M: f64 = 50.0;
+/// A ray towards the sun starts this far off the surface, metres: more than rounding, less than any detail.
 const LIFT_M: f64 = 1e-3;
 
 impl Scene {
-    /// A scene of blocks on a terrain.
-    pub(crate) fn new(terrain: Terrain, blocks: Vec<Block>) -> Self {
-        let (low, ground_top) = terrain.height_range_m();
-        let high = blocks.iter().map(Block::top_m).fold(ground_top, f64::max);
-        let solids: Vec<Solid> = blocks.into_iter().map(Solid::new).collect();
-        Self { terrain, index: BlockIndex::new(&solids), solids, height_range_m: (low, high) }
+    /// The permanent scene (no vehicles) of a configuration, out to `reach_m` from its centre.
+    pub(crate) fn new(config: &SimulationConfig, reach_m: f64) -> Self {
+        let terrain = Terrain::new(config, reach_m + OVERHANG_M);
+        let buildings = town::build(config, &terrain, reach_m);
+        let paint =
+            |index: usize| derived(config.seed, 100 + if config.buildings.identical { 0 } else { index as u64 });
+        let solid = |block: &Block, index| Solid::block(*block, Material::Building, paint(index));
+        let solids: Vec<Solid> = buildings
+            .iter()
+            .enumerate()
+            .flat_map(|(index, b)| b.parts.iter().chain(&b.details).map(move |block| solid(block, index)))
+            .collect();
+        let mut scene = Self::of(terrain, Streets::new(&config.buildings), buildings, solids, reach_m);
+        let is_free =
+            |x: f64, y: f64| scene.surface(x, y).1 == SurfaceClass::Ground && !scene.streets.is_carriageway(x, y);
+        let crowns = planting::trees(config, &scene.terrain, reach_m, is_free);
+        scene.add((0u64..).zip(crowns).map(|(index, crown)| Solid {
+            shape: Shape::Crown(crown),
+            material: Material::Tree,
+            paint: derived(config.seed ^ 0x7ee, index),
+        }));
+        scene
+    }
+
+    fn of(terrain: Terrain, streets: Streets, buildings: Vec<Building>, solids: Vec<Solid>, reach_m: f64) -> Self {
+        let buckets = Buckets::new(reach_m, |low, high| terrain.top(low, high), &[]);
+        let height_range_m = terrain.height_range_m();
+        let (terrain, buildings) = (Arc::new(terrain), buildings.into());
+        let mut scene = Self { terrain, streets, buildings, solids: Vec::new(), buckets, height_range_m, reach_m };
+        scene.add(solids);
+        scene
+    }
+
+    fn add(&mut self, solids: impl IntoIterator<Item = Solid>) {
+        for solid in solids {
+            let extent = solid.extent();
+            self.height_range_m.1 = self.height_range_m.1.max(extent.top_m);
+            self.buckets.insert(self.solids.len() as u32, &extent);
+            self.solids.push(solid);
+        }
+    }
+
+    /// The scene of a date: this one with that date's vehicles.
+    pub(crate) fn on_date(&self, config: &SimulationConfig, date: usize) -> Self {
+        let seed = derived(config.seed, 5000 + date as u64);
+        let vehicles = planting::vehicles(&config.vehicles, &self.streets, &self.terrain, seed, self.reach_m);
+        let mut scene = self.clone();
+        scene.add((0u64..).zip(vehicles).map(|(k, block)| Solid::block(block, Material::Vehicle, derived(seed, k))));
+        scene
     }
 
     /// The bare ground.
@@ -61,9 +151,14 @@ impl Scene {
         &self.terrain
     }
 
-    /// The blocks of the buildings.
-    pub fn blocks(&self) -> impl ExactSizeIterator<Item = &Block> {
-        self.solids.iter().map(|solid| &solid.block)
+    /// The buildings.
+    pub fn buildings(&self) -> &[Building] {
+        &self.buildings
+    }
+
+    /// How many trees there are.
+    pub fn tree_count(&self) -> usize {
+        self.solids.iter().filter(|s| s.material == Material::Tree).count()
     }
 
     /// Bounds of the surface's height, metres above the ellipsoid.
@@ -73,60 +168,104 @@ impl Scene {
 
     /// Height and class of the upper surface at a position.
     pub fn surface(&self, x: f64, y: f64) -> (f64, SurfaceClass) {
-        let ground = self.terrain.height(x, y);
-        let roofs = self.index.near([x, y], [x, y]).filter_map(|i| self.solids[i].roof_height(x, y));
-        match roofs.reduce(f64::max) {
-            Some(roof) if roof > ground => (roof, SurfaceClass::Building),
-            _ => (ground, SurfaceClass::Ground),
+        let mut height = self.terrain.height(x, y);
+        let mut class = if self.terrain.is_water(x, y) { SurfaceClass::Water } else { SurfaceClass::Ground };
+        for solid in self.buckets.members(self.buckets.at(x, y)).iter().map(|i| &self.solids[*i as usize]) {
+            if let Some(top) = solid.height(x, y).filter(|top| *top > height) {
+                (height, class) = (top, solid.class());
+            }
         }
+        (height, class)
     }
 
-    /// The first point of the surface on a ray that descends from above it, with t in (0, `t_max`).
+    /// The first point of the surface on a ray from above it, with t in (0, `t_max`).
     ///
-    /// `None` when the ray does not come down to the surface before `t_max`, or starts below it.
+    /// `None` when the ray does not come to the surface before `t_max`, or leaves the scene.
     pub fn first_point(&self, ray: &Ray, t_max: f64) -> Option<Vector3<f64>> {
         self.first_hit(ray, t_max).map(|hit| hit.point)
     }
 
     pub(crate) fn first_hit(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
-        let ground = self.terrain.intersect(ray, t_max);
-        let mut closest = ground.map(|t| (t, Part::Ground));
-        let end = ray.at(ground.unwrap_or(t_max));
-        for solid in self.index.between(&ray.origin, &end) {
-            let limit = closest.map_or(t_max, |(t, _)| t);
-            if let Some((t, face)) = self.solids[solid].enter(ray, limit) {
-                closest = Some((t, Part::Building { solid, face }));
+        let mut closest: Option<(f64, Vector3<f64>, Part)> = None;
+        self.buckets.walk(ray, t_max, |stretch| {
+            for &index in self.buckets.members(stretch.bucket) {
+                let limit = closest.map_or(t_max, |(t, ..)| t);
+                closest = self.solids[index as usize].meet(index as usize, ray, limit).or(closest);
             }
-        }
-        closest.map(|(t, part)| Hit { point: ray.at(t), part })
-    }
-
-    /// Outward unit normal of the surface at a hit.
-    pub(crate) fn normal(&self, hit: &Hit) -> Vector3<f64> {
-        match hit.part {
-            Part::Ground => self.terrain.normal(hit.point.x, hit.point.y),
-            Part::Building { solid, face } => self.solids[solid].normal(face),
-        }
+            let limit = closest.map_or(stretch.t_out, |(t, ..)| t.min(stretch.t_out));
+            if let Some(t) = self.terrain.intersect(ray, stretch.t_in, limit) {
+                let p = ray.at(t);
+                closest = Some((t, self.terrain.normal(p.x, p.y), Part::Ground));
+            }
+            closest.filter(|(t, ..)| *t <= stretch.t_out).map(|_| ())
+        });
+        closest.map(|(t, normal, part)| Hit { point: ray.at(t), normal, part })
     }
 
     pub(crate) fn solid(&self, index: usize) -> &Solid {
         &self.solids[index]
     }
 
-    /// Whether a building stands between a point of the surface and the sun. The terrain is gentler than the sun's lowest
-    /// permitted elevation (see [`crate::Sun`]), so that it throws no shadow.
+    /// Whether something stands between a point of the surface and the sun.
     pub(crate) fn in_shadow(&self, point: &Vector3<f64>, normal: &Vector3<f64>, to_sun: &Vector3<f64>) -> bool {
         let ray = Ray { origin: point + normal * LIFT_M, direction: *to_sun };
         let t_max = ((self.height_range_m.1 - point.z) / to_sun.z).max(0.0) + LIFT_M;
-        let end = ray.at(t_max);
-        self.index.between(&ray.origin, &end).any(|i| self.solids[i].enter(&ray, t_max).is_some())
+        let blocked = |&index: &u32| self.solids[index as usize].meet(index as usize, &ray, t_max).is_some();
+        self.buckets
+            .walk(&ray, t_max, |stretch| {
+                let hidden = self.buckets.members(stretch.bucket).iter().any(blocked)
+                    || self.terrain.intersect(&ray, stretch.t_in, stretch.t_out).is_some();
+                hidden.then_some(())
+            })
+            .is_some()
+    }
+}
+
+impl Solid {
+    fn block(block: Block, material: Material, paint: u64) -> Self {
+        Self { shape: Shape::Prism(Prism::new(block)), material, paint }
+    }
+
+    fn class(&self) -> SurfaceClass {
+        match self.material {
+            Material::Building => SurfaceClass::Building,
+            Material::Tree => SurfaceClass::Vegetation,
+            Material::Vehicle => SurfaceClass::Ground,
+        }
+    }
+
+    fn height(&self, x: f64, y: f64) -> Option<f64> {
+        match &self.shape {
+            Shape::Prism(prism) => prism.roof_height(x, y),
+            Shape::Crown(crown) => crown.height(x, y),
+        }
+    }
+
+    fn extent(&self) -> Extent {
+        let (centre, half, top_m) = match &self.shape {
+            Shape::Prism(prism) => (prism.block.centre_m, prism.half_extent(), prism.block.top_m()),
+            Shape::Crown(crown) => (crown.centre_m, [crown.radius_m; 2], crown.top_m()),
+        };
+        let [low, high] = [-1.0, 1.0].map(|side| std::array::from_fn(|axis| centre[axis] + side * half[axis]));
+        Extent { low, high, top_m }
+    }
+
+    fn meet(&self, index: usize, ray: &Ray, t_max: f64) -> Option<(f64, Vector3<f64>, Part)> {
+        match &self.shape {
+            Shape::Prism(prism) => prism.enter(ray, t_max).map(|(t, n, face)| (t, n, Part::Prism(index, face))),
+            Shape::Crown(crown) => crown.enter(ray, t_max).map(|(t, n)| (t, n, Part::Crown(index))),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::town;
+
+    fn scene(preset: &str) -> Scene {
+        let config = SimulationConfig::preset(preset).unwrap();
+        Scene::new(&config, 200.0).on_date(&config, 0)
+    }
 
     /// The first point below the surface on a march with a small step, refined by bisection.
     fn marched(scene: &Scene, ray: &Ray, t_max: f64) -> Option<Vector3<f64>> {
@@ -150,41 +289,78 @@ mod tests {
         Some(ray.at(under))
     }
 
-    #[test]
-    fn rays_meet_what_a_brute_force_march_meets() {
-        let scene = town::build(11, 200.0, 120.0, 35.0);
-        let (low, high) = scene.height_range_m();
-        let mut on_buildings = 0;
-        for k in 0..400 {
-            let (x, y) = (f64::from(k % 20) * 9.7 - 95.0, f64::from(k / 20) * 9.3 - 95.0);
-            let ray = Ray { origin: Vector3::new(x, y, high + 1.0), direction: Vector3::new(0.35, -0.2, -1.0) };
-            let t_max = high + 2.0 - low;
-            let hit = scene.first_hit(&ray, t_max).expect("the ray ends below the lowest ground");
-            let reference = marched(&scene, &ray, t_max).expect("the march does too");
-            let apart = (hit.point - reference).norm();
-            // The march walks through a corner that is thinner than its step.
-            assert!(apart < 0.01 || hit.point.z > reference.z, "{apart} m apart at {x}, {y}");
-            assert!(apart < 0.01 || corner_is_thin(&scene, &ray, &hit.point));
-            on_buildings += usize::from(hit.part != Part::Ground);
-        }
-        assert!(on_buildings > 50, "only {on_buildings} rays met a building");
-    }
-
     fn corner_is_thin(scene: &Scene, ray: &Ray, point: &Vector3<f64>) -> bool {
         let p = point + ray.direction.normalize() * 0.02;
         p.z > scene.surface(p.x, p.y).0
     }
 
     #[test]
-    fn a_wall_away_from_the_sun_is_in_its_own_shadow_and_the_roof_is_not() {
-        let scene = town::build(11, 200.0, 120.0, 35.0);
-        let to_sun = Vector3::new(0.4, -0.5, 0.77).normalize();
-        let solid = scene.solids.iter().max_by(|a, b| a.block.top_m().total_cmp(&b.block.top_m())).expect("a tower");
-        let [x, y] = solid.block.centre_m;
-        let roof = Vector3::new(x, y, solid.block.top_m());
-        assert!(!scene.in_shadow(&roof, &Vector3::z(), &to_sun));
-        let behind = [x - to_sun.x * 30.0, y - to_sun.y * 30.0];
-        let ground = Vector3::new(behind[0], behind[1], scene.terrain.height(behind[0], behind[1]));
-        assert!(scene.in_shadow(&ground, &Vector3::z(), &to_sun));
+    fn rays_meet_what_a_brute_force_march_meets() {
+        for (preset, on_solids) in [("town", 30), ("hills", 200), ("high-rise", 30), ("quarry", 0), ("harbour", 20)] {
+            let scene = scene(preset);
+            let (low, high) = scene.height_range_m();
+            let mut solid = 0;
+            for k in 0..400 {
+                let (x, y) = (f64::from(k % 20) * 9.7 - 95.0, f64::from(k / 20) * 9.3 - 95.0);
+                let direction = Vector3::new(0.35, -0.2, -1.0);
+                let ray = Ray { origin: Vector3::new(x, y, high + 1.0) - direction * 0.5 * (high - low), direction };
+                let ray = Ray { origin: Vector3::new(ray.origin.x, ray.origin.y, high + 1.0), ..ray };
+                let t_max = high + 2.0 - low;
+                let hit = scene.first_hit(&ray, t_max).expect("the ray ends below the lowest ground");
+                let reference = marched(&scene, &ray, t_max).expect("the march does too");
+                let apart = (hit.point - reference).norm();
+                // The march walks through a corner that is thinner than its step.
+                assert!(apart < 0.01 || hit.point.z > reference.z, "{preset}: {apart} m apart at {x}, {y}");
+                assert!(apart < 0.01 || corner_is_thin(&scene, &ray, &hit.point), "{preset}: {apart} m at {x}, {y}");
+                assert!(hit.normal.dot(&ray.direction) < 1e-6 || hit.part == Part::Ground);
+                solid += usize::from(hit.part != Part::Ground);
+            }
+            assert!(solid > on_solids, "{preset}: only {solid} rays met a solid");
+        }
+    }
+
+    #[test]
+    fn shadows_are_where_a_march_to_the_sun_meets_the_surface() {
+        for preset in ["town", "hills", "quarry"] {
+            let scene = scene(preset);
+            let to_sun = Vector3::new(0.6, -0.5, 0.4).normalize();
+            let (mut counts, mut wrong) = ([0; 2], 0);
+            for k in 0..900 {
+                let (x, y) = (f64::from(k % 30) * 5.1 - 75.0, f64::from(k / 30) * 4.9 - 75.0);
+                let down = Ray { origin: Vector3::new(x, y, scene.height_range_m().1 + 1.0), direction: -Vector3::z() };
+                let hit = scene.first_hit(&down, 1e3).unwrap();
+                let shadow = hit.normal.dot(&to_sun) <= 0.0 || scene.in_shadow(&hit.point, &hit.normal, &to_sun);
+                let from = hit.point + hit.normal * 0.001;
+                let depth = |t: f64| {
+                    let p = from + to_sun * t;
+                    scene.surface(p.x, p.y).0 - p.z
+                };
+                let deepest = (10..15_000).map(|i| depth(f64::from(i) * 0.02)).fold(f64::NEG_INFINITY, f64::max);
+                // Rays that graze an edge are left out.
+                if deepest.abs() > 0.03 {
+                    wrong += usize::from(shadow != (deepest > 0.0));
+                    counts[usize::from(shadow)] += 1;
+                }
+            }
+            assert!(counts[0] > 150 && counts[1] > 40, "{preset}: {counts:?}");
+            // Where the sun grazes the ground, the smooth normal and the patch disagree about which side is lit.
+            assert!(wrong * 200 < 900, "{preset}: {wrong} of {counts:?} differ");
+        }
+    }
+
+    #[test]
+    fn vehicles_are_no_part_of_the_permanent_scene() {
+        let config = SimulationConfig::default();
+        let permanent = Scene::new(&config, 150.0);
+        let (first, second) = (permanent.on_date(&config, 0), permanent.on_date(&config, 1));
+        let heights = |scene: &Scene| -> Vec<f64> {
+            (0..10_000)
+                .map(|k| scene.surface(f64::from(k % 100) * 2.0 - 100.0, f64::from(k / 100) * 2.0 - 100.0).0)
+                .collect()
+        };
+        let (none, a, b) = (heights(&permanent), heights(&first), heights(&second));
+        let differing = |u: &[f64], v: &[f64]| u.iter().zip(v).filter(|(u, v)| u != v).count();
+        assert!(differing(&none, &a) > 20 && differing(&none, &b) > 20 && differing(&a, &b) > 30);
+        assert!(none.iter().zip(&a).all(|(n, a)| a >= n && *a < n + 2.5));
     }
 }

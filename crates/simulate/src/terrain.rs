@@ -1,123 +1,289 @@
-//! The bare ground: a sum of value noises, smooth and with a bounded slope.
+//! The bare ground: a lattice of heights with bilinear patches between, which rays meet exactly.
+//!
+//! The lattice samples a sum of value noises (undulation), a pit, benches and water. With posts every metre the creases between
+//! patches turn by less than what a matcher can see, and steep faces are as steep as they are made. A patch is
+//! `a + bu + cv + duv`, so that a ray meets it at the root of a quadratic.
 //!
 //! Scene frame: x east, y north (grid metres from the scene's centre), z metres above the ellipsoid.
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::Ray;
-use crate::noise::{slope_bound, value_and_slope, value_noise};
+use crate::config::{SimulationConfig, TerrainConfig};
+use crate::index::BUCKET_M;
+use crate::noise::value_noise;
 use crate::random::derived;
 
-/// (lattice cell, amplitude) of each octave, metres: hills, banks, bumps.
-const OCTAVES: [(f64, f64); 3] = [(150.0, 6.5), (52.0, 1.6), (19.0, 0.25)];
-/// A ray has met the ground when it is this close to it, metres.
-const TOLERANCE_M: f64 = 1e-4;
-/// Steps of a ray before it is given up; a steep one needs about five.
-const MAX_STEPS: u32 = 400;
+/// Distance between posts, metres.
+pub(crate) const POST_M: f64 = 1.0;
+/// Octaves end where a wave would be shorter than this, metres.
+const SHORTEST_WAVE_M: f64 = 16.0;
+/// Land is at least this much above the water, metres, so that height alone tells one from the other.
+const FREEBOARD_M: f64 = 0.3;
+/// Half the width of the pier that reaches into the water, metres.
+const PIER_HALF_M: f64 = 16.0;
 
 /// Ground whose height is known everywhere.
 #[derive(Debug, Clone)]
 pub struct Terrain {
-    mean_height_m: f64,
+    corner_m: f64,
+    posts: usize,
+    base_m: f64,
+    heights: Vec<f32>,
+    range_m: (f64, f64),
+    water_m: Option<f64>,
+}
+
+/// The height function that the lattice samples.
+struct Relief<'a> {
+    config: &'a TerrainConfig,
     seed: u64,
+    half_m: f64,
+    turn: (f64, f64),
 }
 
 impl Terrain {
-    /// The ground of a seed, around a mean ellipsoidal height.
-    pub(crate) fn new(seed: u64, mean_height_m: f64) -> Self {
-        Self { mean_height_m, seed: derived(seed, 1) }
+    /// The ground of a scene, out to `reach_m` from its centre along both axes; beyond, its edge continues.
+    pub(crate) fn new(config: &SimulationConfig, reach_m: f64) -> Self {
+        let turn = config.buildings.turn_deg.to_radians().sin_cos();
+        let relief =
+            Relief { config: &config.terrain, seed: derived(config.seed, 1), half_m: config.size_m / 2.0, turn };
+        // The buckets of the scene end at whole multiples of their side: no ray leaves the lattice before them.
+        let half = ((reach_m / BUCKET_M).ceil() * BUCKET_M / POST_M).ceil() + 2.0;
+        let (posts, corner_m) = (2 * half as usize + 1, -half * POST_M);
+        let at = |k: usize| corner_m + k as f64 * POST_M;
+        let heights: Vec<f32> =
+            (0..posts * posts).into_par_iter().map(|i| relief.height(at(i % posts), at(i / posts)) as f32).collect();
+        let base_m = config.ground_height_m;
+        let low = heights.iter().copied().fold(f32::INFINITY, f32::min);
+        let high = heights.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let range_m = (base_m + f64::from(low), base_m + f64::from(high));
+        let water_m = (config.terrain.water_share > 0.0).then_some(base_m - config.terrain.quay_height_m);
+        Self { corner_m, posts, base_m, heights, range_m, water_m }
     }
 
     /// Height above the ellipsoid, metres.
     pub fn height(&self, x: f64, y: f64) -> f64 {
-        let octave = |((cell, amplitude), k): (&(f64, f64), u64)| amplitude * value_noise(self.seed ^ k, *cell, x, y);
-        self.mean_height_m + OCTAVES.iter().zip(0u64..).map(octave).sum::<f64>()
+        let ((i, u), (j, v)) = (self.cell(x), self.cell(y));
+        let [a, b, c, d] = self.patch(i, j);
+        self.base_m + a + b * u + c * v + d * u * v
     }
 
-    /// The lowest and the highest value that [`Self::height`] can take.
+    /// The lowest and the highest ground.
     pub fn height_range_m(&self) -> (f64, f64) {
-        let amplitude: f64 = OCTAVES.iter().map(|(_, a)| a).sum();
-        (self.mean_height_m - amplitude, self.mean_height_m + amplitude)
+        self.range_m
     }
 
-    /// The steepest slope that the ground can have, metres per metre.
-    pub fn slope_bound() -> f64 {
-        OCTAVES.iter().map(|(cell, amplitude)| amplitude * slope_bound(*cell)).sum()
+    /// Whether the ground is a water surface.
+    pub fn is_water(&self, x: f64, y: f64) -> bool {
+        self.water_m.is_some_and(|level| self.height(x, y) < level + 0.5 * FREEBOARD_M)
     }
 
-    /// Upward unit normal.
+    /// Upward unit normal, over the patches around.
     pub(crate) fn normal(&self, x: f64, y: f64) -> Vector3<f64> {
-        let mut normal = Vector3::z();
-        for ((cell, amplitude), k) in OCTAVES.iter().zip(0u64..) {
-            let (_, [by_x, by_y]) = value_and_slope(self.seed ^ k, *cell, x, y);
-            normal.x -= amplitude * by_x;
-            normal.y -= amplitude * by_y;
-        }
-        normal.normalize()
+        let by_x = self.height(x + POST_M, y) - self.height(x - POST_M, y);
+        let by_y = self.height(x, y + POST_M) - self.height(x, y - POST_M);
+        Vector3::new(-by_x, -by_y, 2.0 * POST_M).normalize()
     }
 
-    /// The parameter at which a descending ray meets the ground. `None` for a ray that starts below the ground or does not
-    /// come down to it before `t_max`.
-    ///
-    /// A ray that is steeper than the ground can be crosses it once, and stepping by the height above the ground over the
-    /// ray's own descent converges to the crossing. A flatter one steps by what the slope bound keeps above the ground, so
-    /// that the first crossing is the one found.
-    pub(crate) fn intersect(&self, ray: &Ray, t_max: f64) -> Option<f64> {
-        let descent = -ray.direction.z;
-        let rise = Self::slope_bound() * ray.direction.x.hypot(ray.direction.y);
-        let closing = if rise < descent { descent } else { descent + rise };
-        let start = ray.origin.z - self.height(ray.origin.x, ray.origin.y);
-        if start < 0.0 || closing <= 0.0 {
-            return None;
-        }
-        let mut t = start / closing;
-        for _ in 0..MAX_STEPS {
-            let p = ray.at(t);
-            let above = p.z - self.height(p.x, p.y);
-            if above.abs() < TOLERANCE_M {
-                return (t <= t_max).then_some(t);
+    /// The highest ground of a box of the plane.
+    pub(crate) fn top(&self, low: [f64; 2], high: [f64; 2]) -> f64 {
+        let ((i0, _), (i1, _)) = (self.cell(low[0]), self.cell(high[0]));
+        let ((j0, _), (j1, _)) = (self.cell(low[1]), self.cell(high[1]));
+        let row = |j: usize| &self.heights[j * self.posts + i0..=j * self.posts + i1 + 1];
+        let top = (j0..=j1 + 1).flat_map(row).copied().fold(f32::NEG_INFINITY, f32::max);
+        self.base_m + f64::from(top)
+    }
+
+    /// The first parameter in [`t_in`, `t_out`] at which a ray over the lattice goes from above the ground to below it.
+    pub(crate) fn intersect(&self, ray: &Ray, t_in: f64, t_out: f64) -> Option<f64> {
+        let mut t = t_in;
+        // Each step crosses one patch; a ray along a patch's edge is nudged over it by rounding, hence the bound.
+        for _ in 0..4 * self.posts {
+            let start = ray.at(t);
+            let (i, j) = (self.cell(start.x).0, self.cell(start.y).0);
+            let leave = self.leaves(ray, i, j, t).min(t_out);
+            if let Some(hit) = self.meet(ray, i, j, t, leave) {
+                return Some(hit);
             }
-            t += above / closing;
-            if rise >= descent && t > t_max {
+            if leave >= t_out {
                 return None;
             }
+            t = leave;
         }
         None
+    }
+
+    /// Where a ray leaves the patch (i, j) that it is in at `t`: just beyond the edge, so that the next patch is found.
+    fn leaves(&self, ray: &Ray, i: usize, j: usize, t: f64) -> f64 {
+        let along = |index: usize, origin: f64, direction: f64| {
+            let edge = self.corner_m + (index + usize::from(direction > 0.0)) as f64 * POST_M;
+            if direction == 0.0 { f64::INFINITY } else { (edge - origin) / direction }
+        };
+        let edge = along(i, ray.origin.x, ray.direction.x).min(along(j, ray.origin.y, ray.direction.y));
+        edge.max(t) + 1e-9 / ray.direction.norm()
+    }
+
+    fn meet(&self, ray: &Ray, i: usize, j: usize, t_in: f64, t_out: f64) -> Option<f64> {
+        let [a, b, c, d] = self.patch(i, j);
+        let (z_in, z_out) = (ray.at(t_in).z - self.base_m, ray.at(t_out).z - self.base_m);
+        let top = a.max(a + b).max(a + c).max(a + b + c + d);
+        if z_in.min(z_out) > top {
+            return None;
+        }
+        let point = ray.at(t_in);
+        let u = (point.x - self.corner_m) / POST_M - i as f64;
+        let v = (point.y - self.corner_m) / POST_M - j as f64;
+        let (du, dv) = (ray.direction.x / POST_M, ray.direction.y / POST_M);
+        // Height above the patch after s more of the ray: q0 + q1 s + q2 s².
+        let q0 = z_in - (a + b * u + c * v + d * u * v);
+        let q1 = ray.direction.z - b * du - c * dv - d * (u * dv + v * du);
+        let q2 = -d * du * dv;
+        falls_to_zero(q0, q1, q2, t_out - t_in).map(|s| t_in + s)
+    }
+
+    /// The patch index along one axis and the position in it; beyond the lattice the outermost patch's edge.
+    fn cell(&self, coordinate: f64) -> (usize, f64) {
+        let u = ((coordinate - self.corner_m) / POST_M).clamp(0.0, (self.posts - 1) as f64);
+        let index = (u as usize).min(self.posts - 2);
+        (index, u - index as f64)
+    }
+
+    /// Coefficients of 1, u, v, uv relative to the base height.
+    fn patch(&self, i: usize, j: usize) -> [f64; 4] {
+        let k = j * self.posts + i;
+        let [h00, h10] = [self.heights[k], self.heights[k + 1]].map(f64::from);
+        let [h01, h11] = [self.heights[k + self.posts], self.heights[k + self.posts + 1]].map(f64::from);
+        [h00, h10 - h00, h01 - h00, h00 - h10 - h01 + h11]
+    }
+}
+
+/// The first s in [0, `s_max`] at which q0 + q1 s + q2 s² is no longer positive.
+fn falls_to_zero(q0: f64, q1: f64, q2: f64, s_max: f64) -> Option<f64> {
+    if q0 <= 0.0 {
+        return Some(0.0);
+    }
+    let discriminant = q1 * q1 - 4.0 * q2 * q0;
+    if discriminant < 0.0 {
+        return None;
+    }
+    // The smaller positive root without cancellation: q0 > 0, so 2 q0 / (−q1 + √Δ) is the first one reached by a falling curve.
+    let s = 2.0 * q0 / (discriminant.sqrt() - q1);
+    (s >= 0.0 && s <= s_max).then_some(s)
+}
+
+impl Relief<'_> {
+    /// Height relative to the mean ground, metres.
+    fn height(&self, x: f64, y: f64) -> f64 {
+        let land = self.benched(self.undulation(x, y) - self.pit(x, y));
+        if self.config.water_share == 0.0 {
+            return land;
+        }
+        let water = -self.config.quay_height_m;
+        if self.in_water(x, y) { water } else { land.max(water + FREEBOARD_M) }
+    }
+
+    fn undulation(&self, x: f64, y: f64) -> f64 {
+        let (mut wave, mut amplitude, mut sum, mut octave) =
+            (self.config.wavelength_m, self.config.relief_m, 0.0, 0u64);
+        while wave >= SHORTEST_WAVE_M && amplitude > 1e-3 {
+            sum += amplitude * value_noise(self.seed ^ octave, 0.5 * wave, x, y);
+            (wave, amplitude, octave) = (0.5 * wave, amplitude * self.config.roughness, octave + 1);
+        }
+        sum
+    }
+
+    /// Depth below the surroundings: none at the rim, the full depth over the floor.
+    fn pit(&self, x: f64, y: f64) -> f64 {
+        if self.config.pit_depth_m == 0.0 {
+            return 0.0;
+        }
+        let rim = self.half_m * (0.85 + 0.1 * value_noise(self.seed ^ 0x71, self.half_m, x, y));
+        let inwards = ((rim - x.hypot(y)) / (0.65 * rim)).clamp(0.0, 1.0);
+        self.config.pit_depth_m * inwards
+    }
+
+    /// Benches: three quarters of each step are level, the rest is its face.
+    fn benched(&self, height: f64) -> f64 {
+        let bench = self.config.bench_height_m;
+        if bench == 0.0 {
+            return height;
+        }
+        let step = (height / bench).floor();
+        let face = ((height / bench - step - 0.75) / 0.25).clamp(0.0, 1.0);
+        // What is left of the slope keeps water from standing and roads from being mirrors.
+        bench * (step + face) + 0.06 * (height - bench * (step + face))
+    }
+
+    fn in_water(&self, x: f64, y: f64) -> bool {
+        let (sin, cos) = self.turn;
+        let (u, v) = (cos * x + sin * y, cos * y - sin * x);
+        let shore = self.half_m * (1.0 - 2.0 * self.config.water_share);
+        let pier_end = shore + 0.6 * (self.half_m - shore);
+        u > shore && (v.abs() > PIER_HALF_M || u > pier_end)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
-    #[test]
-    fn rays_meet_the_ground_where_a_fine_march_does() {
-        let terrain = Terrain::new(5, 100.0);
-        for k in 0..50 {
-            let start = Vector3::new(f64::from(k) * 7.3 - 180.0, f64::from(k) * -3.1, 130.0);
-            // Every other ray is flatter than the slope bound.
-            let reach = if k % 2 == 0 { 0.5 } else { 4.0 };
-            let ray = Ray { origin: start, direction: Vector3::new(0.8 * reach, -0.6 * reach, -1.0) };
-            let found = terrain.intersect(&ray, 100.0).expect("the ray descends 100 m");
-            let step = 1e-3;
-            let marched = (0..100_000)
-                .map(|i| f64::from(i) * step)
-                .find(|t| {
-                    let p = ray.at(*t);
-                    p.z < terrain.height(p.x, p.y)
-                })
-                .expect("the march ends below the ground");
-            assert!((found - marched).abs() < 2.0 * step, "found {found}, marched {marched}");
+    fn terrain(preset: &str) -> Terrain {
+        Terrain::new(&SimulationConfig::preset(preset).unwrap(), 400.0)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn rays_meet_the_ground_where_a_fine_march_does(
+            which in 0usize..4, x in -150.0..150.0f64, y in -150.0..150.0f64, dx in -1.5..1.5f64, dy in -1.5..1.5f64,
+        ) {
+            let terrain = terrain(["town", "hills", "quarry", "harbour"][which]);
+            let (low, high) = terrain.height_range_m();
+            let ray = Ray { origin: Vector3::new(x, y, high + 1.0), direction: Vector3::new(dx, dy, -1.0) };
+            let t_max = high + 2.0 - low;
+            let step = 2e-3;
+            let below = |t: f64| { let p = ray.at(t); p.z < terrain.height(p.x, p.y) };
+            let marched = (0..).map(|i| f64::from(i) * step).take_while(|t| *t < t_max).find(|t| below(*t));
+            match (terrain.intersect(&ray, 0.0, t_max), marched) {
+                // A march steps over a crest that is thinner than its step.
+                (Some(t), Some(m)) => prop_assert!(m - t < 1.01 * step && t <= m || below(t + 1e-6), "{t}, marched {m}"),
+                (Some(t), None) => prop_assert!(below(t + 1e-6) || t > t_max - 2.0 * step),
+                (None, m) => prop_assert!(m.is_none(), "missed at {m:?}"),
+            }
         }
     }
 
     #[test]
-    fn heights_stay_in_the_stated_range() {
-        let terrain = Terrain::new(9, 50.0);
-        let (low, high) = terrain.height_range_m();
-        for k in 0..2000 {
-            let z = terrain.height(f64::from(k) * 1.7, f64::from(k) * 0.9);
-            assert!((low..=high).contains(&z));
+    fn heights_stay_in_the_stated_range_and_presets_are_as_steep_as_they_say() {
+        for (preset, steepest_low, steepest_high) in
+            [("town", 0.1, 0.6), ("hills", 0.6, 3.0), ("quarry", 1.0, 6.0), ("fields", 0.0, 0.1)]
+        {
+            let terrain = terrain(preset);
+            let (low, high) = terrain.height_range_m();
+            let mut steepest: f64 = 0.0;
+            for k in 0..40_000 {
+                let (x, y) = (f64::from(k % 200) * 1.7 - 170.0, f64::from(k / 200) * 1.7 - 170.0);
+                assert!((low - 1e-9..=high + 1e-9).contains(&terrain.height(x, y)));
+                let n = terrain.normal(x, y);
+                steepest = steepest.max(n.x.hypot(n.y) / n.z);
+            }
+            assert!((steepest_low..steepest_high).contains(&steepest), "{preset}: slope {steepest}");
         }
+    }
+
+    #[test]
+    fn water_is_level_and_has_its_share() {
+        let terrain = terrain("harbour");
+        let cells: Vec<(f64, f64)> =
+            (0..6400).map(|k| (f64::from(k % 80) * 4.0 - 158.0, f64::from(k / 80) * 4.0 - 158.0)).collect();
+        let wet: Vec<f64> =
+            cells.iter().filter(|(x, y)| terrain.is_water(*x, *y)).map(|(x, y)| terrain.height(*x, *y)).collect();
+        let share = wet.len() as f64 / cells.len() as f64;
+        assert!((0.3..0.45).contains(&share), "{share}");
+        assert!(wet.iter().filter(|z| (*z - 47.5).abs() < 1e-4).count() > wet.len() * 98 / 100);
     }
 }

@@ -1,97 +1,134 @@
 //! Diffuse reflectance of the surface, [0, 1]: procedural, fixed to the surface, with detail down to half a metre.
 //!
-//! Each surface has its own pattern (streets with markings and parked cars, tiles, panels, windows) times multi-octave noise, so that
-//! every pixel of an image carries something to match, as in a real town.
+//! Each surface has its own pattern (streets with markings, parcels, strata, tiles, panels, windows, foliage) times
+//! multi-octave noise. Water alone is not fixed to the surface: its waves are others in every view.
 
 use nalgebra::Vector3;
 
-use crate::block::{Face, Roof, Solid};
-use crate::noise::detail;
+use crate::config::{GroundCover, SurfaceConfig};
+use crate::noise::{detail, value_noise};
+use crate::prism::{Face, Prism, Roof};
 use crate::random::{derived, lattice};
-use crate::scene::{Hit, Part, Scene};
-use crate::town::STREETS;
+use crate::scene::{Hit, Material, Part, Scene, Shape, Solid};
 
-/// Reflectance of the town of a seed.
+/// The reflectance that a scene without contrast has everywhere.
+const MEAN: f64 = 0.22;
+/// Sides of a field, metres.
+const PARCEL_M: [f64; 2] = [110.0, 64.0];
+
+/// Reflectance of a scene in one view.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Texture {
     seed: u64,
+    waves: u64,
+    surface: SurfaceConfig,
 }
 
 impl Texture {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self { seed: derived(seed, 3) }
+    /// The reflectance of a seed; `view` tells the waves of one view from those of another.
+    pub(crate) fn new(seed: u64, view: u64, surface: SurfaceConfig) -> Self {
+        let seed = derived(seed, 3);
+        Self { seed, waves: derived(seed, view), surface }
     }
 
     /// Reflectance at a hit.
     pub(crate) fn reflectance(&self, scene: &Scene, hit: &Hit) -> f64 {
         let value = match hit.part {
-            Part::Ground => self.ground(hit.point.x, hit.point.y),
-            Part::Building { solid, face } => self.building(scene.solid(solid), solid as u64, face, &hit.point),
+            Part::Ground => self.ground(scene, &hit.point),
+            Part::Crown(index) => self.foliage(scene.solid(index), &hit.point),
+            Part::Prism(index, face) => self.block(scene.solid(index), face, &hit.point),
         };
-        value.clamp(0.02, 0.9)
+        let value = value.clamp(0.02, 0.9);
+        match self.surface.contrast {
+            1.0 => value,
+            contrast => (MEAN * (value / MEAN).powf(contrast)).clamp(0.02, 0.9),
+        }
     }
 
-    fn ground(&self, x: f64, y: f64) -> f64 {
-        let [u, v] = STREETS.street_from_scene(x, y);
-        let (across_u, across_v) = (from_nearest_line(u), from_nearest_line(v));
+    fn ground(&self, scene: &Scene, point: &Vector3<f64>) -> f64 {
+        let (x, y) = (point.x, point.y);
+        if scene.terrain().is_water(x, y) {
+            return 0.045 * (1.0 + 0.5 * value_noise(self.waves, 3.0, x, y) + 0.3 * value_noise(self.waves, 1.1, y, x));
+        }
         let grain = detail(self.seed, x, y);
-        let street = across_u.abs().min(across_v.abs());
-        if street < STREETS.half_width_m {
-            let (across, along) = if across_u.abs() < across_v.abs() { (across_u, v) } else { (across_v, u) };
-            return self.street(across, along) * (1.0 + 0.8 * grain);
+        if scene.streets.half_width_m > 0.0 {
+            let street = scene.streets.nearest(x, y);
+            let distance = street.across_m.abs();
+            if distance < scene.streets.half_width_m {
+                let marked = distance < 0.15 && street.along_m.rem_euclid(9.0) < 4.0;
+                return if marked { 0.5 } else { 0.12 * (1.0 + 0.6 * grain) };
+            }
+            if distance < scene.streets.half_width_m + 1.8 {
+                return 0.34 * (1.0 + 0.4 * grain);
+            }
         }
-        if street < STREETS.half_width_m + 1.8 {
-            return 0.34 * (1.0 + 0.5 * grain);
+        match self.surface.cover {
+            GroundCover::Town => (0.20 + 0.12 * detail(self.seed ^ 0x50, x * 0.3, y * 0.3)) * (1.0 + 0.9 * grain),
+            GroundCover::Fields => self.field(x, y) * (1.0 + 0.35 * grain),
+            GroundCover::Rock => {
+                let strata = value_noise(self.seed ^ 0x57, 2.2, point.z, 0.1 * x);
+                (0.34 + 0.06 * strata) * (1.0 + 0.8 * grain)
+            }
+            GroundCover::Forest => 0.11 * (1.0 + 0.9 * grain),
         }
-        let soil = detail(self.seed ^ 0x50, x * 0.3, y * 0.3);
-        (0.20 + 0.12 * soil) * (1.0 + 1.1 * grain)
     }
 
-    /// A carriageway: a dashed centre line, and cars parked along the kerbs.
-    fn street(&self, across: f64, along: f64) -> f64 {
-        if across.abs() < 0.2 && along.rem_euclid(9.0) < 4.0 {
-            return 0.55;
+    /// Parcels with their own tone and direction of rows, and tracks between them.
+    fn field(&self, x: f64, y: f64) -> f64 {
+        let [u, v] = [x + 0.12 * y, y - 0.09 * x];
+        let (i, j) = ((u / PARCEL_M[0]).floor(), (v / PARCEL_M[1]).floor());
+        let (in_u, in_v) = (u - i * PARCEL_M[0], v - j * PARCEL_M[1]);
+        if in_u < 2.5 || in_v < 2.0 {
+            return 0.32;
         }
-        let slot = (along / 6.0).floor();
-        let in_slot = along - 6.0 * slot;
-        let side = if across > 0.0 { 1 } else { 0 };
-        let parked = lattice(self.seed ^ 0xca, slot as i64, side);
-        if (2.9..4.7).contains(&across.abs()) && (0.8..5.1).contains(&in_slot) && parked < 0.35 {
-            return 0.05 + 1.8 * parked;
-        }
-        0.13
+        let own = |k: u64| lattice(self.seed ^ (0xf0 + k), i as i64, j as i64);
+        let across = if own(1) < 0.5 { in_u } else { in_v };
+        let rows = (std::f64::consts::TAU * across / (1.2 + 2.4 * own(2))).sin();
+        (0.10 + 0.22 * own(0)) * (1.0 + 0.15 * rows)
     }
 
-    fn building(&self, solid: &Solid, id: u64, face: Face, point: &Vector3<f64>) -> f64 {
-        let [u, v] = solid.local(point.x, point.y);
-        let own = derived(self.seed, 100 + id);
-        let tone = lattice(own, 0, 0);
-        match (face, solid.block.roof) {
-            (Face::Roof(_), Roof::Flat { .. }) => {
-                let joint = if u.rem_euclid(4.0) < 0.3 || v.rem_euclid(5.0) < 0.3 { 0.75 } else { 1.0 };
-                let plant = lattice(own, (u / 2.5).floor() as i64, (v / 2.5).floor() as i64);
-                let equipment = if plant > 0.8 { 2.2 * plant - 1.1 } else { 1.0 };
-                (0.22 + 0.22 * tone) * joint * equipment * (1.0 + 0.8 * detail(own, u, v))
-            }
-            (Face::Roof(_), _) => {
-                let course = if v.rem_euclid(1.3) < 0.45 { 0.82 } else { 1.0 };
-                (0.16 + 0.2 * tone) * course * (1.0 + 1.1 * detail(own, u, v))
-            }
-            (Face::End(side), _) => wall(own ^ u64::from(side > 0), tone, v, point.z - solid.block.ground_m),
-            (Face::Side(side), _) => wall(own ^ (2 + u64::from(side > 0)), tone, u, point.z - solid.block.ground_m),
+    fn foliage(&self, tree: &Solid, point: &Vector3<f64>) -> f64 {
+        let tone = 0.07 + 0.08 * lattice(tree.paint, 0, 0);
+        // Leaves hang in tufts: a pattern over the height as well as over the plan.
+        let tufts = value_noise(tree.paint, 0.9, point.x + 0.7 * point.z, point.y - 0.6 * point.z);
+        tone * (1.0 + 0.6 * tufts + 0.7 * detail(self.seed, point.x, point.y))
+    }
+
+    fn block(&self, solid: &Solid, face: Face, point: &Vector3<f64>) -> f64 {
+        let tone = lattice(solid.paint, 0, 0);
+        let Shape::Prism(prism) = &solid.shape else { return MEAN };
+        if solid.material == Material::Vehicle {
+            return 0.04 + 0.66 * tone * tone;
+        }
+        let [u, v] = prism.local(point.x, point.y);
+        let above_ground = point.z - prism.block.base_m;
+        match face {
+            Face::Roof(along) => roof(prism, solid.paint, tone, if along { [v, u] } else { [u, v] }),
+            Face::End(end) => wall(solid.paint ^ u64::from(end), tone, v, above_ground),
+            Face::Side(left) => wall(solid.paint ^ (2 + u64::from(left)), tone, u, above_ground),
         }
     }
 }
 
-/// A façade with a window every 2.6 m on every storey of 3 m.
-fn wall(seed: u64, tone: f64, along: f64, above_ground: f64) -> f64 {
-    let window = (0.8..1.9).contains(&along.rem_euclid(2.6)) && (0.9..2.4).contains(&above_ground.rem_euclid(3.0));
-    let plaster = if window { 0.08 } else { 0.3 + 0.2 * tone };
-    plaster * (1.0 + 0.4 * detail(seed, along, above_ground))
+fn roof(prism: &Prism, paint: u64, tone: f64, [u, v]: [f64; 2]) -> f64 {
+    let grain = detail(paint, u, v);
+    if !matches!(prism.block.roof, Roof::Flat { .. }) {
+        let course = if v.rem_euclid(1.3) < 0.45 { 0.85 } else { 1.0 };
+        return (0.16 + 0.2 * tone) * course * (1.0 + 0.9 * grain);
+    }
+    let joint = if u.rem_euclid(4.0) < 0.3 || v.rem_euclid(5.0) < 0.3 { 0.78 } else { 1.0 };
+    let patch = lattice(paint, (u / 2.5).floor() as i64, (v / 2.5).floor() as i64);
+    let mended = if patch > 0.85 { 2.2 * patch - 1.1 } else { 1.0 };
+    (0.2 + 0.22 * tone) * joint * mended * (1.0 + 0.7 * grain)
 }
 
-/// Signed distance from the nearest centre line of a family of streets.
-fn from_nearest_line(coordinate: f64) -> f64 {
-    let s = STREETS.spacing_m;
-    coordinate - s * (coordinate / s).round()
+/// A façade with a window every few metres on every storey of 3 m.
+fn wall(paint: u64, tone: f64, along: f64, above_ground: f64) -> f64 {
+    let pitch = 2.2 + 1.2 * lattice(paint, 1, 0);
+    let (in_bay, in_storey) = (along.rem_euclid(pitch), above_ground.rem_euclid(3.0));
+    let window = (0.3 * pitch..0.72 * pitch).contains(&in_bay) && (0.9..2.4).contains(&in_storey);
+    // Panes reflect more or less sky; some have a blind.
+    let pane = 0.05 + 0.2 * lattice(paint, (along / pitch).floor() as i64, (above_ground / 3.0).floor() as i64).powi(3);
+    let plaster = if window { pane } else { 0.28 + 0.2 * tone };
+    plaster * (1.0 + 0.4 * detail(paint, along, above_ground))
 }

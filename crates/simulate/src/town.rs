@@ -1,171 +1,269 @@
-//! A town from a seed: blocks of houses, halls and slabs along a street grid, and one stepped tower in the middle.
+//! A town from a seed: along a grid of streets, quarters with houses, rows, halls, courtyards, towers or sheds, and one stepped
+//! tower in the middle.
 //!
-//! The street grid is turned against the map grid, so that roof edges do not fall along the rows of a raster.
+//! A quarter's seed follows from its place, so that a larger town contains the smaller one.
 
-use crate::block::{Block, Roof};
+use crate::building::{Builder, Building, Lot};
+use crate::config::{BuildingsConfig, SimulationConfig};
 use crate::random::{Stream, derived, lattice};
-use crate::scene::Scene;
+use crate::streets::Streets;
 use crate::terrain::Terrain;
 
-/// The street grid, which the ground's texture paints.
-pub(crate) const STREETS: Streets = Streets { turn_deg: 17.0, spacing_m: 62.0, half_width_m: 5.0 };
+/// Space between the carriageway and the lots, metres.
+const SIDEWALK_M: f64 = 2.5;
+/// Heights of walls up to the eaves, metres.
+const HALL_M: [f64; 2] = [6.0, 22.0];
+const ROW_M: [f64; 2] = [8.0, 14.0];
+const HOUSE_M: [f64; 2] = [4.0, 7.0];
+const COURTYARD_M: [f64; 2] = [15.0, 22.0];
+const SHED_M: f64 = 6.0;
 
-/// Two families of parallel streets.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Streets {
-    /// Direction of the first family, degrees counter-clockwise from east.
-    pub(crate) turn_deg: f64,
-    /// Distance between centre lines.
-    pub(crate) spacing_m: f64,
-    /// Half the width of the carriageway.
-    pub(crate) half_width_m: f64,
+/// What stands between four streets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Quarter {
+    Park,
+    Hall,
+    Rows,
+    Houses,
+    Courtyard,
+    HighRise,
+    Sheds,
 }
 
-impl Streets {
-    /// Street coordinates (along the first family, along the second) of a position, metres.
-    pub(crate) fn street_from_scene(&self, x: f64, y: f64) -> [f64; 2] {
-        let (sin, cos) = self.turn_deg.to_radians().sin_cos();
-        [cos * x + sin * y, cos * y - sin * x]
-    }
-
-    fn scene_from_street(self, u: f64, v: f64) -> [f64; 2] {
-        let (sin, cos) = self.turn_deg.to_radians().sin_cos();
-        [cos * u - sin * v, sin * u + cos * v]
-    }
-}
-
-/// A rectangle in street coordinates with a height to build.
-struct Lot {
-    centre: [f64; 2],
-    half_size: [f64; 2],
-    turn_deg: f64,
-}
-
-/// The town of a seed, out to `reach_m` from its centre, on ground around `mean_height_m` above the ellipsoid.
-pub(crate) fn build(seed: u64, reach_m: f64, mean_height_m: f64, landmark_m: f64) -> Scene {
-    let terrain = Terrain::new(seed, mean_height_m);
-    let seed = derived(seed, 2);
-    let count = (reach_m * std::f64::consts::SQRT_2 / STREETS.spacing_m).ceil() as i64;
-    let mut blocks = Vec::new();
-    for j in -count..=count {
-        for i in -count..=count {
-            let centre = [(i as f64 + 0.5) * STREETS.spacing_m, (j as f64 + 0.5) * STREETS.spacing_m];
-            let [x, y] = STREETS.scene_from_street(centre[0], centre[1]);
-            if x.abs().max(y.abs()) > reach_m {
-                continue;
-            }
-            // A quarter's seed follows from its place, so that a larger town contains the smaller one.
-            let mut stream = Stream::new((lattice(seed, i, j) * (1u64 << 53) as f64) as u64);
-            match (i, j) {
-                (0, 0) => tower(&terrain, centre, landmark_m, &mut blocks),
-                _ => quarter(&terrain, centre, &mut stream, &mut blocks),
-            }
-        }
-    }
-    Scene::new(terrain, blocks)
-}
-
-/// A podium, a tower on it and a penthouse on the tower: 9, 29 and 35 m above the ground.
-fn tower(terrain: &Terrain, centre: [f64; 2], height_m: f64, blocks: &mut Vec<Block>) {
-    for (half_size, height) in [([20.0, 15.0], 9.0), ([11.0, 9.0], 0.83 * height_m), ([5.0, 4.0], height_m)] {
-        let lot = Lot { centre, half_size, turn_deg: 0.0 };
-        blocks.push(flat(terrain, &lot, height));
-    }
-}
-
-/// What stands between four streets: nothing (a park), a hall, two rows or up to four houses.
-fn quarter(terrain: &Terrain, centre: [f64; 2], stream: &mut Stream, blocks: &mut Vec<Block>) {
-    let kind = stream.uniform(0.0, 1.0);
-    if (0.12..0.40).contains(&kind) {
-        let half_size = [stream.uniform(12.0, 20.0), stream.uniform(8.0, 16.0)];
-        let lot = Lot { centre, half_size, turn_deg: stream.uniform(-4.0, 4.0) };
-        blocks.push(flat(terrain, &lot, stream.uniform(6.0, 22.0)));
-    } else if (0.40..0.60).contains(&kind) {
-        rows(terrain, centre, stream, blocks);
-    } else if kind >= 0.60 {
-        houses(terrain, centre, stream, blocks);
-    }
-}
-
-fn rows(terrain: &Terrain, [u, v]: [f64; 2], stream: &mut Stream, blocks: &mut Vec<Block>) {
-    for side in [-1.0, 1.0] {
-        let half_size = [stream.uniform(14.0, 20.0), stream.uniform(5.0, 6.5)];
-        blocks.push(row(terrain, &Lot { centre: [u, v + side * 13.0], half_size, turn_deg: 0.0 }, stream));
-    }
-}
-
-fn houses(terrain: &Terrain, [u, v]: [f64; 2], stream: &mut Stream, blocks: &mut Vec<Block>) {
-    for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
-        if stream.chance(0.15) {
+/// The buildings of a scene, out to `reach_m` from its centre.
+pub(crate) fn build(config: &SimulationConfig, terrain: &Terrain, reach_m: f64) -> Vec<Building> {
+    let streets = Streets::new(&config.buildings);
+    let seed = derived(config.seed, 2);
+    let spacing = streets.spacing_m;
+    let count = (reach_m * std::f64::consts::SQRT_2 / spacing).ceil() as i64;
+    let mut town =
+        Town { config: &config.buildings, builder: Builder::new(terrain, streets, config.buildings.details) };
+    for (i, j) in (-count..=count).flat_map(|j| (-count..=count).map(move |i| (i, j))) {
+        let centre = [(i as f64 + 0.5) * spacing, (j as f64 + 0.5) * spacing];
+        let [x, y] = streets.scene_from_street(centre[0], centre[1]);
+        if x.abs().max(y.abs()) > reach_m {
             continue;
         }
-        let centre = [u + a * stream.uniform(11.0, 13.5), v + b * stream.uniform(11.0, 13.5)];
-        let half_size = [stream.uniform(5.0, 8.0), stream.uniform(4.0, 5.5)];
-        blocks.push(house(terrain, &Lot { centre, half_size, turn_deg: stream.uniform(-8.0, 8.0) }, stream));
+        let place = if config.buildings.identical { (0, 1) } else { (i, j) };
+        let mut stream = Stream::new((lattice(seed, place.0, place.1) * (1u64 << 53) as f64) as u64);
+        if (i, j) == (0, 0) && config.buildings.landmark_height_m > 0.0 {
+            town.landmark(centre);
+        } else if let Some(quarter) = drawn(&config.buildings, stream.uniform(0.0, 1.0)) {
+            town.quarter(quarter, centre, &mut stream);
+        }
     }
+    town.builder.buildings
 }
 
-/// A long building of three to five storeys, mostly under a gabled roof.
-fn row(terrain: &Terrain, lot: &Lot, stream: &mut Stream) -> Block {
-    let walls = stream.uniform(8.0, 14.0);
-    if stream.chance(0.3) { flat(terrain, lot, walls) } else { gabled(terrain, lot, walls, stream) }
+/// The kind of quarter that a number in [0, 1) falls on.
+fn drawn(config: &BuildingsConfig, at: f64) -> Option<Quarter> {
+    let q = &config.quarters;
+    let weights = [
+        (q.park, Quarter::Park),
+        (q.hall, Quarter::Hall),
+        (q.rows, Quarter::Rows),
+        (q.houses, Quarter::Houses),
+        (q.courtyard, Quarter::Courtyard),
+        (q.high_rise, Quarter::HighRise),
+        (q.sheds, Quarter::Sheds),
+    ];
+    let mut left = at * weights.iter().map(|(w, _)| w).sum::<f64>();
+    weights
+        .into_iter()
+        .find(|(weight, _)| {
+            left -= weight;
+            left < 0.0
+        })
+        .map(|(_, quarter)| quarter)
 }
 
-/// A house of one or two storeys under a flat or a gabled roof.
-fn house(terrain: &Terrain, lot: &Lot, stream: &mut Stream) -> Block {
-    let walls = stream.uniform(4.0, 7.0);
-    if stream.chance(0.25) { flat(terrain, lot, walls) } else { gabled(terrain, lot, walls, stream) }
+struct Town<'a> {
+    config: &'a BuildingsConfig,
+    builder: Builder<'a>,
 }
 
-fn flat(terrain: &Terrain, lot: &Lot, walls_m: f64) -> Block {
-    block(terrain, lot, |ground| Roof::Flat { height_m: ground + walls_m })
-}
+impl Town<'_> {
+    /// Half the side of the free ground between four streets.
+    fn half_m(&self) -> f64 {
+        0.5 * (self.config.street_spacing_m - self.config.street_width_m) - SIDEWALK_M
+    }
 
-fn gabled(terrain: &Terrain, lot: &Lot, walls_m: f64, stream: &mut Stream) -> Block {
-    let pitch = stream.uniform(0.35, 0.75);
-    block(terrain, lot, |ground| Roof::Gabled {
-        eaves_m: ground + walls_m,
-        ridge_m: ground + walls_m + pitch * lot.half_size[1],
-    })
-}
+    fn quarter(&mut self, quarter: Quarter, centre: [f64; 2], stream: &mut Stream) {
+        match quarter {
+            Quarter::Park => {}
+            Quarter::Hall => self.hall(centre, stream),
+            Quarter::Rows => self.rows(centre, stream),
+            Quarter::Houses => self.houses(centre, stream),
+            Quarter::Courtyard => self.courtyard(centre, stream),
+            Quarter::HighRise => self.towers(centre, stream),
+            Quarter::Sheds => self.sheds(centre),
+        }
+    }
 
-fn block(terrain: &Terrain, lot: &Lot, roof: impl Fn(f64) -> Roof) -> Block {
-    let centre_m = STREETS.scene_from_street(lot.centre[0], lot.centre[1]);
-    let ground_m = terrain.height(centre_m[0], centre_m[1]);
-    let direction_deg = STREETS.turn_deg + lot.turn_deg;
-    Block { centre_m, half_size_m: lot.half_size, direction_deg, ground_m, roof: roof(ground_m) }
+    /// A podium, a tower on it and a penthouse on the tower.
+    fn landmark(&mut self, centre: [f64; 2]) {
+        let height = self.config.landmark_height_m;
+        let steps = [([20.0, 15.0], 9.0_f64.min(0.4 * height)), ([11.0, 9.0], 0.83 * height), ([5.0, 4.0], height)];
+        let steps = steps.map(|(half_size, top)| (Lot { centre, half_size, turn_deg: 0.0 }, top));
+        self.builder.stepped(&steps);
+    }
+
+    fn hall(&mut self, centre: [f64; 2], stream: &mut Stream) {
+        let half = self.half_m();
+        let half_size = [stream.uniform(0.5, 0.85) * half, stream.uniform(0.35, 0.7) * half];
+        let lot = Lot { centre, half_size, turn_deg: stream.uniform(-4.0, 4.0) };
+        let walls = stream.uniform(HALL_M[0], HALL_M[1]);
+        if stream.chance(0.3) {
+            let upper = Lot { half_size: half_size.map(|h| 0.55 * h), ..lot };
+            self.builder.stepped(&[(lot, walls), (upper, walls + stream.uniform(3.0, 8.0))]);
+        } else {
+            self.builder.flat(&lot, walls, stream);
+        }
+    }
+
+    fn rows(&mut self, [u, v]: [f64; 2], stream: &mut Stream) {
+        let half = self.half_m();
+        for side in [-1.0, 1.0] {
+            let half_size = [stream.uniform(0.6, 0.85) * half, stream.uniform(5.0, 6.5)];
+            let lot = Lot { centre: [u, v + side * 0.55 * half], half_size, turn_deg: 0.0 };
+            let walls = stream.uniform(ROW_M[0], ROW_M[1]);
+            self.builder.any_roof(&lot, walls, [0.3, 0.2], stream);
+        }
+    }
+
+    fn houses(&mut self, [u, v]: [f64; 2], stream: &mut Stream) {
+        let half = self.half_m();
+        for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
+            if stream.chance(0.15) {
+                continue;
+            }
+            let place = |side: f64, stream: &mut Stream| side * half * stream.uniform(0.47, 0.57);
+            let centre = [u + place(a, stream), v + place(b, stream)];
+            let half_size = [stream.uniform(5.0, 8.0), stream.uniform(4.0, 5.0)];
+            let lot = Lot { centre, half_size, turn_deg: stream.uniform(-8.0, 8.0) };
+            let walls = stream.uniform(HOUSE_M[0], HOUSE_M[1]);
+            self.builder.any_roof(&lot, walls, [0.2, 0.35], stream);
+        }
+    }
+
+    /// Four wings around a courtyard, wall to wall with the street.
+    fn courtyard(&mut self, [u, v]: [f64; 2], stream: &mut Stream) {
+        let (half, depth) = (self.half_m(), stream.uniform(5.0, 6.5));
+        let walls = stream.uniform(COURTYARD_M[0], COURTYARD_M[1]);
+        let turn_deg = 0.0;
+        for side in [-1.0, 1.0] {
+            let lot = Lot { centre: [u, v + side * (half - depth)], half_size: [half, depth], turn_deg };
+            self.builder.any_roof(&lot, walls + stream.uniform(-1.5, 1.5), [0.4, 0.0], stream);
+        }
+        for side in [-1.0, 1.0] {
+            let half_size = [half - 2.0 * depth, depth];
+            let lot = Lot { centre: [u + side * (half - depth), v], half_size, turn_deg: 90.0 };
+            self.builder.any_roof(&lot, walls + stream.uniform(-1.5, 1.5), [0.4, 0.0], stream);
+        }
+    }
+
+    /// One tower on a podium, or two towers side by side.
+    fn towers(&mut self, [u, v]: [f64; 2], stream: &mut Stream) {
+        let half = self.half_m();
+        let [low, high] = self.config.high_rise_height_m;
+        if stream.chance(0.5) {
+            let lot = Lot { centre: [u, v], half_size: [0.8 * half, 0.6 * half], turn_deg: 0.0 };
+            let tower = Lot { half_size: [stream.uniform(9.0, 14.0), stream.uniform(8.0, 11.0)], ..lot };
+            let height = stream.uniform(low, high);
+            return self.builder.stepped(&[(lot, stream.uniform(6.0, 12.0)), (tower, height)]);
+        }
+        for side in [-1.0, 1.0] {
+            let half_size = [stream.uniform(6.5, 9.5), stream.uniform(6.5, 0.8 * half)];
+            let lot = Lot { centre: [u + side * 0.52 * half, v], half_size, turn_deg: 0.0 };
+            self.builder.flat(&lot, stream.uniform(low, high), stream);
+        }
+    }
+
+    /// Three long sheds under one roof shape.
+    fn sheds(&mut self, [u, v]: [f64; 2]) {
+        let half = self.half_m();
+        let width = 2.0 * half / 3.0;
+        for k in [-1.0, 0.0, 1.0] {
+            let lot = Lot { centre: [u, v + k * width], half_size: [0.9 * half, 0.44 * width], turn_deg: 0.0 };
+            self.builder.gabled(&lot, SHED_M, 0.3);
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::prism::Roof;
+
+    fn built(preset: &str, seed: u64, reach_m: f64) -> (Terrain, Vec<Building>) {
+        let config = SimulationConfig { seed, ..SimulationConfig::preset(preset).unwrap() };
+        let terrain = Terrain::new(&config, reach_m + 50.0);
+        let buildings = build(&config, &terrain, reach_m);
+        (terrain, buildings)
+    }
+
+    fn tallest(buildings: &[Building]) -> f64 {
+        buildings.iter().map(|b| b.parts.last().unwrap().top_m() - b.parts[0].base_m).fold(0.0, f64::max)
+    }
 
     #[test]
     fn a_town_has_what_a_dsm_must_cope_with() {
         for seed in 0..20 {
-            let scene = build(seed, 160.0, 100.0, 35.0);
-            let heights: Vec<f64> = scene.blocks().map(|b| b.top_m() - b.ground_m).collect();
-            assert!(heights.len() >= 15, "seed {seed}: {} blocks", heights.len());
-            assert!(heights.iter().all(|h| (4.0..=35.0 + 1e-9).contains(h)), "seed {seed}: {heights:?}");
-            let gabled = scene.blocks().filter(|b| matches!(b.roof, Roof::Gabled { .. })).count();
-            assert!(gabled >= 3 && gabled + 5 <= heights.len(), "seed {seed}: {gabled} gabled of {}", heights.len());
+            let (_, buildings) = built("town", seed, 160.0);
+            let roofs: Vec<Roof> = buildings.iter().flat_map(|b| &b.parts).map(|p| p.roof).collect();
+            let count = |is: fn(&Roof) -> bool| roofs.iter().filter(|r| is(r)).count();
+            let gabled = count(|r| matches!(r, Roof::Gabled { .. }));
+            let hipped = count(|r| matches!(r, Roof::Hipped { .. }));
+            assert!(
+                buildings.len() >= 15 && gabled >= 3 && hipped >= 2,
+                "{seed}: {gabled}, {hipped} of {}",
+                roofs.len()
+            );
+            assert!(buildings.iter().any(|b| b.parts.len() == 3) && buildings.iter().any(|b| !b.details.is_empty()));
+            assert!((30.0..42.0).contains(&tallest(&buildings)), "{seed}");
         }
+    }
+
+    #[test]
+    fn presets_are_as_high_as_they_say() {
+        assert!(tallest(&built("high-rise", 1, 160.0).1) >= 140.0);
+        assert!(tallest(&built("dense-city", 1, 160.0).1) >= 15.0);
+        assert!(built("hills", 1, 160.0).1.is_empty() && built("fields", 1, 160.0).1.is_empty());
     }
 
     #[test]
     fn a_larger_town_contains_the_smaller_one() {
-        let (small, large) = (build(4, 100.0, 0.0, 35.0), build(4, 250.0, 0.0, 35.0));
-        assert!(small.blocks().all(|b| large.blocks().any(|other| other == b)));
-        assert!(large.blocks().len() > small.blocks().len());
+        let ((_, small), (_, large)) = (built("town", 4, 100.0), built("town", 4, 250.0));
+        let same = |a: &Building, b: &Building| {
+            a.parts.len() == b.parts.len()
+                && a.parts.iter().zip(&b.parts).all(|(a, b)| {
+                    a.centre_m == b.centre_m && a.half_size_m == b.half_size_m && (a.top_m() - b.top_m()).abs() < 1e-9
+                })
+        };
+        assert!(small.iter().all(|b| large.iter().any(|other| same(other, b))) && large.len() > small.len());
     }
 
     #[test]
-    fn no_wall_hangs_over_the_ground_and_no_roof_is_buried() {
-        let scene = build(1, 200.0, 100.0, 35.0);
-        for block in scene.blocks() {
-            let [x, y] = block.centre_m;
-            assert!((scene.terrain().height(x, y) - block.ground_m).abs() < 1e-9);
-            assert!(scene.surface(x, y).0 >= block.top_m() - 1e-9);
+    fn every_part_starts_on_the_ground_or_on_the_part_below_and_nothing_stands_in_water() {
+        for preset in ["town", "dense-city", "high-rise", "harbour"] {
+            let (terrain, buildings) = built(preset, 1, 200.0);
+            for building in &buildings {
+                for corner in building.parts[0].corners() {
+                    let ground = terrain.height(corner[0], corner[1]);
+                    assert!(building.parts[0].base_m <= ground && !terrain.is_water(corner[0], corner[1]), "{preset}");
+                }
+                for pair in building.parts.windows(2) {
+                    assert_eq!(pair[0].top_m(), pair[1].base_m);
+                }
+                assert!(building.parts.iter().all(|p| p.eaves_m() > p.base_m + 1.0), "{preset}: {building:?}");
+            }
         }
+    }
+
+    #[test]
+    fn repetitive_roofs_repeat() {
+        let (_, buildings) = built("repetitive-roofs", 3, 160.0);
+        assert!(buildings.len() > 30);
+        assert!(buildings.iter().all(|b| b.parts[0].half_size_m == buildings[0].parts[0].half_size_m));
     }
 }

@@ -1,0 +1,147 @@
+//! Buildings: blocks that stand on the ground or on each other, and the small things on their roofs.
+//!
+//! The blocks are what an LoD2 model holds; parapets, chimneys and plant rooms are details that it leaves out.
+
+use serde::{Deserialize, Serialize};
+
+use crate::prism::{Block, Roof};
+use crate::random::Stream;
+use crate::streets::Streets;
+use crate::terrain::Terrain;
+
+/// Height and thickness of a parapet, metres.
+const PARAPET_M: [f64; 2] = [0.9, 0.4];
+/// Height of a chimney over the ridge and half its side, metres.
+const CHIMNEY_M: [f64; 2] = [1.2, 0.45];
+
+/// A building.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Building {
+    /// Its blocks: each stands on the ground or on the one before.
+    pub parts: Vec<Block>,
+    /// Parapets, chimneys, plant rooms.
+    pub details: Vec<Block>,
+}
+
+/// A rectangle in street coordinates to build on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lot {
+    pub(crate) centre: [f64; 2],
+    pub(crate) half_size: [f64; 2],
+    pub(crate) turn_deg: f64,
+}
+
+/// Puts buildings on lots.
+pub(crate) struct Builder<'a> {
+    terrain: &'a Terrain,
+    streets: Streets,
+    with_details: bool,
+    pub(crate) buildings: Vec<Building>,
+}
+
+impl<'a> Builder<'a> {
+    pub(crate) fn new(terrain: &'a Terrain, streets: Streets, with_details: bool) -> Self {
+        Self { terrain, streets, with_details, buildings: Vec::new() }
+    }
+
+    /// A building under a flat (first probability), hipped (second) or gabled roof.
+    pub(crate) fn any_roof(&mut self, lot: &Lot, walls_m: f64, [flat, hipped]: [f64; 2], stream: &mut Stream) {
+        let (kind, pitch) = (stream.uniform(0.0, 1.0), stream.uniform(0.35, 0.75));
+        if kind < flat {
+            self.flat(lot, walls_m, stream);
+        } else if kind < flat + hipped {
+            self.hipped(lot, walls_m, pitch);
+        } else {
+            self.gabled(lot, walls_m, pitch);
+        }
+    }
+
+    /// A flat roof with a parapet and a plant room.
+    pub(crate) fn flat(&mut self, lot: &Lot, walls_m: f64, stream: &mut Stream) {
+        let Some((ground, block)) = self.block(lot) else { return };
+        let block = Block { roof: Roof::Flat { height_m: ground + walls_m }, ..block };
+        let mut details = parapets(&block);
+        let [u, v] = block.half_size_m;
+        let at = block.position(stream.uniform(-0.5, 0.5) * u, stream.uniform(-0.4, 0.4) * v);
+        let half_size_m = [stream.uniform(1.2, 0.3 * u + 1.2), stream.uniform(1.0, 0.25 * v + 1.0)];
+        details.push(on_roof(&block, at, half_size_m, block.top_m() + stream.uniform(1.8, 3.2)));
+        self.push(vec![block], details);
+    }
+
+    /// Walls, a gabled roof of a pitch (metres per metre) and a chimney.
+    pub(crate) fn gabled(&mut self, lot: &Lot, walls_m: f64, pitch: f64) {
+        self.pitched(lot, walls_m, pitch, |eaves_m, ridge_m| Roof::Gabled { eaves_m, ridge_m });
+    }
+
+    /// Walls, a hipped roof of a pitch (metres per metre) and a chimney.
+    pub(crate) fn hipped(&mut self, lot: &Lot, walls_m: f64, pitch: f64) {
+        self.pitched(lot, walls_m, pitch, |eaves_m, ridge_m| Roof::Hipped { eaves_m, ridge_m });
+    }
+
+    /// Flat roofs one above the other: (lot, height above the ground), each inside the one before.
+    pub(crate) fn stepped(&mut self, steps: &[(Lot, f64)]) {
+        let Some((ground, _)) = steps.first().and_then(|(lot, _)| self.block(lot)) else { return };
+        let mut parts: Vec<Block> = Vec::new();
+        for (lot, height) in steps {
+            let Some((_, block)) = self.block(lot) else { return };
+            let base_m = parts.last().map_or(block.base_m, Block::top_m);
+            parts.push(Block { base_m, roof: Roof::Flat { height_m: ground + height }, ..block });
+        }
+        let details = parts.iter().flat_map(parapets).collect();
+        self.push(parts, details);
+    }
+
+    fn pitched(&mut self, lot: &Lot, walls_m: f64, pitch: f64, roof: impl Fn(f64, f64) -> Roof) {
+        // The long axis carries the ridge.
+        let [u, v] = lot.half_size;
+        let lot = match u < v {
+            true => Lot { half_size: [v, u], turn_deg: lot.turn_deg + 90.0, ..*lot },
+            false => *lot,
+        };
+        let Some((ground, block)) = self.block(&lot) else { return };
+        let eaves_m = ground + walls_m;
+        let block = Block { roof: roof(eaves_m, eaves_m + pitch * block.half_size_m[1]), ..block };
+        let [u, v] = block.half_size_m;
+        // On the ridge, a third of its length from the middle, a little down the slope.
+        let at = block.position(0.33 * (u - v).max(0.3 * u), 0.12 * v);
+        let chimney = on_roof(&block, at, [CHIMNEY_M[1]; 2], block.top_m() + CHIMNEY_M[0]);
+        self.push(vec![block], vec![chimney]);
+    }
+
+    fn push(&mut self, parts: Vec<Block>, details: Vec<Block>) {
+        let details = if self.with_details { details } else { Vec::new() };
+        self.buildings.push(Building { parts, details });
+    }
+
+    /// The ground at the middle of a lot and a block without a roof on it; `None` where a corner is in the water.
+    fn block(&self, lot: &Lot) -> Option<(f64, Block)> {
+        let centre_m = self.streets.scene_from_street(lot.centre[0], lot.centre[1]);
+        let ground = self.terrain.height(centre_m[0], centre_m[1]);
+        let direction_deg = self.streets.turn_deg + lot.turn_deg;
+        let roof = Roof::Flat { height_m: ground };
+        let block = Block { centre_m, half_size_m: lot.half_size, direction_deg, base_m: ground, roof };
+        let corners = block.corners();
+        let dry = corners.iter().all(|[x, y]| !self.terrain.is_water(*x, *y));
+        let base_m = corners.iter().map(|[x, y]| self.terrain.height(*x, *y)).fold(ground, f64::min);
+        dry.then_some((ground, Block { base_m, ..block }))
+    }
+}
+
+/// A box on a roof.
+fn on_roof(below: &Block, centre_m: [f64; 2], half_size_m: [f64; 2], top_m: f64) -> Block {
+    let (direction_deg, base_m) = (below.direction_deg, below.eaves_m());
+    Block { centre_m, half_size_m, direction_deg, base_m, roof: Roof::Flat { height_m: top_m } }
+}
+
+/// The parapets along the four edges of a flat roof.
+fn parapets(block: &Block) -> Vec<Block> {
+    let ([u, v], [height, thickness]) = (block.half_size_m, PARAPET_M);
+    let half = 0.5 * thickness;
+    let edges = [
+        (0.0, v - half, [u, half]),
+        (0.0, half - v, [u, half]),
+        (u - half, 0.0, [half, v - thickness]),
+        (half - u, 0.0, [half, v - thickness]),
+    ];
+    edges.map(|(u, v, size)| on_roof(block, block.position(u, v), size, block.top_m() + height)).to_vec()
+}

@@ -1,0 +1,145 @@
+//! Trees on free ground and vehicles along the streets.
+//!
+//! Both are placed on lattices, one cell at a time, so that a larger scene contains the smaller one.
+
+use crate::config::{SimulationConfig, VehiclesConfig};
+use crate::crown::Crown;
+use crate::noise::value_noise;
+use crate::prism::{Block, Roof};
+use crate::random::{Stream, derived, lattice};
+use crate::streets::Streets;
+use crate::terrain::Terrain;
+
+/// Width of the clumps in which trees stand, metres.
+const CLUMP_M: f64 = 45.0;
+/// Chance of a place in a clump of mean density to carry a tree.
+const MEAN_CHANCE: f64 = 0.45;
+/// Length and width of a vehicle, halved, and its height, metres.
+const CAR_M: [f64; 3] = [2.2, 0.9, 1.5];
+/// Length of a parking place along the street, metres.
+const PLACE_M: f64 = 6.0;
+/// Share of the places in the lanes that a moving vehicle is on.
+const MOVING_SHARE: f64 = 0.04;
+
+/// Crowns on the ground that `is_free`, out to `reach_m`; about as many per hectare as configured.
+pub(crate) fn trees(
+    config: &SimulationConfig,
+    terrain: &Terrain,
+    reach_m: f64,
+    is_free: impl Fn(f64, f64) -> bool,
+) -> Vec<Crown> {
+    let density = config.vegetation.trees_per_ha / 1e4;
+    if density == 0.0 {
+        return Vec::new();
+    }
+    let seed = derived(config.seed, 4);
+    let cell = (MEAN_CHANCE / density).sqrt();
+    let count = (reach_m / cell).ceil() as i64;
+    let tree = |i: i64, j: i64| {
+        let mut stream = Stream::new((lattice(seed, i, j) * (1u64 << 53) as f64) as u64);
+        let [x, y] = [i, j].map(|k| (k as f64 + stream.uniform(0.0, 1.0)) * cell);
+        let [low, high] = config.vegetation.height_m;
+        let height = low + (high - low) * stream.uniform(0.0, 1.0);
+        let radius_m = height * stream.uniform(0.2, 0.32);
+        let chance = MEAN_CHANCE * (1.0 + 1.2 * value_noise(seed, CLUMP_M, x, y));
+        let stands = stream.chance(chance) && is_free(x, y) && is_clear(x, y, radius_m, &is_free);
+        let shoulder_m = terrain.height(x, y) + 0.35 * height;
+        stands.then_some(Crown { centre_m: [x, y], radius_m, shoulder_m, dome_m: 0.65 * height })
+    };
+    (-count..count).flat_map(|j| (-count..count).map(move |i| (i, j))).filter_map(|(i, j)| tree(i, j)).collect()
+}
+
+/// Whether a crown of a radius hangs over nothing but free ground.
+fn is_clear(x: f64, y: f64, radius_m: f64, is_free: impl Fn(f64, f64) -> bool) -> bool {
+    let r = 0.8 * radius_m;
+    [(r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r)].iter().all(|(dx, dy)| is_free(x + dx, y + dy))
+}
+
+/// The vehicles of a date: parked along the kerbs, and some on the lanes.
+pub(crate) fn vehicles(
+    config: &VehiclesConfig,
+    streets: &Streets,
+    terrain: &Terrain,
+    seed: u64,
+    reach_m: f64,
+) -> Vec<Block> {
+    if streets.half_width_m == 0.0 || config.parked_share == 0.0 {
+        return Vec::new();
+    }
+    let lines = (reach_m * std::f64::consts::SQRT_2 / streets.spacing_m).ceil() as i64;
+    let places = (reach_m * std::f64::consts::SQRT_2 / PLACE_M).ceil() as i64;
+    let mut vehicles = Vec::new();
+    for family in 0..2 {
+        for line in -lines..=lines {
+            let own = derived(seed, (2 * (line + lines) + family) as u64);
+            for place in -places..=places {
+                for (lane, share) in [(0, config.parked_share), (1, config.parked_share), (2, MOVING_SHARE)] {
+                    if lattice(own, place, lane) < share {
+                        vehicles.extend(vehicle(
+                            streets,
+                            terrain,
+                            (family, line, place, lane),
+                            derived(own, 7),
+                            reach_m,
+                        ));
+                    }
+                }
+            }
+        }
+    }
+    vehicles
+}
+
+fn vehicle(
+    streets: &Streets,
+    terrain: &Terrain,
+    (family, line, place, lane): (i64, i64, i64, i64),
+    seed: u64,
+    reach_m: f64,
+) -> Option<Block> {
+    let kerb = streets.half_width_m - 1.3 * CAR_M[1];
+    let across = [kerb, -kerb, 0.35 * streets.half_width_m][lane as usize];
+    let along = (place as f64 + 0.5 + 0.1 * (lattice(seed, place, lane) - 0.5)) * PLACE_M;
+    let on_line = line as f64 * streets.spacing_m + across;
+    let (u, v, turn) = if family == 0 { (along, on_line, 0.0) } else { (on_line, along, 90.0) };
+    let [x, y] = streets.scene_from_street(u, v);
+    let near_crossing = streets.nearest(x, y).to_crossing_m < streets.half_width_m + CAR_M[0] + 1.0;
+    if near_crossing || x.abs().max(y.abs()) > reach_m || terrain.is_water(x, y) {
+        return None;
+    }
+    let ground = terrain.height(x, y);
+    let roof = Roof::Flat { height_m: ground + CAR_M[2] };
+    Some(Block {
+        centre_m: [x, y],
+        half_size_m: [CAR_M[0], CAR_M[1]],
+        direction_deg: streets.turn_deg + turn,
+        base_m: ground,
+        roof,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_have_other_vehicles_on_the_same_streets() {
+        let config = SimulationConfig::default();
+        let terrain = Terrain::new(&config, 150.0);
+        let streets = Streets::new(&config.buildings);
+        let of = |seed| vehicles(&config.vehicles, &streets, &terrain, seed, 150.0);
+        let (first, second) = (of(1), of(2));
+        assert!((100..1500).contains(&first.len()), "{} vehicles", first.len());
+        let common = first.iter().filter(|b| second.iter().any(|o| o.centre_m == b.centre_m)).count();
+        assert!(common * 2 < first.len() && first == of(1));
+        assert!(first.iter().all(|b| streets.is_carriageway(b.centre_m[0], b.centre_m[1])));
+    }
+
+    #[test]
+    fn forests_are_as_dense_as_configured() {
+        let config = SimulationConfig::preset("hills").unwrap();
+        let terrain = Terrain::new(&config, 150.0);
+        let count = trees(&config, &terrain, 150.0, |_, _| true).len() as f64 / 9.0;
+        assert!((0.5..1.1).contains(&(count / config.vegetation.trees_per_ha)), "{count} per hectare");
+    }
+}

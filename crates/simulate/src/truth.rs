@@ -1,0 +1,164 @@
+//! The truth as rasters on the map grid: surface, terrain, classes, what each view sees, and the scene seen from above.
+//!
+//! Values belong to cell centres and are those of the permanent scene (vehicles are left out, as in a reference that
+//! was measured on another day). A view sees a cell when its own ray to the cell's point meets nothing before, the vehicles
+//! of its date included.
+
+use camera::{ImagePoint, Rpc};
+use geodesy::LonLatHeight;
+use mesh::CityModel;
+use nalgebra::Vector3;
+use raster::{GeoTransform, Grid};
+use rayon::prelude::*;
+
+use crate::Ray;
+use crate::config::SimulationConfig;
+use crate::error::SimulateError;
+use crate::frame::SceneFrame;
+use crate::lod2;
+use crate::scene::{Scene, SurfaceClass};
+use crate::sight::Sight;
+use crate::texture::Texture;
+
+/// Reflectance 1 in [`Truth::ortho`].
+pub const ORTHO_SCALE: f64 = 10_000.0;
+/// A point is seen when its ray ends this close to it, metres: the RPC's thousandth of a pixel on a steep slope.
+const SEEN_M: f64 = 0.03;
+/// Positions along each side of a cell of the ortho image.
+const ORTHO_SUBCELLS: usize = 2;
+
+/// The surface as rasters.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    /// Height of the upper surface, metres above the ellipsoid.
+    pub dsm: Grid<f32>,
+    /// Height of the bare ground, under buildings and trees too, metres above the ellipsoid.
+    pub dtm: Grid<f32>,
+    /// Class of the upper surface (see [`SurfaceClass`]).
+    pub classes: Grid<u8>,
+    /// Per view 1 where it sees the cell's point of the upper surface, else 0.
+    pub visibility: Vec<Grid<u8>>,
+    /// Reflectance seen from straight above, mean over the cell, in units of 1 / [`ORTHO_SCALE`].
+    pub ortho: Grid<u16>,
+    /// The buildings at LoD2 in map coordinates.
+    pub buildings: CityModel,
+    /// Where the cells lie on the map.
+    pub geotransform: GeoTransform,
+    /// EPSG code of the map.
+    pub epsg: u32,
+}
+
+/// What tells whether a view sees a point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Witness<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) sight: &'a Sight,
+    pub(crate) rpc: &'a Rpc,
+    pub(crate) size: (usize, usize),
+}
+
+/// The cells of the truth in the scene frame.
+#[derive(Debug, Clone, Copy)]
+struct Cells {
+    count: usize,
+    cell_m: f64,
+    half_m: f64,
+}
+
+impl Cells {
+    fn new(config: &SimulationConfig) -> Self {
+        let count = (config.size_m / config.gsd_m).round() as usize;
+        Self { count, cell_m: config.gsd_m, half_m: (count / 2) as f64 * config.gsd_m }
+    }
+
+    fn centre(&self, index: usize) -> [f64; 2] {
+        let at = |k: usize| (k as f64 + 0.5) * self.cell_m - self.half_m;
+        [at(index % self.count), -at(index / self.count)]
+    }
+
+    fn grid<T: Send>(&self, value: impl Fn([f64; 2]) -> T + Sync) -> Grid<T>
+    where
+        T: Clone,
+    {
+        let data: Vec<T> = (0..self.count * self.count).into_par_iter().map(|k| value(self.centre(k))).collect();
+        Grid::from_vec(self.count, self.count, data).expect("as many values as cells")
+    }
+}
+
+impl Truth {
+    pub(crate) fn new(
+        config: &SimulationConfig,
+        frame: &SceneFrame,
+        scene: &Scene,
+        views: &[Witness<'_>],
+    ) -> Result<Self, SimulateError> {
+        let cells = Cells::new(config);
+        let dsm = cells.grid(|[x, y]| scene.surface(x, y).0 as f32);
+        let positions = cells.grid(|[x, y]| {
+            let point = Vector3::new(x, y, scene.surface(x, y).0);
+            frame.ground_from_scene(point).map(|ground| (point, ground))
+        });
+        let positions: Vec<(Vector3<f64>, LonLatHeight)> =
+            positions.into_vec().into_iter().collect::<Result<_, SimulateError>>()?;
+        let texture = Texture::new(config.seed, 0, config.surface);
+        let [x, y] = frame.origin_m();
+        Ok(Self {
+            dsm,
+            dtm: cells.grid(|[x, y]| scene.terrain().height(x, y) as f32),
+            classes: cells.grid(|at| class(scene, at, cells.cell_m) as u8),
+            visibility: views.iter().map(|view| seen(view, &positions, cells.count)).collect(),
+            ortho: cells.grid(|at| reflectance_from_above(scene, &texture, at, cells.cell_m)),
+            buildings: lod2::model(scene.buildings(), frame),
+            geotransform: GeoTransform::north_up(x - cells.half_m, y + cells.half_m, cells.cell_m),
+            epsg: frame.epsg(),
+        })
+    }
+}
+
+impl Witness<'_> {
+    fn sees(&self, point: &Vector3<f64>, ground: LonLatHeight) -> bool {
+        let inside = |coordinate: f64, pixels: usize| (0.0..=pixels as f64 - 1.0).contains(&coordinate);
+        let at = match self.rpc.project(ground) {
+            Ok(at) if inside(at.sample, self.size.0) && inside(at.line, self.size.1) => at,
+            _ => return false,
+        };
+        self.scene.first_point(&self.sight.ray(at), 1.0).is_some_and(|met| (met - point).norm() < SEEN_M)
+    }
+}
+
+fn seen(view: &Witness<'_>, positions: &[(Vector3<f64>, LonLatHeight)], count: usize) -> Grid<u8> {
+    let cells = positions.par_iter().map(|(point, ground)| u8::from(view.sees(point, *ground))).collect();
+    Grid::from_vec(count, count, cells).expect("as many values as cells")
+}
+
+/// The class of a cell: that of its centre, or the edge of a footprint where a corner tells that a façade goes through.
+fn class(scene: &Scene, [x, y]: [f64; 2], cell_m: f64) -> SurfaceClass {
+    let is_building = |class| class == SurfaceClass::Building;
+    let centre = scene.surface(x, y).1;
+    let half = 0.5 * cell_m;
+    let corner = |(dx, dy): (f64, f64)| is_building(scene.surface(x + dx * half, y + dy * half).1);
+    let differs = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(corner).contains(&!is_building(centre));
+    if differs { SurfaceClass::FootprintEdge } else { centre }
+}
+
+fn reflectance_from_above(scene: &Scene, texture: &Texture, [x, y]: [f64; 2], cell_m: f64) -> u16 {
+    let offset = |k: usize| ((k as f64 + 0.5) / ORTHO_SUBCELLS as f64 - 0.5) * cell_m;
+    let (low, high) = scene.height_range_m();
+    let mut sum = 0.0;
+    for k in 0..ORTHO_SUBCELLS * ORTHO_SUBCELLS {
+        let origin = Vector3::new(x + offset(k % ORTHO_SUBCELLS), y + offset(k / ORTHO_SUBCELLS), high + 1.0);
+        let down = Ray { origin, direction: -Vector3::z() };
+        sum += scene.first_hit(&down, high - low + 2.0).map_or(0.0, |hit| texture.reflectance(scene, &hit));
+    }
+    (sum / (ORTHO_SUBCELLS * ORTHO_SUBCELLS) as f64 * ORTHO_SCALE).round() as u16
+}
+
+/// The height, metres above the ellipsoid, of what each pixel's centre sees; NaN where that is nothing.
+pub(crate) fn image_heights(scene: &Scene, sight: &Sight, (width, height): (usize, usize)) -> Grid<f32> {
+    let height_at = |k: usize| {
+        let at = ImagePoint::new((k % width) as f64, (k / width) as f64);
+        scene.first_point(&sight.ray(at), 1.0).map_or(f32::NAN, |point| point.z as f32)
+    };
+    let heights = (0..width * height).into_par_iter().map(height_at).collect();
+    Grid::from_vec(width, height, heights).expect("as many values as pixels")
+}
