@@ -183,7 +183,7 @@ fn view(
 ) -> Result<View, SimulateError> {
     let look = acquisition::look(config, index);
     let (low, high) = scene.height_range_m();
-    let (camera, size) = acquisition::camera(config, frame, &look, scene.terrain().height_range_m())?;
+    let (camera, size) = acquisition::camera(config, frame, &look, (low, high))?;
     let fitted = camera.fitted((low - RPC_HEIGHT_MARGIN_M, high + RPC_HEIGHT_MARGIN_M))?;
     let sight = Sight::new(&camera, frame, size, (low - 1.0, high + 1.0))?;
     progress.begin(&format!("view {}", index + 1), size.1.div_ceil(BAND));

@@ -81,13 +81,6 @@ fn what_a_view_does_not_see_is_what_a_brute_force_ray_caster_calls_hidden() {
                 let lifted = point + (up - point).normalize() * 0.05;
                 let visible = !is_blocked(&simulation, lifted, up);
                 counts[usize::from(visible)] += 1;
-                if visible != (seen[(column, row)] == 1) {
-                    eprintln!(
-                        "{preset} visible {visible} at {x} {y} class {} h {}",
-                        truth.classes[(column, row)],
-                        point.z
-                    );
-                }
                 wrong += usize::from(visible != (seen[(column, row)] == 1));
             }
         }
