@@ -28,6 +28,7 @@ pub(crate) struct Buckets {
     corner_m: f64,
     side: usize,
     tops: Vec<f64>,
+    ground_tops: Vec<f64>,
     members: Vec<Vec<u32>>,
 }
 
@@ -37,8 +38,10 @@ impl Buckets {
         let half = (reach_m / BUCKET_M).ceil();
         let (side, corner_m) = (2 * half as usize, -half * BUCKET_M);
         let low = |k: usize| [k % side, k / side].map(|c| corner_m + c as f64 * BUCKET_M);
-        let tops = (0..side * side).map(|k| ground_top(low(k), low(k).map(|c| c + BUCKET_M))).collect();
-        let mut buckets = Self { corner_m, side, tops, members: vec![Vec::new(); side * side] };
+        let ground_tops: Vec<f64> =
+            (0..side * side).map(|k| ground_top(low(k), low(k).map(|c| c + BUCKET_M))).collect();
+        let (tops, members) = (ground_tops.clone(), vec![Vec::new(); side * side]);
+        let mut buckets = Self { corner_m, side, tops, ground_tops, members };
         for (object, extent) in (0u32..).zip(extents) {
             buckets.insert(object, extent);
         }
@@ -59,6 +62,18 @@ impl Buckets {
     /// The objects whose box touches a bucket.
     pub(crate) fn members(&self, bucket: usize) -> &[u32] {
         &self.members[bucket]
+    }
+
+    /// The part of a stretch in which a ray is not above all ground of the bucket.
+    pub(crate) fn near_ground(&self, ray: &Ray, stretch: Stretch) -> Option<(f64, f64)> {
+        let (z, dz) = (ray.origin.z, ray.direction.z);
+        let crossing = (self.ground_tops[stretch.bucket] - z) / dz;
+        let (t_in, t_out) = match dz {
+            dz if dz < 0.0 => (stretch.t_in.max(crossing), stretch.t_out),
+            dz if dz > 0.0 => (stretch.t_in, stretch.t_out.min(crossing)),
+            _ => (stretch.t_in, stretch.t_out),
+        };
+        (t_in <= t_out).then_some((t_in, t_out))
     }
 
     /// The bucket of a position, the nearest one for a position beyond them all.

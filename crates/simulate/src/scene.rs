@@ -12,7 +12,7 @@ use crate::Ray;
 use crate::building::Building;
 use crate::config::SimulationConfig;
 use crate::crown::Crown;
-use crate::index::{Buckets, Extent};
+use crate::index::{Buckets, Extent, Stretch};
 use crate::planting;
 use crate::prism::{Block, Face, Prism};
 use crate::random::derived;
@@ -48,7 +48,7 @@ pub(crate) enum Material {
 /// A solid's form.
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
-    Prism(Prism),
+    Prism(Box<Prism>),
     Crown(Crown),
 }
 
@@ -87,6 +87,14 @@ pub(crate) struct Hit {
     pub(crate) point: Vector3<f64>,
     pub(crate) normal: Vector3<f64>,
     pub(crate) part: Part,
+}
+
+/// A ray's parameter where it meets something, and the normal where that is no ground.
+#[derive(Debug, Clone, Copy)]
+struct Meeting {
+    t: f64,
+    normal: Option<Vector3<f64>>,
+    part: Part,
 }
 
 /// What is built within reach may stand out of it by this much, metres.
@@ -182,24 +190,36 @@ impl Scene {
     ///
     /// `None` when the ray does not come to the surface before `t_max`, or leaves the scene.
     pub fn first_point(&self, ray: &Ray, t_max: f64) -> Option<Vector3<f64>> {
-        self.first_hit(ray, t_max).map(|hit| hit.point)
+        self.first(ray, t_max).map(|meeting| ray.at(meeting.t))
     }
 
     pub(crate) fn first_hit(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
-        let mut closest: Option<(f64, Vector3<f64>, Part)> = None;
+        let meeting = self.first(ray, t_max)?;
+        let point = ray.at(meeting.t);
+        let normal = meeting.normal.unwrap_or_else(|| self.terrain.normal(point.x, point.y));
+        Some(Hit { point, normal, part: meeting.part })
+    }
+
+    fn first(&self, ray: &Ray, t_max: f64) -> Option<Meeting> {
+        let mut closest: Option<Meeting> = None;
         self.buckets.walk(ray, t_max, |stretch| {
             for &index in self.buckets.members(stretch.bucket) {
-                let limit = closest.map_or(t_max, |(t, ..)| t);
+                let limit = closest.map_or(t_max, |meeting| meeting.t);
                 closest = self.solids[index as usize].meet(index as usize, ray, limit).or(closest);
             }
-            let limit = closest.map_or(stretch.t_out, |(t, ..)| t.min(stretch.t_out));
-            if let Some(t) = self.terrain.intersect(ray, stretch.t_in, limit) {
-                let p = ray.at(t);
-                closest = Some((t, self.terrain.normal(p.x, p.y), Part::Ground));
+            if let Some(t) = self.ground_on(ray, stretch, closest.map_or(t_max, |meeting| meeting.t)) {
+                closest = Some(Meeting { t, normal: None, part: Part::Ground });
             }
-            closest.filter(|(t, ..)| *t <= stretch.t_out).map(|_| ())
+            closest.filter(|meeting| meeting.t <= stretch.t_out).map(|_| ())
         });
-        closest.map(|(t, normal, part)| Hit { point: ray.at(t), normal, part })
+        closest
+    }
+
+    /// Where a ray meets the ground of a bucket before `limit`.
+    fn ground_on(&self, ray: &Ray, stretch: Stretch, limit: f64) -> Option<f64> {
+        let (t_in, t_out) = self.buckets.near_ground(ray, stretch)?;
+        let t_out = t_out.min(limit);
+        if t_in <= t_out { self.terrain.intersect(ray, t_in, t_out) } else { None }
     }
 
     pub(crate) fn solid(&self, index: usize) -> &Solid {
@@ -214,7 +234,7 @@ impl Scene {
         self.buckets
             .walk(&ray, t_max, |stretch| {
                 let hidden = self.buckets.members(stretch.bucket).iter().any(blocked)
-                    || self.terrain.intersect(&ray, stretch.t_in, stretch.t_out).is_some();
+                    || self.ground_on(&ray, stretch, t_max).is_some();
                 hidden.then_some(())
             })
             .is_some()
@@ -223,7 +243,7 @@ impl Scene {
 
 impl Solid {
     fn block(block: Block, material: Material, paint: u64) -> Self {
-        Self { shape: Shape::Prism(Prism::new(block)), material, paint }
+        Self { shape: Shape::Prism(Box::new(Prism::new(block))), material, paint }
     }
 
     fn class(&self) -> SurfaceClass {
@@ -250,10 +270,13 @@ impl Solid {
         Extent { low, high, top_m }
     }
 
-    fn meet(&self, index: usize, ray: &Ray, t_max: f64) -> Option<(f64, Vector3<f64>, Part)> {
+    fn meet(&self, index: usize, ray: &Ray, t_max: f64) -> Option<Meeting> {
+        let meeting = |t, normal, part| Meeting { t, normal: Some(normal), part };
         match &self.shape {
-            Shape::Prism(prism) => prism.enter(ray, t_max).map(|(t, n, face)| (t, n, Part::Prism(index, face))),
-            Shape::Crown(crown) => crown.enter(ray, t_max).map(|(t, n)| (t, n, Part::Crown(index))),
+            Shape::Prism(prism) => {
+                prism.enter(ray, t_max).map(|(t, normal, face)| meeting(t, normal, Part::Prism(index, face)))
+            }
+            Shape::Crown(crown) => crown.enter(ray, t_max).map(|(t, normal)| meeting(t, normal, Part::Crown(index))),
         }
     }
 }

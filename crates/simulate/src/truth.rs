@@ -76,10 +76,7 @@ impl Cells {
         [at(index % self.count), -at(index / self.count)]
     }
 
-    fn grid<T: Send>(&self, value: impl Fn([f64; 2]) -> T + Sync) -> Grid<T>
-    where
-        T: Clone,
-    {
+    fn grid<T: Send + Clone>(&self, value: impl Fn([f64; 2]) -> T + Sync) -> Grid<T> {
         let data: Vec<T> = (0..self.count * self.count).into_par_iter().map(|k| value(self.centre(k))).collect();
         Grid::from_vec(self.count, self.count, data).expect("as many values as cells")
     }
