@@ -5,9 +5,9 @@
 #[non_exhaustive]
 pub enum EvalError {
     /// The reference has no valid cell left.
-    #[error("the reference has no valid cell{}: check its no-data value and the skipped classes", skipped_text(*.skipped))]
+    #[error("the reference has no valid cell{}: check its no-data value, the mask and the skipped classes", skipped_text(*.skipped))]
     EmptyReference {
-        /// Valid cells that were left out because of their class.
+        /// Valid cells that were left out because of their class or the mask.
         skipped: usize,
     },
     /// No cell is valid in both surfaces.
@@ -29,12 +29,14 @@ pub enum EvalError {
         /// The least number that is accepted.
         needed: usize,
     },
-    /// The class raster is not on the reference grid.
+    /// A raster that has to be on the reference grid is not.
     #[error(
-        "the class grid has {found_width} x {found_height} cells, the reference {width} x {height}: \
-         resample the classes onto the reference first"
+        "the {what} grid has {found_width} x {found_height} cells, the reference {width} x {height}: \
+         resample it onto the reference first"
     )]
-    ClassShape {
+    Shape {
+        /// Which raster.
+        what: &'static str,
         /// Columns found.
         found_width: usize,
         /// Rows found.
@@ -58,6 +60,27 @@ pub enum EvalError {
         /// Its value.
         value: f64,
     },
+    /// The ground has too little slope for Nuth and Kääb's method.
+    #[error(
+        "the ground is too flat for the alignment nuth-kaab: {:.2} % of it is steeper than {slope_deg}° at cells of {cell_m:.1} m, \
+         needed are {:.0} %: use the alignment xyz, z or none", 100.0 * share, 100.0 * needed
+    )]
+    TooFlat {
+        /// Share of the cells that are steep enough, 0 to 1.
+        share: f64,
+        /// The least share that is accepted.
+        needed: f64,
+        /// What counts as steep, degrees.
+        slope_deg: f64,
+        /// The cells at which the slope was taken, metres.
+        cell_m: f64,
+    },
+    /// All slopes look the same way.
+    #[error(
+        "the slopes all face one way or its opposite, which leaves the shift across open for the alignment nuth-kaab: \
+         use the alignment xyz, z or none"
+    )]
+    OneWaySlopes,
     /// The search radius covers more cells than can be tried.
     #[error(
         "a search radius of {radius_m} m covers {candidates} cells of the reference, at most {most} are tried: \
@@ -74,5 +97,9 @@ pub enum EvalError {
 }
 
 fn skipped_text(skipped: usize) -> String {
-    if skipped == 0 { String::new() } else { format!(" outside the skipped classes ({skipped} inside them)") }
+    if skipped == 0 {
+        String::new()
+    } else {
+        format!(" outside the mask and the skipped classes ({skipped} inside them)")
+    }
 }

@@ -1,15 +1,28 @@
-//! One surface against another: alignment, then errors over all cells and per class.
+//! One surface against another: alignment, then errors over all cells, per class, per slope and at edges, and what stands above the terrain.
 
 use crate::align::{Alignment, MetresFromCells, Shift};
+use crate::breakdown::{Cells, ClassMetrics, EdgeMetrics, SlopeMetrics};
 use crate::cell_map::CellMap;
+use crate::edges::{EdgeRule, edge_zone};
 use crate::error::EvalError;
+use crate::gradient::slope_deg;
 use crate::metrics::Metrics;
+use crate::nuth_kaab::{NuthKaab, NuthKaabSummary};
 use crate::resample::bilinear;
 use crate::search::{Search, SearchSummary};
+use crate::sharpness::{Sharpness, sharpness};
+use crate::standing::{Standing, standing};
 use crate::statistics::percentile;
+use crate::terrain::{TerrainSource, estimated_terrain, terrain_from_ground};
 use raster::Grid;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+
+/// The class of bare ground in the LAS specification.
+const GROUND: i32 = 2;
+/// The class of buildings.
+const BUILDING: i32 = 6;
+/// The terrain is taken from the ground class when at least this share of the reference's cells has it.
+const LEAST_GROUND_SHARE: f64 = 0.02;
 
 /// What to compare. Heights are metres above the same vertical datum, cells that are not finite are void.
 #[derive(Debug, Clone, Copy)]
@@ -18,13 +31,29 @@ pub struct EvalInput<'a> {
     pub test: &'a Grid<f32>,
     /// The surface that is believed; errors are measured at its cells.
     pub reference: &'a Grid<f32>,
-    /// Where the reference's cells lie in the test grid. For [`Alignment::Xyz`] it must hold as far outside the reference as
-    /// the search reaches.
+    /// Where the reference's cells lie in the test grid. For [`Alignment::Xyz`] and [`Alignment::NuthKaab`] it must hold as far
+    /// outside the reference as the search reaches.
     pub test_from_reference: &'a CellMap,
     /// The size of the reference's cells.
     pub metres_from_cells: MetresFromCells,
     /// The class of each reference cell, on the reference grid; `None` where there is none.
     pub classes: Option<&'a Grid<Option<i32>>>,
+    /// Which reference cells count, on the reference grid; all without one.
+    pub mask: Option<&'a Grid<bool>>,
+    /// The bare ground on the reference grid, above the same datum; without one it is taken from the ground class, or estimated.
+    pub terrain: Option<&'a Grid<f32>>,
+}
+
+impl<'a> EvalInput<'a> {
+    /// Two surfaces without classes, mask or terrain.
+    pub fn new(
+        test: &'a Grid<f32>,
+        reference: &'a Grid<f32>,
+        test_from_reference: &'a CellMap,
+        metres_from_cells: MetresFromCells,
+    ) -> Self {
+        Self { test, reference, test_from_reference, metres_from_cells, classes: None, mask: None, terrain: None }
+    }
 }
 
 /// How to compare.
@@ -38,21 +67,20 @@ pub struct EvalConfig {
     pub thresholds_m: Vec<f64>,
     /// Classes whose cells are left out of everything, the alignment too.
     pub skip: Vec<i32>,
+    /// Least height above the terrain of what stands, metres.
+    pub standing_m: f64,
 }
 
 impl Default for EvalConfig {
     fn default() -> Self {
-        Self { alignment: Alignment::Xyz, search_m: 5.0, thresholds_m: vec![0.5, 1.0, 2.5, 7.5], skip: Vec::new() }
+        Self {
+            alignment: Alignment::Xyz,
+            search_m: 5.0,
+            thresholds_m: vec![0.5, 1.0, 2.5, 7.5],
+            skip: Vec::new(),
+            standing_m: 2.0,
+        }
     }
-}
-
-/// The metrics of one class.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ClassMetrics {
-    /// The class.
-    pub class: i32,
-    /// What was measured on its cells.
-    pub metrics: Metrics,
 }
 
 /// What was found.
@@ -60,49 +88,74 @@ pub struct ClassMetrics {
 pub struct Evaluation {
     /// The translation that was added to the test surface.
     pub shift: Shift,
-    /// How the horizontal part was found; `None` without a search.
+    /// How the horizontal part was found by [`Alignment::Xyz`].
     pub search: Option<SearchSummary>,
+    /// How it was found by [`Alignment::NuthKaab`].
+    pub nuth_kaab: Option<NuthKaabSummary>,
     /// Over all cells that are not skipped.
     pub overall: Metrics,
     /// Per class, in rising order; empty without classes.
     pub classes: Vec<ClassMetrics>,
-    /// Valid cells of the reference that were left out because of their class.
+    /// Per slope of the reference; cells beside a void have none.
+    pub slopes: Vec<SlopeMetrics>,
+    /// What counts as an edge.
+    pub edge_rule: EdgeRule,
+    /// Near and away from the reference's height jumps.
+    pub edges: EdgeMetrics,
+    /// The overreach at roof edges: of the building class where there is one, else of all that is level on both sides.
+    pub sharpness: Sharpness,
+    /// What stands above the terrain.
+    pub standing: Standing,
+    /// Valid cells of the reference that were left out because of their class or the mask.
     pub skipped_cells: usize,
     /// Test − reference after the alignment, metres, on the reference grid; NaN where either is void, or skipped.
     pub errors: Grid<f32>,
+    /// The test surface after the alignment, on the reference grid; NaN where it is void.
+    pub aligned: Grid<f32>,
 }
 
 /// Aligns the test surface with the reference and measures its errors.
 ///
 /// # Errors
-/// When the settings are unusable, the reference is empty, the two share no cell, or the class grid has another shape.
+/// When the settings are unusable, the reference is empty, the two share no cell, a grid has another shape than the reference, or
+/// the ground does not allow the alignment.
 pub fn evaluate(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Evaluation, EvalError> {
     check(input, config)?;
-    let reference = without_skipped(input, &config.skip);
+    let counted = counted(input, &config.skip);
     let valid = |grid: &Grid<f32>| grid.data().iter().filter(|h| h.is_finite()).count();
-    let reference_cells = valid(&reference);
+    let reference_cells = valid(&counted);
     let skipped_cells = valid(input.reference) - reference_cells;
     if reference_cells == 0 {
         return Err(EvalError::EmptyReference { skipped: skipped_cells });
     }
-    let input = EvalInput { reference: &reference, ..*input };
-    let (cells, search) = horizontal_shift(&input, config)?;
-    let mut errors = differences(&input, cells);
-    let mut common = finite(&errors);
-    let offset = percentile(&mut common, 50.0).ok_or(EvalError::NoOverlap { reference_cells })?;
+    let (cells, search, nuth_kaab) = horizontal_shift(&EvalInput { reference: &counted, ..*input }, config)?;
+    let mut aligned = moved(input, cells);
+    let mut errors = differences(&aligned, &counted);
+    let offset = percentile(&mut finite(&errors), 50.0).ok_or(EvalError::NoOverlap { reference_cells })?;
     let (dx_m, dy_m) = input.metres_from_cells.apply(cells.0, cells.1);
     let mut shift = Shift { dx_m, dy_m, dz_m: 0.0 };
     if config.alignment != Alignment::None {
         shift.dz_m = 0.0 - offset;
-        errors.data_mut().iter_mut().for_each(|e| *e -= offset);
+        for grid in [&mut errors, &mut aligned] {
+            grid.data_mut().iter_mut().for_each(|e| *e -= offset);
+        }
     }
+    let aligned = aligned.map(|&h| h as f32);
+    let part = Cells { reference: &counted, errors: &errors, thresholds_m: &config.thresholds_m };
     Ok(Evaluation {
         shift,
         search,
+        nuth_kaab,
         overall: Metrics::of(&mut finite(&errors), reference_cells, &config.thresholds_m),
-        classes: per_class(&input, &errors, &config.thresholds_m),
+        classes: part.per_class(input.classes),
+        slopes: part.per_slope(&slope_deg(input.reference, input.metres_from_cells)),
+        edge_rule: EdgeRule::of(input.metres_from_cells),
+        edges: part.at_edges(&edge_zone(input.reference, input.metres_from_cells)),
+        sharpness: roof_edges(input, &counted, &aligned),
+        standing: standing_of(input, config, &counted, &aligned),
         skipped_cells,
         errors: errors.map(|&e| e as f32),
+        aligned,
     })
 }
 
@@ -112,80 +165,117 @@ fn check(input: &EvalInput<'_>, config: &EvalConfig) -> Result<(), EvalError> {
     };
     config.thresholds_m.iter().try_for_each(|&t| positive("a threshold", t))?;
     positive("the search radius", config.search_m)?;
+    positive("the least height of what stands", config.standing_m)?;
     let (width, height) = (input.reference.width(), input.reference.height());
-    match input.classes {
-        None if !config.skip.is_empty() => Err(EvalError::SkipWithoutClasses),
-        Some(classes) if (classes.width(), classes.height()) != (width, height) => {
-            Err(EvalError::ClassShape { found_width: classes.width(), found_height: classes.height(), width, height })
+    let fits = |what, size: Option<(usize, usize)>| match size {
+        Some((found_width, found_height)) if (found_width, found_height) != (width, height) => {
+            Err(EvalError::Shape { what, found_width, found_height, width, height })
         }
         _ => Ok(()),
+    };
+    fits("class", input.classes.map(|g| (g.width(), g.height())))?;
+    fits("mask", input.mask.map(|g| (g.width(), g.height())))?;
+    fits("terrain", input.terrain.map(|g| (g.width(), g.height())))?;
+    if input.classes.is_none() && !config.skip.is_empty() {
+        return Err(EvalError::SkipWithoutClasses);
     }
+    Ok(())
 }
 
-/// The reference with its skipped cells void.
-fn without_skipped(input: &EvalInput<'_>, skip: &[i32]) -> Grid<f32> {
+/// The reference with the cells void that do not count.
+fn counted(input: &EvalInput<'_>, skip: &[i32]) -> Grid<f32> {
     let mut reference = input.reference.clone();
-    if let Some(classes) = input.classes {
-        for (height, class) in reference.data_mut().iter_mut().zip(classes.data()) {
-            if class.is_some_and(|class| skip.contains(&class)) {
-                *height = f32::NAN;
-            }
+    for (i, height) in reference.data_mut().iter_mut().enumerate() {
+        let class = input.classes.and_then(|classes| *classes.data().get(i)?);
+        let masked = input.mask.is_some_and(|mask| mask.data().get(i) == Some(&false));
+        if masked || class.is_some_and(|class| skip.contains(&class)) {
+            *height = f32::NAN;
         }
     }
     reference
 }
 
-fn horizontal_shift(
-    input: &EvalInput<'_>,
-    config: &EvalConfig,
-) -> Result<((f64, f64), Option<SearchSummary>), EvalError> {
-    if config.alignment != Alignment::Xyz {
-        return Ok(((0.0, 0.0), None));
+type Horizontal = ((f64, f64), Option<SearchSummary>, Option<NuthKaabSummary>);
+
+fn horizontal_shift(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Horizontal, EvalError> {
+    let (reference, metres_from_cells) = (input.reference, input.metres_from_cells);
+    match config.alignment {
+        Alignment::None | Alignment::Z => Ok(((0.0, 0.0), None, None)),
+        Alignment::Xyz => {
+            let (test, test_from_reference) = (input.test, input.test_from_reference);
+            let search = Search { reference, test, test_from_reference, metres_from_cells };
+            let (cells, summary) = search.run(config.search_m)?;
+            Ok((cells, Some(summary), None))
+        }
+        Alignment::NuthKaab => {
+            let at = |shift| differences(&moved(input, shift), reference).map(|&d| d as f32);
+            if at((0.0, 0.0)).data().iter().all(|d| d.is_nan()) {
+                let reference_cells = reference.data().iter().filter(|h| h.is_finite()).count();
+                return Err(EvalError::NoOverlap { reference_cells });
+            }
+            let (cells, summary) = NuthKaab { reference, metres_from_cells, differences: &at }.run(config.search_m)?;
+            Ok((cells, None, Some(summary)))
+        }
     }
-    let search = Search {
-        reference: input.reference,
-        test: input.test,
-        test_from_reference: input.test_from_reference,
-        metres_from_cells: input.metres_from_cells,
-    };
-    let (cells, summary) = search.run(config.search_m)?;
-    Ok((cells, Some(summary)))
 }
 
-/// Test − reference at every reference cell, the test moved by `shift` reference cells; NaN where either is void.
-fn differences(input: &EvalInput<'_>, shift: (f64, f64)) -> Grid<f64> {
-    let mut errors = Grid::filled(input.reference.width(), input.reference.height(), f64::NAN);
+/// The test at every reference cell, moved by `shift` reference cells; NaN where it is void.
+fn moved(input: &EvalInput<'_>, shift: (f64, f64)) -> Grid<f64> {
+    let mut heights = Grid::filled(input.reference.width(), input.reference.height(), f64::NAN);
     let width = input.reference.width().max(1);
-    errors.data_mut().par_chunks_mut(width).zip(input.reference.data().par_chunks(width)).enumerate().for_each(
-        |(row, (errors, heights))| {
-            for (column, (error, &height)) in errors.iter_mut().zip(heights).enumerate() {
-                if height.is_finite() {
-                    let (x, y) = input.test_from_reference.position(column as f64 - shift.0, row as f64 - shift.1);
-                    *error = bilinear(input.test, x, y).map_or(f64::NAN, |test| test - f64::from(height));
-                }
-            }
-        },
-    );
-    errors
+    heights.data_mut().par_chunks_mut(width).enumerate().for_each(|(row, heights)| {
+        for (column, height) in heights.iter_mut().enumerate() {
+            let (x, y) = input.test_from_reference.position(column as f64 - shift.0, row as f64 - shift.1);
+            *height = bilinear(input.test, x, y).unwrap_or(f64::NAN);
+        }
+    });
+    heights
+}
+
+/// Test − reference; NaN where either is void.
+fn differences(test: &Grid<f64>, reference: &Grid<f32>) -> Grid<f64> {
+    let cells = test.data().iter().zip(reference.data());
+    let cells = cells.map(|(test, &h)| if h.is_finite() { test - f64::from(h) } else { f64::NAN }).collect();
+    Grid::from_vec(reference.width(), reference.height(), cells).unwrap_or_else(|| Grid::filled(0, 0, f64::NAN))
 }
 
 fn finite(errors: &Grid<f64>) -> Vec<f64> {
     errors.data().iter().copied().filter(|e| e.is_finite()).collect()
 }
 
-fn per_class(input: &EvalInput<'_>, errors: &Grid<f64>, thresholds_m: &[f64]) -> Vec<ClassMetrics> {
-    let Some(classes) = input.classes else { return Vec::new() };
-    let mut cells: BTreeMap<i32, (usize, Vec<f64>)> = BTreeMap::new();
-    for ((height, class), error) in input.reference.data().iter().zip(classes.data()).zip(errors.data()) {
-        if let (true, Some(class)) = (height.is_finite(), class) {
-            let (count, errors) = cells.entry(*class).or_default();
-            *count += 1;
-            errors.extend(error.is_finite().then_some(error));
-        }
-    }
-    let metrics = |(class, (count, mut errors)): (i32, (usize, Vec<f64>))| ClassMetrics {
-        class,
-        metrics: Metrics::of(&mut errors, count, thresholds_m),
+/// The overreach at the edges of buildings where their class is known, else at all edges.
+fn roof_edges(input: &EvalInput<'_>, counted: &Grid<f32>, aligned: &Grid<f32>) -> Sharpness {
+    let classes = input.classes.filter(|classes| classes.data().contains(&Some(BUILDING)));
+    let counts = |cell: (usize, usize)| {
+        counted.get(cell.0, cell.1).is_some_and(|h| h.is_finite())
+            && classes.is_none_or(|classes| classes.get(cell.0, cell.1) == Some(&Some(BUILDING)))
     };
-    cells.into_iter().map(metrics).collect()
+    sharpness(input.reference, aligned, input.metres_from_cells, counts)
+}
+
+fn standing_of(input: &EvalInput<'_>, config: &EvalConfig, counted: &Grid<f32>, aligned: &Grid<f32>) -> Standing {
+    let estimate;
+    let terrain = match (input.terrain, ground_cells(input)) {
+        (Some(terrain), _) => (terrain, TerrainSource::Given),
+        (None, Some((classes, cells))) => {
+            estimate = terrain_from_ground(input.reference, |i| classes.data().get(i) == Some(&Some(GROUND)));
+            (&estimate, TerrainSource::GroundClass { cells })
+        }
+        (None, None) => {
+            let source;
+            (estimate, source) = estimated_terrain(input.reference, input.metres_from_cells);
+            (&estimate, source)
+        }
+    };
+    let counts = |i: usize| counted.data().get(i).is_some_and(|h| h.is_finite());
+    let area = input.metres_from_cells.cell_area_m2();
+    standing((input.reference, aligned), terrain, area, config.standing_m, counts)
+}
+
+/// The classes and how many cells of the reference are ground, when these are enough for a terrain.
+fn ground_cells<'a>(input: &EvalInput<'a>) -> Option<(&'a Grid<Option<i32>>, usize)> {
+    let classes = input.classes?;
+    let valid = || input.reference.data().iter().zip(classes.data()).filter(|(h, _)| h.is_finite());
+    let ground = valid().filter(|(_, class)| **class == Some(GROUND)).count();
+    (ground as f64 >= LEAST_GROUND_SHARE * valid().count() as f64 && ground > 0).then_some((classes, ground))
 }

@@ -1,11 +1,11 @@
 //! Accuracy and completeness of one set of reference cells.
 //!
-//! Three of the four things that the field calls completeness, by name, t in metres:
+//! Three of the four things that the field calls completeness, by name, t in metres (the fourth is [`crate::Standing`]):
 //! `completeness_<t>`: share of the reference's valid cells that are estimated with |error| < t (voids are failures);
 //! `pag_<t>`: share of the cells valid in both with |error| < t;
 //! `valid_ratio`: share of the reference's valid cells with any value.
 
-use crate::statistics::ErrorStatistics;
+use crate::statistics::{ErrorStatistics, RobustStatistics};
 
 /// What was measured on one set of cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +16,8 @@ pub struct Metrics {
     pub n: usize,
     /// Errors over the cells valid in both; `None` when there are none.
     pub errors: Option<ErrorStatistics>,
+    /// The same without the outliers.
+    pub robust: Option<RobustStatistics>,
     /// For each threshold (metres), the number of cells with |error| below it.
     pub below: Vec<(f64, usize)>,
 }
@@ -24,7 +26,9 @@ impl Metrics {
     /// The metrics of finite `errors` (metres, their order is lost) on `reference_cells` valid cells of the reference.
     pub fn of(errors: &mut [f64], reference_cells: usize, thresholds_m: &[f64]) -> Self {
         let below = thresholds_m.iter().map(|&t| (t, errors.iter().filter(|e| e.abs() < t).count())).collect();
-        Self { reference_cells, n: errors.len(), errors: ErrorStatistics::of(errors), below }
+        let all = ErrorStatistics::of(errors);
+        let robust = all.map(|all| RobustStatistics::of(errors, &all));
+        Self { reference_cells, n: errors.len(), errors: all, robust, below }
     }
 
     /// Share of the reference's valid cells with any value, 0 to 1; `None` without reference cells.
@@ -51,6 +55,9 @@ impl Metrics {
         ];
         let values = self.errors.map(|errors| errors.values());
         let named = ErrorStatistics::NAMES.iter().enumerate();
+        all.extend(named.map(|(i, name)| ((*name).to_owned(), values.map(|values| values[i]))));
+        let values = self.robust.map(|robust| robust.values());
+        let named = RobustStatistics::NAMES.iter().enumerate();
         all.extend(named.map(|(i, name)| ((*name).to_owned(), values.map(|values| values[i]))));
         all.extend(
             self.below.iter().map(|&(t, count)| (format!("completeness_{t}"), share(count, self.reference_cells))),

@@ -4,11 +4,17 @@
 //! two indices are interpolated. The standard deviation is that of the population (divided by n). NMAD = 1.4826 · median of
 //! |e − median(e)| (Höhle and Höhle 2009, ISPRS J. 64, 398-406) equals the standard deviation for normal errors. LE*p* is the
 //! p-th percentile of |e|, without any assumption about the distribution.
+//!
+//! The robust counterparts leave out what is farther than [`OUTLIER_NMADS`] NMADs from the median: the three-sigma rule of Höhle
+//! and Höhle with both of its parameters estimated robustly.
 
 use serde::Serialize;
 
 /// What makes the median absolute deviation an estimate of a normal distribution's standard deviation.
 pub const NMAD_FACTOR: f64 = 1.4826;
+
+/// An error is an outlier when it is farther than this many NMADs from the median.
+pub const OUTLIER_NMADS: f64 = 3.0;
 
 /// Errors in metres (test − reference), summarised.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -68,6 +74,48 @@ impl ErrorStatistics {
     }
 }
 
+/// Errors in metres without the outliers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RobustStatistics {
+    /// Errors farther than [`OUTLIER_NMADS`] NMADs from the median.
+    pub outliers: usize,
+    /// Mean of the others.
+    pub mean: f64,
+    /// Mean of |e| of the others.
+    pub mae: f64,
+    /// Root of the mean of e² of the others.
+    pub rmse: f64,
+    /// Standard deviation of the others, that of the population.
+    pub std: f64,
+}
+
+impl RobustStatistics {
+    /// The summary of `errors` without their outliers; `all` are the statistics of the same errors.
+    pub fn of(errors: &[f64], all: &ErrorStatistics) -> Self {
+        let kept = || errors.iter().filter(|&e| (e - all.median).abs() <= OUTLIER_NMADS * all.nmad);
+        let (mut count, mut sum, mut absolute, mut square) = (0usize, 0.0, 0.0, 0.0);
+        for e in kept() {
+            count += 1;
+            sum += e;
+            absolute += e.abs();
+            square += e * e;
+        }
+        // At least half of the errors are within one MAD of the median, so some are kept.
+        let n = count.max(1) as f64;
+        let mean = sum / n;
+        let std = (kept().map(|e| (e - mean).powi(2)).sum::<f64>() / n).sqrt();
+        Self { outliers: errors.len() - count, mean, mae: absolute / n, rmse: (square / n).sqrt(), std }
+    }
+
+    /// The names of the statistics, in the order of [`values`](Self::values).
+    pub const NAMES: [&'static str; 5] = ["outliers", "robust_mean", "robust_mae", "robust_rmse", "robust_std"];
+
+    /// The statistics in the order of [`NAMES`](Self::NAMES).
+    pub fn values(&self) -> [f64; 5] {
+        [self.outliers as f64, self.mean, self.mae, self.rmse, self.std]
+    }
+}
+
 /// The `p`-th percentile (0 to 100) with linear interpolation, in linear time; the order of `values` is lost.
 /// `None` when there are no values.
 pub fn percentile(values: &mut [f64], p: f64) -> Option<f64> {
@@ -114,6 +162,19 @@ mod tests {
     #[test]
     fn nothing_has_no_statistics() {
         assert_eq!(ErrorStatistics::of(&mut []), None);
+    }
+
+    #[test]
+    fn outliers_are_left_out_of_the_robust_statistics_and_only_there() {
+        let mut errors = vec![-0.2, -0.1, 0.0, 0.1, 0.2, 40.0];
+        let all = ErrorStatistics::of(&mut errors).unwrap();
+        let robust = RobustStatistics::of(&errors, &all);
+        assert_eq!(robust.outliers, 1);
+        assert!(robust.mean.abs() < 1e-12 && (robust.mae - 0.12).abs() < 1e-12, "{robust:?}");
+        assert!(all.mae > 6.0);
+        let mut equal = vec![0.5; 9];
+        let all = ErrorStatistics::of(&mut equal).unwrap();
+        assert_eq!(RobustStatistics::of(&equal, &all).outliers, 0);
     }
 
     proptest! {

@@ -45,6 +45,8 @@ fn run(
         test_from_reference: &map,
         metres_from_cells: MetresFromCells::new(reference.1, (1.0, 1.0)),
         classes: None,
+        mask: None,
+        terrain: None,
     };
     evaluate(&input, &EvalConfig { alignment, ..EvalConfig::default() })
 }
@@ -93,6 +95,53 @@ fn a_test_surface_much_smaller_than_the_reference_is_found_too() {
     let reference = sampled(600, 500, &grid, |x, y, _| town(x, y));
     let test = displaced_test(&small, (110, 100), 0.1, 0.1);
     assert_planted(&run((&reference, &grid), (&test, &small), Alignment::Xyz).unwrap(), 0.05);
+}
+
+#[test]
+fn nuth_and_kaab_find_the_planted_shift_too() {
+    let geotransform = GeoTransform::north_up(0.0, 0.0, CELL_M);
+    let reference = sampled(400, 360, &geotransform, |x, y, _| town(x, y));
+    for (noise_m, hole_share) in [(0.0, 0.0), (0.2, 0.1)] {
+        let test = displaced_test(&geotransform, (400, 360), noise_m, hole_share);
+        let found = run((&reference, &geotransform), (&test, &geotransform), Alignment::NuthKaab).unwrap();
+        assert_planted(&found, 0.05);
+        assert!(found.nuth_kaab.unwrap().converged, "{:?}", found.nuth_kaab);
+    }
+}
+
+/// The surfaces of `reference/nuth_kaab_xdem.py`.
+fn hills(x: f64, y: f64) -> f64 {
+    300.0 + 25.0 * (x / 61.0).sin() * (y / 47.0).cos() + 9.0 * (x / 23.0 + y / 31.0).sin() + 0.05 * x
+}
+
+#[test]
+fn nuth_and_kaab_agree_with_xdem() {
+    let geotransform = GeoTransform::north_up(0.0, 0.0, 2.0);
+    let reference = sampled(240, 200, &geotransform, |x, y, _| hills(x, y));
+    let lines = include_str!("reference/nuth_kaab_xdem.txt").lines().filter(|line| !line.starts_with('#'));
+    for line in lines {
+        let n: Vec<f64> = line.split_whitespace().map(|n| n.parse().unwrap()).collect();
+        let test = sampled(240, 200, &geotransform, |x, y, _| {
+            hills(x + n[0], y + n[1]) - n[2] + n[3] * (x / 17.0 + 1.0).sin() * (y / 13.0).cos()
+        });
+        let found = run((&reference, &geotransform), (&test, &geotransform), Alignment::NuthKaab).unwrap().shift;
+        for (value, xdem) in [(found.dx_m, n[4]), (found.dy_m, n[5]), (found.dz_m, n[6])] {
+            assert!((value - xdem).abs() < 0.03, "{line}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn flat_ground_is_refused_by_nuth_and_kaab_whatever_its_noise() {
+    let geotransform = GeoTransform::north_up(0.0, 0.0, CELL_M);
+    let plain = |salt| sampled(300, 300, &geotransform, |x, _, i| 10.0 + 0.01 * x + 0.2 * noise(i, salt));
+    let (reference, test) = (plain(1), plain(2));
+    let refused = run((&reference, &geotransform), (&test, &geotransform), Alignment::NuthKaab).unwrap_err();
+    assert!(matches!(refused, EvalError::TooFlat { .. }), "{refused}");
+    assert!(refused.to_string().contains("too flat"), "{refused}");
+    let ramp = sampled(300, 300, &geotransform, |x, _, _| 10.0 + 0.3 * x);
+    let refused = run((&ramp, &geotransform), (&ramp, &geotransform), Alignment::NuthKaab).unwrap_err();
+    assert!(matches!(refused, EvalError::OneWaySlopes), "{refused}");
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! Metrics against NumPy: `reference/eval_numpy.txt`, written by `reference/eval_numpy.py`, to 1e-6.
 
-use eval::{Alignment, CellMap, EvalConfig, EvalInput, MetresFromCells, Metrics, evaluate};
+use eval::{Alignment, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, Metrics, Overlap, evaluate};
 use raster::{GeoTransform, Grid};
 use std::collections::HashMap;
 
 const REFERENCE: &str = include_str!("reference/eval_numpy.txt");
 const TOLERANCE: f64 = 1e-6;
+/// The generator's terrain is level.
+const TERRAIN_M: f32 = 29.0;
 
 struct Case {
     name: String,
@@ -57,11 +59,40 @@ fn check(context: &str, found: &Metrics, expected: &HashMap<String, f64>) {
     }
 }
 
+/// Areas and volumes to 1e-6 of their size: the aligned surface is kept in single precision.
+fn check_overlap(context: &str, found: &Overlap, expected: &HashMap<String, f64>) {
+    for (name, value) in [("reference", found.reference), ("test", found.test), ("shared", found.shared)] {
+        let expected = expected[name];
+        assert!((value - expected).abs() <= TOLERANCE * expected, "{context}, {name}: {value}, NumPy says {expected}");
+    }
+}
+
+/// The metrics with the generator's label: `all`, a class, `slope_<lower bound>`, `edge` or `rest`.
+fn metrics_of<'a>(found: &'a Evaluation, label: &str) -> &'a Metrics {
+    let slope = || found.slopes.iter().find(|bin| label == format!("slope_{}", bin.from_deg)).map(|bin| &bin.metrics);
+    let class = || found.classes.iter().find(|c| c.class.to_string() == label).map(|c| &c.metrics);
+    match label {
+        "all" => &found.overall,
+        "edge" => &found.edges.edge,
+        "rest" => &found.edges.rest,
+        _ => class().or_else(slope).unwrap_or_else(|| panic!("no cells for {label}")),
+    }
+}
+
+/// How many sets of cells have errors.
+fn sets_with_values(found: &Evaluation) -> usize {
+    let classes = found.classes.iter().map(|c| &c.metrics);
+    let slopes = found.slopes.iter().map(|bin| &bin.metrics);
+    let all = classes.chain(slopes).chain([&found.overall, &found.edges.edge, &found.edges.rest]);
+    all.filter(|metrics| metrics.n > 0).count()
+}
+
 #[test]
 fn all_metrics_agree_with_numpy() {
     let mut lines = REFERENCE.lines();
     let mut count = 0;
     while let Some(case) = next_case(&mut lines) {
+        let terrain = case.classes.map(|_| TERRAIN_M);
         let map = CellMap::affine(&case.reference.1, &case.test.1).unwrap();
         let input = EvalInput {
             test: &case.test.0,
@@ -69,15 +100,21 @@ fn all_metrics_agree_with_numpy() {
             test_from_reference: &map,
             metres_from_cells: MetresFromCells::new(&case.reference.1, (1.0, 1.0)),
             classes: Some(&case.classes),
+            mask: None,
+            terrain: Some(&terrain),
         };
         let config = EvalConfig { alignment: case.alignment, skip: case.skip, ..EvalConfig::default() };
         let found = evaluate(&input, &config).unwrap();
         assert!((found.shift.dz_m - case.dz_m).abs() <= TOLERANCE, "{}: {:?}", case.name, found.shift);
-        assert_eq!(found.classes.len() + 1, case.metrics.len(), "{}", case.name);
         for (label, expected) in &case.metrics {
-            let class = found.classes.iter().find(|c| c.class.to_string() == *label).map(|c| &c.metrics);
-            check(&format!("{} {label}", case.name), class.unwrap_or(&found.overall), expected);
+            let context = format!("{} {label}", case.name);
+            match label.as_str() {
+                "footprint" => check_overlap(&context, &found.standing.footprint, expected),
+                "volume" => check_overlap(&context, &found.standing.volume, expected),
+                _ => check(&context, metrics_of(&found, label), expected),
+            }
         }
+        assert_eq!(case.metrics.len(), sets_with_values(&found) + 2, "{}", case.name);
         count += 1;
     }
     assert_eq!(count, 4);

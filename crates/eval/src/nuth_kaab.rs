@@ -1,0 +1,218 @@
+//! The horizontal translation between two surfaces from their slopes (Nuth and Kääb 2011, The Cryosphere 5, 271-290, eq. 2-4).
+//!
+//! A surface that is displaced by d differs from the reference by dh = −d · ∇h + dz: divided by the tangent of the slope, dh
+//! is a cosine over the direction of the slope, whose amplitude and phase are the displacement. As in the paper: bins of 5° of
+//! the aspect, the median of each, a cosine through them (weighted by their cells), and again from the corrected surface until
+//! nothing changes.
+//!
+//! The relation holds while the displacement is smaller than the forms of the ground. So the differences are reduced to cells as
+//! long as the search radius first, where a town is a few hills, and then refined level by level to the cells of the
+//! reference. It needs slopes, in more than one direction: [`EvalError::TooFlat`] and [`EvalError::OneWaySlopes`] say where they
+//! are missing, measured at the coarsest level, where noise makes none.
+
+use crate::align::MetresFromCells;
+use crate::error::EvalError;
+use crate::gradient::{gradients, steepness};
+use crate::statistics::{percentile, quick_nmad};
+use raster::{Grid, reduce};
+use serde::Serialize;
+
+/// Bins of the aspect, as in the paper.
+const BINS: usize = 72;
+/// Slopes that are used, degrees.
+const STEEP_DEG: f64 = 3.0;
+/// Share of the coarsest cells that must be steep.
+const LEAST_STEEP_SHARE: f64 = 0.02;
+/// Least number of steep cells that are common to both.
+const LEAST_CELLS: usize = 50;
+/// Fewest cells of a bin.
+const LEAST_PER_BIN: usize = 5;
+/// Least ratio of the squared axes of the normal matrix: below it the slopes face one way.
+const LEAST_AXES: f64 = 0.02;
+/// No level is coarser than this many cells on its shorter side.
+const LEAST_SIDE: usize = 24;
+/// Iterations per level, and the step at which one ends, in cells of the level.
+const MOST_ITERATIONS: usize = 12;
+const LAST_STEP_CELLS: f64 = 0.004;
+
+/// What Nuth and Kääb's method found on its way.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NuthKaabSummary {
+    /// Reductions of the coarsest level.
+    pub levels: usize,
+    /// Corrections made.
+    pub iterations: usize,
+    /// Share of the coarsest cells that are steep enough.
+    pub steep_share: f64,
+    /// The last correction, metres.
+    pub last_step_m: f64,
+    /// Whether the corrections came to an end and lowered the NMAD.
+    pub converged: bool,
+    /// NMAD of the differences before, metres.
+    pub nmad_before_m: f64,
+    /// NMAD of the differences after, metres.
+    pub nmad_after_m: f64,
+}
+
+/// The reference, and the differences (test − reference) for a shift of the test in reference cells.
+pub(crate) struct NuthKaab<'a> {
+    pub(crate) reference: &'a Grid<f32>,
+    pub(crate) metres_from_cells: MetresFromCells,
+    pub(crate) differences: &'a dyn Fn((f64, f64)) -> Grid<f32>,
+}
+
+/// A level's steepness and direction of the rise.
+struct Level {
+    slopes: Grid<[f32; 2]>,
+    cell_m: f64,
+}
+
+impl NuthKaab<'_> {
+    /// The shift in reference cells that is added to the test surface.
+    pub(crate) fn run(&self, search_m: f64) -> Result<((f64, f64), NuthKaabSummary), EvalError> {
+        let levels = self.levels(search_m);
+        let before = (self.differences)((0.0, 0.0));
+        let steep_share = steep_share(&levels, &before)?;
+        let mut shift_m = (0.0, 0.0);
+        let (mut iterations, mut last_step_m, mut settled) = (0, f64::INFINITY, false);
+        for (number, level) in levels.iter().enumerate().rev() {
+            settled = false;
+            for _ in 0..MOST_ITERATIONS {
+                let differences = (self.differences)(self.metres_from_cells.cells(shift_m.0, shift_m.1));
+                let step = level.step(&reduced(differences, number))?;
+                shift_m = (shift_m.0 + step.0, shift_m.1 + step.1);
+                iterations += 1;
+                last_step_m = step.0.hypot(step.1);
+                settled = last_step_m < LAST_STEP_CELLS * level.cell_m;
+                if settled {
+                    break;
+                }
+            }
+        }
+        let cells = self.metres_from_cells.cells(shift_m.0, shift_m.1);
+        let (nmad_before_m, nmad_after_m) = (nmad(&before), nmad(&(self.differences)(cells)));
+        let converged = settled && nmad_after_m <= nmad_before_m;
+        let levels = levels.len() - 1;
+        let summary =
+            NuthKaabSummary { levels, iterations, steep_share, last_step_m, converged, nmad_before_m, nmad_after_m };
+        Ok((cells, summary))
+    }
+
+    /// The levels, finest first, up to cells of the search radius.
+    fn levels(&self, search_m: f64) -> Vec<Level> {
+        let (along_columns, along_rows) = self.metres_from_cells.cell_size_m();
+        let mut heights = self.reference.clone();
+        let mut scale = 1.0;
+        let mut levels = Vec::new();
+        loop {
+            let cell_m = scale * along_columns.max(along_rows);
+            levels.push(Level { slopes: gradients(&heights, self.metres_from_cells.scaled(scale)), cell_m });
+            if cell_m >= search_m || heights.width().min(heights.height()) < 2 * LEAST_SIDE {
+                return levels;
+            }
+            heights = reduce(&heights);
+            scale *= 2.0;
+        }
+    }
+}
+
+fn reduced(grid: Grid<f32>, times: usize) -> Grid<f32> {
+    (0..times).fold(grid, |grid, _| reduce(&grid))
+}
+
+fn is_steep(slope: [f32; 2]) -> bool {
+    steepness(slope) >= STEEP_DEG.to_radians().tan()
+}
+
+/// The share of the coarsest level's common cells that are steep.
+fn steep_share(levels: &[Level], differences: &Grid<f32>) -> Result<f64, EvalError> {
+    let Some(coarsest) = levels.last() else { return Ok(0.0) };
+    let differences = reduced(differences.clone(), levels.len() - 1);
+    let cells = coarsest.slopes.data().iter().zip(differences.data());
+    let (mut all, mut steep) = (0usize, 0usize);
+    for (slope, _) in cells.filter(|(slope, d)| d.is_finite() && slope[0].is_finite()) {
+        all += 1;
+        steep += usize::from(is_steep(*slope));
+    }
+    let share = steep as f64 / all.max(1) as f64;
+    if steep < LEAST_CELLS || share < LEAST_STEEP_SHARE {
+        let cell_m = coarsest.cell_m;
+        return Err(EvalError::TooFlat { share, needed: LEAST_STEEP_SHARE, slope_deg: STEEP_DEG, cell_m });
+    }
+    Ok(share)
+}
+
+impl Level {
+    /// The translation, metres along x and y, that the differences ask for.
+    fn step(&self, differences: &Grid<f32>) -> Result<(f64, f64), EvalError> {
+        let mut all: Vec<f64> = differences.data().iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect();
+        let offset = percentile(&mut all, 50.0).unwrap_or(0.0);
+        let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
+        for (&slope, &difference) in self.slopes.data().iter().zip(differences.data()) {
+            if difference.is_finite() && is_steep(slope) {
+                let direction = f64::from(slope[1]).atan2(f64::from(slope[0])).rem_euclid(std::f64::consts::TAU);
+                let bin = (direction / std::f64::consts::TAU * BINS as f64) as usize;
+                if let Some(bin) = bins.get_mut(bin.min(BINS - 1)) {
+                    bin.push((f64::from(difference) - offset) / steepness(slope));
+                }
+            }
+        }
+        let step = cosine(&mut bins)?;
+        // Beyond a cell of its level the relation is no longer a line.
+        let most = (1.5 * self.cell_m / step.0.hypot(step.1)).min(1.0);
+        Ok((step.0 * most, step.1 * most))
+    }
+}
+
+/// Fits `A cos + B sin + C` to the medians of the bins; (A, B) is what undoes the displacement.
+fn cosine(bins: &mut [Vec<f64>]) -> Result<(f64, f64), EvalError> {
+    let count = bins.len() as f64;
+    let mut normal = nalgebra::Matrix3::<f64>::zeros();
+    let mut right = nalgebra::Vector3::<f64>::zeros();
+    for (i, bin) in bins.iter_mut().enumerate().filter(|(_, bin)| bin.len() >= LEAST_PER_BIN) {
+        let weight = bin.len() as f64;
+        let Some(median) = percentile(bin, 50.0) else { continue };
+        let (sin, cos) = ((i as f64 + 0.5) / count * std::f64::consts::TAU).sin_cos();
+        let terms = nalgebra::Vector3::new(cos, sin, 1.0);
+        normal += weight * terms * terms.transpose();
+        right += weight * median * terms;
+    }
+    let axes = normal.fixed_view::<2, 2>(0, 0).into_owned().symmetric_eigenvalues();
+    if axes.min() < LEAST_AXES * axes.max() {
+        return Err(EvalError::OneWaySlopes);
+    }
+    let solved = normal.cholesky().ok_or(EvalError::OneWaySlopes)?.solve(&right);
+    Ok((solved[0], solved[1]))
+}
+
+fn nmad(differences: &Grid<f32>) -> f64 {
+    let mut finite: Vec<f32> = differences.data().iter().copied().filter(|d| d.is_finite()).collect();
+    quick_nmad(&mut finite).unwrap_or(f64::INFINITY)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cosine_gives_its_displacement_whatever_the_outliers() {
+        let mut bins: Vec<Vec<f64>> = (0..BINS)
+            .map(|i| {
+                let direction = (i as f64 + 0.5) / BINS as f64 * std::f64::consts::TAU;
+                let value = 1.5 * direction.cos() - 0.5 * direction.sin() + 0.2;
+                (0..20).map(|k| if k % 4 == 0 { 100.0 * (k as f64 - 8.0) } else { value }).collect()
+            })
+            .collect();
+        let (a, b) = cosine(&mut bins).unwrap();
+        assert!((a - 1.5).abs() < 1e-9 && (b + 0.5).abs() < 1e-9, "{a} {b}");
+    }
+
+    #[test]
+    fn slopes_that_face_one_way_are_refused() {
+        let mut bins = vec![Vec::new(); BINS];
+        bins[10] = vec![1.0; 30];
+        bins[46] = vec![-1.0; 30];
+        assert!(matches!(cosine(&mut bins), Err(EvalError::OneWaySlopes)));
+        assert!(matches!(cosine(&mut vec![Vec::new(); BINS]), Err(EvalError::OneWaySlopes)));
+    }
+}

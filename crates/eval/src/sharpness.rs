@@ -1,0 +1,158 @@
+//! How far a surface's roofs reach beyond the true ones.
+//!
+//! A roof edge is a jump of the reference (see [`crate::EdgeRule`]) with level ground or roof on both sides: beyond the two cells of the
+//! jump, three cells each that stay within a quarter of it. Across it, along the row or column that is closer to the edge's normal, the test's profile falls
+//! through the height half-way between the two levels somewhere; the reference's own falls between its two cells. The
+//! distance between the two places, outwards positive and turned onto the normal, is the overreach in metres: positive
+//! where roofs are too large (the fattening of matching windows), negative where they are too small. An edge is not measured
+//! where the test does not fall through that height within [`REACH_M`], or is void there.
+
+use crate::align::MetresFromCells;
+use crate::edges::{Cell, EdgeRule, jumps};
+use crate::gradient::{gradients, steepness};
+use crate::statistics::ErrorStatistics;
+use raster::Grid;
+use serde::Serialize;
+
+/// How far from an edge the test's is looked for, metres; at least four cells.
+pub const REACH_M: f64 = 5.0;
+const LEAST_REACH_CELLS: isize = 4;
+const MOST_REACH_CELLS: isize = 64;
+/// Cells on either side that must be level.
+const LEVEL_CELLS: isize = 3;
+/// How level: the share of the jump that they may differ by.
+const LEVEL_SHARE: f64 = 0.25;
+/// Least cosine between the profile and the edge's normal.
+const LEAST_COSINE: f64 = 0.7;
+
+/// The overreach of a surface at the reference's roof edges.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Sharpness {
+    /// Places on roof edges of the reference.
+    pub edges: usize,
+    /// Those where the test has an edge too.
+    pub measured: usize,
+    /// Overreach in metres, outwards positive.
+    pub overreach_m: Option<ErrorStatistics>,
+}
+
+/// Measures the overreach of `test` (aligned, on the reference grid). `roof` limits the edges by their higher cell.
+pub(crate) fn sharpness(
+    reference: &Grid<f32>,
+    test: &Grid<f32>,
+    metres_from_cells: MetresFromCells,
+    roof: impl Fn(Cell) -> bool,
+) -> Sharpness {
+    let gradients = gradients(reference, metres_from_cells);
+    let rule = EdgeRule::of(metres_from_cells);
+    let mut edges = 0;
+    let mut overreach = Vec::new();
+    for (high, low) in jumps(reference, rule).filter(|&(high, _)| roof(high)) {
+        let profile = Profile { high, step: (offset(high.0, low.0), offset(high.1, low.1)) };
+        let Some((level, at)) = profile.edge(reference) else { continue };
+        let Some((cosine, side_m)) = profile.metres(metres_from_cells, [gradients[high], gradients[low]]) else {
+            continue;
+        };
+        edges += 1;
+        let reach = ((REACH_M / side_m).ceil() as isize).clamp(LEAST_REACH_CELLS, MOST_REACH_CELLS);
+        overreach.extend(profile.crossing(test, level, at, reach).map(|found| (found - at) * side_m * cosine));
+    }
+    Sharpness { edges, measured: overreach.len(), overreach_m: ErrorStatistics::of(&mut overreach) }
+}
+
+fn offset(from: usize, to: usize) -> isize {
+    to as isize - from as isize
+}
+
+/// Cells in a row or column: number 0 is the edge's higher cell, 1 its lower one.
+struct Profile {
+    high: Cell,
+    step: (isize, isize),
+}
+
+impl Profile {
+    fn height(&self, grid: &Grid<f32>, number: isize) -> Option<f64> {
+        let column = self.high.0.checked_add_signed(number * self.step.0)?;
+        let row = self.high.1.checked_add_signed(number * self.step.1)?;
+        grid.get(column, row).map(|&h| f64::from(h)).filter(|h| h.is_finite())
+    }
+
+    /// The height half-way down the jump, and where the reference falls through it; `None` unless both sides are level, or when the
+    /// fall lies between two other cells of a jump that takes several.
+    fn edge(&self, reference: &Grid<f32>) -> Option<(f64, f64)> {
+        let (inside, outside) = (self.height(reference, -1)?, self.height(reference, 2)?);
+        let slack = LEVEL_SHARE * (inside - outside);
+        let (mut top, mut foot) = (0.0, 0.0);
+        for k in 0..LEVEL_CELLS {
+            let (a, b) = (self.height(reference, -1 - k)?, self.height(reference, 2 + k)?);
+            if (a - inside).abs() > slack || (b - outside).abs() > slack {
+                return None;
+            }
+            (top, foot) = (top + a / LEVEL_CELLS as f64, foot + b / LEVEL_CELLS as f64);
+        }
+        let level = (top + foot) / 2.0;
+        let (high, low) = (self.height(reference, 0)?, self.height(reference, 1)?);
+        (high >= level && low < level).then(|| (level, (high - level) / (high - low)))
+    }
+
+    /// The cosine between the profile and the edge's normal, and the distance of the profile's cells in metres.
+    fn metres(&self, metres_from_cells: MetresFromCells, gradients: [[f32; 2]; 2]) -> Option<(f64, f64)> {
+        let (x, y) = metres_from_cells.apply(self.step.0 as f64, self.step.1 as f64);
+        let sum = [gradients[0][0] + gradients[1][0], gradients[0][1] + gradients[1][1]];
+        let (side_m, steep) = (x.hypot(y), steepness(sum));
+        let cosine = (x * f64::from(sum[0]) + y * f64::from(sum[1])).abs() / (side_m * steep);
+        (cosine >= LEAST_COSINE).then_some((cosine, side_m))
+    }
+
+    /// Where the heights fall through `level` outwards, nearest to `at`, in cells.
+    fn crossing(&self, test: &Grid<f32>, level: f64, at: f64, reach: isize) -> Option<f64> {
+        let fall = |number: isize| {
+            let (inner, outer) = (self.height(test, number)?, self.height(test, number + 1)?);
+            (inner >= level && outer < level).then(|| number as f64 + (inner - level) / (inner - outer))
+        };
+        (-reach..=reach).filter_map(fall).min_by(|a, b| (a - at).abs().total_cmp(&(b - at).abs()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raster::GeoTransform;
+
+    const CELL: f64 = 0.5;
+
+    /// A roof of 30 x 24 m, `grown` outwards, turned by an angle; its rim falls over two cells as a sensor blurs it.
+    fn roof(grown: f64, turn_deg: f64) -> Grid<f32> {
+        let (sin, cos) = turn_deg.to_radians().sin_cos();
+        let height = |i: usize| {
+            let (x, y) = (((i % 120) as f64 - 59.5) * CELL, ((i / 120) as f64 - 59.5) * CELL);
+            let (u, v) = (x * cos + y * sin, y * cos - x * sin);
+            let outside = (u.abs() - 15.0 - grown).max(v.abs() - 12.0 - grown);
+            (4.0 + 10.0 * (0.5 - outside / CELL).clamp(0.0, 1.0)) as f32
+        };
+        Grid::from_vec(120, 120, (0..120 * 120).map(height).collect()).unwrap()
+    }
+
+    fn metres() -> MetresFromCells {
+        MetresFromCells::new(&GeoTransform::north_up(0.0, 0.0, CELL), (1.0, 1.0))
+    }
+
+    #[test]
+    fn a_roof_that_is_too_large_reaches_out_by_as_much_in_every_direction() {
+        for (grown, turn) in [(0.0, 0.0), (1.25, 0.0), (-0.75, 0.0), (1.25, 23.0), (-0.6, 40.0)] {
+            let found = sharpness(&roof(0.0, turn), &roof(grown, turn), metres(), |_| true);
+            let overreach = found.overreach_m.unwrap();
+            assert!((overreach.median - grown).abs() < 0.1, "{grown} m, {turn}°: {found:?}");
+            assert!(found.measured > 150 && found.measured as f64 > 0.9 * found.edges as f64, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_missing_roof_is_counted_and_not_measured() {
+        let found = sharpness(&roof(0.0, 0.0), &Grid::filled(120, 120, 4.0), metres(), |_| true);
+        assert!(found.edges > 150 && found.measured == 0 && found.overreach_m.is_none(), "{found:?}");
+        let void = sharpness(&roof(0.0, 0.0), &Grid::filled(120, 120, f32::NAN), metres(), |_| true);
+        assert_eq!(void.measured, 0);
+        assert_eq!(sharpness(&roof(0.0, 0.0), &roof(0.0, 0.0), metres(), |_| false).edges, 0);
+    }
+}
