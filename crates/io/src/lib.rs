@@ -4,5 +4,6 @@
 //! and say so; writers put a file under its name only when it is complete.
 
 pub mod city;
+pub mod points;
 pub mod raster;
 pub mod rpc;

@@ -1,0 +1,163 @@
+//! Reading a cloud and laying it on a grid.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+use las::{PointDataBuilder, Reader};
+use raster::{GeoTransform, Grid};
+
+use super::crs::{Stated, stated};
+use super::{PointsError, preflight};
+use crate::raster::Dem;
+
+/// Points read at a time.
+const BATCH: u64 = 1 << 16;
+/// Classes of points that are no surface: low noise, high noise.
+const NOISE: [u8; 2] = [7, 18];
+/// Most cells of a grid, and most for every point.
+const CELLS_MAX: u64 = 1 << 27;
+const CELLS_PER_POINT: u64 = 64;
+const CELLS_ALWAYS: u64 = 1 << 20;
+
+/// Whether a file is a LAS or LAZ one, by its first four bytes.
+pub fn is_point_cloud(path: impl AsRef<Path>) -> bool {
+    use std::io::Read;
+    let mut magic = [0u8; 4];
+    File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == *b"LASF"
+}
+
+/// A LAS or LAZ file that has been opened.
+pub struct PointCloud {
+    path: PathBuf,
+    reader: Reader,
+    stated: Stated,
+}
+
+/// A cloud as a surface model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GriddedPoints {
+    /// The highest point of every cell.
+    pub dem: Dem,
+    /// The class of that point.
+    pub classes: Grid<Option<i32>>,
+    /// Points read.
+    pub points: u64,
+    /// Points left out: noise, withheld, or outside the extent that the header names.
+    pub left_out: u64,
+}
+
+impl PointCloud {
+    /// Opens a file and reads its header.
+    ///
+    /// # Errors
+    /// [`PointsError::Unreadable`], [`PointsError::Damaged`], [`PointsError::Crs`] for a system that PROJ does not read.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, PointsError> {
+        let path = path.as_ref().to_owned();
+        let unreadable = |source| PointsError::Unreadable { path: path.clone(), source };
+        let file = File::open(&path).map_err(unreadable)?;
+        let length = file.metadata().map_err(unreadable)?.len();
+        let mut file = BufReader::new(file);
+        preflight::check(&mut file, length).map_err(|reason| PointsError::damaged(&path, reason))?;
+        let reader = guarded(&path, || Reader::new(file))?;
+        let stated = stated(reader.header()).map_err(|source| PointsError::Crs { path: path.clone(), source })?;
+        Ok(Self { path, reader, stated })
+    }
+
+    /// The definition of its coordinate system for PROJ, if the file names one.
+    pub fn crs_definition(&self) -> Option<&str> {
+        self.stated.definition.as_deref()
+    }
+
+    /// The middle of the extent that the header names, map units.
+    pub fn centre(&self) -> (f64, f64) {
+        let bounds = self.reader.header().bounds();
+        (0.5 * (bounds.min.x + bounds.max.x), 0.5 * (bounds.min.y + bounds.max.y))
+    }
+
+    /// The highest point of every cell of `cell` (x, y) map units; cell corners fall on `anchor` plus whole cells.
+    ///
+    /// # Errors
+    /// [`PointsError::Damaged`], [`PointsError::TooManyCells`], [`PointsError::NoPoints`].
+    pub fn highest(mut self, cell: (f64, f64), anchor: (f64, f64)) -> Result<GriddedPoints, PointsError> {
+        let (geotransform, width, height) = self.grid(cell, anchor)?;
+        let mut heights = Grid::filled(width, height, f32::NAN);
+        let mut classes = Grid::filled(width, height, None);
+        let mut batch = PointDataBuilder::new().for_header(self.reader.header()).build();
+        let (mut points, mut left_out) = (0u64, 0u64);
+        loop {
+            let read = guarded(&self.path, || self.reader.fill_points(BATCH, &mut batch))?;
+            if read == 0 {
+                break;
+            }
+            for point in batch.points() {
+                let point = point.map_err(|error| PointsError::damaged(&self.path, error))?;
+                points += 1;
+                let class = u8::from(point.classification);
+                let place = place(&geotransform, point.x, point.y).filter(|&(c, r)| c < width && r < height);
+                let usable = !point.is_withheld && !NOISE.contains(&class) && point.z.is_finite();
+                let Some(cell) = place.filter(|_| usable) else {
+                    left_out += 1;
+                    continue;
+                };
+                let z = (point.z * self.stated.height_unit_m) as f32;
+                if heights[cell].is_nan() || z > heights[cell] {
+                    heights[cell] = z;
+                    classes[cell] = Some(i32::from(class));
+                }
+            }
+        }
+        if points == left_out {
+            return Err(PointsError::NoPoints { path: self.path, points });
+        }
+        let dem = Dem {
+            path: self.path,
+            heights,
+            geotransform,
+            crs_wkt: self.stated.definition,
+            horizontal_epsg: self.stated.horizontal_epsg,
+            vertical: self.stated.vertical,
+            no_data: None,
+        };
+        Ok(GriddedPoints { dem, classes, points, left_out })
+    }
+
+    fn grid(&self, cell: (f64, f64), anchor: (f64, f64)) -> Result<(GeoTransform, usize, usize), PointsError> {
+        let (bounds, points) = (self.reader.header().bounds(), self.reader.header().number_of_points());
+        let extent = [bounds.min.x, bounds.min.y, bounds.max.x, bounds.max.y];
+        let ordered = bounds.min.x <= bounds.max.x && bounds.min.y <= bounds.max.y;
+        if !(ordered && extent.iter().all(|v| v.is_finite() && v.abs() < 1e12)) {
+            return Err(PointsError::damaged(&self.path, format!("its extent is {extent:?}")));
+        }
+        let snapped = |value: f64, anchor: f64, cell: f64| anchor + ((value - anchor) / cell).floor() * cell;
+        let left = snapped(bounds.min.x, anchor.0, cell.0);
+        let top = anchor.1 + ((bounds.max.y - anchor.1) / cell.1).ceil() * cell.1;
+        let columns = ((bounds.max.x - left) / cell.0).floor() + 1.0;
+        let rows = ((top - bounds.min.y) / cell.1).floor() + 1.0;
+        let (cells, most) = (columns * rows, points.saturating_mul(CELLS_PER_POINT).clamp(CELLS_ALWAYS, CELLS_MAX));
+        if !(cells.is_finite() && cells > 0.0 && cells <= most as f64) {
+            return Err(PointsError::TooManyCells { path: self.path.clone(), cells, cell: cell.0, points, most });
+        }
+        Ok((GeoTransform([left, cell.0, 0.0, top, 0.0, -cell.1]), columns as usize, rows as usize))
+    }
+}
+
+/// The cell that holds a place of the map.
+fn place(geotransform: &GeoTransform, x: f64, y: f64) -> Option<(usize, usize)> {
+    let (column, row) = geotransform.cell_from_map(x, y)?;
+    let whole = |value: f64| {
+        let value = (value + 0.5).floor();
+        (0.0..9e15).contains(&value).then_some(value as usize)
+    };
+    Some((whole(column)?, whole(row)?))
+}
+
+/// Runs the decoder. It indexes by numbers that it reads, so damaged input may make it panic: that is the input's fault.
+fn guarded<T>(path: &Path, decode: impl FnOnce() -> las::Result<T>) -> Result<T, PointsError> {
+    match catch_unwind(AssertUnwindSafe(decode)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(error)) => Err(PointsError::damaged(path, error)),
+        Err(_) => Err(PointsError::damaged(path, "its points cannot be decoded")),
+    }
+}

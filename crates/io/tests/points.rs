@@ -1,0 +1,126 @@
+//! Point clouds as surface models: LAS and LAZ, coordinate systems, noise, and files that lie.
+
+use std::path::{Path, PathBuf};
+
+use geodesy::{Crs, VerticalDatum};
+use io::points::{GriddedPoints, PointCloud, PointsError, is_point_cloud};
+use las::point::Classification;
+use las::{Builder, Point, Transform, Vector, Version, Writer};
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+const WEST: f64 = 436_078.0;
+const NORTH: f64 = 3_357_752.0;
+
+fn point(x: f64, y: f64, z: f64, class: u8) -> Point {
+    let classification = Classification::new(class).unwrap();
+    Point { x: WEST + x, y: NORTH - y, z, classification, gps_time: Some(0.0), ..Point::default() }
+}
+
+/// Four points: two in one cell, one of noise above all, one withheld.
+fn points() -> Vec<Point> {
+    let withheld = Point { is_withheld: true, ..point(0.2, 0.2, 70.0, 1) };
+    vec![
+        point(0.1, 0.1, 12.0, 2),
+        point(0.3, 0.4, 17.5, 6),
+        point(0.6, 0.2, 500.0, 18),
+        withheld,
+        point(2.4, 1.4, 13.25, 2),
+    ]
+}
+
+fn write(folder: &TempDir, name: &str, crs: Option<Crs>, points: &[Point]) -> PathBuf {
+    let path = folder.path().join(name);
+    let mut builder = Builder::from(Version::new(1, 4));
+    builder.point_format = las::point::Format::new(6).unwrap();
+    builder.point_format.is_compressed = name.ends_with("laz");
+    let axis = |offset| Transform { scale: 0.001, offset };
+    builder.transforms = Vector { x: axis(WEST), y: axis(NORTH), z: axis(0.0) };
+    let mut header = builder.into_header().unwrap();
+    if let Some(crs) = crs {
+        header.set_wkt_crs(crs.wkt().unwrap().into_bytes()).unwrap();
+    }
+    let mut writer = Writer::from_path(&path, header).unwrap();
+    points.iter().for_each(|p| writer.write_point(p.clone()).unwrap());
+    writer.close().unwrap();
+    path
+}
+
+fn gridded(path: &Path) -> Result<GriddedPoints, PointsError> {
+    PointCloud::open(path)?.highest((0.5, 0.5), (WEST, NORTH))
+}
+
+#[test]
+fn the_highest_point_of_a_cell_that_is_no_noise_is_its_height() {
+    let folder = TempDir::new().unwrap();
+    for name in ["cloud.las", "cloud.laz"] {
+        let crs = Crs { horizontal: 32617, vertical: VerticalDatum::Egm96 };
+        let path = write(&folder, name, Some(crs), &points());
+        assert!(is_point_cloud(&path));
+        let found = gridded(&path).unwrap();
+        let dem = &found.dem;
+        assert_eq!((dem.horizontal_epsg, dem.vertical), (Some(32617), Some(VerticalDatum::Egm96)), "{name}");
+        assert_eq!((found.points, found.left_out), (5, 2), "{name}");
+        assert_eq!((dem.geotransform.0[0], dem.geotransform.0[3]), (WEST, NORTH), "{name}");
+        assert_eq!((dem.heights[(0, 0)], found.classes[(0, 0)]), (17.5, Some(6)), "{name}");
+        assert_eq!((dem.heights[(4, 2)], found.classes[(4, 2)]), (13.25, Some(2)), "{name}");
+        assert_eq!(dem.heights.data().iter().filter(|h| h.is_finite()).count(), 2, "{name}");
+    }
+}
+
+#[test]
+fn a_cloud_without_a_coordinate_system_says_so() {
+    let folder = TempDir::new().unwrap();
+    let found = gridded(&write(&folder, "bare.las", None, &points())).unwrap();
+    assert_eq!((found.dem.horizontal_epsg, found.dem.crs_wkt, found.dem.vertical), (None, None, None));
+}
+
+#[test]
+fn clouds_that_make_no_surface_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let noise = write(&folder, "noise.las", None, &[point(0.0, 0.0, 1.0, 7)]);
+    assert!(matches!(gridded(&noise), Err(PointsError::NoPoints { points: 1, .. })));
+    let far = write(&folder, "far.las", None, &[point(0.0, 0.0, 1.0, 2), point(9e5, 9e5, 1.0, 2)]);
+    let error = gridded(&far).unwrap_err().to_string();
+    assert!(error.contains("larger cells") && error.ends_with("far.las"), "{error}");
+    let text = folder.path().join("text.las");
+    std::fs::write(&text, "no points").unwrap();
+    assert!(!is_point_cloud(&text));
+    assert!(gridded(&text).unwrap_err().to_string().contains("LASF"));
+    assert!(matches!(gridded(&folder.path().join("missing.las")), Err(PointsError::Unreadable { .. })));
+}
+
+#[test]
+fn an_extended_record_that_does_not_fit_is_refused_before_it_is_read() {
+    let folder = TempDir::new().unwrap();
+    let path = write(&folder, "cloud.las", None, &points());
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[235..243].copy_from_slice(&100u64.to_le_bytes());
+    bytes[243..247].copy_from_slice(&1u32.to_le_bytes());
+    bytes[120..128].copy_from_slice(&(u64::MAX / 2).to_le_bytes());
+    std::fs::write(&path, bytes).unwrap();
+    assert!(gridded(&path).unwrap_err().to_string().contains("extended record"));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn damaged_files_end_in_an_error_or_a_grid(
+        changes in prop::collection::vec((0usize..900, any::<u8>()), 1..12), cut in 0usize..900, compressed in any::<bool>(),
+    ) {
+        let folder = TempDir::new().unwrap();
+        let path = write(&folder, if compressed { "cloud.laz" } else { "cloud.las" }, None, &points());
+        let mut bytes = std::fs::read(&path).unwrap();
+        for (at, value) in changes {
+            let at = at % bytes.len();
+            bytes[at] = value;
+        }
+        if cut % 3 == 0 {
+            bytes.truncate(cut);
+        }
+        std::fs::write(&path, bytes).unwrap();
+        if let Ok(found) = gridded(&path) {
+            prop_assert!(found.left_out < found.points);
+        }
+    }
+}
