@@ -1,38 +1,53 @@
 //! `skysweep eval`: how far a surface model is from a reference.
 
+mod grids;
 mod inputs;
-mod report;
+mod output;
+mod vertical;
 
 use std::path::PathBuf;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use eval::{Alignment, EvalConfig, EvalInput, Evaluation, evaluate};
-use geodesy::{Crs, VerticalDatum};
-use io::raster::{Band, BandData, CogRaster, write_cog};
+use geodesy::VerticalDatum;
+use report::{EvaluationReport, Protocol};
 
-use crate::{Outcome, print};
+use crate::{Global, Outcome, print};
 use inputs::Inputs;
+use output::Target;
 
 /// Arguments of `skysweep eval`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The surface model that is evaluated, on any grid.
     test: PathBuf,
-    /// The surface model that is believed; errors are measured at its cells.
+    /// The surface model that is believed, or a LAS or LAZ point cloud; errors are measured at its cells.
     #[arg(value_name = "REF")]
     reference: PathBuf,
     /// What is removed before the comparison.
     #[arg(long, value_enum, default_value_t = Align::Xyz)]
     align: Align,
-    /// Radius of the horizontal search of --align xyz, in metres.
+    /// Radius of the horizontal search of --align xyz and nuth-kaab, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 5.0)]
     search_m: f64,
     /// Class raster on any grid (read at the nearest cell): one more column per class.
     #[arg(long, value_name = "FILE")]
     classes: Option<PathBuf>,
     /// Classes that are left out of everything, the alignment too (water is often 9).
-    #[arg(long, value_name = "N", value_delimiter = ',', requires = "classes", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_delimiter = ',', allow_negative_numbers = true)]
     skip: Vec<i32>,
+    /// Raster on any grid: only cells where it is not zero count (read at the nearest cell).
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+    /// Terrain model, for what stands above it [default: from the class ground, else estimated from REF].
+    #[arg(long, value_name = "FILE")]
+    dtm: Option<PathBuf>,
+    /// Least height above the terrain of what stands, in metres.
+    #[arg(long, value_name = "METRES", default_value_t = EvalConfig::default().standing_m)]
+    standing_m: f64,
+    /// Side of the cells into which a point cloud REF is laid, in metres [default: TEST's].
+    #[arg(long, value_name = "METRES")]
+    ref_cell: Option<f64>,
     /// Thresholds of completeness_T and pag_T, in metres.
     #[arg(long, value_name = "METRES", value_delimiter = ',', default_value = "0.5,1,2.5,7.5")]
     thresholds: Vec<f64>,
@@ -42,10 +57,20 @@ pub(crate) struct Args {
     /// What REF's heights are above, likewise.
     #[arg(long, value_name = "DATUM")]
     ref_vertical: Option<VerticalDatum>,
+    /// Folder for report.html, report.json and the error map [default: RUN/eval for a surface model RUN/dsm/dsm.tif that
+    /// skysweep made, else none].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Write the page alone to this file.
+    #[arg(long, value_name = "OUT.html")]
+    html: Option<PathBuf>,
+    /// Write no report that was not asked for.
+    #[arg(long, conflicts_with = "output")]
+    no_report: bool,
     /// Write the errors (test − reference, metres) on the reference grid to this file.
     #[arg(long, value_name = "OUT.tif")]
     error_map: Option<PathBuf>,
-    /// Replace an error map that exists.
+    /// Replace files that exist, also those that no evaluation wrote.
     #[arg(long)]
     overwrite: bool,
     /// Print JSON instead of a table.
@@ -68,6 +93,8 @@ enum Align {
     Z,
     /// The translation with the least NMAD, then the median of the differences.
     Xyz,
+    /// The translation that slopes and aspects tell (Nuth and Kääb 2011), then the median of the differences.
+    NuthKaab,
 }
 
 impl From<Align> for Alignment {
@@ -76,6 +103,7 @@ impl From<Align> for Alignment {
             Align::None => Self::None,
             Align::Z => Self::Z,
             Align::Xyz => Self::Xyz,
+            Align::NuthKaab => Self::NuthKaab,
         }
     }
 }
@@ -102,30 +130,64 @@ impl std::str::FromStr for LeastCompleteness {
 }
 
 /// Runs `skysweep eval`.
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if let Some(max_mae) = args.max_mae {
         ensure!(max_mae >= 0.0, "--max-mae is {max_mae}, expected a number of metres");
     }
-    let config = config(args);
-    let mut inputs = Inputs::read(args)?;
+    let (config, target) = (config(args), Target::of(args));
+    output::check(args, target.as_ref())?;
+    let inputs = Inputs::read(args, config.alignment)?;
     let input = EvalInput {
-        test: &inputs.test.heights,
-        reference: &inputs.reference.heights,
-        test_from_reference: &inputs.test_from_reference,
-        metres_from_cells: inputs.metres_from_cells,
-        classes: inputs.classes.as_ref(),
+        classes: inputs.classes.as_ref().map(|(classes, _)| classes),
+        mask: inputs.mask.as_ref(),
+        terrain: inputs.terrain.as_ref(),
+        ..EvalInput::new(
+            &inputs.test.heights,
+            &inputs.reference.heights,
+            &inputs.test_from_reference,
+            inputs.metres_from_cells,
+        )
     };
     let found = evaluate(&input, &config)?;
-    inputs.notes.extend(notes(&found, &config));
-    let missed = missed(args, &found);
-    if let Some(path) = &args.error_map {
-        write_error_map(path, &inputs, &found, args.overwrite)?;
+    let protocol = protocol(args, config, &inputs, &found);
+    let report = EvaluationReport { protocol: &protocol, found: &found, reference: &inputs.reference.heights };
+    let written = output::write(args, target.as_ref(), &inputs, &report)?;
+    if args.json {
+        print::json(&report.json())?;
+    } else {
+        print::text(&report.table())?;
+        if !global.is_quiet() {
+            print::text(&(written.join("\n") + "\n"))?;
+        }
     }
-    let run = report::Run { args, config: &config, inputs: &inputs, found: &found, missed: &missed };
-    let text = if args.json { run.json()? } else { run.table() };
-    print::text(&text)?;
-    missed.iter().for_each(|line| tracing::error!("{line}"));
-    Ok(if missed.is_empty() { Outcome::Complete } else { Outcome::Partial })
+    protocol.missed.iter().for_each(|line| tracing::error!("{line}"));
+    Ok(if protocol.missed.is_empty() { Outcome::Complete } else { Outcome::Partial })
+}
+
+/// What the numbers mean, from arguments and inputs.
+fn protocol(args: &Args, config: EvalConfig, inputs: &Inputs, found: &Evaluation) -> Protocol {
+    let reference = &inputs.reference;
+    let crs = match (reference.horizontal_epsg, &reference.crs_wkt) {
+        (Some(code), _) => format!("EPSG:{code}"),
+        (None, Some(_)) => "a coordinate system without an EPSG code".into(),
+        (None, None) => "no coordinate system".into(),
+    };
+    let name = |path: &PathBuf| path.display().to_string();
+    Protocol {
+        test: name(&args.test),
+        reference: name(&args.reference),
+        size: (reference.heights.width(), reference.heights.height()),
+        cell_m: inputs.metres_from_cells.cell_size_m(),
+        crs,
+        horizontal_epsg: reference.horizontal_epsg,
+        vertical: inputs.vertical.clone(),
+        classes: inputs.classes.as_ref().map(|(_, source)| source.clone()),
+        mask: args.mask.as_ref().map(name),
+        terrain: args.dtm.as_ref().map(name),
+        notes: inputs.notes.iter().cloned().chain(notes(found, &config)).collect(),
+        missed: missed(args, found),
+        config,
+    }
 }
 
 fn config(args: &Args) -> EvalConfig {
@@ -133,7 +195,13 @@ fn config(args: &Args) -> EvalConfig {
     thresholds_m.extend(args.min_completeness.iter().map(|least| least.threshold_m));
     thresholds_m.sort_by(f64::total_cmp);
     thresholds_m.dedup();
-    EvalConfig { alignment: args.align.into(), search_m: args.search_m, thresholds_m, skip: args.skip.clone() }
+    EvalConfig {
+        alignment: args.align.into(),
+        search_m: args.search_m,
+        thresholds_m,
+        skip: args.skip.clone(),
+        standing_m: args.standing_m,
+    }
 }
 
 /// What a reader of the numbers must know.
@@ -154,6 +222,12 @@ fn notes(found: &Evaluation, config: &EvalConfig) -> Vec<String> {
             );
         }
     }
+    if let Some(nk) = found.nuth_kaab.filter(|nk| !nk.converged) {
+        notes.push(format!(
+            "nuth-kaab did not settle (last correction {:.3} m, NMAD {:.3} m before and {:.3} m after): compare with --align xyz",
+            nk.last_step_m, nk.nmad_before_m, nk.nmad_after_m
+        ));
+    }
     if !config.skip.is_empty() && found.skipped_cells == 0 {
         notes.push("no valid reference cell has a skipped class".into());
     }
@@ -170,13 +244,4 @@ fn missed(args: &Args, found: &Evaluation) -> Vec<String> {
         (share < *needed).then(|| format!("completeness_{threshold_m} is {share:.4}, required are {needed}"))
     });
     mae.into_iter().chain(completeness).collect()
-}
-
-fn write_error_map(path: &PathBuf, inputs: &Inputs, found: &Evaluation, overwrite: bool) -> anyhow::Result<()> {
-    let horizontal = inputs.reference.horizontal_epsg.context(
-        "an error map takes the coordinate system of the reference, which has no EPSG code: leave --error-map out",
-    )?;
-    let bands = [Band { description: "error_m", data: BandData::F32(&found.errors) }];
-    let raster = CogRaster::new(&bands, inputs.reference.geotransform, Crs::ellipsoidal(horizontal));
-    Ok(write_cog(path, &raster, overwrite)?)
 }

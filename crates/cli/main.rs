@@ -83,7 +83,7 @@ fn main() -> ExitCode {
 fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Dsm(args) => dsm::run(args, cli.global),
-        Command::Eval(args) => eval::run(args),
+        Command::Eval(args) => eval::run(args, cli.global),
         Command::Rpc(args) => rpc::run(args),
         Command::Simulate(args) => simulate::run(args, cli.global),
     }

@@ -1,21 +1,25 @@
-//! Two surface models and their classes, read and brought to one vertical datum.
+//! Two surface models, classes, mask and terrain, read and brought to one grid and one vertical datum.
 //!
 //! What a file leaves open is decided here, and every decision that could be wrong is noted for the output.
 
-use std::path::Path;
-
-use anyhow::{Context, bail, ensure};
-use eval::{CellMap, MetresFromCells, convert_heights, nearest};
-use geodesy::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum, meridian_radius_m, prime_vertical_radius_m};
-use io::raster::{Dem, ImageSource, read_dem};
-use raster::{GeoTransform, Grid};
+use anyhow::ensure;
+use eval::{Alignment, CellMap, MetresFromCells};
+use io::points::{PointCloud, is_point_cloud};
+use io::raster::{Dem, read_dem};
+use raster::Grid;
 
 use super::Args;
+use super::grids::{
+    cell_map, definition, metres_per_unit, metres_per_unit_at, numbers_on_reference, surface_on_reference,
+};
+use super::vertical::{Stated, bring_terrain};
 
 /// Cells beyond the search radius for which the map between the grids must hold.
 const MARGIN_CELLS: f64 = 4.0;
-/// Most cells of a class raster.
-const CELLS_MAX: usize = 1 << 30;
+/// A reference made from points is worth a note when fewer of its cells hold one.
+const SPARSE: f64 = 0.7;
+/// Classes of points that nobody has classified.
+const UNCLASSIFIED: [i32; 2] = [0, 1];
 
 /// What is compared.
 pub(super) struct Inputs {
@@ -23,8 +27,12 @@ pub(super) struct Inputs {
     pub(super) reference: Dem,
     pub(super) test_from_reference: CellMap,
     pub(super) metres_from_cells: MetresFromCells,
+    /// On the reference grid, with where they come from.
+    pub(super) classes: Option<(Grid<Option<i32>>, String)>,
     /// On the reference grid.
-    pub(super) classes: Option<Grid<Option<i32>>>,
+    pub(super) mask: Option<Grid<bool>>,
+    /// On the reference grid, above its datum.
+    pub(super) terrain: Option<Grid<f32>>,
     /// The datum of both, in words.
     pub(super) vertical: String,
     /// Decisions and doubts.
@@ -32,9 +40,10 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    pub(super) fn read(args: &Args) -> anyhow::Result<Self> {
-        let (mut test, reference) = (read_dem(&args.test)?, read_dem(&args.reference)?);
+    pub(super) fn read(args: &Args, alignment: Alignment) -> anyhow::Result<Self> {
         let mut notes = Vec::new();
+        let mut test = read_dem(&args.test)?;
+        let (reference, point_classes) = reference(args, &test, &mut notes)?;
         for dem in [&test, &reference] {
             if dem.crs_wkt.is_none() {
                 notes.push(format!("no coordinate system, taken as that of the other file: {}", dem.path.display()));
@@ -48,157 +57,57 @@ impl Inputs {
         let test_from_reference = cell_map(&reference, &test.geotransform, definition(&test), margin)?;
         let stated =
             Stated { test: args.test_vertical.or(test.vertical), reference: args.ref_vertical.or(reference.vertical) };
-        let vertical = stated.reconcile(&mut test, &mut notes)?;
-        let classes = args.classes.as_deref().map(|path| classes(path, &reference, &mut notes)).transpose()?;
-        Ok(Self { test, reference, test_from_reference, metres_from_cells, classes, vertical, notes })
-    }
-}
-
-/// The name of a file's CRS for PROJ; `None` where it has none.
-fn definition(dem: &Dem) -> Option<String> {
-    dem.horizontal_epsg.map(|code| format!("EPSG:{code}")).or_else(|| dem.crs_wkt.clone())
-}
-
-fn projection(definition: &str, path: &Path) -> anyhow::Result<MapProjection> {
-    MapProjection::from_definition(definition).with_context(|| format!("its coordinate system: {}", path.display()))
-}
-
-/// Metres per map unit of the reference along x and y, at its middle.
-fn metres_per_unit(dem: &Dem) -> anyhow::Result<(f64, f64)> {
-    let Some(definition) = definition(dem) else { return Ok((1.0, 1.0)) };
-    if let Some(metres) = projection(&definition, &dem.path)?.metres_per_unit() {
-        return Ok((metres, metres));
-    }
-    let (column, row) = (dem.heights.width() as f64 / 2.0, dem.heights.height() as f64 / 2.0);
-    let lat = dem.geotransform.map_from_cell(column, row).1;
-    let per_degree = 1.0_f64.to_radians();
-    let (east, north) = (prime_vertical_radius_m(lat) * lat.to_radians().cos(), meridian_radius_m(lat));
-    Ok((east * per_degree, north * per_degree))
-}
-
-/// The map from the cells of the reference to those of a grid with a CRS of its own (or, without, that of the reference).
-fn cell_map(
-    reference: &Dem,
-    other: &GeoTransform,
-    other_crs: Option<String>,
-    margin: usize,
-) -> anyhow::Result<CellMap> {
-    let (from, to) = match (definition(reference), other_crs) {
-        (Some(from), Some(to)) if from != to => (from, to),
-        _ => return Ok(CellMap::affine(&reference.geotransform, other)?),
-    };
-    let (from, to) = (projection(&from, &reference.path)?, MapProjection::from_definition(&to)?);
-    let size = (reference.heights.width(), reference.heights.height());
-    let project = |x, y| {
-        let (lon, lat) = from.lonlat_from_map(x, y).ok()?;
-        let point = to.map_from_lonlat(lon, lat).ok()?;
-        Some((point.x, point.y))
-    };
-    Ok(CellMap::projected(&reference.geotransform, other, size, margin, project)?)
-}
-
-/// What the heights of the two are above, as far as files and options say.
-struct Stated {
-    test: Option<VerticalDatum>,
-    reference: Option<VerticalDatum>,
-}
-
-impl Stated {
-    /// Brings the test heights to the reference's datum; says in words which that is.
-    fn reconcile(&self, test: &mut Dem, notes: &mut Vec<String>) -> anyhow::Result<String> {
-        let (test_datum, reference_datum) = match (self.test, self.reference) {
-            (None, None) => {
-                notes.push("neither file says what its heights are above: taken as the same".into());
-                return Ok("not stated".into());
+        let datum = stated.reconcile(&mut test, alignment, &mut notes)?;
+        let classes = match &args.classes {
+            Some(path) => {
+                Some((numbers_on_reference(path, "class", &reference, &mut notes)?, path.display().to_string()))
             }
-            (Some(test), Some(reference)) => (test, reference),
-            (Some(VerticalDatum::Ellipsoid), None) => {
-                notes.push(
-                    "the reference does not say what its heights are above: taken as the ellipsoid, as the test's"
-                        .into(),
-                );
-                (VerticalDatum::Ellipsoid, VerticalDatum::Ellipsoid)
-            }
-            (None, Some(VerticalDatum::Ellipsoid)) => {
-                notes.push(
-                    "the test does not say what its heights are above: taken as the ellipsoid, as the reference's"
-                        .into(),
-                );
-                (VerticalDatum::Ellipsoid, VerticalDatum::Ellipsoid)
-            }
-            (Some(datum), None) => bail!(
-                "the test's heights are above {datum}, the reference does not say what its own are above: give --ref-vertical"
-            ),
-            (None, Some(datum)) => bail!(
-                "the reference's heights are above {datum}, the test does not say what its own are above: give --test-vertical"
-            ),
+            None => point_classes.map(|classes| (classes, "those of the reference's points".to_owned())),
         };
-        if test_datum != reference_datum {
-            convert(test, test_datum, reference_datum)?;
-            notes.push(format!("the test's heights were converted from {test_datum} to {reference_datum}"));
-        }
-        Ok(reference_datum.to_string())
-    }
-}
-
-fn convert(test: &mut Dem, from: VerticalDatum, to: VerticalDatum) -> anyhow::Result<()> {
-    let definition = definition(test).with_context(|| {
-        format!(
-            "heights can be converted from {from} to {to} only in a known coordinate system, there is none: {}",
-            test.path.display()
-        )
-    })?;
-    let (along_columns, along_rows) = MetresFromCells::new(&test.geotransform, metres_per_unit(test)?).cell_size_m();
-    let projection = projection(&definition, &test.path)?;
-    let (from, to) = (HeightConverter::new(from)?, HeightConverter::new(to)?);
-    let cell_m = along_columns.max(along_rows);
-    Ok(convert_heights(&mut test.heights, &test.geotransform, cell_m, &projection, &from, &to)?)
-}
-
-/// The class of each reference cell.
-fn classes(path: &Path, reference: &Dem, notes: &mut Vec<String>) -> anyhow::Result<Grid<Option<i32>>> {
-    let source = ImageSource::open(path)?;
-    let info = source.info();
-    ensure!(info.bands == 1, "{} bands, expected the one of a class raster: {}", info.bands, path.display());
-    let cells = info.width.saturating_mul(info.height);
-    ensure!(cells <= CELLS_MAX, "{cells} cells, at most 2^30 are read as classes: {}", path.display());
-    let own = whole_numbers(&source.read_luma(source.window())?.luma, path)?;
-    let (width, height) = (reference.heights.width(), reference.heights.height());
-    let Some(geotransform) = info.geotransform else {
-        ensure!(
-            (own.width(), own.height()) == (width, height),
-            "the class raster has no georeference and {} x {} cells, the reference {width} x {height}: give one that names \
-             its position: {}",
-            own.width(),
-            own.height(),
-            path.display()
-        );
-        notes.push(
-            "the class raster has no georeference: taken as on the grid of the reference, which has its size".into(),
-        );
-        return Ok(own);
-    };
-    let crs = info.crs_wkt.as_deref().map(|wkt| {
-        Ok::<_, anyhow::Error>(match CrsIdentity::of(wkt)?.horizontal {
-            Some(code) => format!("EPSG:{code}"),
-            None => wkt.to_owned(),
+        let mask = args.mask.as_deref().map(|path| numbers_on_reference(path, "mask", &reference, &mut notes));
+        let terrain = args.dtm.as_deref().map(|path| -> anyhow::Result<Grid<f32>> {
+            let mut terrain = read_dem(path)?;
+            bring_terrain(&mut terrain, datum, &mut notes)?;
+            surface_on_reference(&terrain, &reference)
+        });
+        Ok(Self {
+            test_from_reference,
+            metres_from_cells,
+            classes,
+            mask: mask.transpose()?.map(|mask| mask.map(|&value| value.is_some_and(|value| value != 0))),
+            terrain: terrain.transpose()?,
+            vertical: datum.map_or_else(|| "not stated".into(), |datum| datum.to_string()),
+            test,
+            reference,
+            notes,
         })
-    });
-    let map = cell_map(reference, &geotransform, crs.transpose()?, 0)?;
-    let mut on_reference = Grid::filled(width, height, None);
-    for row in 0..height {
-        for (column, class) in on_reference.row_mut(row).iter_mut().enumerate() {
-            let (x, y) = map.position(column as f64, row as f64);
-            *class = nearest(&own, x, y).flatten();
-        }
     }
-    Ok(on_reference)
 }
 
-fn whole_numbers(values: &Grid<f32>, path: &Path) -> anyhow::Result<Grid<Option<i32>>> {
-    let class = |&value: &f32| (value.is_finite() && value.fract() == 0.0).then_some(value as i32);
-    if let Some(odd) = values.data().iter().find(|v| v.is_finite() && class(v).is_none()) {
-        bail!("the class raster holds {odd}, expected whole numbers: {}", path.display());
+/// The reference, and the classes of its points where it is a classified cloud.
+fn reference(args: &Args, test: &Dem, notes: &mut Vec<String>) -> anyhow::Result<(Dem, Option<Grid<Option<i32>>>)> {
+    if !is_point_cloud(&args.reference) {
+        return Ok((read_dem(&args.reference)?, None));
     }
-    Ok(values.map(class))
+    let test_metres = metres_per_unit(test)?;
+    let (along_columns, along_rows) = MetresFromCells::new(&test.geotransform, test_metres).cell_size_m();
+    let cell_m = args.ref_cell.unwrap_or(along_columns.max(along_rows));
+    ensure!(cell_m.is_finite() && cell_m > 0.0, "--ref-cell is {cell_m}, expected a positive number of metres");
+    let cloud = PointCloud::open(&args.reference)?;
+    let metres = metres_per_unit_at(cloud.crs_definition(), cloud.centre().1, &args.reference)?;
+    // The corners of the test's cells, where its grid is of the same kind: then nothing is interpolated.
+    let anchor = (test.geotransform.0[0], test.geotransform.0[3]);
+    let gridded = cloud.highest((cell_m / metres.0, cell_m / metres.1), anchor)?;
+    let (dem, classes) = (gridded.dem, gridded.classes);
+    let filled = dem.heights.data().iter().filter(|h| h.is_finite()).count();
+    let share = filled as f64 / dem.heights.data().len().max(1) as f64;
+    notes.push(format!(
+        "the reference is a point cloud: the highest of {} points in each cell of {cell_m} m ({} left out)",
+        gridded.points, gridded.left_out
+    ));
+    if share < SPARSE {
+        notes.push(format!("only {:.0} % of the reference's cells hold a point: see --ref-cell", 100.0 * share));
+    }
+    let classified = classes.data().iter().flatten().any(|class| !UNCLASSIFIED.contains(class));
+    Ok((dem, classified.then_some(classes)))
 }

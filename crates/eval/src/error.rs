@@ -47,7 +47,7 @@ pub enum EvalError {
         height: usize,
     },
     /// Classes are to be skipped but none were given.
-    #[error("classes are to be skipped, but there is no class raster: give one")]
+    #[error("classes are to be skipped, but there are none: give a class raster (--classes)")]
     SkipWithoutClasses,
     /// A geotransform cannot be inverted, or holds values that are not finite.
     #[error("the geotransform {0:?} cannot be inverted: a grid needs cells with an area")]

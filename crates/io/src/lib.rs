@@ -7,3 +7,5 @@ pub mod city;
 pub mod points;
 pub mod raster;
 pub mod rpc;
+
+pub use raster::write_bytes;

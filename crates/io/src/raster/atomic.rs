@@ -33,6 +33,17 @@ pub(crate) fn write_whole(
     std::fs::rename(&made, path).map_err(|error| RasterError::unwritable(path, plain(&error)))
 }
 
+/// Writes a file whole.
+///
+/// # Errors
+/// [`RasterError::Exists`] without `overwrite`, [`RasterError::Unwritable`].
+pub fn write_bytes(path: impl AsRef<Path>, bytes: &[u8], overwrite: bool) -> Result<(), RasterError> {
+    let path = path.as_ref();
+    write_whole(path, overwrite, |made| {
+        std::fs::write(made, bytes).map_err(|error| RasterError::unwritable(path, plain(&error)))
+    })
+}
+
 /// The system's answer without the temporary name that `tempfile` adds.
 fn plain(error: &std::io::Error) -> String {
     error.kind().to_string()

@@ -13,6 +13,7 @@ mod luma;
 mod png;
 mod source;
 
+pub use atomic::write_bytes;
 pub use dem::{Dem, read_dem, read_dem_window};
 pub use error::RasterError;
 pub use geotiff::{Band, BandData, CogRaster, Sampling, write_cog, write_image_with_rpc};

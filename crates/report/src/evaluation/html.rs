@@ -1,0 +1,120 @@
+//! The page: headline numbers, protocol, pictures, plots, tables.
+
+use super::EvaluationReport;
+use super::numbers::{grouped, percent};
+use crate::page::{escape, page};
+use crate::picture::PictureError;
+
+impl EvaluationReport<'_> {
+    /// The whole page.
+    ///
+    /// # Errors
+    /// [`PictureError`] for a grid without cells.
+    pub fn html(&self) -> Result<String, PictureError> {
+        let title = format!("{} against {}", short(&self.protocol.test), short(&self.protocol.reference));
+        let body = [
+            format!("<h1>{}</h1>", escape(&title)),
+            format!("<p class=\"lead\">{}</p>", self.lead()),
+            self.cards(),
+            self.notes(),
+            "<h2>Pictures</h2>".to_owned(),
+            self.pictures()?,
+            "<h2>How the errors are distributed</h2>".to_owned(),
+            self.plots(),
+            "<h2>Buildings and trees</h2>".to_owned(),
+            self.standing_table(),
+            format!("<p>{}</p>", self.overreach()),
+            "<h2>All numbers</h2>".to_owned(),
+            self.metric_table(),
+            "<h2>By slope</h2>".to_owned(),
+            self.slope_table(),
+            "<h2>Protocol</h2>".to_owned(),
+            self.protocol_list(),
+        ];
+        Ok(page(&title, &body.join("\n")))
+    }
+
+    /// The result in a sentence.
+    fn lead(&self) -> String {
+        let overall = &self.found.overall;
+        let cell = self.protocol.cell_m.0;
+        let cells = format!("{} cells of {cell:.2} m", grouped(overall.reference_cells));
+        let Some(errors) = overall.errors else { return format!("Of {cells}, none has a height to compare.") };
+        let coverage = percent(overall.valid_ratio());
+        format!(
+            "Of {cells}, {coverage} % have a height. Two thirds of these are within {:.2} m (LE68), nine in ten within {:.2} m (LE90).",
+            errors.le68, errors.le90
+        )
+    }
+
+    fn cards(&self) -> String {
+        let overall = &self.found.overall;
+        let metres = |value: Option<f64>| (value.map_or("–".into(), |v| format!("{v:.3}")), "m");
+        let errors = overall.errors;
+        let share = |value: Option<f64>| (percent(value), "%");
+        let one = [1.0].into_iter().chain(overall.below.iter().map(|(t, _)| *t));
+        let threshold = one.into_iter().find(|&t| overall.completeness(t).is_some());
+        let within = threshold.map_or("completeness".to_owned(), |t| format!("of all cells within {t} m"));
+        let cards = [
+            (metres(errors.map(|e| e.mae)), "mean absolute error".to_owned()),
+            (metres(errors.map(|e| e.rmse)), "root mean square error".to_owned()),
+            (metres(errors.map(|e| e.nmad)), "NMAD, the robust spread".to_owned()),
+            (metres(errors.map(|e| e.mean)), "bias".to_owned()),
+            (share(threshold.and_then(|t| overall.completeness(t))), within),
+            (share(self.found.standing.volume.iou()), "volume IoU above the terrain".to_owned()),
+        ];
+        let cards = cards.map(|((value, unit), text)| {
+            format!("<div class=\"card\"><b>{value} <small>{unit}</small></b><span>{}</span></div>", escape(&text))
+        });
+        format!("<div class=\"cards\">{}</div>", cards.concat())
+    }
+
+    fn notes(&self) -> String {
+        let all: String = self
+            .protocol
+            .missed
+            .iter()
+            .map(|missed| format!("<li><b>missed:</b> {}</li>", escape(missed)))
+            .chain(self.protocol.notes.iter().map(|note| format!("<li>{}</li>", escape(note))))
+            .collect();
+        if all.is_empty() { String::new() } else { format!("<div class=\"notes\"><ul>{all}</ul></div>") }
+    }
+
+    fn overreach(&self) -> String {
+        let sharpness = &self.found.sharpness;
+        let places = format!("{} of {} places", grouped(sharpness.measured), grouped(sharpness.edges));
+        match sharpness.overreach_m {
+            Some(e) => format!(
+                "Roof edges reach out by {:+.2} m (median; NMAD {:.2} m, LE90 {:.2} m), measured at {places} where the reference \
+                 is level on both sides of a jump. Positive is too large.",
+                e.median, e.nmad, e.le90
+            ),
+            None => format!("The overreach of roof edges could not be measured ({places})."),
+        }
+    }
+
+    fn protocol_list(&self) -> String {
+        let lines = self.protocol.lines(self.found);
+        let items: String =
+            lines.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{}</dd>", escape(text))).collect();
+        format!("<dl>{items}</dl>")
+    }
+}
+
+/// The last three parts of a path: enough to know it by.
+fn short(path: &str) -> String {
+    let parts: Vec<&str> = path.split(['/', '\\']).filter(|part| !part.is_empty() && *part != ".").collect();
+    parts[parts.len().saturating_sub(3)..].join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn a_path_is_known_by_its_end() {
+        assert_eq!(short("/tmp/a/d/dsm/dsm.tif"), "d/dsm/dsm.tif");
+        assert_eq!(short("./dsm.tif"), "dsm.tif");
+        assert_eq!(short(""), "");
+    }
+}

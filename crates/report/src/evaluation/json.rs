@@ -1,0 +1,70 @@
+//! The same for programs.
+
+use eval::{Metrics, Overlap, cumulative, histogram};
+use serde_json::{Map, Value, json};
+
+use super::EvaluationReport;
+use super::numbers::is_count;
+
+/// What marks a file as ours.
+const GENERATOR: &str = concat!("skysweep eval ", env!("CARGO_PKG_VERSION"));
+
+impl EvaluationReport<'_> {
+    /// Every number, by name.
+    pub fn json(&self) -> Value {
+        let (found, protocol) = (self.found, self.protocol);
+        let classes: Map<String, Value> =
+            found.classes.iter().map(|c| (c.class.to_string(), metrics_json(&c.metrics))).collect();
+        let slopes = found.slopes.iter().map(
+            |bin| json!({ "from_deg": bin.from_deg, "to_deg": bin.to_deg, "metrics": metrics_json(&bin.metrics) }),
+        );
+        json!({
+            "generator": GENERATOR,
+            "test": protocol.test,
+            "reference": protocol.reference,
+            "protocol": protocol.json(found),
+            "shift": found.shift,
+            "metrics": metrics_json(&found.overall),
+            "classes": classes,
+            "slopes": slopes.collect::<Vec<_>>(),
+            "edges": { "edge": metrics_json(&found.edges.edge), "rest": metrics_json(&found.edges.rest) },
+            "sharpness": found.sharpness,
+            "standing": {
+                "threshold_m": found.standing.threshold_m,
+                "footprint_m2": overlap_json(&found.standing.footprint),
+                "volume_m3": overlap_json(&found.standing.volume),
+            },
+            "histogram": histogram(&found.errors, self.plot_range_m()),
+            "cumulative": cumulative(&found.errors, self.plot_range_m()),
+            "notes": protocol.notes,
+            "requirements_missed": protocol.missed,
+        })
+    }
+
+    /// Whether a JSON text was written by an evaluation.
+    pub fn is_ours(json: &str) -> bool {
+        let generator = serde_json::from_str::<Value>(json).ok();
+        let generator = generator.as_ref().and_then(|value| value.get("generator")?.as_str());
+        generator.is_some_and(|name| name.starts_with("skysweep eval "))
+    }
+}
+
+/// Metrics by name; numbers of cells are whole, what cannot be computed is null.
+fn metrics_json(metrics: &Metrics) -> Value {
+    let value = |name: &str, value: Option<f64>| match value {
+        Some(count) if is_count(name) => json!(count as u64),
+        other => json!(other),
+    };
+    Value::Object(metrics.named().into_iter().map(|(name, v)| (name.clone(), value(&name, v))).collect())
+}
+
+fn overlap_json(overlap: &Overlap) -> Value {
+    json!({
+        "reference": overlap.reference,
+        "test": overlap.test,
+        "shared": overlap.shared,
+        "recall": overlap.recall(),
+        "precision": overlap.precision(),
+        "iou": overlap.iou(),
+    })
+}

@@ -1,0 +1,61 @@
+//! Tables of a page.
+
+use super::EvaluationReport;
+use super::numbers::{cell, label, percent};
+use crate::page::escape;
+
+impl EvaluationReport<'_> {
+    /// Every metric for every set of cells.
+    pub(super) fn metric_table(&self) -> String {
+        let columns: Vec<_> = self.sets().into_iter().map(|(title, metrics)| (title, metrics.named())).collect();
+        let rows = self.found.overall.named().into_iter().enumerate().map(|(i, (name, _))| {
+            let values =
+                columns.iter().map(|(_, metrics)| metrics.get(i).map_or_else(String::new, |(n, v)| cell(n, *v)));
+            (label(&name), values.collect())
+        });
+        table("metric", columns.iter().map(|(title, _)| title.as_str()), rows)
+    }
+
+    /// Slopes, one row each.
+    pub(super) fn slope_table(&self) -> String {
+        let heads = ["cells", "bias m", "median m", "MAE m", "RMSE m", "NMAD m", "LE90 m"];
+        let rows = self.found.slopes.iter().filter(|bin| bin.metrics.reference_cells > 0).map(|bin| {
+            let values = bin.metrics.errors.map(|e| [e.mean, e.median, e.mae, e.rmse, e.nmad, e.le90]);
+            let metres = (0..6).map(|i| cell("mae", values.map(|values| values[i])));
+            let values = std::iter::once(bin.metrics.n.to_string()).chain(metres).collect();
+            (format!("{:.0}° to {:.0}°", bin.from_deg, bin.to_deg), values)
+        });
+        table("slope of the reference", heads.into_iter(), rows)
+    }
+
+    /// What stands above the terrain.
+    pub(super) fn standing_table(&self) -> String {
+        let standing = &self.found.standing;
+        let rows = [("footprint", "m²", standing.footprint), ("volume", "m³", standing.volume)];
+        let heads = ["recall %", "precision %", "IoU %", "reference", "evaluated", "shared"];
+        let rows = rows.into_iter().map(|(name, unit, overlap)| {
+            let shares = [overlap.recall(), overlap.precision(), overlap.iou()].map(percent);
+            let sizes = [overlap.reference, overlap.test, overlap.shared].map(|size| format!("{size:.0} {unit}"));
+            (name.to_owned(), shares.into_iter().chain(sizes).collect())
+        });
+        table("above the terrain", heads.into_iter(), rows)
+    }
+}
+
+fn table<'a>(
+    corner: &str,
+    heads: impl Iterator<Item = &'a str>,
+    rows: impl Iterator<Item = (String, Vec<String>)>,
+) -> String {
+    let heads: String = heads.map(|head| format!("<th scope=\"col\">{}</th>", escape(head))).collect();
+    let rows: String = rows
+        .map(|(name, values)| {
+            let cells: String = values.iter().map(|value| format!("<td>{}</td>", escape(value))).collect();
+            format!("<tr><th scope=\"row\">{}</th>{cells}</tr>", escape(&name))
+        })
+        .collect();
+    format!(
+        "<div class=\"wide\"><table><thead><tr><th scope=\"col\">{}</th>{heads}</tr></thead><tbody>{rows}</tbody></table></div>",
+        escape(corner)
+    )
+}

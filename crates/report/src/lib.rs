@@ -1,0 +1,22 @@
+//! Results for people and programs: pictures, plots, pages and JSON.
+//!
+//! An [`EvaluationReport`] tells one evaluation three times, always with its protocol: as text for the terminal, as JSON, and as
+//! one HTML file that needs no network, no script and no other file. [`Chart`] draws plots as SVG, inside a page or on their own.
+//! Nothing here touches a file: everything comes back as text or bytes, the same for the same input.
+
+mod base64;
+mod class;
+mod evaluation;
+mod page;
+mod palette;
+mod picture;
+mod protocol;
+mod svg;
+
+pub use class::class_title;
+pub use evaluation::EvaluationReport;
+pub use page::escape;
+pub use palette::{MISSING, OUTSIDE, diverging};
+pub use picture::{PictureError, error_picture, png};
+pub use protocol::Protocol;
+pub use svg::{Axis, Chart};

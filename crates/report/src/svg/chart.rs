@@ -1,0 +1,168 @@
+//! The frame of a plot and its marks.
+
+use std::fmt::Write;
+
+use super::Axis;
+use crate::page::escape;
+
+const WIDTH: f64 = 560.0;
+const HEIGHT: f64 = 320.0;
+/// Room for ticks and labels: left, right, top, bottom.
+const MARGINS: [f64; 4] = [58.0, 16.0, 16.0, 48.0];
+
+/// How marks look; colours are variables that a page or a plot on its own sets.
+pub(crate) const STYLE: &str = "\
+.chart text{font:12px system-ui,sans-serif;fill:var(--ink)}.chart .soft{fill:var(--soft)}\
+.chart .grid{stroke:var(--line);stroke-width:1}.chart .bar{fill:var(--a)}.chart .bar2{fill:var(--b)}\
+.chart .line{fill:none;stroke:var(--a);stroke-width:2}.chart .line2{fill:none;stroke:var(--b);stroke-width:2}\
+.chart .rule{fill:none;stroke:var(--soft);stroke-width:1;stroke-dasharray:4 3}.chart .whisker{fill:none;stroke:var(--ink);stroke-width:1.2}\
+.chart .dot{fill:var(--a);stroke:var(--paper);stroke-width:1}.chart .dot2{fill:var(--b);stroke:var(--paper);stroke-width:1}\
+.chart .dot3{fill:var(--soft);stroke:var(--paper);stroke-width:1}";
+
+/// The colours of a plot on its own.
+const COLOURS: &str = "svg{--paper:#fff;--ink:#1d2530;--soft:#66707c;--line:#e2e6ea;--a:#2667a8;--b:#c8551b;background:#fff}\
+@media(prefers-color-scheme:dark){svg{--paper:#14181d;--ink:#e4e8ec;--soft:#98a2ad;--line:#2b323a;--a:#6fb1ee;--b:#f29a63;background:#14181d}}";
+
+/// A plot under construction. Marks are drawn in the order in which they are added.
+#[derive(Debug, Clone)]
+pub struct Chart {
+    title: String,
+    x: Axis,
+    y: Axis,
+    marks: String,
+}
+
+impl Chart {
+    /// A plot with nothing in it; the title is what a screen reader says.
+    pub fn new(title: &str, x: Axis, y: Axis) -> Self {
+        Self { title: title.to_owned(), x, y, marks: String::new() }
+    }
+
+    /// A line through points; `class` is `line`, `line2` or `rule`.
+    pub fn line(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)>) {
+        let places: Vec<String> = points
+            .map(|(x, y)| {
+                let (x, y) = self.place(x, y);
+                format!("{x:.1},{y:.1}")
+            })
+            .collect();
+        self.add(format_args!("<polyline class=\"{class}\" points=\"{}\"/>", places.join(" ")));
+    }
+
+    /// A bar from the foot of the plot; `class` is `bar` or `bar2`.
+    pub fn bar(&mut self, class: &str, (from, to): (f64, f64), value: f64) {
+        let ((left, top), (right, foot)) = (self.place(from, value), self.place(to, f64::NEG_INFINITY));
+        let (width, height) = ((right - left).max(0.0), (foot - top).max(0.0));
+        self.add(format_args!(
+            "<rect class=\"{class}\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>"
+        ));
+    }
+
+    /// A vertical line between two values with a cap at the second.
+    pub fn whisker(&mut self, x: f64, from: f64, to: f64) {
+        let ((x, foot), (_, top)) = (self.place(x, from), self.place(x, to));
+        let (left, right) = (x - 5.0, x + 5.0);
+        self.add(format_args!(
+            "<path class=\"whisker\" d=\"M{x:.1} {foot:.1}V{top:.1}M{left:.1} {top:.1}H{right:.1}\"/>"
+        ));
+    }
+
+    /// A dot; `class` is `dot`, `dot2` or `dot3`.
+    pub fn dot(&mut self, class: &str, x: f64, y: f64) {
+        let (x, y) = self.place(x, y);
+        self.add(format_args!("<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4.5\"/>"));
+    }
+
+    /// Text beside a place, left of it where it would not fit to the right.
+    pub fn note(&mut self, x: f64, y: f64, text: &str) {
+        let (x, y) = self.place(x, y);
+        let fits = x + 8.0 + 6.2 * text.chars().count() as f64 <= WIDTH;
+        let (x, anchor) = if fits { (x + 8.0, "start") } else { (x - 8.0, "end") };
+        let y = y + 4.0;
+        self.add(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>", escape(text)));
+    }
+
+    /// The plot for a page whose style has the colours.
+    pub fn inline(&self) -> String {
+        self.svg("", "")
+    }
+
+    /// The plot as a file of its own.
+    pub fn standalone(&self) -> String {
+        let style = format!("<style>{COLOURS}{STYLE}</style>");
+        let size = format!(" xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\"");
+        self.svg(&size, &style) + "\n"
+    }
+
+    fn svg(&self, attributes: &str, head: &str) -> String {
+        let (title, frame, marks) = (escape(&self.title), self.frame(), &self.marks);
+        format!(
+            "<svg class=\"chart\"{attributes} viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{title}\">\
+             <title>{title}</title>{head}{frame}{marks}</svg>"
+        )
+    }
+
+    fn frame(&self) -> String {
+        let [left, right, top, bottom] = MARGINS;
+        let (foot, end) = (HEIGHT - bottom, WIDTH - right);
+        let mut frame = String::new();
+        // Writing to a string cannot fail.
+        for (value, text) in self.y.ticks() {
+            let y = self.place(0.0, value).1;
+            let _ = write!(frame, "<path class=\"grid\" d=\"M{left} {y:.1}H{end}\"/>");
+            let (x, y) = (left - 7.0, y + 4.0);
+            let _ = write!(
+                frame,
+                "<text class=\"soft\" x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\">{}</text>",
+                escape(&text)
+            );
+        }
+        for (value, text) in self.x.ticks() {
+            let (x, tick, y) = (self.place(value, 0.0).0, foot + 5.0, foot + 19.0);
+            let _ = write!(frame, "<path class=\"grid\" d=\"M{x:.1} {foot}V{tick}\"/>");
+            let _ = write!(
+                frame,
+                "<text class=\"soft\" x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{}</text>",
+                escape(&text)
+            );
+        }
+        let (middle_x, middle_y, low) = ((left + end) / 2.0, (top + foot) / 2.0, HEIGHT - 8.0);
+        let (x, y) = (escape(self.x.label()), escape(self.y.label()));
+        let _ = write!(frame, "<text x=\"{middle_x}\" y=\"{low}\" text-anchor=\"middle\">{x}</text>");
+        let _ =
+            write!(frame, "<text transform=\"translate(14 {middle_y}) rotate(-90)\" text-anchor=\"middle\">{y}</text>");
+        frame
+    }
+
+    /// The place of a pair of values in the picture.
+    fn place(&self, x: f64, y: f64) -> (f64, f64) {
+        let [left, right, top, bottom] = MARGINS;
+        let (width, height) = (WIDTH - left - right, HEIGHT - top - bottom);
+        (left + width * self.x.fraction(x), top + height * (1.0 - self.y.fraction(y)))
+    }
+
+    fn add(&mut self, mark: std::fmt::Arguments<'_>) {
+        let _ = self.marks.write_fmt(mark);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_lie_inside_the_frame_and_texts_are_escaped() {
+        let mut chart = Chart::new("a < b", Axis::linear("x & y", 0.0, 1.0), Axis::linear("", 0.0, 2.0));
+        chart.line("line", [(0.0, 0.0), (1.0, 2.0), (5.0, -9.0)].into_iter());
+        chart.bar("bar", (0.2, 0.4), 1.0);
+        chart.whisker(0.5, 0.0, 1.0);
+        chart.dot("dot", 0.5, 1.0);
+        chart.note(0.99, 1.0, "<balanced>");
+        let svg = chart.inline();
+        assert!(svg.contains("58.0,272.0 544.0,16.0 544.0,272.0"), "{svg}");
+        assert!(svg.contains("a &lt; b") && svg.contains("x &amp; y") && svg.contains("&lt;balanced&gt;"));
+        assert!(svg.contains("text-anchor=\"end\">&lt;balanced"));
+        assert!(!svg.contains("NaN") && !svg.contains("xmlns"));
+        assert!(chart.standalone().contains("xmlns") && chart.standalone().contains("prefers-color-scheme"));
+    }
+}

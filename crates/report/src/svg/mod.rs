@@ -1,0 +1,11 @@
+//! Plots as SVG: two axes, and marks between them.
+//!
+//! Inside a page the marks take their colours from the page's style (classes `bar`, `line`, `dot`, …); on its own
+//! ([`Chart::standalone`]) a plot carries its style, for light and dark surroundings. Sizes are in user units of a 560 × 320 picture.
+
+mod axis;
+mod chart;
+
+pub use axis::Axis;
+pub use chart::Chart;
+pub(crate) use chart::STYLE;
