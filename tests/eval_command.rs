@@ -73,6 +73,11 @@ fn a_moved_copy_is_brought_back() {
     for (axis, expected) in [("dx_m", 3.3), ("dy_m", -2.7), ("dz_m", 4.1)] {
         assert!((number(&found, &format!("/shift/{axis}")) - expected).abs() < 0.05, "{found}");
     }
+    let slopes = json(&["--align", "nuth-kaab"], &test, &reference);
+    for (axis, expected) in [("dx_m", 3.3), ("dy_m", -2.7), ("dz_m", 4.1)] {
+        assert!((number(&slopes, &format!("/shift/{axis}")) - expected).abs() < 0.05, "{slopes}");
+    }
+    assert_eq!(slopes.pointer("/protocol/alignment").and_then(Value::as_str), Some("nuth-kaab"));
     let unaligned = json(&["--align", "z"], &test, &reference);
     assert_eq!(number(&unaligned, "/shift/dx_m"), 0.0);
     assert!(number(&unaligned, "/metrics/mae") > 5.0 * number(&found, "/metrics/mae"), "{unaligned} {found}");
@@ -125,8 +130,11 @@ fn datums_that_may_differ_are_refused_until_they_are_named() {
     let named = json(&["--align", "none", "--test-vertical", "egm96"], &bare, &reference);
     assert_eq!(number(&named, "/metrics/n"), 400.0);
     assert!(named.to_string().contains("no coordinate system"), "{named}");
-    let assumed = json(&["--align", "none"], &bare, &stated);
+    // A geoid taken for the ellipsoid is a constant, which the median removes and nothing else does.
+    let assumed = json(&["--align", "z"], &bare, &stated);
     assert!(assumed.to_string().contains("taken as the ellipsoid"), "{assumed}");
+    skysweep(&["--align", "none"], &bare, &stated).code(2).stderr(contains("--test-vertical"));
+    skysweep(&["--align", "none"], &stated, &bare).code(2).stderr(contains("--ref-vertical"));
     skysweep(&["--test-vertical", "sea"], &bare, &reference).code(2);
 }
 
@@ -151,6 +159,80 @@ fn classes_are_counted_apart_and_skipped() {
     assert!(skipped.pointer("/classes/9").is_none());
     let table = skysweep(&["--align", "none", "--classes", classes], &test, &reference).success();
     table.stdout(contains("2 ground")).stdout(contains("9 water")).stdout(contains("completeness_1 %"));
+}
+
+#[test]
+fn a_mask_leaves_cells_out() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    let heights = sampled((200, 180), &grid(), |x, y| surface(x, y) + if x < WEST + 50.0 { 5.0 } else { 0.25 });
+    let test = write(&folder, "test.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    let mask_grid = GeoTransform::north_up(WEST, NORTH, 1.0);
+    let mask = sampled((100, 90), &mask_grid, |x, _| if x < WEST + 50.0 { 0.0 } else { 255.0 }).map(|&m| m as u8);
+    let mask = write(&folder, "mask.tif", BandData::U8(&mask), mask_grid, Crs::ellipsoidal(32617));
+    let found = json(&["--align", "none", "--mask", mask.to_str().unwrap()], &test, &reference);
+    assert_eq!(number(&found, "/metrics/reference_cells"), 18_000.0);
+    assert_eq!(number(&found, "/protocol/skipped_cells"), 18_000.0);
+    assert!((number(&found, "/metrics/mae") - 0.25).abs() < 1e-5);
+}
+
+#[test]
+fn a_terrain_model_tells_what_stands() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    // Blocks are found on the east half only; the terrain is coarser, and 1.5 m off where nothing stands.
+    let ground = |x: f64, y: f64| 20.0 + 3.0 * ((x - WEST) / 31.0).sin() + 2.0 * ((y - NORTH) / 23.0).cos();
+    let half = |x: f64, y: f64| if x < WEST + 50.0 { ground(x, y) } else { surface(x, y) };
+    let heights = sampled((200, 180), &grid(), half);
+    let test = write(&folder, "test.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    let dtm_grid = GeoTransform::north_up(WEST - 4.0, NORTH + 4.0, 2.0);
+    let dtm = sampled((60, 60), &dtm_grid, ground);
+    let dtm = write(&folder, "dtm.tif", BandData::F32(&dtm), dtm_grid, Crs::ellipsoidal(32617));
+    let found = json(&["--align", "none", "--dtm", dtm.to_str().unwrap()], &test, &reference);
+    let recall = number(&found, "/standing/volume_m3/recall");
+    assert!((0.3..0.7).contains(&recall), "{found}");
+    assert!(number(&found, "/standing/footprint_m2/precision") > 0.999, "{found}");
+    assert_eq!(number(&found, "/standing/footprint_m2/iou"), number(&found, "/standing/footprint_m2/recall"));
+    assert_eq!(found.pointer("/protocol/terrain/source").and_then(Value::as_str), Some("given"));
+    let estimated = json(&["--align", "none"], &test, &reference);
+    assert!((number(&estimated, "/standing/footprint_m2/recall") - recall).abs() < 0.2, "{estimated}");
+    assert_eq!(estimated.pointer("/protocol/terrain/source").and_then(Value::as_str), Some("estimated"));
+}
+
+/// A classified LAZ cloud of the surface, denser than its cells, above EGM96.
+#[test]
+fn a_point_cloud_is_a_reference() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("reference.laz");
+    let mut builder = las::Builder::from(las::Version::new(1, 4));
+    builder.point_format = las::point::Format::new(6).unwrap();
+    builder.point_format.is_compressed = true;
+    let axis = |offset| las::Transform { scale: 0.001, offset };
+    builder.transforms = las::Vector { x: axis(WEST), y: axis(NORTH), z: axis(0.0) };
+    let mut header = builder.into_header().unwrap();
+    let crs = Crs { horizontal: 32617, vertical: VerticalDatum::Egm96 };
+    header.set_wkt_crs(crs.wkt().unwrap().into_bytes()).unwrap();
+    let mut writer = las::Writer::from_path(&path, header).unwrap();
+    for i in 0..100 * 90 {
+        let (x, y) = (WEST + 0.5 + f64::from(i % 100), NORTH - 0.5 - f64::from(i / 100));
+        let classification = las::point::Classification::new(if i % 2 == 0 { 2 } else { 6 }).unwrap();
+        let point = las::Point { x, y, z: 12.0, classification, gps_time: Some(0.0), ..las::Point::default() };
+        writer.write_point(point).unwrap();
+    }
+    writer.close().unwrap();
+    let heights = Grid::filled(100, 90, 12.75f32);
+    let test_grid = GeoTransform::north_up(WEST, NORTH, 1.0);
+    let crs = Crs { horizontal: 32617, vertical: VerticalDatum::Egm96 };
+    let test = write(&folder, "test.tif", BandData::F32(&heights), test_grid, crs);
+    let found = json(&["--align", "none"], &test, &path);
+    assert_eq!(number(&found, "/metrics/n"), 9000.0);
+    assert!((number(&found, "/classes/6/mae") - 0.75).abs() < 1e-6, "{found}");
+    assert_eq!(found.pointer("/protocol/vertical").and_then(Value::as_str), Some("egm96"));
+    let ground = json(&["--align", "none", "--skip", "6"], &test, &path);
+    assert_eq!(number(&ground, "/metrics/reference_cells"), 4500.0);
+    let coarse = json(&["--align", "none", "--ref-cell", "10"], &test, &path);
+    assert_eq!(number(&coarse, "/metrics/reference_cells"), 90.0);
+    skysweep(&["--ref-cell", "-1"], &test, &path).code(2);
 }
 
 #[test]
@@ -194,6 +276,9 @@ fn bad_input_is_refused_in_one_message() {
     skysweep(&[], &elsewhere, &reference).code(2).stderr(contains("error:"));
     skysweep(&[], &text, &reference).code(2).stderr(contains("text.tif"));
     skysweep(&[], &reference, &folder.path().join("missing.tif")).code(2).stderr(contains("missing.tif"));
+    let flat =
+        write(&folder, "flat.tif", BandData::F32(&Grid::filled(200, 180, 5.0f32)), grid(), Crs::ellipsoidal(32617));
+    skysweep(&["--align", "nuth-kaab"], &flat, &flat).code(2).stderr(contains("too flat"));
     skysweep(&["--search-m", "0"], &reference, &reference).code(2).stderr(contains("search radius"));
     skysweep(&["--search-m", "1e9"], &reference, &reference).code(2).stderr(contains("smaller radius"));
     skysweep(&["--search-m", "nan"], &reference, &reference).code(2);
@@ -221,6 +306,10 @@ fn the_lidar_truth_is_brought_back_too() {
     let found = json(&["--classes", classes.to_str().unwrap()], &test, &reference);
     for (axis, expected) in [("dx_m", 3.3), ("dy_m", -2.7), ("dz_m", 4.1)] {
         assert!((number(&found, &format!("/shift/{axis}")) - expected).abs() < 0.05, "{found}");
+    }
+    let slopes = json(&["--align", "nuth-kaab"], &test, &reference);
+    for (axis, expected) in [("dx_m", 3.3), ("dy_m", -2.7), ("dz_m", 4.1)] {
+        assert!((number(&slopes, &format!("/shift/{axis}")) - expected).abs() < 0.05, "{slopes}");
     }
     assert_eq!(number(&found, "/metrics/reference_cells"), 512.0 * 512.0);
     assert!(found.to_string().contains("the class raster has no georeference"));

@@ -3,9 +3,9 @@
 //! From cells known to be ground, the rest is filled: each coarser level of a pyramid holds the mean of the ground cells below it,
 //! and what is open takes the bilinear value of the next coarser level (the pull-push scheme of Gortler et al. 1996,
 //! SIGGRAPH). Without a classification ground is found by a progressive morphological filter (Zhang et al. 2003, IEEE TGRS 41,
-//! 872-882): the surface is opened with windows that double up to [`WINDOW_M`]; a cell that an opening lowers by more than
-//! `0.5 m + slope · growth of the window` is none. The slope is the scene's own: the median slope of the lowest heights of
-//! blocks, between 2 and 100 %. It is an estimate: give a terrain model where one is known.
+//! 872-882): the surface is opened with windows that double up to [`WINDOW_M`] or a quarter of the area's shorter side; a cell
+//! that an opening lowers by more than `0.5 m + slope · growth of the window` is none. The slope is the scene's own: the upper
+//! quartile of the slopes of the lowest heights of blocks half as wide, between 2 and 100 %. It is an estimate: give a terrain model where one is known.
 
 use crate::align::MetresFromCells;
 use crate::gradient::{gradients, steepness};
@@ -54,7 +54,8 @@ pub fn terrain_from_ground(heights: &Grid<f32>, is_ground: impl Fn(usize) -> boo
 pub fn estimated_terrain(heights: &Grid<f32>, metres_from_cells: MetresFromCells) -> (Grid<f32>, TerrainSource) {
     let (along_columns, along_rows) = metres_from_cells.cell_size_m();
     let cell_m = along_columns.max(along_rows);
-    let widest = ((0.5 * WINDOW_M / cell_m) as usize).max(1);
+    let side_m = (heights.width() as f64 * along_columns).min(heights.height() as f64 * along_rows);
+    let widest = ((0.5 * WINDOW_M.min(side_m / 4.0) / cell_m) as usize).max(1);
     let slope = scene_slope(heights, metres_from_cells, widest);
     let mut open = heights.clone();
     let mut ground: Vec<bool> = heights.data().iter().map(|h| h.is_finite()).collect();
@@ -72,7 +73,7 @@ pub fn estimated_terrain(heights: &Grid<f32>, metres_from_cells: MetresFromCells
     (terrain_from_ground(heights, |i| ground.get(i).copied().unwrap_or(false)), source)
 }
 
-/// The median slope of the lowest heights of blocks as wide as half the largest window.
+/// The upper quartile of the slopes of the lowest heights of blocks as wide as half the largest window.
 fn scene_slope(heights: &Grid<f32>, metres_from_cells: MetresFromCells, block: usize) -> f64 {
     let (columns, rows) = (heights.width().div_ceil(block), heights.height().div_ceil(block));
     let mut lowest = Grid::filled(columns, rows, f32::NAN);
@@ -88,7 +89,7 @@ fn scene_slope(heights: &Grid<f32>, metres_from_cells: MetresFromCells, block: u
         .map(|&g| steepness(g) / block as f64)
         .filter(|s| s.is_finite())
         .collect();
-    percentile(&mut slopes, 50.0).unwrap_or(0.0).clamp(*SLOPES.start(), *SLOPES.end())
+    percentile(&mut slopes, 75.0).unwrap_or(0.0).clamp(*SLOPES.start(), *SLOPES.end())
 }
 
 /// The grid with every void filled from its surroundings; unchanged when all is void.
@@ -132,8 +133,9 @@ mod tests {
         MetresFromCells::new(&GeoTransform::north_up(0.0, 0.0, 1.0), (1.0, 1.0))
     }
 
+    /// Hills on a slope.
     fn ground(column: usize, row: usize, slope: f64) -> f64 {
-        50.0 + slope * column as f64 + 2.0 * (row as f64 / 40.0).sin()
+        50.0 + slope * column as f64 + 2.0 * (row as f64 / 40.0).sin() + 3.0 * (column as f64 / 55.0).cos()
     }
 
     /// Buildings of 12 x 20 m with 7 m walls, 30 m apart, on a slope.

@@ -169,7 +169,7 @@ fn unusable_input_is_refused_with_a_reason() {
     let flat = Grid::filled(20, 20, 3.0f32);
     let void = Grid::filled(20, 20, f32::NAN);
     let far = GeoTransform::north_up(1e5, 0.0, CELL_M);
-    for alignment in [Alignment::None, Alignment::Z, Alignment::Xyz] {
+    for alignment in [Alignment::None, Alignment::Z, Alignment::Xyz, Alignment::NuthKaab] {
         let empty = run((&void, &grid), (&flat, &grid), alignment).unwrap_err();
         assert!(matches!(empty, EvalError::EmptyReference { skipped: 0 }), "{empty}");
         assert!(run((&flat, &grid), (&void, &grid), alignment).is_err());
@@ -178,6 +178,8 @@ fn unusable_input_is_refused_with_a_reason() {
     let tiny = Grid::filled(5, 5, 1.0f32);
     let error = run((&tiny, &grid), (&tiny, &grid), Alignment::Xyz).unwrap_err();
     assert!(matches!(error, EvalError::TooFewCells { .. }), "{error}");
+    let error = run((&tiny, &grid), (&tiny, &grid), Alignment::NuthKaab).unwrap_err();
+    assert!(matches!(error, EvalError::TooFlat { .. }), "{error}");
     let nothing = Grid::filled(0, 0, 0.0f32);
     assert!(run((&nothing, &grid), (&flat, &grid), Alignment::Xyz).is_err());
     assert!(run((&flat, &grid), (&nothing, &grid), Alignment::Xyz).is_err());

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use eval::{ErrorStatistics, Metrics, cumulative, histogram, round_up};
+use eval::{ErrorStatistics, Metrics, cumulative, histogram};
 
 use raster::Grid;
 
@@ -109,28 +109,31 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// MAE, NMAD and LE90 of categories; nothing when none has enough cells.
+/// MAE, NMAD and LE90 of categories; nothing when none has enough cells. Logarithmic: edges err a hundred times as much as plains.
 fn categories<'a>(title: &str, label: &str, all: impl Iterator<Item = (String, &'a Metrics)>) -> Option<String> {
     let usable = |(name, m): (String, &Metrics)| Some((name, m.n, m.errors.filter(|_| m.n >= LEAST_CELLS)?));
     let drawn: Vec<(String, usize, ErrorStatistics)> = all.filter_map(usable).collect();
-    let highest = drawn.iter().map(|(_, _, e)| e.le90.max(e.mae)).fold(0.0, f64::max);
-    if drawn.is_empty() || highest <= 0.0 {
+    let values = |e: &ErrorStatistics| [e.nmad, e.mae, e.le90];
+    if drawn.iter().all(|(_, _, e)| e.le90 <= 0.0) {
         return None;
     }
     let x = Axis::names(label, drawn.iter().map(|(name, ..)| name.clone()));
-    let mut chart = Chart::new(title, x, Axis::linear("error, m", 0.0, round_up(highest)));
+    let y = Axis::logarithmic("error, m", drawn.iter().flat_map(|(_, _, e)| values(e)));
+    let mut chart = Chart::new(title, x, y);
     for (i, (_, _, e)) in drawn.iter().enumerate() {
         let middle = i as f64 + 0.5;
-        chart.bar("bar", (middle - 0.28, middle + 0.28), e.mae);
-        chart.whisker(middle, e.mae, e.le90);
-        chart.dot("dot2", middle, e.nmad);
+        let lowest = values(e).into_iter().fold(f64::INFINITY, f64::min);
+        chart.whisker(middle, lowest, values(e).into_iter().fold(0.0, f64::max));
+        for (class, value) in [("dot3", e.le90), ("dot2", e.nmad), ("dot", e.mae)] {
+            chart.dot(class, middle, value);
+        }
     }
     let mut cells = String::new();
     for (i, (name, n, _)) in drawn.iter().enumerate() {
         // Writing to a string cannot fail.
         let _ = write!(cells, "{}{} {}", if i > 0 { ", " } else { "" }, escape(name), grouped(*n));
     }
-    Some(plot(&chart, title, &format!("Bar: MAE; whisker: to the LE90; dot: NMAD. Cells: {cells}.")))
+    Some(plot(&chart, title, &format!("MAE blue, NMAD orange, LE90 grey; the scale is logarithmic. Cells: {cells}.")))
 }
 
 fn plot(chart: &Chart, title: &str, caption: &str) -> String {

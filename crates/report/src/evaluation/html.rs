@@ -1,5 +1,7 @@
 //! The page: headline numbers, protocol, pictures, plots, tables.
 
+use eval::Alignment;
+
 use super::EvaluationReport;
 use super::numbers::{grouped, percent};
 use crate::page::{escape, page};
@@ -15,6 +17,7 @@ impl EvaluationReport<'_> {
         let body = [
             format!("<h1>{}</h1>", escape(&title)),
             format!("<p class=\"lead\">{}</p>", self.lead()),
+            format!("<p class=\"lead\">{}</p>", escape(&self.brief_protocol())),
             self.cards(),
             self.notes(),
             "<h2>Pictures</h2>".to_owned(),
@@ -45,6 +48,21 @@ impl EvaluationReport<'_> {
             "Of {cells}, {coverage} % have a height. Two thirds of these are within {:.2} m (LE68), nine in ten within {:.2} m (LE90).",
             errors.le68, errors.le90
         )
+    }
+
+    /// What the numbers hold under, in a sentence.
+    fn brief_protocol(&self) -> String {
+        let shift = self.found.shift;
+        let moved = match self.protocol.config.alignment {
+            Alignment::None => "Compared as they are, without alignment".to_owned(),
+            Alignment::Z => format!("Aligned by the median: {:+.2} m up", shift.dz_m),
+            _ => format!("Aligned: {:+.2} m east, {:+.2} m north, {:+.2} m up", shift.dx_m, shift.dy_m, shift.dz_m),
+        };
+        let left_out = match self.found.skipped_cells {
+            0 => String::new(),
+            cells => format!(" {} cells are left out by class or mask.", grouped(cells)),
+        };
+        format!("{moved}. Vertical datum: {}. Grid: {}.{left_out}", self.protocol.vertical, self.protocol.crs)
     }
 
     fn cards(&self) -> String {

@@ -1,7 +1,7 @@
 //! Tables of a page.
 
 use super::EvaluationReport;
-use super::numbers::{cell, label, percent};
+use super::numbers::{cell, grouped, is_count, label, percent};
 use crate::page::escape;
 
 impl EvaluationReport<'_> {
@@ -10,7 +10,7 @@ impl EvaluationReport<'_> {
         let columns: Vec<_> = self.sets().into_iter().map(|(title, metrics)| (title, metrics.named())).collect();
         let rows = self.found.overall.named().into_iter().enumerate().map(|(i, (name, _))| {
             let values =
-                columns.iter().map(|(_, metrics)| metrics.get(i).map_or_else(String::new, |(n, v)| cell(n, *v)));
+                columns.iter().map(|(_, metrics)| metrics.get(i).map_or_else(String::new, |(n, v)| pretty(n, *v)));
             (label(&name), values.collect())
         });
         table("metric", columns.iter().map(|(title, _)| title.as_str()), rows)
@@ -22,7 +22,7 @@ impl EvaluationReport<'_> {
         let rows = self.found.slopes.iter().filter(|bin| bin.metrics.reference_cells > 0).map(|bin| {
             let values = bin.metrics.errors.map(|e| [e.mean, e.median, e.mae, e.rmse, e.nmad, e.le90]);
             let metres = (0..6).map(|i| cell("mae", values.map(|values| values[i])));
-            let values = std::iter::once(bin.metrics.n.to_string()).chain(metres).collect();
+            let values = std::iter::once(grouped(bin.metrics.n)).chain(metres).collect();
             (format!("{:.0}° to {:.0}°", bin.from_deg, bin.to_deg), values)
         });
         table("slope of the reference", heads.into_iter(), rows)
@@ -35,10 +35,19 @@ impl EvaluationReport<'_> {
         let heads = ["recall %", "precision %", "IoU %", "reference", "evaluated", "shared"];
         let rows = rows.into_iter().map(|(name, unit, overlap)| {
             let shares = [overlap.recall(), overlap.precision(), overlap.iou()].map(percent);
-            let sizes = [overlap.reference, overlap.test, overlap.shared].map(|size| format!("{size:.0} {unit}"));
+            let sizes = [overlap.reference, overlap.test, overlap.shared]
+                .map(|size| format!("{} {unit}", grouped(size.round() as usize)));
             (name.to_owned(), shares.into_iter().chain(sizes).collect())
         });
         table("above the terrain", heads.into_iter(), rows)
+    }
+}
+
+/// As [`cell`], with counts in groups of three.
+fn pretty(name: &str, value: Option<f64>) -> String {
+    match value {
+        Some(count) if is_count(name) => grouped(count as usize),
+        value => cell(name, value).replace('-', "\u{2212}"),
     }
 }
 
