@@ -39,7 +39,7 @@ pub(crate) fn dsm(scene: &Scene, out: &Path) -> anyhow::Result<Cost> {
 /// Runs `skysweep eval --align xyz` and returns the metrics over all cells, and `median_abs`, the median of |error|.
 pub(crate) fn evaluate(dsm: &Path, truth: &Path, vertical: Option<&str>) -> anyhow::Result<Vec<(String, f64)>> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skysweep"));
-    command.arg("eval").arg(dsm).arg(truth).args(["--align", "xyz", "--json"]);
+    command.arg("eval").arg(dsm).arg(truth).args(["--align", "xyz", "--json", "--no-report"]);
     if let Some(datum) = vertical {
         command.args(["--test-vertical", datum, "--ref-vertical", datum]);
     }

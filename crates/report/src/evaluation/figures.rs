@@ -147,7 +147,7 @@ fn figure(uri: &str, alt: &str, title: &str, caption: &str) -> String {
 /// The colours of the error map with their values.
 fn scale(range_m: f64) -> String {
     let mut bar = String::from(
-        "<svg class=\"scale\" viewBox=\"0 0 320 34\" role=\"img\" aria-label=\"colours of the error map\">",
+        "<svg class=\"scale\" viewBox=\"0 0 320 34\" shape-rendering=\"crispEdges\" role=\"img\" aria-label=\"colours of the error map\">",
     );
     const STEPS: i32 = 64;
     for i in 0..STEPS {

@@ -62,6 +62,7 @@ impl EvaluationReport<'_> {
             0 => String::new(),
             cells => format!(" {} cells are left out by class or mask.", grouped(cells)),
         };
+        let moved = moved.replace('-', "\u{2212}");
         format!("{moved}. Vertical datum: {}. Grid: {}.{left_out}", self.protocol.vertical, self.protocol.crs)
     }
 
