@@ -95,7 +95,11 @@ fn usable_rings(
             continue;
         };
         if kept.len() < MAX_COMPARED && kept.iter().any(|other| same_ring(other, &ring, position)) {
-            findings.push(Finding { code: DefectCode::DuplicateRings, dropped: false, detail: format!("ring {index}") });
+            findings.push(Finding {
+                code: DefectCode::DuplicateRings,
+                dropped: false,
+                detail: format!("ring {index}"),
+            });
             continue;
         }
         match outer {

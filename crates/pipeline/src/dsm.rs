@@ -4,36 +4,41 @@ use std::time::Instant;
 
 use camera::ImagePoint;
 use raster::{Grid, Window};
-use sweep::View;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::fusion::{
     FillConfig, FusionConfig, GridFrame, PlacedView, fill_holes, fuse_views, place_view, remove_speckle,
 };
-use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, TieConfig};
+use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
+use sweep::{HeightMap, View};
 
 use crate::config::DsmConfig;
 use crate::error::PipelineError;
+use crate::first_look::{Looked, asked_pairs, look, ordered, pair_names};
 use crate::heights::{SceneHeights, SweepPlan, sweep_scene};
 use crate::memory;
 use crate::output::{self, FILLED, Product};
-use crate::pointing::{PairTies, adjust_views, match_pairs};
+use crate::pictures;
+use crate::pointing::{PairTies, adjust_views};
 use crate::progress::Progress;
 use crate::report::{DsmReport, ImageReport, PairReport, PointingReport, StageTime, SurfaceReport};
-use crate::scene::{Geometry, Opened, open, read_views};
+use crate::scene::{Geometry, Opened, open};
 use crate::setup::{self, Choices, EARTH_RANGE_M, OutputGrid};
 
-/// Pixels read around what the bounds ask for, full resolution: patches, aggregation and pointing errors reach out.
-const WINDOW_MARGIN: usize = 96;
 /// Isolated patches of less ground than a square of this side are speckle: smaller than a house, metres.
 const SPECKLE_SIDE_M: f64 = 5.0;
 /// … and never of fewer cells than this, whatever the grid.
 const SPECKLE_CELLS_MIN: usize = 9;
+/// Where no two views are further apart than this, heights are ten times less precise than positions, and the user is told.
+const ANGLE_WEAK_DEG: f64 = 3.0;
 /// Smaller output tiles cost more to manage than to fill, cells.
 const TILE_MIN: usize = 64;
 /// Holes up to this many metres across are closed: the shadow side of a house.
 const FILL_SIDE_M: f64 = 10.0;
 /// A facet steeper than this (rise over run) is a tear, not a surface: about 70°.
 const TEAR_SLOPE: f64 = 2.75;
+
+/// A height around which the views correlate by less than this on average has no picture behind it: chance reaches half.
+const CORRELATION_MIN: f32 = 0.1;
 
 /// Runs a DSM job and writes its results.
 ///
@@ -111,30 +116,22 @@ impl<'a> Job<'a> {
     }
 
     fn lap(&mut self, stage: &str) {
-        self.times.push(StageTime { stage: stage.to_owned(), seconds: self.since.elapsed().as_secs_f64() });
-        self.since = Instant::now();
+        lap(&mut self.times, &mut self.since, stage);
     }
 
     fn run(mut self) -> Result<DsmReport, PipelineError> {
         let config = self.config;
         let tuning = config.preset.tuning();
         let mut images = open(&config.images)?;
-        let guess = images.iter().map(|o| o.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
-        let search = self.first_range(&images)?;
-        let first = Geometry::at(&images, guess.clamp(search.0, search.1))?;
-        let useful = first.useful_pairs()?;
-        let pairs = self.pairs(&useful)?;
-        let windows = self.windows(&images, &first, search)?;
-        memory::check(config, &images, &windows)?;
-        self.progress.begin("reading images", images.len());
-        let mut views = read_views(&images, &windows, &|| self.progress.step())?;
-        self.lap("read");
-
-        self.progress.begin("matching tie points", pairs.len());
-        let tie_config = TieConfig::default();
-        let ties = match_pairs(&views, &pairs, search, &tie_config, &|| self.progress.step());
+        let Looked { first, useful, windows, mut views, ties } = {
+            let (times, since) = (&mut self.times, &mut self.since);
+            look(config, &images, self.progress, &mut |stage| lap(times, since, stage))?
+        };
+        self.check_pictures(&views, &windows, &ties)?;
         let (adjustment, tracks) = adjust_views(&views, &ties, &AdjustConfig::default());
         let pointed = self.point(&mut images, &mut views, &windows, &adjustment);
+        let useful = if pointed { self.connected(useful, &ties) } else { useful };
+        let pairs = self.pairs(&useful, &first)?;
         self.lap("pointing");
 
         let dem_span = self.dem_span(&first)?;
@@ -174,41 +171,58 @@ impl<'a> Job<'a> {
         Ok(report)
     }
 
-    /// The heights among which tie points are searched.
-    fn first_range(&self, images: &[Opened]) -> Result<(f64, f64), PipelineError> {
-        let valid = setup::validity_range(images);
-        if valid.0 >= valid.1 {
-            return Err(PipelineError::Value {
-                name: "the RPCs' height validity",
-                found: format!("{:.0} to {:.0} m", valid.0, valid.1),
-                expected: "a range that holds heights of the Earth's surface".to_owned(),
-            });
+    /// Refuses one picture under two RPCs.
+    fn check_pictures(
+        &self,
+        views: &[View],
+        windows: &[Option<Window>],
+        ties: &[PairTies],
+    ) -> Result<(), PipelineError> {
+        let path = |i: usize| self.config.images[i].clone();
+        let blank: Vec<usize> = (0..views.len()).filter(|&i| pictures::is_blank(&views[i])).collect();
+        if let (Some(&first), true) = (blank.first(), views.len() < blank.len() + 2) {
+            return Err(PipelineError::Blank { path: path(first) });
         }
-        Ok(valid)
+        let origins: Vec<[f64; 2]> = windows.iter().map(|w| w.map_or([0.0; 2], |w| [w.x as f64, w.y as f64])).collect();
+        match pictures::same_picture(ties, &origins, setup::TIES_MIN) {
+            Some((a, b)) => Err(PipelineError::SamePixels { first: path(a), second: path(b) }),
+            None => Ok(()),
+        }
     }
 
-    /// The pairs to match: all useful ones, or those of them that were asked for.
-    fn pairs(&mut self, useful: &[(usize, usize)]) -> Result<Vec<(usize, usize)>, PipelineError> {
-        let ordered = |p: &(usize, usize)| (p.0.min(p.1), p.0.max(p.1));
-        let pairs: Vec<(usize, usize)> = match &self.config.pairs {
-            None => useful.to_vec(),
-            Some(asked) => {
-                for pair in asked.iter().filter(|p| !useful.contains(&ordered(p))) {
-                    self.choices.warn(format!(
-                        "the pair {}-{} is left out: it shares too little ground or looks along the same line",
-                        pair.0 + 1,
-                        pair.1 + 1
-                    ));
-                }
-                useful.iter().copied().filter(|p| asked.iter().any(|a| ordered(a) == *p)).collect()
-            }
-        };
-        if pairs.is_empty() {
-            return Err(PipelineError::Value {
-                name: "--pairs",
-                found: "no pair that shares ground under a useful angle".to_owned(),
-                expected: format!("some of {}", pair_names(useful)),
-            });
+    /// The pairs among the views that tie points connect; the others are set aside, and named.
+    fn connected(&mut self, useful: Vec<(usize, usize)>, ties: &[PairTies]) -> Vec<(usize, usize)> {
+        let aside = pictures::unconnected(self.config.images.len(), ties, setup::TIES_MIN);
+        for view in &aside {
+            self.choices.warn(format!(
+                "an image is set aside: fewer than {} tie points connect it with the others, so its pointing is not known; \
+                 --no-pointing uses it as it is: {}",
+                setup::TIES_MIN,
+                self.config.images[*view].display()
+            ));
+        }
+        useful.into_iter().filter(|(i, j)| !aside.contains(i) && !aside.contains(j)).collect()
+    }
+
+    /// The pairs to sweep, told with their reason.
+    fn pairs(&mut self, useful: &[(usize, usize)], geometry: &Geometry) -> Result<Vec<(usize, usize)>, PipelineError> {
+        let pairs = asked_pairs(self.config, useful)?;
+        let widest =
+            pairs.iter().filter_map(|p| geometry.pair(p.0, p.1)).max_by(|a, b| a.angle_deg.total_cmp(&b.angle_deg));
+        if let Some(pair) = widest.filter(|p| p.angle_deg < ANGLE_WEAK_DEG) {
+            self.choices.warn(format!(
+                "the views look along nearly the same line, {:.1}° apart at most: a pixel of parallax is {:.1} m of height; \
+                 add an image from another direction",
+                pair.angle_deg,
+                1.0 / pair.parallax_px_per_m.max(f64::MIN_POSITIVE)
+            ));
+        }
+        for pair in self.config.pairs.iter().flatten().filter(|p| !useful.contains(&ordered(p))) {
+            self.choices.warn(format!(
+                "the pair {}-{} is left out: it shares too little ground, looks along the same line or has no tie points",
+                pair.0 + 1,
+                pair.1 + 1
+            ));
         }
         let reason = match self.config.pairs {
             Some(_) => "given".to_owned(),
@@ -216,32 +230,6 @@ impl<'a> Job<'a> {
         };
         self.choices.tell("pairs", pair_names(&pairs), reason);
         Ok(pairs)
-    }
-
-    /// The part of each image to read: all of it, or what the bounds may need.
-    fn windows(
-        &self,
-        images: &[Opened],
-        geometry: &Geometry,
-        search: (f64, f64),
-    ) -> Result<Vec<Option<Window>>, PipelineError> {
-        if self.config.bounds.is_none() {
-            return Ok(vec![None; images.len()]);
-        }
-        // The grid's placement needs no height; its choices are told later, once they are final.
-        let mut unheard = Choices { made: Vec::new(), warnings: Vec::new(), progress: &crate::progress::Silent };
-        let gsd = images.iter().filter_map(|o| setup::ground_sampling(o, geometry.centre)).fold(0.0, f64::max);
-        let grid = setup::choose_grid(self.config, geometry, gsd, &mut unheard)?;
-        let range = self.config.height_range_m.unwrap_or(search);
-        let window = |o: &Opened| {
-            let w = setup::image_window(o, &grid, range, WINDOW_MARGIN)?;
-            w.map(Some).ok_or_else(|| PipelineError::Value {
-                name: "--bounds",
-                found: format!("an area that an image does not see: {}", o.path.display()),
-                expected: "an area that every image sees, or only the images that see it".to_owned(),
-            })
-        };
-        images.iter().map(window).collect()
     }
 
     /// Puts the corrections into the cameras, unless pointing is off or the ties are too few; says whether it did.
@@ -269,6 +257,13 @@ impl<'a> Job<'a> {
             ModelOrder::Translation => "a shift per image",
             ModelOrder::Affine => "an affine map per image",
         };
+        for (view, apart_px) in pictures::grossly_off(&found.corrections) {
+            self.choices.warn(format!(
+                "the pointing of an image is {apart_px:.0} px off that of the others, far more than providers state; it is \
+                 corrected, but check that the RPC belongs to the image: {}",
+                self.config.images[view].display()
+            ));
+        }
         let (before, after) = found.residual_px;
         self.choices.tell(
             "pointing",
@@ -314,7 +309,10 @@ impl<'a> Job<'a> {
         let mut placed = Vec::with_capacity(all.len());
         let mut kept = Vec::with_capacity(all.len());
         for own in &all {
-            let keep = agreeing(*own, &all, useful, level)?;
+            let mut keep = agreeing(*own, &all, useful, level)?;
+            if let Some(asked) = self.config.height_range_m {
+                drop_outside(&mut keep, own.map, asked);
+            }
             kept.push(keep.data().iter().filter(|k| **k).count() as f64 / keep.data().len().max(1) as f64);
             placed.push(place_view(*own, level, &keep, &frame)?);
             self.progress.step();
@@ -378,11 +376,23 @@ fn agreeing(
     }
     let counts = count_agreeing(own, &others, level, &ConsistencyConfig::default())?;
     let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
-    Ok(counts.map(|n| *n >= needed))
+    let mut keep = counts.map(|n| *n >= needed);
+    for (keep, correlation) in keep.data_mut().iter_mut().zip(own.map.correlation.data()) {
+        *keep = *keep && *correlation >= CORRELATION_MIN;
+    }
+    Ok(keep)
 }
 
-fn pair_names(pairs: &[(usize, usize)]) -> String {
-    pairs.iter().map(|(i, j)| format!("{}-{}", i + 1, j + 1)).collect::<Vec<_>>().join(" ")
+fn lap(times: &mut Vec<StageTime>, since: &mut Instant, stage: &str) {
+    times.push(StageTime { stage: stage.to_owned(), seconds: since.elapsed().as_secs_f64() });
+    *since = Instant::now();
+}
+
+/// Leaves out what lies outside the heights that were asked for.
+fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, (lo, hi): (f64, f64)) {
+    for (keep, h) in keep.data_mut().iter_mut().zip(map.height_m.data()) {
+        *keep = *keep && (lo..=hi).contains(&(map.origin_m + f64::from(*h)));
+    }
 }
 
 fn image_reports(images: &[Opened], gsds: &[Option<f64>], geometry: &Geometry, found: &Adjustment) -> Vec<ImageReport> {

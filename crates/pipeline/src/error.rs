@@ -51,6 +51,23 @@ pub enum PipelineError {
         /// The least one that gives heights.
         needed_deg: f64,
     },
+    /// An image of one value.
+    #[error("an image has no contrast: all its pixels have one value or none; give another one: {}", path.display())]
+    Blank {
+        /// The image.
+        path: PathBuf,
+    },
+    /// The same pixels under two RPCs.
+    #[error(
+        "no parallax: two images have the same pixels; remove one, or give the image that its RPC belongs to: {} and {}",
+        first.display(), second.display()
+    )]
+    SamePixels {
+        /// The first of the two.
+        first: PathBuf,
+        /// The second.
+        second: PathBuf,
+    },
     /// The matcher found nothing that tells the heights.
     #[error(
         "found {ties} tie points, expected at least {needed}: the height range cannot be found automatically; \

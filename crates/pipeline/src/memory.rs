@@ -7,8 +7,8 @@ use crate::error::PipelineError;
 use crate::scene::Opened;
 
 /// Bytes per pixel of one view that stay through the run: image and pyramid (4 + 4/3), the heights of two levels with
-/// deviation and confidence (12 + 3), the ranges (6), placed vertices (16).
-const BYTES_PER_PIXEL: u64 = 43;
+/// deviation, confidence and correlation (16 + 4), the ranges (6), placed vertices (16).
+const BYTES_PER_PIXEL: u64 = 48;
 /// Bytes of one block in work: 1120² pixels of about 24 hypotheses, each a cost and a sum, plus layout.
 const BYTES_PER_BLOCK: u64 = 1120 * 1120 * (24 * 3 + 9);
 /// What the libraries take before anything is done.

@@ -6,7 +6,10 @@ use camera::ImagePoint;
 use sweep::View;
 
 use crate::setup::TIES_MIN;
-use sweep::pointing::{AdjustConfig, Adjustment, Tie, TieConfig, Track, adjust, match_pair};
+use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Tie, TieConfig, Track, adjust, match_pair};
+
+/// Ties of a wide search that one shift per view leaves further apart than this do not belong together, pixels.
+const WIDE_RESIDUAL_PX: f64 = 1.0;
 
 /// Ties of one pair of views.
 #[derive(Debug, Clone)]
@@ -19,7 +22,8 @@ pub(crate) struct PairTies {
     pub(crate) ties: Vec<Tie>,
 }
 
-/// Matches the pairs, given best first. The first one with enough ties narrows the height range of the rest.
+/// Matches the pairs, given best first. The first one with enough ties narrows the height range of the rest. A pair that
+/// gives too few is searched again for a gross pointing error.
 pub(crate) fn match_pairs(
     views: &[View],
     pairs: &[(usize, usize)],
@@ -31,7 +35,11 @@ pub(crate) fn match_pairs(
     let mut out = Vec::with_capacity(pairs.len());
     for &(reference, source) in pairs {
         let ties = match_pair(&views[reference], &views[source], range, config);
-        let found = PairTies { reference, source, ties };
+        let mut found = PairTies { reference, source, ties };
+        if found.ties.len() < TIES_MIN {
+            let ties = match_pair(&views[reference], &views[source], range, &wide_search(config));
+            found = verified(views, PairTies { reference, source, ties });
+        }
         if range == range_m
             && let Some(seen) = heights_seen(views, &found)
         {
@@ -43,6 +51,20 @@ pub(crate) fn match_pairs(
         done();
     }
     out
+}
+
+/// Those of a pair's ties that one correction brings together: a wide search finds more that is alike by chance.
+fn verified(views: &[View], pair: PairTies) -> PairTies {
+    let config = AdjustConfig { max_order: ModelOrder::Translation, ..AdjustConfig::default() };
+    let (adjustment, tracks) = adjust_views(views, std::slice::from_ref(&pair), &config);
+    if adjustment.residual_px.1 > WIDE_RESIDUAL_PX {
+        return PairTies { ties: Vec::new(), ..pair };
+    }
+    let fits = |t: &&Tie| {
+        let at = |track: &Track| track.first().is_some_and(|(_, p)| [p.sample, p.line] == t.reference);
+        tracks.iter().zip(&adjustment.ground).any(|(track, ground)| ground.is_some() && at(track))
+    };
+    PairTies { ties: pair.ties.iter().filter(fits).copied().collect(), ..pair }
 }
 
 /// The span of the heights of one pair's ties, the outliers left out.
@@ -82,4 +104,9 @@ pub(crate) fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustCo
     let cameras: Vec<_> = views.iter().map(|v| v.camera.clone()).collect();
     let sizes: Vec<_> = views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect();
     (adjust(&cameras, &sizes, &tracks, config), tracks)
+}
+
+/// The search for what the ordinary one does not find: ten times its pointing error, from a coarser level.
+fn wide_search(config: &TieConfig) -> TieConfig {
+    TieConfig { band_px: 10.0 * config.band_px, coarse_side: config.coarse_side * 2 / 5, ..*config }
 }

@@ -22,6 +22,10 @@ pub(crate) const EARTH_RANGE_M: (f64, f64) = (-500.0, 9000.0);
 const MARGIN_BELOW_M: f64 = 20.0;
 /// … nor on top of a mast or tower: searched above the highest at least.
 const MARGIN_ABOVE_M: f64 = 60.0;
+/// A given range is not searched further below the lowest tie point than this and the ties' own span.
+const FAR_BELOW_M: f64 = 100.0;
+/// … nor further above the highest one: no building is taller than twice this.
+const FAR_ABOVE_M: f64 = 500.0;
 /// The coarsest level is chosen so that the range is at most this many of its steps: the full range is then searched
 /// where it is cheap, and still at several pixels per building.
 const TOP_HYPOTHESES: f64 = 64.0;
@@ -48,14 +52,15 @@ impl Choices<'_> {
     }
 }
 
-/// Where heights may be before anything is known of the scene: what the RPCs are valid for.
-pub(crate) fn validity_range(images: &[Opened]) -> (f64, f64) {
+/// Where heights may be before anything is known of the scene: what the RPCs are valid for, and what is asked for.
+pub(crate) fn validity_range(images: &[Opened], asked: Option<(f64, f64)>) -> (f64, f64) {
     let ranges = images.iter().map(|o| {
         let r = &o.camera.rpc;
         (r.height_off - r.height_scale.abs(), r.height_off + r.height_scale.abs())
     });
-    let (lo, hi) = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-    (lo.max(EARTH_RANGE_M.0), hi.min(EARTH_RANGE_M.1))
+    let (lo, hi) = ranges.chain(asked).fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let range = (lo.max(EARTH_RANGE_M.0), hi.min(EARTH_RANGE_M.1));
+    if range.0 < range.1 { range } else { EARTH_RANGE_M }
 }
 
 /// The heights to search.
@@ -68,12 +73,16 @@ pub(crate) fn height_range(
     let ties = adjustment.ground.iter().flatten().count();
     let seen = span_of(adjustment, TIES_MIN);
     let (range, reason) = if let Some(given) = config.height_range_m {
-        if let Some(seen) = seen
-            && (given.1 < seen.0 || given.0 > seen.1)
-        {
-            return Err(PipelineError::RangeMissesScene { range: given, seen });
+        match seen {
+            None => (given, "given".to_owned()),
+            Some(seen) if given.1 < seen.0 || given.0 > seen.1 => {
+                return Err(PipelineError::RangeMissesScene { range: given, seen });
+            }
+            Some(seen) => {
+                warn_if_cut(given, seen, choices);
+                (searched(given, seen), given_reason(given, seen))
+            }
         }
-        (given, "given".to_owned())
     } else if let Some(span) = dem_span {
         if span.0 < EARTH_RANGE_M.0 || span.1 > EARTH_RANGE_M.1 {
             return Err(PipelineError::Value {
@@ -92,6 +101,28 @@ pub(crate) fn height_range(
     };
     choices.tell("height range", format!("{:.1} to {:.1} m", range.0, range.1), reason);
     Ok(range)
+}
+
+/// What to search for a given range: where ties are seen outside it too, so that what is there is recognised and left
+/// out instead of being given a false height inside; and not kilometres from every tie.
+fn searched(given: (f64, f64), seen: (f64, f64)) -> (f64, f64) {
+    let near = with_margins(seen);
+    let span = seen.1 - seen.0;
+    (given.0.max(seen.0 - span - FAR_BELOW_M).min(near.0), given.1.min(seen.1 + span + FAR_ABOVE_M).max(near.1))
+}
+
+fn given_reason(given: (f64, f64), seen: (f64, f64)) -> String {
+    format!("given {:.1} to {:.1} m, tie points between {:.0} and {:.0} m", given.0, given.1, seen.0, seen.1)
+}
+
+fn warn_if_cut(given: (f64, f64), seen: (f64, f64), choices: &mut Choices<'_>) {
+    if seen.0 < given.0 || seen.1 > given.1 {
+        choices.warn(format!(
+            "the height range {} to {} m cuts the scene, whose tie points lie between {:.0} and {:.0} m above the ellipsoid: \
+             what is outside stays void",
+            given.0, given.1, seen.0, seen.1
+        ));
+    }
 }
 
 /// A tenth of the span for what the ties missed, and at least the fixed margins.

@@ -12,6 +12,7 @@ use crate::cost::{COST_MAX, CostConfig, SourceLevel, TileScratch, sweep_tile};
 use crate::ranges::Ranges;
 use crate::readout::soft_argmin;
 use crate::semiglobal::{Penalties, Volume, aggregate};
+use crate::support::mean_correlation;
 
 /// Side of a block's core, pixels.
 const BLOCK: usize = 1024;
@@ -42,6 +43,9 @@ pub struct HeightMap {
     pub sigma_m: Grid<f32>,
     /// 0 (a second height is as good) to 1.
     pub confidence: Grid<f32>,
+    /// Mean correlation of the views at the heights around each pixel, 0 to 1; next to 0 no picture stands behind the
+    /// height, only its surroundings.
+    pub correlation: Grid<f32>,
 }
 
 /// Sweeps one view against its sources.
@@ -168,6 +172,8 @@ fn read_out(
     let scale = 8.0 * f32::from(COST_MAX);
     let step = reference.ranges.step_m;
     let mut out = HeightMap::empty(core.width, core.height, origin_m);
+    let place = |p: usize| (window.x as usize + p % window.width, window.y as usize + p / window.width);
+    let correlation = mean_correlation(volume, sums, |p| !reference.view.image[place(p)].is_nan());
     for y in 0..core.height {
         for x in 0..core.width {
             let (gx, gy) = (core.x as usize + x, core.y as usize + y);
@@ -181,6 +187,7 @@ fn read_out(
                 out.height_m[(x, y)] = (height_m - origin_m) as f32;
                 out.sigma_m[(x, y)] = e.spread * step as f32;
                 out.confidence[(x, y)] = e.margin;
+                out.correlation[(x, y)] = correlation[p];
             }
         }
     }
@@ -195,6 +202,7 @@ impl HeightMap {
             height_m: Grid::filled(width, height, f32::NAN),
             sigma_m: Grid::filled(width, height, f32::NAN),
             confidence: Grid::filled(width, height, 0.0),
+            correlation: Grid::filled(width, height, 0.0),
         }
     }
 
@@ -202,6 +210,7 @@ impl HeightMap {
         paste(&mut self.height_m, at, &part.height_m);
         paste(&mut self.sigma_m, at, &part.sigma_m);
         paste(&mut self.confidence, at, &part.confidence);
+        paste(&mut self.correlation, at, &part.correlation);
     }
 }
 

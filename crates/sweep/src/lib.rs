@@ -15,6 +15,7 @@ pub mod pointing;
 pub mod ranges;
 mod readout;
 pub mod semiglobal;
+mod support;
 #[cfg(test)]
 mod testing;
 pub mod view;

@@ -10,6 +10,8 @@ use crate::ranges::Ranges;
 
 /// A tile is not divided below this side: an RPC that is not smooth over eight pixels is broken.
 const TILE_MIN: usize = 8;
+/// … nor below this many heights.
+const PLANES_MIN: i32 = 4;
 /// Variance that an 8-bit quantisation alone leaves in a patch.
 pub(crate) const VARIANCE_FLOOR: f32 = 1.0 / 12.0;
 
@@ -81,16 +83,39 @@ pub(crate) fn sweep_tile(
     block: &mut BlockCosts<'_>,
 ) -> Result<(), SweepError> {
     let planes = plane_span(reference.ranges, tile);
-    let maps = if is_wasteful(reference.ranges, tile, planes) {
-        None
-    } else {
-        fit_maps(reference, sources, tile, planes, config)?
-    };
-    let Some(maps) = maps else {
+    if is_wasteful(reference.ranges, tile, planes) {
         for part in halves(tile) {
             sweep_tile(reference, sources, part, config, scratch, block)?;
         }
         return Ok(());
+    }
+    sweep_planes(reference, sources, (tile, planes), config, scratch, block)
+}
+
+/// Fills the costs of the tile's pixels for those of their hypotheses that lie among `planes`.
+fn sweep_planes(
+    reference: Reference<'_>,
+    sources: &[SourceLevel<'_>],
+    (tile, planes): (Window, (i32, i32)),
+    config: &CostConfig,
+    scratch: &mut TileScratch,
+    block: &mut BlockCosts<'_>,
+) -> Result<(), SweepError> {
+    let maps = match fit_maps(reference, sources, tile, planes, config)? {
+        Fitted::Maps(maps) => maps,
+        Fitted::RoughAcross => {
+            for part in halves(tile) {
+                sweep_planes(reference, sources, (part, planes), config, scratch, block)?;
+            }
+            return Ok(());
+        }
+        Fitted::RoughAlong => {
+            let middle = planes.0 + (planes.1 - planes.0) / 2;
+            for part in [(planes.0, middle), (middle, planes.1)] {
+                sweep_planes(reference, sources, (tile, part), config, scratch, block)?;
+            }
+            return Ok(());
+        }
     };
     scratch.prepare(reference, sources, &maps, tile, planes, config);
     for k in planes.0..planes.1 {
@@ -126,15 +151,23 @@ fn is_wasteful(ranges: &Ranges, tile: Window, planes: (i32, i32)) -> bool {
     swept > 2 * asked.sum::<u64>()
 }
 
-/// The local maps to all sources, or `None` when one is over the bound and the tile must be divided. A source whose
-/// camera does not reach the tile has no map: it sees nothing there.
+/// The local maps of a tile to all sources, or in which direction one of them is over the bound.
+enum Fitted {
+    Maps(Vec<Option<TileMap>>),
+    /// The tile must be divided.
+    RoughAcross,
+    /// The heights must be divided.
+    RoughAlong,
+}
+
+/// The local maps to all sources. A source whose camera does not reach the tile has no map: it sees nothing there.
 fn fit_maps(
     reference: Reference<'_>,
     sources: &[SourceLevel<'_>],
     tile: Window,
     planes: (i32, i32),
     config: &CostConfig,
-) -> Result<Option<Vec<Option<TileMap>>>, SweepError> {
+) -> Result<Fitted, SweepError> {
     let step = reference.ranges.step_m;
     let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
     let corners = [
@@ -151,8 +184,14 @@ fn fit_maps(
             continue;
         };
         if map.max_error_px > config.map_tolerance_px {
+            let centre = [0.5 * (corners[0] + corners[2]), 0.5 * (corners[1] + corners[3])];
+            let along = TileMap::fit([centre[0], centre[1], centre[0], centre[1]], heights, exact);
+            let is_along = along.is_ok_and(|m| m.max_error_px > 0.5 * config.map_tolerance_px);
+            if is_along && planes.1 - planes.0 > PLANES_MIN {
+                return Ok(Fitted::RoughAlong);
+            }
             if tile.width.max(tile.height) / 2 >= TILE_MIN {
-                return Ok(None);
+                return Ok(Fitted::RoughAcross);
             }
             return Err(SweepError::NotSmooth {
                 reference: reference.view.index,
@@ -163,7 +202,7 @@ fn fit_maps(
         }
         maps.push(Some(map));
     }
-    Ok(Some(maps))
+    Ok(Fitted::Maps(maps))
 }
 
 /// The two halves of a tile across its longer side.

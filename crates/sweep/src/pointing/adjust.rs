@@ -3,7 +3,7 @@
 //! Each track gives the residuals of its best ground point, which know nothing of where the ground is: with `J` the
 //! Jacobian of the track's projections, `N` a basis of the null space of `Jᵀ`, and `B` the design of the corrections,
 //! `Nᵀ (r − B x) = 0`. Solved by iteratively reweighted least squares (Cauchy weights on a robust scale). What the ties
-//! cannot see (a common shift of all views) is held by a weak prior, so the mean correction stays as small as it can.
+//! cannot see (a common shift of all views) is held by a weak prior, so the corrections stay as small as they can.
 //! The order of the corrections is the least that the Bayesian information criterion justifies.
 
 use camera::{CameraError, ImageCorrection, ImagePoint, RpcCamera};
@@ -69,6 +69,9 @@ pub struct Adjustment {
 const ROUNDS: usize = 8;
 /// Residuals beyond this many robust deviations are outliers.
 const OUTLIER: f64 = 4.0;
+/// Ties share the errors of relief and light around them: they weigh no more than this many independent ones. Against
+/// the prior, hundreds of them would read a common shift of all views out of a hundredth of a pixel.
+const INDEPENDENT: f64 = 25.0;
 /// Matching is not better than this, pixels: keeps the robust scale from collapsing.
 const SCALE_MIN_PX: f64 = 0.05;
 
@@ -124,7 +127,7 @@ fn fit(
             tracks.iter().filter_map(|t| reduce(&current, sizes, t, order).map(|(r, _)| r)).collect();
         scale = robust_scale(reduced.iter().map(|r| norm_px(&r.residual)));
         if n > 0 {
-            x += solve(&reduced, &x, scale, config);
+            x += solve(&reduced, &x, scale, &prior_weights(&x, order, config));
         }
     }
     let current = corrected(cameras, sizes, &x, order);
@@ -164,14 +167,26 @@ fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
     (all.select_nth_unstable_by(middle, f64::total_cmp).1.to_owned() / 0.6745).max(SCALE_MIN_PX)
 }
 
-/// The step that brings the reweighted reduced residuals to their least, with the prior about zero.
-fn solve(reduced: &[Reduced], x: &DVector<f64>, scale: f64, config: &AdjustConfig) -> DVector<f64> {
-    let n = x.len();
+/// Weights of the prior on every parameter. A view that is shifted by several times the prior's deviation is grossly
+/// off: its shift has a Cauchy weight, so that it is moved to the others, and they are not moved half-way to it.
+fn prior_weights(x: &DVector<f64>, order: ModelOrder, config: &AdjustConfig) -> DVector<f64> {
     let weight = 1.0 / (config.prior_px * config.prior_px);
-    let mut normal = DMatrix::<f64>::identity(n, n) * weight;
-    let mut right = -x * weight;
+    let mut out = DVector::repeat(x.len(), weight);
+    for first in (0..x.len()).step_by(order.parameters().max(1)) {
+        let shift = x[first].hypot(x[first + 1]) / config.prior_px;
+        (0..2).for_each(|i| out[first + i] /= 1.0 + shift * shift);
+    }
+    out
+}
+
+/// The step that brings the reweighted reduced residuals to their least, with the prior about zero.
+fn solve(reduced: &[Reduced], x: &DVector<f64>, scale: f64, prior: &DVector<f64>) -> DVector<f64> {
+    let n = x.len();
+    let mut normal = DMatrix::from_diagonal(prior);
+    let mut right = -x.component_mul(prior);
+    let share = (INDEPENDENT / reduced.len().max(1) as f64).min(1.0);
     for r in reduced {
-        let w = 1.0 / (1.0 + (norm_px(&r.residual) / scale).powi(2)) / (scale * scale);
+        let w = share / (1.0 + (norm_px(&r.residual) / scale).powi(2)) / (scale * scale);
         normal += r.design.transpose() * &r.design * w;
         right += r.design.transpose() * &r.residual * w;
     }
@@ -333,6 +348,17 @@ mod tests {
         assert!(found.rms_px < 0.02, "{}", found.rms_px);
         let outliers = found.ground.iter().filter(|g| g.is_none()).count();
         assert_eq!(outliers, tracks.len().div_ceil(7));
+    }
+
+    #[test]
+    fn a_view_that_is_grossly_off_is_moved_and_the_others_stay() {
+        // Along a pass: a common height moves views 1 and 3 apart, and nothing moves view 2 alone.
+        let cameras = [[0.0, 0.5], [0.05, 0.0], [0.0, -0.5]].map(|p| leaning_camera(SIZE, p));
+        let tracks = tracks(&cameras, &[[0.0; 2], [31.0, -27.0], [0.0; 2]]);
+        let found = adjust(&cameras, &[(SIZE, SIZE); 3], &tracks, &AdjustConfig::default());
+        let [a, b, c] = [0, 1, 2].map(|i| found.corrections[i].translation_px);
+        assert!(a[0].hypot(a[1]) < 3.0 && c[0].hypot(c[1]) < 3.0, "{a:?} {b:?} {c:?}");
+        assert!(found.rms_px < 0.02, "{}", found.rms_px);
     }
 
     #[test]
