@@ -44,4 +44,10 @@ pub enum ModelError {
         /// The object's id.
         object: String,
     },
+    /// A triangle without corners or surface.
+    #[error("triangle {triangle} names a corner or a surface that is not there")]
+    Triangle {
+        /// Index of the triangle.
+        triangle: usize,
+    },
 }

@@ -116,18 +116,35 @@ impl CityModel {
         if let Some(vertex) = self.vertices.iter().position(|p| !p.is_finite()) {
             return Err(ModelError::NotFinite { vertex });
         }
-        for (index, object) in self.objects.iter().enumerate() {
+        for object in &self.objects {
             if object.parent.is_some_and(|parent| parent >= self.objects.len()) {
                 return Err(ModelError::ParentIndex { object: object.id.clone() });
-            }
-            if object.parent.is_some() && self.root(index) == index {
-                return Err(ModelError::ParentCircle { object: object.id.clone() });
             }
             for surface in object.geometries.iter().flat_map(|geometry| &geometry.surfaces) {
                 self.validate_surface(surface, &object.id)?;
             }
         }
-        Ok(())
+        match self.parent_circle() {
+            Some(object) => Err(ModelError::ParentCircle { object: self.objects[object].id.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// An object that is its own ancestor, in time proportional to the number of objects.
+    fn parent_circle(&self) -> Option<usize> {
+        // 0 is unseen; any other number is the walk that came by first.
+        let mut seen = vec![0usize; self.objects.len()];
+        for start in 0..self.objects.len() {
+            let mut at = Some(start);
+            while let Some(object) = at.filter(|&object| seen[object] == 0) {
+                seen[object] = start + 1;
+                at = self.objects[object].parent;
+            }
+            if let Some(object) = at.filter(|&object| seen[object] == start + 1) {
+                return Some(object);
+            }
+        }
+        None
     }
 
     fn validate_surface(&self, surface: &Surface, object: &str) -> Result<(), ModelError> {

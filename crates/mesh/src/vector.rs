@@ -27,3 +27,9 @@ pub(crate) fn unit(a: Vector) -> Option<Vector> {
     let length = norm(a);
     (length > 0.0 && length.is_finite()).then(|| scale(a, 1.0 / length))
 }
+
+/// `sum + a × b`.
+pub(crate) fn add_cross(sum: Vector, a: Vector, b: Vector) -> Vector {
+    let c = cross(a, b);
+    [sum[0] + c[0], sum[1] + c[1], sum[2] + c[2]]
+}
