@@ -1,4 +1,4 @@
-//! Cameras: the RPC00B model of satellite images.
+//! Cameras: the RPC00B model of satellite images, and central perspective cameras ([`Lens`], [`Pose`]).
 //!
 //! Image coordinates are [`ImagePoint`]s: (sample, line) = (column, row), f64, with the centre of the upper-left pixel
 //! at (0, 0). Ground coordinates are [`geodesy::LonLatHeight`]: degrees, and metres above the WGS 84 ellipsoid.
@@ -18,6 +18,7 @@ mod interpolant;
 mod jacobian;
 mod kernel;
 mod localize;
+mod perspective;
 mod plane;
 mod point;
 mod polynomial;
@@ -31,6 +32,7 @@ pub use error::{CameraError, Key, RpcError};
 pub use fit::{Correspondence, FitError, RpcFit};
 pub use interpolant::{DEFAULT_TOLERANCE_PX, InterpolantError, RowInterpolant, TileExtent, TileInterpolant};
 pub use jacobian::ImageFromGroundJacobian;
+pub use perspective::{Lens, LensError, LensModel, Pose};
 pub use plane::{EXTRAPOLATION_MAX, RpcPlane};
 pub use point::ImagePoint;
 pub use rpc::Rpc;

@@ -4,6 +4,7 @@
 //! and say so; writers put a file under its name only when it is complete.
 
 pub mod city;
+pub mod colmap;
 pub mod points;
 pub mod raster;
 pub mod rpc;

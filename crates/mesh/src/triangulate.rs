@@ -1,7 +1,7 @@
 //! Polygons with holes cut into triangles, by constrained Delaunay triangulation in the best-fit plane (`spade`).
 //!
-//! Triangles and strictly convex quadrilaterals, most of a city, take the shortcut with the same result. A polygon whose
-//! rings cross or share edges is split where they cross, and a triangle counts when its centroid is inside the outer ring
+//! Triangles and strictly convex quadrilaterals, most of a city, need none: the latter are cut from their first corner, because
+//! the rounding of coordinates must not choose between the two diagonals of a rectangle. A polygon whose rings cross or share edges is split where they cross, and a triangle counts when its centroid is inside the outer ring
 //! and in no hole (even-odd rule). Coordinates are metres relative to any nearby origin. Nothing is lost in silence: what
 //! was met on the way comes back as [`Finding`]s.
 
@@ -148,7 +148,7 @@ fn check_normals(out: &mut Triangulation, plane: &Plane, position: &impl Fn(u32)
     }
 }
 
-/// A triangle as it is, and a strictly convex quadrilateral by the diagonal that Delaunay's criterion takes.
+/// A triangle as it is, and a strictly convex quadrilateral cut from its first corner.
 fn convex_shortcut(rings: &[Vec<u32>], plane: &Plane, position: &impl Fn(u32) -> Vector) -> Option<Vec<[u32; 3]>> {
     let [ring] = rings else { return None };
     match ring[..] {
@@ -158,18 +158,8 @@ fn convex_shortcut(rings: &[Vec<u32>], plane: &Plane, position: &impl Fn(u32) ->
             let edge = |i: usize| sub(corners[(i + 1) % 4], corners[i % 4]);
             let turn = |i: usize| dot(cross(edge(i), edge(i + 1)), plane.normal);
             let strict = (0..4).all(|i| turn(i) > 1e-6 * plane.area);
-            // Delaunay: the diagonal joins the corners whose angles sum to more than a half turn.
-            let angle = |i: usize| {
-                let (before, after) = (sub(corners[(i + 3) % 4], corners[i]), edge(i));
-                dot(cross(after, before), plane.normal).atan2(dot(after, before))
-            };
-            strict.then(|| {
-                if angle(0) + angle(2) >= angle(1) + angle(3) {
-                    vec![[a, b, c], [a, c, d]]
-                } else {
-                    vec![[a, b, d], [b, c, d]]
-                }
-            })
+            // A rectangle has two Delaunay triangulations, and rounding must not choose: cut from the first corner.
+            strict.then(|| vec![[a, b, c], [a, c, d]])
         }
         _ => None,
     }

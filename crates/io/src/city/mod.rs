@@ -1,4 +1,4 @@
-//! City models in files: CityJSON and CityJSONSeq.
+//! City models in files: CityJSON, CityJSONSeq, OBJ and PLY.
 //!
 //! [`read`] finds the format by the content. What a file says becomes a [`CityModel`]; a surface that cannot be used is left
 //! out and listed among the [`Defect`]s, a file that breaks its format is refused with a number of the catalogue and a
@@ -8,6 +8,8 @@ mod builder;
 mod cityjson;
 mod crs_name;
 mod error;
+mod obj;
+mod ply;
 mod save;
 
 use std::fmt;
@@ -42,6 +44,10 @@ pub enum CityFormat {
     CityJson(String),
     /// CityJSON text sequence, with the version of its first line.
     CityJsonSeq(String),
+    /// Wavefront OBJ.
+    Obj,
+    /// Polygon file format, text or binary.
+    Ply,
 }
 
 impl fmt::Display for CityFormat {
@@ -49,6 +55,8 @@ impl fmt::Display for CityFormat {
         match self {
             Self::CityJson(version) => write!(f, "CityJSON {version}"),
             Self::CityJsonSeq(version) => write!(f, "CityJSONSeq {version}"),
+            Self::Obj => f.write_str("OBJ"),
+            Self::Ply => f.write_str("PLY"),
         }
     }
 }
@@ -74,10 +82,14 @@ pub fn read(path: &Path) -> Result<CityFile, CityError> {
 
 fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    if ply::looks_like(bytes) {
+        return ply::parse(bytes);
+    }
     match text.first() {
         None => Err(CityFault::invalid("the file is empty", "line 1")),
         Some(b'{') => cityjson::parse(text),
-        Some(_) => Err(CityFault::unsupported("found neither CityJSON nor CityJSONSeq", "line 1")),
+        Some(_) if obj::looks_like(text) => obj::parse(bytes),
+        Some(_) => Err(CityFault::unsupported("found none of CityJSON, OBJ and PLY", "line 1")),
     }
 }
 

@@ -1,0 +1,87 @@
+//! COLMAP's text files: one line per camera, two per image (the second holds its points and may be empty).
+
+use camera::LensModel;
+
+use super::{Fault, RawCamera, RawImage, shorten};
+
+pub(super) fn cameras(text: &str) -> Result<Vec<RawCamera>, Fault> {
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    lines.map(|(number, line)| camera(&mut Words::new(line, number))).collect()
+}
+
+pub(super) fn images(text: &str) -> Result<Vec<RawImage>, Fault> {
+    let mut images = Vec::new();
+    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.starts_with('#'));
+    while let Some((number, line)) = lines.next() {
+        if line.trim().is_empty() {
+            continue;
+        }
+        images.push(image(&mut Words::new(line, number))?);
+        lines.next();
+    }
+    Ok(images)
+}
+
+fn camera(words: &mut Words<'_>) -> Result<RawCamera, Fault> {
+    let id = words.number("the camera's number")?;
+    let name = words.next("the model")?;
+    let model = LensModel::from_name(name)
+        .ok_or_else(|| words.fault(format!("{:?} is no camera model of COLMAP", shorten(name))))?;
+    let (width, height) = (words.number("the width")?, words.number("the height")?);
+    let mut parameters = Vec::new();
+    while parameters.len() <= model.parameter_count() && !words.rest().is_empty() {
+        parameters.push(words.number("a parameter")?);
+    }
+    Ok(RawCamera { id, model, width, height, parameters, place: words.place() })
+}
+
+fn image(words: &mut Words<'_>) -> Result<RawImage, Fault> {
+    let id = words.number("the image's number")?;
+    let mut pose = [0.0; 7];
+    for value in &mut pose {
+        *value = words.number("the pose")?;
+    }
+    let camera = words.number("the camera's number")?;
+    let [w, x, y, z, tx, ty, tz] = pose;
+    // Names may hold spaces.
+    let name = words.rest().to_owned();
+    Ok(RawImage { id, quaternion: [w, x, y, z], translation: [tx, ty, tz], camera, name, place: words.place() })
+}
+
+/// The words of a line.
+struct Words<'a> {
+    rest: &'a str,
+    line: usize,
+}
+
+impl<'a> Words<'a> {
+    fn new(line: &'a str, number: usize) -> Self {
+        Self { rest: line.trim(), line: number + 1 }
+    }
+
+    fn rest(&self) -> &'a str {
+        self.rest
+    }
+
+    fn place(&self) -> String {
+        format!("line {}", self.line)
+    }
+
+    fn fault(&self, what: String) -> Fault {
+        Fault { what, place: self.place() }
+    }
+
+    fn next(&mut self, what: &str) -> Result<&'a str, Fault> {
+        if self.rest.is_empty() {
+            return Err(self.fault(format!("the line ends before {what}")));
+        }
+        let (word, rest) = self.rest.split_once(char::is_whitespace).unwrap_or((self.rest, ""));
+        self.rest = rest.trim_start();
+        Ok(word)
+    }
+
+    fn number<T: std::str::FromStr>(&mut self, what: &str) -> Result<T, Fault> {
+        let word = self.next(what)?;
+        word.parse().map_err(|_| self.fault(format!("{what} is {:?}, expected a number", shorten(word))))
+    }
+}
