@@ -28,6 +28,8 @@ fn adv_codes(name: &str) -> Option<(Option<u32>, Option<u32>)> {
         (_, Some(strip)) => leading_digit(strip).filter(|s| (2..=5).contains(s)).map(|s| 31464 + s),
         _ => None,
     };
+    // The geoid model may follow.
+    let height = height.split('*').next().unwrap_or_default();
     let vertical = ADV_HEIGHTS.iter().find(|(known, _)| *known == height).map(|&(_, code)| code);
     Some((horizontal, vertical))
 }
@@ -88,6 +90,7 @@ mod tests {
             ("urn:ogc:def:crs,crs:EPSG:6.12:25833,crs:EPSG:6.12:5783", Some(25833), Some(5783)),
             ("urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH", Some(25832), Some(7837)),
             ("urn:adv:crs:ETRS89_UTM33*DE_DHHN92_NH", Some(25833), Some(5783)),
+            ("urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH*GCG2016", Some(25832), Some(7837)),
             ("urn:adv:crs:ETRS89_UTM32", Some(25832), None),
             ("urn:adv:crs:DE_DHDN_3GK3*DE_DHHN12_NOH", Some(31467), Some(7699)),
             ("local", None, None),

@@ -1,10 +1,11 @@
-//! City models in files: CityJSON, CityJSONSeq, OBJ and PLY.
+//! City models in files: CityJSON, CityJSONSeq, CityGML, OBJ and PLY.
 //!
 //! [`read`] finds the format by the content. What a file says becomes a [`CityModel`]; a surface that cannot be used is left
 //! out and listed among the [`Defect`]s, a file that breaks its format is refused with a number of the catalogue and a
 //! place ([`CityFault`]). Coordinates stay in the reference system of the file. Nothing named inside a file is opened.
 
 mod builder;
+mod citygml;
 mod cityjson;
 mod crs_name;
 mod error;
@@ -44,6 +45,8 @@ pub enum CityFormat {
     CityJson(String),
     /// CityJSON text sequence, with the version of its first line.
     CityJsonSeq(String),
+    /// CityGML, with its version.
+    CityGml(String),
     /// Wavefront OBJ.
     Obj,
     /// Polygon file format, text or binary.
@@ -55,6 +58,7 @@ impl fmt::Display for CityFormat {
         match self {
             Self::CityJson(version) => write!(f, "CityJSON {version}"),
             Self::CityJsonSeq(version) => write!(f, "CityJSONSeq {version}"),
+            Self::CityGml(version) => write!(f, "CityGML {version}"),
             Self::Obj => f.write_str("OBJ"),
             Self::Ply => f.write_str("PLY"),
         }
@@ -88,8 +92,9 @@ fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     match text.first() {
         None => Err(CityFault::invalid("the file is empty", "line 1")),
         Some(b'{') => cityjson::parse(text),
+        Some(b'<') => citygml::parse(text),
         Some(_) if obj::looks_like(text) => obj::parse(bytes),
-        Some(_) => Err(CityFault::unsupported("found none of CityJSON, OBJ and PLY", "line 1")),
+        Some(_) => Err(CityFault::unsupported("found none of CityJSON, CityGML, OBJ and PLY", "line 1")),
     }
 }
 
