@@ -1,4 +1,6 @@
 //! COLMAP models in text and binary, broken and hostile ones among them.
+// A test that is skipped says so.
+#![allow(clippy::print_stderr)]
 
 use super::*;
 
