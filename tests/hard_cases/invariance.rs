@@ -35,8 +35,8 @@ fn cut(by: [[usize; 2]; 3]) -> Vec<Shot> {
 }
 
 /// By whole pixels of every pyramid level, and by odd numbers. The scene's middle moves with the cut, and with it the
-/// lattice of heights: that is worth what the heights' noise is. (On one lattice the heights are the same to the bit:
-/// `sweep: where_the_images_begin_…`.)
+/// lattice of heights: that is worth what the noise of the heights is. (On one lattice they are the same:
+/// `sweep: level`.)
 #[test]
 fn where_an_image_begins_does_not_matter() {
     for by in [[[8, 16], [8, 8], [16, 8]], [[3, 8], [5, 2], [1, 7]]] {

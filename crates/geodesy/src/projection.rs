@@ -132,6 +132,7 @@ fn first_line(definition: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn round_trips_in_utm_ups_and_degrees() {
@@ -146,6 +147,18 @@ mod tests {
             let map = projection.map_from_lonlat(lon, lat).unwrap();
             let (lon_back, lat_back) = projection.lonlat_from_map(map.x, map.y).unwrap();
             assert!((lon_back - lon).abs() < 1e-10 && (lat_back - lat).abs() < 1e-10, "{code}");
+        }
+    }
+
+    proptest! {
+        /// In the zone that is chosen for a place, at any latitude and on both sides of the antimeridian.
+        #[test]
+        fn any_place_survives_its_own_zone(lon in -180.0..180.0f64, lat in -89.9..89.9f64, dx in -2e4..2e4f64, dy in -2e4..2e4f64) {
+            let projection = MapProjection::from_epsg(crate::utm_epsg(lon, lat).unwrap()).unwrap();
+            let at = projection.map_from_lonlat(lon, lat).unwrap();
+            let (lon_back, lat_back) = projection.lonlat_from_map(at.x + dx, at.y + dy).unwrap();
+            let back = projection.map_from_lonlat(lon_back, lat_back).unwrap();
+            prop_assert!((back.x - at.x - dx).abs() < 1e-4 && (back.y - at.y - dy).abs() < 1e-4, "{back:?} {at:?}");
         }
     }
 

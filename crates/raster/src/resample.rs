@@ -138,6 +138,41 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn values_follow_a_gain_and_an_offset(x in 0.0..=11.0f64, y in 0.0..=8.0f64, gain in -8.0..8.0f32, offset in -500.0..500.0f32) {
+            let grid = field(|x, y| 40.0 * (1.3 * x).sin() + 25.0 * (0.7 * x - 1.9 * y).cos());
+            let changed = grid.map(|v| gain * v + offset);
+            for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
+                let expected = gain * sample(&grid, x, y, interpolation) + offset;
+                prop_assert!((sample(&changed, x, y, interpolation) - expected).abs() < 2e-3);
+            }
+        }
+
+        /// Sixteenths of a pixel, which a shift by whole pixels leaves exact.
+        #[test]
+        fn a_shift_by_whole_pixels_moves_the_values_and_nothing_else(x in 16..80u32, y in 16..64u32, dx in 0..5usize, dy in 0..4usize) {
+            let f = |x: f64, y: f64| 40.0 * (1.3 * x).sin() + 25.0 * (0.7 * x - 1.9 * y).cos();
+            let (grid, moved) = (field(f), field(|x, y| f(x + dx as f64, y + dy as f64)));
+            let at = (f64::from(x) / 16.0, f64::from(y) / 16.0);
+            let (there, inside) = ((at.0 + dx as f64, at.1 + dy as f64), |(x, y): (f64, f64)| x < 9.0 && y < 6.0);
+            if inside(at) && inside(there) {
+                for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
+                    let (a, b) = (sample(&moved, at.0, at.1, interpolation), sample(&grid, there.0, there.1, interpolation));
+                    prop_assert_eq!(a.to_bits(), b.to_bits());
+                }
+            }
+        }
+
+        #[test]
+        fn a_value_lies_within_its_neighbours_or_overshoots_by_an_eighth(values in prop::collection::vec(0.0..1.0f32, 108), x in 0.0..=11.0f64, y in 0.0..=8.0f64) {
+            let grid = Grid::from_vec(12, 9, values).unwrap();
+            prop_assert!((0.0..=1.0).contains(&bilinear(&grid, x, y)));
+            // The negative weights of Catmull and Rom's cubic sum to an eighth at most, along each axis.
+            prop_assert!((-0.3..=1.3).contains(&bicubic(&grid, x, y)));
+        }
+    }
+
     #[test]
     fn pixels_and_edges_are_kept() {
         let grid = field(|x, y| x * 10.0 + y);

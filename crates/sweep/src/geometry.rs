@@ -113,3 +113,31 @@ impl TileMap {
         [f(self.by_height[0]), f(self.by_height[1])]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::leaning_camera;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// To the ground, into the other image, and back.
+        #[test]
+        fn the_chain_there_and_back_ends_where_it_began(u in 0.0..200.0f64, v in 0.0..200.0f64, h in -50.0..150.0f64, level in 0..4u32) {
+            let (a, b) = (leaning_camera(400, [0.4, -0.1]), leaning_camera(400, [-0.2, 0.5]));
+            let there = source_from_reference(&a, &b, level, [u, v], h).unwrap();
+            let back = source_from_reference(&b, &a, level, there, h).unwrap();
+            prop_assert!((back[0] - u).abs() < 1e-6 && (back[1] - v).abs() < 1e-6, "{back:?}");
+        }
+
+        #[test]
+        fn the_local_map_keeps_its_stated_error(u in 0.0..63.0f64, v in 0.0..63.0f64, t in 0.0..1.0f64) {
+            let (a, b) = (leaning_camera(400, [0.4, -0.1]), leaning_camera(400, [-0.2, 0.5]));
+            let exact = |p, h| source_from_reference(&a, &b, 0, p, h);
+            let map = TileMap::fit([0.0, 0.0, 63.0, 63.0], (-20.0, 80.0), exact).unwrap();
+            let h = -20.0 + 100.0 * t;
+            let (e, m) = (exact([u, v], h).unwrap(), map.at([u, v], h));
+            prop_assert!((e[0] - m[0]).hypot(e[1] - m[1]) <= map.max_error_px + 1e-6);
+        }
+    }
+}

@@ -263,6 +263,57 @@ mod tests {
         }
     }
 
+    fn swept(views: &[View], order: &[usize]) -> HeightMap {
+        let (w, h) = (views[0].levels[0].width(), views[0].levels[0].height());
+        let ranges = Ranges::uniform(w, h, 1.0, (-10.0, 30.0));
+        let sources: Vec<SourceLevel<'_>> = order.iter().map(|&i| source(views, i)).collect();
+        sweep_level(source(views, 0), 0, &sources, &ranges, 0.0, &config(Aggregation::Variance)).unwrap()
+    }
+
+    /// Share of pixels with one height, to a hundredth of a step.
+    fn same(a: &HeightMap, b: &HeightMap) -> f64 {
+        let pairs = a.height_m.data().iter().zip(b.height_m.data());
+        let same = pairs.filter(|(a, b)| (*a - *b).abs() < 0.01 || (a.is_nan() && b.is_nan())).count();
+        same as f64 / a.height_m.data().len() as f64
+    }
+
+    fn three_views(size: usize) -> Vec<View> {
+        let cameras = [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| leaning_camera(size, p));
+        cameras.map(|c| view_of_plane(c, size, 7.3)).to_vec()
+    }
+
+    #[test]
+    fn the_order_of_the_sources_does_not_matter() {
+        let views = three_views(100);
+        assert!(same(&swept(&views, &[1, 2]), &swept(&views, &[2, 1])) > 0.999);
+    }
+
+    #[test]
+    fn gain_and_offset_of_each_view_do_not_matter() {
+        let views = three_views(100);
+        let changed: Vec<View> = [(2.0f32, 30.0f32), (7.0, -90.0), (1.5, 400.0)]
+            .iter()
+            .zip(&views)
+            .map(|((gain, offset), v)| View::new(v.camera.clone(), v.levels[0].map(|x| gain * x + offset)))
+            .collect();
+        assert!(same(&swept(&views, &[1, 2]), &swept(&changed, &[1, 2])) > 0.99);
+    }
+
+    /// Whole tiles cut off at the upper left of all views: what is left has the heights that it had.
+    #[test]
+    fn where_the_images_begin_does_not_matter() {
+        let views = three_views(192);
+        let cut = Window { x: 64, y: 64, width: 128, height: 128 };
+        let origin = camera::ImagePoint::new(64.0, 64.0);
+        let parts: Vec<View> =
+            views.iter().map(|v| View::new(v.camera.cropped(origin), v.levels[0].window(cut, f32::NAN))).collect();
+        let inner = Window { x: 20, y: 20, width: 88, height: 88 };
+        let whole = swept(&views, &[1, 2]).height_m.window(cut, f32::NAN).window(inner, f32::NAN);
+        let part = swept(&parts, &[1, 2]).height_m.window(inner, f32::NAN);
+        let same = whole.data().iter().zip(part.data()).filter(|(a, b)| (*a - *b).abs() < 0.02).count();
+        assert!(same * 100 >= 99 * part.data().len(), "{same} of {}", part.data().len());
+    }
+
     #[test]
     fn blank_and_missing_images_give_no_height() {
         let cameras = [[0.0, 0.0], [0.5, 0.1]].map(|p| leaning_camera(80, p));

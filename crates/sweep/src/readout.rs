@@ -55,12 +55,32 @@ pub(crate) fn soft_argmin(sums: &[u16], scale: f32, noise: f32) -> Option<Estima
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn equal_costs_say_nothing() {
         assert_eq!(soft_argmin(&[500; 9], 1016.0, 0.05), None);
         let at_the_end = soft_argmin(&[100, 500, 500], 1016.0, 0.05).unwrap();
         assert!(at_the_end.index == 0.0 && at_the_end.spread == WINDOW as f32);
+    }
+
+    proptest! {
+        /// Whatever the costs are, the height lies among the hypotheses, its deviation and margin are numbers, and a
+        /// common addend changes nothing.
+        #[test]
+        fn any_costs_give_a_number_or_nothing(
+            sums in prop::collection::vec(prop_oneof![0..1016u16, 60_000..=60_100u16, Just(0u16)], 0..40),
+            addend in 0..5000u16,
+        ) {
+            let found = soft_argmin(&sums, 1016.0, 0.02);
+            if let Some(e) = found {
+                prop_assert!(e.index >= 0.0 && e.index <= (sums.len() - 1) as f32, "{e:?}");
+                prop_assert!(e.spread > 0.0 && e.spread <= WINDOW as f32, "{e:?}");
+                prop_assert!((0.0..=1.0).contains(&e.margin), "{e:?}");
+            }
+            let raised: Vec<u16> = sums.iter().map(|s| s + addend).collect();
+            prop_assert_eq!(soft_argmin(&raised, 1016.0, 0.02), found);
+        }
     }
 
     #[test]

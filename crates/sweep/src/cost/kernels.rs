@@ -166,6 +166,7 @@ pub(crate) fn quantise(v: &[f32], scale: f32, out: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn identical_patches_cost_nothing_whatever_gain_and_offset() {
@@ -182,6 +183,88 @@ mod tests {
         let side = |t, m, s| Side { tile: t, mean: m, inverse_deviation: s };
         correlation_cost(side(&a, &ma, &sa), side(&b, &mb, &sb), 10, 5, &mut line, &mut out);
         assert!(out.iter().all(|&c| c < 1e-4), "{out:?}");
+    }
+
+    const SIDE: usize = 5;
+
+    /// The cost of two tiles of one patch.
+    fn patch_cost(a: &[f32], b: &[f32], floor: f32) -> f32 {
+        let moments = |t: &[f32]| {
+            let (mut line, mut m, mut s) = (vec![0.0; 2 * SIDE], vec![0.0; 1], vec![0.0; 1]);
+            patch_moments(t, SIDE, SIDE, floor, &mut line, &mut m, &mut s);
+            (m, s)
+        };
+        let ((ma, sa), (mb, sb)) = (moments(a), moments(b));
+        let side = |t, m, s| Side { tile: t, mean: m, inverse_deviation: s };
+        let (mut line, mut out) = (vec![0.0; 2 * SIDE], vec![0.0; 1]);
+        correlation_cost(side(a, &ma, &sa), side(b, &mb, &sb), SIDE, SIDE, &mut line, &mut out);
+        out[0]
+    }
+
+    /// The zero-mean, unit-norm feature of a patch.
+    fn feature(patch: &[f32]) -> Vec<f64> {
+        let mean = patch.iter().map(|v| f64::from(*v)).sum::<f64>() / patch.len() as f64;
+        let centred: Vec<f64> = patch.iter().map(|v| f64::from(*v) - mean).collect();
+        let norm = centred.iter().map(|v| v * v).sum::<f64>().sqrt();
+        centred.iter().map(|v| v / norm).collect()
+    }
+
+    /// Patches with a common picture, so that no correlation is truncated.
+    fn alike(n: usize) -> impl Strategy<Value = Vec<Vec<f32>>> {
+        let patch = || prop::collection::vec(-20.0..20.0f32, SIDE * SIDE);
+        (prop::collection::vec(-60.0..60.0f32, SIDE * SIDE), prop::collection::vec(patch(), n)).prop_map(
+            |(common, own)| {
+                let add = |o: Vec<f32>| o.iter().zip(&common).map(|(a, b)| a + b).collect();
+                own.into_iter().map(add).collect()
+            },
+        )
+    }
+
+    proptest! {
+        /// `1 − ‖mean f‖² = (1 − 1/N)(1 − mean ρ)`; for two views `(1 − ρ) / 2`.
+        #[test]
+        fn the_variance_over_the_views_is_one_minus_their_mean_correlation(patches in (2..6usize).prop_flat_map(alike)) {
+            let n = patches.len();
+            let features: Vec<Vec<f64>> = patches.iter().map(|p| feature(p)).collect();
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+            let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+            prop_assume!(pairs.clone().all(|(i, j)| dot(&features[i], &features[j]) > 0.01));
+            let mean: Vec<f64> = (0..SIDE * SIDE).map(|k| features.iter().map(|f| f[k]).sum::<f64>() / n as f64).collect();
+            let variance = 1.0 - dot(&mean, &mean);
+            let costs: Vec<f64> = pairs.map(|(i, j)| f64::from(patch_cost(&patches[i], &patches[j], 0.0))).collect();
+            let mean_cost = costs.iter().sum::<f64>() / costs.len() as f64;
+            prop_assert!((variance - (1.0 - 1.0 / n as f64) * mean_cost).abs() < 1e-4, "{variance} {mean_cost}");
+        }
+
+        #[test]
+        fn gain_and_offset_do_not_change_the_cost(patches in alike(2), gain in 0.2..20.0f32, offset in -500.0..500.0f32) {
+            let changed: Vec<f32> = patches[1].iter().map(|v| gain * v + offset).collect();
+            let (a, b) = (patch_cost(&patches[0], &patches[1], 0.0), patch_cost(&patches[0], &changed, 0.0));
+            // The offset stands in the sums of squares: the tiles of the sweep have their mean removed.
+            prop_assert!((a - b).abs() < 5e-3, "{a} {b}");
+        }
+
+        #[test]
+        fn whatever_a_pixel_holds_the_cost_lies_between_0_and_1(
+            a in prop::collection::vec(any_pixel(), SIDE * SIDE),
+            b in prop::collection::vec(any_pixel(), SIDE * SIDE),
+        ) {
+            let cost = patch_cost(&a, &b, 1.0 / 12.0);
+            prop_assert!((0.0..=1.0).contains(&cost), "{cost}");
+            let mut out = [255u8];
+            quantise(&[cost], 127.0, &mut out);
+            prop_assert!(out[0] <= 127);
+            let finite = a.iter().chain(&b).all(|v| v.is_finite());
+            prop_assert!(finite || cost == 1.0, "{cost} of a patch that is not finite");
+        }
+    }
+
+    fn any_pixel() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            6 => -2000.0..2000.0f32,
+            1 => prop_oneof![Just(f32::NAN), Just(f32::INFINITY), Just(f32::NEG_INFINITY)],
+            1 => prop_oneof![Just(1e30f32), Just(-3e38f32), Just(1e-40f32)],
+        ]
     }
 
     #[test]

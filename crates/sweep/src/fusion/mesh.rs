@@ -238,3 +238,42 @@ impl ViewSurface {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::level::HeightMap;
+    use crate::testing::{leaning_camera, view_of_plane};
+
+    const SIZE: usize = 80;
+    const METRES_PER_DEGREE: f64 = 111_320.0;
+
+    /// A view's surface (waves of 3 m) on a map whose coordinates are `false_origin` at (0°, 0°).
+    fn surface(false_origin: [f64; 2]) -> ViewSurface {
+        let view = view_of_plane(leaning_camera(SIZE, [0.3, -0.2]), SIZE, 0.0);
+        let mut map = HeightMap::empty(SIZE, SIZE, 40.0);
+        for (i, h) in map.height_m.data_mut().iter_mut().enumerate() {
+            *h = 3.0 * ((i % SIZE) as f32 * 0.1).sin() + 2.0 * ((i / SIZE) as f32 * 0.13).cos();
+        }
+        let heights = Heights { index: 0, view: &view, map: &map };
+        let to_map = move |g: LonLatHeight| {
+            Some([false_origin[0] + g.lon_deg * METRES_PER_DEGREE, false_origin[1] + g.lat_deg * METRES_PER_DEGREE])
+        };
+        let geotransform = GeoTransform::north_up(false_origin[0] - 20.0, false_origin[1] + 20.0, 0.5);
+        let frame = GridFrame { geotransform, map_from_ground: &to_map };
+        let keep = Grid::filled(SIZE, SIZE, true);
+        place_view(heights, 0, &keep, &frame).unwrap().rasterise(Window::whole(80, 80), 5.0)
+    }
+
+    /// At 5 000 km an f32 is half a metre wide: nothing absolute may pass through one.
+    #[test]
+    fn heights_at_utm_coordinates_are_those_at_the_origin() {
+        let (near, far) = (surface([0.0, 0.0]), surface([499_980.0, 5_000_020.0]));
+        let mut compared = 0;
+        for (a, b) in near.height_m.data().iter().zip(far.height_m.data()) {
+            assert!(a.is_nan() == b.is_nan() && (a.is_nan() || (a - b).abs() < 1e-4), "{a} {b}");
+            compared += usize::from(!a.is_nan());
+        }
+        assert!(compared > 3000, "only {compared} cells");
+    }
+}
