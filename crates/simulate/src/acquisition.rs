@@ -23,7 +23,6 @@ pub(crate) fn look(config: &SimulationConfig, index: usize) -> Look {
     let a = &config.acquisition;
     let direction = a.looks.get(index).copied().unwrap_or_else(|| on_pass(config, index));
     Look {
-        camera: a.camera,
         incidence_deg: direction.incidence_deg,
         azimuth_deg: direction.azimuth_deg,
         heading_deg: a.heading_deg,
@@ -48,11 +47,12 @@ pub(crate) fn camera(
     look: &Look,
     (low_m, high_m): (f64, f64),
 ) -> Result<(PhysicalCamera, (usize, usize)), SimulateError> {
-    let half = config.size_m / 2.0;
+    let (half, model) = (config.size_m / 2.0, config.acquisition.camera);
     let centre = frame.ground_from_scene(Vector3::new(0.0, 0.0, config.ground_height_m))?;
     // The scale of a camera does not depend on its image's size: any that holds the area measures the corners.
     let roughly = (1.5 * config.size_m / config.gsd_m) as usize;
-    let measuring = PhysicalCamera::new(look, centre, (roughly, roughly)).fitted((low_m - 1.0, high_m + 1.0))?.rpc;
+    let measuring =
+        PhysicalCamera::new(model, look, centre, (roughly, roughly)).fitted((low_m - 1.0, high_m + 1.0))?.rpc;
     let middle = (roughly as f64 - 1.0) / 2.0;
     let mut reach = ImagePoint::default();
     for (x, y) in [(-half, -half), (half, -half), (-half, half), (half, half)] {
@@ -64,7 +64,7 @@ pub(crate) fn camera(
     }
     let pixels = |reach: f64| 2 * (reach + MARGIN_PX).ceil() as usize;
     let size = (pixels(reach.sample), pixels(reach.line));
-    Ok((PhysicalCamera::new(look, centre, size), size))
+    Ok((PhysicalCamera::new(model, look, centre, size), size))
 }
 
 /// What the given RPC projects too far: a translation at the middle of the image, and a drift along its lines.

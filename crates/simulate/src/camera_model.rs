@@ -37,8 +37,6 @@ const MAX_STEPS: usize = 12;
 /// Where the sensor is seen from the scene, and how finely it samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Look {
-    /// The camera.
-    pub camera: CameraModel,
     /// Angle between the line of sight and the vertical at the scene, degrees.
     pub incidence_deg: f64,
     /// Direction from the scene to the sensor, degrees clockwise from north.
@@ -87,7 +85,7 @@ impl Look {
 
 impl PhysicalCamera {
     /// The camera of an image of `width × height` pixels with the scene's `centre` in its middle.
-    pub(crate) fn new(look: &Look, centre: LonLatHeight, (width, height): (usize, usize)) -> Self {
+    pub(crate) fn new(model: CameraModel, look: &Look, centre: LonLatHeight, (width, height): (usize, usize)) -> Self {
         let to_sensor = look.towards_sensor();
         let centre_of_orbit = Vector3::new(0.0, 0.0, -EARTH_M - centre.height_m);
         let orbit = EARTH_M + ORBIT_M;
@@ -109,7 +107,7 @@ impl PhysicalCamera {
         let step_m = look.gsd_m / scan_normal.dot(&track).abs();
         Self {
             frame: EnuFrame::new(centre),
-            model: look.camera,
+            model,
             position,
             centre_of_orbit,
             tangent,
@@ -206,17 +204,17 @@ mod tests {
 
     const CENTRE: LonLatHeight = LonLatHeight::new(5.4, 43.5, 200.0);
 
-    fn look(camera: CameraModel, incidence_deg: f64, azimuth_deg: f64) -> Look {
-        Look { camera, incidence_deg, azimuth_deg, heading_deg: 190.0, gsd_m: 0.5 }
+    fn look(incidence_deg: f64, azimuth_deg: f64) -> Look {
+        Look { incidence_deg, azimuth_deg, heading_deg: 190.0, gsd_m: 0.5 }
     }
 
     #[test]
     fn the_line_of_sight_has_the_asked_incidence_and_azimuth() {
         for camera in [CameraModel::Pushbroom, CameraModel::Frame] {
             for (incidence, azimuth) in [(17.0, 10.0), (6.0, 100.0), (25.0, 280.0), (40.0, 190.0)] {
-                let camera = PhysicalCamera::new(&look(camera, incidence, azimuth), CENTRE, (701, 681));
+                let camera = PhysicalCamera::new(camera, &look(incidence, azimuth), CENTRE, (701, 681));
                 let (origin, direction) = camera.line_of_sight(ImagePoint::new(350.0, 340.0));
-                let to_sensor = look(CameraModel::Frame, incidence, azimuth).towards_sensor();
+                let to_sensor = look(incidence, azimuth).towards_sensor();
                 assert!((direction + to_sensor).norm() < 1e-12);
                 assert!(((origin - camera.centre_of_orbit).norm() - EARTH_M - ORBIT_M).abs() < 1e-3);
                 let centre = camera.localize(ImagePoint::new(350.0, 340.0), 200.0);
@@ -229,7 +227,7 @@ mod tests {
     #[test]
     fn pixels_have_the_asked_size_and_north_is_up() {
         for model in [CameraModel::Pushbroom, CameraModel::Frame] {
-            let camera = PhysicalCamera::new(&look(model, 0.0, 0.0), CENTRE, (701, 701));
+            let camera = PhysicalCamera::new(model, &look(0.0, 0.0), CENTRE, (701, 701));
             let at = |sample: f64, line: f64| {
                 let p = EnuFrame::new(CENTRE).enu_from_ground(camera.localize(ImagePoint::new(sample, line), 200.0));
                 Vector3::new(p.east, p.north, 0.0)
@@ -246,7 +244,7 @@ mod tests {
     fn an_rpc_holds_the_camera_to_a_thousandth_of_a_pixel() {
         for model in [CameraModel::Pushbroom, CameraModel::Frame] {
             for (incidence, azimuth, size) in [(16.5, 10.0, 700), (3.0, 100.0, 700), (40.0, 300.0, 2000)] {
-                let camera = PhysicalCamera::new(&look(model, incidence, azimuth), CENTRE, (size, size));
+                let camera = PhysicalCamera::new(model, &look(incidence, azimuth), CENTRE, (size, size));
                 let fitted = camera.fitted((150.0, 400.0)).unwrap();
                 assert!(fitted.max_px < 1e-3, "{model:?} at {incidence}°: {} px", fitted.max_px);
             }
@@ -255,10 +253,23 @@ mod tests {
 
     #[test]
     fn the_orbit_moves_the_pushbroom_while_it_scans() {
-        let camera = PhysicalCamera::new(&look(CameraModel::Pushbroom, 10.0, 10.0), CENTRE, (701, 701));
+        let camera = PhysicalCamera::new(CameraModel::Pushbroom, &look(10.0, 10.0), CENTRE, (701, 701));
         let flown = camera.position_at(700.0 * camera.period_s) - camera.position;
         // 350 m of ground are scanned while the sensor flies a tenth more on its wider circle.
         assert!((350.0..420.0).contains(&flown.norm()), "{}", flown.norm());
         assert!(flown.y < 0.0);
+    }
+
+    /// Two derivations of a pushbroom: a line of sight followed to the curved Earth, and the planes of a linear camera.
+    #[test]
+    fn over_a_small_scene_the_pushbroom_is_the_linear_one() {
+        let camera = PhysicalCamera::new(CameraModel::Pushbroom, &look(18.0, 40.0), CENTRE, (601, 601));
+        let linear = look(18.0, 40.0).rpc(CENTRE, 601, 601);
+        for (sample, line, height_m) in
+            [(0.0, 0.0, 200.0), (600.0, 0.0, 240.0), (80.0, 590.0, 180.0), (410.0, 33.0, 260.0)]
+        {
+            let p = linear.project(camera.localize(ImagePoint::new(sample, line), height_m)).unwrap();
+            assert!((p.sample - sample).hypot(p.line - line) < 0.1, "{p:?} for {sample}, {line}");
+        }
     }
 }

@@ -21,6 +21,7 @@ mod date;
 mod error;
 mod frame;
 mod index;
+mod linear;
 mod lod2;
 mod noise;
 mod parameters;

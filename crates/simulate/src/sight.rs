@@ -84,9 +84,9 @@ mod tests {
     fn rays_pass_through_what_the_camera_sees_and_the_rpc_localises() {
         for camera in [CameraModel::Pushbroom, CameraModel::Frame] {
             let frame = SceneFrame::new(5.4, 43.5, 0.5).unwrap();
-            let look = Look { camera, incidence_deg: 24.0, azimuth_deg: 300.0, heading_deg: 190.0, gsd_m: 0.5 };
+            let look = Look { incidence_deg: 24.0, azimuth_deg: 300.0, heading_deg: 190.0, gsd_m: 0.5 };
             let centre = frame.ground_from_scene(Vector3::new(0.0, 0.0, 200.0)).unwrap();
-            let camera = PhysicalCamera::new(&look, centre, (900, 700));
+            let camera = PhysicalCamera::new(camera, &look, centre, (900, 700));
             let sight = Sight::new(&camera, &frame, (900, 700), (190.0, 490.0)).unwrap();
             let rpc = camera.fitted((140.0, 540.0)).unwrap().rpc;
             for (sample, line) in [(-0.5, -0.5), (899.5, 699.5), (7.3, 692.1), (451.9, 350.2), (888.8, 3.0)] {

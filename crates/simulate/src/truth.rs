@@ -1,8 +1,8 @@
 //! The truth as rasters on the map grid: surface, terrain, classes, what each view sees, and the scene seen from above.
 //!
-//! Values belong to cell centres and are those of the permanent scene (vehicles are left out, as in a reference that
-//! was measured on another day). A view sees a cell when its own ray to the cell's point meets nothing before, the vehicles
-//! of its date included.
+//! Values belong to cell centres, heights are kept to a millimetre, and all are those of the permanent scene: vehicles are
+//! left out, as in a reference that was measured on another day. A view sees a cell when its own ray to the cell's point
+//! meets nothing before, the vehicles of its date included.
 
 use camera::{ImagePoint, Rpc};
 use geodesy::LonLatHeight;
@@ -90,7 +90,7 @@ impl Truth {
         views: &[Witness<'_>],
     ) -> Result<Self, SimulateError> {
         let cells = Cells::new(config);
-        let dsm = cells.grid(|[x, y]| scene.surface(x, y).0 as f32);
+        let dsm = cells.grid(|[x, y]| stored(scene.surface(x, y).0));
         let positions = cells.grid(|[x, y]| {
             let point = Vector3::new(x, y, scene.surface(x, y).0);
             frame.ground_from_scene(point).map(|ground| (point, ground))
@@ -101,7 +101,7 @@ impl Truth {
         let [x, y] = frame.origin_m();
         Ok(Self {
             dsm,
-            dtm: cells.grid(|[x, y]| scene.terrain().height(x, y) as f32),
+            dtm: cells.grid(|[x, y]| stored(scene.terrain().height(x, y))),
             classes: cells.grid(|at| class(scene, at, cells.cell_m) as u8),
             visibility: views.iter().map(|view| seen(view, &positions, cells.count)).collect(),
             ortho: cells.grid(|at| reflectance_from_above(scene, &texture, at, cells.cell_m)),
@@ -126,6 +126,11 @@ impl Witness<'_> {
 fn seen(view: &Witness<'_>, positions: &[(Vector3<f64>, LonLatHeight)], count: usize) -> Grid<u8> {
     let cells = positions.par_iter().map(|(point, ground)| u8::from(view.sees(point, *ground))).collect();
     Grid::from_vec(count, count, cells).expect("as many values as cells")
+}
+
+/// A height as rasters keep it: to 2⁻¹⁰ m, whose trailing zeros make files half as large.
+fn stored(height_m: f64) -> f32 {
+    ((height_m * 1024.0).round() / 1024.0) as f32
 }
 
 /// The class of a cell: that of its centre, or the edge of a footprint where a corner tells that a façade goes through.
@@ -154,7 +159,7 @@ fn reflectance_from_above(scene: &Scene, texture: &Texture, [x, y]: [f64; 2], ce
 pub(crate) fn image_heights(scene: &Scene, sight: &Sight, (width, height): (usize, usize)) -> Grid<f32> {
     let height_at = |k: usize| {
         let at = ImagePoint::new((k % width) as f64, (k / width) as f64);
-        scene.first_point(&sight.ray(at), 1.0).map_or(f32::NAN, |point| point.z as f32)
+        scene.first_point(&sight.ray(at), 1.0).map_or(f32::NAN, |point| stored(point.z))
     };
     let heights = (0..width * height).into_par_iter().map(height_at).collect();
     Grid::from_vec(width, height, heights).expect("as many values as pixels")
