@@ -21,6 +21,7 @@ mod date;
 mod error;
 mod frame;
 mod index;
+#[cfg(test)]
 mod linear;
 mod lod2;
 mod noise;

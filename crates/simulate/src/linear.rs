@@ -1,10 +1,10 @@
-//! A linear pushbroom camera, written as an RPC without any fit: for constructed cases that want an exact camera.
+//! A linear pushbroom camera, written as an RPC without any fit: what the physical one is held against.
 //!
 //! A sensor that moves on a straight line at constant speed and attitude has `line = m₁·X`, `sample = m₂·X / m₃·X` for
 //! homogeneous points X (Gupta and Hartley 1997, "Linear pushbroom cameras"): a ratio of polynomials of degree one, which the RPC's
 //! terms 1, L, P, H hold exactly. X is (east, north, up) in metres from the scene's centre, each proportional to the RPC's
-//! normalised longitude, latitude and height. The curvature of the Earth is left out (1 cm over 350 m): views of a
-//! simulation go through the physical camera instead.
+//! normalised longitude, latitude and height. The curvature of the Earth is left out (1 cm over 350 m): the physical
+//! camera has it.
 
 use camera::{ImagePoint, Rpc};
 use geodesy::{LonLatHeight, meridian_radius_m, prime_vertical_radius_m};
@@ -19,7 +19,7 @@ const HEIGHT_SCALE_M: f64 = 500.0;
 
 impl Look {
     /// The RPC of a linear pushbroom image of `width × height` pixels with the scene's `centre` in its middle.
-    pub fn rpc(&self, centre: LonLatHeight, width: usize, height: usize) -> Rpc {
+    pub(crate) fn rpc(&self, centre: LonLatHeight, width: usize, height: usize) -> Rpc {
         let (width, height) = (width as f64, height as f64);
         let middle = ImagePoint::new((width - 1.0) / 2.0, (height - 1.0) / 2.0);
         let metres_per_degree = [
