@@ -11,10 +11,10 @@ SKYSWEEP := target/release/skysweep
 TOWN := data-samples/town
 DEMO := out/demo
 
-.PHONY: help setup demo test lint bench
+.PHONY: help setup demo test lint bench bench-kernels
 
 help: ## list the targets
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1\t/' | expand -t 14
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
 
 setup: ## install the system packages that are missing (Debian, Ubuntu: apt)
 	@command -v cargo > /dev/null || { echo "error: cargo not found: install Rust from https://rustup.rs, then run make again" >&2; exit 2; }
@@ -58,5 +58,8 @@ lint: setup ## format, clippy on every target (benches too), documentation; warn
 	cargo clippy --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 
-bench: setup ## criterion benches of the kernels
-	@cargo bench --workspace
+bench: setup ## speed against error: every preset on every scene; writes benches/results (about 12 minutes)
+	@cargo bench --bench scenes
+
+bench-kernels: setup ## criterion benches of the kernels
+	@cargo bench --workspace --exclude skysweep

@@ -19,7 +19,7 @@ impl Axis {
         Self { label: label.to_owned(), low, high, logarithmic: false, names: Vec::new() }
     }
 
-    /// A logarithmic axis over whole 1, 2, 5 steps that hold all positive values.
+    /// A logarithmic axis that holds all positive values with some room.
     pub fn logarithmic(label: &str, values: impl Iterator<Item = f64>) -> Self {
         let positive = values.filter(|v| v.is_finite() && *v > 0.0);
         let (low, high) = positive.fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
@@ -65,7 +65,9 @@ impl Axis {
 
     fn decades(&self) -> Vec<f64> {
         let (first, last) = (self.low.log10().floor() as i32, self.high.log10().ceil() as i32);
-        let all = (first..=last).flat_map(|decade| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(decade)));
+        let digits: &[f64] =
+            if self.high / self.low < 8.0 { &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0] } else { &[1.0, 2.0, 5.0] };
+        let all = (first..=last).flat_map(|decade| digits.iter().map(move |digit| digit * 10f64.powi(decade)));
         all.filter(|v| (self.low..=self.high).contains(v)).collect()
     }
 }
@@ -87,6 +89,7 @@ mod tests {
         assert_eq!(texts(Axis::linear("", -1.0, 1.0)), ["\u{2212}1", "\u{2212}0.5", "0", "0.5", "1"]);
         assert_eq!(texts(Axis::linear("", 0.0, 100.0)), ["0", "20", "40", "60", "80", "100"]);
         assert_eq!(texts(Axis::logarithmic("", [0.9, 30.0].into_iter())), ["1", "2", "5", "10", "20"]);
+        assert_eq!(texts(Axis::logarithmic("", [0.6, 1.4].into_iter())), ["0.5", "0.6", "0.8", "1", "1.5"]);
         assert_eq!(texts(Axis::names("", ["a", "b"].map(String::from).into_iter())), ["a", "b"]);
     }
 

@@ -9,6 +9,8 @@ const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 320.0;
 /// Room for ticks and labels: left, right, top, bottom.
 const MARGINS: [f64; 4] = [58.0, 16.0, 16.0, 48.0];
+/// Room above a plot for its heading.
+const HEADING: f64 = 26.0;
 
 /// How marks look; colours are variables that a page or a plot on its own sets.
 pub(crate) const STYLE: &str = "\
@@ -20,8 +22,8 @@ pub(crate) const STYLE: &str = "\
 .chart .dot3{fill:var(--soft);stroke:var(--paper);stroke-width:1}";
 
 /// The colours of a plot on its own.
-const COLOURS: &str = "svg{--paper:#fff;--ink:#1d2530;--soft:#66707c;--line:#e2e6ea;--a:#2667a8;--b:#c8551b;background:#fff}\
-@media(prefers-color-scheme:dark){svg{--paper:#14181d;--ink:#e4e8ec;--soft:#98a2ad;--line:#2b323a;--a:#6fb1ee;--b:#f29a63;background:#14181d}}";
+const COLOURS: &str = ":root{--paper:#fff;--ink:#1d2530;--soft:#66707c;--line:#e2e6ea;--a:#2667a8;--b:#c8551b;background:#fff}\
+@media(prefers-color-scheme:dark){:root{--paper:#14181d;--ink:#e4e8ec;--soft:#98a2ad;--line:#2b323a;--a:#6fb1ee;--b:#f29a63;background:#14181d}}";
 
 /// A plot under construction. Marks are drawn in the order in which they are added.
 #[derive(Debug, Clone)]
@@ -73,6 +75,13 @@ impl Chart {
         self.add(format_args!("<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4.5\"/>"));
     }
 
+    /// A square; `class` as for dots.
+    pub fn square(&mut self, class: &str, x: f64, y: f64) {
+        let (x, y) = self.place(x, y);
+        let (left, top) = (x - 4.0, y - 4.0);
+        self.add(format_args!("<rect class=\"{class}\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"8\" height=\"8\"/>"));
+    }
+
     /// Text beside a place, left of it where it would not fit to the right.
     pub fn note(&mut self, x: f64, y: f64, text: &str) {
         let (x, y) = self.place(x, y);
@@ -84,21 +93,47 @@ impl Chart {
 
     /// The plot for a page whose style has the colours.
     pub fn inline(&self) -> String {
-        self.svg("", "")
+        self.svg("")
     }
 
-    /// The plot as a file of its own.
-    pub fn standalone(&self) -> String {
-        let style = format!("<style>{COLOURS}{STYLE}</style>");
-        let size = format!(" xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\"");
-        self.svg(&size, &style) + "\n"
+    /// Plots as a file of their own, side by side in `columns`, each under its title; `key` explains the marks below them: classes
+    /// of dots with texts.
+    pub fn sheet(charts: &[Self], columns: usize, key: &[(&str, &str)]) -> String {
+        let columns = columns.clamp(1, charts.len().max(1));
+        let pitch = HEIGHT + HEADING;
+        let (width, foot) = (WIDTH * columns as f64, pitch * charts.len().div_ceil(columns) as f64);
+        let height = foot + HEADING;
+        let mut body = String::new();
+        for (i, chart) in charts.iter().enumerate() {
+            let (x, y) = ((i % columns) as f64 * WIDTH, (i / columns) as f64 * pitch);
+            let title = escape(&chart.title);
+            let (text_x, text_y, top) = (x + MARGINS[0], y + 18.0, y + HEADING);
+            let place = format!(" x=\"{x}\" y=\"{top}\" width=\"{WIDTH}\" height=\"{HEIGHT}\"");
+            // Writing to a string cannot fail.
+            let _ = write!(
+                body,
+                "<text x=\"{text_x}\" y=\"{text_y}\" font-weight=\"600\">{title}</text>{}",
+                chart.svg(&place)
+            );
+        }
+        let mut x = MARGINS[0];
+        for (class, text) in key {
+            let (y, text_x, text_y) = (foot + 9.0, x + 10.0, foot + 13.0);
+            let _ = write!(body, "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y}\" r=\"4.5\"/>");
+            let _ = write!(body, "<text x=\"{text_x:.1}\" y=\"{text_y}\">{}</text>", escape(text));
+            x += 34.0 + 6.6 * text.chars().count() as f64;
+        }
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"chart\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"0 0 {width} {height}\"><style>{COLOURS}{STYLE}</style>{body}</svg>\n"
+        )
     }
 
-    fn svg(&self, attributes: &str, head: &str) -> String {
+    fn svg(&self, attributes: &str) -> String {
         let (title, frame, marks) = (escape(&self.title), self.frame(), &self.marks);
         format!(
             "<svg class=\"chart\"{attributes} viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{title}\">\
-             <title>{title}</title>{head}{frame}{marks}</svg>"
+             <title>{title}</title>{frame}{marks}</svg>"
         )
     }
 
@@ -163,6 +198,8 @@ mod tests {
         assert!(svg.contains("a &lt; b") && svg.contains("x &amp; y") && svg.contains("&lt;balanced&gt;"));
         assert!(svg.contains("text-anchor=\"end\">&lt;balanced"));
         assert!(!svg.contains("NaN") && !svg.contains("xmlns"));
-        assert!(chart.standalone().contains("xmlns") && chart.standalone().contains("prefers-color-scheme"));
+        let sheet = Chart::sheet(&[chart.clone(), chart.clone(), chart], 2, &[("dot", "balanced")]);
+        assert!(sheet.contains("xmlns") && sheet.contains("prefers-color-scheme"));
+        assert!(sheet.contains("width=\"1120\" height=\"718\"") && sheet.contains("x=\"560\" y=\"26\""), "{sheet}");
     }
 }

@@ -1,0 +1,74 @@
+//! Speed against error: every preset on every scene, `cargo bench --bench scenes [-- NAME… --runs N --out DIR]`.
+//!
+//! Simulated scenes are made first (`skysweep simulate`), real ones are read from `../shared/data/stereo` where that is. The
+//! release binary runs as a user would run it, with default options but for the preset. Runs alternate: all scenes and presets
+//! once, then all again, so that a machine that slows down slows them all. Accuracy is by `skysweep eval`. Medians go to
+//! `benches/results/scenes.json`, a table to `scenes.md`, plots to `scenes.svg`; when names
+//! choose only some scenes, nothing is written without --out. Results of CARS that
+//! `benches/peers/cars/run.sh` left in `benches/results/cars.json` join the table.
+
+#![allow(clippy::print_stdout, reason = "a bench tells its results")]
+
+mod matrix;
+mod peers;
+mod plot;
+mod pyramid;
+mod run;
+mod scenes;
+mod table;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context;
+
+/// Runs per scene and preset: the machine is noisy, the median of three is not.
+const RUNS: usize = 3;
+
+fn main() -> anyhow::Result<()> {
+    let start = Instant::now();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let Arguments { wanted, runs, out } = arguments()?;
+    let folder = tempfile::tempdir()?;
+    let data = root.join("../shared/data/stereo");
+    let mut all = scenes::simulated();
+    if data.is_dir() {
+        all.extend(scenes::real(&data));
+    } else {
+        println!("no real scenes: {} is absent", data.display());
+    }
+    all.retain(|scene| wanted.is_empty() || wanted.iter().any(|w| scene.name.contains(w.as_str())));
+    for scene in &mut all {
+        scene.make(folder.path())?;
+    }
+    let rows = matrix::measure(&all, folder.path(), runs)?;
+    let results = table::Results::new(rows, peers::all(root, &data)?, runs, start.elapsed());
+    println!("{}", results.markdown());
+    match out.or_else(|| wanted.is_empty().then(|| root.join("benches/results"))) {
+        Some(folder) => results.write(&folder),
+        None => Ok(()),
+    }
+}
+
+/// What the command line asks for.
+struct Arguments {
+    /// Names that scenes must contain; all scenes without any.
+    wanted: Vec<String>,
+    runs: usize,
+    out: Option<PathBuf>,
+}
+
+fn arguments() -> anyhow::Result<Arguments> {
+    let mut found = Arguments { wanted: Vec::new(), runs: RUNS, out: None };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--runs" => found.runs = arguments.next().context("--runs needs a number")?.parse::<usize>()?.max(1),
+            "--out" => found.out = Some(arguments.next().context("--out needs a folder")?.into()),
+            // What cargo passes on to every bench.
+            "--bench" => {}
+            name => found.wanted.push(name.to_owned()),
+        }
+    }
+    Ok(found)
+}

@@ -1,0 +1,135 @@
+//! Presets × scenes, alternating.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::pyramid;
+use crate::run::{self, Cost, Metrics};
+use crate::scenes::{Scene, Truth};
+
+/// The presets, fastest first.
+pub(crate) const PRESETS: [&str; 3] = ["fast", "balanced", "accurate"];
+/// The preset that goals are for.
+pub(crate) const DEFAULT: &str = "balanced";
+
+/// Share by which the median times of equal work differ.
+const NOISE: f64 = 0.05;
+
+/// One goal with what was reached.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Reached {
+    pub(crate) metric: &'static str,
+    pub(crate) value: f64,
+    pub(crate) least: f64,
+    pub(crate) greatest: f64,
+    pub(crate) met: bool,
+}
+
+/// One scene with one preset.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Row {
+    pub(crate) scene: &'static str,
+    /// `simulated`, `measured`, `peer` or `pyramid`.
+    pub(crate) truth: &'static str,
+    pub(crate) preset: &'static str,
+    pub(crate) megapixels: f64,
+    pub(crate) cpu_s: f64,
+    pub(crate) cpu_s_per_megapixel: f64,
+    pub(crate) wall_s: f64,
+    pub(crate) peak_mb: f64,
+    pub(crate) metrics: Metrics,
+    pub(crate) s2p_cpu_s: Option<f64>,
+    pub(crate) goals: Vec<Reached>,
+    /// Another preset is at least as fast and as good in MAE and completeness, and better in one of the three.
+    pub(crate) dominated: bool,
+    /// Every run.
+    pub(crate) runs: Vec<Cost>,
+}
+
+impl Row {
+    /// A metric by name; NaN where the scene has none.
+    pub(crate) fn metric(&self, name: &str) -> f64 {
+        self.metrics.iter().find(|(known, _)| known == name).map_or(f64::NAN, |(_, value)| *value)
+    }
+
+    /// Whether the errors are against a truth.
+    pub(crate) fn has_truth(&self) -> bool {
+        matches!(self.truth, "simulated" | "measured")
+    }
+
+    fn new(scene: &Scene, preset: &'static str, runs: Vec<Cost>, metrics: Metrics) -> anyhow::Result<Self> {
+        let median = |f: fn(&Cost) -> f64| {
+            let mut all: Vec<f64> = runs.iter().map(f).collect();
+            all.sort_by(f64::total_cmp);
+            all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        let (megapixels, cpu_s) = (scene.megapixels()?, median(|c| c.cpu_s));
+        let truth = match scene.truth {
+            Truth::Simulated => "simulated",
+            Truth::Measured { .. } => "measured",
+            Truth::Peer { .. } => "peer",
+            Truth::Pyramid { .. } => "pyramid",
+        };
+        let mut row = Self {
+            scene: scene.name,
+            truth,
+            preset,
+            megapixels,
+            cpu_s,
+            cpu_s_per_megapixel: cpu_s / megapixels,
+            wall_s: median(|c| c.wall_s),
+            peak_mb: median(|c| c.peak_mb),
+            metrics,
+            s2p_cpu_s: scene.s2p_cpu_s,
+            goals: Vec::new(),
+            dominated: false,
+            runs,
+        };
+        let goals = scene.goals.iter().filter(|_| preset == DEFAULT).map(|&(metric, least, greatest)| {
+            let value = row.metric(metric);
+            Reached { metric, value, least, greatest, met: (least..=greatest).contains(&value) }
+        });
+        row.goals = goals.collect();
+        Ok(row)
+    }
+
+    /// Whether another row of the same scene makes this one useless. Times that differ by less than [`NOISE`] are equal.
+    fn is_dominated_by(&self, other: &Self) -> bool {
+        let errors = |row: &Self| [row.metric("mae"), 1.0 - row.metric("completeness_1")];
+        let pairs = || errors(other).into_iter().zip(errors(self));
+        let faster = other.cpu_s < (1.0 - NOISE) * self.cpu_s;
+        let not_slower = other.cpu_s <= (1.0 + NOISE) * self.cpu_s;
+        let no_worse = self.scene == other.scene && not_slower && pairs().all(|(a, b)| a <= b);
+        no_worse && (faster || pairs().any(|(a, b)| a < b))
+    }
+}
+
+/// Runs everything `runs` times, all scenes and presets before any comes again.
+pub(crate) fn measure(scenes: &[Scene], folder: &Path, runs: usize) -> anyhow::Result<Vec<Row>> {
+    let mut cells: Vec<(&Scene, &'static str, Vec<Cost>, Metrics)> =
+        scenes.iter().flat_map(|scene| PRESETS.map(|preset| (scene, preset, Vec::new(), Metrics::new()))).collect();
+    let out = folder.join("out");
+    for round in 0..runs {
+        for (scene, preset, costs, metrics) in &mut cells {
+            costs.push(run::dsm(&scene.images, preset, &out)?);
+            if round == 0 {
+                *metrics = accuracy(scene, &out.join("dsm/dsm.tif"))?;
+            }
+            println!("{round} {} {preset}: {:?}", scene.name, costs.last());
+        }
+    }
+    let rows: anyhow::Result<Vec<Row>> =
+        cells.into_iter().map(|(scene, preset, costs, metrics)| Row::new(scene, preset, costs, metrics)).collect();
+    let mut rows = rows?;
+    let dominated: Vec<bool> = rows.iter().map(|row| rows.iter().any(|other| row.is_dominated_by(other))).collect();
+    rows.iter_mut().zip(dominated).for_each(|(row, dominated)| row.dominated = dominated && row.has_truth());
+    Ok(rows)
+}
+
+fn accuracy(scene: &Scene, dsm: &Path) -> anyhow::Result<Metrics> {
+    let Truth::Pyramid { peer } = &scene.truth else { return run::evaluate(dsm, &scene.truth, &scene.folder) };
+    let mut both = pyramid::measure(dsm)?;
+    both.extend(pyramid::measure(peer)?.into_iter().map(|(name, value)| (format!("s2p_{name}"), value)));
+    Ok(both)
+}

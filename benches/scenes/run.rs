@@ -1,0 +1,84 @@
+//! Running the command and reading what it says.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use anyhow::{Context, ensure};
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::scenes::Truth;
+
+const SKYSWEEP: &str = env!("CARGO_BIN_EXE_skysweep");
+
+/// What one run took.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct Cost {
+    /// Processor seconds in user mode.
+    pub(crate) cpu_s: f64,
+    /// Wall seconds.
+    pub(crate) wall_s: f64,
+    /// Largest resident memory, megabytes.
+    pub(crate) peak_mb: f64,
+}
+
+fn checked(output: Output) -> anyhow::Result<Output> {
+    ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Ok(output)
+}
+
+/// Makes a simulated scene.
+pub(crate) fn simulate(arguments: &[&str], folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let made = Command::new(SKYSWEEP).arg("simulate").args(arguments).arg("-o").arg(folder).arg("-q").output()?;
+    checked(made).map(|_| ()).with_context(|| format!("skysweep simulate {}", arguments.join(" ")))
+}
+
+/// Runs `skysweep dsm` with a preset and default options.
+pub(crate) fn dsm(images: &[PathBuf], preset: &str, out: &Path) -> anyhow::Result<Cost> {
+    // bash times the command and its threads; nothing in std does.
+    let output = Command::new("bash")
+        .args(["-c", "TIMEFORMAT='times %U %R'; time \"$@\"", "bash", SKYSWEEP, "dsm", "--preset", preset])
+        .args(["--overwrite", "--json", "-q", "--progress", "none", "-o"])
+        .arg(out)
+        .args(images)
+        .output()?;
+    let output = checked(output)?;
+    let errors = String::from_utf8_lossy(&output.stderr);
+    let report: Value = serde_json::from_slice(&output.stdout)?;
+    let times = errors.lines().find_map(|l| l.strip_prefix("times ")).context("bash printed no times")?;
+    let mut seconds = times.split(' ').map(str::parse::<f64>);
+    let mut next = || seconds.next().context("bash printed too few times")?.context("bash printed no number");
+    Ok(Cost { cpu_s: next()?, wall_s: next()?, peak_mb: report["peak_memory_mb"].as_f64().unwrap_or(f64::NAN) })
+}
+
+/// Metrics by name.
+pub(crate) type Metrics = Vec<(String, f64)>;
+
+/// Runs `skysweep eval --align xyz` and returns the metrics over all cells, `median_abs` (the median of |error|), `volume_iou` and
+/// `overreach`. In simulated scenes water does not count, and the true terrain is used.
+pub(crate) fn evaluate(dsm: &Path, truth: &Truth, folder: &Path) -> anyhow::Result<Metrics> {
+    let mut command = Command::new(SKYSWEEP);
+    command.arg("eval").arg(dsm);
+    match truth {
+        Truth::Simulated => {
+            let file = |name: &str| folder.join("truth").join(name);
+            command.arg(file("dsm.tif")).arg("--dtm").arg(file("dtm.tif"));
+            command.arg("--classes").arg(file("classes.tif")).args(["--skip", "9"]);
+        }
+        Truth::Measured { path, vertical } | Truth::Peer { path, vertical } => {
+            command.arg(path).args(["--test-vertical", vertical, "--ref-vertical", vertical]);
+        }
+        Truth::Pyramid { .. } => return Ok(Metrics::new()),
+    }
+    let output = checked(command.args(["--align", "xyz", "--json", "--no-report"]).output()?)?;
+    let report: Value = serde_json::from_slice(&output.stdout)?;
+    let all = report["metrics"].as_object().context("the evaluation has no member \"metrics\"")?;
+    let mut out: Metrics = all.iter().filter_map(|(k, v)| Some((k.clone(), v.as_f64()?))).collect();
+    let mut add = |name: &str, value: Option<f64>| out.extend(value.map(|value| (name.to_owned(), value)));
+    // The alignment takes the median out, so the median of |error| is the MAD.
+    add("median_abs", all.get("nmad").and_then(Value::as_f64).map(|nmad| nmad / 1.4826));
+    add("volume_iou", report.pointer("/standing/volume_m3/iou").and_then(Value::as_f64));
+    add("overreach", report.pointer("/sharpness/overreach_m/median").and_then(Value::as_f64));
+    Ok(out)
+}

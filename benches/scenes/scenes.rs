@@ -1,0 +1,142 @@
+//! The scenes, their references, and what was promised of each.
+
+use std::path::{Path, PathBuf};
+
+use crate::run;
+
+/// What a scene's DSM is compared with.
+#[derive(Clone)]
+pub(crate) enum Truth {
+    /// The exact surface of a simulated scene, with its terrain and classes.
+    Simulated,
+    /// A measured surface; `vertical` names the datum of a reference that does not say its own.
+    Measured { path: PathBuf, vertical: &'static str },
+    /// Another program's surface: a comparison, no truth.
+    Peer { path: PathBuf, vertical: &'static str },
+    /// The pyramid of Khufu; `peer` is S2P's surface model of it, measured in the same way.
+    Pyramid { peer: PathBuf },
+}
+
+/// A promise for the default preset: name, least, greatest.
+pub(crate) type Goal = (&'static str, f64, f64);
+
+/// One scene of the bench.
+pub(crate) struct Scene {
+    pub(crate) name: &'static str,
+    pub(crate) images: Vec<PathBuf>,
+    pub(crate) truth: Truth,
+    pub(crate) goals: &'static [Goal],
+    /// Processor seconds of S2P on the same scene (`../shared/data/README.md`), where it was run on it.
+    pub(crate) s2p_cpu_s: Option<f64>,
+    /// Arguments of `skysweep simulate` for a scene that is made.
+    simulation: &'static [&'static str],
+    /// Where it is made.
+    pub(crate) folder: PathBuf,
+}
+
+/// Simulated scenes: name and arguments.
+const SIMULATED: [(&str, &[&str]); 9] = [
+    ("town", &["town"]),
+    ("dense-city", &["dense-city"]),
+    ("high-rise", &["high-rise"]),
+    ("hills", &["hills"]),
+    ("quarry", &["quarry"]),
+    ("harbour", &["harbour"]),
+    ("repetitive-roofs", &["repetitive-roofs"]),
+    ("low-texture", &["low-texture"]),
+    ("five-dates", &["town", "--views", "5", "--dates", "5"]),
+];
+
+/// `jax_068`, all seven views.
+const SEVEN: [Goal; 3] = [("mae", 0.0, 1.5), ("completeness_1", 0.62, 1.0), ("valid_ratio", 0.90, 1.0)];
+/// `jax_068`, two views.
+const PAIR: [Goal; 2] = [("mae", 0.0, 1.2), ("completeness_1", 0.58, 1.0)];
+/// Against S2P's own DSM.
+const S2P: [Goal; 2] = [("median_abs", 0.0, 0.35), ("valid_ratio", 0.90, 1.0)];
+/// Khufu: the faces' slope and the height of the apex over the base.
+const KHUFU: [Goal; 4] =
+    [("east_deg", 50.84, 52.84), ("south_deg", 50.84, 52.84), ("west_deg", 50.84, 52.84), ("height_m", 144.0, 148.0)];
+
+/// The simulated scenes, not made yet.
+pub(crate) fn simulated() -> Vec<Scene> {
+    let scene = |(name, simulation)| Scene {
+        name,
+        images: Vec::new(),
+        truth: Truth::Simulated,
+        goals: &[],
+        s2p_cpu_s: None,
+        simulation,
+        folder: PathBuf::new(),
+    };
+    SIMULATED.into_iter().map(scene).collect()
+}
+
+/// The images of Jacksonville with these numbers.
+pub(crate) fn jax_images(data: &Path, views: &[usize]) -> Vec<PathBuf> {
+    views.iter().map(|v| data.join(format!("jax_068/images/JAX_068_{v:03}_RGB.tif"))).collect()
+}
+
+/// The real scenes under `data` (`../shared/data/stereo`).
+pub(crate) fn real(data: &Path) -> Vec<Scene> {
+    let jax = |views: &[usize]| jax_images(data, views);
+    let lidar = || Truth::Measured { path: data.join("jax_068/truth/JAX_068_DSM_georef.tif"), vertical: "ellipsoid" };
+    let s2p = |name: &str| Truth::Peer { path: data.join("peers").join(name), vertical: "ellipsoid" };
+    let numbered = |folder: &str, n: usize| -> Vec<PathBuf> {
+        (1..=n).map(|i| data.join(format!("{folder}/img_0{i}.tif"))).collect()
+    };
+    let scene = |name, images, truth, goals, s2p_cpu_s| Scene {
+        name,
+        images,
+        truth,
+        goals,
+        s2p_cpu_s,
+        simulation: &[],
+        folder: PathBuf::new(),
+    };
+    vec![
+        scene("jax_068 7 views", jax(&[1, 2, 3, 4, 5, 6, 7]), lidar(), &SEVEN, None),
+        scene("jax_068 001-003", jax(&[1, 3]), lidar(), &PAIR, None),
+        scene("jax_068 002-003", jax(&[2, 3]), lidar(), &PAIR, None),
+        scene("jax_068 002-004", jax(&[2, 4]), lidar(), &[], None),
+        scene("s2p_pair", numbered("s2p_pair", 2), s2p("s2p_pair_default_0.5m.tif"), &S2P, Some(30.0)),
+        scene("s2p_triplet", numbered("s2p_triplet", 3), s2p("s2p_triplet_default_0.5m.tif"), &S2P, Some(48.0)),
+        scene(
+            "phr_gizeh",
+            vec![data.join("phr_gizeh/img1_rpc.tif"), data.join("phr_gizeh/img2_rpc.tif")],
+            Truth::Pyramid { peer: data.join("peers/s2p_gizeh_0.5m.tif") },
+            &KHUFU,
+            Some(19.0),
+        ),
+    ]
+}
+
+impl Scene {
+    /// Makes the images of a simulated scene below `folder`; does nothing for a real one.
+    pub(crate) fn make(&mut self, folder: &Path) -> anyhow::Result<()> {
+        if self.simulation.is_empty() {
+            return Ok(());
+        }
+        self.folder = folder.join("scenes").join(self.name);
+        run::simulate(self.simulation, &self.folder)?;
+        let mut images: Vec<PathBuf> = std::fs::read_dir(&self.folder)?.flatten().map(|entry| entry.path()).collect();
+        images.retain(|path| path.extension().is_some_and(|extension| extension == "tif"));
+        images.sort();
+        self.images = images;
+        Ok(())
+    }
+
+    /// Megapixels of all images together.
+    pub(crate) fn megapixels(&self) -> anyhow::Result<f64> {
+        megapixels(&self.images)
+    }
+}
+
+/// Megapixels of images together.
+pub(crate) fn megapixels(images: &[PathBuf]) -> anyhow::Result<f64> {
+    let mut pixels = 0;
+    for image in images {
+        let source = io::raster::ImageSource::open(image)?;
+        pixels += source.info().width * source.info().height;
+    }
+    Ok(pixels as f64 / 1e6)
+}
