@@ -9,6 +9,10 @@ use crate::render::Sun;
 
 /// The key of a parameter file that names the preset it starts from.
 const PRESET_KEY: &str = "preset";
+/// A cell of the truth has a bit for each view.
+const MAX_VIEWS: f64 = 16.0;
+/// About 6 bytes are held for each: 2 GB.
+const MAX_PIXELS: f64 = 3e8;
 
 impl SimulationConfig {
     /// Reads a parameter file's text.
@@ -50,7 +54,9 @@ impl SimulationConfig {
     pub fn validate(&self) -> Result<(), SimulateError> {
         within("the size in metres (size_m)", self.size_m, 50.0, 3000.0)?;
         within("the ground sampling distance in metres (gsd_m)", self.gsd_m, 0.2, 5.0)?;
-        within("the number of views", self.views as f64, 2.0, 16.0)?;
+        within("the number of views", self.views as f64, 2.0, MAX_VIEWS)?;
+        let side = self.size_m / self.gsd_m;
+        within("the number of pixels of all views together", side * side * self.views as f64, 1.0, MAX_PIXELS)?;
         within("the longitude", self.lon_deg, -180.0, 180.0)?;
         within("the latitude", self.lat_deg, -89.0, 89.0)?;
         within("the height of the ground in metres (ground_height_m)", self.ground_height_m, -400.0, 6000.0)?;
@@ -179,6 +185,7 @@ mod tests {
             ("preset = 3", "3"),
             ("size_m = \"big\"", "big"),
             ("size_m = 1e9", "size"),
+            ("size_m = 3000.0\ngsd_m = 0.2", "pixels"),
             ("views = 2\n[[acquisition.looks]]\nincidence_deg = 3.0\nazimuth_deg = 4.0", "looks"),
             ("size_m = ", "line 1"),
             ("[sensor]\nbits = 16", "bits"),

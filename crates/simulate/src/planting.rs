@@ -68,26 +68,19 @@ pub(crate) fn vehicles(
     }
     let lines = (reach_m * std::f64::consts::SQRT_2 / streets.spacing_m).ceil() as i64;
     let places = (reach_m * std::f64::consts::SQRT_2 / PLACE_M).ceil() as i64;
-    let mut vehicles = Vec::new();
-    for family in 0..2 {
-        for line in -lines..=lines {
-            let own = derived(seed, (2 * (line + lines) + family) as u64);
-            for place in -places..=places {
-                for (lane, share) in [(0, config.parked_share), (1, config.parked_share), (2, MOVING_SHARE)] {
-                    if lattice(own, place, lane) < share {
-                        vehicles.extend(vehicle(
-                            streets,
-                            terrain,
-                            (family, line, place, lane),
-                            derived(own, 7),
-                            reach_m,
-                        ));
-                    }
-                }
-            }
-        }
-    }
-    vehicles
+    let shares = [(0, config.parked_share), (1, config.parked_share), (2, MOVING_SHARE)];
+    let streets_of = |family| (-lines..=lines).map(move |line| (family, line));
+    let on_street = |(family, line): (i64, i64)| {
+        let own = derived(seed, (2 * (line + lines) + family) as u64);
+        (-places..=places)
+            .flat_map(|place| shares.map(|(lane, share)| (place, lane, share)))
+            .filter(|(place, lane, share)| lattice(own, *place, *lane) < *share)
+            .filter_map(|(place, lane, _)| {
+                vehicle(streets, terrain, (family, line, place, lane), derived(own, 7), reach_m)
+            })
+            .collect::<Vec<_>>()
+    };
+    (0..2).flat_map(streets_of).flat_map(on_street).collect()
 }
 
 fn vehicle(

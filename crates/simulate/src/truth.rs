@@ -77,8 +77,17 @@ impl Cells {
     }
 
     fn grid<T: Send + Clone>(&self, value: impl Fn([f64; 2]) -> T + Sync) -> Grid<T> {
-        let data: Vec<T> = (0..self.count * self.count).into_par_iter().map(|k| value(self.centre(k))).collect();
+        let data = (0..self.count * self.count).into_par_iter().map(|k| value(self.centre(k))).collect();
         Grid::from_vec(self.count, self.count, data).expect("as many values as cells")
+    }
+
+    fn try_grid<T: Send + Clone>(
+        &self,
+        value: impl Fn([f64; 2]) -> Result<T, SimulateError> + Sync,
+    ) -> Result<Grid<T>, SimulateError> {
+        let data = (0..self.count * self.count).into_par_iter().map(|k| value(self.centre(k)));
+        let data = data.collect::<Result<Vec<T>, SimulateError>>()?;
+        Ok(Grid::from_vec(self.count, self.count, data).expect("as many values as cells"))
     }
 }
 
@@ -91,19 +100,18 @@ impl Truth {
     ) -> Result<Self, SimulateError> {
         let cells = Cells::new(config);
         let dsm = cells.grid(|[x, y]| stored(scene.surface(x, y).0));
-        let positions = cells.grid(|[x, y]| {
+        let seen_by = cells.try_grid(|[x, y]| {
             let point = Vector3::new(x, y, scene.surface(x, y).0);
-            frame.ground_from_scene(point).map(|ground| (point, ground))
-        });
-        let positions: Vec<(Vector3<f64>, LonLatHeight)> =
-            positions.into_vec().into_iter().collect::<Result<_, SimulateError>>()?;
+            let ground = frame.ground_from_scene(point)?;
+            Ok(views.iter().enumerate().fold(0u16, |bits, (k, view)| bits | u16::from(view.sees(&point, ground)) << k))
+        })?;
         let texture = Texture::new(config.seed, 0, config.surface);
         let [x, y] = frame.origin_m();
         Ok(Self {
             dsm,
             dtm: cells.grid(|[x, y]| stored(scene.terrain().height(x, y))),
             classes: cells.grid(|at| class(scene, at, cells.cell_m) as u8),
-            visibility: views.iter().map(|view| seen(view, &positions, cells.count)).collect(),
+            visibility: (0..views.len()).map(|k| seen_by.map(|bits| (bits >> k & 1) as u8)).collect(),
             ortho: cells.grid(|at| reflectance_from_above(scene, &texture, at, cells.cell_m)),
             buildings: lod2::model(scene.buildings(), frame),
             geotransform: GeoTransform::north_up(x - cells.half_m, y + cells.half_m, cells.cell_m),
@@ -121,11 +129,6 @@ impl Witness<'_> {
         };
         self.scene.first_point(&self.sight.ray(at), 1.0).is_some_and(|met| (met - point).norm() < SEEN_M)
     }
-}
-
-fn seen(view: &Witness<'_>, positions: &[(Vector3<f64>, LonLatHeight)], count: usize) -> Grid<u8> {
-    let cells = positions.par_iter().map(|(point, ground)| u8::from(view.sees(point, *ground))).collect();
-    Grid::from_vec(count, count, cells).expect("as many values as cells")
 }
 
 /// A height as rasters keep it: to 2⁻¹⁰ m, whose trailing zeros make files half as large.
