@@ -68,6 +68,22 @@ fn a_surface_in_the_folder_of_a_run_has_its_report_there() {
     assert!(!run.join("eval").exists());
 }
 
+/// What the README says in three commands: the folder that `dsm` leaves is one that `eval` knows.
+#[test]
+fn images_to_surface_to_report_in_three_commands() {
+    let folder = TempDir::new().unwrap();
+    let (scene, run) = (folder.path().join("s"), folder.path().join("d"));
+    let skysweep = |arguments: &[&str]| Command::cargo_bin("skysweep").unwrap().args(arguments).assert().success();
+    let text = |path: &Path| path.to_str().unwrap().to_owned();
+    skysweep(&["simulate", "town", "--size", "90", "--views", "2", "-q", "-o", &text(&scene)]);
+    let views = ["view_1.tif", "view_2.tif"].map(|name| text(&scene.join(name)));
+    skysweep(&["dsm", &views[0], &views[1], "-q", "--progress", "none", "-o", &text(&run)]);
+    let shown = skysweep(&["eval", &text(&run.join("dsm/dsm.tif")), &text(&scene.join("truth/dsm.tif"))]);
+    shown.stdout(contains("d/eval/report.html"));
+    let page = fs::read_to_string(run.join("eval/report.html")).unwrap();
+    assert!(page.contains("mean absolute error") && page.matches("data:image/png").count() == 3);
+}
+
 #[test]
 fn any_other_surface_is_only_printed_until_a_folder_is_named() {
     let (folder, _run, reference) = run_folder();
