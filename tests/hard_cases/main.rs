@@ -11,9 +11,10 @@
 //! | constant images | `radiometry::blank_images_…`, `one_blank_view_…`; `sweep: blank_and_missing_images_…` | refused, or the view set aside by name |
 //! | saturated image | `radiometry::a_saturated_roof_…` | right or void, the rest untouched |
 //! | no-data images | `radiometry::voids_in_a_view_…`, `where_all_views_are_void_…` | other views' heights; void where nobody sees, declared or not |
-//! | repetitive texture | `radiometry::repeated_texture_…` | not a period too high, with two views too |
-//! | water | `radiometry::glittering_water_…` | void or level; land untouched |
-//! | high-rise | `relief::a_tower_of_130_m_…` | ≥ 90 % of the roof right, range found by itself |
+//! | repetitive texture | `radiometry::repeated_texture_…`, `simulated::sheds_that_repeat_…` | not a period too high, with two views too |
+//! | low texture | `simulated::a_town_under_a_veil_…` | ≥ 85 % of the ground, ≥ 75 % of the roofs right |
+//! | water | `radiometry::glittering_water_…`, `simulated::a_harbour_…` | void or level; land untouched |
+//! | high-rise | `relief::a_tower_of_130_m_…`, `simulated::a_slim_tower_…` | ≥ 90 % (slim: 70 %) of the roof right, range found by itself |
 //! | steep slopes | `relief::steep_slopes_…` | ≥ 95 % right at up to 51° |
 //! | multi-date | `radiometry::four_dates_…` | ≥ 85 % right under other suns, contrast, cars and crops |
 //! | pointing off by 5 px | `geometry::pointing_errors_of_five_…` | as without, after a shift |
@@ -36,4 +37,5 @@ mod geometry;
 mod invariance;
 mod radiometry;
 mod relief;
+mod simulated;
 mod stage;

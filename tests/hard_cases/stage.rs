@@ -375,18 +375,7 @@ impl Errors {
         let inside = self.truth.data().iter().zip(self.places.data()).map(|(t, p)| !t.is_nan() && region(p[0], p[1]));
         let chosen: Vec<f64> =
             self.errors.data().iter().zip(inside).filter(|(_, i)| *i).map(|(e, _)| f64::from(*e)).collect();
-        let share = |f: &dyn Fn(&&f64) -> bool| chosen.iter().filter(f).count() as f64 / chosen.len().max(1) as f64;
-        let mut known: Vec<f64> = chosen.iter().copied().filter(|e| e.is_finite()).collect();
-        let bias_m = median(&mut known);
-        let nmad_m = 1.4826 * median(&mut known.iter().map(|e| (e - bias_m).abs()).collect::<Vec<_>>());
-        Score {
-            cells: chosen.len(),
-            covered: share(&|e| e.is_finite()),
-            right: share(&|e| e.abs() < 1.0),
-            wrong: share(&|e| e.abs() > 2.0),
-            bias_m,
-            nmad_m,
-        }
+        Score::of(chosen)
     }
 }
 
@@ -396,6 +385,22 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
 }
 
 impl Score {
+    /// The score of cells with these errors, NaN in voids.
+    pub(crate) fn of(chosen: Vec<f64>) -> Self {
+        let share = |f: &dyn Fn(&&f64) -> bool| chosen.iter().filter(f).count() as f64 / chosen.len().max(1) as f64;
+        let mut known: Vec<f64> = chosen.iter().copied().filter(|e| e.is_finite()).collect();
+        let bias_m = median(&mut known);
+        let nmad_m = 1.4826 * median(&mut known.iter().map(|e| (e - bias_m).abs()).collect::<Vec<_>>());
+        Self {
+            cells: chosen.len(),
+            covered: share(&|e| e.is_finite()),
+            right: share(&|e| e.abs() < 1.0),
+            wrong: share(&|e| e.abs() > 2.0),
+            bias_m,
+            nmad_m,
+        }
+    }
+
     /// Fails, with all numbers, unless at least `right` of the cells are right and at most `wrong` wrong.
     pub(crate) fn expect(&self, case: &str, right: f64, wrong: f64) {
         assert!(self.cells > 100, "{case}: the region is empty: {self:?}");

@@ -39,6 +39,11 @@ const TEAR_SLOPE: f64 = 2.75;
 
 /// A height around which the views correlate by less than this on average has no picture behind it: chance reaches half.
 const CORRELATION_MIN: f32 = 0.1;
+/// What chance reaches where every view has another texture, as on water: such a height is left out unless it stands out
+/// from all others by [`CONFIDENCE_CHANCE`].
+const CORRELATION_CHANCE: f32 = 0.4;
+/// See [`CORRELATION_CHANCE`].
+const CONFIDENCE_CHANCE: f32 = 0.1;
 
 /// Runs a DSM job and writes its results.
 ///
@@ -142,6 +147,8 @@ impl<'a> Job<'a> {
         let coarsest = gsds.iter().flatten().copied().fold(0.0, f64::max);
         let grid = setup::choose_grid(config, &geometry, coarsest, &mut self.choices)?;
         let sources = setup::choose_sources(config, &geometry, &pairs, &ties, &tuning, &mut self.choices)?;
+        let found = (sources.as_slice(), &geometry);
+        let range = setup::with_towers(config, range, &views, found, coarsest, &tuning, &mut self.choices)?;
         let sides = setup::smallest_sides(&views);
         let plan = setup::plan_sweep(range, sources, &geometry, &sides, &tuning, &mut self.choices);
 
@@ -377,8 +384,10 @@ fn agreeing(
     let counts = count_agreeing(own, &others, level, &ConsistencyConfig::default())?;
     let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
     let mut keep = counts.map(|n| *n >= needed);
-    for (keep, correlation) in keep.data_mut().iter_mut().zip(own.map.correlation.data()) {
-        *keep = *keep && *correlation >= CORRELATION_MIN;
+    let reliability = own.map.correlation.data().iter().zip(own.map.confidence.data());
+    for (keep, (correlation, confidence)) in keep.data_mut().iter_mut().zip(reliability) {
+        let is_chance = *correlation < CORRELATION_CHANCE && *confidence < CONFIDENCE_CHANCE;
+        *keep = *keep && *correlation >= CORRELATION_MIN && !is_chance;
     }
     Ok(keep)
 }

@@ -11,6 +11,7 @@ mod memory;
 mod output;
 mod pictures;
 mod pointing;
+mod probe;
 pub mod progress;
 pub mod report;
 mod scene;

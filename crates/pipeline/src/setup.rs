@@ -174,6 +174,36 @@ fn list(views: &[usize]) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(",") }
 }
 
+/// Pixels per metre in the pair that sees most parallax.
+fn widest_parallax(sources: &[Vec<usize>], geometry: &Geometry) -> f64 {
+    let used = sources.iter().enumerate().flat_map(|(i, s)| s.iter().map(move |&j| (i, j)));
+    used.filter_map(|(i, j)| geometry.pair(i, j)).map(|p| p.parallax_px_per_m).fold(0.0, f64::max)
+}
+
+/// The range, extended by what stands outside it: see [`crate::probe`]. A given range is left as it is.
+pub(crate) fn with_towers(
+    config: &DsmConfig,
+    range_m: (f64, f64),
+    views: &[sweep::View],
+    (sources, geometry): (&[Vec<usize>], &Geometry),
+    gsd_m: f64,
+    tuning: &Tuning,
+    choices: &mut Choices<'_>,
+) -> Result<(f64, f64), PipelineError> {
+    if config.height_range_m.is_some() {
+        return Ok(range_m);
+    }
+    let step_m = tuning.step_px / widest_parallax(sources, geometry).max(f64::MIN_POSITIVE);
+    let (level, best_of) = (tuning.level, tuning.best_of);
+    let plan = SweepPlan { range_m, step_m, top_level: 0, bottom_level: 0, sources: sources.to_vec(), best_of, level };
+    let Some(found) = crate::probe::extended_range(views, &plan, gsd_m, &smallest_sides(views))? else {
+        return Ok(range_m);
+    };
+    let reason = format!("{} pixels of a coarse sweep show what no tie point does", found.pixels);
+    choices.tell("height range", format!("{:.1} to {:.1} m", found.range_m.0, found.range_m.1), reason);
+    Ok(found.range_m)
+}
+
 /// Steps and levels of the sweep.
 pub(crate) fn plan_sweep(
     range_m: (f64, f64),
@@ -183,8 +213,7 @@ pub(crate) fn plan_sweep(
     tuning: &Tuning,
     choices: &mut Choices<'_>,
 ) -> SweepPlan {
-    let used = sources.iter().enumerate().flat_map(|(i, s)| s.iter().map(move |&j| (i, j)));
-    let widest = used.filter_map(|(i, j)| geometry.pair(i, j)).map(|p| p.parallax_px_per_m).fold(0.0, f64::max);
+    let widest = widest_parallax(&sources, geometry);
     let step_m = tuning.step_px / widest.max(f64::MIN_POSITIVE);
     choices.tell(
         "height step",
