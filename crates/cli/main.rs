@@ -4,6 +4,7 @@
 //! Results go to standard output; log lines and errors go to standard error.
 //! Exit codes: 0 complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
 
+mod city;
 mod dsm;
 mod error;
 mod eval;
@@ -47,6 +48,8 @@ impl Global {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Show and convert city models.
+    City(city::Args),
     /// Make a surface model from satellite images.
     Dsm(Box<dsm::Args>),
     /// Measure how far a surface model is from a reference.
@@ -82,6 +85,7 @@ fn main() -> ExitCode {
 
 fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
+        Command::City(args) => city::run(args),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
         Command::Rpc(args) => rpc::run(args),

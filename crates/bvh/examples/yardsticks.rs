@@ -1,11 +1,14 @@
 //! Times the tree on a real mesh: `cargo run --release -p skysweep-bvh --example yardsticks -- PEER_REFERENCE [THREADS]`.
 //!
-//! Reads `mesh_local.ply`, `cams.json` (as `sparse/0/images.txt`), and `points_f64.npy` of the yardsticks; prints the sums that
-//! the reference files hold, and Mray/s.
+//! Reads `mesh_local.ply`, the cameras of `sparse/0/images.txt` and `points_f64.npy` of the yardsticks; prints the sums that the
+//! reference files hold, and Mray/s of the casting, wall and CPU (Linux). `benches/peers/open3d_cast.py` does the same with
+//! Open3D, for a run side by side. A depth map is timed with its normals.
 
 #![allow(clippy::print_stdout)]
 
 use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
 
 use bvh::{Bvh, Eye, MISS, Target};
 
@@ -27,33 +30,37 @@ fn main() {
     let start = Instant::now();
     let bvh = Bvh::new(&positions, &triangles).expect("a mesh");
     println!("build {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+    let normals: Vec<[f32; 3]> = triangles.iter().map(|t| normal(t.map(|i| positions[i as usize]))).collect();
     let subset: Vec<Eye> = (0..16).map(|i| 2 + 5 * i).chain([80, 85, 90, 95]).map(|i| eyes[i]).collect();
     for cameras in [&subset[..], &eyes[..]] {
-        depth(&bvh, cameras);
+        depth(&bvh, cameras, &normals);
         visibility(&bvh, cameras, &points);
     }
 }
 
-fn depth(bvh: &Bvh, eyes: &[Eye]) {
+fn depth(bvh: &Bvh, eyes: &[Eye], normals: &[[f32; 3]]) {
     let (mut hits, mut sum) = (0usize, 0.0);
-    let mut casting = Duration::ZERO;
+    let mut clock = Clock::default();
     for eye in eyes {
-        let start = Instant::now();
-        let image = bvh.cast_image(eye, WIDTH, HEIGHT, |column, row| {
-            Some([(column as f64 + 0.5 - CENTRE[0]) / FOCAL, (row as f64 + 0.5 - CENTRE[1]) / FOCAL])
+        let image = clock.time(|| {
+            let image = bvh.cast_image(eye, WIDTH, HEIGHT, |column, row| {
+                Some([(column as f64 + 0.5 - CENTRE[0]) / FOCAL, (row as f64 + 0.5 - CENTRE[1]) / FOCAL])
+            });
+            let normal = |&t: &u32| normals.get(t as usize).copied().unwrap_or_default();
+            let map: Vec<[f32; 3]> = image.triangle.par_iter().map(normal).collect();
+            std::hint::black_box(map);
+            image
         });
-        casting += start.elapsed();
         hits += image.triangle.iter().filter(|&&t| t != MISS).count();
         sum += image.depth.iter().filter(|d| d.is_finite()).map(|&d| f64::from(d)).sum::<f64>();
     }
-    let rays = (eyes.len() * WIDTH * HEIGHT) as f64;
-    println!("{} maps: {hits} hits, sum z {sum:.2}, {:.1} Mray/s", eyes.len(), rays / casting.as_secs_f64() / 1e6);
+    println!("{} maps: {hits} hits, sum z {sum:.2}, {}", eyes.len(), clock.speed(eyes.len() * WIDTH * HEIGHT));
 }
 
 fn visibility(bvh: &Bvh, eyes: &[Eye], points: &[[f64; 3]]) {
     let mut views = vec![0u32; points.len()];
     let mut rays = 0;
-    let mut casting = Duration::ZERO;
+    let mut clock = Clock::default();
     for eye in eyes {
         let mut numbers = Vec::new();
         let mut targets = Vec::new();
@@ -68,22 +75,51 @@ fn visibility(bvh: &Bvh, eyes: &[Eye], points: &[[f64; 3]]) {
             }
         }
         rays += targets.len();
-        let start = Instant::now();
-        let hidden = bvh.occluded(eye, &targets);
-        casting += start.elapsed();
+        let hidden = clock.time(|| bvh.occluded(eye, &targets));
         for (&number, hidden) in numbers.iter().zip(hidden) {
             views[number] += u32::from(!hidden);
         }
     }
     let pairs: u64 = views.iter().map(|&v| u64::from(v)).sum();
     let at_least = |k: u32| views.iter().filter(|&&v| v >= k).count();
-    println!(
-        "{} cameras: {pairs} pairs, {} in one view, {} in two, {rays} rays, {:.1} Mray/s",
-        eyes.len(),
-        at_least(1),
-        at_least(2),
-        rays as f64 / casting.as_secs_f64() / 1e6
-    );
+    let (one, two, count) = (at_least(1), at_least(2), eyes.len());
+    println!("{count} cameras: {pairs} pairs, {one} in one view, {two} in two, {rays} rays, {}", clock.speed(rays));
+}
+
+/// Wall and CPU time of parts of the program.
+#[derive(Default)]
+struct Clock {
+    wall: Duration,
+    ticks: u64,
+}
+
+impl Clock {
+    fn time<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        let (start, ticks) = (Instant::now(), cpu_ticks());
+        let out = work();
+        self.wall += start.elapsed();
+        self.ticks += cpu_ticks() - ticks;
+        out
+    }
+
+    fn speed(&self, rays: usize) -> String {
+        let speed = rays as f64 / self.wall.as_secs_f64() / 1e6;
+        format!("{speed:.1} Mray/s, {:.2} s CPU", self.ticks as f64 / 100.0)
+    }
+}
+
+/// User and system time of the process in hundredths of a second; 0 where the system does not say.
+fn cpu_ticks() -> u64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    text.split(' ').skip(13).take(2).filter_map(|t| t.parse::<u64>().ok()).sum()
+}
+
+/// The unit normal of a triangle; zero where it has no area.
+fn normal([a, b, c]: [[f64; 3]; 3]) -> [f32; 3] {
+    let (u, v) = ([0, 1, 2].map(|i| b[i] - a[i]), [0, 1, 2].map(|i| c[i] - a[i]));
+    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
+    if length > 0.0 { n.map(|c| (c / length) as f32) } else { [0.0; 3] }
 }
 
 fn mesh(bytes: &[u8]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {

@@ -11,6 +11,7 @@
 mod class;
 mod crs;
 mod defect;
+mod ears;
 mod error;
 mod kind;
 mod lod;

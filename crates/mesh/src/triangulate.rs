@@ -1,14 +1,17 @@
 //! Polygons with holes cut into triangles, by constrained Delaunay triangulation in the best-fit plane (`spade`).
 //!
-//! Triangles and strictly convex quadrilaterals, most of a city, need none: the latter are cut from their first corner, because
-//! the rounding of coordinates must not choose between the two diagonals of a rectangle. A polygon whose rings cross or share edges is split where they cross, and a triangle counts when its centroid is inside the outer ring
-//! and in no hole (even-odd rule). Coordinates are metres relative to any nearby origin. Nothing is lost in silence: what
-//! was met on the way comes back as [`Finding`]s.
+//! Triangles and strictly convex quadrilaterals, most of a city, need none: the latter are cut from their first corner,
+//! because the rounding of coordinates must not choose between the two diagonals of a rectangle. Rings off their plane, whose
+//! surface depends on how they are cut, are cut by [`ears`], as other tools do. A polygon whose rings cross or share edges is
+//! split where they cross, and a triangle counts when its centroid is inside the outer ring and in no hole (even-odd rule).
+//! Coordinates are metres relative to any nearby origin. Nothing is lost in silence: what was met on the way comes back as
+//! [`Finding`]s.
 
 use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _};
 
 use crate::DefectCode;
+use crate::ears;
 use crate::ring::{Plane, clean};
 use crate::vector::{Vector, cross, dot, sub, unit};
 
@@ -16,6 +19,10 @@ use crate::vector::{Vector, cross, dot, sub, unit};
 const PLANARITY_M: f64 = 0.01;
 /// A triangle that deviates by more than 20 degrees from the polygon's normal is reported (val3dity's default).
 const NORMAL_COSINE: f64 = 0.939_692_620_785_908_4;
+/// Below this the way a polygon is cut changes its surface by less than can be seen, metres.
+const FLAT_M: f64 = 2e-4;
+/// Ears are searched in rings up to this length: the search is quadratic.
+const MAX_EARS: usize = 1000;
 /// Tests of a point against an edge that one broken polygon may cost.
 const MAX_EDGE_TESTS: usize = 50_000_000;
 /// Rings of one polygon that are compared with each other; further repetitions show as edges that meet.
@@ -56,11 +63,11 @@ impl Finding {
 pub fn triangulate(rings: &[Vec<u32>], position: impl Fn(u32) -> [f64; 3]) -> Triangulation {
     let mut out = Triangulation::default();
     let Some((rings, plane)) = usable_rings(rings, &position, &mut out.findings) else { return out };
-    check_planarity(&rings, &plane, &position, &mut out.findings);
+    let off_plane_m = check_planarity(&rings, &plane, &position, &mut out.findings);
     if let Some(triangles) = convex_shortcut(&rings, &plane, &position) {
         out.triangles = triangles;
     } else {
-        Polygon::new(&rings, plane, &position).cut(&mut out);
+        Polygon::new(&rings, plane, &position).cut(off_plane_m, &mut out);
     }
     check_normals(&mut out, &plane, &position);
     out
@@ -125,11 +132,17 @@ fn same_ring(a: &[u32], b: &[u32], position: &impl Fn(u32) -> Vector) -> bool {
     starts.into_iter().take(2).any(|start| (0..n).all(|i| same(i, start + i)) || (0..n).all(|i| same(i, start + n - i)))
 }
 
-fn check_planarity(rings: &[Vec<u32>], plane: &Plane, position: &impl Fn(u32) -> Vector, findings: &mut Vec<Finding>) {
+fn check_planarity(
+    rings: &[Vec<u32>],
+    plane: &Plane,
+    position: &impl Fn(u32) -> Vector,
+    findings: &mut Vec<Finding>,
+) -> f64 {
     let worst = rings.iter().flatten().map(|&v| plane.distance(position(v)).abs()).fold(0.0, f64::max);
     if worst > PLANARITY_M {
         findings.push(Finding::note(DefectCode::NonPlanarDistance, format!("{worst:.3} m")));
     }
+    worst
 }
 
 fn check_normals(out: &mut Triangulation, plane: &Plane, position: &impl Fn(u32) -> Vector) {
@@ -206,7 +219,18 @@ impl Polygon {
         self.rings.iter().map(Vec::len).sum()
     }
 
-    fn cut(&self, out: &mut Triangulation) {
+    /// The triangles of a ring that is off its plane by more than the planar ones are; `None` for all others.
+    fn cut_by_ears(&self, off_plane_m: f64) -> Option<Vec<[u32; 3]>> {
+        let [ring] = &self.rings[..] else { return None };
+        if off_plane_m <= FLAT_M || ring.len() > MAX_EARS {
+            return None;
+        }
+        let corners: Vec<[f64; 2]> = ring.iter().map(|corner| [corner.at.x, corner.at.y]).collect();
+        let vertex = |i: usize| ring[i].vertex;
+        ears::cut(&corners)?.into_iter().map(|[a, b, c]| Some([vertex(a)?, vertex(b)?, vertex(c)?])).collect()
+    }
+
+    fn cut(&self, off_plane_m: f64, out: &mut Triangulation) {
         let out_of_range = || fatal(DefectCode::NotTriangulated, "the coordinates are out of range");
         let Some((mut cdt, crossing)) = self.constrain() else { return out.findings.push(out_of_range()) };
         let simple = !crossing && cdt.num_constraints() == self.edge_count();
@@ -216,6 +240,10 @@ impl Polygon {
             out.findings.push(self.meeting_rings(crossing));
         }
         let holes_fit = self.rings.len() == 1 || (bounded && self.check_holes(&mut out.findings));
+        if let Some(triangles) = self.cut_by_ears(off_plane_m).filter(|_| simple) {
+            out.triangles = triangles;
+            return;
+        }
         if simple && holes_fit {
             return self.collect(&cdt, &faces_by_parity(&cdt), out);
         }

@@ -9,6 +9,7 @@ mod citygml;
 mod cityjson;
 mod crs_name;
 mod error;
+mod export;
 mod obj;
 mod ply;
 mod save;
@@ -20,6 +21,7 @@ use mesh::{CityModel, Defect};
 
 pub use cityjson::{CityJsonOptions, write_cityjson};
 pub use error::{CityError, CityFault};
+pub use export::{Footprints, MeshFormat, write_footprints, write_mesh};
 
 /// City models are read up to this size, bytes.
 pub const SIZE_LIMIT: u64 = 2 << 30;

@@ -1,0 +1,186 @@
+//! `skysweep city info` and `convert`, from the command line: exit codes, reports, and what the written files hold.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// A house with a ridge roof in EPSG:25832, a part without geometry, a road, and a building whose only surface is a line.
+const MODEL: &str = r#"{"type":"CityJSON","version":"2.0",
+    "metadata":{"referenceSystem":"https://www.opengis.net/def/crs/EPSG/0/25832"},
+    "transform":{"scale":[0.5,0.5,0.5],"translate":[500000.0,5700000.0,30.0]},
+    "CityObjects":{
+        "house":{"type":"Building","geometry":[{"type":"Solid","lod":"2.2","boundaries":[[
+            [[0,3,2,1]],[[0,1,5,4]],[[2,3,7,6]],[[1,2,6,9,5]],[[3,0,4,8,7]],[[4,5,9,8]],[[6,7,8,9]]]],
+            "semantics":{"surfaces":[{"type":"GroundSurface"},{"type":"WallSurface"},{"type":"RoofSurface"}],
+                "values":[[0,1,1,1,1,2,2]]}}]},
+        "annex":{"type":"BuildingPart","parents":["house"]},
+        "street":{"type":"Road","geometry":[{"type":"MultiSurface","lod":"1","boundaries":[[[0,1,2]]]}]},
+        BROKEN
+        "tower":{"type":"Building","geometry":[{"type":"MultiSurface","lod":"3","boundaries":[[[0,1,2]]]}]}},
+    "vertices":[[0,0,0],[16,0,0],[16,12,0],[0,12,0],[0,0,6],[16,0,6],[16,12,6],[0,12,6],[0,6,10],[16,6,10]]}"#;
+const BROKEN: &str =
+    r#""line":{"type":"Building","geometry":[{"type":"MultiSurface","lod":"2","boundaries":[[[0,1,0]]]}]},"#;
+
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new(broken: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("model.city.json"), MODEL.replace("BROKEN", broken)).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn run(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
+        Command::cargo_bin("skysweep").unwrap().current_dir(self.folder.path()).arg("city").args(arguments).assert()
+    }
+
+    fn json(&self, name: &str) -> Value {
+        serde_json::from_slice(&std::fs::read(self.path(name)).unwrap()).unwrap()
+    }
+}
+
+fn stdout(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+}
+
+#[test]
+fn info_says_what_is_there() {
+    let bench = Bench::new("");
+    let text = stdout(&bench.run(&["info", "model.city.json"]).code(0));
+    for words in ["CityJSON 2.0", "EPSG:25832", "500008.000 5700006.000 35.000", "used 1", "RoofSurface 4"] {
+        assert!(text.contains(words), "{words:?} is not in\n{text}");
+    }
+    let summary: Value = serde_json::from_str(&stdout(&bench.run(&["info", "model.city.json", "--json"]))).unwrap();
+    assert_eq!(summary["triangles"], 16);
+    assert_eq!(summary["lods"]["2.2"], 1);
+    let everything = bench.run(&["info", "model.city.json", "--json", "--all-objects"]);
+    assert_eq!(serde_json::from_str::<Value>(&stdout(&everything)).unwrap()["triangles"], 17);
+    let third = bench.run(&["info", "model.city.json", "--json", "--lod", "3"]);
+    assert_eq!(serde_json::from_str::<Value>(&stdout(&third)).unwrap()["triangles"], 1);
+}
+
+#[test]
+fn the_report_names_every_object() {
+    let bench = Bench::new(BROKEN);
+    bench.run(&["info", "model.city.json", "--report", "report.json"]).code(1);
+    let report = bench.json("report.json");
+    let objects: Vec<(&str, &str)> = report["object_reports"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|o| (o["id"].as_str().unwrap(), o["status"].as_str().unwrap()))
+        .collect();
+    let expected = [
+        ("house", "used"),
+        ("annex", "no geometry"),
+        ("street", "no building"),
+        ("line", "unusable"),
+        ("tower", "other level of detail"),
+    ];
+    assert_eq!(objects, expected);
+    let of_line = &report["object_reports"][3];
+    assert_eq!([&of_line["defects"][0]["code"], &of_line["defects"][1]["code"]], [104, 101]);
+    assert!(of_line["reason"].as_str().is_some_and(|reason| reason.contains("defects")));
+    assert_eq!(report["object_reports"][4]["reason"], "its levels of detail are 3");
+    bench.run(&["info", "model.city.json", "--report", "report.json"]).code(2);
+    bench.run(&["info", "model.city.json", "--report", "report.json", "--overwrite"]).code(1);
+}
+
+#[test]
+fn triangles_in_three_formats() {
+    let bench = Bench::new("");
+    for output in ["house.obj", "house.ply", "house.glb"] {
+        bench.run(&["convert", "model.city.json", "-o", output]).code(0);
+    }
+    for (file, classes) in [("house.obj", "RoofSurface 4"), ("house.ply", "Unclassified 16")] {
+        let text = stdout(&bench.run(&["info", file]).code(0));
+        assert!(text.contains("triangles         16") && text.contains(classes), "{text}");
+    }
+    let obj = std::fs::read_to_string(bench.path("house.obj")).unwrap();
+    assert!(obj.contains("v 500008 5700006 33\n") && obj.contains("o house\n"), "{obj}");
+    check_glb(&std::fs::read(bench.path("house.glb")).unwrap());
+    bench.run(&["convert", "model.city.json", "-o", "house.obj"]).code(2);
+    bench.run(&["convert", "model.city.json", "-o", "house.obj", "--overwrite"]).code(0);
+    bench.run(&["convert", "model.city.json", "-o", "house.stl"]).code(2);
+}
+
+/// The rules of the glTF 2.0 container, and accessors that lie in their buffers.
+fn check_glb(bytes: &[u8]) {
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!((&bytes[..4], word(4), word(8)), (&b"glTF"[..], 2, bytes.len()));
+    let json_length = word(12);
+    assert_eq!((&bytes[16..20], json_length % 4), (&b"JSON"[..], 0));
+    let document: Value = serde_json::from_slice(&bytes[20..20 + json_length]).unwrap();
+    let binary = &bytes[28 + json_length..];
+    assert_eq!((word(20 + json_length), &bytes[24 + json_length..28 + json_length]), (binary.len(), &b"BIN\0"[..]));
+    assert_eq!(document["buffers"][0]["byteLength"], binary.len());
+    assert_eq!(document["asset"]["extras"]["origin"][2], 32.0);
+    assert_eq!(document["nodes"][0]["name"], "house");
+    let number = |value: &Value| value.as_u64().unwrap() as usize;
+    let mut triangles = 0;
+    for primitive in document["meshes"][0]["primitives"].as_array().unwrap() {
+        let positions = &document["accessors"][number(&primitive["attributes"]["POSITION"])];
+        let indices = &document["accessors"][number(&primitive["indices"])];
+        let view = &document["bufferViews"][number(&indices["bufferView"])];
+        let start = number(&view["byteOffset"]);
+        let data = &binary[start..start + number(&view["byteLength"])];
+        assert_eq!(data.len(), 4 * number(&indices["count"]));
+        let (chunks, _) = data.as_chunks::<4>();
+        assert!(chunks.iter().all(|c| (u32::from_le_bytes(*c) as usize) < number(&positions["count"])));
+        triangles += number(&indices["count"]) / 3;
+    }
+    assert_eq!(triangles, 16);
+}
+
+#[test]
+fn footprints_and_cityjson() {
+    let bench = Bench::new("");
+    bench.run(&["convert", "model.city.json", "-o", "house.geojson"]).code(0);
+    let footprints = bench.json("house.geojson");
+    let feature = &footprints["features"][0];
+    assert_eq!(footprints["features"].as_array().unwrap().len(), 1);
+    let properties = &feature["properties"];
+    assert_eq!((&properties["id"], &properties["height_m"]), (&Value::from("house"), &Value::from(5.0)));
+    let ring = feature["geometry"]["coordinates"][0][0].as_array().unwrap();
+    assert_eq!((ring.len(), &ring[0]), (5, &ring[4]));
+    // Easting 500 000 m is the zone's central meridian, 9 degrees east; gdaltransform gives the latitude 51.451182.
+    let near = |value: &Value, degrees: f64| (value.as_f64().unwrap() - degrees).abs() < 2e-4;
+    assert!(ring.iter().all(|point| near(&point[0], 9.0) && near(&point[1], 51.4512)), "{ring:?}");
+    bench.run(&["convert", "model.city.json", "-o", "again.json"]).code(0);
+    let text = stdout(&bench.run(&["info", "again.json"]).code(0));
+    assert!(text.contains("EPSG:25832") && text.contains("triangles         16"), "{text}");
+    bench.run(&["convert", "model.city.json", "-o", "house.obj"]).code(0);
+    let refused = bench.run(&["convert", "house.obj", "-o", "none.geojson"]).code(2);
+    let error = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(error.contains("error 1010"), "{error}");
+}
+
+#[test]
+fn files_that_are_no_city_model_end_with_2() {
+    let bench = Bench::new("");
+    std::fs::write(bench.path("broken.json"), "{\"type\":\"CityJSON\",\n\"version\":}").unwrap();
+    let error = String::from_utf8(bench.run(&["info", "broken.json"]).code(2).get_output().stderr.clone()).unwrap();
+    assert!(error.contains("error 901") && error.contains("line 2, column 11"), "{error}");
+    bench.run(&["info", "nothing.json"]).code(2);
+    bench.run(&["info", "."]).code(2);
+    bench.run(&["info", "model.city.json", "--lod", "two"]).code(2);
+}
+
+#[test]
+fn the_tile_of_the_yardsticks() {
+    let tile = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/city/3dbag_5910.city.json");
+    if !tile.is_file() {
+        return;
+    }
+    let bench = Bench::new("");
+    let summary = stdout(&bench.run(&["info", "--json", tile.to_str().unwrap()]).code(0));
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!((&summary["objects"], &summary["statuses"]["used"]), (&Value::from(862), &Value::from(430)));
+}
