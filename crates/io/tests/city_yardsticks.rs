@@ -204,3 +204,26 @@ fn visible_points_of_a_hundred_cameras() {
     check_visibility(Triangles::Reference);
     check_visibility(Triangles::Tile);
 }
+
+#[test]
+fn national_coordinates_change_nothing() {
+    let tile = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/city/3dbag_5910.city.json");
+    if !tile.is_file() {
+        eprintln!("skipped: ../shared/data/city is not there");
+        return;
+    }
+    let near = io::city::read(&tile).unwrap().model;
+    let config = MeshConfig::default();
+    let expected = TriangleMesh::from_model(&near, &config).unwrap();
+    // To where EPSG:25832 has Munich, and to the same place with the zone before the easting.
+    for shift in [[606_000.0, 4_887_000.0, 500.0], [32_606_000.0, 4_887_000.0, 0.0]] {
+        let mut far = near.clone();
+        for vertex in &mut far.vertices {
+            *vertex = ModelPoint::new(vertex.x + shift[0], vertex.y + shift[1], vertex.z + shift[2]);
+        }
+        let found = TriangleMesh::from_model(&far, &config).unwrap();
+        assert_eq!(found.mesh.origin.from_origin(expected.mesh.origin), shift);
+        assert_eq!(TriangleMesh { origin: expected.mesh.origin, ..found.mesh }, expected.mesh);
+        assert_eq!(found.defects, expected.defects);
+    }
+}
