@@ -135,7 +135,7 @@ impl Tile {
         [0, 1].map(|axis| f64::from(self.low[axis].abs().max(self.high[axis].abs())))
     }
 
-    /// Meets a triangle with all rays; whether anything changed.
+    /// Meets a triangle with all rays.
     #[inline(always)]
     pub(crate) fn meet<V: Lanes>(&mut self, eye: &Eye, bvh: &Bvh, number: usize, reach: [f64; 2]) {
         let Some(facet) = Facet::new(eye, &bvh.corners[number]) else { return };

@@ -25,6 +25,8 @@ const FLAT_M: f64 = 2e-4;
 const MAX_EARS: usize = 1000;
 /// Tests of a point against an edge that one broken polygon may cost.
 const MAX_EDGE_TESTS: usize = 50_000_000;
+/// Vertices that the crossings of one polygon may add.
+const MAX_CROSSINGS: usize = 20_000;
 /// Rings of one polygon that are compared with each other; further repetitions show as edges that meet.
 const MAX_COMPARED: usize = 256;
 
@@ -252,7 +254,9 @@ impl Polygon {
             return out.findings.push(fatal(DefectCode::NotTriangulated, detail));
         }
         if crossing {
-            let Some(split) = self.constrain_split() else { return out.findings.push(out_of_range()) };
+            let Some(split) = self.constrain_split() else {
+                return out.findings.push(fatal(DefectCode::NotTriangulated, "its edges cross too often"));
+            };
             cdt = split;
         }
         let inside = self.faces_by_centroid(&cdt);
@@ -263,8 +267,10 @@ impl Polygon {
     fn constrain(&self) -> Option<(Cdt, bool)> {
         let mut cdt = Cdt::new();
         let mut crossing = false;
+        // Where the crossings could not be cut, the first one is enough to know.
+        let patient = self.edge_count().saturating_mul(self.edge_count()) <= MAX_EDGE_TESTS;
         for ring in &self.rings {
-            crossing |= !constrain_ring(&mut cdt, ring)?;
+            crossing |= !constrain_ring(&mut cdt, ring, patient)?;
         }
         Some((cdt, crossing))
     }
@@ -275,8 +281,14 @@ impl Polygon {
     fn constrain_split(&self) -> Option<Cdt> {
         let edges: Vec<[Point2<f64>; 2]> = self.rings.iter().flat_map(|ring| ring_edges(ring)).collect();
         let mut cdt = Cdt::new();
+        let mut added = 0;
         for ring in &self.rings {
-            constrain_ring(&mut cdt, &split_at_crossings(ring, &edges))?;
+            let split = split_at_crossings(ring, &edges);
+            added += split.len() - ring.len();
+            if added > MAX_CROSSINGS {
+                return None;
+            }
+            constrain_ring(&mut cdt, &split, true)?;
         }
         Some(cdt)
     }
@@ -345,18 +357,22 @@ fn midpoint(a: Point2<f64>, b: Point2<f64>) -> Point2<f64> {
     Point2::new(0.5 * (a.x + b.x), 0.5 * (a.y + b.y))
 }
 
-/// Inserts a ring and constrains its edges, leaving out those that cross a constraint; whether none did.
+/// Inserts a ring and constrains its edges, leaving out those that cross a constraint; whether none did. One that is not
+/// `patient` stops at the first.
 ///
 /// `None` for coordinates that `spade` refuses.
-fn constrain_ring(cdt: &mut Cdt, ring: &[Corner]) -> Option<bool> {
+fn constrain_ring(cdt: &mut Cdt, ring: &[Corner], patient: bool) -> Option<bool> {
     let handles: Vec<FixedVertexHandle> = ring.iter().map(|&corner| cdt.insert(corner).ok()).collect::<Option<_>>()?;
     let mut complete = true;
     for (i, &from) in handles.iter().enumerate() {
         let to = handles[(i + 1) % handles.len()];
         if from != to && cdt.can_add_constraint(from, to) {
             cdt.add_constraint(from, to);
-        } else {
-            complete &= from == to;
+        } else if from != to {
+            complete = false;
+            if !patient {
+                break;
+            }
         }
     }
     Some(complete)
@@ -374,6 +390,9 @@ fn split_at_crossings(ring: &[Corner], edges: &[[Point2<f64>; 2]]) -> Vec<Corner
         let mut cuts: Vec<(f64, Point2<f64>)> = edges.iter().filter_map(|&other| crossing(edge, other)).collect();
         cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
         split.extend(cuts.into_iter().map(|(_, at)| Corner { at, vertex: None }));
+        if split.len() > ring.len() + MAX_CROSSINGS {
+            break;
+        }
     }
     split
 }

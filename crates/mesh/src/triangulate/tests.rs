@@ -120,3 +120,16 @@ proptest! {
         prop_assert!(area.abs() <= 121.0 + 1e-9);
     }
 }
+
+#[test]
+fn rings_of_many_crossings_are_given_up() {
+    // A walk that jumps about (a linear congruence), so that almost every edge crosses hundreds of others.
+    let walk = |count: usize| -> Vec<[f64; 2]> {
+        let place = |i: usize| ((i * 7_368_787 + 11) % 1_000_003) as f64 / 1000.0;
+        (0..count).map(|i| [place(i), place(3 * i * i + 5)]).collect()
+    };
+    for count in [1000, 4000, 100_000] {
+        let (area, codes) = cut(&[&walk(count)]);
+        assert_eq!((area, codes), (0.0, vec![104, 1012]), "{count} corners");
+    }
+}
