@@ -6,7 +6,7 @@ use camera::ImagePoint;
 use raster::{Grid, Window};
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::fusion::{
-    FillConfig, FusionConfig, GridFrame, PlacedView, fill_holes, fuse_views, place_view, remove_speckle,
+    FillConfig, FusionConfig, GridFrame, PlacedView, fill_voids, fuse_views, place_view, remove_speckle,
 };
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
 use sweep::{HeightMap, View};
@@ -32,17 +32,19 @@ const SPECKLE_CELLS_MIN: usize = 9;
 const ANGLE_WEAK_DEG: f64 = 3.0;
 /// Smaller output tiles cost more to manage than to fill, cells.
 const TILE_MIN: usize = 64;
-/// Holes up to this many metres across are closed: the shadow side of a house.
-const FILL_SIDE_M: f64 = 10.0;
+/// A void is closed where heights are known within this many metres around: the shadow side of a tower.
+const FILL_REACH_M: f64 = 40.0;
+/// Heights around a void that differ by more than this per metre between them are two surfaces: steeper than streets.
+const FILL_SLOPE: f64 = 0.05;
 /// A facet steeper than this (rise over run) is a tear, not a surface: about 70°.
 const TEAR_SLOPE: f64 = 2.75;
 
-/// A height around which the views correlate by less than this on average has no picture behind it: chance reaches half.
-const CORRELATION_MIN: f32 = 0.1;
+/// A height around which the views agree on less of the picture's contrast than this has no picture behind it.
+const SUPPORT_MIN: f32 = 0.1;
 /// What chance reaches where every view has another texture, as on water: such a height is left out unless it stands out
 /// from all others by [`CONFIDENCE_CHANCE`].
-const CORRELATION_CHANCE: f32 = 0.4;
-/// See [`CORRELATION_CHANCE`].
+const SUPPORT_CHANCE: f32 = 0.3;
+/// See [`SUPPORT_CHANCE`].
 const CONFIDENCE_CHANCE: f32 = 0.1;
 
 /// Runs a DSM job and writes its results.
@@ -313,6 +315,7 @@ impl<'a> Job<'a> {
             |g: geodesy::LonLatHeight| grid.projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok().map(|p| [p.x, p.y]);
         let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &lonlat };
         let level = plan.bottom_level as u32;
+        let jump_m = same_surface_m(plan, grid);
         let mut placed = Vec::with_capacity(all.len());
         let mut kept = Vec::with_capacity(all.len());
         for own in &all {
@@ -321,7 +324,7 @@ impl<'a> Job<'a> {
                 drop_outside(&mut keep, own.map, asked);
             }
             kept.push(keep.data().iter().filter(|k| **k).count() as f64 / keep.data().len().max(1) as f64);
-            placed.push(place_view(*own, level, &keep, &frame)?);
+            placed.push(place_view(*own, level, &keep, jump_m, &frame)?);
             self.progress.step();
         }
         let (product, surface) = self.fuse(&placed, plan, grid, heights.maps[0].origin_m)?;
@@ -340,7 +343,7 @@ impl<'a> Job<'a> {
         // Heights and their places are as coarse as the level that they come from.
         let coarser = f64::from(1u32 << plan.bottom_level);
         let step_m = plan.step_m * coarser;
-        let same_surface_m = (2.0 * step_m).max(1.5 * gsd) as f32;
+        let same_surface_m = same_surface_m(plan, grid);
         let fusion =
             FusionConfig { same_surface_m, tear_m: (TEAR_SLOPE * gsd * coarser) as f32, tile: self.config.tile };
         let mut fused = fuse_views(placed, grid.size, &fusion);
@@ -350,8 +353,12 @@ impl<'a> Job<'a> {
         if observed == 0 {
             return Err(PipelineError::NoSurface { range: plan.range_m });
         }
-        let fill = FillConfig { max_cells: (FILL_SIDE_M / gsd).powi(2) as usize, same_surface_m: (2.0 * gsd) as f32 };
-        let filled = fill_holes(&mut fused.height_m, &fill);
+        let fill = FillConfig {
+            reach_cells: (FILL_REACH_M / gsd).ceil() as usize,
+            same_surface_m: (2.0 * gsd) as f32,
+            slope_m: (FILL_SLOPE * gsd) as f32,
+        };
+        let filled = fill_voids(&mut fused.height_m, &fill);
         let product = Product::new(fused, filled, origin_m);
         let cells = grid.size.0 * grid.size.1;
         let filled = product.filled.data().iter().filter(|f| **f == FILLED).count();
@@ -365,6 +372,12 @@ impl<'a> Job<'a> {
         };
         Ok((product, surface))
     }
+}
+
+/// Heights on the grid closer than this may belong to one surface.
+fn same_surface_m(plan: &SweepPlan, grid: &OutputGrid) -> f32 {
+    let step_m = plan.step_m * f64::from(1u32 << plan.bottom_level);
+    (2.0 * step_m).max(1.5 * grid.gsd_m) as f32
 }
 
 /// Which pixels enough other views agree with: a third of the views that see this one's ground from another direction,
@@ -384,10 +397,10 @@ fn agreeing(
     let counts = count_agreeing(own, &others, level, &ConsistencyConfig::default())?;
     let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
     let mut keep = counts.map(|n| *n >= needed);
-    let reliability = own.map.correlation.data().iter().zip(own.map.confidence.data());
-    for (keep, (correlation, confidence)) in keep.data_mut().iter_mut().zip(reliability) {
-        let is_chance = *correlation < CORRELATION_CHANCE && *confidence < CONFIDENCE_CHANCE;
-        *keep = *keep && *correlation >= CORRELATION_MIN && !is_chance;
+    let reliability = own.map.support.data().iter().zip(own.map.confidence.data());
+    for (keep, (support, confidence)) in keep.data_mut().iter_mut().zip(reliability) {
+        let is_chance = *support < SUPPORT_CHANCE && *confidence < CONFIDENCE_CHANCE;
+        *keep = *keep && *support >= SUPPORT_MIN && !is_chance;
     }
     Ok(keep)
 }

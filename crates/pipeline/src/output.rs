@@ -14,11 +14,12 @@ use crate::report::DsmReport;
 use crate::setup::OutputGrid;
 
 /// The files of a run, relative to its folder.
-const FILES: [&str; 8] = [
+const FILES: [&str; 9] = [
     "dsm/dsm.tif",
     "dsm/sigma.tif",
     "dsm/views.tif",
     "dsm/filled.tif",
+    "dsm/confidence.tif",
     "dsm/hillshade.png",
     "dsm/relief.png",
     "used_config.toml",
@@ -36,6 +37,8 @@ pub(crate) struct Product {
     height_m: Grid<f32>,
     sigma_m: Grid<f32>,
     views: Grid<u8>,
+    /// 0 where nothing was observed, up to 1.
+    confidence: Grid<f32>,
     /// 1 where a height was filled in, 0 where it was observed, 255 in voids.
     pub(crate) filled: Grid<u8>,
 }
@@ -48,7 +51,7 @@ const VOID: u8 = 255;
 impl Product {
     pub(crate) fn new(fused: Surface, filled: Grid<bool>, origin_m: f64) -> Self {
         let mut marks = filled.map(|f| if *f { FILLED } else { 0 });
-        let Surface { height_m, mut sigma_m, mut views } = fused;
+        let Surface { height_m, mut sigma_m, mut views, mut confidence } = fused;
         for (i, h) in height_m.data().iter().enumerate() {
             if h.is_nan() {
                 marks.data_mut()[i] = VOID;
@@ -57,9 +60,10 @@ impl Product {
             if h.is_nan() || marks.data()[i] == FILLED {
                 sigma_m.data_mut()[i] = f32::NAN;
                 views.data_mut()[i] = 0;
+                confidence.data_mut()[i] = if h.is_nan() { f32::NAN } else { 0.0 };
             }
         }
-        Self { origin_m, height_m, sigma_m, views, filled: marks }
+        Self { origin_m, height_m, sigma_m, views, confidence, filled: marks }
     }
 }
 
@@ -142,6 +146,7 @@ fn write_rasters(
     cog("dsm.tif", "height_m", BandData::F32(&heights), float)?;
     cog("sigma.tif", "height_standard_deviation_m", BandData::F32(&product.sigma_m), float)?;
     cog("views.tif", "number_of_views", BandData::U8(&product.views), 0.0)?;
+    cog("confidence.tif", "confidence_0_to_1", BandData::F32(&product.confidence), float)?;
     cog("filled.tif", "1_filled_0_observed", BandData::U8(&product.filled), f64::from(VOID))?;
     Ok(())
 }

@@ -12,7 +12,7 @@ use crate::cost::{COST_MAX, CostConfig, SourceLevel, TileScratch, sweep_tile};
 use crate::ranges::Ranges;
 use crate::readout::soft_argmin;
 use crate::semiglobal::{Penalties, Volume, aggregate};
-use crate::support::mean_correlation;
+use crate::support::agreed_share;
 
 /// Side of a block's core, pixels.
 const BLOCK: usize = 1024;
@@ -43,9 +43,9 @@ pub struct HeightMap {
     pub sigma_m: Grid<f32>,
     /// 0 (a second height is as good) to 1.
     pub confidence: Grid<f32>,
-    /// Mean correlation of the views at the heights around each pixel, 0 to 1; next to 0 no picture stands behind the
-    /// height, only its surroundings.
-    pub correlation: Grid<f32>,
+    /// Share of the picture's contrast around each pixel that the views agree on at its height, 0 to 1; next to 0 no
+    /// picture stands behind the height, only its surroundings.
+    pub support: Grid<f32>,
 }
 
 /// Sweeps one view against its sources.
@@ -172,8 +172,7 @@ fn read_out(
     let scale = 8.0 * f32::from(COST_MAX);
     let step = reference.ranges.step_m;
     let mut out = HeightMap::empty(core.width, core.height, origin_m);
-    let place = |p: usize| (window.x as usize + p % window.width, window.y as usize + p / window.width);
-    let correlation = mean_correlation(volume, sums, |p| !reference.view.image[place(p)].is_nan());
+    let support = agreed_share(volume, sums, &reference.view, window);
     for y in 0..core.height {
         for x in 0..core.width {
             let (gx, gy) = (core.x as usize + x, core.y as usize + y);
@@ -187,7 +186,7 @@ fn read_out(
                 out.height_m[(x, y)] = (height_m - origin_m) as f32;
                 out.sigma_m[(x, y)] = e.spread * step as f32;
                 out.confidence[(x, y)] = e.margin;
-                out.correlation[(x, y)] = correlation[p];
+                out.support[(x, y)] = support[p];
             }
         }
     }
@@ -202,7 +201,7 @@ impl HeightMap {
             height_m: Grid::filled(width, height, f32::NAN),
             sigma_m: Grid::filled(width, height, f32::NAN),
             confidence: Grid::filled(width, height, 0.0),
-            correlation: Grid::filled(width, height, 0.0),
+            support: Grid::filled(width, height, 0.0),
         }
     }
 
@@ -210,7 +209,7 @@ impl HeightMap {
         paste(&mut self.height_m, at, &part.height_m);
         paste(&mut self.sigma_m, at, &part.sigma_m);
         paste(&mut self.confidence, at, &part.confidence);
-        paste(&mut self.correlation, at, &part.correlation);
+        paste(&mut self.support, at, &part.support);
     }
 }
 
@@ -235,7 +234,7 @@ mod tests {
 
     fn source(views: &[View], index: usize) -> SourceLevel<'_> {
         let v = &views[index];
-        SourceLevel { index, image: &v.levels[0], camera: &v.camera, noise: v.noise }
+        SourceLevel { index, image: &v.levels[0], camera: &v.camera, noise: v.noise, contrast: v.contrast[0] }
     }
 
     /// Errors of the inner pixels, in steps, for a plane at a height between two hypotheses.

@@ -15,6 +15,8 @@ pub struct View {
     pub levels: Vec<Grid<f32>>,
     /// Standard deviation of the image noise at level 0, grey values: patches flatter than this carry no information.
     pub noise: f32,
+    /// Typical difference between neighbouring pixels of each level, grey values: what its texture is measured by.
+    pub contrast: Vec<f32>,
 }
 
 impl View {
@@ -22,13 +24,30 @@ impl View {
     pub fn new(camera: RpcCamera, image: Grid<f32>) -> Self {
         let noise = noise_deviation(&image);
         // Sixteen levels reach from the largest image there is to a pixel.
-        Self { camera, levels: Pyramid::new(image, 16, SIDE_MIN).into_levels(), noise }
+        let levels = Pyramid::new(image, 16, SIDE_MIN).into_levels();
+        let contrast = levels.iter().map(typical_difference).collect();
+        Self { camera, levels, noise, contrast }
     }
 
     /// The most noise to expect on a level: each reduction at least halves it.
     pub fn noise_at(&self, level: usize) -> f32 {
         self.noise / (1 << level) as f32
     }
+}
+
+/// Median of the greater of the differences to the left and to the upper neighbour; 0 for an image without any.
+fn typical_difference(g: &Grid<f32>) -> f32 {
+    let (w, h) = (g.width(), g.height());
+    // At most a million pixels: the median does not need more.
+    let step = 1.max(((w * h) as f64 / 1e6).sqrt() as usize);
+    let places = (1..h).step_by(step).flat_map(|y| (1..w).step_by(step).map(move |x| (x, y)));
+    let difference = |(x, y): (usize, usize)| {
+        let here = g[(x, y)];
+        (here - g[(x - 1, y)]).abs().max((here - g[(x, y - 1)]).abs())
+    };
+    let mut all: Vec<f32> = places.map(difference).filter(|d| d.is_finite()).collect();
+    let middle = all.len() / 2;
+    if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 /// Standard deviation of the noise: of the response to Immerkær's mask (1996), which smooth and straight structures do
@@ -60,6 +79,15 @@ fn noise_deviation(g: &Grid<f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_contrast_of_a_ramp_is_its_slope_on_every_level() {
+        let g = Grid::from_vec(128, 128, (0..128 * 128).map(|i| (i % 128) as f32 * 0.5).collect()).unwrap();
+        assert_eq!(typical_difference(&g), 0.5);
+        let levels = Pyramid::new(g, 2, SIDE_MIN).into_levels();
+        assert!((typical_difference(&levels[1]) - 1.0).abs() < 1e-3);
+        assert_eq!(typical_difference(&Grid::filled(9, 9, f32::NAN)), 0.0);
+    }
 
     #[test]
     fn the_noise_of_a_noisy_ramp_is_found() {

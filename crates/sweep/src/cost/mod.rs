@@ -1,9 +1,12 @@
 //! The variance cost volume: how little the views agree, per reference pixel and height hypothesis.
 //!
-//! With zero-mean, unit-norm patch features `f_i` the variance over N views is `1 − ‖mean f_i‖²`
-//! `= (1 − 1/N) (1 − mean over pairs of ρ_ij)` with ρ the zero-mean normalised cross-correlation. The cost stored is
-//! `1 − ρ`, each pair truncated to [0, 1], averaged: anti-correlation says no more than no correlation. The robust form averages
-//! only the best K of the reference–source pairs, so that occluded and changed views do not outvote the rest.
+//! The feature of a pixel is its census in grades: the differences of its eight neighbours to it, in units of the
+//! image's own typical difference, cut to [−1, 1]. Cut hard it is the census transform of Zabih and Woodfill (1994), which keeps
+//! roof edges where they are (one strong edge counts no more than fine texture, where in a correlation it outvotes it);
+//! graded, noise does not decide about bits. Differences in units of the image's own contrast do not depend on gain or offset.
+//! The cost of a pair is the mean absolute difference of the two features, 0 to 1. With hard bits the mean over all pairs of N
+//! views is the variance `2 N / (N − 1) · mean p (1 − p)`. The robust form averages only the best K of the
+//! reference–source pairs, so that occluded and changed views do not outvote the rest.
 //!
 //! Work goes by tiles of the reference: each source is laid over the tile once ([`crate::TileMap`]), and each height
 //! plane is then a sub-pixel shift of that picture.
@@ -13,7 +16,7 @@ pub(crate) use kernels::patch_moments;
 mod tile;
 
 pub use tile::TileScratch;
-pub(crate) use tile::{BlockCosts, Reference, VARIANCE_FLOOR, remove_mean, sweep_tile};
+pub(crate) use tile::{BlockCosts, Reference, VARIANCE_FLOOR, census_scale, remove_mean, sweep_tile};
 
 use raster::Grid;
 
@@ -32,8 +35,6 @@ pub enum Aggregation {
 /// Parameters of the cost volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CostConfig {
-    /// Patches are squares of `2 · radius + 1` pixels.
-    pub patch_radius: usize,
     /// How views are combined.
     pub aggregation: Aggregation,
     /// Side of the tiles, pixels: large enough that the laid-over pictures pay, small enough for the cache.
@@ -43,10 +44,8 @@ pub struct CostConfig {
 }
 
 impl Default for CostConfig {
-    /// 3 × 3 patches, as MicMac uses in cities: the aggregation brings the support that they lack, and roofs keep their
-    /// edges (the simulated town and the LiDAR truth of JAX_068 agree; 5 × 5 loses a point of completeness on both).
     fn default() -> Self {
-        Self { patch_radius: 1, aggregation: Aggregation::BestOf(2), tile: 64, map_tolerance_px: 0.02 }
+        Self { aggregation: Aggregation::BestOf(2), tile: 64, map_tolerance_px: 0.02 }
     }
 }
 
@@ -61,4 +60,6 @@ pub struct SourceLevel<'a> {
     pub camera: &'a camera::RpcCamera,
     /// Its noise on this level, grey values.
     pub noise: f32,
+    /// Its typical difference between neighbouring pixels on this level, grey values.
+    pub contrast: f32,
 }

@@ -2,7 +2,7 @@
 
 use raster::{Grid, Window, bicubic, cubic_weights};
 
-use super::kernels::{self, Picture, Side};
+use super::kernels::{self, Picture};
 use super::{Aggregation, COST_MAX, CostConfig, SourceLevel};
 use crate::SweepError;
 use crate::geometry::{TileMap, source_from_reference};
@@ -14,6 +14,12 @@ const TILE_MIN: usize = 8;
 const PLANES_MIN: i32 = 4;
 /// Variance that an 8-bit quantisation alone leaves in a patch.
 pub(crate) const VARIANCE_FLOOR: f32 = 1.0 / 12.0;
+/// The census looks at the eight neighbours, as MicMac's patches in cities do: the aggregation brings the support that they
+/// lack, and roofs keep their edges.
+const CENSUS_REACH: usize = 1;
+/// The difference that counts fully, in typical differences of the image: half of them then take part in full. Measured
+/// on simulated towns of one and of several dates and on the LiDAR truth of JAX_068, where 0.3 to 0.7 are alike.
+const FULL_DIFFERENCE: f32 = 0.5;
 
 /// The reference on the level being swept.
 #[derive(Clone, Copy)]
@@ -33,20 +39,11 @@ pub(crate) struct BlockCosts<'a> {
 /// Buffers that a thread reuses from tile to tile.
 #[derive(Default)]
 pub struct TileScratch {
-    reference: Patches,
+    reference: Vec<f32>,
     sources: Vec<Laid>,
     rows: Vec<f32>,
-    line: Vec<f32>,
     pair_costs: Vec<Vec<f32>>,
     quantised: Vec<u8>,
-}
-
-/// A padded tile with the moments of its patches.
-#[derive(Default)]
-struct Patches {
-    tile: Vec<f32>,
-    mean: Vec<f32>,
-    inverse_deviation: Vec<f32>,
 }
 
 /// A source laid over the tile, and its shifted form for the current plane.
@@ -57,20 +54,13 @@ struct Laid {
     stride: usize,
     rows: usize,
     origin: [i64; 2],
-    plane: Patches,
-    floor: f32,
+    plane: Vec<f32>,
+    scale: f32,
 }
 
-impl Patches {
-    fn resize(&mut self, padded: usize, core: usize) {
-        self.tile.resize(padded, 0.0);
-        self.mean.resize(core, 0.0);
-        self.inverse_deviation.resize(core, 0.0);
-    }
-
-    fn side(&self) -> Side<'_> {
-        Side { tile: &self.tile, mean: &self.mean, inverse_deviation: &self.inverse_deviation }
-    }
+/// Brings differences of grey values to the unit that counts fully: of the image's contrast, or of its noise where that is more.
+pub(crate) fn census_scale(view: &SourceLevel<'_>) -> f32 {
+    1.0 / (FULL_DIFFERENCE * view.contrast).max(view.noise).max(VARIANCE_FLOOR.sqrt())
 }
 
 /// Fills the costs of `tile` (a part of the block, in image coordinates) for every pixel's own hypotheses.
@@ -119,8 +109,8 @@ fn sweep_planes(
     };
     scratch.prepare(reference, sources, &maps, tile, planes, config);
     for k in planes.0..planes.1 {
-        scratch.shift_sources(f64::from(k) * reference.ranges.step_m, tile, config);
-        scratch.combine(config);
+        scratch.shift_sources(f64::from(k) * reference.ranges.step_m, tile);
+        scratch.combine(tile.width + 2 * CENSUS_REACH, config);
         scatter(reference.ranges, tile, k, &scratch.quantised, block);
     }
     Ok(())
@@ -226,22 +216,19 @@ impl TileScratch {
         planes: (i32, i32),
         config: &CostConfig,
     ) {
-        let r = config.patch_radius;
-        let padded = tile.grown(r);
+        let padded = tile.grown(CENSUS_REACH);
         let (area, core) = (padded.width * padded.height, tile.width * tile.height);
         self.rows.resize(padded.width * (padded.height + 3), 0.0);
-        self.line.resize(2 * padded.width, 0.0);
         self.quantised.resize(core, 0);
-        self.reference.resize(area, core);
-        copy_window(reference.view.image, padded, &mut self.reference.tile);
-        remove_mean(&mut self.reference.tile);
-        let floor = reference.view.noise.powi(2).max(VARIANCE_FLOOR);
-        moments(&mut self.reference, padded.width, 2 * r + 1, floor, &mut self.line);
+        self.reference.resize(area, 0.0);
+        copy_window(reference.view.image, padded, &mut self.reference);
+        let scale = census_scale(&reference.view);
+        self.reference.iter_mut().for_each(|v| *v *= scale);
         self.sources.resize_with(sources.len(), Laid::default);
         let step = reference.ranges.step_m;
         for ((laid, source), map) in self.sources.iter_mut().zip(sources).zip(maps) {
-            laid.plane.resize(area, core);
-            laid.floor = source.noise.powi(2).max(VARIANCE_FLOOR);
+            laid.plane.resize(area, 0.0);
+            laid.scale = census_scale(source);
             laid.map = *map;
             laid.lay_over(source.image, padded, (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step));
         }
@@ -254,27 +241,24 @@ impl TileScratch {
     }
 
     /// Brings every source into the geometry of one height plane.
-    fn shift_sources(&mut self, height_m: f64, tile: Window, config: &CostConfig) {
-        let padded = tile.grown(config.patch_radius);
+    fn shift_sources(&mut self, height_m: f64, tile: Window) {
+        let padded = tile.grown(CENSUS_REACH);
         for laid in &mut self.sources {
             laid.shift_to(height_m, (padded.width, padded.height), &mut self.rows);
-            moments(&mut laid.plane, padded.width, 2 * config.patch_radius + 1, laid.floor, &mut self.line);
         }
     }
 
     /// The cost of the current plane for every pixel of the tile.
-    fn combine(&mut self, config: &CostConfig) {
-        let side = 2 * config.patch_radius + 1;
-        let width = self.line.len() / 2;
+    fn combine(&mut self, width: usize, config: &CostConfig) {
         let mut pair = 0;
         for (i, laid) in self.sources.iter().enumerate() {
             let out = &mut self.pair_costs[pair];
-            kernels::correlation_cost(self.reference.side(), laid.plane.side(), width, side, &mut self.line, out);
+            kernels::census_cost(&self.reference, &laid.plane, width, out);
             pair += 1;
             if config.aggregation == Aggregation::Variance {
                 for other in &self.sources[..i] {
                     let out = &mut self.pair_costs[pair];
-                    kernels::correlation_cost(other.plane.side(), laid.plane.side(), width, side, &mut self.line, out);
+                    kernels::census_cost(&other.plane, &laid.plane, width, out);
                     pair += 1;
                 }
             }
@@ -299,10 +283,6 @@ fn select_smallest(costs: &mut [Vec<f32>], k: usize) -> usize {
         }
     }
     k
-}
-
-fn moments(p: &mut Patches, width: usize, side: usize, floor: f32, line: &mut [f32]) {
-    kernels::patch_moments(&p.tile, width, side, floor, line, &mut p.mean, &mut p.inverse_deviation);
 }
 
 impl Laid {
@@ -335,12 +315,11 @@ impl Laid {
                 self.picture[y * self.stride + x] = bicubic(image, u, v);
             }
         }
-        remove_mean(&mut self.picture);
     }
 
     fn shift_to(&mut self, height_m: f64, (width, height): (usize, usize), rows: &mut [f32]) {
         let Some([dx, dy]) = self.map.and_then(|m| m.shift_at(height_m)) else {
-            self.plane.tile.fill(f32::NAN);
+            self.plane.fill(f32::NAN);
             return;
         };
         let (fx, fy) = (dx.floor(), dy.floor());
@@ -349,13 +328,14 @@ impl Laid {
         let inside =
             x0 >= 0 && y0 >= 0 && x0 as usize + width + 3 <= self.stride && y0 as usize + height + 3 <= self.rows;
         if !inside {
-            self.plane.tile.fill(f32::NAN);
+            self.plane.fill(f32::NAN);
             return;
         }
-        let weights = (cubic_weights((dx - fx) as f32), cubic_weights((dy - fy) as f32));
+        // The unit that counts fully costs nothing here.
+        let weights = (cubic_weights((dx - fx) as f32), cubic_weights((dy - fy) as f32).map(|w| w * self.scale));
         let picture = Picture { data: &self.picture, stride: self.stride };
         let at = (x0 as usize, y0 as usize);
-        kernels::shift_bicubic(picture, at, weights, (width, height), rows, &mut self.plane.tile);
+        kernels::shift_bicubic(picture, at, weights, (width, height), rows, &mut self.plane);
     }
 }
 

@@ -26,6 +26,26 @@ pub struct Surface {
     pub sigma_m: Grid<f32>,
     /// Number of views behind each height.
     pub views: Grid<u8>,
+    /// What speaks for each height against what speaks for others there: `s / (s + o + 1)` with the weights s of the
+    /// views behind it and o of the others; 0 in voids.
+    pub confidence: Grid<f32>,
+}
+
+/// A view's height in a cell.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    height_m: f32,
+    sigma_m: f32,
+    weight: f32,
+}
+
+/// What a cell holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Cell {
+    height_m: f32,
+    sigma_m: f32,
+    views: u8,
+    confidence: f32,
 }
 
 /// Fuses the views on a grid of `size` (columns, rows), tile by tile.
@@ -43,6 +63,7 @@ pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionCon
         paste(&mut out.height_m, *w, &part.height_m);
         paste(&mut out.sigma_m, *w, &part.sigma_m);
         paste(&mut out.views, *w, &part.views);
+        paste(&mut out.confidence, *w, &part.confidence);
     }
     out
 }
@@ -53,6 +74,7 @@ impl Surface {
             height_m: Grid::filled(columns, rows, f32::NAN),
             sigma_m: Grid::filled(columns, rows, f32::NAN),
             views: Grid::filled(columns, rows, 0),
+            confidence: Grid::filled(columns, rows, 0.0),
         }
     }
 }
@@ -63,55 +85,76 @@ fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> 
     let mut samples = Vec::with_capacity(surfaces.len());
     for i in 0..size.0 * size.1 {
         samples.clear();
-        let held = surfaces.iter().map(|s| (s.height_m.data()[i], s.sigma_m.data()[i]));
-        samples.extend(held.filter(|(height, _)| !height.is_nan()));
-        if let Some((height, sigma, views)) = fuse_cell(&mut samples, same_surface_m) {
-            out.height_m.data_mut()[i] = height;
-            out.sigma_m.data_mut()[i] = sigma;
-            out.views.data_mut()[i] = views;
+        let held = surfaces.iter().map(|s| Sample {
+            height_m: s.height_m.data()[i],
+            sigma_m: s.sigma_m.data()[i],
+            weight: s.weight.data()[i],
+        });
+        samples.extend(held.filter(|s| !s.height_m.is_nan()));
+        if let Some(cell) = fuse_cell(&mut samples, same_surface_m) {
+            out.height_m.data_mut()[i] = cell.height_m;
+            out.sigma_m.data_mut()[i] = cell.sigma_m;
+            out.views.data_mut()[i] = cell.views;
+            out.confidence.data_mut()[i] = cell.confidence;
         }
     }
     out
 }
 
-/// Height, deviation and support of the best supported surface among (height, deviation) samples.
-fn fuse_cell(samples: &mut [(f32, f32)], same_surface_m: f32) -> Option<(f32, f32, u8)> {
-    samples.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut best, mut from) = (0..0, 0);
+/// The best supported surface among the samples.
+fn fuse_cell(samples: &mut [Sample], same_surface_m: f32) -> Option<Cell> {
+    samples.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
+    let (mut best, mut most, mut from) = (0..0, 0.0, 0);
     for to in 1..=samples.len() {
-        while samples[to - 1].0 - samples[from].0 > same_surface_m {
+        while samples[to - 1].height_m - samples[from].height_m > same_surface_m {
             from += 1;
         }
+        let weight: f32 = samples[from..to].iter().map(|s| s.weight).sum();
         // ≥: in a tie the upper surface wins.
-        if to - from >= best.len() {
-            best = from..to;
+        if weight >= most {
+            (best, most) = (from..to, weight);
         }
     }
     let mode = &samples[best];
-    let middle = median(mode)?;
+    let all: f32 = samples.iter().map(|s| s.weight).sum();
     // The median is robust within the mode; the deviation is that of the mean of its members, as they are independent.
-    let information: f32 = mode.iter().map(|(_, s)| 1.0 / s.max(1e-3).powi(2)).sum();
-    Some((middle, information.sqrt().recip(), mode.len().min(255) as u8))
+    let information: f32 = mode.iter().map(|s| 1.0 / s.sigma_m.max(1e-3).powi(2)).sum();
+    Some(Cell {
+        height_m: median(mode)?,
+        sigma_m: information.sqrt().recip(),
+        views: mode.len().min(255) as u8,
+        confidence: most / (all + 1.0),
+    })
 }
 
-fn median(sorted: &[(f32, f32)]) -> Option<f32> {
+fn median(sorted: &[Sample]) -> Option<f32> {
     let n = sorted.len();
     let (low, high) = (sorted.get((n.max(1) - 1) / 2)?, sorted.get(n / 2)?);
-    Some(0.5 * (low.0 + high.0))
+    Some(0.5 * (low.height_m + high.height_m))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn cell(samples: &[(f32, f32)]) -> Option<Cell> {
+        let sample = |&(height_m, weight): &(f32, f32)| Sample { height_m, sigma_m: 0.1, weight };
+        fuse_cell(&mut samples.iter().map(sample).collect::<Vec<_>>(), 1.0)
+    }
+
     #[test]
     fn two_surfaces_in_a_cell_give_the_better_supported_one_and_the_upper_in_a_tie() {
-        let cell = |heights: &[f32]| {
-            let mut s: Vec<(f32, f32)> = heights.iter().map(|h| (*h, 0.1)).collect();
-            fuse_cell(&mut s, 1.0)
-        };
-        assert_eq!(cell(&[10.0, 30.0]).map(|c| (c.0, c.2)), Some((30.0, 1)));
-        assert_eq!(cell(&[10.2, 30.0, 10.0]).map(|c| (c.0, c.2)), Some((10.1, 2)));
-        assert_eq!(cell(&[]), None);
+        let held = |samples: &[(f32, f32)]| cell(samples).map(|c| (c.height_m, c.views));
+        assert_eq!(held(&[(10.0, 1.0), (30.0, 1.0)]), Some((30.0, 1)));
+        assert_eq!(held(&[(10.2, 1.0), (30.0, 1.0), (10.0, 1.0)]), Some((10.1, 2)));
+        assert_eq!(held(&[]), None);
+    }
+
+    #[test]
+    fn heights_at_borders_stand_back_for_one_inside_a_surface() {
+        let c = cell(&[(30.0, 0.25), (10.0, 1.0), (30.1, 0.25), (30.2, 0.25)]).unwrap();
+        assert_eq!((c.height_m, c.views), (10.0, 1));
+        assert!((c.confidence - 1.0 / 2.75).abs() < 1e-6);
+        assert!((cell(&[(30.0, 0.25), (30.1, 0.25)]).unwrap().height_m - 30.05).abs() < 1e-5);
     }
 }

@@ -1,135 +1,132 @@
-//! Closing small holes, and only those of which the surroundings say how.
+//! Closing voids from what is known around them.
 //!
-//! The rim of a hole is triangulated (Delaunay) and interpolated. Where the rim holds two levels, the hole is ground
-//! that a building hides from the views, so only the lower level is used.
+//! From each void cell the nearest known heights in eight directions are looked up. Where these hold two levels, the
+//! void is ground that a building hides from the views, so only the lower level counts: the heights on one surface
+//! with the second lowest, as one alone may be a pit. Weights are inverse distances: two opposite heights then
+//! give the straight line between them, so that slopes are continued.
 
 use raster::Grid;
-use spade::{DelaunayTriangulation, FloatTriangulation, HasPosition, Point2, Triangulation};
-
-use super::speckle::neighbours;
+use rayon::prelude::*;
 
 /// Parameters of the filling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FillConfig {
-    /// Holes of more cells than this stay open.
-    pub max_cells: usize,
-    /// A rim that spreads over more than this has two levels, metres.
+    /// How far known heights are looked for, cells.
+    pub reach_cells: usize,
+    /// Neighbouring heights further apart than this are two levels, metres …
     pub same_surface_m: f32,
+    /// … and that much more for every cell between them, metres.
+    pub slope_m: f32,
 }
 
-/// A rim cell.
-struct Rim {
-    position: Point2<f64>,
-    height: f32,
-}
+/// Known heights are needed in this many of the eight directions: more than at the outside of a straight edge.
+const KNOWN_MIN: usize = 4;
 
-impl HasPosition for Rim {
-    type Scalar = f64;
+/// Four of the eight directions, in which what lies before a cell comes before it row by row; their opposites are the
+/// other four.
+const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-    fn position(&self) -> Point2<f64> {
-        self.position
-    }
-}
+/// A known height and how far away it is, cells.
+type Known = (f32, f32);
 
-/// Fills holes of `height_m` in place; returns which cells were filled. Holes that touch the grid's border stay.
-pub fn fill_holes(height_m: &mut Grid<f32>, config: &FillConfig) -> Grid<bool> {
-    let (w, h) = (height_m.width(), height_m.height());
-    let mut filled = Grid::filled(w, h, false);
-    let mut seen = vec![false; w * h];
-    for seed in 0..w * h {
-        if seen[seed] || !height_m.data()[seed].is_nan() {
-            continue;
-        }
-        let (hole, rim) = hole_and_rim(height_m, seed, &mut seen);
-        let at_border = hole.iter().any(|p| p % w == 0 || p % w == w - 1 || p / w == 0 || p / w == h - 1);
-        if at_border || hole.len() > config.max_cells {
-            continue;
-        }
-        for (p, value) in interpolate(height_m, &hole, &rim, config.same_surface_m) {
-            height_m.data_mut()[p] = value;
-            filled.data_mut()[p] = true;
-        }
+/// Fills voids of `height_m` in place; returns which cells were filled.
+pub fn fill_voids(height_m: &mut Grid<f32>, config: &FillConfig) -> Grid<bool> {
+    let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
+    let forward = known_before(height_m, voids.iter().copied(), false, config);
+    let mut backward = known_before(height_m, voids.iter().rev().copied(), true, config);
+    backward.reverse();
+    let around = voids.par_iter().zip(forward.into_par_iter().zip(backward));
+    let value = |(&i, (a, b)): (&usize, (Vec<Known>, Vec<Known>))| Some((i, interpolate(&mut [a, b].concat(), config)?));
+    let found: Vec<(usize, f32)> = around.filter_map(value).collect();
+    let mut filled = Grid::filled(height_m.width(), height_m.height(), false);
+    for (i, value) in found {
+        height_m.data_mut()[i] = value;
+        filled.data_mut()[i] = true;
     }
     filled
 }
 
-/// The connected cells without a height that hold `seed`, and the cells around them.
-fn hole_and_rim(height_m: &Grid<f32>, seed: usize, seen: &mut [bool]) -> (Vec<usize>, Vec<usize>) {
-    let (w, h) = (height_m.width(), height_m.height());
-    let (mut hole, mut rim) = (vec![seed], Vec::new());
-    seen[seed] = true;
-    let mut next = 0;
-    while let Some(&p) = hole.get(next) {
-        next += 1;
-        for q in neighbours(p, w, h) {
-            if !height_m.data()[q].is_nan() {
-                rim.push(q);
-            } else if !seen[q] {
-                seen[q] = true;
-                hole.push(q);
+/// For each of `voids`, in the order of the rows (or all of it reversed), the nearest known heights within reach in the
+/// four directions that come before.
+fn known_before(
+    height_m: &Grid<f32>,
+    voids: impl Iterator<Item = usize>,
+    reversed: bool,
+    config: &FillConfig,
+) -> Vec<Vec<Known>> {
+    let (w, h) = (height_m.width() as isize, height_m.height() as isize);
+    let sign = if reversed { -1 } else { 1 };
+    let reach = config.reach_cells as f32;
+    // What each cell of the last two rows has before it, per direction.
+    let mut rows = [vec![[None::<Known>; 4]; w as usize], vec![[None; 4]; w as usize]];
+    let mut out = Vec::new();
+    let mut voids = voids.peekable();
+    for row in 0..h {
+        rows.swap(0, 1);
+        let y = if reversed { h - 1 - row } else { row };
+        for column in 0..w {
+            let x = if reversed { w - 1 - column } else { column };
+            let before = BEFORE.map(|(dx, dy)| {
+                let (u, v) = (x + sign * dx, y + sign * dy);
+                let inside = (0..w).contains(&u) && (0..h).contains(&v);
+                inside.then_some((u as usize, v as usize, if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 }))
+            });
+            let nearest: [Option<Known>; 4] = std::array::from_fn(|d| {
+                let (u, v, length) = before[d]?;
+                let height = height_m[(u, v)];
+                if !height.is_nan() {
+                    return Some((height, length));
+                }
+                let (height, apart) = rows[usize::from(BEFORE[d].1 == 0)][u][d]?;
+                (apart + length <= reach).then_some((height, apart + length))
+            });
+            rows[1][x as usize] = nearest;
+            if voids.next_if_eq(&((y * w + x) as usize)).is_some() {
+                out.push(nearest.into_iter().flatten().collect());
             }
         }
     }
-    rim.sort_unstable();
-    rim.dedup();
-    (hole, rim)
+    out
 }
 
-fn interpolate(height_m: &Grid<f32>, hole: &[usize], rim: &[usize], same_surface_m: f32) -> Vec<(usize, f32)> {
-    let w = height_m.width();
-    let place = |p: usize| Point2::new((p % w) as f64, (p / w) as f64);
-    let used = lower_level(height_m, rim, same_surface_m);
-    let points: Vec<Rim> = used.iter().map(|&p| Rim { position: place(p), height: height_m.data()[p] }).collect();
-    let Ok(triangulation) = DelaunayTriangulation::<Rim>::bulk_load(points) else { return Vec::new() };
-    let barycentric = triangulation.barycentric();
-    let value = |p: usize| {
-        let inside = barycentric.interpolate(|v| f64::from(v.data().height), place(p));
-        // Outside the lower rim's hull the nearest of it is the best that is known.
-        inside.map(|v| v as f32).or_else(|| triangulation.nearest_neighbor(place(p)).map(|v| v.data().height))
-    };
-    hole.iter().filter_map(|&p| value(p).map(|v| (p, v))).collect()
-}
-
-/// The rim cells of the lowest level that at least a quarter of the rim supports; all of them when there is one level.
-fn lower_level(height_m: &Grid<f32>, rim: &[usize], same_surface_m: f32) -> Vec<usize> {
-    let mut sorted: Vec<f32> = rim.iter().map(|&p| height_m.data()[p]).collect();
-    sorted.sort_by(f32::total_cmp);
-    let (Some(least), Some(greatest)) = (sorted.first(), sorted.last()) else { return Vec::new() };
-    if greatest - least <= same_surface_m {
-        return rim.to_vec();
+fn interpolate(known: &mut [Known], config: &FillConfig) -> Option<f32> {
+    if known.len() < KNOWN_MIN {
+        return None;
     }
-    let quarter = sorted[sorted.len() / 4];
-    rim.iter().copied().filter(|&p| height_m.data()[p] <= quarter + same_surface_m).collect()
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let base = known[1];
+    let same = |k: &&Known| (k.0 - base.0).abs() <= config.same_surface_m + config.slope_m * (k.1 + base.1);
+    let (sum, weight) = known.iter().filter(same).fold((0.0, 0.0), |(s, w), (h, d)| (s + h / d, w + 1.0 / d));
+    Some(sum / weight)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const CONFIG: FillConfig = FillConfig { reach_cells: 8, same_surface_m: 1.5, slope_m: 0.1 };
+
     #[test]
     fn a_hole_in_a_slope_gets_the_slope_and_one_beside_a_wall_the_ground() {
-        let slope = |x: usize| 0.1 * x as f32;
-        let mut g = Grid::from_vec(20, 20, (0..400).map(|i| slope(i % 20)).collect()).unwrap();
-        g[(7, 7)] = f32::NAN;
-        g[(8, 7)] = f32::NAN;
-        let config = FillConfig { max_cells: 10, same_surface_m: 1.5 };
-        let filled = fill_holes(&mut g, &config);
-        assert!((g[(7, 7)] - 0.7).abs() < 1e-3 && (g[(8, 7)] - 0.8).abs() < 1e-3);
-        assert_eq!(filled.data().iter().filter(|f| **f).count(), 2);
+        let mut g = Grid::from_vec(20, 20, (0..400).map(|i| 0.1 * (i % 20) as f32).collect()).unwrap();
+        (6..9).for_each(|x| (6..9).for_each(|y| g[(x, y)] = f32::NAN));
+        let filled = fill_voids(&mut g, &CONFIG);
+        assert!((g[(7, 7)] - 0.7).abs() < 1e-5 && (g[(6, 7)] - 0.6).abs() < 0.02, "{} {}", g[(7, 7)], g[(6, 7)]);
+        assert_eq!(filled.data().iter().filter(|f| **f).count(), 9);
         let mut wall =
             Grid::from_vec(20, 20, (0..400).map(|i| if i % 20 < 10 { 30.0 } else { 2.0 }).collect()).unwrap();
-        wall[(10, 5)] = f32::NAN;
-        wall[(11, 5)] = f32::NAN;
-        fill_holes(&mut wall, &config);
-        assert_eq!((wall[(10, 5)], wall[(11, 5)]), (2.0, 2.0));
+        (0..20).for_each(|y| (10..13).for_each(|x| wall[(x, y)] = f32::NAN));
+        fill_voids(&mut wall, &CONFIG);
+        assert!((10..13).all(|x| (1..19).all(|y| wall[(x, y)] == 2.0)), "{wall:?}");
     }
 
     #[test]
-    fn large_holes_and_holes_at_the_border_stay_open() {
-        let mut g = Grid::filled(20, 20, 1.0f32);
-        g[(0, 3)] = f32::NAN;
-        (5..15).for_each(|x| (5..15).for_each(|y| g[(x, y)] = f32::NAN));
-        let filled = fill_holes(&mut g, &FillConfig { max_cells: 50, same_surface_m: 1.0 });
-        assert!(filled.data().iter().all(|f| !f));
+    fn the_middle_of_a_large_void_and_what_lies_outside_the_scene_stay_open() {
+        let mut g = Grid::filled(60, 60, f32::NAN);
+        (10..50).for_each(|x| (10..50).for_each(|y| g[(x, y)] = 1.0));
+        (16..44).for_each(|x| (16..44).for_each(|y| g[(x, y)] = f32::NAN));
+        let filled = fill_voids(&mut g, &CONFIG);
+        assert!(g[(30, 30)].is_nan() && !g[(18, 18)].is_nan());
+        assert!((0..60).all(|k| !filled[(k, 9)] && !filled[(50, k)] && !filled[(3, k)]));
     }
 }

@@ -26,17 +26,25 @@ pub struct ViewSurface {
     pub height_m: Grid<f32>,
     /// Standard deviation, metres.
     pub sigma_m: Grid<f32>,
+    /// What each height counts for, 0 to 1.
+    pub weight: Grid<f32>,
 }
 
+/// What a height at a border counts for: four of them outvote one inside a surface.
+const BORDER_WEIGHT: f32 = 0.25;
+/// How far from a jump a height is at the border, pixels: a patch's half width, and half a pixel that the edge is blurred
+/// by on either side.
+const BORDER_REACH: usize = 2;
 /// Side of the tiles in which image → map is replaced by a local map.
 const TILE: usize = 64;
-/// A pixel on the grid: column, row, height, deviation.
+/// A pixel on the grid: column, row, height, deviation, weight.
 #[derive(Debug, Clone, Copy)]
 struct Vertex {
     x: f32,
     y: f32,
     h: f32,
     sigma: f32,
+    weight: f32,
 }
 
 /// One view's kept pixels in grid coordinates.
@@ -47,7 +55,8 @@ pub struct PlacedView {
     extents: Vec<(Window, [f32; 4])>,
 }
 
-/// Puts one view's heights on the grid. `keep` says which pixels to use.
+/// Puts one view's heights on the grid. `keep` says which pixels to use. A height with one lower by more than `jump_m`
+/// beside it is at a border, and counts for less: patches that hold a roof's edge see the roof's height outside it too.
 ///
 /// # Errors
 /// A camera that fails inside the scene.
@@ -55,12 +64,35 @@ pub fn place_view(
     heights: Heights<'_>,
     level: u32,
     keep: &Grid<bool>,
+    jump_m: f32,
     frame: &GridFrame<'_>,
 ) -> Result<PlacedView, SweepError> {
-    let vertices = place(heights, level, keep, frame)?;
+    let weights = border_weights(&heights.map.height_m, jump_m);
+    let vertices = place(heights, level, keep, &weights, frame)?;
     let windows = tiles(Window::whole(vertices.width(), vertices.height()), TILE);
     let extents = windows.into_iter().filter_map(|w| Some((w, extent(&vertices, w)?))).collect();
     Ok(PlacedView { vertices, extents })
+}
+
+/// 1 for a height, or [`BORDER_WEIGHT`] where the least height within [`BORDER_REACH`] is lower by more than `jump_m`.
+fn border_weights(height_m: &Grid<f32>, jump_m: f32) -> Grid<f32> {
+    let (width, height) = (height_m.width(), height_m.height());
+    let span = |at: usize, end: usize| at.saturating_sub(BORDER_REACH)..(at + BORDER_REACH + 1).min(end);
+    let least = |values: &mut dyn Iterator<Item = f32>| values.fold(f32::INFINITY, f32::min);
+    let mut rows = Grid::filled(width, height, f32::INFINITY);
+    for y in 0..height {
+        let from = height_m.row(y);
+        rows.row_mut(y).iter_mut().enumerate().for_each(|(x, l)| *l = least(&mut from[span(x, width)].iter().copied()));
+    }
+    let mut out = Grid::filled(width, height, 1.0);
+    for y in 0..height {
+        for x in 0..width {
+            if least(&mut span(y, height).map(|v| rows[(x, v)])) < height_m[(x, y)] - jump_m {
+                out[(x, y)] = BORDER_WEIGHT;
+            }
+        }
+    }
+    out
 }
 
 /// The cells that the window's pixels fall into, widened by a cell for the facets to the next window.
@@ -79,33 +111,26 @@ fn extent(vertices: &Grid<Vertex>, w: Window) -> Option<[f32; 4]> {
 }
 
 impl PlacedView {
-    /// Samples the view's surface at the cells of a window of the grid: facets at the cells' centres; where none covers
-    /// a centre, the highest pixel that falls into the cell.
+    /// Samples the view's surface at the centres of the cells of a window of the grid. Where the surface is torn, at walls and
+    /// beside what the view does not see, a cell whose centre no facet covers holds nothing.
     pub fn rasterise(&self, cells: Window, tear: f32) -> ViewSurface {
-        let (mut facets, mut points) = (ViewSurface::empty(cells), ViewSurface::empty(cells));
+        let mut facets = ViewSurface::empty(cells);
         let (x1, y1) = ((cells.x + cells.width as i64) as f32, (cells.y + cells.height as i64) as f32);
         for (w, e) in &self.extents {
             if e[0] < x1 && e[1] < y1 && e[2] >= cells.x as f32 && e[3] >= cells.y as f32 {
-                self.rasterise_window(*w, tear, &mut facets, &mut points);
-            }
-        }
-        let cells = facets.height_m.data_mut().iter_mut().zip(facets.sigma_m.data_mut());
-        for ((h, sigma), (point, point_sigma)) in cells.zip(points.height_m.data().iter().zip(points.sigma_m.data())) {
-            if h.is_nan() {
-                (*h, *sigma) = (*point, *point_sigma);
+                self.rasterise_window(*w, tear, &mut facets);
             }
         }
         facets
     }
 
-    fn rasterise_window(&self, w: Window, tear: f32, facets: &mut ViewSurface, points: &mut ViewSurface) {
+    fn rasterise_window(&self, w: Window, tear: f32, facets: &mut ViewSurface) {
         for y in w.y as usize..w.y as usize + w.height {
             for x in w.x as usize..w.x as usize + w.width {
                 let a = self.vertices[(x, y)];
                 let corner = |dx, dy| self.vertices.get(x + dx, y + dy).copied().filter(|v| !v.h.is_nan());
                 let (right, below, across) = (corner(1, 0), corner(0, 1), corner(1, 1));
                 if !a.h.is_nan() {
-                    points.put((a.x + 0.5).floor(), (a.y + 0.5).floor(), a.h, a.sigma);
                     match (right, below, across) {
                         (Some(b), Some(c), None) => facets.facet([a, b, c], tear),
                         (_, _, Some(c)) => {
@@ -126,15 +151,16 @@ fn place(
     heights: Heights<'_>,
     level: u32,
     keep: &Grid<bool>,
+    weights: &Grid<f32>,
     frame: &GridFrame<'_>,
 ) -> Result<Grid<Vertex>, SweepError> {
     let map = heights.map;
     let (width, height) = (map.height_m.width(), map.height_m.height());
-    let none = Vertex { x: 0.0, y: 0.0, h: f32::NAN, sigma: f32::NAN };
+    let none = Vertex { x: 0.0, y: 0.0, h: f32::NAN, sigma: f32::NAN, weight: 0.0 };
     let windows = tiles(Window::whole(width, height), TILE);
     let parts: Vec<Grid<Vertex>> = windows
         .par_iter()
-        .map(|w| place_tile(heights, level, *w, keep, frame, none))
+        .map(|w| place_tile(heights, level, *w, (keep, weights), frame, none))
         .collect::<Result<_, SweepError>>()?;
     let mut out = Grid::filled(width, height, none);
     for (w, part) in windows.iter().zip(&parts) {
@@ -147,7 +173,7 @@ fn place_tile(
     heights: Heights<'_>,
     level: u32,
     w: Window,
-    keep: &Grid<bool>,
+    (keep, weights): (&Grid<bool>, &Grid<f32>),
     frame: &GridFrame<'_>,
     none: Vertex,
 ) -> Result<Grid<Vertex>, SweepError> {
@@ -175,7 +201,7 @@ fn place_tile(
             }
             let (p, height_m) = ([at.0 as f64, at.1 as f64], map.origin_m + f64::from(h));
             let [cx, cy] = if fits { local.at(p, height_m) } else { exact(p, height_m).map_err(failed)? };
-            out[(x, y)] = Vertex { x: cx as f32, y: cy as f32, h, sigma: map.sigma_m[at] };
+            out[(x, y)] = Vertex { x: cx as f32, y: cy as f32, h, sigma: map.sigma_m[at], weight: weights[at] };
         }
     }
     Ok(out)
@@ -187,11 +213,12 @@ impl ViewSurface {
             origin: [cells.x as f32, cells.y as f32],
             height_m: Grid::filled(cells.width, cells.height, f32::NAN),
             sigma_m: Grid::filled(cells.width, cells.height, f32::NAN),
+            weight: Grid::filled(cells.width, cells.height, 0.0),
         }
     }
 
     /// Puts a height into a cell unless a higher one is there.
-    fn put(&mut self, column: f32, row: f32, h: f32, sigma: f32) {
+    fn put(&mut self, column: f32, row: f32, (h, sigma, weight): (f32, f32, f32)) {
         let (column, row) = (column - self.origin[0], row - self.origin[1]);
         if column < 0.0 || row < 0.0 {
             return;
@@ -204,6 +231,7 @@ impl ViewSurface {
         if own.is_nan() || *own < h {
             *own = h;
             self.sigma_m[at] = sigma;
+            self.weight[at] = weight;
         }
     }
 
@@ -230,7 +258,8 @@ impl ViewSurface {
                 let t = (dy * (b.x - a.x) - dx * (b.y - a.y)) * inv;
                 if s >= -1e-4 && t >= -1e-4 && s + t <= 1.0 + 1e-4 {
                     let mix = |p: f32, q: f32, r: f32| p + s * (q - p) + t * (r - p);
-                    self.put(x, y, mix(a.h, b.h, c.h), mix(a.sigma, b.sigma, c.sigma));
+                    let weight = a.weight.min(b.weight).min(c.weight);
+                    self.put(x, y, (mix(a.h, b.h, c.h), mix(a.sigma, b.sigma, c.sigma), weight));
                 }
                 x += 1.0;
             }
@@ -262,7 +291,7 @@ mod tests {
         let geotransform = GeoTransform::north_up(false_origin[0] - 20.0, false_origin[1] + 20.0, 0.5);
         let frame = GridFrame { geotransform, map_from_ground: &to_map };
         let keep = Grid::filled(SIZE, SIZE, true);
-        place_view(heights, 0, &keep, &frame).unwrap().rasterise(Window::whole(80, 80), 5.0)
+        place_view(heights, 0, &keep, 5.0, &frame).unwrap().rasterise(Window::whole(80, 80), 5.0)
     }
 
     /// At 5 000 km an f32 is half a metre wide: nothing absolute may pass through one.

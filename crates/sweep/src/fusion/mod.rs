@@ -1,9 +1,9 @@
 //! From the views' heights to one surface on a map grid.
 //!
 //! Each view's surviving pixels are joined to a surface and sampled at the cells' centres, so that a height stays where
-//! it was measured; where the surface is torn (a wall), the points themselves fall into cells. A cell then holds one
-//! height per view: the mode with the most support wins, the upper one in a tie, since averages across a roof's edge
-//! are wrong on both sides.
+//! it was measured. A cell then holds one height per view: the mode with the most support wins, the upper one in a tie,
+//! since averages across a roof's edge are wrong on both sides. Heights at the upper side of a jump support little:
+//! matching makes roofs reach out, and a view that sees the ground beside them knows better.
 
 mod cells;
 mod fill;
@@ -11,6 +11,6 @@ mod mesh;
 mod speckle;
 
 pub use cells::{FusionConfig, Surface, fuse_views};
-pub use fill::{FillConfig, fill_holes};
+pub use fill::{FillConfig, fill_voids};
 pub use mesh::{GridFrame, PlacedView, place_view};
 pub use speckle::remove_speckle;

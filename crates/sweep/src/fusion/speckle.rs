@@ -35,7 +35,7 @@ pub fn remove_speckle(height_m: &mut Grid<f32>, same_surface_m: f32, min_cells: 
 }
 
 /// The up to four neighbours of a cell.
-pub(super) fn neighbours(p: usize, w: usize, h: usize) -> impl Iterator<Item = usize> {
+fn neighbours(p: usize, w: usize, h: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (p % w, p / w);
     let left = (x > 0).then(|| p - 1);
     let right = (x + 1 < w).then(|| p + 1);
