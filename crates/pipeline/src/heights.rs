@@ -69,7 +69,13 @@ pub(crate) fn sweep_scene(
 
 fn source_level(views: &[View], index: usize, level: usize) -> SourceLevel<'_> {
     let v = &views[index];
-    SourceLevel { index, image: &v.levels[level], camera: &v.camera, noise: v.noise_at(level), contrast: v.contrast[level] }
+    SourceLevel {
+        index,
+        image: &v.levels[level],
+        camera: &v.camera,
+        noise: v.noise_at(level),
+        contrast: v.contrast[level],
+    }
 }
 
 fn sweep_view(

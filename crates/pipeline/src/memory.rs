@@ -7,7 +7,7 @@ use crate::error::PipelineError;
 use crate::scene::Opened;
 
 /// Bytes per pixel of one view that stay through the run: image and pyramid (4 + 4/3), the heights of two levels with
-/// deviation, confidence and correlation (16 + 4), the ranges (6), placed vertices (16).
+/// deviation, confidence and support (16 + 4), the ranges (6), placed vertices (20).
 const BYTES_PER_PIXEL: u64 = 48;
 /// Bytes of one block in work: 1120² pixels of about 24 hypotheses, each a cost and a sum, plus layout.
 const BYTES_PER_BLOCK: u64 = 1120 * 1120 * (24 * 3 + 9);

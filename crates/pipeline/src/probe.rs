@@ -19,8 +19,8 @@ const PIXEL_M: f64 = 4.0;
 const SIDE_MIN: usize = 48;
 /// Least confidence of a height that counts.
 const CONFIDENCE_MIN: f32 = 0.2;
-/// Least mean correlation around it: chance reaches half over so many heights.
-const CORRELATION_MIN: f32 = 0.6;
+/// Least support around it: chance reaches 0.4 over so many heights.
+const SUPPORT_MIN: f32 = 0.5;
 /// A pixel counts where at least this many of its eight neighbours have its height.
 const NEIGHBOURS_MIN: usize = 4;
 /// Fewer pixels than this at one height over all views are chance.
@@ -69,7 +69,7 @@ pub(crate) fn extended_range(
         let counts_for = |h: f32, at: (usize, usize)| {
             let height_m = map.origin_m + f64::from(h);
             let is_outside = height_m < range.0 || height_m > range.1;
-            let is_sure = map.confidence[at] >= CONFIDENCE_MIN && map.correlation[at] >= CORRELATION_MIN;
+            let is_sure = map.confidence[at] >= CONFIDENCE_MIN && map.support[at] >= SUPPORT_MIN;
             is_outside && is_sure && counts[at] >= needed
         };
         outside.extend(patches(map, step_m, counts_for).into_iter().map(|h| (index, h)));

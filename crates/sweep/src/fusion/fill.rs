@@ -36,7 +36,8 @@ pub fn fill_voids(height_m: &mut Grid<f32>, config: &FillConfig) -> Grid<bool> {
     let mut backward = known_before(height_m, voids.iter().rev().copied(), true, config);
     backward.reverse();
     let around = voids.par_iter().zip(forward.into_par_iter().zip(backward));
-    let value = |(&i, (a, b)): (&usize, (Vec<Known>, Vec<Known>))| Some((i, interpolate(&mut [a, b].concat(), config)?));
+    let value =
+        |(&i, (a, b)): (&usize, (Vec<Known>, Vec<Known>))| Some((i, interpolate(&mut [a, b].concat(), config)?));
     let found: Vec<(usize, f32)> = around.filter_map(value).collect();
     let mut filled = Grid::filled(height_m.width(), height_m.height(), false);
     for (i, value) in found {
@@ -69,7 +70,11 @@ fn known_before(
             let before = BEFORE.map(|(dx, dy)| {
                 let (u, v) = (x + sign * dx, y + sign * dy);
                 let inside = (0..w).contains(&u) && (0..h).contains(&v);
-                inside.then_some((u as usize, v as usize, if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 }))
+                inside.then_some((
+                    u as usize,
+                    v as usize,
+                    if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 },
+                ))
             });
             let nearest: [Option<Known>; 4] = std::array::from_fn(|d| {
                 let (u, v, length) = before[d]?;
