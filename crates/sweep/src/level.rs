@@ -176,10 +176,11 @@ fn read_out(
     for y in 0..core.height {
         for x in 0..core.width {
             let (gx, gy) = (core.x as usize + x, core.y as usize + y);
-            if reference.view.image[(gx, gy)].is_nan() {
+            let p = (gy - window.y as usize) * window.width + gx - window.x as usize;
+            // No picture, no height: blank parts agree at every height at which both images see them.
+            if reference.view.image[(gx, gy)].is_nan() || support[p] == 0.0 {
                 continue;
             }
-            let p = (gy - window.y as usize) * window.width + gx - window.x as usize;
             let own = &sums[volume.offsets[p] as usize..volume.offsets[p + 1] as usize];
             if let Some(e) = soft_argmin(own, scale, config.cost_noise) {
                 let height_m = (f64::from(volume.low[p]) + f64::from(e.index)) * step;
