@@ -32,8 +32,12 @@ const SPECKLE_CELLS_MIN: usize = 9;
 const ANGLE_WEAK_DEG: f64 = 3.0;
 /// Smaller output tiles cost more to manage than to fill, cells.
 const TILE_MIN: usize = 64;
-/// A void is closed where heights are known within this many metres around: the shadow side of a tower.
+/// Heights around a void are looked for within this many metres: the shadow side of a tower.
 const FILL_REACH_M: f64 = 40.0;
+/// Voids up to this many metres across are closed: the shadow side of a house.
+const FILL_NARROW_M: f64 = 10.0;
+/// A surface hides what is this many times its height away: views lean by up to 30°, and shadows reach further.
+const FILL_HIDDEN: f64 = 1.0;
 /// Heights around a void that differ by more than this per metre between them are two surfaces: steeper than streets.
 const FILL_SLOPE: f64 = 0.05;
 /// A facet steeper than this (rise over run) is a tear, not a surface: about 70°.
@@ -353,6 +357,8 @@ impl<'a> Job<'a> {
         }
         let fill = FillConfig {
             reach_cells: (FILL_REACH_M / gsd).ceil() as usize,
+            narrow_cells: (FILL_NARROW_M / gsd) as f32,
+            hidden_cells_per_m: (FILL_HIDDEN / gsd) as f32,
             same_surface_m: (2.0 * gsd) as f32,
             slope_m: (FILL_SLOPE * gsd) as f32,
         };

@@ -1,7 +1,8 @@
 //! Closing voids from what is known around them.
 //!
-//! From each void cell the nearest known heights in eight directions are looked up. Where these hold two levels, the
-//! void is ground that a building hides from the views, so only the lower level counts: the heights on one surface
+//! From each void cell the nearest known heights in eight directions are looked up. A void is closed where it is narrow, or
+//! where something stands beside it that is high enough to hide it; a wide void beside nothing has another reason
+//! (a saturated roof, water), and what is around says nothing of it. Where the heights hold two levels, the void is ground that a building hides from the views, so only the lower level counts: the heights on one surface
 //! with the second lowest, as one alone may be a pit. Weights are inverse distances: two opposite heights then
 //! give the straight line between them, so that slopes are continued.
 
@@ -13,6 +14,10 @@ use rayon::prelude::*;
 pub struct FillConfig {
     /// How far known heights are looked for, cells.
     pub reach_cells: usize,
+    /// Voids up to this wide between two opposite heights are closed whatever stands there, cells.
+    pub narrow_cells: f32,
+    /// A surface hides what is up to this many cells away per metre that it is higher.
+    pub hidden_cells_per_m: f32,
     /// Neighbouring heights further apart than this are two levels, metres …
     pub same_surface_m: f32,
     /// … and that much more for every cell between them, metres.
@@ -28,6 +33,8 @@ const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
 
 /// A known height and how far away it is, cells.
 type Known = (f32, f32);
+/// The nearest known height in each of the four directions before a cell, or behind it.
+type Nearest = [Option<Known>; 4];
 
 /// Fills voids of `height_m` in place; returns which cells were filled.
 pub fn fill_voids(height_m: &mut Grid<f32>, config: &FillConfig) -> Grid<bool> {
@@ -36,8 +43,7 @@ pub fn fill_voids(height_m: &mut Grid<f32>, config: &FillConfig) -> Grid<bool> {
     let mut backward = known_before(height_m, voids.iter().rev().copied(), true, config);
     backward.reverse();
     let around = voids.par_iter().zip(forward.into_par_iter().zip(backward));
-    let value =
-        |(&i, (a, b)): (&usize, (Vec<Known>, Vec<Known>))| Some((i, interpolate(&mut [a, b].concat(), config)?));
+    let value = |(&i, (a, b)): (&usize, (Nearest, Nearest))| Some((i, interpolate(&a, &b, config)?));
     let found: Vec<(usize, f32)> = around.filter_map(value).collect();
     let mut filled = Grid::filled(height_m.width(), height_m.height(), false);
     for (i, value) in found {
@@ -54,12 +60,12 @@ fn known_before(
     voids: impl Iterator<Item = usize>,
     reversed: bool,
     config: &FillConfig,
-) -> Vec<Vec<Known>> {
+) -> Vec<Nearest> {
     let (w, h) = (height_m.width() as isize, height_m.height() as isize);
     let sign = if reversed { -1 } else { 1 };
     let reach = config.reach_cells as f32;
     // What each cell of the last two rows has before it, per direction.
-    let mut rows = [vec![[None::<Known>; 4]; w as usize], vec![[None; 4]; w as usize]];
+    let mut rows = [vec![Nearest::default(); w as usize], vec![Nearest::default(); w as usize]];
     let mut out = Vec::new();
     let mut voids = voids.peekable();
     for row in 0..h {
@@ -76,7 +82,7 @@ fn known_before(
                     if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 },
                 ))
             });
-            let nearest: [Option<Known>; 4] = std::array::from_fn(|d| {
+            let nearest: Nearest = std::array::from_fn(|d| {
                 let (u, v, length) = before[d]?;
                 let height = height_m[(u, v)];
                 if !height.is_nan() {
@@ -87,19 +93,27 @@ fn known_before(
             });
             rows[1][x as usize] = nearest;
             if voids.next_if_eq(&((y * w + x) as usize)).is_some() {
-                out.push(nearest.into_iter().flatten().collect());
+                out.push(nearest);
             }
         }
     }
     out
 }
 
-fn interpolate(known: &mut [Known], config: &FillConfig) -> Option<f32> {
+/// The height for a cell with the nearest known heights `before` and `behind` it, direction by direction.
+fn interpolate(before: &Nearest, behind: &Nearest, config: &FillConfig) -> Option<f32> {
+    let mut known: Vec<Known> = before.iter().chain(behind).copied().flatten().collect();
     if known.len() < KNOWN_MIN {
         return None;
     }
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
     let base = known[1];
+    let across = before.iter().zip(behind).filter_map(|(a, b)| Some((*a)?.1 + (*b)?.1));
+    let is_narrow = across.fold(f32::INFINITY, f32::min) <= config.narrow_cells;
+    let is_hidden = known.iter().any(|k| k.1 <= (k.0 - base.0) * config.hidden_cells_per_m);
+    if !is_narrow && !is_hidden {
+        return None;
+    }
     let same = |k: &&Known| (k.0 - base.0).abs() <= config.same_surface_m + config.slope_m * (k.1 + base.1);
     let (sum, weight) = known.iter().filter(same).fold((0.0, 0.0), |(s, w), (h, d)| (s + h / d, w + 1.0 / d));
     Some(sum / weight)
@@ -109,7 +123,8 @@ fn interpolate(known: &mut [Known], config: &FillConfig) -> Option<f32> {
 mod tests {
     use super::*;
 
-    const CONFIG: FillConfig = FillConfig { reach_cells: 8, same_surface_m: 1.5, slope_m: 0.1 };
+    const CONFIG: FillConfig =
+        FillConfig { reach_cells: 8, narrow_cells: 6.0, hidden_cells_per_m: 1.0, same_surface_m: 1.5, slope_m: 0.1 };
 
     #[test]
     fn a_hole_in_a_slope_gets_the_slope_and_one_beside_a_wall_the_ground() {
@@ -126,12 +141,21 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_of_a_large_void_and_what_lies_outside_the_scene_stay_open() {
+    fn a_wide_void_is_closed_only_beside_what_can_hide_it() {
+        let mut flat = Grid::filled(40, 40, 1.0f32);
+        (10..20).for_each(|x| (10..20).for_each(|y| flat[(x, y)] = f32::NAN));
+        let mut beside = flat.clone();
+        (20..30).for_each(|x| (10..20).for_each(|y| beside[(x, y)] = 9.0));
+        assert!(fill_voids(&mut flat, &CONFIG).data().iter().filter(|f| **f).count() < 30);
+        fill_voids(&mut beside, &CONFIG);
+        assert!((13..20).all(|x| beside[(x, 15)] == 1.0) && beside[(11, 15)].is_nan(), "{:?}", beside.row(15));
+    }
+
+    #[test]
+    fn what_lies_outside_the_scene_stays_open() {
         let mut g = Grid::filled(60, 60, f32::NAN);
-        (10..50).for_each(|x| (10..50).for_each(|y| g[(x, y)] = 1.0));
-        (16..44).for_each(|x| (16..44).for_each(|y| g[(x, y)] = f32::NAN));
+        (10..50).for_each(|x| (10..50).for_each(|y| g[(x, y)] = if x > 40 { 30.0 } else { 1.0 }));
         let filled = fill_voids(&mut g, &CONFIG);
-        assert!(g[(30, 30)].is_nan() && !g[(18, 18)].is_nan());
         assert!((0..60).all(|k| !filled[(k, 9)] && !filled[(50, k)] && !filled[(3, k)]));
     }
 }
