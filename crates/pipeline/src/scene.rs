@@ -49,9 +49,33 @@ fn open_one(path: &Path) -> Result<Opened, PipelineError> {
 pub(crate) fn read_view(image: &Opened, window: Option<Window>) -> Result<View, PipelineError> {
     let source = io::raster::ImageSource::open(&image.path)?;
     let window = window.unwrap_or(Window::whole(image.size.0, image.size.1));
-    let image_grid = source.read_luma(window)?.luma;
+    let mut image_grid = source.read_luma(window)?.luma;
+    mask_black(&mut image_grid);
     let camera = image.camera.cropped(ImagePoint::new(window.x as f64, window.y as f64));
     Ok(View::new(camera, image_grid))
+}
+
+/// Side of a square of nothing but zeros that no sensor's dark noise leaves, pixels.
+const BLACK_SIDE: usize = 5;
+
+/// Makes undeclared voids, squares of nothing but zeros, invalid: they would be compared with what the other views see.
+fn mask_black(image: &mut Grid<f32>) {
+    let (w, h) = (image.width(), image.height());
+    let mut runs = vec![0usize; w];
+    let mut squares = Vec::new();
+    for y in 0..h {
+        let mut columns = 0;
+        for (x, run) in runs.iter_mut().enumerate() {
+            *run = if image[(x, y)] == 0.0 { *run + 1 } else { 0 };
+            columns = if *run >= BLACK_SIDE { columns + 1 } else { 0 };
+            if columns >= BLACK_SIDE {
+                squares.push((x + 1 - BLACK_SIDE, y + 1 - BLACK_SIDE));
+            }
+        }
+    }
+    for (x, y) in squares {
+        (y..y + BLACK_SIDE).for_each(|v| image.row_mut(v)[x..x + BLACK_SIDE].fill(f32::NAN));
+    }
 }
 
 /// Reads all views, in parallel.
@@ -150,4 +174,22 @@ fn middle_of_both(a: &geo::Polygon<f64>, b: &geo::Polygon<f64>) -> Option<geodes
     use geo::{BooleanOps, Centroid};
     let middle = a.intersection(b).centroid()?;
     Some(geodesy::EnuPoint { east: middle.x(), north: middle.y(), up: 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn black_squares_are_voids_and_dark_pixels_are_not() {
+        let mut image = Grid::filled(30, 20, 0.0f32);
+        for (i, v) in image.data_mut().iter_mut().enumerate().filter(|(i, _)| i % 30 >= 12) {
+            *v = if i % 3 == 0 { 0.0 } else { 4.0 };
+        }
+        mask_black(&mut image);
+        let voids = |from: usize, to: usize| {
+            (0..20).flat_map(|y| (from..to).map(move |x| (x, y))).filter(|p| image[*p].is_nan()).count()
+        };
+        assert_eq!((voids(0, 12), voids(12, 30)), (240, 0));
+    }
 }

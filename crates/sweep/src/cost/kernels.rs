@@ -4,6 +4,12 @@
 
 use multiversion::multiversion;
 
+/// The cost of a pair that cannot be compared: more than any that can, so that it comes last.
+pub(crate) const INVALID: f32 = 2.0;
+/// A void says nothing of a height, so that two views suffice where a third has one; but a height that takes fewer views
+/// into account must not win by having fewer that can disagree.
+const INVALID_WEIGHT: f32 = 0.25;
+
 /// A picture of `width` columns per row, read from an offset on.
 #[derive(Clone, Copy)]
 pub(crate) struct Picture<'a> {
@@ -95,7 +101,8 @@ pub(crate) fn patch_moments(
 }
 
 /// Mean absolute difference of the graded census of every pixel of two tiles of `width` columns that are padded by one
-/// pixel and in the unit that counts fully; cut at 1, which is what unrelated pictures differ by; 1 where a patch is invalid.
+/// pixel and in the unit that counts fully; cut at 1, which is what unrelated pictures differ by; [`INVALID`] where a
+/// patch is.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub(crate) fn census_cost(a: &[f32], b: &[f32], width: usize, out: &mut [f32]) {
     let core = width - 2;
@@ -113,8 +120,7 @@ pub(crate) fn census_cost(a: &[f32], b: &[f32], width: usize, out: &mut [f32]) {
             sum += apart(a2[x + 1], p, b2[x + 1], q);
             sum += apart(a2[x + 2], p, b2[x + 2], q);
             let mean = sum * 0.125;
-            // A NaN compares false and becomes 1.
-            o[x] = if mean < 1.0 { mean } else { 1.0 };
+            o[x] = if mean.is_nan() { INVALID } else { mean.min(1.0) };
         }
     }
 }
@@ -143,11 +149,20 @@ pub(crate) fn sort_pair(a: &mut [f32], b: &mut [f32]) {
     }
 }
 
-/// `out += v`.
+/// `out`: the weighted mean of each pixel's costs, in which an invalid one counts as chance does, 1, with [`INVALID_WEIGHT`].
 #[multiversion(targets("x86_64+avx2+fma"))]
-pub(crate) fn add(out: &mut [f32], v: &[f32]) {
-    for (o, x) in out.iter_mut().zip(v) {
-        *o += x;
+pub(crate) fn mean_cost(costs: &[Vec<f32>], weights: &mut [f32], out: &mut [f32]) {
+    out.fill(0.0);
+    weights.fill(0.0);
+    for pair in costs {
+        for ((o, n), c) in out.iter_mut().zip(weights.iter_mut()).zip(pair) {
+            let weight = if *c <= 1.0 { 1.0 } else { INVALID_WEIGHT };
+            *o += weight * c.min(1.0);
+            *n += weight;
+        }
+    }
+    for (o, n) in out.iter_mut().zip(weights.iter()) {
+        *o /= n;
     }
 }
 
@@ -226,11 +241,13 @@ mod tests {
             b in prop::collection::vec(any_pixel(), SIDE * SIDE),
         ) {
             let cost = patch_cost(&a, &b, (0.1, 0.1));
-            prop_assert!((0.0..=1.0).contains(&cost), "{cost}");
-            let mut out = [255u8];
-            quantise(&[cost], 127.0, &mut out);
+            prop_assert!((0.0..=1.0).contains(&cost) || cost == INVALID, "{cost}");
+            let (mut mean, mut out) = ([0.0], [255u8]);
+            mean_cost(&[vec![cost], vec![INVALID]], &mut [0.0], &mut mean);
+            prop_assert!(mean[0] >= cost.min(1.0) && mean[0] <= 1.0);
+            quantise(&mean, 127.0, &mut out);
             prop_assert!(out[0] <= 127);
-            prop_assert!(!a.iter().chain(&b).any(|v| v.is_nan()) || cost == 1.0, "{cost} of a patch that is not valid");
+            prop_assert!(!a.iter().chain(&b).any(|v| v.is_nan()) || cost == INVALID, "{cost} of a patch that is not valid");
         }
     }
 
@@ -243,12 +260,12 @@ mod tests {
     }
 
     #[test]
-    fn an_invalid_pixel_costs_one_in_every_patch_that_holds_it() {
+    fn an_invalid_pixel_makes_every_patch_invalid_that_holds_it() {
         let mut a: Vec<f32> = (0..49).map(|i| ((i * 37) % 23) as f32).collect();
         a[0] = f32::NAN;
         let mut out = vec![0.0; 25];
         census_cost(&a, &a, 7, &mut out);
-        assert_eq!(out[0], 1.0);
+        assert_eq!(out[0], INVALID);
         assert!(out[1..].iter().all(|&c| c == 0.0));
     }
 }

@@ -43,6 +43,8 @@ pub struct TileScratch {
     sources: Vec<Laid>,
     rows: Vec<f32>,
     pair_costs: Vec<Vec<f32>>,
+    weights: Vec<f32>,
+    mean: Vec<f32>,
     quantised: Vec<u8>,
 }
 
@@ -219,6 +221,8 @@ impl TileScratch {
         let padded = tile.grown(CENSUS_REACH);
         let (area, core) = (padded.width * padded.height, tile.width * tile.height);
         self.rows.resize(padded.width * (padded.height + 3), 0.0);
+        self.weights.resize(core, 0.0);
+        self.mean.resize(core, 0.0);
         self.quantised.resize(core, 0);
         self.reference.resize(area, 0.0);
         copy_window(reference.view.image, padded, &mut self.reference);
@@ -267,9 +271,8 @@ impl TileScratch {
             Aggregation::Variance => pair,
             Aggregation::BestOf(k) => select_smallest(&mut self.pair_costs, k),
         };
-        let Some((total, rest)) = self.pair_costs.split_first_mut() else { return };
-        rest[..used - 1].iter().for_each(|c| kernels::add(total, c));
-        kernels::quantise(total, f32::from(COST_MAX) / used as f32, &mut self.quantised);
+        kernels::mean_cost(&self.pair_costs[..used], &mut self.weights, &mut self.mean);
+        kernels::quantise(&self.mean, f32::from(COST_MAX), &mut self.quantised);
     }
 }
 
