@@ -8,5 +8,6 @@ pub mod colmap;
 pub mod points;
 pub mod raster;
 pub mod rpc;
+pub mod splat_ply;
 
 pub use raster::write_bytes;

@@ -7,6 +7,8 @@
 //! [`TriangleMesh::from_model`] makes triangles of it: one level of detail per object, polygons with holes by constrained
 //! Delaunay triangulation, solids checked. Whatever is wrong is a [`Defect`] with a number, and every object of the model
 //! has a status: used, or why not.
+//!
+//! [`Splat`] is the other element of a surface: a Gaussian on it.
 
 mod class;
 mod crs;
@@ -21,6 +23,7 @@ mod pool;
 mod ring;
 mod select;
 mod shell;
+mod splat;
 mod triangle_mesh;
 mod triangulate;
 mod vector;
@@ -35,5 +38,6 @@ pub use model::{CityModel, CityObject, Geometry, GeometryKind, Surface};
 pub use point::ModelPoint;
 pub use pool::VertexPool;
 pub use select::{LodChoice, ObjectStatus, Scope};
+pub use splat::{Splat, SplatDefect, quaternion_of_axes};
 pub use triangle_mesh::{MeshConfig, MeshSurface, Meshed, ObjectReport, TriangleMesh};
 pub use triangulate::{Finding, Triangulation, triangulate};
