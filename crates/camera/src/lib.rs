@@ -23,6 +23,7 @@ mod plane;
 mod point;
 mod polynomial;
 mod rpc;
+mod similarity;
 mod view;
 
 pub use camera::RpcCamera;
@@ -36,4 +37,5 @@ pub use perspective::{Lens, LensError, LensModel, Pose};
 pub use plane::{EXTRAPOLATION_MAX, RpcPlane};
 pub use point::ImagePoint;
 pub use rpc::Rpc;
+pub use similarity::{Similarity, SimilarityError};
 pub use view::{GroundSamplingDistance, ViewDirection};

@@ -204,6 +204,13 @@ impl Lens {
         self.centre
     }
 
+    /// COLMAP's parameters, with the principal point in this toolkit's pixels: what [`Lens::new`] takes.
+    pub fn parameters(&self) -> Vec<f64> {
+        let focal_count = if self.model.has_one_focal_length() { 1 } else { 2 };
+        let focal = self.focal[..focal_count].iter().copied();
+        focal.chain([self.centre.sample, self.centre.line]).chain(self.distortion.iter().copied()).collect()
+    }
+
     /// The pixel of a point (x, y) of the image plane at distance 1; `None` where a fisheye has none.
     pub fn project(&self, x: f64, y: f64) -> Option<ImagePoint> {
         let [x, y] = self.distort(x, y)?;
@@ -334,6 +341,11 @@ impl Pose {
         Some(Self { rotation, centre })
     }
 
+    /// The unit quaternion (w, x, y, z) of the rotation from the world to the camera, with w ≥ 0.
+    pub fn quaternion(&self) -> [f64; 4] {
+        quaternion_from_rotation(&self.rotation)
+    }
+
     /// The translation from the world to the camera: where the world's origin is in the camera.
     pub fn translation(&self) -> [f64; 3] {
         self.rotation.map(|row| -(0..3).map(|i| row[i] * self.centre[i]).sum::<f64>())
@@ -343,6 +355,23 @@ impl Pose {
     pub fn camera_from_world(&self, position: [f64; 3]) -> [f64; 3] {
         self.rotation.map(|row| (0..3).map(|i| row[i] * (position[i] - self.centre[i])).sum())
     }
+}
+
+/// The unit quaternion (w, x, y, z), w ≥ 0, of a rotation matrix: from its largest component, which is where no digits
+/// are lost (Shepperd 1978).
+pub(crate) fn quaternion_from_rotation(r: &[[f64; 3]; 3]) -> [f64; 4] {
+    let trace = r[0][0] + r[1][1] + r[2][2];
+    let squares = [trace, r[0][0], r[1][1], r[2][2]];
+    let largest = (0..4).max_by(|&a, &b| squares[a].total_cmp(&squares[b])).unwrap_or(0);
+    let unscaled = match largest {
+        0 => [1.0 + trace, r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]],
+        1 => [r[2][1] - r[1][2], 1.0 + 2.0 * r[0][0] - trace, r[0][1] + r[1][0], r[0][2] + r[2][0]],
+        2 => [r[0][2] - r[2][0], r[0][1] + r[1][0], 1.0 + 2.0 * r[1][1] - trace, r[1][2] + r[2][1]],
+        _ => [r[1][0] - r[0][1], r[0][2] + r[2][0], r[1][2] + r[2][1], 1.0 + 2.0 * r[2][2] - trace],
+    };
+    let length = unscaled.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let sign = if unscaled[0] < 0.0 { -1.0 } else { 1.0 };
+    unscaled.map(|c| sign * c / length)
 }
 
 #[cfg(test)]
@@ -380,6 +409,26 @@ mod tests {
                 assert!(off < 1e-7, "{:?} {pixel:?}: {off}", lens.model());
             }
         }
+    }
+
+    #[test]
+    fn parameters_make_the_lens_again() {
+        for lens in [lens(LensModel::SimpleRadial, &[-0.13]), lens(LensModel::OpenCv, &[-0.2, 0.05, 1e-3, -2e-3])] {
+            let again = Lens::new(lens.width(), lens.height(), lens.model(), &lens.parameters()).unwrap();
+            assert_eq!(again, lens);
+        }
+    }
+
+    #[test]
+    fn quaternions_lead_back() {
+        // Each component is the largest once, and half turns have w = 0.
+        for q in [[0.9, 0.1, -0.3, 0.2], [0.1, 0.9, 0.2, -0.3], [0.1, -0.2, 0.9, 0.3], [0.2, 0.1, 0.3, -0.9]] {
+            let length = q.iter().map(|c: &f64| c * c).sum::<f64>().sqrt();
+            let found = Pose::from_quaternion(q, [0.0; 3]).unwrap().quaternion();
+            assert!((0..4).all(|i| (found[i] - q[i] / length).abs() < 1e-15), "{found:?}");
+        }
+        let half = Pose::from_quaternion([0.0, 0.0, 1.0, 0.0], [0.0; 3]).unwrap().quaternion();
+        assert_eq!(half.map(f64::abs), [0.0, 0.0, 1.0, 0.0]);
     }
 
     #[test]

@@ -5,9 +5,15 @@
 
 pub mod city;
 pub mod colmap;
+pub mod npy;
+pub mod ply;
 pub mod points;
 pub mod raster;
 pub mod rpc;
+mod save;
+pub mod similarity;
 pub mod splat_ply;
+pub mod transforms;
 
 pub use raster::write_bytes;
+pub use save::SaveError;

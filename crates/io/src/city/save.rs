@@ -1,9 +1,10 @@
-//! A file under its final name is complete: written beside its destination under another name, then renamed.
+//! City models under their final name: [`crate::save`] with the errors of this module.
 
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
 use super::CityError;
+use crate::save::SaveError;
 
 /// Makes a file by `make` and puts it to `path`.
 ///
@@ -14,23 +15,8 @@ pub(super) fn save(
     overwrite: bool,
     make: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), CityError> {
-    let unwritable = |e: std::io::Error| CityError::Unwritable { path: path.to_owned(), reason: e.kind().to_string() };
-    let exists = || CityError::Exists { path: path.to_owned() };
-    if !overwrite && path.symlink_metadata().is_ok() {
-        return Err(exists());
-    }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    crate::rpc::set_usual_permissions(&mut builder);
-    let mut file = builder.prefix(".skysweep-").tempfile_in(folder).map_err(unwritable)?;
-    let mut buffered = BufWriter::new(file.as_file_mut());
-    make(&mut buffered).and_then(|()| buffered.flush()).map_err(unwritable)?;
-    drop(buffered);
-    if overwrite {
-        return file.persist(path).map(drop).map_err(|e| unwritable(e.error));
-    }
-    file.persist_noclobber(path).map(drop).map_err(|e| match e.error.kind() {
-        std::io::ErrorKind::AlreadyExists => exists(),
-        _ => unwritable(e.error),
+    crate::save::save(path, overwrite, make).map_err(|error| match error {
+        SaveError::Exists { path } => CityError::Exists { path },
+        SaveError::Unwritable { path, reason } => CityError::Unwritable { path, reason },
     })
 }

@@ -2,12 +2,16 @@
 
 use camera::LensModel;
 
-use super::{Fault, RawCamera, RawImage};
+use super::points::RawPoint;
+use super::{Fault, ImagePoints, RawCamera, RawImage};
 
-/// Bytes of a camera without its parameters, of an image without name and points, and of a point.
+/// Bytes of a camera without its parameters, of an image without name and points, of a point in an image, of a point in
+/// space without its track, and of an element of the track.
 const CAMERA_BYTES: usize = 24;
 const IMAGE_BYTES: usize = 73;
-const POINT_BYTES: u64 = 24;
+const IMAGE_POINT_BYTES: usize = 24;
+const POINT_BYTES: usize = 51;
+const TRACK_BYTES: usize = 8;
 /// Longest image name.
 const NAME_LIMIT: usize = 4096;
 
@@ -17,10 +21,27 @@ pub(super) fn cameras(bytes: &[u8]) -> Result<Vec<RawCamera>, Fault> {
     (0..count).map(|_| camera(&mut bytes)).collect()
 }
 
-pub(super) fn images(bytes: &[u8]) -> Result<Vec<RawImage>, Fault> {
+pub(super) fn images(bytes: &[u8], keep: ImagePoints) -> Result<Vec<RawImage>, Fault> {
     let mut bytes = Bytes { all: bytes, at: 0 };
     let count = bytes.count("images", IMAGE_BYTES)?;
-    (0..count).map(|_| image(&mut bytes)).collect()
+    (0..count).map(|_| image(&mut bytes, keep)).collect()
+}
+
+pub(super) fn points(bytes: &[u8]) -> Result<Vec<RawPoint>, Fault> {
+    let mut bytes = Bytes { all: bytes, at: 0 };
+    let count = bytes.count("points", POINT_BYTES)?;
+    (0..count).map(|_| point(&mut bytes)).collect()
+}
+
+fn point(bytes: &mut Bytes<'_>) -> Result<RawPoint, Fault> {
+    let place = bytes.place();
+    bytes.u64()?;
+    let position = [bytes.f64()?, bytes.f64()?, bytes.f64()?];
+    let [r, g, b] = bytes.take::<3>()?;
+    let error_px = bytes.f64()?;
+    let count = bytes.count("observations", TRACK_BYTES)?;
+    let track = (0..count).map(|_| Ok((bytes.u32()?, bytes.u32()?))).collect::<Result<_, _>>()?;
+    Ok(RawPoint { position, color: [r, g, b], error_px, track, place })
 }
 
 fn camera(bytes: &mut Bytes<'_>) -> Result<RawCamera, Fault> {
@@ -33,7 +54,7 @@ fn camera(bytes: &mut Bytes<'_>) -> Result<RawCamera, Fault> {
     Ok(RawCamera { id, model, width, height, parameters, place })
 }
 
-fn image(bytes: &mut Bytes<'_>) -> Result<RawImage, Fault> {
+fn image(bytes: &mut Bytes<'_>, keep: ImagePoints) -> Result<RawImage, Fault> {
     let place = bytes.place();
     let id = bytes.u32()?;
     let mut pose = [0.0; 7];
@@ -42,10 +63,24 @@ fn image(bytes: &mut Bytes<'_>) -> Result<RawImage, Fault> {
     }
     let camera = bytes.u32()?;
     let name = bytes.text()?;
-    let points = bytes.u64()?;
-    bytes.skip(points.checked_mul(POINT_BYTES), "the points of an image")?;
+    let count = bytes.u64()?;
+    let points = match keep {
+        ImagePoints::PassOver => {
+            bytes.skip(count.checked_mul(IMAGE_POINT_BYTES as u64), "the points of an image")?;
+            Vec::new()
+        }
+        ImagePoints::Keep => {
+            let end = bytes.after(count.checked_mul(IMAGE_POINT_BYTES as u64), "the points of an image")?;
+            let mut points = Vec::with_capacity((end - bytes.at) / IMAGE_POINT_BYTES);
+            while bytes.at < end {
+                points.push([bytes.f64()?, bytes.f64()?]);
+                bytes.u64()?;
+            }
+            points
+        }
+    };
     let [w, x, y, z, tx, ty, tz] = pose;
-    Ok(RawImage { id, quaternion: [w, x, y, z], translation: [tx, ty, tz], camera, name, place })
+    Ok(RawImage { id, quaternion: [w, x, y, z], translation: [tx, ty, tz], camera, name, points, place })
 }
 
 struct Bytes<'a> {
@@ -100,10 +135,15 @@ impl Bytes<'_> {
         Ok(text)
     }
 
-    fn skip(&mut self, count: Option<u64>, what: &str) -> Result<(), Fault> {
+    /// Where so many bytes end, if the file holds them.
+    fn after(&self, count: Option<u64>, what: &str) -> Result<usize, Fault> {
         let room = (self.all.len() - self.at) as u64;
         let count = count.filter(|&count| count <= room).ok_or_else(|| self.ends(what))?;
-        self.at += count as usize;
+        Ok(self.at + count as usize)
+    }
+
+    fn skip(&mut self, count: Option<u64>, what: &str) -> Result<(), Fault> {
+        self.at = self.after(count, what)?;
         Ok(())
     }
 }

@@ -1,20 +1,28 @@
 //! COLMAP models: the cameras and poses of images, from text or binary files.
 //!
 //! [`read`] takes the folder of a model (`cameras` and `images`, `.bin` or `.txt`; binary wins where both are there) and keeps
-//! what a renderer needs: lenses and poses. Points and tracks are passed over. Newer versions add `rigs` and `frames` and
-//! still write the pose of every image, which is what is read. COLMAP's pixels have the centre of the upper-left one
-//! at (0.5, 0.5); principal points are moved to this toolkit's convention here.
+//! what a renderer needs: lenses and poses; [`read_with_points`] adds the points and their tracks, [`write`] is the way back.
+//! Newer versions add `rigs` and `frames` and still write the pose of every image, which is what is read; they read models
+//! without those files, so none are written. COLMAP's pixels have the centre of the upper-left one at (0.5, 0.5);
+//! principal points and observations are moved between that and this toolkit's convention here.
 //!
 //! Counts in binary files are checked against the size of the file before anything is allocated. An image name that leads
 //! out of its folder is refused.
 
 mod binary;
+mod points;
 mod text;
+mod write;
 
 use std::collections::HashMap;
 use std::path::{Component, Path, PathBuf};
 
 use camera::{Lens, LensError, LensModel, Pose};
+
+pub use points::{ColmapObservation, ColmapPoint, read_with_points};
+pub use write::{ColmapEncoding, write};
+
+use crate::save::SaveError;
 
 /// Files are read up to this size, bytes: images come with all their points.
 const SIZE_LIMIT: u64 = 4 << 30;
@@ -71,6 +79,17 @@ pub enum ColmapError {
         /// The line, or the byte.
         place: String,
     },
+    /// A model that no file can hold.
+    #[error("the model cannot be written ({what}): {}", .folder.display())]
+    Inconsistent {
+        /// The folder.
+        folder: PathBuf,
+        /// What does not fit.
+        what: String,
+    },
+    /// A file was not written.
+    #[error(transparent)]
+    NotWritten(#[from] SaveError),
 }
 
 /// What is wrong and where, before the file is known.
@@ -99,7 +118,16 @@ struct RawImage {
     translation: [f64; 3],
     camera: u32,
     name: String,
+    /// Where its points are in COLMAP's pixels; empty where they are passed over.
+    points: Vec<[f64; 2]>,
     place: String,
+}
+
+/// Whether the points of images are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ImagePoints {
+    Keep,
+    PassOver,
 }
 
 /// Reads the model in a folder.
@@ -108,8 +136,14 @@ struct RawImage {
 /// A file that is missing, cannot be read or breaks its format; a camera with impossible numbers; an image without its camera,
 /// with a pose that is none, or whose name leads out of its folder; two of either with one number.
 pub fn read(folder: &Path) -> Result<ColmapModel, ColmapError> {
+    Ok(read_views(folder, ImagePoints::PassOver)?.0)
+}
+
+/// The model, and per view where its points are.
+fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapModel, Vec<Vec<[f64; 2]>>), ColmapError> {
     let (cameras_path, cameras) = load(folder, "cameras", binary::cameras, text::cameras)?;
-    let (images_path, images) = load(folder, "images", binary::images, text::images)?;
+    let images = |bytes: &[u8]| binary::images(bytes, keep);
+    let (images_path, images) = load(folder, "images", images, |text| text::images(text, keep))?;
     let (mut lenses, mut lens_of) = (Vec::with_capacity(cameras.len()), HashMap::new());
     for camera in cameras {
         let fault = |what: String| invalid(&cameras_path, Fault { what, place: camera.place.clone() });
@@ -119,15 +153,16 @@ pub fn read(folder: &Path) -> Result<ColmapModel, ColmapError> {
         lenses.push(lens(&camera).map_err(|error| fault(error.to_string()))?);
     }
     let mut seen = std::collections::HashSet::new();
-    let mut views = Vec::with_capacity(images.len());
-    for image in images {
+    let (mut views, mut points) = (Vec::with_capacity(images.len()), Vec::with_capacity(images.len()));
+    for mut image in images {
         if !seen.insert(image.id) {
             let what = format!("image {} occurs a second time", image.id);
             return Err(invalid(&images_path, Fault { what, place: image.place }));
         }
+        points.push(std::mem::take(&mut image.points));
         views.push(view(image, &lens_of).map_err(|fault| invalid(&images_path, fault))?);
     }
-    Ok(ColmapModel { lenses, views })
+    Ok((ColmapModel { lenses, views }, points))
 }
 
 fn lens(camera: &RawCamera) -> Result<Lens, LensError> {
@@ -151,9 +186,8 @@ fn principal_point_index(model: LensModel) -> usize {
 }
 
 fn view(image: RawImage, lens_of: &HashMap<u32, usize>) -> Result<ColmapView, Fault> {
-    let RawImage { id, quaternion, translation, camera, name, place } = image;
-    let inside = Path::new(&name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if name.is_empty() || !inside || name.contains(['\\', '\0']) {
+    let RawImage { id, quaternion, translation, camera, name, place, .. } = image;
+    if !is_inside(&name) {
         let what = format!("the image name {:?} is empty or leads out of its folder", shorten(&name));
         return Err(Fault { what, place });
     }
@@ -164,6 +198,12 @@ fn view(image: RawImage, lens_of: &HashMap<u32, usize>) -> Result<ColmapView, Fa
         Some(pose) => Ok(ColmapView { id, name, lens, pose }),
         None => Err(Fault { what: format!("the pose of image {id} is not finite or has no rotation"), place }),
     }
+}
+
+/// Whether the name of an image stays in the folder of the images.
+pub(crate) fn is_inside(name: &str) -> bool {
+    let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    !name.is_empty() && inside && !name.contains(['\\', '\0'])
 }
 
 fn shorten(text: &str) -> String {
@@ -199,3 +239,5 @@ fn load<T>(
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod write_tests;

@@ -2,24 +2,59 @@
 
 use camera::LensModel;
 
-use super::{Fault, RawCamera, RawImage, shorten};
+use super::points::RawPoint;
+use super::{Fault, ImagePoints, RawCamera, RawImage, shorten};
 
 pub(super) fn cameras(text: &str) -> Result<Vec<RawCamera>, Fault> {
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     lines.map(|(number, line)| camera(&mut Words::new(line, number))).collect()
 }
 
-pub(super) fn images(text: &str) -> Result<Vec<RawImage>, Fault> {
+pub(super) fn images(text: &str, keep: ImagePoints) -> Result<Vec<RawImage>, Fault> {
     let mut images = Vec::new();
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.starts_with('#'));
     while let Some((number, line)) = lines.next() {
         if line.trim().is_empty() {
             continue;
         }
-        images.push(image(&mut Words::new(line, number))?);
-        lines.next();
+        let mut image = image(&mut Words::new(line, number))?;
+        if let (Some((number, line)), ImagePoints::Keep) = (lines.next(), keep) {
+            image.points = image_points(&mut Words::new(line, number))?;
+        }
+        images.push(image);
     }
     Ok(images)
+}
+
+pub(super) fn points(text: &str) -> Result<Vec<RawPoint>, Fault> {
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    lines.map(|(number, line)| point(&mut Words::new(line, number))).collect()
+}
+
+fn point(words: &mut Words<'_>) -> Result<RawPoint, Fault> {
+    words.number::<u64>("the point's number")?;
+    let (mut position, mut color) = ([0.0; 3], [0; 3]);
+    for value in &mut position {
+        *value = words.number("the position")?;
+    }
+    for value in &mut color {
+        *value = words.number("the colour")?;
+    }
+    let error_px = words.number("the error")?;
+    let mut track = Vec::new();
+    while !words.rest().is_empty() {
+        track.push((words.number("an image of the track")?, words.number("a point of the track")?));
+    }
+    Ok(RawPoint { position, color, error_px, track, place: words.place() })
+}
+
+fn image_points(words: &mut Words<'_>) -> Result<Vec<[f64; 2]>, Fault> {
+    let mut points = Vec::new();
+    while !words.rest().is_empty() {
+        points.push([words.number("a point of the image")?, words.number("a point of the image")?]);
+        words.number::<i64>("the number of a point")?;
+    }
+    Ok(points)
 }
 
 fn camera(words: &mut Words<'_>) -> Result<RawCamera, Fault> {
@@ -45,7 +80,15 @@ fn image(words: &mut Words<'_>) -> Result<RawImage, Fault> {
     let [w, x, y, z, tx, ty, tz] = pose;
     // Names may hold spaces.
     let name = words.rest().to_owned();
-    Ok(RawImage { id, quaternion: [w, x, y, z], translation: [tx, ty, tz], camera, name, place: words.place() })
+    Ok(RawImage {
+        id,
+        quaternion: [w, x, y, z],
+        translation: [tx, ty, tz],
+        camera,
+        name,
+        points: Vec::new(),
+        place: words.place(),
+    })
 }
 
 /// The words of a line.

@@ -32,6 +32,8 @@ pub enum BandData<'a> {
     U8(&'a Grid<u8>),
     /// Image samples, counts.
     U16(&'a Grid<u16>),
+    /// Numbers of objects.
+    U32(&'a Grid<u32>),
 }
 
 /// One band of an output.
@@ -132,13 +134,7 @@ pub fn write_image_with_rpc(
     let path = path.as_ref();
     write_whole(path, overwrite, |made| {
         let mut memory = in_memory(path, bands, no_data)?;
-        let float = matches!(bands.first(), Some(Band { data: BandData::F32(_), .. }));
-        let options = [
-            ("COMPRESS", "DEFLATE"),
-            ("PREDICTOR", if float { "3" } else { "2" }),
-            ("TILED", "YES"),
-            ("BIGTIFF", "IF_SAFER"),
-        ];
+        let options = plain_options(bands);
         with_gdal(|| {
             for (key, value) in rpc_items(rpc) {
                 memory.set_metadata_item(key, &value, "RPC")?;
@@ -147,6 +143,37 @@ pub fn write_image_with_rpc(
         })
         .map_err(|reason| RasterError::unwritable(path, reason))
     })
+}
+
+/// Writes a map in the pixels of an image: tiled, deflate, no georeference. As in every float raster NaN becomes `no_data`.
+///
+/// # Errors
+/// As [`write_cog`], without those of the CRS.
+pub fn write_map(
+    path: impl AsRef<Path>,
+    bands: &[Band<'_>],
+    no_data: Option<f64>,
+    metadata: &[(&str, &str)],
+    overwrite: bool,
+) -> Result<(), RasterError> {
+    let path = path.as_ref();
+    write_whole(path, overwrite, |made| {
+        let mut memory = in_memory(path, bands, no_data)?;
+        let options = plain_options(bands);
+        with_gdal(|| {
+            for (key, value) in metadata {
+                memory.set_metadata_item(key, value, "")?;
+            }
+            copy(&memory, "GTiff", made, &options)
+        })
+        .map_err(|reason| RasterError::unwritable(path, reason))
+    })
+}
+
+/// Tiles with deflate and the predictor of the samples.
+fn plain_options(bands: &[Band<'_>]) -> [(&'static str, &'static str); 4] {
+    let float = matches!(bands.first(), Some(Band { data: BandData::F32(_), .. }));
+    [("COMPRESS", "DEFLATE"), ("PREDICTOR", if float { "3" } else { "2" }), ("TILED", "YES"), ("BIGTIFF", "IF_SAFER")]
 }
 
 /// The RPC in GDAL's keys. Numbers are written so that they read back to the same bits.
@@ -190,6 +217,7 @@ fn in_memory(path: &Path, bands: &[Band<'_>], no_data: Option<f64>) -> Result<Da
         }),
         BandData::U8(_) => fill(path, bands, no_data, as_u8, |v| v),
         BandData::U16(_) => fill(path, bands, no_data, as_u16, |v| v),
+        BandData::U32(_) => fill(path, bands, no_data, as_u32, |v| v),
     }
 }
 
@@ -203,6 +231,10 @@ fn as_u8<'a>(band: &Band<'a>) -> Option<&'a Grid<u8>> {
 
 fn as_u16<'a>(band: &Band<'a>) -> Option<&'a Grid<u16>> {
     if let BandData::U16(grid) = band.data { Some(grid) } else { None }
+}
+
+fn as_u32<'a>(band: &Band<'a>) -> Option<&'a Grid<u32>> {
+    if let BandData::U32(grid) = band.data { Some(grid) } else { None }
 }
 
 fn fill<'a, T: GdalType + Copy + 'a>(

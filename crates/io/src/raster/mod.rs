@@ -6,6 +6,7 @@
 
 mod atomic;
 mod dem;
+mod depth_png;
 mod error;
 mod gdal_setup;
 mod geotiff;
@@ -15,8 +16,9 @@ mod source;
 
 pub use atomic::write_bytes;
 pub use dem::{Dem, read_dem, read_dem_window};
+pub use depth_png::{DepthScale, write_depth_png};
 pub use error::RasterError;
-pub use geotiff::{Band, BandData, CogRaster, Sampling, write_cog, write_image_with_rpc};
+pub use geotiff::{Band, BandData, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
 pub use luma::{LumaRule, LumaTile};
 pub use png::{write_png_gray, write_png_rgb};
 pub use source::{ImageInfo, ImageSource, SampleType};

@@ -1,0 +1,84 @@
+//! Points for Gaussian splatting trainers: PLY, binary little-endian, `x y z nx ny nz` as float and `red green blue` as uchar.
+//!
+//! These are the properties, in the order, that the readers of 3DGS and 2DGS ask for (a file without normals stops them).
+//! Positions are f32 relative to an origin that stands in the comments, so that map coordinates lose nothing.
+
+use std::path::Path;
+
+use crate::SaveError;
+use crate::save::save;
+
+/// A point with its surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlyPoint {
+    /// Position relative to the origin of the file.
+    pub position: [f32; 3],
+    /// Unit normal; zeros where there is none.
+    pub normal: [f32; 3],
+    /// Red, green, blue.
+    pub color: [u8; 3],
+}
+
+const PROPERTIES: &str = "property float x\nproperty float y\nproperty float z\n\
+    property float nx\nproperty float ny\nproperty float nz\n\
+    property uchar red\nproperty uchar green\nproperty uchar blue\n";
+
+/// Writes points; `comments` are kept as they are, a line each (`origin x y z`, `crs …`).
+///
+/// # Errors
+/// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`], also for an iterator that is shorter or longer than it
+/// says.
+pub fn write_points(
+    path: impl AsRef<Path>,
+    points: impl ExactSizeIterator<Item = PlyPoint>,
+    comments: &[String],
+    overwrite: bool,
+) -> Result<(), SaveError> {
+    save(path.as_ref(), overwrite, |out| {
+        let count = points.len();
+        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+        for comment in comments {
+            let line: String = comment.chars().filter(|c| c.is_ascii() && !c.is_control()).collect();
+            writeln!(out, "comment {line}")?;
+        }
+        write!(out, "element vertex {count}\n{PROPERTIES}end_header\n")?;
+        let mut written = 0;
+        for point in points {
+            let mut record = [0u8; 27];
+            let floats = point.position.into_iter().chain(point.normal);
+            record
+                .chunks_exact_mut(4)
+                .zip(floats)
+                .for_each(|(bytes, value)| bytes.copy_from_slice(&value.to_le_bytes()));
+            record[24..].copy_from_slice(&point.color);
+            out.write_all(&record)?;
+            written += 1;
+        }
+        if written == count { Ok(()) } else { Err(std::io::ErrorKind::InvalidInput.into()) }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bytes_are_those_of_the_format() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("points3D.ply");
+        let point = PlyPoint { position: [1.5, -2.0, 3.0], normal: [0.0, 0.0, 1.0], color: [1, 128, 255] };
+        write_points(&path, [point, point].into_iter(), &["origin 1 2 3\nend_header".to_owned()], false).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let end = bytes.windows(12).position(|window| window == b"\nend_header\n").unwrap() + 12;
+        let header = std::str::from_utf8(&bytes[..end]).unwrap();
+        assert!(header.starts_with("ply\nformat binary_little_endian 1.0\ncomment origin 1 2 3end_header\nelement"));
+        assert!(header.contains("element vertex 2\nproperty float x\n"));
+        assert_eq!(bytes.len(), end + 2 * 27);
+        let floats: Vec<f32> =
+            bytes[end..end + 24].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+        assert_eq!(floats, [1.5, -2.0, 3.0, 0.0, 0.0, 1.0]);
+        assert_eq!(&bytes[end + 24..end + 27], [1, 128, 255]);
+        let again = write_points(&path, [].into_iter(), &[], false);
+        assert!(matches!(again, Err(SaveError::Exists { .. })));
+    }
+}

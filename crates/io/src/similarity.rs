@@ -1,0 +1,202 @@
+//! The similarity between a model's frame and that of the cameras, as JSON.
+//!
+//! camera = s · R · (model + (0, 0, vertical offset)) + t. A file holds either the parts
+//!
+//! ```json
+//! { "scale": 1.0, "rotation": [1, 0, 0, 0], "translation": [-690000.0, -5336000.0, 0.0], "vertical_offset_m": 45.2 }
+//! ```
+//!
+//! (all but one may be left out; the rotation is a quaternion with w first, or three rows), or a matrix of four rows under
+//! `base_to_canonical`, `camera_from_model` or `matrix`, or that matrix alone. `canonical_to_base` and `model_from_camera` are
+//! the way back. The vertical offset, metres, is added to the model's heights: a geoid's height above the ellipsoid where
+//! the cameras have ellipsoidal heights. Unknown keys are refused.
+
+use std::path::{Path, PathBuf};
+
+use camera::{Pose, Similarity, SimilarityError};
+use serde::Deserialize;
+
+/// Files are read up to this size, bytes.
+const SIZE_LIMIT: u64 = 1 << 20;
+
+/// A file that holds no similarity.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimilarityFileError {
+    /// The file cannot be read.
+    #[error("cannot read the file ({source}): {}", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// The file is no JSON, or has other keys than are read.
+    #[error("no similarity ({what}): {}", .path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What was found and expected.
+        what: String,
+    },
+    /// The numbers make none.
+    #[error("{source}: {}", .path.display())]
+    Numbers {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with them.
+        source: SimilarityError,
+    },
+}
+
+/// Why a text is refused.
+#[derive(Debug)]
+enum Fault {
+    Text(String),
+    Numbers(SimilarityError),
+}
+
+type Rows = Vec<Vec<f64>>;
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Parts {
+    scale: Option<f64>,
+    rotation: Option<Rotation>,
+    translation: Option<[f64; 3]>,
+    vertical_offset_m: Option<f64>,
+    #[serde(alias = "camera_from_model", alias = "matrix")]
+    base_to_canonical: Option<Rows>,
+    #[serde(alias = "model_from_camera")]
+    canonical_to_base: Option<Rows>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Rotation {
+    Quaternion([f64; 4]),
+    Rows([[f64; 3]; 3]),
+}
+
+/// Reads the similarity from the model's frame to that of the cameras, the vertical offset included.
+///
+/// # Errors
+/// A file that cannot be read, is larger than 1 MiB, is no JSON of the form above, or whose numbers are no similarity: a scale
+/// that is not positive, a matrix that mirrors or shears, anything that is not finite.
+pub fn read(path: impl AsRef<Path>) -> Result<Similarity, SimilarityFileError> {
+    let path = path.as_ref();
+    let unreadable = |source| SimilarityFileError::Unreadable { path: path.to_owned(), source };
+    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    if size > SIZE_LIMIT {
+        let what = format!("{size} bytes, up to {SIZE_LIMIT} are read");
+        return Err(SimilarityFileError::Invalid { path: path.to_owned(), what });
+    }
+    parse(&std::fs::read(path).map_err(unreadable)?).map_err(|fault| match fault {
+        Fault::Text(what) => SimilarityFileError::Invalid { path: path.to_owned(), what },
+        Fault::Numbers(source) => SimilarityFileError::Numbers { path: path.to_owned(), source },
+    })
+}
+
+fn parse(bytes: &[u8]) -> Result<Similarity, Fault> {
+    let json = |error: serde_json::Error| Fault::Text(error.to_string());
+    if bytes.trim_ascii_start().starts_with(b"[") {
+        return matrix(&serde_json::from_slice(bytes).map_err(json)?);
+    }
+    let parts: Parts = serde_json::from_slice(bytes).map_err(json)?;
+    let has_parts = parts.scale.is_some() || parts.rotation.is_some() || parts.translation.is_some();
+    let camera_from_model = match (&parts.base_to_canonical, &parts.canonical_to_base, has_parts) {
+        (Some(rows), None, false) => matrix(rows)?,
+        (None, Some(rows), false) => matrix(rows)?.inverse(),
+        (None, None, true) => of_parts(&parts)?,
+        (None, None, false) if parts.vertical_offset_m.is_some() => Similarity::IDENTITY,
+        (None, None, false) => return Err(Fault::Text("no key of a similarity".to_owned())),
+        _ => return Err(Fault::Text("a matrix beside other parts, expected one or the other".to_owned())),
+    };
+    let raised = [0.0, 0.0, parts.vertical_offset_m.unwrap_or(0.0)];
+    let raise = Similarity::new(1.0, Similarity::IDENTITY.rotation(), raised).map_err(Fault::Numbers)?;
+    Ok(camera_from_model.after(&raise))
+}
+
+fn of_parts(parts: &Parts) -> Result<Similarity, Fault> {
+    let rotation = match parts.rotation {
+        None => Similarity::IDENTITY.rotation(),
+        Some(Rotation::Rows(rows)) => rows,
+        Some(Rotation::Quaternion(quaternion)) => {
+            let pose = Pose::from_quaternion(quaternion, [0.0; 3]);
+            pose.ok_or_else(|| Fault::Text("the quaternion has no length or is not finite".to_owned()))?.rotation
+        }
+    };
+    Similarity::new(parts.scale.unwrap_or(1.0), rotation, parts.translation.unwrap_or_default()).map_err(Fault::Numbers)
+}
+
+/// Three or four rows of four.
+fn matrix(rows: &Rows) -> Result<Similarity, Fault> {
+    let row = |i: usize| <[f64; 4]>::try_from(rows.get(i)?.as_slice()).ok();
+    let last_fits = rows.get(3).is_none_or(|last| last.as_slice() == [0.0, 0.0, 0.0, 1.0]);
+    match (row(0), row(1), row(2)) {
+        (Some(a), Some(b), Some(c)) if last_fits && rows.len() <= 4 => {
+            Similarity::from_matrix([a, b, c]).map_err(Fault::Numbers)
+        }
+        _ => Err(Fault::Text("the matrix has not four rows of four numbers, the last 0 0 0 1".to_owned())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str) -> Result<Similarity, Fault> {
+        parse(text.as_bytes())
+    }
+
+    #[track_caller]
+    fn check(text: &str, from: [f64; 3], to: [f64; 3]) {
+        let found = read_text(text).unwrap().apply(from);
+        assert!((0..3).all(|i| (found[i] - to[i]).abs() < 1e-9), "{found:?}");
+    }
+
+    #[test]
+    fn all_forms_are_read() {
+        let p = [690_010.0, 5_336_020.0, 500.0];
+        check(r#"{"translation": [-690000, -5336000, -500]}"#, p, [10.0, 20.0, 0.0]);
+        check(r#"{"vertical_offset_m": 45.5}"#, p, [p[0], p[1], 545.5]);
+        // A quarter turn about z, then twice as large; the offset comes before both.
+        let quarter =
+            r#"{"scale": 2, "rotation": [0.7071067811865476, 0, 0, 0.7071067811865476], "vertical_offset_m": 1}"#;
+        check(quarter, [1.0, 0.0, 0.0], [0.0, 2.0, 2.0]);
+        check(r#"{"rotation": [[0,-1,0],[1,0,0],[0,0,1]]}"#, [1.0, 2.0, 3.0], [-2.0, 1.0, 3.0]);
+        let rows = "[[0,-2,0,5],[2,0,0,6],[0,0,2,7],[0,0,0,1]]";
+        check(rows, [1.0, 2.0, 3.0], [1.0, 8.0, 13.0]);
+        check(&format!(r#"{{"base_to_canonical": {rows}}}"#), [1.0, 2.0, 3.0], [1.0, 8.0, 13.0]);
+        check(&format!(r#"{{"matrix": {rows}, "vertical_offset_m": 1}}"#), [1.0, 2.0, 2.0], [1.0, 8.0, 13.0]);
+        check(&format!(r#"{{"canonical_to_base": {rows}}}"#), [1.0, 8.0, 13.0], [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn what_is_none_is_refused() {
+        #[track_caller]
+        fn refused(text: &str, words: &str) {
+            let fault = match read_text(text).unwrap_err() {
+                Fault::Text(what) => what,
+                Fault::Numbers(source) => source.to_string(),
+            };
+            assert!(fault.contains(words), "{fault}");
+        }
+        refused("", "EOF");
+        refused("{}", "no key");
+        refused(r#"{"scales": 1}"#, "unknown field");
+        refused(r#"{"scale": NaN}"#, "line 1");
+        refused(r#"{"scale": 1e999}"#, "out of range");
+        refused(r#"{"scale": 0}"#, "scale is 0");
+        refused(r#"{"scale": 1e300}"#, "scale is");
+        refused(r#"{"rotation": [0, 0, 0, 0]}"#, "quaternion");
+        refused(r#"{"rotation": [1, 0, 0]}"#, "variant");
+        refused(r#"{"rotation": [[1,0,0],[0,1,0],[0,0,-1]]}"#, "mirrors");
+        refused(r#"{"scale": 1, "matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}"#, "one or the other");
+        refused("[[1,0,0,0],[0,1,0,0],[0,0,0,0],[0,0,0,1]]", "scale is 0");
+        refused("[[1,0,0,0],[0,1,0,0],[0,0,3,0],[0,0,0,1]]", "no rotation");
+        refused("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,2]]", "0 0 0 1");
+        refused("[[1,0,0],[0,1,0],[0,0,1]]", "four rows");
+        refused(&format!(r#"{{"rotation": {}"#, "[".repeat(100_000)), "recursion");
+    }
+}
