@@ -8,7 +8,9 @@ mod city;
 mod dsm;
 mod error;
 mod eval;
+mod heightmap;
 mod log;
+mod ortho;
 mod print;
 mod progress;
 mod rpc;
@@ -54,6 +56,10 @@ enum Command {
     Dsm(Box<dsm::Args>),
     /// Measure how far a surface model is from a reference.
     Eval(Box<eval::Args>),
+    /// Make height maps seen from above around a camera, turned to its heading.
+    Heightmap(Box<heightmap::Args>),
+    /// Lay satellite images on a surface model, hidden cells marked.
+    Ortho(Box<ortho::Args>),
     /// Show, use and convert RPC camera models.
     Rpc(rpc::Args),
     /// Make a scene seen through RPC cameras, with its exact surface.
@@ -88,6 +94,8 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::City(args) => city::run(args),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
+        Command::Heightmap(args) => heightmap::run(args, cli.global),
+        Command::Ortho(args) => ortho::run(args, cli.global),
         Command::Rpc(args) => rpc::run(args),
         Command::Simulate(args) => simulate::run(args, cli.global),
     }

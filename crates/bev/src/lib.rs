@@ -2,3 +2,6 @@
 //! views of a height field, alignment and splits of camera models, and satellite splats.
 //!
 //! Heights are metres above the WGS 84 ellipsoid unless a type says otherwise; local frames are east, north, up in metres.
+
+pub mod heightmap;
+pub mod ortho;

@@ -11,6 +11,7 @@ mod error;
 mod point;
 mod proj_handle;
 mod projection;
+mod transverse_mercator;
 mod vertical;
 
 pub use crs::{Crs, CrsIdentity, CrsRequest, VerticalDatum, ups_epsg, utm_epsg};
@@ -22,4 +23,5 @@ pub use enu::{EnuFrame, EnuPoint};
 pub use error::GeodesyError;
 pub use point::LonLatHeight;
 pub use projection::{MapPoint, MapProjection};
+pub use transverse_mercator::TransverseMercator;
 pub use vertical::HeightConverter;

@@ -8,6 +8,7 @@ pub mod colmap;
 pub mod npy;
 pub mod ply;
 pub mod points;
+pub mod positions;
 pub mod raster;
 pub mod rpc;
 mod save;

@@ -432,6 +432,7 @@ fn image_reports(images: &[Opened], gsds: &[Option<f64>], geometry: &Geometry, f
         gsd_m: gsds.get(i).copied().flatten(),
         incidence_deg: o.camera.view_direction(geometry.centre).ok().map(|v| v.incidence_deg()),
         correction: found.corrections.get(i).copied(),
+        applied_correction: o.camera.correction,
     };
     images.iter().enumerate().map(one).collect()
 }

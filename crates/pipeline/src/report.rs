@@ -51,6 +51,8 @@ pub struct ImageReport {
     pub incidence_deg: Option<f64>,
     /// The correction found, in the frame of the part that was read.
     pub correction: Option<ImageCorrection>,
+    /// The correction that was applied, in the frame of the whole image.
+    pub applied_correction: ImageCorrection,
 }
 
 /// One pair of images.

@@ -5,6 +5,7 @@ use std::io::BufReader;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+use geodesy::VerticalDatum;
 use las::{PointDataBuilder, Reader};
 use raster::{GeoTransform, Grid};
 
@@ -33,6 +34,19 @@ pub struct PointCloud {
     path: PathBuf,
     reader: Reader,
     stated: Stated,
+}
+
+/// A point of a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Easting (or longitude), map units.
+    pub x: f64,
+    /// Northing (or latitude), map units.
+    pub y: f64,
+    /// Height above the file's datum, metres.
+    pub height_m: f64,
+    /// Its class.
+    pub class: u8,
 }
 
 /// A cloud as a surface model.
@@ -84,30 +98,20 @@ impl PointCloud {
         let (geotransform, width, height) = self.grid(cell, anchor)?;
         let mut heights = Grid::filled(width, height, f32::NAN);
         let mut classes = Grid::filled(width, height, None);
-        let mut batch = PointDataBuilder::new().for_header(self.reader.header()).build();
-        let (mut points, mut left_out) = (0u64, 0u64);
-        loop {
-            let read = guarded(&self.path, || self.reader.fill_points(BATCH, &mut batch))?;
-            if read == 0 {
-                break;
-            }
-            for point in batch.points() {
-                let point = point.map_err(|error| PointsError::damaged(&self.path, error))?;
-                points += 1;
-                let class = u8::from(point.classification);
-                let place = place(&geotransform, point.x, point.y).filter(|&(c, r)| c < width && r < height);
-                let usable = !point.is_withheld && !NOISE.contains(&class) && point.z.is_finite();
-                let Some(cell) = place.filter(|_| usable) else {
-                    left_out += 1;
-                    continue;
-                };
-                let z = (point.z * self.stated.height_unit_m) as f32;
-                if heights[cell].is_nan() || z > heights[cell] {
-                    heights[cell] = z;
-                    classes[cell] = Some(i32::from(class));
+        let mut outside = 0u64;
+        let (points, unusable) = self.each(|point| {
+            match place(&geotransform, point.x, point.y).filter(|&(c, r)| c < width && r < height) {
+                Some(cell) => {
+                    let z = point.height_m as f32;
+                    if heights[cell].is_nan() || z > heights[cell] {
+                        heights[cell] = z;
+                        classes[cell] = Some(i32::from(point.class));
+                    }
                 }
+                None => outside += 1,
             }
-        }
+        })?;
+        let left_out = unusable + outside;
         if points == left_out {
             return Err(PointsError::NoPoints { path: self.path, points });
         }
@@ -121,6 +125,49 @@ impl PointCloud {
             no_data: None,
         };
         Ok(GriddedPoints { dem, classes, points, left_out })
+    }
+
+    /// What the file says its heights are above.
+    pub fn vertical(&self) -> Option<VerticalDatum> {
+        self.stated.vertical
+    }
+
+    /// The middle of the heights that the header names, metres; 0 where it names none.
+    pub fn middle_height_m(&self) -> f64 {
+        let bounds = self.reader.header().bounds();
+        let middle = 0.5 * (bounds.min.z + bounds.max.z) * self.stated.height_unit_m;
+        if middle.is_finite() { middle } else { 0.0 }
+    }
+
+    /// Hands over every point of the surface in the order of the file; returns how many were read, and how many of them were
+    /// noise, withheld or without a height.
+    ///
+    /// # Errors
+    /// [`PointsError::Damaged`].
+    pub fn visit(mut self, take: impl FnMut(SurfacePoint)) -> Result<(u64, u64), PointsError> {
+        self.each(take)
+    }
+
+    fn each(&mut self, mut take: impl FnMut(SurfacePoint)) -> Result<(u64, u64), PointsError> {
+        let mut batch = PointDataBuilder::new().for_header(self.reader.header()).build();
+        let (mut points, mut left_out) = (0u64, 0u64);
+        loop {
+            let read = guarded(&self.path, || self.reader.fill_points(BATCH, &mut batch))?;
+            if read == 0 {
+                return Ok((points, left_out));
+            }
+            for point in batch.points() {
+                let point = point.map_err(|error| PointsError::damaged(&self.path, error))?;
+                points += 1;
+                let class = u8::from(point.classification);
+                if point.is_withheld || NOISE.contains(&class) || !point.z.is_finite() {
+                    left_out += 1;
+                    continue;
+                }
+                let height_m = point.z * self.stated.height_unit_m;
+                take(SurfacePoint { x: point.x, y: point.y, height_m, class });
+            }
+        }
     }
 
     fn grid(&self, cell: (f64, f64), anchor: (f64, f64)) -> Result<(GeoTransform, usize, usize), PointsError> {

@@ -8,7 +8,9 @@
 mod cloud;
 mod crs;
 mod error;
+mod export;
 mod preflight;
 
-pub use cloud::{GriddedPoints, PointCloud, is_point_cloud};
+pub use cloud::{GriddedPoints, PointCloud, SurfacePoint, is_point_cloud};
 pub use error::PointsError;
+pub use export::write_las;

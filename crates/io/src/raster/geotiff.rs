@@ -201,14 +201,14 @@ fn rpc_items(rpc: &Rpc) -> Vec<(&'static str, String)> {
 }
 
 /// Copies a dataset into a file and closes it, which is when GDAL writes the last bytes.
-fn copy(memory: &Dataset, driver: &str, made: &Path, options: &[(&str, &str)]) -> gdal::errors::Result<()> {
+pub(super) fn copy(memory: &Dataset, driver: &str, made: &Path, options: &[(&str, &str)]) -> gdal::errors::Result<()> {
     let options = RasterCreationOptions::from_iter(options.iter().map(|(key, value)| format!("{key}={value}")));
     let driver = DriverManager::get_driver_by_name(driver)?;
     memory.create_copy(&driver, made, &options)?.close()
 }
 
 /// The bands as a MEM dataset.
-fn in_memory(path: &Path, bands: &[Band<'_>], no_data: Option<f64>) -> Result<Dataset, RasterError> {
+pub(super) fn in_memory(path: &Path, bands: &[Band<'_>], no_data: Option<f64>) -> Result<Dataset, RasterError> {
     let first = bands.first().ok_or_else(|| inconsistent(path, "there is no band"))?;
     match first.data {
         BandData::F32(_) => fill(path, bands, no_data, as_f32, |v: f32| match no_data {

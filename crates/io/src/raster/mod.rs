@@ -13,6 +13,7 @@ mod geotiff;
 mod luma;
 mod png;
 mod source;
+mod tile;
 
 pub use atomic::write_bytes;
 pub use dem::{Dem, read_dem, read_dem_window};
@@ -22,6 +23,7 @@ pub use geotiff::{Band, BandData, CogRaster, Sampling, write_cog, write_image_wi
 pub use luma::{LumaRule, LumaTile};
 pub use png::{write_png_gray, write_png_rgb};
 pub use source::{ImageInfo, ImageSource, SampleType};
+pub use tile::{MapTile, write_map_tile};
 
 pub(crate) use atomic::write_whole;
 pub(crate) use gdal_setup::{open_dataset, prepare_gdal, with_gdal};

@@ -130,6 +130,27 @@ impl ImageSource {
         luma::read(self, window)
     }
 
+    /// One band (counted from 1) over a window, as it stands in the file; NaN outside the image and where the file has no data.
+    ///
+    /// # Errors
+    /// [`RasterError::Unsupported`] for a band that is not there; [`RasterError::Damaged`] when GDAL cannot decode the pixels.
+    pub fn read_samples(&self, band: usize, window: Window) -> Result<Grid<f32>, RasterError> {
+        if !(1..=self.info.bands).contains(&band) {
+            let found = format!("band {band} of {}", self.info.bands);
+            return Err(RasterError::Unsupported { path: self.path.clone(), found, expected: "a band that is there" });
+        }
+        let Some(inside) = self.window().intersection(&window) else {
+            return Ok(Grid::filled(window.width, window.height, f32::NAN));
+        };
+        let mut samples = self.read_band(band, inside)?;
+        if let Some(mask) = self.read_mask(band, inside)? {
+            let void = samples.data_mut().iter_mut().zip(mask.data()).filter(|(_, mask)| **mask == 0);
+            void.for_each(|(sample, _)| *sample = f32::NAN);
+        }
+        let (x, y) = (window.x - inside.x, window.y - inside.y);
+        Ok(samples.window(Window { x, y, ..window }, f32::NAN))
+    }
+
     /// One band (counted from 1) over a window inside the image, as f32 and untouched.
     pub(crate) fn read_band(&self, band: usize, inside: Window) -> Result<Grid<f32>, RasterError> {
         read_as(&self.path, &self.dataset, band, inside)

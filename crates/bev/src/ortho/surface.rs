@@ -1,0 +1,185 @@
+//! A surface model as an obstacle: what stands between a point of it and a sensor.
+//!
+//! From the point one goes along the line of sight, half a cell at a time along the grid's longer axis of motion, until the line is above
+//! everything. The point is hidden where the surface is above the line. Between cell centres the surface is bilinear, except where
+//! two neighbours differ by more than a slope of [`STEP_SLOPE`]: that is a wall, and it stands in the middle between them, the
+//! higher side included. (A ramp in its place would take half a cell off every roof's edge and let the sensor see
+//! behind it.) Where the surface has no height nothing stands in the way.
+
+use raster::Grid;
+
+/// Slope beyond which neighbours are a wall and not a slope: 2 (63°).
+pub const STEP_SLOPE: f32 = 2.0;
+
+/// Side of the blocks whose highest cell is kept.
+const BLOCK: usize = 16;
+
+/// Heights on a grid, made ready for lines of sight.
+#[derive(Debug, Clone)]
+pub struct Surface<'a> {
+    heights: &'a Grid<f32>,
+    /// Difference of neighbours that makes a wall, metres.
+    step_m: f32,
+    /// The highest cell of each block and of one cell around it.
+    ceilings: Grid<f32>,
+    highest: f32,
+}
+
+impl<'a> Surface<'a> {
+    /// Prepares heights (metres, NaN where there is none) on cells of `cell_m` metres.
+    pub fn new(heights: &'a Grid<f32>, cell_m: f64) -> Self {
+        let blocks = |cells: usize| cells.div_ceil(BLOCK).max(1);
+        let mut ceilings = Grid::filled(blocks(heights.width()), blocks(heights.height()), f32::NEG_INFINITY);
+        for j in 0..ceilings.height() {
+            let rows = (j * BLOCK).saturating_sub(1)..(j * BLOCK + BLOCK + 1).min(heights.height());
+            for i in 0..ceilings.width() {
+                let columns = (i * BLOCK).saturating_sub(1)..(i * BLOCK + BLOCK + 1).min(heights.width());
+                let cells = rows.clone().flat_map(|row| &heights.row(row)[columns.clone()]);
+                // f32::max passes over NaN.
+                ceilings[(i, j)] = cells.fold(f32::NEG_INFINITY, |high, &h| high.max(h));
+            }
+        }
+        let highest = ceilings.data().iter().fold(f32::NEG_INFINITY, |high, &h| high.max(h));
+        Self { heights, step_m: STEP_SLOPE * cell_m as f32, ceilings, highest }
+    }
+
+    /// The height at a (column, row): bilinear, with walls kept upright; NaN where the cells that count have none.
+    #[inline]
+    pub fn height_at(&self, column: f64, row: f64) -> f32 {
+        let (c, r) = (column.floor(), row.floor());
+        if !(c >= 0.0
+            && r >= 0.0
+            && column <= (self.heights.width() as f64 - 1.0)
+            && row <= (self.heights.height() as f64 - 1.0))
+        {
+            return f32::NAN;
+        }
+        let (u, v) = ((column - c) as f32, (row - r) as f32);
+        let (c, r) = (c as usize, r as usize);
+        let along = |row: usize| {
+            let cells = self.heights.row(row);
+            if u == 0.0 { cells[c] } else { self.between(cells[c], cells[c + 1], u) }
+        };
+        if v == 0.0 { along(r) } else { self.between(along(r), along(r + 1), v) }
+    }
+
+    /// Between two neighbours: a slope, or the nearer of them where there is a wall (the higher at the wall itself).
+    #[inline]
+    fn between(&self, a: f32, b: f32, t: f32) -> f32 {
+        if (a - b).abs() <= self.step_m {
+            a + (b - a) * t
+        } else if t < 0.5 {
+            a
+        } else if t > 0.5 {
+            b
+        } else {
+            a.max(b)
+        }
+    }
+
+    /// Whether anything stands between the point at (column, row), `height_m`, and a sensor towards which the line of sight moves by
+    /// `per_metre` (columns, rows) for each metre that it rises. What is less than `tolerance_m` above the line does not count.
+    pub fn hides(&self, column: f64, row: f64, height_m: f64, per_metre: [f64; 2], tolerance_m: f64) -> bool {
+        let fastest = per_metre[0].abs().max(per_metre[1].abs());
+        if !(fastest > 0.0 && fastest.is_finite() && height_m.is_finite()) {
+            return false;
+        }
+        // Half a cell along the faster axis.
+        let rise = 0.5 / fastest;
+        let step = [per_metre[0] * rise, per_metre[1] * rise];
+        let (width, height) = (self.heights.width() as f64, self.heights.height() as f64);
+        let top = f64::from(self.highest) - tolerance_m;
+        let mut k = 1.0;
+        loop {
+            let line = height_m + k * rise;
+            let (c, r) = (column + k * step[0], row + k * step[1]);
+            // Negated, so that numbers that are none end it.
+            if !(line < top && c > -0.5 && r > -0.5 && c < width - 0.5 && r < height - 0.5) {
+                return false;
+            }
+            let (i, j) = ((c + 0.5) as usize / BLOCK, (r + 0.5) as usize / BLOCK);
+            if f64::from(self.ceilings[(i, j)]) - tolerance_m <= line {
+                k += steps_out([c, r], step, [i, j]);
+                continue;
+            }
+            let at = self.height_at(c.clamp(0.0, width - 1.0), r.clamp(0.0, height - 1.0));
+            if f64::from(at) - tolerance_m > line {
+                return true;
+            }
+            k += 1.0;
+        }
+    }
+}
+
+/// Whole steps that lead out of a block, at least one.
+#[inline]
+fn steps_out(at: [f64; 2], step: [f64; 2], block: [usize; 2]) -> f64 {
+    let along = |i: usize| {
+        let low = (block[i] * BLOCK) as f64 - 0.5;
+        let side = if step[i] > 0.0 { low + BLOCK as f64 } else { low };
+        if step[i] == 0.0 { f64::INFINITY } else { (side - at[i]) / step[i] }
+    };
+    along(0).min(along(1)).floor().max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Flat ground with a block of 10 m between columns 20 and 29.
+    fn block() -> Grid<f32> {
+        let mut heights = Grid::filled(64, 40, 100.0_f32);
+        for row in 0..40 {
+            heights.row_mut(row)[20..30].fill(110.0);
+        }
+        heights
+    }
+
+    #[test]
+    fn a_wall_hides_as_far_as_its_height_and_the_angle_say() {
+        let heights = block();
+        let surface = Surface::new(&heights, 0.5);
+        // The sensor stands towards smaller columns, under 45°: two cells per metre.
+        let hidden =
+            |column: usize| surface.hides(column as f64, 20.0, f64::from(heights[(column, 20)]), [-2.0, 0.0], 0.01);
+        // The wall stands at column 29.5; its shadow is 10 m, 20 cells, long.
+        for column in 0..64 {
+            assert_eq!(hidden(column), (30..=49).contains(&column), "{column}");
+        }
+        // From above nothing is hidden, and beyond the edge nothing stands.
+        assert!(!surface.hides(31.0, 20.0, 100.0, [0.0, 0.0], 0.01));
+        assert!(!surface.hides(31.0, 20.0, 100.0, [2.0, 0.0], 0.01));
+        assert!(!surface.hides(31.0, 20.0, f64::NAN, [-2.0, 0.0], 0.01));
+    }
+
+    #[test]
+    fn a_slope_hides_itself_only_where_it_is_steeper_than_the_line() {
+        let slope = |s: f32| Grid::from_vec(40, 3, (0..120).map(|i| -(i % 40) as f32 * 0.5 * s).collect()).unwrap();
+        for (s, expected) in [(0.9, false), (1.1, true)] {
+            let heights = slope(s);
+            let surface = Surface::new(&heights, 0.5);
+            let hidden = surface.hides(20.0, 1.0, f64::from(heights[(20, 1)]), [-2.0, 0.0], 0.0);
+            assert_eq!(hidden, expected, "{s}");
+        }
+    }
+
+    proptest! {
+        /// Leaving blocks out changes nothing.
+        #[test]
+        fn blocks_are_passed_over_and_nothing_in_them(
+            cells in prop::collection::vec(0.0..12.0f32, 70 * 50), column in 0..70usize, row in 0..50usize,
+            dx in -3.0..3.0f64, dy in -3.0..3.0f64, spikes in prop::collection::vec((0..70usize, 0..50usize, 20.0..60.0f32), 0..6),
+        ) {
+            let mut heights = Grid::from_vec(70, 50, cells.iter().map(|h| if *h < 0.5 { f32::NAN } else { *h * 0.1 }).collect()).unwrap();
+            for (c, r, h) in spikes {
+                heights[(c, r)] = h;
+            }
+            let surface = Surface::new(&heights, 0.5);
+            let slow = Surface { ceilings: surface.ceilings.map(|_| f32::INFINITY), ..surface.clone() };
+            let from = f64::from(heights[(column, row)]);
+            let ask = |s: &Surface<'_>| s.hides(column as f64, row as f64, from, [dx, dy], 0.05);
+            prop_assert_eq!(ask(&surface), ask(&slow));
+        }
+    }
+}

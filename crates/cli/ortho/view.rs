@@ -1,0 +1,108 @@
+//! What one image has to say about some cells: whether it sees them, and the values of its bands.
+
+use bev::ortho::{Eyeline, Sight, Surface};
+use camera::ImagePoint;
+use geodesy::LonLatHeight;
+use io::raster::ImageSource;
+use raster::{Grid, Window, bicubic};
+use rayon::prelude::*;
+
+use super::inputs::Image;
+
+/// Pixels around those that are needed, for the interpolation.
+const MARGIN: usize = 3;
+/// Most pixels of an image that are read at once: an image far finer than the ortho is read by fewer cells.
+const PIXELS_MAX: usize = 1 << 27;
+
+/// A cell of the ortho.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cell {
+    /// Position in the surface model.
+    pub(super) in_dsm: [f64; 2],
+    pub(super) ground: LonLatHeight,
+}
+
+/// Some cells in one image.
+pub(super) struct Seen {
+    pub(super) sights: Vec<Sight>,
+    /// Per band the values; NaN where the image has none.
+    pub(super) values: Vec<Vec<f32>>,
+}
+
+/// Looks at cells through an image. Hidden cells have the values of what stands before them.
+pub(super) fn look(
+    surface: &Surface<'_>,
+    image: &Image,
+    cells: &[Option<Cell>],
+    tolerance_m: f64,
+) -> anyhow::Result<Seen> {
+    let (width, height) = (image.source.info().width as f64 - 1.0, image.source.info().height as f64 - 1.0);
+    let inside = |p: &ImagePoint| (0.0..=width).contains(&p.sample) && (0.0..=height).contains(&p.line);
+    // The image's file cannot be shared among threads, its geometry can.
+    let (camera, eyeline) = (&image.camera, &image.eyeline);
+    let places: Vec<Option<ImagePoint>> =
+        cells.par_iter().map(|cell| camera.project(cell.as_ref()?.ground).ok().filter(inside)).collect();
+    let mut sights: Vec<Sight> = cells
+        .par_iter()
+        .zip(&places)
+        .map(|(cell, place)| match (cell, place) {
+            (Some(cell), Some(_)) => sight(surface, eyeline, cell, tolerance_m),
+            _ => Sight::Outside,
+        })
+        .collect();
+    let values = values(&image.source, &places)?;
+    for (i, sight) in sights.iter_mut().enumerate() {
+        if values.iter().any(|band| band[i].is_nan()) {
+            *sight = Sight::Outside;
+        }
+    }
+    Ok(Seen { sights, values })
+}
+
+fn sight(surface: &Surface<'_>, eyeline: &Eyeline, cell: &Cell, tolerance_m: f64) -> Sight {
+    let [column, row] = cell.in_dsm;
+    let towards = eyeline.per_metre(column, row);
+    if surface.hides(column, row, cell.ground.height_m, towards, tolerance_m) {
+        Sight::Hidden
+    } else {
+        Sight::Seen { incidence_deg: eyeline.incidence_deg(column, row) }
+    }
+}
+
+/// The values of all bands at places of an image.
+fn values(source: &ImageSource, places: &[Option<ImagePoint>]) -> anyhow::Result<Vec<Vec<f32>>> {
+    let bands = source.info().bands;
+    let Some(window) = window(places) else { return Ok(vec![vec![f32::NAN; places.len()]; bands]) };
+    let pixels = window.width.saturating_mul(window.height);
+    if pixels > PIXELS_MAX && places.len() > 1 {
+        return halves(source, places);
+    }
+    let sample = |pixels: &Grid<f32>, place: &Option<ImagePoint>| match place {
+        Some(at) => bicubic(pixels, at.sample - window.x as f64, at.line - window.y as f64),
+        None => f32::NAN,
+    };
+    let band = |number: usize| {
+        let pixels = source.read_samples(number, window)?;
+        Ok(places.par_iter().map(|place| sample(&pixels, place)).collect())
+    };
+    (1..=bands).map(band).collect()
+}
+
+fn halves(source: &ImageSource, places: &[Option<ImagePoint>]) -> anyhow::Result<Vec<Vec<f32>>> {
+    let (first, second) = places.split_at(places.len() / 2);
+    let (mut first, second) = (values(source, first)?, values(source, second)?);
+    first.iter_mut().zip(second).for_each(|(all, rest)| all.extend(rest));
+    Ok(first)
+}
+
+/// The pixels that places need.
+fn window(places: &[Option<ImagePoint>]) -> Option<Window> {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for place in places.iter().flatten() {
+        low = [low[0].min(place.sample), low[1].min(place.line)];
+        high = [high[0].max(place.sample), high[1].max(place.line)];
+    }
+    let side = |i: usize| (high[i].ceil() - low[i].floor()) as usize + 1;
+    let first = Window { x: low[0].floor() as i64, y: low[1].floor() as i64, width: 1, height: 1 };
+    low[0].is_finite().then(|| Window { width: side(0), height: side(1), ..first }.grown(MARGIN))
+}
