@@ -47,7 +47,8 @@ const TEAR_SLOPE: f64 = 2.75;
 /// several unrelated pictures reaches nearly this.
 const SUPPORT_MIN: f32 = 0.2;
 /// A height that stands out from all others by less than this, of the worst cost, may be chance, as on water: what is known
-/// around says more. Half of it and twice it are alike on simulated towns; JAX_068 gains in every measure.
+/// around says more. Half of it and twice it are alike on simulated towns; JAX_068 gains in completeness with every set of its
+/// views, and loses 0.02 m of MAE with one pair.
 const CONFIDENCE_MIN: f32 = 0.1;
 
 /// Runs a DSM job and writes its results.
@@ -345,7 +346,7 @@ impl<'a> Job<'a> {
         let gsd = grid.gsd_m;
         // Heights and their places are as coarse as the level that they come from.
         let coarser = f64::from(1u32 << plan.bottom_level);
-        let step_m = plan.step_m * coarser;
+        let step_m = plan.step_at(plan.bottom_level);
         let same_surface_m = same_surface_m(plan, grid);
         let fusion = FusionConfig {
             same_surface_m,
@@ -384,8 +385,7 @@ impl<'a> Job<'a> {
 
 /// Heights on the grid closer than this may belong to one surface.
 fn same_surface_m(plan: &SweepPlan, grid: &OutputGrid) -> f32 {
-    let step_m = plan.step_m * f64::from(1u32 << plan.bottom_level);
-    (2.0 * step_m).max(1.5 * grid.gsd_m) as f32
+    (2.0 * plan.step_at(plan.bottom_level)).max(1.5 * grid.gsd_m) as f32
 }
 
 /// Which pixels enough other views agree with: a third of the views that see this one's ground from another direction,

@@ -28,6 +28,13 @@ pub(crate) struct SweepPlan {
     pub(crate) level: LevelConfig,
 }
 
+impl SweepPlan {
+    /// Metres between the hypotheses of a level.
+    pub(crate) fn step_at(&self, level: usize) -> f64 {
+        self.step_m * f64::from(1u32 << level)
+    }
+}
+
 /// Heights of all views on the finest level used, and how many hypotheses were evaluated for them.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneHeights {
@@ -91,7 +98,7 @@ fn sweep_view(
     if plan.sources[index].is_empty() {
         return Ok((HeightMap::empty(w, h, origin_m), 0));
     }
-    let step = plan.step_m * f64::from(1u32 << level);
+    let step = plan.step_at(level);
     let ranges = match coarser {
         None => Ranges::uniform(w, h, step, plan.range_m),
         Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, plan.range_m),

@@ -58,7 +58,7 @@ pub(crate) fn extended_range(
     let coarse = SweepPlan { range_m: wide, top_level: level, bottom_level: level, ..plan.clone() };
     // A camera that fails far from the scene says nothing about what stands there.
     let Ok(SceneHeights { maps, .. }) = sweep_scene(views, &coarse, &|| ()) else { return Ok(None) };
-    let step_m = (plan.step_m * f64::from(1u32 << level)) as f32;
+    let step_m = plan.step_at(level) as f32;
     let mut outside: Vec<(usize, f64)> = Vec::new();
     for (index, map) in maps.iter().enumerate().filter(|(i, _)| !plan.sources[*i].is_empty()) {
         let heights = |index: usize, map| Heights { index, view: &views[index], map };

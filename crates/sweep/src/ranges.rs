@@ -108,7 +108,7 @@ fn known_extremes(g: &Grid<f32>) -> (Grid<f32>, Grid<f32>) {
 }
 
 /// `pick` over the square of half width `reach` around every cell, NaN cells left out.
-fn extremes(g: &Grid<f32>, start: f32, pick: impl Fn(f32, f32) -> f32, reach: usize) -> Grid<f32> {
+pub(crate) fn extremes(g: &Grid<f32>, start: f32, pick: impl Fn(f32, f32) -> f32, reach: usize) -> Grid<f32> {
     let (w, h) = (g.width(), g.height());
     let mut rows = Grid::filled(w, h, start);
     for y in 0..h {

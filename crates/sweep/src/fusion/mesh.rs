@@ -8,6 +8,7 @@ use crate::SweepError;
 use crate::consistency::{Heights, height_span};
 use crate::geometry::TileMap;
 use crate::level::{paste, tiles};
+use crate::ranges::extremes;
 
 /// The output grid: its placement and the map projection.
 pub struct GridFrame<'a> {
@@ -76,21 +77,9 @@ pub fn place_view(
 
 /// 1 for a height, or [`BORDER_WEIGHT`] where the least height within [`BORDER_REACH`] is lower by more than `jump_m`.
 fn border_weights(height_m: &Grid<f32>, jump_m: f32) -> Grid<f32> {
-    let (width, height) = (height_m.width(), height_m.height());
-    let span = |at: usize, end: usize| at.saturating_sub(BORDER_REACH)..(at + BORDER_REACH + 1).min(end);
-    let least = |values: &mut dyn Iterator<Item = f32>| values.fold(f32::INFINITY, f32::min);
-    let mut rows = Grid::filled(width, height, f32::INFINITY);
-    for y in 0..height {
-        let from = height_m.row(y);
-        rows.row_mut(y).iter_mut().enumerate().for_each(|(x, l)| *l = least(&mut from[span(x, width)].iter().copied()));
-    }
-    let mut out = Grid::filled(width, height, 1.0);
-    for y in 0..height {
-        for x in 0..width {
-            if least(&mut span(y, height).map(|v| rows[(x, v)])) < height_m[(x, y)] - jump_m {
-                out[(x, y)] = BORDER_WEIGHT;
-            }
-        }
+    let mut out = extremes(height_m, f32::INFINITY, f32::min, BORDER_REACH);
+    for (weight, height) in out.data_mut().iter_mut().zip(height_m.data()) {
+        *weight = if *weight < height - jump_m { BORDER_WEIGHT } else { 1.0 };
     }
     out
 }
