@@ -18,7 +18,7 @@ pub use grid::Grid;
 pub use mask::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, Flags, is_missing};
 pub use pyramid::{Pyramid, level_from_level0, level0_from_level, reduce};
 pub use relief::{Light, coloured_relief, height_percentiles, hillshade};
-pub use resample::{Interpolation, bicubic, bilinear, cubic_weights, resample, sample};
+pub use resample::{Interpolation, bicubic, bicubic_along, bilinear, cubic_weights, resample, sample};
 pub use window::Window;
 
 /// The no-data value of every float raster that the toolkit writes, unless told otherwise.

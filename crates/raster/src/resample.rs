@@ -53,6 +53,36 @@ pub fn bicubic(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
     if value.is_finite() { value } else { bilinear(grid, column, row) }
 }
 
+/// [`bicubic`] at `from`, `from + step`, … (column, row).
+pub fn bicubic_along(grid: &Grid<f32>, from: [f64; 2], step: [f64; 2], out: &mut [f32]) {
+    for (i, value) in out.iter_mut().enumerate() {
+        let [column, row] = [from[0] + step[0] * i as f64, from[1] + step[1] * i as f64];
+        *value = match bicubic_inside(grid, column, row) {
+            Some(inside) if inside.is_finite() => inside,
+            _ => bicubic(grid, column, row),
+        };
+    }
+}
+
+/// The bicubic value where all sixteen pixels are there; whatever comes of it where some are not finite.
+#[inline(always)]
+fn bicubic_inside(grid: &Grid<f32>, column: f64, row: f64) -> Option<f32> {
+    let is_inside =
+        column >= 1.0 && row >= 1.0 && column < grid.width() as f64 - 3.0 && row < grid.height() as f64 - 3.0;
+    if !is_inside {
+        return None;
+    }
+    let (c, r) = (column as usize, row as usize);
+    let (wu, wv) = (cubic_weights((column - c as f64) as f32), cubic_weights((row - r as f64) as f32));
+    // Rows first: four neighbouring pixels are one vector.
+    let mut sums = [0.0f32; 4];
+    for (j, weight) in wv.iter().enumerate() {
+        let pixels: &[f32; 4] = grid.row(r - 1 + j).get(c - 1..c + 3)?.try_into().ok()?;
+        sums.iter_mut().zip(pixels).for_each(|(s, p)| *s += weight * p);
+    }
+    Some(wu[0] * sums[0] + wu[1] * sums[1] + wu[2] * sums[2] + wu[3] * sums[3])
+}
+
 /// A grid filled from another through a map of positions, rows in parallel.
 ///
 /// `source_from_target` gives the (column, row) in `source` of a target cell; cells without a value become NaN.

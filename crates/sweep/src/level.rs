@@ -11,7 +11,7 @@ use crate::cost::{BlockCosts, Reference};
 use crate::cost::{COST_MAX, CostConfig, SourceLevel, TileScratch, sweep_tile};
 use crate::ranges::Ranges;
 use crate::readout::soft_argmin;
-use crate::semiglobal::{Penalties, Volume, aggregate};
+use crate::semiglobal::{LANES, Penalties, Volume, aggregate};
 use crate::support::agreed_share;
 
 /// Side of a block's core, pixels.
@@ -99,7 +99,7 @@ fn sweep_block(
     let whole = Window::whole(image.width(), image.height());
     let window = core.grown(BLOCK_MARGIN).intersection(&whole).unwrap_or(core);
     let (low, offsets) = layout(reference.ranges, window)?;
-    let mut costs = vec![COST_MAX; offsets.last().map_or(0, |&n| n as usize)];
+    let mut costs = vec![COST_MAX; offsets.last().map_or(0, |&n| n as usize) + LANES];
     let mut scratch = TileScratch::default();
     let mut block = BlockCosts { window, offsets: &offsets, costs: &mut costs };
     for tile in tiles(window, config.cost.tile) {

@@ -27,13 +27,15 @@ const DEVIATION: f32 = 0.8;
 /// Reads one pixel's sums; `None` where all hypotheses are as good, which says nothing. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the deviation of a
 /// cost relative to it, which turns the mode's curvature into the deviation of its position.
 pub(crate) fn soft_argmin(sums: &[u16], scale: f32, noise: f32) -> Option<Estimate> {
-    let (best, &least) = sums.iter().enumerate().min_by_key(|&(_, s)| *s)?;
+    let least = least_of(sums);
+    let best = sums.iter().position(|s| *s == least)?;
     let reach = WINDOW.min(best).min(sums.len() - 1 - best);
     // A window cut on one side by the range's end would pull the mean inward: both sides are cut alike.
     let (from, to) = (best - reach, best + reach + 1);
     let above = |i: usize| f32::from(sums[i] - least);
     let curvature = if reach == 0 { 0.0 } else { 0.5 * (above(best - 1) + above(best + 1)) };
-    let outside = sums[..from].iter().chain(&sums[to..]).min().map_or(scale, |&s| f32::from(s - least));
+    let outside = least_of(&sums[..from]).min(least_of(&sums[to..]));
+    let outside = if outside == u16::MAX { scale } else { f32::from(outside - least) };
     let margin = (outside / scale).min(1.0);
     if curvature == 0.0 && margin == 0.0 {
         return None;
@@ -42,14 +44,32 @@ pub(crate) fn soft_argmin(sums: &[u16], scale: f32, noise: f32) -> Option<Estima
         return Some(Estimate { index: best as f32, spread: WINDOW as f32, margin });
     }
     let cold = 1.0 / (2.0 * curvature * DEVIATION * DEVIATION);
-    let (mut weight, mut first) = (0.0f32, 0.0f32);
-    for i in from..to {
-        let w = (-above(i) * cold).exp();
-        weight += w;
-        first += w * (i as f32 - best as f32);
+    let (mut weight, mut first) = (1.0f32, 0.0f32);
+    for i in 1..=reach {
+        let (before, behind) = (exp(-above(best - i) * cold), exp(-above(best + i) * cold));
+        weight += before + behind;
+        first += i as f32 * (behind - before);
     }
     let spread = (noise * scale / (2.0 * curvature)).sqrt().min(WINDOW as f32);
     Some(Estimate { index: best as f32 + first / weight, spread, margin })
+}
+
+fn least_of(sums: &[u16]) -> u16 {
+    sums.iter().copied().fold(u16::MAX, u16::min)
+}
+
+/// `e^x` for x ≤ 0 to a relative 4e-6: a power of two, and a polynomial for what is left of the exponent. The library's
+/// took a third of the read-out's time.
+#[inline(always)]
+fn exp(x: f32) -> f32 {
+    // Below this, weights count nothing, and the exponent would leave its bits.
+    let t = (x * std::f32::consts::LOG2_E).max(-100.0);
+    // Adding 1.5 · 2²³ rounds to a whole number, and leaves it in the lowest bits.
+    const ROUND: f32 = 12_582_912.0;
+    let rounded = t + ROUND;
+    let u = (t - (rounded - ROUND)) * std::f32::consts::LN_2;
+    let series = 1.0 + u * (1.0 + u * (1.0 / 2.0 + u * (1.0 / 6.0 + u * (1.0 / 24.0 + u * (1.0 / 120.0)))));
+    series * f32::from_bits(rounded.to_bits().wrapping_add(127) << 23)
 }
 
 #[cfg(test)]
@@ -107,5 +127,13 @@ mod tests {
     fn huge_costs_do_not_overflow_and_no_hypothesis_gives_nothing() {
         assert!(soft_argmin(&[u16::MAX, 0, u16::MAX], 1016.0, 0.01).unwrap().index.is_finite());
         assert!(soft_argmin(&[], 1016.0, 0.01).is_none());
+    }
+
+    #[test]
+    fn the_exponential_is_that_of_the_library() {
+        for i in 0..4000 {
+            let x = -0.01 * i as f32;
+            assert!((exp(x) - x.exp()).abs() <= 4e-6 * x.exp(), "e^{x} = {}", exp(x));
+        }
     }
 }

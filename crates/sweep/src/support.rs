@@ -39,35 +39,49 @@ fn census_contrast(view: &SourceLevel<'_>, window: Window) -> Vec<f32> {
 
 fn share(volume: &Volume<'_>, sums: &[u16], contrast: &[f32]) -> Vec<f32> {
     let (w, h) = (volume.width, volume.height);
-    let mut own = vec![[0.0f32; 2]; w * h];
-    for (p, (own, contrast)) in own.iter_mut().zip(contrast).enumerate().filter(|(_, (_, c))| !c.is_nan()) {
+    // In units of the cost, so that the sums over the window are exact.
+    let (mut costs, mut held) = (vec![0u16; w * h], vec![0u16; w * h]);
+    for (p, contrast) in contrast.iter().enumerate().filter(|(_, c)| !c.is_nan()) {
         let range = volume.offsets[p] as usize..volume.offsets[p + 1] as usize;
-        let least = sums[range.clone()].iter().zip(&volume.costs[range]).min_by_key(|(s, _)| **s);
-        *own = least.map_or([0.0; 2], |(_, c)| [f32::from(*c) / f32::from(COST_MAX), *contrast]);
-    }
-    let mut rows = vec![[0.0f32; 2]; w * h];
-    for (to, from) in rows.chunks_exact_mut(w).zip(own.chunks_exact(w)) {
-        for (x, to) in to.iter_mut().enumerate() {
-            *to = total(&from[x.saturating_sub(REACH)..(x + REACH + 1).min(w)]);
+        if let Some((_, cost)) = sums[range.clone()].iter().zip(&volume.costs[range]).min_by_key(|(s, _)| **s) {
+            costs[p] = u16::from(*cost);
+            held[p] = (contrast * f32::from(COST_MAX)).round() as u16;
         }
     }
-    let mut out = vec![0.0; w * h];
-    for y in 0..h {
-        let around = y.saturating_sub(REACH)..(y + REACH + 1).min(h);
-        for x in 0..w {
-            let [cost, held] = around.clone().fold([0.0; 2], |a, v| add(a, rows[v * w + x]));
-            out[y * w + x] = if held > 0.0 { (1.0 - cost / held).max(0.0) } else { 0.0 };
+    let (costs, held) = (window_sums(&costs, w), window_sums(&held, w));
+    let share = |(cost, held): (&u16, &u16)| match held {
+        0 => 0.0,
+        _ => (1.0 - f32::from(*cost) / f32::from(*held)).max(0.0),
+    };
+    costs.iter().zip(&held).map(share).collect()
+}
+
+/// Sums over the window around every pixel, cut at the borders; 81 costs fit 16 bits.
+fn window_sums(values: &[u16], width: usize) -> Vec<u16> {
+    let height = values.len() / width;
+    let mut rows = vec![0; values.len()];
+    for (to, from) in rows.chunks_exact_mut(width).zip(values.chunks_exact(width)) {
+        let mut sum: u16 = from[..REACH.min(width)].iter().sum();
+        for (x, to) in to.iter_mut().enumerate() {
+            sum += from.get(x + REACH).copied().unwrap_or(0);
+            *to = sum;
+            sum -= x.checked_sub(REACH).map_or(0, |left| from[left]);
+        }
+    }
+    let row = |y: usize| &rows[y * width..(y + 1) * width];
+    let mut sums = vec![0u16; width];
+    (0..REACH.min(height)).for_each(|y| sums.iter_mut().zip(row(y)).for_each(|(s, v)| *s += v));
+    let mut out = vec![0; values.len()];
+    for (y, to) in out.chunks_exact_mut(width).enumerate() {
+        if y + REACH < height {
+            sums.iter_mut().zip(row(y + REACH)).for_each(|(s, v)| *s += v);
+        }
+        to.copy_from_slice(&sums);
+        if let Some(above) = y.checked_sub(REACH) {
+            sums.iter_mut().zip(row(above)).for_each(|(s, v)| *s -= v);
         }
     }
     out
-}
-
-fn total(values: &[[f32; 2]]) -> [f32; 2] {
-    values.iter().fold([0.0; 2], |a, b| add(a, *b))
-}
-
-fn add(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
-    [a[0] + b[0], a[1] + b[1]]
 }
 
 #[cfg(test)]

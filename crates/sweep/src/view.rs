@@ -3,6 +3,8 @@
 use camera::RpcCamera;
 use raster::{Grid, Pyramid};
 
+/// Variance that an 8-bit quantisation alone leaves.
+pub(crate) const QUANTISATION_VARIANCE: f32 = 1.0 / 12.0;
 /// The pyramid stops when a side would fall below this: a handful of patches.
 const SIDE_MIN: usize = 32;
 
@@ -21,7 +23,9 @@ pub struct View {
 
 impl View {
     /// A view of an image, NaN where invalid.
-    pub fn new(camera: RpcCamera, image: Grid<f32>) -> Self {
+    pub fn new(camera: RpcCamera, mut image: Grid<f32>) -> Self {
+        // One kind of NaN: the census tells it by its bits.
+        image.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = f32::NAN);
         let noise = noise_deviation(&image);
         // Sixteen levels reach from the largest image there is to a pixel.
         let levels = Pyramid::new(image, 16, SIDE_MIN).into_levels();

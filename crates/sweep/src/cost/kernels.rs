@@ -5,10 +5,16 @@
 use multiversion::multiversion;
 
 /// The cost of a pair that cannot be compared: more than any that can, so that it comes last.
-pub(crate) const INVALID: f32 = 2.0;
+pub(crate) const INVALID: u8 = 255;
+/// A difference of the census that counts fully, as its grade.
+pub(crate) const FULL: f32 = 127.0;
+/// The grade of no difference; 1 to 255 are those of −[`FULL`] to [`FULL`].
+const EQUAL: f32 = 128.0;
+/// Adding 2²³ leaves the rounded integer in the lowest bits of the sum, which vectorises; a cast does not.
+const TWO_23: f32 = 8_388_608.0;
 /// A void says nothing of a height, so that two views suffice where a third has one; but a height that takes fewer views
-/// into account must not win by having fewer that can disagree.
-const INVALID_WEIGHT: f32 = 0.25;
+/// into account must not win by having fewer that can disagree. Its weight is one part of these.
+const VALID_WEIGHT: u16 = 4;
 
 /// A picture of `width` columns per row, read from an offset on.
 #[derive(Clone, Copy)]
@@ -46,133 +52,132 @@ pub(crate) fn shift_bicubic(
     }
 }
 
-/// Sums over windows of `side` columns: `out[x] = Σ_{i < side} v[x + i]`.
-#[inline(always)]
-fn slide(v: &[f32], side: usize, out: &mut [f32]) {
-    let n = out.len();
-    out.copy_from_slice(&v[..n]);
-    for i in 1..side {
-        let s = &v[i..i + n];
-        for x in 0..n {
-            out[x] += s[x];
-        }
+/// The graded census of a picture: every pixel's difference to the neighbours to the right, below, below on the right, and
+/// of its right neighbour to the one below; the other four are those of neighbours. 0 marks a difference that is not
+/// valid.
+#[derive(Default)]
+pub(crate) struct Census {
+    /// One byte per pixel of the padded tile each; the last column or row is not used.
+    pub(crate) grades: [Vec<u8>; 4],
+}
+
+impl Census {
+    /// Grades a tile of `width` columns in which [`FULL`] is the difference that counts fully.
+    pub(crate) fn fill(&mut self, tile: &[f32], width: usize) {
+        self.grades.iter_mut().for_each(|g| g.resize(tile.len(), 0));
+        let [right, below, falling, rising] = &mut self.grades;
+        grade(tile, width, right, below, falling, rising);
     }
 }
 
-/// Mean and `1 / sqrt(variance + floor)` of every `side × side` patch of a padded tile of `width` columns.
 #[multiversion(targets("x86_64+avx2+fma"))]
-pub(crate) fn patch_moments(
-    tile: &[f32],
-    width: usize,
-    side: usize,
-    floor: f32,
-    line: &mut [f32],
-    mean: &mut [f32],
-    inverse_deviation: &mut [f32],
-) {
-    let core = width + 1 - side;
-    let rows = mean.len() / core;
-    let inv_n = 1.0 / (side * side) as f32;
-    let (sum, square) = line[..2 * width].split_at_mut(width);
+fn grade(tile: &[f32], width: usize, right: &mut [u8], below: &mut [u8], falling: &mut [u8], rising: &mut [u8]) {
+    let (rows, n) = (tile.len() / width, width - 1);
     for y in 0..rows {
-        let first = &tile[y * width..(y + 1) * width];
+        let own = &tile[y * width..(y + 1) * width];
+        let (from, to) = (&own[..n], &own[1..]);
+        let out = &mut right[y * width..y * width + n];
+        for x in 0..n {
+            out[x] = code(to[x] - from[x]);
+        }
+        if y + 1 == rows {
+            break;
+        }
+        let next = &tile[(y + 1) * width..(y + 2) * width];
+        let out = &mut below[y * width..(y + 1) * width];
         for x in 0..width {
-            sum[x] = first[x];
-            square[x] = first[x] * first[x];
+            out[x] = code(next[x] - own[x]);
         }
-        for j in 1..side {
-            let r = &tile[(y + j) * width..(y + j + 1) * width];
-            for x in 0..width {
-                sum[x] += r[x];
-                square[x] += r[x] * r[x];
-            }
+        let out = &mut falling[y * width..y * width + n];
+        for x in 0..n {
+            out[x] = code(next[x + 1] - from[x]);
         }
-        let m = &mut mean[y * core..(y + 1) * core];
-        let s = &mut inverse_deviation[y * core..(y + 1) * core];
-        slide(sum, side, m);
-        slide(square, side, s);
-        for x in 0..core {
-            m[x] *= inv_n;
-            let variance = (s[x] * inv_n - m[x] * m[x]).max(0.0) + floor;
-            // `max` drops a NaN; adding 0 · mean brings it back.
-            s[x] = 1.0 / variance.sqrt() + 0.0 * m[x];
+        let out = &mut rising[y * width..y * width + n];
+        for x in 0..n {
+            out[x] = code(next[x] - to[x]);
         }
     }
 }
 
-/// Mean absolute difference of the graded census of every pixel of two tiles of `width` columns that are padded by one
-/// pixel and in the unit that counts fully; cut at 1, which is what unrelated pictures differ by; [`INVALID`] where a
-/// patch is.
+/// The grade of a difference; 0 for NaN, whose lowest byte is 0 ([`crate::View`] keeps no others).
+#[inline(always)]
+fn code(difference: f32) -> u8 {
+    // `clamp` passes a NaN on.
+    (difference.clamp(-FULL, FULL) + (TWO_23 + EQUAL)).to_bits() as u8
+}
+
+/// The cost of every pixel of two padded tiles of `width` columns: the mean absolute difference of their census in
+/// [`FULL`]ths, cut at 1, which is what unrelated pictures differ by; [`INVALID`] where a patch is.
+pub(crate) fn census_cost(a: &Census, b: &Census, width: usize, apart: &mut [Vec<u8>; 4], out: &mut [u8]) {
+    for ((a, b), d) in a.grades.iter().zip(&b.grades).zip(apart.iter_mut()) {
+        d.resize(a.len(), 0);
+        differ(a, b, d);
+    }
+    let [right, below, falling, rising] = apart;
+    gather(right, below, falling, rising, width, out);
+}
+
+/// Absolute differences of grades, at most 254; 255 where one is not valid.
 #[multiversion(targets("x86_64+avx2+fma"))]
-pub(crate) fn census_cost(a: &[f32], b: &[f32], width: usize, out: &mut [f32]) {
+fn differ(a: &[u8], b: &[u8], out: &mut [u8]) {
+    for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
+        *o = if *a.min(b) == 0 { 255 } else { a.abs_diff(*b) };
+    }
+}
+
+/// The mean of the eight differences around every pixel of the core.
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn gather(right: &[u8], below: &[u8], falling: &[u8], rising: &[u8], width: usize, out: &mut [u8]) {
     let core = width - 2;
     for (y, o) in out.chunks_exact_mut(core).enumerate() {
-        let (a0, a1, a2) = three_rows(a, y, width);
-        let (b0, b1, b2) = three_rows(b, y, width);
+        let (upper, own) = (y * width, (y + 1) * width);
+        let (left, on) = (&right[own..own + core], &right[own + 1..own + 1 + core]);
+        let (up, down) = (&below[upper + 1..upper + 1 + core], &below[own + 1..own + 1 + core]);
+        let (up_left, down_right) = (&falling[upper..upper + core], &falling[own + 1..own + 1 + core]);
+        let (up_right, down_left) = (&rising[upper + 1..upper + 1 + core], &rising[own..own + core]);
         for x in 0..core {
-            let (p, q) = (a1[x + 1], b1[x + 1]);
-            let mut sum = apart(a0[x], p, b0[x], q);
-            sum += apart(a0[x + 1], p, b0[x + 1], q);
-            sum += apart(a0[x + 2], p, b0[x + 2], q);
-            sum += apart(a1[x], p, b1[x], q);
-            sum += apart(a1[x + 2], p, b1[x + 2], q);
-            sum += apart(a2[x], p, b2[x], q);
-            sum += apart(a2[x + 1], p, b2[x + 1], q);
-            sum += apart(a2[x + 2], p, b2[x + 2], q);
-            let mean = sum * 0.125;
-            o[x] = if mean.is_nan() { INVALID } else { mean.min(1.0) };
+            let two = |a: u8, b: u8| u16::from(a) + u16::from(b);
+            let beside = two(left[x], on[x]) + two(up[x], down[x]);
+            let across = two(up_left[x], down_right[x]) + two(up_right[x], down_left[x]);
+            let most = left[x].max(on[x]).max(up[x].max(down[x]));
+            let most = most.max(up_left[x].max(down_right[x]).max(up_right[x].max(down_left[x])));
+            o[x] = if most == 255 { INVALID } else { ((beside + across + 4) >> 3).min(FULL as u16) as u8 };
         }
     }
-}
-
-/// The rows `y`, `y + 1` and `y + 2` of a tile.
-#[inline(always)]
-fn three_rows(tile: &[f32], y: usize, width: usize) -> (&[f32], &[f32], &[f32]) {
-    let rows = &tile[y * width..(y + 3) * width];
-    (&rows[..width], &rows[width..2 * width], &rows[2 * width..])
-}
-
-/// Difference of two graded bits: of neighbours `u`, `v` to their centres `p`, `q`.
-#[inline(always)]
-fn apart(u: f32, p: f32, v: f32, q: f32) -> f32 {
-    // `clamp` passes a NaN on.
-    ((u - p).clamp(-1.0, 1.0) - (v - q).clamp(-1.0, 1.0)).abs()
 }
 
 /// Keeps the smaller of two rows in `a` and the larger in `b`.
 #[multiversion(targets("x86_64+avx2+fma"))]
-pub(crate) fn sort_pair(a: &mut [f32], b: &mut [f32]) {
+pub(crate) fn sort_pair(a: &mut [u8], b: &mut [u8]) {
     for (p, q) in a.iter_mut().zip(b) {
-        let (lo, hi) = (p.min(*q), p.max(*q));
+        let (lo, hi) = ((*p).min(*q), (*p).max(*q));
         *p = lo;
         *q = hi;
     }
 }
 
-/// `out`: the weighted mean of each pixel's costs, in which an invalid one counts as chance does, 1, with [`INVALID_WEIGHT`].
+/// `out`: the weighted mean of each pixel's costs, in which an invalid one counts as chance does, [`FULL`], and a valid
+/// one [`VALID_WEIGHT`] times as much.
+pub(crate) fn mean_cost(costs: &[Vec<u8>], sums: &mut [u16], weights: &mut [u16], out: &mut [u8]) {
+    sums.fill(0);
+    weights.fill(0);
+    costs.iter().for_each(|pair| add_cost(pair, sums, weights));
+    divide(sums, weights, out);
+}
+
 #[multiversion(targets("x86_64+avx2+fma"))]
-pub(crate) fn mean_cost(costs: &[Vec<f32>], weights: &mut [f32], out: &mut [f32]) {
-    out.fill(0.0);
-    weights.fill(0.0);
-    for pair in costs {
-        for ((o, n), c) in out.iter_mut().zip(weights.iter_mut()).zip(pair) {
-            let weight = if *c <= 1.0 { 1.0 } else { INVALID_WEIGHT };
-            *o += weight * c.min(1.0);
-            *n += weight;
-        }
-    }
-    for (o, n) in out.iter_mut().zip(weights.iter()) {
-        *o /= n;
+fn add_cost(pair: &[u8], sums: &mut [u16], weights: &mut [u16]) {
+    for ((s, n), c) in sums.iter_mut().zip(weights.iter_mut()).zip(pair) {
+        let weight = if *c == INVALID { 1 } else { VALID_WEIGHT };
+        *s += weight * u16::from((*c).min(FULL as u8));
+        *n += weight;
     }
 }
 
-/// `out = round(v · scale)` as an integer cost.
 #[multiversion(targets("x86_64+avx2+fma"))]
-pub(crate) fn quantise(v: &[f32], scale: f32, out: &mut [u8]) {
-    // Adding 2²³ leaves the rounded integer in the lowest bits of the sum, which vectorises; a cast does not.
-    const TWO_23: f32 = 8_388_608.0;
-    for (o, x) in out.iter_mut().zip(v) {
-        *o = (x * scale + TWO_23).to_bits() as u8;
+fn divide(sums: &[u16], weights: &[u16], out: &mut [u8]) {
+    for ((o, s), n) in out.iter_mut().zip(sums).zip(weights) {
+        *o = (f32::from(*s) / f32::from(*n) + TWO_23).to_bits() as u8;
     }
 }
 
@@ -183,11 +188,18 @@ mod tests {
 
     const SIDE: usize = 3;
 
+    /// The least difference of two costs.
+    const UNIT: f64 = 1.0 / FULL as f64;
+
     /// The cost of two tiles of one patch.
-    fn patch_cost(a: &[f32], b: &[f32], (scale_a, scale_b): (f32, f32)) -> f32 {
-        let scaled = |t: &[f32], scale: f32| t.iter().map(|v| v * scale).collect::<Vec<_>>();
-        let mut out = [0.0];
-        census_cost(&scaled(a, scale_a), &scaled(b, scale_b), SIDE, &mut out);
+    fn patch_cost(a: &[f32], b: &[f32], (scale_a, scale_b): (f32, f32)) -> u8 {
+        let graded = |tile: &[f32], scale: f32| {
+            let mut census = Census::default();
+            census.fill(&tile.iter().map(|v| v * scale * FULL).collect::<Vec<_>>(), SIDE);
+            census
+        };
+        let mut out = [0];
+        census_cost(&graded(a, scale_a), &graded(b, scale_b), SIDE, &mut Default::default(), &mut out);
         out[0]
     }
 
@@ -217,12 +229,12 @@ mod tests {
             let variance = bits.clone().map(|k| share(k) * (1.0 - share(k))).sum::<f64>() / bits.count() as f64;
             let pairs = (0..patches.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
             let costs: Vec<f64> = pairs
-                .map(|(i, j)| f64::from(patch_cost(&patches[i], &patches[j], (HARD, HARD))))
+                .map(|(i, j)| UNIT * f64::from(patch_cost(&patches[i], &patches[j], (HARD, HARD))))
                 .collect();
             // A pair that differs in more than half of its bits is cut at 1.
             prop_assume!(costs.iter().all(|c| *c < 1.0));
             let mean = costs.iter().sum::<f64>() / costs.len() as f64;
-            prop_assert!((mean - 4.0 * n / (n - 1.0) * variance).abs() < 1e-5, "{mean} {variance}");
+            prop_assert!((mean - 4.0 * n / (n - 1.0) * variance).abs() < UNIT, "{mean} {variance}");
         }
 
         #[test]
@@ -231,22 +243,20 @@ mod tests {
         ) {
             let changed: Vec<f32> = b.iter().map(|v| gain * v + offset).collect();
             let (before, after) = (patch_cost(&a, &b, (0.1, 0.1)), patch_cost(&a, &changed, (0.1, 0.1 / gain)));
-            prop_assert!((before - after).abs() < 1e-3, "{before} {after}");
-            prop_assert!(patch_cost(&b, &changed, (0.1, 0.1 / gain)) < 1e-3);
+            prop_assert!(before.abs_diff(after) <= 1, "{before} {after}");
+            prop_assert!(patch_cost(&b, &changed, (0.1, 0.1 / gain)) <= 1);
         }
 
         #[test]
-        fn whatever_a_pixel_holds_the_cost_lies_between_0_and_1(
+        fn whatever_a_pixel_holds_the_cost_lies_between_0_and_the_worst(
             a in prop::collection::vec(any_pixel(), SIDE * SIDE),
             b in prop::collection::vec(any_pixel(), SIDE * SIDE),
         ) {
             let cost = patch_cost(&a, &b, (0.1, 0.1));
-            prop_assert!((0.0..=1.0).contains(&cost) || cost == INVALID, "{cost}");
-            let (mut mean, mut out) = ([0.0], [255u8]);
-            mean_cost(&[vec![cost], vec![INVALID]], &mut [0.0], &mut mean);
-            prop_assert!(mean[0] >= cost.min(1.0) && mean[0] <= 1.0);
-            quantise(&mean, 127.0, &mut out);
-            prop_assert!(out[0] <= 127);
+            prop_assert!(cost <= 127 || cost == INVALID, "{cost}");
+            let mut out = [255];
+            mean_cost(&[vec![cost], vec![INVALID]], &mut [0], &mut [0], &mut out);
+            prop_assert!(out[0] >= cost.min(127) && out[0] <= 127, "{out:?}");
             prop_assert!(!a.iter().chain(&b).any(|v| v.is_nan()) || cost == INVALID, "{cost} of a patch that is not valid");
         }
     }
@@ -263,9 +273,10 @@ mod tests {
     fn an_invalid_pixel_makes_every_patch_invalid_that_holds_it() {
         let mut a: Vec<f32> = (0..49).map(|i| ((i * 37) % 23) as f32).collect();
         a[0] = f32::NAN;
-        let mut out = vec![0.0; 25];
-        census_cost(&a, &a, 7, &mut out);
+        let (mut census, mut out) = (Census::default(), [1; 25]);
+        census.fill(&a, 7);
+        census_cost(&census, &census, 7, &mut Default::default(), &mut out);
         assert_eq!(out[0], INVALID);
-        assert!(out[1..].iter().all(|&c| c == 0.0));
+        assert!(out[1..].iter().all(|&c| c == 0));
     }
 }

@@ -12,11 +12,10 @@
 //! plane is then a sub-pixel shift of that picture.
 
 mod kernels;
-pub(crate) use kernels::patch_moments;
 mod tile;
 
 pub use tile::TileScratch;
-pub(crate) use tile::{BlockCosts, Reference, VARIANCE_FLOOR, census_scale, remove_mean, sweep_tile};
+pub(crate) use tile::{BlockCosts, Reference, census_scale, sweep_tile};
 
 use raster::Grid;
 

@@ -3,12 +3,13 @@
 //! The source is laid over the reference once, so that every height is a shift, and the moments of all its patches are
 //! known before the first is compared.
 
-use raster::{Grid, bicubic};
+use raster::{Grid, bicubic_along};
 
+use super::moments::{patch_moments, remove_mean};
 use super::patch::Patch;
 use super::ties::{Pair, TieConfig};
-use crate::cost::{VARIANCE_FLOOR, patch_moments, remove_mean};
 use crate::geometry::TileMap;
+use crate::view::QUANTISATION_VARIANCE;
 
 /// A source laid over the reference, ready to be searched.
 pub(crate) struct Coarse {
@@ -110,11 +111,9 @@ fn lay_over(source: &Grid<f32>, map: &TileMap) -> Option<([i64; 2], Grid<f32>)> 
     let extent = |i: usize| (span[i][1].ceil() as i64 - origin[i] + 1) as usize;
     let mut out = Grid::filled(extent(0), extent(1), f32::NAN);
     for y in 0..out.height() {
-        for x in 0..out.width() {
-            let p = [(origin[0] + x as i64) as f64, (origin[1] + y as i64) as f64];
-            let [u, v] = map.at(p, map.mid_height_m());
-            out[(x, y)] = bicubic(source, u, v);
-        }
+        let at = |x: i64| map.at([x as f64, (origin[1] + y as i64) as f64], map.mid_height_m());
+        let (from, next) = (at(origin[0]), at(origin[0] + 1));
+        bicubic_along(source, from, [next[0] - from[0], next[1] - from[1]], out.row_mut(y));
     }
     Some((origin, out))
 }
@@ -129,7 +128,7 @@ fn deviations(picture: &Grid<f32>, radius: usize, noise: f32) -> Grid<f32> {
     let mut mean = vec![0.0; w * h];
     let mut out = Grid::filled(w, h, f32::NAN);
     let mut line = vec![0.0; 2 * picture.width()];
-    patch_moments(picture.data(), picture.width(), side, VARIANCE_FLOOR, &mut line, &mut mean, out.data_mut());
+    patch_moments(picture.data(), picture.width(), side, QUANTISATION_VARIANCE, &mut line, &mut mean, out.data_mut());
     out.data_mut().iter_mut().filter(|v| **v * noise >= 1.0).for_each(|v| *v = f32::NAN);
     out
 }

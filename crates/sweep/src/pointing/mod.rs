@@ -5,6 +5,7 @@
 mod adjust;
 mod coarse;
 mod interest;
+mod moments;
 mod patch;
 mod ties;
 
