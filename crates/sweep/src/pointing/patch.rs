@@ -11,21 +11,10 @@ pub(crate) struct Patch {
 impl Patch {
     /// The patch around a pixel; `None` when it leaves the image, holds invalid pixels, or is flatter than the noise.
     pub(crate) fn around(image: &Grid<f32>, [x, y]: [f64; 2], radius: i32, noise: f32) -> Option<Self> {
-        Self::sampled(image, radius, noise, |i, j| [x + f64::from(i), y + f64::from(j)])
-    }
-
-    /// The patch sampled at `place(column offset, row offset)`.
-    pub(crate) fn sampled(
-        image: &Grid<f32>,
-        radius: i32,
-        noise: f32,
-        place: impl Fn(i32, i32) -> [f64; 2],
-    ) -> Option<Self> {
         let mut values = Vec::with_capacity(((2 * radius + 1) * (2 * radius + 1)) as usize);
         for j in -radius..=radius {
             for i in -radius..=radius {
-                let [u, v] = place(i, j);
-                let value = bicubic(image, u, v);
+                let value = bicubic(image, x + f64::from(i), y + f64::from(j));
                 if value.is_nan() {
                     return None;
                 }
@@ -49,10 +38,21 @@ impl Patch {
         &self.values
     }
 
-    /// Zero-mean normalised cross-correlation with a patch of the same size.
-    pub(crate) fn correlation(&self, other: &Self) -> f32 {
-        debug_assert_eq!(self.radius, other.radius);
-        self.values.iter().zip(&other.values).map(|(a, b)| a * b).sum()
+    /// Zero-mean normalised cross-correlation with the part of a picture (of mean near 0) that begins at `(x, y)`; `None`
+    /// where that holds invalid pixels or is flatter than the noise.
+    pub(crate) fn correlation_at(&self, picture: &Grid<f32>, (x, y): (usize, usize), noise: f32) -> Option<f32> {
+        let side = 2 * self.radius as usize + 1;
+        let (mut sum, mut square, mut product) = (0.0f32, 0.0f32, 0.0f32);
+        for (j, own) in self.values.chunks_exact(side).enumerate() {
+            for (a, b) in own.iter().zip(&picture.row(y + j)[x..x + side]) {
+                sum += b;
+                square += b * b;
+                product += a * b;
+            }
+        }
+        let n = self.values.len() as f32;
+        let spread = square - sum * sum / n;
+        (spread > n * noise * noise).then(|| product / spread.sqrt())
     }
 }
 

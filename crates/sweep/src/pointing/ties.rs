@@ -5,11 +5,12 @@
 //! fraction of a pixel, and kept when the search back from the source returns to where it came from.
 
 use camera::{CameraError, RpcCamera};
-use raster::{Grid, level_from_level0, level0_from_level};
+use raster::{Grid, bicubic_along, level_from_level0, level0_from_level};
 use rayon::prelude::*;
 
 use super::coarse::Coarse;
 use super::interest::corners;
+use super::moments::remove_mean;
 use super::patch::{Patch, parabola_peak};
 use crate::geometry::source_from_reference;
 use crate::view::View;
@@ -113,7 +114,8 @@ impl Pair<'_> {
         source_from_reference(&self.reference.camera, &self.source.camera, level as u32, at, height_m)
     }
 
-    /// The offset of best correlation within two pixels of `start`, to a fraction of a pixel.
+    /// The offset of best correlation within two pixels of `start`, to a fraction of a pixel. The source is sampled once in
+    /// the reference's frame; every place is a part of that picture.
     fn refine(
         &self,
         at: [f64; 2],
@@ -125,20 +127,22 @@ impl Pair<'_> {
         const REACH: i32 = 2;
         const SIDE: usize = 2 * REACH as usize + 1;
         let own = Patch::around(&self.reference.levels[level], at, config.radius, self.reference.noise_at(level))?;
-        let image = &self.source.levels[level];
-        let noise = self.source.noise_at(level);
         let frame = LocalFrame::at(&self.reference.camera, &self.source.camera, level, at, height_m).ok()?;
         let centre = self.chain(at, level, height_m).ok()?;
+        let from = [centre[0] + start[0], centre[1] + start[1]];
+        let reach = config.radius + REACH;
+        let mut picture = Grid::filled(2 * reach as usize + 1, 2 * reach as usize + 1, f32::NAN);
+        for j in 0..picture.height() {
+            let line = frame.place(from, -reach, j as i32 - reach);
+            bicubic_along(&self.source.levels[level], line, frame.column_step(), picture.row_mut(j));
+        }
+        remove_mean(picture.data_mut());
+        let noise = self.source.noise_at(level);
         let mut scores = [[-1.0f32; SIDE]; SIDE];
         let mut best = (-1.0f32, 0usize, 0usize);
         for (j, row) in scores.iter_mut().enumerate() {
             for (i, score) in row.iter_mut().enumerate() {
-                let place = [
-                    centre[0] + start[0] + f64::from(i as i32 - REACH),
-                    centre[1] + start[1] + f64::from(j as i32 - REACH),
-                ];
-                let other = Patch::sampled(image, config.radius, noise, |a, b| frame.place(place, a, b));
-                *score = other.map_or(-1.0, |o| own.correlation(&o));
+                *score = own.correlation_at(&picture, (i, j), noise).unwrap_or(-1.0);
                 if *score > best.0 {
                     best = (*score, i, j);
                 }
@@ -151,8 +155,8 @@ impl Pair<'_> {
         }
         let dx = parabola_peak(scores[j][i - 1], score, scores[j][i + 1]);
         let dy = parabola_peak(scores[j - 1][i], score, scores[j + 1][i]);
-        let offset = |base: f64, i: usize, d: f64| base + f64::from(i as i32 - REACH) + d;
-        Some(([offset(start[0], i, dx), offset(start[1], j, dy)], score))
+        let steps = |i: usize, d: f64| f64::from(i as i32 - REACH) + d;
+        Some((frame.moved(start, steps(i, dx), steps(j, dy)), score))
     }
 }
 
@@ -176,7 +180,16 @@ impl LocalFrame {
     }
 
     fn place(&self, centre: [f64; 2], i: i32, j: i32) -> [f64; 2] {
-        let (i, j) = (f64::from(i), f64::from(j));
+        self.moved(centre, f64::from(i), f64::from(j))
+    }
+
+    /// The source's step from one reference column to the next.
+    fn column_step(&self) -> [f64; 2] {
+        [self.0[0][0], self.0[1][0]]
+    }
+
+    /// A source position moved by so many reference columns and rows.
+    fn moved(&self, centre: [f64; 2], i: f64, j: f64) -> [f64; 2] {
         let [[a, b], [c, d]] = self.0;
         [centre[0] + a * i + b * j, centre[1] + c * i + d * j]
     }
