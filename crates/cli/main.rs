@@ -12,6 +12,7 @@ mod heightmap;
 mod log;
 mod ortho;
 mod print;
+mod priors;
 mod progress;
 mod rpc;
 mod simulate;
@@ -60,6 +61,8 @@ enum Command {
     Heightmap(Box<heightmap::Args>),
     /// Lay satellite images on a surface model, hidden cells marked.
     Ortho(Box<ortho::Args>),
+    /// Make depth, normal and mask priors of a city model for the cameras of a scene.
+    Priors(Box<priors::Args>),
     /// Show, use and convert RPC camera models.
     Rpc(rpc::Args),
     /// Make a scene seen through RPC cameras, with its exact surface.
@@ -96,6 +99,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Eval(args) => eval::run(args, cli.global),
         Command::Heightmap(args) => heightmap::run(args, cli.global),
         Command::Ortho(args) => ortho::run(args, cli.global),
+        Command::Priors(args) => priors::run(args, cli.global),
         Command::Rpc(args) => rpc::run(args),
         Command::Simulate(args) => simulate::run(args, cli.global),
     }

@@ -1,4 +1,31 @@
-//! Building priors from LoD2 city models (GS4Buildings, Zhang et al. 2025): area-weighted samples, the points that at least
-//! k cameras see, and depth, normal, mask, class and object maps per camera.
+//! Building priors from LoD2 city models, after GS4Buildings (Zhang et al. 2025, arXiv 2508.07355): area-weighted samples, the
+//! points that at least k cameras see, and depth, normal, mask, class and object maps per camera.
 //!
-//! Positions are f64 metres from a recorded local origin.
+//! Positions are f64 metres from the recorded origin of the mesh. Results do not depend on the number of threads, and a model at
+//! other coordinates (a shift by whole metres) gives the same.
+//!
+//! - [`PriorModel`] holds the triangles, arranged for rays; [`View`] is a camera in its frame.
+//! - [`sample`] spreads points over the surfaces, by count, by density or under a geometric error.
+//! - [`Visibility`] counts views per point, and keeps the best of them.
+//! - [`PriorMaps`] are what a camera would measure of the model.
+//! - [`initial_splats`] are flat Gaussians to begin a training with, [`Schedule`] how much the priors weigh in it.
+
+mod error;
+mod maps;
+mod model;
+mod random;
+mod sample;
+mod schedule;
+mod splats;
+mod vector;
+mod view;
+mod visibility;
+
+pub use error::PriorsError;
+pub use maps::{DepthKind, MISSING_CLASS, MapConfig, NO_OBJECT, NormalFrame, PriorMaps};
+pub use model::PriorModel;
+pub use sample::{Amount, ClassWeights, ErrorCurve, Sample, SampleConfig, Samples, Spacing, error_curve, sample};
+pub use schedule::{Ramp, Schedule};
+pub use splats::initial_splats;
+pub use view::{MAX_PIXELS, Rays, View};
+pub use visibility::{Observation, ViewCounts, Visibility, VisibilityConfig, Visible};

@@ -2,6 +2,7 @@
 //!
 //! An [`EvaluationReport`] tells one evaluation three times, always with its protocol: as text for the terminal, as JSON, and as
 //! one HTML file that needs no network, no script and no other file. [`Chart`] draws plots as SVG, inside a page or on their own.
+//! A [`PriorsReport`] does the same for the priors of a city model; [`depth_preview`] and [`normal_preview`] are its pictures.
 //! Nothing here touches a file: everything comes back as text or bytes, the same for the same input.
 
 mod base64;
@@ -10,6 +11,8 @@ mod evaluation;
 mod page;
 mod palette;
 mod picture;
+mod preview;
+mod priors;
 mod protocol;
 mod svg;
 
@@ -18,5 +21,7 @@ pub use evaluation::EvaluationReport;
 pub use page::escape;
 pub use palette::{MISSING, OUTSIDE, diverging};
 pub use picture::{PictureError, error_picture, png};
+pub use preview::{depth_preview, normal_preview};
+pub use priors::{ErrorRow, PriorsReport, ViewRow};
 pub use protocol::Protocol;
 pub use svg::{Axis, Chart};

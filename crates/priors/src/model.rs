@@ -1,0 +1,165 @@
+//! The triangles of a city model with their areas and normals, arranged for rays.
+
+use bvh::Bvh;
+use mesh::TriangleMesh;
+use rayon::prelude::*;
+
+use crate::PriorsError;
+use crate::vector::{Vector, cross, norm, sub, unit};
+
+/// Triangles lower than this take the normal of their surface: their own would be made of the rounding of their corners.
+const SLIVER_M: f64 = 1e-3;
+
+/// A city model to take priors from.
+#[derive(Debug, Clone)]
+pub struct PriorModel {
+    mesh: TriangleMesh,
+    bvh: Bvh,
+    areas: Vec<f64>,
+    normals: Vec<Vector>,
+    building: Vec<bool>,
+}
+
+impl PriorModel {
+    /// Arranges a mesh. `is_building` says of every object of the model whether it is (part of) a building: the others hide
+    /// what is behind them, and give no priors.
+    ///
+    /// # Errors
+    /// A mesh that fails [`TriangleMesh::validate`], that rays cannot be cast at, or that names more objects.
+    pub fn new(mesh: TriangleMesh, is_building: &[bool]) -> Result<Self, PriorsError> {
+        mesh.validate()?;
+        let bvh = Bvh::new(&mesh.positions, &mesh.triangles)?;
+        let known = |surface: &mesh::MeshSurface| is_building.get(surface.object as usize).copied();
+        if let Some(surface) = mesh.surfaces.iter().find(|surface| known(surface).is_none()) {
+            return Err(PriorsError::Objects { flags: is_building.len(), object: surface.object });
+        }
+        let count = mesh.triangles.len();
+        let building = (0..count).map(|t| known(&mesh.surface(t)).unwrap_or(false)).collect();
+        let areas = (0..count).into_par_iter().map(|t| 0.5 * norm(doubled_area(mesh.corners(t)))).collect();
+        let normals = normals(&mesh);
+        Ok(Self { mesh, bvh, areas, normals, building })
+    }
+
+    /// The triangles.
+    pub fn mesh(&self) -> &TriangleMesh {
+        &self.mesh
+    }
+
+    /// The triangles, arranged for rays.
+    pub fn bvh(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    /// Area of a triangle, m².
+    ///
+    /// # Panics
+    /// When there is no such triangle.
+    pub fn area_m2(&self, triangle: usize) -> f64 {
+        self.areas[triangle]
+    }
+
+    /// Unit normal of a triangle, outwards where the model's solids allow to tell; zero where the triangle and its surface have
+    /// no area.
+    ///
+    /// # Panics
+    /// When there is no such triangle.
+    pub fn normal(&self, triangle: usize) -> [f64; 3] {
+        self.normals[triangle]
+    }
+
+    /// Whether a triangle is a building's.
+    ///
+    /// # Panics
+    /// When there is no such triangle.
+    pub fn is_building(&self, triangle: usize) -> bool {
+        self.building[triangle]
+    }
+}
+
+/// A vector along the normal, twice the area long.
+fn doubled_area([a, b, c]: [Vector; 3]) -> Vector {
+    cross(sub(b, a), sub(c, a))
+}
+
+fn normals(mesh: &TriangleMesh) -> Vec<Vector> {
+    let mut of_surface = vec![[0.0; 3]; mesh.surfaces.len()];
+    for (triangle, &surface) in mesh.surface_of.iter().enumerate() {
+        let doubled = doubled_area(mesh.corners(triangle));
+        of_surface[surface as usize].iter_mut().zip(doubled).for_each(|(sum, c)| *sum += c);
+    }
+    let normal = |triangle: usize| {
+        let corners = mesh.corners(triangle);
+        let doubled = doubled_area(corners);
+        let longest = (0..3).map(|i| norm(sub(corners[(i + 1) % 3], corners[i]))).fold(0.0, f64::max);
+        let own = unit(doubled).filter(|_| norm(doubled) >= SLIVER_M * longest);
+        let surface = unit(of_surface[mesh.surface_of[triangle] as usize]);
+        own.or(surface).or(unit(doubled)).unwrap_or_default()
+    };
+    (0..mesh.triangles.len()).into_par_iter().map(normal).collect()
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use mesh::{MeshSurface, ModelPoint, SurfaceClass};
+
+    use super::*;
+
+    /// A box with its corner at `low`: ground, roof, four walls, two triangles each, looking outwards; object 0.
+    pub(crate) fn cuboid(low: Vector, size: Vector) -> TriangleMesh {
+        let corner = |i: usize| [0, 1, 2].map(|axis| low[axis] + if i >> axis & 1 == 1 { size[axis] } else { 0.0 });
+        let faces: [([u32; 4], SurfaceClass); 6] = [
+            ([0, 2, 3, 1], SurfaceClass::Ground),
+            ([4, 5, 7, 6], SurfaceClass::Roof),
+            ([0, 1, 5, 4], SurfaceClass::Wall),
+            ([1, 3, 7, 5], SurfaceClass::Wall),
+            ([3, 2, 6, 7], SurfaceClass::Wall),
+            ([2, 0, 4, 6], SurfaceClass::Wall),
+        ];
+        let mut mesh = TriangleMesh { origin: ModelPoint::default(), ..TriangleMesh::default() };
+        mesh.positions = (0..8).map(corner).collect();
+        for (number, ([a, b, c, d], class)) in faces.into_iter().enumerate() {
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+            mesh.surface_of.extend([number as u32; 2]);
+            mesh.surfaces.push(MeshSurface { object: 0, class });
+        }
+        mesh
+    }
+
+    /// Both meshes; the objects of the second come after those of the first.
+    pub(crate) fn joined(mut first: TriangleMesh, second: &TriangleMesh) -> TriangleMesh {
+        let (corners, surfaces) = (first.positions.len() as u32, first.surfaces.len() as u32);
+        let object = first.surfaces.iter().map(|s| s.object + 1).max().unwrap_or(0);
+        first.positions.extend(&second.positions);
+        first.triangles.extend(second.triangles.iter().map(|t| t.map(|c| c + corners)));
+        first.surface_of.extend(second.surface_of.iter().map(|s| s + surfaces));
+        let shifted = second.surfaces.iter().map(|s| MeshSurface { object: s.object + object, ..*s });
+        first.surfaces.extend(shifted);
+        first
+    }
+
+    #[test]
+    fn areas_and_normals_of_a_box() {
+        let model = PriorModel::new(cuboid([1.0, 2.0, 3.0], [8.0, 6.0, 3.0]), &[true]).unwrap();
+        let total: f64 = (0..12).map(|t| model.area_m2(t)).sum();
+        assert!((total - 2.0 * (48.0 + 24.0 + 18.0)).abs() < 1e-12);
+        assert_eq!(
+            [model.normal(0), model.normal(3), model.normal(4)],
+            [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
+        );
+        let missing = PriorModel::new(cuboid([0.0; 3], [1.0; 3]), &[]).unwrap_err();
+        assert_eq!(missing, PriorsError::Objects { flags: 0, object: 0 });
+    }
+
+    #[test]
+    fn a_sliver_takes_the_normal_of_its_surface() {
+        let mut mesh = cuboid([0.0; 3], [8.0, 6.0, 3.0]);
+        // A needle along an edge of the roof, tilted by the lattice of its corners.
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([[0.0, 0.0, 3.0], [8.0, 0.0, 3.0], [4.0, 1e-6, 3.000_001]]);
+        mesh.triangles.push([first, first + 1, first + 2]);
+        mesh.surface_of.push(1);
+        let model = PriorModel::new(mesh, &[true]).unwrap();
+        let normal = model.normal(12);
+        assert!(normal[2] > 0.999_999, "{normal:?}");
+    }
+}

@@ -1,0 +1,149 @@
+//! Depth and normal maps as pictures for people: colours from near to far with a bar that has the depths written on it; normals
+//! as the usual colours, (n + 1) / 2 as red, green, blue. Pixels without a value are grey. Large maps are thinned first, by
+//! whole numbers of pixels, without mixing depths across edges.
+
+use raster::Grid;
+
+use crate::palette::OUTSIDE;
+
+/// Longest side of a preview without its bar, pixels.
+const LONGEST_SIDE: usize = 640;
+/// Colours from near to far, dark at the far end: light means close, also in print.
+const NEAR_TO_FAR: [[f64; 3]; 6] = [
+    [252.0, 246.0, 190.0],
+    [251.0, 178.0, 96.0],
+    [226.0, 100.0, 84.0],
+    [152.0, 52.0, 112.0],
+    [74.0, 30.0, 104.0],
+    [18.0, 14.0, 46.0],
+];
+const PAPER: [u8; 3] = [255; 3];
+const INK: [u8; 3] = [30; 3];
+/// Width of the bar, of the gap before it, and of the room for its numbers.
+const BAR: [usize; 3] = [14, 10, 52];
+/// Numbers at the bar.
+const MARKS: usize = 5;
+
+/// Depths from near (light) to far (dark), with a bar; what is not finite is grey.
+pub fn depth_preview(depth_m: &Grid<f32>) -> Grid<[u8; 3]> {
+    let depth = thinned(depth_m);
+    let range = raster::height_percentiles(&depth, 1.0, 99.0);
+    let (near, far) = range.map_or((0.0, 1.0), |(n, f)| (f64::from(n), f64::from(f)));
+    let span = if far > near { far - near } else { 1.0 };
+    let [bar, gap, text] = BAR;
+    let (width, height) = (depth.width(), depth.height());
+    let mut picture = Grid::filled(width + gap + bar + text, height.max(7 * MARKS), PAPER);
+    for row in 0..height {
+        for (pixel, &value) in picture.row_mut(row).iter_mut().zip(depth.row(row)) {
+            *pixel = if value.is_finite() { near_to_far((f64::from(value) - near) / span) } else { OUTSIDE };
+        }
+    }
+    let last = picture.height() - 1;
+    for row in 0..picture.height() {
+        let colour = near_to_far(row as f64 / last as f64);
+        picture.row_mut(row)[width + gap..width + gap + bar].fill(colour);
+    }
+    for mark in 0..MARKS {
+        let part = mark as f64 / (MARKS - 1) as f64;
+        let top = ((part * last as f64) as usize).saturating_sub(3).min(picture.height() - 7);
+        write(&mut picture, width + gap + bar + 3, top, &short(near + part * span));
+    }
+    picture
+}
+
+/// Normals as colours; pixels with a normal of zero are grey.
+pub fn normal_preview(normals: &Grid<[f32; 3]>) -> Grid<[u8; 3]> {
+    let colour = |n: &[f32; 3]| {
+        if *n == [0.0; 3] { OUTSIDE } else { n.map(|c| (127.5 * (c + 1.0)).round().clamp(0.0, 255.0) as u8) }
+    };
+    thinned(normals).map(colour)
+}
+
+/// Every n-th pixel of every n-th row, so that the longest side fits.
+fn thinned<T: Copy>(map: &Grid<T>) -> Grid<T> {
+    let step = map.width().max(map.height()).div_ceil(LONGEST_SIDE).max(1);
+    let (width, height) = (map.width().div_ceil(step), map.height().div_ceil(step));
+    let rows = (0..map.height()).step_by(step);
+    let data = rows.flat_map(|row| map.row(row).iter().step_by(step).copied()).collect();
+    // The count is that of the two divisions by construction.
+    Grid::from_vec(width, height, data).unwrap_or_else(|| map.clone())
+}
+
+fn near_to_far(part: f64) -> [u8; 3] {
+    let position = part.clamp(0.0, 1.0) * (NEAR_TO_FAR.len() - 1) as f64;
+    let below = (position as usize).min(NEAR_TO_FAR.len() - 2);
+    let t = position - below as f64;
+    std::array::from_fn(|i| {
+        (NEAR_TO_FAR[below][i] + t * (NEAR_TO_FAR[below + 1][i] - NEAR_TO_FAR[below][i])).round() as u8
+    })
+}
+
+/// A depth in at most five characters, and its unit.
+fn short(value_m: f64) -> String {
+    let digits = if value_m < 9.995 { 2 } else { usize::from(value_m < 999.95) };
+    if value_m < 99_999.5 { format!("{value_m:.digits$}m") } else { format!("{:.0}km", value_m / 1e3) }
+}
+
+/// Letters of 5 × 7 pixels, a row per number, the leftmost pixel in the highest of five bits.
+const LETTERS: [(char, [u8; 7]); 13] = [
+    ('0', [0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e]),
+    ('1', [0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e]),
+    ('2', [0x0e, 0x11, 0x01, 0x02, 0x04, 0x08, 0x1f]),
+    ('3', [0x0e, 0x11, 0x01, 0x06, 0x01, 0x11, 0x0e]),
+    ('4', [0x02, 0x06, 0x0a, 0x12, 0x1f, 0x02, 0x02]),
+    ('5', [0x1f, 0x10, 0x1e, 0x01, 0x01, 0x11, 0x0e]),
+    ('6', [0x06, 0x08, 0x10, 0x1e, 0x11, 0x11, 0x0e]),
+    ('7', [0x1f, 0x01, 0x02, 0x04, 0x08, 0x08, 0x08]),
+    ('8', [0x0e, 0x11, 0x11, 0x0e, 0x11, 0x11, 0x0e]),
+    ('9', [0x0e, 0x11, 0x11, 0x0f, 0x01, 0x02, 0x0c]),
+    ('.', [0x00, 0x00, 0x00, 0x00, 0x00, 0x0c, 0x0c]),
+    ('m', [0x00, 0x00, 0x1a, 0x15, 0x15, 0x15, 0x15]),
+    ('k', [0x10, 0x10, 0x12, 0x14, 0x18, 0x14, 0x12]),
+];
+
+fn write(picture: &mut Grid<[u8; 3]>, left: usize, top: usize, text: &str) {
+    for (place, letter) in text.chars().enumerate() {
+        let Some((_, rows)) = LETTERS.iter().find(|(known, _)| *known == letter) else { continue };
+        for (row, bits) in rows.iter().enumerate() {
+            for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
+                let (x, y) = (left + 6 * place + column, top + row);
+                if picture.get(x, y).is_some() {
+                    picture[(x, y)] = INK;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_is_light_far_is_dark_and_nothing_is_grey() {
+        let depth = (0..100 * 60).map(|i| if i % 100 < 10 { f32::INFINITY } else { (i % 100) as f32 }).collect();
+        let picture = depth_preview(&Grid::from_vec(100, 60, depth).unwrap());
+        assert_eq!((picture.width(), picture.height()), (100 + 76, 60));
+        let light = |x: usize| picture[(x, 30)].iter().map(|&c| u32::from(c)).sum::<u32>();
+        assert_eq!(picture[(5, 30)], OUTSIDE);
+        assert!(light(12) > light(50) && light(50) > light(95));
+        // The bar has the colours of its ends, and something is written beside it.
+        assert_eq!([picture[(112, 0)], picture[(112, 59)]], [near_to_far(0.0), near_to_far(1.0)]);
+        assert!((127..176).any(|x| picture[(x, 2)] == INK));
+    }
+
+    #[test]
+    fn empty_and_large_maps() {
+        let nothing = depth_preview(&Grid::filled(8, 2, f32::INFINITY));
+        assert_eq!((nothing[(0, 0)], nothing.height()), (OUTSIDE, 35));
+        assert_eq!(depth_preview(&Grid::filled(2_000, 1_500, 5.0)).width(), 500 + 76);
+        let normals = normal_preview(&Grid::from_vec(3, 1, vec![[0.0; 3], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]).unwrap());
+        assert_eq!(normals.data(), [OUTSIDE, [128, 128, 255], [0, 128, 128]]);
+    }
+
+    #[test]
+    fn depths_are_short() {
+        let texts = [0.5, 9.994, 12.34, 999.9, 1_234.4, 250_000.0].map(short);
+        assert_eq!(texts, ["0.50m", "9.99m", "12.3m", "999.9m", "1234m", "250km"]);
+    }
+}

@@ -1,0 +1,273 @@
+//! The account of a set of priors: what went in, what came out, and what it may be used for; as JSON and as one page.
+
+use raster::Grid;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::page::{escape, page};
+use crate::picture::{PictureError, data_uri};
+
+/// What became of a city model and its cameras.
+#[derive(Debug, Clone, Serialize)]
+pub struct PriorsReport {
+    /// The city model's file.
+    pub model: String,
+    /// Where the cameras were read.
+    pub cameras: String,
+    /// `building-only` or `building-enhanced`.
+    pub mode: String,
+    /// What is to be known: choices with their reasons, what was left out.
+    pub notes: Vec<String>,
+    /// Triangles of the model in use.
+    pub triangles: usize,
+    /// Area that was sampled, m².
+    pub sampled_area_m2: f64,
+    /// Area by class that was not sampled, m².
+    pub skipped_area_m2: Vec<(String, f64)>,
+    /// Points on the model.
+    pub samples: usize,
+    /// Points that enough views see.
+    pub kept: usize,
+    /// How many views a point needs.
+    pub min_views: u32,
+    /// Pairs of a view and a point that it sees.
+    pub pairs: u64,
+    /// Points by the number of views that see them; the last counts that many and more.
+    pub views_histogram: Vec<usize>,
+    /// Kept points by class.
+    pub kept_by_class: Vec<(String, usize)>,
+    /// Points of the structure from motion that were taken along.
+    pub scene_points: usize,
+    /// Number of points against geometric error.
+    pub error_curve: Vec<ErrorRow>,
+    /// Metres per step of the 16-bit depth maps; `None` where there are none.
+    pub depth_png_step: Option<f64>,
+    /// The views.
+    pub views: Vec<ViewRow>,
+    /// How it was made, as values by name.
+    pub settings: Value,
+}
+
+/// How many points keep an error.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct ErrorRow {
+    /// The geometric error, metres.
+    pub error_m: f64,
+    /// Points of varying spacing.
+    pub points: f64,
+    /// Points of one spacing.
+    pub even_points: f64,
+}
+
+/// One view.
+#[derive(Debug, Clone, Serialize)]
+pub struct ViewRow {
+    /// The image.
+    pub name: String,
+    /// Columns and rows of its maps.
+    pub size: [usize; 2],
+    /// Pixels that see a building.
+    pub hit_pixels: usize,
+    /// The smallest and the largest depth; `None` where no building is seen.
+    pub depth_range: Option<[f32; 2]>,
+    /// Points in the image.
+    pub candidates: usize,
+    /// Those that nothing hides.
+    pub visible: usize,
+}
+
+impl PriorsReport {
+    /// Every number, by name.
+    ///
+    /// # Errors
+    /// None that a report of finite numbers can cause.
+    pub fn json(&self) -> Result<Value, serde_json::Error> {
+        let mut value = json!({ "generator": concat!("skysweep priors ", env!("CARGO_PKG_VERSION")) });
+        if let (Some(all), Value::Object(own)) = (value.as_object_mut(), serde_json::to_value(self)?) {
+            all.extend(own);
+        }
+        Ok(value)
+    }
+
+    /// The page; `pictures` are the depth and the normals of some views with their names.
+    ///
+    /// # Errors
+    /// [`PictureError`] for a picture without pixels.
+    pub fn html(&self, pictures: &[(String, Grid<[u8; 3]>, Grid<[u8; 3]>)]) -> Result<String, PictureError> {
+        let title = format!("Priors of {}", last_part(&self.model));
+        let mut body = vec![
+            format!("<h1>{}</h1>", escape(&title)),
+            format!("<p class=\"lead\">{}</p>", escape(&self.lead())),
+            self.cards(),
+            self.note_list(),
+        ];
+        if !pictures.is_empty() {
+            body.push("<h2>Views</h2><div class=\"pictures\">".to_owned());
+            for (name, depth, normals) in pictures {
+                for (what, picture) in [("depth", depth), ("normals", normals)] {
+                    let (uri, name) = (data_uri(picture)?, escape(name));
+                    body.push(format!(
+                        "<figure><img src=\"{uri}\" alt=\"{what} of {name}\"><figcaption><b>{name}</b> {what}</figcaption></figure>"
+                    ));
+                }
+            }
+            body.push("</div>".to_owned());
+        }
+        body.extend([self.curve_table(), self.class_table(), self.view_table(), self.setting_list()]);
+        Ok(page(&title, &body.join("\n")))
+    }
+
+    fn lead(&self) -> String {
+        format!(
+            "Of {} points on {} triangles, {} are seen by {} or more of {} views ({}).",
+            self.samples,
+            self.triangles,
+            self.kept,
+            self.min_views,
+            self.views.len(),
+            self.mode
+        )
+    }
+
+    fn cards(&self) -> String {
+        let hits: usize = self.views.iter().map(|v| v.hit_pixels).sum();
+        let pixels: usize = self.views.iter().map(|v| v.size[0] * v.size[1]).sum();
+        let share = 100.0 * hits as f64 / pixels.max(1) as f64;
+        let cards = [
+            (self.kept.to_string(), "points kept"),
+            (self.pairs.to_string(), "pairs of view and point"),
+            (self.views.len().to_string(), "views"),
+            (format!("{share:.1} <small>%</small>"), "of the pixels see a building"),
+        ];
+        let cards = cards.map(|(value, text)| format!("<div class=\"card\"><b>{value}</b><span>{text}</span></div>"));
+        format!("<div class=\"cards\">{}</div>", cards.concat())
+    }
+
+    fn note_list(&self) -> String {
+        let notes: String = self.notes.iter().map(|note| format!("<li>{}</li>", escape(note))).collect();
+        if notes.is_empty() { notes } else { format!("<div class=\"notes\"><ul>{notes}</ul></div>") }
+    }
+
+    fn curve_table(&self) -> String {
+        if self.error_curve.is_empty() {
+            return String::new();
+        }
+        let row = |row: &ErrorRow| {
+            vec![format!("{} m", row.error_m), format!("{:.0}", row.points), format!("{:.0}", row.even_points)]
+        };
+        let rows = self.error_curve.iter().map(row);
+        table("Points against geometric error", &["error", "points", "of one spacing"], rows)
+    }
+
+    fn class_table(&self) -> String {
+        let kept =
+            self.kept_by_class.iter().map(|(class, count)| vec![class.clone(), count.to_string(), String::new()]);
+        let skipped = self.skipped_area_m2.iter();
+        let skipped =
+            skipped.map(|(class, area)| vec![class.clone(), "not sampled".to_owned(), format!("{area:.0} m²")]);
+        table("Classes", &["class", "points kept", "left out"], kept.chain(skipped))
+    }
+
+    fn view_table(&self) -> String {
+        let row = |view: &ViewRow| {
+            let range = view.depth_range.map_or("–".to_owned(), |[near, far]| format!("{near:.1} to {far:.1}"));
+            let share = 100.0 * view.hit_pixels as f64 / (view.size[0] * view.size[1]).max(1) as f64;
+            let size = format!("{} × {}", view.size[0], view.size[1]);
+            vec![
+                view.name.clone(),
+                size,
+                format!("{share:.1} %"),
+                range,
+                view.candidates.to_string(),
+                view.visible.to_string(),
+            ]
+        };
+        let heads = ["image", "size", "building", "depth", "points in it", "visible"];
+        table("All views", &heads, self.views.iter().map(row))
+    }
+
+    fn setting_list(&self) -> String {
+        let Value::Object(settings) = &self.settings else { return String::new() };
+        let item = |(name, value): (&String, &Value)| {
+            let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(&text))
+        };
+        format!("<h2>Settings</h2><dl>{}</dl>", settings.iter().map(item).collect::<String>())
+    }
+}
+
+fn table(title: &str, heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let heads: String = heads.iter().map(|head| format!("<th scope=\"col\">{}</th>", escape(head))).collect();
+    let row = |cells: Vec<String>| {
+        let mut cells = cells.iter().map(|cell| escape(cell));
+        let first = cells.next().unwrap_or_default();
+        let rest: String = cells.map(|cell| format!("<td>{cell}</td>")).collect();
+        format!("<tr><th scope=\"row\">{first}</th>{rest}</tr>")
+    };
+    let rows: String = rows.map(row).collect();
+    format!(
+        "<h2>{}</h2><div class=\"wide\"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>",
+        escape(title)
+    )
+}
+
+fn last_part(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report() -> PriorsReport {
+        PriorsReport {
+            model: "data/<town>.city.json".to_owned(),
+            cameras: "sparse/0".to_owned(),
+            mode: "building-only".to_owned(),
+            notes: vec!["grounds & closures are left out".to_owned()],
+            triangles: 12,
+            sampled_area_m2: 132.0,
+            skipped_area_m2: vec![("GroundSurface".to_owned(), 48.0)],
+            samples: 1_000,
+            kept: 321,
+            min_views: 2,
+            pairs: 900,
+            views_histogram: vec![600, 79, 321],
+            kept_by_class: vec![("RoofSurface".to_owned(), 321)],
+            scene_points: 0,
+            error_curve: vec![ErrorRow { error_m: 0.1, points: 5e3, even_points: 5e4 }],
+            depth_png_step: Some(0.001),
+            views: vec![ViewRow {
+                name: "<a>.png".to_owned(),
+                size: [8, 6],
+                hit_pixels: 12,
+                depth_range: Some([3.0, 9.5]),
+                candidates: 500,
+                visible: 400,
+            }],
+            settings: json!({ "seed": 7 }),
+        }
+    }
+
+    #[test]
+    fn the_page_holds_the_numbers_and_nothing_leaves_its_place() {
+        let picture = Grid::filled(4, 3, [9; 3]);
+        let page = report().html(&[("<a>.png".to_owned(), picture.clone(), picture)]).unwrap();
+        for words in
+            ["321 are seen by 2 or more of 1 views", "25.0 %", "3.0 to 9.5", "not sampled", "data:image/png", "50000"]
+        {
+            assert!(page.contains(words), "{words}");
+        }
+        assert!(!page.contains("<a>") && page.contains("&lt;a&gt;.png") && page.contains("&lt;town&gt;"));
+    }
+
+    #[test]
+    fn the_json_says_who_made_it() {
+        let value = report().json().unwrap();
+        assert!(value["generator"].as_str().unwrap().starts_with("skysweep priors "));
+        assert_eq!(
+            (&value["kept"], &value["views"][0]["visible"], &value["settings"]["seed"]),
+            (&json!(321), &json!(400), &json!(7))
+        );
+    }
+}

@@ -1,0 +1,190 @@
+//! Priors of a real tile against what Open3D (Embree) made of the same points and cameras, and the same tile at other
+//! coordinates.
+//!
+//! Reference: `../shared/data/city/peer_reference`, whose points are relative to an offset on whole metres; where that is
+//! absent the tests say so and pass.
+
+#![allow(clippy::print_stderr)]
+
+use std::path::{Path, PathBuf};
+
+use io::colmap::{self, ColmapModel};
+use mesh::{CityModel, MeshConfig, ModelPoint, SurfaceClass, TriangleMesh};
+use priors::{
+    Amount, MapConfig, PriorMaps, PriorModel, Rays, Sample, SampleConfig, Spacing, View, Visibility, VisibilityConfig,
+    sample,
+};
+
+/// The reference's offset from the tile's coordinates.
+const OFFSET: ModelPoint = ModelPoint::new(85_320.0, 446_656.0, 0.0);
+/// Counts agree within this part of them.
+const COUNT_TOLERANCE: f64 = 1e-4;
+
+fn city() -> Option<PathBuf> {
+    let city = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/city");
+    if !city.is_dir() {
+        eprintln!("skipped: ../shared/data/city is not there");
+        return None;
+    }
+    Some(city)
+}
+
+fn arranged(model: &CityModel) -> PriorModel {
+    let meshed = TriangleMesh::from_model(model, &MeshConfig::default()).unwrap();
+    PriorModel::new(meshed.mesh, &vec![true; model.objects.len()]).unwrap()
+}
+
+struct Scene {
+    folder: PathBuf,
+    model: PriorModel,
+    shift: [f64; 3],
+    cameras: ColmapModel,
+}
+
+impl Scene {
+    /// With our triangles of the tile.
+    fn load() -> Option<Self> {
+        Self::of("3dbag_5910.city.json", OFFSET)
+    }
+
+    /// With the triangles that the reference was computed with: those of warped polygons are cut in other ways.
+    fn with_their_triangles() -> Option<Self> {
+        Self::of("peer_reference/mesh_local.ply", ModelPoint::default())
+    }
+
+    fn of(name: &str, offset: ModelPoint) -> Option<Self> {
+        let city = city()?;
+        let model = arranged(&io::city::read(&city.join(name)).unwrap().model);
+        let folder = city.join("peer_reference");
+        let cameras = colmap::read(&folder.join("sparse/0")).unwrap();
+        Some(Self { shift: offset.from_origin(model.mesh().origin), model, cameras, folder })
+    }
+
+    fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(self.folder.join(name)).unwrap()).unwrap()
+    }
+
+    fn subset(&self) -> Vec<usize> {
+        let numbers = self.json("cams.json");
+        numbers["idx20"].as_array().unwrap().iter().map(|v| v.as_u64().unwrap() as usize).collect()
+    }
+
+    fn view(&self, index: usize) -> View {
+        let view = &self.cameras.views[index];
+        let centre = [0, 1, 2].map(|i| view.pose.centre[i] + self.shift[i]);
+        View { lens: self.cameras.lenses[view.lens].clone(), pose: camera::Pose { centre, ..view.pose } }
+    }
+
+    fn points(&self) -> Vec<Sample> {
+        let sample = |p: &[[u8; 8]]| Sample {
+            position: [0, 1, 2].map(|i| f64::from_le_bytes(p[i]) + self.shift[i]),
+            normal: [0.0; 3],
+            spacing_m: 0.0,
+            triangle: 0,
+            object: 0,
+            class: SurfaceClass::Unclassified,
+        };
+        npy::<8>(&self.folder.join("points_f64.npy")).chunks_exact(3).map(sample).collect()
+    }
+}
+
+/// The data of a C-ordered array of little-endian numbers.
+fn npy<const N: usize>(path: &Path) -> Vec<[u8; N]> {
+    let bytes = std::fs::read(path).unwrap();
+    let data = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    bytes[data..].chunks_exact(N).map(|chunk| chunk.try_into().unwrap()).collect()
+}
+
+fn close(found: [usize; 3], expected: [usize; 3]) {
+    let within = found.iter().zip(&expected).all(|(f, e)| f.abs_diff(*e) as f64 <= *e as f64 * COUNT_TOLERANCE);
+    assert!(within, "pairs, in one view, in two: {found:?}, expected {expected:?}");
+}
+
+#[test]
+fn visible_points_equal_the_yardsticks() {
+    let Some(scene) = Scene::load() else { return };
+    let points = scene.points();
+    let config = VisibilityConfig { margin_px: 0.0, near_m: 0.0, max_observations: 4, ..VisibilityConfig::default() };
+    let per_camera = scene.json("reference_100_visible.json");
+    let all: Vec<usize> = (0..scene.cameras.views.len()).collect();
+    let cases = [(scene.subset(), [494_586, 316_280, 130_065]), (all, [2_039_718, 572_457, 472_904])];
+    for (cameras, expected) in cases {
+        let mut visibility = Visibility::new(&scene.model, &points, config).unwrap();
+        for &camera in &cameras {
+            let found = visibility.add(&scene.view(camera)).visible;
+            let of_peer = per_camera[&scene.cameras.views[camera].name].as_u64().unwrap() as usize;
+            let allowed = 5.0 + of_peer as f64 * COUNT_TOLERANCE;
+            assert!(found.abs_diff(of_peer) as f64 <= allowed, "camera {camera}: {found}, expected {of_peer}");
+        }
+        let visible = visibility.finish();
+        close([visible.pairs as usize, points.len() - visible.histogram[0], visible.points.len()], expected);
+        let enough = |(o, &v): (&Vec<_>, &u32)| o.len() == (v as usize).min(4);
+        assert!(visible.observations.iter().zip(&visible.views).all(enough));
+    }
+}
+
+/// Hits, depths and normals of every camera; counts of hits agree within five and `hit_tolerance` of them.
+fn check_statistics(scene: &Scene, hit_tolerance: f64) {
+    let rays = Rays::new(&scene.cameras.lenses[0]).unwrap();
+    let stats = scene.json("depth_o3d_100_stats.json");
+    for (index, view) in scene.cameras.views.iter().enumerate() {
+        let maps = PriorMaps::render(&scene.model, &scene.view(index), &rays, MapConfig::default());
+        let expected = stats[index][0].as_u64().unwrap() as usize;
+        let allowed = 5.0 + hit_tolerance * expected as f64;
+        let found = maps.hits();
+        assert!(found.abs_diff(expected) as f64 <= allowed, "{}: {found} hits, expected {expected}", view.name);
+        let sum: f64 = maps.depth_m.data().iter().filter(|d| d.is_finite()).map(|&d| f64::from(d)).sum();
+        let upwards: f64 = maps.normal.data().iter().map(|n| f64::from(n[2].abs())).sum();
+        for (found, number) in [(sum, 1), (upwards, 2)] {
+            let expected = stats[index][number].as_f64().unwrap();
+            assert!((found - expected).abs() < 1e-4 * expected + 5.0, "{}: {found}, expected {expected}", view.name);
+        }
+    }
+}
+
+#[test]
+fn statistics_of_maps_equal_the_yardsticks() {
+    let Some(scene) = Scene::with_their_triangles() else { return };
+    check_statistics(&scene, 0.0);
+    let Some(scene) = Scene::load() else { return };
+    check_statistics(&scene, COUNT_TOLERANCE);
+}
+
+#[test]
+fn maps_equal_the_stored_ones() {
+    let Some(scene) = Scene::load() else { return };
+    let rays = Rays::new(&scene.cameras.lenses[0]).unwrap();
+    for name in ["uav_002", "street_000"] {
+        let index = scene.cameras.views.iter().position(|v| v.name.starts_with(name)).unwrap();
+        let maps = PriorMaps::render(&scene.model, &scene.view(index), &rays, MapConfig::default());
+        let stored = npy::<4>(&scene.folder.join(format!("{name}_z.npy"))).into_iter().map(f32::from_le_bytes);
+        // Misses are stored as 0.
+        let differs = |(&found, stored): (&f32, f32)| {
+            if stored == 0.0 { found.is_finite() } else { !((found - stored).abs() <= 1e-3) }
+        };
+        let off = maps.depth_m.data().iter().zip(stored).filter(|&pair| differs(pair)).count();
+        assert!(off <= 20, "{name}: {off} pixels differ");
+    }
+}
+
+#[test]
+fn national_coordinates_change_nothing() {
+    let Some(city) = city() else { return };
+    let near = io::city::read(&city.join("3dbag_5910.city.json")).unwrap().model;
+    let mut far = near.clone();
+    for vertex in &mut far.vertices {
+        *vertex = ModelPoint::new(vertex.x + 606_000.0, vertex.y + 4_887_000.0, vertex.z + 500.0);
+    }
+    let (near, far) = (arranged(&near), arranged(&far));
+    let amounts = [
+        (Amount::Count(30_000), Spacing::Random),
+        (Amount::Count(30_000), Spacing::Stratified),
+        (Amount::Count(10_000), Spacing::PoissonDisk),
+        (Amount::Adaptive { error_m: 2.0, max_spacing_m: 6.0 }, Spacing::Stratified),
+    ];
+    for (amount, spacing) in amounts {
+        let config = SampleConfig { amount, spacing, ..SampleConfig::default() };
+        let (a, b) = (sample(&near, &config).unwrap(), sample(&far, &config).unwrap());
+        assert!(a == b && a.points.len() >= 10_000, "{amount:?}: {} and {}", a.points.len(), b.points.len());
+    }
+}
