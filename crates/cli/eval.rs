@@ -1,13 +1,19 @@
 //! `skysweep eval`: how far a surface model is from a reference.
+//!
+//! What is compared follows from the files: height grids (the reference may be a LAS cloud), surfaces (both are meshes, city models or
+//! clouds), or maps in the pixels of a camera (both are `.npy`, or `--maps` says so).
 
 mod grids;
 mod inputs;
+mod maps;
 mod output;
+mod surface_inputs;
+mod surfaces;
 mod vertical;
 
 use std::path::PathBuf;
 
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use eval::{Alignment, EvalConfig, EvalInput, Evaluation, evaluate};
 use geodesy::VerticalDatum;
 use report::{EvaluationReport, Protocol};
@@ -19,14 +25,15 @@ use output::Target;
 /// Arguments of `skysweep eval`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The surface model that is evaluated, on any grid.
+    /// The surface model that is evaluated, on any grid; a mesh, city model or cloud (OBJ, PLY, CityJSON, CityGML, LAS, LAZ) where
+    /// REF is one, too; or a map of depths, normals or a mask (.npy).
     test: PathBuf,
-    /// The surface model that is believed, or a LAS or LAZ point cloud; errors are measured at its cells.
+    /// What is believed, of the same kind; a LAS or LAZ cloud may stand for a grid, errors are then measured at its cells.
     #[arg(value_name = "REF")]
     reference: PathBuf,
-    /// What is removed before the comparison.
-    #[arg(long, value_enum, default_value_t = Align::Xyz)]
-    align: Align,
+    /// What is removed before the comparison [default: xyz for grids; surfaces and maps are compared as they are].
+    #[arg(long, value_enum)]
+    align: Option<Align>,
     /// Radius of the horizontal search of --align xyz and nuth-kaab, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 5.0)]
     search_m: f64,
@@ -48,8 +55,9 @@ pub(crate) struct Args {
     /// Side of the cells into which a point cloud REF is laid, in metres [default: TEST's].
     #[arg(long, value_name = "METRES")]
     ref_cell: Option<f64>,
-    /// Thresholds of completeness_T and pag_T, in metres.
-    #[arg(long, value_name = "METRES", value_delimiter = ',', default_value = "0.5,1,2.5,7.5")]
+    /// Thresholds in metres: of completeness_T and pag_T [default: 0.5,1,2.5,7.5], or of precision, recall and F-score of
+    /// surfaces [default: 0.1,0.2,0.5,1].
+    #[arg(long, value_name = "METRES", value_delimiter = ',')]
     thresholds: Vec<f64>,
     /// What TEST's heights are above, where the file does not say or is wrong: ellipsoid, egm96, egm2008 or EPSG:n.
     #[arg(long, value_name = "DATUM")]
@@ -76,7 +84,12 @@ pub(crate) struct Args {
     /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
-    /// Exit with 1 when the MAE over all cells is above this, in metres.
+    #[command(flatten)]
+    surface: surfaces::SurfaceArgs,
+    /// The files are maps of this kind in the pixels of one camera [default: found by shape and type of .npy files].
+    #[arg(long, value_enum, value_name = "KIND")]
+    maps: Option<maps::MapKind>,
+    /// Exit with 1 when the MAE over all cells is above this, in metres; of surfaces the mean distance of TEST to REF.
     #[arg(long, value_name = "METRES")]
     max_mae: Option<f64>,
     /// Exit with 1 when the completeness over all cells is below this share (0 to 1), at 1 m unless T says otherwise.
@@ -134,6 +147,38 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if let Some(max_mae) = args.max_mae {
         ensure!(max_mae >= 0.0, "--max-mae is {max_mae}, expected a number of metres");
     }
+    let both = |is: fn(&PathBuf) -> bool| is(&args.test) && is(&args.reference);
+    let missed = if args.maps.is_some() || both(|path| io::maps::is_npy(path)) {
+        maps::run(args)?
+    } else if both(|path| io::surfaces::is_surface(path)) {
+        surfaces::run(args, global)?
+    } else {
+        grids(args, global)?
+    };
+    missed.iter().for_each(|line| tracing::error!("{line}"));
+    Ok(if missed.is_empty() { Outcome::Complete } else { Outcome::Partial })
+}
+
+/// Refuses options that only height grids have.
+fn refuse_grid_options(args: &Args, what: &str) -> anyhow::Result<()> {
+    let given = [
+        ("--align", args.align.is_some_and(|align| !matches!(align, Align::None))),
+        ("--classes", args.classes.is_some()),
+        ("--skip", !args.skip.is_empty()),
+        ("--mask", args.mask.is_some()),
+        ("--dtm", args.dtm.is_some()),
+        ("--ref-cell", args.ref_cell.is_some()),
+        ("--html", args.html.is_some()),
+        ("--error-map", args.error_map.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((option, _)) => bail!("{option} is for height grids, and these are {what}: leave it out"),
+        None => Ok(()),
+    }
+}
+
+/// Compares height grids; the requirements that were missed.
+fn grids(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     let (config, target) = (config(args), Target::of(args));
     output::check(args, target.as_ref())?;
     let inputs = Inputs::read(args, config.alignment)?;
@@ -160,8 +205,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
             print::text(&(written.join("\n") + "\n"))?;
         }
     }
-    protocol.missed.iter().for_each(|line| tracing::error!("{line}"));
-    Ok(if protocol.missed.is_empty() { Outcome::Complete } else { Outcome::Partial })
+    Ok(protocol.missed)
 }
 
 /// What the numbers mean, from arguments and inputs.
@@ -191,12 +235,12 @@ fn protocol(args: &Args, config: EvalConfig, inputs: &Inputs, found: &Evaluation
 }
 
 fn config(args: &Args) -> EvalConfig {
-    let mut thresholds_m = args.thresholds.clone();
+    let mut thresholds_m = if args.thresholds.is_empty() { vec![0.5, 1.0, 2.5, 7.5] } else { args.thresholds.clone() };
     thresholds_m.extend(args.min_completeness.iter().map(|least| least.threshold_m));
     thresholds_m.sort_by(f64::total_cmp);
     thresholds_m.dedup();
     EvalConfig {
-        alignment: args.align.into(),
+        alignment: args.align.unwrap_or(Align::Xyz).into(),
         search_m: args.search_m,
         thresholds_m,
         skip: args.skip.clone(),

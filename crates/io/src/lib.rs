@@ -5,6 +5,7 @@
 
 pub mod city;
 pub mod colmap;
+pub mod maps;
 pub mod npy;
 pub mod ply;
 pub mod points;
@@ -14,6 +15,7 @@ pub mod rpc;
 mod save;
 pub mod similarity;
 pub mod splat_ply;
+pub mod surfaces;
 pub mod transforms;
 
 pub use raster::write_bytes;

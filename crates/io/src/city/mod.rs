@@ -22,6 +22,7 @@ use mesh::{CityModel, Defect};
 pub use cityjson::{CityJsonOptions, write_cityjson};
 pub use error::{CityError, CityFault};
 pub use export::{Footprints, MeshFormat, write_footprints, write_mesh};
+pub(crate) use ply::points as ply_points;
 
 /// City models are read up to this size, bytes.
 pub const SIZE_LIMIT: u64 = 2 << 30;
@@ -100,7 +101,7 @@ fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     }
 }
 
-fn content(path: &Path) -> Result<Vec<u8>, CityError> {
+pub(crate) fn content(path: &Path) -> Result<Vec<u8>, CityError> {
     let unreadable = |source| CityError::Unreadable { path: path.to_owned(), source };
     let found = std::fs::metadata(path).map_err(unreadable)?;
     if !found.is_file() {

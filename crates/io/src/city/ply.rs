@@ -25,6 +25,37 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     Ok(Parsed { model, format: CityFormat::Ply, defects })
 }
 
+/// The points of a file, and what its comments say.
+#[derive(Debug)]
+pub(crate) struct PlyPoints {
+    pub(crate) positions: Vec<[f64; 3]>,
+    pub(crate) comments: Vec<String>,
+    /// Whether there are polygons, too.
+    pub(crate) has_faces: bool,
+}
+
+/// The vertices as they stand in the file, for clouds: one that is not finite is a fault.
+pub(crate) fn points(bytes: &[u8]) -> Result<PlyPoints, CityFault> {
+    let header = header(bytes)?;
+    let mut body = Body { bytes, at: header.end, encoding: header.encoding };
+    let has_faces = header.elements.iter().any(|element| element.name == "face" && element.count > 0);
+    let mut positions = Vec::new();
+    for element in header.elements.iter().take_while(|element| element.name != "face") {
+        let axes = body.check(element)?;
+        let is_vertex = element.name == "vertex";
+        for number in 0..if axes.is_empty() { 0 } else { element.count } {
+            let point = body.record(element, &axes)?;
+            if is_vertex && !point.iter().all(|c| c.is_finite()) {
+                return Err(CityFault::invalid(format!("the position {point:?}"), format!("vertex {number}")));
+            }
+            if is_vertex {
+                positions.push(point);
+            }
+        }
+    }
+    Ok(PlyPoints { positions, comments: header.comments, has_faces })
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Encoding {
     Ascii,
@@ -58,6 +89,7 @@ struct Element {
 struct Header {
     encoding: Encoding,
     elements: Vec<Element>,
+    comments: Vec<String>,
     /// Where the data begin.
     end: usize,
 }
@@ -85,7 +117,7 @@ impl Number {
 }
 
 fn header(bytes: &[u8]) -> Result<Header, CityFault> {
-    let (mut encoding, mut elements, mut at) = (None, Vec::<Element>::new(), 0);
+    let (mut encoding, mut elements, mut comments, mut at) = (None, Vec::<Element>::new(), Vec::new(), 0);
     for number in 1.. {
         let place = format!("line {number}");
         let rest = &bytes[at..];
@@ -114,12 +146,13 @@ fn header(bytes: &[u8]) -> Result<Header, CityFault> {
                     found.ok_or_else(|| CityFault::invalid("a property that PLY does not know", place))?;
                 element.properties.push(property);
             }
+            ["comment", ..] => comments.push(words[1..].join(" ")),
             ["end_header"] => break,
             _ => {}
         }
     }
     let encoding = encoding.ok_or_else(|| CityFault::invalid("the header names no format", "header"))?;
-    Ok(Header { encoding, elements, end: at })
+    Ok(Header { encoding, elements, comments, end: at })
 }
 
 fn property(words: &[&str]) -> Option<Property> {
@@ -140,21 +173,8 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn element(&mut self, element: &Element, object: usize) -> Result<(), CityFault> {
-        let smallest = self.body.smallest(element);
-        let room = self.body.room();
-        if smallest == 0 || element.count > (room / smallest) as u64 {
-            if element.count == 0 {
-                return Ok(());
-            }
-            let what = format!("{} of {} are announced, and {room} bytes are left", element.count, element.name);
-            return Err(CityFault::invalid(what, "header"));
-        }
-        let axis_of = |p: &Property| ["x", "y", "z"].iter().position(|axis| *axis == p.name && p.count.is_none());
-        let axes: Vec<Option<usize>> = element.properties.iter().map(axis_of).collect();
+        let axes = self.body.check(element)?;
         let is_vertex = element.name == "vertex";
-        if is_vertex && (0..3).any(|axis| !axes.contains(&Some(axis))) {
-            return Err(CityFault::invalid("the vertices have no x, y and z", "header"));
-        }
         for number in 0..element.count {
             let mut point = [0.0; 3];
             for (property, axis) in element.properties.iter().zip(&axes) {
@@ -208,6 +228,37 @@ struct Body<'a> {
 impl Body<'_> {
     fn room(&self) -> usize {
         self.bytes.len() - self.at
+    }
+
+    /// Checks that the file can hold an element as often as it says; which of its properties are x, y, z.
+    fn check(&self, element: &Element) -> Result<Vec<Option<usize>>, CityFault> {
+        if element.count == 0 {
+            return Ok(Vec::new());
+        }
+        let (smallest, room) = (self.smallest(element), self.room());
+        if smallest == 0 || element.count > (room / smallest) as u64 {
+            let what = format!("{} of {} are announced, and {room} bytes are left", element.count, element.name);
+            return Err(CityFault::invalid(what, "header"));
+        }
+        let axis_of = |p: &Property| ["x", "y", "z"].iter().position(|axis| *axis == p.name && p.count.is_none());
+        let axes: Vec<Option<usize>> = element.properties.iter().map(axis_of).collect();
+        if element.name == "vertex" && (0..3).any(|axis| !axes.contains(&Some(axis))) {
+            return Err(CityFault::invalid("the vertices have no x, y and z", "header"));
+        }
+        Ok(axes)
+    }
+
+    /// An element's position; everything else in it is passed over.
+    fn record(&mut self, element: &Element, axes: &[Option<usize>]) -> Result<[f64; 3], CityFault> {
+        let mut point = [0.0; 3];
+        for (property, axis) in element.properties.iter().zip(axes) {
+            match (property.count, axis) {
+                (Some(count), _) => drop(self.list(count, property.value, false)?),
+                (None, &Some(axis)) => point[axis] = self.number(property.value)?,
+                (None, None) => drop(self.number(property.value)?),
+            }
+        }
+        Ok(point)
     }
 
     /// The fewest bytes that an element can take: a digit and a separator per number in text.

@@ -90,6 +90,41 @@ impl PointCloud {
         (0.5 * (bounds.min.x + bounds.max.x), 0.5 * (bounds.min.y + bounds.max.y))
     }
 
+    /// The horizontal EPSG code that the file states, if any.
+    pub fn horizontal_epsg(&self) -> Option<u32> {
+        self.stated.horizontal_epsg
+    }
+
+    /// What the heights are measured from, if the file says.
+    pub fn vertical(&self) -> Option<VerticalDatum> {
+        self.stated.vertical
+    }
+
+    /// All points in map units, heights in metres; those of the noise classes and withheld ones are left out.
+    ///
+    /// # Errors
+    /// [`PointsError::Damaged`]; [`PointsError::NoPoints`]; [`PointsError::TooManyPoints`] above `most`.
+    pub fn positions(mut self, most: u64) -> Result<Vec<[f64; 3]>, PointsError> {
+        let announced = self.reader.header().number_of_points();
+        if announced > most {
+            return Err(PointsError::TooManyPoints { path: self.path, points: announced, most });
+        }
+        let mut batch = PointDataBuilder::new().for_header(self.reader.header()).build();
+        let (mut found, mut points) = (Vec::new(), 0u64);
+        while guarded(&self.path, || self.reader.fill_points(BATCH, &mut batch))? > 0 {
+            for point in batch.points() {
+                let point = point.map_err(|error| PointsError::damaged(&self.path, error))?;
+                points += 1;
+                let position = [point.x, point.y, point.z * self.stated.height_unit_m];
+                let noise = point.is_withheld || NOISE.contains(&u8::from(point.classification));
+                if !noise && position.iter().all(|c| c.is_finite()) {
+                    found.push(position);
+                }
+            }
+        }
+        if found.is_empty() { Err(PointsError::NoPoints { path: self.path, points }) } else { Ok(found) }
+    }
+
     /// The highest point of every cell of `cell` (x, y) map units; cell corners fall on `anchor` plus whole cells.
     ///
     /// # Errors

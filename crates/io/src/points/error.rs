@@ -30,6 +30,16 @@ pub enum PointsError {
         /// Points read.
         points: u64,
     },
+    /// More points than are held in memory.
+    #[error("the cloud has {points} points, up to {most} are compared: thin it or cut it: {}", path.display())]
+    TooManyPoints {
+        /// The file.
+        path: PathBuf,
+        /// Points in the file.
+        points: u64,
+        /// The most.
+        most: u64,
+    },
     /// The grid would be far larger than the cloud.
     #[error(
         "the cloud's extent holds {cells:.0} cells of {cell} map units for {points} points, at most {most} are made: \
