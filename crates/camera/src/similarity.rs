@@ -135,7 +135,8 @@ impl Similarity {
 fn proper_rotation(r: &[[f64; 3]; 3]) -> Result<[[f64; 3]; 3], SimilarityError> {
     let dot = |i: usize, j: usize| (0..3).map(|k| r[i][k] * r[j][k]).sum::<f64>();
     let off = (0..9).map(|n| (dot(n / 3, n % 3) - if n / 3 == n % 3 { 1.0 } else { 0.0 }).abs()).fold(0.0, f64::max);
-    if !(off <= ORTHOGONAL) {
+    // The entries are finite, but their squares may not be.
+    if off.is_nan() || off > ORTHOGONAL {
         return Err(SimilarityError::NotARotation { off });
     }
     if determinant(r) < 0.0 {

@@ -1,6 +1,5 @@
 //! Meshes, city models and point clouds against one another: table, JSON, thresholds.
 
-use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::{Context, bail};
@@ -149,8 +148,7 @@ fn document(
 
 fn table(args: &Args, inputs: &SurfaceInputs, found: &SurfaceComparison) -> String {
     let mut text = String::new();
-    // Writing to a string cannot fail.
-    let mut line = |label: &str, value: String| drop(writeln!(text, "{label:<10} {value}"));
+    let mut line = |label: &str, value: String| text += &format!("{label:<10} {value}\n");
     line("test", format!("{} ({})", args.test.display(), inputs.formats[0]));
     line("reference", format!("{} ({})", args.reference.display(), inputs.formats[1]));
     line("crs", inputs.crs.clone().unwrap_or_else(|| "no coordinate system".into()));

@@ -77,7 +77,7 @@ impl CityFault {
         Self::new(DefectCode::NotSupported, what, place)
     }
 
-    pub(super) fn at(self, path: &Path) -> CityError {
+    pub(crate) fn at(self, path: &Path) -> CityError {
         CityError::Refused { path: path.to_owned(), fault: self }
     }
 }

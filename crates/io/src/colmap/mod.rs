@@ -123,6 +123,9 @@ struct RawImage {
     place: String,
 }
 
+/// Per view where its points are, in COLMAP's pixels.
+type PixelsOfViews = Vec<Vec<[f64; 2]>>;
+
 /// Whether the points of images are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ImagePoints {
@@ -140,7 +143,7 @@ pub fn read(folder: &Path) -> Result<ColmapModel, ColmapError> {
 }
 
 /// The model, and per view where its points are.
-fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapModel, Vec<Vec<[f64; 2]>>), ColmapError> {
+fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapModel, PixelsOfViews), ColmapError> {
     let (cameras_path, cameras) = load(folder, "cameras", binary::cameras, text::cameras)?;
     let images = |bytes: &[u8]| binary::images(bytes, keep);
     let (images_path, images) = load(folder, "images", images, |text| text::images(text, keep))?;
