@@ -4,18 +4,22 @@
 //! Results go to standard output; log lines and errors go to standard error.
 //! Exit codes: 0 complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
 
+mod align;
 mod city;
 mod dsm;
 mod error;
 mod eval;
 mod heightmap;
 mod log;
+mod map_surface;
 mod ortho;
 mod print;
 mod priors;
 mod progress;
 mod rpc;
 mod simulate;
+mod splats;
+mod split;
 
 use std::process::ExitCode;
 
@@ -51,6 +55,8 @@ impl Global {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Bring a COLMAP model to the world by GPS or point pairs.
+    Align(Box<align::Args>),
     /// Show and convert city models.
     City(city::Args),
     /// Make a surface model from satellite images.
@@ -67,6 +73,10 @@ enum Command {
     Rpc(rpc::Args),
     /// Make a scene seen through RPC cameras, with its exact surface.
     Simulate(simulate::Args),
+    /// Make Gaussian splats of a surface model and its images.
+    Splats(Box<splats::Args>),
+    /// Choose context and target views of a COLMAP model by their overlap.
+    Split(split::Args),
 }
 
 /// How a command ended that was not stopped by an error.
@@ -94,6 +104,7 @@ fn main() -> ExitCode {
 
 fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
+        Command::Align(args) => align::run(args, cli.global),
         Command::City(args) => city::run(args),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
@@ -102,5 +113,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Priors(args) => priors::run(args, cli.global),
         Command::Rpc(args) => rpc::run(args),
         Command::Simulate(args) => simulate::run(args, cli.global),
+        Command::Splats(args) => splats::run(args, cli.global),
+        Command::Split(args) => split::run(args, cli.global),
     }
 }

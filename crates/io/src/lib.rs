@@ -5,6 +5,7 @@
 
 pub mod city;
 pub mod colmap;
+pub mod control;
 pub mod maps;
 pub mod npy;
 pub mod ply;

@@ -5,6 +5,7 @@
 //! on a network is fetched. A file appears under its final name when it is complete.
 
 mod atomic;
+mod colour;
 mod dem;
 mod depth_png;
 mod error;

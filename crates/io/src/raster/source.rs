@@ -10,7 +10,7 @@ use gdal::{Dataset, Metadata};
 use raster::{GeoTransform, Grid, Window};
 
 use super::luma::{self, LumaRule, LumaTile};
-use super::{RasterError, open_dataset, with_gdal};
+use super::{RasterError, colour, open_dataset, with_gdal};
 
 /// How samples are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,6 +149,14 @@ impl ImageSource {
         }
         let (x, y) = (window.x - inside.x, window.y - inside.y);
         Ok(samples.window(Window { x, y, ..window }, f32::NAN))
+    }
+
+    /// Red, green and blue of a window, which may reach outside the image; NaN where there is none. A single band is all three.
+    ///
+    /// # Errors
+    /// [`RasterError::Damaged`] when GDAL cannot decode the pixels.
+    pub fn read_colour(&self, window: Window) -> Result<Grid<[f32; 3]>, RasterError> {
+        colour::read(self, window)
     }
 
     /// One band (counted from 1) over a window inside the image, as f32 and untouched.

@@ -44,14 +44,21 @@ impl LocalOrigin {
     /// Writes it beside a file; see [`origin_path`].
     ///
     /// # Errors
-    /// An origin that is not finite; a file that exists or cannot be written.
+    /// As [`Self::write`].
     pub fn write_beside(&self, file: &Path, overwrite: bool) -> Result<(), SplatPlyError> {
-        let path = origin_path(file);
+        self.write(&origin_path(file), overwrite)
+    }
+
+    /// Writes it to a file of its own.
+    ///
+    /// # Errors
+    /// An origin that is not finite; a file that exists or cannot be written.
+    pub fn write(&self, path: &Path, overwrite: bool) -> Result<(), SplatPlyError> {
         if !self.origin.iter().all(|c| c.is_finite()) {
-            return Err(invalid(&path, "the origin is not finite"));
+            return Err(invalid(path, "the origin is not finite"));
         }
-        let text = serde_json::to_string_pretty(self).map_err(|error| invalid(&path, error.to_string()))?;
-        Ok(write_bytes(&path, (text + "\n").as_bytes(), overwrite)?)
+        let text = serde_json::to_string_pretty(self).map_err(|error| invalid(path, error.to_string()))?;
+        Ok(write_bytes(path, (text + "\n").as_bytes(), overwrite)?)
     }
 
     /// Reads the origin beside a file; `None` when there is none.

@@ -1,0 +1,255 @@
+//! The similarity among outliers.
+//!
+//! Triples of pairs (all of them where there are few, else a fixed sequence of random ones) propose similarities. With a threshold given,
+//! the proposal with the least Σ min(r², threshold²) wins (MSAC, Torr and Zisserman 2000), without one that with the
+//! least median of r² (Rousseeuw 1984), which takes up to half of outliers. The least-squares fit to the pairs within the
+//! threshold is repeated until the set does not change. Without a threshold it follows the residuals: 2.19 times their median,
+//! the 99th percentile of the length of an isotropic normal vector, estimated anew in every round.
+
+use camera::Similarity;
+
+use super::random::Random;
+use super::{AlignError, PointPair, fit_similarity};
+
+/// Up to this many pairs every triple is tried.
+const ALL_TRIPLES: usize = 20;
+/// Refinements at most; sets settle within a few.
+const ROUNDS: usize = 50;
+/// The 99th percentile of |e| over its median for a normal vector of three equal components: 3.368 / 1.538.
+const PERCENTILE_99: f64 = 2.19;
+/// Residuals below this part of the extent of the world's positions are rounding.
+const ROUNDING: f64 = 1e-10;
+
+/// How the alignment is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlignConfig {
+    /// Largest residual of a pair that is believed, metres; found from the residuals where not given.
+    pub threshold_m: Option<f64>,
+    /// Random triples.
+    pub samples: usize,
+    /// Of the random numbers.
+    pub seed: u64,
+}
+
+impl Default for AlignConfig {
+    /// 2000 triples: with half of the pairs wrong, a right triple is missed once in 10¹¹⁵.
+    fn default() -> Self {
+        Self { threshold_m: None, samples: 2000, seed: 1 }
+    }
+}
+
+/// A similarity with what speaks for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alignment {
+    /// From the model to the world.
+    pub world_from_model: Similarity,
+    /// |target − similarity(source)| of every pair, metres.
+    pub residuals_m: Vec<f64>,
+    /// Which pairs the fit is made of.
+    pub inliers: Vec<bool>,
+    /// Largest residual that was believed, metres.
+    pub threshold_m: f64,
+}
+
+impl Alignment {
+    /// Number of pairs that the fit is made of.
+    pub fn inlier_count(&self) -> usize {
+        self.inliers.iter().filter(|i| **i).count()
+    }
+
+    /// Root mean square of the inliers' residuals, metres.
+    pub fn rmse_m(&self) -> f64 {
+        let inside = self.residuals_m.iter().zip(&self.inliers).filter(|(_, inlier)| **inlier);
+        (inside.map(|(r, _)| r * r).sum::<f64>() / self.inlier_count().max(1) as f64).sqrt()
+    }
+}
+
+/// Aligns a model to the world by pairs some of which may be wrong.
+///
+/// # Errors
+/// Fewer than three pairs, positions that are not finite or lie on a line, no agreement among more than three pairs (or more than a third).
+pub fn align(pairs: &[PointPair], config: &AlignConfig) -> Result<Alignment, AlignError> {
+    // Refuses too few pairs and positions that are no numbers; a line may still turn up through outliers.
+    let plain = match fit_similarity(pairs) {
+        Err(error @ (AlignError::TooFew { .. } | AlignError::NotFinite { .. })) => return Err(error),
+        plain => plain,
+    };
+    let floor = ROUNDING * extent(pairs);
+    let mut best: Option<(f64, Similarity)> = None;
+    let mut consider = |triple: [usize; 3]| {
+        if let Ok(proposal) = fit_similarity(&triple.map(|i| pairs[i])) {
+            let score = score(pairs, &proposal, config.threshold_m);
+            if best.is_none_or(|(least, _)| score < least) {
+                best = Some((score, proposal));
+            }
+        }
+    };
+    triples(pairs.len(), config, &mut consider);
+    let (_, first) = best.ok_or_else(|| plain.err().unwrap_or(AlignError::Degenerate { ratio: 0.0 }))?;
+    refine(pairs, first, config.threshold_m, floor)
+}
+
+fn triples(count: usize, config: &AlignConfig, consider: &mut impl FnMut([usize; 3])) {
+    if count <= ALL_TRIPLES {
+        for a in 0..count {
+            for b in a + 1..count {
+                (b + 1..count).for_each(|c| consider([a, b, c]));
+            }
+        }
+        return;
+    }
+    let mut random = Random::new(config.seed);
+    for _ in 0..config.samples {
+        let triple = [0; 3].map(|_| random.below(count));
+        if triple[0] != triple[1] && triple[1] != triple[2] && triple[0] != triple[2] {
+            consider(triple);
+        }
+    }
+}
+
+fn extent(pairs: &[PointPair]) -> f64 {
+    let range = |axis: usize| {
+        let values = pairs.iter().map(|p| p.target[axis]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        // Far from the origin, rounding is that of the coordinates themselves.
+        (high - low) + 1e-3 * low.abs().max(high.abs())
+    };
+    (0..3).map(range).fold(0.0, f64::max)
+}
+
+fn residuals(pairs: &[PointPair], similarity: &Similarity) -> Vec<f64> {
+    let one = |p: &PointPair| {
+        let at = similarity.apply(p.source);
+        (0..3).map(|i| (at[i] - p.target[i]).powi(2)).sum::<f64>().sqrt()
+    };
+    pairs.iter().map(one).collect()
+}
+
+fn score(pairs: &[PointPair], similarity: &Similarity, threshold_m: Option<f64>) -> f64 {
+    let residuals = residuals(pairs, similarity);
+    match threshold_m {
+        Some(threshold) => residuals.iter().map(|r| r.min(threshold).powi(2)).sum(),
+        None => half(residuals),
+    }
+}
+
+/// The residual that half of the pairs and the three that made the proposal stay below.
+fn half(mut residuals: Vec<f64>) -> f64 {
+    let at = (residuals.len() / 2 + 1).min(residuals.len() - 1);
+    *residuals.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+fn refine(
+    pairs: &[PointPair],
+    first: Similarity,
+    threshold_m: Option<f64>,
+    floor: f64,
+) -> Result<Alignment, AlignError> {
+    let mut similarity = first;
+    let mut inliers = Vec::new();
+    for round in 0.. {
+        let residuals = residuals(pairs, &similarity);
+        // The inliers' median: among all pairs, outliers would widen it.
+        let scale = if round == 0 { half(residuals.clone()) } else { median_of(&residuals, &inliers) };
+        let threshold = threshold_m.unwrap_or(PERCENTILE_99 * scale).max(floor);
+        let now: Vec<bool> = residuals.iter().map(|&r| r <= threshold).collect();
+        let chosen: Vec<PointPair> = pairs.iter().zip(&now).filter(|(_, inlier)| **inlier).map(|(p, _)| *p).collect();
+        if chosen.len() < 3.max(pairs.len().div_ceil(3)) {
+            return Err(AlignError::NoConsensus { inliers: chosen.len(), pairs: pairs.len() });
+        }
+        if now == inliers || round == ROUNDS {
+            return Ok(Alignment {
+                world_from_model: similarity,
+                residuals_m: residuals,
+                inliers: now,
+                threshold_m: threshold,
+            });
+        }
+        similarity = fit_similarity(&chosen)?;
+        inliers = now;
+    }
+    Err(AlignError::NoConsensus { inliers: 0, pairs: pairs.len() })
+}
+
+fn median_of(residuals: &[f64], inliers: &[bool]) -> f64 {
+    let mut inside: Vec<f64> = residuals.iter().zip(inliers).filter(|(_, inlier)| **inlier).map(|(r, _)| *r).collect();
+    let middle = inside.len() / 2;
+    if inside.is_empty() { 0.0 } else { *inside.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use camera::Pose;
+    use proptest::prelude::*;
+
+    fn planted() -> Similarity {
+        let rotation = Pose::from_quaternion([0.5, -0.3, 0.7, 0.2], [0.0; 3]).unwrap().rotation;
+        Similarity::new(7.25, rotation, [412.5, -87.25, 31.0]).unwrap()
+    }
+
+    /// Cameras along a bent street, with noise (metres) and every third-or-so position wrong by tens of metres.
+    fn pairs(count: usize, noise_m: f64, outliers: f64, seed: u64) -> Vec<PointPair> {
+        let mut random = Random::new(seed);
+        let truth = planted();
+        (0..count)
+            .map(|i| {
+                let t = i as f64 / count as f64;
+                let source = [10.0 * t, (3.0 * t).sin(), 0.2 * (9.0 * t).cos()];
+                let wrong = ((i + 1) as f64 * outliers).floor() > (i as f64 * outliers).floor();
+                let size = if wrong { 40.0 } else { noise_m };
+                let target = truth.apply(source).map(|c| c + size * random.normal());
+                PointPair { source, target }
+            })
+            .collect()
+    }
+
+    fn off(found: &Similarity, pairs: &[PointPair]) -> f64 {
+        let truth = planted();
+        let squares = pairs.iter().map(|p| {
+            let (a, b) = (found.apply(p.source), truth.apply(p.source));
+            (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>()
+        });
+        (squares.sum::<f64>() / pairs.len() as f64).sqrt()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn without_noise_it_is_exact_among_30_percent_of_outliers(count in 10..120usize, seed in 0..1000u64) {
+            let pairs = pairs(count, 0.0, 0.3, seed);
+            let found = align(&pairs, &AlignConfig::default()).unwrap();
+            prop_assert!(off(&found.world_from_model, &pairs) < 1e-6);
+            prop_assert!((found.world_from_model.scale() / 7.25 - 1.0).abs() < 1e-9);
+            prop_assert_eq!(found.inlier_count(), count - (count as f64 * 0.3 + 1e-9).floor() as usize);
+        }
+
+        #[test]
+        fn with_noise_it_is_as_good_as_the_noise(count in 30..120usize, seed in 0..1000u64) {
+            let pairs = pairs(count, 0.5, 0.3, seed);
+            for threshold_m in [None, Some(2.0)] {
+                let found = align(&pairs, &AlignConfig { threshold_m, ..AlignConfig::default() }).unwrap();
+                // Seven parameters over 0.7 n positions of three coordinates, with room for bad luck.
+                let expected = 0.5 * (7.0 / (0.7 * count as f64)).sqrt();
+                prop_assert!(off(&found.world_from_model, &pairs) < 3.0 * expected, "{} {expected}", off(&found.world_from_model, &pairs));
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_of_cameras_is_refused() {
+        let line: Vec<PointPair> =
+            (0..30).map(|i| PointPair { source: [f64::from(i), 0.0, 0.0], target: [0.0, f64::from(i), 5.0] }).collect();
+        assert!(matches!(align(&line, &AlignConfig::default()), Err(AlignError::Degenerate { .. })));
+    }
+
+    #[test]
+    fn positions_of_other_images_agree_with_nothing() {
+        let mut random = Random::new(3);
+        let mut place = || [0; 3].map(|_| 100.0 * random.normal());
+        let pairs: Vec<PointPair> = (0..40).map(|_| PointPair { source: place(), target: place() }).collect();
+        let config = AlignConfig { threshold_m: Some(1.0), ..AlignConfig::default() };
+        assert!(matches!(align(&pairs, &config), Err(AlignError::NoConsensus { .. })));
+    }
+}

@@ -1,0 +1,250 @@
+//! Context and target views of a camera model, by what they see in common.
+//!
+//! The overlap of two views is the intersection over union of the model's points that they see. Views are chosen greedily: from a
+//! first view, each further context is the unused view whose overlap with the contexts so far is closest to the wanted one;
+//! then, for each wanted target overlap in turn, the unused view closest to it. A view's overlap with several contexts is its
+//! largest with any of them. Ties go to the view that comes first. Without a first view every view is tried, and the split with the
+//! least sum of deviations is taken.
+//!
+//! The presets are those of Cross-View Splatter (Turkulainen et al. 2026): contexts 0.15 with targets 0.02, 0.05, 0.07, 0.1, and
+//! contexts 0.25 with targets 0.03, 0.07, 0.1, 0.15.
+
+use serde::Serialize;
+
+/// What is wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SplitConfig {
+    /// Number of context views.
+    pub contexts: usize,
+    /// Overlap of each context with those before it.
+    pub context_iou: f64,
+    /// Overlap of each target with the contexts.
+    pub target_ious: Vec<f64>,
+    /// The first context; found where not given.
+    pub first: Option<usize>,
+}
+
+impl SplitConfig {
+    /// The paper's contexts of overlap 0.15.
+    pub fn narrow() -> Self {
+        Self { contexts: 2, context_iou: 0.15, target_ious: vec![0.02, 0.05, 0.07, 0.1], first: None }
+    }
+
+    /// The paper's contexts of overlap 0.25.
+    pub fn wide() -> Self {
+        Self { contexts: 2, context_iou: 0.25, target_ious: vec![0.03, 0.07, 0.1, 0.15], first: None }
+    }
+}
+
+/// A chosen view.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Choice {
+    /// Index of the view.
+    pub view: usize,
+    /// The overlap that was wanted; none for the first context.
+    pub wanted_iou: Option<f64>,
+    /// Its largest overlap with a context that was chosen before it; none for the first context.
+    pub iou: Option<f64>,
+}
+
+/// Contexts and targets.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Split {
+    /// Views to reconstruct from, in the order of choice.
+    pub contexts: Vec<Choice>,
+    /// Views to predict, in the order of the wanted overlaps.
+    pub targets: Vec<Choice>,
+    /// Σ |overlap − wanted|.
+    pub deviation: f64,
+}
+
+/// Why there is no split.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SplitError {
+    /// Fewer views that see points than are to be chosen.
+    #[error("{found} views see points of the model, {needed} are to be chosen")]
+    TooFew {
+        /// How many there are.
+        found: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// A first view that is not there or sees nothing.
+    #[error("view {view} cannot be the first: it is not in the model or sees no point of it")]
+    First {
+        /// Its index.
+        view: usize,
+    },
+    /// No contexts, or an overlap that is none.
+    #[error("{what}: expected at least one context and overlaps from 0 to 1")]
+    Wanted {
+        /// What was asked for.
+        what: String,
+    },
+}
+
+/// Per view the points that it sees, in rising order without repetitions, from the views of each point.
+pub fn points_of_views<'a>(view_count: usize, tracks: impl Iterator<Item = &'a [u32]>) -> Vec<Vec<u32>> {
+    let mut points = vec![Vec::new(); view_count];
+    for (point, track) in (0u32..).zip(tracks) {
+        for &view in track {
+            if let Some(seen) = points.get_mut(view as usize).filter(|seen| seen.last() != Some(&point)) {
+                seen.push(point);
+            }
+        }
+    }
+    points
+}
+
+/// Intersection over union of two rising sequences; 0 where both are empty.
+pub fn iou(a: &[u32], b: &[u32]) -> f64 {
+    let (mut i, mut j, mut both) = (0, 0, 0usize);
+    while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
+        both += usize::from(x == y);
+        i += usize::from(x <= y);
+        j += usize::from(y <= x);
+    }
+    let union = a.len() + b.len() - both;
+    if union > 0 { both as f64 / union as f64 } else { 0.0 }
+}
+
+/// Chooses contexts and targets; `points` are those of [`points_of_views`].
+///
+/// # Errors
+/// Overlaps outside 0 to 1, fewer views than are to be chosen, a first view that cannot be one.
+pub fn split(points: &[Vec<u32>], config: &SplitConfig) -> Result<Split, SplitError> {
+    let wanted = std::iter::once(config.context_iou).chain(config.target_ious.iter().copied());
+    if let Some(bad) = wanted.into_iter().find(|iou| !(0.0..=1.0).contains(iou)) {
+        return Err(SplitError::Wanted { what: format!("an overlap of {bad} was asked for") });
+    }
+    if config.contexts == 0 {
+        return Err(SplitError::Wanted { what: "no contexts were asked for".to_owned() });
+    }
+    let usable: Vec<usize> = (0..points.len()).filter(|&view| !points[view].is_empty()).collect();
+    let needed = config.contexts + config.target_ious.len();
+    if usable.len() < needed {
+        return Err(SplitError::TooFew { found: usable.len(), needed });
+    }
+    let overlaps = Overlaps::new(points);
+    match config.first {
+        Some(first) if usable.contains(&first) => Ok(from_first(&overlaps, &usable, first, config)),
+        Some(view) => Err(SplitError::First { view }),
+        None => {
+            let all = usable.iter().map(|&first| from_first(&overlaps, &usable, first, config));
+            // The first of equals.
+            let best = all.reduce(|best, other| if other.deviation < best.deviation { other } else { best });
+            best.ok_or(SplitError::TooFew { found: 0, needed })
+        }
+    }
+}
+
+/// The overlaps of all pairs of views.
+struct Overlaps {
+    count: usize,
+    iou: Vec<f64>,
+}
+
+impl Overlaps {
+    fn new(points: &[Vec<u32>]) -> Self {
+        let count = points.len();
+        let mut overlaps = vec![0.0; count * count];
+        for a in 0..count {
+            for b in a + 1..count {
+                let overlap = iou(&points[a], &points[b]);
+                (overlaps[a * count + b], overlaps[b * count + a]) = (overlap, overlap);
+            }
+        }
+        Self { count, iou: overlaps }
+    }
+
+    /// The largest overlap of a view with some others.
+    fn with(&self, view: usize, others: &[Choice]) -> f64 {
+        others.iter().map(|other| self.iou[view * self.count + other.view]).fold(0.0, f64::max)
+    }
+}
+
+fn from_first(overlaps: &Overlaps, usable: &[usize], first: usize, config: &SplitConfig) -> Split {
+    let mut unused: Vec<usize> = usable.iter().copied().filter(|&view| view != first).collect();
+    let mut contexts = vec![Choice { view: first, wanted_iou: None, iou: None }];
+    for _ in 1..config.contexts {
+        let next = closest(overlaps, &mut unused, &contexts, config.context_iou);
+        contexts.extend(next);
+    }
+    let mut targets = Vec::with_capacity(config.target_ious.len());
+    for &wanted in &config.target_ious {
+        targets.extend(closest(overlaps, &mut unused, &contexts, wanted));
+    }
+    let off = |choice: &Choice| choice.iou.zip(choice.wanted_iou).map_or(0.0, |(iou, wanted)| (iou - wanted).abs());
+    let deviation = contexts.iter().chain(&targets).map(off).sum();
+    Split { contexts, targets, deviation }
+}
+
+/// Takes the unused view whose overlap with the contexts is closest to what is wanted.
+fn closest(overlaps: &Overlaps, unused: &mut Vec<usize>, contexts: &[Choice], wanted: f64) -> Option<Choice> {
+    let off = |view: usize| (overlaps.with(view, contexts) - wanted).abs();
+    let mut best: Option<(usize, f64)> = None;
+    for (place, &view) in unused.iter().enumerate() {
+        if best.is_none_or(|(_, least)| off(view) < least) {
+            best = Some((place, off(view)));
+        }
+    }
+    let (place, _) = best?;
+    let view = unused.remove(place);
+    Some(Choice { view, wanted_iou: Some(wanted), iou: Some(overlaps.with(view, contexts)) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn overlaps_are_counted() {
+        assert_eq!(iou(&[1, 3, 5], &[3, 4, 5, 6]), 0.4);
+        assert_eq!((iou(&[], &[]), iou(&[1], &[]), iou(&[2, 9], &[2, 9])), (0.0, 0.0, 1.0));
+        let tracks: [&[u32]; 3] = [&[0, 2, 0], &[2], &[1, 7]];
+        assert_eq!(points_of_views(3, tracks.into_iter()), [vec![0], vec![2], vec![0, 1]]);
+    }
+
+    #[test]
+    fn what_cannot_be_split_is_refused() {
+        let points = vec![vec![1, 2], vec![], vec![2, 3]];
+        let config = |contexts, target_ious: &[f64]| SplitConfig {
+            contexts,
+            target_ious: target_ious.to_vec(),
+            ..SplitConfig::narrow()
+        };
+        assert!(matches!(split(&points, &config(2, &[0.1])), Err(SplitError::TooFew { found: 2, needed: 3 })));
+        assert!(matches!(split(&points, &config(0, &[])), Err(SplitError::Wanted { .. })));
+        assert!(matches!(split(&points, &config(1, &[1.5])), Err(SplitError::Wanted { .. })));
+        let first = SplitConfig { first: Some(1), ..config(1, &[0.1]) };
+        assert!(matches!(split(&points, &first), Err(SplitError::First { view: 1 })));
+        let found = split(&points, &config(1, &[0.3])).unwrap();
+        assert_eq!((found.contexts[0].view, found.targets[0].view), (0, 2));
+    }
+
+    proptest! {
+        /// Against sets, and the definition followed to the letter.
+        #[test]
+        fn the_choice_is_that_of_the_definition(seen in prop::collection::vec(prop::collection::btree_set(0..40u32, 1..30), 7..12)) {
+            let points: Vec<Vec<u32>> = seen.iter().map(|s| s.iter().copied().collect()).collect();
+            let by_sets = |a: &BTreeSet<u32>, b: &BTreeSet<u32>| a.intersection(b).count() as f64 / a.union(b).count() as f64;
+            for config in [SplitConfig::narrow(), SplitConfig::wide()] {
+                let found = split(&points, &config).unwrap();
+                let mut chosen = vec![found.contexts[0].view];
+                let contexts: Vec<usize> = found.contexts.iter().map(|c| c.view).collect();
+                for choice in found.contexts[1..].iter().chain(&found.targets) {
+                    let known: Vec<usize> = contexts.iter().copied().filter(|c| chosen.contains(c)).collect();
+                    let overlap = |v: usize| known.iter().map(|&c| by_sets(&seen[v], &seen[c])).fold(0.0, f64::max);
+                    let off = |v: usize| (overlap(v) - choice.wanted_iou.unwrap()).abs();
+                    let least = (0..seen.len()).filter(|v| !chosen.contains(v)).map(off).fold(f64::INFINITY, f64::min);
+                    prop_assert!((off(choice.view) - least).abs() < 1e-12);
+                    chosen.push(choice.view);
+                }
+                prop_assert_eq!(chosen.iter().collect::<BTreeSet<_>>().len(), 6);
+            }
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! Tables of control positions, known in the world: of images by name (GPS), or of points of a model, as CSV.
+//!
+//! The first line names the columns, separated by commas, semicolons or tabs; case does not matter, further columns are passed over:
+//!
+//! - what: `name` (or `image`, `file`, `filename`), or `x`, `y`, `z` of the model;
+//! - where: `lon`, `lat`, `height` (or `longitude`, `latitude`, `altitude`, `alt`, `h`), degrees and metres; or `easting`,
+//!   `northing`, `height` on a map.
+//!
+//! Empty lines and lines that begin with `#` are passed over.
+
+use std::path::{Path, PathBuf};
+
+use geodesy::LonLatHeight;
+
+/// Files are read up to this size, bytes.
+const SIZE_LIMIT: u64 = 256 << 20;
+
+/// What a position is of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Subject {
+    /// The image of a name.
+    Image(String),
+    /// A place in the model.
+    Model([f64; 3]),
+}
+
+/// Where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// Degrees, and metres above whatever the table's heights are above.
+    Geographic(LonLatHeight),
+    /// Easting, northing and height on a map, metres.
+    Map([f64; 3]),
+}
+
+/// A line of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControlPosition {
+    /// What it is of.
+    pub subject: Subject,
+    /// Where that is.
+    pub place: Place,
+}
+
+/// A table that cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ControlError {
+    /// The file cannot be read.
+    #[error("cannot read the file ({source}): {}", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// A line that breaks the format.
+    #[error("{what} (line {line}): {}", .path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What was found and expected.
+        what: String,
+        /// Number of the line, from 1.
+        line: usize,
+    },
+}
+
+/// Reads a table of positions.
+///
+/// # Errors
+/// A file that cannot be read or is larger than 256 MiB; columns that are missing; a value that is no finite number; a latitude
+/// beyond the poles.
+pub fn read(path: &Path) -> Result<Vec<ControlPosition>, ControlError> {
+    let unreadable = |source| ControlError::Unreadable { path: path.to_owned(), source };
+    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    if size > SIZE_LIMIT {
+        let what = format!("the file has {size} bytes, up to {SIZE_LIMIT} are read");
+        return Err(ControlError::Invalid { path: path.to_owned(), what, line: 1 });
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    parse(&String::from_utf8_lossy(&bytes)).map_err(|(line, what)| ControlError::Invalid {
+        path: path.to_owned(),
+        what,
+        line,
+    })
+}
+
+type Fault = (usize, String);
+
+fn parse(text: &str) -> Result<Vec<ControlPosition>, Fault> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let mut lines = lines.peekable();
+    let (number, first) = lines.next().ok_or_else(|| (1, "the table is empty".to_owned()))?;
+    let separator = [';', '\t'].into_iter().find(|&s| first.contains(s)).unwrap_or(',');
+    let columns = Columns::of(&fields(first, separator)).map_err(|what| (number, what))?;
+    lines.map(|(number, line)| columns.position(&fields(line, separator)).map_err(|what| (number, what))).collect()
+}
+
+/// The fields of a line; quotes protect separators and are doubled inside themselves.
+fn fields(line: &str, separator: char) -> Vec<String> {
+    let (mut fields, mut quoted) = (vec![String::new()], false);
+    let mut characters = line.chars().peekable();
+    while let Some(c) = characters.next() {
+        let last = fields.len() - 1;
+        match c {
+            '"' if quoted && characters.peek() == Some(&'"') => {
+                characters.next();
+                fields[last].push('"');
+            }
+            '"' => quoted = !quoted,
+            c if c == separator && !quoted => fields.push(String::new()),
+            c => fields[last].push(c),
+        }
+    }
+    fields.iter().map(|field| field.trim().to_owned()).collect()
+}
+
+/// Where the values stand.
+struct Columns {
+    subject: SubjectColumns,
+    geographic: bool,
+    place: [usize; 3],
+}
+
+enum SubjectColumns {
+    Name(usize),
+    Model([usize; 3]),
+}
+
+impl Columns {
+    fn of(header: &[String]) -> Result<Self, String> {
+        let find = |names: &[&str]| header.iter().position(|h| names.iter().any(|n| h.eq_ignore_ascii_case(n)));
+        let all =
+            |names: [&[&str]; 3]| -> Option<[usize; 3]> { Some([find(names[0])?, find(names[1])?, find(names[2])?]) };
+        let name = find(&["name", "image", "file", "filename", "image_name"]);
+        let model = all([&["x"], &["y"], &["z"]]);
+        let subject = match (name, model) {
+            (Some(name), _) => SubjectColumns::Name(name),
+            (None, Some(model)) => SubjectColumns::Model(model),
+            _ => {
+                return Err(
+                    "no column name, and none of x, y and z: the table must say what its positions are of".to_owned()
+                );
+            }
+        };
+        let height: &[&str] = &["height", "height_m", "altitude", "alt", "h", "elevation", "up"];
+        let geographic = all([&["lon", "longitude", "lon_deg", "lng"], &["lat", "latitude", "lat_deg"], height]);
+        let map = all([&["easting", "east", "easting_m"], &["northing", "north", "northing_m"], height]);
+        match (geographic, map) {
+            (Some(place), _) => Ok(Self { subject, geographic: true, place }),
+            (None, Some(place)) => Ok(Self { subject, geographic: false, place }),
+            _ => Err(format!(
+                "the columns are {}, expected lon, lat and height, or easting, northing and height",
+                header.join(", ")
+            )),
+        }
+    }
+
+    fn position(&self, fields: &[String]) -> Result<ControlPosition, String> {
+        let text = |column: usize| fields.get(column).map(String::as_str).unwrap_or_default();
+        let number = |column: usize| match text(column).parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(format!("{:?} is no finite number", text(column).chars().take(40).collect::<String>())),
+        };
+        let three =
+            |columns: [usize; 3]| Ok::<_, String>([number(columns[0])?, number(columns[1])?, number(columns[2])?]);
+        let subject = match self.subject {
+            SubjectColumns::Name(column) if text(column).is_empty() => return Err("the name is empty".to_owned()),
+            SubjectColumns::Name(column) => Subject::Image(text(column).to_owned()),
+            SubjectColumns::Model(columns) => Subject::Model(three(columns)?),
+        };
+        let [a, b, height] = three(self.place)?;
+        if self.geographic && (b.abs() > 90.0 || a.abs() > 360.0) {
+            return Err(format!("longitude {a} and latitude {b} are no place on Earth"));
+        }
+        let place = if self.geographic {
+            Place::Geographic(LonLatHeight::new(a, b, height))
+        } else {
+            Place::Map([a, b, height])
+        };
+        Ok(ControlPosition { subject, place })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn names_and_points_on_earth_and_on_maps() {
+        let gps = parse("\u{feff}# drone\nImage, Latitude,longitude,note,ALT\n\"a,\"\"b\"\".jpg\", 43.5,5.4,x,180.25\n\nc.jpg,44,6,,1\n").unwrap();
+        assert_eq!(gps.len(), 2);
+        assert_eq!(gps[0].subject, Subject::Image("a,\"b\".jpg".to_owned()));
+        assert_eq!(gps[0].place, Place::Geographic(LonLatHeight::new(5.4, 43.5, 180.25)));
+        let pairs = parse("x;y;z;easting;northing;height\n1;2;3;400000.5;5e6;-3\n").unwrap();
+        assert_eq!(pairs[0].subject, Subject::Model([1.0, 2.0, 3.0]));
+        assert_eq!(pairs[0].place, Place::Map([400_000.5, 5e6, -3.0]));
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        for (text, line, words) in [
+            ("", 1, "empty"),
+            ("lon,lat,height\n", 1, "no column name"),
+            ("name,lon,lat\n", 1, "expected lon, lat and height"),
+            ("name,lon,lat,height\na,1,2,3\n\nb,1,x,3\n", 4, "\"x\" is no finite number"),
+            ("name,lon,lat,height\na,1,2\n", 2, "\"\" is no finite number"),
+            ("name,lon,lat,height\na,1,2,nan\n", 2, "no finite number"),
+            ("name,lon,lat,height\na,1,92,3\n", 2, "no place on Earth"),
+            ("name,lon,lat,height\n,1,2,3\n", 2, "the name is empty"),
+        ] {
+            let (found, what) = parse(text).unwrap_err();
+            assert!(found == line && what.contains(words), "{text:?}: {what} ({found})");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_makes_the_reader_panic(text in "\\PC{0,200}", lines in "[a-z,;\"\\n0-9.-]{0,200}") {
+            let _ = parse(&text);
+            let _ = parse(&format!("name,lon,lat,height\n{lines}"));
+        }
+    }
+}

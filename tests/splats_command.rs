@@ -1,0 +1,215 @@
+//! `skysweep splats` end to end: count against error on a simulated town, the image that the splats render back to, the file
+//! as trainers read it, pointing taken over from a run, and what is refused.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use io::raster::{ImageSource, read_dem};
+use io::splat_ply::LocalOrigin;
+use predicates::prelude::*;
+use serde_json::Value;
+
+fn skysweep() -> Command {
+    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
+}
+
+fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
+}
+
+/// A town of 120 m whose images point where their RPCs say.
+fn town(folder: &Path) -> PathBuf {
+    let parameters = std::fs::read_to_string(sample("scene.toml")).unwrap();
+    let parameters = parameters
+        .replace("size_m = 320.0", "size_m = 120.0")
+        .replace("pointing_error_px = [1.0, 3.0]", "pointing_error_px = [0.0, 0.0]");
+    let (file, scene) = (folder.join("scene.toml"), folder.join("town"));
+    std::fs::write(&file, parameters).unwrap();
+    skysweep().arg("simulate").arg(&file).arg("-o").arg(&scene).args(["--progress", "none"]).assert().code(0);
+    scene
+}
+
+fn json(output: std::process::Output) -> Value {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// PSNR of a rendering over the pixels whose true height is that of the surface model there: those it shows.
+fn psnr_by_truth(scene: &Path, rendering: &Path, range: &Value, view: &str) -> (f64, usize) {
+    let image = ImageSource::open(scene.join(format!("{view}.tif"))).unwrap();
+    let pixels = image.read_colour(image.window()).unwrap();
+    let rendered = ImageSource::open(rendering).unwrap();
+    let rendered = rendered.read_colour(rendered.window()).unwrap();
+    let truth = scene.join("truth").join(view.replace("view", "heights") + ".tif");
+    let rpc = io::rpc::read_for_image(&truth).unwrap().rpc;
+    let source = ImageSource::open(&truth).unwrap();
+    let heights = source.read_luma(source.window()).unwrap().luma;
+    let dsm = read_dem(scene.join("truth/dsm.tif")).unwrap();
+    let projection = geodesy::MapProjection::from_epsg(dsm.horizontal_epsg.unwrap()).unwrap();
+    let (low, high) = (range[0].as_f64().unwrap(), range[1].as_f64().unwrap());
+    let (mut sum, mut count) = (0.0, 0);
+    for row in 0..heights.height() {
+        for column in 0..heights.width() {
+            let height = f64::from(heights[(column, row)]);
+            let Ok(ground) = rpc.localize(camera::ImagePoint::new(column as f64, row as f64), height) else { continue };
+            let map = projection.map_from_lonlat(ground.lon_deg, ground.lat_deg).unwrap();
+            let (c, r) = dsm.geotransform.cell_from_map(map.x, map.y).unwrap();
+            let (c, r) = (c.round(), r.round());
+            // Away from the border, beyond which there are no splats to complete a pixel.
+            let inside = |at: f64, size: usize| at >= 2.0 && at < size as f64 - 2.0;
+            if !inside(c, dsm.heights.width()) || !inside(r, dsm.heights.height()) {
+                continue;
+            }
+            if (f64::from(dsm.heights[(c as usize, r as usize)]) - height).abs() < 0.3 {
+                let expected = ((f64::from(pixels[(column, row)][0]) - low) / (high - low)).clamp(0.0, 1.0);
+                sum += (f64::from(rendered[(column, row)][0]) / 255.0 - expected).powi(2);
+                count += 1;
+            }
+        }
+    }
+    (-10.0 * (sum / f64::from(count)).log10(), count as usize)
+}
+
+#[test]
+fn a_quarter_of_the_splats_shows_the_same_town() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = town(folder.path());
+    let (ply, pictures) = (folder.path().join("s.ply"), folder.path().join("pictures"));
+    for view in ["view_2", "view_3"] {
+        let mut command = skysweep();
+        command
+            .arg("splats")
+            .arg(scene.join("truth/dsm.tif"))
+            .arg(scene.join(format!("{view}.tif")))
+            .arg("-o")
+            .arg(&ply);
+        command.arg("--render").arg(&pictures).args(["--compare", "--json", "--overwrite"]);
+        let report = json(command.output().unwrap());
+        let number = |key: &str| report[key].as_f64().unwrap();
+        let times = number("uniform_at_equal_rmse") / number("splats");
+        assert!(times >= 4.0, "uniform splats are only {times:.2} times as many at the same error");
+        assert!(number("plane_error_max_m") <= 0.25 + 1e-6);
+        assert!(report["median_height"]["rmse_m"].as_f64().unwrap() < 0.1);
+        let told = report["views"][0]["psnr_db"].as_f64().unwrap();
+        let rendering = pictures.join(view).with_extension("png");
+        let (found, pixels) = psnr_by_truth(&scene, &rendering, &report["display_range"][0], view);
+        assert!(pixels > 40_000, "{pixels} pixels show the surface");
+        assert!(told >= 28.0 && found >= 28.0, "{view}: PSNR {told:.2} dB as told, {found:.2} dB by the truth");
+    }
+}
+
+/// The rows of a PLY as the loaders of 3DGS see them: properties by name, little-endian f32.
+fn load(path: &Path) -> (Vec<String>, Vec<Vec<f32>>) {
+    let bytes = std::fs::read(path).unwrap();
+    let mark = b"end_header\n";
+    let body = bytes.windows(mark.len()).position(|w| w == mark).unwrap() + mark.len();
+    let header = std::str::from_utf8(&bytes[..body]).unwrap();
+    assert!(header.starts_with("ply\nformat binary_little_endian 1.0\nelement vertex "));
+    let names: Vec<String> =
+        header.lines().filter_map(|line| line.strip_prefix("property float ")).map(str::to_owned).collect();
+    let floats: Vec<f32> = bytes[body..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+    (names.clone(), floats.chunks_exact(names.len()).map(<[f32]>::to_vec).collect())
+}
+
+#[test]
+fn the_file_is_what_trainers_load_and_lies_on_the_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, ply) = (town(folder.path()), folder.path().join("s.ply"));
+    let mut command = skysweep();
+    command.arg("splats").arg(scene.join("truth/dsm.tif")).arg(scene.join("view_2.tif")).arg("-o").arg(&ply);
+    let report = json(command.args(["--json", "--sh-degree", "3"]).output().unwrap());
+    let (names, rows) = load(&ply);
+    assert_eq!(rows.len() as u64, report["splats"].as_u64().unwrap());
+    assert_eq!(names.iter().filter(|n| n.starts_with("f_rest_")).count(), 45);
+    let column = |name: &str| names.iter().position(|n| n == name).unwrap();
+    let origin: LocalOrigin =
+        serde_json::from_slice(&std::fs::read(ply.with_extension("origin.json")).unwrap()).unwrap();
+    assert_eq!((origin.crs.as_str(), origin.vertical.as_str()), ("EPSG:32631", "ellipsoid"));
+    let dsm = read_dem(scene.join("truth/dsm.tif")).unwrap();
+    let mut off_surface = 0;
+    for row in &rows {
+        let at = |name: &str| f64::from(row[column(name)]);
+        let length: f64 = (0..4).map(|i| at(&format!("rot_{i}")).powi(2)).sum();
+        assert!((length - 1.0).abs() < 1e-5);
+        let opacity = 1.0 / (1.0 + (-at("opacity")).exp());
+        assert!((opacity - 0.99).abs() < 1e-3, "no confidence was given: {opacity}");
+        assert!((0..3).all(|i| (0.001..40.0).contains(&at(&format!("scale_{i}")).exp())));
+        let [x, y, z] = ["x", "y", "z"].map(at);
+        let (c, r) = dsm.geotransform.cell_from_map(x + origin.origin[0], y + origin.origin[1]).unwrap();
+        // The middle of an even block lies between cells, of which the plane is within the bound.
+        let near =
+            [c.floor(), c.ceil()].into_iter().flat_map(|c| [r.floor(), r.ceil()].map(|r| (c as usize, r as usize)));
+        let off =
+            near.map(|cell| (f64::from(dsm.heights[cell]) - z - origin.origin[2]).abs()).fold(f64::INFINITY, f64::min);
+        off_surface += usize::from(off > 0.25 + 0.01);
+    }
+    assert_eq!(off_surface, 0);
+}
+
+#[test]
+fn discs_uniform_splats_and_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = town(folder.path());
+    let run = |name: &str, threads: &str, options: &[&str]| {
+        let ply = folder.path().join(name);
+        let mut command = skysweep();
+        command.env("RAYON_NUM_THREADS", threads).arg("splats").arg(scene.join("truth/dsm.tif"));
+        command.arg(scene.join("view_2.tif")).arg("-o").arg(&ply).arg("-q").args(options).assert().code(0);
+        ply
+    };
+    let bytes = |path: PathBuf| std::fs::read(path).unwrap();
+    assert!(bytes(run("a.ply", "1", &[])) == bytes(run("b.ply", "3", &[])), "threads change the splats");
+    let discs = io::splat_ply::read(&run("c.ply", "2", &["--form", "2d", "--uniform", "4"])).unwrap();
+    assert_eq!((discs.layout.form, discs.splats.len()), (io::splat_ply::SplatForm::Discs, 60 * 60));
+    // Squares of 4 cells of half a metre: one metre of standard deviation where the ground is level.
+    assert!(discs.splats.iter().all(|s| s.scale_m[0] >= 0.999 && s.scale_m[1] >= 0.999));
+}
+
+/// The sample's RPCs are off by pixels, each its own way: a run finds out, and the splats take it over.
+#[test]
+fn pointing_comes_from_the_run_that_made_the_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, ply) = (folder.path().join("out"), folder.path().join("s.ply"));
+    let images = ["view_1.tif", "view_2.tif", "view_3.tif"].map(sample);
+    skysweep().arg("dsm").args(&images).arg("-o").arg(&out).args(["-q", "--gsd", "1"]).assert().code(0);
+    let psnr = |options: &[&str]| {
+        let mut command = skysweep();
+        command.arg("splats").arg(out.join("dsm/dsm.tif")).args(&images).arg("-o").arg(&ply);
+        command.arg("--confidence").arg(out.join("dsm/confidence.tif")).args(["--json", "--overwrite"]).args(options);
+        let report = json(command.output().unwrap());
+        (0..3).map(|i| report["views"][i]["psnr_db"].as_f64().unwrap()).sum::<f64>() / 3.0
+    };
+    let (with, without) = (psnr(&[]), psnr(&["--pointing", "none"]));
+    assert!(with > without + 0.5, "{with:.2} dB with the corrections of the run, {without:.2} dB without");
+    let opacities: Vec<f32> = io::splat_ply::read(&ply).unwrap().splats.iter().map(|s| s.opacity).collect();
+    assert!(opacities.iter().any(|o| *o < 0.7) && opacities.iter().any(|o| *o > 0.9), "confidence becomes opacity");
+}
+
+#[test]
+fn what_cannot_be_done_is_said_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let ply = folder.path().join("s.ply");
+    let (dsm, image) = (sample("truth/dsm.tif"), sample("view_1.tif"));
+    let refused = |options: &[&std::ffi::OsStr], words: &str| {
+        let words = predicate::str::contains(words.to_owned());
+        skysweep().arg("splats").args(options).arg("-o").arg(&ply).assert().code(2).stderr(words);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    };
+    let (dsm, image) = (dsm.as_os_str(), image.as_os_str());
+    refused(&[dsm, image, "--error".as_ref(), "0".as_ref()], "the bound on heights is 0");
+    refused(&[dsm, dsm], "RPC");
+    refused(&[image, image], "coordinate reference system");
+    refused(&["none.tif".as_ref(), image], "none.tif");
+    refused(&[dsm, image, "--confidence".as_ref(), image], "confidence");
+    std::fs::write(&ply, "mine").unwrap();
+    let arguments = [dsm, image];
+    skysweep()
+        .arg("splats")
+        .args(arguments)
+        .arg("-o")
+        .arg(&ply)
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("--overwrite"));
+    assert_eq!(std::fs::read(&ply).unwrap(), b"mine");
+}
