@@ -179,7 +179,7 @@ fn pointing_comes_from_the_run_that_made_the_surface() {
         let report = json(command.output().unwrap());
         (0..3).map(|i| report["views"][i]["psnr_db"].as_f64().unwrap()).sum::<f64>() / 3.0
     };
-    let (with, without) = (psnr(&[]), psnr(&["--pointing", "none"]));
+    let (with, without) = (psnr(&[]), psnr(&["--corrections", "none"]));
     assert!(with > without + 0.5, "{with:.2} dB with the corrections of the run, {without:.2} dB without");
     let opacities: Vec<f32> = io::splat_ply::read(&ply).unwrap().splats.iter().map(|s| s.opacity).collect();
     assert!(opacities.iter().any(|o| *o < 0.7) && opacities.iter().any(|o| *o > 0.9), "confidence becomes opacity");

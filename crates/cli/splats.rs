@@ -43,10 +43,10 @@ pub(crate) struct Args {
     /// Confidence of the cells, 0 to 1, on the grid of the DSM; it becomes opacity [default: full].
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
-    /// Report of the run that made the DSM, whose pointing corrections the images get: a file, or none [default: RUN/report/report.json for
-    /// RUN/dsm/dsm.tif].
-    #[arg(long, value_name = "FILE|none")]
-    pointing: Option<PathBuf>,
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default: those of the run that made the
+    /// surface model, for the images that it used].
+    #[arg(long, value_name = "report.json|none")]
+    corrections: Option<PathBuf>,
     /// What the DSM's heights are above, where the file does not say: ellipsoid, egm96, egm2008 or an EPSG code.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
@@ -156,28 +156,35 @@ fn image(path: &Path, corrections: &Corrections) -> anyhow::Result<Image> {
 /// The pointing corrections of a run, by image.
 struct Corrections(Vec<(PathBuf, ImageCorrection)>);
 
+/// What is read of a run's report.
+#[derive(serde::Deserialize)]
+struct RunReport {
+    images: Vec<RunImage>,
+}
+
+#[derive(serde::Deserialize)]
+struct RunImage {
+    path: PathBuf,
+    applied_correction: Option<ImageCorrection>,
+}
+
 impl Corrections {
     fn of(args: &Args) -> anyhow::Result<Self> {
-        let beside = || args.dsm.parent()?.parent().map(|run| run.join("report/report.json"));
-        let path = match &args.pointing {
+        let folder = args.dsm.parent().filter(|folder| folder.file_name().is_some_and(|name| name == "dsm"));
+        let beside = || Some(folder?.parent()?.join("report/report.json")).filter(|path| path.is_file());
+        let path = match &args.corrections {
             Some(path) if path.as_os_str() == "none" => return Ok(Self(Vec::new())),
             Some(path) => path.clone(),
-            None => match beside().filter(|path| path.is_file()) {
+            None => match beside() {
                 Some(path) => path,
                 None => return Ok(Self(Vec::new())),
             },
         };
         let text =
             std::fs::read_to_string(&path).with_context(|| format!("cannot read the file: {}", path.display()))?;
-        let report: Value =
-            serde_json::from_str(&text).with_context(|| format!("not a report of skysweep dsm: {}", path.display()))?;
-        let applied = report["pointing"]["applied"].as_bool().unwrap_or(false);
-        let images = report["images"].as_array().filter(|_| applied).map(Vec::as_slice).unwrap_or_default();
-        let one = |image: &Value| {
-            let correction = serde_json::from_value(image.get("correction")?.clone()).ok()?;
-            Some((PathBuf::from(image.get("path")?.as_str()?), correction))
-        };
-        Ok(Self(images.iter().filter_map(one).collect()))
+        let report: RunReport = serde_json::from_str(&text)
+            .with_context(|| format!("no report of skysweep dsm with its images: {}", path.display()))?;
+        Ok(Self(report.images.into_iter().filter_map(|image| Some((image.path, image.applied_correction?))).collect()))
     }
 
     /// The correction of an image: by its path, else by its name where that is unique; none where the run did not use it.
