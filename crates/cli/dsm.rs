@@ -55,9 +55,12 @@ pub(crate) struct Args {
     /// Worker threads [default: all cores].
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Memory to stay under, megabytes.
+    /// Memory to stay under, megabytes; a scene that takes more is computed by chunks [default: 4000].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
+    /// Side of the chunks that a scene is computed by, cells [default: as large as the memory allows].
+    #[arg(long, value_name = "CELLS")]
+    chunk: Option<usize>,
     /// Side of the tiles that are fused at a time, cells; it changes memory, never the result.
     #[arg(long, value_name = "CELLS", default_value_t = 1024)]
     tile: usize,
@@ -117,6 +120,7 @@ impl Args {
             pointing: !self.no_pointing,
             threads: self.threads,
             memory_mb: self.memory,
+            chunk: self.chunk,
             tile: self.tile,
             overwrite: self.overwrite,
             ..DsmConfig::new(self.images.clone(), self.output.clone())
@@ -134,7 +138,8 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     } else if !global.is_quiet() {
         crate::print::text(&summary(args, &report))?;
     }
-    Ok(Outcome::Complete)
+    let is_whole = report.chunks.as_ref().is_none_or(|c| c.failed.is_empty());
+    Ok(if is_whole { Outcome::Complete } else { Outcome::Partial })
 }
 
 fn summary(args: &Args, report: &DsmReport) -> String {

@@ -54,8 +54,10 @@ pub struct DsmConfig {
     pub pointing: bool,
     /// Worker threads; all cores when `None`.
     pub threads: Option<usize>,
-    /// Memory to stay under, megabytes.
+    /// Memory to stay under, megabytes; 4000 when `None`. A scene that takes more is computed by chunks.
     pub memory_mb: Option<u64>,
+    /// Side of the chunks that a scene is computed by, cells; as large as the memory allows when `None`.
+    pub chunk: Option<usize>,
     /// Side of the output tiles that are fused at a time, cells.
     pub tile: usize,
     /// Whether existing results may be replaced.
@@ -80,6 +82,7 @@ impl DsmConfig {
             pointing: true,
             threads: None,
             memory_mb: None,
+            chunk: None,
             tile: 1024,
             overwrite: false,
         }

@@ -2,54 +2,33 @@
 
 use std::time::Instant;
 
-use camera::ImagePoint;
-use raster::{Grid, Window};
-use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::fusion::{
-    FillConfig, FusionConfig, GridFrame, PlacedView, fill_voids, fuse_views, place_view, remove_speckle,
-};
+use camera::{ImagePoint, RpcCamera};
+use raster::Window;
+use sweep::View;
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
-use sweep::{HeightMap, View};
 
-use crate::config::DsmConfig;
+use crate::chunks::{self, ChunkedScene, Outcome};
+use crate::config::{DsmConfig, Tuning};
 use crate::error::PipelineError;
-use crate::first_look::{Looked, asked_pairs, look, ordered, pair_names};
-use crate::heights::{SceneHeights, SweepPlan, sweep_scene};
+use crate::first_look::{Looked, Pixels, asked_pairs, look, ordered, pair_names};
+use crate::heights::sweep_scene;
 use crate::memory;
-use crate::output::{self, FILLED, Product};
+use crate::output::{self, ChunkedOutput};
 use crate::pictures;
-use crate::pointing::{PairTies, adjust_views};
+use crate::pointing::{PairTies, adjust_cameras};
 use crate::progress::Progress;
-use crate::report::{DsmReport, ImageReport, PairReport, PointingReport, StageTime, SurfaceReport};
+use crate::report::{
+    ChunksReport, DsmReport, FailedChunk, ImageReport, PairReport, PointingReport, StageTime, SurfaceReport,
+};
 use crate::scene::{Geometry, Opened, open};
 use crate::setup::{self, Choices, EARTH_RANGE_M, OutputGrid};
+use crate::surface::{Counts, SurfaceInput, make_surface};
+use crate::tie_windows::Character;
 
-/// Isolated patches of less ground than a square of this side are speckle: smaller than a house, metres.
-const SPECKLE_SIDE_M: f64 = 5.0;
-/// … and never of fewer cells than this, whatever the grid.
-const SPECKLE_CELLS_MIN: usize = 9;
 /// Where no two views are further apart than this, heights are ten times less precise than positions, and the user is told.
 const ANGLE_WEAK_DEG: f64 = 3.0;
 /// Smaller output tiles cost more to manage than to fill, cells.
 const TILE_MIN: usize = 64;
-/// Heights around a void are looked for within this many metres: the shadow side of a tower.
-const FILL_REACH_M: f64 = 40.0;
-/// Voids up to this many metres across are closed: the shadow side of a house.
-const FILL_NARROW_M: f64 = 10.0;
-/// A surface hides what is this many times its height away: views lean by up to 30°, and shadows reach further.
-const FILL_HIDDEN: f64 = 1.0;
-/// Heights around a void that differ by more than this per metre between them are two surfaces: steeper than streets.
-const FILL_SLOPE: f64 = 0.05;
-/// A facet steeper than this (rise over run) is a tear, not a surface: about 70°. Two hypotheses apart is no tear yet.
-const TEAR_SLOPE: f64 = 2.75;
-
-/// A height around which the views agree on less of the picture's contrast than this has no picture behind it: the best of
-/// several unrelated pictures reaches nearly this.
-const SUPPORT_MIN: f32 = 0.2;
-/// A height that stands out from all others by less than this, of the worst cost, may be chance, as on water: what is known
-/// around says more. Half of it and twice it are alike on simulated towns; JAX_068 gains in completeness with every set of its
-/// views, and loses 0.02 m of MAE with one pair.
-const CONFIDENCE_MIN: f32 = 0.1;
 
 /// Runs a DSM job and writes its results.
 ///
@@ -100,6 +79,9 @@ fn validate(config: &DsmConfig) -> Result<(), PipelineError> {
     if config.tile < TILE_MIN {
         return value("--tile", config.tile.to_string(), "64 or more cells");
     }
+    if let Some(side) = config.chunk.filter(|side| *side < TILE_MIN) {
+        return value("--chunk", side.to_string(), "64 or more cells");
+    }
     if config.threads == Some(0) {
         return value("--threads", "0".to_owned(), "1 or more");
     }
@@ -134,13 +116,16 @@ impl<'a> Job<'a> {
         let config = self.config;
         let tuning = config.preset.tuning();
         let mut images = open(&config.images)?;
-        let Looked { first, useful, windows, mut views, ties } = {
+        let Looked { first, useful, ties, windows, cameras, sizes, blank, mut pixels } = {
             let (times, since) = (&mut self.times, &mut self.since);
             look(config, &images, self.progress, &mut |stage| lap(times, since, stage))?
         };
-        self.check_pictures(&views, &windows, &ties)?;
-        let (adjustment, tracks) = adjust_views(&views, &ties, &AdjustConfig::default());
-        let pointed = self.point(&mut images, &mut views, &windows, &adjustment);
+        self.check_pictures(&blank, &windows, &ties)?;
+        let (adjustment, tracks) = adjust_cameras(&cameras, &sizes, &ties, &AdjustConfig::default());
+        let pointed = self.is_pointed(&adjustment);
+        if pointed {
+            point(&mut images, &mut pixels, cameras, &windows, &adjustment);
+        }
         let useful = if pointed { self.connected(useful, &ties) } else { useful };
         let pairs = self.pairs(&useful, &first)?;
         self.lap("pointing");
@@ -151,49 +136,155 @@ impl<'a> Job<'a> {
         let geometry = Geometry::at(&images, middle)?;
         let gsds: Vec<Option<f64>> = images.iter().map(|o| setup::ground_sampling(o, geometry.centre)).collect();
         let coarsest = gsds.iter().flatten().copied().fold(0.0, f64::max);
-        let grid = setup::choose_grid(config, &geometry, coarsest, &mut self.choices)?;
+        let grid = setup::choose_grid(config, &geometry, coarsest)?;
+        setup::tell_grid(config, &grid, coarsest, &mut self.choices);
         let sources = setup::choose_sources(config, &geometry, &pairs, &ties, &tuning, &mut self.choices)?;
-        let found = (sources.as_slice(), &geometry);
-        let range = setup::with_towers(config, range, &views, found, coarsest, &tuning, &mut self.choices)?;
-        let sides = setup::smallest_sides(&views);
-        let plan = setup::plan_sweep(range, sources, &geometry, &sides, &tuning, &mut self.choices);
+        let scene = Scene { images: &images, geometry, useful, sources, range, coarsest, grid: &grid, tuning };
+        let drawn = |range, hypotheses, surface, chunks| DsmReport {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            images: image_reports(&images, &gsds, &scene.geometry, &adjustment),
+            pairs: pair_reports(&scene.geometry, &ties),
+            pointing: PointingReport::new(&adjustment, tracks.len(), pointed),
+            height_range_m: range,
+            hypotheses,
+            surface,
+            chunks,
+            choices: Vec::new(),
+            warnings: Vec::new(),
+            stages: Vec::new(),
+            peak_memory_mb: None,
+        };
+        match pixels {
+            Pixels::Whole(views) => self.at_once(&scene, views, drawn),
+            Pixels::ByChunk(characters) => self.by_chunks(&scene, &characters, drawn),
+        }
+    }
+
+    /// Sweeps all views and writes the surface.
+    fn at_once(mut self, scene: &Scene<'_>, views: Vec<View>, drawn: impl Drawn) -> Result<DsmReport, PipelineError> {
+        let Scene { geometry, sources, tuning, grid, coarsest, .. } = scene;
+        let found = (sources.as_slice(), geometry);
+        let range = setup::with_towers(self.config, scene.range, &views, found, *coarsest, tuning, &mut self.choices)?;
+        let step_m = setup::height_step(sources, geometry, tuning);
+        setup::tell_step(sources, geometry, tuning, &mut self.choices);
+        let plan = setup::plan_sweep(range, step_m, sources.clone(), &setup::smallest_sides(&views), tuning);
+        setup::tell_levels(&plan, &mut self.choices);
 
         self.progress.begin("sweeping heights", views.len() * (plan.top_level - plan.bottom_level + 1));
         let heights = sweep_scene(&views, &plan, &|| self.progress.step())?;
         self.lap("sweep");
-        let evaluations = heights.evaluations;
-        let (product, surface) = self.surface(&views, &plan, &useful, heights, &grid)?;
+        let hypotheses = heights.evaluations;
+        let core = Window::whole(grid.size.0, grid.size.1);
+        let input = SurfaceInput { config: self.config, plan: &plan, useful: &scene.useful, grid, core };
+        self.progress.begin("fusing", 1 + sources.iter().filter(|s| !s.is_empty()).count());
+        let (product, counts) = make_surface(input, views, heights, &|| self.progress.step())?;
+        if counts.observed == 0 {
+            return Err(PipelineError::NoSurface { range });
+        }
         self.lap("fusion");
 
         self.progress.begin("writing", 1);
-        let report = DsmReport {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            images: image_reports(&images, &gsds, &geometry, &adjustment),
-            pairs: pair_reports(&geometry, &ties),
-            pointing: PointingReport::new(&adjustment, tracks.len(), pointed),
-            height_range_m: range,
-            hypotheses: evaluations,
-            surface,
+        let report = self.told(drawn(range, hypotheses, surface_report(grid, counts), None));
+        let report = output::write(self.config, grid, &product, report)?;
+        self.progress.step();
+        Ok(report)
+    }
+
+    /// Sweeps a large scene chunk by chunk. A chunk that fails leaves a void, and the others go on.
+    fn by_chunks(
+        mut self,
+        scene: &Scene<'_>,
+        characters: &[Character],
+        drawn: impl Drawn,
+    ) -> Result<DsmReport, PipelineError> {
+        let (config, grid) = (self.config, scene.grid);
+        setup::tell_step(&scene.sources, &scene.geometry, &scene.tuning, &mut self.choices);
+        let side = chunks::choose_side(config, scene.images, grid, scene.range)?;
+        let mut cores = chunks::cores(grid.size, side);
+        self.tell_chunks(cores.len(), side);
+        let chunked = ChunkedScene {
+            config,
+            tuning: &scene.tuning,
+            images: scene.images,
+            characters,
+            grid,
+            useful: &scene.useful,
+            sources: &scene.sources,
+            step_m: setup::height_step(&scene.sources, &scene.geometry, &scene.tuning),
+            gsd_m: scene.coarsest,
+            range_m: scene.range,
+        };
+        let mut output = ChunkedOutput::begin(config, grid)?;
+        let mut total = ChunkTotal { report: ChunksReport { side, ..ChunksReport::default() }, ..Default::default() };
+        self.progress.begin("sweeping chunks", cores.len());
+        cores.reverse();
+        while let Some(core) = cores.pop() {
+            match chunked.sweep(core) {
+                Ok(Outcome::TooLarge) => {
+                    // The quarters come in its place; the last of them makes its step.
+                    cores.extend(chunks::quarters(core).into_iter().rev());
+                    continue;
+                }
+                Ok(Outcome::Swept(swept)) => {
+                    output.put(core, &swept.product)?;
+                    total.add(swept.counts, swept.evaluations, swept.range_m);
+                }
+                Ok(Outcome::Unseen) => {
+                    total.report.unseen += 1;
+                    total.leave(core);
+                }
+                Err(error) => {
+                    let bounds = grid.part(core)?.bounds();
+                    self.choices.warn(format!("the chunk {bounds:.1?} is left void: {}", reason_of(&error)));
+                    total.report.failed.push(FailedChunk { bounds, reason: reason_of(&error) });
+                    total.leave(core);
+                    total.error.get_or_insert(error);
+                }
+            }
+            self.progress.step();
+        }
+        self.lap("chunks");
+        let ChunkTotal { counts, evaluations, range_m, report, error } = total;
+        if counts.observed == 0 {
+            return Err(error.unwrap_or(PipelineError::NoSurface { range: scene.range }));
+        }
+        self.progress.begin("writing", 1);
+        let surface = surface_report(grid, counts);
+        let report = self.told(drawn(range_m.unwrap_or(scene.range), evaluations, surface, Some(report)));
+        let report = output.finish(report)?;
+        self.progress.step();
+        Ok(report)
+    }
+
+    fn tell_chunks(&mut self, count: usize, side: usize) {
+        let reason = match self.config.chunk {
+            Some(_) => "given".to_owned(),
+            None => format!("the largest that {} MB allow", memory::limit_mb(self.config)),
+        };
+        self.choices.tell("chunks", format!("{count} of up to {side} cells a side"), reason);
+    }
+
+    /// The report with what was said and measured on the way.
+    fn told(&mut self, report: DsmReport) -> DsmReport {
+        DsmReport {
             choices: self.choices.made.clone(),
             warnings: self.choices.warnings.clone(),
             stages: self.times.clone(),
             peak_memory_mb: memory::peak_mb(),
-        };
-        let report = output::write(config, &grid, &product, report)?;
-        self.progress.step();
-        Ok(report)
+            ..report
+        }
     }
 
     /// Refuses one picture under two RPCs.
     fn check_pictures(
         &self,
-        views: &[View],
+        blank: &[bool],
         windows: &[Option<Window>],
         ties: &[PairTies],
     ) -> Result<(), PipelineError> {
         let path = |i: usize| self.config.images[i].clone();
-        let blank: Vec<usize> = (0..views.len()).filter(|&i| pictures::is_blank(&views[i])).collect();
-        if let (Some(&first), true) = (blank.first(), views.len() < blank.len() + 2) {
+        let pictures = blank.iter().filter(|b| !**b).count();
+        if let (Some(first), true) = (blank.iter().position(|b| *b), pictures < 2) {
             return Err(PipelineError::Blank { path: path(first) });
         }
         let origins: Vec<[f64; 2]> = windows.iter().map(|w| w.map_or([0.0; 2], |w| [w.x as f64, w.y as f64])).collect();
@@ -245,14 +336,8 @@ impl<'a> Job<'a> {
         Ok(pairs)
     }
 
-    /// Puts the corrections into the cameras, unless pointing is off or the ties are too few; says whether it did.
-    fn point(
-        &mut self,
-        images: &mut [Opened],
-        views: &mut [View],
-        windows: &[Option<Window>],
-        found: &Adjustment,
-    ) -> bool {
+    /// Whether corrections are to be put into the cameras: unless pointing is off or the ties are too few.
+    fn is_pointed(&mut self, found: &Adjustment) -> bool {
         let ties = found.ground.iter().flatten().count();
         if !self.config.pointing {
             self.choices.tell("pointing", "as given".to_owned(), "--no-pointing");
@@ -283,13 +368,6 @@ impl<'a> Job<'a> {
             order.to_owned(),
             format!("{ties} tie points, residual {before:.2} px before and {after:.2} px after, by BIC"),
         );
-        for ((view, image), (correction, window)) in
-            views.iter_mut().zip(images).zip(found.corrections.iter().zip(windows))
-        {
-            view.camera.correction = *correction;
-            let origin = window.map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(-w.x as f64, -w.y as f64));
-            image.camera = view.camera.cropped(origin);
-        }
         true
     }
 
@@ -297,131 +375,94 @@ impl<'a> Job<'a> {
     fn dem_span(&self, geometry: &Geometry) -> Result<Option<(f64, f64)>, PipelineError> {
         self.config.dem.as_deref().map(|path| crate::dem::height_span(path, geometry)).transpose()
     }
+}
 
-    /// Consistency, fusion and clean-up.
-    fn surface(
-        &mut self,
-        views: &[View],
-        plan: &SweepPlan,
-        useful: &[(usize, usize)],
-        heights: SceneHeights,
-        grid: &OutputGrid,
-    ) -> Result<(Product, SurfaceReport), PipelineError> {
-        let all: Vec<Heights<'_>> = heights
-            .maps
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| !plan.sources[*i].is_empty())
-            .map(|(index, map)| Heights { index, view: &views[index], map })
-            .collect();
-        self.progress.begin("fusing", all.len() + 1);
-        let lonlat =
-            |g: geodesy::LonLatHeight| grid.projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok().map(|p| [p.x, p.y]);
-        let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &lonlat };
-        let level = plan.bottom_level as u32;
-        let jump_m = same_surface_m(plan, grid);
-        let mut placed = Vec::with_capacity(all.len());
-        let mut kept = Vec::with_capacity(all.len());
-        for own in &all {
-            let mut keep = agreeing(*own, &all, useful, level)?;
-            if let Some(asked) = self.config.height_range_m {
-                drop_outside(&mut keep, own.map, asked);
-            }
-            kept.push(keep.data().iter().filter(|k| **k).count() as f64 / keep.data().len().max(1) as f64);
-            placed.push(place_view(*own, level, &keep, jump_m, &frame)?);
-            self.progress.step();
-        }
-        let (product, surface) = self.fuse(&placed, plan, grid, heights.maps[0].origin_m)?;
-        self.progress.step();
-        Ok((product, SurfaceReport { kept_by_view: kept, ..surface }))
+/// What is known of a scene when its heights are to be computed.
+struct Scene<'a> {
+    /// With corrected cameras.
+    images: &'a [Opened],
+    geometry: Geometry,
+    /// Pairs that look from different directions.
+    useful: Vec<(usize, usize)>,
+    sources: Vec<Vec<usize>>,
+    /// Heights to search, metres above the ellipsoid.
+    range: (f64, f64),
+    /// The coarsest image's pixel, metres.
+    coarsest: f64,
+    grid: &'a OutputGrid,
+    tuning: Tuning,
+}
+
+/// Draws up the report: heights searched, hypotheses, surface, chunks.
+trait Drawn: FnOnce((f64, f64), u64, SurfaceReport, Option<ChunksReport>) -> DsmReport {}
+
+impl<F: FnOnce((f64, f64), u64, SurfaceReport, Option<ChunksReport>) -> DsmReport> Drawn for F {}
+
+/// What the chunks done so far come to.
+#[derive(Default)]
+struct ChunkTotal {
+    counts: Counts,
+    evaluations: u64,
+    /// Heights searched in any chunk.
+    range_m: Option<(f64, f64)>,
+    report: ChunksReport,
+    /// The first.
+    error: Option<PipelineError>,
+}
+
+impl ChunkTotal {
+    fn add(&mut self, counts: Counts, evaluations: u64, range: (f64, f64)) {
+        self.counts.add(counts);
+        self.evaluations += evaluations;
+        self.range_m = Some(self.range_m.map_or(range, |r| (r.0.min(range.0), r.1.max(range.1))));
+        self.report.done += 1;
     }
 
-    fn fuse(
-        &self,
-        placed: &[PlacedView],
-        plan: &SweepPlan,
-        grid: &OutputGrid,
-        origin_m: f64,
-    ) -> Result<(Product, SurfaceReport), PipelineError> {
-        let gsd = grid.gsd_m;
-        // Heights and their places are as coarse as the level that they come from.
-        let coarser = f64::from(1u32 << plan.bottom_level);
-        let step_m = plan.step_at(plan.bottom_level);
-        let same_surface_m = same_surface_m(plan, grid);
-        let fusion = FusionConfig {
-            same_surface_m,
-            tear_m: (TEAR_SLOPE * gsd * coarser).max(2.0 * step_m) as f32,
-            tile: self.config.tile,
-        };
-        let mut fused = fuse_views(placed, grid.size, &fusion);
-        let speckle_cells = ((SPECKLE_SIDE_M / gsd).powi(2) as usize).max(SPECKLE_CELLS_MIN);
-        let removed = remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd) as f32, speckle_cells);
-        let observed = fused.height_m.data().iter().filter(|h| !h.is_nan()).count();
-        if observed == 0 {
-            return Err(PipelineError::NoSurface { range: plan.range_m });
-        }
-        let fill = FillConfig {
-            reach_cells: (FILL_REACH_M / gsd).ceil() as usize,
-            narrow_cells: (FILL_NARROW_M / gsd) as f32,
-            hidden_cells_per_m: (FILL_HIDDEN / gsd) as f32,
-            same_surface_m: (2.0 * gsd) as f32,
-            slope_m: (FILL_SLOPE * gsd) as f32,
-        };
-        let filled = fill_voids(&mut fused.height_m, &fill);
-        let product = Product::new(fused, filled, origin_m);
-        let cells = grid.size.0 * grid.size.1;
-        let filled = product.filled.data().iter().filter(|f| **f == FILLED).count();
-        let surface = SurfaceReport {
-            cells,
-            observed,
-            filled,
-            void: cells - observed - filled,
-            speckle_removed: removed,
-            kept_by_view: Vec::new(),
-        };
-        Ok((product, surface))
+    /// A chunk that stays void.
+    fn leave(&mut self, core: Window) {
+        self.counts.void += core.width * core.height;
     }
 }
 
-/// Heights on the grid closer than this may belong to one surface.
-fn same_surface_m(plan: &SweepPlan, grid: &OutputGrid) -> f32 {
-    (2.0 * plan.step_at(plan.bottom_level)).max(1.5 * grid.gsd_m) as f32
+/// An error with its causes.
+fn reason_of(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(error.source(), |e| e.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
-/// Which pixels enough other views agree with: a third of the views that see this one's ground from another direction,
-/// so that a chance agreement of two among many does not put a height on the map, and at least one. A single reference
-/// view has nobody to agree with: its heights stand.
-fn agreeing(
-    own: Heights<'_>,
-    all: &[Heights<'_>],
-    useful: &[(usize, usize)],
-    level: u32,
-) -> Result<Grid<bool>, PipelineError> {
-    let partner = |h: &Heights<'_>| useful.contains(&(own.index.min(h.index), own.index.max(h.index)));
-    let others: Vec<Heights<'_>> = all.iter().copied().filter(partner).collect();
-    if others.is_empty() {
-        return Ok(own.map.height_m.map(|h| !h.is_nan()));
+fn surface_report(grid: &OutputGrid, counts: Counts) -> SurfaceReport {
+    let share = |(kept, all): &(u64, u64)| (*all > 0).then(|| *kept as f64 / *all as f64);
+    SurfaceReport {
+        cells: grid.size.0 * grid.size.1,
+        observed: counts.observed,
+        filled: counts.filled,
+        void: counts.void,
+        speckle_removed: counts.speckle_removed,
+        kept_by_view: counts.kept.iter().filter_map(share).collect(),
     }
-    let counts = count_agreeing(own, &others, level, &ConsistencyConfig::default())?;
-    let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
-    let mut keep = counts.map(|n| *n >= needed);
-    let reliability = own.map.support.data().iter().zip(own.map.confidence.data());
-    for (keep, (support, confidence)) in keep.data_mut().iter_mut().zip(reliability) {
-        *keep = *keep && *support >= SUPPORT_MIN && *confidence >= CONFIDENCE_MIN;
+}
+
+/// Puts the corrections found in the windows' frames into the cameras of windows and images.
+fn point(
+    images: &mut [Opened],
+    pixels: &mut Pixels,
+    cameras: Vec<RpcCamera>,
+    windows: &[Option<Window>],
+    found: &Adjustment,
+) {
+    for (i, mut camera) in cameras.into_iter().enumerate() {
+        camera.correction = found.corrections[i];
+        let origin = windows[i].map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(-w.x as f64, -w.y as f64));
+        images[i].camera = camera.cropped(origin);
+        if let Pixels::Whole(views) = pixels {
+            views[i].camera = camera;
+        }
     }
-    Ok(keep)
 }
 
 fn lap(times: &mut Vec<StageTime>, since: &mut Instant, stage: &str) {
     times.push(StageTime { stage: stage.to_owned(), seconds: since.elapsed().as_secs_f64() });
     *since = Instant::now();
-}
-
-/// Leaves out what lies outside the heights that were asked for.
-fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, (lo, hi): (f64, f64)) {
-    for (keep, h) in keep.data_mut().iter_mut().zip(map.height_m.data()) {
-        *keep = *keep && (lo..=hi).contains(&(map.origin_m + f64::from(*h)));
-    }
 }
 
 fn image_reports(images: &[Opened], gsds: &[Option<f64>], geometry: &Geometry, found: &Adjustment) -> Vec<ImageReport> {

@@ -5,32 +5,52 @@
 //! ground, coefficients of another block). Two images from different directions share ground only within some heights,
 //! which bounds the search whatever the RPCs say.
 
+use camera::RpcCamera;
 use raster::Window;
 use sweep::View;
 use sweep::pointing::TieConfig;
 
+use crate::chunks;
 use crate::config::DsmConfig;
 use crate::error::PipelineError;
 use crate::geometry::{footprint, local_polygon, overlap_share};
 use crate::memory;
+use crate::pictures;
 use crate::pointing::{PairTies, match_pairs};
-use crate::progress::{Progress, Silent};
+use crate::progress::Progress;
 use crate::scene::{Geometry, OVERLAP_MIN, Opened, read_views};
-use crate::setup::{self, Choices, EARTH_RANGE_M};
+use crate::setup::{self, EARTH_RANGE_M, OutputGrid};
+use crate::tie_windows::{Character, match_in_windows};
 
 /// Heights between which overlaps are looked at, metres: footprints move by tens of metres over it.
 const STEP_M: f64 = 50.0;
 
 /// Pixels read around what the bounds ask for, full resolution: patches, aggregation and pointing errors reach out.
-const WINDOW_MARGIN: usize = 96;
+pub(crate) const WINDOW_MARGIN: usize = 96;
 
-/// What is known before the pointing: the first geometry, the pairs that can give heights, and the views with their ties.
+/// What is known before the pointing: the first geometry, the pairs that can give heights, and the ties.
 pub(crate) struct Looked {
     pub(crate) first: Geometry,
     pub(crate) useful: Vec<(usize, usize)>,
-    pub(crate) windows: Vec<Option<Window>>,
-    pub(crate) views: Vec<View>,
+    /// In the frame of each image's window.
     pub(crate) ties: Vec<PairTies>,
+    /// The part of each image that is used; `None` is all of it.
+    pub(crate) windows: Vec<Option<Window>>,
+    /// The cameras of these windows.
+    pub(crate) cameras: Vec<RpcCamera>,
+    /// Their columns and rows.
+    pub(crate) sizes: Vec<(usize, usize)>,
+    /// Which images have no contrast.
+    pub(crate) blank: Vec<bool>,
+    pub(crate) pixels: Pixels,
+}
+
+/// The images' pixels.
+pub(crate) enum Pixels {
+    /// All that are used.
+    Whole(Vec<View>),
+    /// Too many to hold at once: what windows of them told.
+    ByChunk(Vec<Character>),
 }
 
 impl Looked {
@@ -74,14 +94,48 @@ fn look_at(
 ) -> Result<Looked, PipelineError> {
     let useful = first.useful_pairs()?;
     let pairs = asked_pairs(config, &useful)?;
-    let windows = windows(config, images, &first, search)?;
-    memory::check(config, images, &windows)?;
+    let gsd = images.iter().filter_map(|o| setup::ground_sampling(o, first.centre)).fold(0.0, f64::max);
+    let grid = setup::choose_grid(config, &first, gsd)?;
+    let windows = windows(config, images, &grid, search)?;
+    if !fits(config, images, &windows, &grid) {
+        // A limit that holds not even a small chunk is refused before anything is read.
+        chunks::choose_side(config, images, &grid, (first.centre.height_m, first.centre.height_m))?;
+        let (ties, characters) = match_in_windows(images, &grid, &pairs, search, progress)?;
+        return Ok(Looked {
+            first,
+            useful,
+            ties,
+            windows: vec![None; images.len()],
+            cameras: images.iter().map(|o| o.camera.clone()).collect(),
+            sizes: images.iter().map(|o| o.size).collect(),
+            blank: characters.iter().map(Character::is_blank).collect(),
+            pixels: Pixels::ByChunk(characters),
+        });
+    }
     progress.begin("reading images", images.len());
     let views = read_views(images, &windows, &|| progress.step())?;
     lap("read");
     progress.begin("matching tie points", pairs.len());
     let ties = match_pairs(&views, &pairs, search, &TieConfig::default(), &|| progress.step());
-    Ok(Looked { first, useful, windows, views, ties })
+    Ok(Looked {
+        first,
+        useful,
+        ties,
+        windows,
+        cameras: views.iter().map(|v| v.camera.clone()).collect(),
+        sizes: views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect(),
+        blank: views.iter().map(pictures::is_blank).collect(),
+        pixels: Pixels::Whole(views),
+    })
+}
+
+/// Whether the scene may be read at once.
+fn fits(config: &DsmConfig, images: &[Opened], windows: &[Option<Window>], grid: &OutputGrid) -> bool {
+    let cells = grid.size.0 * grid.size.1;
+    let pixels = |(o, w): (&Opened, &Option<Window>)| w.map_or(o.size.0 * o.size.1, |w| w.width * w.height) as u64;
+    let pixels: Vec<u64> = images.iter().zip(windows).map(pixels).collect();
+    let asked = config.chunk.is_none_or(|side| side >= grid.size.0.max(grid.size.1));
+    asked && memory::needed_mb(&pixels, cells as u64) <= memory::limit_mb(config)
 }
 
 /// The useful pairs, or those of them that were asked for.
@@ -104,19 +158,15 @@ pub(crate) fn asked_pairs(config: &DsmConfig, useful: &[(usize, usize)]) -> Resu
 fn windows(
     config: &DsmConfig,
     images: &[Opened],
-    geometry: &Geometry,
+    grid: &OutputGrid,
     search: (f64, f64),
 ) -> Result<Vec<Option<Window>>, PipelineError> {
     if config.bounds.is_none() {
         return Ok(vec![None; images.len()]);
     }
-    // The grid's placement needs no height; its choices are told later, once they are final.
-    let mut unheard = Choices { made: Vec::new(), warnings: Vec::new(), progress: &Silent };
-    let gsd = images.iter().filter_map(|o| setup::ground_sampling(o, geometry.centre)).fold(0.0, f64::max);
-    let grid = setup::choose_grid(config, geometry, gsd, &mut unheard)?;
     let range = config.height_range_m.unwrap_or(search);
     let window = |o: &Opened| {
-        let w = setup::image_window(o, &grid, range, WINDOW_MARGIN)?;
+        let w = setup::image_window(o, grid, range, WINDOW_MARGIN)?;
         w.map(Some).ok_or_else(|| PipelineError::Value {
             name: "--bounds",
             found: format!("an area that an image does not see: {}", o.path.display()),

@@ -1,5 +1,6 @@
 //! The jobs of the toolkit, from files to files: configuration, scene set-up, the DSM run, its report.
 
+mod chunks;
 pub mod config;
 mod dem;
 mod dsm;
@@ -16,6 +17,8 @@ pub mod progress;
 pub mod report;
 mod scene;
 mod setup;
+mod surface;
+mod tie_windows;
 
 pub use config::{DsmConfig, Preset};
 pub use dsm::run_dsm;

@@ -1,32 +1,49 @@
 //! What a run needs of memory, and what it took.
-
-use raster::Window;
+//!
+//! The estimate is the greatest of the stages' needs: while a view is swept all images and heights are there, while the
+//! views are placed on the grid all their vertices too, and at the end only vertices and the grid. `benches/results/scale.md`
+//! holds it against measured peaks.
 
 use crate::config::DsmConfig;
 use crate::error::PipelineError;
-use crate::scene::Opened;
 
-/// Bytes per pixel of one view that stay through the run: image and pyramid (4 + 4/3), the heights of two levels with
-/// deviation, confidence and support (16 + 4), the ranges (6), placed vertices (20).
-const BYTES_PER_PIXEL: u64 = 48;
-/// Bytes of one block in work: 1120² pixels of about 24 hypotheses, each a cost and a sum, plus layout.
-const BYTES_PER_BLOCK: u64 = 1120 * 1120 * (24 * 3 + 9);
-/// What the libraries take before anything is done.
-const BASE: u64 = 60_000_000;
+/// Memory to stay under where none is given, megabytes: what any machine of today has.
+const DEFAULT_MB: u64 = 4000;
+/// What the libraries take before anything is done, GDAL's blocks and the program's buffers among it, bytes.
+const BASE: u64 = 200_000_000;
+/// Bytes per pixel of a view from its reading to its placement: the image with its pyramid (16/3), the heights of two
+/// levels with deviation, confidence and support (16 + 4), the hypotheses' ranges (6) with what they are found from (4),
+/// and the placed vertices, which come when the ranges have gone (20 − 10).
+const BYTES_PER_PIXEL: u64 = 46;
+/// Bytes per cell of the grid: four results twice, before and after the clean-up (26), with a void's surroundings in up to
+/// half of the cells (48).
+const BYTES_PER_CELL: u64 = 74;
+/// Bytes per pixel of one block in work: about 24 hypotheses, each a cost and a sum, plus layout.
+const BYTES_PER_BLOCK_PIXEL: u64 = 24 * 3 + 9;
+/// Pixels of a whole block with its margins.
+const BLOCK_PIXELS: u64 = 1120 * 1120;
 
-/// Refuses a run that does not fit the limit.
-pub(crate) fn check(config: &DsmConfig, images: &[Opened], windows: &[Option<Window>]) -> Result<(), PipelineError> {
-    let Some(limit_mb) = config.memory_mb else { return Ok(()) };
-    let pixels: Vec<u64> =
-        images.iter().zip(windows).map(|(o, w)| w.map_or(o.size.0 * o.size.1, |w| w.width * w.height) as u64).collect();
+/// The limit of a run, megabytes.
+pub(crate) fn limit_mb(config: &DsmConfig) -> u64 {
+    config.memory_mb.unwrap_or(DEFAULT_MB)
+}
+
+/// What it takes to sweep views of so many pixels onto so many cells at once, megabytes.
+pub(crate) fn needed_mb(pixels: &[u64], cells: u64) -> u64 {
+    let all = pixels.iter().fold(0, |sum: u64, p| sum.saturating_add(*p));
     let largest = pixels.iter().copied().max().unwrap_or(0);
-    let blocks = rayon::current_num_threads().min(images.len()) as u64;
-    let block = BYTES_PER_BLOCK.min(largest * (BYTES_PER_BLOCK / (1120 * 1120)));
-    let needed_mb = (BASE + pixels.iter().sum::<u64>() * BYTES_PER_PIXEL + blocks * block) / 1_000_000;
-    if needed_mb > limit_mb {
-        return Err(PipelineError::Memory { needed_mb, limit_mb });
-    }
-    Ok(())
+    let blocks = BYTES_PER_BLOCK_PIXEL * BLOCK_PIXELS.min(largest) * rayon::current_num_threads() as u64;
+    let bytes = all.saturating_mul(BYTES_PER_PIXEL).saturating_add(cells.saturating_mul(BYTES_PER_CELL));
+    BASE.saturating_add(blocks).saturating_add(bytes) / 1_000_000
+}
+
+/// Refuses what does not fit the limit.
+///
+/// # Errors
+/// [`PipelineError::Memory`].
+pub(crate) fn check(config: &DsmConfig, needed_mb: u64) -> Result<(), PipelineError> {
+    let limit_mb = limit_mb(config);
+    if needed_mb > limit_mb { Err(PipelineError::Memory { needed_mb, limit_mb }) } else { Ok(()) }
 }
 
 /// The largest resident size of the process so far, megabytes, where the system tells (Linux).

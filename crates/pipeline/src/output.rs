@@ -1,11 +1,14 @@
 //! Writing a run's results: first all beside their places, then each to its final name.
+//!
+//! A scene that was computed at once is written from memory. Chunks of a large one go into spools on the disk as they come;
+//! its pictures are reduced, so that they can be looked at.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use geodesy::{Crs, HeightConverter, VerticalDatum};
-use io::raster::{Band, BandData, CogRaster, write_cog};
-use raster::{Grid, NO_DATA};
+use io::raster::{Band, BandData, CogPlace, CogRaster, RasterSpool, SpoolBand, write_cog};
+use raster::{Grid, NO_DATA, Window};
 use sweep::fusion::Surface;
 
 use crate::config::DsmConfig;
@@ -65,6 +68,21 @@ impl Product {
         }
         Self { origin_m, height_m, sigma_m, views, confidence, filled: marks }
     }
+
+    /// The cells of a window inside.
+    pub(crate) fn cropped(self, cells: Window) -> Self {
+        if cells == Window::whole(self.height_m.width(), self.height_m.height()) {
+            return self;
+        }
+        Self {
+            origin_m: self.origin_m,
+            height_m: self.height_m.window(cells, f32::NAN),
+            sigma_m: self.sigma_m.window(cells, f32::NAN),
+            views: self.views.window(cells, 0),
+            confidence: self.confidence.window(cells, f32::NAN),
+            filled: self.filled.window(cells, VOID),
+        }
+    }
 }
 
 /// Refuses early what would fail at the end: results in the way, or a place that cannot be written.
@@ -97,30 +115,149 @@ pub(crate) fn write(
     report: DsmReport,
 ) -> Result<DsmReport, PipelineError> {
     let created = !config.output.exists();
-    let written = write_partial(config, grid, product, &report).and_then(|()| publish(config));
+    let written = make_folders(config)
+        .and_then(|()| write_rasters(&dsm_folder(config), config.vertical, grid, product))
+        .and_then(|()| write_texts(config, &report))
+        .and_then(|()| publish(config));
     clean(config, created && written.is_err());
     written.map(|()| report)
 }
 
-fn write_partial(
-    config: &DsmConfig,
-    grid: &OutputGrid,
-    product: &Product,
-    report: &DsmReport,
-) -> Result<(), PipelineError> {
-    let root = config.output.join(PARTIAL);
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| PipelineError::Output { path, source }
-    };
-    for folder in ["dsm", "report"] {
-        fs::create_dir_all(root.join(folder)).map_err(failed(&config.output))?;
+/// The rasters of a large scene, which grow chunk by chunk. What was made goes when this goes before
+/// [`ChunkedOutput::finish`].
+pub(crate) struct ChunkedOutput<'a> {
+    config: &'a DsmConfig,
+    grid: &'a OutputGrid,
+    created: bool,
+    spools: Vec<RasterSpool>,
+}
+
+/// Names and contents of the rasters, the heights first.
+const BANDS: [(&str, SpoolBand<'static>); 5] = [
+    ("dsm.tif", SpoolBand { description: "height_m", is_float: true, no_data: NO_DATA as f64 }),
+    ("sigma.tif", SpoolBand { description: "height_standard_deviation_m", is_float: true, no_data: NO_DATA as f64 }),
+    ("views.tif", SpoolBand { description: "number_of_views", is_float: false, no_data: 0.0 }),
+    ("confidence.tif", SpoolBand { description: "confidence_0_to_1", is_float: true, no_data: NO_DATA as f64 }),
+    ("filled.tif", SpoolBand { description: "1_filled_0_observed", is_float: false, no_data: VOID as f64 }),
+];
+
+/// Pictures of large scenes are reduced to this width and height at most, pixels.
+const PICTURE_SIDE: usize = 4096;
+
+impl<'a> ChunkedOutput<'a> {
+    pub(crate) fn begin(config: &'a DsmConfig, grid: &'a OutputGrid) -> Result<Self, PipelineError> {
+        let mut out = Self { config, grid, created: !config.output.exists(), spools: Vec::new() };
+        make_folders(config)?;
+        for (name, band) in BANDS {
+            out.spools.push(RasterSpool::create(spool_path(config, name), grid.size, band)?);
+        }
+        Ok(out)
     }
-    write_rasters(&root.join("dsm"), config.vertical, grid, product)?;
+
+    /// Puts the cells of a chunk into their place.
+    pub(crate) fn put(&mut self, core: Window, product: &Product) -> Result<(), PipelineError> {
+        let heights = absolute_heights(&self.grid.part(core)?, self.config.vertical, product)?;
+        let cells = [
+            BandData::F32(&heights),
+            BandData::F32(&product.sigma_m),
+            BandData::U8(&product.views),
+            BandData::F32(&product.confidence),
+            BandData::U8(&product.filled),
+        ];
+        for (spool, cells) in self.spools.iter_mut().zip(cells) {
+            spool.put((core.x as usize, core.y as usize), cells)?;
+            spool.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Makes the final files, with those of the report, and moves everything to its place.
+    pub(crate) fn finish(mut self, report: DsmReport) -> Result<DsmReport, PipelineError> {
+        let (config, grid) = (self.config, self.grid);
+        let folder = dsm_folder(config);
+        if let Some(heights) = self.spools.first() {
+            let factor = grid.size.0.max(grid.size.1).div_ceil(PICTURE_SIDE);
+            let reduced = reduced(heights, factor)?;
+            write_pictures(&folder, &reduced, grid.gsd_m * factor as f64)?;
+        }
+        let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
+        let place =
+            CogPlace { geotransform: grid.geotransform, crs, metadata: &[], threads: rayon::current_num_threads() };
+        for ((name, _), spool) in BANDS.iter().zip(self.spools.drain(..)) {
+            spool.into_cog(folder.join(name), place, false)?;
+        }
+        write_texts(config, &report)?;
+        publish(config)?;
+        self.created = false;
+        Ok(report)
+    }
+}
+
+impl Drop for ChunkedOutput<'_> {
+    fn drop(&mut self) {
+        self.spools.clear();
+        clean(self.config, self.created);
+    }
+}
+
+/// Means of the known cells of squares of side `factor`, NaN where none is known.
+fn reduced(spool: &RasterSpool, factor: usize) -> Result<Grid<f32>, PipelineError> {
+    let (width, height) = spool.size();
+    let mut out = Grid::filled(width.div_ceil(factor), height.div_ceil(factor), f32::NAN);
+    for y in 0..out.height() {
+        let top = y * factor;
+        let strip = Window { x: 0, y: top as i64, width, height: factor.min(height - top) };
+        let cells = spool.read(strip)?;
+        let mut sums = vec![(0.0f64, 0u32); out.width()];
+        for row in 0..cells.height() {
+            for (x, h) in cells.row(row).iter().enumerate().filter(|(_, h)| !h.is_nan()) {
+                let (sum, n) = &mut sums[x / factor];
+                *sum += f64::from(*h);
+                *n += 1;
+            }
+        }
+        for (cell, (sum, n)) in out.row_mut(y).iter_mut().zip(sums).filter(|(_, (_, n))| *n > 0) {
+            *cell = (sum / f64::from(n)) as f32;
+        }
+    }
+    Ok(out)
+}
+
+fn dsm_folder(config: &DsmConfig) -> PathBuf {
+    config.output.join(PARTIAL).join("dsm")
+}
+
+fn spool_path(config: &DsmConfig, name: &str) -> PathBuf {
+    config.output.join(PARTIAL).join("spool").join(name)
+}
+
+fn failed(path: &Path) -> impl Fn(std::io::Error) -> PipelineError + use<> {
+    let path = path.to_owned();
+    move |source| PipelineError::Output { path: path.clone(), source }
+}
+
+fn make_folders(config: &DsmConfig) -> Result<(), PipelineError> {
+    let root = config.output.join(PARTIAL);
+    let made = |folder| fs::create_dir_all(root.join(folder)).map_err(failed(&config.output));
+    ["dsm", "report", "spool"].into_iter().try_for_each(made)
+}
+
+fn write_texts(config: &DsmConfig, report: &DsmReport) -> Result<(), PipelineError> {
+    let root = config.output.join(PARTIAL);
     let json = serde_json::to_string_pretty(report).map_err(|e| failed(&root)(e.into()))?;
     fs::write(root.join("report/report.json"), json + "\n").map_err(failed(&root))?;
     let used = toml::to_string_pretty(config).map_err(|e| failed(&root)(std::io::Error::other(e)))?;
     fs::write(root.join("used_config.toml"), used).map_err(failed(&root))
+}
+
+/// Hillshade and coloured relief of heights in cells of `cell_m`.
+fn write_pictures(folder: &Path, heights: &Grid<f32>, cell_m: f64) -> Result<(), PipelineError> {
+    let shade = raster::hillshade(heights, (cell_m, cell_m), raster::Light::default());
+    io::raster::write_png_gray(folder.join("hillshade.png"), &shade, false)?;
+    // The extreme hundredths are left out, so that one mast does not take the colours from the rest.
+    let (low, high) = raster::height_percentiles(heights, 1.0, 99.0).unwrap_or((0.0, 1.0));
+    let relief = raster::coloured_relief(heights, &shade, low, high);
+    Ok(io::raster::write_png_rgb(folder.join("relief.png"), &relief, false)?)
 }
 
 fn write_rasters(
@@ -131,23 +268,19 @@ fn write_rasters(
 ) -> Result<(), PipelineError> {
     let crs = Crs { horizontal: grid.epsg, vertical };
     let heights = absolute_heights(grid, vertical, product)?;
-    let shade = raster::hillshade(&heights, (grid.gsd_m, grid.gsd_m), raster::Light::default());
-    io::raster::write_png_gray(folder.join("hillshade.png"), &shade, false)?;
-    // The extreme hundredths are left out, so that one mast does not take the colours from the rest.
-    let (low, high) = raster::height_percentiles(&heights, 1.0, 99.0).unwrap_or((0.0, 1.0));
-    let relief = raster::coloured_relief(&heights, &shade, low, high);
-    io::raster::write_png_rgb(folder.join("relief.png"), &relief, false)?;
-    let cog = |name: &str, description: &str, data: BandData<'_>, no_data: f64| {
-        let bands = [Band { description, data }];
-        let raster = CogRaster { no_data: Some(no_data), ..CogRaster::new(&bands, grid.geotransform, crs) };
-        write_cog(folder.join(name), &raster, false)
-    };
-    let float = f64::from(NO_DATA);
-    cog("dsm.tif", "height_m", BandData::F32(&heights), float)?;
-    cog("sigma.tif", "height_standard_deviation_m", BandData::F32(&product.sigma_m), float)?;
-    cog("views.tif", "number_of_views", BandData::U8(&product.views), 0.0)?;
-    cog("confidence.tif", "confidence_0_to_1", BandData::F32(&product.confidence), float)?;
-    cog("filled.tif", "1_filled_0_observed", BandData::U8(&product.filled), f64::from(VOID))?;
+    write_pictures(folder, &heights, grid.gsd_m)?;
+    let cells = [
+        BandData::F32(&heights),
+        BandData::F32(&product.sigma_m),
+        BandData::U8(&product.views),
+        BandData::F32(&product.confidence),
+        BandData::U8(&product.filled),
+    ];
+    for ((name, band), data) in BANDS.iter().zip(cells) {
+        let bands = [Band { description: band.description, data }];
+        let raster = CogRaster { no_data: Some(band.no_data), ..CogRaster::new(&bands, grid.geotransform, crs) };
+        write_cog(folder.join(name), &raster, false)?;
+    }
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use camera::ImagePoint;
+use camera::{ImagePoint, RpcCamera};
 use sweep::View;
 
 use crate::setup::TIES_MIN;
@@ -68,7 +68,7 @@ fn verified(views: &[View], pair: PairTies) -> PairTies {
 }
 
 /// The span of the heights of one pair's ties, the outliers left out.
-fn heights_seen(views: &[View], pair: &PairTies) -> Option<(f64, f64)> {
+pub(crate) fn heights_seen(views: &[View], pair: &PairTies) -> Option<(f64, f64)> {
     if pair.ties.len() < TIES_MIN {
         return None;
     }
@@ -88,8 +88,21 @@ pub(crate) fn span_of(adjustment: &Adjustment, min: usize) -> Option<(f64, f64)>
     Some((heights[cut], heights[heights.len() - 1 - cut]))
 }
 
-/// Joins the pairs' ties to tracks (one corner of a reference, seen in all its sources) and adjusts all views.
-pub(crate) fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
+/// Joins the pairs' ties to tracks and adjusts all views: see [`adjust_cameras`].
+fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
+    let cameras: Vec<_> = views.iter().map(|v| v.camera.clone()).collect();
+    let sizes: Vec<_> = views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect();
+    adjust_cameras(&cameras, &sizes, pairs, config)
+}
+
+/// Joins the pairs' ties to tracks (one corner of a reference, seen in all its sources) and adjusts all cameras, whose images
+/// have `sizes` (columns, rows).
+pub(crate) fn adjust_cameras(
+    cameras: &[RpcCamera],
+    sizes: &[(usize, usize)],
+    pairs: &[PairTies],
+    config: &AdjustConfig,
+) -> (Adjustment, Vec<Track>) {
     let mut by_corner: BTreeMap<(usize, u64, u64), Track> = BTreeMap::new();
     for pair in pairs {
         for tie in &pair.ties {
@@ -101,9 +114,7 @@ pub(crate) fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustCo
         }
     }
     let tracks: Vec<Track> = by_corner.into_values().collect();
-    let cameras: Vec<_> = views.iter().map(|v| v.camera.clone()).collect();
-    let sizes: Vec<_> = views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect();
-    (adjust(&cameras, &sizes, &tracks, config), tracks)
+    (adjust(cameras, sizes, &tracks, config), tracks)
 }
 
 /// The search for what the ordinary one does not find: ten times its pointing error, from a coarser level.

@@ -3,6 +3,8 @@
 //! One coarse sweep over a range that holds the tallest buildings. Where a patch of neighbouring pixels has heights outside
 //! the range that the ties gave, confident ones on which another view agrees, the range is extended to hold them. The
 //! sweep costs about two hypotheses per full-resolution pixel.
+//!
+//! For a chunk of a large scene the same sweep tells its whole range: see [`seen_range`].
 
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::{HeightMap, SweepError, View};
@@ -28,11 +30,11 @@ const PIXELS_MIN: usize = 10;
 /// What is found is searched this far beyond, metres: masts and the coarse sweep's own step.
 const MARGIN_M: f64 = 20.0;
 
-/// A range that was extended.
+/// A range that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extended {
     pub(crate) range_m: (f64, f64),
-    /// How many pixels stand outside the range before.
+    /// How many pixels show it.
     pub(crate) pixels: usize,
 }
 
@@ -47,19 +49,53 @@ pub(crate) fn extended_range(
     gsd_m: f64,
     sides: &[usize],
 ) -> Result<Option<Extended>, SweepError> {
-    let level = sides
-        .iter()
-        .enumerate()
-        .take_while(|(l, side)| **side >= SIDE_MIN && gsd_m * f64::from(1u32 << l) <= PIXEL_M)
-        .count();
-    let level = level.saturating_sub(1);
+    let level = level_of(gsd_m, sides);
     let range = plan.range_m;
-    let wide = (range.0 - BELOW_M, range.1 + ABOVE_M);
-    let coarse = SweepPlan { range_m: wide, top_level: level, bottom_level: level, ..plan.clone() };
+    let wide = widened(range);
+    let found =
+        sure_heights(views, &SweepPlan { range_m: wide, ..plan.clone() }, level, |h| h < range.0 || h > range.1)?;
+    let (lo, hi) = extremes(&found);
+    let range_m = ((lo - MARGIN_M).min(range.0), (hi + MARGIN_M).max(range.1));
+    Ok((!found.is_empty()).then_some(Extended { range_m, pixels: found.len() }))
+}
+
+/// A range that holds towers and pits beside what lies in `range`.
+pub(crate) fn widened(range: (f64, f64)) -> (f64, f64) {
+    (range.0 - BELOW_M, range.1 + ABOVE_M)
+}
+
+/// The level that is swept, of levels whose shortest sides are `sides`.
+pub(crate) fn level_of(gsd_m: f64, sides: &[usize]) -> usize {
+    let fits = |(l, side): &(usize, &usize)| **side >= SIDE_MIN && gsd_m * f64::from(1u32 << l) <= PIXEL_M;
+    sides.iter().enumerate().take_while(fits).count().saturating_sub(1)
+}
+
+/// Least and greatest height that a sweep of one level over the plan's range shows for sure, and how many pixels do;
+/// `None` where nothing is sure.
+///
+/// # Errors
+/// Those of the consistency check.
+pub(crate) fn seen_range(views: &[View], plan: &SweepPlan, level: usize) -> Result<Option<Extended>, SweepError> {
+    let found = sure_heights(views, plan, level, |_| true)?;
+    Ok((!found.is_empty()).then(|| Extended { range_m: extremes(&found), pixels: found.len() }))
+}
+
+fn extremes(heights: &[f64]) -> (f64, f64) {
+    heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, h| (a.0.min(*h), a.1.max(*h)))
+}
+
+/// The heights of pixels that nothing speaks against, among those that are asked for.
+fn sure_heights(
+    views: &[View],
+    plan: &SweepPlan,
+    level: usize,
+    is_asked: impl Fn(f64) -> bool,
+) -> Result<Vec<f64>, SweepError> {
+    let coarse = SweepPlan { top_level: level, bottom_level: level, ..plan.clone() };
     // A camera that fails far from the scene says nothing about what stands there.
-    let Ok(SceneHeights { maps, .. }) = sweep_scene(views, &coarse, &|| ()) else { return Ok(None) };
+    let Ok(SceneHeights { maps, .. }) = sweep_scene(views, &coarse, &|| ()) else { return Ok(Vec::new()) };
     let step_m = plan.step_at(level) as f32;
-    let mut outside: Vec<(usize, f64)> = Vec::new();
+    let mut asked: Vec<(usize, f64)> = Vec::new();
     for (index, map) in maps.iter().enumerate().filter(|(i, _)| !plan.sources[*i].is_empty()) {
         let heights = |index: usize, map| Heights { index, view: &views[index], map };
         let others: Vec<Heights<'_>> = plan.sources[index].iter().map(|&s| heights(s, &maps[s])).collect();
@@ -68,16 +104,12 @@ pub(crate) fn extended_range(
         let needed = others.len().min(2) as u8;
         let counts_for = |h: f32, at: (usize, usize)| {
             let height_m = map.origin_m + f64::from(h);
-            let is_outside = height_m < range.0 || height_m > range.1;
             let is_sure = map.confidence[at] >= CONFIDENCE_MIN && map.support[at] >= SUPPORT_MIN;
-            is_outside && is_sure && counts[at] >= needed
+            is_asked(height_m) && is_sure && counts[at] >= needed
         };
-        outside.extend(patches(map, step_m, counts_for).into_iter().map(|h| (index, h)));
+        asked.extend(patches(map, step_m, counts_for).into_iter().map(|h| (index, h)));
     }
-    let found = shared(outside, 2.0 * f64::from(step_m));
-    let (lo, hi) = found.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, h| (a.0.min(*h), a.1.max(*h)));
-    let range_m = ((lo - MARGIN_M).min(range.0), (hi + MARGIN_M).max(range.1));
-    Ok((!found.is_empty()).then_some(Extended { range_m, pixels: found.len() }))
+    Ok(shared(asked, 2.0 * f64::from(step_m)))
 }
 
 /// The heights that pixels of at least two views have, to a tolerance, and enough pixels in all.

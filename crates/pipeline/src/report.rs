@@ -26,6 +26,9 @@ pub struct DsmReport {
     pub hypotheses: u64,
     /// The surface.
     pub surface: SurfaceReport,
+    /// How the scene was divided; absent when it was computed at once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chunks: Option<ChunksReport>,
     /// All choices with their reasons.
     pub choices: Vec<Choice>,
     /// What the user should know.
@@ -120,6 +123,28 @@ pub struct SurfaceReport {
     pub speckle_removed: usize,
     /// Share of each view's pixels that another view agrees with.
     pub kept_by_view: Vec<f64>,
+}
+
+/// How a large scene was divided.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ChunksReport {
+    /// Side of the largest chunk, cells.
+    pub side: usize,
+    /// Chunks with a surface.
+    pub done: usize,
+    /// Chunks that no two images see.
+    pub unseen: usize,
+    /// Chunks that could not be computed; their cells are void.
+    pub failed: Vec<FailedChunk>,
+}
+
+/// A chunk without a result.
+#[derive(Debug, Clone, Serialize)]
+pub struct FailedChunk {
+    /// x_min, y_min, x_max, y_max in the DSM's CRS.
+    pub bounds: [f64; 4],
+    /// Why.
+    pub reason: String,
 }
 
 /// Wall time of one stage.

@@ -55,6 +55,18 @@ pub(crate) fn read_view(image: &Opened, window: Option<Window>) -> Result<View, 
     Ok(View::new(camera, image_grid))
 }
 
+/// Reads one pyramid level of a window, whose first pixel is one of the level's too; the camera is moved to the window.
+pub(crate) fn read_coarse_view(image: &Opened, window: Window, level: usize) -> Result<View, PipelineError> {
+    let source = io::raster::ImageSource::open(&image.path)?;
+    let mut picture = source.read_luma(window)?.luma;
+    mask_black(&mut picture);
+    for _ in 0..level {
+        picture = raster::reduce(&picture);
+    }
+    let camera = image.camera.cropped(ImagePoint::new(window.x as f64, window.y as f64));
+    Ok(View::from_level(camera, level, picture))
+}
+
 /// Side of a square of nothing but zeros that no sensor's dark noise leaves, pixels.
 const BLACK_SIDE: usize = 5;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use geodesy::{LonLatHeight, MapProjection, utm_epsg};
-use raster::GeoTransform;
+use raster::{GeoTransform, Window};
 use sweep::pointing::Adjustment;
 
 use crate::config::{Bounds, DsmConfig, Tuning};
@@ -193,7 +193,7 @@ pub(crate) fn with_towers(
     if config.height_range_m.is_some() {
         return Ok(range_m);
     }
-    let step_m = tuning.step_px / widest_parallax(sources, geometry).max(f64::MIN_POSITIVE);
+    let step_m = height_step(sources, geometry, tuning);
     let (level, best_of) = (tuning.level, tuning.best_of);
     let plan = SweepPlan { range_m, step_m, top_level: 0, bottom_level: 0, sources: sources.to_vec(), best_of, level };
     let Some(found) = crate::probe::extended_range(views, &plan, gsd_m, &smallest_sides(views))? else {
@@ -204,35 +204,46 @@ pub(crate) fn with_towers(
     Ok(found.range_m)
 }
 
-/// Steps and levels of the sweep.
-pub(crate) fn plan_sweep(
-    range_m: (f64, f64),
-    sources: Vec<Vec<usize>>,
-    geometry: &Geometry,
-    smallest_sides: &[usize],
-    tuning: &Tuning,
-    choices: &mut Choices<'_>,
-) -> SweepPlan {
-    let widest = widest_parallax(&sources, geometry);
-    let step_m = tuning.step_px / widest.max(f64::MIN_POSITIVE);
+/// Metres between hypotheses at full resolution.
+pub(crate) fn height_step(sources: &[Vec<usize>], geometry: &Geometry, tuning: &Tuning) -> f64 {
+    tuning.step_px / widest_parallax(sources, geometry).max(f64::MIN_POSITIVE)
+}
+
+/// Tells the choice of [`height_step`].
+pub(crate) fn tell_step(sources: &[Vec<usize>], geometry: &Geometry, tuning: &Tuning, choices: &mut Choices<'_>) {
+    let widest = widest_parallax(sources, geometry);
     choices.tell(
         "height step",
-        format!("{step_m:.3} m"),
+        format!("{:.3} m", height_step(sources, geometry, tuning)),
         format!("{} px of parallax in the pair that sees most of it ({widest:.3} px/m)", tuning.step_px),
     );
+}
+
+/// Levels of the sweep of views whose shortest sides are `smallest_sides`.
+pub(crate) fn plan_sweep(
+    range_m: (f64, f64),
+    step_m: f64,
+    sources: Vec<Vec<usize>>,
+    smallest_sides: &[usize],
+    tuning: &Tuning,
+) -> SweepPlan {
     let deepest = smallest_sides.iter().filter(|s| **s >= TOP_SIDE_MIN).count().saturating_sub(1);
     let too_many = |level: &usize| (range_m.1 - range_m.0) / (step_m * f64::from(1u32 << *level)) > TOP_HYPOTHESES;
     let bottom_level = tuning.finest_level.min(deepest);
     let top_level = (0..deepest).take_while(too_many).count().max(bottom_level);
+    SweepPlan { range_m, step_m, top_level, bottom_level, sources, best_of: tuning.best_of, level: tuning.level }
+}
+
+/// Tells the choice of [`plan_sweep`].
+pub(crate) fn tell_levels(plan: &SweepPlan, choices: &mut Choices<'_>) {
     choices.tell(
         "pyramid",
-        format!("{} levels", top_level - bottom_level + 1),
+        format!("{} levels", plan.top_level - plan.bottom_level + 1),
         format!(
             "{:.0} hypotheses over the whole range on the coarsest",
-            (range_m.1 - range_m.0) / (step_m * f64::from(1u32 << top_level))
+            (plan.range_m.1 - plan.range_m.0) / (plan.step_m * f64::from(1u32 << plan.top_level))
         ),
     );
-    SweepPlan { range_m, step_m, top_level, bottom_level, sources, best_of: tuning.best_of, level: tuning.level }
 }
 
 /// The output grid.
@@ -246,6 +257,26 @@ pub(crate) struct OutputGrid {
     pub(crate) gsd_m: f64,
 }
 
+impl OutputGrid {
+    /// The grid of a window of this one's cells.
+    pub(crate) fn part(&self, cells: Window) -> Result<Self, PipelineError> {
+        Ok(Self {
+            epsg: self.epsg,
+            projection: MapProjection::from_epsg(self.epsg)?,
+            geotransform: self.geotransform.shifted(cells.x as f64, cells.y as f64),
+            size: (cells.width, cells.height),
+            gsd_m: self.gsd_m,
+        })
+    }
+
+    /// x_min, y_min, x_max, y_max.
+    pub(crate) fn bounds(&self) -> Bounds {
+        let (x0, y1) = self.geotransform.map_from_cell(-0.5, -0.5);
+        let (x1, y0) = self.geotransform.map_from_cell(self.size.0 as f64 - 0.5, self.size.1 as f64 - 0.5);
+        [x0, y0, x1, y1]
+    }
+}
+
 /// Grids of more cells than this are a mistake in the units of `--gsd` or `--bounds`.
 const CELLS_MAX: f64 = 4e9;
 
@@ -254,15 +285,12 @@ pub(crate) fn choose_grid(
     config: &DsmConfig,
     geometry: &Geometry,
     coarsest_gsd_m: f64,
-    choices: &mut Choices<'_>,
 ) -> Result<OutputGrid, PipelineError> {
     let centre = geometry.centre;
     let epsg = match config.crs_epsg {
         Some(code) => code,
         None => utm_epsg(centre.lon_deg, centre.lat_deg)?,
     };
-    let why = if config.crs_epsg.is_some() { "given" } else { "the UTM (or polar) zone of the scene's centre" };
-    choices.tell("crs", format!("EPSG:{epsg}, heights above {}", config.vertical), why);
     let projection = MapProjection::from_epsg(epsg)?;
     if projection.metres_per_unit() != Some(1.0) {
         return Err(PipelineError::Value {
@@ -271,15 +299,7 @@ pub(crate) fn choose_grid(
             expected: "a projected CRS in metres; a cell has one size".to_owned(),
         });
     }
-    let gsd_m = match config.gsd_m {
-        Some(gsd) => gsd,
-        None => rounded_gsd(coarsest_gsd_m),
-    };
-    let why = match config.gsd_m {
-        Some(_) => "given".to_owned(),
-        None => format!("the coarsest image's {coarsest_gsd_m:.3} m, rounded to 5 cm"),
-    };
-    choices.tell("gsd", format!("{gsd_m} m"), why);
+    let gsd_m = config.gsd_m.unwrap_or_else(|| rounded_gsd(coarsest_gsd_m));
     let covered = covered_bounds(geometry, &projection)?;
     let asked = config.bounds.unwrap_or(covered);
     let meets = asked[0] < covered[2] && asked[2] > covered[0] && asked[1] < covered[3] && asked[3] > covered[1];
@@ -287,9 +307,18 @@ pub(crate) fn choose_grid(
         return Err(PipelineError::BoundsMissScene { bounds: asked, covered, epsg });
     }
     let (geotransform, size) = snapped(asked, gsd_m)?;
-    let why = if config.bounds.is_some() { "given" } else { "the ground that at least two images see" };
-    choices.tell("bounds", format!("{asked:.1?}, {} × {} cells", size.0, size.1), why);
     Ok(OutputGrid { epsg, projection, geotransform, size, gsd_m })
+}
+
+/// Tells the choices of [`choose_grid`].
+pub(crate) fn tell_grid(config: &DsmConfig, grid: &OutputGrid, coarsest_gsd_m: f64, choices: &mut Choices<'_>) {
+    let given = |is_given: bool, else_why: String| if is_given { "given".to_owned() } else { else_why };
+    let zone = given(config.crs_epsg.is_some(), "the UTM (or polar) zone of the scene's centre".to_owned());
+    choices.tell("crs", format!("EPSG:{}, heights above {}", grid.epsg, config.vertical), zone);
+    let coarsest = format!("the coarsest image's {coarsest_gsd_m:.3} m, rounded to 5 cm");
+    choices.tell("gsd", format!("{} m", grid.gsd_m), given(config.gsd_m.is_some(), coarsest));
+    let seen = given(config.bounds.is_some(), "the ground that at least two images see".to_owned());
+    choices.tell("bounds", format!("{:.1?}, {} × {} cells", grid.bounds(), grid.size.0, grid.size.1), seen);
 }
 
 /// To whole multiples of 5 cm: a tidy number costs no detail.
@@ -331,13 +360,16 @@ pub(crate) fn ground_sampling(image: &Opened, centre: LonLatHeight) -> Option<f6
     image.camera.gsd(centre).ok().map(|g| g.mean_m())
 }
 
-/// The pixels of an image that the grid may need at any height of the range, grown by `margin`.
-pub(crate) fn image_window(
+/// No image reaches further than this, pixels; cameras may say anything far outside their images.
+const FARTHEST_PX: f64 = 1e9;
+
+/// The pixels that show the grid at some height of the range, grown by `margin`; they may lie outside the image.
+pub(crate) fn image_span(
     image: &Opened,
     grid: &OutputGrid,
     range_m: (f64, f64),
     margin: usize,
-) -> Result<Option<raster::Window>, PipelineError> {
+) -> Result<Window, PipelineError> {
     let (columns, rows) = (grid.size.0 as f64, grid.size.1 as f64);
     let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for (c, r) in [(0.0, 0.0), (columns, 0.0), (0.0, rows), (columns, rows)] {
@@ -346,17 +378,28 @@ pub(crate) fn image_window(
         for h in [range_m.0, range_m.1] {
             let failed = |source| PipelineError::Camera { path: image.path.clone(), source };
             let p = image.camera.project(LonLatHeight::new(lon, lat, h)).map_err(failed)?;
-            lo = [lo[0].min(p.sample), lo[1].min(p.line)];
-            hi = [hi[0].max(p.sample), hi[1].max(p.line)];
+            let at = [p.sample, p.line].map(|v| v.clamp(-FARTHEST_PX, FARTHEST_PX));
+            lo = [lo[0].min(at[0]), lo[1].min(at[1])];
+            hi = [hi[0].max(at[0]), hi[1].max(at[1])];
         }
     }
-    let wanted = raster::Window {
+    let wanted = Window {
         x: lo[0].floor() as i64,
         y: lo[1].floor() as i64,
         width: (hi[0] - lo[0]).ceil() as usize + 1,
         height: (hi[1] - lo[1]).ceil() as usize + 1,
     };
-    Ok(wanted.grown(margin).intersection(&raster::Window::whole(image.size.0, image.size.1)))
+    Ok(wanted.grown(margin))
+}
+
+/// The part of [`image_span`] that the image has.
+pub(crate) fn image_window(
+    image: &Opened,
+    grid: &OutputGrid,
+    range_m: (f64, f64),
+    margin: usize,
+) -> Result<Option<Window>, PipelineError> {
+    Ok(image_span(image, grid, range_m, margin)?.intersection(&Window::whole(image.size.0, image.size.1)))
 }
 
 /// The height at which footprints and angles are taken: the middle of what the ties saw, else of the range.
@@ -365,9 +408,11 @@ pub(crate) fn middle_height(adjustment: &Adjustment, range: (f64, f64)) -> f64 {
     (0.5 * (lo + hi)).clamp(range.0, range.1)
 }
 
-/// For each pyramid level that all views have, the shortest side of any view on it, pixels.
+/// For each pyramid level that all views have, the shortest side of any view on it, pixels; absent views do not count.
 pub(crate) fn smallest_sides(views: &[sweep::View]) -> Vec<usize> {
-    let levels = views.iter().map(|v| v.levels.len()).min().unwrap_or(0);
-    let side = |level: usize| views.iter().map(|v| v.levels[level].width().min(v.levels[level].height())).min();
+    let is_there = |v: &&sweep::View| v.levels.iter().any(|l| !l.data().is_empty());
+    let there: Vec<&sweep::View> = views.iter().filter(is_there).collect();
+    let levels = there.iter().map(|v| v.levels.len()).min().unwrap_or(0);
+    let side = |level: usize| there.iter().map(|v| v.levels[level].width().min(v.levels[level].height())).min();
     (0..levels).filter_map(side).collect()
 }

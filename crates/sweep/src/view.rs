@@ -7,6 +7,8 @@ use raster::{Grid, Pyramid};
 pub(crate) const QUANTISATION_VARIANCE: f32 = 1.0 / 12.0;
 /// The pyramid stops when a side would fall below this: a handful of patches.
 const SIDE_MIN: usize = 32;
+/// From the largest image there is to a pixel.
+const LEVELS_MAX: usize = 16;
 
 /// One image of the scene. Invalid pixels (no-data, masked) are NaN on every level.
 #[derive(Debug, Clone)]
@@ -27,10 +29,24 @@ impl View {
         // One kind of NaN: the census tells it by its bits.
         image.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = f32::NAN);
         let noise = noise_deviation(&image);
-        // Sixteen levels reach from the largest image there is to a pixel.
-        let levels = Pyramid::new(image, 16, SIDE_MIN).into_levels();
+        let levels = Pyramid::new(image, LEVELS_MAX, SIDE_MIN).into_levels();
         let contrast = levels.iter().map(typical_difference).collect();
         Self { camera, levels, noise, contrast }
+    }
+
+    /// A view of which only the levels from `level` on are there: `image` is that level, the finer ones are empty.
+    pub fn from_level(camera: RpcCamera, level: usize, image: Grid<f32>) -> Self {
+        let noise = noise_deviation(&image) * (1 << level) as f32;
+        let mut levels = vec![Grid::filled(0, 0, f32::NAN); level];
+        levels.extend(Pyramid::new(image, LEVELS_MAX, SIDE_MIN).into_levels());
+        let contrast = levels.iter().map(typical_difference).collect();
+        Self { camera, levels, noise, contrast }
+    }
+
+    /// A view that does not see the scene: every level is empty.
+    pub fn absent(camera: RpcCamera) -> Self {
+        let levels = vec![Grid::filled(0, 0, f32::NAN); LEVELS_MAX];
+        Self { camera, levels, noise: 0.0, contrast: vec![0.0; LEVELS_MAX] }
     }
 
     /// The most noise to expect on a level: each reduction at least halves it.

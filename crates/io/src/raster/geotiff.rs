@@ -55,6 +55,19 @@ pub enum Sampling {
     Nearest,
 }
 
+/// Where a raster lies, and what its file says of it.
+#[derive(Debug, Clone, Copy)]
+pub struct CogPlace<'a> {
+    /// Position of the grid.
+    pub geotransform: GeoTransform,
+    /// Horizontal CRS and vertical datum.
+    pub crs: Crs,
+    /// Further items of the default metadata domain.
+    pub metadata: &'a [(&'a str, &'a str)],
+    /// Threads that compress.
+    pub threads: usize,
+}
+
 /// A raster to write.
 #[derive(Debug, Clone, Copy)]
 pub struct CogRaster<'a> {
@@ -94,31 +107,42 @@ pub fn write_cog(path: impl AsRef<Path>, raster: &CogRaster<'_>, overwrite: bool
     raster.crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
     write_whole(path, overwrite, |made| {
         let mut memory = in_memory(path, raster.bands, raster.no_data)?;
-        let resampling = match raster.overviews {
-            Sampling::Average => "AVERAGE",
-            Sampling::Nearest => "NEAREST",
-        };
-        let threads = raster.threads.max(1).to_string();
-        let options = [
-            ("COMPRESS", "DEFLATE"),
-            // Measured heights end in noise: higher levels take several times longer for a hundredth of the size.
-            ("LEVEL", "1"),
-            ("PREDICTOR", "YES"),
-            ("BLOCKSIZE", "512"),
-            ("BIGTIFF", "IF_SAFER"),
-            ("OVERVIEW_RESAMPLING", resampling),
-            ("NUM_THREADS", threads.as_str()),
-        ];
-        with_gdal(|| {
-            memory.set_spatial_ref(&SpatialRef::from_definition(&raster.crs.to_string())?)?;
-            memory.set_geo_transform(&raster.geotransform.0)?;
-            memory.set_metadata_item(VERTICAL_DATUM, &raster.crs.vertical.to_string(), "")?;
-            for (key, value) in raster.metadata {
-                memory.set_metadata_item(key, value, "")?;
-            }
-            copy(&memory, "COG", made, &options)
-        })
-        .map_err(|reason| RasterError::unwritable(path, reason))
+        let CogRaster { geotransform, crs, metadata, threads, .. } = *raster;
+        let place = CogPlace { geotransform, crs, metadata, threads };
+        finish_cog(&mut memory, place, raster.overviews, made).map_err(|reason| RasterError::unwritable(path, reason))
+    })
+}
+
+/// Gives a dataset its place on the Earth and copies it into a Cloud-Optimised GeoTIFF.
+pub(super) fn finish_cog(
+    dataset: &mut Dataset,
+    place: CogPlace<'_>,
+    overviews: Sampling,
+    made: &Path,
+) -> Result<(), String> {
+    let resampling = match overviews {
+        Sampling::Average => "AVERAGE",
+        Sampling::Nearest => "NEAREST",
+    };
+    let threads = place.threads.max(1).to_string();
+    let options = [
+        ("COMPRESS", "DEFLATE"),
+        // Measured heights end in noise: higher levels take several times longer for a hundredth of the size.
+        ("LEVEL", "1"),
+        ("PREDICTOR", "YES"),
+        ("BLOCKSIZE", "512"),
+        ("BIGTIFF", "IF_SAFER"),
+        ("OVERVIEW_RESAMPLING", resampling),
+        ("NUM_THREADS", threads.as_str()),
+    ];
+    with_gdal(|| {
+        dataset.set_spatial_ref(&SpatialRef::from_definition(&place.crs.to_string())?)?;
+        dataset.set_geo_transform(&place.geotransform.0)?;
+        dataset.set_metadata_item(VERTICAL_DATUM, &place.crs.vertical.to_string(), "")?;
+        for (key, value) in place.metadata {
+            dataset.set_metadata_item(key, value, "")?;
+        }
+        copy(dataset, "COG", made, &options)
     })
 }
 

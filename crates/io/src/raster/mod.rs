@@ -14,16 +14,18 @@ mod geotiff;
 mod luma;
 mod png;
 mod source;
+mod spool;
 mod tile;
 
 pub use atomic::write_bytes;
 pub use dem::{Dem, read_dem, read_dem_window};
 pub use depth_png::{DepthScale, write_depth_png};
 pub use error::RasterError;
-pub use geotiff::{Band, BandData, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
+pub use geotiff::{Band, BandData, CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
 pub use luma::{LumaRule, LumaTile};
 pub use png::{write_png_gray, write_png_rgb};
 pub use source::{ImageInfo, ImageSource, SampleType};
+pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use tile::{MapTile, write_map_tile};
 
 pub(crate) use atomic::write_whole;

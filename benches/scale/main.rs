@@ -1,0 +1,266 @@
+//! Cost and memory of large scenes: `cargo bench --bench scale [-- SIDE… --memory MB --preset NAME --runs N --folder DIR --out DIR]`.
+//!
+//! Pairs of SIDE × SIDE pixels (4096, 8192, 12288 and 20000 when none is named) show a town that repeats itself every
+//! 2048 pixels (see `town`), as a GDAL mosaic (VRT) of one rendered tile per view: pixels are decoded window by window as from
+//! any file, and a pair of 800 megapixels takes 30 MB of disk. The release binary runs as a user would run it with `--memory`.
+//! Processor seconds, wall seconds and the largest resident memory of the command go to `benches/results/scale.md`, with the
+//! error against the town's own heights; nothing is aligned. Results of runs with named sides are written only with --out.
+
+#![allow(clippy::print_stdout, reason = "a bench tells its results")]
+
+mod town;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, ensure};
+use io::raster::{Band, BandData, ImageSource, read_dem_window, write_image_with_rpc};
+use raster::Window;
+use serde_json::Value;
+use town::{LOOKS, PERIOD};
+
+const SKYSWEEP: &str = env!("CARGO_BIN_EXE_skysweep");
+/// Every how many cells of a row, and rows, the error is looked at.
+const EVERY: usize = 3;
+
+fn main() -> anyhow::Result<()> {
+    let arguments = arguments()?;
+    let temporary = tempfile::tempdir()?;
+    let folder = arguments.folder.as_deref().unwrap_or(temporary.path());
+    std::fs::create_dir_all(folder)?;
+    let tiles = render(folder)?;
+    let mut rows = Vec::new();
+    for &side in &arguments.sides {
+        let images = mosaics(folder, &tiles, side)?;
+        for _ in 0..arguments.runs {
+            let row = measure(folder, &images, side, &arguments)?;
+            println!("{}", line(&row));
+            rows.push(row);
+        }
+    }
+    let text = markdown(&rows, &arguments);
+    println!("{text}");
+    if let Some(out) = &arguments.out {
+        std::fs::write(out.join("scale.md"), text)?;
+    }
+    Ok(())
+}
+
+struct Arguments {
+    sides: Vec<usize>,
+    memory_mb: u64,
+    preset: String,
+    runs: usize,
+    folder: Option<PathBuf>,
+    out: Option<PathBuf>,
+    asked: String,
+}
+
+fn arguments() -> anyhow::Result<Arguments> {
+    let given: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let mut found = Arguments {
+        sides: Vec::new(),
+        memory_mb: 2000,
+        preset: "balanced".to_owned(),
+        runs: 1,
+        folder: None,
+        out: None,
+        asked: given.join(" "),
+    };
+    let mut rest = given.iter();
+    while let Some(argument) = rest.next() {
+        let mut value = || rest.next().with_context(|| format!("{argument} needs a value"));
+        match argument.as_str() {
+            "--memory" => found.memory_mb = value()?.parse()?,
+            "--preset" => found.preset.clone_from(value()?),
+            "--runs" => found.runs = value()?.parse::<usize>()?.max(1),
+            "--folder" => found.folder = Some(value()?.into()),
+            "--out" => found.out = Some(value()?.into()),
+            side => found.sides.push(side.parse().with_context(|| format!("{side} is no side in pixels"))?),
+        }
+    }
+    if found.sides.is_empty() {
+        found.sides = vec![4096, 8192, 12_288, 20_000];
+        found.out.get_or_insert_with(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/results"));
+    }
+    Ok(found)
+}
+
+/// The tile of each view.
+fn render(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let mut out = Vec::new();
+    for (view, look) in (0..).zip(LOOKS) {
+        let rpc = town::rpc(look, PERIOD);
+        // A point's place in the tile is where the formula that rendered it has it.
+        let [x, y, z] = [100.0, -200.0, 30.0];
+        let p = town::project(&rpc, [x, y, z])?;
+        let expected = [(x + look[0] * z) / town::GSD_M, (look[1] * z - y) / town::GSD_M];
+        ensure!((p.sample - expected[0]).hypot(p.line - expected[1]) < 1e-6, "the RPC does not fit the tile: {p:?}");
+        let path = folder.join(format!("tile_{view}.tif"));
+        let pixels = town::tile(look, view);
+        let bands = [Band { description: "pan", data: BandData::U16(&pixels) }];
+        write_image_with_rpc(&path, &bands, &rpc, None, true)?;
+        out.push(path);
+    }
+    Ok(out)
+}
+
+/// Images of a side made of the tiles, each with its RPC beside it.
+fn mosaics(folder: &Path, tiles: &[PathBuf], side: usize) -> anyhow::Result<Vec<PathBuf>> {
+    let mut out = Vec::new();
+    for ((view, tile), look) in (0..).zip(tiles).zip(LOOKS) {
+        let path = folder.join(format!("view_{view}_{side}.vrt"));
+        let mut xml = format!("<VRTDataset rasterXSize=\"{side}\" rasterYSize=\"{side}\">\n");
+        xml += "<VRTRasterBand dataType=\"UInt16\" band=\"1\">\n";
+        let starts = || (0..side).step_by(PERIOD);
+        for (x, y) in starts().flat_map(|y| starts().map(move |x| (x, y))) {
+            let (w, h) = (PERIOD.min(side - x), PERIOD.min(side - y));
+            writeln!(
+                xml,
+                "<SimpleSource><SourceFilename>{}</SourceFilename><SourceBand>1</SourceBand>\
+                 <SourceProperties RasterXSize=\"{PERIOD}\" RasterYSize=\"{PERIOD}\" DataType=\"UInt16\" \
+                 BlockXSize=\"256\" BlockYSize=\"256\"/><SrcRect xOff=\"0\" yOff=\"0\" xSize=\"{w}\" ySize=\"{h}\"/>\
+                 <DstRect xOff=\"{x}\" yOff=\"{y}\" xSize=\"{w}\" ySize=\"{h}\"/></SimpleSource>",
+                tile.display()
+            )?;
+        }
+        std::fs::write(&path, xml + "</VRTRasterBand>\n</VRTDataset>\n")?;
+        let sidecar = folder.join(format!("view_{view}_{side}_RPC.TXT"));
+        io::rpc::write(&sidecar, &town::rpc(look, side), io::rpc::RpcFormat::Text, io::rpc::Existing::Replace)?;
+        out.push(path);
+    }
+    Ok(out)
+}
+
+/// What a run took and gave.
+struct Row {
+    side: usize,
+    chunks: String,
+    cpu_s: f64,
+    wall_s: f64,
+    peak_mb: f64,
+    mae_m: f64,
+    /// Share of the cells that are right to a metre, voids counted as wrong, percent.
+    right: f64,
+}
+
+impl Row {
+    /// Both images.
+    fn megapixels(&self) -> f64 {
+        LOOKS.len() as f64 * (self.side * self.side) as f64 / 1e6
+    }
+}
+
+fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments) -> anyhow::Result<Row> {
+    let out = folder.join("out");
+    // bash times the command and its threads; nothing in std does.
+    let output = Command::new("bash")
+        .args([
+            "-c",
+            "TIMEFORMAT='times %U %S %R'; time \"$@\"",
+            "bash",
+            SKYSWEEP,
+            "dsm",
+            "--overwrite",
+            "--json",
+            "-q",
+        ])
+        .args(["--progress", "none", "--gsd", &town::GSD_M.to_string(), "--preset", &arguments.preset])
+        .args(["--memory", &arguments.memory_mb.to_string(), "-o"])
+        .arg(&out)
+        .args(images)
+        .output()?;
+    let errors = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "skysweep dsm on {side} pixels: {errors}");
+    let report: Value = serde_json::from_slice(&output.stdout)?;
+    let times = errors.lines().find_map(|l| l.strip_prefix("times ")).context("bash printed no times")?;
+    let seconds: Vec<f64> = times.split(' ').map(str::parse).collect::<Result<_, _>>()?;
+    let [user, system, wall_s] = seconds[..] else { anyhow::bail!("bash printed other times: {times}") };
+    let (mae_m, right) = errors_of(&out.join("dsm/dsm.tif"), side)?;
+    let chunk = |name: &str| report["chunks"][name].as_u64();
+    let chunks = match (chunk("done"), chunk("side")) {
+        (Some(done), Some(side)) => format!("{done} of ≤ {side}²"),
+        _ => "1 (at once)".to_owned(),
+    };
+    let peak_mb = report["peak_memory_mb"].as_f64().unwrap_or(f64::NAN);
+    Ok(Row { side, chunks, cpu_s: user + system, wall_s, peak_mb, mae_m, right })
+}
+
+/// Mean absolute error of the cells with a height, metres, and the share of all that are right to a metre, percent.
+fn errors_of(dsm: &Path, side: usize) -> anyhow::Result<(f64, f64)> {
+    let info = ImageSource::open(dsm)?.info().clone();
+    let (mut sum, mut known, mut right, mut all) = (0.0, 0u64, 0u64, 0u64);
+    for top in (0..info.height).step_by(512) {
+        let strip = Window { x: 0, y: top as i64, width: info.width, height: 512.min(info.height - top) };
+        let dem = read_dem_window(dsm, strip)?;
+        let projection = geodesy::MapProjection::from_epsg(dem.horizontal_epsg.context("the DSM has no CRS")?)?;
+        for row in (0..dem.heights.height()).step_by(EVERY) {
+            let columns: Vec<usize> = (0..dem.heights.width()).step_by(EVERY).collect();
+            let places = columns.iter().map(|&c| dem.geotransform.map_from_cell(c as f64, row as f64));
+            let (mut lon, mut lat): (Vec<f64>, Vec<f64>) = places.unzip();
+            projection.lonlat_from_map_slices(&mut lon, &mut lat)?;
+            for ((&c, lon), lat) in columns.iter().zip(lon).zip(lat) {
+                let Some(truth) = town::truth(lon, lat, side) else { continue };
+                all += 1;
+                let error = (f64::from(dem.heights[(c, row)]) - truth).abs();
+                if error.is_finite() {
+                    (sum, known) = (sum + error, known + 1);
+                    right += u64::from(error < 1.0);
+                }
+            }
+        }
+    }
+    ensure!(known > 0, "the DSM has no height");
+    Ok((sum / known as f64, 100.0 * right as f64 / all as f64))
+}
+
+fn line(r: &Row) -> String {
+    let per = |v: f64| v / r.megapixels();
+    format!(
+        "| {} | {:.0} | {} | {:.0} | {:.3} | {:.0} | {:.0} | {:.3} | {:.2} |",
+        r.side,
+        r.megapixels(),
+        r.chunks,
+        r.cpu_s,
+        per(r.cpu_s),
+        r.wall_s,
+        r.peak_mb,
+        r.mae_m,
+        r.right
+    )
+}
+
+fn markdown(rows: &[Row], arguments: &Arguments) -> String {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut out = format!(
+        "# Large scenes\n\n\
+         Written by `cargo bench --bench scale -- {}` on {cores} cores. A pair of SIDE × SIDE pixels at {} m, preset \
+         {}, `--memory {}`; the images are mosaics of one rendered tile per view (a town that repeats itself every {PERIOD} \
+         pixels; see `benches/scale/town.rs`), the truth is the town's own height function, nothing is aligned. \
+         CPU is user and system time of the command, megapixels are those of both images, peak is the largest \
+         resident memory.\n\n\
+         | side px | Mpx | chunks | CPU s | CPU s/Mpx | wall s | peak MB | MAE m | < 1 m % |\n|--:|--:|:--|--:|--:|--:|--:|--:|--:|\n",
+        arguments.asked,
+        town::GSD_M,
+        arguments.preset,
+        arguments.memory_mb
+    );
+    rows.iter().for_each(|r| out += &(line(r) + "\n"));
+    let costs: Vec<f64> =
+        rows.iter().filter(|r| !r.chunks.contains("at once")).map(|r| r.cpu_s / r.megapixels()).collect();
+    let peaks: Vec<f64> = rows.iter().filter(|r| !r.chunks.contains("at once")).map(|r| r.peak_mb).collect();
+    let spread = |v: &[f64]| {
+        let (lo, hi) = v.iter().fold((f64::INFINITY, 0.0f64), |a, x| (a.0.min(*x), a.1.max(*x)));
+        100.0 * (hi / lo - 1.0)
+    };
+    if costs.len() > 1 {
+        let _ = writeln!(
+            out,
+            "\nOver the runs by chunks the greatest cost per megapixel is {:.0} % above the least, the greatest peak {:.0} %.",
+            spread(&costs),
+            spread(&peaks)
+        );
+    }
+    out
+}

@@ -1,0 +1,160 @@
+//! A town that repeats itself every kilometre, in x and in y, and two cameras that see it repeat in whole pixels.
+//!
+//! Frame: x east, y north in metres, each proportional to longitude and latitude; z metres above the scene's ground height.
+//! The cameras are affine, `sample = (x + a z) / g`, `line = (b z − y) / g`, which an RPC holds exactly: a step of one period on
+//! the ground is a step of [`PERIOD`] pixels in both images, so one rendered tile per view makes images of any size.
+
+use camera::{ImagePoint, Rpc};
+use raster::Grid;
+use rayon::prelude::*;
+
+/// Side of the tile that repeats, pixels.
+pub(crate) const PERIOD: usize = 2048;
+/// Pixel and cell, metres.
+pub(crate) const GSD_M: f64 = 0.5;
+/// Height of z = 0 above the ellipsoid, metres.
+const GROUND_M: f64 = 180.0;
+/// Least and greatest z of the surface.
+const SPAN_M: (f64, f64) = (-6.0, 62.0);
+/// Where x = y = 0 lies: the upper left of the images.
+const ORIGIN: (f64, f64) = (5.4, 43.55);
+/// Metres per degree of longitude and latitude there, rounded: the frame is whatever these make it.
+const METRES_PER_DEGREE: [f64; 2] = [80_800.0, 111_110.0];
+/// (a, b) of the two views: they look 27° apart, as a forward and a backward view of one pass may.
+pub(crate) const LOOKS: [[f64; 2]; 2] = [[0.12, 0.22], [0.05, -0.26]];
+/// Buildings stand on a lattice of this spacing, metres.
+const BLOCK_M: f64 = 64.0;
+
+const PERIOD_M: f64 = PERIOD as f64 * GSD_M;
+
+/// Height of the surface above the ground height.
+pub(crate) fn height(x: f64, y: f64) -> f64 {
+    let (i, j) = ((x / BLOCK_M).floor(), (y / BLOCK_M).floor());
+    let blocks = (PERIOD_M / BLOCK_M) as i64;
+    let key = |k: u64| uniform([k, (i as i64).rem_euclid(blocks) as u64, (j as i64).rem_euclid(blocks) as u64, 0]);
+    let ground = rolling(x, y);
+    let (u, v) = (x - (i + 0.5) * BLOCK_M, y - (j + 0.5) * BLOCK_M);
+    let half = [8.0 + 14.0 * key(1), 7.0 + 12.0 * key(2)];
+    if key(0) < 0.15 || u.abs() > half[0] || v.abs() > half[1] {
+        return ground;
+    }
+    let eaves = if key(3) > 0.96 { 52.0 } else { 5.0 + 17.0 * key(3) };
+    let ridge = if key(4) > 0.5 { 4.0 * (1.0 - v.abs() / half[1]) } else { 0.0 };
+    eaves + ridge
+}
+
+fn rolling(x: f64, y: f64) -> f64 {
+    let wave = |n: f64, v: f64| (std::f64::consts::TAU * n * v / PERIOD_M).sin();
+    2.5 * wave(2.0, x) + 2.0 * wave(3.0, y) + wave(5.0, x + y)
+}
+
+/// Reflectance, 0 to 1: detail from a metre to a block on every surface, walls too.
+fn paint([x, y, z]: [f64; 3]) -> f64 {
+    const OCTAVES: [(f64, f64); 4] = [(1.0, 0.34), (4.0, 0.28), (8.0, 0.22), (32.0, 0.16)];
+    let sum: f64 =
+        (0..).zip(OCTAVES).map(|(k, (cell, share))| share * noise(k, [x, y, z].map(|v| v / cell), cell)).sum();
+    (0.45 + 0.75 * sum).clamp(0.0, 1.0)
+}
+
+/// Uniform in [−1, 1] at lattice points that repeat with the town, smooth between them.
+fn noise(seed: u64, p: [f64; 3], cell: f64) -> f64 {
+    let period = (PERIOD_M / cell) as i64;
+    let floor = p.map(f64::floor);
+    let t: [f64; 3] = std::array::from_fn(|i| {
+        let f = p[i] - floor[i];
+        f * f * (3.0 - 2.0 * f)
+    });
+    let corner = |k: usize| {
+        let at = |i: usize| floor[i] as i64 + (k >> i & 1) as i64;
+        let weight: f64 = (0..3).map(|i| if k >> i & 1 == 1 { t[i] } else { 1.0 - t[i] }).product();
+        let key = [seed, at(0).rem_euclid(period) as u64, at(1).rem_euclid(period) as u64, at(2) as u64];
+        weight * (2.0 * uniform(key) - 1.0)
+    };
+    (0..8).map(corner).sum()
+}
+
+/// Uniform in [0, 1), by its key alone (splitmix64).
+fn uniform(key: [u64; 4]) -> f64 {
+    let mix = |state: u64, k: u64| {
+        let z = (state ^ k).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    (key.into_iter().fold(0, mix) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// The tile that a view's image is made of, with noise of four digital numbers.
+pub(crate) fn tile([a, b]: [f64; 2], view: u64) -> Grid<u16> {
+    let mut tile = Grid::filled(PERIOD, PERIOD, 0);
+    tile.data_mut().par_chunks_mut(PERIOD).enumerate().for_each(|(line, row)| {
+        for (sample, pixel) in row.iter_mut().enumerate() {
+            let at = |z: f64| [GSD_M * sample as f64 - a * z, b * z - GSD_M * line as f64, z];
+            let random: f64 = (0..4).map(|k| uniform([view, sample as u64, line as u64, k]) - 0.5).sum();
+            let value = 100.0 + 1000.0 * paint(at(hit(at))) + 4.0 * 3f64.sqrt() * random;
+            *pixel = value.round().clamp(1.0, 2047.0) as u16;
+        }
+    });
+    tile
+}
+
+/// z at which a ray from above first meets the surface: marched, then bisected.
+fn hit(at: impl Fn(f64) -> [f64; 3]) -> f64 {
+    const STEP_M: f64 = 0.5;
+    let is_above = |z: f64| {
+        let [x, y, _] = at(z);
+        z > height(x, y)
+    };
+    let mut above = SPAN_M.1;
+    while above > SPAN_M.0 && is_above(above - STEP_M) {
+        above -= STEP_M;
+    }
+    let mut below = above - STEP_M;
+    for _ in 0..10 {
+        let middle = 0.5 * (above + below);
+        if is_above(middle) { above = middle } else { below = middle }
+    }
+    above
+}
+
+/// The RPC of an image of `size` × `size` pixels.
+pub(crate) fn rpc([a, b]: [f64; 2], size: usize) -> Rpc {
+    const HEIGHT_SCALE_M: f64 = 200.0;
+    let half_px = size as f64 / 2.0;
+    let half_m = half_px * GSD_M;
+    // Terms 1, L, P, H; x = half_m (1 + L), y = half_m (P − 1).
+    let linear = |c: [f64; 4]| std::array::from_fn(|i| c.get(i).copied().unwrap_or(0.0));
+    let one = linear([1.0, 0.0, 0.0, 0.0]);
+    Rpc {
+        line_off: half_px,
+        samp_off: half_px,
+        lat_off: ORIGIN.1 - half_m / METRES_PER_DEGREE[1],
+        long_off: ORIGIN.0 + half_m / METRES_PER_DEGREE[0],
+        height_off: GROUND_M,
+        line_scale: half_px,
+        samp_scale: half_px,
+        lat_scale: half_m / METRES_PER_DEGREE[1],
+        long_scale: half_m / METRES_PER_DEGREE[0],
+        height_scale: HEIGHT_SCALE_M,
+        line_num: linear([0.0, 0.0, -1.0, b * HEIGHT_SCALE_M / half_m]),
+        line_den: one,
+        samp_num: linear([0.0, 1.0, 0.0, a * HEIGHT_SCALE_M / half_m]),
+        samp_den: one,
+        err_bias_m: None,
+        err_rand_m: None,
+    }
+}
+
+/// Height above the ellipsoid of a place, and whether images of `size` pixels surely see it.
+pub(crate) fn truth(lon_deg: f64, lat_deg: f64, size: usize) -> Option<f64> {
+    let x = (lon_deg - ORIGIN.0) * METRES_PER_DEGREE[0];
+    let y = (lat_deg - ORIGIN.1) * METRES_PER_DEGREE[1];
+    let inside = |v: f64| (40.0..size as f64 * GSD_M - 40.0).contains(&v);
+    (inside(x) && inside(-y)).then(|| GROUND_M + height(x, y))
+}
+
+/// Where a view has a ground point, pixels: the RPC's own answer, to hold the tile against.
+pub(crate) fn project(rpc: &Rpc, [x, y, z]: [f64; 3]) -> anyhow::Result<ImagePoint> {
+    let (lon, lat) = (ORIGIN.0 + x / METRES_PER_DEGREE[0], ORIGIN.1 + y / METRES_PER_DEGREE[1]);
+    Ok(camera::RpcCamera::new(rpc.clone()).project(geodesy::LonLatHeight::new(lon, lat, GROUND_M + z))?)
+}

@@ -1,0 +1,217 @@
+//! Rasters that are made window by window on disk, for results that do not fit the memory.
+//!
+//! A spool is an uncompressed tiled GeoTIFF whose unwritten tiles take no space and read as no-data. When all windows are
+//! there it is copied into a Cloud-Optimised GeoTIFF, block by block. Windows that begin and end on whole tiles
+//! ([`SPOOL_TILE`]) are written once; others cost a read of the tiles at their rim.
+
+use std::path::{Path, PathBuf};
+
+use gdal::raster::{Buffer, GdalType, RasterCreationOptions};
+use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, Metadata};
+use raster::{Grid, NO_DATA, Window};
+
+use super::geotiff::{BandData, CogPlace, finish_cog};
+use super::source::read_as;
+use super::{RasterError, Sampling, with_gdal, write_whole};
+
+/// Side of a spool's tiles, cells.
+pub const SPOOL_TILE: usize = 256;
+
+/// A raster of one band that grows on disk.
+pub struct RasterSpool {
+    path: PathBuf,
+    dataset: Dataset,
+    /// Columns and rows.
+    size: (usize, usize),
+    is_float: bool,
+}
+
+/// What a spool holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpoolBand<'a> {
+    /// What a reader of the result sees as the band's name: `height_m`.
+    pub description: &'a str,
+    /// Single precision, where NaN is no-data, or bytes.
+    pub is_float: bool,
+    /// What cells hold that no window was written to, and NaN becomes.
+    pub no_data: f64,
+}
+
+impl<'a> SpoolBand<'a> {
+    /// Heights and other quantities.
+    pub fn float(description: &'a str) -> Self {
+        Self { description, is_float: true, no_data: f64::from(NO_DATA) }
+    }
+
+    /// Masks and counts.
+    pub fn bytes(description: &'a str, no_data: u8) -> Self {
+        Self { description, is_float: false, no_data: f64::from(no_data) }
+    }
+}
+
+impl RasterSpool {
+    /// Makes an empty spool of `size` (columns, rows); an older file of the name is replaced.
+    ///
+    /// # Errors
+    /// [`RasterError::Unwritable`].
+    pub fn create(path: impl AsRef<Path>, size: (usize, usize), band: SpoolBand<'_>) -> Result<Self, RasterError> {
+        let path = path.as_ref().to_owned();
+        let tile = SPOOL_TILE.to_string();
+        let items = [
+            ("TILED", "YES"),
+            ("BLOCKXSIZE", tile.as_str()),
+            ("BLOCKYSIZE", tile.as_str()),
+            ("SPARSE_OK", "TRUE"),
+            ("BIGTIFF", "IF_SAFER"),
+        ];
+        let made = with_gdal(|| {
+            let options = RasterCreationOptions::from_iter(items.iter().map(|(key, value)| format!("{key}={value}")));
+            let driver = DriverManager::get_driver_by_name("GTiff")?;
+            let dataset = if band.is_float {
+                driver.create_with_band_type_with_options::<f32, _>(&path, size.0, size.1, 1, &options)?
+            } else {
+                driver.create_with_band_type_with_options::<u8, _>(&path, size.0, size.1, 1, &options)?
+            };
+            let mut only = dataset.rasterband(1)?;
+            only.set_no_data_value(Some(band.no_data))?;
+            only.set_description(band.description)?;
+            Ok(dataset)
+        });
+        let dataset = made.map_err(|reason| RasterError::unwritable(&path, reason))?;
+        Ok(Self { path, dataset, size, is_float: band.is_float })
+    }
+
+    /// Goes on with a spool that an earlier process left.
+    ///
+    /// # Errors
+    /// [`RasterError::NotARaster`] and [`RasterError::InconsistentBands`] when it is not the spool that [`Self::create`]
+    /// would make.
+    pub fn reopen(path: impl AsRef<Path>, size: (usize, usize), band: SpoolBand<'_>) -> Result<Self, RasterError> {
+        let path = path.as_ref().to_owned();
+        let open_flags = GdalOpenFlags::GDAL_OF_RASTER | GdalOpenFlags::GDAL_OF_UPDATE;
+        let dataset = with_gdal(|| Dataset::open_ex(&path, DatasetOptions { open_flags, ..Default::default() }))
+            .map_err(|reason| RasterError::NotARaster { path: path.clone(), reason })?;
+        if dataset.raster_size() != size || dataset.raster_count() != 1 {
+            let reason = format!("{:?} cells in {} bands", dataset.raster_size(), dataset.raster_count());
+            return Err(RasterError::InconsistentBands { path, reason });
+        }
+        Ok(Self { path, dataset, size, is_float: band.is_float })
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    /// Writes cells whose first one is at `(column, row)`.
+    ///
+    /// # Errors
+    /// [`RasterError::InconsistentBands`] for another type of cells or a window outside, [`RasterError::Unwritable`].
+    pub fn put(&mut self, at: (usize, usize), cells: BandData<'_>) -> Result<(), RasterError> {
+        match (cells, self.is_float) {
+            (BandData::F32(grid), true) => self.write(at, grid, |v| if v.is_nan() { NO_DATA } else { v }),
+            (BandData::U8(grid), false) => self.write(at, grid, |v| v),
+            _ => Err(self.unlike("the cells are of another type than the spool")),
+        }
+    }
+
+    /// All that was put is on the disk when this returns.
+    ///
+    /// # Errors
+    /// [`RasterError::Unwritable`].
+    pub fn flush(&mut self) -> Result<(), RasterError> {
+        with_gdal(|| self.dataset.flush_cache()).map_err(|reason| RasterError::unwritable(&self.path, reason))
+    }
+
+    /// The cells of a window inside, NaN where there is no data.
+    ///
+    /// # Errors
+    /// [`RasterError::Damaged`].
+    pub fn read(&self, inside: Window) -> Result<Grid<f32>, RasterError> {
+        let no_data = with_gdal(|| Ok(self.dataset.rasterband(1)?.no_data_value()))
+            .map_err(|reason| RasterError::damaged(&self.path, reason))?;
+        let mut cells = read_as::<f32>(&self.path, &self.dataset, 1, inside)?;
+        let void = no_data.map(|v| v as f32);
+        cells.data_mut().iter_mut().filter(|v| Some(**v) == void).for_each(|v| *v = f32::NAN);
+        Ok(cells)
+    }
+
+    /// Copies what was put into a Cloud-Optimised GeoTIFF of the toolkit's form (see [`super::write_cog`]) and removes the
+    /// spool.
+    ///
+    /// # Errors
+    /// Those of [`super::write_cog`].
+    pub fn into_cog(mut self, path: impl AsRef<Path>, place: CogPlace<'_>, overwrite: bool) -> Result<(), RasterError> {
+        let path = path.as_ref();
+        self.flush()?;
+        let sampling = if self.is_float { Sampling::Average } else { Sampling::Nearest };
+        write_whole(path, overwrite, |made| {
+            finish_cog(&mut self.dataset, place, sampling, made).map_err(|reason| RasterError::unwritable(path, reason))
+        })?;
+        let spool = self.path.clone();
+        drop(self);
+        // The result is complete; a spool that stays costs only space.
+        let _ = std::fs::remove_file(spool);
+        Ok(())
+    }
+
+    fn write<T: GdalType + Copy>(
+        &mut self,
+        at: (usize, usize),
+        grid: &Grid<T>,
+        convert: impl Fn(T) -> T,
+    ) -> Result<(), RasterError> {
+        let size = (grid.width(), grid.height());
+        if at.0 + size.0 > self.size.0 || at.1 + size.1 > self.size.1 {
+            return Err(self.unlike("the window reaches outside the spool"));
+        }
+        let cells = grid.data().iter().map(|&v| convert(v)).collect();
+        with_gdal(|| {
+            let mut band = self.dataset.rasterband(1)?;
+            band.write((at.0 as isize, at.1 as isize), size, &mut Buffer::new(size, cells))
+        })
+        .map_err(|reason| RasterError::unwritable(&self.path, reason))
+    }
+
+    fn unlike(&self, reason: &str) -> RasterError {
+        RasterError::InconsistentBands { path: self.path.clone(), reason: reason.to_owned() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::{Band, CogRaster, read_dem, write_cog};
+    use geodesy::{Crs, VerticalDatum};
+    use raster::GeoTransform;
+
+    /// Windows in any order, some never put, give the file that a grid in memory gives.
+    #[test]
+    fn a_spool_becomes_the_raster_that_memory_would_give() {
+        let folder = tempfile::tempdir().unwrap();
+        let crs = Crs { horizontal: 32631, vertical: VerticalDatum::Ellipsoid };
+        let geotransform = GeoTransform::north_up(500_000.0, 4_800_000.0, 0.5);
+        let mut whole = Grid::filled(700, 600, f32::NAN);
+        let mut spool =
+            RasterSpool::create(folder.path().join("s.tif"), (700, 600), SpoolBand::float("height_m")).unwrap();
+        for (x, y) in [(512, 256), (0, 0), (256, 512)] {
+            let part = Grid::filled(188.min(700 - x), 88.min(600 - y), (x + y) as f32 * 0.25);
+            (0..part.height()).for_each(|r| whole.row_mut(y + r)[x..x + part.width()].copy_from_slice(part.row(r)));
+            spool.put((x, y), BandData::F32(&part)).unwrap();
+        }
+        drop(spool);
+        let mut spool =
+            RasterSpool::reopen(folder.path().join("s.tif"), (700, 600), SpoolBand::float("height_m")).unwrap();
+        assert!(spool.put((0, 0), BandData::U8(&Grid::filled(2, 2, 1))).is_err());
+        assert!(spool.put((699, 0), BandData::F32(&Grid::filled(2, 2, 1.0))).is_err());
+        let (a, b) = (folder.path().join("a.tif"), folder.path().join("b.tif"));
+        spool.into_cog(&a, CogPlace { geotransform, crs, metadata: &[], threads: 1 }, false).unwrap();
+        assert!(!folder.path().join("s.tif").exists());
+        let bands = [Band { description: "height_m", data: BandData::F32(&whole) }];
+        write_cog(&b, &CogRaster::new(&bands, geotransform, crs), false).unwrap();
+        let same = |x: &f32, y: &f32| x == y || (x.is_nan() && y.is_nan());
+        let (a, b) = (read_dem(&a).unwrap(), read_dem(&b).unwrap());
+        assert_eq!((a.geotransform, a.vertical, a.horizontal_epsg), (b.geotransform, b.vertical, b.horizontal_epsg));
+        assert!(a.heights.data().iter().zip(b.heights.data()).all(|(x, y)| same(x, y)));
+    }
+}

@@ -1,0 +1,111 @@
+//! `skysweep dsm` by chunks: the town in one piece and in four has the same accuracy, no seam shows, and threads change
+//! nothing. What large scenes cost is measured by `cargo bench --bench scale`.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use assert_cmd::Command;
+use raster::Grid;
+use serde_json::Value;
+
+fn skysweep() -> Command {
+    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
+}
+
+fn town(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
+}
+
+/// `skysweep dsm` on the town, with further options; returns its report.
+fn run(out: &Path, options: &[&str]) -> Value {
+    let views = ["view_1.tif", "view_2.tif", "view_3.tif"].map(town);
+    let mut command = skysweep();
+    command.arg("dsm").args(views).arg("-o").arg(out).args(["-q", "--json"]).args(options);
+    let output = command.assert().code(0).get_output().stdout.clone();
+    serde_json::from_slice(&output).unwrap()
+}
+
+/// The town in one piece and in four.
+struct Both {
+    folder: tempfile::TempDir,
+    reports: [Value; 2],
+}
+
+static BOTH: LazyLock<Both> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let once = run(&folder.path().join("once"), &[]);
+    let side = once["surface"]["cells"].as_u64().unwrap().isqrt() / 2 + 30;
+    let four = run(&folder.path().join("four"), &["--chunk", &side.to_string()]);
+    Both { folder, reports: [once, four] }
+});
+
+impl Both {
+    fn dsm(&self, name: &str) -> Grid<f32> {
+        io::raster::read_dem(self.folder.path().join(name).join("dsm/dsm.tif")).unwrap().heights
+    }
+
+    fn completeness(&self, name: &str) -> f64 {
+        let output = skysweep()
+            .arg("eval")
+            .arg(self.folder.path().join(name).join("dsm/dsm.tif"))
+            .arg(town("truth/dsm.tif"))
+            .args(["--align", "xyz", "--json", "--no-report"])
+            .output()
+            .unwrap();
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        report["metrics"]["completeness_1"].as_f64().unwrap()
+    }
+}
+
+#[test]
+fn four_chunks_are_as_right_as_one() {
+    let [once, four] = &BOTH.reports;
+    assert!(once["chunks"].is_null());
+    assert_eq!((four["chunks"]["done"].as_u64(), &four["chunks"]["failed"]), (Some(4), &Value::Array(Vec::new())));
+    let (a, b) = (BOTH.completeness("once"), BOTH.completeness("four"));
+    assert!((a - b).abs() < 0.002, "{a} in one piece, {b} in four");
+    let count = |r: &Value, name: &str| r["surface"][name].as_f64().unwrap();
+    assert_eq!(count(once, "cells"), count(four, "cells"));
+    let sum: f64 = ["observed", "filled", "void"].iter().map(|n| count(four, n)).sum();
+    assert_eq!(sum, count(four, "cells"));
+    assert!((count(once, "observed") / count(four, "observed") - 1.0).abs() < 0.002);
+    for file in ["dsm/sigma.tif", "dsm/views.tif", "dsm/filled.tif", "dsm/confidence.tif", "dsm/relief.png"] {
+        assert!(BOTH.folder.path().join("four").join(file).is_file(), "{file} is missing");
+    }
+    assert!(!BOTH.folder.path().join("four/.skysweep-partial").exists());
+}
+
+/// Steps between neighbouring cells across the seams are those of the same cells computed in one piece.
+#[test]
+fn no_seam_shows() {
+    let (once, four) = (BOTH.dsm("once"), BOTH.dsm("four"));
+    let (w, h) = (four.width(), four.height());
+    assert_eq!((once.width(), once.height()), (w, h));
+    let vertical = (0..h).map(|y| ((w / 2 - 1, y), (w / 2, y)));
+    let horizontal = (0..w).map(|x| ((x, h / 2 - 1), (x, h / 2)));
+    let pairs: Vec<_> = vertical.chain(horizontal).collect();
+    let steps = |g: &Grid<f32>| {
+        let all: Vec<f64> =
+            pairs.iter().map(|(a, b)| f64::from((g[*a] - g[*b]).abs())).filter(|d| d.is_finite()).collect();
+        (all.len(), all.iter().sum::<f64>() / all.len() as f64)
+    };
+    let (a, b) = (steps(&once), steps(&four));
+    assert!(a.0 > 1000 && a.0.abs_diff(b.0) * 50 < a.0, "{} and {} known pairs", a.0, b.0);
+    assert!((a.1 - b.1).abs() < 0.02, "mean steps of {} m in one piece, {} m across seams", a.1, b.1);
+    // Height by height: what the paths of the aggregation bring from beyond the rim is noise.
+    let near = |d: f32| if d.is_finite() { d.abs() <= 0.1 } else { false };
+    let known = once.data().iter().zip(four.data()).filter(|(a, b)| !(a.is_nan() && b.is_nan()));
+    let (same, all) = known.fold((0, 0), |(s, n), (a, b)| (s + usize::from(near(a - b)), n + 1));
+    assert!(same * 1000 >= 985 * all, "{same} of {all} cells are the same");
+}
+
+#[test]
+fn threads_do_not_change_a_byte_of_chunks() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = |name: &str, threads: &str| {
+        let out = folder.path().join(name);
+        run(&out, &["--chunk", "200", "--gsd", "1", "--preset", "fast", "--threads", threads]);
+        ["dsm/dsm.tif", "dsm/sigma.tif", "dsm/views.tif", "dsm/filled.tif"].map(|f| std::fs::read(out.join(f)).unwrap())
+    };
+    assert!(bytes("one", "1") == bytes("two", "2"), "two threads give other bytes than one");
+}
