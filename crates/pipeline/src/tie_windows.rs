@@ -86,7 +86,8 @@ pub(crate) fn match_in_windows(
     progress: &dyn Progress,
 ) -> Result<(Vec<PairTies>, Vec<Character>), PipelineError> {
     let places = places(images, grid, pairs, search)?;
-    let config = TieConfig { points: POINTS, ..TieConfig::default() };
+    let all = TieConfig::default();
+    let config = TieConfig { points: POINTS.max(all.points / places.len().max(1)), ..all };
     let mut characters = vec![Character::default(); images.len()];
     let mut out: Vec<PairTies> =
         pairs.iter().map(|&(reference, source)| PairTies { reference, source, ties: Vec::new() }).collect();

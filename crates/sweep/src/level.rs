@@ -139,9 +139,11 @@ fn layout(ranges: &Ranges, window: Window) -> Result<(Vec<i32>, Vec<u32>), Sweep
     Ok((low, offsets))
 }
 
-/// How strong an edge each pixel is, 0 to 255: its gradient against the block's typical one and the noise.
+/// How strong an edge each pixel is, 0 to 255: its gradient against the block's typical one and the noise. Pixels without
+/// a value are no edge, and say nothing of what is typical.
 fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
     let mut gradient = Vec::with_capacity(w.width * w.height);
+    let mut known = Vec::with_capacity(w.width * w.height);
     for y in 0..w.height {
         for x in 0..w.width {
             let (gx, gy) = (w.x as usize + x, w.y as usize + y);
@@ -150,11 +152,11 @@ fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
             let below = image.get(gx, gy + 1).copied().unwrap_or(here);
             let g = (right - here).abs().max((below - here).abs());
             gradient.push(if g.is_finite() { g } else { 0.0 });
+            known.extend(g.is_finite().then_some(g));
         }
     }
-    let mut sorted = gradient.clone();
-    let middle = sorted.len() / 2;
-    let typical = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let middle = known.len() / 2;
+    let typical = if known.is_empty() { 0.0 } else { *known.select_nth_unstable_by(middle, f32::total_cmp).1 };
     // Gradients up to twice the typical one are texture; from eight times on they are edges.
     let unit = typical.max(noise).max(f32::MIN_POSITIVE);
     gradient.iter().map(|g| (((g / unit - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as u8).collect()
