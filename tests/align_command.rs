@@ -1,6 +1,8 @@
 //! `skysweep align` end to end: a planted similarity among right and wrong positions (made by NumPy and PROJ), the files it writes,
 //! the noise harness, a real model, and what is refused.
 
+#![allow(clippy::print_stderr, reason = "a test that skips says so")]
+
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;

@@ -1,5 +1,7 @@
 //! `skysweep split` on real COLMAP models against a brute-force choice by Python sets, and what it refuses.
 
+#![allow(clippy::print_stderr, reason = "a test that skips says so")]
+
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;

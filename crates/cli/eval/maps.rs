@@ -45,7 +45,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Vec<String>> {
         reference.channels
     );
     let (result, mae) = compare(kind, &test, &reference)?;
-    let missed = args.max_mae.filter(|&most| mae.is_some_and(|mae| !(mae <= most)));
+    let missed = args.max_mae.filter(|&most| mae.is_some_and(|mae| mae.is_nan() || mae > most));
     let missed: Vec<String> = missed.map(|most| format!("mae is above {most}")).into_iter().collect();
     let report = json!({
         "generator": format!("skysweep eval {}", env!("CARGO_PKG_VERSION")),

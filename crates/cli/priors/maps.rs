@@ -8,8 +8,8 @@ use anyhow::Context;
 use io::npy;
 use io::raster::{Band, BandData, DepthScale, write_depth_png, write_map, write_png_gray, write_png_rgb};
 use pipeline::Progress as _;
-use raster::{Grid, NO_DATA};
-use report::{ViewRow, depth_preview, normal_preview};
+use raster::NO_DATA;
+use report::{ViewPictures, ViewRow, depth_preview, normal_preview};
 
 use super::content::Dataset;
 use super::options::Normals;
@@ -20,14 +20,11 @@ const FOLDERS: [&str; 8] = ["raw_depth", "raw_normal", "raw_mask", "masks", "cla
 /// Views that the page shows.
 const IN_PAGE: usize = 6;
 
-/// Pictures of a view for the page: its name, depth, normals.
-type Picture = (String, Grid<[u8; 3]>, Grid<[u8; 3]>);
-
 /// What was written.
 #[derive(Debug)]
 pub(super) struct Written {
     pub(super) rows: Vec<ViewRow>,
-    pub(super) pictures: Vec<Picture>,
+    pub(super) pictures: Vec<ViewPictures>,
     /// Length of a step of the 16-bit maps.
     pub(super) depth_png_step: f64,
 }
@@ -50,12 +47,12 @@ pub(super) fn write(dataset: &Dataset<'_>, folder: &Path, watcher: &Watcher) -> 
         let in_page = spread(view, count, dataset.args.previews.min(IN_PAGE));
         if in_folder || in_page {
             let stem = &dataset.cameras.stems[view];
-            let pair = (depth_preview(&maps.depth_m), normal_preview(&maps.normal));
+            let (depth, normals) = (depth_preview(&maps.depth_m), normal_preview(&maps.normal));
             let path = |what: &str| folder.join("previews").join(format!("{stem}_{what}.png"));
-            write_png_rgb(path("depth"), &pair.0, false)?;
-            write_png_rgb(path("normal"), &pair.1, false)?;
+            write_png_rgb(path("depth"), &depth, false)?;
+            write_png_rgb(path("normal"), &normals, false)?;
             if in_page {
-                pictures.push((stem.clone(), pair.0, pair.1));
+                pictures.push(ViewPictures { name: stem.clone(), depth, normals });
             }
         }
         rows.push(row(dataset, view, &maps));

@@ -22,6 +22,6 @@ pub use page::escape;
 pub use palette::{MISSING, OUTSIDE, diverging};
 pub use picture::{PictureError, error_picture, png};
 pub use preview::{depth_preview, normal_preview};
-pub use priors::{ErrorRow, PriorsReport, ViewRow};
+pub use priors::{ErrorRow, PriorsReport, ViewPictures, ViewRow};
 pub use protocol::Protocol;
 pub use svg::{Axis, Chart};

@@ -76,6 +76,17 @@ pub struct ViewRow {
     pub visible: usize,
 }
 
+/// What the page shows of one view.
+#[derive(Debug, Clone)]
+pub struct ViewPictures {
+    /// The image.
+    pub name: String,
+    /// Its depths in colours.
+    pub depth: Grid<[u8; 3]>,
+    /// Its normals in colours.
+    pub normals: Grid<[u8; 3]>,
+}
+
 impl PriorsReport {
     /// Every number, by name.
     ///
@@ -89,11 +100,11 @@ impl PriorsReport {
         Ok(value)
     }
 
-    /// The page; `pictures` are the depth and the normals of some views with their names.
+    /// The page, with pictures of some views.
     ///
     /// # Errors
     /// [`PictureError`] for a picture without pixels.
-    pub fn html(&self, pictures: &[(String, Grid<[u8; 3]>, Grid<[u8; 3]>)]) -> Result<String, PictureError> {
+    pub fn html(&self, pictures: &[ViewPictures]) -> Result<String, PictureError> {
         let title = format!("Priors of {}", last_part(&self.model));
         let mut body = vec![
             format!("<h1>{}</h1>", escape(&title)),
@@ -103,7 +114,7 @@ impl PriorsReport {
         ];
         if !pictures.is_empty() {
             body.push("<h2>Views</h2><div class=\"pictures\">".to_owned());
-            for (name, depth, normals) in pictures {
+            for ViewPictures { name, depth, normals } in pictures {
                 for (what, picture) in [("depth", depth), ("normals", normals)] {
                     let (uri, name) = (data_uri(picture)?, escape(name));
                     body.push(format!(
@@ -252,7 +263,9 @@ mod tests {
     #[test]
     fn the_page_holds_the_numbers_and_nothing_leaves_its_place() {
         let picture = Grid::filled(4, 3, [9; 3]);
-        let page = report().html(&[("<a>.png".to_owned(), picture.clone(), picture)]).unwrap();
+        let page = report()
+            .html(&[ViewPictures { name: "<a>.png".to_owned(), depth: picture.clone(), normals: picture }])
+            .unwrap();
         for words in
             ["321 are seen by 2 or more of 1 views", "25.0 %", "3.0 to 9.5", "not sampled", "data:image/png", "50000"]
         {

@@ -74,7 +74,8 @@ impl TileFrame {
     pub fn new(request: TileRequest, height_m: f64, system: MapSystem) -> Result<Self, HeightMapError> {
         let TileRequest { lon_deg, lat_deg, heading_deg, size, resolution_px_per_m } = request;
         let side_m = size as f64 / resolution_px_per_m;
-        if !(1..=SIZE_MAX).contains(&size) || !(resolution_px_per_m > 0.0 && side_m > 0.0 && side_m <= SIDE_MAX_M) {
+        let sound = (1..=SIZE_MAX).contains(&size) && resolution_px_per_m > 0.0 && side_m > 0.0 && side_m <= SIDE_MAX_M;
+        if !sound {
             let (most, widest_m) = (SIZE_MAX, SIDE_MAX_M);
             return Err(HeightMapError::Tile { size, resolution_px_per_m, most, widest_m });
         }

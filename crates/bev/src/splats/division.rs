@@ -184,7 +184,7 @@ impl Division<'_> {
             return Some((along_columns, if along_columns { block.width } else { block.height } / 2));
         }
         let near = (side / 4).max(1);
-        Some((worst < 2, if worst % 2 == 0 { near } else { side - near }))
+        Some((worst < 2, if worst.is_multiple_of(2) { near } else { side - near }))
     }
 
     /// The cut with the least squares in both parts, the one nearest to the middle where several are alike.

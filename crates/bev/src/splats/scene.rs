@@ -210,7 +210,7 @@ fn check(surface: &Surface<'_>, confidence: Option<&Grid<f32>>, config: &SplatCo
         ("the bound on colours", config.division.colour_error),
         ("the spread", config.gaussian.spread),
     ];
-    if let Some((name, value)) = bounds.into_iter().find(|(_, value)| !(*value > 0.0)) {
+    if let Some((name, value)) = bounds.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
         return Err(SplatError::Bound { name, value });
     }
     let expected = (surface.heights().width(), surface.heights().height());

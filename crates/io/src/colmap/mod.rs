@@ -1,7 +1,7 @@
 //! COLMAP models: the cameras and poses of images, from text or binary files.
 //!
 //! [`read`] takes the folder of a model (`cameras` and `images`, `.bin` or `.txt`; binary wins where both are there) and keeps
-//! what a renderer needs: lenses and poses; [`read_with_points`] adds the points and their tracks, [`write`] is the way back.
+//! what a renderer needs: lenses and poses; [`read_with_points`] adds the points and their tracks, [`write()`] is the way back.
 //! Newer versions add `rigs` and `frames` and still write the pose of every image, which is what is read; they read models
 //! without those files, so none are written. COLMAP's pixels have the centre of the upper-left one at (0.5, 0.5);
 //! principal points and observations are moved between that and this toolkit's convention here.

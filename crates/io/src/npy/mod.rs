@@ -1,6 +1,6 @@
 //! NumPy's `.npy` files, version 1.0, C order: the maps that Gaussian splatting trainers read.
 //!
-//! [`write`] streams a slice without a second copy. [`read`] takes what NumPy writes for real numbers and bools in either byte
+//! [`write()`] streams a slice without a second copy. [`read`] takes what NumPy writes for real numbers and bools in either byte
 //! order, and widens nothing; structured types, objects (pickles) and Fortran order beyond one axis are refused.
 //! No shape is believed before it is checked against the size of the file.
 
@@ -121,7 +121,7 @@ mod sealed {
     pub trait Sealed {}
 }
 
-/// A type of numbers that [`write`] takes: `f32`, `f64`, `bool`, `u8`, `u16`, `u32`.
+/// A type of numbers that [`write()`] takes: `f32`, `f64`, `bool`, `u8`, `u16`, `u32`.
 pub trait NpyNumber: sealed::Sealed + Copy {
     /// NumPy's name for it.
     #[doc(hidden)]

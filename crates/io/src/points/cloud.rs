@@ -109,19 +109,12 @@ impl PointCloud {
         if announced > most {
             return Err(PointsError::TooManyPoints { path: self.path, points: announced, most });
         }
-        let mut batch = PointDataBuilder::new().for_header(self.reader.header()).build();
-        let (mut found, mut points) = (Vec::new(), 0u64);
-        while guarded(&self.path, || self.reader.fill_points(BATCH, &mut batch))? > 0 {
-            for point in batch.points() {
-                let point = point.map_err(|error| PointsError::damaged(&self.path, error))?;
-                points += 1;
-                let position = [point.x, point.y, point.z * self.stated.height_unit_m];
-                let noise = point.is_withheld || NOISE.contains(&u8::from(point.classification));
-                if !noise && position.iter().all(|c| c.is_finite()) {
-                    found.push(position);
-                }
+        let mut found = Vec::new();
+        let (points, _) = self.each(|point| {
+            if point.x.is_finite() && point.y.is_finite() {
+                found.push([point.x, point.y, point.height_m]);
             }
-        }
+        })?;
         if found.is_empty() { Err(PointsError::NoPoints { path: self.path, points }) } else { Ok(found) }
     }
 
@@ -160,11 +153,6 @@ impl PointCloud {
             no_data: None,
         };
         Ok(GriddedPoints { dem, classes, points, left_out })
-    }
-
-    /// What the file says its heights are above.
-    pub fn vertical(&self) -> Option<VerticalDatum> {
-        self.stated.vertical
     }
 
     /// The middle of the heights that the header names, metres; 0 where it names none.
