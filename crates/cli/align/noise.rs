@@ -8,6 +8,7 @@ use camera::Similarity;
 
 /// Options of the harness.
 #[derive(Debug, clap::Args)]
+#[group(id = "noise options")]
 pub(super) struct Args {
     /// Repeat the alignment with noise and report what changes: mean and standard deviation over seeds.
     #[arg(long)]
