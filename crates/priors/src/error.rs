@@ -10,6 +10,12 @@ pub enum PriorsError {
     /// A mesh that rays cannot be cast at.
     #[error(transparent)]
     Bvh(#[from] bvh::BvhError),
+    /// A place that the map of the model does not have, or a map that cannot be had.
+    #[error(transparent)]
+    Geodesy(#[from] geodesy::GeodesyError),
+    /// A model without triangles.
+    #[error("the model has no triangle that an image could see")]
+    NothingToSee,
     /// Nothing is left to put samples on.
     #[error("no surface is left to sample: {total} triangles, and all of them are excluded or without area")]
     NothingToSample {

@@ -7,7 +7,7 @@
 //! - [`PriorModel`] holds the triangles, arranged for rays; [`View`] is a camera in its frame.
 //! - [`sample`] spreads points over the surfaces, by count, by density or under a geometric error.
 //! - [`Visibility`] counts views per point, and keeps the best of them.
-//! - [`PriorMaps`] are what a camera would measure of the model.
+//! - [`PriorMaps`] are what a camera would measure of the model, [`SatelliteMaps`] what a satellite image would.
 //! - [`initial_splats`] are flat Gaussians to begin a training with, [`Schedule`] how much the priors weigh in it.
 
 mod error;
@@ -15,6 +15,7 @@ mod maps;
 mod model;
 mod random;
 mod sample;
+mod satellite;
 mod schedule;
 mod splats;
 mod vector;
@@ -25,6 +26,7 @@ pub use error::PriorsError;
 pub use maps::{DepthKind, MISSING_CLASS, MapConfig, NO_OBJECT, NormalFrame, PriorMaps};
 pub use model::PriorModel;
 pub use sample::{Amount, ClassWeights, ErrorCurve, Sample, SampleConfig, Samples, Spacing, error_curve, sample};
+pub use satellite::{LinesOfSight, SatelliteMaps};
 pub use schedule::{Ramp, Schedule};
 pub use splats::initial_splats;
 pub use view::{MAX_PIXELS, Rays, View};
