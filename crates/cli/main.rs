@@ -6,6 +6,7 @@
 
 mod align;
 mod city;
+mod corrections;
 mod dsm;
 mod error;
 mod eval;

@@ -3,7 +3,7 @@
 //! The folder holds the points that enough cameras see (COLMAP's `sparse/0` as text and binary, `points3D.ply`), per image
 //! the depth, the normals, the mask, the surface class and the object, flat Gaussians to begin with, and a report. It is made
 //! beside its place and moved there when it is complete. Everything stays in the frame of the cameras; `origin.json` says how
-//! the model lies in it. Exit code 1 when objects of the model could not be used.
+//! the model lies in it. Of satellite images there are maps only ([`satellite`]). Exit code 1 when objects of the model could not be used.
 
 mod cameras;
 mod content;
@@ -11,7 +11,10 @@ mod folder;
 mod frame;
 mod maps;
 mod options;
+mod satellite;
 mod trainer;
+
+use std::path::PathBuf;
 
 use ::priors::{PriorModel, Samples, View, Visibility, Visible, sample};
 use anyhow::{Context, bail};
@@ -35,23 +38,48 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         pool = pool.num_threads(threads.max(1));
     }
     let watcher = Watcher::new(args.progress, global);
-    let made = pool.build().context("the threads could not be started")?.install(|| make(args, &watcher));
+    let pool = pool.build().context("the threads could not be started")?;
+    let made = pool.install(|| match cameras::satellite_images(&args.cameras)? {
+        Some(images) => of_satellite_images(args, &images, &watcher),
+        None => of_cameras(args, &watcher),
+    });
     watcher.finish();
-    let (report, outcome) = made?;
+    let Made { report, summary, unusable } = made?;
     if args.json {
-        print::json(&report.json()?)?;
+        print::json(&report)?;
     } else if !global.is_quiet() {
-        print::text(&summary(args, &report))?;
+        print::text(&summary)?;
     }
-    Ok(outcome)
+    Ok(if unusable > 0 { Outcome::Partial } else { Outcome::Complete })
 }
 
-fn make(args: &Args, watcher: &Watcher) -> anyhow::Result<(PriorsReport, Outcome)> {
+/// What a run tells.
+struct Made {
+    report: serde_json::Value,
+    summary: String,
+    /// Objects of the model that could not be used.
+    unusable: usize,
+}
+
+fn of_satellite_images(args: &Args, images: &[PathBuf], watcher: &Watcher) -> anyhow::Result<Made> {
+    let (report, unusable) = satellite::make(args, images, watcher)?;
+    Ok(Made { summary: satellite::summary(args, &report), report, unusable })
+}
+
+fn of_cameras(args: &Args, watcher: &Watcher) -> anyhow::Result<Made> {
+    let (report, unusable) = make(args, watcher)?;
+    Ok(Made { report: report.json()?, summary: summary(args, &report), unusable })
+}
+
+fn make(args: &Args, watcher: &Watcher) -> anyhow::Result<(PriorsReport, usize)> {
+    if args.crs.is_some() || args.vertical.is_some() || args.corrections.is_some() {
+        bail!("--crs, --vertical and --corrections are for satellite images: the cameras are none");
+    }
     let folder = Folder::new(&args.output, args.overwrite)?;
     let sampling = args.sampling()?;
     let cameras = Cameras::read(args)?;
     let (file, meshed) = read_model(args)?;
-    let unusable = meshed.objects.iter().filter(|object| object.status == ObjectStatus::Unusable).count();
+    let unusable = unusable(&meshed);
     let frame = Frame::new(args, meshed.mesh.origin, &cameras)?;
     let model = PriorModel::new(meshed.mesh, &buildings(&file))?;
     let views = cameras.views(&frame);
@@ -71,7 +99,12 @@ fn make(args: &Args, watcher: &Watcher) -> anyhow::Result<(PriorsReport, Outcome
     let place = folder.begin()?;
     let report = dataset.write(place.path(), unusable, watcher)?;
     place.publish()?;
-    Ok((report, if unusable > 0 { Outcome::Partial } else { Outcome::Complete }))
+    Ok((report, unusable))
+}
+
+/// How many objects could not be used.
+fn unusable(meshed: &Meshed) -> usize {
+    meshed.objects.iter().filter(|object| object.status == ObjectStatus::Unusable).count()
 }
 
 fn read_model(args: &Args) -> anyhow::Result<(CityFile, Meshed)> {

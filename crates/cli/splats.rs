@@ -6,13 +6,14 @@ use anyhow::{Context, ensure};
 use bev::splats::{
     ColourFit, DivisionConfig, RpcSplatCamera, SplatConfig, SplatReport, SplatView, Surface, make_splats,
 };
-use camera::{ImageCorrection, RpcCamera};
+use camera::RpcCamera;
 use geodesy::VerticalDatum;
 use io::raster::{ImageSource, read_dem, write_png_rgb};
 use io::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
 use raster::Grid;
 use serde_json::Value;
 
+use crate::corrections::Corrections;
 use crate::{Global, Outcome, map_surface, print};
 
 /// Arguments of `skysweep splats`.
@@ -102,7 +103,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         .with_context(|| format!("the surface model has no height: {}", args.dsm.display()))?;
     let surface = Surface::new(&dem.heights, dem.geotransform, origin);
     let confidence = args.confidence.as_deref().map(confidence).transpose()?;
-    let corrections = Corrections::of(args)?;
+    let corrections = corrections(args)?;
     let images = args.images.iter().map(|path| image(path, &corrections)).collect::<anyhow::Result<Vec<_>>>()?;
     let mut views = Vec::with_capacity(images.len());
     for (path, image) in args.images.iter().zip(&images) {
@@ -153,58 +154,14 @@ fn image(path: &Path, corrections: &Corrections) -> anyhow::Result<Image> {
     Ok(Image { camera: RpcCamera { rpc: rpc.rpc, correction }, pixels })
 }
 
-/// The pointing corrections of a run, by image.
-struct Corrections(Vec<(PathBuf, ImageCorrection)>);
-
-/// What is read of a run's report.
-#[derive(serde::Deserialize)]
-struct RunReport {
-    images: Vec<RunImage>,
-}
-
-#[derive(serde::Deserialize)]
-struct RunImage {
-    path: PathBuf,
-    applied_correction: Option<ImageCorrection>,
-}
-
-impl Corrections {
-    fn of(args: &Args) -> anyhow::Result<Self> {
-        let folder = args.dsm.parent().filter(|folder| folder.file_name().is_some_and(|name| name == "dsm"));
-        let beside = || Some(folder?.parent()?.join("report/report.json")).filter(|path| path.is_file());
-        let path = match &args.corrections {
-            Some(path) if path.as_os_str() == "none" => return Ok(Self(Vec::new())),
-            Some(path) => path.clone(),
-            None => match beside() {
-                Some(path) => path,
-                None => return Ok(Self(Vec::new())),
-            },
-        };
-        let text =
-            std::fs::read_to_string(&path).with_context(|| format!("cannot read the file: {}", path.display()))?;
-        let report: RunReport = serde_json::from_str(&text)
-            .with_context(|| format!("no report of skysweep dsm with its images: {}", path.display()))?;
-        Ok(Self(report.images.into_iter().filter_map(|image| Some((image.path, image.applied_correction?))).collect()))
-    }
-
-    /// The correction of an image: by its path, else by its name where that is unique; none where the run did not use it.
-    fn for_image(&self, path: &Path) -> ImageCorrection {
-        let same = |a: &Path, b: &Path| a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b);
-        let by_path = self.0.iter().find(|(other, _)| same(other, path));
-        let mut by_name = self.0.iter().filter(|(other, _)| other.file_name() == path.file_name());
-        let only = by_name.next().filter(|_| by_name.next().is_none());
-        match by_path.or(only) {
-            Some((_, correction)) => *correction,
-            None => {
-                if !self.0.is_empty() {
-                    tracing::warn!(
-                        "the run that made the DSM did not use the image: its RPC is taken as it is: {}",
-                        path.display()
-                    );
-                }
-                ImageCorrection::IDENTITY
-            }
-        }
+/// The corrections of the run that made the surface model, or of the one that is named.
+fn corrections(args: &Args) -> anyhow::Result<Corrections> {
+    let folder = args.dsm.parent().filter(|folder| folder.file_name().is_some_and(|name| name == "dsm"));
+    let beside = || Some(folder?.parent()?.join("report/report.json")).filter(|path| path.is_file());
+    match &args.corrections {
+        Some(path) if path.as_os_str() == "none" => Ok(Corrections::default()),
+        Some(path) => Corrections::read(path),
+        None => beside().map_or_else(|| Ok(Corrections::default()), |path| Corrections::read(&path)),
     }
 }
 

@@ -4,6 +4,7 @@
 //! dot, or two images with one stem, would be paired wrongly and are refused.
 
 use std::collections::HashMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use ::priors::{MAX_PIXELS, View};
@@ -31,7 +32,13 @@ pub(super) struct Cameras {
 
 impl Cameras {
     pub(super) fn read(args: &Args) -> anyhow::Result<Self> {
-        let source = find(&args.cameras)?;
+        let [path] = args.cameras.as_slice() else {
+            bail!(
+                "{} cameras are named, expected satellite images, or one COLMAP folder or transforms.json",
+                args.cameras.len()
+            );
+        };
+        let source = find(path)?;
         let (mut model, points) = load(args, &source)?;
         if model.views.is_empty() {
             bail!("the cameras have no image: {}", source.display());
@@ -66,9 +73,39 @@ fn find(path: &Path) -> anyhow::Result<PathBuf> {
         return Ok(file);
     }
     bail!(
-        "found no cameras: expected cameras.bin or cameras.txt of a COLMAP model, sparse/0 with them, or transforms.json: {}",
+        "found no cameras: expected cameras.bin or cameras.txt of a COLMAP model, sparse/0 with them, transforms.json, or satellite \
+         images: {}",
         path.display()
     )
+}
+
+/// The satellite images among what `--cameras` names: image files, or those in a folder without other cameras.
+pub(super) fn satellite_images(paths: &[PathBuf]) -> anyhow::Result<Option<Vec<PathBuf>>> {
+    if let [folder] = paths
+        && folder.is_dir()
+    {
+        if find(folder).is_ok() {
+            return Ok(None);
+        }
+        let failed = || format!("cannot read the folder: {}", folder.display());
+        let entries = fs::read_dir(folder).with_context(failed)?.collect::<Result<Vec<_>, _>>().with_context(failed)?;
+        let mut images: Vec<PathBuf> = entries.into_iter().map(|e| e.path()).filter(|path| is_image(path)).collect();
+        images.sort_unstable();
+        return Ok(Some(images).filter(|images| !images.is_empty()));
+    }
+    if !paths.iter().any(|path| is_image(path)) {
+        return Ok(None);
+    }
+    match paths.iter().find(|path| !is_image(path)) {
+        Some(other) => bail!("among satellite images there is something else: {}", other.display()),
+        None => Ok(Some(paths.to_vec())),
+    }
+}
+
+/// Whether a file is a satellite image by its ending.
+fn is_image(path: &Path) -> bool {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    ["tif", "tiff", "ntf", "nitf", "jp2", "img", "vrt"].contains(&ending.as_str())
 }
 
 fn load(args: &Args, source: &Path) -> anyhow::Result<(ColmapModel, Vec<ColmapPoint>)> {
@@ -124,7 +161,7 @@ fn stem(name: &str) -> anyhow::Result<String> {
     Ok(stem.to_owned())
 }
 
-fn shown(text: &str) -> String {
+pub(super) fn shown(text: &str) -> String {
     text.chars().take(60).collect()
 }
 

@@ -10,7 +10,7 @@ use io::city::CityFile;
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint};
 use io::ply::{self, PlyPoint};
 use io::splat_ply::{self, LocalOrigin, SplatForm, SplatLayout};
-use mesh::SurfaceClass;
+use mesh::{CityModel, SurfaceClass, TriangleMesh};
 use report::{ErrorRow, PriorsReport};
 use serde_json::{Value, json};
 
@@ -45,7 +45,7 @@ impl Dataset<'_> {
             self.write_points(folder)?;
             self.write_crops(folder)?;
         }
-        write_json(&folder.join("labels.json"), &self.labels())?;
+        write_json(&folder.join("labels.json"), &labels(&self.file.model, self.model.mesh()))?;
         write_json(&folder.join("schedule.json"), &self.schedule())?;
         write_json(&folder.join("origin.json"), &self.frame.describe(&self.file.model.crs))?;
         let report = self.report(&written, unusable)?;
@@ -147,27 +147,6 @@ impl Dataset<'_> {
         if crops.is_empty() { Ok(()) } else { write_json(&folder.join("crops.json"), &json!(crops)) }
     }
 
-    /// What the numbers in the class and object maps are.
-    fn labels(&self) -> Value {
-        let classes: serde_json::Map<String, Value> =
-            SurfaceClass::all().map(|class| ((class as u8).to_string(), json!(class.name()))).collect();
-        let model = &self.file.model;
-        let mut used: Vec<u32> = self.model.mesh().surfaces.iter().map(|surface| surface.object).collect();
-        used.sort_unstable();
-        used.dedup();
-        let object = |&index: &u32| {
-            let object = &model.objects[index as usize];
-            let building = &model.objects[model.root(index as usize)];
-            json!({ "number": index + 1, "id": object.id, "kind": object.kind.name(), "building": building.id })
-        };
-        json!({
-            "classes": classes,
-            "missing_class": ::priors::MISSING_CLASS,
-            "missing_object": ::priors::NO_OBJECT,
-            "objects": used.iter().map(object).collect::<Vec<_>>(),
-        })
-    }
-
     fn schedule(&self) -> Value {
         json!({
             "mode": self.args.mode.name(),
@@ -222,9 +201,7 @@ impl Dataset<'_> {
             ));
         }
         if unusable > 0 {
-            notes.push(format!(
-                "{unusable} objects of the model could not be used; skysweep city info --report names them."
-            ));
+            notes.push(unusable_note(unusable));
         }
         if self.visible.points.is_empty() {
             notes.push(format!("No point is seen by {} views: the dataset has no points.", self.args.min_views));
@@ -271,6 +248,11 @@ impl Dataset<'_> {
     }
 }
 
+/// What to say of objects that could not be used.
+pub(super) fn unusable_note(unusable: usize) -> String {
+    format!("{unusable} objects of the model could not be used; skysweep city info --report names them.")
+}
+
 /// The colour of a class, red, green, blue: something to tell roofs from walls by until a training knows better.
 fn colour(class: SurfaceClass) -> [u8; 3] {
     match class {
@@ -282,7 +264,27 @@ fn colour(class: SurfaceClass) -> [u8; 3] {
     }
 }
 
-fn write_json(path: &Path, value: &Value) -> anyhow::Result<()> {
+/// What the numbers in the class and object maps are.
+pub(super) fn labels(model: &CityModel, mesh: &TriangleMesh) -> Value {
+    let classes: serde_json::Map<String, Value> =
+        SurfaceClass::all().map(|class| ((class as u8).to_string(), json!(class.name()))).collect();
+    let mut used: Vec<u32> = mesh.surfaces.iter().map(|surface| surface.object).collect();
+    used.sort_unstable();
+    used.dedup();
+    let object = |&index: &u32| {
+        let object = &model.objects[index as usize];
+        let building = &model.objects[model.root(index as usize)];
+        json!({ "number": index + 1, "id": object.id, "kind": object.kind.name(), "building": building.id })
+    };
+    json!({
+        "classes": classes,
+        "missing_class": ::priors::MISSING_CLASS,
+        "missing_object": ::priors::NO_OBJECT,
+        "objects": used.iter().map(object).collect::<Vec<_>>(),
+    })
+}
+
+pub(super) fn write_json(path: &Path, value: &Value) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(value)? + "\n";
     Ok(io::write_bytes(path, text.as_bytes(), false)?)
 }

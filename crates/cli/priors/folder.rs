@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 /// What a dataset consists of, the report last.
-const ENTRIES: [&str; 16] = [
+const ENTRIES: [&str; 20] = [
     "sparse",
     "points3D.ply",
     "raw_depth",
@@ -20,6 +20,10 @@ const ENTRIES: [&str; 16] = [
     "object",
     "depth_png",
     "geotiff",
+    "height",
+    "distance",
+    "normal",
+    "mask",
     "previews",
     "splats",
     "labels.json",

@@ -70,7 +70,7 @@ pub(super) fn write(dataset: &Dataset<'_>, folder: &Path, watcher: &Watcher) -> 
 }
 
 /// Whether a view is one of `wanted` that are spread over all.
-fn spread(view: usize, count: usize, wanted: usize) -> bool {
+pub(super) fn spread(view: usize, count: usize, wanted: usize) -> bool {
     let wanted = wanted.min(count);
     wanted > 0 && (view == 0 || view * wanted / count != (view - 1) * wanted / count)
 }

@@ -6,6 +6,7 @@ use ::priors::{
     Amount, ClassWeights, DepthKind, MapConfig, NormalFrame, SampleConfig, Spacing as Placement, VisibilityConfig,
 };
 use clap::ValueEnum;
+use geodesy::{CrsRequest, VerticalDatum};
 use mesh::{Lod, SurfaceClass};
 
 use crate::progress::ProgressStyle;
@@ -13,15 +14,19 @@ use crate::progress::ProgressStyle;
 /// Make depth, normal and mask priors of a city model for the cameras of a Gaussian splatting scene.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example: skysweep priors town.city.json --cameras scene/sparse/0 --offset 690000 5336000 0 -o scene_priors"
+    after_help = "Examples: skysweep priors town.city.json --cameras scene/sparse/0 --offset 690000 5336000 0 -o scene_priors; \
+                  skysweep priors town.city.json --cameras view_*.tif -o satellite_priors"
 )]
 pub(crate) struct Args {
     /// City model: CityJSON, CityJSONSeq, CityGML, OBJ or PLY.
     #[arg(value_name = "MODEL")]
     pub(super) model: PathBuf,
-    /// Cameras: the folder of a COLMAP model (or one with sparse/0 in it), or a transforms.json.
-    #[arg(long, value_name = "DIR|FILE")]
-    pub(super) cameras: PathBuf,
+    /// Cameras: the folder of a COLMAP model (or one with sparse/0 in it), a transforms.json, or satellite images with RPCs.
+    ///
+    /// Of satellite images (files, or a folder of them) the maps are made, in the pixels of each image and with its RPC: heights
+    /// above the ellipsoid, distances along the line of sight, normals in east, north and up, mask, class and object.
+    #[arg(long, value_name = "DIR|FILE", required = true, num_args = 1..)]
+    pub(super) cameras: Vec<PathBuf>,
     /// Folder for the dataset.
     #[arg(short, long, value_name = "DIR")]
     pub(super) output: PathBuf,
@@ -34,6 +39,16 @@ pub(crate) struct Args {
     /// Columns and rows of the images, for a transforms.json that does not say.
     #[arg(long, num_args = 2, value_names = ["COLUMNS", "ROWS"])]
     pub(super) image_size: Option<Vec<usize>>,
+
+    /// The model's map, where its file does not say (satellite images): EPSG:n or EPSG:n+m with the code of the heights.
+    #[arg(long, value_name = "EPSG", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
+    pub(super) crs: Option<CrsRequest>,
+    /// What the model's heights are above, where its file does not say: ellipsoid, egm96, egm2008 or an EPSG code.
+    #[arg(long, value_name = "DATUM", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
+    pub(super) vertical: Option<VerticalDatum>,
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm [default: RPCs as they are].
+    #[arg(long, value_name = "report.json", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
+    pub(super) corrections: Option<PathBuf>,
 
     /// What is to be trained: only the buildings, or the whole scene with priors on them.
     #[arg(long, value_enum, default_value_t = Mode::BuildingOnly)]
