@@ -382,3 +382,26 @@ fn transforms_json_serves_as_well() {
     // The ridge is 5 m high.
     assert!((25.0..25.4).contains(&nearest), "{nearest}");
 }
+
+/// The two lines of the README: the sample town in the cameras of a flight, and in its satellite images.
+#[test]
+fn the_sample_town() {
+    let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town");
+    let folder = tempfile::tempdir().unwrap();
+    let run = |cameras: &[&str], out: &str, more: &[&str]| {
+        let mut command = Command::cargo_bin("skysweep").unwrap();
+        command.current_dir(&town).args(["priors", "truth/buildings.city.json", "--cameras"]).args(cameras).args(more);
+        let assert =
+            command.arg("-o").arg(folder.path().join(out)).args(["--json", "--progress", "none"]).assert().code(0);
+        serde_json::from_slice::<Value>(&assert.get_output().stdout).unwrap()
+    };
+    let flight = run(&["cameras"], "flight", &["--points", "20000"]);
+    assert!(flight["kept"].as_u64().unwrap() > 5_000, "{flight}");
+    let views = flight["views"].as_array().unwrap();
+    assert!(views.iter().all(|view| view["hit_pixels"].as_u64().unwrap() > 20_000), "{flight}");
+    assert!(folder.path().join("flight/previews/flight_01.png").is_file());
+    let satellite = run(&["view_1.tif", "view_2.tif"], "satellite", &[]);
+    let images = satellite["images"].as_array().unwrap();
+    assert_eq!(images.len(), 2);
+    assert!(images.iter().all(|image| image["hit_pixels"].as_u64().unwrap() > 20_000), "{satellite}");
+}

@@ -36,6 +36,7 @@ fn a_simulation_is_written_whole_and_the_same_each_time() {
     let folder = tempfile::tempdir().unwrap();
     let (first, second) = (folder.path().join("a"), folder.path().join("b"));
     skysweep().args(SMALL).arg("-o").arg(&first).assert().code(0);
+    assert!(!first.join("cameras").exists());
     // The parameters that were written make the same scene again.
     skysweep().arg("simulate").arg(first.join("scene.toml")).arg("-o").arg(&second).assert().code(0);
     for name in FILES {
@@ -168,5 +169,21 @@ fn bad_requests_name_what_is_wrong_and_write_nothing() {
         let refused = predicate::str::contains(named);
         skysweep().arg("simulate").args(arguments).arg("-o").arg(&output).assert().code(2).stderr(refused);
         assert!(!output.exists());
+    }
+}
+
+#[test]
+fn a_flight_looks_at_the_buildings_in_map_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    skysweep().args(SMALL).args(["--flight", "5", "-o"]).arg(folder.path()).assert().code(0);
+    let model = io::colmap::read(&folder.path().join("cameras/sparse/0")).unwrap();
+    assert_eq!((model.views.len(), model.views[4].name.as_str()), (5, "flight_05.png"));
+    let record = json(&folder.path().join("scene.json"));
+    let middle = [0, 1].map(|i| record["origin_m"][i].as_f64().unwrap());
+    for view in &model.views {
+        let ground = record["height_range_m"][0].as_f64().unwrap();
+        let [x, y, z] = view.pose.camera_from_world([middle[0], middle[1], ground]);
+        // The middle of the scene, at its ground, is near the middle of every image.
+        assert!(z > 30.0 && (x / z).abs() < 0.1 && (y / z).abs() < 0.2, "{:?}", [x / z, y / z, z]);
     }
 }

@@ -68,7 +68,8 @@ def reprojection(model, np):
 def plys(paths, np):
     open3d, trimesh = package("open3d"), package("trimesh")
     for path in paths:
-        if open3d is not None:
+        # Splats have other properties than points and are no point clouds for Open3D.
+        if open3d is not None and "splat" not in path.name:
             cloud = open3d.io.read_point_cloud(str(path))
             count = len(cloud.points)
             check(count > 0 and cloud.has_colors(), f"Open3D {path.name}: {count} points with colours")
@@ -97,8 +98,7 @@ def main(folder):
     sparse = folder / "sparse" / "0"
     if sparse.is_dir():
         colmap(sparse, np)
-    # Splats have other properties than points and are no point clouds for Open3D.
-    plys([p for p in sorted(folder.rglob("*.ply")) if "splat" not in p.name], np)
+    plys(sorted(folder.rglob("*.ply")), np)
     maps(sorted(folder.rglob("*.npy")), np)
 
 

@@ -1,7 +1,8 @@
 //! `skysweep simulate`: a seeded scene seen through RPC cameras, with its exact surface beside.
 //!
 //! Writes `view_1.tif` … (RPC in the file), the record `scene.json`, the parameters `scene.toml`, and in `truth/` the
-//! rasters, the heights of every image and the buildings at LoD2.
+//! rasters, the heights of every image and the buildings at LoD2. With `--flight` also perspective cameras, in
+//! `cameras/sparse/0`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use ::simulate::{PRESETS, Simulation, SimulationConfig, View};
 use anyhow::{Context, bail};
 use geodesy::Crs;
 use io::city::{CityJsonOptions, write_cityjson};
+use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapView};
 use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc};
 
 use crate::print;
@@ -37,6 +39,10 @@ pub(crate) struct Args {
     /// Number of dates that the views are shared out over: another sun, other vehicles, other radiometry on each.
     #[arg(long, value_name = "N")]
     dates: Option<usize>,
+    /// Also write N perspective cameras around the scene (a COLMAP model in cameras/sparse/0, in map coordinates), for skysweep
+    /// priors and the trainers that it prepares.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    flight: u32,
     /// Folder for the images and the truth.
     #[arg(short, long, value_name = "DIR", required_unless_present_any = ["list", "template"])]
     output: Option<PathBuf>,
@@ -95,7 +101,7 @@ fn made(config: SimulationConfig, args: &Args, output: &Path, global: Global) ->
     let watcher = Watcher::new(args.progress, global);
     let simulation = Simulation::with_progress(config, &watcher)?;
     watcher.finish();
-    Folder { simulation: &simulation, path: output, overwrite: args.overwrite }.write()?;
+    Folder { simulation: &simulation, path: output, overwrite: args.overwrite }.write(args.flight)?;
     let (record, views) = (simulation.record(), simulation.views.len());
     tracing::info!(
         "{views} views of {} buildings and {} trees in {}",
@@ -114,7 +120,7 @@ struct Folder<'a> {
 }
 
 impl Folder<'_> {
-    fn write(&self) -> anyhow::Result<()> {
+    fn write(&self, flight: u32) -> anyhow::Result<()> {
         for (number, view) in (1..).zip(&self.simulation.views) {
             self.write_view(number, view)?;
         }
@@ -130,6 +136,9 @@ impl Folder<'_> {
         let options = CityJsonOptions { overwrite: self.overwrite, ..CityJsonOptions::default() };
         write_cityjson(&self.path.join("truth/buildings.city.json"), &truth.buildings, &options)?;
         let record = serde_json::to_string_pretty(&self.simulation.record())? + "\n";
+        if flight > 0 {
+            self.write_flight(flight)?;
+        }
         self.write_text("scene.toml", &self.simulation.config.to_toml()?)?;
         self.write_text("scene.json", &record)
     }
@@ -158,6 +167,15 @@ impl Folder<'_> {
             write_image_with_rpc(path("clouds"), &bands, &view.true_rpc, None, self.overwrite)?;
         }
         Ok(())
+    }
+
+    fn write_flight(&self, count: u32) -> anyhow::Result<()> {
+        let (lens, poses) = self.simulation.flight(count as usize)?;
+        let view = |(id, pose)| ColmapView { id, name: format!("flight_{id:02}.png"), lens: 0, pose };
+        let model = ColmapModel { lenses: vec![lens], views: (1..).zip(poses).map(view).collect() };
+        let folder = self.path.join("cameras/sparse/0");
+        fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder: {}", folder.display()))?;
+        Ok(colmap::write(&folder, &model, &[], ColmapEncoding::Text, self.overwrite)?)
     }
 
     fn map(&self, name: &str, bands: &[Band<'_>]) -> anyhow::Result<()> {

@@ -9,7 +9,7 @@ use io::npy;
 use io::raster::{Band, BandData, DepthScale, write_depth_png, write_map, write_png_gray, write_png_rgb};
 use pipeline::Progress as _;
 use raster::NO_DATA;
-use report::{ViewPictures, ViewRow, depth_preview, normal_preview};
+use report::{ViewPictures, ViewRow, depth_preview, mask_preview, normal_preview, side_by_side};
 
 use super::content::Dataset;
 use super::options::Normals;
@@ -51,6 +51,8 @@ pub(super) fn write(dataset: &Dataset<'_>, folder: &Path, watcher: &Watcher) -> 
             let path = |what: &str| folder.join("previews").join(format!("{stem}_{what}.png"));
             write_png_rgb(path("depth"), &depth, false)?;
             write_png_rgb(path("normal"), &normals, false)?;
+            let sheet = side_by_side(&[&depth, &normals, &mask_preview(&maps.mask())]);
+            write_png_rgb(folder.join("previews").join(format!("{stem}.png")), &sheet, false)?;
             if in_page {
                 pictures.push(ViewPictures { name: stem.clone(), depth, normals });
             }

@@ -21,7 +21,7 @@ pub use evaluation::EvaluationReport;
 pub use page::escape;
 pub use palette::{MISSING, OUTSIDE, diverging};
 pub use picture::{PictureError, error_picture, png};
-pub use preview::{depth_preview, normal_preview};
+pub use preview::{depth_preview, mask_preview, normal_preview, side_by_side};
 pub use priors::{ErrorRow, PriorsReport, ViewPictures, ViewRow};
 pub use protocol::Protocol;
 pub use svg::{Axis, Chart};

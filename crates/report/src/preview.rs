@@ -59,6 +59,27 @@ pub fn normal_preview(normals: &Grid<[f32; 3]>) -> Grid<[u8; 3]> {
     thinned(normals).map(colour)
 }
 
+/// Pictures side by side on white, a strip of 8 pixels between them.
+pub fn side_by_side(pictures: &[&Grid<[u8; 3]>]) -> Grid<[u8; 3]> {
+    const GAP: usize = 8;
+    let width = pictures.iter().map(|p| p.width() + GAP).sum::<usize>().saturating_sub(GAP);
+    let height = pictures.iter().map(|p| p.height()).max().unwrap_or(0);
+    let mut sheet = Grid::filled(width, height, PAPER);
+    let mut left = 0;
+    for picture in pictures {
+        for row in 0..picture.height() {
+            sheet.row_mut(row)[left..left + picture.width()].copy_from_slice(picture.row(row));
+        }
+        left += picture.width() + GAP;
+    }
+    sheet
+}
+
+/// A mask, white where it is set.
+pub fn mask_preview(mask: &Grid<bool>) -> Grid<[u8; 3]> {
+    thinned(mask).map(|set| if *set { PAPER } else { INK })
+}
+
 /// Every n-th pixel of every n-th row, so that the longest side fits.
 fn thinned<T: Copy>(map: &Grid<T>) -> Grid<T> {
     let step = map.width().max(map.height()).div_ceil(LONGEST_SIDE).max(1);
@@ -118,6 +139,17 @@ fn write(picture: &mut Grid<[u8; 3]>, left: usize, top: usize, text: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_stand_side_by_side() {
+        let (a, b) = (Grid::filled(3, 2, [1; 3]), Grid::filled(4, 5, [2; 3]));
+        let sheet = side_by_side(&[&a, &b]);
+        assert_eq!((sheet.width(), sheet.height()), (15, 5));
+        assert_eq!([sheet[(2, 1)], sheet[(3, 1)], sheet[(2, 2)], sheet[(11, 4)]], [[1; 3], PAPER, PAPER, [2; 3]]);
+        assert_eq!(side_by_side(&[]).width(), 0);
+        let mask = mask_preview(&Grid::from_vec(2, 1, vec![true, false]).unwrap());
+        assert_eq!(mask.data(), [PAPER, INK]);
+    }
 
     #[test]
     fn near_is_light_far_is_dark_and_nothing_is_grey() {

@@ -19,6 +19,7 @@ mod config;
 mod crown;
 mod date;
 mod error;
+mod flight;
 mod frame;
 mod index;
 #[cfg(test)]
