@@ -185,16 +185,10 @@ fn national_coordinates_change_nothing() {
     far.vertices.iter_mut().for_each(|vertex| *vertex = moved(*vertex));
     let (near, far) = (Scene::with(&city, &near, OFFSET), Scene::with(&city, &far, moved(OFFSET)));
     assert_eq!(near.shift, far.shift);
-    let amounts = [
-        (Amount::Count(30_000), Spacing::Random),
-        (Amount::Count(30_000), Spacing::Stratified),
-        (Amount::Count(10_000), Spacing::PoissonDisk),
-        (Amount::Adaptive { error_m: 2.0, max_spacing_m: 6.0 }, Spacing::Stratified),
-    ];
-    for (amount, spacing) in amounts {
-        let config = SampleConfig { amount, spacing, ..SampleConfig::default() };
+    for spacing in [Spacing::Random, Spacing::Stratified] {
+        let config = SampleConfig { amount: Amount::Count(30_000), spacing, ..SampleConfig::default() };
         let (a, b) = (sample(&near.model, &config).unwrap(), sample(&far.model, &config).unwrap());
-        assert!(a == b && a.points.len() >= 10_000, "{amount:?}: {} and {}", a.points.len(), b.points.len());
+        assert!(a == b && a.points.len() == 30_000, "{spacing:?}: {} and {}", a.points.len(), b.points.len());
     }
     let rays = Rays::new(&near.cameras.lenses[0]).unwrap();
     let maps = |scene: &Scene, view| PriorMaps::render(&scene.model, &scene.view(view), &rays, MapConfig::default());
