@@ -111,6 +111,11 @@ fn load(path: &Path) -> (Vec<String>, Vec<Vec<f32>>) {
     (names.clone(), floats.chunks_exact(names.len()).map(<[f32]>::to_vec).collect())
 }
 
+/// The normal of a splat: what its quaternion (real part first) makes of the third axis.
+fn third_axis([w, x, y, z]: [f64; 4]) -> [f64; 3] {
+    [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)]
+}
+
 #[test]
 fn the_file_is_what_trainers_load_and_lies_on_the_surface() {
     let folder = tempfile::tempdir().unwrap();
@@ -135,12 +140,18 @@ fn the_file_is_what_trainers_load_and_lies_on_the_surface() {
         assert!((opacity - 0.99).abs() < 1e-3, "no confidence was given: {opacity}");
         assert!((0..3).all(|i| (0.001..40.0).contains(&at(&format!("scale_{i}")).exp())));
         let [x, y, z] = ["x", "y", "z"].map(at);
-        let (c, r) = dsm.geotransform.cell_from_map(x + origin.origin[0], y + origin.origin[1]).unwrap();
-        // The middle of an even block lies between cells, of which the plane is within the bound.
-        let near =
-            [c.floor(), c.ceil()].into_iter().flat_map(|c| [r.floor(), r.ceil()].map(|r| (c as usize, r as usize)));
-        let off =
-            near.map(|cell| (f64::from(dsm.heights[cell]) - z - origin.origin[2]).abs()).fold(f64::INFINITY, f64::min);
+        let map = [x + origin.origin[0], y + origin.origin[1]];
+        let (c, r) = dsm.geotransform.cell_from_map(map[0], map[1]).unwrap();
+        let normal = third_axis([0, 1, 2, 3].map(|i| at(&format!("rot_{i}"))));
+        // The middle of an even block lies between cells of the block; its plane is within the bound of each.
+        let near = [(c - 0.01).round(), (c + 0.01).round()];
+        let near = near.into_iter().flat_map(|c| [(r - 0.01).round(), (r + 0.01).round()].map(|r| [c, r]));
+        let off = near.map(|[c, r]| {
+            let (e, n) = dsm.geotransform.map_from_cell(c, r);
+            let rise = -(normal[0] * (e - map[0]) + normal[1] * (n - map[1])) / normal[2];
+            (f64::from(dsm.heights[(c as usize, r as usize)]) - origin.origin[2] - z - rise).abs()
+        });
+        let off = off.fold(0.0, f64::max);
         off_surface += usize::from(off > 0.25 + 0.01);
     }
     assert_eq!(off_surface, 0);
@@ -182,7 +193,12 @@ fn pointing_comes_from_the_run_that_made_the_surface() {
     let (with, without) = (psnr(&[]), psnr(&["--corrections", "none"]));
     assert!(with > without + 0.5, "{with:.2} dB with the corrections of the run, {without:.2} dB without");
     let opacities: Vec<f32> = io::splat_ply::read(&ply).unwrap().splats.iter().map(|s| s.opacity).collect();
-    assert!(opacities.iter().any(|o| *o < 0.7) && opacities.iter().any(|o| *o > 0.9), "confidence becomes opacity");
+    let confidence = read_dem(out.join("dsm/confidence.tif")).unwrap().heights;
+    let surest = confidence.data().iter().copied().filter(|c| c.is_finite()).fold(0.0, f32::max);
+    let most = opacities.iter().copied().fold(0.0, f32::max);
+    // Opacities go from 0.3 without any confidence to 0.99 with all of it.
+    assert!((most - (0.3 + 0.69 * surest)).abs() < 1e-4, "{most} of a confidence of {surest}");
+    assert!(opacities.iter().any(|o| *o < 0.7), "confidence becomes opacity");
 }
 
 #[test]
@@ -198,7 +214,7 @@ fn what_cannot_be_done_is_said_and_nothing_is_written() {
     let (dsm, image) = (dsm.as_os_str(), image.as_os_str());
     refused(&[dsm, image, "--error".as_ref(), "0".as_ref()], "the bound on heights is 0");
     refused(&[dsm, dsm], "RPC");
-    refused(&[image, image], "coordinate reference system");
+    refused(&[image, image], "geotransform");
     refused(&["none.tif".as_ref(), image], "none.tif");
     refused(&[dsm, image, "--confidence".as_ref(), image], "confidence");
     std::fs::write(&ply, "mine").unwrap();

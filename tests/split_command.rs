@@ -87,5 +87,5 @@ fn options_are_obeyed_and_nonsense_is_refused() {
     refused(&["--contexts", "38"], "42 are to be chosen");
     let empty = folder.path().join("empty");
     std::fs::create_dir(&empty).unwrap();
-    skysweep().arg("split").arg(&empty).assert().code(2).stderr(predicate::str::contains("images"));
+    skysweep().arg("split").arg(&empty).assert().code(2).stderr(predicate::str::contains("cameras.txt"));
 }
