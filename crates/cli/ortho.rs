@@ -46,7 +46,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DATUM")]
     dsm_vertical: Option<VerticalDatum>,
     /// How far the surface must stand above a line of sight to hide what is behind, metres.
-    #[arg(long, value_name = "METRES", default_value_t = 0.1)]
+    #[arg(long, value_name = "METRES", default_value_t = 0.05)]
     tolerance: f64,
     /// Leave the images' grey values as they are.
     #[arg(long)]

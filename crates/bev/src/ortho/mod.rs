@@ -8,6 +8,7 @@ mod balance;
 mod eyeline;
 mod ground;
 mod surface;
+mod wall;
 
 pub use balance::{Balance, BalanceError, Pair, balance};
 pub use eyeline::{Eyeline, EyelineError};

@@ -1,18 +1,22 @@
 //! A surface model as an obstacle: what stands between a point of it and a sensor.
 //!
-//! From the point one goes along the line of sight, half a cell at a time along the grid's longer axis of motion, until the line is above
-//! everything. The point is hidden where the surface is above the line. Between cell centres the surface is bilinear, except where
-//! two neighbours differ by more than a slope of [`STEP_SLOPE`]: that is a wall, and it stands in the middle between them, the
-//! higher side included. (A ramp in its place would take half a cell off every roof's edge and let the sensor see
-//! behind it.) Where the surface has no height nothing stands in the way.
+//! From the point one goes along the line of sight, an eighth of a cell at a time along the grid's longer axis of motion, until the
+//! line is above everything. The point is hidden where the surface is above the line. Between cell centres the surface is
+//! bilinear, except where neighbours differ by more than a slope of [`STEP_SLOPE`]: there a wall stands, whose place
+//! [`wall`](super::wall) finds from the cells around it. (A ramp in its place would take half a cell off every roof's edge and
+//! let the sensor see behind it.) Where the surface has no height nothing stands in the way.
 
 use raster::Grid;
+
+use super::wall;
 
 /// Slope beyond which neighbours are a wall and not a slope: 2 (63°).
 pub const STEP_SLOPE: f32 = 2.0;
 
 /// Side of the blocks whose highest cell is kept.
 const BLOCK: usize = 16;
+/// Steps of the line of sight per cell.
+const STEPS_PER_CELL: f64 = 8.0;
 
 /// Heights on a grid, made ready for lines of sight.
 #[derive(Debug, Clone)]
@@ -46,34 +50,47 @@ impl<'a> Surface<'a> {
     /// The height at a (column, row): bilinear, with walls kept upright; NaN where the cells that count have none.
     #[inline]
     pub fn height_at(&self, column: f64, row: f64) -> f32 {
-        let (c, r) = (column.floor(), row.floor());
-        if !(c >= 0.0
-            && r >= 0.0
-            && column <= (self.heights.width() as f64 - 1.0)
-            && row <= (self.heights.height() as f64 - 1.0))
-        {
-            return f32::NAN;
-        }
-        let (u, v) = ((column - c) as f32, (row - r) as f32);
-        let (c, r) = (c as usize, r as usize);
-        let along = |row: usize| {
-            let cells = self.heights.row(row);
-            if u == 0.0 { cells[c] } else { self.between(cells[c], cells[c + 1], u) }
-        };
-        if v == 0.0 { along(r) } else { self.between(along(r), along(r + 1), v) }
+        self.quad(column, row).map_or(f32::NAN, |quad| self.height_in(&quad))
     }
 
-    /// Between two neighbours: a slope, or the nearer of them where there is a wall (the higher at the wall itself).
+    /// Whether the surface is above a level at a (column, row).
     #[inline]
-    fn between(&self, a: f32, b: f32, t: f32) -> f32 {
-        if (a - b).abs() <= self.step_m {
-            a + (b - a) * t
-        } else if t < 0.5 {
-            a
-        } else if t > 0.5 {
-            b
+    fn is_above(&self, column: f64, row: f64, level: f64) -> bool {
+        let Some(quad) = self.quad(column, row) else { return false };
+        let (low, high) = quad.range();
+        f64::from(high) > level && (f64::from(low) > level || f64::from(self.height_in(&quad)) > level)
+    }
+
+    /// The cells around a position; `None` outside their centres.
+    #[inline]
+    fn quad(&self, column: f64, row: f64) -> Option<Quad> {
+        let (last_column, last_row) = (self.heights.width().checked_sub(1)?, self.heights.height().checked_sub(1)?);
+        // Negated, so that numbers that are none are outside.
+        if !(column >= 0.0 && row >= 0.0 && column <= last_column as f64 && row <= last_row as f64) {
+            return None;
+        }
+        let (c, r) = (column as usize, row as usize);
+        let (next_column, next_row) = ((c + 1).min(last_column), (r + 1).min(last_row));
+        let (top, low) = (self.heights.row(r), self.heights.row(next_row));
+        Some(Quad {
+            corner: (c, r),
+            at: [(column - c as f64) as f32, (row - r as f64) as f32],
+            heights: [top[c], top[next_column], low[c], low[next_column]],
+        })
+    }
+
+    fn height_in(&self, quad: &Quad) -> f32 {
+        let [a, b, c, d] = quad.heights;
+        let [u, v] = quad.at;
+        let steepest = (a - b).abs().max((c - d).abs()).max((a - c).abs()).max((b - d).abs());
+        if quad.heights.iter().any(|h| h.is_nan()) {
+            // The nearest cell; at equal distance the later one.
+            quad.heights[usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5)]
+        } else if steepest <= self.step_m {
+            let (upper, lower) = (a + (b - a) * u, c + (d - c) * u);
+            upper + (lower - upper) * v
         } else {
-            a.max(b)
+            wall::height(self.heights, quad.corner, quad.heights, quad.at)
         }
     }
 
@@ -84,8 +101,7 @@ impl<'a> Surface<'a> {
         if !(fastest > 0.0 && fastest.is_finite() && height_m.is_finite()) {
             return false;
         }
-        // Half a cell along the faster axis.
-        let rise = 0.5 / fastest;
+        let rise = 1.0 / (STEPS_PER_CELL * fastest);
         let step = [per_metre[0] * rise, per_metre[1] * rise];
         let (width, height) = (self.heights.width() as f64, self.heights.height() as f64);
         let top = f64::from(self.highest) - tolerance_m;
@@ -102,12 +118,32 @@ impl<'a> Surface<'a> {
                 k += steps_out([c, r], step, [i, j]);
                 continue;
             }
-            let at = self.height_at(c.clamp(0.0, width - 1.0), r.clamp(0.0, height - 1.0));
-            if f64::from(at) - tolerance_m > line {
+            if self.is_above(c.clamp(0.0, width - 1.0), r.clamp(0.0, height - 1.0), line + tolerance_m) {
                 return true;
             }
             k += 1.0;
         }
+    }
+}
+
+/// Four cells around a position.
+struct Quad {
+    /// Column and row of the first.
+    corner: (usize, usize),
+    /// Where the position is among them, 0 to 1 along columns and rows.
+    at: [f32; 2],
+    /// Upper left, upper right, lower left, lower right.
+    heights: [f32; 4],
+}
+
+impl Quad {
+    /// Least and greatest height; NaN for the least where one is missing.
+    #[inline]
+    fn range(&self) -> (f32, f32) {
+        let [a, b, c, d] = self.heights;
+        let low = if (a + b + c + d).is_nan() { f32::NAN } else { a.min(b).min(c.min(d)) };
+        // f32::max passes over NaN.
+        (low, a.max(b).max(c.max(d)))
     }
 }
 
