@@ -4,6 +4,7 @@
 //! Heights are metres above the WGS 84 ellipsoid unless a type says otherwise; local frames are east, north, up in metres.
 
 pub mod align;
+pub mod ground;
 pub mod heightmap;
 pub mod ortho;
 pub mod splats;

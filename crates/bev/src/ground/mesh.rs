@@ -1,0 +1,35 @@
+//! Triangles as ground: rays through the tree of the crate `bvh`.
+
+use bvh::{Bvh, BvhError, Ray};
+
+use super::{Ground, Met, cross, unit};
+
+/// Triangles in metres from the local origin.
+#[derive(Debug)]
+pub struct MeshGround {
+    bvh: Bvh,
+    normals: Vec<[f64; 3]>,
+}
+
+impl MeshGround {
+    /// Arranges triangles; their normals are those of their corners' order.
+    ///
+    /// # Errors
+    /// As [`Bvh::new`].
+    pub fn new(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<Self, BvhError> {
+        let bvh = Bvh::new(positions, triangles)?;
+        let normal = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|corner| positions[corner as usize]);
+            let side = |p: [f64; 3]| [0, 1, 2].map(|i| p[i] - a[i]);
+            unit(cross(side(b), side(c)))
+        };
+        Ok(Self { normals: triangles.iter().map(normal).collect(), bvh })
+    }
+}
+
+impl Ground for MeshGround {
+    fn meet(&self, ray: &Ray) -> Option<Met> {
+        let hit = self.bvh.closest_hit(ray)?;
+        Some(Met { t: hit.t, normal: self.normals[hit.triangle as usize] })
+    }
+}

@@ -1,0 +1,42 @@
+//! Views from the ground: what cameras and 360° panoramas see of a height field or of a mesh.
+//!
+//! Positions are metres from a local origin on a map: easting, northing, height. [`HeightField`] is followed exactly, two triangles to
+//! each square of cells; [`MeshGround`] goes through the tree of the crate `bvh`. [`render`] makes depths, normals and what
+//! each pixel is; [`visible_cells`] is the way back, from a camera to the cells that it sees. [`compose`] lays a
+//! rendered ground layer over a satellite layer.
+
+mod compose;
+mod field;
+mod mesh;
+mod panorama;
+mod view;
+
+pub use compose::{SizeError, compose};
+pub use field::HeightField;
+pub use mesh::MeshGround;
+pub use panorama::{Panorama, level_pose};
+pub use view::{BEYOND, GROUND, GroundView, SKY, Viewer, render, visible_cells};
+
+/// Where a ray meets a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Met {
+    /// In lengths of the ray's direction.
+    pub t: f64,
+    /// Unit normal of the surface, in the axes of the map; of fields upwards.
+    pub normal: [f64; 3],
+}
+
+/// What rays can meet.
+pub trait Ground: Sync {
+    /// The first of the surface that a ray meets between its origin (exclusive) and its end.
+    fn meet(&self, ray: &bvh::Ray) -> Option<Met>;
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn unit(a: [f64; 3]) -> [f64; 3] {
+    let length = a.iter().map(|c| c * c).sum::<f64>().sqrt();
+    a.map(|c| c / length)
+}
