@@ -121,7 +121,7 @@ fn what_makes_no_ortho_is_refused() {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written");
     };
     refused(&view, &dsm, &["--gsd", "0"], "--gsd");
-    refused(&view, &dsm, &["--tolerance", "-1"], "--tolerance");
+    refused(&view, &dsm, &["--tolerance=-1"], "--tolerance");
     refused(&dsm, &dsm, &[], "RPC");
     refused(&view, &view, &[], "geotransform");
     refused(Path::new("none.tif"), &dsm, &[], "none.tif");

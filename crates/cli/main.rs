@@ -10,6 +10,7 @@ mod corrections;
 mod dsm;
 mod error;
 mod eval;
+mod groundview;
 mod heightmap;
 mod log;
 mod map_surface;
@@ -64,6 +65,8 @@ enum Command {
     Dsm(Box<dsm::Args>),
     /// Measure how far a surface model is from a reference.
     Eval(Box<eval::Args>),
+    /// Make depths, normals and masks of what cameras and panoramas on the ground see.
+    Groundview(Box<groundview::Args>),
     /// Make height maps seen from above around a camera, turned to its heading.
     Heightmap(Box<heightmap::Args>),
     /// Lay satellite images on a surface model, hidden cells marked.
@@ -109,6 +112,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::City(args) => city::run(args),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
+        Command::Groundview(args) => groundview::run(args, cli.global),
         Command::Heightmap(args) => heightmap::run(args, cli.global),
         Command::Ortho(args) => ortho::run(args, cli.global),
         Command::Priors(args) => priors::run(args, cli.global),
