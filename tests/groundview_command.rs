@@ -29,7 +29,14 @@ fn town(name: &str) -> PathBuf {
 fn views(folder: &TempDir, options: &[&str]) -> (PathBuf, PathBuf) {
     let (map, out) = (folder.path().join("map.tif"), folder.path().join("views"));
     let mut command = skysweep();
-    command.arg("heightmap").arg(town("dsm.tif")).args(CENTRE).args(["--heading", "37", "--no-preview", "-q"]);
+    command.arg("heightmap").arg(town("dsm.tif")).args(CENTRE).args([
+        "--heading",
+        "37",
+        "--size",
+        "300",
+        "--no-preview",
+        "-q",
+    ]);
     command.arg("-o").arg(&map).assert().code(0);
     let mut command = skysweep();
     command.arg("groundview").arg(&map).args(CENTRE).args(["--heading", "37", "-q", "-o"]).arg(&out).args(options);
@@ -154,7 +161,8 @@ fn panoramas_look_along_the_heading_and_masks_say_what_is_what() {
     // What is seen: the cells under the camera, and not all.
     let cells = ImageSource::open(out.join("visibility.tif")).unwrap();
     let cells = cells.read_samples(1, cells.window()).unwrap();
-    assert!(cells[(258, 258)] == 1.0 && cells.data().contains(&0.0));
+    assert!(cells[(150, 150)] == 1.0 && cells.data().contains(&0.0));
+    assert!(out.join("previews/panorama.png").is_file());
     let told = [0, 1].map(|i| report["cells_seen"][i].as_u64().unwrap());
     assert_eq!(told[0] as usize, cells.data().iter().filter(|c| **c > 0.0).count());
 }

@@ -1,10 +1,11 @@
 //! `skysweep groundview`: what cameras and 360° panoramas on the ground see of a surface.
 //!
 //! The folder: `depth/NAME.npy` (metres; z-depth of perspective cameras, ray length of panoramas, NaN for none),
-//! `normal/NAME.npy` (east, north, up of the map), `mask/NAME.png` (255 shows the surface) and `sky/NAME.png` (255 is sky),
-//! `visibility.tif` (how many cameras see each cell, for rasters), `sparse/0` (a COLMAP model of the perspective cameras with
-//! points of the surface), `images` (crops of pictures, where given), `origin.json` (where local positions are counted
-//! from, also beside the model) and `report.json`. `skysweep groundview compose` lays a rendered ground layer over a satellite layer.
+//! `normal/NAME.npy` (east, north, up of the map), `mask/NAME.png` (255 shows the surface), `sky/NAME.png` (255 is sky) and
+//! `previews/NAME.png` (normals and depths to look at), `visibility.tif` (how many cameras see each cell, for rasters),
+//! `sparse/0` (a COLMAP model of the perspective cameras with points of the surface), `images` (crops of pictures, where
+//! given), `origin.json` (where local positions are counted from, also beside the model) and `report.json`.
+//! `skysweep groundview compose` lays a rendered ground layer over a satellite layer.
 
 mod compose;
 mod output;

@@ -9,6 +9,7 @@ use io::colmap::{ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, Co
 use io::npy;
 use io::raster::{Band, BandData, ImageSource, MapTile, write_map_tile, write_png_gray, write_png_rgb};
 use raster::Grid;
+use report::{depth_preview, normal_preview, side_by_side};
 use serde::Serialize;
 
 use super::MakeArgs;
@@ -60,7 +61,9 @@ impl Report {
 /// Renders and writes all views.
 pub(super) fn write(args: &MakeArgs, surface: &Surface, shots: &Shots, folder: &Path) -> anyhow::Result<Report> {
     let pictures = shots.shots.iter().any(|shot| shot.picture.is_some());
-    for name in ["depth", "normal", "mask", "sky", "sparse/0"].into_iter().chain(pictures.then_some("images")) {
+    for name in
+        ["depth", "normal", "mask", "sky", "previews", "sparse/0"].into_iter().chain(pictures.then_some("images"))
+    {
         let path = folder.join(name);
         std::fs::create_dir_all(&path).with_context(|| format!("cannot make the folder: {}", path.display()))?;
     }
@@ -142,7 +145,9 @@ fn write_maps(folder: &Path, shot: &Shot, view: &GroundView, overwrite: bool) ->
     npy::write(path("normal", "npy"), &[height, width, 3], view.normal.data().as_flattened(), overwrite)?;
     let mask = |wanted: u8| view.kind.map(|kind| if *kind == wanted { 255 } else { 0 });
     write_png_gray(path("mask", "png"), &mask(GROUND), overwrite)?;
-    Ok(write_png_gray(path("sky", "png"), &mask(SKY), overwrite)?)
+    write_png_gray(path("sky", "png"), &mask(SKY), overwrite)?;
+    let preview = side_by_side(&[&normal_preview(&view.normal), &depth_preview(&view.depth_m)]);
+    Ok(write_png_rgb(path("previews", "png"), &preview, overwrite)?)
 }
 
 fn view_report(shot: &Shot, view: &GroundView) -> ViewReport {
