@@ -45,13 +45,13 @@ fn main() -> anyhow::Result<()> {
     let (dsm, list) = (folder.join("dsm.tif"), folder.join("cameras.csv"));
     write_surface(&dsm)?;
     write_positions(&list, arguments.tiles, &projection)?;
-    let mut seconds: Vec<Vec<f64>> = vec![Vec::new(); READINGS.len()];
+    let mut seconds: Vec<Vec<[f64; 2]>> = vec![Vec::new(); READINGS.len()];
     let mut errors = Vec::new();
     for run in 0..arguments.runs {
         for (reading, seconds) in READINGS.iter().zip(&mut seconds) {
             let out = folder.join("maps");
             seconds.push(make(&dsm, &list, &out, reading, arguments.tiles)?);
-            println!("{reading:8} {:.1} s", seconds[run]);
+            println!("{reading:8} {:.1} s, {:.1} s of processors", seconds[run][0], seconds[run][1]);
             if run == 0 {
                 errors.push(measure(&out, arguments.tiles, &projection)?);
             }
@@ -119,17 +119,25 @@ fn write_positions(path: &Path, tiles: usize, projection: &MapProjection) -> any
     Ok(std::fs::write(path, text)?)
 }
 
-/// Makes all tiles, and returns the seconds that a user waits.
-fn make(dsm: &Path, list: &Path, out: &Path, reading: &str, tiles: usize) -> anyhow::Result<f64> {
-    let begun = std::time::Instant::now();
+/// Makes all tiles, and returns the seconds that a user waits and those of all processors.
+fn make(dsm: &Path, list: &Path, out: &Path, reading: &str, tiles: usize) -> anyhow::Result<[f64; 2]> {
+    let (begun, used) = (std::time::Instant::now(), children_seconds()?);
     let mut command = Command::new(SKYSWEEP);
     command.arg("heightmap").arg(dsm).arg("--positions").arg(list).arg("-o").arg(out);
     command.args(["--interpolation", reading, "--threads", "2", "--progress", "none", "--quiet"]);
     ensure!(command.status()?.success(), "{command:?} failed");
-    let seconds = begun.elapsed().as_secs_f64();
+    let seconds = [begun.elapsed().as_secs_f64(), children_seconds()? - used];
     let report: Value = serde_json::from_slice(&std::fs::read(out.join("report.json"))?)?;
     ensure!(report["made"].as_u64() == Some(tiles as u64), "not all tiles were made: {}", report["made"]);
     Ok(seconds)
+}
+
+/// Processor seconds of all commands that have ended: Linux counts them in hundredths.
+fn children_seconds() -> anyhow::Result<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat")?;
+    let (_, fields) = stat.rsplit_once(')').context("no name in /proc/self/stat")?;
+    let ticks = fields.split_whitespace().skip(13).take(2).map(str::parse::<f64>).sum::<Result<f64, _>>()?;
+    Ok(ticks / 100.0)
 }
 
 /// Errors away from walls and on them, metres, sorted.
@@ -159,15 +167,16 @@ fn measure(maps: &Path, tiles: usize, projection: &MapProjection) -> anyhow::Res
     Ok(errors)
 }
 
-fn row(reading: &str, seconds: &mut [f64], errors: &Errors, arguments: &Arguments) -> Value {
-    seconds.sort_by(f64::total_cmp);
+fn row(reading: &str, seconds: &mut [[f64; 2]], errors: &Errors, arguments: &Arguments) -> Value {
+    seconds.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let rmse = |e: &[f64]| (e.iter().map(|e| e * e).sum::<f64>() / e.len().max(1) as f64).sqrt();
     let share = |e: &[f64], share: f64| e.get((share * (e.len().max(1) - 1) as f64) as usize).copied();
-    let middle = seconds[seconds.len() / 2];
+    let [middle, processors] = seconds[seconds.len() / 2];
     json!({
         "interpolation": reading,
         "seconds": middle,
-        "seconds_least_and_most": [seconds[0], seconds[seconds.len() - 1]],
+        "seconds_least_and_most": [seconds[0][0], seconds[seconds.len() - 1][0]],
+        "processor_seconds": processors,
         "tiles_per_second": arguments.tiles as f64 / middle,
         "open": { "pixels": errors.open.len(), "rmse_m": rmse(&errors.open), "median_m": share(&errors.open, 0.5), "p99_m": share(&errors.open, 0.99) },
         "walls": { "pixels": errors.wall.len(), "rmse_m": rmse(&errors.wall), "median_m": share(&errors.wall, 0.5), "p99_m": share(&errors.wall, 0.99) },
@@ -179,7 +188,7 @@ fn markdown(result: &Value) -> String {
         "# Height maps: speed against interpolation error\n\n{} tiles of 518 × 518 pixels at 2 px/m, random headings, from one surface \
          model of {CELLS} × {CELLS} cells of {CELL_M} m; whole command, files included, 2 threads; {}; median of {} runs.\n\
          Errors are against the formula that the surface model was sampled from, away from walls and within {WALL_M} m of them.\n\n\
-         | interpolation | seconds | tiles/s | RMSE m | median m | 99 % m | at walls: RMSE m | median m |\n|---|---|---|---|---|---|---|---|\n",
+         | interpolation | seconds | CPU s | tiles/s | RMSE m | median m | 99 % m | at walls: RMSE m | median m |\n|---|---|---|---|---|---|---|---|---|\n",
         result["tiles"],
         result["machine"].as_str().unwrap_or_default(),
         result["runs"]
@@ -188,11 +197,12 @@ fn markdown(result: &Value) -> String {
         let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
         let (open, walls) = (&row["open"], &row["walls"]);
         text += &format!(
-            "| {} | {:.1} ({:.1} to {:.1}) | {:.0} | {:.4} | {:.4} | {:.4} | {:.2} | {:.3} |\n",
+            "| {} | {:.1} ({:.1} to {:.1}) | {:.1} | {:.0} | {:.4} | {:.4} | {:.4} | {:.2} | {:.3} |\n",
             row["interpolation"].as_str().unwrap_or_default(),
             number(&row["seconds"]),
             number(&row["seconds_least_and_most"][0]),
             number(&row["seconds_least_and_most"][1]),
+            number(&row["processor_seconds"]),
             number(&row["tiles_per_second"]),
             number(&open["rmse_m"]),
             number(&open["median_m"]),
