@@ -147,6 +147,7 @@ fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, origin_m: f64) -> (Pro
     let fill = FillConfig {
         reach_cells: (FILL_REACH_M / gsd).ceil() as usize,
         narrow_cells: (FILL_NARROW_M / gsd) as f32,
+        island_cells: (FILL_NARROW_M / gsd).powi(2) as usize,
         hidden_cells_per_m: (FILL_HIDDEN / gsd) as f32,
         same_surface_m: (2.0 * gsd) as f32,
         slope_m: (FILL_SLOPE * gsd) as f32,

@@ -2,12 +2,16 @@
 //!
 //! From each void cell the nearest known heights in eight directions are looked up. A void is closed where it is narrow, or
 //! where something stands beside it that is high enough to hide it; a wide void beside nothing has another reason
-//! (a saturated roof, water), and what is around says nothing of it. Where the heights hold two levels, the void is ground that a building hides from the views, so only the lower level counts: the heights on one surface
-//! with the second lowest, as one alone may be a pit. Weights are inverse distances: two opposite heights then
-//! give the straight line between them, so that slopes are continued.
+//! (a saturated roof, water), and what is around says nothing of it. An island smaller than the voids that it would close
+//! may be chance itself: nothing is drawn from it. Where the heights hold two levels, the void is ground that a building
+//! hides from the views, so only the lower level counts: the heights on one surface with the second lowest, as one alone
+//! may be a pit. Weights are inverse distances: two opposite heights then give the straight line between them, so that
+//! slopes are continued.
 
 use raster::Grid;
 use rayon::prelude::*;
+
+use super::speckle::remove_speckle;
 
 /// Parameters of the filling.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +20,8 @@ pub struct FillConfig {
     pub reach_cells: usize,
     /// Voids up to this wide between two opposite heights are closed whatever stands there, cells.
     pub narrow_cells: f32,
+    /// Heights count where at least this many cells hang together, whatever their heights.
+    pub island_cells: usize,
     /// A surface hides what is up to this many cells away per metre that it is higher.
     pub hidden_cells_per_m: f32,
     /// Neighbouring heights further apart than this are two levels, metres …
@@ -39,8 +45,10 @@ type Nearest = [Option<Known>; 4];
 /// Fills voids of `height_m` in place; returns which cells were filled.
 pub fn fill_voids(height_m: &mut Grid<f32>, config: &FillConfig) -> Grid<bool> {
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
-    let forward = known_before(height_m, voids.iter().copied(), false, config);
-    let mut backward = known_before(height_m, voids.iter().rev().copied(), true, config);
+    let mut sources = height_m.clone();
+    remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
+    let forward = known_before(&sources, voids.iter().copied(), false, config);
+    let mut backward = known_before(&sources, voids.iter().rev().copied(), true, config);
     backward.reverse();
     let around = voids.par_iter().zip(forward.into_par_iter().zip(backward));
     let value = |(&i, (a, b)): (&usize, (Nearest, Nearest))| Some((i, interpolate(&a, &b, config)?));
@@ -73,22 +81,18 @@ fn known_before(
         let y = if reversed { h - 1 - row } else { row };
         for column in 0..w {
             let x = if reversed { w - 1 - column } else { column };
-            let before = BEFORE.map(|(dx, dy)| {
-                let (u, v) = (x + sign * dx, y + sign * dy);
-                let inside = (0..w).contains(&u) && (0..h).contains(&v);
-                inside.then_some((
-                    u as usize,
-                    v as usize,
-                    if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 },
-                ))
-            });
             let nearest: Nearest = std::array::from_fn(|d| {
-                let (u, v, length) = before[d]?;
-                let height = height_m[(u, v)];
+                let (dx, dy) = BEFORE[d];
+                let (u, v) = (x + sign * dx, y + sign * dy);
+                if !(0..w).contains(&u) || !(0..h).contains(&v) {
+                    return None;
+                }
+                let length = if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 };
+                let height = height_m[(u as usize, v as usize)];
                 if !height.is_nan() {
                     return Some((height, length));
                 }
-                let (height, apart) = rows[usize::from(BEFORE[d].1 == 0)][u][d]?;
+                let (height, apart) = rows[usize::from(dy == 0)][u as usize][d]?;
                 (apart + length <= reach).then_some((height, apart + length))
             });
             rows[1][x as usize] = nearest;
@@ -124,7 +128,14 @@ mod tests {
     use super::*;
 
     const CONFIG: FillConfig =
-        FillConfig { reach_cells: 8, narrow_cells: 6.0, hidden_cells_per_m: 1.0, same_surface_m: 1.5, slope_m: 0.1 };
+        FillConfig {
+            reach_cells: 8,
+            narrow_cells: 6.0,
+            island_cells: 36,
+            hidden_cells_per_m: 1.0,
+            same_surface_m: 1.5,
+            slope_m: 0.1,
+        };
 
     #[test]
     fn a_hole_in_a_slope_gets_the_slope_and_one_beside_a_wall_the_ground() {
@@ -149,6 +160,16 @@ mod tests {
         assert!(fill_voids(&mut flat, &CONFIG).data().iter().filter(|f| **f).count() < 30);
         fill_voids(&mut beside, &CONFIG);
         assert!((13..20).all(|x| beside[(x, 15)] == 1.0) && beside[(11, 15)].is_nan(), "{:?}", beside.row(15));
+    }
+
+    #[test]
+    fn a_small_island_in_a_void_is_kept_and_not_spread() {
+        let mut g = Grid::filled(40, 40, 1.0f32);
+        (5..35).for_each(|x| (5..35).for_each(|y| g[(x, y)] = f32::NAN));
+        (18..22).for_each(|x| (18..22).for_each(|y| g[(x, y)] = 9.0));
+        let filled = fill_voids(&mut g, &CONFIG);
+        assert!((18..22).all(|x| g[(x, 20)] == 9.0) && g[(17, 20)].is_nan(), "{:?}", g.row(20));
+        assert!((10..30).all(|x| (10..30).all(|y| !filled[(x, y)])));
     }
 
     #[test]
