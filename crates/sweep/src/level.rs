@@ -7,17 +7,15 @@ use raster::{Grid, Window};
 use rayon::prelude::*;
 
 use crate::SweepError;
-use crate::cost::{BlockCosts, Reference};
-use crate::cost::{COST_MAX, CostConfig, SourceLevel, TileScratch, sweep_tile};
+use crate::cost::{COST_MAX, CostConfig, Reference, SourceLevel};
 use crate::ranges::Ranges;
 use crate::readout::soft_argmin;
-use crate::semiglobal::{LANES, Penalties, Volume, aggregate};
+use crate::semiglobal::{Penalties, Volume};
 use crate::support::agreed_share;
+use crate::volume::CostVolume;
 
 /// Side of a block's core, pixels.
 const BLOCK: usize = 1024;
-/// A block with more hypotheses than this would take more than 2 GB.
-const HYPOTHESES_MAX: u32 = 700_000_000;
 /// Overlap of a block on each side: a path forgets its start within a few tens of pixels.
 const BLOCK_MARGIN: usize = 48;
 
@@ -95,71 +93,11 @@ fn sweep_block(
     origin_m: f64,
     config: &LevelConfig,
 ) -> Result<HeightMap, SweepError> {
-    let image = reference.view.image;
-    let whole = Window::whole(image.width(), image.height());
+    let whole = Window::whole(reference.view.image.width(), reference.view.image.height());
     let window = core.grown(BLOCK_MARGIN).intersection(&whole).unwrap_or(core);
-    let (low, offsets) = layout(reference.ranges, window)?;
-    let mut costs = vec![COST_MAX; offsets.last().map_or(0, |&n| n as usize) + LANES];
-    let mut scratch = TileScratch::default();
-    let mut block = BlockCosts { window, offsets: &offsets, costs: &mut costs };
-    for tile in tiles(window, config.cost.tile) {
-        sweep_tile(reference, sources, tile, &config.cost, &mut scratch, &mut block)?;
-    }
-    let edges = edge_strength(image, window, reference.view.noise);
-    let volume = Volume {
-        width: window.width,
-        height: window.height,
-        low: &low,
-        offsets: &offsets,
-        costs: &costs,
-        edges: &edges,
-    };
-    let mut sums = Vec::new();
-    aggregate(&volume, config.penalties, &mut sums);
-    Ok(read_out(&volume, &sums, window, core, reference, origin_m, config))
-}
-
-/// First hypotheses and cost offsets of a window's pixels.
-fn layout(ranges: &Ranges, window: Window) -> Result<(Vec<i32>, Vec<u32>), SweepError> {
-    let area = window.width * window.height;
-    let (mut low, mut offsets) = (Vec::with_capacity(area), Vec::with_capacity(area + 1));
-    let mut next = 0u32;
-    offsets.push(next);
-    for y in 0..window.height {
-        for x in 0..window.width {
-            let at = (window.x as usize + x, window.y as usize + y);
-            low.push(ranges.low[at]);
-            next += u32::from(ranges.count[at]);
-            if next > HYPOTHESES_MAX {
-                return Err(SweepError::TooManyHypotheses { limit: HYPOTHESES_MAX });
-            }
-            offsets.push(next);
-        }
-    }
-    Ok((low, offsets))
-}
-
-/// How strong an edge each pixel is, 0 to 255: its gradient against the block's typical one and the noise. Pixels without
-/// a value are no edge, and say nothing of what is typical.
-fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
-    let mut gradient = Vec::with_capacity(w.width * w.height);
-    let mut known = Vec::with_capacity(w.width * w.height);
-    for y in 0..w.height {
-        for x in 0..w.width {
-            let (gx, gy) = (w.x as usize + x, w.y as usize + y);
-            let here = image[(gx, gy)];
-            let right = image.get(gx + 1, gy).copied().unwrap_or(here);
-            let below = image.get(gx, gy + 1).copied().unwrap_or(here);
-            let g = (right - here).abs().max((below - here).abs());
-            gradient.push(if g.is_finite() { g } else { 0.0 });
-            known.extend(g.is_finite().then_some(g));
-        }
-    }
-    let middle = known.len() / 2;
-    let typical = if known.is_empty() { 0.0 } else { *known.select_nth_unstable_by(middle, f32::total_cmp).1 };
-    // Gradients up to twice the typical one are texture; from eight times on they are edges.
-    let unit = typical.max(noise).max(f32::MIN_POSITIVE);
-    gradient.iter().map(|g| (((g / unit - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as u8).collect()
+    let volume = CostVolume::compute(reference, sources, window, &config.cost)?;
+    let sums = volume.aggregate(config.penalties);
+    Ok(read_out(&volume.as_block(), &sums, window, core, reference, origin_m, config))
 }
 
 fn read_out(

@@ -19,10 +19,12 @@ mod support;
 #[cfg(test)]
 mod testing;
 pub mod view;
+mod volume;
 
 pub use geometry::{TileMap, source_from_reference};
 pub use level::{HeightMap, LevelConfig, sweep_level};
 pub use view::View;
+pub use volume::CostVolume;
 
 /// Why a stage could not give a result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

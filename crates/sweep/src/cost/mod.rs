@@ -14,8 +14,8 @@
 mod kernels;
 mod tile;
 
-pub use tile::TileScratch;
-pub(crate) use tile::{BlockCosts, Reference, census_scale, sweep_tile};
+pub use tile::Reference;
+pub(crate) use tile::{BlockCosts, TileScratch, census_scale, sweep_tile};
 
 use raster::Grid;
 

@@ -25,11 +25,14 @@ const CACHE_LINE: usize = 64;
 const FULL_DIFFERENCE: f32 = 0.5;
 
 /// The reference on the level being swept.
-#[derive(Clone, Copy)]
-pub(crate) struct Reference<'a> {
-    pub(crate) view: SourceLevel<'a>,
-    pub(crate) level: u32,
-    pub(crate) ranges: &'a Ranges,
+#[derive(Debug, Clone, Copy)]
+pub struct Reference<'a> {
+    /// Its image and camera.
+    pub view: SourceLevel<'a>,
+    /// The level of its pyramid.
+    pub level: u32,
+    /// The hypotheses of its pixels.
+    pub ranges: &'a Ranges,
 }
 
 /// Where a block's costs go: pixel `(x, y)` of `window` has its hypotheses at `offsets[y · width + x]`.
@@ -41,7 +44,7 @@ pub(crate) struct BlockCosts<'a> {
 
 /// Buffers that a thread reuses from tile to tile.
 #[derive(Default)]
-pub struct TileScratch {
+pub(crate) struct TileScratch {
     reference: Census,
     sources: Vec<Laid>,
     padded: Vec<f32>,

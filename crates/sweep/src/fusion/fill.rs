@@ -127,15 +127,14 @@ fn interpolate(before: &Nearest, behind: &Nearest, config: &FillConfig) -> Optio
 mod tests {
     use super::*;
 
-    const CONFIG: FillConfig =
-        FillConfig {
-            reach_cells: 8,
-            narrow_cells: 6.0,
-            island_cells: 36,
-            hidden_cells_per_m: 1.0,
-            same_surface_m: 1.5,
-            slope_m: 0.1,
-        };
+    const CONFIG: FillConfig = FillConfig {
+        reach_cells: 8,
+        narrow_cells: 6.0,
+        island_cells: 36,
+        hidden_cells_per_m: 1.0,
+        same_surface_m: 1.5,
+        slope_m: 0.1,
+    };
 
     #[test]
     fn a_hole_in_a_slope_gets_the_slope_and_one_beside_a_wall_the_ground() {

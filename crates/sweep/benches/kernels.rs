@@ -1,0 +1,92 @@
+//! Hypotheses per second of one thread: the cost volume, its aggregation, and the whole chain of a level.
+//!
+//! Criterion's `elem/s` is pixel × hypothesis per second (Gde/s when divided by 10⁹); the costs are also counted per source,
+//! as each hypothesis is compared with every one of them.
+
+use std::hint::black_box;
+
+use camera::{Rpc, RpcCamera};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use raster::{Grid, Window};
+use sweep::cost::{CostConfig, Reference, SourceLevel};
+use sweep::ranges::Ranges;
+use sweep::semiglobal::Penalties;
+use sweep::{CostVolume, LevelConfig, View, sweep_level};
+
+/// Side of the images: a block with its margin is larger than the caches.
+const SIZE: usize = 512;
+/// Hypotheses per pixel, in steps of a metre.
+const HYPOTHESES: usize = 64;
+const PENALTIES: Penalties = Penalties { step: 36, jump: 140, jump_at_edge: 36 };
+
+/// A linear camera whose pixels move by `parallax` (samples, lines) per metre of height.
+fn camera(parallax: [f64; 2]) -> RpcCamera {
+    let half = SIZE as f64 / 2.0;
+    let polynomial = |terms: [f64; 4]| std::array::from_fn(|i| terms.get(i).copied().unwrap_or(0.0));
+    let extent_deg = half * 0.5 / 111_320.0;
+    RpcCamera::new(Rpc {
+        line_off: half,
+        samp_off: half,
+        lat_off: 0.0,
+        long_off: 0.0,
+        height_off: 0.0,
+        line_scale: half,
+        samp_scale: half,
+        lat_scale: extent_deg,
+        long_scale: extent_deg,
+        height_scale: 100.0,
+        line_num: polynomial([0.0, 0.0, -1.0, parallax[1] * 100.0 / half]),
+        line_den: polynomial([1.0, 0.0, 0.0, 0.0]),
+        samp_num: polynomial([0.0, 1.0, 0.0, parallax[0] * 100.0 / half]),
+        samp_den: polynomial([1.0, 0.0, 0.0, 0.0]),
+        err_bias_m: None,
+        err_rand_m: None,
+    })
+}
+
+/// Views of a textured plane at height 0, where all cameras agree.
+fn views() -> Vec<View> {
+    let texture = |i: usize| {
+        let (x, y) = ((i % SIZE) as f32, (i / SIZE) as f32);
+        500.0 + 90.0 * ((0.9 * x).sin() + (1.1 * y + 0.3 * x).sin() + (0.13 * x * y / 40.0).sin())
+    };
+    let image = Grid::from_vec(SIZE, SIZE, (0..SIZE * SIZE).map(texture).collect()).expect("a square image");
+    [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| View::new(camera(p), image.clone())).into()
+}
+
+fn level(views: &[View], index: usize) -> SourceLevel<'_> {
+    let v = &views[index];
+    SourceLevel { index, image: &v.levels[0], camera: &v.camera, noise: v.noise, contrast: v.contrast[0] }
+}
+
+fn kernels(c: &mut Criterion) {
+    let views = views();
+    let ranges = Ranges::uniform(SIZE, SIZE, 1.0, (-32.0, (HYPOTHESES - 33) as f64));
+    let reference = Reference { view: level(&views, 0), level: 0, ranges: &ranges };
+    let (whole, cost) = (Window::whole(SIZE, SIZE), CostConfig::default());
+    let evaluations = ranges.evaluations();
+    let mut group = c.benchmark_group("sweep");
+    group.sample_size(20);
+    for count in [1, 2] {
+        let sources: Vec<SourceLevel<'_>> = (1..=count).map(|i| level(&views, i)).collect();
+        group.throughput(Throughput::Elements(evaluations * count as u64));
+        group.bench_function(BenchmarkId::new("cost per source", count), |b| {
+            b.iter(|| CostVolume::compute(reference, black_box(&sources), whole, &cost).expect("linear cameras"));
+        });
+    }
+    let sources = [level(&views, 1)];
+    let volume = CostVolume::compute(reference, &sources, whole, &cost).expect("linear cameras");
+    group.throughput(Throughput::Elements(volume.hypotheses() as u64));
+    group.bench_function("aggregation", |b| b.iter(|| black_box(&volume).aggregate(PENALTIES)));
+    let config = LevelConfig { cost, penalties: PENALTIES, cost_noise: 0.02 };
+    // A level of one block runs on one thread.
+    group.bench_function("chain of a pair", |b| {
+        b.iter(|| {
+            sweep_level(level(&views, 0), 0, black_box(&sources), &ranges, 0.0, &config).expect("linear cameras")
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, kernels);
+criterion_main!(benches);
