@@ -62,7 +62,7 @@ fn level(views: &[View], index: usize) -> SourceLevel<'_> {
 fn kernels(c: &mut Criterion) {
     let views = views();
     let ranges = Ranges::uniform(SIZE, SIZE, 1.0, (-32.0, (HYPOTHESES - 33) as f64));
-    let reference = Reference { view: level(&views, 0), level: 0, ranges: &ranges };
+    let reference = Reference { view: level(&views, 0), level: 0, ranges: &ranges, prior: None };
     let (whole, cost) = (Window::whole(SIZE, SIZE), CostConfig::default());
     let evaluations = ranges.evaluations();
     let mut group = c.benchmark_group("sweep");
@@ -82,7 +82,7 @@ fn kernels(c: &mut Criterion) {
     // A level of one block runs on one thread.
     group.bench_function("chain of a pair", |b| {
         b.iter(|| {
-            sweep_level(level(&views, 0), 0, black_box(&sources), &ranges, 0.0, &config).expect("linear cameras")
+            sweep_level(reference, black_box(&sources), 0.0, &config).expect("linear cameras")
         });
     });
     group.finish();

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use crate::SweepError;
 use crate::cost::{COST_MAX, CostConfig, Reference, SourceLevel};
-use crate::ranges::Ranges;
 use crate::readout::soft_argmin;
 use crate::semiglobal::{Penalties, Volume};
 use crate::support::agreed_share;
@@ -51,18 +50,15 @@ pub struct HeightMap {
 /// # Errors
 /// A camera that fails inside the scene, or is not smooth at the scale of a tile.
 pub fn sweep_level(
-    reference: SourceLevel<'_>,
-    level: u32,
+    reference: Reference<'_>,
     sources: &[SourceLevel<'_>],
-    ranges: &Ranges,
     origin_m: f64,
     config: &LevelConfig,
 ) -> Result<HeightMap, SweepError> {
-    let (width, height) = (reference.image.width(), reference.image.height());
+    let (width, height) = (reference.view.image.width(), reference.view.image.height());
     let cores = tiles(Window::whole(width, height), BLOCK);
-    let input = Reference { view: reference, level, ranges };
     let parts: Vec<HeightMap> =
-        cores.par_iter().map(|core| sweep_block(input, sources, *core, origin_m, config)).collect::<Result<_, _>>()?;
+        cores.par_iter().map(|core| sweep_block(reference, sources, *core, origin_m, config)).collect::<Result<_, _>>()?;
     let mut out = HeightMap::empty(width, height, origin_m);
     for (core, part) in cores.iter().zip(&parts) {
         out.put(*core, part);
@@ -165,6 +161,7 @@ pub(crate) fn paste<T: Copy>(whole: &mut Grid<T>, at: Window, part: &Grid<T>) {
 mod tests {
     use super::*;
     use crate::cost::Aggregation;
+    use crate::ranges::Ranges;
     use crate::testing::{leaning_camera, view_of_plane};
     use crate::view::View;
 
@@ -178,12 +175,16 @@ mod tests {
         SourceLevel { index, image: &v.levels[0], camera: &v.camera, noise: v.noise, contrast: v.contrast[0] }
     }
 
+    fn reference<'a>(views: &'a [View], ranges: &'a Ranges) -> Reference<'a> {
+        Reference { view: source(views, 0), level: 0, ranges, prior: None }
+    }
+
     /// Errors of the inner pixels, in steps, for a plane at a height between two hypotheses.
     fn errors(views: &[View], height_m: f64, aggregation: Aggregation) -> Vec<f64> {
         let size = views[0].levels[0].width();
         let ranges = Ranges::uniform(size, size, 1.0, (-10.0, 30.0));
         let sources: Vec<SourceLevel<'_>> = (1..views.len()).map(|i| source(views, i)).collect();
-        let map = sweep_level(source(views, 0), 0, &sources, &ranges, 0.0, &config(aggregation)).unwrap();
+        let map = sweep_level(reference(views, &ranges), &sources, 0.0, &config(aggregation)).unwrap();
         let inner = 30..size - 30;
         let at = |x: usize, y: usize| f64::from(map.height_m[(x, y)]) - height_m;
         inner.clone().flat_map(|y| inner.clone().map(move |x| (x, y))).map(|(x, y)| at(x, y)).collect()
@@ -207,7 +208,7 @@ mod tests {
         let (w, h) = (views[0].levels[0].width(), views[0].levels[0].height());
         let ranges = Ranges::uniform(w, h, 1.0, (-10.0, 30.0));
         let sources: Vec<SourceLevel<'_>> = order.iter().map(|&i| source(views, i)).collect();
-        sweep_level(source(views, 0), 0, &sources, &ranges, 0.0, &config(Aggregation::Variance)).unwrap()
+        sweep_level(reference(views, &ranges), &sources, 0.0, &config(Aggregation::Variance)).unwrap()
     }
 
     /// Share of pixels with one height, to a hundredth of a step.

@@ -12,6 +12,7 @@ pub mod fusion;
 mod geometry;
 pub mod level;
 pub mod pointing;
+mod prior;
 pub mod ranges;
 mod readout;
 pub mod semiglobal;
@@ -23,6 +24,7 @@ mod volume;
 
 pub use geometry::{TileMap, source_from_reference};
 pub use level::{HeightMap, LevelConfig, sweep_level};
+pub use prior::Prior;
 pub use view::View;
 pub use volume::CostVolume;
 

@@ -41,7 +41,11 @@ impl CostVolume {
         for tile in tiles(window, config.tile) {
             sweep_tile(reference, sources, tile, config, &mut scratch, &mut block)?;
         }
-        let edges = edge_strength(reference.view.image, window, reference.view.noise);
+        let mut edges = edge_strength(reference.view.image, window, reference.view.noise);
+        if let Some(prior) = reference.prior {
+            prior.favour(window, reference.ranges.step_m, &low, &offsets, &mut costs);
+            prior.mark_edges(window, reference.ranges.step_m, &mut edges);
+        }
         Ok(Self { width: window.width, height: window.height, low, offsets, costs, edges })
     }
 

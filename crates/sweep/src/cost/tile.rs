@@ -6,6 +6,7 @@ use super::kernels::{self, Census, FULL, Picture};
 use super::{Aggregation, CostConfig, SourceLevel};
 use crate::SweepError;
 use crate::geometry::{TileMap, source_from_reference};
+use crate::prior::Prior;
 use crate::ranges::Ranges;
 use crate::view::QUANTISATION_VARIANCE;
 
@@ -33,6 +34,8 @@ pub struct Reference<'a> {
     pub level: u32,
     /// The hypotheses of its pixels.
     pub ranges: &'a Ranges,
+    /// What is known of its heights beforehand.
+    pub prior: Option<Prior<'a>>,
 }
 
 /// Where a block's costs go: pixel `(x, y)` of `window` has its hypotheses at `offsets[y · width + x]`.
