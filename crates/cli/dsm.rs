@@ -37,6 +37,9 @@ pub(crate) struct Args {
     /// A coarse elevation model that tells the heights to search.
     #[arg(long, value_name = "FILE")]
     dem: Option<PathBuf>,
+    /// City model (CityJSON, CityGML) whose roofs are expected: searched and favoured, never believed against the images.
+    #[arg(long, value_name = "MODEL")]
+    prior: Option<PathBuf>,
     /// What the DSM's heights are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
@@ -109,6 +112,7 @@ impl Args {
             bounds: self.bounds.as_ref().and_then(|b| b.as_slice().try_into().ok()),
             height_range_m: self.height_range.as_ref().and_then(two),
             dem: self.dem.clone(),
+            prior: self.prior.clone(),
             vertical: self.vertical.or(datum).unwrap_or_default(),
             preset: match self.preset {
                 PresetName::Fast => Preset::Fast,

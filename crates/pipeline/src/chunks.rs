@@ -18,6 +18,7 @@ use crate::error::PipelineError;
 use crate::first_look::WINDOW_MARGIN;
 use crate::heights::{SweepPlan, sweep_scene};
 use crate::output::Product;
+use crate::prior::CityPrior;
 use crate::scene::{Opened, read_coarse_view, read_view};
 use crate::setup::{self, OutputGrid, image_span};
 use crate::surface::{Counts, SURROUNDINGS_M, SurfaceInput, make_surface};
@@ -55,6 +56,7 @@ pub(crate) struct ChunkedScene<'a> {
     pub(crate) gsd_m: f64,
     /// Heights of the whole scene as its ties or the user tell them.
     pub(crate) range_m: (f64, f64),
+    pub(crate) prior: Option<&'a CityPrior>,
 }
 
 /// The core of a chunk.
@@ -166,7 +168,8 @@ impl ChunkedScene<'_> {
         }
         let views = self.views(&windows, |image, window| read_view(image, Some(window)))?;
         let sides = setup::smallest_sides(&views);
-        let plan = setup::plan_sweep(range_m, self.step_m, sources, &sides, self.tuning);
+        let mut plan = setup::plan_sweep(range_m, self.step_m, sources, &sides, self.tuning);
+        plan.priors = self.prior.map(|prior| prior.seen_from(&views)).transpose()?.unwrap_or_default();
         let heights = sweep_scene(&views, &plan, &|| ())?;
         let evaluations = heights.evaluations;
         let core = Window { x: core.x - grown.x, y: core.y - grown.y, ..core };
@@ -236,6 +239,7 @@ impl ChunkedScene<'_> {
             sources: sources.to_vec(),
             best_of: self.tuning.best_of,
             level: self.tuning.level,
+            priors: Vec::new(),
         };
         let Some(found) = probe::seen_range(&views, &plan, level)? else { return Ok(self.range_m) };
         let (lo, hi) = found.range_m;

@@ -42,6 +42,8 @@ pub struct DsmConfig {
     pub height_range_m: Option<(f64, f64)>,
     /// A coarse elevation model that tells the height range.
     pub dem: Option<PathBuf>,
+    /// A city model that tells where roofs are expected.
+    pub prior: Option<PathBuf>,
     /// What the DSM's heights are measured from.
     pub vertical: VerticalDatum,
     /// Speed against accuracy.
@@ -75,6 +77,7 @@ impl DsmConfig {
             bounds: None,
             height_range_m: None,
             dem: None,
+            prior: None,
             vertical: VerticalDatum::Ellipsoid,
             preset: Preset::default(),
             pairs: None,

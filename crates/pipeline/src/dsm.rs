@@ -16,6 +16,7 @@ use crate::memory;
 use crate::output::{self, ChunkedOutput};
 use crate::pictures;
 use crate::pointing::{PairTies, adjust_cameras};
+use crate::prior::CityPrior;
 use crate::progress::Progress;
 use crate::report::{
     ChunksReport, DsmReport, FailedChunk, ImageReport, PairReport, PointingReport, StageTime, SurfaceReport,
@@ -139,7 +140,8 @@ impl<'a> Job<'a> {
         let grid = setup::choose_grid(config, &geometry, coarsest)?;
         setup::tell_grid(config, &grid, coarsest, &mut self.choices);
         let sources = setup::choose_sources(config, &geometry, &pairs, &ties, &tuning, &mut self.choices)?;
-        let scene = Scene { images: &images, geometry, useful, sources, range, coarsest, grid: &grid, tuning };
+        let prior = self.config.prior.as_deref().map(|path| CityPrior::read(path, &mut self.choices)).transpose()?;
+        let scene = Scene { images: &images, geometry, useful, sources, range, coarsest, grid: &grid, tuning, prior };
         let drawn = |range, hypotheses, surface, chunks| DsmReport {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             images: image_reports(&images, &gsds, &scene.geometry, &adjustment),
@@ -167,7 +169,8 @@ impl<'a> Job<'a> {
         let range = setup::with_towers(self.config, scene.range, &views, found, *coarsest, tuning, &mut self.choices)?;
         let step_m = setup::height_step(sources, geometry, tuning);
         setup::tell_step(sources, geometry, tuning, &mut self.choices);
-        let plan = setup::plan_sweep(range, step_m, sources.clone(), &setup::smallest_sides(&views), tuning);
+        let mut plan = setup::plan_sweep(range, step_m, sources.clone(), &setup::smallest_sides(&views), tuning);
+        plan.priors = scene.prior.as_ref().map(|prior| prior.seen_from(&views)).transpose()?.unwrap_or_default();
         setup::tell_levels(&plan, &mut self.choices);
 
         self.progress.begin("sweeping heights", views.len() * (plan.top_level - plan.bottom_level + 1));
@@ -213,6 +216,7 @@ impl<'a> Job<'a> {
             step_m: setup::height_step(&scene.sources, &scene.geometry, &scene.tuning),
             gsd_m: scene.coarsest,
             range_m: scene.range,
+            prior: scene.prior.as_ref(),
         };
         let mut output = ChunkedOutput::begin(config, grid)?;
         let mut total = ChunkTotal { report: ChunksReport { side, ..ChunksReport::default() }, ..Default::default() };
@@ -391,6 +395,8 @@ struct Scene<'a> {
     coarsest: f64,
     grid: &'a OutputGrid,
     tuning: Tuning,
+    /// A city model.
+    prior: Option<CityPrior>,
 }
 
 /// Draws up the report: heights searched, hypotheses, surface, chunks.

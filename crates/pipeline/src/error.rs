@@ -18,6 +18,14 @@ pub enum PipelineError {
         /// Its path.
         path: PathBuf,
     },
+    /// A city model cannot be the prior.
+    #[error("cannot use the city model as prior: {}", path.display())]
+    Prior {
+        /// The model.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// An image could not be read.
     #[error("cannot read the image")]
     Image(#[from] io::raster::RasterError),

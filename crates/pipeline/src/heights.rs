@@ -3,11 +3,14 @@
 //! The coarsest level covers the scene's whole range; each finer one searches, per pixel, around what the coarser one
 //! found there and next to it.
 
+use raster::Grid;
 use rayon::prelude::*;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::cost::{Aggregation, SourceLevel};
+use sweep::cost::{Aggregation, Reference, SourceLevel};
 use sweep::ranges::Ranges;
-use sweep::{HeightMap, LevelConfig, SweepError, View, sweep_level};
+use sweep::{HeightMap, LevelConfig, Prior, SweepError, View, sweep_level};
+
+use crate::prior;
 
 /// What the sweep needs to know of the scene.
 #[derive(Debug, Clone)]
@@ -26,6 +29,8 @@ pub(crate) struct SweepPlan {
     pub(crate) best_of: usize,
     /// Cost, penalties and read-out.
     pub(crate) level: LevelConfig,
+    /// For each view the heights of a city model in it, where there are any; empty without one.
+    pub(crate) priors: Vec<Option<Grid<f32>>>,
 }
 
 impl SweepPlan {
@@ -104,13 +109,20 @@ fn sweep_view(
         Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, plan.range_m),
     }
     .without_voids(reference.image);
+    let prior_m = plan.priors.get(index).and_then(Option::as_ref).map(|p| prior::at_level(p, level, (w, h)));
+    let prior = prior_m.as_ref().map(|height_m| Prior { height_m, deviation_m: prior::DEVIATION_M });
+    let ranges = match prior {
+        Some(prior) => prior.widened(ranges),
+        None => ranges,
+    };
     let sources: Vec<SourceLevel<'_>> = plan.sources[index].iter().map(|&s| source_level(views, s, level)).collect();
     let mut config = plan.level;
     config.cost.aggregation = match sources.len() {
         0..=2 => Aggregation::Variance,
         n => Aggregation::BestOf(plan.best_of.min(n)),
     };
-    let map = sweep_level(reference, level as u32, &sources, &ranges, origin_m, &config)?;
+    let reference = Reference { view: reference, level: level as u32, ranges: &ranges, prior };
+    let map = sweep_level(reference, &sources, origin_m, &config)?;
     Ok((map, ranges.evaluations()))
 }
 

@@ -12,6 +12,7 @@ mod memory;
 mod output;
 mod pictures;
 mod pointing;
+mod prior;
 mod probe;
 pub mod progress;
 pub mod report;

@@ -195,7 +195,16 @@ pub(crate) fn with_towers(
     }
     let step_m = height_step(sources, geometry, tuning);
     let (level, best_of) = (tuning.level, tuning.best_of);
-    let plan = SweepPlan { range_m, step_m, top_level: 0, bottom_level: 0, sources: sources.to_vec(), best_of, level };
+    let plan = SweepPlan {
+        range_m,
+        step_m,
+        top_level: 0,
+        bottom_level: 0,
+        sources: sources.to_vec(),
+        best_of,
+        level,
+        priors: Vec::new(),
+    };
     let Some(found) = crate::probe::extended_range(views, &plan, gsd_m, &smallest_sides(views))? else {
         return Ok(range_m);
     };
@@ -231,7 +240,16 @@ pub(crate) fn plan_sweep(
     let too_many = |level: &usize| (range_m.1 - range_m.0) / (step_m * f64::from(1u32 << *level)) > TOP_HYPOTHESES;
     let bottom_level = tuning.finest_level.min(deepest);
     let top_level = (0..deepest).take_while(too_many).count().max(bottom_level);
-    SweepPlan { range_m, step_m, top_level, bottom_level, sources, best_of: tuning.best_of, level: tuning.level }
+    SweepPlan {
+        range_m,
+        step_m,
+        top_level,
+        bottom_level,
+        sources,
+        best_of: tuning.best_of,
+        level: tuning.level,
+        priors: Vec::new(),
+    }
 }
 
 /// Tells the choice of [`plan_sweep`].

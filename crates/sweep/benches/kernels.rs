@@ -81,9 +81,7 @@ fn kernels(c: &mut Criterion) {
     let config = LevelConfig { cost, penalties: PENALTIES, cost_noise: 0.02 };
     // A level of one block runs on one thread.
     group.bench_function("chain of a pair", |b| {
-        b.iter(|| {
-            sweep_level(reference, black_box(&sources), 0.0, &config).expect("linear cameras")
-        });
+        b.iter(|| sweep_level(reference, black_box(&sources), 0.0, &config).expect("linear cameras"));
     });
     group.finish();
 }

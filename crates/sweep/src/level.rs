@@ -57,8 +57,10 @@ pub fn sweep_level(
 ) -> Result<HeightMap, SweepError> {
     let (width, height) = (reference.view.image.width(), reference.view.image.height());
     let cores = tiles(Window::whole(width, height), BLOCK);
-    let parts: Vec<HeightMap> =
-        cores.par_iter().map(|core| sweep_block(reference, sources, *core, origin_m, config)).collect::<Result<_, _>>()?;
+    let parts: Vec<HeightMap> = cores
+        .par_iter()
+        .map(|core| sweep_block(reference, sources, *core, origin_m, config))
+        .collect::<Result<_, _>>()?;
     let mut out = HeightMap::empty(width, height, origin_m);
     for (core, part) in cores.iter().zip(&parts) {
         out.put(*core, part);
@@ -262,7 +264,7 @@ mod tests {
             let views = cameras.clone().map(|c| View::new(c, Grid::filled(80, 80, value)));
             let ranges = Ranges::uniform(80, 80, 1.0, (-10.0, 30.0));
             let config = config(Aggregation::Variance);
-            let map = sweep_level(source(&views, 0), 0, &[source(&views, 1)], &ranges, 0.0, &config).unwrap();
+            let map = sweep_level(reference(&views, &ranges), &[source(&views, 1)], 0.0, &config).unwrap();
             assert!(map.height_m.data().iter().all(|h| h.is_nan()));
         }
     }
