@@ -169,7 +169,7 @@ impl ChunkedScene<'_> {
         let views = self.views(&windows, |image, window| read_view(image, Some(window)))?;
         let sides = setup::smallest_sides(&views);
         let mut plan = setup::plan_sweep(range_m, self.step_m, sources, &sides, self.tuning);
-        plan.priors = self.prior.map(|prior| prior.seen_from(&views)).transpose()?.unwrap_or_default();
+        plan.priors = self.prior.map(|prior| prior.seen_from(&views, self.gsd_m)).transpose()?.unwrap_or_default();
         let heights = sweep_scene(&views, &plan, &|| ())?;
         let evaluations = heights.evaluations;
         let core = Window { x: core.x - grown.x, y: core.y - grown.y, ..core };

@@ -170,7 +170,8 @@ impl<'a> Job<'a> {
         let step_m = setup::height_step(sources, geometry, tuning);
         setup::tell_step(sources, geometry, tuning, &mut self.choices);
         let mut plan = setup::plan_sweep(range, step_m, sources.clone(), &setup::smallest_sides(&views), tuning);
-        plan.priors = scene.prior.as_ref().map(|prior| prior.seen_from(&views)).transpose()?.unwrap_or_default();
+        plan.priors =
+            scene.prior.as_ref().map(|prior| prior.seen_from(&views, *coarsest)).transpose()?.unwrap_or_default();
         setup::tell_levels(&plan, &mut self.choices);
 
         self.progress.begin("sweeping heights", views.len() * (plan.top_level - plan.bottom_level + 1));

@@ -3,14 +3,13 @@
 //! The coarsest level covers the scene's whole range; each finer one searches, per pixel, around what the coarser one
 //! found there and next to it.
 
-use raster::Grid;
 use rayon::prelude::*;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::cost::{Aggregation, Reference, SourceLevel};
 use sweep::ranges::Ranges;
 use sweep::{HeightMap, LevelConfig, Prior, SweepError, View, sweep_level};
 
-use crate::prior;
+use crate::prior::{self, ViewPrior};
 
 /// What the sweep needs to know of the scene.
 #[derive(Debug, Clone)]
@@ -29,8 +28,8 @@ pub(crate) struct SweepPlan {
     pub(crate) best_of: usize,
     /// Cost, penalties and read-out.
     pub(crate) level: LevelConfig,
-    /// For each view the heights of a city model in it, where there are any; empty without one.
-    pub(crate) priors: Vec<Option<Grid<f32>>>,
+    /// For each view what it sees of a city model, if anything; empty without one.
+    pub(crate) priors: Vec<Option<ViewPrior>>,
 }
 
 impl SweepPlan {
@@ -61,11 +60,15 @@ pub(crate) fn sweep_scene(
     let origin_m = 0.5 * (plan.range_m.0 + plan.range_m.1);
     let mut maps: Vec<HeightMap> = Vec::new();
     let mut evaluations = 0;
+    // Where there are coarser levels, the prior waits for them to tell where it lies.
+    let is_single = plan.top_level == plan.bottom_level;
+    let mut priors: Vec<Option<ViewPrior>> = if is_single { plan.priors.clone() } else { Vec::new() };
+    priors.resize(views.len(), None);
     for level in (plan.bottom_level..=plan.top_level).rev() {
         let swept: Vec<(HeightMap, u64)> = (0..views.len())
             .into_par_iter()
             .map(|i| {
-                let out = sweep_view(views, plan, i, level, maps.get(i), origin_m);
+                let out = sweep_view(views, plan, i, level, maps.get(i), priors[i].as_ref(), origin_m);
                 done();
                 out
             })
@@ -74,6 +77,11 @@ pub(crate) fn sweep_scene(
         maps = swept.into_iter().map(|(m, _)| m).collect();
         if level > plan.bottom_level {
             maps = drop_lone_heights(views, plan, &maps, level as u32)?;
+            let checked = |(prior, map): (&Option<ViewPrior>, &HeightMap)| {
+                prior.as_ref()?.checked(map, level, plan.step_at(level))
+            };
+            priors = plan.priors.iter().zip(&maps).map(checked).collect();
+            priors.resize(views.len(), None);
         }
     }
     Ok(SceneHeights { maps, evaluations })
@@ -96,6 +104,7 @@ fn sweep_view(
     index: usize,
     level: usize,
     coarser: Option<&HeightMap>,
+    known: Option<&ViewPrior>,
     origin_m: f64,
 ) -> Result<(HeightMap, u64), SweepError> {
     let reference = source_level(views, index, level);
@@ -109,7 +118,7 @@ fn sweep_view(
         Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, plan.range_m),
     }
     .without_voids(reference.image);
-    let prior_m = plan.priors.get(index).and_then(Option::as_ref).map(|p| prior::at_level(p, level, (w, h)));
+    let prior_m = known.map(|prior| prior.at_level(level, (w, h)));
     let prior = prior_m.as_ref().map(|height_m| Prior { height_m, deviation_m: prior::DEVIATION_M });
     let ranges = match prior {
         Some(prior) => prior.widened(ranges),

@@ -1,0 +1,145 @@
+//! `skysweep dsm --prior`: a city model that is right helps, and one that is wrong does no harm.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use serde_json::{Value, json};
+
+/// Roofs in the class raster.
+const ROOF: &str = "6";
+/// Where the wrong building is put: an open place of the town, EPSG:32631, and its ground, metres above the ellipsoid.
+const OPEN_PLACE: [f64; 3] = [693_830.5, 4_822_578.5, 182.3];
+/// Half of what the wrong building covers and a little more, metres.
+const HALF_M: f64 = 10.0;
+
+fn town(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
+}
+
+fn skysweep() -> Command {
+    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
+}
+
+/// The town's surface model with a prior or without.
+fn surface(folder: &Path, name: &str, prior: Option<&Path>) -> PathBuf {
+    let out = folder.join(name);
+    let mut command = skysweep();
+    command.arg("dsm").args(["view_1.tif", "view_2.tif", "view_3.tif"].map(town)).args(["-q", "-o"]).arg(&out);
+    if let Some(path) = prior {
+        command.arg("--prior").arg(path);
+    }
+    command.assert().code(0);
+    out.join("dsm/dsm.tif")
+}
+
+fn evaluation(dsm: &Path) -> Value {
+    let mut command = skysweep();
+    command.arg("eval").arg(dsm).arg(town("truth/dsm.tif")).args(["--align", "xyz", "--json", "--classes"]);
+    let output = command.arg(town("truth/classes.tif")).assert().code(0).get_output().stdout.clone();
+    serde_json::from_slice(&output).unwrap()
+}
+
+fn mae(evaluation: &Value, path: &str) -> f64 {
+    evaluation.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} is missing: {evaluation}"))
+}
+
+/// Every vertex index of nested boundaries.
+fn indices(boundaries: &Value, found: &mut Vec<usize>) {
+    match boundaries {
+        Value::Array(parts) => parts.iter().for_each(|part| indices(part, found)),
+        other => found.extend(other.as_u64().map(|i| i as usize)),
+    }
+}
+
+fn moved(boundaries: &Value, by: usize) -> Value {
+    match boundaries {
+        Value::Array(parts) => parts.iter().map(|part| moved(part, by)).collect(),
+        other => json!(other.as_u64().unwrap() as usize + by),
+    }
+}
+
+/// The town's model without its largest building and with a copy of another one in an open place.
+fn wrong_model(path: &Path) {
+    let mut model: Value = serde_json::from_slice(&std::fs::read(town("truth/buildings.city.json")).unwrap()).unwrap();
+    let numbers =
+        |value: &Value| -> Vec<f64> { value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect() };
+    let (scale, start) = (numbers(&model["transform"]["scale"]), numbers(&model["transform"]["translate"]));
+    let vertices: Vec<Vec<f64>> = model["vertices"].as_array().unwrap().iter().map(numbers).collect();
+    let extent = |object: &Value| {
+        let mut used = Vec::new();
+        indices(&object["geometry"][0]["boundaries"], &mut used);
+        let along = |axis: usize| used.iter().map(|&i| vertices[i][axis]).collect::<Vec<_>>();
+        [0, 1, 2].map(|axis| {
+            let all = along(axis);
+            let (lo, hi) = all.iter().fold((f64::MAX, f64::MIN), |a, v| (a.0.min(*v), a.1.max(*v)));
+            (lo * scale[axis] + start[axis], (hi - lo) * scale[axis])
+        })
+    };
+    let objects = model["CityObjects"].as_object().unwrap().clone();
+    let largest = |most_m: f64| {
+        let sides = |object: &Value| [0, 1].map(|axis| extent(object)[axis].1);
+        let whole = objects.iter().filter(|(_, object)| object.pointer("/geometry/0").is_some());
+        let fits = whole.filter(|(_, object)| sides(object).iter().all(|side| *side < most_m));
+        fits.max_by(|a, b| (sides(a.1)[0] * sides(a.1)[1]).total_cmp(&(sides(b.1)[0] * sides(b.1)[1]))).unwrap()
+    };
+    let (gone, _) = largest(f64::MAX);
+    let (_, copied) = largest(2.0 * HALF_M - 2.0);
+    let place = extent(copied);
+    let lowest = [OPEN_PLACE[0] - 0.5 * place[0].1, OPEN_PLACE[1] - 0.5 * place[1].1, OPEN_PLACE[2]];
+    let by: Vec<f64> = (0..3).map(|axis| ((lowest[axis] - place[axis].0) / scale[axis]).round()).collect();
+    let mut extra = copied.clone();
+    extra["geometry"][0]["boundaries"] = moved(&copied["geometry"][0]["boundaries"], vertices.len());
+    let copies = vertices.iter().map(|v| json!((0..3).map(|axis| (v[axis] + by[axis]) as i64).collect::<Vec<_>>()));
+    model["vertices"].as_array_mut().unwrap().extend(copies);
+    let all = model["CityObjects"].as_object_mut().unwrap();
+    all.remove(gone);
+    all.insert("not-there".to_owned(), extra);
+    std::fs::write(path, serde_json::to_vec(&model).unwrap()).unwrap();
+}
+
+/// Heights within the square around the open place.
+fn heights_in_the_open_place(dsm: &Path) -> Vec<f64> {
+    let dem = io::raster::read_dem(dsm).unwrap();
+    let steps = || (0..40).map(|i| -HALF_M + 0.5 * f64::from(i));
+    let places = steps().flat_map(|dy| steps().map(move |dx| (OPEN_PLACE[0] + dx, OPEN_PLACE[1] + dy)));
+    let cell = |(x, y)| dem.geotransform.cell_from_map(x, y).map(|(c, r)| (c.round() as usize, r.round() as usize));
+    places.filter_map(cell).map(|at| f64::from(dem.heights[at])).collect()
+}
+
+#[test]
+fn a_model_that_lacks_a_building_and_has_one_too_many_still_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("wrong.city.json");
+    wrong_model(&model);
+    let (without, with) =
+        (surface(folder.path(), "without", None), surface(folder.path(), "with", Some(model.as_path())));
+    let (before, after) = (evaluation(&without), evaluation(&with));
+    let roofs = format!("/classes/{ROOF}/mae");
+    for (name, path, share) in
+        [("all", "/metrics/mae", 0.96), ("roofs", roofs.as_str(), 0.85), ("edges", "/edges/edge/mae", 0.97)]
+    {
+        let (before, after) = (mae(&before, path), mae(&after, path));
+        assert!(after < share * before, "{name}: MAE {before} without, {after} with the prior");
+    }
+    let (rest, worse) = (mae(&before, "/edges/rest/mae"), mae(&after, "/edges/rest/mae"));
+    assert!(worse <= rest, "away from edges the prior costs accuracy: {rest} m without, {worse} m with");
+    let (open, beside) = (heights_in_the_open_place(&without), heights_in_the_open_place(&with));
+    let changed = open.iter().zip(&beside).filter(|(a, b)| (*a - *b).abs() > 1.0).count();
+    assert!(changed * 50 < open.len(), "the wrong building shows in {changed} of {} cells", open.len());
+}
+
+#[test]
+fn a_prior_that_is_none_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let path = folder.path().join("empty.city.json");
+    let nothing = json!({ "type": "CityJSON", "version": "2.0", "CityObjects": {}, "vertices": [],
+        "transform": { "scale": [0.001, 0.001, 0.001], "translate": [0.0, 0.0, 0.0] } });
+    std::fs::write(&path, nothing.to_string()).unwrap();
+    let mut command = skysweep();
+    command.arg("dsm").args(["view_1.tif", "view_3.tif"].map(town)).args(["--gsd", "1", "-q", "-o"]).arg(&out);
+    command.arg("--prior").arg(&path);
+    command.assert().code(2).stderr(predicate::str::contains("empty.city.json"));
+    assert!(!out.exists());
+}
