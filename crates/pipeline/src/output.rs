@@ -40,7 +40,7 @@ pub(crate) struct Product {
     height_m: Grid<f32>,
     sigma_m: Grid<f32>,
     views: Grid<u8>,
-    /// 0 where nothing was observed, up to 1.
+    /// [`sweep::fusion::reliability`].
     confidence: Grid<f32>,
     /// 1 where a height was filled in, 0 where it was observed, 255 in voids.
     pub(crate) filled: Grid<u8>,
@@ -54,7 +54,7 @@ const VOID: u8 = 255;
 impl Product {
     pub(crate) fn new(fused: Surface, filled: Grid<bool>, origin_m: f64) -> Self {
         let mut marks = filled.map(|f| if *f { FILLED } else { 0 });
-        let Surface { height_m, mut sigma_m, mut views, mut confidence } = fused;
+        let Surface { height_m, mut sigma_m, mut views, confidence } = fused;
         for (i, h) in height_m.data().iter().enumerate() {
             if h.is_nan() {
                 marks.data_mut()[i] = VOID;
@@ -63,7 +63,6 @@ impl Product {
             if h.is_nan() || marks.data()[i] == FILLED {
                 sigma_m.data_mut()[i] = f32::NAN;
                 views.data_mut()[i] = 0;
-                confidence.data_mut()[i] = if h.is_nan() { f32::NAN } else { 0.0 };
             }
         }
         Self { origin_m, height_m, sigma_m, views, confidence, filled: marks }

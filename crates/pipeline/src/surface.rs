@@ -6,7 +6,7 @@
 use raster::{Grid, Window};
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::fusion::{
-    FillConfig, FusionConfig, GridFrame, PlacedView, fill_voids, fuse_views, place_view, remove_speckle,
+    FillConfig, FusionConfig, GridFrame, PlacedView, fill_voids, fuse_views, place_view, reliability, remove_speckle,
 };
 use sweep::{HeightMap, View};
 
@@ -144,6 +144,8 @@ fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, origin_m: f64) -> (Pro
     let speckle_cells = ((SPECKLE_SIDE_M / gsd).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd) as f32, speckle_cells);
     let observed = known(&fused.height_m, core);
+    let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
+    agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
     let fill = FillConfig {
         reach_cells: (FILL_REACH_M / gsd).ceil() as usize,
         narrow_cells: (FILL_NARROW_M / gsd) as f32,
@@ -153,6 +155,8 @@ fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, origin_m: f64) -> (Pro
         slope_m: (FILL_SLOPE * gsd) as f32,
     };
     let filled = fill_voids(&mut fused.height_m, &fill);
+    let reach = (0.5 * SPECKLE_SIDE_M / gsd).round().max(1.0) as usize;
+    fused.confidence = reliability(&fused.height_m, &fused.confidence, reach, 2.0 * gsd);
     let product = Product::new(fused, filled, origin_m).cropped(core);
     let filled = product.filled.data().iter().filter(|f| **f == FILLED).count();
     let cells = core.width * core.height;

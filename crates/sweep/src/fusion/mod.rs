@@ -8,9 +8,11 @@
 mod cells;
 mod fill;
 mod mesh;
+mod reliability;
 mod speckle;
 
 pub use cells::{FusionConfig, Surface, fuse_views};
 pub use fill::{FillConfig, fill_voids};
 pub use mesh::{GridFrame, PlacedView, place_view};
+pub use reliability::reliability;
 pub use speckle::remove_speckle;

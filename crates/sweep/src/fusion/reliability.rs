@@ -1,0 +1,85 @@
+//! How far each height of a fused surface is to be believed, from what is around it.
+//!
+//! That views agree in a cell says little where they disagree beside it, or where heights tumble as in trees and at walls. The
+//! reliability is the mean agreement of a window, observed or not, divided by one plus the deviation of its heights in units of
+//! what counts as one surface. On JAX_068 the cells that remain when those of least reliability are dropped are a quarter to a
+//! third better than S2P's at S2P's coverage; by the agreement of the cell alone they are worse.
+
+use raster::Grid;
+
+/// What a cell without any agreement around it is worth beside one with full agreement: its height was interpolated from
+/// what is around, and that deviates more or less.
+const INTERPOLATED: f64 = 0.1;
+
+/// The reliability of every height, 0 to 1; NaN in voids.
+///
+/// `agreement` is 0 to 1 where a height was observed and 0 elsewhere; the window reaches `reach` cells to each side, and heights
+/// that deviate by `same_surface_m` halve it.
+pub fn reliability(height_m: &Grid<f32>, agreement: &Grid<f32>, reach: usize, same_surface_m: f64) -> Grid<f32> {
+    let known = |h: &f32| if h.is_nan() { 0.0 } else { 1.0 };
+    let value = |h: &f32| if h.is_nan() { 0.0 } else { f64::from(*h) };
+    let count = window_sums(&height_m.map(known), reach);
+    let sum = window_sums(&height_m.map(value), reach);
+    let squares = window_sums(&height_m.map(|h| value(h).powi(2)), reach);
+    let agreed = window_sums(&agreement.map(value), reach);
+    let (width, height) = (height_m.width(), height_m.height());
+    let mut out = height_m.clone();
+    for (i, out) in out.data_mut().iter_mut().enumerate().filter(|(_, h)| !h.is_nan()) {
+        let n = count.data()[i];
+        let mean = sum.data()[i] / n;
+        let deviation_m = (squares.data()[i] / n - mean * mean).max(0.0).sqrt();
+        let cells = span(i % width, reach, width).len() * span(i / width, reach, height).len();
+        let share = (INTERPOLATED + agreed.data()[i] / cells as f64) / (INTERPOLATED + 1.0);
+        *out = (share / (1.0 + deviation_m / same_surface_m)) as f32;
+    }
+    out
+}
+
+/// Sums over the square of half width `reach` around every cell, as much of it as there is.
+fn window_sums(grid: &Grid<f64>, reach: usize) -> Grid<f64> {
+    let (width, height) = (grid.width(), grid.height());
+    let mut rows = Grid::filled(width, height, 0.0);
+    for y in 0..height {
+        let values = grid.row(y);
+        rows.row_mut(y).iter_mut().enumerate().for_each(|(x, sum)| *sum = values[span(x, reach, width)].iter().sum());
+    }
+    let mut out = Grid::filled(width, height, 0.0);
+    for y in 0..height {
+        for above in span(y, reach, height) {
+            out.row_mut(y).iter_mut().zip(rows.row(above)).for_each(|(sum, row)| *sum += row);
+        }
+    }
+    out
+}
+
+/// What a window around `i` covers of `0..n`.
+fn span(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
+    i.saturating_sub(reach)..(i + reach + 1).min(n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_alone_or_tumbles_is_believed_less() {
+        let mut height_m = Grid::filled(40, 20, 5.0f32);
+        let mut agreement = Grid::filled(40, 20, 0.9f32);
+        (0..20).for_each(|y| (30..40).for_each(|x| height_m[(x, y)] = 5.0 + 3.0 * ((x + y) % 2) as f32));
+        (0..20).for_each(|y| (0..10).for_each(|x| agreement[(x, y)] = 0.0));
+        height_m[(20, 10)] = f32::NAN;
+        let all = reliability(&height_m, &agreement, 3, 1.0);
+        assert!(all[(20, 10)].is_nan());
+        assert!((all[(16, 3)] - 1.0 / 1.1).abs() < 1e-6, "{}", all[(16, 3)]);
+        assert!((all[(2, 10)] - 0.1 / 1.1).abs() < 1e-6, "{}", all[(2, 10)]);
+        assert!((all[(36, 10)] - 1.0 / 1.1 / 2.5).abs() < 0.01, "{}", all[(36, 10)]);
+        assert!(all[(2, 10)] < all[(9, 10)] && all[(9, 10)] < all[(16, 10)]);
+    }
+
+    #[test]
+    fn sums_are_those_of_the_window() {
+        let grid = Grid::from_vec(5, 3, (0..15).map(f64::from).collect()).unwrap();
+        let sums = window_sums(&grid, 1);
+        assert_eq!((sums[(0, 0)], sums[(2, 1)], sums[(4, 2)]), (12.0, 63.0, 44.0));
+    }
+}
