@@ -49,6 +49,10 @@ pub(crate) struct Args {
     /// Terrain model, for what stands above it [default: from the class ground, else estimated from REF].
     #[arg(long, value_name = "FILE")]
     dtm: Option<PathBuf>,
+    /// How far each cell of TEST is to be believed, more is better, on its grid (dsm/confidence.tif): rows for what remains when
+    /// the least believed cells are dropped, 95 to 50 % of REF's cells.
+    #[arg(long, value_name = "FILE")]
+    confidence: Option<PathBuf>,
     /// Least height above the terrain of what stands, in metres.
     #[arg(long, value_name = "METRES", default_value_t = EvalConfig::default().standing_m)]
     standing_m: f64,
@@ -164,6 +168,7 @@ fn refuse_grid_options(args: &Args, what: &str) -> anyhow::Result<()> {
     let given = [
         ("--align", args.align.is_some_and(|align| !matches!(align, Align::None))),
         ("--classes", args.classes.is_some()),
+        ("--confidence", args.confidence.is_some()),
         ("--skip", !args.skip.is_empty()),
         ("--mask", args.mask.is_some()),
         ("--dtm", args.dtm.is_some()),
@@ -186,6 +191,7 @@ fn grids(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
         classes: inputs.classes.as_ref().map(|(classes, _)| classes),
         mask: inputs.mask.as_ref(),
         terrain: inputs.terrain.as_ref(),
+        confidence: inputs.confidence.as_ref(),
         ..EvalInput::new(
             &inputs.test.heights,
             &inputs.reference.heights,

@@ -319,15 +319,7 @@ impl Stage {
     pub(crate) fn errors(&self, outcome: &Outcome, half_m: f64, alignment: Alignment) -> Errors {
         let (dem, truth) = (&outcome.dem, self.truth(&outcome.dem, half_m));
         let map = CellMap::affine(&dem.geotransform, &dem.geotransform).expect("a grid on itself");
-        let input = EvalInput {
-            test: &dem.heights,
-            reference: &truth,
-            test_from_reference: &map,
-            metres_from_cells: MetresFromCells::new(&dem.geotransform, (1.0, 1.0)),
-            classes: None,
-            mask: None,
-            terrain: None,
-        };
+        let input = EvalInput::new(&dem.heights, &truth, &map, MetresFromCells::new(&dem.geotransform, (1.0, 1.0)));
         let found =
             evaluate(&input, &EvalConfig { alignment, search_m: 15.0, ..EvalConfig::default() }).expect("common cells");
         Errors { errors: found.errors, truth, places: self.places(dem) }

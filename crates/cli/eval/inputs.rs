@@ -2,6 +2,8 @@
 //!
 //! What a file leaves open is decided here, and every decision that could be wrong is noted for the output.
 
+use std::path::Path;
+
 use anyhow::ensure;
 use eval::{Alignment, CellMap, MetresFromCells};
 use io::points::{PointCloud, is_point_cloud};
@@ -33,6 +35,7 @@ pub(super) struct Inputs {
     pub(super) mask: Option<Grid<bool>>,
     /// On the reference grid, above its datum.
     pub(super) terrain: Option<Grid<f32>>,
+    pub(super) confidence: Option<Grid<f32>>,
     /// The datum of both, in words.
     pub(super) vertical: String,
     /// Decisions and doubts.
@@ -65,6 +68,7 @@ impl Inputs {
             None => point_classes.map(|classes| (classes, "those of the reference's points".to_owned())),
         };
         let mask = args.mask.as_deref().map(|path| numbers_on_reference(path, "mask", &reference, &mut notes));
+        let confidence = args.confidence.as_deref().map(|path| on_test_grid(path, &test)).transpose()?;
         let terrain = args.dtm.as_deref().map(|path| -> anyhow::Result<Grid<f32>> {
             let mut terrain = read_dem(path)?;
             bring_terrain(&mut terrain, datum, &mut notes)?;
@@ -76,12 +80,29 @@ impl Inputs {
             classes,
             mask: mask.transpose()?.map(|mask| mask.map(|&value| value.is_some_and(|value| value != 0))),
             terrain: terrain.transpose()?,
+            confidence,
             vertical: datum.map_or_else(|| "not stated".into(), |datum| datum.to_string()),
             test,
             reference,
             notes,
         })
     }
+}
+
+/// A raster on the very grid of the test.
+fn on_test_grid(path: &Path, test: &Dem) -> anyhow::Result<Grid<f32>> {
+    let found = read_dem(path)?;
+    let size = |dem: &Dem| (dem.heights.width(), dem.heights.height());
+    ensure!(
+        size(&found) == size(test) && found.geotransform == test.geotransform,
+        "found {:?} cells from {:?}, expected the grid of {} ({:?} cells): {}",
+        size(&found),
+        found.geotransform.0,
+        test.path.display(),
+        size(test),
+        path.display()
+    );
+    Ok(found.heights)
 }
 
 /// The reference, and the classes of its points where it is a classified cloud.

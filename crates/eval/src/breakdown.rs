@@ -36,6 +36,20 @@ pub struct EdgeMetrics {
     pub rest: Metrics,
 }
 
+/// Shares of the reference's cells that are kept of a surface, the most believed first.
+pub const COVERAGES: [f64; 10] = [0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.5];
+
+/// The metrics of the most believed cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoverageMetrics {
+    /// Their share of the reference's valid cells.
+    pub coverage: f64,
+    /// The least confidence among them.
+    pub confidence: f64,
+    /// What was measured on them; the others are voids.
+    pub metrics: Metrics,
+}
+
 /// The reference's valid cells with their errors, and how finely errors are counted.
 #[derive(Clone, Copy)]
 pub(crate) struct Cells<'a> {
@@ -64,6 +78,27 @@ impl Cells<'_> {
     pub(crate) fn per_class(&self, classes: Option<&Grid<Option<i32>>>) -> Vec<ClassMetrics> {
         let by_class = self.by(|i| classes.and_then(|classes| *classes.data().get(i)?));
         by_class.into_iter().map(|(class, metrics)| ClassMetrics { class, metrics }).collect()
+    }
+
+    /// One entry for each of [`COVERAGES`] that the surface reaches.
+    pub(crate) fn per_coverage(&self, confidence: &Grid<f32>) -> Vec<CoverageMetrics> {
+        let reference_cells = self.reference.data().iter().filter(|h| h.is_finite()).count();
+        let cells = self.errors.data().iter().zip(confidence.data());
+        let mut known: Vec<(f32, f64)> = cells
+            .filter(|(error, _)| error.is_finite())
+            .map(|(error, confidence)| (if confidence.is_nan() { f32::NEG_INFINITY } else { *confidence }, *error))
+            .collect();
+        // Stable: cells of one confidence stay in the order of the rows, whatever their errors.
+        known.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let of = |coverage: f64| {
+            let count = (coverage * reference_cells as f64).round() as usize;
+            let kept = known.get(..count).filter(|kept| !kept.is_empty())?;
+            let confidence = f64::from(kept.last()?.0);
+            let mut errors: Vec<f64> = kept.iter().map(|(_, error)| *error).collect();
+            let metrics = Metrics::of(&mut errors, reference_cells, self.thresholds_m);
+            Some(CoverageMetrics { coverage, confidence, metrics })
+        };
+        COVERAGES.into_iter().filter_map(of).collect()
     }
 
     /// One entry per bin, the empty ones too, so that tables of different scenes have the same rows.

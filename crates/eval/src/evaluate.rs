@@ -1,14 +1,14 @@
 //! One surface against another: alignment, then errors over all cells, per class, per slope and at edges, and what stands above the terrain.
 
 use crate::align::{Alignment, MetresFromCells, Shift};
-use crate::breakdown::{Cells, ClassMetrics, EdgeMetrics, SlopeMetrics};
+use crate::breakdown::{Cells, ClassMetrics, CoverageMetrics, EdgeMetrics, SlopeMetrics};
 use crate::cell_map::CellMap;
 use crate::edges::{EdgeRule, edge_zone};
 use crate::error::EvalError;
 use crate::gradient::slope_deg;
 use crate::metrics::Metrics;
 use crate::nuth_kaab::{NuthKaab, NuthKaabSummary};
-use crate::resample::bilinear;
+use crate::resample::{bilinear, nearest};
 use crate::search::{Search, SearchSummary};
 use crate::sharpness::{Sharpness, sharpness};
 use crate::standing::{Standing, standing};
@@ -42,17 +42,29 @@ pub struct EvalInput<'a> {
     pub mask: Option<&'a Grid<bool>>,
     /// The bare ground on the reference grid, above the same datum; without one it is taken from the ground class, or estimated.
     pub terrain: Option<&'a Grid<f32>>,
+    /// How far each cell of the test is to be believed, on the test's grid, more is better: what remains when the least
+    /// believed are dropped.
+    pub confidence: Option<&'a Grid<f32>>,
 }
 
 impl<'a> EvalInput<'a> {
-    /// Two surfaces without classes, mask or terrain.
+    /// Two surfaces and nothing else.
     pub fn new(
         test: &'a Grid<f32>,
         reference: &'a Grid<f32>,
         test_from_reference: &'a CellMap,
         metres_from_cells: MetresFromCells,
     ) -> Self {
-        Self { test, reference, test_from_reference, metres_from_cells, classes: None, mask: None, terrain: None }
+        Self {
+            test,
+            reference,
+            test_from_reference,
+            metres_from_cells,
+            classes: None,
+            mask: None,
+            terrain: None,
+            confidence: None,
+        }
     }
 }
 
@@ -106,6 +118,8 @@ pub struct Evaluation {
     pub sharpness: Sharpness,
     /// What stands above the terrain.
     pub standing: Standing,
+    /// What remains of the surface when its least believed cells are dropped; empty without a confidence.
+    pub coverages: Vec<CoverageMetrics>,
     /// Valid cells of the reference that were left out because of their class or the mask.
     pub skipped_cells: usize,
     /// Test − reference after the alignment, metres, on the reference grid; NaN where either is void, or skipped.
@@ -153,10 +167,23 @@ pub fn evaluate(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Evaluation
         edges: part.at_edges(&edge_zone(input.reference, input.metres_from_cells)),
         sharpness: roof_edges(input, &counted, &aligned),
         standing: standing_of(input, config, &counted, &aligned),
+        coverages: input.confidence.map_or_else(Vec::new, |c| part.per_coverage(&confidences(input, c, cells))),
         skipped_cells,
         errors: errors.map(|&e| e as f32),
         aligned,
     })
+}
+
+/// The test's confidence at every reference cell, moved by `shift` reference cells.
+fn confidences(input: &EvalInput<'_>, confidence: &Grid<f32>, shift: (f64, f64)) -> Grid<f32> {
+    let (width, height) = (input.reference.width(), input.reference.height());
+    let mut out = Grid::filled(width, height, f32::NAN);
+    for (i, out) in out.data_mut().iter_mut().enumerate() {
+        let (column, row) = ((i % width) as f64, (i / width) as f64);
+        let (x, y) = input.test_from_reference.position(column - shift.0, row - shift.1);
+        *out = nearest(confidence, x, y).unwrap_or(f32::NAN);
+    }
+    out
 }
 
 fn check(input: &EvalInput<'_>, config: &EvalConfig) -> Result<(), EvalError> {
@@ -176,6 +203,13 @@ fn check(input: &EvalInput<'_>, config: &EvalConfig) -> Result<(), EvalError> {
     fits("class", input.classes.map(|g| (g.width(), g.height())))?;
     fits("mask", input.mask.map(|g| (g.width(), g.height())))?;
     fits("terrain", input.terrain.map(|g| (g.width(), g.height())))?;
+    if let Some(confidence) = input.confidence {
+        let (width, height) = (input.test.width(), input.test.height());
+        let (found_width, found_height) = (confidence.width(), confidence.height());
+        if (found_width, found_height) != (width, height) {
+            return Err(EvalError::Shape { what: "confidence", found_width, found_height, width, height });
+        }
+    }
     if input.classes.is_none() && !config.skip.is_empty() {
         return Err(EvalError::SkipWithoutClasses);
     }

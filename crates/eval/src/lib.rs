@@ -36,7 +36,7 @@ mod terrain;
 mod vertical;
 
 pub use align::{Alignment, MetresFromCells, Shift};
-pub use breakdown::{ClassMetrics, EdgeMetrics, SLOPE_BOUNDS_DEG, SlopeMetrics};
+pub use breakdown::{COVERAGES, ClassMetrics, CoverageMetrics, EdgeMetrics, SLOPE_BOUNDS_DEG, SlopeMetrics};
 pub use cell_map::CellMap;
 pub use distribution::{Cumulative, Histogram, cumulative, histogram, round_up};
 pub use edges::{EdgeRule, JUMP_M, JUMP_STEEPNESS, ZONE_CELLS, ZONE_M, edge_zone};

@@ -39,15 +39,7 @@ fn run(
     alignment: Alignment,
 ) -> Result<Evaluation, EvalError> {
     let map = CellMap::affine(reference.1, test.1)?;
-    let input = EvalInput {
-        test: test.0,
-        reference: reference.0,
-        test_from_reference: &map,
-        metres_from_cells: MetresFromCells::new(reference.1, (1.0, 1.0)),
-        classes: None,
-        mask: None,
-        terrain: None,
-    };
+    let input = EvalInput::new(test.0, reference.0, &map, MetresFromCells::new(reference.1, (1.0, 1.0)));
     evaluate(&input, &EvalConfig { alignment, ..EvalConfig::default() })
 }
 
@@ -216,4 +208,33 @@ proptest! {
         prop_assert_eq!((found.shift.dx_m, found.shift.dy_m), (dx, dy));
         prop_assert!(found.overall.errors.unwrap().mae < 1e-4);
     }
+}
+
+#[test]
+fn what_is_believed_most_has_the_errors_of_those_cells() {
+    let geotransform = GeoTransform::north_up(0.0, 0.0, 1.0);
+    let reference = Grid::filled(20, 10, 5.0f32);
+    // Errors of 0.1 m per column; the confidence falls with them, and one column is void.
+    let cell = |i: usize| if i % 20 == 19 { f32::NAN } else { 5.0 + 0.1 * (i % 20) as f32 };
+    let test = Grid::from_vec(20, 10, (0..200).map(cell).collect()).unwrap();
+    let confidence = Grid::from_vec(20, 10, (0..200).map(|i| 1.0 - 0.01 * (i % 20) as f32).collect()).unwrap();
+    let map = CellMap::affine(&geotransform, &geotransform).unwrap();
+    let input = EvalInput {
+        confidence: Some(&confidence),
+        ..EvalInput::new(&test, &reference, &map, MetresFromCells::new(&geotransform, (1.0, 1.0)))
+    };
+    let config = EvalConfig { alignment: Alignment::None, ..EvalConfig::default() };
+    let kept = evaluate(&input, &config).unwrap().coverages;
+    assert_eq!(kept.iter().map(|c| c.coverage).collect::<Vec<_>>(), eval::COVERAGES);
+    for c in &kept {
+        // The columns that are kept have errors of 0, 0.1, …
+        let columns = (20.0 * c.coverage).round();
+        let mae = c.metrics.errors.unwrap().mae;
+        assert!((mae - 0.05 * (columns - 1.0)).abs() < 1e-6, "{c:?}");
+        assert!((c.confidence - (1.0 - 0.01 * (columns - 1.0))).abs() < 1e-6);
+        assert_eq!((c.metrics.n, c.metrics.reference_cells), (columns as usize * 10, 200));
+    }
+    let small = Grid::filled(3, 3, 1.0f32);
+    let wrong = evaluate(&EvalInput { confidence: Some(&small), ..input }, &config);
+    assert!(matches!(wrong, Err(EvalError::Shape { what: "confidence", .. })), "{wrong:?}");
 }

@@ -95,13 +95,9 @@ fn all_metrics_agree_with_numpy() {
         let terrain = case.classes.map(|_| TERRAIN_M);
         let map = CellMap::affine(&case.reference.1, &case.test.1).unwrap();
         let input = EvalInput {
-            test: &case.test.0,
-            reference: &case.reference.0,
-            test_from_reference: &map,
-            metres_from_cells: MetresFromCells::new(&case.reference.1, (1.0, 1.0)),
             classes: Some(&case.classes),
-            mask: None,
             terrain: Some(&terrain),
+            ..EvalInput::new(&case.test.0, &case.reference.0, &map, MetresFromCells::new(&case.reference.1, (1.0, 1.0)))
         };
         let config = EvalConfig { alignment: case.alignment, skip: case.skip, ..EvalConfig::default() };
         let found = evaluate(&input, &config).unwrap();

@@ -31,6 +31,7 @@ impl EvaluationReport<'_> {
             self.metric_table(),
             "<h2>By slope</h2>".to_owned(),
             self.slope_table(),
+            self.coverage_table(),
             "<h2>Protocol</h2>".to_owned(),
             self.protocol_list(),
         ];

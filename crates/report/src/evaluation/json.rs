@@ -18,6 +18,9 @@ impl EvaluationReport<'_> {
         let slopes = found.slopes.iter().map(
             |bin| json!({ "from_deg": bin.from_deg, "to_deg": bin.to_deg, "metrics": metrics_json(&bin.metrics) }),
         );
+        let coverages = found.coverages.iter().map(
+            |c| json!({ "coverage": c.coverage, "confidence": c.confidence, "metrics": metrics_json(&c.metrics) }),
+        );
         json!({
             "generator": GENERATOR,
             "test": protocol.test,
@@ -27,6 +30,7 @@ impl EvaluationReport<'_> {
             "metrics": metrics_json(&found.overall),
             "classes": classes,
             "slopes": slopes.collect::<Vec<_>>(),
+            "coverages": coverages.collect::<Vec<_>>(),
             "edges": { "edge": metrics_json(&found.edges.edge), "rest": metrics_json(&found.edges.rest) },
             "sharpness": found.sharpness,
             "standing": {

@@ -28,6 +28,22 @@ impl EvaluationReport<'_> {
         table("slope of the reference", heads.into_iter(), rows)
     }
 
+    /// What remains when the least believed cells are dropped, one row per coverage; nothing without a confidence.
+    pub(super) fn coverage_table(&self) -> String {
+        if self.found.coverages.is_empty() {
+            return String::new();
+        }
+        let heads = ["confidence", "MAE m", "RMSE m", "NMAD m", "LE90 m", "< 1 m %"];
+        let rows = self.found.coverages.iter().map(|kept| {
+            let values = kept.metrics.errors.map(|e| [e.mae, e.rmse, e.nmad, e.le90]);
+            let metres = (0..4).map(|i| cell("mae", values.map(|values| values[i])));
+            let first = std::iter::once(format!("{:.2}", kept.confidence));
+            let right = std::iter::once(percent(kept.metrics.completeness(1.0)));
+            (format!("{:.0} %", 100.0 * kept.coverage), first.chain(metres).chain(right).collect())
+        });
+        table("most believed cells", heads.into_iter(), rows)
+    }
+
     /// What stands above the terrain.
     pub(super) fn standing_table(&self) -> String {
         let standing = &self.found.standing;

@@ -14,6 +14,7 @@ impl EvaluationReport<'_> {
         lines.extend(self.metric_lines());
         lines.push(String::new());
         lines.extend(self.slope_lines());
+        lines.extend(self.coverage_lines());
         lines.push(String::new());
         lines.extend(self.building_lines());
         lines.extend(self.protocol.notes.iter().map(|note| format!("note: {note}")));
@@ -42,6 +43,19 @@ impl EvaluationReport<'_> {
             lines.push(row(&format!("{:.0} to {:.0} deg", bin.from_deg, bin.to_deg), cells));
         }
         lines
+    }
+
+    fn coverage_lines(&self) -> Vec<String> {
+        let heads = ["confidence", "mae m", "nmad m", "le90 m", "< 1 m %"];
+        let mut lines = vec![row("most believed", heads.iter().map(|head| (*head).to_owned()))];
+        for kept in &self.found.coverages {
+            let Some(e) = kept.metrics.errors else { continue };
+            let metres = [e.mae, e.nmad, e.le90].map(|value| cell("mae", Some(value)));
+            let first = std::iter::once(format!("{:.2}", kept.confidence));
+            let cells = first.chain(metres).chain(std::iter::once(percent(kept.metrics.completeness(1.0))));
+            lines.push(row(&format!("{:.0} % of ref.", 100.0 * kept.coverage), cells));
+        }
+        if self.found.coverages.is_empty() { Vec::new() } else { lines }
     }
 
     fn building_lines(&self) -> Vec<String> {
