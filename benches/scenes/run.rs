@@ -71,6 +71,7 @@ pub(crate) fn evaluate(dsm: &Path, truth: &Truth, folder: &Path) -> anyhow::Resu
         }
         Truth::Pyramid { .. } => return Ok(Metrics::new()),
     }
+    command.arg("--confidence").arg(dsm.with_file_name("confidence.tif"));
     let output = checked(command.args(["--align", "xyz", "--json", "--no-report"]).output()?)?;
     let report: Value = serde_json::from_slice(&output.stdout)?;
     let all = report["metrics"].as_object().context("the evaluation has no member \"metrics\"")?;
@@ -80,5 +81,16 @@ pub(crate) fn evaluate(dsm: &Path, truth: &Truth, folder: &Path) -> anyhow::Resu
     add("median_abs", all.get("nmad").and_then(Value::as_f64).map(|nmad| nmad / 1.4826));
     add("volume_iou", report.pointer("/standing/volume_m3/iou").and_then(Value::as_f64));
     add("overreach", report.pointer("/sharpness/overreach_m/median").and_then(Value::as_f64));
+    for kept in report["coverages"].as_array().into_iter().flatten() {
+        let of = |name: &str| kept.pointer(name).and_then(Value::as_f64);
+        let share = of("/coverage").context("a coverage without its share")?;
+        add(&at_coverage("mae", share), of("/metrics/mae"));
+        add(&at_coverage("completeness_1", share), of("/metrics/completeness_1"));
+    }
     Ok(out)
+}
+
+/// The name of a metric of the most believed cells, when they are a share of the reference's.
+pub(crate) fn at_coverage(metric: &str, share: f64) -> String {
+    format!("{metric}_at_{:.0}", 100.0 * share)
 }

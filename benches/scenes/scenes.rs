@@ -95,6 +95,8 @@ pub(crate) fn real(data: &Path) -> Vec<Scene> {
     };
     vec![
         scene("jax_068 7 views", jax(&[1, 2, 3, 4, 5, 6, 7]), lidar(), &SEVEN, None),
+        scene("jax_068 001-003-004", jax(&[1, 3, 4]), lidar(), &[], None),
+        scene("jax_068 002-005-006", jax(&[2, 5, 6]), lidar(), &[], None),
         scene("jax_068 001-003", jax(&[1, 3]), lidar(), &PAIR, None),
         scene("jax_068 002-003", jax(&[2, 3]), lidar(), &PAIR, None),
         scene("jax_068 002-004", jax(&[2, 4]), lidar(), &[], None),

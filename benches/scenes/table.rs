@@ -8,9 +8,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::matrix::{Reached, Row};
+use crate::matrix::{DEFAULT, Reached, Row};
 use crate::peers::Peer;
 use crate::plot;
+use crate::run::at_coverage;
 
 /// All that was measured, and where and when.
 #[derive(Serialize)]
@@ -44,6 +45,7 @@ impl Results {
         }
         text.push_str(&self.goal_table());
         text.push_str(&self.peer_table());
+        text.push_str(&self.coverage_table());
         text
     }
 
@@ -90,6 +92,40 @@ impl Results {
                 peer.nmad,
                 100.0 * peer.completeness_1,
                 100.0 * peer.valid_ratio
+            );
+        }
+        text
+    }
+
+    /// The default preset when its least believed cells are dropped, beside other programs that cover less.
+    fn coverage_table(&self) -> String {
+        let mut text = String::from(
+            "\nAt the other's coverage: of skysweep's default preset the most believed cells (`dsm/confidence.tif`), as many as the next \
+             twentieth of the reference above what the other covers.\n\n\
+             | program | input | coverage % | MAE | < 1 m % | skysweep coverage % | MAE | < 1 m % |\n|---|---|---|---|---|---|---|---|\n",
+        );
+        for peer in &self.peers {
+            let names: Vec<String> = peer.views.iter().map(|v| format!("{v:03}")).collect();
+            let scene = match names.len() {
+                7 => "jax_068 7 views".to_owned(),
+                _ => format!("jax_068 {}", names.join("-")),
+            };
+            let Some(row) = self.rows.iter().find(|row| row.preset == DEFAULT && row.scene == scene) else { continue };
+            let share = (20.0 * peer.valid_ratio).ceil() / 20.0;
+            let mae = row.metric(&at_coverage("mae", share));
+            if mae.is_nan() {
+                continue;
+            }
+            let _ = writeln!(
+                text,
+                "| {} | {} | {:.1} | {:.3} | {:.1} | {:.0} | {mae:.3} | {:.1} |",
+                peer.tool,
+                peer.input,
+                100.0 * peer.valid_ratio,
+                peer.mae,
+                100.0 * peer.completeness_1,
+                100.0 * share,
+                100.0 * row.metric(&at_coverage("completeness_1", share))
             );
         }
         text
