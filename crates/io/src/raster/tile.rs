@@ -44,6 +44,8 @@ pub fn write_map_tile(path: impl AsRef<Path>, tile: &MapTile<'_>, overwrite: boo
         let mut memory = in_memory(path, tile.bands, float.then_some(f64::from(NO_DATA)))?;
         let options = [
             ("COMPRESS", "DEFLATE"),
+            // Half the time of the default for a twentieth more bytes.
+            ("ZLEVEL", "1"),
             ("PREDICTOR", if float { "3" } else { "2" }),
             ("BLOCKYSIZE", STRIP_ROWS),
             ("BIGTIFF", "IF_SAFER"),
