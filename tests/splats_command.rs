@@ -196,8 +196,9 @@ fn pointing_comes_from_the_run_that_made_the_surface() {
     let confidence = read_dem(out.join("dsm/confidence.tif")).unwrap().heights;
     let surest = confidence.data().iter().copied().filter(|c| c.is_finite()).fold(0.0, f32::max);
     let most = opacities.iter().copied().fold(0.0, f32::max);
-    // Opacities go from 0.3 without any confidence to 0.99 with all of it.
-    assert!((most - (0.3 + 0.69 * surest)).abs() < 1e-4, "{most} of a confidence of {surest}");
+    // Opacities go from 0.3 without any confidence to 0.99 with all of it; a splat has the mean confidence of its cells.
+    let bound = 0.3 + 0.69 * surest;
+    assert!(most <= bound + 1e-6 && most > bound - 0.01, "{most} of a confidence of {surest}");
     assert!(opacities.iter().any(|o| *o < 0.7), "confidence becomes opacity");
 }
 

@@ -82,18 +82,18 @@ mod tests {
 
     #[test]
     fn a_tower_hides_what_lies_behind_it() {
-        let mut heights = Grid::filled(40, 5, 0.0f32);
-        heights[(10, 2)] = 8.0;
-        heights[(30, 2)] = f32::NAN;
+        let mut heights = Grid::filled(40, 7, 0.0f32);
+        (6..=10).for_each(|x| (2..=4).for_each(|y| heights[(x, y)] = 8.0));
+        heights[(30, 3)] = f32::NAN;
         let surface = Surface::new(&heights, GeoTransform::north_up(0.0, 0.0, 1.0), [0.0; 3]);
         // The sensor stands in the west at 45°: eight cells east of the tower are hidden.
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let seen = visible_cells(&surface, [-half, 0.0, half]);
-        let hidden: Vec<usize> = (0..40).filter(|&c| !seen[(c, 2)]).collect();
+        let hidden: Vec<usize> = (0..40).filter(|&c| !seen[(c, 3)]).collect();
         // The tower's wall stands half a cell towards its neighbour.
         assert_eq!(hidden, [11, 12, 13, 14, 15, 16, 17, 18, 30]);
-        assert!(seen.row(1).iter().all(|&s| s));
-        assert!(visible_cells(&surface, [0.0, 0.0, 1.0]).row(2).iter().filter(|s| !**s).count() == 1);
+        assert!(seen.row(0).iter().all(|&s| s));
+        assert!(visible_cells(&surface, [0.0, 0.0, 1.0]).row(3).iter().filter(|s| !**s).count() == 1);
         assert!(visible_cells(&surface, [1.0, 0.0, 0.0]).data().iter().all(|s| !s));
     }
 }
