@@ -68,6 +68,17 @@ impl Product {
         Self { origin_m, height_m, sigma_m, views, confidence, filled: marks }
     }
 
+    /// What goes into each of [`BANDS`]; `heights` are those of [`absolute_heights`].
+    fn bands<'a>(&'a self, heights: &'a Grid<f32>) -> [BandData<'a>; 5] {
+        [
+            BandData::F32(heights),
+            BandData::F32(&self.sigma_m),
+            BandData::U8(&self.views),
+            BandData::F32(&self.confidence),
+            BandData::U8(&self.filled),
+        ]
+    }
+
     /// The cells of a window inside.
     pub(crate) fn cropped(self, cells: Window) -> Self {
         if cells == Window::whole(self.height_m.width(), self.height_m.height()) {
@@ -156,14 +167,7 @@ impl<'a> ChunkedOutput<'a> {
     /// Puts the cells of a chunk into their place.
     pub(crate) fn put(&mut self, core: Window, product: &Product) -> Result<(), PipelineError> {
         let heights = absolute_heights(&self.grid.part(core)?, self.config.vertical, product)?;
-        let cells = [
-            BandData::F32(&heights),
-            BandData::F32(&product.sigma_m),
-            BandData::U8(&product.views),
-            BandData::F32(&product.confidence),
-            BandData::U8(&product.filled),
-        ];
-        for (spool, cells) in self.spools.iter_mut().zip(cells) {
+        for (spool, cells) in self.spools.iter_mut().zip(product.bands(&heights)) {
             spool.put((core.x as usize, core.y as usize), cells)?;
             spool.flush()?;
         }
@@ -268,14 +272,7 @@ fn write_rasters(
     let crs = Crs { horizontal: grid.epsg, vertical };
     let heights = absolute_heights(grid, vertical, product)?;
     write_pictures(folder, &heights, grid.gsd_m)?;
-    let cells = [
-        BandData::F32(&heights),
-        BandData::F32(&product.sigma_m),
-        BandData::U8(&product.views),
-        BandData::F32(&product.confidence),
-        BandData::U8(&product.filled),
-    ];
-    for ((name, band), data) in BANDS.iter().zip(cells) {
+    for ((name, band), data) in BANDS.iter().zip(product.bands(&heights)) {
         let bands = [Band { description: band.description, data }];
         let raster = CogRaster { no_data: Some(band.no_data), ..CogRaster::new(&bands, grid.geotransform, crs) };
         write_cog(folder.join(name), &raster, false)?;

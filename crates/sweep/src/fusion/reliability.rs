@@ -2,8 +2,8 @@
 //!
 //! That views agree in a cell says little where they disagree beside it, or where heights tumble as in trees and at walls. The
 //! reliability is the mean agreement of a window, observed or not, divided by one plus the deviation of its heights in units of
-//! what counts as one surface. On JAX_068 the cells that remain when those of least reliability are dropped are a quarter to a
-//! third better than S2P's at S2P's coverage; by the agreement of the cell alone they are worse.
+//! what counts as one surface. On JAX_068 the most reliable cells, at no less than S2P's coverage, have less MAE than S2P's pairs
+//! (`benches/results/scenes.md`); chosen by the agreement of the cell alone they have more.
 
 use raster::Grid;
 
