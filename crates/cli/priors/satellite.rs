@@ -4,13 +4,13 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::priors::{LinesOfSight, MISSING_CLASS, NO_OBJECT, PriorModel, SatelliteMaps};
+use ::priors::{LinesOfSight, MISSING_CLASS, NO_OBJECT, PriorModel, SatelliteMaps, mesh_to_ellipsoid};
 use anyhow::{Context, bail};
 use camera::{ImageCorrection, RpcCamera};
-use geodesy::{CrsIdentity, CrsRequest, HeightConverter, MapProjection, VerticalDatum};
+use geodesy::{CrsIdentity, CrsRequest, MapProjection, VerticalDatum};
 use io::city::CityFile;
 use io::raster::{Band, BandData, ImageSource, write_image_with_rpc, write_png_rgb};
-use mesh::{CrsReference, TriangleMesh};
+use mesh::CrsReference;
 use pipeline::Progress as _;
 use raster::NO_DATA;
 use report::{depth_preview, normal_preview};
@@ -64,7 +64,7 @@ pub(super) fn make(args: &Args, paths: &[PathBuf], watcher: &Watcher) -> anyhow:
     let unusable = super::unusable(&meshed);
     let place = Place::of(args, &file.model.crs)?;
     let mut mesh = meshed.mesh;
-    place.to_ellipsoid(&mut mesh)?;
+    mesh_to_ellipsoid(&mut mesh, &place.projection, place.datum)?;
     let model = PriorModel::new(mesh, &super::buildings(&file))?;
     let made = folder.begin()?;
     for name in FOLDERS {
@@ -142,24 +142,6 @@ impl Place {
             tracing::warn!("the model does not say what its heights are above, taken as the ellipsoid (--vertical)");
         }
         Ok(Self { projection, datum: datum.unwrap_or_default(), stated: datum.is_some() })
-    }
-
-    /// Heights above the model's datum become heights above the ellipsoid.
-    fn to_ellipsoid(&self, mesh: &mut TriangleMesh) -> anyhow::Result<()> {
-        if self.datum == VerticalDatum::Ellipsoid {
-            return Ok(());
-        }
-        let origin = mesh.origin;
-        let (mut x, mut y): (Vec<f64>, Vec<f64>) =
-            mesh.positions.iter().map(|p| (p[0] + origin.x, p[1] + origin.y)).unzip();
-        self.projection.lonlat_from_map_slices(&mut x, &mut y)?;
-        let mut heights: Vec<f64> = mesh.positions.iter().map(|p| p[2] + origin.z).collect();
-        HeightConverter::new(self.datum)?.ellipsoid_from_datum_slices(&x, &y, &mut heights)?;
-        if heights.iter().any(|height| !height.is_finite()) {
-            bail!("the model reaches beyond where heights above {} are known", self.datum);
-        }
-        mesh.positions.iter_mut().zip(heights).for_each(|(p, height)| p[2] = height - origin.z);
-        Ok(())
     }
 }
 

@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use geodesy::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
+use geodesy::{CrsIdentity, MapProjection, VerticalDatum};
 use mesh::{MeshConfig, Role, TriangleMesh};
-use priors::{LinesOfSight, NO_OBJECT, PriorModel, SatelliteMaps};
+use priors::{LinesOfSight, NO_OBJECT, PriorModel, SatelliteMaps, mesh_to_ellipsoid};
 use raster::Grid;
 use rayon::prelude::*;
 use sweep::{HeightMap, View};
@@ -73,7 +73,7 @@ impl CityPrior {
                 path.display()
             ));
         }
-        to_ellipsoid(&mut mesh, &projection, stated.unwrap_or_default())?;
+        mesh_to_ellipsoid(&mut mesh, &projection, stated.unwrap_or_default())?;
         choices.tell("prior", format!("{} buildings' surfaces", mesh.surfaces.len()), path.display().to_string());
         Ok(Self { path: path.to_owned(), model: PriorModel::new(mesh, &is_building)?, projection })
     }
@@ -95,24 +95,6 @@ impl CityPrior {
         let all: Result<_, priors::PriorsError> = views.iter().map(seen).collect();
         all.map_err(|source| PipelineError::Prior { path: self.path.clone(), source: source.into() })
     }
-}
-
-/// Heights above the model's datum become heights above the ellipsoid.
-fn to_ellipsoid(mesh: &mut TriangleMesh, projection: &MapProjection, datum: VerticalDatum) -> Result<(), Cause> {
-    if datum == VerticalDatum::Ellipsoid {
-        return Ok(());
-    }
-    let origin = mesh.origin;
-    let (mut x, mut y): (Vec<f64>, Vec<f64>) =
-        mesh.positions.iter().map(|p| (p[0] + origin.x, p[1] + origin.y)).unzip();
-    projection.lonlat_from_map_slices(&mut x, &mut y)?;
-    let mut heights: Vec<f64> = mesh.positions.iter().map(|p| p[2] + origin.z).collect();
-    HeightConverter::new(datum)?.ellipsoid_from_datum_slices(&x, &y, &mut heights)?;
-    if heights.iter().any(|height| !height.is_finite()) {
-        return Err(format!("the model reaches beyond where heights above {datum} are known").into());
-    }
-    mesh.positions.iter_mut().zip(heights).for_each(|(p, height)| p[2] = height - origin.z);
-    Ok(())
 }
 
 /// What one view sees of the model, at its full resolution.

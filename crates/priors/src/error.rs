@@ -13,6 +13,12 @@ pub enum PriorsError {
     /// A place that the map of the model does not have, or a map that cannot be had.
     #[error(transparent)]
     Geodesy(#[from] geodesy::GeodesyError),
+    /// A model outside the geoid model that its heights are above.
+    #[error("the model reaches beyond where heights above {datum} are known")]
+    BeyondDatum {
+        /// What the heights are above.
+        datum: geodesy::VerticalDatum,
+    },
     /// A model without triangles.
     #[error("the model has no triangle that an image could see")]
     NothingToSee,

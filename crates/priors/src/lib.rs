@@ -10,6 +10,7 @@
 //! - [`PriorMaps`] are what a camera would measure of the model, [`SatelliteMaps`] what a satellite image would.
 //! - [`initial_splats`] are flat Gaussians to begin a training with, [`Schedule`] how much the priors weigh in it.
 
+mod datum;
 mod error;
 mod maps;
 mod model;
@@ -22,6 +23,7 @@ mod vector;
 mod view;
 mod visibility;
 
+pub use datum::mesh_to_ellipsoid;
 pub use error::PriorsError;
 pub use maps::{DepthKind, MISSING_CLASS, MapConfig, NO_OBJECT, NormalFrame, PriorMaps};
 pub use model::PriorModel;
