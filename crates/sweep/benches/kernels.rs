@@ -17,7 +17,7 @@ use sweep::{CostVolume, LevelConfig, View, sweep_level};
 const SIZE: usize = 512;
 /// Hypotheses per pixel, in steps of a metre.
 const HYPOTHESES: usize = 64;
-const PENALTIES: Penalties = Penalties { step: 36, jump: 140, jump_at_edge: 36 };
+const PENALTIES: Penalties = Penalties { step: 32, jump: 124, jump_at_edge: 32 };
 
 /// A linear camera whose pixels move by `parallax` (samples, lines) per metre of height.
 fn camera(parallax: [f64; 2]) -> RpcCamera {

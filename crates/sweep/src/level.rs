@@ -169,7 +169,7 @@ mod tests {
 
     fn config(aggregation: Aggregation) -> LevelConfig {
         let cost = CostConfig { aggregation, ..CostConfig::default() };
-        LevelConfig { cost, penalties: Penalties { step: 36, jump: 140, jump_at_edge: 36 }, cost_noise: 0.02 }
+        LevelConfig { cost, penalties: Penalties { step: 32, jump: 124, jump_at_edge: 32 }, cost_noise: 0.02 }
     }
 
     fn source(views: &[View], index: usize) -> SourceLevel<'_> {

@@ -16,6 +16,7 @@ mod prior;
 pub mod ranges;
 mod readout;
 pub mod semiglobal;
+mod simd;
 mod support;
 #[cfg(test)]
 mod testing;

@@ -8,9 +8,9 @@ use raster::{Grid, Window};
 
 use crate::ranges::Ranges;
 
-/// How much cheaper the prior's height is, of the worst cost 127: a tenth, so that where the picture tells heights apart it still
+/// How much cheaper the prior's height is, of [`crate::cost::COST_MAX`]: a tenth, so that where the picture tells heights apart it still
 /// decides (`tests/dsm_prior.rs`: a building too many does not show).
-const FAVOUR: f32 = 12.0;
+const FAVOUR: f32 = 11.0;
 /// Steps of the search that the prior is off by at least: a step is half a pixel of parallax.
 const STEPS: f64 = 2.0;
 /// Prior heights of neighbours further apart than this many steps belong to two surfaces.

@@ -98,14 +98,16 @@ mod tests {
         let sums: Vec<u16> = [900, 100, 800].repeat(n);
         let cost = |p: usize| if p % width < 20 { [0, 64, 0] } else { [0, 32, 0] };
         let costs: Vec<u8> = (0..n).flat_map(cost).collect();
-        let contrast: Vec<f32> = (0..n).map(|p| if p / width < 15 { 64.0 / 127.0 } else { 0.0 }).collect();
+        let contrast: Vec<f32> =
+            (0..n).map(|p| if p / width < 15 { 64.0 / f32::from(COST_MAX) } else { 0.0 }).collect();
         let (low, edges) = (vec![0; n], vec![0; n]);
         let volume = Volume { width, height, low: &low, offsets: &offsets, costs: &costs, edges: &edges };
         let all = share(&volume, &sums, &contrast);
         assert!(all[10 * width + 5] == 0.0 && (all[10 * width + 35] - 0.5).abs() < 1e-6);
         assert!((all[10 * width + 20] - 0.5 * 5.0 / 9.0).abs() < 1e-6);
         assert_eq!(all[25 * width + 35], 0.0);
-        let invalid: Vec<f32> = (0..n).map(|p| if p % width < 20 { f32::NAN } else { 64.0 / 127.0 }).collect();
+        let invalid: Vec<f32> =
+            (0..n).map(|p| if p % width < 20 { f32::NAN } else { 64.0 / f32::from(COST_MAX) }).collect();
         let right = share(&volume, &sums, &invalid);
         assert!((right[10 * width + 20] - 0.5).abs() < 1e-6 && right[0] == 0.0);
     }

@@ -56,9 +56,7 @@ impl CostVolume {
 
     /// The sums of the path costs over eight directions, one per hypothesis.
     pub fn aggregate(&self, penalties: Penalties) -> Vec<u16> {
-        let mut sums = Vec::new();
-        aggregate(&self.as_block(), penalties, &mut sums);
-        sums
+        aggregate(&self.as_block(), penalties)
     }
 
     pub(crate) fn as_block(&self) -> Volume<'_> {

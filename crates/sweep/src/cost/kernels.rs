@@ -4,11 +4,13 @@
 
 use multiversion::multiversion;
 
+use super::COST_MAX;
+
 /// The cost of a pair that cannot be compared: more than any that can, so that it comes last.
 pub(crate) const INVALID: u8 = 255;
 /// A difference of the census that counts fully, as its grade.
-pub(crate) const FULL: f32 = 127.0;
-/// The grade of no difference; 1 to 255 are those of −[`FULL`] to [`FULL`].
+pub(crate) const FULL: f32 = COST_MAX as f32;
+/// The grade of no difference; those of −[`FULL`] to [`FULL`] lie around it.
 const EQUAL: f32 = 128.0;
 /// Adding 2²³ leaves the rounded integer in the lowest bits of the sum, which vectorises; a cast does not.
 const TWO_23: f32 = 8_388_608.0;
@@ -253,10 +255,10 @@ mod tests {
             b in prop::collection::vec(any_pixel(), SIDE * SIDE),
         ) {
             let cost = patch_cost(&a, &b, (0.1, 0.1));
-            prop_assert!(cost <= 127 || cost == INVALID, "{cost}");
+            prop_assert!(cost <= COST_MAX || cost == INVALID, "{cost}");
             let mut out = [255];
             mean_cost(&[vec![cost], vec![INVALID]], &mut [0], &mut [0], &mut out);
-            prop_assert!(out[0] >= cost.min(127) && out[0] <= 127, "{out:?}");
+            prop_assert!(out[0] >= cost.min(COST_MAX) && out[0] <= COST_MAX, "{out:?}");
             prop_assert!(!a.iter().chain(&b).any(|v| v.is_nan()) || cost == INVALID, "{cost} of a patch that is not valid");
         }
     }

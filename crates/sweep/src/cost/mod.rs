@@ -19,8 +19,9 @@ pub(crate) use tile::{BlockCosts, TileScratch, census_scale, sweep_tile};
 
 use raster::Grid;
 
-/// Costs are stored as integers 0 to this: finer than the noise of any correlation, and sums of eight paths fit 16 bits.
-pub const COST_MAX: u8 = 127;
+/// Costs are stored as integers 0 to this: finer than the noise of any correlation, and a path's cost fits a byte: this and the
+/// penalty of a jump, which is a little more.
+pub const COST_MAX: u8 = 112;
 
 /// How the pairs of views are combined into one cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
