@@ -5,6 +5,7 @@
 //! bicubic falls back to bilinear where its 4 × 4 neighbourhood is not complete. Positions outside
 //! [0, width − 1] × [0, height − 1] have no value: nothing is extrapolated.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::Grid;
@@ -54,6 +55,7 @@ pub fn bicubic(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
 }
 
 /// [`bicubic`] at `from`, `from + step`, … (column, row).
+#[multiversion(targets("x86_64+avx2"))]
 pub fn bicubic_along(grid: &Grid<f32>, from: [f64; 2], step: [f64; 2], out: &mut [f32]) {
     for (i, value) in out.iter_mut().enumerate() {
         let [column, row] = [from[0] + step[0] * i as f64, from[1] + step[1] * i as f64];

@@ -2,12 +2,13 @@
 
 use raster::{Grid, Window, bicubic_along, cubic_weights};
 
-use super::kernels::{self, Census, FULL, Picture};
+use super::kernels::{self, Census, FULL};
 use super::{Aggregation, CostConfig, SourceLevel};
 use crate::SweepError;
 use crate::geometry::{TileMap, source_from_reference};
 use crate::prior::Prior;
 use crate::ranges::Ranges;
+use crate::simd::{OVERHANG, Picture, shift_bicubic, transposed};
 use crate::view::QUANTISATION_VARIANCE;
 
 /// A tile is not divided below this side: an RPC that is not smooth over eight pixels is broken.
@@ -17,7 +18,9 @@ const PLANES_MIN: i32 = 4;
 /// The census looks at the eight neighbours, as MicMac's patches in cities do: the aggregation brings the support that they
 /// lack, and roofs keep their edges.
 const CENSUS_REACH: usize = 1;
-/// Planes that are computed before their costs go to the pixels: enough to write runs, few enough for the cache.
+/// Pixels that the cubic interpolation takes in a row.
+const CUBIC_TAPS: usize = 4;
+/// Planes that are computed before their costs go to the pixels: as many as bytes in a register.
 const PLANES_AT_ONCE: usize = 16;
 /// Bytes.
 const CACHE_LINE: usize = 64;
@@ -42,6 +45,7 @@ pub struct Reference<'a> {
 pub(crate) struct BlockCosts<'a> {
     pub(crate) window: Window,
     pub(crate) offsets: &'a [u32],
+    /// With as many entries behind them that belong to no pixel as a register holds.
     pub(crate) costs: &'a mut [u8],
 }
 
@@ -49,9 +53,11 @@ pub(crate) struct BlockCosts<'a> {
 #[derive(Default)]
 pub(crate) struct TileScratch {
     reference: Census,
+    reference_voids: Vec<u8>,
     sources: Vec<Laid>,
-    padded: Vec<f32>,
-    rows: Vec<f32>,
+    grey: Vec<f32>,
+    padded: Vec<i16>,
+    rows: Vec<i16>,
     apart: [Vec<u8>; 4],
     pair_costs: Vec<Vec<u8>>,
     sums: Vec<u16>,
@@ -71,12 +77,15 @@ struct Planes {
 #[derive(Default)]
 struct Laid {
     map: Option<TileMap>,
-    picture: Vec<f32>,
+    picture: Vec<i16>,
+    /// Where the census of a pixel that is moved here holds a void; empty where there is none.
+    voids: Vec<u8>,
     stride: usize,
     rows: usize,
     origin: [i64; 2],
+    /// Where the part's first padded pixel lies for the current plane; `None` where the source is not seen.
+    at: Option<(usize, usize)>,
     census: Census,
-    scale: f32,
 }
 
 /// Brings differences of grey values to the unit that counts fully: of the image's contrast, or of its noise where that is more.
@@ -231,9 +240,9 @@ impl TileScratch {
         self.sources.resize_with(sources.len(), Laid::default);
         let step = reference.ranges.step_m;
         for ((laid, source), map) in self.sources.iter_mut().zip(sources).zip(maps) {
-            laid.scale = FULL * census_scale(source);
             laid.map = *map;
-            laid.lay_over(source.image, padded, (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step));
+            let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
+            laid.lay_over(source, padded, heights, &mut self.grey);
         }
         let pairs = match config.aggregation {
             Aggregation::Variance => sources.len() * (sources.len() + 1) / 2,
@@ -277,16 +286,17 @@ impl TileScratch {
     fn look_at(&mut self, reference: Reference<'_>, part: Window) {
         let padded = part.grown(CENSUS_REACH);
         let (area, core) = (padded.width * padded.height, part.width * part.height);
-        self.rows.resize(padded.width * (padded.height + 3), 0.0);
-        self.padded.resize(area, 0.0);
+        self.rows.resize(padded.width * (padded.height + 3) + OVERHANG, 0);
+        self.grey.resize(area, 0.0);
         self.sums.resize(core, 0);
         self.weights.resize(core, 0);
         self.pair_costs.iter_mut().for_each(|c| c.resize(core, 0));
         self.planes.stride = core + CACHE_LINE;
         self.planes.costs.resize(PLANES_AT_ONCE * self.planes.stride, 0);
-        copy_window(reference.view.image, padded, &mut self.padded);
+        copy_window(reference.view.image, padded, &mut self.grey);
         let scale = FULL * census_scale(&reference.view);
-        self.padded.iter_mut().for_each(|v| *v *= scale);
+        kernels::quantise(&self.grey, scale, &mut self.padded, &mut self.reference_voids);
+        kernels::spread(&mut self.reference_voids, padded.width, 2 * CENSUS_REACH + 1);
         self.reference.fill(&self.padded, padded.width);
     }
 
@@ -296,7 +306,6 @@ impl TileScratch {
         let within = [part.x - tile.x, part.y - tile.y];
         for laid in &mut self.sources {
             laid.shift_to(height_m, within, (padded.width, padded.height), &mut self.rows, &mut self.padded);
-            laid.census.fill(&self.padded, padded.width);
         }
     }
 
@@ -308,11 +317,15 @@ impl TileScratch {
         for (i, laid) in self.sources.iter().enumerate() {
             let cost = &mut self.pair_costs[pair];
             kernels::census_cost(&self.reference, &laid.census, width, &mut self.apart, cost);
+            kernels::hide(cost, part.width, &self.reference_voids, width);
+            laid.hide(cost, part.width);
             pair += 1;
             if config.aggregation == Aggregation::Variance {
                 for other in &self.sources[..i] {
                     let cost = &mut self.pair_costs[pair];
                     kernels::census_cost(&other.census, &laid.census, width, &mut self.apart, cost);
+                    laid.hide(cost, part.width);
+                    other.hide(cost, part.width);
                     pair += 1;
                 }
             }
@@ -340,7 +353,7 @@ fn select_smallest(costs: &mut [Vec<u8>], k: usize) -> usize {
 
 impl Laid {
     /// Resamples the source over the padded tile at the map's middle height, wide enough for all heights.
-    fn lay_over(&mut self, image: &Grid<f32>, padded: Window, (h_lo, h_hi): (f64, f64)) {
+    fn lay_over(&mut self, source: &SourceLevel<'_>, padded: Window, (h_lo, h_hi): (f64, f64), grey: &mut Vec<f32>) {
         let Some(map) = self.map else { return };
         let mut span = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         for h in [h_lo, 0.5 * (h_lo + h_hi), h_hi] {
@@ -360,42 +373,56 @@ impl Laid {
         self.stride = padded.width + extent(0);
         self.rows = padded.height + extent(1);
         self.origin = first;
-        self.picture.resize(self.stride * self.rows, 0.0);
+        grey.resize(self.stride * self.rows, 0.0);
         let x = (padded.x + first[0]) as f64;
-        for (row, out) in self.picture.chunks_exact_mut(self.stride).enumerate() {
+        for (row, out) in grey.chunks_exact_mut(self.stride).enumerate() {
             let y = (padded.y + first[1] + row as i64) as f64;
             let (from, next) = (map.at([x, y], map.mid_height_m()), map.at([x + 1.0, y], map.mid_height_m()));
-            bicubic_along(image, from, [next[0] - from[0], next[1] - from[1]], out);
+            bicubic_along(source.image, from, [next[0] - from[0], next[1] - from[1]], out);
         }
+        kernels::quantise(grey, FULL * census_scale(source), &mut self.picture, &mut self.voids);
+        self.picture.resize(grey.len() + OVERHANG, 0);
+        kernels::spread(&mut self.voids, self.stride, CUBIC_TAPS + 2 * CENSUS_REACH);
     }
 
-    /// The picture as it lies over the part `within` the tile at a height, in the unit of the census.
+    /// Grades the picture as it lies over the part `within` the tile at a height; `moved` is for it.
     fn shift_to(
-        &self,
+        &mut self,
         height_m: f64,
         within: [i64; 2],
         (width, height): (usize, usize),
-        rows: &mut [f32],
-        out: &mut [f32],
+        rows: &mut [i16],
+        moved: &mut Vec<i16>,
     ) {
-        let Some([dx, dy]) = self.map.and_then(|m| m.shift_at(height_m)) else {
-            out.fill(f32::NAN);
-            return;
-        };
+        self.at = None;
+        let Some([dx, dy]) = self.map.and_then(|m| m.shift_at(height_m)) else { return };
         let (fx, fy) = (dx.floor(), dy.floor());
         let x0 = fx as i64 - 1 - self.origin[0] + within[0];
         let y0 = fy as i64 - 1 - self.origin[1] + within[1];
         let inside =
             x0 >= 0 && y0 >= 0 && x0 as usize + width + 3 <= self.stride && y0 as usize + height + 3 <= self.rows;
         if !inside {
-            out.fill(f32::NAN);
             return;
         }
-        // The unit that counts fully costs nothing here.
-        let weights = (cubic_weights((dx - fx) as f32), cubic_weights((dy - fy) as f32).map(|w| w * self.scale));
-        let picture = Picture { data: &self.picture, stride: self.stride };
         let at = (x0 as usize, y0 as usize);
-        kernels::shift_bicubic(picture, at, weights, (width, height), rows, out);
+        self.at = Some(at);
+        let weights = (cubic_weights((dx - fx) as f32), cubic_weights((dy - fy) as f32));
+        let weights = (weights.0.map(kernels::fixed), weights.1.map(kernels::fixed));
+        let picture = Picture { data: &self.picture, stride: self.stride };
+        moved.resize(width * height + OVERHANG, 0);
+        shift_bicubic(picture, at, weights, (width, height), rows, moved);
+        self.census.fill(&moved[..width * height], width);
+    }
+
+    /// Makes the costs of the current plane invalid where the source has voids; rows of `width`.
+    fn hide(&self, costs: &mut [u8], width: usize) {
+        match self.at {
+            None => costs.fill(kernels::INVALID),
+            Some((x, y)) if !self.voids.is_empty() => {
+                kernels::hide(costs, width, &self.voids[y * self.stride + x..], self.stride);
+            }
+            Some(_) => {}
+        }
     }
 }
 
@@ -417,16 +444,29 @@ fn scatter(ranges: &Ranges, part: Window, (first, count): (i32, usize), planes: 
         let low = &ranges.low.row(part.y as usize + y)[part.x as usize..][..part.width];
         let asked = &ranges.count.row(part.y as usize + y)[part.x as usize..][..part.width];
         let offsets = &block.offsets[(by + y) * block.window.width + bx..][..part.width];
-        for x in 0..part.width {
-            let from = low[x].max(first);
-            let to = (low[x] + i32::from(asked[x])).min(first + count as i32);
-            if from < to {
-                let at = offsets[x] as usize + (from - low[x]) as usize;
-                let column =
-                    planes.costs[y * part.width + x..].iter().step_by(planes.stride).skip((from - first) as usize);
-                let out = &mut block.costs[at..at + (to - from) as usize];
-                out.iter_mut().zip(column).for_each(|(o, c)| *o = *c);
+        for x0 in (0..part.width).step_by(PLANES_AT_ONCE) {
+            let columns = transposed(&planes.costs[y * part.width + x0..], planes.stride);
+            for (x, column) in (x0..part.width).zip(&columns) {
+                let from = low[x].max(first);
+                let to = (low[x] + i32::from(asked[x])).min(first + count as i32);
+                if from < to {
+                    let at = offsets[x] as usize + (from - low[x]) as usize;
+                    put(column, (from - first) as usize, (to - from) as usize, &mut block.costs[at..]);
+                }
             }
         }
     }
+}
+
+/// Writes `count` of the column's costs, from `first` on, without a loop; what lies behind in `out` stays.
+#[inline(always)]
+fn put(column: &[u8; PLANES_AT_ONCE], first: usize, count: usize, out: &mut [u8]) {
+    let Some(out) = out.first_chunk_mut::<PLANES_AT_ONCE>() else { return };
+    if count == PLANES_AT_ONCE {
+        *out = *column;
+        return;
+    }
+    let own = u128::MAX >> (8 * (PLANES_AT_ONCE - count));
+    let costs = u128::from_le_bytes(*column) >> (8 * first);
+    *out = ((costs & own) | (u128::from_le_bytes(*out) & !own)).to_le_bytes();
 }
