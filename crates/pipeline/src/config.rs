@@ -12,7 +12,7 @@ use sweep::semiglobal::Penalties;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// Half the images' resolution, two sources per view.
+    /// Half the images' resolution, in matching and in the DSM; two sources per view.
     Fast,
     /// The default.
     #[default]
@@ -108,6 +108,11 @@ pub(crate) struct Tuning {
 }
 
 impl Preset {
+    /// Side of a cell that is not asked for, in pixels of the coarsest image: that of the pixels that are matched.
+    pub(crate) fn pixels_per_cell(self) -> f64 {
+        f64::from(1u32 << self.tuning().finest_level)
+    }
+
     pub(crate) fn tuning(self) -> Tuning {
         let (finest_level, sources) = match self {
             Self::Fast => (1, 2),

@@ -6,7 +6,7 @@ use geodesy::{LonLatHeight, MapProjection, utm_epsg};
 use raster::{GeoTransform, Window};
 use sweep::pointing::Adjustment;
 
-use crate::config::{Bounds, DsmConfig, Tuning};
+use crate::config::{Bounds, DsmConfig, Preset, Tuning};
 use crate::error::PipelineError;
 use crate::geometry::shared_ground;
 use crate::heights::SweepPlan;
@@ -317,7 +317,7 @@ pub(crate) fn choose_grid(
             expected: "a projected CRS in metres; a cell has one size".to_owned(),
         });
     }
-    let gsd_m = config.gsd_m.unwrap_or_else(|| rounded_gsd(coarsest_gsd_m));
+    let gsd_m = config.gsd_m.unwrap_or_else(|| rounded_gsd(coarsest_gsd_m * config.preset.pixels_per_cell()));
     let covered = covered_bounds(geometry, &projection)?;
     let asked = config.bounds.unwrap_or(covered);
     let meets = asked[0] < covered[2] && asked[2] > covered[0] && asked[1] < covered[3] && asked[3] > covered[1];
@@ -333,7 +333,11 @@ pub(crate) fn tell_grid(config: &DsmConfig, grid: &OutputGrid, coarsest_gsd_m: f
     let given = |is_given: bool, else_why: String| if is_given { "given".to_owned() } else { else_why };
     let zone = given(config.crs_epsg.is_some(), "the UTM (or polar) zone of the scene's centre".to_owned());
     choices.tell("crs", format!("EPSG:{}, heights above {}", grid.epsg, config.vertical), zone);
-    let coarsest = format!("the coarsest image's {coarsest_gsd_m:.3} m, rounded to 5 cm");
+    let matched = match config.preset {
+        Preset::Fast => "twice the coarsest image's",
+        Preset::Balanced | Preset::Accurate => "the coarsest image's",
+    };
+    let coarsest = format!("{matched} {coarsest_gsd_m:.3} m, rounded to 5 cm");
     choices.tell("gsd", format!("{} m", grid.gsd_m), given(config.gsd_m.is_some(), coarsest));
     let seen = given(config.bounds.is_some(), "the ground that at least two images see".to_owned());
     choices.tell("bounds", format!("{:.1?}, {} × {} cells", grid.bounds(), grid.size.0, grid.size.1), seen);

@@ -83,12 +83,17 @@ impl Coarse {
         if inverse.is_nan() {
             return None;
         }
-        let mut sum = 0.0;
+        // Four sums side by side are one vector.
+        let (mut sums, mut rest) = ([0.0f32; 4], 0.0f32);
         for (j, row) in own.values().chunks_exact(side).enumerate() {
-            let other = &self.picture.row(y + j)[x..x + side];
-            sum += row.iter().zip(other).map(|(a, b)| a * b).sum::<f32>();
+            let (own, own_rest) = row.as_chunks::<4>();
+            let (other, other_rest) = self.picture.row(y + j)[x..x + side].as_chunks::<4>();
+            for (a, b) in own.iter().zip(other) {
+                sums.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| *s += a * b);
+            }
+            rest += own_rest.iter().zip(other_rest).map(|(a, b)| a * b).sum::<f32>();
         }
-        Some(sum * inverse / side as f32)
+        Some((sums.iter().sum::<f32>() + rest) * inverse / side as f32)
     }
 }
 
