@@ -1,29 +1,30 @@
 //! A surface model as an obstacle: what stands between a point of it and a sensor.
 //!
-//! From the point one goes along the line of sight, an eighth of a cell at a time along the grid's longer axis of motion, until the
-//! line is above everything. The point is hidden where the surface is above the line. Between cell centres the surface is
-//! bilinear, except where neighbours differ by more than a slope of [`STEP_SLOPE`]: there a wall stands, whose place
-//! [`wall`](super::wall) finds from the cells around it. (A ramp in its place would take half a cell off every roof's edge and
-//! let the sensor see behind it.) Where the surface has no height nothing stands in the way.
+//! From the point one goes along the line of sight, an eighth of a cell at a time along the grid's longer axis of motion and a
+//! sixty-fourth where the surface is nearly met, until the line is above everything. The point is hidden where the surface is
+//! above the line. Between cell centres the surface is bilinear, except where neighbours differ by more than a slope of
+//! [`STEP_SLOPE`]: there a wall stands, whose place [`wall`](super::wall) finds from the cells around it. (A ramp in its place would take
+//! half a cell off every roof's edge and let the sensor see behind it.) Where the surface has no height nothing stands in the way.
 
 use raster::Grid;
 
-use super::wall;
+use super::wall::Walls;
 
-/// Slope beyond which neighbours are a wall and not a slope: 2 (63°).
-pub const STEP_SLOPE: f32 = 2.0;
+/// Slope beyond which neighbours are a wall and not a slope (58°): a parapet of 0.9 m on cells of 0.5 m is a wall.
+pub const STEP_SLOPE: f32 = 1.6;
 
 /// Side of the blocks whose highest cell is kept.
 const BLOCK: usize = 16;
 /// Steps of the line of sight per cell.
 const STEPS_PER_CELL: f64 = 8.0;
+/// Parts of a step in which the surface is nearly met.
+const PARTS: u32 = 8;
 
 /// Heights on a grid, made ready for lines of sight.
 #[derive(Debug, Clone)]
 pub struct Surface<'a> {
     heights: &'a Grid<f32>,
-    /// Difference of neighbours that makes a wall, metres.
-    step_m: f32,
+    walls: Walls,
     /// The highest cell of each block and of one cell around it.
     ceilings: Grid<f32>,
     highest: f32,
@@ -44,7 +45,7 @@ impl<'a> Surface<'a> {
             }
         }
         let highest = ceilings.data().iter().fold(f32::NEG_INFINITY, |high, &h| high.max(h));
-        Self { heights, step_m: STEP_SLOPE * cell_m as f32, ceilings, highest }
+        Self { heights, walls: Walls::find(heights, STEP_SLOPE * cell_m as f32), ceilings, highest }
     }
 
     /// The height at a (column, row): bilinear, with walls kept upright; NaN where the cells that count have none.
@@ -53,12 +54,16 @@ impl<'a> Surface<'a> {
         self.quad(column, row).map_or(f32::NAN, |quad| self.height_in(&quad))
     }
 
-    /// Whether the surface is above a level at a (column, row).
+    /// The height at a (column, row) where it may be above a level, else something below it.
     #[inline]
-    fn is_above(&self, column: f64, row: f64, level: f64) -> bool {
-        let Some(quad) = self.quad(column, row) else { return false };
+    fn height_above(&self, column: f64, row: f64, level: f64) -> f64 {
+        let Some(quad) = self.quad(column, row) else { return f64::NEG_INFINITY };
         let (low, high) = quad.range();
-        f64::from(high) > level && (f64::from(low) > level || f64::from(self.height_in(&quad)) > level)
+        match f64::from(high) > level {
+            true if low == high => f64::from(high),
+            true => f64::from(self.height_in(&quad)),
+            false => f64::NEG_INFINITY,
+        }
     }
 
     /// The cells around a position; `None` outside their centres.
@@ -82,16 +87,14 @@ impl<'a> Surface<'a> {
     fn height_in(&self, quad: &Quad) -> f32 {
         let [a, b, c, d] = quad.heights;
         let [u, v] = quad.at;
-        let steepest = (a - b).abs().max((c - d).abs()).max((a - c).abs()).max((b - d).abs());
         if quad.heights.iter().any(|h| h.is_nan()) {
             // The nearest cell; at equal distance the later one.
-            quad.heights[usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5)]
-        } else if steepest <= self.step_m {
+            return quad.heights[usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5)];
+        }
+        self.walls.height(self.heights, quad.corner, quad.heights, quad.at).unwrap_or_else(|| {
             let (upper, lower) = (a + (b - a) * u, c + (d - c) * u);
             upper + (lower - upper) * v
-        } else {
-            wall::height(self.heights, quad.corner, quad.heights, quad.at)
-        }
+        })
     }
 
     /// Whether anything stands between the point at (column, row), `height_m`, and a sensor towards which the line of sight moves by
@@ -110,15 +113,24 @@ impl<'a> Surface<'a> {
             let line = height_m + k * rise;
             let (c, r) = (column + k * step[0], row + k * step[1]);
             // Negated, so that numbers that are none end it.
-            if !(line < top && c > -0.5 && r > -0.5 && c < width - 0.5 && r < height - 0.5) {
+            if !(line - rise < top && c > -0.5 && r > -0.5 && c < width - 0.5 && r < height - 0.5) {
                 return false;
             }
             let (i, j) = ((c + 0.5) as usize / BLOCK, (r + 0.5) as usize / BLOCK);
-            if f64::from(self.ceilings[(i, j)]) - tolerance_m <= line {
+            if f64::from(self.ceilings[(i, j)]) - tolerance_m <= line - rise {
                 k += steps_out([c, r], step, [i, j]);
                 continue;
             }
-            if self.is_above(c.clamp(0.0, width - 1.0), r.clamp(0.0, height - 1.0), line + tolerance_m) {
+            let surface = |c: f64, r: f64, level: f64| {
+                self.height_above(c.clamp(0.0, width - 1.0), r.clamp(0.0, height - 1.0), level) - tolerance_m
+            };
+            let here = surface(c, r, line - rise + tolerance_m);
+            let between = |part: u32| {
+                let back = f64::from(part) / f64::from(PARTS);
+                let line = line - back * rise;
+                surface(c - back * step[0], r - back * step[1], line + tolerance_m) > line
+            };
+            if here > line || (here > line - rise && (1..PARTS).any(between)) {
                 return true;
             }
             k += 1.0;
