@@ -3,17 +3,15 @@
 
 #![allow(clippy::print_stderr, reason = "a test that skips says so")]
 
+mod common;
+
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
+use common::skysweep;
 use io::colmap::{ColmapPoint, read_with_points};
 use io::splat_ply::LocalOrigin;
 use predicates::prelude::*;
 use serde_json::Value;
-
-fn skysweep() -> Command {
-    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
-}
 
 fn reference(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/align").join(name)

@@ -1,11 +1,13 @@
 //! `skysweep groundview` end to end: depths and normals against the tree of triangles of the same surface, the COLMAP set, masks,
 //! crops and compositions, and what is refused.
 
+mod common;
+
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
 use bvh::{Bvh, Ray};
 use camera::ImagePoint;
+use common::skysweep;
 use geodesy::MapProjection;
 use io::colmap::read_with_points;
 use io::raster::{Dem, ImageSource, read_dem, write_png_rgb};
@@ -17,12 +19,8 @@ use tempfile::TempDir;
 
 const CENTRE: [&str; 3] = ["--center", "5.4", "43.53"];
 
-fn skysweep() -> Command {
-    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
-}
-
 fn town(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town/truth").join(name)
+    common::sample("truth").join(name)
 }
 
 /// A height map of the town, turned by 37°, and the views from its middle.

@@ -3,10 +3,12 @@
 
 #![allow(clippy::print_stderr, reason = "a test that skips says so")]
 
+mod common;
+
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
+use common::skysweep;
 use geodesy::{Crs, MapProjection, VerticalDatum};
 use io::raster::{Band, BandData, CogRaster, Dem, ImageSource, read_dem, write_cog};
 use predicates::prelude::*;
@@ -18,12 +20,8 @@ const CENTRE: [&str; 3] = ["--center", "5.4", "43.53"];
 /// A twentieth of a pixel of half a metre.
 const PLACE_TOLERANCE_M: f64 = 0.05 * 0.5;
 
-fn skysweep() -> Command {
-    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
-}
-
 fn town(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town/truth").join(name)
+    common::sample("truth").join(name)
 }
 
 /// The rows of a section of the reference.
@@ -50,8 +48,7 @@ fn number(tags: &HashMap<String, String>, key: &str) -> f64 {
 
 /// Values as they stand in the file.
 fn values(path: &Path, band: usize) -> Grid<f32> {
-    let source = ImageSource::open(path).unwrap();
-    source.read_samples(band, source.window()).unwrap()
+    common::band(path, band)
 }
 
 /// Whether two maps hold the same, voids included.
@@ -99,7 +96,7 @@ fn gdallocationinfo_finds_the_surface_at_the_places() {
     let path = map(&folder, &town("dsm.tif"), &["--heading", "37"]);
     let places = reference("place");
     let lonlat: String = places.iter().map(|row| format!("{} {}\n", row[2], row[3])).collect();
-    let mut gdal = Command::new("gdallocationinfo");
+    let mut gdal = assert_cmd::Command::new("gdallocationinfo");
     let Ok(output) = gdal.args(["-valonly", "-wgs84"]).arg(&path).write_stdin(lonlat).output() else {
         eprintln!("skipped: gdallocationinfo is not installed");
         return;

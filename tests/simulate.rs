@@ -1,14 +1,12 @@
 //! `skysweep simulate` end to end: the files it writes, the loop through `dsm` and `eval`, and what it refuses.
 
+mod common;
+
 use std::path::Path;
 
-use assert_cmd::Command;
+use common::skysweep;
 use predicates::prelude::*;
 use serde_json::Value;
-
-fn skysweep() -> Command {
-    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
-}
 
 const SMALL: [&str; 8] = ["simulate", "town", "--size", "60", "--gsd", "1", "--views", "2"];
 

@@ -2,15 +2,13 @@
 
 #![allow(clippy::print_stderr, reason = "a test that skips says so")]
 
+mod common;
+
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
+use common::skysweep;
 use predicates::prelude::*;
 use serde_json::Value;
-
-fn skysweep() -> Command {
-    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
-}
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

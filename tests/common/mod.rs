@@ -1,0 +1,49 @@
+//! What tests of the command share: the binary, the sample town, towns simulated once for all tests of a file, bands of rasters.
+
+#![allow(dead_code, reason = "no test file uses all of it")]
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use io::raster::ImageSource;
+use raster::Grid;
+use serde_json::Value;
+
+/// The command.
+pub(crate) fn skysweep() -> Command {
+    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
+}
+
+/// A file of the sample town.
+pub(crate) fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
+}
+
+/// Simulates the sample town with some of its parameters changed (from, to); `name` is a folder of the test file's own.
+pub(crate) fn simulated(name: &str, changes: &[(&str, &str)]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut parameters = std::fs::read_to_string(sample("scene.toml")).unwrap();
+    for (from, to) in changes {
+        assert!(parameters.contains(from), "{from} is no parameter of the town");
+        parameters = parameters.replace(from, to);
+    }
+    let (file, scene) = (folder.join("scene.toml"), folder.join("town"));
+    std::fs::write(&file, parameters).unwrap();
+    let mut command = skysweep();
+    command.arg("simulate").arg(&file).arg("-o").arg(&scene).args(["--overwrite", "--progress", "none"]);
+    command.assert().code(0);
+    scene
+}
+
+/// A band (from 1) of a raster.
+pub(crate) fn band(path: &Path, number: usize) -> Grid<f32> {
+    let source = ImageSource::open(path).unwrap();
+    source.read_samples(number, source.window()).unwrap()
+}
+
+/// What a command that ends well says in JSON.
+pub(crate) fn json(output: std::process::Output) -> Value {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
