@@ -313,25 +313,21 @@ impl TileScratch {
     fn combine(&mut self, part: Window, i: usize, config: &CostConfig) {
         let width = part.width + 2 * CENSUS_REACH;
         let out = &mut self.planes.costs[i * self.planes.stride..][..part.width * part.height];
-        let mut pair = 0;
+        let mut costs = self.pair_costs.iter_mut();
         for (i, laid) in self.sources.iter().enumerate() {
-            let cost = &mut self.pair_costs[pair];
-            kernels::census_cost(&self.reference, &laid.census, width, &mut self.apart, cost);
-            kernels::hide(cost, part.width, &self.reference_voids, width);
-            laid.hide(cost, part.width);
-            pair += 1;
+            if let Some(cost) = costs.next() {
+                laid.compare(Some(&self.reference), part.width, &mut self.apart, cost);
+                kernels::hide(cost, part.width, &self.reference_voids, width);
+            }
             if config.aggregation == Aggregation::Variance {
-                for other in &self.sources[..i] {
-                    let cost = &mut self.pair_costs[pair];
-                    kernels::census_cost(&other.census, &laid.census, width, &mut self.apart, cost);
-                    laid.hide(cost, part.width);
+                for (other, cost) in self.sources[..i].iter().zip(&mut costs) {
+                    laid.compare(other.seen(), part.width, &mut self.apart, cost);
                     other.hide(cost, part.width);
-                    pair += 1;
                 }
             }
         }
         let used = match config.aggregation {
-            Aggregation::Variance => pair,
+            Aggregation::Variance => self.pair_costs.len(),
             Aggregation::BestOf(k) => select_smallest(&mut self.pair_costs, k),
         };
         let used = &self.pair_costs[..used];
@@ -412,6 +408,19 @@ impl Laid {
         moved.resize(width * height + OVERHANG, 0);
         shift_bicubic(picture, at, weights, (width, height), rows, moved);
         self.census.fill(&moved[..width * height], width);
+    }
+
+    /// The census of the current plane, where the source is seen at all.
+    fn seen(&self) -> Option<&Census> {
+        self.at.map(|_| &self.census)
+    }
+
+    /// The costs of the current plane against another picture, in rows of `width`; invalid where this source is.
+    fn compare(&self, other: Option<&Census>, width: usize, apart: &mut [Vec<u8>; 4], costs: &mut [u8]) {
+        if let (Some(own), Some(other)) = (self.seen(), other) {
+            kernels::census_cost(other, own, width + 2 * CENSUS_REACH, apart, costs);
+        }
+        self.hide(costs, width);
     }
 
     /// Makes the costs of the current plane invalid where the source has voids; rows of `width`.
