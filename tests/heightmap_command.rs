@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use common::skysweep;
 use geodesy::{Crs, MapProjection, VerticalDatum};
 use io::raster::{Band, BandData, CogRaster, Dem, ImageSource, read_dem, write_cog};
+use io::splat_ply::LocalOrigin;
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;
@@ -279,6 +280,52 @@ fn unprojected_points_lie_on_the_surface() {
     let body = bytes.windows(header.len()).position(|w| w == header).unwrap() + header.len();
     assert_eq!(bytes.len() - body, 27 * known);
     assert!(String::from_utf8_lossy(&bytes[..body]).contains(&format!("element vertex {known}")));
+}
+
+#[test]
+fn unprojected_splats_lie_on_the_surface_in_the_pictures_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = map(&folder, &town("dsm.tif"), &["--heading", "37", "--normalize", "auto", "--confidence"]);
+    let picture = folder.path().join("tile.png");
+    let size = values(&path, 1).width();
+    let pixels = Grid::from_vec(size, size, (0..size * size).map(|i| [(i % 251) as u8, 80, 0]).collect()).unwrap();
+    io::raster::write_png_rgb(&picture, &pixels, false).unwrap();
+    let unproject = |name: &str, options: &[&str]| {
+        let ply = folder.path().join(name);
+        let mut command = skysweep();
+        command.args(["heightmap", "unproject", "--splats", "--picture"]).arg(&picture).arg(&path).arg("-o").arg(&ply);
+        command.args(options).assert().code(0);
+        let origin: LocalOrigin =
+            serde_json::from_slice(&std::fs::read(ply.with_extension("origin.json")).unwrap()).unwrap();
+        (io::splat_ply::read(&ply).unwrap().splats, origin)
+    };
+    let (splats, origin) = unproject("splats.ply", &[]);
+    let heights = values(&path, 1);
+    assert_eq!(splats.len(), heights.data().iter().filter(|h| h.is_finite()).count());
+    let (from, to) = (MapProjection::from_definition(&origin.crs).unwrap(), MapProjection::from_epsg(32631).unwrap());
+    let dsm = read_dem(town("dsm.tif")).unwrap();
+    for splat in splats.iter().step_by(7) {
+        let [x, y, z] = [0, 1, 2].map(|i| f64::from(splat.position[i]) + origin.origin[i]);
+        let (lon, lat) = from.lonlat_from_map(x, y).unwrap();
+        let at = to.map_from_lonlat(lon, lat).unwrap();
+        let (c, r) = dsm.geotransform.cell_from_map(at.x, at.y).unwrap();
+        let height = f64::from(raster::bilinear(&dsm.heights, c, r));
+        assert!(height.is_nan() || (height - z).abs() < 0.02, "{height} {z}");
+        // The source has every height: confidence 1. A pixel of half a metre: a quarter of a metre of standard deviation.
+        assert!((splat.opacity - 0.99).abs() < 1e-4 && splat.scale_m[0] >= 0.2499);
+        assert!((splat.colour[1] - 80.0 / 255.0).abs() < 1e-5 && splat.colour[2].abs() < 1e-5);
+    }
+    assert!(splats.iter().any(|s| s.colour[0] > 0.9) && splats.iter().any(|s| s.colour[0] < 0.1));
+    // Colours that change with every pixel keep theirs apart; grey ones go together.
+    io::raster::write_png_rgb(&picture, &Grid::filled(size, size, [128; 3]), true).unwrap();
+    let (merged, _) = unproject("merged.ply", &["--merge", "0.25"]);
+    assert!(merged.len() * 4 < splats.len(), "{} of {}", merged.len(), splats.len());
+    let mut command = skysweep();
+    command.args(["heightmap", "unproject", "--splats", "--frame", "camera"]).arg(&path).arg("-o");
+    command.arg(folder.path().join("c.ply")).assert().code(2).stderr(predicate::str::contains("mirrored"));
+    let mut command = skysweep();
+    command.args(["heightmap", "unproject", "--splats"]).arg(&path).arg("-o").arg(folder.path().join("c.las"));
+    command.assert().code(2).stderr(predicate::str::contains(".ply"));
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! `skysweep heightmap`: the surface seen from above around a camera, turned to its heading, as a GeoTIFF.
 //!
 //! One map, or one per row of a list. A map that cannot be made does not stop the others of a list: it is named in the
-//! report, and the exit code is 1. `skysweep heightmap unproject` leads back to points.
+//! report, and the exit code is 1. `skysweep heightmap unproject` leads back to points
+//! or splats.
 
 mod batch;
 mod camera;
@@ -44,7 +45,7 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Turn a height map back into points.
+    /// Turn a height map back into points or splats.
     Unproject(unproject::Args),
 }
 

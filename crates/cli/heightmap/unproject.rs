@@ -1,15 +1,16 @@
-//! `skysweep heightmap unproject`: a height map back as points.
+//! `skysweep heightmap unproject`: a height map back as points or as Gaussian splats.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use bev::heightmap::{camera_points, map_points};
+use bev::splats::{DivisionConfig, Surface, picture_splats, stretched};
 use clap::ValueEnum;
 use geodesy::{Crs, LonLatHeight, MapProjection, TransverseMercator, utm_epsg};
 use io::ply::{PlyPoint, write_points};
 use io::points::write_las;
-use io::raster::ImageSource;
-use io::splat_ply::LocalOrigin;
+use io::raster::{ImageSource, SampleType};
+use io::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
 use raster::{GeoTransform, Grid};
 use serde_json::json;
 
@@ -30,9 +31,18 @@ pub(crate) struct Args {
     /// File to write: .ply (metres from the camera) or .las (UTM, heights above the ellipsoid).
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Axes of a PLY.
+    /// Axes of points in a PLY.
     #[arg(long, value_enum, default_value_t = Frame::World)]
     frame: Frame,
+    /// Write Gaussian splats as 3DGS viewers and trainers read them (.ply, its origin beside it), one for each pixel.
+    #[arg(long)]
+    splats: bool,
+    /// Picture of the map's own pixels that gives the splats their colours [default: grey].
+    #[arg(long, value_name = "IMAGE", requires = "splats")]
+    picture: Option<PathBuf>,
+    /// Merge splats whose heights are within so many metres of one plane, and whose colours are alike.
+    #[arg(long, value_name = "METRES", requires = "splats")]
+    merge: Option<f64>,
     /// Replace a file that exists.
     #[arg(long)]
     overwrite: bool,
@@ -55,14 +65,18 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let map = Map::read(&args.map)?;
     let ending = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let points = match ending.as_str() {
+        "ply" if args.splats => map.write_splats(args)?,
+        _ if args.splats => bail!("splats are written as .ply, not as {}", args.output.display()),
         "ply" => map.write_ply(args)?,
         "las" | "laz" => map.write_las(args)?,
         _ => bail!("no format belongs to the ending of {}: expected .ply, .las or .laz", args.output.display()),
     };
     if args.json {
-        print::json(&json!({ "path": args.output, "points": points, "camera": map.tags }))?;
+        let what = if args.splats { "splats" } else { "points" };
+        print::json(&json!({ "path": args.output, what: points, "camera": map.tags }))?;
     } else if !global.is_quiet() {
-        print::text(&format!("points  {points}\nfile    {}\n", args.output.display()))?;
+        let what = if args.splats { "splats" } else { "points" };
+        print::text(&format!("{what}  {points}\nfile    {}\n", args.output.display()))?;
     }
     Ok(Outcome::Complete)
 }
@@ -72,6 +86,8 @@ struct Map {
     tags: Tags,
     /// As they stand in the file, NaN where there is none.
     values: Grid<f32>,
+    /// Where the map has them.
+    confidence: Option<Grid<f32>>,
     geotransform: GeoTransform,
     projection: MapProjection,
 }
@@ -91,7 +107,8 @@ impl Map {
         let geotransform = info.geotransform.with_context(|| format!("no georeference: {}", path.display()))?;
         let crs = info.crs_wkt.as_deref().with_context(|| format!("no coordinate system: {}", path.display()))?;
         let values = source.read_samples(1, cells)?;
-        Ok(Self { tags, values, geotransform, projection: MapProjection::from_definition(crs)? })
+        let confidence = if info.bands > 1 { Some(source.read_samples(2, cells)?) } else { None };
+        Ok(Self { tags, values, confidence, geotransform, projection: MapProjection::from_definition(crs)? })
     }
 
     /// Metres per unit of the values.
@@ -141,6 +158,24 @@ impl Map {
         Ok(count)
     }
 
+    /// Splats on the axes of the map's own coordinate system, from the camera.
+    fn write_splats(&self, args: &Args) -> anyhow::Result<usize> {
+        ensure!(args.frame == Frame::World, "splats are turned by rotations, and the camera's frame is a mirrored one");
+        ensure!(self.projection.metres_per_unit() == Some(1.0), "the map is not in metres: {}", args.map.display());
+        let Tags { camera_lon_deg, camera_lat_deg, camera_height_m, .. } = self.tags;
+        let camera = self.projection.map_from_lonlat(camera_lon_deg, camera_lat_deg)?;
+        let heights = self.values.map(|&h| (f64::from(h) * self.scale()) as f32);
+        // The heights stay relative to the camera: its own height is the origin's.
+        let surface = Surface::new(&heights, self.geotransform, [camera.x, camera.y, 0.0]);
+        let picture = args.picture.as_deref().map(picture).transpose()?;
+        let merged = args.merge.map(|error_m| DivisionConfig { error_m, ..DivisionConfig::default() });
+        let splats = picture_splats(&surface, picture.as_ref(), self.confidence.as_ref(), merged)?;
+        let origin = LocalOrigin::new(self.projection.definition(), "ellipsoid", [camera.x, camera.y, camera_height_m]);
+        let layout = SplatLayout { form: SplatForm::Ellipsoids, sh_degree: 0 };
+        io::splat_ply::write(&args.output, &splats, &origin, layout, args.overwrite)?;
+        Ok(splats.len())
+    }
+
     fn write_las(&self, args: &Args) -> anyhow::Result<usize> {
         let epsg = utm_epsg(self.tags.camera_lon_deg, self.tags.camera_lat_deg)?;
         let utm = MapProjection::from_epsg(epsg)?;
@@ -153,4 +188,14 @@ impl Map {
         write_las(&args.output, &points, Crs::ellipsoidal(epsg), args.overwrite)?;
         Ok(points.len())
     }
+}
+
+/// A picture in 0 to 1: bytes as they are, other samples stretched.
+fn picture(path: &Path) -> anyhow::Result<Grid<[f32; 3]>> {
+    let source = ImageSource::open(path)?;
+    let colours = source.read_colour(source.window())?;
+    Ok(match source.info().sample {
+        SampleType::U8 => colours.map(|p| p.map(|c| c / 255.0)),
+        _ => stretched(&colours),
+    })
 }

@@ -8,7 +8,7 @@
 //! - [`splat_of_block`] makes the Gaussian: centre on the plane, tangents along the block, normal of the plane.
 //! - [`render`] composites splats front to back through any [`SplatCamera`]: RPC, perspective, or straight from above.
 //! - [`fit_colours`] finds the colours that render back to the images, robustly and over all views that see a splat.
-//! - [`make_splats`] does all of it and measures the result.
+//! - [`make_splats`] does all of it and measures the result; [`picture_splats`] does with a picture on the surface's own grid.
 
 mod block;
 mod camera;
@@ -17,6 +17,7 @@ mod division;
 mod gaussian;
 mod overhang;
 mod pass;
+mod picture;
 mod quality;
 mod render;
 mod scene;
@@ -28,6 +29,7 @@ pub use camera::{LensSplatCamera, MapSplatCamera, Projection, RpcSplatCamera, Sp
 pub use colour::{ColourFit, FitView, fit_colours};
 pub use division::{DivisionConfig, divide, uniform};
 pub use gaussian::{GaussianConfig, splat_of_block};
+pub use picture::{picture_splats, stretched};
 pub use quality::{HeightErrors, height_errors, psnr_db, ssim};
 pub use render::{Rendering, render};
 pub use scene::{CurvePoint, SplatConfig, SplatError, SplatReport, SplatScene, SplatView, ViewReport, make_splats};

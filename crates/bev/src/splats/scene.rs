@@ -204,7 +204,11 @@ pub fn make_splats(
     Ok(SplatScene { splats, blocks, renderings, report })
 }
 
-fn check(surface: &Surface<'_>, confidence: Option<&Grid<f32>>, config: &SplatConfig) -> Result<(), SplatError> {
+pub(super) fn check(
+    surface: &Surface<'_>,
+    confidence: Option<&Grid<f32>>,
+    config: &SplatConfig,
+) -> Result<(), SplatError> {
     let bounds = [
         ("the bound on heights", config.division.error_m),
         ("the bound on colours", config.division.colour_error),
@@ -309,7 +313,7 @@ fn cell_colours(surface: &Surface<'_>, seen: &[Seen], balance: &[Balance]) -> Gr
     colours
 }
 
-fn display_range(colours: &Grid<[f32; 3]>) -> [[f32; 2]; 3] {
+pub(super) fn display_range(colours: &Grid<[f32; 3]>) -> [[f32; 2]; 3] {
     [0, 1, 2].map(|channel| {
         let mut values: Vec<f32> = colours.data().iter().map(|c| c[channel]).filter(|c| c.is_finite()).collect();
         if values.is_empty() {
@@ -320,12 +324,12 @@ fn display_range(colours: &Grid<[f32; 3]>) -> [[f32; 2]; 3] {
     })
 }
 
-fn displayed(colour: [f32; 3], range: &[[f32; 2]; 3]) -> [f32; 3] {
+pub(super) fn displayed(colour: [f32; 3], range: &[[f32; 2]; 3]) -> [f32; 3] {
     [0, 1, 2].map(|i| (colour[i] - range[i][0]) / (range[i][1] - range[i][0]))
 }
 
 /// The splat of a block with the mean of its cells' colours and confidences; middle grey where no view sees any.
-fn first_splat(
+pub(super) fn first_splat(
     surface: &Surface<'_>,
     block: &Block,
     colours: &Grid<[f32; 3]>,
