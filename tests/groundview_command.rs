@@ -227,6 +227,55 @@ fn pictures_are_cut_and_layers_laid_over_each_other() {
 }
 
 #[test]
+fn a_bad_row_of_a_list_is_named_and_the_others_are_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let (list, pictures, out) =
+        (folder.path().join("list.csv"), folder.path().join("pictures"), folder.path().join("views"));
+    let rows =
+        "id,lon,lat,heading\na,5.4,43.53,37\nfar,6.5,43.5,0\nbad,east,43.53,0\nb,5.4002,43.5301,\nc,5.4001,43.53,\n";
+    std::fs::write(&list, rows).unwrap();
+    std::fs::create_dir(&pictures).unwrap();
+    let picture = Grid::filled(36, 18, [9, 9, 9]);
+    for id in ["a", "b"] {
+        write_png_rgb(pictures.join(format!("{id}.png")), &picture, false).unwrap();
+    }
+    std::fs::write(pictures.join("c.png"), "no picture").unwrap();
+    let mut command = skysweep();
+    command.arg("groundview").arg(town("dsm.tif")).arg("--positions").arg(&list).arg("--pictures").arg(&pictures);
+    command.args(["--width", "60", "--crops", "2", "--crop-size", "32", "--heading", "90", "--json"]);
+    let assert = command.args(["--progress", "json"]).arg("-o").arg(&out).assert().code(1);
+    let assert = assert.stderr(predicate::str::contains("far").and(predicate::str::contains("views")));
+    let report: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    let names = |key: &str, name: &str| {
+        let all = report[key].as_array().unwrap().iter();
+        all.map(|v| v[name].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(names("failed", "id"), ["far", "bad", "c_000", "c_001"]);
+    assert_eq!(names("views", "name"), ["a", "a_000", "a_001", "b", "b_000", "b_001", "c"]);
+    assert_eq!(read_with_points(&out.join("sparse/0")).unwrap().0.views.len(), 4);
+    let told: Value = serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap();
+    assert_eq!(told, report);
+}
+
+#[test]
+fn a_camera_file_stands_for_its_options() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("camera.json");
+    std::fs::write(&file, r#"{"lon_deg": 5.4, "lat_deg": 43.53, "heading_deg": 37.0, "height_m": 240.0}"#).unwrap();
+    let centre = |name: &str, options: &[&str]| {
+        let mut command = skysweep();
+        command.arg("groundview").arg(town("dsm.tif")).args(["--width", "60", "--crops", "0", "--json"]);
+        command.args(options).arg("-o").arg(folder.path().join(name));
+        let report: Value = serde_json::from_slice(&command.assert().code(0).get_output().stdout).unwrap();
+        (report["views"][0]["centre"].clone(), array(folder.path().join(name).join("depth/panorama.npy")))
+    };
+    let options = ["--center", "5.4", "43.53", "--heading", "37", "--camera-height", "240"];
+    let (by_file, by_options) = (centre("a", &["--camera", file.to_str().unwrap()]), centre("b", &options));
+    assert_eq!(by_file.0, by_options.0);
+    assert!(by_file.1.iter().zip(&by_options.1).all(|(a, b)| a.to_bits() == b.to_bits()));
+}
+
+#[test]
 fn what_cannot_be_seen_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let (out, dsm) = (folder.path().join("views"), town("dsm.tif"));

@@ -5,7 +5,8 @@
 //! `previews/NAME.png` (normals and depths to look at), `visibility.tif` (how many cameras see each cell, for rasters),
 //! `sparse/0` (a COLMAP model of the perspective cameras with points of the surface), `images` (crops of pictures, where
 //! given), `origin.json` (where local positions are counted from, also beside the model) and `report.json`.
-//! `skysweep groundview compose` lays a rendered ground layer over a satellite layer.
+//! A row of a list without a view (no surface under it, no picture of it) does not stop the others: it is named in the report, and
+//! the exit code is 1. `skysweep groundview compose` lays a rendered ground layer over a satellite layer.
 
 mod compose;
 mod output;
@@ -14,10 +15,12 @@ mod surface;
 
 use std::path::PathBuf;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{bail, ensure};
 use geodesy::VerticalDatum;
 
-use crate::{Global, Outcome, print};
+use crate::progress::{ProgressStyle, Watcher};
+use crate::stand::StandArgs;
+use crate::{Global, Outcome, print, threads};
 
 /// Arguments of `skysweep groundview`.
 #[derive(Debug, clap::Args)]
@@ -50,23 +53,10 @@ enum Command {
 #[derive(Debug, clap::Args)]
 struct MakeArgs {
     /// Cameras of a COLMAP model on the surface's map, with origin.json beside: what skysweep align writes.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["center", "positions"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["center", "camera", "positions"])]
     cameras: Option<PathBuf>,
-    /// A panorama at this longitude and latitude, degrees.
-    #[arg(long, num_args = 2, value_names = ["LON", "LAT"], allow_negative_numbers = true)]
-    center: Option<Vec<f64>>,
-    /// A panorama for each row of a list (CSV or GeoJSON: id, lon, lat, heading, height_m).
-    #[arg(long, value_name = "FILE", conflicts_with = "center")]
-    positions: Option<PathBuf>,
-    /// Where panoramas look, degrees clockwise from true north [default: the row's, else 0].
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
-    heading: Option<f64>,
-    /// Height of a panorama above the surface under it, metres.
-    #[arg(long, value_name = "METRES", default_value_t = 2.0)]
-    ground_offset: f64,
-    /// Height of a panorama above the ellipsoid, metres [default: the row's, else the surface's and --ground-offset].
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
-    camera_height: Option<f64>,
+    #[command(flatten)]
+    stand: StandArgs,
     /// Columns of a panorama; it has half as many rows.
     #[arg(long, value_name = "PX", default_value_t = 1024)]
     width: usize,
@@ -94,6 +84,9 @@ struct MakeArgs {
     /// Replace files that exist.
     #[arg(long)]
     overwrite: bool,
+    /// How progress is shown on stderr.
+    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
+    progress: ProgressStyle,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
@@ -107,10 +100,8 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         _ => bail!("expected SURFACE and -o OUT"),
     };
     let make = &args.make;
-    if let Some(threads) = make.threads {
-        ensure!(threads > 0, "--threads is 0, expected 1 or more");
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
-    }
+    make.stand.check()?;
+    threads::start(make.threads)?;
     ensure!(
         make.overwrite || output.join(output::REPORT).symlink_metadata().is_err(),
         "the folder holds views already: choose another or pass --overwrite: {}",
@@ -118,11 +109,15 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     );
     let surface = surface::Surface::open(surface, make.vertical)?;
     let shots = shots::Shots::of(make, &surface)?;
-    let report = output::write(make, &surface, &shots, output)?;
+    let watcher = Watcher::new(make.progress, global);
+    let report = output::write(make, &surface, &shots, output, &watcher);
+    watcher.finish();
+    let report = report?;
+    report.tell_failures();
     if make.json {
         print::json(&report)?;
     } else if !global.is_quiet() {
         print::text(&report.text(output))?;
     }
-    Ok(Outcome::Complete)
+    Ok(if report.is_complete() { Outcome::Complete } else { Outcome::Partial })
 }

@@ -5,7 +5,6 @@
 //! or splats.
 
 mod batch;
-mod camera;
 mod settings;
 mod source;
 mod tags;
@@ -14,12 +13,13 @@ mod unproject;
 
 use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use geodesy::{CrsRequest, VerticalDatum};
 use mesh::Lod;
 
 use crate::progress::ProgressStyle;
-use crate::{Global, Outcome};
+use crate::stand::StandArgs;
+use crate::{Global, Outcome, threads};
 
 /// Arguments of `skysweep heightmap`.
 #[derive(Debug, clap::Args)]
@@ -52,30 +52,14 @@ enum Command {
 /// How maps are made.
 #[derive(Debug, clap::Args)]
 struct MakeArgs {
-    /// Longitude and latitude of the camera, degrees.
-    #[arg(long, num_args = 2, value_names = ["LON", "LAT"], allow_negative_numbers = true)]
-    center: Option<Vec<f64>>,
-    /// The camera: a JSON file with lon_deg and lat_deg, and where wanted heading_deg and height_m.
-    #[arg(long, value_name = "FILE", conflicts_with = "center")]
-    camera: Option<PathBuf>,
-    /// One map for each row of a list (CSV or GeoJSON: id, lon, lat, heading, height_m).
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["center", "camera"])]
-    positions: Option<PathBuf>,
-    /// Where the top of the map points, degrees clockwise from true north [default: the camera's or row's, else 0].
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
-    heading: Option<f64>,
+    #[command(flatten)]
+    stand: StandArgs,
     /// Pixels along each side.
     #[arg(long, value_name = "PX", default_value_t = 518)]
     size: usize,
     /// Pixels per metre on the ground.
     #[arg(long, value_name = "PX/M", default_value_t = 2.0)]
     resolution: f64,
-    /// Height of the camera above the ground under it, metres.
-    #[arg(long, value_name = "METRES", default_value_t = 2.0, allow_negative_numbers = true)]
-    ground_offset: f64,
-    /// Height of the camera above the ellipsoid, metres [default: the ground's and --ground-offset].
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
-    camera_height: Option<f64>,
     /// Terrain model: the ground under the camera, and the height where SOURCE has none.
     #[arg(long, value_name = "FILE")]
     dtm: Option<PathBuf>,
@@ -131,11 +115,9 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         (None, Some(source), Some(output)) => (source, output),
         _ => bail!("expected SOURCE and -o OUT"),
     };
-    if let Some(threads) = args.make.threads {
-        anyhow::ensure!(threads > 0, "--threads is 0, expected 1 or more");
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
-    }
-    match &args.make.positions {
+    args.make.stand.check()?;
+    threads::start(args.make.threads)?;
+    match &args.make.stand.positions {
         Some(positions) => batch::run(&args.make, source, positions, output, global),
         None => tile::run(&args.make, source, output, global),
     }

@@ -22,6 +22,8 @@ mod rpc;
 mod simulate;
 mod splats;
 mod split;
+mod stand;
+mod threads;
 
 use std::process::ExitCode;
 

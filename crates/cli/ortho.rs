@@ -10,11 +10,10 @@ mod view;
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use geodesy::VerticalDatum;
 
 use crate::progress::{ProgressStyle, Watcher};
-use crate::{Global, Outcome, print};
+use crate::{Global, Outcome, print, threads};
 
 /// Arguments of `skysweep ortho`.
 #[derive(Debug, clap::Args)]
@@ -71,10 +70,7 @@ pub(crate) struct Args {
 /// Runs `skysweep ortho`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     output::check(args)?;
-    if let Some(threads) = args.threads {
-        anyhow::ensure!(threads > 0, "--threads is 0, expected 1 or more");
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
-    }
+    threads::start(args.threads)?;
     let inputs = inputs::Inputs::open(args)?;
     let watcher = Watcher::new(args.progress, global);
     let made = mosaic::make(&inputs, args, &watcher);

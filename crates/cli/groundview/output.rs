@@ -8,15 +8,18 @@ use camera::ImagePoint;
 use io::colmap::{ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
 use io::npy;
 use io::raster::{Band, BandData, ImageSource, MapTile, write_map_tile, write_png_gray, write_png_rgb};
+use pipeline::Progress;
 use raster::Grid;
 use report::{depth_preview, normal_preview, side_by_side};
 use serde::Serialize;
 
 use super::MakeArgs;
-use super::shots::{Shot, Shots};
+use super::shots::{Failure, Shot, Shots};
 use super::surface::{Kind, Surface};
 
 pub(super) const REPORT: &str = "report.json";
+/// Failures that are printed one by one.
+const TOLD: usize = 20;
 /// Colour of points of views without a picture.
 const GREY: [u8; 3] = [128; 3];
 
@@ -24,6 +27,8 @@ const GREY: [u8; 3] = [128; 3];
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     views: Vec<ViewReport>,
+    /// What was asked for and is not there.
+    failed: Vec<Failure>,
     points: usize,
     /// Cells of a raster that some view sees, and all that have a height.
     cells_seen: Option<[usize; 2]>,
@@ -41,6 +46,18 @@ struct ViewReport {
 }
 
 impl Report {
+    /// Whether all that was asked for is there.
+    pub(super) fn is_complete(&self) -> bool {
+        self.failed.is_empty()
+    }
+
+    /// Names what is not there.
+    pub(super) fn tell_failures(&self) {
+        for Failure { id, reason } in self.failed.iter().take(TOLD) {
+            tracing::error!("{id}: {reason}");
+        }
+    }
+
     pub(super) fn text(&self, folder: &Path) -> String {
         let mut text = String::new();
         for view in &self.views {
@@ -54,12 +71,21 @@ impl Report {
         if let Some([seen, all]) = self.cells_seen {
             text += &format!("cells       {seen} of {all} seen\n");
         }
+        if !self.failed.is_empty() {
+            text += &format!("failed      {}, see {}\n", self.failed.len(), folder.join(REPORT).display());
+        }
         text + &format!("points      {}\nwritten     {}\n", self.points, folder.display())
     }
 }
 
 /// Renders and writes all views.
-pub(super) fn write(args: &MakeArgs, surface: &Surface, shots: &Shots, folder: &Path) -> anyhow::Result<Report> {
+pub(super) fn write(
+    args: &MakeArgs,
+    surface: &Surface,
+    shots: &Shots,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> anyhow::Result<Report> {
     let pictures = shots.shots.iter().any(|shot| shot.picture.is_some());
     for name in
         ["depth", "normal", "mask", "sky", "previews", "sparse/0"].into_iter().chain(pictures.then_some("images"))
@@ -67,7 +93,7 @@ pub(super) fn write(args: &MakeArgs, surface: &Surface, shots: &Shots, folder: &
         let path = folder.join(name);
         std::fs::create_dir_all(&path).with_context(|| format!("cannot make the folder: {}", path.display()))?;
     }
-    let mut report = Report { views: Vec::new(), points: 0, cells_seen: None };
+    let mut report = Report { views: Vec::new(), failed: shots.failed.clone(), points: 0, cells_seen: None };
     let mut model = ColmapModel { lenses: shots.lenses.clone(), views: Vec::new() };
     let mut points = Vec::new();
     let mut seen_by = match &surface.kind {
@@ -75,11 +101,19 @@ pub(super) fn write(args: &MakeArgs, surface: &Surface, shots: &Shots, folder: &
         Kind::Mesh(_) => None,
     };
     let mut open: Option<(PathBuf, Grid<[f32; 3]>)> = None;
+    progress.begin("views", shots.shots.len());
     for shot in &shots.shots {
         let viewer = shots.viewer(shot);
+        let picture = match cut(shots, shot, &mut open) {
+            Err(error) if args.stand.positions.is_some() => {
+                report.failed.push(Failure { id: shot.stem.clone(), reason: format!("{error:#}") });
+                progress.step();
+                continue;
+            }
+            picture => picture?,
+        };
         let view = render(surface, &viewer, &shot.pose);
         write_maps(folder, shot, &view, args.overwrite)?;
-        let picture = cut(shots, shot, &mut open)?;
         if let Some(picture) = &picture {
             write_png_rgb(folder.join("images").join(&shot.name), picture, args.overwrite)?;
         }
@@ -96,6 +130,7 @@ pub(super) fn write(args: &MakeArgs, surface: &Surface, shots: &Shots, folder: &
             model.views.push(ColmapView { id: number + 1, name: shot.name.clone(), lens, pose: shot.pose });
         }
         report.views.push(view_report(shot, &view));
+        progress.step();
     }
     if let (Some(counts), Kind::Field(field, geotransform)) = (&seen_by, &surface.kind) {
         let bands = [Band { description: "cameras_that_see_the_cell", data: BandData::U16(counts) }];

@@ -6,11 +6,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use bev::ground::{Panorama, level_pose};
 use camera::{Lens, Pose};
-use io::positions::{Position, read_positions};
+use io::positions::read_positions;
 use io::splat_ply::LocalOrigin;
+use serde::Serialize;
 
 use super::MakeArgs;
 use super::surface::Surface;
+use crate::stand::Stand;
 
 /// Most columns of a panorama and pixels along a crop.
 const SIDE_MAX: usize = 16_384;
@@ -23,6 +25,15 @@ pub(super) struct Shots {
     /// The pixels of every panorama.
     pub(super) panorama: Panorama,
     pub(super) shots: Vec<Shot>,
+    /// Rows of the list that give none.
+    pub(super) failed: Vec<Failure>,
+}
+
+/// What was asked for and is not there.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Failure {
+    pub(super) id: String,
+    pub(super) reason: String,
 }
 
 /// A camera in its place.
@@ -45,14 +56,6 @@ impl Shots {
         if let Some(folder) = &args.cameras {
             return Self::of_model(folder, surface, panorama);
         }
-        let rows = match (args.center.as_deref(), &args.positions) {
-            (Some(&[lon_deg, lat_deg]), _) => {
-                let position = Position { lon_deg, lat_deg, heading_deg: None, height_m: None };
-                vec![("panorama".to_owned(), position)]
-            }
-            (_, Some(list)) => rows(list)?,
-            _ => bail!("no cameras: give --cameras FOLDER, --center LON LAT or --positions FILE"),
-        };
         ensure!(
             (1..=SIDE_MAX).contains(&args.crop_size),
             "--crop-size is {}, expected 1 to {SIDE_MAX}",
@@ -60,12 +63,28 @@ impl Shots {
         );
         ensure!(args.fov > 0.0 && args.fov < 180.0, "--fov is {}, expected degrees between 0 and 180", args.fov);
         ensure!(args.crops <= 360, "--crops is {}, at most 360", args.crops);
-        let mut made =
-            Self { lenses: vec![Panorama::crop_lens(args.crop_size, args.fov)?], panorama, shots: Vec::new() };
-        for (id, position) in rows {
-            made.add_panorama(args, surface, &id, &position).with_context(|| format!("position {id}"))?;
+        let lenses = vec![Panorama::crop_lens(args.crop_size, args.fov)?];
+        let mut made = Self { lenses, panorama, shots: Vec::new(), failed: Vec::new() };
+        match (args.stand.single()?, &args.stand.positions) {
+            (Some(stand), _) => made.add_panorama(args, surface, "panorama", &stand)?,
+            (_, Some(list)) => made.add_list(args, surface, list)?,
+            _ => bail!("no cameras: give --cameras FOLDER, --center LON LAT, --camera FILE or --positions FILE"),
         }
         Ok(made)
+    }
+
+    /// Adds the rows of a list; one that gives no view is noted and left out.
+    fn add_list(&mut self, args: &MakeArgs, surface: &Surface, list: &Path) -> anyhow::Result<()> {
+        for row in read_positions(list)? {
+            let added = match &row.position {
+                Ok(position) => self
+                    .add_panorama(args, surface, &row.id, &args.stand.of_row(position))
+                    .map_err(|error| format!("{error:#}")),
+                Err(reason) => Err(reason.clone()),
+            };
+            self.failed.extend(added.err().map(|reason| Failure { id: row.id, reason }));
+        }
+        Ok(())
     }
 
     fn of_model(folder: &Path, surface: &Surface, panorama: Panorama) -> anyhow::Result<Self> {
@@ -95,23 +114,23 @@ impl Shots {
             let pose = Pose { centre, ..view.pose };
             shots.push(Shot { stem, name: view.name, lens: Some(view.lens), pose, picture: None });
         }
-        Ok(Self { lenses: model.lenses, panorama, shots })
+        Ok(Self { lenses: model.lenses, panorama, shots, failed: Vec::new() })
     }
 
-    fn add_panorama(&mut self, args: &MakeArgs, surface: &Surface, id: &str, at: &Position) -> anyhow::Result<()> {
+    fn add_panorama(&mut self, args: &MakeArgs, surface: &Surface, id: &str, at: &Stand) -> anyhow::Result<()> {
         let map = surface.projection.map_from_lonlat(at.lon_deg, at.lat_deg)?;
         // True north is a little beside the north of the map.
         let north = surface.projection.map_from_lonlat(at.lon_deg, at.lat_deg + 1e-4)?;
         let north_deg = (north.x - map.x).atan2(north.y - map.y).to_degrees();
-        let heading = at.heading_deg.or(args.heading).unwrap_or(0.0);
+        let heading = at.heading_deg;
         ensure!(heading.is_finite(), "the heading is {heading}, expected degrees");
         let (x, y) = (map.x - surface.origin[0], map.y - surface.origin[1]);
-        let z = match at.height_m.or(args.camera_height) {
+        let z = match at.height_m {
             Some(height) => height - surface.origin[2],
             None => {
                 let ground =
                     surface.height_at(x, y).context("the surface has no height under it: give --camera-height")?;
-                ground + args.ground_offset
+                ground + args.stand.ground_offset
             }
         };
         ensure!(z.is_finite(), "the camera's height is {z}, expected metres");
@@ -130,15 +149,6 @@ impl Shots {
         }
         Ok(())
     }
-}
-
-/// The rows of a list, all of which must be usable.
-fn rows(list: &Path) -> anyhow::Result<Vec<(String, Position)>> {
-    let row = |row: io::positions::PositionRow| match row.position {
-        Ok(position) => Ok((row.id, position)),
-        Err(reason) => bail!("{}: {reason}: {}", row.id, list.display()),
-    };
-    read_positions(list)?.into_iter().map(row).collect()
 }
 
 fn picture(folder: &Path, id: &str) -> anyhow::Result<PathBuf> {

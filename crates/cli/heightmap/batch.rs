@@ -13,10 +13,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::MakeArgs;
-use super::settings::Stand;
 use super::tags::Tags;
 use super::tile::{Made, Maker};
 use crate::progress::Watcher;
+use crate::stand::Stand;
 use crate::{Global, Outcome, print};
 
 const REPORT: &str = "report.json";
@@ -119,12 +119,7 @@ impl Run<'_> {
             let (fate, stand) = match &row.position {
                 Err(reason) => (Some(Fate::Failed { reason: reason.clone() }), None),
                 Ok(position) => {
-                    let stand = Stand {
-                        lon_deg: position.lon_deg,
-                        lat_deg: position.lat_deg,
-                        heading_deg: position.heading_deg.or(self.args.heading).unwrap_or(0.0),
-                        height_m: position.height_m.or(self.args.camera_height),
-                    };
+                    let stand = self.args.stand.of_row(position);
                     if self.is_there(row, &stand)? { (Some(Fate::Kept), None) } else { (None, Some(stand)) }
                 }
             };

@@ -4,11 +4,12 @@ use std::collections::HashMap;
 use std::str::FromStr;
 use std::sync::{Arc, Mutex};
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use bev::heightmap::{MapSystem, Reading, TileRequest};
 use geodesy::{MapProjection, utm_epsg};
 
 use super::MakeArgs;
+use crate::stand::Stand;
 
 /// `--normalize`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,16 +85,6 @@ impl From<Interpolation> for Reading {
     }
 }
 
-/// Where a camera stands and looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stand {
-    pub(super) lon_deg: f64,
-    pub(super) lat_deg: f64,
-    pub(super) heading_deg: f64,
-    /// Height above the ellipsoid, metres, where it is known.
-    pub(super) height_m: Option<f64>,
-}
-
 /// What all tiles of a run share.
 #[derive(Debug)]
 pub(super) struct Settings {
@@ -108,18 +99,16 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    pub(super) fn new(args: &MakeArgs) -> anyhow::Result<Self> {
-        ensure!(args.ground_offset.is_finite(), "--ground-offset is {}, expected metres", args.ground_offset);
-        ensure!(args.camera_height.is_none_or(f64::is_finite), "--camera-height is no number of metres");
-        Ok(Self {
+    pub(super) fn new(args: &MakeArgs) -> Self {
+        Self {
             size: args.size,
             resolution_px_per_m: args.resolution,
-            ground_offset_m: args.ground_offset,
+            ground_offset_m: args.stand.ground_offset,
             normalize: args.normalize,
             reading: args.interpolation.into(),
             crs: args.crs,
             projections: Mutex::default(),
-        })
+        }
     }
 
     pub(super) fn request(&self, stand: &Stand) -> TileRequest {

@@ -15,7 +15,8 @@ use mesh::{LodChoice, MeshConfig, Scope, TriangleMesh};
 use raster::{GeoTransform, Grid, Window};
 
 use super::MakeArgs;
-use super::settings::{Settings, Stand};
+use super::settings::Settings;
+use crate::stand::Stand;
 
 /// Rasters up to this many cells are kept in memory (512 MiB); of larger ones the part under a tile is read.
 const WHOLE_CELLS: usize = 1 << 27;

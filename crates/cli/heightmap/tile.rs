@@ -8,10 +8,11 @@ use io::raster::{Band, BandData, MapTile, write_map_tile, write_png_rgb};
 use raster::{Grid, Light};
 use serde::Serialize;
 
-use super::settings::{Normalize, Settings, Stand};
+use super::MakeArgs;
+use super::settings::{Normalize, Settings};
 use super::source::{Laid, RasterSource, Source};
 use super::tags::Tags;
-use super::{MakeArgs, camera};
+use crate::stand::Stand;
 use crate::{Global, Outcome, print};
 
 /// Name that a run of skysweep gives to the confidence beside its DSM.
@@ -49,7 +50,8 @@ pub(super) struct Made {
 
 /// Runs `skysweep heightmap` for one camera.
 pub(super) fn run(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
-    let stand = camera::stand(args)?;
+    let stand =
+        args.stand.single()?.context("no position: give --center LON LAT, --camera FILE or --positions FILE")?;
     ensure!(
         args.overwrite || output.symlink_metadata().is_err(),
         "the output exists already: choose another name or pass --overwrite: {}",
@@ -87,7 +89,7 @@ impl Made {
 
 impl Maker {
     pub(super) fn open(args: &MakeArgs, path: &Path, previews: bool) -> anyhow::Result<Self> {
-        let settings = Settings::new(args)?;
+        let settings = Settings::new(args);
         let source = Source::open(path, args)?;
         let terrain = args.dtm.as_deref().map(|dtm| RasterSource::open(dtm, None, None)).transpose()?;
         Ok(Self {
