@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use geodesy::{CrsRequest, VerticalDatum};
-use pipeline::{DsmConfig, DsmReport, Preset};
+use pipeline::{DsmConfig, DsmReport, Fill, Preset};
 
 use crate::progress::{ProgressStyle, Watcher};
 use crate::{Global, Outcome};
@@ -46,6 +46,10 @@ pub(crate) struct Args {
     /// Speed against accuracy.
     #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
     preset: PresetName,
+    /// Voids to close from their surroundings, marked in filled.tif: justified (narrow ones and those behind buildings) or all
+    /// (wide ones too, whatever made them).
+    #[arg(long, value_enum, default_value_t = FillName::Justified)]
+    fill: FillName,
     /// Pairs of images to match, by position: 1-2,1-3 [default: all that are useful].
     #[arg(long, value_name = "I-J,…", value_delimiter = ',', value_parser = parse_pair)]
     pairs: Option<Vec<(usize, usize)>>,
@@ -85,6 +89,12 @@ enum PresetName {
     Accurate,
 }
 
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum FillName {
+    Justified,
+    All,
+}
+
 /// `2-3` → (1, 2): positions count from 1 for people.
 fn parse_pair(text: &str) -> Result<(usize, usize), String> {
     let (i, j) = text.split_once('-').ok_or_else(|| format!("expected two positions like 1-2, found {text:?}"))?;
@@ -118,6 +128,10 @@ impl Args {
                 PresetName::Fast => Preset::Fast,
                 PresetName::Balanced => Preset::Balanced,
                 PresetName::Accurate => Preset::Accurate,
+            },
+            fill: match self.fill {
+                FillName::Justified => Fill::Justified,
+                FillName::All => Fill::All,
             },
             pairs: self.pairs.clone(),
             references: self.reference.clone(),

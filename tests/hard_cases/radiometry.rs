@@ -1,7 +1,7 @@
 //! Pixels that say little, nothing, or something else in every view.
 
 use eval::Alignment;
-use pipeline::PipelineError;
+use pipeline::{Fill, PipelineError};
 use raster::Grid;
 
 use crate::stage::{EASY, Shot, Stage, look, noise_3d, rolling, triplet, uniform, village, weathered};
@@ -48,6 +48,13 @@ fn a_saturated_roof_is_right_or_void() {
         let (inside, beside) = (errors.over(white), errors.over(|x, y| !white(x, y)));
         assert!(inside.wrong < 0.15, "{limit}: {inside:?}");
         beside.expect("beside the white", 0.95, 0.03);
+        if limit == 2047 {
+            let closed = stage.run(&shots, |config| config.fill = Fill::All).unwrap();
+            let (before, after) = (&outcome.report.surface, &closed.report.surface);
+            assert!(inside.covered < 0.5 && stage.errors(&closed, 50.0, Alignment::None).over(white).covered == 1.0);
+            // What is closed on request is told as closed, and nothing else changes.
+            assert!(before.observed == after.observed && before.filled + 1000 < after.filled, "{before:?} {after:?}");
+        }
     }
 }
 

@@ -173,7 +173,14 @@ impl ChunkedScene<'_> {
         let heights = sweep_scene(&views, &plan, &|| ())?;
         let evaluations = heights.evaluations;
         let core = Window { x: core.x - grown.x, y: core.y - grown.y, ..core };
-        let input = SurfaceInput { config: self.config, plan: &plan, useful: self.useful, grid: &grid, core };
+        let input = SurfaceInput {
+            config: self.config,
+            plan: &plan,
+            useful: self.useful,
+            grid: &grid,
+            pixel_m: self.gsd_m,
+            core,
+        };
         let (product, counts) = make_surface(input, views, heights, &|| ())?;
         Ok(Outcome::Swept(Box::new(Swept { product, counts, evaluations, range_m })))
     }

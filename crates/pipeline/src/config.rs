@@ -21,6 +21,17 @@ pub enum Preset {
     Accurate,
 }
 
+/// Which voids are closed from what is known around them; closed cells are marked in any case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Fill {
+    /// Narrow ones, and those that a surface beside them hides.
+    #[default]
+    Justified,
+    /// Wide ones too, whatever made them: water, saturated roofs, what changed between the dates.
+    All,
+}
+
 /// A rectangle on the map: x_min, y_min, x_max, y_max.
 pub type Bounds = [f64; 4];
 
@@ -48,6 +59,8 @@ pub struct DsmConfig {
     pub vertical: VerticalDatum,
     /// Speed against accuracy.
     pub preset: Preset,
+    /// Which voids are closed.
+    pub fill: Fill,
     /// The pairs of images to match, by position in `images`; all useful ones when `None`.
     pub pairs: Option<Vec<(usize, usize)>>,
     /// The images to compute heights for, by position; all when `None`.
@@ -80,6 +93,7 @@ impl DsmConfig {
             prior: None,
             vertical: VerticalDatum::Ellipsoid,
             preset: Preset::default(),
+            fill: Fill::default(),
             pairs: None,
             references: None,
             pointing: true,

@@ -179,7 +179,14 @@ impl<'a> Job<'a> {
         self.lap("sweep");
         let hypotheses = heights.evaluations;
         let core = Window::whole(grid.size.0, grid.size.1);
-        let input = SurfaceInput { config: self.config, plan: &plan, useful: &scene.useful, grid, core };
+        let input = SurfaceInput {
+            config: self.config,
+            plan: &plan,
+            useful: &scene.useful,
+            grid,
+            pixel_m: scene.coarsest,
+            core,
+        };
         self.progress.begin("fusing", 1 + sources.iter().filter(|s| !s.is_empty()).count());
         let (product, counts) = make_surface(input, views, heights, &|| self.progress.step())?;
         if counts.observed == 0 {

@@ -21,7 +21,7 @@ mod setup;
 mod surface;
 mod tie_windows;
 
-pub use config::{DsmConfig, Preset};
+pub use config::{DsmConfig, Fill, Preset};
 pub use dsm::run_dsm;
 pub use error::PipelineError;
 pub use progress::{Choice, Progress, Silent};

@@ -10,7 +10,7 @@ use sweep::fusion::{
 };
 use sweep::{HeightMap, View};
 
-use crate::config::DsmConfig;
+use crate::config::{DsmConfig, Fill};
 use crate::error::PipelineError;
 use crate::heights::{SceneHeights, SweepPlan};
 use crate::output::{FILLED, Product};
@@ -22,6 +22,8 @@ const SPECKLE_SIDE_M: f64 = 5.0;
 const SPECKLE_CELLS_MIN: usize = 9;
 /// Heights around a void are looked for within this many metres: the shadow side of a tower.
 const FILL_REACH_M: f64 = 40.0;
+/// … and this far where every void is to be closed: the middle of a pond or of a hall.
+const FILL_REACH_ALL_M: f64 = 60.0;
 /// Voids up to this many metres across are closed: the shadow side of a house.
 const FILL_NARROW_M: f64 = 10.0;
 /// A surface hides what is this many times its height away: views lean by up to 30°, and shadows reach further.
@@ -40,7 +42,7 @@ const SUPPORT_MIN: f32 = 0.2;
 const CONFIDENCE_MIN: f32 = 0.1;
 
 /// Ground around a cell that decides what it holds, metres: speckle is judged, then voids are filled from this far.
-pub(crate) const SURROUNDINGS_M: f64 = FILL_REACH_M + 2.0 * SPECKLE_SIDE_M;
+pub(crate) const SURROUNDINGS_M: f64 = FILL_REACH_ALL_M + 2.0 * SPECKLE_SIDE_M;
 
 /// What the surface is made with.
 #[derive(Clone, Copy)]
@@ -50,6 +52,8 @@ pub(crate) struct SurfaceInput<'a> {
     /// Pairs of views that look from different directions.
     pub(crate) useful: &'a [(usize, usize)],
     pub(crate) grid: &'a OutputGrid,
+    /// The coarsest image's pixel, metres.
+    pub(crate) pixel_m: f64,
     /// The cells of the grid that count.
     pub(crate) core: Window,
 }
@@ -135,7 +139,7 @@ fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, origin_m: f64) -> (Pro
     let step_m = plan.step_at(plan.bottom_level);
     let fusion = FusionConfig {
         same_surface_m: same_surface_m(plan, grid),
-        tear_m: (TEAR_SLOPE * gsd * coarser).max(2.0 * step_m) as f32,
+        tear_m: (TEAR_SLOPE * input.pixel_m * coarser).max(2.0 * step_m) as f32,
         tile: config.tile,
     };
     let mut fused = fuse_views(&placed, grid.size, &fusion);
@@ -146,9 +150,13 @@ fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, origin_m: f64) -> (Pro
     let observed = known(&fused.height_m, core);
     let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
     agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
+    let (reach_m, narrow_m) = match config.fill {
+        Fill::Justified => (FILL_REACH_M, FILL_NARROW_M),
+        Fill::All => (FILL_REACH_ALL_M, f64::INFINITY),
+    };
     let fill = FillConfig {
-        reach_cells: (FILL_REACH_M / gsd).ceil() as usize,
-        narrow_cells: (FILL_NARROW_M / gsd) as f32,
+        reach_cells: (reach_m / gsd).ceil() as usize,
+        narrow_cells: (narrow_m / gsd) as f32,
         island_cells: (FILL_NARROW_M / gsd).powi(2) as usize,
         hidden_cells_per_m: (FILL_HIDDEN / gsd) as f32,
         same_surface_m: (2.0 * gsd) as f32,
