@@ -6,6 +6,7 @@
 
 #![allow(clippy::print_stderr)]
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use io::colmap::{self, ColmapModel};
@@ -128,17 +129,15 @@ fn visible_points_equal_the_yardsticks() {
     }
 }
 
-/// Hits, depths and normals of every fifth camera (`benches/casting` compares all); counts of hits agree within five and `hit_tolerance`
-/// of them.
-fn check_statistics(scene: &Scene, hit_tolerance: f64) {
+/// Hits, depths and normals of every fifth camera (`benches/casting` compares all); counts of hits agree within five.
+fn check_statistics(scene: &Scene, without: &HashMap<usize, usize>) {
     let rays = Rays::new(&scene.cameras.lenses[0]).unwrap();
     let stats = scene.json("depth_o3d_100_stats.json");
     for (index, view) in scene.cameras.views.iter().enumerate().step_by(5) {
         let maps = PriorMaps::render(&scene.model, &scene.view(index), &rays, MapConfig::default());
-        let expected = stats[index][0].as_u64().unwrap() as usize;
-        let allowed = 5.0 + hit_tolerance * expected as f64;
+        let expected = stats[index][0].as_u64().unwrap() as usize - without.get(&index).unwrap_or(&0);
         let found = maps.hits();
-        assert!(found.abs_diff(expected) as f64 <= allowed, "{}: {found} hits, expected {expected}", view.name);
+        assert!(found.abs_diff(expected) <= 5, "{}: {found} hits, expected {expected}", view.name);
         let sum: f64 = maps.depth_m.data().iter().filter(|d| d.is_finite()).map(|&d| f64::from(d)).sum();
         let upwards: f64 = maps.normal.data().iter().map(|n| f64::from(n[2].abs())).sum();
         for (found, number) in [(sum, 1), (upwards, 2)] {
@@ -151,10 +150,60 @@ fn check_statistics(scene: &Scene, hit_tolerance: f64) {
 #[test]
 fn statistics_of_maps_equal_the_yardsticks() {
     let Some(scene) = Scene::with_their_triangles() else { return };
-    check_statistics(&scene, 0.0);
+    check_statistics(&scene, &HashMap::new());
     let Some(scene) = Scene::load() else { return };
-    // One roof has a ring that nearly touches itself; the triangles of the reference cover ten pixels more there, in one camera.
-    check_statistics(&scene, COUNT_TOLERANCE);
+    check_statistics(&scene, &HashMap::from([FALSE_ROOF_HITS]));
+}
+
+/// A camera that sees, in the reference only, a sliver of roof outside of the roof's ring; and in how many pixels.
+const FALSE_ROOF_HITS: (usize, usize) = (45, 10);
+
+/// A corner of one roof lies a quarter of a millimetre across another edge of its ring. The ear clipping of the reference
+/// then covers a sliver beside the roof; where it does, the ring does not go around the place that is hit.
+#[test]
+fn the_roof_that_only_the_reference_has_is_outside_of_its_ring() {
+    let (Some(ours), Some(theirs), Some(city)) = (Scene::load(), Scene::with_their_triangles(), city()) else { return };
+    let tile = io::city::read(&city.join("3dbag_5910.city.json")).unwrap().model;
+    let building = tile.objects.iter().find(|o| o.id == "NL.IMBAG.Pand.0503100000033695-0").unwrap();
+    let detailed = building.geometries.iter().find(|g| g.lod == "2.2".parse().ok()).unwrap();
+    let ring: Vec<[f64; 3]> = detailed.surfaces[410].rings[0]
+        .iter()
+        .map(|&vertex| tile.vertices[vertex as usize].from_origin(OFFSET))
+        .collect();
+    let height = ring[0][2];
+    assert!(ring.len() == 72 && ring.iter().all(|p| p[2] == height));
+    let (view, expected) = FALSE_ROOF_HITS;
+    let rays = Rays::new(&ours.cameras.lenses[0]).unwrap();
+    let depths =
+        |scene: &Scene| PriorMaps::render(&scene.model, &scene.view(view), &rays, MapConfig::default()).depth_m;
+    let (mine, reference) = (depths(&ours), depths(&theirs));
+    let (lens, pose) = (&ours.cameras.lenses[0], &ours.cameras.views[view].pose);
+    let mut only_theirs = 0;
+    for (pixel, (mine, reference)) in mine.data().iter().zip(reference.data()).enumerate() {
+        if mine.is_finite() || !reference.is_finite() {
+            continue;
+        }
+        let (sample, line) = ((pixel % lens.width()) as f64, (pixel / lens.width()) as f64);
+        let [x, y] = lens.direction(camera::ImagePoint { sample, line }).unwrap();
+        let [right, down, forward] = pose.rotation;
+        let ray = [0, 1, 2].map(|i| x * right[i] + y * down[i] + forward[i]);
+        let along = (height - pose.centre[2]) / ray[2];
+        let place = [0, 1].map(|i| pose.centre[i] + along * ray[i]);
+        assert_eq!(times_around(&ring, place), 0, "pixel {sample}, {line}");
+        only_theirs += 1;
+    }
+    assert_eq!(only_theirs, expected);
+}
+
+/// How often a ring goes around a place in the plan.
+fn times_around(ring: &[[f64; 3]], [x, y]: [f64; 2]) -> i32 {
+    let edges = ring.iter().zip(ring.iter().cycle().skip(1));
+    edges
+        .map(|(a, b)| {
+            let left = (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) > 0.0;
+            i32::from(a[1] <= y && b[1] > y && left) - i32::from(a[1] > y && b[1] <= y && !left)
+        })
+        .sum()
 }
 
 #[test]

@@ -28,6 +28,11 @@ loaded = time.perf_counter() - wall
 model.triangulate(True)
 print(json.dumps({"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu, "load": loaded}))
 """
+# What `tests/priors_yardsticks.rs` proves.
+FALSE_ROOF = """The camera off by more than five (45, by ten): a corner of one roof (NL.IMBAG.Pand.0503100000033695-0, \
+LoD 2.2, surface 410) lies 0.26 mm across another edge of its ring, and the ear clipping of the reference covers a sliver \
+beside that roof. The ten places hit are outside of the ring (its winding number is 0 there), so that a right map has \
+369,394 hits where the reference has 369,404; `tests/priors_yardsticks.rs` holds both."""
 YARDSTICKS = {"20": [494_586, 316_280, 130_065], "100": [2_039_718, 572_457, 472_904]}
 
 
@@ -148,6 +153,7 @@ def markdown(found):
     row("hits of a camera off by at most", "0", lambda of: f"{max(of['hits_off_per_camera']):.0f}")
     row("Σz of a camera off by at most", "0", lambda of: f"{of['sum_z_off_at_most']:.1e}")
     row("Σ abs(nz) of a camera off by at most", "0", lambda of: f"{of['sum_nz_off_at_most']:.1e}")
+    lines += ["", FALSE_ROOF]
     return "\n".join(lines) + "\n"
 
 
