@@ -93,6 +93,21 @@ fn the_report_names_every_object() {
     bench.run(&["info", "model.city.json", "--report", "report.json", "--overwrite"]).code(1);
 }
 
+/// A part of the house that is inside of it.
+const WING: &str = r#""wing":{"type":"BuildingPart","parents":["house"],"geometry":[{"type":"Solid","lod":"2.2","boundaries":[[
+    [[0,3,2,1]],[[0,1,5,4]],[[1,2,6,5]],[[2,3,7,6]],[[3,0,4,7]],[[4,5,6,7]]]]}]},"#;
+
+#[test]
+fn solids_are_checked_for_a_report() {
+    let bench = Bench::new(WING);
+    bench.run(&["info", "model.city.json", "--report", "report.json"]).code(0);
+    let report = bench.json("report.json");
+    let wing = report["object_reports"].as_array().unwrap().iter().find(|object| object["id"] == "wing").unwrap();
+    assert_eq!((&wing["status"], &wing["defects"][0]["code"]), (&Value::from("used"), &Value::from(601)));
+    assert_eq!(wing["defects"][0]["detail"], "with house");
+    assert!(!stdout(&bench.run(&["info", "model.city.json"])).contains("601"));
+}
+
 #[test]
 fn triangles_in_three_formats() {
     let bench = Bench::new("");

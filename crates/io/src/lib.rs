@@ -6,6 +6,7 @@
 pub mod city;
 pub mod colmap;
 pub mod control;
+mod lines;
 pub mod maps;
 pub mod npy;
 pub mod ply;

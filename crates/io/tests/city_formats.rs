@@ -167,8 +167,75 @@ fn broken_polygons_cost_themselves() {
     assert_eq!(with("0 0 0 1 0 0 &lol; 1 0 0 0 0"), (1, vec![1002]));
     let flat = gml("2.0", &format!("<bldg:lod0FootPrint>{}</bldg:lod0FootPrint>", polygon("x", "0 0 1 0 1 1 0 0")));
     assert_eq!(codes(&read_bytes(flat.replace("srsDimension=\"3\"", "srsDimension=\"2\"")).unwrap()), [904, 902]);
-    let implicit = "<bldg:lod2ImplicitRepresentation><core:ImplicitGeometry/></bldg:lod2ImplicitRepresentation>";
-    assert_eq!(codes(&read_bytes(gml("2.0", implicit)).unwrap()), [904]);
+}
+
+/// An implicit geometry: what is said of its placement, and its shape.
+fn implicit(placement: &str, shape: &str) -> String {
+    format!(
+        "<bldg:lod2ImplicitRepresentation><core:ImplicitGeometry>{placement}{shape}</core:ImplicitGeometry>\
+         </bldg:lod2ImplicitRepresentation>"
+    )
+}
+
+#[test]
+fn implicit_geometries_are_placed() {
+    let at = |x: f64| {
+        format!("<core:referencePoint><gml:Point><gml:pos>{x} 5700000 30</gml:pos></gml:Point></core:referencePoint>")
+    };
+    // A quarter turn to the left, twice as tall, a metre up.
+    let matrix = "<core:transformationMatrix>0 -1 0 0 1 0 0 0 0 0 2 1 0 0 0 1</core:transformationMatrix>";
+    let shape = format!(
+        "<core:relativeGMLGeometry><gml:MultiSurface gml:id=\"shape\"><gml:surfaceMember>{}</gml:surfaceMember>\
+         </gml:MultiSurface></core:relativeGMLGeometry>",
+        polygon("p", "0 0 0 4 0 0 0 3 5 0 0 0")
+    );
+    let again = "<core:relativeGMLGeometry xlink:href=\"#shape\"/>";
+    let both = implicit(&at(500_000.0), again) + &implicit(&format!("{matrix}{}", at(600_000.0)), &shape);
+    for version in ["1.0", "2.0", "3.0"] {
+        let text = gml(version, &both)
+            .replace("relativeGMLGeometry", if version == "3.0" { "relativeGeometry" } else { "relativeGMLGeometry" });
+        let file = read_bytes(text).unwrap();
+        assert!(file.defects.is_empty(), "{:?}", file.defects);
+        let geometries = &file.model.objects[0].geometries;
+        let corners = |geometry: usize| -> Vec<ModelPoint> {
+            geometries[geometry].surfaces[0].rings[0].iter().map(|&v| file.model.vertices[v as usize]).collect()
+        };
+        let point = |x: f64, y: f64, z: f64| ModelPoint::new(x, 5_700_000.0 + y, z);
+        let plain = [point(500_000.0, 0.0, 30.0), point(500_004.0, 0.0, 30.0), point(500_000.0, 3.0, 35.0)];
+        let turned = [point(600_000.0, 0.0, 31.0), point(600_000.0, 4.0, 31.0), point(599_997.0, 0.0, 41.0)];
+        assert_eq!((geometries.len(), corners(0), corners(1)), (2, plain.to_vec(), turned.to_vec()));
+    }
+    let refused = |content: &str, expected: &[u16], words: &str| {
+        let file = read_bytes(gml("2.0", content)).unwrap();
+        assert_eq!(codes(&file), expected, "{:?}", file.defects);
+        assert!(file.defects[0].detail.contains(words), "{:?}", file.defects);
+        assert!(file.model.objects[0].geometries.is_empty());
+    };
+    let library = "<core:libraryObject>file:///etc/passwd</core:libraryObject>";
+    refused(&implicit(&at(0.0), library), &[904], "not opened");
+    refused(&implicit("", ""), &[902], "without a shape");
+    refused(&implicit("", &shape), &[1006], "referencePoint");
+    refused(&implicit(&at(0.0).replace("0 5700000", "x 5700000"), &shape), &[1002], "\"x\"");
+    refused(&implicit(&format!("{}{}", at(0.0), matrix.replace(" 1<", "<")), &shape), &[1006], "16 numbers");
+    refused(
+        &implicit(&format!("{}{}", at(0.0), matrix.replace(" 1<", " NaN<").replace(">0 ", ">inf ")), &shape),
+        &[1002],
+        "",
+    );
+    refused(&implicit(&at(0.0), "<core:relativeGMLGeometry xlink:href=\"other.gml#shape\"/>"), &[1006], "other.gml");
+}
+
+#[test]
+fn a_property_may_be_a_link() {
+    let link = "<bldg:lod2MultiSurface xlink:href=\"#m\"/>";
+    let shared = format!(
+        "<bldg:lod1MultiSurface><gml:MultiSurface gml:id=\"m\"><gml:surfaceMember>{}</gml:surfaceMember>\
+         </gml:MultiSurface></bldg:lod1MultiSurface>",
+        polygon("p", RINGS[0].2)
+    );
+    let file = read_bytes(gml("2.0", &format!("{link}{shared}"))).unwrap();
+    assert!(file.defects.is_empty(), "{:?}", file.defects);
+    assert_eq!(file.model.objects[0].geometries.iter().map(|g| g.surfaces.len()).collect::<Vec<_>>(), [1, 1]);
 }
 
 #[test]

@@ -26,6 +26,8 @@ pub enum DefectCode {
     NonPlanarDistance = 203,
     /// A triangle of the polygon looks another way than the polygon.
     NonPlanarNormals = 204,
+    /// Rings touch so that the inside of the polygon falls into several pieces.
+    InteriorDisconnected = 205,
     /// A hole lies outside of the outer ring.
     InnerRingOutside = 206,
     /// A hole lies in another hole.
@@ -36,12 +38,32 @@ pub enum DefectCode {
     TooFewPolygons = 301,
     /// A shell has edges that only one polygon uses.
     ShellNotClosed = 302,
-    /// An edge is used by more than two polygons of a shell.
+    /// An edge is used by more than two polygons of a shell, or the polygons around a vertex are no single fan.
     NonManifold = 303,
     /// A shell falls into several pieces.
     MultipleComponents = 305,
-    /// Polygons of a shell look inwards.
+    /// Polygons of a shell meet elsewhere than along the edges they share.
+    ShellSelfIntersection = 306,
+    /// Some polygons of a shell look to the wrong side.
     WrongOrientation = 307,
+    /// Two shells of a solid cross, or share a piece of a face.
+    ShellsIntersect = 401,
+    /// Two shells of a solid are the same.
+    DuplicateShells = 402,
+    /// A cavity lies outside of its solid, or in another cavity.
+    InnerShellOutside = 403,
+    /// Shells touch so that the inside of the solid falls into several pieces.
+    SolidInteriorDisconnected = 404,
+    /// All polygons of a shell look to the wrong side.
+    WrongOrientationShell = 405,
+    /// Two solids of a composite solid overlap.
+    SolidsIntersect = 501,
+    /// Two solids of a composite solid are the same.
+    DuplicateSolids = 502,
+    /// The solids of a composite solid do not hang together by faces.
+    SolidsDisconnected = 503,
+    /// Parts of a building overlap.
+    PartsOverlap = 601,
     /// An object has no geometry.
     NoGeometry = 609,
     /// The file breaks the rules of its format.
@@ -74,6 +96,8 @@ pub enum DefectCode {
     CrsUnknown = 1011,
     /// A polygon that could not be cut into triangles.
     NotTriangulated = 1012,
+    /// Something that is too large to be checked.
+    NotChecked = 1013,
 }
 
 /// What a defect did to the thing it was found in.
@@ -104,7 +128,7 @@ pub struct Defect {
 
 impl DefectCode {
     /// Every code, ascending.
-    pub const ALL: [Self; 32] = [
+    pub const ALL: [Self; 44] = [
         Self::TooFewPoints,
         Self::ConsecutivePointsSame,
         Self::RingNotClosed,
@@ -113,6 +137,7 @@ impl DefectCode {
         Self::DuplicateRings,
         Self::NonPlanarDistance,
         Self::NonPlanarNormals,
+        Self::InteriorDisconnected,
         Self::InnerRingOutside,
         Self::InnerRingsNested,
         Self::OrientationRingsSame,
@@ -120,7 +145,17 @@ impl DefectCode {
         Self::ShellNotClosed,
         Self::NonManifold,
         Self::MultipleComponents,
+        Self::ShellSelfIntersection,
         Self::WrongOrientation,
+        Self::ShellsIntersect,
+        Self::DuplicateShells,
+        Self::InnerShellOutside,
+        Self::SolidInteriorDisconnected,
+        Self::WrongOrientationShell,
+        Self::SolidsIntersect,
+        Self::DuplicateSolids,
+        Self::SolidsDisconnected,
+        Self::PartsOverlap,
         Self::NoGeometry,
         Self::InvalidFile,
         Self::EmptyPrimitive,
@@ -137,6 +172,7 @@ impl DefectCode {
         Self::CrsMissing,
         Self::CrsUnknown,
         Self::NotTriangulated,
+        Self::NotChecked,
     ];
 
     /// The number in the catalogue.
@@ -155,14 +191,25 @@ impl DefectCode {
             Self::DuplicateRings => "two rings of a polygon are the same",
             Self::NonPlanarDistance => "a vertex lies off the polygon's plane",
             Self::NonPlanarNormals => "a part of the polygon looks another way than the polygon",
+            Self::InteriorDisconnected => "touching rings cut the polygon's inside into pieces",
             Self::InnerRingOutside => "a hole lies outside of the outer ring",
             Self::InnerRingsNested => "a hole lies in another hole",
             Self::OrientationRingsSame => "a hole turns the same way as the outer ring",
             Self::TooFewPolygons => "a shell has fewer than four polygons",
             Self::ShellNotClosed => "a shell is not closed",
-            Self::NonManifold => "an edge is used by more than two polygons of a shell",
+            Self::NonManifold => "an edge or a vertex joins more polygons of a shell than go around it once",
             Self::MultipleComponents => "a shell falls into several pieces",
-            Self::WrongOrientation => "polygons of a shell look inwards",
+            Self::ShellSelfIntersection => "polygons of a shell meet elsewhere than along their edges",
+            Self::WrongOrientation => "polygons of a shell look to the wrong side",
+            Self::ShellsIntersect => "two shells of a solid cross or share a piece of a face",
+            Self::DuplicateShells => "two shells of a solid are the same",
+            Self::InnerShellOutside => "a cavity lies outside of its solid, or in another cavity",
+            Self::SolidInteriorDisconnected => "touching shells cut the solid's inside into pieces",
+            Self::WrongOrientationShell => "all polygons of a shell look to the wrong side",
+            Self::SolidsIntersect => "two solids of a composite solid overlap",
+            Self::DuplicateSolids => "two solids of a composite solid are the same",
+            Self::SolidsDisconnected => "the solids of a composite solid do not hang together",
+            Self::PartsOverlap => "parts of a building overlap",
             Self::NoGeometry => "an object has no geometry",
             Self::InvalidFile => "the file breaks the rules of its format",
             Self::EmptyPrimitive => "a geometry or a part of it has no surfaces",
@@ -179,6 +226,7 @@ impl DefectCode {
             Self::CrsMissing => "the file does not name its reference system",
             Self::CrsUnknown => "the reference system's name gives no EPSG code",
             Self::NotTriangulated => "a polygon could not be cut into triangles",
+            Self::NotChecked => "too large to be checked",
         }
     }
 }

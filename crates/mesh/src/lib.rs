@@ -6,7 +6,8 @@
 //!
 //! [`TriangleMesh::from_model`] makes triangles of it: one level of detail per object, polygons with holes by constrained
 //! Delaunay triangulation, solids checked. Whatever is wrong is a [`Defect`] with a number, and every object of the model
-//! has a status: used, or why not.
+//! has a status: used, or why not. [`check_solids`] adds what only a report needs: shells that meet themselves, cavities, solids
+//! and parts that overlap.
 //!
 //! [`Splat`] is the other element of a surface: a Gaussian on it.
 
@@ -22,11 +23,13 @@ mod point;
 mod pool;
 mod ring;
 mod select;
+mod sets;
 mod shell;
 mod splat;
 mod triangle_mesh;
 mod triangulate;
-mod vector;
+mod validity;
+pub mod vector;
 
 pub use class::SurfaceClass;
 pub use crs::CrsReference;
@@ -41,3 +44,4 @@ pub use select::{LodChoice, ObjectStatus, Scope};
 pub use splat::{Splat, SplatDefect, quaternion_of_axes};
 pub use triangle_mesh::{MeshConfig, MeshSurface, Meshed, ObjectReport, TriangleMesh};
 pub use triangulate::{Finding, Triangulation, triangulate};
+pub use validity::check_solids;

@@ -76,7 +76,7 @@ impl TriangleMesh {
         model.validate()?;
         let chosen = select::choose(model, config.lod, config.scope);
         let origin = origin(model, &chosen);
-        let position = |i: u32| micrometres(model.vertices[i as usize].from_origin(origin));
+        let position = positions(model, origin);
         let pieces: Vec<Option<Piece>> = chosen
             .par_iter()
             .enumerate()
@@ -165,6 +165,16 @@ fn origin(model: &CityModel, chosen: &[Chosen]) -> ModelPoint {
     })
 }
 
+/// Where the vertices of a model are, metres from an origin, on the lattice of micrometres.
+fn positions(model: &CityModel, origin: ModelPoint) -> impl Fn(u32) -> Vector + '_ {
+    move |i| micrometres(model.vertices[i as usize].from_origin(origin))
+}
+
+/// Where the vertices of a model are in the frame that its triangles have.
+pub(crate) fn positions_of<'a>(model: &'a CityModel, chosen: &[Chosen]) -> impl Fn(u32) -> Vector + 'a {
+    positions(model, origin(model, chosen))
+}
+
 fn micrometres(position: Vector) -> Vector {
     position.map(|c| (c * 1e6).round() / 1e6)
 }
@@ -231,7 +241,8 @@ impl Piece {
             turn[start..start + members.len()].copy_from_slice(&check.turn);
             start += members.len();
             for (code, detail) in check.found {
-                let effect = if code == DefectCode::WrongOrientation { Effect::Repaired } else { Effect::Noted };
+                let turned = matches!(code, DefectCode::WrongOrientation | DefectCode::WrongOrientationShell);
+                let effect = if turned { Effect::Repaired } else { Effect::Noted };
                 let place = format!("geometry {number}, solid {solid}, shell {number_of_shell}");
                 self.defects.push((code, effect, place, detail));
             }

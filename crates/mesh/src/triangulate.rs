@@ -7,18 +7,24 @@
 //! Coordinates are metres relative to any nearby origin. Nothing is lost in silence: what was met on the way comes back as
 //! [`Finding`]s.
 
-use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
+use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _};
 
 use crate::DefectCode;
 use crate::ears;
 use crate::ring::{Plane, clean};
-use crate::vector::{Vector, cross, dot, sub, unit};
+use crate::vector::{Vector, cross, dot, norm, sub, unit};
+
+mod faces;
+
+use faces::{faces_by_parity, pieces_inside};
 
 /// A vertex off the plane by more than this is reported, metres (val3dity's default).
 const PLANARITY_M: f64 = 0.01;
 /// A triangle that deviates by more than 20 degrees from the polygon's normal is reported (val3dity's default).
 const NORMAL_COSINE: f64 = 0.939_692_620_785_908_4;
+/// Triangles that are narrower look anywhere where coordinates are on millimetres, metres.
+const NARROW_M: f64 = 2.5e-3;
 /// Below this the way a polygon is cut changes its surface by less than can be seen, metres.
 const FLAT_M: f64 = 2e-4;
 /// Ears are searched in rings up to this length: the search is quadratic.
@@ -71,7 +77,9 @@ pub fn triangulate(rings: &[Vec<u32>], position: impl Fn(u32) -> [f64; 3]) -> Tr
     } else {
         Polygon::new(&rings, plane, &position).cut(off_plane_m, &mut out);
     }
-    check_normals(&mut out, &plane, &position);
+    if off_plane_m > FLAT_M {
+        check_normals(&mut out, &plane, &position);
+    }
     out
 }
 
@@ -94,8 +102,17 @@ fn usable_rings(
             let detail = format!("{} edges lead back over themselves in ring {index}", found.spikes);
             findings.push(Finding::note(DefectCode::RingSelfIntersection, detail));
         }
+        if found.spikes == 0 && touches_itself(&ring, position) {
+            let detail = format!("ring {index} comes to a vertex twice");
+            findings.push(Finding::note(DefectCode::RingSelfIntersection, detail));
+        }
         let points: Vec<Vector> = ring.iter().map(|&v| position(v)).collect();
-        let code = if ring.len() < 3 { DefectCode::TooFewPoints } else { DefectCode::ZeroArea };
+        let code = match ring.len() {
+            0..=2 => DefectCode::TooFewPoints,
+            // No area and not on a line: loops that cancel each other.
+            _ if points.windows(3).any(|corner| Plane::of_ring(corner).is_some()) => DefectCode::RingSelfIntersection,
+            _ => DefectCode::ZeroArea,
+        };
         let Some(plane) = Plane::of_ring(&points) else {
             findings.push(Finding { code, dropped: true, detail: format!("ring {index}") });
             if index == 0 {
@@ -123,6 +140,17 @@ fn usable_rings(
     outer.map(|plane| (kept, plane))
 }
 
+/// Whether a vertex occurs twice in a cleaned ring.
+fn touches_itself(ring: &[u32], position: &impl Fn(u32) -> Vector) -> bool {
+    // Two triangles that share a corner are the shortest such ring.
+    if ring.len() < 6 {
+        return false;
+    }
+    let mut places: Vec<[u64; 3]> = ring.iter().map(|&vertex| position(vertex).map(|c| (c + 0.0).to_bits())).collect();
+    places.sort_unstable();
+    places.windows(2).any(|pair| pair[0] == pair[1])
+}
+
 /// Whether two rings have the same corners in the same or the opposite order, wherever they begin.
 fn same_ring(a: &[u32], b: &[u32], position: &impl Fn(u32) -> Vector) -> bool {
     let n = a.len();
@@ -148,13 +176,13 @@ fn check_planarity(
 }
 
 fn check_normals(out: &mut Triangulation, plane: &Plane, position: &impl Fn(u32) -> Vector) {
-    if !out.findings.iter().any(|finding| finding.code == DefectCode::NonPlanarDistance) {
-        return;
-    }
     let corner = |v: u32| out.added.get((u32::MAX - v) as usize).copied().unwrap_or_else(|| position(v));
     let normal = |t: &[u32; 3]| {
         let [a, b, c] = t.map(corner);
-        unit(cross(sub(b, a), sub(c, a)))
+        let doubled = cross(sub(b, a), sub(c, a));
+        let longest = [sub(b, a), sub(c, a), sub(c, b)].map(norm).into_iter().fold(0.0, f64::max);
+        // Of a narrower one the rounding of coordinates makes what it likes.
+        unit(doubled).filter(|_| norm(doubled) > NARROW_M * longest)
     };
     let least = out.triangles.iter().filter_map(normal).map(|n| dot(n, plane.normal)).fold(1.0, f64::min);
     if least < NORMAL_COSINE {
@@ -247,7 +275,9 @@ impl Polygon {
             return;
         }
         if simple && holes_fit {
-            return self.collect(&cdt, &faces_by_parity(&cdt), out);
+            let inside = faces_by_parity(&cdt);
+            self.check_connected(&cdt, &inside, &mut out.findings);
+            return self.collect(&cdt, &inside, out);
         }
         if !bounded {
             let detail = "too many vertices for a polygon with such rings";
@@ -294,7 +324,16 @@ impl Polygon {
     }
 
     fn meeting_rings(&self, crossing: bool) -> Finding {
-        let code = if self.rings.len() == 1 { DefectCode::RingSelfIntersection } else { DefectCode::RingIntersection };
+        // A ring that is alone in a triangulation meets nothing but itself.
+        let meets_itself = |ring: &Vec<Corner>| {
+            let mut alone = Cdt::new();
+            constrain_ring(&mut alone, ring, false) != Some(true) || alone.num_constraints() != ring.len()
+        };
+        let code = if self.rings.len() == 1 || self.rings.iter().any(meets_itself) {
+            DefectCode::RingSelfIntersection
+        } else {
+            DefectCode::RingIntersection
+        };
         Finding::note(code, if crossing { "edges cross" } else { "a vertex or an edge lies on another edge" })
     }
 
@@ -313,6 +352,18 @@ impl Polygon {
             }
         }
         findings.len() == before
+    }
+
+    /// Whether holes that touch cut the inside into pieces.
+    fn check_connected(&self, cdt: &Cdt, inside: &[bool], findings: &mut Vec<Finding>) {
+        // A ring that touches itself is the defect already.
+        if self.rings.len() == 1 || findings.iter().any(|found| found.code == DefectCode::RingSelfIntersection) {
+            return;
+        }
+        let pieces = pieces_inside(cdt, inside);
+        if pieces > 1 {
+            findings.push(Finding::note(DefectCode::InteriorDisconnected, format!("{pieces} pieces")));
+        }
     }
 
     /// Which faces have their centroid inside the outer ring and in no hole.
@@ -415,26 +466,6 @@ fn crossing([a, b]: [Point2<f64>; 2], [c, d]: [Point2<f64>; 2]) -> Option<(f64, 
         };
         (t, at)
     })
-}
-
-/// Which faces an odd number of constraints separates from the outside, by walking from face to face.
-fn faces_by_parity(cdt: &Cdt) -> Vec<bool> {
-    let mut parity: Vec<Option<bool>> = vec![None; cdt.num_all_faces()];
-    let mut open: Vec<(FixedFaceHandle<InnerTag>, bool)> = Vec::new();
-    let border = cdt.directed_edges().filter(|edge| edge.is_outer_edge()).map(|edge| edge.rev());
-    open.extend(border.filter_map(|edge| Some((edge.face().as_inner()?.fix(), edge.is_constraint_edge()))));
-    while let Some((face, inside)) = open.pop() {
-        let face = cdt.face(face);
-        if parity[face.index()].replace(inside).is_some() {
-            continue;
-        }
-        for edge in face.adjacent_edges().map(|edge| edge.rev()) {
-            if let Some(next) = edge.face().as_inner().filter(|next| parity[next.index()].is_none()) {
-                open.push((next.fix(), inside ^ edge.is_constraint_edge()));
-            }
-        }
-    }
-    parity.into_iter().map(|inside| inside.unwrap_or(false)).collect()
 }
 
 /// Whether a point is inside a ring (even-odd rule).

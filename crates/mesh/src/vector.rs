@@ -1,35 +1,45 @@
-//! The few vector operations on `[f64; 3]` that the geometry here needs.
+//! Vectors of three numbers: the few operations that geometry here and in the crates above needs.
 
-pub(crate) type Vector = [f64; 3];
+/// Three coordinates, or three components.
+pub type Vector = [f64; 3];
 
-pub(crate) fn sub(a: Vector, b: Vector) -> Vector {
+/// `a − b`.
+pub fn sub(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
+/// The scalar product.
+pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
+/// The vector product.
+pub fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-pub(crate) fn scale(a: Vector, factor: f64) -> Vector {
+/// `factor · a`.
+pub fn scale(a: Vector, factor: f64) -> Vector {
     a.map(|c| c * factor)
 }
 
-pub(crate) fn norm(a: Vector) -> f64 {
+/// `a + t · b`.
+pub fn along(a: Vector, t: f64, b: Vector) -> Vector {
+    [a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]]
+}
+
+/// The length.
+pub fn norm(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// The vector of length 1; `None` for zero and for lengths that are not finite.
-pub(crate) fn unit(a: Vector) -> Option<Vector> {
+/// The vector of length 1 in the same direction; `None` for zero and for lengths that are not finite.
+pub fn unit(a: Vector) -> Option<Vector> {
     let length = norm(a);
-    (length > 0.0 && length.is_finite()).then(|| scale(a, 1.0 / length))
+    (length > 0.0 && length.is_finite()).then(|| a.map(|c| c / length))
 }
 
 /// `sum + a × b`.
-pub(crate) fn add_cross(sum: Vector, a: Vector, b: Vector) -> Vector {
-    let c = cross(a, b);
-    [sum[0] + c[0], sum[1] + c[1], sum[2] + c[2]]
+pub fn add_cross(sum: Vector, a: Vector, b: Vector) -> Vector {
+    along(sum, 1.0, cross(a, b))
 }

@@ -11,6 +11,7 @@ mod crs_name;
 mod error;
 mod export;
 mod obj;
+mod placement;
 mod ply;
 mod save;
 

@@ -7,6 +7,7 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::error::Fault;
+use crate::lines::Lines;
 
 /// RPC documents are about six levels deep.
 const DEPTH_MAX: usize = 64;
@@ -67,7 +68,7 @@ pub(super) fn root(text: &str) -> Option<String> {
 /// Calls `visit` for every leaf in document order.
 pub(super) fn walk(text: &str, mut visit: impl FnMut(Leaf<'_>) -> Result<(), Fault>) -> Result<(), Fault> {
     let mut reader = Reader::from_str(text);
-    let mut lines = Lines { text, position: 0, line: 1 };
+    let mut lines = Lines::new(text);
     let mut path: Vec<Element> = Vec::new();
     let mut content = String::new();
     let mut is_leaf = false;
@@ -146,21 +147,4 @@ fn reference(name: &str, line: usize) -> Result<char, Fault> {
         },
     };
     character.ok_or_else(|| syntax(format!("unknown XML entity &{name};"), line))
-}
-
-/// Line numbers for growing positions, in one pass over the text.
-struct Lines<'a> {
-    text: &'a str,
-    position: usize,
-    line: usize,
-}
-
-impl Lines<'_> {
-    fn at(&mut self, position: u64) -> usize {
-        let position = usize::try_from(position).unwrap_or(usize::MAX).min(self.text.len());
-        let passed = self.text.as_bytes().get(self.position..position).unwrap_or_default();
-        self.line += passed.iter().filter(|b| **b == b'\n').count();
-        self.position = position.max(self.position);
-        self.line
-    }
 }

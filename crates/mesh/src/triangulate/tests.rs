@@ -61,6 +61,8 @@ fn holes() {
     covers(&[&square(0.0, 0.0, 4.0), &hole, &hole], 15.0, &[202]);
     covers(&[&square(0.0, 0.0, 4.0), &reversed(square(3.0, 1.0, 2.0))], 14.0, &[201]);
     covers(&[&square(0.0, 0.0, 4.0), &reversed(square(2.0, 1.0, 2.0))], 12.0, &[201]);
+    // A hole that cuts the square in two by touching the border with two corners.
+    covers(&[&square(0.0, 0.0, 4.0), &reversed(vec![[0.0, 0.0], [4.0, 4.0], [2.0, 3.0]])], 14.0, &[205]);
     // A hole that touches the border with one corner.
     covers(&[&square(0.0, 0.0, 4.0), &reversed(vec![[0.0, 0.0], [2.0, 1.0], [1.0, 2.0]])], 14.5, &[]);
 }
@@ -75,7 +77,7 @@ fn broken_rings() {
     covers(&[], 0.0, &[]);
     // A ring that touches itself at a corner of two squares, and a bow tie with a large and a small wing.
     let touching = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0], [1.0, 1.0], [0.0, 1.0]];
-    covers(&[&touching], 2.0, &[]);
+    covers(&[&touching], 2.0, &[104]);
     let (area, codes) = cut(&[&[[0.0, 0.0], [4.0, 0.0], [3.0, -1.0], [3.0, 3.0]]]);
     assert_eq!(codes, [104]);
     assert!((area - 5.0).abs() < 1e-9, "{area}");

@@ -2,10 +2,12 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use mesh::{DefectCode, Geometry, GeometryKind, Lod, Surface, SurfaceClass};
+use mesh::{DefectCode, Geometry, GeometryKind, Lod, ModelPoint, Surface, SurfaceClass};
 
+use super::implicit::Implicit;
 use crate::city::CityFault;
 use crate::city::builder::Builder;
+use crate::city::placement::Instances;
 
 /// A link may lead to surfaces that are links themselves, this many times in a row.
 const LINK_DEPTH_MAX: usize = 4;
@@ -28,6 +30,8 @@ pub(super) struct Group {
     /// Whether it is that of a boundary surface.
     pub(super) in_boundary: bool,
     pub(super) members: Vec<Member>,
+    /// How its surfaces are placed, where their coordinates are not those of the model.
+    pub(super) implicit: Option<Implicit>,
     pub(super) line: usize,
 }
 
@@ -100,11 +104,16 @@ pub(super) fn assemble(
     let in_solids: HashSet<(usize, Lod, usize)> = groups
         .iter()
         .zip(&resolved)
-        .filter(|(group, _)| group.kind.is_solid())
+        .filter(|(group, _)| group.kind.is_solid() && group.implicit.is_none())
         .flat_map(|(group, found)| found.iter().map(|member| (group.object, group.lod, member.polygon)))
         .collect();
     let mut boundaries: BTreeMap<(usize, Lod), Geometry> = BTreeMap::new();
+    let mut instances = Instances::default();
     for (group, found) in groups.iter().zip(&resolved) {
+        if let Some(implicit) = &group.implicit {
+            add_instance(builder, &mut instances, group, implicit, found, &polygons)?;
+            continue;
+        }
         let surface = |member: &Resolved| surface(&polygons[member.polygon], member);
         if group.kind.is_solid() {
             let mut geometry = Geometry::new(Some(group.lod), group.kind);
@@ -127,6 +136,44 @@ pub(super) fn assemble(
     for ((object, _), geometry) in boundaries {
         add(builder, object, geometry);
     }
+    Ok(())
+}
+
+/// Adds the surfaces of an implicit geometry, with vertices of their own.
+fn add_instance(
+    builder: &mut Builder,
+    instances: &mut Instances,
+    group: &Group,
+    implicit: &Implicit,
+    found: &[Resolved],
+    polygons: &[Polygon],
+) -> Result<(), CityFault> {
+    let place = format!("line {}", group.line);
+    let placement = match implicit.placement() {
+        Ok(placement) => placement,
+        Err((code, detail)) => {
+            builder.dropped(code, group.object, place, detail);
+            return Ok(());
+        }
+    };
+    let rings = found.iter().flat_map(|member| &polygons[member.polygon].rings);
+    let mut used: Vec<u32> = rings.flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let own: Vec<(u64, [f64; 3])> =
+        used.iter().map(|&v| (u64::from(v), builder.position(v).from_origin(ModelPoint::default()))).collect();
+    let index_of = instances.place(builder, &placement, own.into_iter(), &place)?;
+    let mut geometry = Geometry::new(Some(group.lod), group.kind);
+    for mut surface in found.iter().filter_map(|member| surface(&polygons[member.polygon], member)) {
+        let placed = surface.rings.iter_mut().flatten();
+        placed.for_each(|vertex| *vertex = index_of.get(&u64::from(*vertex)).copied().unwrap_or(*vertex));
+        if surface.rings.iter().flatten().all(|&vertex| builder.is_usable(vertex)) {
+            geometry.surfaces.push(surface);
+        } else {
+            builder.dropped(DefectCode::CoordinateOutOfRange, group.object, place.clone(), "an implicit geometry");
+        }
+    }
+    add(builder, group.object, geometry);
     Ok(())
 }
 

@@ -2,10 +2,11 @@
 //!
 //! One pass over the text, without a tree. Documents with a DTD are refused, no entity but the predefined ones is expanded,
 //! and links (`xlink:href`) are followed inside the file only, to a bounded depth and number. Boundary surfaces give
-//! polygons their class; a solid that links to them becomes one geometry with classes. Curves, points, implicit
-//! geometries, appearance and attributes are passed over.
+//! polygons their class; a solid that links to them becomes one geometry with classes. Implicit
+//! geometries are placed where they say. Curves, points, appearance and attributes are passed over.
 
 mod assemble;
+mod implicit;
 mod walker;
 
 use std::borrow::Cow;
@@ -14,6 +15,7 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::{CityFault, CityFormat, Parsed};
+use crate::lines::Lines;
 use walker::Walker;
 
 /// Real files are about 25 levels deep.
@@ -24,7 +26,7 @@ const ATTRIBUTES_MAX: usize = 256;
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     let text = decode(bytes)?;
     let mut reader = Reader::from_str(&text);
-    let mut lines = Lines { text: &text, position: 0, line: 1 };
+    let mut lines = Lines::new(&text);
     let mut version = None;
     let mut walker = Walker::default();
     loop {
@@ -123,21 +125,4 @@ fn check_root(name: &str, attributes: &Attributes, line: usize) -> Result<String
     version.map(str::to_owned).ok_or_else(|| {
         CityFault::unsupported("no namespace of CityGML 1.0, 2.0 or 3.0 at the root", format!("line {line}"))
     })
-}
-
-/// Line numbers for growing positions, in one pass over the text.
-struct Lines<'a> {
-    text: &'a str,
-    position: usize,
-    line: usize,
-}
-
-impl Lines<'_> {
-    fn at(&mut self, position: u64) -> usize {
-        let position = usize::try_from(position).unwrap_or(usize::MAX).min(self.text.len());
-        let passed = self.text.as_bytes().get(self.position..position).unwrap_or_default();
-        self.line += passed.iter().filter(|byte| **byte == b'\n').count();
-        self.position = position.max(self.position);
-        self.line
-    }
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use mesh::{CityModel, Defect, DefectCode, GeometryKind, Lod, ModelPoint, ObjectKind, SurfaceClass, VertexPool};
 
 use super::assemble::{Group, Member, Named, Polygon, Target, assemble};
+use super::implicit::{Field, Implicit};
 use super::{Attributes, attribute};
 use crate::city::CityFault;
 use crate::city::builder::Builder;
@@ -91,6 +92,11 @@ enum Mark {
     Positions {
         text: String,
     },
+    /// Text of an implicit geometry.
+    Implicit {
+        field: Field,
+        text: String,
+    },
 }
 
 /// The state inside of a geometry property.
@@ -100,7 +106,7 @@ struct Progress {
     shell: u32,
     turned: bool,
     polygon: Option<OpenPolygon>,
-    implicit: bool,
+    implicit: Option<Implicit>,
 }
 
 #[derive(Debug)]
@@ -126,7 +132,7 @@ impl Walker {
         let mark = if self.geometry.is_some() {
             self.start_in_geometry(name, attributes, line)
         } else {
-            self.start_outside(name, id.as_deref(), line)
+            self.start_outside(name, id.as_deref(), attribute(attributes, "href"), line)
         };
         self.stack.push(Frame { name: name.to_owned(), id, dimension, mark });
         Ok(())
@@ -136,7 +142,7 @@ impl Walker {
         self.stack.last().map_or("", |frame| &frame.name)
     }
 
-    fn start_outside(&mut self, name: &str, id: Option<&str>, line: usize) -> Mark {
+    fn start_outside(&mut self, name: &str, id: Option<&str>, link: Option<&str>, line: usize) -> Mark {
         if OBJECT_PROPERTIES.contains(&self.parent()) {
             let id = id.map_or_else(|| format!("{name} in line {line}"), str::to_owned);
             let object = self.builder.object(id, ObjectKind::new(name.to_owned()));
@@ -154,8 +160,13 @@ impl Walker {
             (Some(object), Some(lod)) => {
                 let kind = GeometryKind::MultiSurface;
                 let in_boundary = self.class != SurfaceClass::Unclassified;
-                self.groups.push(Group { object, lod, kind, in_boundary, members: Vec::new(), line });
-                self.geometry = Some(Progress::default());
+                self.groups.push(Group { object, lod, kind, in_boundary, members: Vec::new(), implicit: None, line });
+                let implicit = name.ends_with("ImplicitRepresentation").then(Implicit::default);
+                let is_link_to_surfaces = implicit.is_none();
+                self.geometry = Some(Progress { implicit, ..Progress::default() });
+                if let Some(link) = link.filter(|_| is_link_to_surfaces) {
+                    self.member(Target::Link(link.to_owned()), line);
+                }
                 Mark::Geometry
             }
             _ => Mark::Nothing,
@@ -166,7 +177,11 @@ impl Walker {
         let in_polygon = self.geometry.as_ref().is_some_and(|g| g.polygon.is_some());
         let parent = self.parent().to_owned();
         let first = self.groups.last().map_or(0, |group| group.members.len());
-        if let (Some(link), false) = (attribute(attributes, "href"), in_polygon) {
+        if let Some(field) = self.field(name).filter(|_| !in_polygon) {
+            return Mark::Implicit { field, text: String::new() };
+        }
+        let in_reference = name == "referencePoint" || parent == "referencePoint";
+        if let (Some(link), false) = (attribute(attributes, "href"), in_polygon || in_reference) {
             self.member(Target::Link(link.to_owned()), line);
         }
         let (Some(progress), Some(group)) = (&mut self.geometry, self.groups.last_mut()) else { return Mark::Nothing };
@@ -185,7 +200,7 @@ impl Walker {
                 Mark::Members { first }
             }
             "ImplicitGeometry" => {
-                progress.implicit = true;
+                progress.implicit.get_or_insert_default();
                 Mark::Nothing
             }
             "OrientableSurface" => {
@@ -216,8 +231,16 @@ impl Walker {
         }
     }
 
+    /// What an element says about an implicit geometry.
+    fn field(&self, name: &str) -> Option<Field> {
+        self.geometry.as_ref()?.implicit.as_ref()?;
+        Field::of(name, self.stack.iter().map(|frame| frame.name.as_str()))
+    }
+
     pub(super) fn text(&mut self, text: &str) {
-        if let Some(Frame { mark: Mark::Positions { text: so_far }, .. }) = self.stack.last_mut() {
+        let frame = self.stack.last_mut();
+        if let Some(Mark::Positions { text: so_far } | Mark::Implicit { text: so_far, .. }) = frame.map(|f| &mut f.mark)
+        {
             so_far.push_str(text);
         }
     }
@@ -243,6 +266,11 @@ impl Walker {
                 let dimension = frame.dimension.or_else(|| self.stack.iter().rev().find_map(|frame| frame.dimension));
                 self.positions(&text, &frame.name, dimension.unwrap_or(3));
             }
+            Mark::Implicit { field, text } => {
+                if let Some(implicit) = self.geometry.as_mut().and_then(|g| g.implicit.as_mut()) {
+                    implicit.take(field, &text);
+                }
+            }
         }
     }
 
@@ -264,12 +292,15 @@ impl Walker {
     }
 
     fn end_geometry(&mut self) {
-        let Some(progress) = self.geometry.take() else { return };
-        let Some(group) = self.groups.last().filter(|group| group.members.is_empty()) else { return };
-        let (code, detail) = if progress.implicit {
-            (DefectCode::NotSupported, "an implicit geometry")
-        } else {
-            (DefectCode::EmptyPrimitive, "no surface")
+        let Some(Progress { implicit, .. }) = self.geometry.take() else { return };
+        let Some(group) = self.groups.last_mut() else { return };
+        if !group.members.is_empty() {
+            group.implicit = implicit;
+            return;
+        }
+        let (code, detail) = match implicit {
+            Some(implicit) => implicit.without_shape(),
+            None => (DefectCode::EmptyPrimitive, "no surface".to_owned()),
         };
         let (object, place) = (group.object, format!("line {}", group.line));
         self.builder.dropped(code, object, place, detail);

@@ -12,9 +12,9 @@ use mesh::{ModelPoint, ObjectKind};
 
 use super::builder::Builder;
 use super::crs_name::crs_reference;
+use super::placement::Instances;
 use super::{CityFault, CityFormat, Parsed};
 use schema::{Document, Object, Pairs, Templates, Transform};
-use template::Instances;
 
 pub use write::{CityJsonOptions, write_cityjson};
 
@@ -121,7 +121,8 @@ impl Reader {
             for (number, shape) in object.geometry.iter().flatten().enumerate() {
                 let place = geometry::Place { object: index, geometry: number };
                 if shape.kind.as_deref() == Some("GeometryInstance") {
-                    self.instances.add(&mut self.builder, shape, templates, first..first + count, place)?;
+                    let (builder, vertices) = (&mut self.builder, first..first + count);
+                    template::add_instance(builder, &mut self.instances, shape, templates, vertices, place)?;
                 } else {
                     let vertex_at = |i: u64| usize::try_from(i).ok().filter(|&i| i < count).map(|i| (first + i) as u32);
                     geometry::add(&mut self.builder, shape, vertex_at, place);

@@ -1,0 +1,35 @@
+//! Line numbers in a text that is read from front to back.
+
+/// Line numbers for growing positions, in one pass over the text.
+pub(crate) struct Lines<'a> {
+    text: &'a str,
+    position: usize,
+    line: usize,
+}
+
+impl<'a> Lines<'a> {
+    /// At the start of a text.
+    pub(crate) fn new(text: &'a str) -> Self {
+        Self { text, position: 0, line: 1 }
+    }
+
+    /// The line of a byte, the first being 1; of the farthest one asked for where that is farther.
+    pub(crate) fn at(&mut self, position: u64) -> usize {
+        let position = usize::try_from(position).unwrap_or(usize::MAX).min(self.text.len());
+        let passed = self.text.as_bytes().get(self.position..position).unwrap_or_default();
+        self.line += passed.iter().filter(|byte| **byte == b'\n').count();
+        self.position = position.max(self.position);
+        self.line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_grow_with_positions() {
+        let mut lines = Lines::new("ab\n\ncd");
+        assert_eq!([1, 3, 4, 2, 99].map(|position| lines.at(position)), [1, 2, 3, 3, 3]);
+    }
+}

@@ -1,0 +1,158 @@
+//! How two closed surfaces lie to each other: beside, touching, sharing faces, reaching into each other.
+//!
+//! Every edge of one surface is cut where it goes through a triangle of the other, and the pieces are inside, outside or on
+//! it. Surfaces whose edges lie in each other's faces are told apart by the faces that they share: two that look the same way
+//! have their insides on the same side.
+
+use super::patch::{Bounds, Patch, Side};
+use super::{MAX_COMPARISONS, SHELL_TOLERANCE_M};
+use crate::vector::{Vector, cross, dot, norm, sub, unit};
+
+/// How surfaces A and B lie to each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Contact {
+    /// Some of A is inside B; outside of it.
+    pub(super) a_inside: bool,
+    pub(super) a_outside: bool,
+    /// Some of B is inside A; outside of it.
+    pub(super) b_inside: bool,
+    pub(super) b_outside: bool,
+    /// They share a piece of a face and look the same way; opposite ways.
+    pub(super) same_face: bool,
+    pub(super) opposite_face: bool,
+}
+
+impl Contact {
+    /// Compares two surfaces; `None` when that would take too long.
+    pub(super) fn of(a: &Patch, b: &Patch, tolerance_m: f64) -> Option<Self> {
+        let mut contact = Self { a_outside: true, b_outside: true, ..Self::default() };
+        if !a.bounds.meets(&b.bounds, tolerance_m) {
+            return Some(contact);
+        }
+        (contact.a_inside, contact.a_outside) = pieces(a, b, tolerance_m)?;
+        (contact.b_inside, contact.b_outside) = pieces(b, a, tolerance_m)?;
+        for (i, s) in a.corners.iter().enumerate().filter(|(_, s)| Bounds::of(**s).meets(&b.bounds, tolerance_m)) {
+            let bounds = Bounds::of(*s);
+            for t in b.corners.iter().filter(|t| bounds.meets(&Bounds::of(**t), tolerance_m)) {
+                match shared_face(&a.corners[i], t, tolerance_m) {
+                    Some(true) => contact.same_face = true,
+                    Some(false) => contact.opposite_face = true,
+                    None => {}
+                }
+            }
+        }
+        Some(contact)
+    }
+
+    /// Whether the insides of two solids, each looking outwards, have something in common.
+    pub(super) fn interiors_meet(&self) -> bool {
+        self.a_inside || self.b_inside || self.same_face
+    }
+
+    /// Whether neither leaves the other's surface.
+    pub(super) fn is_same(&self) -> bool {
+        !(self.a_inside || self.a_outside || self.b_inside || self.b_outside)
+    }
+
+    /// Whether they share a piece of a face.
+    pub(super) fn shares_face(&self) -> bool {
+        self.same_face || self.opposite_face
+    }
+}
+
+/// Whether some of the edges of `a` is inside of `b`, and outside.
+fn pieces(a: &Patch, b: &Patch, tolerance_m: f64) -> Option<(bool, bool)> {
+    let (mut inside, mut outside) = (false, false);
+    let mut comparisons = 0usize;
+    for (_, [p, q]) in a.edges() {
+        if inside && outside {
+            break;
+        }
+        if !Bounds::of([p, q]).meets(&b.bounds, tolerance_m) {
+            outside = true;
+            continue;
+        }
+        let cuts = cuts([p, q], b);
+        comparisons = comparisons.saturating_add(b.corners.len() * cuts.len());
+        if comparisons > MAX_COMPARISONS {
+            return None;
+        }
+        for pair in cuts.windows(2) {
+            let middle = 0.5 * (pair[0] + pair[1]);
+            match b.side([0, 1, 2].map(|i| p[i] + middle * (q[i] - p[i])), tolerance_m) {
+                Side::Inside => inside = true,
+                Side::Outside => outside = true,
+                Side::On => {}
+            }
+        }
+    }
+    Some((inside, outside))
+}
+
+/// The fractions of an edge at its ends and where it goes through a plane of a triangle close by, ascending.
+fn cuts([p, q]: [Vector; 2], b: &Patch) -> Vec<f64> {
+    let edge = Bounds::of([p, q]);
+    let mut cuts = vec![0.0, 1.0];
+    for t in b.corners.iter().filter(|t| Bounds::of(**t).meets(&edge, SHELL_TOLERANCE_M)) {
+        let Some(normal) = normal(t) else { continue };
+        let (from, to) = (dot(normal, sub(p, t[0])), dot(normal, sub(q, t[0])));
+        if from * to < 0.0 {
+            cuts.push(from / (from - to));
+        }
+    }
+    cuts.sort_by(f64::total_cmp);
+    cuts.dedup();
+    cuts
+}
+
+/// The unit normal of a triangle; `None` for one that is thinner than the tolerance.
+pub(super) fn normal(&[a, b, c]: &[Vector; 3]) -> Option<Vector> {
+    let (e, f, g) = (sub(b, a), sub(c, a), sub(c, b));
+    let doubled = cross(e, f);
+    let longest = norm(e).max(norm(f)).max(norm(g));
+    (norm(doubled) > SHELL_TOLERANCE_M * longest).then(|| unit(doubled)).flatten()
+}
+
+/// Whether two triangles in one plane share more than their borders, and then whether they look the same way.
+pub(super) fn shared_face(s: &[Vector; 3], t: &[Vector; 3], tolerance_m: f64) -> Option<bool> {
+    let (n, m) = (normal(s)?, normal(t)?);
+    let off = |n: Vector, of: &[Vector; 3], others: &[Vector; 3]| {
+        others.iter().any(|&p| dot(n, sub(p, of[0])).abs() > tolerance_m)
+    };
+    if off(n, s, t) || off(m, t, s) {
+        return None;
+    }
+    let common = clipped(s, t, n);
+    let area = common_area(&common, n);
+    let around: f64 = (0..common.len()).map(|i| norm(sub(common[(i + 1) % common.len()], common[i]))).sum();
+    (area > tolerance_m * around).then(|| dot(n, m) > 0.0)
+}
+
+/// The part of `t` that is within the sides of `s`, whose normal is `n` (Sutherland and Hodgman 1974).
+fn clipped(s: &[Vector; 3], t: &[Vector; 3], n: Vector) -> Vec<Vector> {
+    let mut polygon = t.to_vec();
+    for i in 0..3 {
+        let (from, inwards) = (s[i], cross(n, sub(s[(i + 1) % 3], s[i])));
+        let depth = |p: Vector| dot(inwards, sub(p, from));
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for k in 0..polygon.len() {
+            let (a, b) = (polygon[k], polygon[(k + 1) % polygon.len()]);
+            let (da, db) = (depth(a), depth(b));
+            if da >= 0.0 {
+                kept.push(a);
+            }
+            if (da < 0.0) != (db < 0.0) {
+                let along = da / (da - db);
+                kept.push([0, 1, 2].map(|i| a[i] + along * (b[i] - a[i])));
+            }
+        }
+        polygon = kept;
+    }
+    polygon
+}
+
+fn common_area(polygon: &[Vector], n: Vector) -> f64 {
+    let Some((&first, rest)) = polygon.split_first() else { return 0.0 };
+    let doubled: f64 = rest.windows(2).map(|pair| dot(n, cross(sub(pair[0], first), sub(pair[1], first)))).sum();
+    0.5 * doubled.abs()
+}

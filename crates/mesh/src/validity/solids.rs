@@ -1,0 +1,93 @@
+//! Shells within a solid (401 to 404), and solids within a geometry (501 to 503).
+
+use std::collections::HashMap;
+
+use super::contact::Contact;
+use super::patch::{Patch, Side};
+use super::{Body, OVERLAP_M, SHELL_TOLERANCE_M};
+use crate::DefectCode;
+use crate::sets::DisjointSets;
+
+/// What is wrong between the shells of a solid, whose first one is the outer: code, shell, details.
+pub(super) fn compare_shells(shells: &[Patch]) -> Vec<(DefectCode, usize, String)> {
+    let mut found = Vec::new();
+    for (index, shell) in shells.iter().enumerate().skip(1) {
+        for (other, earlier) in shells[..index].iter().enumerate() {
+            let Some(contact) = Contact::of(earlier, shell, SHELL_TOLERANCE_M) else {
+                found.push((DefectCode::NotChecked, index, "4xx: too many triangles".to_owned()));
+                continue;
+            };
+            if let Some(code) = wrong_between(&contact, other == 0) {
+                found.push((code, index, format!("and shell {other}")));
+            }
+        }
+    }
+    if found.is_empty() {
+        let cut_off = (1..shells.len()).filter(|&index| touches_all_around(shells, index));
+        found.extend(cut_off.map(|index| (DefectCode::SolidInteriorDisconnected, index, String::new())));
+    }
+    found
+}
+
+/// What is wrong with shell B beside shell A, the outer one or another cavity.
+fn wrong_between(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
+    if contact.is_same() {
+        return Some(DefectCode::DuplicateShells);
+    }
+    if contact.shares_face() || (contact.b_inside && contact.b_outside) || (contact.a_inside && contact.a_outside) {
+        return Some(DefectCode::ShellsIntersect);
+    }
+    let nested = contact.a_inside || contact.b_inside;
+    // A cavity must be in the outer shell, and in no other cavity.
+    (a_is_outer != contact.b_inside || (nested && !a_is_outer)).then_some(DefectCode::InnerShellOutside)
+}
+
+/// Whether edges of a cavity that lie on earlier shells close a circle: what is inside of it is cut off.
+fn touches_all_around(shells: &[Patch], index: usize) -> bool {
+    let mut number_of: HashMap<u32, usize> = HashMap::new();
+    let touching: Vec<[usize; 2]> = shells[index]
+        .edges()
+        .into_iter()
+        .filter(|(_, [p, q])| {
+            let middle = [0, 1, 2].map(|i| 0.5 * (p[i] + q[i]));
+            let on = |shell: &Patch| [*p, *q, middle].iter().all(|&at| shell.side(at, SHELL_TOLERANCE_M) == Side::On);
+            shells[..index].iter().any(on)
+        })
+        .map(|(ends, _)| {
+            ends.map(|vertex| {
+                let next = number_of.len();
+                *number_of.entry(vertex).or_insert(next)
+            })
+        })
+        .collect();
+    let mut joined = DisjointSets::new(number_of.len());
+    touching.into_iter().any(|[a, b]| !joined.join(a, b))
+}
+
+/// What is wrong between the solids of a composite solid: code, solid, details.
+pub(super) fn compare(bodies: &[Body]) -> Vec<(DefectCode, u32, String)> {
+    let mut found = Vec::new();
+    let mut joined = DisjointSets::new(bodies.len());
+    for (index, b) in bodies.iter().enumerate() {
+        for (other, a) in bodies[..index].iter().enumerate() {
+            let and = format!("and solid {}", a.solid);
+            match Contact::of(&a.surface, &b.surface, OVERLAP_M) {
+                None => found.push((DefectCode::NotChecked, b.solid, "5xx: too many triangles".to_owned())),
+                Some(contact) if contact.is_same() => found.push((DefectCode::DuplicateSolids, b.solid, and)),
+                Some(contact) if contact.interiors_meet() => {
+                    found.push((DefectCode::SolidsIntersect, b.solid, and));
+                }
+                Some(contact) if contact.opposite_face => {
+                    joined.join(index, other);
+                }
+                Some(_) => {}
+            }
+        }
+    }
+    let pieces = joined.count();
+    if pieces > 1 && found.is_empty() {
+        let last = bodies.last().map_or(0, |body| body.solid);
+        found.push((DefectCode::SolidsDisconnected, last, format!("{pieces} pieces")));
+    }
+    found
+}
