@@ -16,10 +16,10 @@ mod trainer;
 
 use std::path::PathBuf;
 
-use ::priors::{PriorModel, Samples, View, Visibility, Visible, sample};
+use ::priors::{PriorModel, Samples, View, Visibility, Visible, buildings_of, sample};
 use anyhow::{Context, bail};
 use io::city::CityFile;
-use mesh::{LodChoice, MeshConfig, Meshed, ObjectStatus, Role, Scope, TriangleMesh};
+use mesh::{LodChoice, MeshConfig, Meshed, ObjectStatus, Scope, TriangleMesh};
 use pipeline::Progress as _;
 use report::PriorsReport;
 
@@ -81,7 +81,7 @@ fn make(args: &Args, watcher: &Watcher) -> anyhow::Result<(PriorsReport, usize)>
     let (file, meshed) = read_model(args)?;
     let unusable = unusable(&meshed);
     let frame = Frame::new(args, meshed.mesh.origin, &cameras)?;
-    let model = PriorModel::new(meshed.mesh, &buildings(&file))?;
+    let model = PriorModel::new(meshed.mesh, &buildings_of(&file.model))?;
     let views = cameras.views(&frame);
     let samples = sample(&model, &sampling)?;
     let visible = look(args, &model, &samples, &views, watcher)?;
@@ -122,14 +122,6 @@ fn read_model(args: &Args) -> anyhow::Result<(CityFile, Meshed)> {
         );
     }
     Ok((file, meshed))
-}
-
-/// Which objects are buildings or belong to one.
-fn buildings(file: &CityFile) -> Vec<bool> {
-    let role = |object: &mesh::CityObject| object.kind.role();
-    // OBJ and PLY know no kinds: what stands in them is what priors are wanted of.
-    let any = file.model.objects.iter().any(|object| role(object) != Role::Other);
-    file.model.objects.iter().map(|object| !any || !matches!(role(object), Role::Other | Role::Interior)).collect()
 }
 
 fn look(

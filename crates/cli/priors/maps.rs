@@ -4,11 +4,11 @@ use std::fs;
 use std::path::Path;
 
 use ::priors::{DepthKind, PriorMaps, Rays};
-use anyhow::Context;
-use io::npy;
+use anyhow::{Context, bail};
+use io::npy::{self, NpyArray, NpyData};
 use io::raster::{Band, BandData, DepthScale, write_depth_png, write_map, write_png_gray, write_png_rgb};
 use pipeline::Progress as _;
-use raster::NO_DATA;
+use raster::{Grid, NO_DATA};
 use report::{ViewPictures, ViewRow, depth_preview, mask_preview, normal_preview, side_by_side};
 
 use super::content::Dataset;
@@ -18,7 +18,7 @@ use crate::progress::Watcher;
 /// Folders of maps.
 const FOLDERS: [&str; 8] = ["raw_depth", "raw_normal", "raw_mask", "masks", "class", "object", "depth_png", "previews"];
 /// Views that the page shows.
-const IN_PAGE: usize = 6;
+pub(super) const IN_PAGE: usize = 6;
 
 /// What was written.
 #[derive(Debug)]
@@ -54,7 +54,7 @@ pub(super) fn write(dataset: &Dataset<'_>, folder: &Path, watcher: &Watcher) -> 
             let sheet = side_by_side(&[&depth, &normals, &mask_preview(&maps.mask())]);
             write_png_rgb(folder.join("previews").join(format!("{stem}.png")), &sheet, false)?;
             if in_page {
-                pictures.push(ViewPictures { name: stem.clone(), depth, normals });
+                pictures.push(ViewPictures { name: stem.clone(), maps: vec![("depth", depth), ("normals", normals)] });
             }
         }
         rows.push(row(dataset, view, &maps));
@@ -63,12 +63,23 @@ pub(super) fn write(dataset: &Dataset<'_>, folder: &Path, watcher: &Watcher) -> 
     // One step for all views, so that their values can be compared; the largest depth is known only now.
     let largest = rows.iter().filter_map(|row| row.depth_range).map(|range| range[1]).fold(0.0, f32::max);
     let step = DepthScale::Fit.step_m(f64::from(largest)).context("the depths are too large for 16-bit maps")?;
-    for view in 0..count {
-        let path = folder.join("depth_png").join(format!("{}.png", dataset.cameras.stems[view]));
-        write_depth_png(path, &render(view).depth_m, DepthScale::Step(step), false)?;
+    for stem in &dataset.cameras.stems {
+        let path = folder.join("depth_png").join(format!("{stem}.png"));
+        write_depth_png(path, &read_depth(folder, stem)?, DepthScale::Step(step), false)?;
         watcher.step();
     }
     Ok(Written { rows, pictures, depth_png_step: step })
+}
+
+/// The depths of a view as they were written: all together are too many to be kept.
+fn read_depth(folder: &Path, stem: &str) -> anyhow::Result<Grid<f32>> {
+    let path = folder.join("raw_depth").join(format!("{stem}.npy"));
+    match npy::read(&path)? {
+        NpyArray { shape, data: NpyData::F32(depth) } if shape.len() == 2 => {
+            Grid::from_vec(shape[1], shape[0], depth).with_context(|| format!("cannot use {}", path.display()))
+        }
+        _ => bail!("someone else wrote to the output folder: {}", path.display()),
+    }
 }
 
 /// Whether a view is one of `wanted` that are spread over all.

@@ -4,17 +4,18 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::priors::{LinesOfSight, MISSING_CLASS, NO_OBJECT, PriorModel, SatelliteMaps, mesh_to_ellipsoid};
+use ::priors::{
+    LinesOfSight, MISSING_CLASS, ModelPlace, NO_OBJECT, PriorModel, PriorsError, SatelliteMaps, buildings_of,
+};
 use anyhow::{Context, bail};
 use camera::{ImageCorrection, RpcCamera};
-use geodesy::{CrsIdentity, CrsRequest, MapProjection, VerticalDatum};
+use geodesy::CrsRequest;
 use io::city::CityFile;
 use io::raster::{Band, BandData, ImageSource, write_image_with_rpc, write_png_rgb};
 use mesh::CrsReference;
 use pipeline::Progress as _;
 use raster::NO_DATA;
-use report::{depth_preview, normal_preview};
-use serde::Serialize;
+use report::{SatellitePriorsReport, SatelliteRow, ViewPictures, depth_preview, normal_preview};
 use serde_json::{Value, json};
 
 use super::content::{labels, write_json};
@@ -34,54 +35,37 @@ struct Image {
     size: (usize, usize),
 }
 
-/// What became of an image.
-#[derive(Debug, Serialize)]
-struct Row {
-    image: String,
-    name: String,
-    size: [usize; 2],
-    hit_pixels: usize,
-    height_range_m: Option<[f32; 2]>,
-    /// Distances are counted from this height.
-    distance_from_height_m: f64,
-    /// How far the lines of sight are from those of the RPC.
-    line_of_sight_error_m: f64,
-    corrected: bool,
-}
-
-/// The map and the heights of a model.
-struct Place {
-    projection: MapProjection,
-    datum: VerticalDatum,
-    stated: bool,
-}
-
 /// Makes the maps of all images; the report.
 pub(super) fn make(args: &Args, paths: &[PathBuf], watcher: &Watcher) -> anyhow::Result<(Value, usize)> {
     let folder = Folder::new(&args.output, args.overwrite)?;
     let images = images(args, paths)?;
     let (file, meshed) = super::read_model(args)?;
     let unusable = super::unusable(&meshed);
-    let place = Place::of(args, &file.model.crs)?;
+    let place = place_of(args, &file.model.crs)?;
     let mut mesh = meshed.mesh;
-    mesh_to_ellipsoid(&mut mesh, &place.projection, place.datum)?;
-    let model = PriorModel::new(mesh, &super::buildings(&file))?;
+    place.to_ellipsoid(&mut mesh)?;
+    let model = PriorModel::new(mesh, &buildings_of(&file.model))?;
     let made = folder.begin()?;
     for name in FOLDERS {
         let path = made.path().join(name);
         fs::create_dir_all(&path).with_context(|| format!("cannot make the folder: {}", path.display()))?;
     }
     watcher.begin("maps", images.len());
-    let mut rows = Vec::with_capacity(images.len());
+    let (mut rows, mut pictures) = (Vec::with_capacity(images.len()), Vec::new());
     for (number, image) in images.iter().enumerate() {
-        let previews = super::maps::spread(number, images.len(), args.previews);
-        rows.push(write_image(image, &model, &place, made.path(), previews)?);
+        let shown = |wanted| super::maps::spread(number, images.len(), wanted);
+        let previews = shown(args.previews);
+        let (row, picture) = write_image(image, &model, &place, made.path(), previews)?;
+        rows.push(row);
+        pictures.extend(picture.filter(|_| shown(args.previews.min(super::maps::IN_PAGE))));
         watcher.step();
     }
     if rows.iter().all(|row| row.hit_pixels == 0) {
         bail!("{}", nothing_in_sight(&model, &place, &images));
     }
-    let report = report(args, &file, &model, &place, &rows, unusable);
+    let report = report(args, &file, &model, &place, rows, unusable);
+    io::write_bytes(made.path().join("report.html"), report.html(&pictures)?.as_bytes(), false)?;
+    let report = report.json()?;
     write_json(&made.path().join("labels.json"), &labels(&file.model, model.mesh()))?;
     write_json(&made.path().join("report.json"), &report)?;
     made.publish()?;
@@ -94,7 +78,7 @@ pub(super) fn summary(args: &Args, report: &Value) -> String {
     for image in report["images"].as_array().into_iter().flatten() {
         text += &format!("image      {} pixels see a building: {}\n", image["hit_pixels"], args.output.display());
     }
-    text + &format!("report     {}\n", args.output.join("report.json").display())
+    text + &format!("report     {}\n", args.output.join("report.html").display())
 }
 
 fn images(args: &Args, paths: &[PathBuf]) -> anyhow::Result<Vec<Image>> {
@@ -120,32 +104,30 @@ fn images(args: &Args, paths: &[PathBuf]) -> anyhow::Result<Vec<Image>> {
     Ok(images)
 }
 
-impl Place {
-    fn of(args: &Args, crs: &CrsReference) -> anyhow::Result<Self> {
-        let (asked, asked_datum) = match args.crs {
-            Some(CrsRequest::Epsg { horizontal, vertical }) => (Some(format!("EPSG:{horizontal}")), vertical),
-            Some(CrsRequest::Auto) => bail!("--crs must name a code: EPSG:n"),
-            None => (None, None),
-        };
-        let stated = crs.epsg.map(|code| format!("EPSG:{code}"));
-        let identity = stated.as_deref().map(CrsIdentity::of).transpose()?;
-        let Some(definition) = asked.or(stated) else {
-            bail!("the model does not say in which map it is ({crs}), and satellite images need it: give --crs EPSG:n");
-        };
-        let projection = MapProjection::from_definition(&definition)?;
-        if projection.metres_per_unit() != Some(1.0) {
-            bail!("the model is in {definition}, expected a projected coordinate system in metres");
-        }
-        let in_file = crs.vertical_epsg.map(VerticalDatum::from_epsg).or(identity.and_then(|i| i.vertical));
-        let datum = args.vertical.or(asked_datum).or(in_file);
-        if datum.is_none() {
-            tracing::warn!("the model does not say what its heights are above, taken as the ellipsoid (--vertical)");
-        }
-        Ok(Self { projection, datum: datum.unwrap_or_default(), stated: datum.is_some() })
+/// Where the model is, by its own words and by the options.
+fn place_of(args: &Args, crs: &CrsReference) -> anyhow::Result<ModelPlace> {
+    let (map, datum) = match args.crs {
+        Some(CrsRequest::Epsg { horizontal, vertical }) => (Some(horizontal), vertical),
+        Some(CrsRequest::Auto) => bail!("--crs must name a code: EPSG:n"),
+        None => (None, None),
+    };
+    let place = match ModelPlace::of(crs, map, args.vertical.or(datum)) {
+        Err(e @ PriorsError::MapUnknown { .. }) => bail!("{e}: satellite images need it, give --crs EPSG:n"),
+        place => place?,
+    };
+    if place.datum.is_none() {
+        tracing::warn!("the model does not say what its heights are above, taken as the ellipsoid (--vertical)");
     }
+    Ok(place)
 }
 
-fn write_image(image: &Image, model: &PriorModel, place: &Place, folder: &Path, previews: bool) -> anyhow::Result<Row> {
+fn write_image(
+    image: &Image,
+    model: &PriorModel,
+    place: &ModelPlace,
+    folder: &Path,
+    previews: bool,
+) -> anyhow::Result<(SatelliteRow, Option<ViewPictures>)> {
     let failed = || format!("in the image: {}", image.path.display());
     let lines = LinesOfSight::new(&image.camera, image.size, model, &place.projection).with_context(failed)?;
     let maps = SatelliteMaps::render(model, &lines).with_context(failed)?;
@@ -171,14 +153,10 @@ fn write_image(image: &Image, model: &PriorModel, place: &Place, folder: &Path, 
     write("class", &class, Some(f64::from(MISSING_CLASS)))?;
     let object = [Band { description: "object_number", data: BandData::U32(&maps.object) }];
     write("object", &object, Some(f64::from(NO_OBJECT)))?;
-    if previews {
-        let path = |what: &str| folder.join("previews").join(format!("{}_{what}.png", image.stem));
-        write_png_rgb(path("height"), &depth_preview(&maps.height_m), false)?;
-        write_png_rgb(path("normal"), &normal_preview(&maps.normal), false)?;
-    }
+    let pictures = previews.then(|| write_previews(image, &maps, folder)).transpose()?;
     let heights = || maps.height_m.data().iter().copied().filter(|h| h.is_finite());
     let range = [heights().fold(f32::INFINITY, f32::min), heights().fold(f32::NEG_INFINITY, f32::max)];
-    Ok(Row {
+    let row = SatelliteRow {
         image: image.path.display().to_string(),
         name: image.stem.clone(),
         size: [image.size.0, image.size.1],
@@ -187,42 +165,58 @@ fn write_image(image: &Image, model: &PriorModel, place: &Place, folder: &Path, 
         distance_from_height_m: lines.from_height_m(),
         line_of_sight_error_m: lines.error_m(),
         corrected,
-    })
+    };
+    Ok((row, pictures))
 }
 
-fn report(args: &Args, file: &CityFile, model: &PriorModel, place: &Place, rows: &[Row], unusable: usize) -> Value {
+fn write_previews(image: &Image, maps: &SatelliteMaps, folder: &Path) -> anyhow::Result<ViewPictures> {
+    let (heights, normals) = (depth_preview(&maps.height_m), normal_preview(&maps.normal));
+    let path = |what: &str| folder.join("previews").join(format!("{}_{what}.png", image.stem));
+    write_png_rgb(path("height"), &heights, false)?;
+    write_png_rgb(path("normal"), &normals, false)?;
+    Ok(ViewPictures { name: image.stem.clone(), maps: vec![("heights", heights), ("normals", normals)] })
+}
+
+fn report(
+    args: &Args,
+    file: &CityFile,
+    model: &PriorModel,
+    place: &ModelPlace,
+    rows: Vec<SatelliteRow>,
+    unusable: usize,
+) -> SatellitePriorsReport {
     let mut notes = Vec::new();
     if unusable > 0 {
         notes.push(super::content::unusable_note(unusable));
     }
-    if !place.stated {
+    if place.datum.is_none() {
         notes.push("The model does not say what its heights are above: taken as the ellipsoid.".to_owned());
     }
     let blind = rows.iter().filter(|row| row.hit_pixels == 0).count();
     if blind > 0 {
         notes.push(format!("{blind} images see no building."));
     }
-    json!({
-        "model": args.model.display().to_string(),
-        "model_crs": file.model.crs.to_string(),
-        "map": place.projection.definition(),
-        "model_heights_above": place.datum.to_string(),
-        "triangles": model.mesh().triangles.len(),
-        "notes": notes,
-        "images": rows,
-        "maps": {
+    SatellitePriorsReport {
+        model: args.model.display().to_string(),
+        model_crs: file.model.crs.to_string(),
+        map: place.projection.definition().to_owned(),
+        model_heights_above: place.datum().to_string(),
+        triangles: model.mesh().triangles.len(),
+        notes,
+        images: rows,
+        maps: json!({
             "height": "metres above the WGS 84 ellipsoid, no-data -32768",
             "distance": "metres along the line of sight from distance_from_height_m downwards, no-data -32768",
             "normal": "east, north, up; unit length, turned to the sensor, 0 where no building is seen",
             "mask": "1 where a building is seen",
             "class": "labels.json has the names",
             "object": "labels.json has the identifiers",
-        },
-    })
+        }),
+    }
 }
 
 /// What to say where no image has the model in it.
-fn nothing_in_sight(model: &PriorModel, place: &Place, images: &[Image]) -> String {
+fn nothing_in_sight(model: &PriorModel, place: &ModelPlace, images: &[Image]) -> String {
     let origin = model.mesh().origin;
     let at = place.projection.lonlat_from_map(origin.x, origin.y);
     let model = at.map_or_else(|error| error.to_string(), |(lon, lat)| format!("{lon:.5}° E, {lat:.5}° N"));

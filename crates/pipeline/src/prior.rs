@@ -3,9 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use geodesy::{CrsIdentity, MapProjection, VerticalDatum};
-use mesh::{MeshConfig, Role, TriangleMesh};
-use priors::{LinesOfSight, NO_OBJECT, PriorModel, SatelliteMaps, mesh_to_ellipsoid};
+use mesh::{MeshConfig, TriangleMesh};
+use priors::{LinesOfSight, ModelPlace, NO_OBJECT, PriorModel, SatelliteMaps, buildings_of};
 use raster::Grid;
 use rayon::prelude::*;
 use sweep::{HeightMap, View};
@@ -38,7 +37,7 @@ type Cause = Box<dyn std::error::Error + Send + Sync>;
 pub(crate) struct CityPrior {
     path: PathBuf,
     model: PriorModel,
-    projection: MapProjection,
+    place: ModelPlace,
 }
 
 impl CityPrior {
@@ -52,30 +51,20 @@ impl CityPrior {
 
     fn open(path: &Path, choices: &mut Choices<'_>) -> Result<Self, Cause> {
         let file = io::city::read(path)?;
-        let role = |object: &mesh::CityObject| object.kind.role();
-        let is_building: Vec<bool> =
-            file.model.objects.iter().map(|object| !matches!(role(object), Role::Other | Role::Interior)).collect();
         let mut mesh = TriangleMesh::from_model(&file.model, &MeshConfig::default())?.mesh;
         if mesh.triangles.is_empty() {
             return Err("no building of the model has a surface; skysweep city info says why".into());
         }
-        let crs = &file.model.crs;
-        let code = crs.epsg.ok_or("the model does not say in which map it is (EPSG code)")?;
-        let definition = format!("EPSG:{code}");
-        let projection = MapProjection::from_definition(&definition)?;
-        if projection.metres_per_unit() != Some(1.0) {
-            return Err(format!("the model is in {definition}, expected a projected system in metres").into());
-        }
-        let stated = crs.vertical_epsg.map(VerticalDatum::from_epsg).or(CrsIdentity::of(&definition)?.vertical);
-        if stated.is_none() {
+        let place = ModelPlace::of(&file.model.crs, None, None)?;
+        if place.datum.is_none() {
             choices.warn(format!(
                 "the model does not say what its heights are above, taken as the ellipsoid: {}",
                 path.display()
             ));
         }
-        mesh_to_ellipsoid(&mut mesh, &projection, stated.unwrap_or_default())?;
+        place.to_ellipsoid(&mut mesh)?;
         choices.tell("prior", format!("{} buildings' surfaces", mesh.surfaces.len()), path.display().to_string());
-        Ok(Self { path: path.to_owned(), model: PriorModel::new(mesh, &is_building)?, projection })
+        Ok(Self { path: path.to_owned(), model: PriorModel::new(mesh, &buildings_of(&file.model))?, place })
     }
 
     /// What every view sees of the model; `None` for a view that does not see it.
@@ -88,7 +77,7 @@ impl CityPrior {
             if size.0 == 0 || size.1 == 0 {
                 return Ok(None);
             }
-            let lines = LinesOfSight::new(&view.camera, size, &self.model, &self.projection)?;
+            let lines = LinesOfSight::new(&view.camera, size, &self.model, &self.place.projection)?;
             let maps = SatelliteMaps::render(&self.model, &lines)?;
             Ok((maps.hits() > 0).then_some(ViewPrior { height_m: maps.height_m, object: maps.object, gsd_m }))
         };

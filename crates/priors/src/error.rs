@@ -13,6 +13,18 @@ pub enum PriorsError {
     /// A place that the map of the model does not have, or a map that cannot be had.
     #[error(transparent)]
     Geodesy(#[from] geodesy::GeodesyError),
+    /// A model that does not say in which map it is.
+    #[error("the model does not say in which map it is ({crs}), expected an EPSG code")]
+    MapUnknown {
+        /// What it says of its reference system.
+        crs: String,
+    },
+    /// A model in degrees or feet.
+    #[error("the model is in {definition}, expected a projected coordinate system in metres")]
+    MapNotMetric {
+        /// Its reference system.
+        definition: String,
+    },
     /// A model outside the geoid model that its heights are above.
     #[error("the model reaches beyond where heights above {datum} are known")]
     BeyondDatum {

@@ -8,8 +8,8 @@ use bvh::{DepthImage, MISS};
 use raster::Grid;
 use rayon::prelude::*;
 
-use crate::vector::dot;
 use crate::{PriorModel, Rays, View};
+use mesh::vector::dot;
 
 /// What depth means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

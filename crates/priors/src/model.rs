@@ -1,11 +1,11 @@
 //! The triangles of a city model with their areas and normals, arranged for rays.
 
 use bvh::Bvh;
-use mesh::TriangleMesh;
+use mesh::{CityModel, Role, TriangleMesh};
 use rayon::prelude::*;
 
 use crate::PriorsError;
-use crate::vector::{Vector, cross, norm, sub, unit};
+use mesh::vector::{Vector, cross, norm, sub, unit};
 
 /// Triangles lower than this take the normal of their surface: their own would be made of the rounding of their corners.
 const SLIVER_M: f64 = 1e-3;
@@ -74,6 +74,14 @@ impl PriorModel {
     pub fn is_building(&self, triangle: usize) -> bool {
         self.building[triangle]
     }
+}
+
+/// Which objects of a model are buildings or belong to one: what [`PriorModel::new`] wants to know.
+pub fn buildings_of(model: &CityModel) -> Vec<bool> {
+    let roles = || model.objects.iter().map(|object| object.kind.role());
+    // OBJ and PLY know no kinds: what stands in them is what priors are wanted of.
+    let is_named = roles().any(|role| role != Role::Other);
+    roles().map(|role| !is_named || !matches!(role, Role::Other | Role::Interior)).collect()
 }
 
 /// A vector along the normal, twice the area long.

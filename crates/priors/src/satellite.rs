@@ -13,8 +13,8 @@ use raster::Grid;
 use rayon::prelude::*;
 
 use crate::maps::{MISSING_CLASS, NO_OBJECT};
-use crate::vector::{along, dot, norm};
 use crate::{PriorModel, PriorsError};
+use mesh::vector::{along, dot, norm};
 
 /// The maps of one image, all of its size.
 #[derive(Debug, Clone, PartialEq)]

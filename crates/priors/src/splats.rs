@@ -7,7 +7,7 @@
 use mesh::Splat;
 
 use crate::Sample;
-use crate::vector::{Vector, cross, unit};
+use mesh::vector::{Vector, cross, unit};
 
 /// Opacity of a splat that nothing has been learned about.
 const OPACITY: f32 = 0.1;
@@ -52,7 +52,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::vector::{norm, sub};
+    use mesh::vector::{norm, sub};
 
     fn point(normal: Vector) -> Sample {
         Sample {

@@ -10,8 +10,8 @@ use bvh::Target;
 use camera::ImagePoint;
 use rayon::prelude::*;
 
-use crate::vector::{dot, norm, sub};
 use crate::{PriorModel, PriorsError, Sample, View};
+use mesh::vector::{dot, norm, sub};
 
 /// What it takes to be seen, and to be kept.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,11 +1,11 @@
 //! The account of a set of priors: what went in, what came out, and what it may be used for; as JSON and as one page.
 
-use raster::Grid;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::page::{escape, page};
-use crate::picture::{PictureError, data_uri};
+use crate::parts::{ViewPictures, cards_of, figures, last_part, notes, table};
+use crate::picture::PictureError;
 
 /// What became of a city model and its cameras.
 #[derive(Debug, Clone, Serialize)]
@@ -76,17 +76,6 @@ pub struct ViewRow {
     pub visible: usize,
 }
 
-/// What the page shows of one view.
-#[derive(Debug, Clone)]
-pub struct ViewPictures {
-    /// The image.
-    pub name: String,
-    /// Its depths in colours.
-    pub depth: Grid<[u8; 3]>,
-    /// Its normals in colours.
-    pub normals: Grid<[u8; 3]>,
-}
-
 impl PriorsReport {
     /// Every number, by name.
     ///
@@ -110,20 +99,9 @@ impl PriorsReport {
             format!("<h1>{}</h1>", escape(&title)),
             format!("<p class=\"lead\">{}</p>", escape(&self.lead())),
             self.cards(),
-            self.note_list(),
+            notes(&self.notes),
         ];
-        if !pictures.is_empty() {
-            body.push("<h2>Views</h2><div class=\"pictures\">".to_owned());
-            for ViewPictures { name, depth, normals } in pictures {
-                for (what, picture) in [("depth", depth), ("normals", normals)] {
-                    let (uri, name) = (data_uri(picture)?, escape(name));
-                    body.push(format!(
-                        "<figure><img src=\"{uri}\" alt=\"{what} of {name}\"><figcaption><b>{name}</b> {what}</figcaption></figure>"
-                    ));
-                }
-            }
-            body.push("</div>".to_owned());
-        }
+        body.push(figures(pictures)?);
         body.extend([self.curve_table(), self.class_table(), self.view_table(), self.setting_list()]);
         Ok(page(&title, &body.join("\n")))
     }
@@ -150,13 +128,7 @@ impl PriorsReport {
             (self.views.len().to_string(), "views"),
             (format!("{share:.1} <small>%</small>"), "of the pixels see a building"),
         ];
-        let cards = cards.map(|(value, text)| format!("<div class=\"card\"><b>{value}</b><span>{text}</span></div>"));
-        format!("<div class=\"cards\">{}</div>", cards.concat())
-    }
-
-    fn note_list(&self) -> String {
-        let notes: String = self.notes.iter().map(|note| format!("<li>{}</li>", escape(note))).collect();
-        if notes.is_empty() { notes } else { format!("<div class=\"notes\"><ul>{notes}</ul></div>") }
+        cards_of(&cards)
     }
 
     fn curve_table(&self) -> String {
@@ -207,28 +179,10 @@ impl PriorsReport {
     }
 }
 
-fn table(title: &str, heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
-    let heads: String = heads.iter().map(|head| format!("<th scope=\"col\">{}</th>", escape(head))).collect();
-    let row = |cells: Vec<String>| {
-        let mut cells = cells.iter().map(|cell| escape(cell));
-        let first = cells.next().unwrap_or_default();
-        let rest: String = cells.map(|cell| format!("<td>{cell}</td>")).collect();
-        format!("<tr><th scope=\"row\">{first}</th>{rest}</tr>")
-    };
-    let rows: String = rows.map(row).collect();
-    format!(
-        "<h2>{}</h2><div class=\"wide\"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>",
-        escape(title)
-    )
-}
-
-fn last_part(path: &str) -> &str {
-    path.rsplit(['/', '\\']).next().unwrap_or(path)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use raster::Grid;
 
     fn report() -> PriorsReport {
         PriorsReport {
@@ -264,7 +218,10 @@ mod tests {
     fn the_page_holds_the_numbers_and_nothing_leaves_its_place() {
         let picture = Grid::filled(4, 3, [9; 3]);
         let page = report()
-            .html(&[ViewPictures { name: "<a>.png".to_owned(), depth: picture.clone(), normals: picture }])
+            .html(&[ViewPictures {
+                name: "<a>.png".to_owned(),
+                maps: vec![("depth", picture.clone()), ("normals", picture)],
+            }])
             .unwrap();
         for words in
             ["321 are seen by 2 or more of 1 views", "25.0 %", "3.0 to 9.5", "not sampled", "data:image/png", "50000"]

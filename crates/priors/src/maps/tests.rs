@@ -5,8 +5,8 @@ use mesh::SurfaceClass;
 
 use super::*;
 use crate::model::tests::{cuboid, joined};
-use crate::vector::norm;
 use crate::view::tests::{nadir, pinhole};
+use mesh::vector::norm;
 
 /// A box of 8 × 6 × 3 m that is a building, on a large slab that is none.
 fn model() -> PriorModel {

@@ -1,7 +1,8 @@
 //! Points as dense as a geometric error needs, and no denser.
 //!
 //! The spacing s at a place comes from the creases around it ([`super::creases`]). Triangles are halved until the spacing
-//! hardly changes over a piece; a piece of area A stands for w A / s² points, w being the weight of its class. The pieces of a
+//! hardly changes over a piece. The spacing grows no faster than one goes away from a crease, so that the parts of a piece look only
+//! at the creases that may bound it somewhere on the piece. A piece of area A stands for w A / s² points, w being the weight of its class. The pieces of a
 //! triangle, laid end to end in the order of the halving, take a point at every whole number past a random start.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -10,11 +11,14 @@ use rayon::prelude::*;
 
 use super::creases::Creases;
 use super::{Amount, LIMIT, Purpose, Sample, SampleConfig, on_triangle, positive};
-use crate::vector::{Vector, cross, norm, sub};
 use crate::{PriorModel, PriorsError};
+use mesh::vector::{Vector, cross, norm, sub};
 
 /// A piece is small enough when it is no longer than this many spacings.
 const PIECE: f64 = 0.7;
+
+/// Creases that are no nearer than this to being of no use are kept, metres.
+const ROUNDING_M: f64 = 1e-9;
 
 /// What the points must keep.
 #[derive(Debug, Clone, Copy)]
@@ -53,8 +57,10 @@ pub struct ErrorCurve {
 pub fn error_curve(model: &PriorModel, config: &SampleConfig, factors: &[f64]) -> Result<Vec<ErrorCurve>, PriorsError> {
     let Amount::Adaptive { error_m, max_spacing_m } = config.amount else { return Ok(Vec::new()) };
     let area: f64 = (0..model.mesh().triangles.len()).map(|t| config.weight(model, t) * model.area_m2(t)).sum();
-    let of_error = |error_m: f64| {
-        let work = Work::new(model, config, Bound::new(error_m, max_spacing_m)?)?;
+    let mut work = Work::new(model, config, Bound::new(error_m, max_spacing_m)?)?;
+    let mut of_error = |error_m: f64| {
+        work.bound = Bound::new(error_m, max_spacing_m)?;
+        work.made = AtomicUsize::new(0);
         let shares: Vec<f64> = work.pieces(|pieces, _| pieces.iter().map(|piece| piece.share).sum())?;
         let even = max_spacing_m.min(0.5 * error_m);
         Ok(ErrorCurve { error_m, points: shares.iter().sum(), even_points: area / (even * even) })
@@ -108,11 +114,15 @@ impl<'a> Work<'a> {
         if weight == 0.0 {
             return Ok(());
         }
-        let normal = self.model.normal(triangle);
-        let mut open = vec![self.model.mesh().corners(triangle)];
-        while let Some(corners) = open.pop() {
+        let corners = self.model.mesh().corners(triangle);
+        // The creases of the pieces still to be cut, one list after the other; those of a piece end where its parts' begin.
+        let mut near = self.creases.near(&corners, self.model.normal(triangle), self.bound.error_m);
+        let mut open = vec![(corners, 0..near.len())];
+        while let Some((corners, own)) = open.pop() {
+            near.truncate(own.end);
             let centre = [0, 1, 2].map(|i| (corners[0][i] + corners[1][i] + corners[2][i]) / 3.0);
-            let spacing_m = self.creases.spacing(centre, normal, self.bound.error_m);
+            let allowed = near[own.clone()].iter().map(|crease| crease.allows(centre));
+            let spacing_m = allowed.fold(self.creases.reach_m(), f64::min);
             let edge = |i: usize| norm(sub(corners[(i + 1) % 3], corners[i]));
             let longest = (0..3).max_by(|&i, &j| edge(i).total_cmp(&edge(j))).unwrap_or(0);
             if edge(longest) <= PIECE * spacing_m {
@@ -127,7 +137,17 @@ impl<'a> Work<'a> {
             }
             let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);
             let middle = [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]));
-            open.extend([[middle, b, c], [a, middle, c]]);
+            let radius = corners.iter().map(|&corner| norm(sub(corner, centre))).fold(0.0, f64::max);
+            // At the far side of the piece the bound of a crease may be lower by the radius, and all others' higher.
+            let highest = spacing_m + 2.0 * radius + ROUNDING_M;
+            for i in own.clone() {
+                let crease = near[i];
+                if crease.allows(centre) <= highest {
+                    near.push(crease);
+                }
+            }
+            let kept = own.end..near.len();
+            open.extend([([middle, b, c], kept.clone()), ([a, middle, c], kept)]);
         }
         Ok(())
     }

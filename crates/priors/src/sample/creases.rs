@@ -8,9 +8,11 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use super::LIMIT;
-use crate::vector::{Vector, along, cross, dot, norm, sub};
 use crate::{PriorModel, PriorsError};
+use mesh::vector::{Vector, along, cross, dot, norm, sub};
 
 /// Normals closer than this belong to one plane (sine of the angle).
 const FLAT: f64 = 1e-4;
@@ -29,66 +31,80 @@ struct Crease {
 #[derive(Debug)]
 pub(super) struct Creases {
     creases: Vec<Crease>,
-    cells: HashMap<[i64; 3], Vec<u32>>,
+    /// Pairs of a cell and a crease that may touch it, ascending.
+    touching: Vec<([i32; 3], u32)>,
+    /// Where the pairs of a cell begin and end.
+    cells: HashMap<[i32; 3], (u32, u32)>,
     side_m: f64,
     reach_m: f64,
 }
 
-/// Cells along the reach: the shells of cells around a point are searched from the inside, and most points lie near an edge.
-const CELLS: i64 = 4;
+/// A crease as a triangle meets it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Near {
+    ends: [Vector; 2],
+    /// How far a disk may reach over it, metres.
+    over_m: f64,
+}
+
+impl Near {
+    /// The largest radius of a disk at a point that this crease allows.
+    pub(super) fn allows(&self, position: Vector) -> f64 {
+        to_segment(position, self.ends) + self.over_m
+    }
+}
 
 impl Creases {
     /// The creases of a model, found from points up to `reach_m` away.
     pub(super) fn new(model: &PriorModel, reach_m: f64) -> Result<Self, PriorsError> {
         let creases = collect(model);
-        let side_m = reach_m / CELLS as f64;
+        // A cell as wide as the reach: most triangles then look into a few dozen cells.
+        let side_m = reach_m;
         let pieces: f64 = creases.iter().map(|c| norm(sub(c.ends[1], c.ends[0])) / side_m + 1.0).sum();
-        if pieces > LIMIT as f64 / 5.0 {
-            return Err(PriorsError::TooMany { asked: pieces as u64, limit: LIMIT / 5 });
+        let extent = model.mesh().positions.iter().flatten().fold(0.0, |most: f64, c| most.max(c.abs()));
+        if pieces > LIMIT as f64 / 5.0 || extent / side_m > f64::from(i32::MAX / 2) {
+            return Err(PriorsError::TooMany { asked: pieces.max(extent / side_m) as u64, limit: LIMIT / 5 });
         }
-        let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-        for (number, crease) in (0u32..).zip(&creases) {
-            for cell in touched(crease.ends, side_m) {
-                let list = cells.entry(cell).or_default();
-                if list.last() != Some(&number) {
-                    list.push(number);
-                }
-            }
+        let of_crease = |(number, crease): (u32, &Crease)| touched(crease.ends, side_m).map(move |cell| (cell, number));
+        let mut touching: Vec<([i32; 3], u32)> = (0u32..).zip(&creases).flat_map(of_crease).collect();
+        touching.par_sort_unstable();
+        touching.dedup();
+        let mut cells = HashMap::new();
+        let mut start = 0;
+        for group in touching.chunk_by(|a, b| a.0 == b.0) {
+            let end = start + group.len() as u32;
+            cells.insert(group[0].0, (start, end));
+            start = end;
         }
-        Ok(Self { creases, cells, side_m, reach_m })
+        Ok(Self { creases, touching, cells, side_m, reach_m })
     }
 
-    /// The largest radius of a disk at a point with a normal that stays within the error, at most the reach.
-    pub(super) fn spacing(&self, position: Vector, normal: Vector, error_m: f64) -> f64 {
-        let home = position.map(|c| (c / self.side_m).floor() as i64);
-        let mut spacing = self.reach_m;
-        for shell in 0..=CELLS {
-            // What lies in this shell of cells is at least this far away, and can take nothing off a smaller spacing.
-            if (shell - 1) as f64 * self.side_m >= spacing {
-                break;
-            }
-            for list in around(home, shell).filter_map(|cell| self.cells.get(&cell)) {
-                for &number in list {
-                    let crease = &self.creases[number as usize];
-                    let distance = to_segment(position, crease.ends);
-                    if distance < spacing {
-                        spacing = spacing.min(distance + 0.5 * error_m / crease.bend(normal));
-                    }
-                }
-            }
-        }
-        spacing
+    /// The largest radius of all, metres.
+    pub(super) fn reach_m(&self) -> f64 {
+        self.reach_m
     }
-}
 
-/// The cells at a distance from one, counted as a king moves.
-fn around([x, y, z]: [i64; 3], shell: i64) -> impl Iterator<Item = [i64; 3]> {
-    (-shell..=shell).flat_map(move |dx| {
-        (-shell..=shell).flat_map(move |dy| {
-            let step = if dx.abs() == shell || dy.abs() == shell { 1 } else { (2 * shell).max(1) as usize };
-            (-shell..=shell).step_by(step).map(move |dz| [x + dx, y + dy, z + dz])
-        })
-    })
+    /// The creases that may bound the radius of a disk somewhere on a triangle with a normal.
+    pub(super) fn near(&self, corners: &[Vector; 3], normal: Vector, error_m: f64) -> Vec<Near> {
+        let limit = |axis: usize, pick: fn(f64, f64) -> f64, by: f64| {
+            let most = corners.iter().map(|c| c[axis]).reduce(pick).unwrap_or(0.0);
+            ((most + by) / self.side_m).floor() as i32
+        };
+        let range = |axis| limit(axis, f64::min, -self.reach_m)..=limit(axis, f64::max, self.reach_m);
+        let cells = range(0).flat_map(|x| range(1).flat_map(move |y| range(2).map(move |z| [x, y, z])));
+        let of_cell = |cell: [i32; 3]| {
+            let (start, end) = self.cells.get(&cell).copied().unwrap_or_default();
+            &self.touching[start as usize..end as usize]
+        };
+        let mut numbers: Vec<u32> = cells.flat_map(of_cell).map(|(_, number)| *number).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let of_crease = |number: u32| {
+            let crease = &self.creases[number as usize];
+            Near { ends: crease.ends, over_m: 0.5 * error_m / crease.bend(normal) }
+        };
+        numbers.into_iter().map(of_crease).collect()
+    }
 }
 
 impl Crease {
@@ -126,10 +142,10 @@ fn collect(model: &PriorModel) -> Vec<Crease> {
 }
 
 /// The cells that a segment may touch: those around its pieces, each no longer than a cell.
-fn touched([start, end]: [Vector; 2], side: f64) -> impl Iterator<Item = [i64; 3]> {
+fn touched([start, end]: [Vector; 2], side: f64) -> impl Iterator<Item = [i32; 3]> {
     let span = sub(end, start);
     let pieces = (norm(span) / side).ceil().max(1.0) as usize;
-    let cell = move |t: usize| along(start, t as f64 / pieces as f64, span).map(|c| (c / side).floor() as i64);
+    let cell = move |t: usize| along(start, t as f64 / pieces as f64, span).map(|c| (c / side).floor() as i32);
     (0..pieces).flat_map(move |piece| {
         let (a, b) = (cell(piece), cell(piece + 1));
         let range = |axis: usize| a[axis].min(b[axis])..=a[axis].max(b[axis]);

@@ -13,8 +13,8 @@ use mesh::SurfaceClass;
 use rayon::prelude::*;
 
 use crate::random::Stream;
-use crate::vector::Vector;
 use crate::{PriorModel, PriorsError};
+use mesh::vector::Vector;
 
 pub use adaptive::{ErrorCurve, error_curve};
 pub use weights::ClassWeights;

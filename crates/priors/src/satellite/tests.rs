@@ -6,7 +6,7 @@ use mesh::{ModelPoint, SurfaceClass, TriangleMesh};
 
 use super::*;
 use crate::model::tests::cuboid;
-use crate::vector::sub;
+use mesh::vector::sub;
 
 const PLACE: LonLatHeight = LonLatHeight { lon_deg: 5.4, lat_deg: 43.53, height_m: 200.0 };
 const SIZE: (usize, usize) = (150, 120);

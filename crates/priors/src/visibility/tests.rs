@@ -27,9 +27,9 @@ fn seen(model: &PriorModel, samples: &[Sample], views: &[View], config: Visibili
 
 /// A camera that looks at a point.
 fn looking_at(centre: [f64; 3], at: [f64; 3]) -> View {
-    let forward = crate::vector::unit(sub(at, centre)).unwrap();
-    let right = crate::vector::unit(crate::vector::cross(forward, [0.0, 0.0, 1.0])).unwrap();
-    let down = crate::vector::cross(forward, right);
+    let forward = mesh::vector::unit(sub(at, centre)).unwrap();
+    let right = mesh::vector::unit(mesh::vector::cross(forward, [0.0, 0.0, 1.0])).unwrap();
+    let down = mesh::vector::cross(forward, right);
     View { lens: pinhole(200, 150, 120.0), pose: camera::Pose { rotation: [right, down, forward], centre } }
 }
 

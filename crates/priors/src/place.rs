@@ -1,0 +1,82 @@
+//! Where on the Earth a city model is: the map of its coordinates, and what its heights are above.
+//!
+//! RPCs count from the WGS 84 ellipsoid, so the heights of the model go there first.
+
+use geodesy::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
+use mesh::{CrsReference, TriangleMesh};
+
+use crate::PriorsError;
+
+/// The map and the heights of a model.
+#[derive(Debug)]
+pub struct ModelPlace {
+    /// The map, in metres.
+    pub projection: MapProjection,
+    /// What the heights are above; `None` where no one says, and they are taken to be above the ellipsoid.
+    pub datum: Option<VerticalDatum>,
+}
+
+impl ModelPlace {
+    /// The place that a model names; `map_epsg` and `datum` go before what it says.
+    ///
+    /// # Errors
+    /// [`PriorsError::MapUnknown`], [`PriorsError::MapNotMetric`], a code that PROJ does not know.
+    pub fn of(crs: &CrsReference, map_epsg: Option<u32>, datum: Option<VerticalDatum>) -> Result<Self, PriorsError> {
+        let stated = crs.epsg.map(|code| CrsIdentity::of(&format!("EPSG:{code}"))).transpose()?;
+        let code = map_epsg.or(crs.epsg).ok_or_else(|| PriorsError::MapUnknown { crs: crs.to_string() })?;
+        let definition = format!("EPSG:{code}");
+        let projection = MapProjection::from_definition(&definition)?;
+        if projection.metres_per_unit() != Some(1.0) {
+            return Err(PriorsError::MapNotMetric { definition });
+        }
+        let in_file = crs.vertical_epsg.map(VerticalDatum::from_epsg).or(stated.and_then(|identity| identity.vertical));
+        Ok(Self { projection, datum: datum.or(in_file) })
+    }
+
+    /// What the heights are taken to be above.
+    pub fn datum(&self) -> VerticalDatum {
+        self.datum.unwrap_or_default()
+    }
+
+    /// The heights of a mesh in this map become heights above the WGS 84 ellipsoid.
+    ///
+    /// # Errors
+    /// A datum whose grid cannot be had; [`PriorsError::BeyondDatum`] outside its area, the mesh is then as it was.
+    pub fn to_ellipsoid(&self, mesh: &mut TriangleMesh) -> Result<(), PriorsError> {
+        let datum = self.datum();
+        if datum == VerticalDatum::Ellipsoid {
+            return Ok(());
+        }
+        let origin = mesh.origin;
+        let (mut x, mut y): (Vec<f64>, Vec<f64>) =
+            mesh.positions.iter().map(|p| (p[0] + origin.x, p[1] + origin.y)).unzip();
+        self.projection.lonlat_from_map_slices(&mut x, &mut y)?;
+        let mut heights: Vec<f64> = mesh.positions.iter().map(|p| p[2] + origin.z).collect();
+        HeightConverter::new(datum)?.ellipsoid_from_datum_slices(&x, &y, &mut heights)?;
+        if heights.iter().any(|height| !height.is_finite()) {
+            return Err(PriorsError::BeyondDatum { datum });
+        }
+        mesh.positions.iter_mut().zip(heights).for_each(|(p, height)| p[2] = height - origin.z);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_asked_for_goes_before_what_the_model_says() {
+        let place = |epsg, vertical, asked, datum| {
+            ModelPlace::of(&CrsReference { name: None, epsg, vertical_epsg: vertical }, asked, datum)
+        };
+        let dutch = place(Some(7415), None, None, None).unwrap();
+        assert!(dutch.datum.is_some() && dutch.projection.definition().contains("7415"));
+        let above_sea = Some(VerticalDatum::from_epsg(5773));
+        let asked = place(Some(25832), Some(7837), Some(32632), above_sea).unwrap();
+        assert_eq!((asked.datum, asked.projection.definition()), (above_sea, "EPSG:32632"));
+        assert_eq!(place(Some(25832), None, None, None).unwrap().datum(), VerticalDatum::Ellipsoid);
+        assert!(matches!(place(None, None, None, None), Err(PriorsError::MapUnknown { .. })));
+        assert!(matches!(place(Some(4326), None, None, None), Err(PriorsError::MapNotMetric { .. })));
+    }
+}

@@ -1,0 +1,63 @@
+//! What pages about priors are made of: cards, notes, pictures of views, tables.
+
+use raster::Grid;
+
+use crate::page::escape;
+use crate::picture::{PictureError, data_uri};
+
+/// What the page shows of one view.
+#[derive(Debug, Clone)]
+pub struct ViewPictures {
+    /// The image.
+    pub name: String,
+    /// Its maps in colours, with what they show.
+    pub maps: Vec<(&'static str, Grid<[u8; 3]>)>,
+}
+
+/// Numbers with what they count; the numbers are HTML already.
+pub(crate) fn cards_of(cards: &[(String, &str)]) -> String {
+    let cards: String = cards
+        .iter()
+        .map(|(value, text)| format!("<div class=\"card\"><b>{value}</b><span>{text}</span></div>"))
+        .collect();
+    format!("<div class=\"cards\">{cards}</div>")
+}
+
+/// The notes as a list; nothing without any.
+pub(crate) fn notes(notes: &[String]) -> String {
+    let items: String = notes.iter().map(|note| format!("<li>{}</li>", escape(note))).collect();
+    if items.is_empty() { items } else { format!("<div class=\"notes\"><ul>{items}</ul></div>") }
+}
+
+/// The pictures of views under a heading; nothing without any.
+pub(crate) fn figures(pictures: &[ViewPictures]) -> Result<String, PictureError> {
+    let mut figures = String::new();
+    for ViewPictures { name, maps } in pictures {
+        for (what, picture) in maps {
+            let (uri, name) = (data_uri(picture)?, escape(name));
+            figures += &format!(
+                "<figure><img src=\"{uri}\" alt=\"{what} of {name}\"><figcaption><b>{name}</b> {what}</figcaption></figure>"
+            );
+        }
+    }
+    Ok(if figures.is_empty() { figures } else { format!("<h2>Views</h2><div class=\"pictures\">{figures}</div>") })
+}
+
+pub(crate) fn table(title: &str, heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let heads: String = heads.iter().map(|head| format!("<th scope=\"col\">{}</th>", escape(head))).collect();
+    let row = |cells: Vec<String>| {
+        let mut cells = cells.iter().map(|cell| escape(cell));
+        let first = cells.next().unwrap_or_default();
+        let rest: String = cells.map(|cell| format!("<td>{cell}</td>")).collect();
+        format!("<tr><th scope=\"row\">{first}</th>{rest}</tr>")
+    };
+    let rows: String = rows.map(row).collect();
+    format!(
+        "<h2>{}</h2><div class=\"wide\"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>",
+        escape(title)
+    )
+}
+
+pub(crate) fn last_part(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}

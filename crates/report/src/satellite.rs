@@ -1,0 +1,185 @@
+//! The account of priors for satellite images: what each image sees of a city model, as JSON and as one page.
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::page::{escape, page};
+use crate::parts::{ViewPictures, cards_of, figures, last_part, notes, table};
+use crate::picture::PictureError;
+
+/// What became of a city model in satellite images.
+#[derive(Debug, Clone, Serialize)]
+pub struct SatellitePriorsReport {
+    /// The city model's file.
+    pub model: String,
+    /// Its reference system, as it says.
+    pub model_crs: String,
+    /// The map that it was taken to be in.
+    pub map: String,
+    /// What its heights were taken to be above.
+    pub model_heights_above: String,
+    /// Triangles of the model in use.
+    pub triangles: usize,
+    /// What is to be known.
+    pub notes: Vec<String>,
+    /// The images.
+    pub images: Vec<SatelliteRow>,
+    /// What the maps hold, by name.
+    pub maps: Value,
+}
+
+/// One image.
+#[derive(Debug, Clone, Serialize)]
+pub struct SatelliteRow {
+    /// Its file.
+    pub image: String,
+    /// The name that its maps have.
+    pub name: String,
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Pixels that see a building.
+    pub hit_pixels: usize,
+    /// The lowest and the highest place seen, metres above the ellipsoid; `None` where no building is seen.
+    pub height_range_m: Option<[f32; 2]>,
+    /// Distances are counted from this height, metres above the ellipsoid.
+    pub distance_from_height_m: f64,
+    /// How far the lines of sight are from those of the RPC at most, metres.
+    pub line_of_sight_error_m: f64,
+    /// Whether a correction was applied to the RPC.
+    pub corrected: bool,
+}
+
+impl SatellitePriorsReport {
+    /// Every number, by name.
+    ///
+    /// # Errors
+    /// None that a report of finite numbers can cause.
+    pub fn json(&self) -> Result<Value, serde_json::Error> {
+        let mut value = json!({ "generator": concat!("skysweep priors ", env!("CARGO_PKG_VERSION")) });
+        if let (Some(all), Value::Object(own)) = (value.as_object_mut(), serde_json::to_value(self)?) {
+            all.extend(own);
+        }
+        Ok(value)
+    }
+
+    /// The page, with pictures of some images.
+    ///
+    /// # Errors
+    /// [`PictureError`] for a picture without pixels.
+    pub fn html(&self, pictures: &[ViewPictures]) -> Result<String, PictureError> {
+        let title = format!("Priors of {} in satellite images", last_part(&self.model));
+        let lead = format!(
+            "{} triangles in {}, heights above {}, seen from {} images.",
+            self.triangles,
+            self.map,
+            self.model_heights_above,
+            self.images.len()
+        );
+        let body = [
+            format!("<h1>{}</h1>", escape(&title)),
+            format!("<p class=\"lead\">{}</p>", escape(&lead)),
+            self.cards(),
+            notes(&self.notes),
+            figures(pictures)?,
+            self.image_table(),
+            self.map_table(),
+        ];
+        Ok(page(&title, &body.join("\n")))
+    }
+
+    fn cards(&self) -> String {
+        let hits: usize = self.images.iter().map(|row| row.hit_pixels).sum();
+        let pixels: usize = self.images.iter().map(|row| row.size[0] * row.size[1]).sum();
+        let seeing = self.images.iter().filter(|row| row.hit_pixels > 0).count();
+        let error_m = self.images.iter().map(|row| row.line_of_sight_error_m).fold(0.0, f64::max);
+        let share = 100.0 * hits as f64 / pixels.max(1) as f64;
+        cards_of(&[
+            (format!("{seeing} <small>of {}</small>", self.images.len()), "images see a building"),
+            (format!("{share:.1} <small>%</small>"), "of the pixels see a building"),
+            (format!("{:.1} <small>mm</small>", 1e3 * error_m), "off the RPC's lines of sight at most"),
+        ])
+    }
+
+    fn image_table(&self) -> String {
+        let row = |row: &SatelliteRow| {
+            let range = row.height_range_m.map_or("–".to_owned(), |[low, high]| format!("{low:.1} to {high:.1} m"));
+            let share = 100.0 * row.hit_pixels as f64 / (row.size[0] * row.size[1]).max(1) as f64;
+            vec![
+                row.name.clone(),
+                format!("{} × {}", row.size[0], row.size[1]),
+                format!("{share:.1} %"),
+                range,
+                format!("{:.1} m", row.distance_from_height_m),
+                format!("{:.2} mm", 1e3 * row.line_of_sight_error_m),
+                if row.corrected { "corrected" } else { "as delivered" }.to_owned(),
+            ]
+        };
+        let heads = ["image", "size", "building", "heights", "distances from", "lines of sight off by", "RPC"];
+        table("All images", &heads, self.images.iter().map(row))
+    }
+
+    fn map_table(&self) -> String {
+        let Value::Object(maps) = &self.maps else { return String::new() };
+        let row = |(name, value): (&String, &Value)| vec![name.clone(), value.as_str().unwrap_or_default().to_owned()];
+        table("Maps", &["folder", "what it holds"], maps.iter().map(row))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raster::Grid;
+
+    fn report() -> SatellitePriorsReport {
+        let row = |name: &str, hit_pixels| SatelliteRow {
+            image: format!("images/{name}.tif"),
+            name: name.to_owned(),
+            size: [10, 4],
+            hit_pixels,
+            height_range_m: (hit_pixels > 0).then_some([181.5, 203.25]),
+            distance_from_height_m: 210.0,
+            line_of_sight_error_m: 0.000_4,
+            corrected: hit_pixels > 0,
+        };
+        SatellitePriorsReport {
+            model: "data/town.city.json".to_owned(),
+            model_crs: "EPSG:32631".to_owned(),
+            map: "EPSG:32631".to_owned(),
+            model_heights_above: "the ellipsoid".to_owned(),
+            triangles: 12,
+            notes: vec!["one image sees <nothing>".to_owned()],
+            images: vec![row("view_1", 10), row("view_2", 0)],
+            maps: json!({ "mask": "1 where a building is seen" }),
+        }
+    }
+
+    #[test]
+    fn the_page_holds_the_numbers() {
+        let maps = vec![("heights", Grid::filled(4, 3, [9; 3]))];
+        let page = report().html(&[ViewPictures { name: "view_1".to_owned(), maps }]).unwrap();
+        for words in [
+            "1 <small>of 2</small>",
+            "12.5 <small>%</small>",
+            "181.5 to 203.2 m",
+            "0.40 mm",
+            "as delivered",
+            "&lt;nothing&gt;",
+            "data:image/png",
+            "1 where a building is seen",
+        ] {
+            assert!(page.contains(words), "{words} is not in\n{page}");
+        }
+        assert!(!page.contains("<nothing>"));
+        let plain = report().html(&[]).unwrap();
+        assert!(!plain.contains("<figure"));
+    }
+
+    #[test]
+    fn the_json_has_every_image() {
+        let value = report().json().unwrap();
+        assert_eq!(
+            (&value["images"][0]["hit_pixels"], &value["images"][1]["height_range_m"]),
+            (&json!(10), &Value::Null)
+        );
+    }
+}
