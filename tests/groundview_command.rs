@@ -23,6 +23,15 @@ fn town(name: &str) -> PathBuf {
     common::sample("truth").join(name)
 }
 
+/// A small height map of the town's middle.
+fn small_map(folder: &TempDir) -> PathBuf {
+    let map = folder.path().join("small.tif");
+    let mut command = skysweep();
+    command.arg("heightmap").arg(town("dsm.tif")).args(CENTRE).args(["--size", "120", "--no-preview", "-q", "-o"]);
+    command.arg(&map).assert().code(0);
+    map
+}
+
 /// A height map of the town, turned by 37°, and the views from its middle.
 fn views(folder: &TempDir, options: &[&str]) -> (PathBuf, PathBuf) {
     let (map, out) = (folder.path().join("map.tif"), folder.path().join("views"));
@@ -229,6 +238,7 @@ fn pictures_are_cut_and_layers_laid_over_each_other() {
 #[test]
 fn a_bad_row_of_a_list_is_named_and_the_others_are_made() {
     let folder = tempfile::tempdir().unwrap();
+    let map = small_map(&folder);
     let (list, pictures, out) =
         (folder.path().join("list.csv"), folder.path().join("pictures"), folder.path().join("views"));
     let rows =
@@ -241,7 +251,7 @@ fn a_bad_row_of_a_list_is_named_and_the_others_are_made() {
     }
     std::fs::write(pictures.join("c.png"), "no picture").unwrap();
     let mut command = skysweep();
-    command.arg("groundview").arg(town("dsm.tif")).arg("--positions").arg(&list).arg("--pictures").arg(&pictures);
+    command.arg("groundview").arg(&map).arg("--positions").arg(&list).arg("--pictures").arg(&pictures);
     command.args(["--width", "60", "--crops", "2", "--crop-size", "32", "--heading", "90", "--json"]);
     let assert = command.args(["--progress", "json"]).arg("-o").arg(&out).assert().code(1);
     let assert = assert.stderr(predicate::str::contains("far").and(predicate::str::contains("views")));
@@ -260,11 +270,12 @@ fn a_bad_row_of_a_list_is_named_and_the_others_are_made() {
 #[test]
 fn a_camera_file_stands_for_its_options() {
     let folder = tempfile::tempdir().unwrap();
+    let map = small_map(&folder);
     let file = folder.path().join("camera.json");
     std::fs::write(&file, r#"{"lon_deg": 5.4, "lat_deg": 43.53, "heading_deg": 37.0, "height_m": 240.0}"#).unwrap();
     let centre = |name: &str, options: &[&str]| {
         let mut command = skysweep();
-        command.arg("groundview").arg(town("dsm.tif")).args(["--width", "60", "--crops", "0", "--json"]);
+        command.arg("groundview").arg(&map).args(["--width", "60", "--crops", "0", "--json"]);
         command.args(options).arg("-o").arg(folder.path().join(name));
         let report: Value = serde_json::from_slice(&command.assert().code(0).get_output().stdout).unwrap();
         (report["views"][0]["centre"].clone(), array(folder.path().join(name).join("depth/panorama.npy")))
