@@ -189,6 +189,79 @@ fn pointing_comes_from_the_run_that_made_the_surface() {
     assert!(opacities.iter().any(|o| *o < 0.7), "confidence becomes opacity");
 }
 
+/// Splats seen from the air and from the ground: the image that they are of, and heights where a ray meets the same surface.
+#[test]
+fn splats_are_seen_again_through_images_and_perspective_cameras() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, ply) = (town(), folder.path().join("s.ply"));
+    let (dsm, image) = (scene.join("truth/dsm.tif"), scene.join("view_2.tif"));
+    skysweep().arg("splats").arg(&dsm).arg(&image).arg("-o").arg(&ply).arg("-q").assert().code(0);
+    let render = |name: &str, arguments: &[&std::ffi::OsStr]| {
+        let out = folder.path().join(name);
+        let mut command = skysweep();
+        command
+            .args(["splats", "render", "--json", "--progress", "none"])
+            .arg(&ply)
+            .args(arguments)
+            .arg("-o")
+            .arg(&out);
+        (json(command.output().unwrap()), out)
+    };
+    let (report, out) = render("image", &[image.as_os_str()]);
+    let view = &report["views"][0];
+    assert_eq!((report["views"].as_array().unwrap().len(), view["name"].as_str()), (1, Some("view_2")));
+    // Façades are in the image and in no splat.
+    assert!(view["psnr_db"].as_f64().unwrap() > 24.0, "{view}");
+    assert!(out.join("colour/view_2.png").is_file() && out.join("alpha/view_2.png").is_file());
+
+    let ground = folder.path().join("ground");
+    let mut command = skysweep();
+    command.arg("groundview").arg(&dsm).args(["--center", "5.4", "43.53", "--ground-offset", "25", "--width", "16"]);
+    command.args(["--crops", "3", "--crop-size", "200", "-q", "-o"]).arg(&ground).assert().code(0);
+    let model = ground.join("sparse/0");
+    let (report, out) = render("cameras", &["--cameras".as_ref(), model.as_os_str()]);
+    assert!(report["views"][2]["psnr_db"].is_null() && report["views"][2]["coverage"].as_f64().unwrap() > 0.1);
+    let array = |path: PathBuf| io::npy::read(path).unwrap().data.to_f64();
+    let cameras = io::colmap::read(&model).unwrap();
+    let origin: LocalOrigin = serde_json::from_slice(&std::fs::read(model.join("origin.json")).unwrap()).unwrap();
+    let mut off: Vec<f64> = Vec::new();
+    for view in &cameras.views {
+        // Splats lie on roofs and on the ground; there are none on walls.
+        let stem = view.name.strip_suffix(".png").unwrap();
+        let depth = array(ground.join(format!("depth/{stem}.npy")));
+        let normal = array(ground.join(format!("normal/{stem}.npy")));
+        let height = array(out.join(format!("height/{stem}.npy")));
+        let both = depth
+            .iter()
+            .zip(&height)
+            .enumerate()
+            .filter(|(k, (d, h))| (*d + *h).is_finite() && normal[3 * k + 2] > 0.9);
+        for (k, (depth, height)) in both {
+            let at = camera::ImagePoint::new((k % 200) as f64, (k / 200) as f64);
+            let [x, y] = cameras.lenses[view.lens].direction(at).unwrap();
+            let r = &view.pose.rotation;
+            let up = r[0][2] * x + r[1][2] * y + r[2][2];
+            off.push((view.pose.centre[2] + depth * up + origin.origin[2] - height).abs());
+        }
+    }
+    off.sort_by(f64::total_cmp);
+    assert!(off.len() > 15_000, "{} pixels", off.len());
+    assert!(off[off.len() / 2] < 0.25, "the median height is {} m off", off[off.len() / 2]);
+    // The views as pictures of themselves differ by the bytes of a PNG.
+    let pictures = folder.path().join("cameras/colour");
+    let options = ["--cameras".as_ref(), model.as_os_str(), "--pictures".as_ref(), pictures.as_os_str()];
+    let (report, _) = render("again", &options);
+    assert!((0..3).all(|i| report["views"][i]["psnr_db"].as_f64().unwrap() > 50.0), "{report}");
+    let refused = |arguments: &[&std::ffi::OsStr], words: &str| {
+        let mut command = skysweep();
+        command.args(["splats", "render"]).arg(&ply).args(arguments).arg("-o").arg(folder.path().join("no"));
+        command.assert().code(2).stderr(predicate::str::contains(words.to_owned()));
+        assert!(!folder.path().join("no").exists());
+    };
+    refused(&[], "nothing to look through");
+    refused(&["--cameras".as_ref(), scene.as_os_str()], "COLMAP");
+}
+
 #[test]
 fn what_cannot_be_done_is_said_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -15,6 +15,7 @@ mod heightmap;
 mod log;
 mod map_surface;
 mod ortho;
+mod placed_model;
 mod print;
 mod priors;
 mod progress;

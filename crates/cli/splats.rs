@@ -1,8 +1,11 @@
 //! `skysweep splats`: Gaussian splats of a surface model and its images, as the PLY that 3DGS viewers and trainers read.
+//! `skysweep splats render` looks at them again, through images and perspective cameras.
+
+mod render;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use bev::splats::{
     ColourFit, DivisionConfig, RpcSplatCamera, SplatConfig, SplatReport, SplatView, Surface, make_splats,
 };
@@ -19,19 +22,36 @@ use crate::{Global, Outcome, map_surface, print};
 /// Arguments of `skysweep splats`.
 #[derive(Debug, clap::Args)]
 #[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
     after_help = "Example: skysweep splats out/dsm/dsm.tif view_*.tif -o splats.ply. The report says how many splats \
                         there are, how far their heights are from the surface, and how well they render back into each image."
 )]
 pub(crate) struct Args {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    make: MakeArgs,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    /// Render splats through images with RPCs and through perspective cameras.
+    Render(render::Args),
+}
+
+/// What splats are made of, and how.
+#[derive(Debug, clap::Args)]
+struct MakeArgs {
     /// The surface model, in a projected CRS in metres.
-    #[arg(value_name = "DSM")]
-    dsm: PathBuf,
+    #[arg(required = true, value_name = "DSM")]
+    dsm: Option<PathBuf>,
     /// Images with RPCs that give the colours.
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
     /// File to write; its origin goes beside it as OUT.origin.json.
-    #[arg(short, long, value_name = "OUT.ply")]
-    output: PathBuf,
+    #[arg(short, long, required = true, value_name = "OUT.ply")]
+    output: Option<PathBuf>,
     /// Largest distance of a height from its splat's plane, metres.
     #[arg(long, value_name = "METRES", default_value_t = DivisionConfig::default().error_m)]
     error: f64,
@@ -90,20 +110,28 @@ struct Image {
 
 /// Runs `skysweep splats`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    for path in [Some(&args.output), args.report.as_ref()].into_iter().flatten() {
+    match (&args.command, &args.make.dsm, &args.make.output) {
+        (Some(Command::Render(args)), ..) => render::run(args, global),
+        (None, Some(dsm), Some(output)) => make(&args.make, dsm, output, global),
+        _ => bail!("expected DSM, IMAGE and -o OUT.ply"),
+    }
+}
+
+fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
+    for path in [Some(output), args.report.as_deref()].into_iter().flatten() {
         ensure!(
             args.overwrite || !path.exists(),
             "the output exists: give --overwrite to replace it: {}",
             path.display()
         );
     }
-    let read = map_surface::read(&args.dsm, args.vertical)?;
+    let read = map_surface::read(dsm, args.vertical)?;
     let dem = &read.dem;
     let origin = Surface::middle(&dem.heights, dem.geotransform)
-        .with_context(|| format!("the surface model has no height: {}", args.dsm.display()))?;
+        .with_context(|| format!("the surface model has no height: {}", dsm.display()))?;
     let surface = Surface::new(&dem.heights, dem.geotransform, origin);
     let confidence = args.confidence.as_deref().map(confidence).transpose()?;
-    let corrections = corrections(args)?;
+    let corrections = Corrections::for_surface(dsm, args.corrections.as_deref())?;
     let images = args.images.iter().map(|path| image(path, &corrections)).collect::<anyhow::Result<Vec<_>>>()?;
     let mut views = Vec::with_capacity(images.len());
     for (path, image) in args.images.iter().zip(&images) {
@@ -125,13 +153,13 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         sh_degree: args.sh_degree,
     };
     let local = LocalOrigin::new(read.projection.definition(), "ellipsoid", origin);
-    io::splat_ply::write(&args.output, &scene.splats, &local, layout, args.overwrite)?;
+    io::splat_ply::write(output, &scene.splats, &local, layout, args.overwrite)?;
     write_renderings(args, &scene.renderings)?;
-    tell(args, global, &scene.report)?;
+    tell(args, output, global, &scene.report)?;
     Ok(Outcome::Complete)
 }
 
-fn write_renderings(args: &Args, renderings: &[Grid<[f32; 3]>]) -> anyhow::Result<()> {
+fn write_renderings(args: &MakeArgs, renderings: &[Grid<[f32; 3]>]) -> anyhow::Result<()> {
     let Some(folder) = &args.render else { return Ok(()) };
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder: {}", folder.display()))?;
     for (path, rendering) in args.images.iter().zip(renderings) {
@@ -154,18 +182,7 @@ fn image(path: &Path, corrections: &Corrections) -> anyhow::Result<Image> {
     Ok(Image { camera: RpcCamera { rpc: rpc.rpc, correction }, pixels })
 }
 
-/// The corrections of the run that made the surface model, or of the one that is named.
-fn corrections(args: &Args) -> anyhow::Result<Corrections> {
-    let folder = args.dsm.parent().filter(|folder| folder.file_name().is_some_and(|name| name == "dsm"));
-    let beside = || Some(folder?.parent()?.join("report/report.json")).filter(|path| path.is_file());
-    match &args.corrections {
-        Some(path) if path.as_os_str() == "none" => Ok(Corrections::default()),
-        Some(path) => Corrections::read(path),
-        None => beside().map_or_else(|| Ok(Corrections::default()), |path| Corrections::read(&path)),
-    }
-}
-
-fn tell(args: &Args, global: Global, report: &SplatReport) -> anyhow::Result<()> {
+fn tell(args: &MakeArgs, output: &Path, global: Global, report: &SplatReport) -> anyhow::Result<()> {
     let images = args.images.iter().zip(&report.views).map(|(path, view)| {
         let mut value = serde_json::to_value(view)?;
         value["image"] = path.display().to_string().into();
@@ -174,7 +191,7 @@ fn tell(args: &Args, global: Global, report: &SplatReport) -> anyhow::Result<()>
     let images: Vec<Value> = images.collect::<anyhow::Result<_>>()?;
     let mut value = serde_json::to_value(report)?;
     value["views"] = images.into();
-    value["output"] = args.output.display().to_string().into();
+    value["output"] = output.display().to_string().into();
     value["error_bound_m"] = args.error.into();
     value["colour_bound"] = serde_json::to_value(args.colour_error)?;
     if let Some(path) = &args.report {
@@ -184,12 +201,12 @@ fn tell(args: &Args, global: Global, report: &SplatReport) -> anyhow::Result<()>
     if args.json {
         print::json(&value)?;
     } else if !global.is_quiet() {
-        print::text(&summary(args, report))?;
+        print::text(&summary(args, output, report))?;
     }
     Ok(())
 }
 
-fn summary(args: &Args, report: &SplatReport) -> String {
+fn summary(args: &MakeArgs, output: &Path, report: &SplatReport) -> String {
     let share = 100.0 * report.splats as f64 / report.cells.max(1) as f64;
     let mut text = format!(
         "splats     {} for {} cells ({share:.1} %)\nplanes     within {:.3} m\n",
@@ -219,5 +236,5 @@ fn summary(args: &Args, report: &SplatReport) -> String {
         text +=
             &format!("equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n", count / report.splats as f64);
     }
-    text + &format!("written    {}\n", args.output.display())
+    text + &format!("written    {}\n", output.display())
 }

@@ -7,11 +7,11 @@ use anyhow::{Context, bail, ensure};
 use bev::ground::{Panorama, level_pose};
 use camera::{Lens, Pose};
 use io::positions::read_positions;
-use io::splat_ply::LocalOrigin;
 use serde::Serialize;
 
 use super::MakeArgs;
 use super::surface::Surface;
+use crate::placed_model;
 use crate::stand::Stand;
 
 /// Most columns of a panorama and pixels along a crop.
@@ -88,31 +88,13 @@ impl Shots {
     }
 
     fn of_model(folder: &Path, surface: &Surface, panorama: Panorama) -> anyhow::Result<Self> {
-        let model = io::colmap::read(folder)?;
-        let path = folder.join("origin.json");
-        let text = std::fs::read_to_string(&path).with_context(|| {
-            format!("the model has no origin on a map: bring it there with skysweep align: {}", path.display())
-        })?;
-        let origin: LocalOrigin = serde_json::from_str(&text)
-            .with_context(|| format!("not an origin as skysweep writes it: {}", path.display()))?;
-        let here = surface.local_origin();
-        ensure!(
-            origin.crs == here.crs && origin.vertical == here.vertical,
-            "the cameras are in {} above the {}, the surface is in {} above the {}: align them there (skysweep align --crs)",
-            origin.crs,
-            origin.vertical,
-            here.crs,
-            here.vertical
-        );
-        let shift = [0, 1, 2].map(|i| origin.origin[i] - surface.origin[i]);
+        let model = placed_model::read(folder, &surface.local_origin())?;
         let mut taken = HashSet::new();
         let mut shots = Vec::with_capacity(model.views.len());
         for view in model.views {
             let stem = Path::new(&view.name).with_extension("").to_string_lossy().replace(['/', '\\'], "_");
             ensure!(taken.insert(stem.clone()), "two images would be written as {stem}");
-            let centre = [0, 1, 2].map(|i| view.pose.centre[i] + shift[i]);
-            let pose = Pose { centre, ..view.pose };
-            shots.push(Shot { stem, name: view.name, lens: Some(view.lens), pose, picture: None });
+            shots.push(Shot { stem, name: view.name, lens: Some(view.lens), pose: view.pose, picture: None });
         }
         Ok(Self { lenses: model.lenses, panorama, shots, failed: Vec::new() })
     }

@@ -8,9 +8,9 @@ use camera::{ImageCorrection, RpcCamera};
 use geodesy::{HeightConverter, MapProjection, VerticalDatum};
 use io::raster::{Dem, ImageSource, read_dem};
 use raster::GeoTransform;
-use serde::Deserialize;
 
 use super::Args;
+use crate::corrections::Corrections;
 
 /// Most cells of an ortho, and of all its bands.
 const CELLS_MAX: usize = 1 << 28;
@@ -52,23 +52,23 @@ impl Inputs {
     pub(super) fn open(args: &Args) -> anyhow::Result<Self> {
         ensure!(args.images.len() <= IMAGES_MAX, "{} images, at most {IMAGES_MAX} at a time", args.images.len());
         ensure!(args.tolerance >= 0.0, "--tolerance is {}, expected metres", args.tolerance);
-        let run = Run::of(&args.dsm);
-        let mut dsm = read_dem(&run.dsm)?;
-        let epsg = dsm.horizontal_epsg.with_context(|| {
-            format!("the surface model's coordinate system has no EPSG code: {}", run.dsm.display())
-        })?;
+        let path = if args.dsm.is_dir() { args.dsm.join("dsm/dsm.tif") } else { args.dsm.clone() };
+        let mut dsm = read_dem(&path)?;
+        let epsg = dsm
+            .horizontal_epsg
+            .with_context(|| format!("the surface model's coordinate system has no EPSG code: {}", path.display()))?;
         let projection = MapProjection::from_epsg(epsg)?;
         let metres = projection.metres_per_unit().with_context(|| {
-            format!("the surface model is in degrees, expected a projected map: {}", run.dsm.display())
+            format!("the surface model is in degrees, expected a projected map: {}", path.display())
         })?;
         let (along_columns, along_rows) = dsm.geotransform.cell_size();
         let cell_m = metres * (along_columns * along_rows).sqrt();
         to_ellipsoid(&mut dsm, args.dsm_vertical, &projection, cell_m)?;
         let known: Vec<f64> = dsm.heights.data().iter().filter(|h| h.is_finite()).map(|&h| f64::from(h)).collect();
-        ensure!(!known.is_empty(), "the surface model has no heights: {}", run.dsm.display());
+        ensure!(!known.is_empty(), "the surface model has no heights: {}", path.display());
         let middle_m = known.iter().sum::<f64>() / known.len() as f64;
         let grid = OrthoGrid::new(args, &dsm, &projection)?;
-        let corrections = run.corrections(args)?;
+        let corrections = Corrections::for_surface(&args.dsm, args.corrections.as_deref())?;
         let open = |path: &PathBuf| Image::open(path, &dsm, &projection, middle_m, &corrections);
         let images = args.images.iter().map(open).collect::<anyhow::Result<Vec<_>>>()?;
         let bands = images.first().map_or(0, |image| image.source.info().bands);
@@ -113,18 +113,17 @@ impl Image {
         dsm: &Dem,
         projection: &MapProjection,
         middle_m: f64,
-        corrections: &[(PathBuf, ImageCorrection)],
+        corrections: &Corrections,
     ) -> anyhow::Result<Self> {
         let source = ImageSource::open(path)?;
         let rpc = io::rpc::read_for_image(path)?.rpc;
-        let same =
-            |known: &Path| known == path || (known.file_name().is_some() && known.file_name() == path.file_name());
-        let correction = corrections.iter().find(|(known, _)| same(known)).map(|(_, correction)| *correction);
-        let camera = RpcCamera { rpc, correction: correction.unwrap_or(ImageCorrection::IDENTITY) };
+        let correction = corrections.for_image(path);
+        let corrected = correction != ImageCorrection::IDENTITY;
+        let camera = RpcCamera { rpc, correction };
         let size = (dsm.heights.width(), dsm.heights.height());
         let eyeline = Eyeline::new(&camera, projection, &dsm.geotransform, size, middle_m)
             .with_context(|| format!("the image does not see the surface model: {}", path.display()))?;
-        Ok(Self { source, camera, corrected: correction.is_some(), eyeline })
+        Ok(Self { source, camera, corrected, eyeline })
     }
 }
 
@@ -164,52 +163,4 @@ fn extent(geotransform: &GeoTransform, width: usize, height: usize) -> [f64; 4] 
         corners.iter().map(pick).reduce(best).unwrap_or_default()
     };
     [fold(|c| c.0, f64::min), fold(|c| c.1, f64::min), fold(|c| c.0, f64::max), fold(|c| c.1, f64::max)]
-}
-
-/// A surface model and the report of the run that made it, where there is one.
-struct Run {
-    dsm: PathBuf,
-    report: Option<PathBuf>,
-}
-
-/// What is read of a run's report.
-#[derive(Deserialize)]
-struct RunReport {
-    images: Vec<RunImage>,
-}
-
-#[derive(Deserialize)]
-struct RunImage {
-    path: PathBuf,
-    applied_correction: Option<ImageCorrection>,
-}
-
-impl Run {
-    fn of(asked: &Path) -> Self {
-        let folder = if asked.is_dir() {
-            Some(asked)
-        } else {
-            asked.parent().filter(|p| p.file_name().is_some_and(|n| n == "dsm")).and_then(Path::parent)
-        };
-        let dsm = if asked.is_dir() { asked.join("dsm/dsm.tif") } else { asked.to_owned() };
-        Self { dsm, report: folder.map(|f| f.join("report/report.json")).filter(|r| r.is_file()) }
-    }
-
-    /// The corrections to apply, by image.
-    fn corrections(&self, args: &Args) -> anyhow::Result<Vec<(PathBuf, ImageCorrection)>> {
-        let path = match &args.corrections {
-            Some(none) if none == Path::new("none") => return Ok(Vec::new()),
-            Some(named) => named,
-            None => match &self.report {
-                Some(report) => report,
-                None => return Ok(Vec::new()),
-            },
-        };
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("cannot read the report: {}", path.display()))?;
-        let report: RunReport = serde_json::from_str(&text)
-            .with_context(|| format!("no report of skysweep dsm with its images: {}", path.display()))?;
-        let found = report.images.into_iter().filter_map(|image| Some((image.path, image.applied_correction?)));
-        Ok(found.collect())
-    }
 }

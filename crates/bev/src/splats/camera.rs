@@ -4,7 +4,7 @@
 //! Local positions are metres along the axes of the map. Depth is only compared: the distance along the viewing direction for
 //! satellites, along the optical axis for perspective cameras, and minus the height from above.
 
-use camera::{Lens, Pose, RpcCamera};
+use camera::{ImagePoint, Lens, Pose, RpcCamera};
 use geodesy::{GeodesyError, LonLatHeight, MapProjection};
 
 use super::Surface;
@@ -15,6 +15,10 @@ const RPC_STEP_M: f64 = 1.0;
 const NEAR_M: f64 = 0.1;
 /// Step of the numerical derivatives of a lens, in its image plane at distance 1.
 const LENS_STEP: f64 = 1e-5;
+
+/// Beyond so many times the image's own half width and height, a lens is continued as if it were flat: a splat beside the camera has
+/// a derivative without bounds there, and would be smeared over the image (the original 3DGS code has the same 1.3).
+const BESIDE: f64 = 1.3;
 
 /// The low-pass of the original 3DGS code, px².
 const LOW_PASS_PX2: f64 = 0.3;
@@ -145,26 +149,45 @@ pub struct LensSplatCamera<'a> {
     pub pose: &'a Pose,
 }
 
+impl LensSplatCamera<'_> {
+    /// Least and greatest column and row of the image plane at distance 1 where the lens is taken at its word.
+    fn word(&self) -> [[f64; 2]; 2] {
+        let (width, height) = (self.lens.width() as f64 - 1.0, self.lens.height() as f64 - 1.0);
+        let rim = [0.0, 0.5, 1.0].map(|t| [[t, 0.0], [t, 1.0], [0.0, t], [1.0, t]]).into_iter().flatten();
+        let seen = rim.filter_map(|[s, t]| self.lens.direction(ImagePoint::new(s * width, t * height)));
+        let none = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        let [u, v] = seen.fold(none, |range, at| [0, 1].map(|i| [range[i][0].min(at[i]), range[i][1].max(at[i])]));
+        [u, v].map(|[low, high]| {
+            let (middle, half) = (low + (high - low) / 2.0, BESIDE * (high - low) / 2.0);
+            // Without a rim that the lens knows there is no bound.
+            if half >= 0.0 { [middle - half, middle + half] } else { [f64::NEG_INFINITY, f64::INFINITY] }
+        })
+    }
+}
+
 impl SplatCamera for LensSplatCamera<'_> {
     fn size(&self) -> (usize, usize) {
         (self.lens.width(), self.lens.height())
     }
 
     fn project(&self, positions: &[[f64; 3]]) -> Result<Vec<Option<Projection>>, GeodesyError> {
+        let word = self.word();
         let one = |p: &[f64; 3]| {
             let [x, y, z] = self.pose.camera_from_world(*p);
             if z <= NEAR_M {
                 return None;
             }
-            let (u, v) = (x / z, y / z);
+            let beside = [x / z, y / z];
+            let [u, v] = [0, 1].map(|i| beside[i].clamp(word[i][0], word[i][1]));
             let at = |u: f64, v: f64| self.lens.project(u, v).map(|p| [p.sample, p.line]);
             let (here, right, below) = (at(u, v)?, at(u + LENS_STEP, v)?, at(u, v + LENS_STEP)?);
-            let jacobian = [0, 1].map(|i| {
-                let (by_u, by_v) = ((right[i] - here[i]) / LENS_STEP, (below[i] - here[i]) / LENS_STEP);
+            let by = [0, 1].map(|i| [(right[i] - here[i]) / LENS_STEP, (below[i] - here[i]) / LENS_STEP]);
+            let jacobian = by.map(|[by_u, by_v]| {
                 let in_camera = [by_u / z, by_v / z, -(by_u * u + by_v * v) / z];
                 [0, 1, 2].map(|axis| (0..3).map(|k| in_camera[k] * self.pose.rotation[k][axis]).sum::<f64>())
             });
-            Some(Projection { pixel: here, depth: z, jacobian })
+            let pixel = [0, 1].map(|i| here[i] + by[i][0] * (beside[0] - u) + by[i][1] * (beside[1] - v));
+            Some(Projection { pixel, depth: z, jacobian })
         };
         Ok(positions.iter().map(one).collect())
     }
@@ -231,6 +254,10 @@ mod tests {
                 assert!((slope - here.jacobian[i][axis]).abs() < 1e-2 * (1.0 + slope.abs()), "{slope} {here:?}");
             }
         }
+        // Far beside the image there is no derivative without bounds, and no way back into it.
+        let aside = pose.rotation[0];
+        let far = at([0, 1, 2].map(|i| pose.centre[i] + 25.0 * aside[i] + 0.2 * pose.rotation[2][i]));
+        assert!(far.pixel[0] > 10_000.0 && far.jacobian.as_flattened().iter().all(|j| j.abs() < 5000.0), "{far:?}");
         let behind = pose.centre.map(|c| c - 100.0);
         assert!(camera.project(&[behind]).unwrap()[0].is_none_or(|p| p.depth > NEAR_M));
     }
