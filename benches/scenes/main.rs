@@ -1,4 +1,4 @@
-//! Speed against error: every preset on every scene, `cargo bench --bench scenes [-- NAME… --runs N --out DIR]`.
+//! Speed against error: every preset on every scene (measured ones with all voids closed too), `cargo bench --bench scenes [-- NAME… --runs N --out DIR]`.
 //!
 //! Simulated scenes are made first (`skysweep simulate`), real ones are read from `../shared/data/stereo` where that is. The
 //! release binary runs as a user would run it, with default options but for the preset. Runs alternate: all scenes and presets

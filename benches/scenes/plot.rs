@@ -75,11 +75,12 @@ fn series(rows: &[Row], truth: &str, error: fn(&Row) -> f64) -> Vec<Series> {
     let mut all: Vec<Series> = Vec::new();
     let mut scene = "";
     for row in rows.iter().filter(|row| row.truth == truth) {
+        let Some(preset) = PRESETS.iter().position(|preset| *preset == row.preset) else { continue };
         if row.scene != scene {
             all.push(Series::new());
             scene = row.scene;
         }
-        let mark = Mark::Preset(PRESETS.iter().position(|preset| *preset == row.preset).unwrap_or(0));
+        let mark = Mark::Preset(preset);
         let label =
             if row.preset == DEFAULT { row.scene.trim_start_matches("jax_068 ").to_owned() } else { String::new() };
         let point = Point { cost: row.cpu_s_per_megapixel, error: error(row), label, mark };

@@ -34,11 +34,12 @@ pub(crate) fn simulate(arguments: &[&str], folder: &Path) -> anyhow::Result<()> 
     checked(made).map(|_| ()).with_context(|| format!("skysweep simulate {}", arguments.join(" ")))
 }
 
-/// Runs `skysweep dsm` with a preset and default options.
+/// Runs `skysweep dsm` with a preset, any options that follow it, and else its defaults.
 pub(crate) fn dsm(images: &[PathBuf], preset: &str, out: &Path) -> anyhow::Result<Cost> {
     // bash times the command and its threads; nothing in std does.
     let output = Command::new("bash")
-        .args(["-c", "TIMEFORMAT='times %U %R'; time \"$@\"", "bash", SKYSWEEP, "dsm", "--preset", preset])
+        .args(["-c", "TIMEFORMAT='times %U %R'; time \"$@\"", "bash", SKYSWEEP, "dsm", "--preset"])
+        .args(preset.split(' '))
         .args(["--overwrite", "--json", "-q", "--progress", "none", "-o"])
         .arg(out)
         .args(images)

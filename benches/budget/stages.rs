@@ -1,0 +1,156 @@
+//! The stages of a run, each with what it is to find given or not.
+
+use camera::RpcCamera;
+use raster::Grid;
+use rayon::prelude::*;
+use simulate::Simulation;
+use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
+use sweep::cost::{Aggregation, CostConfig, Reference, SourceLevel};
+use sweep::fusion::{FusionConfig, GridFrame, fuse_views, place_view};
+use sweep::ranges::Ranges;
+use sweep::semiglobal::Penalties;
+use sweep::{HeightMap, LevelConfig, View, source_from_reference, sweep_level};
+
+/// Those of the default preset.
+const PENALTIES: Penalties = Penalties { step: 32, jump: 124, jump_at_edge: 32 };
+const STEP_PX: f64 = 0.5;
+/// Steps around the true heights that are searched where these are given.
+const AROUND: f64 = 4.0;
+/// Heights around those of the scene that are searched, metres.
+const MARGIN_M: f64 = 20.0;
+
+/// What is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Known {
+    /// The pointing.
+    Pointing,
+    /// That, and the heights to a few steps.
+    Range,
+    /// That, and each pixel stands for itself.
+    RangeAlone,
+}
+
+/// A simulation as the sweep sees it.
+pub(crate) struct Scene<'a> {
+    simulation: &'a Simulation,
+    views: Vec<View>,
+    step_m: f64,
+    origin_m: f64,
+}
+
+impl<'a> Scene<'a> {
+    /// With the true RPCs, or those that a user gets.
+    pub(crate) fn new(simulation: &'a Simulation, is_true: bool) -> anyhow::Result<Self> {
+        let view = |v: &simulate::View| {
+            let rpc = if is_true { &v.true_rpc } else { &v.rpc };
+            let image = v.image.map(|p| if *p == 0 { f32::NAN } else { f32::from(*p) });
+            View::new(RpcCamera::new(rpc.clone()), image)
+        };
+        let views: Vec<View> = simulation.views.iter().map(view).collect();
+        let (low, high) = simulation.scene.height_range_m();
+        let origin_m = 0.5 * (low + high);
+        let mut parallax = 0.0f64;
+        for (i, a) in views.iter().enumerate() {
+            for b in &views[..i] {
+                let centre = [a.levels[0].width() as f64 / 2.0, a.levels[0].height() as f64 / 2.0];
+                let at = |h| source_from_reference(&a.camera, &b.camera, 0, centre, h);
+                let (p, q) = (at(origin_m)?, at(origin_m + 10.0)?);
+                parallax = parallax.max((q[0] - p[0]).hypot(q[1] - p[1]) / 10.0);
+            }
+        }
+        Ok(Self { simulation, views, step_m: STEP_PX / parallax, origin_m })
+    }
+
+    /// Heights of all views.
+    pub(crate) fn heights(&self, known: Known) -> anyhow::Result<Vec<HeightMap>> {
+        (0..self.views.len()).into_par_iter().map(|i| self.view_heights(i, known)).collect()
+    }
+
+    fn view_heights(&self, index: usize, known: Known) -> anyhow::Result<HeightMap> {
+        if known != Known::Pointing {
+            let truth = self.simulation.views[index].heights.map(|h| (f64::from(*h) - self.origin_m) as f32);
+            return self.sweep(index, 0, &self.around(&truth), known);
+        }
+        let mut found: Option<HeightMap> = None;
+        for level in (0..self.views[index].levels.len().min(4)).rev() {
+            let (image, step_m) = (&self.views[index].levels[level], self.step_m * f64::from(1u32 << level));
+            let (low, high) = self.simulation.scene.height_range_m();
+            let full = (low - MARGIN_M, high + MARGIN_M);
+            let ranges = match &found {
+                None => Ranges::uniform(image.width(), image.height(), step_m, full),
+                Some(c) => Ranges::from_coarser(image.width(), image.height(), step_m, &c.height_m, c.origin_m, full),
+            };
+            found = Some(self.sweep(index, level, &ranges.without_voids(image), known)?);
+        }
+        found.ok_or_else(|| anyhow::anyhow!("an image without a level"))
+    }
+
+    /// A few steps around heights above the origin.
+    fn around(&self, height_m: &Grid<f32>) -> Ranges {
+        let mut out = Ranges::uniform(height_m.width(), height_m.height(), self.step_m, (0.0, 0.0));
+        for (i, h) in height_m.data().iter().enumerate().filter(|(_, h)| !h.is_nan()) {
+            out.low.data_mut()[i] = ((f64::from(*h) + self.origin_m) / self.step_m - AROUND).round() as i32;
+            out.count.data_mut()[i] = 2 * AROUND as u16 + 1;
+        }
+        out
+    }
+
+    fn sweep(&self, index: usize, level: usize, ranges: &Ranges, known: Known) -> anyhow::Result<HeightMap> {
+        let at = |index: usize| {
+            let v = &self.views[index];
+            SourceLevel {
+                index,
+                image: &v.levels[level],
+                camera: &v.camera,
+                noise: v.noise_at(level),
+                contrast: v.contrast[level],
+            }
+        };
+        let sources: Vec<SourceLevel<'_>> = (0..self.views.len()).filter(|&i| i != index).map(at).collect();
+        let aggregation = if sources.len() > 2 { Aggregation::BestOf(2) } else { Aggregation::Variance };
+        let penalties =
+            if known == Known::RangeAlone { Penalties { step: 0, jump: 0, jump_at_edge: 0 } } else { PENALTIES };
+        let cost = CostConfig { aggregation, ..CostConfig::default() };
+        let config = LevelConfig { cost, penalties, cost_noise: 0.02 };
+        let reference = Reference { view: at(index), level: level as u32, ranges, prior: None };
+        Ok(sweep_level(reference, &sources, self.origin_m, &config)?)
+    }
+
+    /// The true heights of all pixels.
+    pub(crate) fn true_heights(&self) -> Vec<HeightMap> {
+        let map = |v: &simulate::View| {
+            let mut out = HeightMap::empty(v.heights.width(), v.heights.height(), self.origin_m);
+            out.height_m = v.heights.map(|h| (f64::from(*h) - self.origin_m) as f32);
+            out.sigma_m = v.heights.map(|h| if h.is_nan() { f32::NAN } else { 0.1 });
+            out.confidence = v.heights.map(|_| 1.0);
+            out.support = v.heights.map(|_| 1.0);
+            out
+        };
+        self.simulation.views.iter().map(map).collect()
+    }
+
+    /// The surface of all heights, or of those that another view confirms, on the cells of the truth; metres above the ellipsoid.
+    pub(crate) fn fused(&self, maps: &[HeightMap], checked: bool) -> anyhow::Result<Grid<f32>> {
+        let truth = &self.simulation.truth;
+        let all: Vec<Heights<'_>> =
+            maps.iter().enumerate().map(|(index, map)| Heights { index, view: &self.views[index], map }).collect();
+        let [x, y] = self.simulation.frame.origin_m();
+        let map_from_ground = |g| self.simulation.frame.scene_from_ground(g).ok().map(|p| [p.x + x, p.y + y]);
+        let frame = GridFrame { geotransform: truth.geotransform, map_from_ground: &map_from_ground };
+        let cell_m = self.simulation.config.gsd_m;
+        let mut placed = Vec::new();
+        for own in &all {
+            let others: Vec<Heights<'_>> = all.iter().filter(|o| o.index != own.index).copied().collect();
+            let counts = count_agreeing(*own, &others, 0, &ConsistencyConfig::default())?;
+            let keep = counts.map(|n| !checked || *n > 0);
+            placed.push(place_view(*own, 0, &keep, (2.0 * self.step_m) as f32, &frame)?);
+        }
+        let config = FusionConfig {
+            same_surface_m: (2.0 * self.step_m).max(1.5 * cell_m) as f32,
+            tear_m: (2.75 * cell_m).max(2.0 * self.step_m) as f32,
+            tile: 1024,
+        };
+        let fused = fuse_views(&placed, (truth.dsm.width(), truth.dsm.height()), &config);
+        Ok(fused.height_m.map(|h| (f64::from(*h) + self.origin_m) as f32))
+    }
+}
