@@ -114,9 +114,10 @@ fn triangles_in_three_formats() {
     for output in ["house.obj", "house.ply", "house.glb"] {
         bench.run(&["convert", "model.city.json", "-o", output]).code(0);
     }
-    for (file, classes) in [("house.obj", "RoofSurface 4"), ("house.ply", "Unclassified 16")] {
+    for (file, classes) in [("house.obj", "RoofSurface 4"), ("house.ply", "RoofSurface 4")] {
         let text = stdout(&bench.run(&["info", file]).code(0));
         assert!(text.contains("triangles         16") && text.contains(classes), "{text}");
+        assert!(text.contains("EPSG:25832") && text.contains("500008.000 5700006.000 35.000"), "{text}");
     }
     let obj = std::fs::read_to_string(bench.path("house.obj")).unwrap();
     assert!(obj.contains("v 500008 5700006 33\n") && obj.contains("o house\n"), "{obj}");

@@ -114,6 +114,13 @@ fn a_model_that_lacks_a_building_and_has_one_too_many_still_helps() {
     wrong_model(&model);
     let (without, with) =
         (surface(folder.path(), "without", None), surface(folder.path(), "with", Some(model.as_path())));
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("with/report/report.json")).unwrap()).unwrap();
+    let wrong = report["prior"]["left_out"].as_array().unwrap().iter().find(|b| b["id"] == "not-there").unwrap();
+    let number = |name: &str| wrong[name].as_u64().unwrap();
+    assert!(number("views") == number("of_views") && number("compared_pixels") > 100, "{wrong}");
+    assert!(number("agreeing_pixels") * 10 < number("compared_pixels"), "{wrong}");
+    assert!(report["choices"].as_array().unwrap().iter().any(|choice| choice["name"] == "buildings left out"));
     let (before, after) = (evaluation(&without), evaluation(&with));
     let roofs = format!("/classes/{ROOF}/mae");
     for (name, path, share) in

@@ -133,12 +133,15 @@ fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, Su
         let found = LocalOrigin::read_beside(path)?;
         Ok(found.map(|found| (found.origin, Some(found.crs), found.vertical.parse().ok())))
     };
+    let is_commented = commented.is_some();
     let placed = match commented {
         Some(origin) => Some(origin),
         None => beside()?,
     };
     if let Some((origin, crs, vertical)) = placed {
-        surface.positions.iter_mut().for_each(|p| (0..3).for_each(|i| p[i] += origin[i]));
+        // A mesh has been read with the origin of its comments.
+        let by = if points.has_faces && is_commented { [0.0; 3] } else { origin };
+        surface.positions.iter_mut().for_each(|p| (0..3).for_each(|i| p[i] += by[i]));
         surface.name_crs(crs.filter(|name| name != "unknown"));
         surface.vertical = vertical.or(surface.vertical);
         surface.notes.push(format!("its positions are relative to {origin:?}, which was added: {}", path.display()));

@@ -360,6 +360,23 @@ fn ply_in_three_encodings() {
 }
 
 #[test]
+fn comments_say_where_a_mesh_is() {
+    let with = |comments: &str| {
+        let text = String::from_utf8(ply("ascii")).unwrap();
+        read_bytes(text.replacen("comment x\n", comments, 1)).unwrap()
+    };
+    let file = with("comment crs EPSG:25832+7837\ncomment origin 1000 2000 -3\n");
+    assert!(codes(&file).is_empty(), "{:?}", file.defects);
+    assert_eq!((file.model.crs.epsg, file.model.crs.vertical_epsg), (Some(25832), Some(7837)));
+    assert_eq!(file.model.vertices[1], ModelPoint::new(501_000.25, 2000.0, -2.5));
+    assert_eq!(codes(&with("comment crs unknown\n")), [1010]);
+    assert_eq!(with("comment origin 1 2 inf\n").model.vertices[1], ModelPoint::new(500_000.25, 0.0, 0.5));
+    let obj = |head: &str| read_bytes(format!("{head}v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")).unwrap();
+    assert_eq!(obj("# made by hand\n# crs EPSG:7415\n").model.crs.epsg, Some(7415));
+    assert_eq!(codes(&obj("# crs unknown\n")), [1010]);
+}
+
+#[test]
 fn hostile_ply_is_refused() {
     let text = |from: &str, to: &str| String::from_utf8(ply("ascii")).unwrap().replacen(from, to, 1);
     refused(text("vertex 4", "vertex 18446744073709551615"), 901, "header", "announced");

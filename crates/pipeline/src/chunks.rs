@@ -18,7 +18,8 @@ use crate::error::PipelineError;
 use crate::first_look::WINDOW_MARGIN;
 use crate::heights::{SweepPlan, sweep_scene};
 use crate::output::Product;
-use crate::prior::CityPrior;
+use crate::prior::{CityPrior, Findings};
+use crate::report::ChunksReport;
 use crate::scene::{Opened, read_coarse_view, read_view};
 use crate::setup::{self, OutputGrid, image_span};
 use crate::surface::{Counts, SURROUNDINGS_M, SurfaceInput, make_surface};
@@ -64,7 +65,38 @@ pub(crate) struct Swept {
     pub(crate) product: Product,
     pub(crate) counts: Counts,
     pub(crate) evaluations: u64,
+    /// What is said of the prior.
+    pub(crate) findings: Findings,
     pub(crate) range_m: (f64, f64),
+}
+
+/// What the chunks done so far come to.
+#[derive(Default)]
+pub(crate) struct ChunkTotal {
+    pub(crate) counts: Counts,
+    pub(crate) evaluations: u64,
+    /// Heights searched in any chunk.
+    pub(crate) range_m: Option<(f64, f64)>,
+    pub(crate) report: ChunksReport,
+    pub(crate) findings: Findings,
+    /// The first.
+    pub(crate) error: Option<PipelineError>,
+}
+
+impl ChunkTotal {
+    pub(crate) fn add(&mut self, swept: &Swept) {
+        self.counts.add(swept.counts.clone());
+        self.evaluations += swept.evaluations;
+        let range = swept.range_m;
+        self.range_m = Some(self.range_m.map_or(range, |r| (r.0.min(range.0), r.1.max(range.1))));
+        self.findings.extend(&swept.findings);
+        self.report.done += 1;
+    }
+
+    /// A chunk that stays void.
+    pub(crate) fn leave(&mut self, core: Window) {
+        self.counts.void += core.width * core.height;
+    }
 }
 
 /// What became of a chunk.
@@ -171,7 +203,7 @@ impl ChunkedScene<'_> {
         let mut plan = setup::plan_sweep(range_m, self.step_m, sources, &sides, self.tuning);
         plan.priors = self.prior.map(|prior| prior.seen_from(&views, self.gsd_m)).transpose()?.unwrap_or_default();
         let heights = sweep_scene(&views, &plan, &|| ())?;
-        let evaluations = heights.evaluations;
+        let (evaluations, findings) = (heights.evaluations, heights.findings.clone());
         let core = Window { x: core.x - grown.x, y: core.y - grown.y, ..core };
         let input = SurfaceInput {
             config: self.config,
@@ -182,7 +214,7 @@ impl ChunkedScene<'_> {
             core,
         };
         let (product, counts) = make_surface(input, views, heights, &|| ())?;
-        Ok(Outcome::Swept(Box::new(Swept { product, counts, evaluations, range_m })))
+        Ok(Outcome::Swept(Box::new(Swept { product, counts, evaluations, findings, range_m })))
     }
 
     /// Which images may show the grid.

@@ -7,7 +7,7 @@ use raster::Window;
 use sweep::View;
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
 
-use crate::chunks::{self, ChunkedScene, Outcome};
+use crate::chunks::{self, ChunkTotal, ChunkedScene, Outcome};
 use crate::config::{DsmConfig, Tuning};
 use crate::error::PipelineError;
 use crate::first_look::{Looked, Pixels, asked_pairs, look, ordered, pair_names};
@@ -19,7 +19,8 @@ use crate::pointing::{PairTies, adjust_cameras};
 use crate::prior::CityPrior;
 use crate::progress::Progress;
 use crate::report::{
-    ChunksReport, DsmReport, FailedChunk, ImageReport, PairReport, PointingReport, StageTime, SurfaceReport,
+    ChunksReport, DsmReport, FailedChunk, ImageReport, PairReport, PointingReport, PriorReport, StageTime,
+    SurfaceReport,
 };
 use crate::scene::{Geometry, Opened, open};
 use crate::setup::{self, Choices, EARTH_RANGE_M, OutputGrid};
@@ -151,6 +152,7 @@ impl<'a> Job<'a> {
             hypotheses,
             surface,
             chunks,
+            prior: None,
             choices: Vec::new(),
             warnings: Vec::new(),
             stages: Vec::new(),
@@ -178,6 +180,7 @@ impl<'a> Job<'a> {
         let heights = sweep_scene(&views, &plan, &|| self.progress.step())?;
         self.lap("sweep");
         let hypotheses = heights.evaluations;
+        let prior = scene.prior.as_ref().map(|prior| prior.report(&heights.findings, &mut self.choices));
         let core = Window::whole(grid.size.0, grid.size.1);
         let input = SurfaceInput {
             config: self.config,
@@ -195,7 +198,7 @@ impl<'a> Job<'a> {
         self.lap("fusion");
 
         self.progress.begin("writing", 1);
-        let report = self.told(drawn(range, hypotheses, surface_report(grid, counts), None));
+        let report = self.told(drawn(range, hypotheses, surface_report(grid, counts), None), prior);
         let report = output::write(self.config, grid, &product, report)?;
         self.progress.step();
         Ok(report)
@@ -239,7 +242,7 @@ impl<'a> Job<'a> {
                 }
                 Ok(Outcome::Swept(swept)) => {
                     output.put(core, &swept.product)?;
-                    total.add(swept.counts, swept.evaluations, swept.range_m);
+                    total.add(&swept);
                 }
                 Ok(Outcome::Unseen) => {
                     total.report.unseen += 1;
@@ -256,13 +259,14 @@ impl<'a> Job<'a> {
             self.progress.step();
         }
         self.lap("chunks");
-        let ChunkTotal { counts, evaluations, range_m, report, error } = total;
+        let ChunkTotal { counts, evaluations, range_m, report, error, findings } = total;
         if counts.observed == 0 {
             return Err(error.unwrap_or(PipelineError::NoSurface { range: scene.range }));
         }
         self.progress.begin("writing", 1);
         let surface = surface_report(grid, counts);
-        let report = self.told(drawn(range_m.unwrap_or(scene.range), evaluations, surface, Some(report)));
+        let prior = scene.prior.as_ref().map(|prior| prior.report(&findings, &mut self.choices));
+        let report = self.told(drawn(range_m.unwrap_or(scene.range), evaluations, surface, Some(report)), prior);
         let report = output.finish(report)?;
         self.progress.step();
         Ok(report)
@@ -277,8 +281,9 @@ impl<'a> Job<'a> {
     }
 
     /// The report with what was said and measured on the way.
-    fn told(&mut self, report: DsmReport) -> DsmReport {
+    fn told(&mut self, report: DsmReport, prior: Option<PriorReport>) -> DsmReport {
         DsmReport {
+            prior,
             choices: self.choices.made.clone(),
             warnings: self.choices.warnings.clone(),
             stages: self.times.clone(),
@@ -411,32 +416,6 @@ struct Scene<'a> {
 trait Drawn: FnOnce((f64, f64), u64, SurfaceReport, Option<ChunksReport>) -> DsmReport {}
 
 impl<F: FnOnce((f64, f64), u64, SurfaceReport, Option<ChunksReport>) -> DsmReport> Drawn for F {}
-
-/// What the chunks done so far come to.
-#[derive(Default)]
-struct ChunkTotal {
-    counts: Counts,
-    evaluations: u64,
-    /// Heights searched in any chunk.
-    range_m: Option<(f64, f64)>,
-    report: ChunksReport,
-    /// The first.
-    error: Option<PipelineError>,
-}
-
-impl ChunkTotal {
-    fn add(&mut self, counts: Counts, evaluations: u64, range: (f64, f64)) {
-        self.counts.add(counts);
-        self.evaluations += evaluations;
-        self.range_m = Some(self.range_m.map_or(range, |r| (r.0.min(range.0), r.1.max(range.1))));
-        self.report.done += 1;
-    }
-
-    /// A chunk that stays void.
-    fn leave(&mut self, core: Window) {
-        self.counts.void += core.width * core.height;
-    }
-}
 
 /// An error with its causes.
 fn reason_of(error: &dyn std::error::Error) -> String {

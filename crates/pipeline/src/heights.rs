@@ -9,7 +9,7 @@ use sweep::cost::{Aggregation, Reference, SourceLevel};
 use sweep::ranges::Ranges;
 use sweep::{HeightMap, LevelConfig, Prior, SweepError, View, sweep_level};
 
-use crate::prior::{self, ViewPrior};
+use crate::prior::{self, Findings, ViewPrior};
 
 /// What the sweep needs to know of the scene.
 #[derive(Debug, Clone)]
@@ -46,6 +46,8 @@ pub(crate) struct SceneHeights {
     pub(crate) maps: Vec<HeightMap>,
     /// Pixel × hypothesis pairs over all views and levels.
     pub(crate) evaluations: u64,
+    /// What the last coarse level says of the buildings of the prior.
+    pub(crate) findings: Findings,
 }
 
 /// Sweeps all views from the coarsest level down. `done` is told after each view and level.
@@ -64,6 +66,7 @@ pub(crate) fn sweep_scene(
     let is_single = plan.top_level == plan.bottom_level;
     let mut priors: Vec<Option<ViewPrior>> = if is_single { plan.priors.clone() } else { Vec::new() };
     priors.resize(views.len(), None);
+    let mut findings = Findings::default();
     for level in (plan.bottom_level..=plan.top_level).rev() {
         let swept: Vec<(HeightMap, u64)> = (0..views.len())
             .into_par_iter()
@@ -77,14 +80,17 @@ pub(crate) fn sweep_scene(
         maps = swept.into_iter().map(|(m, _)| m).collect();
         if level > plan.bottom_level {
             maps = drop_lone_heights(views, plan, &maps, level as u32)?;
-            let checked = |(prior, map): (&Option<ViewPrior>, &HeightMap)| {
-                prior.as_ref()?.checked(map, level, plan.step_at(level))
+            findings = Findings::default();
+            let mut checked = |(prior, map): (&Option<ViewPrior>, &HeightMap)| {
+                let held = prior.as_ref()?.checked(map, level, plan.step_at(level));
+                findings.add(held.as_ref().map(|(_, evidence)| evidence));
+                Some(held?.0)
             };
-            priors = plan.priors.iter().zip(&maps).map(checked).collect();
+            priors = plan.priors.iter().zip(&maps).map(&mut checked).collect();
             priors.resize(views.len(), None);
         }
     }
-    Ok(SceneHeights { maps, evaluations })
+    Ok(SceneHeights { maps, evaluations, findings })
 }
 
 fn source_level(views: &[View], index: usize, level: usize) -> SourceLevel<'_> {

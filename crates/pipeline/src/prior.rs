@@ -1,6 +1,6 @@
 //! A city model as the prior of the height sweep: what each view would see of it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mesh::{MeshConfig, TriangleMesh};
@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use sweep::{HeightMap, View};
 
 use crate::error::PipelineError;
+use crate::report::{LeftOut, PriorReport};
 use crate::setup::Choices;
 
 /// How far the heights of city models are off: roofs of LoD2 models lie within half a metre of laser heights.
@@ -27,6 +28,8 @@ const AGREEING_STEPS: f64 = 2.0;
 const AGREEING_MIN: f64 = 0.3;
 /// A building that fewer of its pixels agree with is gone. On small ones the coarse heights are wrong more often than right.
 const BUILDING_MIN: f64 = 0.1;
+/// Buildings that are named on the terminal; the report names all.
+const NAMED: usize = 3;
 /// A move has to bring this much more agreement: walls that hide what is behind them draw the model a pixel to their side.
 const MOVE_GAIN: f64 = 0.05;
 
@@ -38,6 +41,8 @@ pub(crate) struct CityPrior {
     path: PathBuf,
     model: PriorModel,
     place: ModelPlace,
+    /// The identifiers of all objects.
+    ids: Vec<String>,
 }
 
 impl CityPrior {
@@ -64,7 +69,8 @@ impl CityPrior {
         }
         place.to_ellipsoid(&mut mesh)?;
         choices.tell("prior", format!("{} buildings' surfaces", mesh.surfaces.len()), path.display().to_string());
-        Ok(Self { path: path.to_owned(), model: PriorModel::new(mesh, &buildings_of(&file.model))?, place })
+        let ids = file.model.objects.iter().map(|object| object.id.clone()).collect();
+        Ok(Self { path: path.to_owned(), model: PriorModel::new(mesh, &buildings_of(&file.model))?, place, ids })
     }
 
     /// What every view sees of the model; `None` for a view that does not see it.
@@ -107,6 +113,116 @@ struct Shift {
     agreeing: f64,
 }
 
+/// Pixels of a building in a view: those with a height to compare with, and those that agree with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Vote {
+    agreeing: u64,
+    compared: u64,
+}
+
+impl Vote {
+    /// Whether too few agree.
+    fn is_gone(&self) -> bool {
+        (self.agreeing as f64) < BUILDING_MIN * self.compared as f64
+    }
+}
+
+/// What the heights of a level say of the buildings that a view sees.
+#[derive(Debug, Clone)]
+pub(crate) struct Evidence {
+    votes: BTreeMap<u32, Vote>,
+    tolerance_m: f32,
+}
+
+/// What all views, and all chunks of a scene, say of the buildings.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Findings {
+    /// By building: what the views say that keep it, and what those say that leave it out.
+    buildings: BTreeMap<u32, [Said; 2]>,
+    tolerance_m: f32,
+    /// Views that see the model, and whose heights hardly agree with any of it.
+    disagreeing_views: usize,
+}
+
+/// Views that agree about a building, and their pixels.
+#[derive(Debug, Clone, Copy, Default)]
+struct Said {
+    views: usize,
+    vote: Vote,
+}
+
+impl Findings {
+    /// Takes what a view says that sees the model; `None` where hardly anything agrees.
+    pub(crate) fn add(&mut self, evidence: Option<&Evidence>) {
+        let Some(evidence) = evidence else {
+            self.disagreeing_views += 1;
+            return;
+        };
+        self.tolerance_m = evidence.tolerance_m;
+        for (&building, vote) in &evidence.votes {
+            let said = &mut self.buildings.entry(building).or_default()[usize::from(vote.is_gone())];
+            said.views += 1;
+            said.vote.agreeing += vote.agreeing;
+            said.vote.compared += vote.compared;
+        }
+    }
+
+    /// Takes what a chunk says.
+    pub(crate) fn extend(&mut self, other: &Self) {
+        self.tolerance_m = self.tolerance_m.max(other.tolerance_m);
+        self.disagreeing_views += other.disagreeing_views;
+        for (&building, said) in &other.buildings {
+            let known = self.buildings.entry(building).or_default();
+            for (known, said) in known.iter_mut().zip(said) {
+                known.views += said.views;
+                known.vote.agreeing += said.vote.agreeing;
+                known.vote.compared += said.vote.compared;
+            }
+        }
+    }
+}
+
+impl CityPrior {
+    /// Which buildings were left out, and why; told on the way.
+    pub(crate) fn report(&self, findings: &Findings, choices: &mut Choices<'_>) -> PriorReport {
+        let name = |number: u32| self.ids.get((number as usize).wrapping_sub(1)).cloned().unwrap_or_default();
+        let left_out = findings.buildings.iter().filter(|(_, [_, gone])| gone.views > 0);
+        let left_out: Vec<LeftOut> = left_out
+            .map(|(&number, [kept, gone])| LeftOut {
+                id: name(number),
+                views: gone.views,
+                of_views: gone.views + kept.views,
+                agreeing_pixels: gone.vote.agreeing,
+                compared_pixels: gone.vote.compared,
+            })
+            .collect();
+        let names: Vec<&str> = left_out.iter().take(NAMED).map(|building| building.id.as_str()).collect();
+        let more = if left_out.len() > NAMED { ", …" } else { "" };
+        let value = match left_out.len() {
+            0 if findings.disagreeing_views > 0 => format!(
+                "none of {}; {} views agree with nothing of the model and do without",
+                findings.buildings.len(),
+                findings.disagreeing_views
+            ),
+            0 => format!("none of {}", findings.buildings.len()),
+            count => format!("{count} of {}: {}{more}", findings.buildings.len(), names.join(", ")),
+        };
+        let reason = format!(
+            "fewer than {:.0} % of their pixels are at the heights that a coarser level found",
+            100.0 * BUILDING_MIN
+        );
+        choices.tell("buildings left out", value, reason);
+        PriorReport {
+            model: self.path.clone(),
+            buildings_seen: findings.buildings.len(),
+            disagreeing_views: findings.disagreeing_views,
+            least_agreeing: BUILDING_MIN,
+            tolerance_m: f64::from(findings.tolerance_m),
+            left_out,
+        }
+    }
+}
+
 impl ViewPrior {
     /// The heights of a level: those of the pixel in the middle of each coarse one, so that edges stay sharp.
     pub(crate) fn at_level(&self, level: usize, (width, height): (usize, usize)) -> Grid<f32> {
@@ -121,7 +237,7 @@ impl ViewPrior {
     /// The prior held against the heights that a level found. The images' pointing and the model's place are each off by metres:
     /// the prior is moved to where most of its pixels agree. Buildings that still do not agree are left out, as they may be gone;
     /// `None` when hardly anything agrees, because then nothing says where the rest belongs.
-    pub(crate) fn checked(&self, map: &HeightMap, level: usize, step_m: f64) -> Option<Self> {
+    pub(crate) fn checked(&self, map: &HeightMap, level: usize, step_m: f64) -> Option<(Self, Evidence)> {
         let tolerance_m = (AGREEING_STEPS * step_m).max(DEVIATION_M) as f32;
         let side = 1i64 << level;
         let reach = ((SEARCH_M / (self.gsd_m * side as f64)).ceil() as i64).min(REACH_MAX);
@@ -135,7 +251,9 @@ impl ViewPrior {
         let best = scored.iter().max_by(order).filter(|best| best.agreeing >= AGREEING_MIN)?;
         let unmoved = scored.iter().find(|s| far(s) == 0 && s.agreeing + MOVE_GAIN >= best.agreeing);
         let best = *unmoved.unwrap_or(best);
-        Some(self.moved(best).without(|known| known.lost(map, side as usize, tolerance_m)))
+        let moved = self.moved(best);
+        let votes = moved.votes(map, side as usize, tolerance_m);
+        Some((moved.without(&votes), Evidence { votes, tolerance_m }))
     }
 
     /// Pixels in the middles of coarse ones, with their heights, a few thousand at most.
@@ -168,28 +286,26 @@ impl ViewPrior {
         out
     }
 
-    /// The buildings that too few of their pixels agree with.
-    fn lost(&self, map: &HeightMap, side: usize, tolerance_m: f32) -> BTreeSet<u32> {
-        let mut votes: BTreeMap<u32, (usize, usize)> = BTreeMap::new();
+    /// How many pixels of each building agree with the heights found.
+    fn votes(&self, map: &HeightMap, side: usize, tolerance_m: f32) -> BTreeMap<u32, Vote> {
+        let mut votes: BTreeMap<u32, Vote> = BTreeMap::new();
         for y in 0..self.height_m.height() {
             for x in 0..self.height_m.width() {
                 let object = self.object[(x, y)];
                 let found = found_at(map, x as i64 / side as i64, y as i64 / side as i64);
                 if let (true, Some(found)) = (object != NO_OBJECT, found) {
                     let vote = votes.entry(object).or_default();
-                    vote.0 += usize::from((found - self.height_m[(x, y)]).abs() <= tolerance_m);
-                    vote.1 += 1;
+                    vote.agreeing += u64::from((found - self.height_m[(x, y)]).abs() <= tolerance_m);
+                    vote.compared += 1;
                 }
             }
         }
-        let gone = |&(_, (agreeing, all)): &(u32, (usize, usize))| (agreeing as f64) < BUILDING_MIN * all as f64;
-        votes.into_iter().filter(gone).map(|(object, _)| object).collect()
+        votes
     }
 
-    fn without(mut self, lost: impl FnOnce(&Self) -> BTreeSet<u32>) -> Self {
-        let lost = lost(&self);
+    fn without(mut self, votes: &BTreeMap<u32, Vote>) -> Self {
         for (object, height_m) in self.object.data_mut().iter_mut().zip(self.height_m.data_mut()) {
-            if lost.contains(object) {
+            if votes.get(object).is_some_and(Vote::is_gone) {
                 (*object, *height_m) = (NO_OBJECT, f32::NAN);
             }
         }
@@ -259,7 +375,8 @@ mod tests {
 
     #[test]
     fn a_model_that_lies_elsewhere_is_moved_there() {
-        let checked = boxes().checked(&found((4, -6), 3.5, |_| true), 1, 0.5).unwrap();
+        let (checked, evidence) = boxes().checked(&found((4, -6), 3.5, |_| true), 1, 0.5).unwrap();
+        assert!(evidence.votes.values().all(|vote| !vote.is_gone() && vote.compared == 18 * 18));
         let expected = boxes().moved(Shift { x: 4, y: -6, height_m: 3.5, agreeing: 1.0 });
         let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
         assert!(checked.height_m.data().iter().zip(expected.height_m.data()).all(same));
@@ -268,9 +385,15 @@ mod tests {
 
     #[test]
     fn a_building_that_is_gone_is_left_out_and_the_other_stays() {
-        let checked = boxes().checked(&found((0, 0), 0.0, |number| number == 1), 1, 0.5).unwrap();
+        let (checked, evidence) = boxes().checked(&found((0, 0), 0.0, |number| number == 1), 1, 0.5).unwrap();
         let kept = |number| checked.object.data().iter().filter(|o| **o == number).count();
         assert_eq!((kept(1), kept(2)), (18 * 18, 0));
+        assert_eq!(evidence.votes[&2], Vote { agreeing: 0, compared: 18 * 18 });
+        let mut findings = Findings::default();
+        findings.add(Some(&evidence));
+        findings.extend(&findings.clone());
+        let of = |building| findings.buildings[&building].map(|said| said.views);
+        assert_eq!((of(1), of(2)), ([2, 0], [0, 2]));
     }
 
     #[test]

@@ -29,6 +29,9 @@ pub struct DsmReport {
     /// How the scene was divided; absent when it was computed at once.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chunks: Option<ChunksReport>,
+    /// What became of the city model; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorReport>,
     /// All choices with their reasons.
     pub choices: Vec<Choice>,
     /// What the user should know.
@@ -123,6 +126,38 @@ pub struct SurfaceReport {
     pub speckle_removed: usize,
     /// Share of each view's pixels that another view agrees with.
     pub kept_by_view: Vec<f64>,
+}
+
+/// A city model held against the heights that a coarser level found.
+#[derive(Debug, Clone, Serialize)]
+pub struct PriorReport {
+    /// Its file.
+    pub model: PathBuf,
+    /// Buildings that at least one view sees.
+    pub buildings_seen: usize,
+    /// Views (of chunks, each counts) that see the model and agree with hardly any of it: they do without.
+    pub disagreeing_views: usize,
+    /// A building is left out in a view where a smaller share of its pixels agrees.
+    pub least_agreeing: f64,
+    /// Pixels agree whose heights differ by at most this, metres.
+    pub tolerance_m: f64,
+    /// Buildings that are taken to be gone.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A building that is not where the model has it.
+#[derive(Debug, Clone, Serialize)]
+pub struct LeftOut {
+    /// Its identifier in the model.
+    pub id: String,
+    /// Views that leave it out.
+    pub views: usize,
+    /// Views that see it.
+    pub of_views: usize,
+    /// Its pixels in the views that leave it out whose heights agree.
+    pub agreeing_pixels: u64,
+    /// Its pixels there that have a height to be compared with.
+    pub compared_pixels: u64,
 }
 
 /// How a large scene was divided.

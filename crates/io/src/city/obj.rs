@@ -1,11 +1,13 @@
 //! Wavefront OBJ: vertices and polygons. Objects and groups become city objects, materials named after CityGML's surfaces
-//! (`usemtl RoofSurface`) their classes. Material files are not opened, lines and curves are passed over.
+//! (`usemtl RoofSurface`) their classes. Material files are not opened, lines and curves are passed over. A comment
+//! `# crs EPSG:n` at the top names the reference system.
 
 use std::collections::HashMap;
 
 use mesh::{CrsReference, DefectCode, Geometry, GeometryKind, ModelPoint, ObjectKind, Surface, SurfaceClass};
 
 use super::builder::Builder;
+use super::crs_name::crs_reference;
 use super::{CityFault, CityFormat, Parsed};
 
 /// Words that a line of an OBJ file may begin with.
@@ -22,7 +24,7 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
     let text = std::str::from_utf8(text)
         .map_err(|error| CityFault::invalid("the text is not UTF-8", format!("byte {}", error.valid_up_to())))?;
     let mut reader = Reader::default();
-    reader.builder.set_crs(CrsReference::default());
+    reader.builder.set_crs(stated_crs(text));
     let (mut number, mut joined) = (0, String::new());
     for (index, line) in text.lines().enumerate() {
         if joined.is_empty() {
@@ -44,6 +46,13 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
     reader.line(&joined, number)?;
     let (model, defects) = reader.builder.finish();
     Ok(Parsed { model, format: CityFormat::Obj, defects })
+}
+
+/// The reference system in a comment `# crs EPSG:n` at the top, as this program writes it.
+fn stated_crs(text: &str) -> CrsReference {
+    let comments = text.lines().map_while(|line| line.strip_prefix('#'));
+    let name = comments.filter_map(|line| line.trim().strip_prefix("crs ")).next().unwrap_or("unknown");
+    if name == "unknown" { CrsReference::default() } else { crs_reference(name) }
 }
 
 #[derive(Default)]

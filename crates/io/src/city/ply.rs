@@ -1,10 +1,13 @@
-//! PLY meshes, text and binary: the positions of `vertex` and the polygons of `face`. Everything else is passed over.
+//! PLY meshes, text and binary: the positions of `vertex` and the polygons of `face`. Everything else is passed over, but for the
+//! comments `origin x y z`, which the positions are relative to, and `crs EPSG:n`; where both stand, as this program writes
+//! them, the `class` of a face is that of its surface.
 //!
 //! Counts are checked against the size of the file before anything is allocated.
 
 use mesh::{CrsReference, DefectCode, Geometry, GeometryKind, ModelPoint, ObjectKind, Surface, SurfaceClass};
 
 use super::builder::Builder;
+use super::crs_name::crs_reference;
 use super::{CityFault, CityFormat, Parsed};
 
 pub(super) fn looks_like(bytes: &[u8]) -> bool {
@@ -13,9 +16,14 @@ pub(super) fn looks_like(bytes: &[u8]) -> bool {
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     let header = header(bytes)?;
-    let mut reader =
-        Reader { body: Body { bytes, at: header.end, encoding: header.encoding }, builder: Builder::default() };
-    reader.builder.set_crs(CrsReference::default());
+    let (origin, crs) = (header.origin(), header.crs());
+    let mut reader = Reader {
+        body: Body { bytes, at: header.end, encoding: header.encoding },
+        builder: Builder::default(),
+        origin: origin.unwrap_or_default(),
+        has_classes: origin.is_some() && crs.is_some(),
+    };
+    reader.builder.set_crs(crs.unwrap_or_default());
     let object = reader.builder.object("model", ObjectKind::BUILDING);
     reader.builder.object_mut(object).geometries.push(Geometry::new(None, GeometryKind::MultiSurface));
     for element in &header.elements {
@@ -94,6 +102,25 @@ struct Header {
     end: usize,
 }
 
+impl Header {
+    fn said(&self, key: &str) -> Option<&str> {
+        self.comments.iter().find_map(|comment| comment.strip_prefix(key)).map(str::trim)
+    }
+
+    /// What the positions are relative to.
+    fn origin(&self) -> Option<[f64; 3]> {
+        let numbers = self.said("origin ")?.split_whitespace().map(|word| word.parse::<f64>().ok());
+        let numbers = <[f64; 3]>::try_from(numbers.collect::<Option<Vec<_>>>()?).ok()?;
+        numbers.iter().all(|c| c.is_finite()).then_some(numbers)
+    }
+
+    /// The reference system; that of a model without one is `unknown`.
+    fn crs(&self) -> Option<CrsReference> {
+        let name = self.said("crs ")?;
+        Some(if name == "unknown" { CrsReference::default() } else { crs_reference(name) })
+    }
+}
+
 impl Number {
     fn from_name(name: &str) -> Option<Self> {
         Some(match name {
@@ -169,6 +196,8 @@ fn property(words: &[&str]) -> Option<Property> {
 struct Reader<'a> {
     body: Body<'a>,
     builder: Builder,
+    origin: [f64; 3],
+    has_classes: bool,
 }
 
 impl Reader<'_> {
@@ -177,20 +206,30 @@ impl Reader<'_> {
         let is_vertex = element.name == "vertex";
         for number in 0..element.count {
             let mut point = [0.0; 3];
+            let (mut ring, mut class) = (None, SurfaceClass::Unclassified);
             for (property, axis) in element.properties.iter().zip(&axes) {
                 let corners = element.name == "face" && matches!(&*property.name, "vertex_indices" | "vertex_index");
                 match (property.count, axis) {
                     (Some(count), _) => {
                         let list = self.body.list(count, property.value, corners)?;
                         if corners {
-                            self.face(list, number, object);
+                            ring = Some(list);
                         }
                     }
                     (None, &Some(axis)) => point[axis] = self.body.number(property.value)?,
-                    (None, None) => drop(self.body.number(property.value)?),
+                    (None, None) => {
+                        let value = self.body.number(property.value)?;
+                        if self.has_classes && property.name == "class" {
+                            class = SurfaceClass::from_number(value as u8).unwrap_or_default();
+                        }
+                    }
                 }
             }
+            if let Some(ring) = ring {
+                self.face(ring, class, number, object);
+            }
             if is_vertex {
+                let point = [0, 1, 2].map(|i| point[i] + self.origin[i]);
                 let added = self.builder.vertex(ModelPoint::from(point));
                 added.ok_or_else(|| CityFault::unsupported("more than 2^32 vertices", "header"))?;
             }
@@ -198,7 +237,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn face(&mut self, corners: Vec<f64>, number: u64, object: usize) {
+    fn face(&mut self, corners: Vec<f64>, class: SurfaceClass, number: u64, object: usize) {
         let count = self.builder.vertex_count();
         let place = || format!("face {number}");
         let index = |corner: f64| (corner >= 0.0 && corner < count as f64).then_some(corner as u32).ok_or(corner);
@@ -211,7 +250,7 @@ impl Reader<'_> {
                 self.builder.dropped(DefectCode::CoordinateOutOfRange, object, place(), "");
             }
             Ok(ring) => {
-                let surface = Surface::new(vec![ring], SurfaceClass::Unclassified);
+                let surface = Surface::new(vec![ring], class);
                 self.builder.object_mut(object).geometries[0].surfaces.push(surface);
             }
         }
