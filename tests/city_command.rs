@@ -173,6 +173,9 @@ fn footprints_and_cityjson() {
     let text = stdout(&bench.run(&["info", "again.json"]).code(0));
     assert!(text.contains("EPSG:25832") && text.contains("triangles         16"), "{text}");
     bench.run(&["convert", "model.city.json", "-o", "house.obj"]).code(0);
+    bench.run(&["convert", "house.obj", "-o", "from-obj.geojson"]).code(0);
+    let obj = std::fs::read_to_string(bench.path("house.obj")).unwrap();
+    std::fs::write(bench.path("house.obj"), obj.replace("# crs EPSG:25832\n", "")).unwrap();
     let refused = bench.run(&["convert", "house.obj", "-o", "none.geojson"]).code(2);
     let error = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
     assert!(error.contains("error 1010"), "{error}");

@@ -5,7 +5,10 @@
 use std::path::{Path, PathBuf};
 
 use io::city::{CityError, CityFile, CityFormat, read};
-use mesh::{GeometryKind, MeshConfig, ModelPoint, ObjectStatus, Role, Scope, SurfaceClass, TriangleMesh};
+use mesh::{
+    DefectCode, GeometryKind, MeshConfig, ModelPoint, ObjectStatus, Role, Scope, SurfaceClass, TriangleMesh,
+    check_solids,
+};
 
 fn read_bytes(bytes: impl AsRef<[u8]>) -> Result<CityFile, CityError> {
     let folder = tempfile::tempdir().unwrap();
@@ -425,6 +428,8 @@ fn everything_there_is_loads_or_is_refused() {
                     let meshed = TriangleMesh::from_model(&file.model, &config).unwrap();
                     assert_eq!(meshed.objects.len(), file.model.objects.len(), "{}", path.display());
                     assert_eq!(meshed.mesh.validate(), Ok(()));
+                    let solids = check_solids(&file.model, &config).unwrap();
+                    assert!(solids.iter().all(|defect| defect.code != DefectCode::NotChecked), "{}", path.display());
                 }
             }
             Err(CityError::Refused { fault, .. }) => {

@@ -8,6 +8,24 @@ use super::patch::{Bounds, Patch, Side};
 use super::{MAX_COMPARISONS, SHELL_TOLERANCE_M};
 use crate::vector::{Vector, cross, dot, norm, sub, unit};
 
+/// Comparisons of triangles that may still be made.
+#[derive(Debug)]
+pub(super) struct Budget {
+    left: usize,
+}
+
+impl Budget {
+    pub(super) fn new() -> Self {
+        Self { left: MAX_COMPARISONS }
+    }
+
+    /// Takes some; `None` when there are not so many left.
+    pub(super) fn spend(&mut self, comparisons: usize) -> Option<()> {
+        self.left = self.left.checked_sub(comparisons)?;
+        Some(())
+    }
+}
+
 /// How surfaces A and B lie to each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Contact {
@@ -23,16 +41,18 @@ pub(super) struct Contact {
 }
 
 impl Contact {
-    /// Compares two surfaces; `None` when that would take too long.
-    pub(super) fn of(a: &Patch, b: &Patch, tolerance_m: f64) -> Option<Self> {
+    /// Compares two surfaces; `None` when that takes more than the budget.
+    pub(super) fn of(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option<Self> {
+        budget.spend(1)?;
         let mut contact = Self { a_outside: true, b_outside: true, ..Self::default() };
         if !a.bounds.meets(&b.bounds, tolerance_m) {
             return Some(contact);
         }
-        (contact.a_inside, contact.a_outside) = pieces(a, b, tolerance_m)?;
-        (contact.b_inside, contact.b_outside) = pieces(b, a, tolerance_m)?;
+        (contact.a_inside, contact.a_outside) = pieces(a, b, tolerance_m, budget)?;
+        (contact.b_inside, contact.b_outside) = pieces(b, a, tolerance_m, budget)?;
         for (i, s) in a.corners.iter().enumerate().filter(|(_, s)| Bounds::of(**s).meets(&b.bounds, tolerance_m)) {
             let bounds = Bounds::of(*s);
+            budget.spend(b.corners.len())?;
             for t in b.corners.iter().filter(|t| bounds.meets(&Bounds::of(**t), tolerance_m)) {
                 match shared_face(&a.corners[i], t, tolerance_m) {
                     Some(true) => contact.same_face = true,
@@ -61,9 +81,8 @@ impl Contact {
 }
 
 /// Whether some of the edges of `a` is inside of `b`, and outside.
-fn pieces(a: &Patch, b: &Patch, tolerance_m: f64) -> Option<(bool, bool)> {
+fn pieces(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option<(bool, bool)> {
     let (mut inside, mut outside) = (false, false);
-    let mut comparisons = 0usize;
     for (_, [p, q]) in a.edges() {
         if inside && outside {
             break;
@@ -73,10 +92,7 @@ fn pieces(a: &Patch, b: &Patch, tolerance_m: f64) -> Option<(bool, bool)> {
             continue;
         }
         let cuts = cuts([p, q], b);
-        comparisons = comparisons.saturating_add(b.corners.len() * cuts.len());
-        if comparisons > MAX_COMPARISONS {
-            return None;
-        }
+        budget.spend(b.corners.len().saturating_mul(cuts.len()))?;
         for pair in cuts.windows(2) {
             let middle = 0.5 * (pair[0] + pair[1]);
             match b.side([0, 1, 2].map(|i| p[i] + middle * (q[i] - p[i])), tolerance_m) {

@@ -23,14 +23,14 @@ use crate::vector::Vector;
 use crate::{
     CityModel, Defect, DefectCode, Effect, Geometry, GeometryKind, MeshConfig, ModelError, ObjectKind, Surface,
 };
-use contact::Contact;
+use contact::{Budget, Contact};
 use patch::Patch;
 
 /// Surfaces nearer than this touch, metres.
 const SHELL_TOLERANCE_M: f64 = 5e-6;
 /// What overlaps by less are neighbours, metres.
 const OVERLAP_M: f64 = 1e-3;
-/// Comparisons of triangles that one pair of surfaces may cost.
+/// Comparisons of triangles that a shell, the shells of a solid, the solids of a geometry and those of a building may cost.
 const MAX_COMPARISONS: usize = 30_000_000;
 
 /// Checks the solids that [`TriangleMesh::from_model`](crate::TriangleMesh::from_model) makes triangles of, and nothing
@@ -180,18 +180,22 @@ fn compare_parts(model: &CityModel, bodies: Vec<Body>, defects: &mut Vec<Defect>
 }
 
 fn overlapping_parts(model: &CityModel, bodies: &[(usize, Body)]) -> Vec<Defect> {
-    let mut found = Vec::new();
+    let (mut found, mut budget) = (Vec::new(), Budget::new());
     for (index, (_, b)) in bodies.iter().enumerate() {
         for (_, a) in bodies[..index].iter().filter(|(_, a)| (a.object, a.geometry) != (b.object, b.geometry)) {
-            let (code, detail) = match Contact::of(&a.surface, &b.surface, OVERLAP_M) {
+            let contact = Contact::of(&a.surface, &b.surface, OVERLAP_M, &mut budget);
+            let (code, detail) = match contact {
                 Some(contact) if contact.interiors_meet() || contact.is_same() => {
                     (DefectCode::PartsOverlap, format!("with {}", model.objects[a.object].id))
                 }
                 Some(_) => continue,
-                None => (DefectCode::NotChecked, "601: too many triangles".to_owned()),
+                None => (DefectCode::NotChecked, "601, from here on: too many triangles".to_owned()),
             };
             let place = format!("geometry {}, solid {}", b.geometry, b.solid);
             found.push(Defect { code, effect: Effect::Noted, object: Some(b.object), place, detail });
+            if contact.is_none() {
+                return found;
+            }
         }
     }
     found

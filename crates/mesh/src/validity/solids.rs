@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::contact::Contact;
+use super::contact::{Budget, Contact};
 use super::patch::{Patch, Side};
 use super::{Body, OVERLAP_M, SHELL_TOLERANCE_M};
 use crate::DefectCode;
@@ -10,12 +10,12 @@ use crate::sets::DisjointSets;
 
 /// What is wrong between the shells of a solid, whose first one is the outer: code, shell, details.
 pub(super) fn compare_shells(shells: &[Patch]) -> Vec<(DefectCode, usize, String)> {
-    let mut found = Vec::new();
+    let (mut found, mut budget) = (Vec::new(), Budget::new());
     for (index, shell) in shells.iter().enumerate().skip(1) {
         for (other, earlier) in shells[..index].iter().enumerate() {
-            let Some(contact) = Contact::of(earlier, shell, SHELL_TOLERANCE_M) else {
-                found.push((DefectCode::NotChecked, index, "4xx: too many triangles".to_owned()));
-                continue;
+            let Some(contact) = Contact::of(earlier, shell, SHELL_TOLERANCE_M, &mut budget) else {
+                found.push((DefectCode::NotChecked, index, "4xx, from here on: too many triangles".to_owned()));
+                return found;
             };
             if let Some(code) = wrong_between(&contact, other == 0) {
                 found.push((code, index, format!("and shell {other}")));
@@ -66,13 +66,16 @@ fn touches_all_around(shells: &[Patch], index: usize) -> bool {
 
 /// What is wrong between the solids of a composite solid: code, solid, details.
 pub(super) fn compare(bodies: &[Body]) -> Vec<(DefectCode, u32, String)> {
-    let mut found = Vec::new();
+    let (mut found, mut budget) = (Vec::new(), Budget::new());
     let mut joined = DisjointSets::new(bodies.len());
     for (index, b) in bodies.iter().enumerate() {
         for (other, a) in bodies[..index].iter().enumerate() {
             let and = format!("and solid {}", a.solid);
-            match Contact::of(&a.surface, &b.surface, OVERLAP_M) {
-                None => found.push((DefectCode::NotChecked, b.solid, "5xx: too many triangles".to_owned())),
+            match Contact::of(&a.surface, &b.surface, OVERLAP_M, &mut budget) {
+                None => {
+                    found.push((DefectCode::NotChecked, b.solid, "5xx, from here on: too many triangles".to_owned()));
+                    return found;
+                }
                 Some(contact) if contact.is_same() => found.push((DefectCode::DuplicateSolids, b.solid, and)),
                 Some(contact) if contact.interiors_meet() => {
                     found.push((DefectCode::SolidsIntersect, b.solid, and));

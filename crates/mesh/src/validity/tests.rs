@@ -161,3 +161,13 @@ fn broken_shells_are_left_to_the_first_check() {
     solid(&[open.clone()], &[]);
     composite(&[&[open], &[cube()]], &[]);
 }
+
+#[test]
+fn what_is_too_large_is_told() {
+    let many: Vec<Vec<Faces>> =
+        (0..600).map(|i| vec![block([0.0; 3], [1.0 + 0.01 * f64::from(i), 1.0, 1.0])]).collect();
+    let solids: Vec<&[Faces]> = many.iter().map(Vec::as_slice).collect();
+    let building = Builder::new().object(ObjectKind::BUILDING, None, GeometryKind::CompositeSolid, &solids);
+    let codes = building.codes();
+    assert_eq!((codes.last(), codes.iter().filter(|&&code| code == 1013).count()), (Some(&1013), 1));
+}
