@@ -7,6 +7,10 @@
 //! as one side of a strip (a parapet thinner than the cells), and a circle (a crown); the form that is wrong about the fewest centres is
 //! taken. Four cells of which one side differs by another step are parted twice: ground, roof and the parapet between them.
 //!
+//! On simulated towns with parapets of 0.4 m and trees (three seeds, cells of 0.5 m, true heights), hidden cells are told with 97 %
+//! precision and 96 to 97 % recall under 16.5°, and 93 % of both under 6°, where a wall hides two cells and a parapet a fifth of
+//! one; on cells of 0.25 m, 97 % of both. A surface that is bilinear throughout has a recall of 82, 62 and 73 %.
+//!
 //! Every centre keeps its own side. On either side the surface is bilinear, and continued in a straight line beyond the side's own
 //! cells: a roof goes on falling to its eaves.
 
