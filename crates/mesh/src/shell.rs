@@ -63,6 +63,21 @@ pub(crate) fn check(surfaces: &[&Surface], outer: bool, position: impl Fn(u32) -
     out
 }
 
+/// What is wrong with surfaces that claim to be connected, but to enclose nothing.
+pub(crate) fn check_sheet(surfaces: &[&Surface]) -> Vec<(DefectCode, String)> {
+    let edges = sorted_edges(surfaces);
+    let crowded = edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).filter(|group| group.len() > 2).count();
+    let pieces = pieces(surfaces.len(), &edges);
+    let mut found = Vec::new();
+    if crowded > 0 {
+        found.push((DefectCode::NonManifold, format!("{crowded} edges")));
+    }
+    if pieces > 1 {
+        found.push((DefectCode::MultipleComponents, format!("{pieces}")));
+    }
+    found
+}
+
 fn sorted_edges(surfaces: &[&Surface]) -> Vec<Edge> {
     let mut edges: Vec<Edge> = Vec::new();
     for (number, surface) in surfaces.iter().enumerate() {
@@ -206,6 +221,21 @@ mod tests {
         faces.extend([lid.clone(), lid]);
         assert_eq!(checked(&faces, true).1, [303]);
         assert_eq!(checked(&faces[..3], true).1, [301]);
+    }
+
+    #[test]
+    fn a_sheet_hangs_together_and_branches_nowhere() {
+        let codes = |faces: &[Vec<u32>]| -> Vec<u16> {
+            let surfaces: Vec<Surface> =
+                faces.iter().map(|ring| Surface::new(vec![ring.clone()], SurfaceClass::Roof)).collect();
+            let found = check_sheet(&surfaces.iter().collect::<Vec<_>>());
+            found.iter().map(|(code, _)| code.number()).collect()
+        };
+        let mut faces = cube();
+        assert_eq!(codes(&faces[..3]), []);
+        assert_eq!(codes(&faces[..2]), [305]);
+        faces.push(vec![0, 1, 6, 7]);
+        assert_eq!(codes(&faces), [303]);
     }
 
     #[test]

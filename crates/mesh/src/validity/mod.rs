@@ -1,4 +1,5 @@
-//! What is wrong with the solids of a model: val3dity's codes 303 (at a vertex), 306, 4xx, 5xx and 601.
+//! What is wrong with the solids of a model: val3dity's codes 303 (at a vertex), 306, 4xx, 5xx and 601; and with composite
+//! surfaces: 303 and 305.
 //!
 //! These checks compare triangles with triangles and are made for a report; loading a model does not pay for them. They build
 //! upon each other as in val3dity (Ledoux 2018): only closed shells are searched for meetings with themselves, only sound
@@ -87,6 +88,12 @@ impl Checked {
     }
 
     fn geometry(&mut self, object: usize, number: usize, geometry: &Geometry, position: &impl Fn(u32) -> Vector) {
+        if geometry.kind == GeometryKind::CompositeSurface {
+            let found = shell::check_sheet(&geometry.surfaces.iter().collect::<Vec<_>>());
+            found
+                .into_iter()
+                .for_each(|(code, detail)| self.report(object, code, format!("geometry {number}"), detail));
+        }
         if !geometry.kind.is_solid() {
             return;
         }

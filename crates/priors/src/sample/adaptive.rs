@@ -17,6 +17,10 @@ use mesh::vector::{Vector, cross, norm, sub};
 /// A piece is small enough when it is no longer than this many spacings.
 const PIECE: f64 = 0.7;
 
+/// Cuts for each point that is made of them, on city models.
+const CUTS_PER_POINT: usize = 30;
+/// Without this a huge plane and a tiny error would never end.
+const MAX_CUTS: usize = CUTS_PER_POINT * LIMIT;
 /// Creases that are no nearer than this to being of no use are kept, metres.
 const ROUNDING_M: f64 = 1e-9;
 
@@ -130,10 +134,9 @@ impl<'a> Work<'a> {
                 pieces.push(Piece { corners, spacing_m, share: weight * area / (spacing_m * spacing_m) });
                 continue;
             }
-            // Pieces are fewer than a few for each point; without the limit a huge plane would take all memory.
             let made = self.made.fetch_add(1, Ordering::Relaxed);
-            if made > LIMIT {
-                return Err(PriorsError::TooMany { asked: made as u64, limit: LIMIT });
+            if made > MAX_CUTS {
+                return Err(PriorsError::TooMany { asked: (made / CUTS_PER_POINT) as u64, limit: LIMIT });
             }
             let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);
             let middle = [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]));
