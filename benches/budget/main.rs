@@ -36,9 +36,10 @@ fn main() -> anyhow::Result<()> {
         text += &table;
     }
     let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/results");
-    Ok(if named.is_empty() {
-        std::fs::write(results.join("budget.md"), text)?
-    })
+    if named.is_empty() {
+        std::fs::write(results.join("budget.md"), text)?;
+    }
+    Ok(())
 }
 
 fn introduction() -> String {

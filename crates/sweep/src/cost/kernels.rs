@@ -55,8 +55,8 @@ fn round(values: &[f32], mean: f32, scale: f32, out: &mut [i16]) {
     // Adding 1.5 · 2²³ leaves the rounded integer in the lowest bits of the sum, which vectorises; a cast does not.
     const ROUND: f32 = 12_582_912.0;
     for (o, v) in out.iter_mut().zip(values) {
-        // `max` and `min` return the other operand for a NaN.
-        *o = (((v - mean) * scale).max(-GREY_MAX).min(GREY_MAX) + ROUND).to_bits() as i16;
+        // `clamp` passes a NaN on, whose lowest bits are 0: `View` keeps no others.
+        *o = (((v - mean) * scale).clamp(-GREY_MAX, GREY_MAX) + ROUND).to_bits() as i16;
     }
 }
 
