@@ -243,7 +243,12 @@ impl ChunkedScene<'_> {
         seen: &[bool],
     ) -> Result<Vec<Option<Window>>, PipelineError> {
         let one = |(o, seen): (&Opened, &bool)| {
-            seen.then(|| image_span(o, grid, range_m, WINDOW_MARGIN).map(aligned)).transpose()
+            if !*seen {
+                return Ok(None);
+            }
+            // Pixels beyond the image would be voids, which on coarse levels reach into it.
+            let inside = Window::whole(o.size.0, o.size.1);
+            Ok(aligned(image_span(o, grid, range_m, WINDOW_MARGIN)?).intersection(&inside))
         };
         self.images.iter().zip(seen).map(one).collect()
     }
