@@ -54,35 +54,69 @@ pub fn bicubic(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
     if value.is_finite() { value } else { bilinear(grid, column, row) }
 }
 
+/// Positions that are worked on together.
+const LANES: usize = 8;
+
 /// [`bicubic`] at `from`, `from + step`, … (column, row).
 #[multiversion(targets("x86_64+avx2"))]
 pub fn bicubic_along(grid: &Grid<f32>, from: [f64; 2], step: [f64; 2], out: &mut [f32]) {
-    for (i, value) in out.iter_mut().enumerate() {
-        let [column, row] = [from[0] + step[0] * i as f64, from[1] + step[1] * i as f64];
-        *value = match bicubic_inside(grid, column, row) {
-            Some(inside) if inside.is_finite() => inside,
-            _ => bicubic(grid, column, row),
-        };
+    let at = |i: usize| [from[0] + step[0] * i as f64, from[1] + step[1] * i as f64];
+    for (k, values) in out.chunks_mut(LANES).enumerate() {
+        let first = k * LANES;
+        // Positions between two that have all their pixels have them too.
+        if let Ok(values) = <&mut [f32; LANES]>::try_from(&mut *values)
+            && has_all_pixels(grid, at(first))
+            && has_all_pixels(grid, at(first + LANES - 1))
+        {
+            *values = bicubic_inside(grid, std::array::from_fn(|i| at(first + i)));
+        } else {
+            values.fill(f32::NAN);
+        }
+        for (i, value) in values.iter_mut().enumerate().filter(|(_, value)| !value.is_finite()) {
+            let [column, row] = at(first + i);
+            *value = bicubic(grid, column, row);
+        }
     }
 }
 
-/// The bicubic value where all sixteen pixels are there; whatever comes of it where some are not finite.
 #[inline(always)]
-fn bicubic_inside(grid: &Grid<f32>, column: f64, row: f64) -> Option<f32> {
-    let is_inside =
-        column >= 1.0 && row >= 1.0 && column < grid.width() as f64 - 3.0 && row < grid.height() as f64 - 3.0;
-    if !is_inside {
-        return None;
+fn has_all_pixels(grid: &Grid<f32>, [column, row]: [f64; 2]) -> bool {
+    column >= 1.0 && row >= 1.0 && column < grid.width() as f64 - 3.0 && row < grid.height() as f64 - 3.0
+}
+
+/// The bicubic values where all sixteen pixels of each are there; whatever comes of it where some are not finite.
+#[inline(always)]
+fn bicubic_inside(grid: &Grid<f32>, at: [[f64; 2]; LANES]) -> [f32; LANES] {
+    let mut pixel = [0usize; LANES];
+    let (mut u, mut v) = ([0.0f32; LANES], [0.0f32; LANES]);
+    for (i, [column, row]) in at.into_iter().enumerate() {
+        let (c, r) = (column as i32, row as i32);
+        (u[i], v[i]) = ((column - f64::from(c)) as f32, (row - f64::from(r)) as f32);
+        pixel[i] = (r as usize - 1) * grid.width() + c as usize - 1;
     }
-    let (c, r) = (column as usize, row as usize);
-    let (wu, wv) = (cubic_weights((column - c as f64) as f32), cubic_weights((row - r as f64) as f32));
+    let (mut wu, mut wv) = ([[0.0f32; LANES]; 4], [[0.0f32; LANES]; 4]);
+    for i in 0..LANES {
+        let (a, b) = (cubic_weights(u[i]), cubic_weights(v[i]));
+        for k in 0..4 {
+            (wu[k][i], wv[k][i]) = (a[k], b[k]);
+        }
+    }
     // Rows first: four neighbouring pixels are one vector.
-    let mut sums = [0.0f32; 4];
-    for (j, weight) in wv.iter().enumerate() {
-        let pixels: &[f32; 4] = grid.row(r - 1 + j).get(c - 1..c + 3)?.try_into().ok()?;
-        sums.iter_mut().zip(pixels).for_each(|(s, p)| *s += weight * p);
+    let mut sums = [[0.0f32; LANES]; 4];
+    for i in 0..LANES {
+        let mut columns = [0.0f32; 4];
+        for j in 0..4 {
+            let from = pixel[i] + j * grid.width();
+            let pixels = &grid.data()[from..from + 4];
+            columns.iter_mut().zip(pixels).for_each(|(s, p)| *s += wv[j][i] * p);
+        }
+        for k in 0..4 {
+            sums[k][i] = columns[k];
+        }
     }
-    Some(wu[0] * sums[0] + wu[1] * sums[1] + wu[2] * sums[2] + wu[3] * sums[3])
+    std::array::from_fn(|i| {
+        wu[0][i] * sums[0][i] + wu[1][i] * sums[1][i] + wu[2][i] * sums[2][i] + wu[3][i] * sums[3][i]
+    })
 }
 
 /// A grid filled from another through a map of positions, rows in parallel.
