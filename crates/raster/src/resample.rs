@@ -105,10 +105,10 @@ fn bicubic_inside(grid: &Grid<f32>, at: [[f64; 2]; LANES]) -> [f32; LANES] {
     let mut sums = [[0.0f32; LANES]; 4];
     for i in 0..LANES {
         let mut columns = [0.0f32; 4];
-        for j in 0..4 {
+        for (j, weights) in wv.iter().enumerate() {
             let from = pixel[i] + j * grid.width();
             let pixels = &grid.data()[from..from + 4];
-            columns.iter_mut().zip(pixels).for_each(|(s, p)| *s += wv[j][i] * p);
+            columns.iter_mut().zip(pixels).for_each(|(s, p)| *s += weights[i] * p);
         }
         for k in 0..4 {
             sums[k][i] = columns[k];
