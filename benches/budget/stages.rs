@@ -5,14 +5,13 @@ use raster::Grid;
 use rayon::prelude::*;
 use simulate::Simulation;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::cost::{Aggregation, CostConfig, Reference, SourceLevel};
+use sweep::cost::{Aggregation, Reference, SourceLevel};
 use sweep::fusion::{FusionConfig, GridFrame, fuse_views, place_view};
 use sweep::ranges::Ranges;
 use sweep::semiglobal::Penalties;
 use sweep::{HeightMap, LevelConfig, View, source_from_reference, sweep_level};
 
-/// Those of the default preset.
-const PENALTIES: Penalties = Penalties { step: 32, jump: 124, jump_at_edge: 32 };
+/// That of the default preset.
 const STEP_PX: f64 = 0.5;
 /// Steps around the true heights that are searched where these are given.
 const AROUND: f64 = 4.0;
@@ -96,22 +95,14 @@ impl<'a> Scene<'a> {
     }
 
     fn sweep(&self, index: usize, level: usize, ranges: &Ranges, known: Known) -> anyhow::Result<HeightMap> {
-        let at = |index: usize| {
-            let v = &self.views[index];
-            SourceLevel {
-                index,
-                image: &v.levels[level],
-                camera: &v.camera,
-                noise: v.noise_at(level),
-                contrast: v.contrast[level],
-            }
-        };
+        let at = |index: usize| self.views[index].on_level(index, level);
         let sources: Vec<SourceLevel<'_>> = (0..self.views.len()).filter(|&i| i != index).map(at).collect();
         let aggregation = if sources.len() > 2 { Aggregation::BestOf(2) } else { Aggregation::Variance };
-        let penalties =
-            if known == Known::RangeAlone { Penalties { step: 0, jump: 0, jump_at_edge: 0 } } else { PENALTIES };
-        let cost = CostConfig { aggregation, ..CostConfig::default() };
-        let config = LevelConfig { cost, penalties, cost_noise: 0.02 };
+        let mut config = LevelConfig::default();
+        config.cost.aggregation = aggregation;
+        if known == Known::RangeAlone {
+            config.penalties = Penalties { step: 0, jump: 0, jump_at_edge: 0 };
+        }
         let reference = Reference { view: at(index), level: level as u32, ranges, prior: None };
         Ok(sweep_level(reference, &sources, self.origin_m, &config)?)
     }

@@ -5,8 +5,6 @@ use std::path::PathBuf;
 use geodesy::VerticalDatum;
 use serde::{Deserialize, Serialize};
 use sweep::LevelConfig;
-use sweep::cost::CostConfig;
-use sweep::semiglobal::Penalties;
 
 /// Speed against accuracy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -133,11 +131,6 @@ impl Preset {
             Self::Balanced => (0, 4),
             Self::Accurate => (0, 8),
         };
-        // In units of the worst cost, 112. Measured on simulated towns and the LiDAR truth of JAX_068: a step costs about a
-        // quarter, so that noise does not ripple a roof; a jump a little more than the worst cost, and no more than a
-        // step across an image edge, where roofs end. The proportions are those of CARS and S2P (8 to 32 of 24 bits).
-        let penalties = Penalties { step: 32, jump: 124, jump_at_edge: 32 };
-        let level = LevelConfig { cost: CostConfig::default(), penalties, cost_noise: 0.02 };
-        Tuning { step_px: 0.5, finest_level, sources, best_of: sources.div_ceil(2), level }
+        Tuning { step_px: 0.5, finest_level, sources, best_of: sources.div_ceil(2), level: LevelConfig::default() }
     }
 }

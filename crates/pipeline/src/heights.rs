@@ -93,17 +93,6 @@ pub(crate) fn sweep_scene(
     Ok(SceneHeights { maps, evaluations, findings })
 }
 
-fn source_level(views: &[View], index: usize, level: usize) -> SourceLevel<'_> {
-    let v = &views[index];
-    SourceLevel {
-        index,
-        image: &v.levels[level],
-        camera: &v.camera,
-        noise: v.noise_at(level),
-        contrast: v.contrast[level],
-    }
-}
-
 fn sweep_view(
     views: &[View],
     plan: &SweepPlan,
@@ -113,7 +102,7 @@ fn sweep_view(
     known: Option<&ViewPrior>,
     origin_m: f64,
 ) -> Result<(HeightMap, u64), SweepError> {
-    let reference = source_level(views, index, level);
+    let reference = views[index].on_level(index, level);
     let (w, h) = (reference.image.width(), reference.image.height());
     if plan.sources[index].is_empty() {
         return Ok((HeightMap::empty(w, h, origin_m), 0));
@@ -130,7 +119,7 @@ fn sweep_view(
         Some(prior) => prior.widened(ranges),
         None => ranges,
     };
-    let sources: Vec<SourceLevel<'_>> = plan.sources[index].iter().map(|&s| source_level(views, s, level)).collect();
+    let sources: Vec<SourceLevel<'_>> = plan.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
     let mut config = plan.level;
     config.cost.aggregation = match sources.len() {
         0..=2 => Aggregation::Variance,

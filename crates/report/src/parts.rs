@@ -1,6 +1,8 @@
 //! What pages about priors are made of: cards, notes, pictures of views, tables.
 
 use raster::Grid;
+use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::page::escape;
 use crate::picture::{PictureError, data_uri};
@@ -60,4 +62,16 @@ pub(crate) fn table(title: &str, heads: &[&str], rows: impl Iterator<Item = Vec<
 
 pub(crate) fn last_part(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+/// Every number of a report of priors, by name, and who made it.
+///
+/// # Errors
+/// None that a report of finite numbers can cause.
+pub(crate) fn with_generator(report: &impl Serialize) -> Result<Value, serde_json::Error> {
+    let mut value = json!({ "generator": concat!("skysweep priors ", env!("CARGO_PKG_VERSION")) });
+    if let (Some(all), Value::Object(own)) = (value.as_object_mut(), serde_json::to_value(report)?) {
+        all.extend(own);
+    }
+    Ok(value)
 }

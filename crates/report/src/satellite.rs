@@ -1,10 +1,10 @@
 //! The account of priors for satellite images: what each image sees of a city model, as JSON and as one page.
 
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::page::{escape, page};
-use crate::parts::{ViewPictures, cards_of, figures, last_part, notes, table};
+use crate::parts::{ViewPictures, cards_of, figures, last_part, notes, table, with_generator};
 use crate::picture::PictureError;
 
 /// What became of a city model in satellite images.
@@ -55,11 +55,7 @@ impl SatellitePriorsReport {
     /// # Errors
     /// None that a report of finite numbers can cause.
     pub fn json(&self) -> Result<Value, serde_json::Error> {
-        let mut value = json!({ "generator": concat!("skysweep priors ", env!("CARGO_PKG_VERSION")) });
-        if let (Some(all), Value::Object(own)) = (value.as_object_mut(), serde_json::to_value(self)?) {
-            all.extend(own);
-        }
-        Ok(value)
+        with_generator(self)
     }
 
     /// The page, with pictures of some images.
@@ -129,6 +125,7 @@ impl SatellitePriorsReport {
 mod tests {
     use super::*;
     use raster::Grid;
+    use serde_json::json;
 
     fn report() -> SatellitePriorsReport {
         let row = |name: &str, hit_pixels| SatelliteRow {

@@ -17,7 +17,6 @@ use sweep::{CostVolume, LevelConfig, View, sweep_level};
 const SIZE: usize = 512;
 /// Hypotheses per pixel, in steps of a metre.
 const HYPOTHESES: usize = 64;
-const PENALTIES: Penalties = Penalties { step: 32, jump: 124, jump_at_edge: 32 };
 
 /// A linear camera whose pixels move by `parallax` (samples, lines) per metre of height.
 fn camera(parallax: [f64; 2]) -> RpcCamera {
@@ -54,31 +53,26 @@ fn views() -> Vec<View> {
     [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| View::new(camera(p), image.clone())).into()
 }
 
-fn level(views: &[View], index: usize) -> SourceLevel<'_> {
-    let v = &views[index];
-    SourceLevel { index, image: &v.levels[0], camera: &v.camera, noise: v.noise, contrast: v.contrast[0] }
-}
-
 fn kernels(c: &mut Criterion) {
     let views = views();
     let ranges = Ranges::uniform(SIZE, SIZE, 1.0, (-32.0, (HYPOTHESES - 33) as f64));
-    let reference = Reference { view: level(&views, 0), level: 0, ranges: &ranges, prior: None };
+    let reference = Reference { view: views[0].on_level(0, 0), level: 0, ranges: &ranges, prior: None };
     let (whole, cost) = (Window::whole(SIZE, SIZE), CostConfig::default());
     let evaluations = ranges.evaluations();
     let mut group = c.benchmark_group("sweep");
     group.sample_size(20);
     for count in [1, 2] {
-        let sources: Vec<SourceLevel<'_>> = (1..=count).map(|i| level(&views, i)).collect();
+        let sources: Vec<SourceLevel<'_>> = (1..=count).map(|i| views[i].on_level(i, 0)).collect();
         group.throughput(Throughput::Elements(evaluations * count as u64));
         group.bench_function(BenchmarkId::new("cost per source", count), |b| {
             b.iter(|| CostVolume::compute(reference, black_box(&sources), whole, &cost).expect("linear cameras"));
         });
     }
-    let sources = [level(&views, 1)];
+    let sources = [views[1].on_level(1, 0)];
     let volume = CostVolume::compute(reference, &sources, whole, &cost).expect("linear cameras");
     group.throughput(Throughput::Elements(volume.hypotheses() as u64));
-    group.bench_function("aggregation", |b| b.iter(|| black_box(&volume).aggregate(PENALTIES)));
-    let config = LevelConfig { cost, penalties: PENALTIES, cost_noise: 0.02 };
+    group.bench_function("aggregation", |b| b.iter(|| black_box(&volume).aggregate(Penalties::default())));
+    let config = LevelConfig::default();
     // A level of one block runs on one thread.
     group.bench_function("chain of a pair", |b| {
         b.iter(|| sweep_level(reference, black_box(&sources), 0.0, &config).expect("linear cameras"));

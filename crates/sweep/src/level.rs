@@ -29,6 +29,12 @@ pub struct LevelConfig {
     pub cost_noise: f32,
 }
 
+impl Default for LevelConfig {
+    fn default() -> Self {
+        Self { cost: CostConfig::default(), penalties: Penalties::default(), cost_noise: 0.02 }
+    }
+}
+
 /// Heights of one view on one level, with their reliability.
 #[derive(Debug, Clone)]
 pub struct HeightMap {
@@ -169,23 +175,18 @@ mod tests {
 
     fn config(aggregation: Aggregation) -> LevelConfig {
         let cost = CostConfig { aggregation, ..CostConfig::default() };
-        LevelConfig { cost, penalties: Penalties { step: 32, jump: 124, jump_at_edge: 32 }, cost_noise: 0.02 }
-    }
-
-    fn source(views: &[View], index: usize) -> SourceLevel<'_> {
-        let v = &views[index];
-        SourceLevel { index, image: &v.levels[0], camera: &v.camera, noise: v.noise, contrast: v.contrast[0] }
+        LevelConfig { cost, ..LevelConfig::default() }
     }
 
     fn reference<'a>(views: &'a [View], ranges: &'a Ranges) -> Reference<'a> {
-        Reference { view: source(views, 0), level: 0, ranges, prior: None }
+        Reference { view: views[0].on_level(0, 0), level: 0, ranges, prior: None }
     }
 
     /// Errors of the inner pixels, in steps, for a plane at a height between two hypotheses.
     fn errors(views: &[View], height_m: f64, aggregation: Aggregation) -> Vec<f64> {
         let size = views[0].levels[0].width();
         let ranges = Ranges::uniform(size, size, 1.0, (-10.0, 30.0));
-        let sources: Vec<SourceLevel<'_>> = (1..views.len()).map(|i| source(views, i)).collect();
+        let sources: Vec<SourceLevel<'_>> = (1..views.len()).map(|i| views[i].on_level(i, 0)).collect();
         let map = sweep_level(reference(views, &ranges), &sources, 0.0, &config(aggregation)).unwrap();
         let inner = 30..size - 30;
         let at = |x: usize, y: usize| f64::from(map.height_m[(x, y)]) - height_m;
@@ -209,7 +210,7 @@ mod tests {
     fn swept(views: &[View], order: &[usize]) -> HeightMap {
         let (w, h) = (views[0].levels[0].width(), views[0].levels[0].height());
         let ranges = Ranges::uniform(w, h, 1.0, (-10.0, 30.0));
-        let sources: Vec<SourceLevel<'_>> = order.iter().map(|&i| source(views, i)).collect();
+        let sources: Vec<SourceLevel<'_>> = order.iter().map(|&i| views[i].on_level(i, 0)).collect();
         sweep_level(reference(views, &ranges), &sources, 0.0, &config(Aggregation::Variance)).unwrap()
     }
 
@@ -264,7 +265,7 @@ mod tests {
             let views = cameras.clone().map(|c| View::new(c, Grid::filled(80, 80, value)));
             let ranges = Ranges::uniform(80, 80, 1.0, (-10.0, 30.0));
             let config = config(Aggregation::Variance);
-            let map = sweep_level(reference(&views, &ranges), &[source(&views, 1)], 0.0, &config).unwrap();
+            let map = sweep_level(reference(&views, &ranges), &[views[1].on_level(1, 0)], 0.0, &config).unwrap();
             assert!(map.height_m.data().iter().all(|h| h.is_nan()));
         }
     }

@@ -1,5 +1,6 @@
 //! A view: an image pyramid with its camera.
 
+use crate::cost::SourceLevel;
 use camera::RpcCamera;
 use raster::{Grid, Pyramid};
 
@@ -47,6 +48,17 @@ impl View {
     pub fn absent(camera: RpcCamera) -> Self {
         let levels = vec![Grid::filled(0, 0, f32::NAN); LEVELS_MAX];
         Self { camera, levels, noise: 0.0, contrast: vec![0.0; LEVELS_MAX] }
+    }
+
+    /// What the sweep takes of it on a level; `index` is its place among the views.
+    pub fn on_level(&self, index: usize, level: usize) -> SourceLevel<'_> {
+        SourceLevel {
+            index,
+            image: &self.levels[level],
+            camera: &self.camera,
+            noise: self.noise_at(level),
+            contrast: self.contrast[level],
+        }
     }
 
     /// The most noise to expect on a level: each reduction at least halves it.
