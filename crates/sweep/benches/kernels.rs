@@ -71,7 +71,10 @@ fn kernels(c: &mut Criterion) {
     let sources = [views[1].on_level(1, 0)];
     let volume = CostVolume::compute(reference, &sources, whole, &cost).expect("linear cameras");
     group.throughput(Throughput::Elements(volume.hypotheses() as u64));
-    group.bench_function("aggregation", |b| b.iter(|| black_box(&volume).aggregate(Penalties::default())));
+    let mut forward = Vec::new();
+    group.bench_function("aggregation", |b| {
+        b.iter(|| black_box(&volume).aggregate(Penalties::default(), &mut forward, |_, row| _ = black_box(row)));
+    });
     let config = LevelConfig::default();
     // A level of one block runs on one thread.
     group.bench_function("chain of a pair", |b| {

@@ -3,13 +3,14 @@
 //! Blocks lie on a fixed lattice of the image and overlap by a margin over which the aggregation settles; they are
 //! part of the method, so the result does not depend on tiles, memory or threads.
 
+use multiversion::multiversion;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
 use crate::SweepError;
 use crate::cost::{COST_MAX, CostConfig, Reference, SourceLevel};
-use crate::readout::soft_argmin;
-use crate::semiglobal::{Penalties, Volume};
+use crate::readout::{place_of_least, soft_argmin};
+use crate::semiglobal::{Penalties, RowSums, Volume};
 use crate::support::agreed_share;
 use crate::volume::CostVolume;
 
@@ -100,42 +101,75 @@ fn sweep_block(
     let whole = Window::whole(reference.view.image.width(), reference.view.image.height());
     let window = core.grown(BLOCK_MARGIN).intersection(&whole).unwrap_or(core);
     let volume = CostVolume::compute(reference, sources, window, &config.cost)?;
-    let sums = volume.aggregate(config.penalties);
-    Ok(read_out(&volume.as_block(), &sums, window, core, reference, origin_m, config))
+    let mut reader = Reader {
+        reference,
+        window,
+        core,
+        config,
+        best: vec![0; window.width * window.height],
+        out: HeightMap::empty(core.width, core.height, origin_m),
+    };
+    let block = volume.as_block();
+    volume.aggregate(config.penalties, &mut Vec::new(), |y, sums| read_row(&mut reader, &block, y, sums));
+    Ok(reader.finish())
 }
 
-fn read_out(
-    volume: &Volume<'_>,
-    sums: &[u16],
+/// Reads the heights of a block out of its sums, row by row.
+struct Reader<'a> {
+    reference: Reference<'a>,
     window: Window,
     core: Window,
-    reference: Reference<'_>,
-    origin_m: f64,
-    config: &LevelConfig,
-) -> HeightMap {
+    config: &'a LevelConfig,
+    /// The cost of each pixel of the window at its hypothesis with the least sum.
+    best: Vec<u8>,
+    /// Of the core.
+    out: HeightMap,
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn read_row(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize, sums: RowSums<'_>) {
+    let Reader { reference, window, core, config, best, out } = reader;
     let scale = 8.0 * f32::from(COST_MAX);
     let step = reference.ranges.step_m;
-    let mut out = HeightMap::empty(core.width, core.height, origin_m);
-    let support = agreed_share(volume, sums, &reference.view, window);
-    for y in 0..core.height {
-        for x in 0..core.width {
-            let (gx, gy) = (core.x as usize + x, core.y as usize + y);
-            let p = (gy - window.y as usize) * window.width + gx - window.x as usize;
-            // No picture, no height: blank parts agree at every height at which both images see them.
-            if reference.view.image[(gx, gy)].is_nan() || support[p] == 0.0 {
-                continue;
-            }
-            let own = &sums[volume.offsets[p] as usize..volume.offsets[p + 1] as usize];
-            if let Some(e) = soft_argmin(own, scale, config.cost_noise) {
-                let height_m = (f64::from(volume.low[p]) + f64::from(e.index)) * step;
-                out.height_m[(x, y)] = (height_m - origin_m) as f32;
-                out.sigma_m[(x, y)] = e.spread * step as f32;
-                out.confidence[(x, y)] = e.margin;
-                out.support[(x, y)] = support[p];
-            }
+    let gy = window.y + y as i64;
+    let image = &reference.view.image.row(gy as usize)[window.x as usize..][..window.width];
+    let in_core = (gy >= core.y && gy < core.y + core.height as i64).then(|| (gy - core.y) as usize);
+    for (x, grey) in image.iter().enumerate() {
+        let (p, own) = (y * window.width + x, sums.pixel(x));
+        let Some(place) = place_of_least(own) else { continue };
+        best[p] = volume.costs[volume.offsets[p] as usize + place];
+        let Some(to) = in_core.and_then(|cy| Some((x.checked_sub((core.x - window.x) as usize)?, cy))) else {
+            continue;
+        };
+        // No picture, no height: blank parts agree at every height at which both images see them.
+        if to.0 >= core.width || grey.is_nan() {
+            continue;
+        }
+        if let Some(e) = soft_argmin(own, place, scale, config.cost_noise) {
+            let height_m = (f64::from(volume.low[p]) + f64::from(e.index)) * step;
+            out.height_m[to] = (height_m - out.origin_m) as f32;
+            out.sigma_m[to] = e.spread * step as f32;
+            out.confidence[to] = e.margin;
         }
     }
-    out
+}
+
+impl Reader<'_> {
+    /// The heights that a picture stands behind.
+    fn finish(self) -> HeightMap {
+        let Self { reference, window, core, best, mut out, .. } = self;
+        let support = agreed_share(&best, &reference.view, window);
+        for y in 0..core.height {
+            for x in 0..core.width {
+                let from = ((core.x - window.x) as usize + x, (core.y - window.y) as usize + y);
+                out.support[(x, y)] = support[from.1 * window.width + from.0];
+                if out.height_m[(x, y)].is_nan() || out.support[(x, y)] == 0.0 {
+                    out.clear((x, y));
+                }
+            }
+        }
+        out
+    }
 }
 
 impl HeightMap {
@@ -148,6 +182,14 @@ impl HeightMap {
             confidence: Grid::filled(width, height, 0.0),
             support: Grid::filled(width, height, 0.0),
         }
+    }
+
+    /// Makes a pixel one without a height.
+    fn clear(&mut self, at: (usize, usize)) {
+        self.height_m[at] = f32::NAN;
+        self.sigma_m[at] = f32::NAN;
+        self.confidence[at] = 0.0;
+        self.support[at] = 0.0;
     }
 
     fn put(&mut self, at: Window, part: &Self) {

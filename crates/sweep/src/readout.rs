@@ -24,11 +24,19 @@ const WINDOW: usize = 3;
 /// window holds all of it.
 const DEVIATION: f32 = 0.8;
 
-/// Reads one pixel's sums; `None` where all hypotheses are as good, which says nothing. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the deviation of a
-/// cost relative to it, which turns the mode's curvature into the deviation of its position.
-pub(crate) fn soft_argmin(sums: &[u16], scale: f32, noise: f32) -> Option<Estimate> {
+/// The first of the hypotheses with the least sum; `None` where there is none at all.
+#[inline(always)]
+pub(crate) fn place_of_least(sums: &[u16]) -> Option<usize> {
     let least = least_of(sums);
-    let best = sums.iter().position(|s| *s == least)?;
+    sums.iter().position(|s| *s == least)
+}
+
+/// Reads one pixel's sums, of which that at `best` is the first of the least; `None` where all hypotheses are as good, which
+/// says nothing. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the deviation of a cost relative to it,
+/// which turns the mode's curvature into the deviation of its position.
+#[inline(always)]
+pub(crate) fn soft_argmin(sums: &[u16], best: usize, scale: f32, noise: f32) -> Option<Estimate> {
+    let least = sums[best];
     let reach = WINDOW.min(best).min(sums.len() - 1 - best);
     // A window cut on one side by the range's end would pull the mean inward: both sides are cut alike.
     let (from, to) = (best - reach, best + reach + 1);
@@ -54,6 +62,7 @@ pub(crate) fn soft_argmin(sums: &[u16], scale: f32, noise: f32) -> Option<Estima
     Some(Estimate { index: best as f32 + first / weight, spread, margin })
 }
 
+#[inline(always)]
 fn least_of(sums: &[u16]) -> u16 {
     sums.iter().copied().fold(u16::MAX, u16::min)
 }
@@ -77,10 +86,14 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn read(sums: &[u16], scale: f32, noise: f32) -> Option<Estimate> {
+        soft_argmin(sums, place_of_least(sums)?, scale, noise)
+    }
+
     #[test]
     fn equal_costs_say_nothing() {
-        assert_eq!(soft_argmin(&[500; 9], 1016.0, 0.05), None);
-        let at_the_end = soft_argmin(&[100, 500, 500], 1016.0, 0.05).unwrap();
+        assert_eq!(read(&[500; 9], 1016.0, 0.05), None);
+        let at_the_end = read(&[100, 500, 500], 1016.0, 0.05).unwrap();
         assert!(at_the_end.index == 0.0 && at_the_end.spread == WINDOW as f32);
     }
 
@@ -92,14 +105,14 @@ mod tests {
             sums in prop::collection::vec(prop_oneof![0..1016u16, 60_000..=60_100u16, Just(0u16)], 0..40),
             addend in 0..5000u16,
         ) {
-            let found = soft_argmin(&sums, 1016.0, 0.02);
+            let found = read(&sums, 1016.0, 0.02);
             if let Some(e) = found {
                 prop_assert!(e.index >= 0.0 && e.index <= (sums.len() - 1) as f32, "{e:?}");
                 prop_assert!(e.spread > 0.0 && e.spread <= WINDOW as f32, "{e:?}");
                 prop_assert!((0.0..=1.0).contains(&e.margin), "{e:?}");
             }
             let raised: Vec<u16> = sums.iter().map(|s| s + addend).collect();
-            prop_assert_eq!(soft_argmin(&raised, 1016.0, 0.02), found);
+            prop_assert_eq!(read(&raised, 1016.0, 0.02), found);
         }
     }
 
@@ -108,7 +121,7 @@ mod tests {
         for tenth in -5..=5 {
             let truth = 10.0 + f32::from(tenth as i8) / 10.0;
             let sums: Vec<u16> = (0..21).map(|k| (60.0 * (k as f32 - truth).powi(2)).min(900.0) as u16).collect();
-            let e = soft_argmin(&sums, 1016.0, 0.02).unwrap();
+            let e = read(&sums, 1016.0, 0.02).unwrap();
             assert!((e.index - truth).abs() < 0.03, "{} for {truth}", e.index);
         }
     }
@@ -118,15 +131,15 @@ mod tests {
         let mut sums = [900u16; 40];
         sums[9..12].copy_from_slice(&[120, 100, 120]);
         sums[30] = 110;
-        let e = soft_argmin(&sums, 1016.0, 0.02).unwrap();
+        let e = read(&sums, 1016.0, 0.02).unwrap();
         assert!((e.index - 10.0).abs() < 1e-3, "{e:?}");
         assert!(e.margin < 0.02);
     }
 
     #[test]
     fn huge_costs_do_not_overflow_and_no_hypothesis_gives_nothing() {
-        assert!(soft_argmin(&[u16::MAX, 0, u16::MAX], 1016.0, 0.01).unwrap().index.is_finite());
-        assert!(soft_argmin(&[], 1016.0, 0.01).is_none());
+        assert!(read(&[u16::MAX, 0, u16::MAX], 1016.0, 0.01).unwrap().index.is_finite());
+        assert!(read(&[], 1016.0, 0.01).is_none());
     }
 
     #[test]

@@ -8,9 +8,12 @@
 use multiversion::multiversion;
 use multiversion::target::match_target;
 
-use crate::simd::{Bytes, Plain};
 #[cfg(target_arch = "x86_64")]
-use crate::simd::{Sixteen, ThirtyTwo};
+use crate::simd::Avx2;
+use crate::simd::paths::{GUARD, Last, Pixel, Previous, Slot};
+use crate::simd::{Anywhere, Instructions};
+
+pub(crate) use crate::simd::paths::{FAR, LANES};
 
 /// Penalties in units of the cost ([`crate::cost::COST_MAX`] = worst).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,16 +35,6 @@ impl Default for Penalties {
     }
 }
 
-/// The cost of heights that a pixel does not search. Others reach it only where the worst cost and the penalty of a jump do
-/// together, and are cut.
-const FAR: u8 = u8::MAX;
-/// Most hypotheses that are worked on together, a vector register of bytes; most pixels need half of it.
-pub(crate) const LANES: usize = 32;
-/// Guard entries before a pixel's path costs: a neighbour may search this many heights fewer one, and find its own in place.
-const BEFORE: usize = 8;
-/// Guard entries behind them: a vector that overhangs, and heights above this one's as below.
-const BEHIND: usize = LANES + BEFORE;
-
 /// A block of pixels with their hypotheses, row after row.
 pub(crate) struct Volume<'a> {
     pub(crate) width: usize,
@@ -56,204 +49,191 @@ pub(crate) struct Volume<'a> {
     pub(crate) edges: &'a [u8],
 }
 
-/// Path costs of one row along one direction, and each pixel's least.
+/// Sums of path costs of one row.
+#[derive(Debug, Clone, Copy)]
+pub struct RowSums<'a> {
+    sums: &'a [u16],
+    /// Of the row's pixels among all costs, and where the next row's begin.
+    offsets: &'a [u32],
+}
+
+impl RowSums<'_> {
+    /// Those of the pixel at `x`.
+    pub fn pixel(&self, x: usize) -> &[u16] {
+        // The last pixel comes first.
+        let end = self.offsets[self.offsets.len() - 1];
+        &self.sums[(end - self.offsets[x + 1]) as usize..(end - self.offsets[x]) as usize]
+    }
+}
+
+/// The sums of the path costs over eight directions: `read` is given every row, the last one first. `forward` is for the
+/// sums of the first four directions.
+pub(crate) fn aggregate(
+    volume: &Volume<'_>,
+    penalties: Penalties,
+    forward: &mut Vec<u16>,
+    read: impl FnMut(usize, RowSums<'_>),
+) {
+    aggregate_with(volume, penalties, forward, sweep_row, read);
+}
+
+/// [`aggregate`] with a function that computes a row as [`extend_row`] does.
+fn aggregate_with(
+    volume: &Volume<'_>,
+    penalties: Penalties,
+    forward: &mut Vec<u16>,
+    sweep_row: impl Fn(&Volume<'_>, &mut Sweep, usize, Option<&[u16]>, &mut [u16]),
+    mut read: impl FnMut(usize, RowSums<'_>),
+) {
+    if volume.low.is_empty() {
+        return;
+    }
+    if forward.len() < volume.costs.len() {
+        forward.resize(volume.costs.len(), 0);
+    }
+    let mut sweep = Sweep::new(volume, penalties, false);
+    for y in 0..volume.height {
+        sweep.begin_row(volume, y);
+        let first = volume.row_offsets(y)[0] as usize;
+        sweep_row(volume, &mut sweep, y, None, &mut forward[first..]);
+    }
+    let mut sweep = Sweep::new(volume, penalties, true);
+    let mut sums = vec![0; volume.row_capacity() + LANES];
+    for y in (0..volume.height).rev() {
+        sweep.begin_row(volume, y);
+        sweep_row(volume, &mut sweep, y, Some(forward), &mut sums);
+        read(y, RowSums { sums: &sums, offsets: volume.row_offsets(y) });
+    }
+}
+
+/// Four of the eight directions, row by row: from the left and from the three pixels above, or mirrored at the centre.
+struct Sweep {
+    backward: bool,
+    step: u8,
+    /// The jump penalty by the strength of the edge.
+    jumps: [u8; 256],
+    above: RowPaths,
+    here: RowPaths,
+    /// Room for the path costs of single pixels.
+    single: [Vec<u8>; 6],
+}
+
+/// Path costs of one row along the three directions from the row before, in the order in which they are computed.
 struct RowPaths {
+    /// One direction after the other.
     paths: Vec<u8>,
-    least: Vec<u8>,
+    /// One more at either end, at which nothing has a cost.
+    slots: Vec<Slot>,
 }
 
-/// Where a pixel's hypotheses are: among all costs, and among the paths of its row.
-#[derive(Clone, Copy)]
-struct Span {
-    pixel: usize,
-    at: usize,
-    count: usize,
-    place: usize,
+impl Sweep {
+    fn new(volume: &Volume<'_>, penalties: Penalties, backward: bool) -> Self {
+        let (row, pixel) = (volume.row_capacity() + GUARD * (volume.width + 1) + 2 * LANES, volume.pixel_capacity());
+        let new_row = || RowPaths { paths: vec![FAR; 3 * row], slots: vec![Slot::default(); volume.width + 2] };
+        let mut sweep = Self {
+            backward,
+            step: penalties.step,
+            jumps: [0; 256],
+            above: new_row(),
+            here: new_row(),
+            single: std::array::from_fn(|_| vec![FAR; pixel + 4 * LANES]),
+        };
+        // Nothing comes before a path's first pixel, and staying there costs nothing: a jump neither.
+        sweep.begin_row(volume, if backward { volume.height - 1 } else { 0 });
+        sweep.jumps = std::array::from_fn(|edge| jump_penalty(penalties, edge as u8));
+        sweep
+    }
+
+    /// Makes the row that was here the one above, and takes the places and penalties of the next.
+    fn begin_row(&mut self, v: &Volume<'_>, y: usize) {
+        std::mem::swap(&mut self.above, &mut self.here);
+        let row = y * v.width..(y + 1) * v.width;
+        let ranges = v.row_offsets(y).array_windows();
+        let pixels = v.low[row.clone()].iter().zip(ranges).zip(&v.edges[row]);
+        match self.backward {
+            true => self.here.place(pixels.rev(), &self.jumps),
+            false => self.here.place(pixels, &self.jumps),
+        }
+    }
 }
 
-/// The previous pixel of a path, as the next one sees it.
-#[derive(Clone, Copy)]
-struct Previous<'a> {
-    /// Its path costs from the height below the next pixel's first one on; [`FAR`] for heights that it did not search.
-    paths: &'a [u8],
-    least: u8,
-    /// The cost of a jump from its best height.
-    jumped: u8,
-}
-
-/// The sum of the path costs over eight directions, in the layout of the costs.
-pub(crate) fn aggregate(volume: &Volume<'_>, penalties: Penalties) -> Vec<u16> {
-    let mut sums = vec![0; volume.costs.len()];
-    sweep_rows(volume, penalties, false, &mut sums);
-    sweep_rows(volume, penalties, true, &mut sums);
-    sums
+impl RowPaths {
+    #[inline(always)]
+    fn place<'a>(&mut self, pixels: impl Iterator<Item = ((&'a i32, &'a [u32; 2]), &'a u8)>, jumps: &[u8; 256]) {
+        let mut place = GUARD;
+        for (slot, ((low, range), edge)) in self.slots[1..].iter_mut().zip(pixels) {
+            let count = (range[1] - range[0]) as usize;
+            *slot = Slot { low: *low, count, place, least: [0; 4], jump: jumps[usize::from(*edge)] };
+            place += count + GUARD;
+        }
+        let last = self.slots.len() - 1;
+        self.slots[0] = Slot { jump: 0, ..self.slots[1] };
+        self.slots[last] = Slot { jump: 0, ..self.slots[last - 1] };
+    }
 }
 
 impl Volume<'_> {
-    #[inline(always)]
-    fn span(&self, x: usize, y: usize) -> Span {
-        let (row, pixel) = (y * self.width, y * self.width + x);
-        let at = self.offsets[pixel] as usize;
-        let count = self.offsets[pixel + 1] as usize - at;
-        Span { pixel, at, count, place: at - self.offsets[row] as usize + (BEFORE + BEHIND) * x }
+    /// Where the costs of a row's pixels begin, and those of the next row.
+    fn row_offsets(&self, y: usize) -> &[u32] {
+        &self.offsets[y * self.width..(y + 1) * self.width + 1]
     }
 
-    /// The previous pixel `q` of a path to `p`, whose vectors take `len` path costs with one on either side; they are
-    /// moved to `aside` where they do not lie ready.
-    #[inline(always)]
-    fn previous<'a>(
-        &self,
-        (p, q): (Span, Span),
-        (paths, least): (&'a [u8], u8),
-        len: usize,
-        penalties: Penalties,
-        aside: &'a mut [u8],
-    ) -> Previous<'a> {
-        let jump = jump_penalty(penalties, self.edges[p.pixel], self.edges[q.pixel]);
-        // The previous pixel's hypothesis that is one below this one's first.
-        let first = self.low[p.pixel] - self.low[q.pixel] - 1;
-        let begin = BEFORE as i32 + first;
-        let paths = if begin >= 0 && begin as usize + len <= q.count + BEFORE + BEHIND {
-            &paths[begin as usize..][..len]
-        } else {
-            moved(&paths[BEFORE..BEFORE + q.count], first, &mut aside[..len])
-        };
-        Previous { paths, least, jumped: least.saturating_add(jump) }
-    }
-
-    /// The longest row, in entries with their guards.
+    /// The most hypotheses of a row.
     fn row_capacity(&self) -> usize {
-        let rows = (0..self.height).map(|y| self.offsets[(y + 1) * self.width] - self.offsets[y * self.width]);
-        rows.max().unwrap_or(0) as usize + (BEFORE + BEHIND) * self.width
+        let row = |y: usize| self.offsets[(y + 1) * self.width] - self.offsets[y * self.width];
+        (0..self.height).map(row).max().unwrap_or(0) as usize
     }
 
-    /// The most hypotheses of a pixel, with their guards.
+    /// The most hypotheses of a pixel.
     fn pixel_capacity(&self) -> usize {
-        self.offsets.windows(2).map(|o| o[1] - o[0]).max().unwrap_or(0) as usize + BEFORE + BEHIND
+        self.offsets.windows(2).map(|o| o[1] - o[0]).max().unwrap_or(0) as usize
     }
 }
 
-/// The path costs from the hypothesis `first` on, which may lie outside, as many as `to` holds.
-fn moved<'a>(paths: &[u8], first: i32, to: &'a mut [u8]) -> &'a [u8] {
-    let (have, want) = (paths.len() as i32, to.len() as i32);
-    let from = first.clamp(0, have);
-    let end = first.saturating_add(want).clamp(from, have);
-    to.fill(FAR);
-    if from < end {
-        let at = (from - first) as usize;
-        to[at..at + (end - from) as usize].copy_from_slice(&paths[from as usize..end as usize]);
-    }
-    to
-}
-
-/// Four of the eight directions: from the left and from the three pixels above, or mirrored at the centre.
+/// [`extend_row`] with the best instructions of the machine.
 #[multiversion(targets("x86_64+avx2"))]
-fn sweep_rows(v: &Volume<'_>, penalties: Penalties, backward: bool, sums: &mut [u16]) {
-    let (row, pixel) = (v.row_capacity(), v.pixel_capacity());
-    let new_row = || RowPaths { paths: vec![FAR; row], least: vec![0; v.width] };
-    let mut above: [RowPaths; 3] = std::array::from_fn(|_| new_row());
-    let mut here: [RowPaths; 3] = std::array::from_fn(|_| new_row());
-    // Along the row only the last pixel's paths are needed.
-    let (mut last, mut along, mut last_least) = (vec![FAR; pixel], vec![FAR; pixel], 0);
-    let mut aside: [Vec<u8>; 4] = std::array::from_fn(|_| vec![FAR; pixel]);
-    let nothing = vec![FAR; pixel];
-    for i in 0..v.height {
-        let y = if backward { v.height - 1 - i } else { i };
-        let y_above = if backward { y + 1 } else { y.wrapping_sub(1) };
-        for j in 0..v.width {
-            let x = if backward { v.width - 1 - j } else { j };
-            let p = v.span(x, y);
-            let len = p.count.next_multiple_of(if p.count > LANES / 2 { LANES } else { LANES / 2 }) + 2;
-            // Nothing comes before a path's first pixel, and staying there costs nothing.
-            let mut from = [Previous { paths: &nothing[..len], least: 0, jumped: 0 }; 4];
-            let [beside, upper @ ..] = &mut aside;
-            if j > 0 {
-                let q = v.span(if backward { x + 1 } else { x - 1 }, y);
-                from[0] = v.previous((p, q), (&last, last_least), len, penalties, beside);
-            }
-            for (d, aside) in upper.iter_mut().enumerate() {
-                let qx = (x + d).wrapping_sub(1);
-                if i > 0 && qx < v.width {
-                    let q = v.span(qx, y_above);
-                    let paths = (&above[d].paths[q.place..], above[d].least[qx]);
-                    from[d + 1] = v.previous((p, q), paths, len, penalties, aside);
-                }
-            }
-            let [a, b, c] = &mut here;
-            let to = [&mut along[..], &mut a.paths[p.place..], &mut b.paths[p.place..], &mut c.paths[p.place..]];
-            let (costs, own) = (&v.costs[p.at..], &mut sums[p.at..]);
-            let narrow = p.count <= LANES / 2;
-            let least = match_target! {
-                "x86_64+avx2" => match narrow {
-                    true => extend::<Sixteen>(costs, p.count, from, penalties.step, to, own),
-                    false => extend::<ThirtyTwo>(costs, p.count, from, penalties.step, to, own),
-                },
-                _ => match narrow {
-                    true => extend::<Plain<16>>(costs, p.count, from, penalties.step, to, own),
-                    false => extend::<Plain<32>>(costs, p.count, from, penalties.step, to, own),
-                },
-            };
-            last_least = least[0];
-            here.iter_mut().zip(&least[1..]).for_each(|(row, l)| row.least[x] = *l);
-            std::mem::swap(&mut last, &mut along);
-        }
-        std::mem::swap(&mut above, &mut here);
+fn sweep_row(v: &Volume<'_>, sweep: &mut Sweep, y: usize, before: Option<&[u16]>, sums: &mut [u16]) {
+    match_target! {
+        "x86_64+avx2" => extend_row::<Avx2>(v, sweep, y, before, sums),
+        _ => extend_row::<Anywhere>(v, sweep, y, before, sums),
+    };
+}
+
+/// The next row of a sweep; its sums, and those `before` of all rows, go to `sums` in the order of the sweep.
+#[inline(always)]
+fn extend_row<I: Instructions>(v: &Volume<'_>, sweep: &mut Sweep, y: usize, before: Option<&[u16]>, sums: &mut [u16]) {
+    let Sweep { backward, step, above, here, single, .. } = sweep;
+    let [wide, next_wide, aside, upper_aside @ ..] = single;
+    let mut last = Last::<I>::none([wide, next_wide], aside);
+    let (offsets, mut done) = (v.row_offsets(y), 0);
+    let apart = here.paths.len() / 3;
+    let [from_a, from_b, from_c] = [&above.paths[..apart], &above.paths[apart..2 * apart], &above.paths[2 * apart..]];
+    for (j, (slot, [q_a, q_b, q_c])) in here.slots[1..].iter_mut().zip(above.slots.array_windows()).enumerate() {
+        let at = offsets[if *backward { v.width - 1 - j } else { j }] as usize;
+        let [a, b, c] = &mut *upper_aside;
+        let upper = [
+            Previous::new(slot, q_a, 0, from_a, a),
+            Previous::new(slot, q_b, 1, from_b, b),
+            Previous::new(slot, q_c, 2, from_c, c),
+        ];
+        let pixel = Pixel {
+            costs: &v.costs[at..],
+            upper,
+            before: before.map(|all| &all[at..]),
+            paths: &mut here.paths[slot.place..],
+            apart,
+            sums: &mut sums[done..],
+        };
+        last.extend(slot, *step, pixel);
+        done += slot.count;
     }
 }
 
-/// The jump penalty between two pixels: lowered by the stronger of their edges.
-#[inline(always)]
-fn jump_penalty(p: Penalties, a: u8, b: u8) -> u8 {
+/// The jump penalty at a pixel: the stronger its edge is, the lower. Between two pixels it is the lower one of theirs.
+fn jump_penalty(p: Penalties, edge: u8) -> u8 {
     let range = u16::from(p.jump.saturating_sub(p.jump_at_edge));
-    p.jump - ((range * u16::from(a.max(b))) / 255) as u8
+    p.jump - ((range * u16::from(edge)) / 255) as u8
 }
-
-/// Extends four paths to a pixel with `count` hypotheses and adds them to its sums; returns the least cost of each. `costs`
-/// and `sums` begin at the pixel and may be read, not changed, behind it; the paths get their guards.
-#[inline(always)]
-fn extend<V: Bytes>(
-    costs: &[u8],
-    count: usize,
-    from: [Previous<'_>; 4],
-    step: u8,
-    mut to: [&mut [u8]; 4],
-    sums: &mut [u16],
-) -> [u8; 4] {
-    let step = V::splat(step);
-    let mut least = [V::splat(FAR); 4];
-    for at in (0..count).step_by(V::LANES) {
-        let cost = V::load(&costs[at..]);
-        let own = V::load(&OWN[LANES - (count - at).min(V::LANES)..]);
-        let mut values = least;
-        for (((q, to), least), value) in from.iter().zip(&mut to).zip(&mut least).zip(&mut values) {
-            let around = &q.paths[at..at + V::LANES + 2];
-            let (below, same, above) = (V::load(around), V::load(&around[1..]), V::load(&around[2..]));
-            let stay = same.min(below.min(above).plus(step)).min(V::splat(q.jumped));
-            let path = cost.plus(stay.minus(V::splat(q.least)));
-            *value = path.and(own);
-            let path = path.or_not(own);
-            path.store(&mut to[BEFORE + at..]);
-            *least = least.min(path);
-        }
-        V::add_to(values, &mut sums[at..]);
-    }
-    for to in to {
-        to[..BEFORE].fill(FAR);
-        to[BEFORE + count..][..BEHIND].fill(FAR);
-    }
-    V::least(least)
-}
-
-/// From [`LANES`] − n on: all bits of n lanes, and none of those that follow.
-const OWN: [u8; 2 * LANES] = {
-    let mut out = [0; 2 * LANES];
-    let mut i = 0;
-    while i < LANES {
-        out[i] = u8::MAX;
-        i += 1;
-    }
-    out
-};
 
 #[cfg(test)]
 mod tests {
@@ -267,6 +247,7 @@ mod tests {
         low: &[i32],
         counts: &[usize],
         costs: &[Vec<u8>],
+        edges: &[u8],
         p: Penalties,
     ) -> Vec<Vec<u32>> {
         let mut sums: Vec<Vec<u32>> = counts.iter().map(|&n| vec![0; n]).collect();
@@ -289,8 +270,9 @@ mod tests {
                             if i >= 0 && (i as usize) < counts[q] { paths[q][i as usize] } else { 1 << 20 }
                         };
                         let least = *paths[q].iter().min().unwrap();
+                        let jump = u32::from(jump_penalty(p, edges[at].max(edges[q])));
                         let smooth = path(k).min(path(k - 1) + u32::from(p.step)).min(path(k + 1) + u32::from(p.step));
-                        (c + smooth.min(least + u32::from(p.jump)).min(255) - least).min(255)
+                        (c + smooth.min(least + jump).min(255) - least).min(255)
                     });
                     let row: Vec<u32> = row.collect();
                     sums[at].iter_mut().zip(&row).for_each(|(s, l)| *s += l);
@@ -309,6 +291,11 @@ mod tests {
         }
     }
 
+    type SweepRow = fn(&Volume<'_>, &mut Sweep, usize, Option<&[u16]>, &mut [u16]);
+
+    const ROWS: [(&str, SweepRow); 2] =
+        [("this machine's instructions", sweep_row), ("any machine's", extend_row::<Anywhere>)];
+
     /// First hypotheses over `lows` lattice heights, and up to `most` of them.
     fn compare_with_the_recurrence(lows: u32, most: u32) {
         let (width, height) = (9, 7);
@@ -323,13 +310,16 @@ mod tests {
         let mut offsets = vec![0u32];
         counts.iter().for_each(|&n| offsets.push(offsets[offsets.len() - 1] + n as u32));
         let flat: Vec<u8> = [costs.concat(), vec![0; LANES]].concat();
-        let p = Penalties { step: 30, jump: 150, jump_at_edge: 150 };
-        let edges = vec![0; width * height];
+        let p = Penalties { step: 30, jump: 150, jump_at_edge: 60 };
+        let edges: Vec<u8> = (0..width * height).map(|_| random(256) as u8).collect();
         let volume = Volume { width, height, low: &low, offsets: &offsets, costs: &flat, edges: &edges };
-        let sums = aggregate(&volume, p);
-        let expected: Vec<u32> = reference(width, height, &low, &counts, &costs, p).concat();
-        let (own, behind) = sums.split_at(expected.len());
-        assert_eq!(own.iter().map(|&s| u32::from(s)).collect::<Vec<_>>(), expected);
-        assert_eq!(behind, [0; LANES]);
+        let expected = reference(width, height, &low, &counts, &costs, &edges, p);
+        for (name, sweep_row) in ROWS {
+            let mut sums = vec![Vec::new(); width * height];
+            aggregate_with(&volume, p, &mut Vec::new(), sweep_row, |y, row| {
+                (0..width).for_each(|x| sums[y * width + x] = row.pixel(x).iter().map(|&s| u32::from(s)).collect());
+            });
+            assert_eq!(sums, expected, "{name}, {lows} first heights, up to {} hypotheses", 6 + most);
+        }
     }
 }

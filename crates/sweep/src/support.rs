@@ -8,15 +8,14 @@
 use raster::{Grid, Window};
 
 use crate::cost::{COST_MAX, SourceLevel, census_scale};
-use crate::semiglobal::Volume;
 
 /// Half width of the window, pixels: 81 patches bring the spread of a mean at chance down to a few percent.
 const REACH: usize = 4;
 
-/// For each pixel of the block the share of contrast agreed on, 0 to 1, at the hypotheses with the least `sums` around it.
-pub(crate) fn agreed_share(volume: &Volume<'_>, sums: &[u16], view: &SourceLevel<'_>, window: Window) -> Vec<f32> {
-    let contrast = census_contrast(view, window);
-    share(volume, sums, &contrast)
+/// For each pixel of the window the share of contrast agreed on, 0 to 1; `best` are the costs of its pixels at the hypotheses with
+/// the least sums.
+pub(crate) fn agreed_share(best: &[u8], view: &SourceLevel<'_>, window: Window) -> Vec<f32> {
+    share(best, &census_contrast(view, window), window.width)
 }
 
 /// Mean absolute graded census of every pixel, 0 to 1; NaN where the image is invalid.
@@ -37,18 +36,12 @@ fn census_contrast(view: &SourceLevel<'_>, window: Window) -> Vec<f32> {
     out
 }
 
-fn share(volume: &Volume<'_>, sums: &[u16], contrast: &[f32]) -> Vec<f32> {
-    let (w, h) = (volume.width, volume.height);
+fn share(best: &[u8], contrast: &[f32], width: usize) -> Vec<f32> {
     // In units of the cost, so that the sums over the window are exact.
-    let (mut costs, mut held) = (vec![0u16; w * h], vec![0u16; w * h]);
-    for (p, contrast) in contrast.iter().enumerate().filter(|(_, c)| !c.is_nan()) {
-        let range = volume.offsets[p] as usize..volume.offsets[p + 1] as usize;
-        if let Some((_, cost)) = sums[range.clone()].iter().zip(&volume.costs[range]).min_by_key(|(s, _)| **s) {
-            costs[p] = u16::from(*cost);
-            held[p] = (contrast * f32::from(COST_MAX)).round() as u16;
-        }
-    }
-    let (costs, held) = (window_sums(&costs, w), window_sums(&held, w));
+    let costs: Vec<u16> = best.iter().zip(contrast).map(|(b, c)| if c.is_nan() { 0 } else { u16::from(*b) }).collect();
+    let held: Vec<u16> =
+        contrast.iter().map(|c| if c.is_nan() { 0 } else { (c * f32::from(COST_MAX)).round() as u16 }).collect();
+    let (costs, held) = (window_sums(&costs, width), window_sums(&held, width));
     let share = |(cost, held): (&u16, &u16)| match held {
         0 => 0.0,
         _ => (1.0 - f32::from(*cost) / f32::from(*held)).max(0.0),
@@ -90,25 +83,19 @@ mod tests {
 
     #[test]
     fn a_pixel_has_the_share_that_the_best_hypotheses_around_it_agree_on() {
-        // Three hypotheses each; the second has the least sum. On the right half of the contrast is agreed on, on the
-        // left nothing, and the lowest rows hold no picture.
+        // On the right half of the contrast is agreed on, on the left nothing, and the lowest rows hold no picture.
         let (width, height) = (40, 30);
         let n = width * height;
-        let offsets: Vec<u32> = (0..=n as u32).map(|i| 3 * i).collect();
-        let sums: Vec<u16> = [900, 100, 800].repeat(n);
-        let cost = |p: usize| if p % width < 20 { [0, 64, 0] } else { [0, 32, 0] };
-        let costs: Vec<u8> = (0..n).flat_map(cost).collect();
+        let best: Vec<u8> = (0..n).map(|p| if p % width < 20 { 64 } else { 32 }).collect();
         let contrast: Vec<f32> =
             (0..n).map(|p| if p / width < 15 { 64.0 / f32::from(COST_MAX) } else { 0.0 }).collect();
-        let (low, edges) = (vec![0; n], vec![0; n]);
-        let volume = Volume { width, height, low: &low, offsets: &offsets, costs: &costs, edges: &edges };
-        let all = share(&volume, &sums, &contrast);
+        let all = share(&best, &contrast, width);
         assert!(all[10 * width + 5] == 0.0 && (all[10 * width + 35] - 0.5).abs() < 1e-6);
         assert!((all[10 * width + 20] - 0.5 * 5.0 / 9.0).abs() < 1e-6);
         assert_eq!(all[25 * width + 35], 0.0);
         let invalid: Vec<f32> =
             (0..n).map(|p| if p % width < 20 { f32::NAN } else { 64.0 / f32::from(COST_MAX) }).collect();
-        let right = share(&volume, &sums, &invalid);
+        let right = share(&best, &invalid, width);
         assert!((right[10 * width + 20] - 0.5).abs() < 1e-6 && right[0] == 0.0);
     }
 }

@@ -7,7 +7,7 @@ use crate::SweepError;
 use crate::cost::{BlockCosts, COST_MAX, CostConfig, Reference, SourceLevel, TileScratch, sweep_tile};
 use crate::level::tiles;
 use crate::ranges::Ranges;
-use crate::semiglobal::{LANES, Penalties, Volume, aggregate};
+use crate::semiglobal::{LANES, Penalties, RowSums, Volume, aggregate};
 
 /// A window with more hypotheses than this would take more than 2 GB.
 const HYPOTHESES_MAX: u32 = 700_000_000;
@@ -54,9 +54,10 @@ impl CostVolume {
         self.costs.len() - LANES
     }
 
-    /// The sums of the path costs over eight directions, one per hypothesis.
-    pub fn aggregate(&self, penalties: Penalties) -> Vec<u16> {
-        aggregate(&self.as_block(), penalties)
+    /// The sums of the path costs over eight directions, one per hypothesis: `read` is given every row's, the last row first.
+    /// `forward` is room for the first half of the directions; one that is used again need not be made anew.
+    pub fn aggregate(&self, penalties: Penalties, forward: &mut Vec<u16>, read: impl FnMut(usize, RowSums<'_>)) {
+        aggregate(&self.as_block(), penalties, forward, read);
     }
 
     pub(crate) fn as_block(&self) -> Volume<'_> {
