@@ -46,8 +46,8 @@ pub(crate) struct Args {
     /// Speed against accuracy.
     #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
     preset: PresetName,
-    /// Voids to close from their surroundings, marked in filled.tif: justified (narrow ones and those behind buildings) or all
-    /// (wide ones too, whatever made them).
+    /// Voids to close from their surroundings, marked in filled.tif: none, justified (narrow ones, those behind buildings, those
+    /// between known heights where the images show something) or all within reach of known heights.
     #[arg(long, value_enum, default_value_t = FillName::Justified)]
     fill: FillName,
     /// Pairs of images to match, by position: 1-2,1-3 [default: all that are useful].
@@ -91,6 +91,7 @@ enum PresetName {
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum FillName {
+    None,
     Justified,
     All,
 }
@@ -130,6 +131,7 @@ impl Args {
                 PresetName::Accurate => Preset::Accurate,
             },
             fill: match self.fill {
+                FillName::None => Fill::None,
                 FillName::Justified => Fill::Justified,
                 FillName::All => Fill::All,
             },

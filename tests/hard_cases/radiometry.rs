@@ -54,6 +54,8 @@ fn a_saturated_roof_is_right_or_void() {
             assert!(inside.covered < 0.5 && stage.errors(&closed, 50.0, Alignment::None).over(white).covered == 1.0);
             // What is closed on request is told as closed, and nothing else changes.
             assert!(before.observed == after.observed && before.filled + 1000 < after.filled, "{before:?} {after:?}");
+            let open = stage.run(&shots, |config| config.fill = Fill::None).unwrap().report.surface;
+            assert!(before.observed == open.observed && before.filled > 0 && open.filled == 0, "{before:?} {open:?}");
         }
     }
 }

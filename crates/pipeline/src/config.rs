@@ -23,10 +23,12 @@ pub enum Preset {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fill {
-    /// Narrow ones, and those that a surface beside them hides.
+    /// None: what is written was observed.
+    None,
+    /// Narrow ones, those that a surface beside them hides, and those between known heights where the images show something.
     #[default]
     Justified,
-    /// Wide ones too, whatever made them: water, saturated roofs, what changed between the dates.
+    /// All within reach of known heights, whatever made them: water, saturated roofs, the border of what two views see.
     All,
 }
 

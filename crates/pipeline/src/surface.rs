@@ -6,7 +6,8 @@
 use raster::{Grid, Window};
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::fusion::{
-    FillConfig, FusionConfig, GridFrame, PlacedView, fill_voids, fuse_views, place_view, reliability, remove_speckle,
+    FillConfig, FusionConfig, GridFrame, PlacedView, fill_voids, fuse_views, mark_cells, place_view, reliability,
+    remove_speckle,
 };
 use sweep::{HeightMap, View};
 
@@ -24,7 +25,7 @@ const SPECKLE_CELLS_MIN: usize = 9;
 const FILL_REACH_M: f64 = 40.0;
 /// … and this far where every void is to be closed: the middle of a pond or of a hall.
 const FILL_REACH_ALL_M: f64 = 60.0;
-/// Voids up to this many metres across are closed: the shadow side of a house.
+/// Voids up to this many metres across are closed, whatever the images show there: the shadow side of a house.
 const FILL_NARROW_M: f64 = 10.0;
 /// A surface hides what is this many times its height away: views lean by up to 30°, and shadows reach further.
 const FILL_HIDDEN: f64 = 1.0;
@@ -112,7 +113,10 @@ pub(crate) fn make_surface(
     let jump_m = same_surface_m(plan, grid);
     let mut placed = Vec::with_capacity(all.len());
     let mut kept = vec![(0, 0); views.len()];
+    let mut blind = Grid::filled(grid.size.0, grid.size.1, false);
     for own in &all {
+        let unseen = unseen(*own, plan.bottom_level, config.height_range_m);
+        mark_cells(*own, level, &unseen, &frame, &mut blind)?;
         let mut keep = agreeing(*own, &all, useful, level)?;
         if let Some(asked) = config.height_range_m {
             drop_outside(&mut keep, own.map, asked);
@@ -126,12 +130,12 @@ pub(crate) fn make_surface(
     drop(all);
     drop(heights);
     drop(views);
-    let (product, counts) = fuse(input, placed, origin_m);
+    let (product, counts) = fuse(input, placed, &blind, origin_m);
     done();
     Ok((product, Counts { kept, ..counts }))
 }
 
-fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, origin_m: f64) -> (Product, Counts) {
+fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, blind: &Grid<bool>, origin_m: f64) -> (Product, Counts) {
     let SurfaceInput { config, plan, grid, core, .. } = input;
     let gsd = grid.gsd_m;
     // Heights and their places are as coarse as the level that they come from.
@@ -150,19 +154,10 @@ fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, origin_m: f64) -> (Pro
     let observed = known(&fused.height_m, core);
     let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
     agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
-    let (reach_m, narrow_m) = match config.fill {
-        Fill::Justified => (FILL_REACH_M, FILL_NARROW_M),
-        Fill::All => (FILL_REACH_ALL_M, f64::INFINITY),
+    let filled = match fill_config(config.fill, gsd) {
+        Some(fill) => fill_voids(&mut fused.height_m, blind, &fill),
+        None => fused.height_m.map(|_| false),
     };
-    let fill = FillConfig {
-        reach_cells: (reach_m / gsd).ceil() as usize,
-        narrow_cells: (narrow_m / gsd) as f32,
-        island_cells: (FILL_NARROW_M / gsd).powi(2) as usize,
-        hidden_cells_per_m: (FILL_HIDDEN / gsd) as f32,
-        same_surface_m: (2.0 * gsd) as f32,
-        slope_m: (FILL_SLOPE * gsd) as f32,
-    };
-    let filled = fill_voids(&mut fused.height_m, &fill);
     let reach = (0.5 * SPECKLE_SIDE_M / gsd).round().max(1.0) as usize;
     fused.confidence = reliability(&fused.height_m, &fused.confidence, reach, 2.0 * gsd);
     let product = Product::new(fused, filled, origin_m).cropped(core);
@@ -176,6 +171,23 @@ fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, origin_m: f64) -> (Pro
         kept: Vec::new(),
     };
     (product, counts)
+}
+
+/// How voids are filled on cells of `gsd` metres, if at all.
+fn fill_config(fill: Fill, gsd: f64) -> Option<FillConfig> {
+    let (reach_m, narrow_m) = match fill {
+        Fill::None => return None,
+        Fill::Justified => (FILL_REACH_M, FILL_NARROW_M),
+        Fill::All => (FILL_REACH_ALL_M, f64::INFINITY),
+    };
+    Some(FillConfig {
+        reach_cells: (reach_m / gsd).ceil() as usize,
+        narrow_cells: (narrow_m / gsd) as f32,
+        island_cells: (FILL_NARROW_M / gsd).powi(2) as usize,
+        hidden_cells_per_m: (FILL_HIDDEN / gsd) as f32,
+        same_surface_m: (2.0 * gsd) as f32,
+        slope_m: (FILL_SLOPE * gsd) as f32,
+    })
 }
 
 /// Number of cells of a window that have a height.
@@ -214,9 +226,24 @@ fn agreeing(
     Ok(keep)
 }
 
-/// Leaves out what lies outside the heights that were asked for.
-fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, (lo, hi): (f64, f64)) {
-    for (keep, h) in keep.data_mut().iter_mut().zip(map.height_m.data()) {
-        *keep = *keep && (lo..=hi).contains(&(map.origin_m + f64::from(*h)));
+/// Pixels that cannot tell what they show: blank ones, and those whose best height lies outside the range that was asked for.
+fn unseen(own: Heights<'_>, level: usize, asked: Option<(f64, f64)>) -> Grid<bool> {
+    let mut out = own.view.blank(level);
+    if let Some(asked) = asked {
+        for (unseen, h) in out.data_mut().iter_mut().zip(own.map.height_m.data()) {
+            *unseen = *unseen || is_outside(own.map, *h, asked);
+        }
     }
+    out
+}
+
+/// Leaves out what lies outside the heights that were asked for.
+fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: (f64, f64)) {
+    for (keep, h) in keep.data_mut().iter_mut().zip(map.height_m.data()) {
+        *keep = *keep && !is_outside(map, *h, asked);
+    }
+}
+
+fn is_outside(map: &HeightMap, height_m: f32, (lo, hi): (f64, f64)) -> bool {
+    !(lo..=hi).contains(&(map.origin_m + f64::from(height_m)))
 }

@@ -61,6 +61,21 @@ impl View {
         }
     }
 
+    /// The pixels of a level whose patch holds a single value: saturated, or a void that nothing declares. No height shows there.
+    pub fn blank(&self, level: usize) -> Grid<bool> {
+        let image = &self.levels[level];
+        let mut out = Grid::filled(image.width(), image.height(), false);
+        for y in 1..image.height().saturating_sub(1) {
+            let rows = [image.row(y - 1), image.row(y), image.row(y + 1)].map(|row| row.windows(3));
+            let [above, own, below] = rows;
+            for (blank, ((a, b), c)) in out.row_mut(y)[1..].iter_mut().zip(above.zip(own).zip(below)) {
+                let all = |row: &[f32]| (row[0] == b[1]) & (row[1] == b[1]) & (row[2] == b[1]);
+                *blank = all(a) & all(b) & all(c);
+            }
+        }
+        out
+    }
+
     /// The most noise to expect on a level: each reduction at least halves it.
     pub fn noise_at(&self, level: usize) -> f32 {
         self.noise / (1 << level) as f32

@@ -1,12 +1,13 @@
 //! Closing voids from what is known around them.
 //!
-//! From each void cell the nearest known heights in eight directions are looked up. A void is closed where it is narrow, or
-//! where something stands beside it that is high enough to hide it; a wide void beside nothing has another reason
-//! (a saturated roof, water), and what is around says nothing of it. An island smaller than the voids that it would close
-//! may be chance itself: nothing is drawn from it. Where the heights hold two levels, the void is ground that a building
-//! hides from the views, so only the lower level counts: the heights on one surface with the second lowest, as one alone
-//! may be a pit. Weights are inverse distances: two opposite heights then give the straight line between them, so that
-//! slopes are continued.
+//! From each void cell the nearest known heights in eight directions are looked up. A void is closed where it is narrow, where
+//! something stands beside it that is high enough to hide it, or between two opposite heights: what changed between the dates, or
+//! has too little texture, is mostly more of what is around. It stays open where the images could not show what stands there
+//! (a saturated roof), and where heights are known on one side alone (water, the scene's border). An island smaller than the
+//! voids that it would close may be chance itself: nothing is drawn from it. Where the heights hold two levels, the void is
+//! ground that a building hides from the views, so only the lower level counts: the heights on one surface with the second
+//! lowest, as one alone may be a pit. Weights are inverse distances: two opposite heights then give the straight line between
+//! them, so that slopes are continued.
 
 use raster::Grid;
 use rayon::prelude::*;
@@ -37,18 +38,28 @@ const KNOWN_MIN: usize = 4;
 /// other four.
 const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// A known height and how far away it is, cells.
-type Known = (f32, f32);
+/// A known height.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    /// Above the origin, metres.
+    height_m: f32,
+    /// How far away it is, cells.
+    apart: f32,
+    /// Whether no blind cell lies between.
+    in_sight: bool,
+}
+
 /// The nearest known height in each of the four directions before a cell, or behind it.
 type Nearest = [Option<Known>; 4];
 
-/// Fills voids of `height_m` in place; returns which cells were filled.
-pub fn fill_voids(height_m: &mut Grid<f32>, config: &FillConfig) -> Grid<bool> {
+/// Fills voids of `height_m` in place; returns which cells were filled. `blind` are cells where the images could not show what
+/// stands there.
+pub fn fill_voids(height_m: &mut Grid<f32>, blind: &Grid<bool>, config: &FillConfig) -> Grid<bool> {
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut sources = height_m.clone();
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
-    let forward = known_before(&sources, voids.iter().copied(), false, config);
-    let mut backward = known_before(&sources, voids.iter().rev().copied(), true, config);
+    let forward = known_before((&sources, blind), voids.iter().copied(), false, config);
+    let mut backward = known_before((&sources, blind), voids.iter().rev().copied(), true, config);
     backward.reverse();
     let around = voids.par_iter().zip(forward.into_par_iter().zip(backward));
     let value = |(&i, (a, b)): (&usize, (Nearest, Nearest))| Some((i, interpolate(&a, &b, config)?));
@@ -64,7 +75,7 @@ pub fn fill_voids(height_m: &mut Grid<f32>, config: &FillConfig) -> Grid<bool> {
 /// For each of `voids`, in the order of the rows (or all of it reversed), the nearest known heights within reach in the
 /// four directions that come before.
 fn known_before(
-    height_m: &Grid<f32>,
+    (height_m, blind): (&Grid<f32>, &Grid<bool>),
     voids: impl Iterator<Item = usize>,
     reversed: bool,
     config: &FillConfig,
@@ -88,12 +99,14 @@ fn known_before(
                     return None;
                 }
                 let length = if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 };
-                let height = height_m[(u as usize, v as usize)];
-                if !height.is_nan() {
-                    return Some((height, length));
+                let at = (u as usize, v as usize);
+                let height_m = height_m[at];
+                if !height_m.is_nan() {
+                    return Some(Known { height_m, apart: length, in_sight: true });
                 }
-                let (height, apart) = rows[usize::from(dy == 0)][u as usize][d]?;
-                (apart + length <= reach).then_some((height, apart + length))
+                let next = rows[usize::from(dy == 0)][u as usize][d]?;
+                let known = Known { apart: next.apart + length, in_sight: next.in_sight && !blind[at], ..next };
+                (known.apart <= reach).then_some(known)
             });
             rows[1][x as usize] = nearest;
             if voids.next_if_eq(&((y * w + x) as usize)).is_some() {
@@ -110,16 +123,20 @@ fn interpolate(before: &Nearest, behind: &Nearest, config: &FillConfig) -> Optio
     if known.len() < KNOWN_MIN {
         return None;
     }
-    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    known.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
     let base = known[1];
-    let across = before.iter().zip(behind).filter_map(|(a, b)| Some((*a)?.1 + (*b)?.1));
-    let is_narrow = across.fold(f32::INFINITY, f32::min) <= config.narrow_cells;
-    let is_hidden = known.iter().any(|k| k.1 <= (k.0 - base.0) * config.hidden_cells_per_m);
-    if !is_narrow && !is_hidden {
+    let across = || before.iter().zip(behind).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
+    let is_narrow = across().any(|(a, b)| a.apart + b.apart <= config.narrow_cells);
+    let is_hidden = known.iter().any(|k| k.apart <= (k.height_m - base.height_m) * config.hidden_cells_per_m);
+    let is_between = across().any(|(a, b)| a.in_sight && b.in_sight);
+    if !is_narrow && !is_hidden && !is_between {
         return None;
     }
-    let same = |k: &&Known| (k.0 - base.0).abs() <= config.same_surface_m + config.slope_m * (k.1 + base.1);
-    let (sum, weight) = known.iter().filter(same).fold((0.0, 0.0), |(s, w), (h, d)| (s + h / d, w + 1.0 / d));
+    let same = |k: &&Known| {
+        (k.height_m - base.height_m).abs() <= config.same_surface_m + config.slope_m * (k.apart + base.apart)
+    };
+    let of_base = known.iter().filter(same);
+    let (sum, weight) = of_base.fold((0.0, 0.0), |(s, w), k| (s + k.height_m / k.apart, w + 1.0 / k.apart));
     Some(sum / weight)
 }
 
@@ -136,29 +153,41 @@ mod tests {
         slope_m: 0.1,
     };
 
+    /// With nothing that the images cannot show.
+    fn fill(height_m: &mut Grid<f32>) -> Grid<bool> {
+        let blind = Grid::filled(height_m.width(), height_m.height(), false);
+        fill_voids(height_m, &blind, &CONFIG)
+    }
+
     #[test]
     fn a_hole_in_a_slope_gets_the_slope_and_one_beside_a_wall_the_ground() {
         let mut g = Grid::from_vec(20, 20, (0..400).map(|i| 0.1 * (i % 20) as f32).collect()).unwrap();
         (6..9).for_each(|x| (6..9).for_each(|y| g[(x, y)] = f32::NAN));
-        let filled = fill_voids(&mut g, &CONFIG);
+        let filled = fill(&mut g);
         assert!((g[(7, 7)] - 0.7).abs() < 1e-5 && (g[(6, 7)] - 0.6).abs() < 0.02, "{} {}", g[(7, 7)], g[(6, 7)]);
         assert_eq!(filled.data().iter().filter(|f| **f).count(), 9);
         let mut wall =
             Grid::from_vec(20, 20, (0..400).map(|i| if i % 20 < 10 { 30.0 } else { 2.0 }).collect()).unwrap();
         (0..20).for_each(|y| (10..13).for_each(|x| wall[(x, y)] = f32::NAN));
-        fill_voids(&mut wall, &CONFIG);
+        fill(&mut wall);
         assert!((10..13).all(|x| (1..19).all(|y| wall[(x, y)] == 2.0)), "{wall:?}");
     }
 
     #[test]
-    fn a_wide_void_is_closed_only_beside_what_can_hide_it() {
-        let mut flat = Grid::filled(40, 40, 1.0f32);
-        (10..20).for_each(|x| (10..20).for_each(|y| flat[(x, y)] = f32::NAN));
-        let mut beside = flat.clone();
-        (20..30).for_each(|x| (10..20).for_each(|y| beside[(x, y)] = 9.0));
-        assert!(fill_voids(&mut flat, &CONFIG).data().iter().filter(|f| **f).count() < 30);
-        fill_voids(&mut beside, &CONFIG);
-        assert!((13..20).all(|x| beside[(x, 15)] == 1.0) && beside[(11, 15)].is_nan(), "{:?}", beside.row(15));
+    fn a_wide_void_is_closed_between_known_heights_and_where_the_images_cannot_show_it_beside_what_hides_it() {
+        let mut open = Grid::filled(40, 40, 1.0f32);
+        (10..20).for_each(|x| (10..20).for_each(|y| open[(x, y)] = f32::NAN));
+        let mut flat = open.clone();
+        fill(&mut flat);
+        assert!((10..20).all(|x| (10..20).all(|y| flat[(x, y)] == 1.0)), "{:?}", flat.row(15));
+        let mut blind = Grid::filled(40, 40, false);
+        (12..18).for_each(|x| (0..40).for_each(|y| blind[(x, y)] = true));
+        let mut unseen = open.clone();
+        fill_voids(&mut unseen, &blind, &CONFIG);
+        assert!((12..18).all(|x| unseen[(x, 15)].is_nan()) && unseen[(10, 15)] == 1.0, "{:?}", unseen.row(15));
+        (20..30).for_each(|x| (10..20).for_each(|y| open[(x, y)] = 9.0));
+        fill_voids(&mut open, &blind, &CONFIG);
+        assert!((13..20).all(|x| open[(x, 15)] == 1.0), "{:?}", open.row(15));
     }
 
     #[test]
@@ -166,7 +195,7 @@ mod tests {
         let mut g = Grid::filled(40, 40, 1.0f32);
         (5..35).for_each(|x| (5..35).for_each(|y| g[(x, y)] = f32::NAN));
         (18..22).for_each(|x| (18..22).for_each(|y| g[(x, y)] = 9.0));
-        let filled = fill_voids(&mut g, &CONFIG);
+        let filled = fill(&mut g);
         assert!((18..22).all(|x| g[(x, 20)] == 9.0) && g[(17, 20)].is_nan(), "{:?}", g.row(20));
         assert!((10..30).all(|x| (10..30).all(|y| !filled[(x, y)])));
     }
@@ -175,7 +204,7 @@ mod tests {
     fn what_lies_outside_the_scene_stays_open() {
         let mut g = Grid::filled(60, 60, f32::NAN);
         (10..50).for_each(|x| (10..50).for_each(|y| g[(x, y)] = if x > 40 { 30.0 } else { 1.0 }));
-        let filled = fill_voids(&mut g, &CONFIG);
+        let filled = fill(&mut g);
         assert!((0..60).all(|k| !filled[(k, 9)] && !filled[(50, k)] && !filled[(3, k)]));
     }
 }

@@ -75,6 +75,27 @@ pub fn place_view(
     Ok(PlacedView { vertices, extents })
 }
 
+/// Marks the cells of the grid that `pixels` of a view fall into at their heights.
+///
+/// # Errors
+/// A camera that fails inside the scene.
+pub fn mark_cells(
+    heights: Heights<'_>,
+    level: u32,
+    pixels: &Grid<bool>,
+    frame: &GridFrame<'_>,
+    cells: &mut Grid<bool>,
+) -> Result<(), SweepError> {
+    let vertices = place(heights, level, pixels, &pixels.map(|_| 1.0), frame)?;
+    for v in vertices.data().iter().filter(|v| !v.h.is_nan() && v.x >= 0.0 && v.y >= 0.0) {
+        let at = (v.x as usize, v.y as usize);
+        if at.0 < cells.width() && at.1 < cells.height() {
+            cells[at] = true;
+        }
+    }
+    Ok(())
+}
+
 /// 1 for a height, or [`BORDER_WEIGHT`] where the least height within [`BORDER_REACH`] is lower by more than `jump_m`.
 fn border_weights(height_m: &Grid<f32>, jump_m: f32) -> Grid<f32> {
     let mut out = extremes(height_m, f32::INFINITY, f32::min, BORDER_REACH);
@@ -168,7 +189,8 @@ fn place_tile(
 ) -> Result<Grid<Vertex>, SweepError> {
     let mut out = Grid::filled(w.width, w.height, none);
     let map = heights.map;
-    let Some(range) = height_span(map, w) else { return Ok(out) };
+    let mut rows = (0..w.height).map(|y| &keep.row(w.y as usize + y)[w.x as usize..][..w.width]);
+    let Some(range) = height_span(map, w).filter(|_| rows.any(|row| row.contains(&true))) else { return Ok(out) };
     let exact = |[u, v]: [f64; 2], h: f64| {
         let at = camera::ImagePoint::new(level0_from_level(u, level), level0_from_level(v, level));
         let ground = heights.view.camera.localize(at, h)?;

@@ -13,6 +13,6 @@ mod speckle;
 
 pub use cells::{FusionConfig, Surface, fuse_views};
 pub use fill::{FillConfig, fill_voids};
-pub use mesh::{GridFrame, PlacedView, place_view};
+pub use mesh::{GridFrame, PlacedView, mark_cells, place_view};
 pub use reliability::reliability;
 pub use speckle::remove_speckle;
