@@ -65,11 +65,16 @@ fn kernels(c: &mut Criterion) {
         let sources: Vec<SourceLevel<'_>> = (1..=count).map(|i| views[i].on_level(i, 0)).collect();
         group.throughput(Throughput::Elements(evaluations * count as u64));
         group.bench_function(BenchmarkId::new("cost per source", count), |b| {
-            b.iter(|| CostVolume::compute(reference, black_box(&sources), whole, &cost).expect("linear cameras"));
+            let mut room = Vec::new();
+            b.iter(|| {
+                let volume =
+                    CostVolume::compute(reference, black_box(&sources), whole, &cost, std::mem::take(&mut room));
+                room = black_box(volume).expect("linear cameras").into_room();
+            });
         });
     }
     let sources = [views[1].on_level(1, 0)];
-    let volume = CostVolume::compute(reference, &sources, whole, &cost).expect("linear cameras");
+    let volume = CostVolume::compute(reference, &sources, whole, &cost, Vec::new()).expect("linear cameras");
     group.throughput(Throughput::Elements(volume.hypotheses() as u64));
     let mut forward = Vec::new();
     group.bench_function("aggregation", |b| {

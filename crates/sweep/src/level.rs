@@ -3,14 +3,21 @@
 //! Blocks lie on a fixed lattice of the image and overlap by a margin over which the aggregation settles; they are
 //! part of the method, so the result does not depend on tiles, memory or threads.
 
+use std::cell::Cell;
+
 use multiversion::multiversion;
+use multiversion::target::match_target;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
 use crate::SweepError;
 use crate::cost::{COST_MAX, CostConfig, Reference, SourceLevel};
-use crate::readout::{place_of_least, soft_argmin};
+use crate::readout::soft_argmin;
 use crate::semiglobal::{Penalties, RowSums, Volume};
+use crate::simd::Anywhere;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::Avx2;
+use crate::simd::sums::Sums;
 use crate::support::agreed_share;
 use crate::volume::CostVolume;
 
@@ -18,6 +25,9 @@ use crate::volume::CostVolume;
 const BLOCK: usize = 1024;
 /// Overlap of a block on each side: a path forgets its start within a few tens of pixels.
 const BLOCK_MARGIN: usize = 48;
+
+/// Room for more hypotheses than this, four times those of a usual block, is given back.
+const KEPT_MAX: usize = 64 << 20;
 
 /// Parameters of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +110,8 @@ fn sweep_block(
 ) -> Result<HeightMap, SweepError> {
     let whole = Window::whole(reference.view.image.width(), reference.view.image.height());
     let window = core.grown(BLOCK_MARGIN).intersection(&whole).unwrap_or(core);
-    let volume = CostVolume::compute(reference, sources, window, &config.cost)?;
+    let Room { costs, mut forward } = ROOM.take();
+    let volume = CostVolume::compute(reference, sources, window, &config.cost, costs)?;
     let mut reader = Reader {
         reference,
         window,
@@ -110,8 +121,23 @@ fn sweep_block(
         out: HeightMap::empty(core.width, core.height, origin_m),
     };
     let block = volume.as_block();
-    volume.aggregate(config.penalties, &mut Vec::new(), |y, sums| read_row(&mut reader, &block, y, sums));
+    volume.aggregate(config.penalties, &mut forward, |y, sums| read_row(&mut reader, &block, y, sums));
+    if volume.hypotheses() <= KEPT_MAX {
+        ROOM.set(Room { costs: volume.into_room(), forward });
+    }
     Ok(reader.finish())
+}
+
+/// Room for a block's costs and sums, three bytes per hypothesis.
+#[derive(Default)]
+struct Room {
+    costs: Vec<u8>,
+    forward: Vec<u16>,
+}
+
+thread_local! {
+    /// Blocks of one level and of the next take the same: fresh pages cost more than what is done with them.
+    static ROOM: Cell<Room> = Cell::default();
 }
 
 /// Reads the heights of a block out of its sums, row by row.
@@ -128,6 +154,14 @@ struct Reader<'a> {
 
 #[multiversion(targets("x86_64+avx2"))]
 fn read_row(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize, sums: RowSums<'_>) {
+    match_target! {
+        "x86_64+avx2" => read_row_with::<Avx2>(reader, volume, y, sums),
+        _ => read_row_with::<Anywhere>(reader, volume, y, sums),
+    };
+}
+
+#[inline(always)]
+fn read_row_with<S: Sums>(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize, sums: RowSums<'_>) {
     let Reader { reference, window, core, config, best, out } = reader;
     let scale = 8.0 * f32::from(COST_MAX);
     let step = reference.ranges.step_m;
@@ -135,9 +169,9 @@ fn read_row(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize, sums: RowSum
     let image = &reference.view.image.row(gy as usize)[window.x as usize..][..window.width];
     let in_core = (gy >= core.y && gy < core.y + core.height as i64).then(|| (gy - core.y) as usize);
     for (x, grey) in image.iter().enumerate() {
-        let (p, own) = (y * window.width + x, sums.pixel(x));
-        let Some(place) = place_of_least(own) else { continue };
-        best[p] = volume.costs[volume.offsets[p] as usize + place];
+        let (p, own) = (y * window.width + x, sums.pixel_and_more(x));
+        let least = S::least(own.0, own.1);
+        best[p] = volume.costs[volume.offsets[p] as usize + least.1];
         let Some(to) = in_core.and_then(|cy| Some((x.checked_sub((core.x - window.x) as usize)?, cy))) else {
             continue;
         };
@@ -145,7 +179,7 @@ fn read_row(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize, sums: RowSum
         if to.0 >= core.width || grey.is_nan() {
             continue;
         }
-        if let Some(e) = soft_argmin(own, place, scale, config.cost_noise) {
+        if let Some(e) = soft_argmin::<S>(own, least, scale, config.cost_noise) {
             let height_m = (f64::from(volume.low[p]) + f64::from(e.index)) * step;
             out.height_m[to] = (height_m - out.origin_m) as f32;
             out.sigma_m[to] = e.spread * step as f32;

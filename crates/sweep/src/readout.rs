@@ -7,6 +7,8 @@
 //! and its mean over whole hypotheses is k₀ to a thousandth only if that deviation is near a step. A fixed temperature
 //! is too cold for sharp modes and locks heights to the lattice.
 
+use crate::simd::sums::Sums;
+
 /// What a pixel's aggregated costs say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Estimate {
@@ -24,25 +26,22 @@ const WINDOW: usize = 3;
 /// window holds all of it.
 const DEVIATION: f32 = 0.8;
 
-/// The first of the hypotheses with the least sum; `None` where there is none at all.
+/// Reads the `count` sums of a pixel, of which that at `best` is the first of the least, with those of others behind them; `None`
+/// where all hypotheses are as good, which says nothing. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the
+/// deviation of a cost relative to it, which turns the mode's curvature into the deviation of its position.
 #[inline(always)]
-pub(crate) fn place_of_least(sums: &[u16]) -> Option<usize> {
-    let least = least_of(sums);
-    sums.iter().position(|s| *s == least)
-}
-
-/// Reads one pixel's sums, of which that at `best` is the first of the least; `None` where all hypotheses are as good, which
-/// says nothing. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the deviation of a cost relative to it,
-/// which turns the mode's curvature into the deviation of its position.
-#[inline(always)]
-pub(crate) fn soft_argmin(sums: &[u16], best: usize, scale: f32, noise: f32) -> Option<Estimate> {
-    let least = sums[best];
-    let reach = WINDOW.min(best).min(sums.len() - 1 - best);
+pub(crate) fn soft_argmin<S: Sums>(
+    (sums, count): (&[u16], usize),
+    (least, best): (u16, usize),
+    scale: f32,
+    noise: f32,
+) -> Option<Estimate> {
+    let reach = WINDOW.min(best).min(count - 1 - best);
     // A window cut on one side by the range's end would pull the mean inward: both sides are cut alike.
     let (from, to) = (best - reach, best + reach + 1);
     let above = |i: usize| f32::from(sums[i] - least);
     let curvature = if reach == 0 { 0.0 } else { 0.5 * (above(best - 1) + above(best + 1)) };
-    let outside = least_of(&sums[..from]).min(least_of(&sums[to..]));
+    let outside = S::least_outside(sums, count, from, to);
     let outside = if outside == u16::MAX { scale } else { f32::from(outside - least) };
     let margin = (outside / scale).min(1.0);
     if curvature == 0.0 && margin == 0.0 {
@@ -62,11 +61,6 @@ pub(crate) fn soft_argmin(sums: &[u16], best: usize, scale: f32, noise: f32) -> 
     Some(Estimate { index: best as f32 + first / weight, spread, margin })
 }
 
-#[inline(always)]
-fn least_of(sums: &[u16]) -> u16 {
-    sums.iter().copied().fold(u16::MAX, u16::min)
-}
-
 /// `e^x` for x ≤ 0 to a relative 4e-6: a power of two, and a polynomial for what is left of the exponent. The library's
 /// took a third of the read-out's time.
 #[inline(always)]
@@ -84,10 +78,14 @@ fn exp(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::Anywhere;
+    use crate::simd::sums::WORDS;
     use proptest::prelude::*;
 
     fn read(sums: &[u16], scale: f32, noise: f32) -> Option<Estimate> {
-        soft_argmin(sums, place_of_least(sums)?, scale, noise)
+        let sums = [sums, &[0; WORDS]].concat();
+        let own = (&sums[..], sums.len() - WORDS);
+        (own.1 > 0).then(|| soft_argmin::<Anywhere>(own, Anywhere::least(own.0, own.1), scale, noise))?
     }
 
     #[test]

@@ -8,12 +8,13 @@
 use multiversion::multiversion;
 use multiversion::target::match_target;
 
+use crate::simd::Anywhere;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::Avx2;
-use crate::simd::paths::{GUARD, Last, Pixel, Previous, Slot};
-use crate::simd::{Anywhere, Instructions};
+use crate::simd::paths::{Task, extend_row};
+use crate::simd::rows::{Between, Row};
 
-pub(crate) use crate::simd::paths::{FAR, LANES};
+pub(crate) use crate::simd::rows::LANES;
 
 /// Penalties in units of the cost ([`crate::cost::COST_MAX`] = worst).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,9 +61,17 @@ pub struct RowSums<'a> {
 impl RowSums<'_> {
     /// Those of the pixel at `x`.
     pub fn pixel(&self, x: usize) -> &[u16] {
+        let (sums, count) = self.pixel_and_more(x);
+        &sums[..count]
+    }
+
+    /// Those of the pixel at `x` with [`LANES`] more behind them, and how many they are.
+    #[inline(always)]
+    pub(crate) fn pixel_and_more(&self, x: usize) -> (&[u16], usize) {
         // The last pixel comes first.
         let end = self.offsets[self.offsets.len() - 1];
-        &self.sums[(end - self.offsets[x + 1]) as usize..(end - self.offsets[x]) as usize]
+        let (first, count) = (end - self.offsets[x + 1], self.offsets[x + 1] - self.offsets[x]);
+        (&self.sums[first as usize..][..count as usize + LANES], count as usize)
     }
 }
 
@@ -74,7 +83,7 @@ pub(crate) fn aggregate(
     forward: &mut Vec<u16>,
     read: impl FnMut(usize, RowSums<'_>),
 ) {
-    aggregate_with(volume, penalties, forward, sweep_row, read);
+    aggregate_with(volume, penalties, forward, extend_row_fast, read);
 }
 
 /// [`aggregate`] with a function that computes a row as [`extend_row`] does.
@@ -82,7 +91,7 @@ fn aggregate_with(
     volume: &Volume<'_>,
     penalties: Penalties,
     forward: &mut Vec<u16>,
-    sweep_row: impl Fn(&Volume<'_>, &mut Sweep, usize, Option<&[u16]>, &mut [u16]),
+    extend_row: ExtendRow,
     mut read: impl FnMut(usize, RowSums<'_>),
 ) {
     if volume.low.is_empty() {
@@ -91,19 +100,28 @@ fn aggregate_with(
     if forward.len() < volume.costs.len() {
         forward.resize(volume.costs.len(), 0);
     }
-    let mut sweep = Sweep::new(volume, penalties, false);
+    let mut sweep = Sweep::new(volume, penalties, false, extend_row);
     for y in 0..volume.height {
-        sweep.begin_row(volume, y);
         let first = volume.row_offsets(y)[0] as usize;
-        sweep_row(volume, &mut sweep, y, None, &mut forward[first..]);
+        sweep.extend(volume, y, None, &mut forward[first..]);
     }
-    let mut sweep = Sweep::new(volume, penalties, true);
+    let mut sweep = Sweep::new(volume, penalties, true, extend_row);
     let mut sums = vec![0; volume.row_capacity() + LANES];
     for y in (0..volume.height).rev() {
-        sweep.begin_row(volume, y);
-        sweep_row(volume, &mut sweep, y, Some(forward), &mut sums);
+        sweep.extend(volume, y, Some(forward), &mut sums);
         read(y, RowSums { sums: &sums, offsets: volume.row_offsets(y) });
     }
+}
+
+type ExtendRow = fn(&Row, &mut Row, Task<'_>, &mut Between);
+
+/// [`extend_row`] with the best instructions of the machine.
+#[multiversion(targets("x86_64+avx2"))]
+fn extend_row_fast(above: &Row, here: &mut Row, task: Task<'_>, between: &mut Between) {
+    match_target! {
+        "x86_64+avx2" => extend_row::<Avx2>(above, here, task, between),
+        _ => extend_row::<Anywhere>(above, here, task, between),
+    };
 }
 
 /// Four of the eight directions, row by row: from the left and from the three pixels above, or mirrored at the centre.
@@ -112,63 +130,44 @@ struct Sweep {
     step: u8,
     /// The jump penalty by the strength of the edge.
     jumps: [u8; 256],
-    above: RowPaths,
-    here: RowPaths,
-    /// Room for the path costs of single pixels.
-    single: [Vec<u8>; 6],
-}
-
-/// Path costs of one row along the three directions from the row before, in the order in which they are computed.
-struct RowPaths {
-    /// One direction after the other.
-    paths: Vec<u8>,
-    /// One more at either end, at which nothing has a cost.
-    slots: Vec<Slot>,
+    above: Row,
+    here: Row,
+    between: Between,
+    extend_row: ExtendRow,
 }
 
 impl Sweep {
-    fn new(volume: &Volume<'_>, penalties: Penalties, backward: bool) -> Self {
-        let (row, pixel) = (volume.row_capacity() + GUARD * (volume.width + 1) + 2 * LANES, volume.pixel_capacity());
-        let new_row = || RowPaths { paths: vec![FAR; 3 * row], slots: vec![Slot::default(); volume.width + 2] };
-        let mut sweep = Self {
-            backward,
-            step: penalties.step,
-            jumps: [0; 256],
-            above: new_row(),
-            here: new_row(),
-            single: std::array::from_fn(|_| vec![FAR; pixel + 4 * LANES]),
-        };
+    fn new(v: &Volume<'_>, penalties: Penalties, backward: bool, extend_row: ExtendRow) -> Self {
+        let (above, here, between) = (Row::default(), Row::default(), Between::default());
+        let mut sweep = Self { backward, step: penalties.step, jumps: [0; 256], above, here, between, extend_row };
         // Nothing comes before a path's first pixel, and staying there costs nothing: a jump neither.
-        sweep.begin_row(volume, if backward { volume.height - 1 } else { 0 });
+        sweep.place(v, if backward { v.height - 1 } else { 0 });
         sweep.jumps = std::array::from_fn(|edge| jump_penalty(penalties, edge as u8));
         sweep
     }
 
-    /// Makes the row that was here the one above, and takes the places and penalties of the next.
-    fn begin_row(&mut self, v: &Volume<'_>, y: usize) {
-        std::mem::swap(&mut self.above, &mut self.here);
+    /// Takes the places and penalties of a row.
+    fn place(&mut self, v: &Volume<'_>, y: usize) {
         let row = y * v.width..(y + 1) * v.width;
-        let ranges = v.row_offsets(y).array_windows();
-        let pixels = v.low[row.clone()].iter().zip(ranges).zip(&v.edges[row]);
+        let pixels = v.low[row.clone()].iter().zip(v.row_offsets(y).array_windows()).zip(&v.edges[row]);
+        let jumps = &self.jumps;
+        let pixel = |((low, [from, to]), edge): ((&i32, &[u32; 2]), &u8)| {
+            (*low, (to - from) as usize, jumps[usize::from(*edge)])
+        };
         match self.backward {
-            true => self.here.place(pixels.rev(), &self.jumps),
-            false => self.here.place(pixels, &self.jumps),
+            true => self.here.place(v.width, pixels.rev().map(pixel)),
+            false => self.here.place(v.width, pixels.map(pixel)),
         }
     }
-}
 
-impl RowPaths {
-    #[inline(always)]
-    fn place<'a>(&mut self, pixels: impl Iterator<Item = ((&'a i32, &'a [u32; 2]), &'a u8)>, jumps: &[u8; 256]) {
-        let mut place = GUARD;
-        for (slot, ((low, range), edge)) in self.slots[1..].iter_mut().zip(pixels) {
-            let count = (range[1] - range[0]) as usize;
-            *slot = Slot { low: *low, count, place, least: [0; 4], jump: jumps[usize::from(*edge)] };
-            place += count + GUARD;
-        }
-        let last = self.slots.len() - 1;
-        self.slots[0] = Slot { jump: 0, ..self.slots[1] };
-        self.slots[last] = Slot { jump: 0, ..self.slots[last - 1] };
+    /// The next row; its sums, and those `before` of all rows, go to `sums` in the order of the sweep.
+    fn extend(&mut self, v: &Volume<'_>, y: usize, before: Option<&[u16]>, sums: &mut [u16]) {
+        std::mem::swap(&mut self.above, &mut self.here);
+        self.place(v, y);
+        let first = v.row_offsets(y)[0] as usize;
+        let (costs, before) = (&v.costs[first..], before.map(|all| &all[first..]));
+        let task = Task { costs, backward: self.backward, step: self.step, before, sums };
+        (self.extend_row)(&self.above, &mut self.here, task, &mut self.between);
     }
 }
 
@@ -182,50 +181,6 @@ impl Volume<'_> {
     fn row_capacity(&self) -> usize {
         let row = |y: usize| self.offsets[(y + 1) * self.width] - self.offsets[y * self.width];
         (0..self.height).map(row).max().unwrap_or(0) as usize
-    }
-
-    /// The most hypotheses of a pixel.
-    fn pixel_capacity(&self) -> usize {
-        self.offsets.windows(2).map(|o| o[1] - o[0]).max().unwrap_or(0) as usize
-    }
-}
-
-/// [`extend_row`] with the best instructions of the machine.
-#[multiversion(targets("x86_64+avx2"))]
-fn sweep_row(v: &Volume<'_>, sweep: &mut Sweep, y: usize, before: Option<&[u16]>, sums: &mut [u16]) {
-    match_target! {
-        "x86_64+avx2" => extend_row::<Avx2>(v, sweep, y, before, sums),
-        _ => extend_row::<Anywhere>(v, sweep, y, before, sums),
-    };
-}
-
-/// The next row of a sweep; its sums, and those `before` of all rows, go to `sums` in the order of the sweep.
-#[inline(always)]
-fn extend_row<I: Instructions>(v: &Volume<'_>, sweep: &mut Sweep, y: usize, before: Option<&[u16]>, sums: &mut [u16]) {
-    let Sweep { backward, step, above, here, single, .. } = sweep;
-    let [wide, next_wide, aside, upper_aside @ ..] = single;
-    let mut last = Last::<I>::none([wide, next_wide], aside);
-    let (offsets, mut done) = (v.row_offsets(y), 0);
-    let apart = here.paths.len() / 3;
-    let [from_a, from_b, from_c] = [&above.paths[..apart], &above.paths[apart..2 * apart], &above.paths[2 * apart..]];
-    for (j, (slot, [q_a, q_b, q_c])) in here.slots[1..].iter_mut().zip(above.slots.array_windows()).enumerate() {
-        let at = offsets[if *backward { v.width - 1 - j } else { j }] as usize;
-        let [a, b, c] = &mut *upper_aside;
-        let upper = [
-            Previous::new(slot, q_a, 0, from_a, a),
-            Previous::new(slot, q_b, 1, from_b, b),
-            Previous::new(slot, q_c, 2, from_c, c),
-        ];
-        let pixel = Pixel {
-            costs: &v.costs[at..],
-            upper,
-            before: before.map(|all| &all[at..]),
-            paths: &mut here.paths[slot.place..],
-            apart,
-            sums: &mut sums[done..],
-        };
-        last.extend(slot, *step, pixel);
-        done += slot.count;
     }
 }
 
@@ -291,10 +246,8 @@ mod tests {
         }
     }
 
-    type SweepRow = fn(&Volume<'_>, &mut Sweep, usize, Option<&[u16]>, &mut [u16]);
-
-    const ROWS: [(&str, SweepRow); 2] =
-        [("this machine's instructions", sweep_row), ("any machine's", extend_row::<Anywhere>)];
+    const ROWS: [(&str, ExtendRow); 2] =
+        [("this machine's instructions", extend_row_fast), ("any machine's", extend_row::<Anywhere>)];
 
     /// First hypotheses over `lows` lattice heights, and up to `most` of them.
     fn compare_with_the_recurrence(lows: u32, most: u32) {
@@ -314,9 +267,9 @@ mod tests {
         let edges: Vec<u8> = (0..width * height).map(|_| random(256) as u8).collect();
         let volume = Volume { width, height, low: &low, offsets: &offsets, costs: &flat, edges: &edges };
         let expected = reference(width, height, &low, &counts, &costs, &edges, p);
-        for (name, sweep_row) in ROWS {
+        for (name, extend_row) in ROWS {
             let mut sums = vec![Vec::new(); width * height];
-            aggregate_with(&volume, p, &mut Vec::new(), sweep_row, |y, row| {
+            aggregate_with(&volume, p, &mut Vec::new(), extend_row, |y, row| {
                 (0..width).for_each(|x| sums[y * width + x] = row.pixel(x).iter().map(|&s| u32::from(s)).collect());
             });
             assert_eq!(sums, expected, "{name}, {lows} first heights, up to {} hypotheses", 6 + most);

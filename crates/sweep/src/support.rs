@@ -5,7 +5,8 @@
 //! over a window does. Unrelated pictures differ by as much as one of them holds: `1 − Σ cost / Σ contrast` is then 0, with
 //! contrast the mean of the absolute graded census of the reference.
 
-use raster::{Grid, Window};
+use multiversion::multiversion;
+use raster::Window;
 
 use crate::cost::{COST_MAX, SourceLevel, census_scale};
 
@@ -21,19 +22,25 @@ pub(crate) fn agreed_share(best: &[u8], view: &SourceLevel<'_>, window: Window) 
 /// Mean absolute graded census of every pixel, 0 to 1; NaN where the image is invalid.
 fn census_contrast(view: &SourceLevel<'_>, window: Window) -> Vec<f32> {
     let scale = census_scale(view);
-    let image: &Grid<f32> = view.image;
-    let at = |x: i64, y: i64| image.get(usize::try_from(x).ok()?, usize::try_from(y).ok()?).copied();
-    let mut out = Vec::with_capacity(window.width * window.height);
-    for y in window.y..window.y + window.height as i64 {
-        for x in window.x..window.x + window.width as i64 {
-            let here = at(x, y).unwrap_or(f32::NAN);
-            let around = (-1..=1).flat_map(|j| (-1..=1).map(move |i| (i, j)));
-            let known = around.filter_map(|(i, j)| at(x + i, y + j)).filter(|v| !v.is_nan());
-            let total: f32 = known.map(|v| ((v - here) * scale).abs().min(1.0)).sum();
-            out.push(total / 8.0 + 0.0 * here);
-        }
+    let padded = view.image.window(window.grown(1), f32::NAN);
+    let mut out = vec![0.0; window.width * window.height];
+    for (y, out) in out.chunks_exact_mut(window.width).enumerate() {
+        contrast_of_row([padded.row(y), padded.row(y + 1), padded.row(y + 2)], scale, out);
     }
     out
+}
+
+/// The contrast of the middle one of three rows, which have a pixel more at either end.
+#[multiversion(targets("x86_64+avx2"))]
+fn contrast_of_row(rows: [&[f32]; 3], scale: f32, out: &mut [f32]) {
+    let own = &rows[1][1..][..out.len()];
+    out.fill(0.0);
+    for (row, first) in rows.into_iter().flat_map(|row| (0..3).map(move |first| (row, first))) {
+        for ((total, v), here) in out.iter_mut().zip(&row[first..]).zip(own) {
+            *total += if v.is_nan() { 0.0 } else { ((v - here) * scale).abs().min(1.0) };
+        }
+    }
+    out.iter_mut().zip(own).for_each(|(total, here)| *total = *total / 8.0 + 0.0 * here);
 }
 
 fn share(best: &[u8], contrast: &[f32], width: usize) -> Vec<f32> {

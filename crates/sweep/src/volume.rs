@@ -1,10 +1,11 @@
 //! The cost volume of one window of a view: for every pixel its own hypotheses, their costs against the sources, and what
 //! the semi-global aggregation makes of them.
 
+use multiversion::multiversion;
 use raster::{Grid, Window};
 
 use crate::SweepError;
-use crate::cost::{BlockCosts, COST_MAX, CostConfig, Reference, SourceLevel, TileScratch, sweep_tile};
+use crate::cost::{BlockCosts, CostConfig, Reference, SourceLevel, TileScratch, sweep_tile};
 use crate::level::tiles;
 use crate::ranges::Ranges;
 use crate::semiglobal::{LANES, Penalties, RowSums, Volume, aggregate};
@@ -24,7 +25,8 @@ pub struct CostVolume {
 }
 
 impl CostVolume {
-    /// Sweeps a window of the reference through the hypotheses of its pixels.
+    /// Sweeps a window of the reference through the hypotheses of its pixels. `room` is for the costs ([`Self::into_room`]): fresh
+    /// pages cost as much as what is written to them.
     ///
     /// # Errors
     /// A camera that fails inside the scene, or is not smooth at the scale of a tile; more hypotheses than fit into memory.
@@ -33,9 +35,12 @@ impl CostVolume {
         sources: &[SourceLevel<'_>],
         window: Window,
         config: &CostConfig,
+        room: Vec<u8>,
     ) -> Result<Self, SweepError> {
         let (low, offsets) = layout(reference.ranges, window)?;
-        let mut costs = vec![COST_MAX; offsets.last().map_or(0, |&n| n as usize) + LANES];
+        // Every hypothesis gets its cost below, whatever was there.
+        let mut costs = room;
+        costs.resize(offsets.last().map_or(0, |&n| n as usize) + LANES, 0);
         let mut scratch = TileScratch::default();
         let mut block = BlockCosts { window, offsets: &offsets, costs: &mut costs };
         for tile in tiles(window, config.tile) {
@@ -52,6 +57,11 @@ impl CostVolume {
     /// Number of hypotheses of all pixels.
     pub fn hypotheses(&self) -> usize {
         self.costs.len() - LANES
+    }
+
+    /// The room that the costs took, for the next volume.
+    pub fn into_room(self) -> Vec<u8> {
+        self.costs
     }
 
     /// The sums of the path costs over eight directions, one per hypothesis: `read` is given every row's, the last row first.
@@ -78,15 +88,14 @@ fn layout(ranges: &Ranges, window: Window) -> Result<(Vec<i32>, Vec<u32>), Sweep
     let (mut low, mut offsets) = (Vec::with_capacity(area), Vec::with_capacity(area + 1));
     let mut next = 0u32;
     offsets.push(next);
-    for y in 0..window.height {
-        for x in 0..window.width {
-            let at = (window.x as usize + x, window.y as usize + y);
-            low.push(ranges.low[at]);
-            next += u32::from(ranges.count[at]);
-            if next > HYPOTHESES_MAX {
-                return Err(SweepError::TooManyHypotheses { limit: HYPOTHESES_MAX });
-            }
+    for y in window.y as usize..window.y as usize + window.height {
+        low.extend_from_slice(&ranges.low.row(y)[window.x as usize..][..window.width]);
+        for count in &ranges.count.row(y)[window.x as usize..][..window.width] {
+            next += u32::from(*count);
             offsets.push(next);
+        }
+        if next > HYPOTHESES_MAX {
+            return Err(SweepError::TooManyHypotheses { limit: HYPOTHESES_MAX });
         }
     }
     Ok((low, offsets))
@@ -95,22 +104,30 @@ fn layout(ranges: &Ranges, window: Window) -> Result<(Vec<i32>, Vec<u32>), Sweep
 /// How strong an edge each pixel is, 0 to 255: its gradient against the block's typical one and the noise. Pixels without
 /// a value are no edge, and say nothing of what is typical.
 fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
-    let mut gradient = Vec::with_capacity(w.width * w.height);
-    let mut known = Vec::with_capacity(w.width * w.height);
-    for y in 0..w.height {
-        for x in 0..w.width {
-            let (gx, gy) = (w.x as usize + x, w.y as usize + y);
-            let here = image[(gx, gy)];
-            let right = image.get(gx + 1, gy).copied().unwrap_or(here);
-            let below = image.get(gx, gy + 1).copied().unwrap_or(here);
-            let g = (right - here).abs().max((below - here).abs());
-            gradient.push(if g.is_finite() { g } else { 0.0 });
-            known.extend(g.is_finite().then_some(g));
-        }
+    let mut gradient = vec![0.0f32; w.width * w.height];
+    for (y, row) in gradient.chunks_exact_mut(w.width).enumerate() {
+        let gy = w.y as usize + y;
+        let below = if gy + 1 < image.height() { gy + 1 } else { gy };
+        gradients(&image.row(gy)[w.x as usize..], &image.row(below)[w.x as usize..], row);
     }
+    let mut known: Vec<f32> = gradient.iter().copied().filter(|g| g.is_finite()).collect();
     let middle = known.len() / 2;
     let typical = if known.is_empty() { 0.0 } else { *known.select_nth_unstable_by(middle, f32::total_cmp).1 };
     // Gradients up to twice the typical one are texture; from eight times on they are edges.
     let unit = typical.max(noise).max(f32::MIN_POSITIVE);
-    gradient.iter().map(|g| (((g / unit - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as u8).collect()
+    let grade = |g: &f32| if g.is_finite() { (((g / unit - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as u8 } else { 0 };
+    gradient.iter().map(grade).collect()
+}
+
+/// The greater of the differences to the right and to the lower neighbour; the last column may have no right one.
+#[multiversion(targets("x86_64+avx2"))]
+fn gradients(row: &[f32], below: &[f32], out: &mut [f32]) {
+    let inner = out.len().min(row.len() - 1);
+    let (own, right) = (&row[..inner], &row[1..][..inner]);
+    for (((g, here), right), below) in out.iter_mut().zip(own).zip(right).zip(below) {
+        *g = (right - here).abs().max((below - here).abs());
+    }
+    if let Some(g) = out.get_mut(inner) {
+        *g = (below[inner] - row[inner]).abs().max((0.0 * row[inner]).abs());
+    }
 }

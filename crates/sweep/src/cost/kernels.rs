@@ -138,18 +138,24 @@ fn gather(right: &[u8], below: &[u8], falling: &[u8], rising: &[u8], width: usiz
 }
 
 /// Marks in `voids` (rows of `stride`) every place from which a square of `side` to the right and below holds a marked one.
+#[multiversion(targets("x86_64+avx2"))]
 pub(crate) fn spread(voids: &mut [u8], stride: usize, side: usize) {
     for row in voids.chunks_exact_mut(stride) {
-        for x in 0..row.len() {
-            row[x] = row[x..(x + side).min(stride)].iter().fold(0, |all, v| all | v);
+        for _ in 1..side {
+            (1..stride).for_each(|x| row[x - 1] |= row[x]);
         }
     }
-    for at in 0..voids.len() {
-        voids[at] = voids[at..].iter().step_by(stride).take(side).fold(0, |all, v| all | v);
+    let mut rest = voids;
+    while let Some((row, below)) = rest.split_at_mut_checked(stride) {
+        for other in below.chunks(stride).take(side - 1) {
+            row.iter_mut().zip(other).for_each(|(v, other)| *v |= other);
+        }
+        rest = below;
     }
 }
 
 /// Makes the costs of rows of `width` invalid where `voids` (rows of `stride`) are marked.
+#[multiversion(targets("x86_64+avx2"))]
 pub(crate) fn hide(costs: &mut [u8], width: usize, voids: &[u8], stride: usize) {
     for (costs, voids) in costs.chunks_exact_mut(width).zip(voids.chunks(stride)) {
         costs.iter_mut().zip(voids).for_each(|(c, v)| *c |= v);

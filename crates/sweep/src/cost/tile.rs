@@ -1,5 +1,6 @@
 //! One tile of the reference: all height planes, all sources.
 
+use multiversion::multiversion;
 use raster::{Grid, Window, bicubic_along, cubic_weights};
 
 use super::kernels::{self, Census, FULL};
@@ -137,13 +138,14 @@ fn sweep_planes(
 }
 
 /// First plane and one past the last that any pixel of the tile asks for.
+#[multiversion(targets("x86_64+avx2"))]
 fn plane_span(ranges: &Ranges, tile: Window) -> (i32, i32) {
     let mut span = (i32::MAX, i32::MIN);
-    for y in 0..tile.height {
-        for x in 0..tile.width {
-            let at = (tile.x as usize + x, tile.y as usize + y);
-            let low = ranges.low[at];
-            span = (span.0.min(low), span.1.max(low + i32::from(ranges.count[at])));
+    for y in tile.y as usize..tile.y as usize + tile.height {
+        let low = &ranges.low.row(y)[tile.x as usize..][..tile.width];
+        let count = &ranges.count.row(y)[tile.x as usize..][..tile.width];
+        for (low, count) in low.iter().zip(count) {
+            span = (span.0.min(*low), span.1.max(low + i32::from(*count)));
         }
     }
     span
@@ -156,9 +158,10 @@ fn is_wasteful(ranges: &Ranges, part: Window, planes: (i32, i32)) -> bool {
         return false;
     }
     let rows = part.y as usize..part.y as usize + part.height;
-    let asked = rows.flat_map(|y| &ranges.count.row(y)[part.x as usize..][..part.width]).map(|&n| u64::from(n));
+    let asked =
+        |y: usize| ranges.count.row(y)[part.x as usize..][..part.width].iter().map(|&n| u64::from(n)).sum::<u64>();
     let swept = (planes.1 - planes.0) as u64 * (part.width * part.height) as u64;
-    swept > 2 * asked.sum::<u64>()
+    swept > 2 * rows.map(asked).sum::<u64>()
 }
 
 /// The local maps of a tile to all sources, or in which direction one of them is over the bound.

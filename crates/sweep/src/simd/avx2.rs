@@ -217,13 +217,17 @@ impl Bytes for ThirtyTwo {
 
 impl Half for Sixteen {
     #[inline(always)]
-    fn moved(self, by: i32) -> Self {
-        let at = (by.clamp(-18, 18) + 18) as usize;
-        // SAFETY: as above; the tables hold 16 bytes from every place on that `at` can be.
+    fn around(self, by: i32) -> [Self; 3] {
+        // Beyond its lanes there are none, however far.
+        let at = (by.clamp(-17, 17) + 17) as usize;
+        // SAFETY: as above; the tables hold 18 bytes from every place on that `at` can be.
         unsafe {
-            let lanes = _mm_loadu_si128(LANE.as_ptr().add(at).cast());
-            let outside = _mm_loadu_si128(OUTSIDE.as_ptr().add(at).cast());
-            Self(_mm_or_si128(_mm_shuffle_epi8(self.0, lanes), outside))
+            let (lanes, outside) = (LANE.as_ptr().add(at), OUTSIDE.as_ptr().add(at));
+            let moved = |by: usize| {
+                let lanes = _mm_shuffle_epi8(self.0, _mm_loadu_si128(lanes.add(by).cast()));
+                Self(_mm_or_si128(lanes, _mm_loadu_si128(outside.add(by).cast())))
+            };
+            [moved(0), moved(1), moved(2)]
         }
     }
 }

@@ -37,8 +37,8 @@ pub(crate) trait Bytes: Copy {
 
 /// Sixteen lanes.
 pub(crate) trait Half: Bytes {
-    /// The lanes `by` further back, and 255 where there are none; `by` is cut to ±18.
-    fn moved(self, by: i32) -> Self;
+    /// The lanes one less than `by` further back, `by`, and one more, and 255 where there are none.
+    fn around(self, by: i32) -> [Self; 3];
 }
 
 /// As many lanes as a pixel's hypotheses are worked on at once, and half of them.
@@ -167,8 +167,10 @@ impl<const N: usize> Bytes for Plain<N> {
 
 impl Half for Plain<16> {
     #[inline(always)]
-    fn moved(self, by: i32) -> Self {
-        self.lanes_from(by, u8::MAX)
+    fn around(self, by: i32) -> [Self; 3] {
+        // Beyond its lanes there are none, however far.
+        let by = by.clamp(-17, 17);
+        [self.lanes_from(by - 1, u8::MAX), self.lanes_from(by, u8::MAX), self.lanes_from(by + 1, u8::MAX)]
     }
 }
 
@@ -201,14 +203,14 @@ mod tests {
     }
 
     /// The narrow register's lanes moved, and what becomes of them in a wide one.
-    fn halves<I: Instructions>(bytes: &[u8], by: i32) -> [Vec<u8>; 3] {
-        let mut out = [vec![0; 16], vec![0; 32], vec![0; 16]];
+    fn halves<I: Instructions>(bytes: &[u8], by: i32) -> [Vec<u8>; 5] {
+        let mut out = [vec![0; 16], vec![0; 16], vec![0; 16], vec![0; 32], vec![0; 16]];
         // SAFETY: the slices are as long as the registers.
         unsafe {
             let narrow = I::Narrow::load(bytes[..16].as_ptr());
-            narrow.moved(by).store(out[0].as_mut_ptr());
-            I::widened(narrow).store(out[1].as_mut_ptr());
-            I::narrowed(I::Wide::load(bytes[..32].as_ptr())).store(out[2].as_mut_ptr());
+            narrow.around(by).iter().zip(&mut out).for_each(|(v, out)| v.store(out.as_mut_ptr()));
+            I::widened(narrow).store(out[3].as_mut_ptr());
+            I::narrowed(I::Wide::load(bytes[..32].as_ptr())).store(out[4].as_mut_ptr());
         }
         out
     }
@@ -233,9 +235,10 @@ mod tests {
             let four: u16 = (0..4).map(|i| u16::from(bytes[16 * i + 5])).sum();
             prop_assert_eq!((sums[0][5], sums[1][5]), (four, words[5] + four));
             prop_assert_eq!(Some(least[2]), bytes[32..48].iter().min().copied());
-            let [moved, ..] = halves::<Anywhere>(&bytes, by);
-            let at = usize::try_from(by + 4).ok().filter(|at| *at < 16);
-            prop_assert_eq!(moved[4], at.map_or(u8::MAX, |at| bytes[at]));
+            for (moved, by) in halves::<Anywhere>(&bytes, by).iter().zip(by - 1..=by + 1) {
+                let at = usize::try_from(by + 4).ok().filter(|at| *at < 16);
+                prop_assert_eq!(moved[4], at.map_or(u8::MAX, |at| bytes[at]));
+            }
         }
     }
 }

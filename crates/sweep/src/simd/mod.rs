@@ -7,13 +7,15 @@
 mod avx2;
 mod bytes;
 pub(crate) mod paths;
+pub(crate) mod rows;
+pub(crate) mod sums;
 
 use multiversion::multiversion;
 use multiversion::target::match_target;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
-pub(crate) use bytes::{Anywhere, Instructions};
+pub(crate) use bytes::Anywhere;
 
 /// A picture of `stride` columns per row, with [`OVERHANG`] values behind it.
 #[derive(Clone, Copy)]
