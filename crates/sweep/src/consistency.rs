@@ -115,17 +115,17 @@ fn parallax_per_metre(map: &TileMap) -> f64 {
 
 /// Whether one of the four pixels around `q` has a height within the tolerance.
 fn agrees(map: &HeightMap, q: [f64; 2], height_m: f64, tolerance_m: f64) -> bool {
-    let (x, y) = (q[0].floor(), q[1].floor());
-    if x < -1.0 || y < -1.0 {
+    // Also for a position that is no number.
+    if !(q[0] >= -1.0 && q[1] >= -1.0) {
         return false;
     }
+    // The pixels to the right and below; casts of what is not negative round down.
+    let (right, below) = ((q[0] + 1.0) as usize, (q[1] + 1.0) as usize);
     let wanted = height_m - map.origin_m;
-    [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].iter().any(|(dx, dy)| {
-        let (u, v) = (x + dx, y + dy);
-        u >= 0.0
-            && v >= 0.0
-            && map.height_m.get(u as usize, v as usize).is_some_and(|h| (f64::from(*h) - wanted).abs() <= tolerance_m)
-    })
+    let rows = below.saturating_sub(1)..(below + 1).min(map.height_m.height());
+    let columns = right.saturating_sub(1)..(right + 1).min(map.height_m.width());
+    let near = |h: &f32| (f64::from(*h) - wanted).abs() <= tolerance_m;
+    columns.start < columns.end && rows.into_iter().any(|y| map.height_m.row(y)[columns.clone()].iter().any(near))
 }
 
 /// Least and greatest height in a window.

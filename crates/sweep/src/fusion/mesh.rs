@@ -1,6 +1,7 @@
 //! One view's heights on the map grid.
 
 use geodesy::LonLatHeight;
+use multiversion::multiversion;
 use raster::{GeoTransform, Grid, Window, level0_from_level};
 use rayon::prelude::*;
 
@@ -128,29 +129,31 @@ impl PlacedView {
         let (x1, y1) = ((cells.x + cells.width as i64) as f32, (cells.y + cells.height as i64) as f32);
         for (w, e) in &self.extents {
             if e[0] < x1 && e[1] < y1 && e[2] >= cells.x as f32 && e[3] >= cells.y as f32 {
-                self.rasterise_window(*w, tear, &mut facets);
+                rasterise_window(&self.vertices, *w, tear, &mut facets);
             }
         }
         facets
     }
+}
 
-    fn rasterise_window(&self, w: Window, tear: f32, facets: &mut ViewSurface) {
-        for y in w.y as usize..w.y as usize + w.height {
-            for x in w.x as usize..w.x as usize + w.width {
-                let a = self.vertices[(x, y)];
-                let corner = |dx, dy| self.vertices.get(x + dx, y + dy).copied().filter(|v| !v.h.is_nan());
-                let (right, below, across) = (corner(1, 0), corner(0, 1), corner(1, 1));
-                if !a.h.is_nan() {
-                    match (right, below, across) {
-                        (Some(b), Some(c), None) => facets.facet([a, b, c], tear),
-                        (_, _, Some(c)) => {
-                            [right, below].into_iter().flatten().for_each(|b| facets.facet([a, b, c], tear));
-                        }
-                        _ => {}
+/// Samples the facets that begin in a window of the image.
+#[multiversion(targets("x86_64+avx2"))]
+fn rasterise_window(vertices: &Grid<Vertex>, w: Window, tear: f32, facets: &mut ViewSurface) {
+    for y in w.y as usize..w.y as usize + w.height {
+        for x in w.x as usize..w.x as usize + w.width {
+            let a = vertices[(x, y)];
+            let corner = |dx, dy| vertices.get(x + dx, y + dy).copied().filter(|v| !v.h.is_nan());
+            let (right, below, across) = (corner(1, 0), corner(0, 1), corner(1, 1));
+            if !a.h.is_nan() {
+                match (right, below, across) {
+                    (Some(b), Some(c), None) => facets.facet([a, b, c], tear),
+                    (_, _, Some(c)) => {
+                        [right, below].into_iter().flatten().for_each(|b| facets.facet([a, b, c], tear));
                     }
-                } else if let (Some(b), Some(c), Some(d)) = (right, below, across) {
-                    facets.facet([b, c, d], tear);
+                    _ => {}
                 }
+            } else if let (Some(b), Some(c), Some(d)) = (right, below, across) {
+                facets.facet([b, c, d], tear);
             }
         }
     }
@@ -229,6 +232,7 @@ impl ViewSurface {
     }
 
     /// Puts a height into a cell unless a higher one is there.
+    #[inline(always)]
     fn put(&mut self, column: f32, row: f32, (h, sigma, weight): (f32, f32, f32)) {
         let (column, row) = (column - self.origin[0], row - self.origin[1]);
         if column < 0.0 || row < 0.0 {
@@ -247,6 +251,7 @@ impl ViewSurface {
     }
 
     /// Samples a triangle at the centres of the cells it covers.
+    #[inline(always)]
     fn facet(&mut self, [a, b, c]: [Vertex; 3], tear: f32) {
         let least = a.h.min(b.h).min(c.h);
         let greatest = a.h.max(b.h).max(c.h);

@@ -39,9 +39,15 @@ pub fn reliability(height_m: &Grid<f32>, agreement: &Grid<f32>, reach: usize, sa
 fn window_sums(grid: &Grid<f64>, reach: usize) -> Grid<f64> {
     let (width, height) = (grid.width(), grid.height());
     let mut rows = Grid::filled(width, height, 0.0);
+    let mut before = vec![0.0; width + 1];
     for y in 0..height {
-        let values = grid.row(y);
-        rows.row_mut(y).iter_mut().enumerate().for_each(|(x, sum)| *sum = values[span(x, reach, width)].iter().sum());
+        for (x, value) in grid.row(y).iter().enumerate() {
+            before[x + 1] = before[x] + value;
+        }
+        for (x, sum) in rows.row_mut(y).iter_mut().enumerate() {
+            let span = span(x, reach, width);
+            *sum = before[span.end] - before[span.start];
+        }
     }
     let mut out = Grid::filled(width, height, 0.0);
     for y in 0..height {
