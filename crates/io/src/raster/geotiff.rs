@@ -20,6 +20,8 @@ use super::{RasterError, with_gdal, write_whole};
 
 /// Metadata item that names what heights are measured from.
 pub(super) const VERTICAL_DATUM: &str = "VERTICAL_DATUM";
+/// Side of a COG's tiles, cells.
+const BLOCK: usize = 512;
 /// Rows converted at a time between our memory and GDAL's.
 const CHUNK_ROWS: usize = 256;
 
@@ -107,10 +109,28 @@ pub fn write_cog(path: impl AsRef<Path>, raster: &CogRaster<'_>, overwrite: bool
     raster.crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
     write_whole(path, overwrite, |made| {
         let mut memory = in_memory(path, raster.bands, raster.no_data)?;
+        // Left to the COG driver, they would take a way through a file.
+        let factors = overview_factors(memory.raster_size());
+        with_gdal(|| memory.build_overviews(resampling(raster.overviews), &factors, &[]))
+            .map_err(|reason| RasterError::unwritable(path, reason))?;
         let CogRaster { geotransform, crs, metadata, threads, .. } = *raster;
         let place = CogPlace { geotransform, crs, metadata, threads };
         finish_cog(&mut memory, place, raster.overviews, made).map_err(|reason| RasterError::unwritable(path, reason))
     })
+}
+
+/// Each overview's reduction: halves, until one block holds all.
+fn overview_factors((width, height): (usize, usize)) -> Vec<i32> {
+    let halvings = width.max(height).div_ceil(BLOCK).next_power_of_two().ilog2();
+    (1..=halvings).map(|k| 1 << k).collect()
+}
+
+/// GDAL's name.
+fn resampling(sampling: Sampling) -> &'static str {
+    match sampling {
+        Sampling::Average => "AVERAGE",
+        Sampling::Nearest => "NEAREST",
+    }
 }
 
 /// Gives a dataset its place on the Earth and copies it into a Cloud-Optimised GeoTIFF.
@@ -120,19 +140,15 @@ pub(super) fn finish_cog(
     overviews: Sampling,
     made: &Path,
 ) -> Result<(), String> {
-    let resampling = match overviews {
-        Sampling::Average => "AVERAGE",
-        Sampling::Nearest => "NEAREST",
-    };
-    let threads = place.threads.max(1).to_string();
+    let (threads, block) = (place.threads.max(1).to_string(), BLOCK.to_string());
     let options = [
         ("COMPRESS", "DEFLATE"),
         // Measured heights end in noise: higher levels take several times longer for a hundredth of the size.
         ("LEVEL", "1"),
         ("PREDICTOR", "YES"),
-        ("BLOCKSIZE", "512"),
+        ("BLOCKSIZE", block.as_str()),
         ("BIGTIFF", "IF_SAFER"),
-        ("OVERVIEW_RESAMPLING", resampling),
+        ("OVERVIEW_RESAMPLING", resampling(overviews)),
         ("NUM_THREADS", threads.as_str()),
     ];
     with_gdal(|| {
