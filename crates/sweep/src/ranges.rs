@@ -43,16 +43,19 @@ impl Ranges {
         let (least, greatest) = known_extremes(coarse);
         let mut out = Self::uniform(width, height, step_m, full);
         let margin = MARGIN_STEPS * step_m;
+        // All pixels of a coarse one search alike.
+        let extremes = least.data().iter().zip(greatest.data());
+        let spans = extremes.map(|(lo, hi)| {
+            let (lo, hi) = (f64::from(*lo), f64::from(*hi));
+            (lo <= hi).then(|| span((origin_m + lo - margin).max(full.0), (origin_m + hi + margin).min(full.1), step_m))
+        });
+        let spans: Vec<Option<(i32, u16)>> = spans.collect();
         for y in 0..height {
-            let cy = (y / 2).min(coarse.height() - 1);
-            for x in 0..width {
-                let c = ((x / 2).min(coarse.width() - 1), cy);
-                let (lo, hi) = (f64::from(least[c]), f64::from(greatest[c]));
-                if lo <= hi {
-                    let (low, count) =
-                        span((origin_m + lo - margin).max(full.0), (origin_m + hi + margin).min(full.1), step_m);
-                    out.low[(x, y)] = low;
-                    out.count[(x, y)] = count;
+            let row = &spans[(y / 2).min(coarse.height() - 1) * coarse.width()..][..coarse.width()];
+            let own = out.low.row_mut(y).iter_mut().zip(out.count.row_mut(y));
+            for (x, (low, count)) in own.enumerate() {
+                if let Some(span) = row[(x / 2).min(coarse.width() - 1)] {
+                    (*low, *count) = span;
                 }
             }
         }
@@ -112,18 +115,17 @@ pub(crate) fn extremes(g: &Grid<f32>, start: f32, pick: impl Fn(f32, f32) -> f32
     let (w, h) = (g.width(), g.height());
     let mut rows = Grid::filled(w, h, start);
     for y in 0..h {
-        for x in 0..w {
-            let span = &g.row(y)[x.saturating_sub(reach)..(x + reach + 1).min(w)];
-            // `f32::min` and `max` return the other operand for a NaN.
-            rows[(x, y)] = span.iter().copied().fold(start, &pick);
+        let (from, to) = (g.row(y), rows.row_mut(y));
+        // `f32::min` and `max` return the other operand for a NaN.
+        for shift in 0..=reach.min(w.saturating_sub(1)) {
+            to.iter_mut().zip(&from[shift..]).for_each(|(to, v)| *to = pick(*to, *v));
+            to[shift..].iter_mut().zip(from).for_each(|(to, v)| *to = pick(*to, *v));
         }
     }
     let mut out = Grid::filled(w, h, start);
     for y in 0..h {
         for v in y.saturating_sub(reach)..(y + reach + 1).min(h) {
-            for x in 0..w {
-                out[(x, y)] = pick(out[(x, y)], rows[(x, v)]);
-            }
+            out.row_mut(y).iter_mut().zip(rows.row(v)).for_each(|(to, v)| *to = pick(*to, *v));
         }
     }
     out

@@ -92,6 +92,10 @@ fn known_before(
         let y = if reversed { h - 1 - row } else { row };
         for column in 0..w {
             let x = if reversed { w - 1 - column } else { column };
+            // What is known ends the search of others and has none of its own.
+            if !height_m[(x as usize, y as usize)].is_nan() {
+                continue;
+            }
             let nearest: Nearest = std::array::from_fn(|d| {
                 let (dx, dy) = BEFORE[d];
                 let (u, v) = (x + sign * dx, y + sign * dy);

@@ -49,6 +49,9 @@ struct Vertex {
     weight: f32,
 }
 
+/// For a pixel that is not kept.
+const NO_VERTEX: Vertex = Vertex { x: 0.0, y: 0.0, h: f32::NAN, sigma: f32::NAN, weight: 0.0 };
+
 /// One view's kept pixels in grid coordinates.
 #[derive(Debug, Clone)]
 pub struct PlacedView {
@@ -87,11 +90,14 @@ pub fn mark_cells(
     frame: &GridFrame<'_>,
     cells: &mut Grid<bool>,
 ) -> Result<(), SweepError> {
-    let vertices = place(heights, level, pixels, &pixels.map(|_| 1.0), frame)?;
-    for v in vertices.data().iter().filter(|v| !v.h.is_nan() && v.x >= 0.0 && v.y >= 0.0) {
-        let at = (v.x as usize, v.y as usize);
-        if at.0 < cells.width() && at.1 < cells.height() {
-            cells[at] = true;
+    let weights = Grid::filled(pixels.width(), pixels.height(), 1.0);
+    for w in tiles(Window::whole(pixels.width(), pixels.height()), TILE) {
+        let vertices = place_tile(heights, level, w, (pixels, &weights), frame)?;
+        for v in vertices.iter().flat_map(|tile| tile.data()).filter(|v| !v.h.is_nan() && v.x >= 0.0 && v.y >= 0.0) {
+            let at = (v.x as usize, v.y as usize);
+            if at.0 < cells.width() && at.1 < cells.height() {
+                cells[at] = true;
+            }
         }
     }
     Ok(())
@@ -169,31 +175,32 @@ fn place(
 ) -> Result<Grid<Vertex>, SweepError> {
     let map = heights.map;
     let (width, height) = (map.height_m.width(), map.height_m.height());
-    let none = Vertex { x: 0.0, y: 0.0, h: f32::NAN, sigma: f32::NAN, weight: 0.0 };
     let windows = tiles(Window::whole(width, height), TILE);
-    let parts: Vec<Grid<Vertex>> = windows
+    let parts: Vec<Option<Grid<Vertex>>> = windows
         .par_iter()
-        .map(|w| place_tile(heights, level, *w, (keep, weights), frame, none))
+        .map(|w| place_tile(heights, level, *w, (keep, weights), frame))
         .collect::<Result<_, SweepError>>()?;
-    let mut out = Grid::filled(width, height, none);
+    let mut out = Grid::filled(width, height, NO_VERTEX);
     for (w, part) in windows.iter().zip(&parts) {
-        paste(&mut out, *w, part);
+        part.iter().for_each(|part| paste(&mut out, *w, part));
     }
     Ok(out)
 }
 
+/// The kept pixels of a tile; `None` where there are none.
 fn place_tile(
     heights: Heights<'_>,
     level: u32,
     w: Window,
     (keep, weights): (&Grid<bool>, &Grid<f32>),
     frame: &GridFrame<'_>,
-    none: Vertex,
-) -> Result<Grid<Vertex>, SweepError> {
-    let mut out = Grid::filled(w.width, w.height, none);
+) -> Result<Option<Grid<Vertex>>, SweepError> {
     let map = heights.map;
-    let mut rows = (0..w.height).map(|y| &keep.row(w.y as usize + y)[w.x as usize..][..w.width]);
-    let Some(range) = height_span(map, w).filter(|_| rows.any(|row| row.contains(&true))) else { return Ok(out) };
+    let is_kept = |y: usize| keep.row(y)[w.x as usize..][..w.width].contains(&true);
+    if !(w.y as usize..w.y as usize + w.height).any(is_kept) {
+        return Ok(None);
+    }
+    let Some(range) = height_span(map, w) else { return Ok(None) };
     let exact = |[u, v]: [f64; 2], h: f64| {
         let at = camera::ImagePoint::new(level0_from_level(u, level), level0_from_level(v, level));
         let ground = heights.view.camera.localize(at, h)?;
@@ -206,6 +213,7 @@ fn place_tile(
     let local = TileMap::fit(corners, range, exact).map_err(failed)?;
     // A twentieth of a cell is invisible in the result; a tile over it is placed exactly.
     let fits = local.max_error_px <= 0.05;
+    let mut out = Grid::filled(w.width, w.height, NO_VERTEX);
     for y in 0..w.height {
         for x in 0..w.width {
             let at = (w.x as usize + x, w.y as usize + y);
@@ -218,7 +226,7 @@ fn place_tile(
             out[(x, y)] = Vertex { x: cx as f32, y: cy as f32, h, sigma: map.sigma_m[at], weight: weights[at] };
         }
     }
-    Ok(out)
+    Ok(Some(out))
 }
 
 impl ViewSurface {

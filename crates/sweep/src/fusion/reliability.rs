@@ -50,10 +50,19 @@ fn window_sums(grid: &Grid<f64>, reach: usize) -> Grid<f64> {
         }
     }
     let mut out = Grid::filled(width, height, 0.0);
+    let mut sums = vec![0.0; width];
+    let add = |sums: &mut [f64], y: usize, sign: f64| {
+        sums.iter_mut().zip(rows.row(y)).for_each(|(sum, row)| *sum += sign * row);
+    };
+    (0..reach.min(height)).for_each(|y| add(&mut sums, y, 1.0));
     for y in 0..height {
-        for above in span(y, reach, height) {
-            out.row_mut(y).iter_mut().zip(rows.row(above)).for_each(|(sum, row)| *sum += row);
+        if y + reach < height {
+            add(&mut sums, y + reach, 1.0);
         }
+        if y > reach {
+            add(&mut sums, y - reach - 1, -1.0);
+        }
+        out.row_mut(y).copy_from_slice(&sums);
     }
     out
 }
