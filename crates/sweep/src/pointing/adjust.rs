@@ -232,7 +232,7 @@ fn reduce(
     track: &Track,
     order: ModelOrder,
 ) -> Option<(Reduced, LonLatHeight)> {
-    let (ground, residual, jacobian) = triangulate(cameras, track).ok()??;
+    let (ground, mut residual, jacobian) = triangulate(cameras, track).ok()??;
     let rows = residual.len();
     let m = order.parameters();
     let mut design = DMatrix::zeros(rows, m * cameras.len());
@@ -242,13 +242,13 @@ fn reduce(
             design[(2 * i + 1, view * m + k)] = l;
         }
     }
-    // The last columns of the full U span the null space of Jᵀ: from the projector's eigenvectors of eigenvalue 1.
-    let inverse = (jacobian.transpose() * &jacobian).try_inverse()?;
-    let projector = DMatrix::identity(rows, rows) - &jacobian * inverse * jacobian.transpose();
-    let eigen = projector.symmetric_eigen();
-    let kept: Vec<usize> = (0..rows).filter(|&i| eigen.eigenvalues[i] > 0.5).collect();
-    let null = eigen.eigenvectors.select_columns(&kept).transpose();
-    Some((Reduced { residual: &null * residual, design: &null * design }, ground))
+    // Turned by Qᵀ of J = QR, all but the first three rows are free of J.
+    let freedom = rows.checked_sub(3)?;
+    let qr = jacobian.qr();
+    qr.q_tr_mul(&mut residual);
+    qr.q_tr_mul(&mut design);
+    let free = Reduced { residual: residual.rows(3, freedom).into(), design: design.rows(3, freedom).into() };
+    Some((free, ground))
 }
 
 type Triangulated = Option<(LonLatHeight, DVector<f64>, DMatrix<f64>)>;
