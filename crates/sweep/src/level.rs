@@ -74,10 +74,13 @@ pub fn sweep_level(
 ) -> Result<HeightMap, SweepError> {
     let (width, height) = (reference.view.image.width(), reference.view.image.height());
     let cores = tiles(Window::whole(width, height), BLOCK);
-    let parts: Vec<HeightMap> = cores
+    let mut parts: Vec<HeightMap> = cores
         .par_iter()
         .map(|core| sweep_block(reference, sources, *core, origin_m, config))
         .collect::<Result<_, _>>()?;
+    if let [_] = parts[..] {
+        return Ok(parts.remove(0));
+    }
     let mut out = HeightMap::empty(width, height, origin_m);
     for (core, part) in cores.iter().zip(&parts) {
         out.put(*core, part);

@@ -51,11 +51,17 @@ pub(crate) fn soft_argmin<S: Sums>(
         return Some(Estimate { index: best as f32, spread: WINDOW as f32, margin });
     }
     let cold = 1.0 / (2.0 * curvature * DEVIATION * DEVIATION);
+    // Side by side: those before the best, and those behind it.
+    let mut weights = [0.0f32; 2 * WINDOW];
+    for i in 0..reach {
+        (weights[i], weights[WINDOW + i]) = (-above(best - 1 - i) * cold, -above(best + 1 + i) * cold);
+    }
+    weights.iter_mut().for_each(|w| *w = exp(*w));
     let (mut weight, mut first) = (1.0f32, 0.0f32);
-    for i in 1..=reach {
-        let (before, behind) = (exp(-above(best - i) * cold), exp(-above(best + i) * cold));
+    for i in 0..reach {
+        let (before, behind) = (weights[i], weights[WINDOW + i]);
         weight += before + behind;
-        first += i as f32 * (behind - before);
+        first += (i + 1) as f32 * (behind - before);
     }
     let spread = (noise * scale / (2.0 * curvature)).sqrt().min(WINDOW as f32);
     Some(Estimate { index: best as f32 + first / weight, spread, margin })

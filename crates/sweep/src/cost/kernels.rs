@@ -174,6 +174,7 @@ pub(crate) fn sort_pair(a: &mut [u8], b: &mut [u8]) {
 
 /// `out`: the weighted mean of each pixel's costs, in which an invalid one counts as chance does, [`COST_MAX`], and a
 /// valid one [`VALID_WEIGHT`] times as much.
+#[multiversion(targets("x86_64+avx2"))]
 pub(crate) fn mean_cost(costs: &[Vec<u8>], sums: &mut [u16], weights: &mut [u16], out: &mut [u8]) {
     if let [only] = costs {
         out.iter_mut().zip(only).for_each(|(o, c)| *o = (*c).min(COST_MAX));

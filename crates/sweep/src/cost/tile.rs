@@ -450,6 +450,7 @@ fn copy_window(image: &Grid<f32>, w: Window, out: &mut [f32]) {
 }
 
 /// Writes the costs of the planes from `first` on to the pixels that ask for them.
+#[multiversion(targets("x86_64+avx2"))]
 fn scatter(ranges: &Ranges, part: Window, (first, count): (i32, usize), planes: &Planes, block: &mut BlockCosts<'_>) {
     let (bx, by) = ((part.x - block.window.x) as usize, (part.y - block.window.y) as usize);
     for y in 0..part.height {
