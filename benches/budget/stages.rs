@@ -7,7 +7,7 @@ use simulate::Simulation;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::cost::{Aggregation, Reference, SourceLevel};
 use sweep::fusion::{FusionConfig, GridFrame, fuse_views, place_view};
-use sweep::ranges::Ranges;
+use sweep::ranges::{EDGE_REACH, Ranges};
 use sweep::semiglobal::Penalties;
 use sweep::{HeightMap, LevelConfig, View, source_from_reference, sweep_level};
 
@@ -77,7 +77,10 @@ impl<'a> Scene<'a> {
             let full = (low - MARGIN_M, high + MARGIN_M);
             let ranges = match &found {
                 None => Ranges::uniform(image.width(), image.height(), step_m, full),
-                Some(c) => Ranges::from_coarser(image.width(), image.height(), step_m, &c.height_m, c.origin_m, full),
+                Some(c) => {
+                    let size = (image.width(), image.height());
+                    Ranges::from_coarser(size.0, size.1, step_m, &c.height_m, c.origin_m, full, EDGE_REACH)
+                }
             };
             found = Some(self.sweep(index, level, &ranges.without_voids(image), known)?);
         }

@@ -282,6 +282,7 @@ impl ChunkedScene<'_> {
             bottom_level: level,
             sources: sources.to_vec(),
             best_of: self.tuning.best_of,
+            reach: self.tuning.reach,
             level: self.tuning.level,
             priors: Vec::new(),
         };

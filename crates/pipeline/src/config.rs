@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use geodesy::VerticalDatum;
 use serde::{Deserialize, Serialize};
 use sweep::LevelConfig;
+use sweep::ranges::EDGE_REACH;
 
 /// Speed against accuracy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -106,6 +107,9 @@ impl DsmConfig {
     }
 }
 
+/// Two of the sources see even the ground beside a wall, and on dates like the reference's; the third best may not.
+const BEST_OF: usize = 2;
+
 /// The parameters that a preset stands for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Tuning {
@@ -115,8 +119,10 @@ pub(crate) struct Tuning {
     pub(crate) finest_level: usize,
     /// Sources per view, at most.
     pub(crate) sources: usize,
-    /// How many of the best sources count at a pixel: half of them see it even beside a wall.
+    /// How many of the best sources count at a pixel.
     pub(crate) best_of: usize,
+    /// How far around a coarse pixel the next level takes over heights to search, coarse pixels.
+    pub(crate) reach: usize,
     /// Cost, penalties and read-out.
     pub(crate) level: LevelConfig,
 }
@@ -128,11 +134,11 @@ impl Preset {
     }
 
     pub(crate) fn tuning(self) -> Tuning {
-        let (finest_level, sources) = match self {
-            Self::Fast => (1, 2),
-            Self::Balanced => (0, 4),
-            Self::Accurate => (0, 8),
+        let (finest_level, sources, reach) = match self {
+            Self::Fast => (1, 2, EDGE_REACH),
+            Self::Balanced => (0, 4, EDGE_REACH),
+            Self::Accurate => (0, 8, 2 * EDGE_REACH),
         };
-        Tuning { step_px: 0.5, finest_level, sources, best_of: sources.div_ceil(2), level: LevelConfig::default() }
+        Tuning { step_px: 0.5, finest_level, sources, best_of: BEST_OF, reach, level: LevelConfig::default() }
     }
 }

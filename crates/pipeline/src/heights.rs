@@ -26,6 +26,8 @@ pub(crate) struct SweepPlan {
     pub(crate) sources: Vec<Vec<usize>>,
     /// How many of the best sources count, at most.
     pub(crate) best_of: usize,
+    /// How far around a coarse pixel heights are taken over, coarse pixels.
+    pub(crate) reach: usize,
     /// Cost, penalties and read-out.
     pub(crate) level: LevelConfig,
     /// For each view what it sees of a city model, if anything; empty without one.
@@ -110,7 +112,7 @@ fn sweep_view(
     let step = plan.step_at(level);
     let ranges = match coarser {
         None => Ranges::uniform(w, h, step, plan.range_m),
-        Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, plan.range_m),
+        Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, plan.range_m, plan.reach),
     }
     .without_voids(reference.image);
     let prior_m = known.map(|prior| prior.at_level(level, (w, h)));

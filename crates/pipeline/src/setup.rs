@@ -202,6 +202,7 @@ pub(crate) fn with_towers(
         bottom_level: 0,
         sources: sources.to_vec(),
         best_of,
+        reach: tuning.reach,
         level,
         priors: Vec::new(),
     };
@@ -247,6 +248,7 @@ pub(crate) fn plan_sweep(
         bottom_level,
         sources,
         best_of: tuning.best_of,
+        reach: tuning.reach,
         level: tuning.level,
         priors: Vec::new(),
     }

@@ -16,6 +16,9 @@ pub struct Ranges {
     pub count: Grid<u16>,
 }
 
+/// How far around a coarse pixel heights count, coarse pixels: a patch that holds an edge sees the upper surface's height up to
+/// two pixels beside it, and the lower one begins only there. Twice as far gains little more.
+pub const EDGE_REACH: usize = 2;
 /// Squares of unknown heights wider than about four times this take the whole map's heights.
 const REACH_MAX: usize = 16;
 /// Steps that a finer level searches beyond what the coarser one found: one coarse step is two fine ones, and the
@@ -30,8 +33,8 @@ impl Ranges {
     }
 
     /// Ranges of a level from the heights of the next coarser one (metres, NaN where unknown): the least and greatest
-    /// height among the 3 × 3 coarse neighbours, with a margin. Where all of them are unknown, the nearest known ones
-    /// around count; `full` where the whole map is unknown.
+    /// height among the coarse neighbours up to `reach` away, with a margin. Where all of them are unknown, the nearest known
+    /// ones around count; `full` where the whole map is unknown.
     pub fn from_coarser(
         width: usize,
         height: usize,
@@ -39,8 +42,9 @@ impl Ranges {
         coarse: &Grid<f32>,
         origin_m: f64,
         full: (f64, f64),
+        reach: usize,
     ) -> Self {
-        let (least, greatest) = known_extremes(coarse);
+        let (least, greatest) = known_extremes(coarse, reach);
         let mut out = Self::uniform(width, height, step_m, full);
         let margin = MARGIN_STEPS * step_m;
         // All pixels of a coarse one search alike.
@@ -84,13 +88,13 @@ fn span(lo_m: f64, hi_m: f64, step_m: f64) -> (i32, u16) {
     (low, (high - low + 1).clamp(1, i32::from(u16::MAX)) as u16)
 }
 
-/// Least and greatest known height around every cell: of its 3 × 3 neighbours or, where all are unknown, of the
+/// Least and greatest known height around every cell: of its neighbours up to `reach` away or, where all are unknown, of the
 /// smallest of a few growing squares that holds a known one, or else of the whole map. (+inf, −inf) when nothing is.
-fn known_extremes(g: &Grid<f32>) -> (Grid<f32>, Grid<f32>) {
+fn known_extremes(g: &Grid<f32>, reach: usize) -> (Grid<f32>, Grid<f32>) {
     let (mut least, mut greatest) =
-        (extremes(g, f32::INFINITY, f32::min, 1), extremes(g, f32::NEG_INFINITY, f32::max, 1));
+        (extremes(g, f32::INFINITY, f32::min, reach), extremes(g, f32::NEG_INFINITY, f32::max, reach));
     // Each round adds its reach to that of the rounds before it.
-    let mut reach = 2;
+    let mut reach = reach + 1;
     let (mut wide_least, mut wide_greatest) = (least.clone(), greatest.clone());
     while reach <= REACH_MAX && least.data().iter().any(|v| v.is_infinite()) {
         wide_least = extremes(&wide_least, f32::INFINITY, f32::min, reach);
@@ -139,7 +143,7 @@ mod tests {
     fn a_thin_tower_widens_the_range_around_it_and_nowhere_else() {
         let mut coarse = Grid::filled(20, 20, 0.0f32);
         coarse[(10, 10)] = 130.0;
-        let r = Ranges::from_coarser(40, 40, 0.5, &coarse, 100.0, (0.0, 400.0));
+        let r = Ranges::from_coarser(40, 40, 0.5, &coarse, 100.0, (0.0, 400.0), 1);
         assert_eq!((r.low[(2, 2)], r.count[(2, 2)]), (197, 7));
         assert_eq!((r.low[(19, 19)], r.count[(19, 19)]), (197, 267));
     }
@@ -148,9 +152,9 @@ mod tests {
     fn an_unknown_stretch_takes_what_is_known_next_to_it() {
         let mut coarse = Grid::filled(30, 30, f32::NAN);
         (0..30).for_each(|y| coarse[(0, y)] = 7.0);
-        let r = Ranges::from_coarser(60, 60, 1.0, &coarse, 0.0, (-100.0, 100.0));
+        let r = Ranges::from_coarser(60, 60, 1.0, &coarse, 0.0, (-100.0, 100.0), 1);
         assert_eq!((r.low[(50, 30)], r.count[(50, 30)]), (4, 7));
-        let none = Ranges::from_coarser(4, 4, 1.0, &Grid::filled(2, 2, f32::NAN), 0.0, (-100.0, 100.0));
+        let none = Ranges::from_coarser(4, 4, 1.0, &Grid::filled(2, 2, f32::NAN), 0.0, (-100.0, 100.0), 1);
         assert_eq!((none.low[(0, 0)], none.count[(0, 0)]), (-100, 201));
     }
 }
