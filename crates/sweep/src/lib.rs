@@ -22,9 +22,10 @@
 //! | compression of the results | 2 | 7 |
 //! | the rest, below a percent each | 21 | 21 |
 //!
-//! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; best runs beside other work on the machine):
-//! 0.5 · 10⁹ hypotheses per second and source for the costs, 0.9 · 10⁹ for the aggregation over eight directions, 0.24 · 10⁹ for a
-//! level of a pair as a whole. Nearly half of the costs' time goes to laying sources over tiles and to moving costs from planes to pixels.
+//! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; the less as the bench had it on a slow evening of
+//! the host, the more as best runs): 0.4 to 0.5 · 10⁹ hypotheses per second and source for the costs, 0.6 to 0.9 · 10⁹ for the
+//! aggregation over eight directions, 0.15 to 0.24 · 10⁹ for a level of a pair as a whole. Nearly half of the costs' time goes to laying
+//! sources over tiles and to moving costs from planes to pixels.
 //! The aggregation waits neither for memory nor for the path along the row: it is bound by its instructions, some 370 for a pixel
 //! and four directions. In scenes a pixel has ten to twenty hypotheses, so that what is done once per pixel counts as much as the
 //! vectors: ranges that follow the heights save more than faster kernels would.
