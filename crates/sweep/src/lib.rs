@@ -11,16 +11,16 @@
 //!
 //! | stage | seven views | triplet |
 //! |---|--:|--:|
-//! | costs: shifted pictures, census, differences, columns to pixels | 20 | 13 |
-//! | sources laid over tiles (and over views, for the tie points) | 8 | 4 |
-//! | tie points | 13 | 3 |
-//! | consistency | 9 | 4 |
-//! | read-out, support, ranges | 9 | 12 |
-//! | aggregation | 7 | 11 |
-//! | fusion, speckle, filling, confidence | 4 | 10 |
-//! | the operating system: pages, files | 7 | 15 |
-//! | compression of the results | 2 | 7 |
-//! | the rest, below a percent each | 21 | 21 |
+//! | costs: shifted pictures, census, differences, columns to pixels | 25 | 17 |
+//! | sources laid over tiles (and over views, for the tie points), pyramids | 15 | 8 |
+//! | tie points, adjustment, cameras | 19 | 7 |
+//! | consistency | 10 | 5 |
+//! | read-out, support, ranges | 5 | 9 |
+//! | aggregation | 5 | 7 |
+//! | fusion, speckle, filling, confidence, pictures | 4 | 12 |
+//! | the operating system: pages, files | 9 | 17 |
+//! | compression of the results | 2 | 9 |
+//! | the rest, below a percent each | 6 | 9 |
 //!
 //! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; the less as the bench had it on a slow evening of
 //! the host, the more as best runs): 0.4 to 0.5 · 10⁹ hypotheses per second and source for the costs, 0.6 to 0.9 · 10⁹ for the
