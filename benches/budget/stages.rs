@@ -100,9 +100,8 @@ impl<'a> Scene<'a> {
     fn sweep(&self, index: usize, level: usize, ranges: &Ranges, known: Known) -> anyhow::Result<HeightMap> {
         let at = |index: usize| self.views[index].on_level(index, level);
         let sources: Vec<SourceLevel<'_>> = (0..self.views.len()).filter(|&i| i != index).map(at).collect();
-        let aggregation = if sources.len() > 2 { Aggregation::BestOf(2) } else { Aggregation::Variance };
         let mut config = LevelConfig::default();
-        config.cost.aggregation = aggregation;
+        config.cost.aggregation = Aggregation::of_sources(sources.len());
         if known == Known::RangeAlone {
             config.penalties = Penalties { step: 0, jump: 0, jump_at_edge: 0 };
         }

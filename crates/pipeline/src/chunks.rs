@@ -281,7 +281,6 @@ impl ChunkedScene<'_> {
             top_level: level,
             bottom_level: level,
             sources: sources.to_vec(),
-            best_of: self.tuning.best_of,
             reach: self.tuning.reach,
             level: self.tuning.level,
             priors: Vec::new(),

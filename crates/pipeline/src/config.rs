@@ -107,9 +107,6 @@ impl DsmConfig {
     }
 }
 
-/// Two of the sources see even the ground beside a wall, and on dates like the reference's; the third best may not.
-const BEST_OF: usize = 2;
-
 /// The parameters that a preset stands for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Tuning {
@@ -119,8 +116,6 @@ pub(crate) struct Tuning {
     pub(crate) finest_level: usize,
     /// Sources per view, at most.
     pub(crate) sources: usize,
-    /// How many of the best sources count at a pixel.
-    pub(crate) best_of: usize,
     /// How far around a coarse pixel the next level takes over heights to search, coarse pixels.
     pub(crate) reach: usize,
     /// Cost, penalties and read-out.
@@ -139,6 +134,6 @@ impl Preset {
             Self::Balanced => (0, 4, EDGE_REACH),
             Self::Accurate => (0, 8, 2 * EDGE_REACH),
         };
-        Tuning { step_px: 0.5, finest_level, sources, best_of: BEST_OF, reach, level: LevelConfig::default() }
+        Tuning { step_px: 0.5, finest_level, sources, reach, level: LevelConfig::default() }
     }
 }

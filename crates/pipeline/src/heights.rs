@@ -24,8 +24,6 @@ pub(crate) struct SweepPlan {
     pub(crate) bottom_level: usize,
     /// For each view, the views it is compared with.
     pub(crate) sources: Vec<Vec<usize>>,
-    /// How many of the best sources count, at most.
-    pub(crate) best_of: usize,
     /// How far around a coarse pixel heights are taken over, coarse pixels.
     pub(crate) reach: usize,
     /// Cost, penalties and read-out.
@@ -123,10 +121,7 @@ fn sweep_view(
     };
     let sources: Vec<SourceLevel<'_>> = plan.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
     let mut config = plan.level;
-    config.cost.aggregation = match sources.len() {
-        0..=2 => Aggregation::Variance,
-        n => Aggregation::BestOf(plan.best_of.min(n)),
-    };
+    config.cost.aggregation = Aggregation::of_sources(sources.len());
     let reference = Reference { view: reference, level: level as u32, ranges: &ranges, prior };
     let map = sweep_level(reference, &sources, origin_m, &config)?;
     Ok((map, ranges.evaluations()))

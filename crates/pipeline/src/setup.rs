@@ -194,16 +194,14 @@ pub(crate) fn with_towers(
         return Ok(range_m);
     }
     let step_m = height_step(sources, geometry, tuning);
-    let (level, best_of) = (tuning.level, tuning.best_of);
     let plan = SweepPlan {
         range_m,
         step_m,
         top_level: 0,
         bottom_level: 0,
         sources: sources.to_vec(),
-        best_of,
         reach: tuning.reach,
-        level,
+        level: tuning.level,
         priors: Vec::new(),
     };
     let Some(found) = crate::probe::extended_range(views, &plan, gsd_m, &smallest_sides(views))? else {
@@ -247,7 +245,6 @@ pub(crate) fn plan_sweep(
         top_level,
         bottom_level,
         sources,
-        best_of: tuning.best_of,
         reach: tuning.reach,
         level: tuning.level,
         priors: Vec::new(),

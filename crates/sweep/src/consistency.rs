@@ -122,10 +122,10 @@ fn agrees(map: &HeightMap, q: [f64; 2], height_m: f64, tolerance_m: f64) -> bool
     // The pixels to the right and below; casts of what is not negative round down.
     let (right, below) = ((q[0] + 1.0) as usize, (q[1] + 1.0) as usize);
     let wanted = height_m - map.origin_m;
-    let rows = below.saturating_sub(1)..(below + 1).min(map.height_m.height());
+    let mut rows = below.saturating_sub(1)..(below + 1).min(map.height_m.height());
     let columns = right.saturating_sub(1)..(right + 1).min(map.height_m.width());
     let near = |h: &f32| (f64::from(*h) - wanted).abs() <= tolerance_m;
-    columns.start < columns.end && rows.into_iter().any(|y| map.height_m.row(y)[columns.clone()].iter().any(near))
+    columns.start < columns.end && rows.any(|y| map.height_m.row(y)[columns.clone()].iter().any(near))
 }
 
 /// Least and greatest height in a window.

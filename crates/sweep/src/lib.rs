@@ -6,7 +6,7 @@
 //! result does not depend on how the work is divided.
 //!
 //! # Where the time goes
-//! Of the samples of `perf` in `skysweep dsm` (default preset, two cores of AMD EPYC, 2026-11-21), in percent, for the seven views of
+//! Of the samples of `perf record`, grouped by symbol, in `skysweep dsm` (default preset, two cores of AMD EPYC, 2026-11-21), in percent, for the seven views of
 //! JAX_068 and for the Pléiades triplet of the quarry:
 //!
 //! | stage | seven views | triplet |
@@ -22,13 +22,11 @@
 //! | compression of the results | 2 | 9 |
 //! | the rest, below a percent each | 6 | 9 |
 //!
-//! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; the less as the bench had it on a slow evening of
-//! the host, the more as best runs): 0.4 to 0.5 · 10⁹ hypotheses per second and source for the costs, 0.6 to 0.9 · 10⁹ for the
-//! aggregation over eight directions, 0.15 to 0.24 · 10⁹ for a level of a pair as a whole. Nearly half of the costs' time goes to laying
-//! sources over tiles and to moving costs from planes to pixels.
-//! The aggregation waits neither for memory nor for the path along the row: it is bound by its instructions, some 370 for a pixel
-//! and four directions. In scenes a pixel has ten to twenty hypotheses, so that what is done once per pixel counts as much as the
-//! vectors: ranges that follow the heights save more than faster kernels would.
+//! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; on a slow evening of the host):
+//! 0.4 · 10⁹ hypotheses per second and source for the costs, 0.58 · 10⁹ for the aggregation over eight directions, 0.15 · 10⁹ for a
+//! level of a pair as a whole. Much of the costs' time goes to laying sources over tiles and to moving costs from planes to
+//! pixels. In scenes a pixel has ten to twenty hypotheses, so that what is done once per pixel counts as much as the vectors:
+//! ranges that follow the heights save more than faster kernels would.
 
 pub mod consistency;
 pub mod cost;
@@ -47,6 +45,7 @@ mod support;
 mod testing;
 pub mod view;
 mod volume;
+mod window_sums;
 
 pub use geometry::{TileMap, source_from_reference};
 pub use level::{HeightMap, LevelConfig, sweep_level};

@@ -9,6 +9,7 @@ use multiversion::multiversion;
 use raster::Window;
 
 use crate::cost::{COST_MAX, SourceLevel, census_scale};
+use crate::window_sums::window_sums;
 
 /// Half width of the window, pixels: 81 patches bring the spread of a mean at chance down to a few percent.
 const REACH: usize = 4;
@@ -44,44 +45,16 @@ fn contrast_of_row(rows: [&[f32]; 3], scale: f32, out: &mut [f32]) {
 }
 
 fn share(best: &[u8], contrast: &[f32], width: usize) -> Vec<f32> {
-    // In units of the cost, so that the sums over the window are exact.
+    // In units of the cost, so that the sums over the window are exact; 81 costs fit 16 bits.
     let costs: Vec<u16> = best.iter().zip(contrast).map(|(b, c)| if c.is_nan() { 0 } else { u16::from(*b) }).collect();
     let held: Vec<u16> =
         contrast.iter().map(|c| if c.is_nan() { 0 } else { (c * f32::from(COST_MAX)).round() as u16 }).collect();
-    let (costs, held) = (window_sums(&costs, width), window_sums(&held, width));
+    let (costs, held) = (window_sums(&costs, width, REACH), window_sums(&held, width, REACH));
     let share = |(cost, held): (&u16, &u16)| match held {
         0 => 0.0,
         _ => (1.0 - f32::from(*cost) / f32::from(*held)).max(0.0),
     };
     costs.iter().zip(&held).map(share).collect()
-}
-
-/// Sums over the window around every pixel, cut at the borders; 81 costs fit 16 bits.
-fn window_sums(values: &[u16], width: usize) -> Vec<u16> {
-    let height = values.len() / width;
-    let mut rows = vec![0; values.len()];
-    for (to, from) in rows.chunks_exact_mut(width).zip(values.chunks_exact(width)) {
-        let mut sum: u16 = from[..REACH.min(width)].iter().sum();
-        for (x, to) in to.iter_mut().enumerate() {
-            sum += from.get(x + REACH).copied().unwrap_or(0);
-            *to = sum;
-            sum -= x.checked_sub(REACH).map_or(0, |left| from[left]);
-        }
-    }
-    let row = |y: usize| &rows[y * width..(y + 1) * width];
-    let mut sums = vec![0u16; width];
-    (0..REACH.min(height)).for_each(|y| sums.iter_mut().zip(row(y)).for_each(|(s, v)| *s += v));
-    let mut out = vec![0; values.len()];
-    for (y, to) in out.chunks_exact_mut(width).enumerate() {
-        if y + REACH < height {
-            sums.iter_mut().zip(row(y + REACH)).for_each(|(s, v)| *s += v);
-        }
-        to.copy_from_slice(&sums);
-        if let Some(above) = y.checked_sub(REACH) {
-            sums.iter_mut().zip(row(above)).for_each(|(s, v)| *s -= v);
-        }
-    }
-    out
 }
 
 #[cfg(test)]

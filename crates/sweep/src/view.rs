@@ -66,8 +66,7 @@ impl View {
         let image = &self.levels[level];
         let mut out = Grid::filled(image.width(), image.height(), false);
         for y in 1..image.height().saturating_sub(1) {
-            let rows = [image.row(y - 1), image.row(y), image.row(y + 1)].map(|row| row.windows(3));
-            let [above, own, below] = rows;
+            let [above, own, below] = [y - 1, y, y + 1].map(|y| image.row(y).windows(3));
             for (blank, ((a, b), c)) in out.row_mut(y)[1..].iter_mut().zip(above.zip(own).zip(below)) {
                 let all = |row: &[f32]| (row[0] == b[1]) & (row[1] == b[1]) & (row[2] == b[1]);
                 *blank = all(a) & all(b) & all(c);
@@ -126,6 +125,15 @@ fn noise_deviation(g: &Grid<f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pixel_is_blank_where_its_whole_patch_has_one_value() {
+        let value = |i: usize| if (2..6).contains(&(i % 9)) && i / 9 < 5 { 255.0 } else { (i * i % 251) as f32 };
+        let image = Grid::from_vec(9, 8, (0..72).map(value).collect()).unwrap();
+        let blank = View { levels: vec![image], ..View::absent(crate::testing::leaning_camera(9, [0.0; 2])) }.blank(0);
+        let expected = |i: usize| (3..5).contains(&(i % 9)) && (1..4).contains(&(i / 9));
+        assert!((0..72).all(|i| blank.data()[i] == expected(i)), "{blank:?}");
+    }
 
     #[test]
     fn the_contrast_of_a_ramp_is_its_slope_on_every_level() {

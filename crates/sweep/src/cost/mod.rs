@@ -33,6 +33,16 @@ pub enum Aggregation {
     BestOf(usize),
 }
 
+/// Two of the sources see even the ground beside a wall, and on dates like the reference's; the third best may not.
+const BEST: usize = 2;
+
+impl Aggregation {
+    /// That for so many sources: the best count where there are others.
+    pub fn of_sources(count: usize) -> Self {
+        if count > BEST { Self::BestOf(BEST) } else { Self::Variance }
+    }
+}
+
 /// Parameters of the cost volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CostConfig {
@@ -46,7 +56,7 @@ pub struct CostConfig {
 
 impl Default for CostConfig {
     fn default() -> Self {
-        Self { aggregation: Aggregation::BestOf(2), tile: 64, map_tolerance_px: 0.02 }
+        Self { aggregation: Aggregation::BestOf(BEST), tile: 64, map_tolerance_px: 0.02 }
     }
 }
 

@@ -131,8 +131,8 @@ fn interpolate(before: &Nearest, behind: &Nearest, config: &FillConfig) -> Optio
     let base = known[1];
     let across = || before.iter().zip(behind).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let is_narrow = across().any(|(a, b)| a.apart + b.apart <= config.narrow_cells);
-    let hides = |k: &&Known| k.apart <= (k.height_m - base.height_m) * config.hidden_cells_per_m;
-    let is_hidden = known.iter().filter(|k| k.in_sight).any(|k| hides(&k));
+    let hides = |k: &Known| k.apart <= (k.height_m - base.height_m) * config.hidden_cells_per_m;
+    let is_hidden = known.iter().any(|k| k.in_sight && hides(k));
     let is_between = across().any(|(a, b)| a.in_sight && b.in_sight);
     if !is_narrow && !is_hidden && !is_between {
         return None;

@@ -73,7 +73,8 @@ pub fn place_view(
     frame: &GridFrame<'_>,
 ) -> Result<PlacedView, SweepError> {
     let weights = border_weights(&heights.map.height_m, jump_m);
-    let vertices = place(heights, level, keep, &weights, frame)?;
+    let mut vertices = place(heights, level, keep, frame)?;
+    vertices.data_mut().iter_mut().zip(weights.data()).for_each(|(vertex, weight)| vertex.weight = *weight);
     let windows = tiles(Window::whole(vertices.width(), vertices.height()), TILE);
     let extents = windows.into_iter().filter_map(|w| Some((w, extent(&vertices, w)?))).collect();
     Ok(PlacedView { vertices, extents })
@@ -90,9 +91,8 @@ pub fn mark_cells(
     frame: &GridFrame<'_>,
     cells: &mut Grid<bool>,
 ) -> Result<(), SweepError> {
-    let weights = Grid::filled(pixels.width(), pixels.height(), 1.0);
     for w in tiles(Window::whole(pixels.width(), pixels.height()), TILE) {
-        let vertices = place_tile(heights, level, w, (pixels, &weights), frame)?;
+        let vertices = place_tile(heights, level, w, pixels, frame)?;
         for v in vertices.iter().flat_map(|tile| tile.data()).filter(|v| !v.h.is_nan() && v.x >= 0.0 && v.y >= 0.0) {
             let at = (v.x as usize, v.y as usize);
             if at.0 < cells.width() && at.1 < cells.height() {
@@ -170,16 +170,13 @@ fn place(
     heights: Heights<'_>,
     level: u32,
     keep: &Grid<bool>,
-    weights: &Grid<f32>,
     frame: &GridFrame<'_>,
 ) -> Result<Grid<Vertex>, SweepError> {
     let map = heights.map;
     let (width, height) = (map.height_m.width(), map.height_m.height());
     let windows = tiles(Window::whole(width, height), TILE);
-    let parts: Vec<Option<Grid<Vertex>>> = windows
-        .par_iter()
-        .map(|w| place_tile(heights, level, *w, (keep, weights), frame))
-        .collect::<Result<_, SweepError>>()?;
+    let parts: Vec<Option<Grid<Vertex>>> =
+        windows.par_iter().map(|w| place_tile(heights, level, *w, keep, frame)).collect::<Result<_, SweepError>>()?;
     let mut out = Grid::filled(width, height, NO_VERTEX);
     for (w, part) in windows.iter().zip(&parts) {
         part.iter().for_each(|part| paste(&mut out, *w, part));
@@ -192,7 +189,7 @@ fn place_tile(
     heights: Heights<'_>,
     level: u32,
     w: Window,
-    (keep, weights): (&Grid<bool>, &Grid<f32>),
+    keep: &Grid<bool>,
     frame: &GridFrame<'_>,
 ) -> Result<Option<Grid<Vertex>>, SweepError> {
     let map = heights.map;
@@ -223,7 +220,7 @@ fn place_tile(
             }
             let (p, height_m) = ([at.0 as f64, at.1 as f64], map.origin_m + f64::from(h));
             let [cx, cy] = if fits { local.at(p, height_m) } else { exact(p, height_m).map_err(failed)? };
-            out[(x, y)] = Vertex { x: cx as f32, y: cy as f32, h, sigma: map.sigma_m[at], weight: weights[at] };
+            out[(x, y)] = Vertex { x: cx as f32, y: cy as f32, h, sigma: map.sigma_m[at], weight: 1.0 };
         }
     }
     Ok(Some(out))

@@ -7,6 +7,8 @@
 
 use raster::Grid;
 
+use crate::window_sums::window_sums;
+
 /// What a cell without any agreement around it is worth beside one with full agreement: its height was interpolated from
 /// what is around, and that deviates more or less.
 const INTERPOLATED: f64 = 0.1;
@@ -18,51 +20,20 @@ const INTERPOLATED: f64 = 0.1;
 pub fn reliability(height_m: &Grid<f32>, agreement: &Grid<f32>, reach: usize, same_surface_m: f64) -> Grid<f32> {
     let known = |h: &f32| if h.is_nan() { 0.0 } else { 1.0 };
     let value = |h: &f32| if h.is_nan() { 0.0 } else { f64::from(*h) };
-    let count = window_sums(&height_m.map(known), reach);
-    let sum = window_sums(&height_m.map(value), reach);
-    let squares = window_sums(&height_m.map(|h| value(h).powi(2)), reach);
-    let agreed = window_sums(&agreement.map(value), reach);
     let (width, height) = (height_m.width(), height_m.height());
+    let sums = |grid: Grid<f64>| window_sums(grid.data(), width, reach);
+    let count = sums(height_m.map(known));
+    let sum = sums(height_m.map(value));
+    let squares = sums(height_m.map(|h| value(h).powi(2)));
+    let agreed = sums(agreement.map(value));
     let mut out = height_m.clone();
     for (i, out) in out.data_mut().iter_mut().enumerate().filter(|(_, h)| !h.is_nan()) {
-        let n = count.data()[i];
-        let mean = sum.data()[i] / n;
-        let deviation_m = (squares.data()[i] / n - mean * mean).max(0.0).sqrt();
+        let n = count[i];
+        let mean = sum[i] / n;
+        let deviation_m = (squares[i] / n - mean * mean).max(0.0).sqrt();
         let cells = span(i % width, reach, width).len() * span(i / width, reach, height).len();
-        let share = (INTERPOLATED + agreed.data()[i] / cells as f64) / (INTERPOLATED + 1.0);
+        let share = (INTERPOLATED + agreed[i] / cells as f64) / (INTERPOLATED + 1.0);
         *out = (share / (1.0 + deviation_m / same_surface_m)) as f32;
-    }
-    out
-}
-
-/// Sums over the square of half width `reach` around every cell, as much of it as there is.
-fn window_sums(grid: &Grid<f64>, reach: usize) -> Grid<f64> {
-    let (width, height) = (grid.width(), grid.height());
-    let mut rows = Grid::filled(width, height, 0.0);
-    let mut before = vec![0.0; width + 1];
-    for y in 0..height {
-        for (x, value) in grid.row(y).iter().enumerate() {
-            before[x + 1] = before[x] + value;
-        }
-        for (x, sum) in rows.row_mut(y).iter_mut().enumerate() {
-            let span = span(x, reach, width);
-            *sum = before[span.end] - before[span.start];
-        }
-    }
-    let mut out = Grid::filled(width, height, 0.0);
-    let mut sums = vec![0.0; width];
-    let add = |sums: &mut [f64], y: usize, sign: f64| {
-        sums.iter_mut().zip(rows.row(y)).for_each(|(sum, row)| *sum += sign * row);
-    };
-    (0..reach.min(height)).for_each(|y| add(&mut sums, y, 1.0));
-    for y in 0..height {
-        if y + reach < height {
-            add(&mut sums, y + reach, 1.0);
-        }
-        if y > reach {
-            add(&mut sums, y - reach - 1, -1.0);
-        }
-        out.row_mut(y).copy_from_slice(&sums);
     }
     out
 }
@@ -89,12 +60,5 @@ mod tests {
         assert!((all[(2, 10)] - 0.1 / 1.1).abs() < 1e-6, "{}", all[(2, 10)]);
         assert!((all[(36, 10)] - 1.0 / 1.1 / 2.5).abs() < 0.01, "{}", all[(36, 10)]);
         assert!(all[(2, 10)] < all[(9, 10)] && all[(9, 10)] < all[(16, 10)]);
-    }
-
-    #[test]
-    fn sums_are_those_of_the_window() {
-        let grid = Grid::from_vec(5, 3, (0..15).map(f64::from).collect()).unwrap();
-        let sums = window_sums(&grid, 1);
-        assert_eq!((sums[(0, 0)], sums[(2, 1)], sums[(4, 2)]), (12.0, 63.0, 44.0));
     }
 }
