@@ -1,59 +1,93 @@
 //! A patch of one image searched for in another, bent by the local map between them.
 
-use raster::{Grid, bicubic};
+use multiversion::multiversion;
+use raster::{Grid, bicubic_along};
+
+/// Values that are worked on together; rows of patches are padded to whole ones.
+const LANES: usize = 8;
 
 /// A zero-mean, unit-norm patch of `2 · radius + 1` pixels.
 pub(crate) struct Patch {
-    radius: i32,
+    side: usize,
+    /// In rows of [`padded`]`(side)`, 0 behind the patch.
     values: Vec<f32>,
+}
+
+/// As much as the rows of a patch of `side` pixels take, and what can be read from where it is compared.
+pub(crate) fn padded(side: usize) -> usize {
+    side.next_multiple_of(LANES)
 }
 
 impl Patch {
     /// The patch around a pixel; `None` when it leaves the image, holds invalid pixels, or is flatter than the noise.
     pub(crate) fn around(image: &Grid<f32>, [x, y]: [f64; 2], radius: i32, noise: f32) -> Option<Self> {
-        let mut values = Vec::with_capacity(((2 * radius + 1) * (2 * radius + 1)) as usize);
-        for j in -radius..=radius {
-            for i in -radius..=radius {
-                let value = bicubic(image, x + f64::from(i), y + f64::from(j));
-                if value.is_nan() {
-                    return None;
-                }
-                values.push(value);
-            }
+        let side = 2 * radius as usize + 1;
+        let mut values = vec![0.0; padded(side) * side];
+        for (row, j) in values.chunks_exact_mut(padded(side)).zip(-radius..) {
+            bicubic_along(image, [x - f64::from(radius), y + f64::from(j)], [1.0, 0.0], &mut row[..side]);
         }
-        let n = values.len() as f32;
-        let mean = values.iter().sum::<f32>() / n;
-        values.iter_mut().for_each(|v| *v -= mean);
-        let square: f32 = values.iter().map(|v| v * v).sum();
-        if square <= n * noise * noise {
+        let own = || values.chunks_exact(padded(side)).flat_map(|row| &row[..side]);
+        let n = (side * side) as f32;
+        let mean = own().sum::<f32>() / n;
+        let square: f32 = own().map(|v| (v - mean) * (v - mean)).sum();
+        // Not so where a value is none.
+        if !(square > n * noise * noise) {
             return None;
         }
         let scale = square.sqrt().recip();
-        values.iter_mut().for_each(|v| *v *= scale);
-        Some(Self { radius, values })
+        for row in values.chunks_exact_mut(padded(side)) {
+            row[..side].iter_mut().for_each(|v| *v = (*v - mean) * scale);
+        }
+        Some(Self { side, values })
     }
 
-    /// The values, row after row.
-    pub(crate) fn values(&self) -> &[f32] {
-        &self.values
+    /// The sum of the products with the part of a picture that begins at `(x, y)`, whose values are all numbers; there are as many
+    /// of them as [`padded`] says.
+    pub(crate) fn product_at(&self, picture: &Grid<f32>, at: (usize, usize)) -> f32 {
+        product(&self.values, padded(self.side), picture, at)
     }
 
     /// Zero-mean normalised cross-correlation with the part of a picture (of mean near 0) that begins at `(x, y)`; `None`
-    /// where that holds invalid pixels or is flatter than the noise.
-    pub(crate) fn correlation_at(&self, picture: &Grid<f32>, (x, y): (usize, usize), noise: f32) -> Option<f32> {
-        let side = 2 * self.radius as usize + 1;
-        let (mut sum, mut square, mut product) = (0.0f32, 0.0f32, 0.0f32);
-        for (j, own) in self.values.chunks_exact(side).enumerate() {
-            for (a, b) in own.iter().zip(&picture.row(y + j)[x..x + side]) {
-                sum += b;
-                square += b * b;
-                product += a * b;
-            }
-        }
-        let n = self.values.len() as f32;
+    /// where that holds invalid pixels or is flatter than the noise. The picture has as many columns as [`padded`] says.
+    pub(crate) fn correlation_at(&self, picture: &Grid<f32>, at: (usize, usize), noise: f32) -> Option<f32> {
+        let [sum, square, product] = moments(&self.values, self.side, picture, at);
+        let n = (self.side * self.side) as f32;
         let spread = square - sum * sum / n;
         (spread > n * noise * noise).then(|| product / spread.sqrt())
     }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn product(values: &[f32], stride: usize, picture: &Grid<f32>, (x, y): (usize, usize)) -> f32 {
+    let mut sums = [0.0f32; LANES];
+    for (j, own) in values.chunks_exact(stride).enumerate() {
+        let other = &picture.row(y + j)[x..x + stride];
+        for (a, b) in own.as_chunks::<LANES>().0.iter().zip(other.as_chunks::<LANES>().0) {
+            (0..LANES).for_each(|i| sums[i] += a[i] * b[i]);
+        }
+    }
+    sums.iter().sum()
+}
+
+/// Sums of the picture's values, of their squares, and of their products with a patch of `side` columns.
+#[multiversion(targets("x86_64+avx2"))]
+fn moments(values: &[f32], side: usize, picture: &Grid<f32>, (x, y): (usize, usize)) -> [f32; 3] {
+    let stride = side.next_multiple_of(LANES);
+    let (mut sum, mut square, mut product) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+    for (j, own) in values.chunks_exact(stride).enumerate() {
+        let other = &picture.row(y + j)[x..x + stride];
+        let chunks = own.as_chunks::<LANES>().0.iter().zip(other.as_chunks::<LANES>().0);
+        for (k, (a, b)) in chunks.enumerate() {
+            for i in 0..LANES {
+                // What lies behind the patch does not count, whatever it is.
+                let b = if k * LANES + i < side { b[i] } else { 0.0 };
+                sum[i] += b;
+                square[i] += b * b;
+                product[i] += a[i] * b;
+            }
+        }
+    }
+    [sum, square, product].map(|lanes| lanes.iter().sum())
 }
 
 /// Offset in [−0.5, 0.5] of the peak of a parabola through values at −1, 0, 1; 0 where there is no peak.
@@ -63,4 +97,42 @@ pub(crate) fn parabola_peak(left: f32, middle: f32, right: f32) -> f64 {
         return 0.0;
     }
     (0.5 * (f64::from(left) - f64::from(right)) / curvature).clamp(-0.5, 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture with a void, and the correlation as it is defined.
+    #[test]
+    fn the_correlation_is_that_of_the_definition() {
+        let value = |x: usize, y: usize| ((x * x + 3 * y * y + x * y) as f32 * 0.37).sin() * 20.0;
+        let grid =
+            |f: &dyn Fn(usize, usize) -> f32| Grid::from_vec(40, 30, (0..1200).map(|i| f(i % 40, i / 40)).collect());
+        let image = grid(&value).unwrap();
+        let mut other = grid(&|x, y| 3.0 * value(x + 2, y + 1) + 0.5 * value(y, x)).unwrap();
+        other[(33, 5)] = f32::NAN;
+        let patch = Patch::around(&image, [15.0, 12.0], 7, 0.1).unwrap();
+        let window = |g: &Grid<f32>, x: usize, y: usize| -> Vec<f64> {
+            let v: Vec<f64> = (0..225).map(|i| f64::from(g[(x + i % 15, y + i / 15)])).collect();
+            let mean = v.iter().sum::<f64>() / 225.0;
+            v.iter().map(|v| v - mean).collect()
+        };
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let a = window(&image, 8, 5);
+        for at in [(6, 4), (0, 0), (18, 3), (3, 14)] {
+            let b = window(&other, at.0, at.1);
+            let expected = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
+            let found = patch.correlation_at(&other, at, 0.1).unwrap();
+            assert!((f64::from(found) - expected).abs() < 1e-4, "{found} {expected} at {at:?}");
+            let product = f64::from(patch.product_at(&other, at)) / dot(&b, &b).sqrt();
+            assert!(at == (18, 3) || (product - expected).abs() < 1e-4, "{product} {expected} at {at:?}");
+        }
+        assert_eq!(patch.correlation_at(&other, (19, 0), 0.1), None);
+        assert!(patch.correlation_at(&image, (8, 5), 0.1).unwrap() > 0.9999);
+        assert!(
+            Patch::around(&other, [30.0, 6.0], 7, 0.1).is_none() && Patch::around(&image, [3.0, 9.0], 7, 0.1).is_none()
+        );
+        assert!(Patch::around(&image, [15.0, 12.0], 7, 30.0).is_none());
+    }
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::coarse::Coarse;
 use super::interest::corners;
 use super::moments::remove_mean;
-use super::patch::{Patch, parabola_peak};
+use super::patch::{Patch, padded, parabola_peak};
 use crate::geometry::source_from_reference;
 use crate::view::View;
 
@@ -131,10 +131,11 @@ impl Pair<'_> {
         let centre = self.chain(at, level, height_m).ok()?;
         let from = [centre[0] + start[0], centre[1] + start[1]];
         let reach = config.radius + REACH;
-        let mut picture = Grid::filled(2 * reach as usize + 1, 2 * reach as usize + 1, f32::NAN);
+        let (side, whole) = (2 * config.radius as usize + 1, 2 * reach as usize + 1);
+        let mut picture = Grid::filled(whole + padded(side) - side, whole, f32::NAN);
         for j in 0..picture.height() {
             let line = frame.place(from, -reach, j as i32 - reach);
-            bicubic_along(&self.source.levels[level], line, frame.column_step(), picture.row_mut(j));
+            bicubic_along(&self.source.levels[level], line, frame.column_step(), &mut picture.row_mut(j)[..whole]);
         }
         remove_mean(picture.data_mut());
         let noise = self.source.noise_at(level);
