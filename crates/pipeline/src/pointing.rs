@@ -11,6 +11,9 @@ use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Tie, TieConfig, Trac
 /// Ties of a wide search that one shift per view leaves further apart than this do not belong together, pixels.
 const WIDE_RESIDUAL_PX: f64 = 1.0;
 
+/// One of so many points is tried over all heights, before the others are near those that it shows.
+const FEW: usize = 5;
+
 /// Ties of one pair of views.
 #[derive(Debug, Clone)]
 pub(crate) struct PairTies {
@@ -22,8 +25,8 @@ pub(crate) struct PairTies {
     pub(crate) ties: Vec<Tie>,
 }
 
-/// Matches the pairs, given best first. The first one with enough ties narrows the height range of the rest. A pair that
-/// gives too few is searched again for a gross pointing error.
+/// Matches the pairs, given best first. A few points of the first one with enough ties narrow the height range of the others, and
+/// all of them that of the other pairs. A pair that gives too few is searched again for a gross pointing error.
 pub(crate) fn match_pairs(
     views: &[View],
     pairs: &[(usize, usize)],
@@ -33,19 +36,27 @@ pub(crate) fn match_pairs(
 ) -> Vec<PairTies> {
     let mut range = range_m;
     let mut out = Vec::with_capacity(pairs.len());
+    // Everything may lie as far outside what is seen as that's own spread, and 100 m more.
+    let narrowed = |found: &PairTies| {
+        let seen = heights_seen(views, found)?;
+        let margin = (seen.1 - seen.0) + 100.0;
+        Some(((seen.0 - margin).max(range_m.0), (seen.1 + margin).min(range_m.1)))
+    };
     for &(reference, source) in pairs {
+        let is_wide = range == range_m;
+        if is_wide {
+            let few = TieConfig { points: config.points / FEW, ..*config };
+            let ties = match_pair(&views[reference], &views[source], range, &few);
+            range = narrowed(&PairTies { reference, source, ties }).unwrap_or(range_m);
+        }
         let ties = match_pair(&views[reference], &views[source], range, config);
         let mut found = PairTies { reference, source, ties };
         if found.ties.len() < TIES_MIN {
             let ties = match_pair(&views[reference], &views[source], range, &wide_search(config));
             found = verified(views, PairTies { reference, source, ties });
         }
-        if range == range_m
-            && let Some(seen) = heights_seen(views, &found)
-        {
-            // Everything may lie as far outside what the first pair saw as that pair's own spread, and 100 m more.
-            let margin = (seen.1 - seen.0) + 100.0;
-            range = ((seen.0 - margin).max(range_m.0), (seen.1 + margin).min(range_m.1));
+        if is_wide {
+            range = narrowed(&found).unwrap_or(range_m);
         }
         out.push(found);
         done();

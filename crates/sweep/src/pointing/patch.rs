@@ -30,8 +30,7 @@ impl Patch {
         let n = (side * side) as f32;
         let mean = own().sum::<f32>() / n;
         let square: f32 = own().map(|v| (v - mean) * (v - mean)).sum();
-        // Not so where a value is none.
-        if !(square > n * noise * noise) {
+        if square.is_nan() || square <= n * noise * noise {
             return None;
         }
         let scale = square.sqrt().recip();
