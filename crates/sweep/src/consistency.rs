@@ -4,6 +4,7 @@
 //! within a tolerance. The tolerance is a length: the height by which the parallax between the two views changes by a
 //! stated number of pixels (SkySplat's |Δh|/|h| < 0.2 breaks near and below height 0; SatMVS uses < 1 px and < 2.5 m).
 
+use multiversion::multiversion;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
@@ -84,26 +85,55 @@ fn count_in_tile(
     let exact = |p, h| source_from_reference(&reference.view.camera, &source.view.camera, level, p, h);
     // A source whose camera does not reach the tile has nothing to say there.
     let Ok(map) = TileMap::fit(corners, range, exact) else { return Ok(()) };
-    let failed = |e| SweepError::Camera { view: source.index, source: e };
     let fits = map.max_error_px <= config.map_tolerance_px;
     let parallax = parallax_per_metre(&map);
-    let tolerance_m = config.tolerance_px / parallax.max(f64::MIN_POSITIVE);
+    let tolerance_m = (config.tolerance_px / parallax.max(f64::MIN_POSITIVE)) as f32;
+    let apart_m = (reference.map.origin_m - source.map.origin_m) as f32;
+    let mut pixels = Pixels { right: vec![0; w.width], below: vec![0; w.width] };
     for y in 0..w.height {
-        for x in 0..w.width {
-            let at = (w.x as usize + x, w.y as usize + y);
-            let own = reference.map.height_m[at];
-            if own.is_nan() {
-                continue;
+        let gy = w.y as usize + y;
+        let own = &reference.map.height_m.row(gy)[w.x as usize..][..w.width];
+        if fits {
+            pixels.follow(&map, [w.x as f64, gy as f64], own, reference.map.origin_m);
+        } else {
+            let failed = |e| SweepError::Camera { view: source.index, source: e };
+            for (x, h) in own.iter().enumerate().filter(|(_, h)| !h.is_nan()) {
+                let p = [(w.x as usize + x) as f64, gy as f64];
+                pixels.put(x, exact(p, reference.map.origin_m + f64::from(*h)).map_err(failed)?);
             }
-            let height_m = reference.map.origin_m + f64::from(own);
-            let p = [at.0 as f64, at.1 as f64];
-            let q = if fits { map.at(p, height_m) } else { exact(p, height_m).map_err(failed)? };
-            if agrees(source.map, q, height_m, tolerance_m) {
-                counts[(x, y)] = counts[(x, y)].saturating_add(1);
-            }
+        }
+        let at = pixels.right.iter().zip(&pixels.below);
+        for ((count, at), own) in counts.row_mut(y).iter_mut().zip(at).zip(own).filter(|(_, own)| !own.is_nan()) {
+            let agrees = agrees(&source.map.height_m, at, own + apart_m, tolerance_m);
+            *count = count.saturating_add(u8::from(agrees));
         }
     }
     Ok(())
+}
+
+/// Where the pixels of a row are seen in the source: the pixels to the right and below.
+struct Pixels {
+    right: Vec<i32>,
+    below: Vec<i32>,
+}
+
+impl Pixels {
+    /// The row that begins at `first`, at its heights above the origin.
+    fn follow(&mut self, map: &TileMap, first: [f64; 2], height_m: &[f32], origin_m: f64) {
+        follow_row(map, first, height_m, origin_m, &mut self.right, &mut self.below);
+    }
+
+    fn put(&mut self, x: usize, q: [f64; 2]) {
+        (self.right[x], self.below[x]) = ((q[0] + 1.0).floor() as i32, (q[1] + 1.0).floor() as i32);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn follow_row(map: &TileMap, first: [f64; 2], height_m: &[f32], origin_m: f64, right: &mut [i32], below: &mut [i32]) {
+    for (x, ((right, below), h)) in right.iter_mut().zip(below).zip(height_m).enumerate() {
+        let q = map.at([first[0] + x as f64, first[1]], origin_m + f64::from(*h));
+        (*right, *below) = ((q[0] + 1.0).floor() as i32, (q[1] + 1.0).floor() as i32);
+    }
 }
 
 /// Source pixels per metre of height.
@@ -113,19 +143,22 @@ fn parallax_per_metre(map: &TileMap) -> f64 {
     (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
-/// Whether one of the four pixels around `q` has a height within the tolerance.
-fn agrees(map: &HeightMap, q: [f64; 2], height_m: f64, tolerance_m: f64) -> bool {
-    // Also for a position that is no number.
-    if !(q[0] >= -1.0 && q[1] >= -1.0) {
+/// Whether one of four pixels, of which the last is named, has a height within the tolerance.
+#[inline(always)]
+fn agrees(map: &Grid<f32>, (right, below): (&i32, &i32), wanted: f32, tolerance_m: f32) -> bool {
+    // One that is less than 0 becomes more than any.
+    let (right, below) = (*right as u32 as usize, *below as u32 as usize);
+    if right > map.width() || below > map.height() {
         return false;
     }
-    // The pixels to the right and below; casts of what is not negative round down.
-    let (right, below) = ((q[0] + 1.0) as usize, (q[1] + 1.0) as usize);
-    let wanted = height_m - map.origin_m;
-    let mut rows = below.saturating_sub(1)..(below + 1).min(map.height_m.height());
-    let columns = right.saturating_sub(1)..(right + 1).min(map.height_m.width());
-    let near = |h: &f32| (f64::from(*h) - wanted).abs() <= tolerance_m;
-    columns.start < columns.end && rows.any(|y| map.height_m.row(y)[columns.clone()].iter().any(near))
+    let columns = right.saturating_sub(1)..(right + 1).min(map.width());
+    let rows = below.saturating_sub(1)..(below + 1).min(map.height());
+    let near = |h: f32| (h - wanted).abs() <= tolerance_m;
+    if let (&[a, b], 2) = (&map.row(rows.start)[columns.clone()], rows.len()) {
+        let [c, d] = [columns.start, columns.end - 1].map(|x| map.row(rows.end - 1)[x]);
+        return near(a) | near(b) | near(c) | near(d);
+    }
+    rows.into_iter().any(|y| map.row(y)[columns.clone()].iter().any(|h| near(*h)))
 }
 
 /// Least and greatest height in a window.

@@ -72,6 +72,7 @@ impl TileMap {
     }
 
     /// The source position of a reference position at a height.
+    #[inline(always)]
     pub fn at(&self, p: [f64; 2], height_m: f64) -> [f64; 2] {
         let c = self.centre_at(height_m);
         let d = [p[0] - self.centre[0], p[1] - self.centre[1]];
@@ -107,6 +108,7 @@ impl TileMap {
         self.mid_height_m
     }
 
+    #[inline(always)]
     fn centre_at(&self, height_m: f64) -> [f64; 2] {
         let t = height_m - self.mid_height_m;
         let f = |c: [f64; 3]| c[0] + t * (c[1] + t * c[2]);

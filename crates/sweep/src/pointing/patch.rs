@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use raster::{Grid, bicubic_along};
 
 /// Values that are worked on together; rows of patches are padded to whole ones.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
 /// A zero-mean, unit-norm patch of `2 · radius + 1` pixels.
 pub(crate) struct Patch {
@@ -57,11 +57,10 @@ impl Patch {
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn product(values: &[f32], stride: usize, picture: &Grid<f32>, (x, y): (usize, usize)) -> f32 {
+fn product(values: &[f32], stride: usize, picture: &Grid<f32>, at: (usize, usize)) -> f32 {
     let mut sums = [0.0f32; LANES];
-    for (j, own) in values.chunks_exact(stride).enumerate() {
-        let other = &picture.row(y + j)[x..x + stride];
-        for (a, b) in own.as_chunks::<LANES>().0.iter().zip(other.as_chunks::<LANES>().0) {
+    for (own, other) in rows(values, stride, picture, at) {
+        for (a, b) in own.iter().zip(other) {
             (0..LANES).for_each(|i| sums[i] += a[i] * b[i]);
         }
     }
@@ -70,13 +69,10 @@ fn product(values: &[f32], stride: usize, picture: &Grid<f32>, (x, y): (usize, u
 
 /// Sums of the picture's values, of their squares, and of their products with a patch of `side` columns.
 #[multiversion(targets("x86_64+avx2"))]
-fn moments(values: &[f32], side: usize, picture: &Grid<f32>, (x, y): (usize, usize)) -> [f32; 3] {
-    let stride = side.next_multiple_of(LANES);
+fn moments(values: &[f32], side: usize, picture: &Grid<f32>, at: (usize, usize)) -> [f32; 3] {
     let (mut sum, mut square, mut product) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
-    for (j, own) in values.chunks_exact(stride).enumerate() {
-        let other = &picture.row(y + j)[x..x + stride];
-        let chunks = own.as_chunks::<LANES>().0.iter().zip(other.as_chunks::<LANES>().0);
-        for (k, (a, b)) in chunks.enumerate() {
+    for (own, other) in rows(values, side.next_multiple_of(LANES), picture, at) {
+        for (k, (a, b)) in own.iter().zip(other).enumerate() {
             for i in 0..LANES {
                 // What lies behind the patch does not count, whatever it is.
                 let b = if k * LANES + i < side { b[i] } else { 0.0 };
@@ -87,6 +83,21 @@ fn moments(values: &[f32], side: usize, picture: &Grid<f32>, (x, y): (usize, usi
         }
     }
     [sum, square, product].map(|lanes| lanes.iter().sum())
+}
+
+type Lanes = [f32; LANES];
+
+/// The rows of a patch, each with the part of the picture that it lies over from `(x, y)` on.
+#[inline(always)]
+fn rows<'a>(
+    values: &'a [f32],
+    stride: usize,
+    picture: &'a Grid<f32>,
+    (x, y): (usize, usize),
+) -> impl Iterator<Item = (&'a [Lanes], &'a [Lanes])> {
+    let under = picture.data()[y * picture.width() + x..].chunks(picture.width());
+    let whole = move |row: &'a [f32]| row[..stride].as_chunks::<LANES>().0;
+    values.chunks_exact(stride).zip(under).map(move |(own, other)| (whole(own), whole(other)))
 }
 
 /// Offset in [−0.5, 0.5] of the peak of a parabola through values at −1, 0, 1; 0 where there is no peak.
