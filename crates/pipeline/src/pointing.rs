@@ -66,8 +66,7 @@ pub(crate) fn match_pairs(
 
 /// Those of a pair's ties that one correction brings together: a wide search finds more that is alike by chance.
 fn verified(views: &[View], pair: PairTies) -> PairTies {
-    let config = AdjustConfig { max_order: ModelOrder::Translation, ..AdjustConfig::default() };
-    let (adjustment, tracks) = adjust_views(views, std::slice::from_ref(&pair), &config);
+    let (adjustment, tracks) = adjust_views(views, std::slice::from_ref(&pair), &shifts());
     if adjustment.residual_px.1 > WIDE_RESIDUAL_PX {
         return PairTies { ties: Vec::new(), ..pair };
     }
@@ -83,8 +82,13 @@ pub(crate) fn heights_seen(views: &[View], pair: &PairTies) -> Option<(f64, f64)
     if pair.ties.len() < TIES_MIN {
         return None;
     }
-    let adjustment = adjust_views(views, std::slice::from_ref(pair), &AdjustConfig::default()).0;
+    let adjustment = adjust_views(views, std::slice::from_ref(pair), &shifts()).0;
     span_of(&adjustment, TIES_MIN)
+}
+
+/// For one pair, of which nothing more is asked than heights and whether its ties belong together.
+fn shifts() -> AdjustConfig {
+    AdjustConfig { max_order: ModelOrder::Translation, ..AdjustConfig::default() }
 }
 
 /// Least and greatest height of an adjustment's inliers, when there are at least `min` of them.

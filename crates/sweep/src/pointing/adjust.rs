@@ -9,6 +9,7 @@
 use camera::{CameraError, ImageCorrection, ImagePoint, RpcCamera};
 use geodesy::LonLatHeight;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// One ground point seen in two or more views: (view, position in full-resolution pixels).
 pub type Track = Vec<(usize, ImagePoint)>;
@@ -65,8 +66,10 @@ pub struct Adjustment {
     pub ground: Vec<Option<LonLatHeight>>,
 }
 
-/// Rounds of re-triangulation and reweighting; the problem is nearly linear, so the weights settle within these.
+/// Rounds of re-triangulation and reweighting, at most; the problem is nearly linear, so the weights settle within these.
 const ROUNDS: usize = 8;
+/// Smaller steps end the rounds, pixels: hundreds of ties do not tell as much.
+const SETTLED_PX: f64 = 1e-4;
 /// Residuals beyond this many robust deviations are outliers.
 const OUTLIER: f64 = 4.0;
 /// Ties share the errors of relief and light around them: they weigh no more than this many independent ones. Against
@@ -124,15 +127,19 @@ fn fit(
     for _ in 0..rounds {
         let current = corrected(cameras, sizes, &x, order);
         let reduced: Vec<Reduced> =
-            tracks.iter().filter_map(|t| reduce(&current, sizes, t, order).map(|(r, _)| r)).collect();
+            tracks.par_iter().filter_map(|t| reduce(&current, sizes, t, order).map(|(r, _)| r)).collect();
         scale = robust_scale(reduced.iter().map(|r| norm_px(&r.residual)));
         if n > 0 {
-            x += solve(&reduced, &x, scale, &prior_weights(&x, order, config));
+            let step = solve(&reduced, &x, scale, &prior_weights(&x, order, config));
+            x += &step;
+            if step.amax() < SETTLED_PX {
+                break;
+            }
         }
     }
     let current = corrected(cameras, sizes, &x, order);
     let found: Vec<Option<(Reduced, LonLatHeight)>> =
-        tracks.iter().map(|t| reduce(&current, sizes, t, order)).collect();
+        tracks.par_iter().map(|t| reduce(&current, sizes, t, order)).collect();
     let norms: Vec<f64> = found.iter().flatten().map(|(r, _)| norm_px(&r.residual)).collect();
     scale = if norms.is_empty() { scale } else { robust_scale(norms.iter().copied()) };
     let limit = OUTLIER * scale;
