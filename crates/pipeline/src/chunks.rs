@@ -285,7 +285,7 @@ impl ChunkedScene<'_> {
             level: self.tuning.level,
             priors: Vec::new(),
         };
-        let Some(found) = probe::seen_range(&views, &plan, level)? else { return Ok(self.range_m) };
+        let Some(found) = probe::seen_range(&views, &plan, level, self.range_m)? else { return Ok(self.range_m) };
         let (lo, hi) = found.range_m;
         let margin = MARGIN_M.max(0.1 * (hi - lo));
         let near = ((lo - margin).max(wide.0), (hi + margin).min(wide.1));

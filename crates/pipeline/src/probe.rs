@@ -7,7 +7,7 @@
 //! For a chunk of a large scene the same sweep tells its whole range: see [`seen_range`].
 
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::{HeightMap, SweepError, View};
+use sweep::{HeightMap, SweepError, View, source_from_reference};
 
 use crate::heights::{SceneHeights, SweepPlan, sweep_scene};
 
@@ -15,8 +15,9 @@ use crate::heights::{SceneHeights, SweepPlan, sweep_scene};
 const BELOW_M: f64 = 150.0;
 /// … and above them: all but a dozen buildings of the world.
 const ABOVE_M: f64 = 450.0;
-/// Pixels of about this size are swept, metres: a slim tower is three of them wide.
-const PIXEL_M: f64 = 4.0;
+/// Pixels of up to this size are swept, metres: a slim tower is three of them wide. Images whose pixels are half a metre in name
+/// have some that are a little more.
+const PIXEL_M: f64 = 4.2;
 /// The level swept keeps at least this many pixels on a side.
 const SIDE_MIN: usize = 48;
 /// Least confidence of a height that counts.
@@ -52,8 +53,8 @@ pub(crate) fn extended_range(
     let level = level_of(gsd_m, sides);
     let range = plan.range_m;
     let wide = widened(range);
-    let found =
-        sure_heights(views, &SweepPlan { range_m: wide, ..plan.clone() }, level, |h| h < range.0 || h > range.1)?;
+    let coarse = SweepPlan { range_m: wide, ..plan.clone() };
+    let found = sure_heights(views, &coarse, level, range, |h| h < range.0 || h > range.1)?;
     let (lo, hi) = extremes(&found);
     let range_m = ((lo - MARGIN_M).min(range.0), (hi + MARGIN_M).max(range.1));
     Ok((!found.is_empty()).then_some(Extended { range_m, pixels: found.len() }))
@@ -71,12 +72,17 @@ pub(crate) fn level_of(gsd_m: f64, sides: &[usize]) -> usize {
 }
 
 /// Least and greatest height that a sweep of one level over the plan's range shows for sure, and how many pixels do;
-/// `None` where nothing is sure.
+/// `None` where nothing is sure. Most heights are within `usual_m`.
 ///
 /// # Errors
 /// Those of the consistency check.
-pub(crate) fn seen_range(views: &[View], plan: &SweepPlan, level: usize) -> Result<Option<Extended>, SweepError> {
-    let found = sure_heights(views, plan, level, |_| true)?;
+pub(crate) fn seen_range(
+    views: &[View],
+    plan: &SweepPlan,
+    level: usize,
+    usual_m: (f64, f64),
+) -> Result<Option<Extended>, SweepError> {
+    let found = sure_heights(views, plan, level, usual_m, |_| true)?;
     Ok((!found.is_empty()).then(|| Extended { range_m: extremes(&found), pixels: found.len() }))
 }
 
@@ -84,11 +90,13 @@ fn extremes(heights: &[f64]) -> (f64, f64) {
     heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, h| (a.0.min(*h), a.1.max(*h)))
 }
 
-/// The heights of pixels that nothing speaks against, among those that are asked for.
+/// The heights of pixels that nothing speaks against, among those that are asked for. An unusual height says nothing where the
+/// other view does not show what the pixel would be at a usual one: a likeness is then the best that there is.
 fn sure_heights(
     views: &[View],
     plan: &SweepPlan,
     level: usize,
+    usual_m: (f64, f64),
     is_asked: impl Fn(f64) -> bool,
 ) -> Result<Vec<f64>, SweepError> {
     let coarse = SweepPlan { top_level: level, bottom_level: level, ..plan.clone() };
@@ -105,11 +113,26 @@ fn sure_heights(
         let counts_for = |h: f32, at: (usize, usize)| {
             let height_m = map.origin_m + f64::from(h);
             let is_sure = map.confidence[at] >= CONFIDENCE_MIN && map.support[at] >= SUPPORT_MIN;
-            is_asked(height_m) && is_sure && counts[at] >= needed
+            let is_usual = || (usual_m.0..=usual_m.1).contains(&height_m);
+            let sees = |other: &&Heights<'_>| shows(&views[index], other, level, at, usual_m);
+            is_asked(height_m)
+                && is_sure
+                && counts[at] >= needed
+                && (is_usual() || others.iter().filter(sees).count() >= usize::from(needed))
         };
         asked.extend(patches(map, step_m, counts_for).into_iter().map(|h| (index, h)));
     }
     Ok(shared(asked, 2.0 * f64::from(step_m)))
+}
+
+/// Whether another view shows what a pixel of a level sees, if that is at any height of a range.
+fn shows(view: &View, other: &Heights<'_>, level: usize, (x, y): (usize, usize), range_m: (f64, f64)) -> bool {
+    let size = [other.map.height_m.width(), other.map.height_m.height()];
+    let is_inside = |h: f64| {
+        source_from_reference(&view.camera, &other.view.camera, level as u32, [x as f64, y as f64], h)
+            .is_ok_and(|q| (0..2).all(|axis| (0.0..=size[axis] as f64 - 1.0).contains(&q[axis])))
+    };
+    is_inside(range_m.0) && is_inside(range_m.1)
 }
 
 /// The heights that pixels of at least two views have, to a tolerance, and enough pixels in all.
