@@ -10,36 +10,34 @@ use super::COST_MAX;
 pub(crate) const INVALID: u8 = 255;
 /// A difference of the census that counts fully; those of −`FULL` to `FULL` − 1 fit a byte.
 pub(crate) const FULL: f32 = 128.0;
-/// Sums of eight differences, each at most twice [`FULL`], times this over [`PARTS`] are costs: [`COST_MAX`] for a mean of [`FULL`].
-const SHARE: u16 = COST_MAX as u16 / 16;
-const PARTS: u16 = 8 * FULL as u16 / 16;
 /// Grey values are cut here: the cubic interpolation may overshoot by 1.25 in each direction before a 16-bit integer is full.
 const GREY_MAX: f32 = 20_000.0;
+/// One in so many values tells well enough around which grey value integers lie.
+const MEAN_STEP: usize = 4;
 /// A void says nothing of a height, so that two views suffice where a third has one; but a height that takes fewer views
 /// into account must not win by having fewer that can disagree. Its weight is one part of these.
 const VALID_WEIGHT: u16 = 4;
 
-/// Turns grey values into integers around the mean, `scale` to one; NaN becomes 0 and is marked in `voids`, which stays empty
-/// where there is none.
-pub(crate) fn quantise(values: &[f32], scale: f32, out: &mut Vec<i16>, voids: &mut Vec<u8>) {
-    let (sum, known) = sum_known(values);
-    let mean = if known > 0.0 { sum / known } else { 0.0 };
-    let mean = if mean.is_finite() { mean } else { 0.0 };
-    out.resize(values.len(), 0);
-    round(values, mean, scale, out);
-    voids.clear();
-    if (known as usize) < values.len() {
-        voids.extend(values.iter().map(|v| if v.is_nan() { INVALID } else { 0 }));
-    }
+/// Turns grey values into integers around the mean, `scale` to one, with some more behind them; NaN becomes 0. Tells whether
+/// there is one.
+pub(crate) fn quantise(values: &[f32], scale: f32, behind: usize, out: &mut Vec<i16>) -> bool {
+    let mean = rough_mean(values);
+    out.resize(values.len() + behind, 0);
+    round(values, mean, scale, out)
 }
 
-/// The sum of all values but NaN, and their number.
+/// The mean of a part of the values, or of all where that part has none, NaN left out; 0 where all are.
+fn rough_mean(values: &[f32]) -> f32 {
+    [MEAN_STEP, 1].into_iter().map(|step| mean_of(values, step)).find(|mean| mean.is_finite()).unwrap_or(0.0)
+}
+
+/// The mean of every `step`th sixteen values, NaN left out.
 #[multiversion(targets("x86_64+avx2+fma"))]
-fn sum_known(values: &[f32]) -> (f32, f32) {
+fn mean_of(values: &[f32], step: usize) -> f32 {
     const LANES: usize = 16;
     let (mut sum, mut known) = ([0.0f32; LANES], [0.0f32; LANES]);
     let (whole, rest) = values.as_chunks::<LANES>();
-    for values in whole {
+    for values in whole.iter().step_by(step) {
         for i in 0..LANES {
             let is_known = !values[i].is_nan();
             sum[i] += if is_known { values[i] } else { 0.0 };
@@ -47,119 +45,26 @@ fn sum_known(values: &[f32]) -> (f32, f32) {
         }
     }
     let rest = rest.iter().filter(|v| !v.is_nan());
-    (sum.iter().sum::<f32>() + rest.clone().sum::<f32>(), known.iter().sum::<f32>() + rest.count() as f32)
+    (sum.iter().sum::<f32>() + rest.clone().sum::<f32>()) / (known.iter().sum::<f32>() + rest.count() as f32)
 }
 
+/// Rounds what differs from the mean; tells whether a value is NaN.
 #[multiversion(targets("x86_64+avx2+fma"))]
-fn round(values: &[f32], mean: f32, scale: f32, out: &mut [i16]) {
+fn round(values: &[f32], mean: f32, scale: f32, out: &mut [i16]) -> bool {
     // Adding 1.5 · 2²³ leaves the rounded integer in the lowest bits of the sum, which vectorises; a cast does not.
     const ROUND: f32 = 12_582_912.0;
+    let mut has_nan = 0;
     for (o, v) in out.iter_mut().zip(values) {
         // `clamp` passes a NaN on, whose lowest bits are 0: `View` keeps no others.
         *o = (((v - mean) * scale).clamp(-GREY_MAX, GREY_MAX) + ROUND).to_bits() as i16;
+        has_nan |= i32::from(v.is_nan());
     }
+    has_nan != 0
 }
 
 /// A weight of an interpolation, in 2¹⁵ths.
 pub(crate) fn fixed(weight: f32) -> i16 {
     (weight * 32_768.0).round().min(32_767.0) as i16
-}
-
-/// The graded census of a picture: every pixel's difference to the neighbours to the right, below, below on the right, and
-/// of its right neighbour to the one below; the other four are those of neighbours.
-#[derive(Default)]
-pub(crate) struct Census {
-    /// One byte per pixel of the padded tile each, [`FULL`] for no difference; the last column or row is not used.
-    pub(crate) grades: [Vec<u8>; 4],
-}
-
-impl Census {
-    /// Grades a tile of `width` columns.
-    pub(crate) fn fill(&mut self, tile: &[i16], width: usize) {
-        self.grades.iter_mut().for_each(|g| g.resize(tile.len(), 0));
-        let [right, below, falling, rising] = &mut self.grades;
-        grade(tile, width, right, below, falling, rising);
-    }
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-fn grade(tile: &[i16], width: usize, right: &mut [u8], below: &mut [u8], falling: &mut [u8], rising: &mut [u8]) {
-    // What the last columns and the last row get is not used.
-    let n = tile.len();
-    codes(&tile[1..], &tile[..n - 1], right);
-    codes(&tile[width..], &tile[..n - width], below);
-    codes(&tile[width + 1..], &tile[..n - width - 1], falling);
-    codes(&tile[width..], &tile[1..n - width + 1], rising);
-}
-
-/// The grades of differences.
-#[inline(always)]
-fn codes(to: &[i16], from: &[i16], out: &mut [u8]) {
-    for ((o, to), from) in out.iter_mut().zip(to).zip(from) {
-        *o = (to.saturating_sub(*from).clamp(-128, 127) as i8 as u8) ^ 0x80;
-    }
-}
-
-/// The cost of every pixel of two padded tiles of `width` columns: the mean absolute difference of their census in
-/// [`FULL`]ths, cut at 1, which is what unrelated pictures differ by, as 0 to [`COST_MAX`].
-pub(crate) fn census_cost(a: &Census, b: &Census, width: usize, apart: &mut [Vec<u8>; 4], out: &mut [u8]) {
-    for ((a, b), d) in a.grades.iter().zip(&b.grades).zip(apart.iter_mut()) {
-        d.resize(a.len(), 0);
-        differ(a, b, d);
-    }
-    let [right, below, falling, rising] = apart;
-    gather(right, below, falling, rising, width, out);
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-fn differ(a: &[u8], b: &[u8], out: &mut [u8]) {
-    for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
-        *o = a.abs_diff(*b);
-    }
-}
-
-/// The mean of the eight differences around every pixel of the core.
-#[multiversion(targets("x86_64+avx2"))]
-fn gather(right: &[u8], below: &[u8], falling: &[u8], rising: &[u8], width: usize, out: &mut [u8]) {
-    let core = width - 2;
-    for (y, o) in out.chunks_exact_mut(core).enumerate() {
-        let (upper, own) = (y * width, (y + 1) * width);
-        let (left, on) = (&right[own..own + core], &right[own + 1..own + 1 + core]);
-        let (up, down) = (&below[upper + 1..upper + 1 + core], &below[own + 1..own + 1 + core]);
-        let (up_left, down_right) = (&falling[upper..upper + core], &falling[own + 1..own + 1 + core]);
-        let (up_right, down_left) = (&rising[upper + 1..upper + 1 + core], &rising[own..own + core]);
-        for x in 0..core {
-            let two = |a: u8, b: u8| u16::from(a) + u16::from(b);
-            let beside = two(left[x], on[x]) + two(up[x], down[x]);
-            let across = two(up_left[x], down_right[x]) + two(up_right[x], down_left[x]);
-            o[x] = (((beside + across) * SHARE + PARTS / 2) / PARTS).min(u16::from(COST_MAX)) as u8;
-        }
-    }
-}
-
-/// Marks in `voids` (rows of `stride`) every place from which a square of `side` to the right and below holds a marked one.
-#[multiversion(targets("x86_64+avx2"))]
-pub(crate) fn spread(voids: &mut [u8], stride: usize, side: usize) {
-    for row in voids.chunks_exact_mut(stride) {
-        for _ in 1..side {
-            (1..stride).for_each(|x| row[x - 1] |= row[x]);
-        }
-    }
-    let mut rest = voids;
-    while let Some((row, below)) = rest.split_at_mut_checked(stride) {
-        for other in below.chunks(stride).take(side - 1) {
-            row.iter_mut().zip(other).for_each(|(v, other)| *v |= other);
-        }
-        rest = below;
-    }
-}
-
-/// Makes the costs of rows of `width` invalid where `voids` (rows of `stride`) are marked.
-#[multiversion(targets("x86_64+avx2"))]
-pub(crate) fn hide(costs: &mut [u8], width: usize, voids: &[u8], stride: usize) {
-    for (costs, voids) in costs.chunks_exact_mut(width).zip(voids.chunks(stride)) {
-        costs.iter_mut().zip(voids).for_each(|(c, v)| *c |= v);
-    }
 }
 
 /// Keeps the smaller of two rows in `a` and the larger in `b`.
@@ -173,17 +78,34 @@ pub(crate) fn sort_pair(a: &mut [u8], b: &mut [u8]) {
 }
 
 /// `out`: the weighted mean of each pixel's costs, in which an invalid one counts as chance does, [`COST_MAX`], and a
-/// valid one [`VALID_WEIGHT`] times as much.
-#[multiversion(targets("x86_64+avx2"))]
-pub(crate) fn mean_cost(costs: &[Vec<u8>], sums: &mut [u16], weights: &mut [u16], out: &mut [u8]) {
-    if let [only] = costs {
-        out.iter_mut().zip(only).for_each(|(o, c)| *o = (*c).min(COST_MAX));
-        return;
+/// valid one [`VALID_WEIGHT`] times as much. `is_hidden` tells whether one is invalid.
+pub(crate) fn mean_cost(costs: &[Vec<u8>], is_hidden: bool, sums: &mut [u16], weights: &mut [u16], out: &mut [u8]) {
+    match costs {
+        [a, b] if !is_hidden => mean_of_two(a, b, out),
+        [a, b, c] if !is_hidden => mean_of_three([a, b, c], out),
+        _ => {
+            sums.fill(0);
+            weights.fill(0);
+            costs.iter().for_each(|pair| add_cost(pair, sums, weights));
+            divide(sums, weights, out);
+        }
     }
-    sums.fill(0);
-    weights.fill(0);
-    costs.iter().for_each(|pair| add_cost(pair, sums, weights));
-    divide(sums, weights, out);
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn mean_of_two(a: &[u8], b: &[u8], out: &mut [u8]) {
+    for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
+        *o = (u16::from(*a) + u16::from(*b)).div_ceil(2) as u8;
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn mean_of_three([a, b, c]: [&[u8]; 3], out: &mut [u8]) {
+    for (((o, a), b), c) in out.iter_mut().zip(a).zip(b).zip(c) {
+        // Rounded; 21,846 is a third of 2¹⁶.
+        let sum = u16::from(*a) + u16::from(*b) + u16::from(*c) + 1;
+        *o = ((u32::from(sum) * 21_846) >> 16) as u8;
+    }
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
@@ -206,7 +128,10 @@ fn divide(sums: &[u16], weights: &[u16], out: &mut [u8]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::laid::Part;
+    use super::super::voids::Voids;
     use super::*;
+    use crate::simd::census::{CHUNK, Census, Room, census_cost, overhang};
     use proptest::prelude::*;
 
     const SIDE: usize = 3;
@@ -216,19 +141,23 @@ mod tests {
 
     /// The cost of two tiles of `side` columns each, as the sweep computes it.
     fn tile_cost(a: &[f32], b: &[f32], (scale_a, scale_b): (f32, f32), side: usize) -> Vec<u8> {
-        let mut out = vec![0; (side - 2) * (side - 2)];
+        let part = Part { within: [0; 2], width: side, height: side };
         let mut hidden = Vec::new();
         let mut graded = |tile: &[f32], scale: f32| {
-            let (mut grey, mut voids, mut census) = (Vec::new(), Vec::new(), Census::default());
-            quantise(tile, scale * FULL, &mut grey, &mut voids);
-            census.fill(&grey, side);
-            spread(&mut voids, side, 3);
+            let (mut grey, mut voids, mut census) = (Vec::new(), Voids::default(), Census::default());
+            let has_voids = quantise(tile, scale * FULL, overhang(side), &mut grey);
+            census.fill(&grey, side, tile.len());
+            voids.mark(tile, side, 3, has_voids);
             hidden.push(voids);
             census
         };
-        census_cost(&graded(a, scale_a), &graded(b, scale_b), side, &mut Default::default(), &mut out);
-        hidden.iter().for_each(|voids| hide(&mut out, side - 2, voids, side));
-        out
+        let (a, b) = (graded(a, scale_a), graded(b, scale_b));
+        let mut costs = vec![0; part.area().next_multiple_of(CHUNK)];
+        census_cost(&a, &b, side, &mut Room::default(), &mut costs);
+        for voids in hidden {
+            voids.hide((0, 0), part, INVALID, &mut costs);
+        }
+        (1..side - 1).flat_map(|y| costs[y * side + 1..(y + 1) * side - 1].to_vec()).collect()
     }
 
     /// The cost of two tiles of one patch.
@@ -288,7 +217,7 @@ mod tests {
             let cost = patch_cost(&a, &b, (0.1, 0.1));
             prop_assert!(cost <= COST_MAX || cost == INVALID, "{cost}");
             let mut out = [255];
-            mean_cost(&[vec![cost], vec![INVALID]], &mut [0], &mut [0], &mut out);
+            mean_cost(&[vec![cost], vec![INVALID]], true, &mut [0], &mut [0], &mut out);
             prop_assert!(out[0] >= cost.min(COST_MAX) && out[0] <= COST_MAX, "{out:?}");
             prop_assert!(!a.iter().chain(&b).any(|v| v.is_nan()) || cost == INVALID, "{cost} of a patch that is not valid");
         }

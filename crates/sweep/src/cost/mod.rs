@@ -13,7 +13,10 @@
 //! features and costs are bytes.
 
 mod kernels;
+mod laid;
+mod planes;
 mod tile;
+mod voids;
 
 pub use tile::Reference;
 pub(crate) use tile::{BlockCosts, TileScratch, census_scale, sweep_tile};

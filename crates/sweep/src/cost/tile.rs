@@ -1,15 +1,18 @@
 //! One tile of the reference: all height planes, all sources.
 
 use multiversion::multiversion;
-use raster::{Grid, Window, bicubic_along, cubic_weights};
+use raster::{Grid, Window};
 
-use super::kernels::{self, Census, FULL};
-use super::{Aggregation, CostConfig, SourceLevel};
+use super::kernels::{self, FULL, INVALID};
+use super::laid::{Laid, Part, Room};
+use super::planes::{PLANES_AT_ONCE, Planes, scatter};
+use super::voids::Voids;
+use super::{Aggregation, COST_MAX, CostConfig, SourceLevel};
 use crate::SweepError;
 use crate::geometry::{TileMap, source_from_reference};
 use crate::prior::Prior;
 use crate::ranges::Ranges;
-use crate::simd::{OVERHANG, Picture, shift_bicubic, transposed};
+use crate::simd::census::{CHUNK, Census, overhang};
 use crate::view::QUANTISATION_VARIANCE;
 
 /// A tile is not divided below this side: an RPC that is not smooth over eight pixels is broken.
@@ -18,13 +21,7 @@ const TILE_MIN: usize = 8;
 const PLANES_MIN: i32 = 4;
 /// The census looks at the eight neighbours, as MicMac's patches in cities do: the aggregation brings the support that they
 /// lack, and roofs keep their edges.
-const CENSUS_REACH: usize = 1;
-/// Pixels that the cubic interpolation takes in a row.
-const CUBIC_TAPS: usize = 4;
-/// Planes that are computed before their costs go to the pixels: as many as bytes in a register.
-const PLANES_AT_ONCE: usize = 16;
-/// Bytes.
-const CACHE_LINE: usize = 64;
+pub(super) const CENSUS_REACH: usize = 1;
 /// The difference that counts fully, in typical differences of the image: half of them then take part in full. Measured
 /// on simulated towns of one and of several dates and on the LiDAR truth of JAX_068, where 0.3 to 0.7 are alike.
 const FULL_DIFFERENCE: f32 = 0.5;
@@ -54,39 +51,15 @@ pub(crate) struct BlockCosts<'a> {
 #[derive(Default)]
 pub(crate) struct TileScratch {
     reference: Census,
-    reference_voids: Vec<u8>,
+    reference_voids: Voids,
     sources: Vec<Laid>,
     grey: Vec<f32>,
     padded: Vec<i16>,
-    rows: Vec<i16>,
-    apart: [Vec<u8>; 4],
+    room: Room,
     pair_costs: Vec<Vec<u8>>,
     sums: Vec<u16>,
     weights: Vec<u16>,
     planes: Planes,
-}
-
-/// Costs of a few planes, before they go to the pixels: writing them one plane at a time would cost more than computing them.
-#[derive(Default)]
-struct Planes {
-    costs: Vec<u8>,
-    /// From one plane to the next: more than a plane holds, so that planes do not share cache sets.
-    stride: usize,
-}
-
-/// A source laid over the tile, and the census of its shifted form for the current plane.
-#[derive(Default)]
-struct Laid {
-    map: Option<TileMap>,
-    picture: Vec<i16>,
-    /// Where the census of a pixel that is moved here holds a void; empty where there is none.
-    voids: Vec<u8>,
-    stride: usize,
-    rows: usize,
-    origin: [i64; 2],
-    /// Where the part's first padded pixel lies for the current plane; `None` where the source is not seen.
-    at: Option<(usize, usize)>,
-    census: Census,
 }
 
 /// Brings differences of grey values to the unit that counts fully: of the image's contrast, or of its noise where that is more.
@@ -243,9 +216,8 @@ impl TileScratch {
         self.sources.resize_with(sources.len(), Laid::default);
         let step = reference.ranges.step_m;
         for ((laid, source), map) in self.sources.iter_mut().zip(sources).zip(maps) {
-            laid.map = *map;
             let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
-            laid.lay_over(source, padded, heights, &mut self.grey);
+            laid.lay_over(source, *map, padded, heights, &mut self.grey);
         }
         let pairs = match config.aggregation {
             Aggregation::Variance => sources.len() * (sources.len() + 1) / 2,
@@ -275,57 +247,60 @@ impl TileScratch {
             return;
         }
         self.look_at(reference, part);
+        let is_all = planes == asked && (planes.1 - planes.0) as usize <= PLANES_AT_ONCE;
+        let padded = Part {
+            within: [part.x - tile.x, part.y - tile.y],
+            width: part.width + 2 * CENSUS_REACH,
+            height: part.height + 2 * CENSUS_REACH,
+        };
         for first in (planes.0..planes.1).step_by(PLANES_AT_ONCE) {
             let count = PLANES_AT_ONCE.min((planes.1 - first) as usize);
             for i in 0..count {
-                self.shift_sources(f64::from(first + i as i32) * reference.ranges.step_m, part, tile);
-                self.combine(part, i, config);
+                self.sweep_plane(f64::from(first + i as i32) * reference.ranges.step_m, padded, i, config);
             }
-            scatter(reference.ranges, part, (first, count), &self.planes, block);
+            scatter(reference.ranges, part, (first, count), is_all, &mut self.planes, block);
         }
     }
 
     /// Takes the reference's picture of a part of the tile, and the room that its planes need.
     fn look_at(&mut self, reference: Reference<'_>, part: Window) {
         let padded = part.grown(CENSUS_REACH);
-        let (area, core) = (padded.width * padded.height, part.width * part.height);
-        self.rows.resize(padded.width * (padded.height + 3) + OVERHANG, 0);
+        let area = padded.width * padded.height;
+        let whole = area.next_multiple_of(CHUNK);
         self.grey.resize(area, 0.0);
-        self.sums.resize(core, 0);
-        self.weights.resize(core, 0);
-        self.pair_costs.iter_mut().for_each(|c| c.resize(core, 0));
-        self.planes.stride = core + CACHE_LINE;
-        self.planes.costs.resize(PLANES_AT_ONCE * self.planes.stride, 0);
+        self.sums.resize(whole, 0);
+        self.weights.resize(whole, 0);
+        self.pair_costs.iter_mut().for_each(|c| c.resize(whole, 0));
+        self.planes.fit(padded.width, area);
         copy_window(reference.view.image, padded, &mut self.grey);
         let scale = FULL * census_scale(&reference.view);
-        kernels::quantise(&self.grey, scale, &mut self.padded, &mut self.reference_voids);
-        kernels::spread(&mut self.reference_voids, padded.width, 2 * CENSUS_REACH + 1);
-        self.reference.fill(&self.padded, padded.width);
+        let has_voids = kernels::quantise(&self.grey, scale, overhang(padded.width), &mut self.padded);
+        self.reference_voids.mark(&self.grey, padded.width, 2 * CENSUS_REACH + 1, has_voids);
+        self.reference.fill(&self.padded, padded.width, area);
     }
 
-    /// Brings every source into the geometry of one height plane.
-    fn shift_sources(&mut self, height_m: f64, part: Window, tile: Window) {
-        let padded = part.grown(CENSUS_REACH);
-        let within = [part.x - tile.x, part.y - tile.y];
-        for laid in &mut self.sources {
-            laid.shift_to(height_m, within, (padded.width, padded.height), &mut self.rows, &mut self.padded);
+    /// The cost of a height plane, the `i`th at hand, for every pixel of the part.
+    fn sweep_plane(&mut self, height_m: f64, part: Part, i: usize, config: &CostConfig) {
+        let Self { reference, reference_voids, sources, room, pair_costs, planes, .. } = self;
+        let out = planes.plane_mut(i);
+        if let [only] = &mut sources[..] {
+            only.place(height_m, part, room);
+            only.cost(reference, part, COST_MAX, room, out);
+            reference_voids.hide((0, 0), part, COST_MAX, out);
+            return;
         }
-    }
-
-    /// The cost of the current plane, the `i`th at hand, for every pixel of the part.
-    fn combine(&mut self, part: Window, i: usize, config: &CostConfig) {
-        let width = part.width + 2 * CENSUS_REACH;
-        let out = &mut self.planes.costs[i * self.planes.stride..][..part.width * part.height];
-        let mut costs = self.pair_costs.iter_mut();
-        for (i, laid) in self.sources.iter().enumerate() {
-            if let Some(cost) = costs.next() {
-                laid.compare(Some(&self.reference), part.width, &mut self.apart, cost);
-                kernels::hide(cost, part.width, &self.reference_voids, width);
-            }
+        let mut costs = pair_costs.iter_mut();
+        let mut is_hidden = false;
+        for i in 0..sources.len() {
+            let (before, rest) = sources.split_at_mut(i);
+            let (Some(laid), Some(cost)) = (rest.first_mut(), costs.next()) else { continue };
+            laid.place(height_m, part, room);
+            is_hidden |= laid.cost(reference, part, INVALID, room, cost);
+            is_hidden |= reference_voids.hide((0, 0), part, INVALID, cost);
             if config.aggregation == Aggregation::Variance {
-                for (other, cost) in self.sources[..i].iter().zip(&mut costs) {
-                    laid.compare(other.seen(), part.width, &mut self.apart, cost);
-                    other.hide(cost, part.width);
+                laid.grade(part, room);
+                for (other, cost) in before.iter().zip(&mut costs) {
+                    is_hidden |= laid.cost_between(other, part, room, cost);
                 }
             }
         }
@@ -334,7 +309,7 @@ impl TileScratch {
             Aggregation::BestOf(k) => select_smallest(&mut self.pair_costs, k),
         };
         let used = &self.pair_costs[..used];
-        kernels::mean_cost(used, &mut self.sums, &mut self.weights, out);
+        kernels::mean_cost(used, is_hidden, &mut self.sums, &mut self.weights, out);
     }
 }
 
@@ -350,94 +325,6 @@ fn select_smallest(costs: &mut [Vec<u8>], k: usize) -> usize {
     k
 }
 
-impl Laid {
-    /// Resamples the source over the padded tile at the map's middle height, wide enough for all heights.
-    fn lay_over(&mut self, source: &SourceLevel<'_>, padded: Window, (h_lo, h_hi): (f64, f64), grey: &mut Vec<f32>) {
-        let Some(map) = self.map else { return };
-        let mut span = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-        for h in [h_lo, 0.5 * (h_lo + h_hi), h_hi] {
-            if let Some(shift) = map.shift_at(h) {
-                for (s, v) in span.iter_mut().zip(shift) {
-                    *s = [s[0].min(v), s[1].max(v)];
-                }
-            }
-        }
-        if !span.iter().flatten().all(|v| v.is_finite()) {
-            self.map = None;
-            return;
-        }
-        // One pixel before and two after for the cubic, one more at each side for the curvature between the heights.
-        let first = [span[0][0].floor() as i64 - 2, span[1][0].floor() as i64 - 2];
-        let extent = |i: usize| (span[i][1].ceil() as i64 + 3 - first[i]) as usize;
-        self.stride = padded.width + extent(0);
-        self.rows = padded.height + extent(1);
-        self.origin = first;
-        grey.resize(self.stride * self.rows, 0.0);
-        let x = (padded.x + first[0]) as f64;
-        for (row, out) in grey.chunks_exact_mut(self.stride).enumerate() {
-            let y = (padded.y + first[1] + row as i64) as f64;
-            let (from, next) = (map.at([x, y], map.mid_height_m()), map.at([x + 1.0, y], map.mid_height_m()));
-            bicubic_along(source.image, from, [next[0] - from[0], next[1] - from[1]], out);
-        }
-        kernels::quantise(grey, FULL * census_scale(source), &mut self.picture, &mut self.voids);
-        self.picture.resize(grey.len() + OVERHANG, 0);
-        kernels::spread(&mut self.voids, self.stride, CUBIC_TAPS + 2 * CENSUS_REACH);
-    }
-
-    /// Grades the picture as it lies over the part `within` the tile at a height; `moved` is for it.
-    fn shift_to(
-        &mut self,
-        height_m: f64,
-        within: [i64; 2],
-        (width, height): (usize, usize),
-        rows: &mut [i16],
-        moved: &mut Vec<i16>,
-    ) {
-        self.at = None;
-        let Some([dx, dy]) = self.map.and_then(|m| m.shift_at(height_m)) else { return };
-        let (fx, fy) = (dx.floor(), dy.floor());
-        let x0 = fx as i64 - 1 - self.origin[0] + within[0];
-        let y0 = fy as i64 - 1 - self.origin[1] + within[1];
-        let inside =
-            x0 >= 0 && y0 >= 0 && x0 as usize + width + 3 <= self.stride && y0 as usize + height + 3 <= self.rows;
-        if !inside {
-            return;
-        }
-        let at = (x0 as usize, y0 as usize);
-        self.at = Some(at);
-        let weights = (cubic_weights((dx - fx) as f32), cubic_weights((dy - fy) as f32));
-        let weights = (weights.0.map(kernels::fixed), weights.1.map(kernels::fixed));
-        let picture = Picture { data: &self.picture, stride: self.stride };
-        moved.resize(width * height + OVERHANG, 0);
-        shift_bicubic(picture, at, weights, (width, height), rows, moved);
-        self.census.fill(&moved[..width * height], width);
-    }
-
-    /// The census of the current plane, where the source is seen at all.
-    fn seen(&self) -> Option<&Census> {
-        self.at.map(|_| &self.census)
-    }
-
-    /// The costs of the current plane against another picture, in rows of `width`; invalid where this source is.
-    fn compare(&self, other: Option<&Census>, width: usize, apart: &mut [Vec<u8>; 4], costs: &mut [u8]) {
-        if let (Some(own), Some(other)) = (self.seen(), other) {
-            kernels::census_cost(other, own, width + 2 * CENSUS_REACH, apart, costs);
-        }
-        self.hide(costs, width);
-    }
-
-    /// Makes the costs of the current plane invalid where the source has voids; rows of `width`.
-    fn hide(&self, costs: &mut [u8], width: usize) {
-        match self.at {
-            None => costs.fill(kernels::INVALID),
-            Some((x, y)) if !self.voids.is_empty() => {
-                kernels::hide(costs, width, &self.voids[y * self.stride + x..], self.stride);
-            }
-            Some(_) => {}
-        }
-    }
-}
-
 /// Copies a window that may reach outside the image; NaN there.
 fn copy_window(image: &Grid<f32>, w: Window, out: &mut [f32]) {
     out.fill(f32::NAN);
@@ -447,39 +334,4 @@ fn copy_window(image: &Grid<f32>, w: Window, out: &mut [f32]) {
         let to = ((i.y - w.y) as usize + y) * w.width + (i.x - w.x) as usize;
         out[to..to + i.width].copy_from_slice(from);
     }
-}
-
-/// Writes the costs of the planes from `first` on to the pixels that ask for them.
-#[multiversion(targets("x86_64+avx2"))]
-fn scatter(ranges: &Ranges, part: Window, (first, count): (i32, usize), planes: &Planes, block: &mut BlockCosts<'_>) {
-    let (bx, by) = ((part.x - block.window.x) as usize, (part.y - block.window.y) as usize);
-    for y in 0..part.height {
-        let low = &ranges.low.row(part.y as usize + y)[part.x as usize..][..part.width];
-        let asked = &ranges.count.row(part.y as usize + y)[part.x as usize..][..part.width];
-        let offsets = &block.offsets[(by + y) * block.window.width + bx..][..part.width];
-        for x0 in (0..part.width).step_by(PLANES_AT_ONCE) {
-            let columns = transposed(&planes.costs[y * part.width + x0..], planes.stride);
-            for (x, column) in (x0..part.width).zip(&columns) {
-                let from = low[x].max(first);
-                let to = (low[x] + i32::from(asked[x])).min(first + count as i32);
-                if from < to {
-                    let at = offsets[x] as usize + (from - low[x]) as usize;
-                    put(column, (from - first) as usize, (to - from) as usize, &mut block.costs[at..]);
-                }
-            }
-        }
-    }
-}
-
-/// Writes `count` of the column's costs, from `first` on, without a loop; what lies behind in `out` stays.
-#[inline(always)]
-fn put(column: &[u8; PLANES_AT_ONCE], first: usize, count: usize, out: &mut [u8]) {
-    let Some(out) = out.first_chunk_mut::<PLANES_AT_ONCE>() else { return };
-    if count == PLANES_AT_ONCE {
-        *out = *column;
-        return;
-    }
-    let own = u128::MAX >> (8 * (PLANES_AT_ONCE - count));
-    let costs = u128::from_le_bytes(*column) >> (8 * first);
-    *out = ((costs & own) | (u128::from_le_bytes(*out) & !own)).to_le_bytes();
 }
