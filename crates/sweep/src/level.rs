@@ -131,11 +131,11 @@ fn sweep_block(
     Ok(reader.finish())
 }
 
-/// Room for a block's costs and sums, three bytes per hypothesis.
+/// Room for a block's costs and sums, two bytes per hypothesis.
 #[derive(Default)]
 struct Room {
     costs: Vec<u8>,
-    forward: Vec<u16>,
+    forward: Vec<u8>,
 }
 
 thread_local! {

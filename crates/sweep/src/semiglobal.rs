@@ -4,6 +4,8 @@
 //! the pixel before p; the result is ΣL. Hypotheses are indices on one height lattice, so pixels with different ranges
 //! meet at equal heights; a height that the previous pixel did not search can only be reached by a jump. P2 falls where
 //! the image has an edge. Path costs are bytes, cut at 255.
+//!
+//! What the first four paths add to the cost is kept in bytes too, halved and rounded up.
 
 use multiversion::multiversion;
 use multiversion::target::match_target;
@@ -11,8 +13,10 @@ use multiversion::target::match_target;
 use crate::simd::Anywhere;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::Avx2;
-use crate::simd::paths::{Task, extend_row};
-use crate::simd::rows::{Between, Row};
+use crate::simd::Instructions;
+use crate::simd::paths::{Results, Room, Task, extend_row};
+use crate::simd::pixel::JUMP_MAX;
+use crate::simd::rows::{Pixels, Row};
 
 pub(crate) use crate::simd::rows::LANES;
 
@@ -21,7 +25,7 @@ pub(crate) use crate::simd::rows::LANES;
 pub struct Penalties {
     /// For a change of one step.
     pub step: u8,
-    /// For a jump, where the image is flat.
+    /// For a jump, where the image is flat; at most 127, more counts as that.
     pub jump: u8,
     /// For a jump, across the strongest edges.
     pub jump_at_edge: u8,
@@ -50,7 +54,7 @@ pub(crate) struct Volume<'a> {
     pub(crate) edges: &'a [u8],
 }
 
-/// Sums of path costs of one row.
+/// Sums of path costs of one row; what the first four directions add is rounded up to an even number.
 #[derive(Debug, Clone, Copy)]
 pub struct RowSums<'a> {
     sums: &'a [u16],
@@ -75,12 +79,12 @@ impl RowSums<'_> {
     }
 }
 
-/// The sums of the path costs over eight directions: `read` is given every row, the last one first. `forward` is for the
-/// sums of the first four directions.
+/// The sums of the path costs over eight directions: `read` is given every row, the last one first. `forward` is for what the
+/// first four directions add.
 pub(crate) fn aggregate(
     volume: &Volume<'_>,
     penalties: Penalties,
-    forward: &mut Vec<u16>,
+    forward: &mut Vec<u8>,
     read: impl FnMut(usize, RowSums<'_>),
 ) {
     aggregate_with(volume, penalties, forward, extend_row_fast, read);
@@ -90,7 +94,7 @@ pub(crate) fn aggregate(
 fn aggregate_with(
     volume: &Volume<'_>,
     penalties: Penalties,
-    forward: &mut Vec<u16>,
+    forward: &mut Vec<u8>,
     extend_row: ExtendRow,
     mut read: impl FnMut(usize, RowSums<'_>),
 ) {
@@ -103,75 +107,70 @@ fn aggregate_with(
     let mut sweep = Sweep::new(volume, penalties, false, extend_row);
     for y in 0..volume.height {
         let first = volume.row_offsets(y)[0] as usize;
-        sweep.extend(volume, y, None, &mut forward[first..]);
+        sweep.extend(volume, y, Results::Forward(&mut forward[first..]));
     }
     let mut sweep = Sweep::new(volume, penalties, true, extend_row);
     let mut sums = vec![0; volume.row_capacity() + LANES];
     for y in (0..volume.height).rev() {
-        sweep.extend(volume, y, Some(forward), &mut sums);
+        let first = volume.row_offsets(y)[0] as usize;
+        sweep.extend(volume, y, Results::Backward(&forward[first..], &mut sums));
         read(y, RowSums { sums: &sums, offsets: volume.row_offsets(y) });
     }
 }
 
-type ExtendRow = fn(&Row, &mut Row, Task<'_>, &mut Between);
+type ExtendRow = fn(&Row, &mut Row, (Pixels<'_>, Penalties), Task<'_>, &mut Room);
 
 /// [`extend_row`] with the best instructions of the machine.
 #[multiversion(targets("x86_64+avx2"))]
-fn extend_row_fast(above: &Row, here: &mut Row, task: Task<'_>, between: &mut Between) {
+fn extend_row_fast(above: &Row, here: &mut Row, pixels: (Pixels<'_>, Penalties), task: Task<'_>, room: &mut Room) {
     match_target! {
-        "x86_64+avx2" => extend_row::<Avx2>(above, here, task, between),
-        _ => extend_row::<Anywhere>(above, here, task, between),
+        "x86_64+avx2" => extend_row_with::<Avx2>(above, here, pixels, task, room),
+        _ => extend_row_with::<Anywhere>(above, here, pixels, task, room),
     };
+}
+
+#[inline(always)]
+fn extend_row_with<I: Instructions>(
+    above: &Row,
+    here: &mut Row,
+    (pixels, penalties): (Pixels<'_>, Penalties),
+    task: Task<'_>,
+    room: &mut Room,
+) {
+    extend_row::<I>(above, here, (pixels, |edge| jump_penalty(penalties, edge)), task, room);
 }
 
 /// Four of the eight directions, row by row: from the left and from the three pixels above, or mirrored at the centre.
 struct Sweep {
-    backward: bool,
-    step: u8,
-    /// The jump penalty by the strength of the edge.
-    jumps: [u8; 256],
+    penalties: Penalties,
     above: Row,
     here: Row,
-    between: Between,
+    room: Room,
     extend_row: ExtendRow,
 }
 
 impl Sweep {
     fn new(v: &Volume<'_>, penalties: Penalties, backward: bool, extend_row: ExtendRow) -> Self {
-        let (above, here, between) = (Row::default(), Row::default(), Between::default());
-        let mut sweep = Self { backward, step: penalties.step, jumps: [0; 256], above, here, between, extend_row };
-        // Nothing comes before a path's first pixel, and staying there costs nothing: a jump neither.
-        sweep.place(v, if backward { v.height - 1 } else { 0 });
-        sweep.jumps = std::array::from_fn(|edge| jump_penalty(penalties, edge as u8));
-        sweep
+        let (above, mut here) = (Row::default(), Row::default());
+        here.place(v.row(if backward { v.height - 1 } else { 0 }), backward, |_| 0);
+        Self { penalties, above, here, room: Room::default(), extend_row }
     }
 
-    /// Takes the places and penalties of a row.
-    fn place(&mut self, v: &Volume<'_>, y: usize) {
-        let row = y * v.width..(y + 1) * v.width;
-        let pixels = v.low[row.clone()].iter().zip(v.row_offsets(y).array_windows()).zip(&v.edges[row]);
-        let jumps = &self.jumps;
-        let pixel = |((low, [from, to]), edge): ((&i32, &[u32; 2]), &u8)| {
-            (*low, (to - from) as usize, jumps[usize::from(*edge)])
-        };
-        match self.backward {
-            true => self.here.place(v.width, pixels.rev().map(pixel)),
-            false => self.here.place(v.width, pixels.map(pixel)),
-        }
-    }
-
-    /// The next row; its sums, and those `before` of all rows, go to `sums` in the order of the sweep.
-    fn extend(&mut self, v: &Volume<'_>, y: usize, before: Option<&[u16]>, sums: &mut [u16]) {
+    /// The next row.
+    fn extend(&mut self, v: &Volume<'_>, y: usize, results: Results<'_>) {
         std::mem::swap(&mut self.above, &mut self.here);
-        self.place(v, y);
-        let first = v.row_offsets(y)[0] as usize;
-        let (costs, before) = (&v.costs[first..], before.map(|all| &all[first..]));
-        let task = Task { costs, backward: self.backward, step: self.step, before, sums };
-        (self.extend_row)(&self.above, &mut self.here, task, &mut self.between);
+        let row = v.row(y);
+        let task = Task { costs: &v.costs[row.offsets[0] as usize..], step: self.penalties.step, results };
+        (self.extend_row)(&self.above, &mut self.here, (row, self.penalties), task, &mut self.room);
     }
 }
 
 impl Volume<'_> {
+    fn row(&self, y: usize) -> Pixels<'_> {
+        let row = y * self.width..(y + 1) * self.width;
+        Pixels { low: &self.low[row.clone()], offsets: self.row_offsets(y), edges: &self.edges[row] }
+    }
+
     /// Where the costs of a row's pixels begin, and those of the next row.
     fn row_offsets(&self, y: usize) -> &[u32] {
         &self.offsets[y * self.width..(y + 1) * self.width + 1]
@@ -185,9 +184,10 @@ impl Volume<'_> {
 }
 
 /// The jump penalty at a pixel: the stronger its edge is, the lower. Between two pixels it is the lower one of theirs.
+#[inline(always)]
 fn jump_penalty(p: Penalties, edge: u8) -> u8 {
     let range = u16::from(p.jump.saturating_sub(p.jump_at_edge));
-    p.jump - ((range * u16::from(edge)) / 255) as u8
+    (p.jump - ((range * u16::from(edge)) / 255) as u8).min(JUMP_MAX)
 }
 
 #[cfg(test)]
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     /// The recurrence as it is written in the module's text, over a full lattice, without ranges or guards; path costs are
-    /// cut at 255.
+    /// cut at 255, and what those from above and from the left add rounded up to an even number.
     fn reference(
         width: usize,
         height: usize,
@@ -205,7 +205,7 @@ mod tests {
         edges: &[u8],
         p: Penalties,
     ) -> Vec<Vec<u32>> {
-        let mut sums: Vec<Vec<u32>> = counts.iter().map(|&n| vec![0; n]).collect();
+        let mut sums: [Vec<Vec<u32>>; 2] = std::array::from_fn(|_| counts.iter().map(|&n| vec![0; n]).collect());
         for (dx, dy) in [(1i64, 0i64), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)] {
             let mut paths: Vec<Vec<u32>> = vec![Vec::new(); width * height];
             let xs: Vec<i64> = if dx < 0 { (0..width as i64).rev().collect() } else { (0..width as i64).collect() };
@@ -230,40 +230,64 @@ mod tests {
                         (c + smooth.min(least + jump).min(255) - least).min(255)
                     });
                     let row: Vec<u32> = row.collect();
-                    sums[at].iter_mut().zip(&row).for_each(|(s, l)| *s += l);
+                    let sums = &mut sums[usize::from(dy < 0 || (dy == 0 && dx < 0))][at];
+                    let added = row.iter().zip(&costs[at]).map(|(l, c)| l - u32::from(*c));
+                    sums.iter_mut().zip(added).for_each(|(sum, added)| *sum += added);
                     paths[at] = row;
                 }
             }
         }
-        sums
+        let [above, below] = sums;
+        let pixel = |at: usize| {
+            let added = above[at].iter().zip(&below[at]).map(|(a, b)| a.next_multiple_of(2) + b);
+            added.zip(&costs[at]).map(|(added, c)| added + 8 * u32::from(*c)).collect()
+        };
+        (0..width * height).map(pixel).collect()
+    }
+
+    fn random() -> impl FnMut(u32) -> u32 {
+        let mut state = 12345u32;
+        move |n: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % n
+        }
     }
 
     /// Neighbours that search quite other heights, nearly the same ones, and the same.
     #[test]
     fn equals_the_textbook_recurrence_with_ranges_that_differ() {
-        for (lows, counts) in [(30, 24), (300, 90), (4, 24), (4, 3), (1, 1)] {
-            compare_with_the_recurrence(lows, counts);
+        for (lows, counts) in [(30, 24), (300, 90), (4, 24), (4, 3), (1, 1), (60, 12), (3, 70)] {
+            let mut random = random();
+            let mut range = || (random(lows) as i32 - 10, 7 + random(counts) as usize);
+            let each: Vec<(i32, usize)> = (0..9 * 7).map(|_| range()).collect();
+            compare_with_the_recurrence((9, 7), |x, y| each[9 * y + x]);
+            // Squares of pixels that search alike, as the pixels of a coarser one do, and more of them than are linked at once.
+            compare_with_the_recurrence((71, 5), |x, y| each[(x / 2 + 9 * (y / 2)) % each.len()]);
+        }
+    }
+
+    #[test]
+    fn equals_the_textbook_recurrence_with_ranges_that_are_the_same() {
+        for count in [1, 7, 16, 17, 32, 33, 64, 65, 97, 130] {
+            compare_with_the_recurrence((70, 4), |_, _| (-3, count));
+            // Up and down, by more on the one side than on the other.
+            compare_with_the_recurrence((70, 4), |x, _| if x / 20 == 1 { (4, count) } else { (-3, count + 9) });
+            compare_with_the_recurrence((12, 6), |_, y| if y < 3 { (-3, count) } else { (6, count) });
         }
     }
 
     const ROWS: [(&str, ExtendRow); 2] =
-        [("this machine's instructions", extend_row_fast), ("any machine's", extend_row::<Anywhere>)];
+        [("this machine's instructions", extend_row_fast), ("any machine's", extend_row_with::<Anywhere>)];
 
-    /// First hypotheses over `lows` lattice heights, and up to `most` of them.
-    fn compare_with_the_recurrence(lows: u32, most: u32) {
-        let (width, height) = (9, 7);
-        let mut state = 12345u32;
-        let mut random = move |n: u32| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) % n
-        };
-        let low: Vec<i32> = (0..width * height).map(|_| random(lows) as i32 - 10).collect();
-        let counts: Vec<usize> = (0..width * height).map(|_| 7 + random(most) as usize).collect();
+    /// First hypotheses and how many of each pixel.
+    fn compare_with_the_recurrence((width, height): (usize, usize), range: impl Fn(usize, usize) -> (i32, usize)) {
+        let mut random = random();
+        let (low, counts): (Vec<i32>, Vec<usize>) = (0..width * height).map(|i| range(i % width, i / width)).unzip();
         let costs: Vec<Vec<u8>> = counts.iter().map(|&n| (0..n).map(|_| random(128) as u8).collect()).collect();
         let mut offsets = vec![0u32];
         counts.iter().for_each(|&n| offsets.push(offsets[offsets.len() - 1] + n as u32));
         let flat: Vec<u8> = [costs.concat(), vec![0; LANES]].concat();
-        let p = Penalties { step: 30, jump: 150, jump_at_edge: 60 };
+        let p = Penalties { step: 30, jump: 125, jump_at_edge: 60 };
         let edges: Vec<u8> = (0..width * height).map(|_| random(256) as u8).collect();
         let volume = Volume { width, height, low: &low, offsets: &offsets, costs: &flat, edges: &edges };
         let expected = reference(width, height, &low, &counts, &costs, &edges, p);
@@ -272,7 +296,10 @@ mod tests {
             aggregate_with(&volume, p, &mut Vec::new(), extend_row, |y, row| {
                 (0..width).for_each(|x| sums[y * width + x] = row.pixel(x).iter().map(|&s| u32::from(s)).collect());
             });
-            assert_eq!(sums, expected, "{name}, {lows} first heights, up to {} hypotheses", 6 + most);
+            for (at, (sums, expected)) in sums.iter().zip(&expected).enumerate() {
+                let (x, y) = (at % width, at / width);
+                assert_eq!(sums, expected, "{name}, ({x}, {y}) of {width} x {height}, {} first heights", low[at]);
+            }
         }
     }
 }

@@ -66,7 +66,7 @@ impl CostVolume {
 
     /// The sums of the path costs over eight directions, one per hypothesis: `read` is given every row's, the last row first.
     /// `forward` is room for the first half of the directions; one that is used again need not be made anew.
-    pub fn aggregate(&self, penalties: Penalties, forward: &mut Vec<u16>, read: impl FnMut(usize, RowSums<'_>)) {
+    pub fn aggregate(&self, penalties: Penalties, forward: &mut Vec<u8>, read: impl FnMut(usize, RowSums<'_>)) {
         aggregate(&self.as_block(), penalties, forward, read);
     }
 

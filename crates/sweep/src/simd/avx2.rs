@@ -1,10 +1,15 @@
 //! Bytes in registers of AVX2: for functions that are compiled for it, and nowhere else.
 
-use super::bytes::{Bytes, Half, Instructions};
+use super::bytes::{Bytes, Instructions};
+use super::rows::REACH;
 use std::arch::x86_64::*;
 
 /// The instructions of AVX2.
 pub(crate) struct Avx2;
+
+/// A byte in the first lane of a register.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct First(__m128i);
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sixteen(__m128i);
@@ -15,24 +20,32 @@ pub(crate) struct ThirtyTwo(__m256i);
 // SAFETY of all blocks below: the instructions are those of AVX2, for whose functions alone these types are; for what
 // pointers point at, the caller vouches.
 impl Instructions for Avx2 {
-    type Narrow = Sixteen;
-    type Wide = ThirtyTwo;
+    type First = First;
+    type Half = Sixteen;
+    type One = ThirtyTwo;
 
     #[inline(always)]
-    fn widened(first: Sixteen) -> ThirtyTwo {
+    fn one(half: Sixteen) -> ThirtyTwo {
         // SAFETY: as above.
-        ThirtyTwo(unsafe { _mm256_broadcastb_epi8(first.0) })
+        ThirtyTwo(unsafe { _mm256_inserti128_si256::<0>(_mm256_set1_epi8(-1), half.0) })
     }
 
     #[inline(always)]
-    fn narrowed(all: ThirtyTwo) -> Sixteen {
+    fn half(one: ThirtyTwo) -> Sixteen {
         // SAFETY: as above.
-        Sixteen(unsafe { _mm256_castsi256_si128(all.0) })
+        Sixteen(unsafe { _mm256_castsi256_si128(one.0) })
     }
 }
 
 impl Bytes for Sixteen {
     const LANES: usize = 16;
+    type First = First;
+
+    #[inline(always)]
+    fn splat_first(first: First) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm_broadcastb_epi8(first.0) })
+    }
 
     #[inline(always)]
     fn splat(value: u8) -> Self {
@@ -71,6 +84,12 @@ impl Bytes for Sixteen {
     }
 
     #[inline(always)]
+    fn average(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm_avg_epu8(self.0, other.0) })
+    }
+
+    #[inline(always)]
     fn or(self, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm_or_si128(self.0, other.0) })
@@ -89,46 +108,58 @@ impl Bytes for Sixteen {
     }
 
     #[inline(always)]
-    fn least(self) -> Self {
+    unsafe fn around(self, by: i32) -> [Self; 3] {
+        let at = (by + MIDDLE) as usize;
+        let moved = |at: usize| {
+            // SAFETY: as above; the tables are as long as any place and a register.
+            unsafe {
+                let (lanes, outside) = (LANE.as_ptr().add(at), OUTSIDE.as_ptr().add(at));
+                let moved = _mm_shuffle_epi8(self.0, _mm_loadu_si128(lanes.cast()));
+                Self(_mm_or_si128(moved, _mm_loadu_si128(outside.cast())))
+            }
+        };
+        [moved(at - 1), moved(at), moved(at + 1)]
+    }
+
+    #[inline(always)]
+    fn first(self) -> First {
+        First(self.0)
+    }
+
+    #[inline(always)]
+    fn leasts(four: [Self; 4], to: &mut [u8; 4]) -> First {
         // SAFETY: as above.
         unsafe {
             // The lesser of each two lanes as a word, of which the least can be had at once.
-            let words = _mm_min_epu8(self.0, _mm_srli_epi16::<8>(self.0));
-            Self(_mm_broadcastb_epi8(_mm_minpos_epu16(words)))
+            let least = four.map(|v| _mm_minpos_epu16(_mm_min_epu8(v.0, _mm_srli_epi16::<8>(v.0))));
+            let [a, b, c, d] = least;
+            let all = _mm_unpacklo_epi16(_mm_unpacklo_epi8(a, b), _mm_unpacklo_epi8(c, d));
+            *to = _mm_cvtsi128_si32(all).to_le_bytes();
+            First(a)
         }
     }
 
     #[inline(always)]
-    fn least_of_each([a, b, c, d]: [Self; 4]) -> [u8; 4] {
+    unsafe fn store_sums(eightfold: Self, twofold: Self, [a, b]: [Self; 2], to: *mut u16) {
         // SAFETY: as above.
         unsafe {
-            // Each step halves the lanes of every vector and lays two of them side by side.
-            let ab = _mm_min_epu8(_mm_unpacklo_epi8(a.0, b.0), _mm_unpackhi_epi8(a.0, b.0));
-            let cd = _mm_min_epu8(_mm_unpacklo_epi8(c.0, d.0), _mm_unpackhi_epi8(c.0, d.0));
-            let all = _mm_min_epu8(_mm_unpacklo_epi16(ab, cd), _mm_unpackhi_epi16(ab, cd));
-            let all = _mm_min_epu8(all, _mm_srli_si128::<8>(all));
-            let all = _mm_min_epu8(all, _mm_srli_si128::<4>(all));
-            _mm_cvtsi128_si32(all).to_le_bytes()
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn sum(four: [Self; 4], to: *mut u16) {
-        // SAFETY: as above.
-        unsafe { _mm256_storeu_si256(to.cast(), sums_of_sixteen(four)) }
-    }
-
-    #[inline(always)]
-    unsafe fn sum_with(four: [Self; 4], before: *const u16, to: *mut u16) {
-        // SAFETY: as above.
-        unsafe {
-            _mm256_storeu_si256(to.cast(), _mm256_add_epi16(_mm256_loadu_si256(before.cast()), sums_of_sixteen(four)))
+            let two = _mm256_add_epi16(_mm256_cvtepu8_epi16(a.0), _mm256_cvtepu8_epi16(b.0));
+            let fourfold = _mm256_slli_epi16::<2>(_mm256_cvtepu8_epi16(eightfold.0));
+            let half = _mm256_add_epi16(_mm256_cvtepu8_epi16(twofold.0), fourfold);
+            _mm256_storeu_si256(to.cast(), _mm256_add_epi16(two, _mm256_add_epi16(half, half)));
         }
     }
 }
 
 impl Bytes for ThirtyTwo {
     const LANES: usize = 32;
+    type First = First;
+
+    #[inline(always)]
+    fn splat_first(first: First) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_broadcastb_epi8(first.0) })
+    }
 
     #[inline(always)]
     fn splat(value: u8) -> Self {
@@ -167,6 +198,12 @@ impl Bytes for ThirtyTwo {
     }
 
     #[inline(always)]
+    fn average(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_avg_epu8(self.0, other.0) })
+    }
+
+    #[inline(always)]
     fn or(self, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_or_si256(self.0, other.0) })
@@ -185,113 +222,96 @@ impl Bytes for ThirtyTwo {
     }
 
     #[inline(always)]
-    fn least(self) -> Self {
-        Avx2::widened(lesser_half(self).least())
-    }
-
-    #[inline(always)]
-    fn least_of_each([a, b, c, d]: [Self; 4]) -> [u8; 4] {
-        Sixteen::least_of_each([lesser_half(a), lesser_half(b), lesser_half(c), lesser_half(d)])
-    }
-
-    #[inline(always)]
-    unsafe fn sum(four: [Self; 4], to: *mut u16) {
-        let (low, high) = sums_of_thirty_two(four);
-        // SAFETY: as above.
+    unsafe fn around(self, by: i32) -> [Self; 3] {
+        let at = (by + MIDDLE) as usize;
+        // SAFETY: as above; the tables are as long as any place, half a register to either side of it, and a register.
         unsafe {
-            _mm256_storeu_si256(to.cast(), low);
-            _mm256_storeu_si256(to.add(16).cast(), high);
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn sum_with(four: [Self; 4], before: *const u16, to: *mut u16) {
-        let (low, high) = sums_of_thirty_two(four);
-        // SAFETY: as above.
-        unsafe {
-            _mm256_storeu_si256(to.cast(), _mm256_add_epi16(_mm256_loadu_si256(before.cast()), low));
-            _mm256_storeu_si256(to.add(16).cast(), _mm256_add_epi16(_mm256_loadu_si256(before.add(16).cast()), high));
-        }
-    }
-}
-
-impl Half for Sixteen {
-    #[inline(always)]
-    fn around(self, by: i32) -> [Self; 3] {
-        // Beyond its lanes there are none, however far.
-        let at = (by.clamp(-17, 17) + 17) as usize;
-        // SAFETY: as above; the tables hold 18 bytes from every place on that `at` can be.
-        unsafe {
-            let (lanes, outside) = (LANE.as_ptr().add(at), OUTSIDE.as_ptr().add(at));
-            let moved = |by: usize| {
-                let lanes = _mm_shuffle_epi8(self.0, _mm_loadu_si128(lanes.add(by).cast()));
-                Self(_mm_or_si128(lanes, _mm_loadu_si128(outside.add(by).cast())))
+            let swapped = _mm256_permute2x128_si256::<1>(self.0, self.0);
+            let half = |at: usize| _mm_loadu_si128(LANE.as_ptr().add(at).cast());
+            let moved = |at: usize| {
+                // What comes from the same half of the register, and from the other one.
+                let own = _mm256_shuffle_epi8(self.0, _mm256_broadcastsi128_si256(half(at)));
+                let other = _mm256_shuffle_epi8(swapped, _mm256_set_m128i(half(at + 16), half(at - 16)));
+                let outside = _mm256_loadu_si256(OUTSIDE_OF_BOTH.as_ptr().add(at).cast());
+                Self(_mm256_or_si256(_mm256_or_si256(own, other), outside))
             };
-            [moved(0), moved(1), moved(2)]
+            [moved(at - 1), moved(at), moved(at + 1)]
+        }
+    }
+
+    #[inline(always)]
+    fn first(self) -> First {
+        First(Avx2::half(self).0)
+    }
+
+    #[inline(always)]
+    fn leasts([a, b, c, d]: [Self; 4], to: &mut [u8; 4]) -> First {
+        // SAFETY: as above.
+        unsafe {
+            // Each step halves the lanes of every vector and lays two of them side by side.
+            let ab = _mm256_min_epu8(_mm256_unpacklo_epi8(a.0, b.0), _mm256_unpackhi_epi8(a.0, b.0));
+            let cd = _mm256_min_epu8(_mm256_unpacklo_epi8(c.0, d.0), _mm256_unpackhi_epi8(c.0, d.0));
+            let all = _mm256_min_epu8(_mm256_unpacklo_epi16(ab, cd), _mm256_unpackhi_epi16(ab, cd));
+            let all = _mm_min_epu8(_mm256_castsi256_si128(all), _mm256_extracti128_si256::<1>(all));
+            let all = _mm_min_epu8(all, _mm_srli_si128::<8>(all));
+            let all = _mm_min_epu8(all, _mm_srli_si128::<4>(all));
+            *to = _mm_cvtsi128_si32(all).to_le_bytes();
+            First(all)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn store_sums(eightfold: Self, twofold: Self, [a, b]: [Self; 2], to: *mut u16) {
+        // SAFETY: as above.
+        unsafe {
+            let (weights, ones) = (_mm256_set1_epi16(0x0208), _mm256_set1_epi8(1));
+            // Lanes 0 to 7 and 16 to 23, and the others: unpacking keeps to the halves of a register.
+            let outer = _mm256_add_epi16(
+                _mm256_maddubs_epi16(_mm256_unpacklo_epi8(eightfold.0, twofold.0), weights),
+                _mm256_maddubs_epi16(_mm256_unpacklo_epi8(a.0, b.0), ones),
+            );
+            let inner = _mm256_add_epi16(
+                _mm256_maddubs_epi16(_mm256_unpackhi_epi8(eightfold.0, twofold.0), weights),
+                _mm256_maddubs_epi16(_mm256_unpackhi_epi8(a.0, b.0), ones),
+            );
+            _mm256_storeu_si256(to.cast(), _mm256_permute2x128_si256::<0x20>(outer, inner));
+            _mm256_storeu_si256(to.add(16).cast(), _mm256_permute2x128_si256::<0x31>(outer, inner));
         }
     }
 }
 
-/// The lanes −18 to 33, of which there are sixteen.
-static LANE: [u8; 52] = {
-    let mut out = [0x80; 52];
+/// Where in the tables below a register's lanes stay where they are.
+const MIDDLE: i32 = REACH + 17;
+
+/// Which lane of sixteen a lane gets, or none: from each place in the table on, those of lanes moved one further.
+static LANE: [u8; 2 * MIDDLE as usize + 16] = {
+    let mut out = [0x80; 2 * MIDDLE as usize + 16];
     let mut i = 0;
     while i < 16 {
-        out[18 + i] = i as u8;
+        out[MIDDLE as usize + i] = i as u8;
         i += 1;
     }
     out
 };
 
 /// All bits where [`LANE`] names none.
-static OUTSIDE: [u8; 52] = {
-    let mut out = [u8::MAX; 52];
+static OUTSIDE: [u8; 2 * MIDDLE as usize + 16] = {
+    let mut out = [u8::MAX; 2 * MIDDLE as usize + 16];
     let mut i = 0;
     while i < 16 {
-        out[18 + i] = 0;
+        out[MIDDLE as usize + i] = 0;
         i += 1;
     }
     out
 };
 
-/// The lesser of each lane of the lower half and the same one of the upper.
-#[inline(always)]
-fn lesser_half(v: ThirtyTwo) -> Sixteen {
-    // SAFETY: as above.
-    Sixteen(unsafe { _mm_min_epu8(_mm256_castsi256_si128(v.0), _mm256_extracti128_si256::<1>(v.0)) })
-}
-
-#[inline(always)]
-fn sums_of_sixteen([a, b, c, d]: [Sixteen; 4]) -> __m256i {
-    // SAFETY: as above.
-    unsafe {
-        let ones = _mm_set1_epi8(1);
-        let low = _mm_add_epi16(
-            _mm_maddubs_epi16(_mm_unpacklo_epi8(a.0, b.0), ones),
-            _mm_maddubs_epi16(_mm_unpacklo_epi8(c.0, d.0), ones),
-        );
-        let high = _mm_add_epi16(
-            _mm_maddubs_epi16(_mm_unpackhi_epi8(a.0, b.0), ones),
-            _mm_maddubs_epi16(_mm_unpackhi_epi8(c.0, d.0), ones),
-        );
-        _mm256_set_m128i(high, low)
+/// The same for thirty-two lanes.
+static OUTSIDE_OF_BOTH: [u8; 2 * MIDDLE as usize + 32] = {
+    let mut out = [u8::MAX; 2 * MIDDLE as usize + 32];
+    let mut i = 0;
+    while i < 32 {
+        out[MIDDLE as usize + i] = 0;
+        i += 1;
     }
-}
-
-#[inline(always)]
-fn sums_of_thirty_two([a, b, c, d]: [ThirtyTwo; 4]) -> (__m256i, __m256i) {
-    // SAFETY: as above.
-    unsafe {
-        let ones = _mm256_set1_epi8(1);
-        // Lanes 0 to 7 and 16 to 23, and the others: unpacking keeps to the halves of a register.
-        let outer = _mm256_add_epi16(
-            _mm256_maddubs_epi16(_mm256_unpacklo_epi8(a.0, b.0), ones),
-            _mm256_maddubs_epi16(_mm256_unpacklo_epi8(c.0, d.0), ones),
-        );
-        let inner = _mm256_add_epi16(
-            _mm256_maddubs_epi16(_mm256_unpackhi_epi8(a.0, b.0), ones),
-            _mm256_maddubs_epi16(_mm256_unpackhi_epi8(c.0, d.0), ones),
-        );
-        (_mm256_permute2x128_si256::<0x20>(outer, inner), _mm256_permute2x128_si256::<0x31>(outer, inner))
-    }
-}
+    out
+};

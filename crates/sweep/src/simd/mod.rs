@@ -8,6 +8,7 @@ mod avx2;
 mod bytes;
 pub(crate) mod census;
 pub(crate) mod paths;
+pub(crate) mod pixel;
 pub(crate) mod raise;
 pub(crate) mod rows;
 pub(crate) mod shift;
@@ -16,4 +17,4 @@ pub(crate) mod transpose;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
-pub(crate) use bytes::Anywhere;
+pub(crate) use bytes::{Anywhere, Instructions};

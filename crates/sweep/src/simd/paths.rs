@@ -1,84 +1,186 @@
 //! Path costs of one row along four directions: from the pixel before, and from three pixels of the row before.
 //!
-//! A pixel of up to sixteen hypotheses is one register of half the lanes, and its path costs along the row stay there: what
-//! has just been written cannot be read one lane off without waiting for the memory.
+//! The path costs along the row of up to [`LANES`] hypotheses stay in a register: what has just been written cannot be read one
+//! lane off without waiting for the memory.
 
-use super::bytes::{Bytes, Half, Instructions};
-use super::rows::{Between, FAR, GUARD, LANES, Range, Row};
+use super::bytes::{Bytes, Instructions};
+use super::pixel::{Backward, Forward, Pixel, Store, lanes};
+use super::rows::{FAR, HALF, LANES, Links, MORE, ONE, Pixels, RUN, Range, Row, TWO};
 
 /// What a row of pixels is computed from, and where its results go.
 pub(crate) struct Task<'a> {
     /// The costs of the row's pixels from left to right and, behind them, [`LANES`] others.
     pub(crate) costs: &'a [u8],
-    /// From right to left.
-    pub(crate) backward: bool,
     /// The penalty of a step.
     pub(crate) step: u8,
-    /// What to add to the sums, in the layout of the costs.
-    pub(crate) before: Option<&'a [u16]>,
-    /// The sums of all four paths, in the order of the row; [`LANES`] entries more are overwritten.
-    pub(crate) sums: &'a mut [u16],
+    pub(crate) results: Results<'a>,
 }
 
-/// Extends four paths to every pixel of `here`, whose pixels are placed; `above` is the row before, of as many.
+/// What becomes of four path costs; [`LANES`] entries more are overwritten.
+pub(crate) enum Results<'a> {
+    /// From left to right: halves of what they add to the cost, rounded up, in the layout of the costs.
+    Forward(&'a mut [u8]),
+    /// From right to left: with twice the halves of the other four, the sums of eight path costs, the last pixel's first.
+    Backward(&'a [u8], &'a mut [u16]),
+}
+
+/// Room for single pixels' path costs: along the row of two, and of those before one, moved to where it has its own.
+#[derive(Default)]
+pub(crate) struct Room {
+    along: [Vec<u8>; 2],
+    aside: [Vec<u8>; 4],
+}
+
+impl Room {
+    /// Makes room for pixels of up to so many hypotheses, behind [`LANES`] entries and before as many and more.
+    fn prepare(&mut self, most: usize) {
+        let len = most + 4 * LANES;
+        for room in self.along.iter_mut().chain(&mut self.aside) {
+            if room.len() < len {
+                room.resize(len, FAR);
+            }
+            room[..LANES].fill(FAR);
+        }
+    }
+}
+
+/// Places the pixels in `here` and extends four paths to each; `above` is the row before, of as many. `jump` is the penalty of a
+/// jump by the edge, at most [`super::pixel::JUMP_MAX`].
 ///
 /// # Panics
-/// Slices that are not as long as [`Task`] says, and rows of different widths.
+/// Slices that are not as long as [`Task`] and [`Results`] say, and rows of different widths.
 #[inline(always)]
-pub(crate) fn extend_row<I: Instructions>(above: &Row, here: &mut Row, task: Task<'_>, between: &mut Between) {
-    let Task { costs, backward, step, before, sums } = task;
-    assert!(costs.len() >= here.count + LANES && sums.len() >= here.count + LANES);
-    assert!(before.is_none_or(|before| before.len() >= here.count + LANES));
-    assert!(above.low.len() == here.low.len());
-    between.prepare(above, here);
-    let (width, apart) = (here.low.len() - 2, here.apart());
-    let from: [*const u8; 3] = std::array::from_fn(|d| above.paths[d * above.apart()..].as_ptr());
-    let Between { jumps, beyond, along: [along, next], aside: [aside @ .., along_aside] } = between;
-    let [jump_along, jump_a, jump_b, jump_c] = jumps.each_ref().map(|jumps| &jumps[..width]);
-    let mut last = Last::<I>::none([along.as_mut_ptr(), next.as_mut_ptr()], along_aside);
-    let (low, high, base, least) =
-        (&here.low[1..=width], &here.high[1..=width], &here.base[1..=width], &mut here.least[1..=width]);
-    let (q_low, q_high) = (&above.low[..width + 2], &above.high[..width + 2]);
-    let (q_base, q_least) = (&above.base[..width + 2], &above.least[..width + 2]);
-    let beyond = &beyond[..width];
-    let to = here.paths.as_mut_ptr();
-    let mut done = 0;
-    for j in 0..width {
-        let range = Range { low: low[j], high: high[j] };
-        let own = range.count();
-        let at = if backward { here.count - done - own } else { done };
-        // SAFETY: places are those that `Row::place` made room for, with whole registers and guards behind the last; costs and sums
-        // are as many as the row's hypotheses and a register more, checked above.
-        unsafe {
-            let mut upper = from;
-            for (d, paths) in upper.iter_mut().enumerate() {
-                *paths = paths.wrapping_offset((q_base[j + d].wrapping_add(range.low) - 1) as isize);
-            }
-            if beyond[j] >= GUARD as i32 {
-                for d in 0..3 {
-                    let q = Range { low: q_low[j + d], high: q_high[j + d] };
-                    let paths = from[d].add(q_base[j + d].wrapping_add(q.low) as usize);
-                    upper[d] = moved(q, paths, range, &mut aside[d]);
+pub(crate) fn extend_row<I: Instructions>(
+    above: &Row,
+    here: &mut Row,
+    (pixels, jump): (Pixels<'_>, impl Fn(u8) -> u8),
+    task: Task<'_>,
+    room: &mut Room,
+) {
+    let Task { costs, step, results } = task;
+    here.place(pixels, matches!(results, Results::Backward(..)), jump);
+    assert!(costs.len() >= here.count + LANES && above.width == here.width);
+    room.prepare(here.most);
+    match results {
+        Results::Forward(halves) => {
+            assert!(halves.len() >= here.count + LANES);
+            extend_pixels::<I, _>(above, here, (costs, step), Forward(halves.as_mut_ptr()), room);
+        }
+        Results::Backward(halves, sums) => {
+            assert!(halves.len().min(sums.len()) >= here.count + LANES);
+            extend_pixels::<I, _>(above, here, (costs, step), Backward(halves.as_ptr(), sums.as_mut_ptr()), room);
+        }
+    }
+}
+
+#[inline(always)]
+fn extend_pixels<I: Instructions, S: Store>(
+    above: &Row,
+    here: &mut Row,
+    (costs, step): (&[u8], u8),
+    results: S,
+    room: &mut Room,
+) {
+    let Room { along: [along, next], aside: [aside @ .., along_aside] } = room;
+    let rows = Rows {
+        step,
+        costs: costs.as_ptr(),
+        from: [0, 1, 2].map(|d| above.paths[d * above.apart()..].as_ptr()),
+        befores: above.least.as_ptr(),
+        apart: here.apart(),
+        paths: here.paths.as_mut_ptr(),
+        leasts: here.least[1..].as_mut_ptr(),
+        results,
+    };
+    let mut last = Last::<I>::new([along, next].map(|room| room[LANES..].as_mut_ptr()));
+    let mut links = Links::new();
+    let runs = here.width.div_ceil(RUN);
+    for run in 0..runs {
+        let start = RUN * if S::BACKWARD { runs - 1 - run } else { run };
+        links.prepare(above, here, start, S::BACKWARD);
+        let many = RUN.min(here.width - start);
+        let order = |done: usize| if S::BACKWARD { many - 1 - done } else { done };
+        let mut done = 0;
+        while done < many {
+            let (first, class) = (order(done), links.class[order(done)]);
+            // SAFETY: places are those that `Row::place` made room for, with whole registers and guards behind the last; costs and
+            // results are as many as the row's hypotheses and a register more, as `extend_row` checks.
+            unsafe {
+                // Each kind has a loop of its own, for the sake of its registers.
+                macro_rules! each {
+                    ($extend:expr) => {
+                        loop {
+                            let i = order(done);
+                            $extend(i);
+                            done += 1;
+                            if done == many || links.class[order(done)] != class {
+                                break;
+                            }
+                        }
+                    };
+                }
+                match class {
+                    HALF => each!(|i: usize| last.extend_half(links.by[i], rows.pixel(&links, start, i))),
+                    ONE => each!(|i: usize| last.extend_one(links.by[i], rows.pixel(&links, start, i))),
+                    TWO => each!(|i: usize| last.extend_two(rows.pixel(&links, start, i))),
+                    MORE => each!(|i: usize| last.extend_more(last.more[0], rows.pixel(&links, start, i))),
+                    _ => {
+                        let i = first;
+                        let mut pixel = rows.pixel(&links, start, i);
+                        let p = here.range(start + i + 1);
+                        let q = here.range(if S::BACKWARD { start + i + 2 } else { start + i });
+                        let along = last.moved(q, p, along_aside);
+                        for (d, (upper, aside)) in pixel.upper.iter_mut().zip(&mut *aside).enumerate() {
+                            let entry = start + i + if S::BACKWARD { 2 - d } else { d };
+                            let paths = rows.from[d].add(above.place[entry] as usize);
+                            *upper = moved(above.range(entry), paths, p, aside);
+                        }
+                        last.extend_more(along, pixel);
+                        done += 1;
+                    }
                 }
             }
-            let pixel = Pixel {
-                range,
-                costs: costs.as_ptr().add(at),
-                upper,
-                least: [&q_least[j][1], &q_least[j + 1][2], &q_least[j + 2][3]],
-                jumps: [&jump_along[j], &jump_a[j], &jump_b[j], &jump_c[j]],
-                before: before.map(|before| before.as_ptr().add(at)),
-                paths: to.add(base[j].wrapping_add(range.low) as usize),
-                apart,
-                sums: sums.as_mut_ptr().add(done),
-            };
-            least[j] = match own <= LANES / 2 {
-                true => last.extend_narrow(step, &pixel),
-                false => last.extend_wide(step, &pixel),
-            };
         }
-        last.range = range;
-        done += own;
+    }
+}
+
+/// A row's and the row's before it, from their first pixels on.
+struct Rows<S> {
+    step: u8,
+    costs: *const u8,
+    from: [*const u8; 3],
+    befores: *const [u8; 4],
+    apart: usize,
+    paths: *mut u8,
+    leasts: *mut [u8; 4],
+    results: S,
+}
+
+impl<S: Store> Rows<S> {
+    /// The pixel `i` of the run from `start` on.
+    ///
+    /// # Safety
+    /// The links are those of the run, and the row has as many pixels.
+    #[inline(always)]
+    unsafe fn pixel<'a>(&self, links: &'a Links, start: usize, i: usize) -> Pixel<'a, S> {
+        // SAFETY: the caller's.
+        unsafe {
+            let q = self.befores.add(start + i);
+            let (a, c) = if S::BACKWARD { (q.add(2), q) } else { (q, q.add(2)) };
+            let own = links.costs[i] as usize;
+            Pixel {
+                count: links.count[i] as usize,
+                step: self.step,
+                costs: self.costs.add(own),
+                upper: lanes(|d| self.from[d].wrapping_add(links.from[d][i] as usize)),
+                least: [&(*a)[1], &(*q.add(1))[2], &(*c)[3]],
+                jumps: lanes(|d| &links.jumps[d][i]),
+                paths: self.paths.add(links.to[i] as usize),
+                apart: self.apart,
+                results: self.results.pixel(own, links.before[i] as usize),
+                leasts: self.leasts.add(start + i),
+            }
+        }
     }
 }
 
@@ -90,7 +192,7 @@ pub(crate) fn extend_row<I: Instructions>(above: &Row, here: &mut Row, task: Tas
 unsafe fn moved(q: Range, paths: *const u8, p: Range, to: &mut [u8]) -> *const u8 {
     // SAFETY: the caller's.
     let paths = unsafe { std::slice::from_raw_parts(paths, q.count()) };
-    let to = &mut to[..p.count().next_multiple_of(LANES) + 2];
+    let to = &mut to[LANES - 1..][..p.count().next_multiple_of(LANES) + 2];
     let (have, first) = (paths.len() as i64, i64::from(p.low) - i64::from(q.low) - 1);
     let from = first.clamp(0, have);
     let end = (first + to.len() as i64).clamp(from, have);
@@ -102,280 +204,146 @@ unsafe fn moved(q: Range, paths: *const u8, p: Range, to: &mut [u8]) -> *const u
     to.as_ptr()
 }
 
-/// A pixel: what its path costs come from, and where they go. All that is read or written are whole registers.
-struct Pixel<'a> {
-    range: Range,
-    costs: *const u8,
-    /// The path costs of the three pixels before it in the row before, from the height below its first one on, and two more than
-    /// its registers hold.
-    upper: [*const u8; 3],
-    /// The least of them.
-    least: [&'a u8; 3],
-    /// The penalties of a jump, along the row first.
-    jumps: [&'a u8; 4],
-    before: Option<*const u16>,
-    /// For the path costs from the row before, each direction `apart` from the one before; there is room for a guard behind.
-    paths: *mut u8,
-    apart: usize,
-    sums: *mut u16,
-}
-
 /// The path costs of the last pixel along the row.
-struct Last<'a, I: Instructions> {
-    range: Range,
-    /// Of up to sixteen hypotheses.
-    narrow: I::Narrow,
-    /// The least, in all lanes.
-    least: I::Narrow,
+struct Last<I: Instructions> {
+    /// Of up to twice [`LANES`] hypotheses.
+    two: [I::One; 2],
+    least: I::First,
     /// Those of more hypotheses, behind [`LANES`] entries that are [`FAR`] and before as many; the second is for the next pixel.
-    /// There is room for the most hypotheses of a pixel and five times [`LANES`].
-    wide: [*mut u8; 2],
-    aside: &'a mut [u8],
+    /// There is room for the most hypotheses of a pixel and three times [`LANES`].
+    more: [*mut u8; 2],
 }
 
-/// All bits of no lane, and from [`LANES`] on of all of them.
-static OUTSIDE: [u8; 2 * LANES] = {
-    let mut out = [0; 2 * LANES];
-    let mut i = LANES;
-    while i < 2 * LANES {
-        out[i] = u8::MAX;
-        i += 1;
-    }
-    out
-};
-
-/// All bits in the lanes behind the first `count`.
-///
-/// # Safety
-/// There are no more than the register has.
-#[inline(always)]
-unsafe fn outside<V: Bytes>(count: usize) -> V {
-    debug_assert!(count <= V::LANES);
-    // SAFETY: the table is twice as long as the longest register.
-    unsafe { V::load(OUTSIDE.as_ptr().add(LANES - count)) }
-}
-
-/// `C + min(L, L(± 1) + P1, min L + P2) − min L`, with the path costs L from below, at the same height and above.
-#[inline(always)]
-fn path<V: Bytes>(cost: V, [below, same, above]: [V; 3], step: V, least: V, jump: V) -> V {
-    let smooth = same.min(below.min(above).plus(step));
-    cost.plus(smooth.minus(least).min(jump))
-}
-
-/// # Safety
-/// There are a register's lanes and two.
-#[inline(always)]
-unsafe fn around<V: Bytes>(paths: *const u8) -> [V; 3] {
-    // SAFETY: the caller's.
-    unsafe { [V::load(paths), V::load(paths.add(1)), V::load(paths.add(2))] }
-}
-
-impl<'a, I: Instructions> Last<'a, I> {
-    /// Nothing comes before a row's first pixel.
+impl<I: Instructions> Last<I> {
+    /// Whatever is before a row's first pixel: a jump from there costs nothing.
     #[inline(always)]
-    fn none(wide: [*mut u8; 2], aside: &'a mut [u8]) -> Self {
-        Self { range: Range::default(), narrow: I::Narrow::splat(FAR), least: I::Narrow::splat(0), wide, aside }
+    fn new(more: [*mut u8; 2]) -> Self {
+        Self { two: [I::One::splat(FAR); 2], least: I::Half::splat(FAR).first(), more }
     }
 
-    #[inline(always)]
-    fn is_narrow(&self) -> bool {
-        self.range.count() <= LANES / 2
-    }
-
-    /// Extends four paths to a pixel of up to sixteen hypotheses; returns the least path cost of each.
+    /// A pixel of [`HALF`].
     ///
     /// # Safety
-    /// What [`Pixel`] says.
+    /// What [`Pixel`] says, and `by` is up to [`super::rows::REACH`].
     #[inline(always)]
-    unsafe fn extend_narrow(&mut self, step: u8, pixel: &Pixel<'_>) -> [u8; 4] {
-        let (step, count) = (I::Narrow::splat(step), pixel.range.count());
+    unsafe fn extend_half<S: Store>(&mut self, by: i32, pixel: Pixel<'_, S>) {
         // SAFETY: the caller's.
         unsafe {
-            let along = match self.is_narrow() {
-                true => self.narrow.around(pixel.range.low.wrapping_sub(self.range.low)),
-                false => around(self.window(pixel.range)),
-            };
-            let outside = outside::<I::Narrow>(count);
-            let cost = I::Narrow::load(pixel.costs);
-            let mut values = [path(cost, along, step, self.least, I::Narrow::splat(*pixel.jumps[0])); 4];
-            self.narrow = values[0].or(outside);
-            self.least = self.narrow.least();
-            let mut own = [self.narrow; 4];
-            for d in 0..3 {
-                let (least, jump) = (I::Narrow::splat(*pixel.least[d]), I::Narrow::splat(*pixel.jumps[d + 1]));
-                values[d + 1] = path(cost, around(pixel.upper[d]), step, least, jump);
-                own[d + 1] = values[d + 1].or(outside);
-                let to = pixel.paths.add(d * pixel.apart);
-                own[d + 1].store(to);
-                close(to.add(count));
-            }
-            add_up(values, pixel.before, pixel.sums, 0);
-            I::Narrow::least_of_each(own)
+            let around = I::half(self.two[0]).around(by);
+            let ([along], leasts) = pixel.extend((0, pixel.count), [around], I::Half::splat_first(self.least));
+            pixel.close();
+            self.least = I::Half::leasts(leasts, &mut *pixel.leasts);
+            self.two[0] = I::one(along);
         }
     }
 
-    /// Extends four paths to a pixel; returns the least path cost of each.
+    /// A pixel of [`ONE`].
+    ///
+    /// # Safety
+    /// What [`Pixel`] says, and `by` is up to [`super::rows::REACH`].
+    #[inline(always)]
+    unsafe fn extend_one<S: Store>(&mut self, by: i32, pixel: Pixel<'_, S>) {
+        let (last, far) = (self.two[0], I::One::splat(FAR));
+        // SAFETY: the caller's.
+        unsafe {
+            let around = if by == 0 { [last.behind(far), last, last.ahead(far)] } else { last.around(by) };
+            let ([along], leasts) = pixel.extend((0, pixel.count), [around], I::One::splat_first(self.least));
+            pixel.close();
+            self.least = I::One::leasts(leasts, &mut *pixel.leasts);
+            self.two[0] = along;
+        }
+    }
+
+    /// A pixel of [`TWO`].
     ///
     /// # Safety
     /// What [`Pixel`] says.
     #[inline(always)]
-    unsafe fn extend_wide(&mut self, step: u8, pixel: &Pixel<'_>) -> [u8; 4] {
-        let (far, count) = (I::Wide::splat(FAR), pixel.range.count());
-        let mut before = [I::widened(self.least); 4];
-        let mut jumps = [I::Wide::splat(*pixel.jumps[0]); 4];
-        for d in 0..3 {
-            before[d + 1] = I::Wide::splat(*pixel.least[d]);
-            jumps[d + 1] = I::Wide::splat(*pixel.jumps[d + 1]);
-        }
-        // SAFETY: the caller's, and the lengths of the buffers.
+    unsafe fn extend_two<S: Store>(&mut self, pixel: Pixel<'_, S>) {
+        let ([first, second], far) = (self.two, I::One::splat(FAR));
+        let around =
+            [[first.behind(far), first, first.ahead(second)], [second.behind(first), second, second.ahead(far)]];
+        // SAFETY: the caller's.
         unsafe {
-            if self.is_narrow() {
-                self.spill();
-            }
-            // Whole registers are read as they were written, where they can be.
-            let in_place = pixel.range.low == self.range.low && count <= self.range.count().next_multiple_of(LANES);
-            let from = if in_place { self.wide[0].add(LANES).cast_const() } else { self.window(pixel.range) };
-            let to = self.wide[1].add(LANES);
-            let along = Along { in_place, from, to, before: far, here: I::Wide::load(from) };
-            let mut wide = Wide { step: I::Wide::splat(step), before, jumps, least: [far; 4], along };
-            let whole = count & !(LANES - 1);
-            // `step_by` would cost as much as half a register's work.
-            let mut at = 0;
-            while at < whole {
-                wide.extend(at, None, pixel);
-                at += LANES;
-            }
-            if whole < count {
-                wide.extend(whole, Some(outside(count - whole)), pixel);
+            let (along, leasts) = pixel.extend((0, pixel.count), around, I::One::splat_first(self.least));
+            pixel.close();
+            self.least = I::One::leasts(leasts, &mut *pixel.leasts);
+            self.two = along;
+        }
+    }
+
+    /// Any pixel; `from` are the path costs along the row at its heights, as many as its registers hold and one on either side.
+    ///
+    /// # Safety
+    /// What [`Pixel`] and [`Last`] say; there are as many behind and before `from` as a register holds.
+    #[inline(always)]
+    unsafe fn extend_more<S: Store>(&mut self, from: *const u8, pixel: Pixel<'_, S>) {
+        let (least, far, count) = (I::One::splat_first(self.least), I::One::splat(FAR), pixel.count);
+        // SAFETY: the caller's.
+        unsafe {
+            let to = self.more[1];
+            let mut along = Along { from, before: I::One::load(from.sub(LANES)), here: I::One::load(from) };
+            let (mut at, mut leasts) = (0, [far; 4]);
+            while at < count {
+                let left = (count - at).min(2 * LANES);
+                let others = if left > LANES {
+                    let (own, others) = pixel.extend((at, left), along.around::<2>(at), least);
+                    own[0].store(to.add(at));
+                    own[1].store(to.add(at + LANES));
+                    others
+                } else {
+                    let ([own], others) = pixel.extend((at, left), along.around::<1>(at), least);
+                    own.store(to.add(at));
+                    others
+                };
+                leasts = lanes(|d| leasts[d].min(others[d]));
+                at += 2 * LANES;
             }
             far.store(to.add(count.next_multiple_of(LANES)));
-            for d in 0..3 {
-                close(pixel.paths.add(d * pixel.apart + count));
-            }
-            self.least = I::narrowed(wide.least[0].least());
-            self.wide.swap(0, 1);
-            I::Wide::least_of_each(wide.least)
+            pixel.close();
+            self.least = I::One::leasts(leasts, &mut *pixel.leasts);
+            self.two = lanes(|i| I::One::load(to.add(i * LANES)));
+            self.more.swap(0, 1);
         }
     }
 
-    /// Writes the path costs of up to sixteen hypotheses where those of more lie.
+    /// The path costs of `q` at the heights of `p`, as its registers take them.
     ///
     /// # Safety
     /// What [`Last`] says.
     #[inline(always)]
-    unsafe fn spill(&mut self) {
+    unsafe fn moved(&mut self, q: Range, p: Range, to: &mut [u8]) -> *const u8 {
         // SAFETY: the caller's.
         unsafe {
-            let to = self.wide[0].add(LANES);
-            self.narrow.store(to);
-            I::Narrow::splat(FAR).store(to.add(LANES / 2));
-            I::Wide::splat(FAR).store(to.add(LANES));
-        }
-    }
-
-    /// The path costs from the height below the first one of `range` on, as whole registers take them.
-    ///
-    /// # Safety
-    /// What [`Last`] says.
-    #[inline(always)]
-    unsafe fn window(&mut self, range: Range) -> *const u8 {
-        let q = self.range;
-        // SAFETY: the caller's; there are more entries than the pixel has hypotheses.
-        unsafe {
-            let paths = self.wide[0].add(LANES).cast_const();
-            match range.beyond(q) < LANES as i32 {
-                true => paths.offset((range.low.wrapping_sub(q.low) - 1) as isize),
-                false => moved(q, paths, range, self.aside),
+            if q.count() <= 2 * LANES {
+                self.two[0].store(self.more[0]);
+                self.two[1].store(self.more[0].add(LANES));
             }
+            moved(q, self.more[0], p, to).add(1)
         }
     }
 }
 
-/// A pixel of more hypotheses than half a register holds: what they have in common, and the least path costs so far.
-struct Wide<V> {
-    step: V,
-    /// The least path costs of the pixels before.
-    before: [V; 4],
-    jumps: [V; 4],
-    least: [V; 4],
-    along: Along<V>,
-}
-
-/// The path along the row, a register after the other.
+/// The path along the row, register after register, one ahead of the one at hand.
 struct Along<V> {
-    /// Whether registers are read as they were written, one ahead of the one at hand.
-    in_place: bool,
     from: *const u8,
-    to: *mut u8,
     before: V,
     here: V,
 }
 
-impl<V: Bytes> Wide<V> {
-    /// The hypotheses of a pixel from `at` on, as many as a register holds; `outside` are the lanes of others.
+impl<V: Bytes> Along<V> {
+    /// The next path costs from `at` on below, at the same height and above.
     ///
     /// # Safety
-    /// What [`Pixel`] and [`Last`] say.
+    /// What [`Last::extend_more`] says.
     #[inline(always)]
-    unsafe fn extend(&mut self, at: usize, outside: Option<V>, pixel: &Pixel<'_>) {
-        // SAFETY: the caller's.
-        unsafe {
-            let cost = V::load(pixel.costs.add(at));
-            let mut values = [path(cost, self.along.around(at), self.step, self.before[0], self.jumps[0]); 4];
-            for d in 0..3 {
-                let upper = around(pixel.upper[d].add(at));
-                values[d + 1] = path(cost, upper, self.step, self.before[d + 1], self.jumps[d + 1]);
-            }
-            for (d, value) in values.into_iter().enumerate() {
-                let own = if let Some(outside) = outside { value.or(outside) } else { value };
-                let to = if d == 0 { self.along.to } else { pixel.paths.add((d - 1) * pixel.apart) };
-                own.store(to.add(at));
-                self.least[d] = self.least[d].min(own);
-            }
-            add_up(values, pixel.before, pixel.sums, at);
-        }
-    }
-}
-
-impl<V: Bytes> Along<V> {
-    /// # Safety
-    /// There are path costs of the last pixel from `at` on, and as many behind them as [`Last`] says.
-    #[inline(always)]
-    unsafe fn around(&mut self, at: usize) -> [V; 3] {
-        // SAFETY: the caller's.
-        unsafe {
-            if !self.in_place {
-                return around(self.from.add(at));
-            }
-            let next = V::load(self.from.add(at + LANES));
+    unsafe fn around<const N: usize>(&mut self, at: usize) -> [[V; 3]; N] {
+        lanes(|i| {
+            // SAFETY: the caller's.
+            let next = unsafe { V::load(self.from.add(at + (i + 1) * LANES)) };
             let around = [self.here.behind(self.before), self.here, self.here.ahead(next)];
             (self.before, self.here) = (self.here, next);
             around
-        }
-    }
-}
-
-/// Writes the guard behind a pixel's path costs, which is the one before those of the next.
-///
-/// # Safety
-/// [`GUARD`] bytes can be written.
-#[inline(always)]
-unsafe fn close(to: *mut u8) {
-    // SAFETY: the caller's.
-    unsafe { to.cast::<[u8; GUARD]>().write([FAR; GUARD]) }
-}
-
-/// Writes the sums of four paths, and of what was before, from the hypothesis `at` on.
-///
-/// # Safety
-/// There are a register's lanes of both from there on.
-#[inline(always)]
-unsafe fn add_up<V: Bytes>(four: [V; 4], before: Option<*const u16>, sums: *mut u16, at: usize) {
-    // SAFETY: the caller's.
-    unsafe {
-        match before {
-            Some(before) => V::sum_with(four, before.add(at), sums.add(at)),
-            None => V::sum(four, sums.add(at)),
-        }
+        })
     }
 }
