@@ -12,6 +12,8 @@ pub(crate) const INVALID: u8 = 255;
 pub(crate) const FULL: f32 = 128.0;
 /// Grey values are cut here: the cubic interpolation may overshoot by 1.25 in each direction before a 16-bit integer is full.
 const GREY_MAX: f32 = 20_000.0;
+/// 1.5 · 2²³: added to a value it leaves the rounded integer in the lowest bits of the sum, which vectorises; a cast does not.
+const ROUND: f32 = 12_582_912.0;
 /// One in so many values tells well enough around which grey value integers lie.
 const MEAN_STEP: usize = 4;
 /// A void says nothing of a height, so that two views suffice where a third has one; but a height that takes fewer views
@@ -51,8 +53,6 @@ fn mean_of(values: &[f32], step: usize) -> f32 {
 /// Rounds what differs from the mean; tells whether a value is NaN.
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn round(values: &[f32], mean: f32, scale: f32, out: &mut [i16]) -> bool {
-    // Adding 1.5 · 2²³ leaves the rounded integer in the lowest bits of the sum, which vectorises; a cast does not.
-    const ROUND: f32 = 12_582_912.0;
     let mut has_nan = 0;
     for (o, v) in out.iter_mut().zip(values) {
         // `clamp` passes a NaN on, whose lowest bits are 0: `View` keeps no others.
@@ -64,7 +64,7 @@ fn round(values: &[f32], mean: f32, scale: f32, out: &mut [i16]) -> bool {
 
 /// A weight of an interpolation, in 2¹⁵ths.
 pub(crate) fn fixed(weight: f32) -> i16 {
-    (weight * 32_768.0).round().min(32_767.0) as i16
+    ((weight * 32_768.0).min(32_767.0) + ROUND).to_bits() as i16
 }
 
 /// Keeps the smaller of two rows in `a` and the larger in `b`.

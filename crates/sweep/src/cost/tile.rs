@@ -13,6 +13,7 @@ use crate::geometry::{TileMap, source_from_reference};
 use crate::prior::Prior;
 use crate::ranges::Ranges;
 use crate::simd::census::{CHUNK, Census, overhang};
+use crate::simd::shift::OVERHANG;
 use crate::view::QUANTISATION_VARIANCE;
 
 /// A tile is not divided below this side: an RPC that is not smooth over eight pixels is broken.
@@ -22,6 +23,8 @@ const PLANES_MIN: i32 = 4;
 /// The census looks at the eight neighbours, as MicMac's patches in cities do: the aggregation brings the support that they
 /// lack, and roofs keep their edges.
 pub(super) const CENSUS_REACH: usize = 1;
+/// What a plane costs beside its pixels, in pixels.
+const PLANE_PIXELS: usize = 256;
 /// The difference that counts fully, in typical differences of the image: half of them then take part in full. Measured
 /// on simulated towns of one and of several dates and on the LiDAR truth of JAX_068, where 0.3 to 0.7 are alike.
 const FULL_DIFFERENCE: f32 = 0.5;
@@ -60,6 +63,7 @@ pub(crate) struct TileScratch {
     sums: Vec<u16>,
     weights: Vec<u16>,
     planes: Planes,
+    parts: Vec<(Window, (i32, i32))>,
 }
 
 /// Brings differences of grey values to the unit that counts fully: of the image's contrast, or of its noise where that is more.
@@ -106,7 +110,13 @@ fn sweep_planes(
         }
     };
     scratch.prepare(reference, sources, &maps, tile, planes, config);
-    scratch.sweep_part(reference, tile, (tile, planes), config, block);
+    let mut parts = std::mem::take(&mut scratch.parts);
+    parts.clear();
+    divide(reference.ranges, tile, planes, &mut parts);
+    for part in &parts {
+        scratch.sweep_part(reference, *part, tile, config, block);
+    }
+    scratch.parts = parts;
     Ok(())
 }
 
@@ -124,17 +134,28 @@ fn plane_span(ranges: &Ranges, tile: Window) -> (i32, i32) {
     span
 }
 
-/// Whether a part of a tile would be swept through far more planes than its pixels ask for, as at a wall between two roofs.
-/// Parts cost their margins again: below 16 pixels these outweigh the gain.
-fn is_wasteful(ranges: &Ranges, part: Window, planes: (i32, i32)) -> bool {
-    if part.width.max(part.height) < 32 {
-        return false;
+/// Appends the parts in which a tile is swept at the least cost, each with those of `planes` that its pixels ask for, as beside
+/// a wall between two roofs; returns that cost, in pixels.
+fn divide(ranges: &Ranges, tile: Window, planes: (i32, i32), parts: &mut Vec<(Window, (i32, i32))>) -> usize {
+    let asked = plane_span(ranges, tile);
+    let own = (asked.0.max(planes.0), asked.1.min(planes.1));
+    if own.0 >= own.1 {
+        return 0;
     }
-    let rows = part.y as usize..part.y as usize + part.height;
-    let asked =
-        |y: usize| ranges.count.row(y)[part.x as usize..][..part.width].iter().map(|&n| u64::from(n)).sum::<u64>();
-    let swept = (planes.1 - planes.0) as u64 * (part.width * part.height) as u64;
-    swept > 2 * rows.map(asked).sum::<u64>()
+    // Parts cost their margins again, and registers are filled up.
+    let width = tile.width + 2 * CENSUS_REACH;
+    let area = (width + width.next_multiple_of(OVERHANG)) / 2 * (tile.height + 2 * CENSUS_REACH);
+    let whole = (own.1 - own.0) as usize * (area + PLANE_PIXELS) + area;
+    let first = parts.len();
+    if tile.width.max(tile.height) >= 2 * TILE_MIN {
+        let divided = halves(tile).into_iter().map(|half| divide(ranges, half, own, parts)).sum();
+        if divided < whole {
+            return divided;
+        }
+    }
+    parts.truncate(first);
+    parts.push((tile, own));
+    whole
 }
 
 /// The local maps of a tile to all sources, or in which direction one of them is over the bound.
@@ -230,24 +251,13 @@ impl TileScratch {
     fn sweep_part(
         &mut self,
         reference: Reference<'_>,
-        part: Window,
-        (tile, planes): (Window, (i32, i32)),
+        (part, planes): (Window, (i32, i32)),
+        tile: Window,
         config: &CostConfig,
         block: &mut BlockCosts<'_>,
     ) {
-        let asked = plane_span(reference.ranges, part);
-        let planes = (asked.0.max(planes.0), asked.1.min(planes.1));
-        if planes.0 >= planes.1 {
-            return;
-        }
-        if is_wasteful(reference.ranges, part, planes) {
-            for half in halves(part) {
-                self.sweep_part(reference, half, (tile, planes), config, block);
-            }
-            return;
-        }
         self.look_at(reference, part);
-        let is_all = planes == asked && (planes.1 - planes.0) as usize <= PLANES_AT_ONCE;
+        let is_all = planes == plane_span(reference.ranges, part) && (planes.1 - planes.0) as usize <= PLANES_AT_ONCE;
         let padded = Part {
             within: [part.x - tile.x, part.y - tile.y],
             width: part.width + 2 * CENSUS_REACH,

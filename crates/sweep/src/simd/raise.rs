@@ -3,8 +3,8 @@
 use multiversion::multiversion;
 use multiversion::target::match_target;
 
-/// Bytes in a register.
-const LANES: usize = 32;
+/// Bytes in a register, half of the largest: rows are often short.
+const LANES: usize = 16;
 
 /// Raises `width` bytes of each row that `is_marked` to `worst` where `marks` has 255, not 0; rows begin as far apart as is said.
 #[multiversion(targets("x86_64+avx2"))]
@@ -45,10 +45,9 @@ mod registers {
             // SAFETY: the instructions are those of AVX2, for whose functions alone this is; both slices hold a register from
             // `last` on.
             unsafe {
-                let mark =
-                    _mm256_and_si256(_mm256_loadu_si256(marks.as_ptr().add(x).cast()), _mm256_set1_epi8(worst as i8));
+                let mark = _mm_and_si128(_mm_loadu_si128(marks.as_ptr().add(x).cast()), _mm_set1_epi8(worst as i8));
                 let at = bytes.as_mut_ptr().add(x).cast();
-                _mm256_storeu_si256(at, _mm256_max_epu8(_mm256_loadu_si256(at), mark));
+                _mm_storeu_si128(at, _mm_max_epu8(_mm_loadu_si128(at), mark));
             }
             if x == last {
                 return;
