@@ -15,14 +15,13 @@ use sweep::View;
 
 use crate::config::{DsmConfig, Tuning};
 use crate::error::PipelineError;
-use crate::first_look::WINDOW_MARGIN;
 use crate::heights::{SweepPlan, sweep_scene};
 use crate::output::Product;
 use crate::prior::{CityPrior, Findings};
 use crate::report::ChunksReport;
 use crate::scene::{Opened, read_coarse_view, read_view};
 use crate::setup::{self, OutputGrid, image_span};
-use crate::surface::{Counts, SURROUNDINGS_M, SurfaceInput, make_surface};
+use crate::surface::{Counts, SurfaceInput, make_surface, surroundings_m};
 use crate::tie_windows::Character;
 use crate::{memory, probe};
 
@@ -30,6 +29,9 @@ use crate::{memory, probe};
 const SIDE_MAX: usize = 8192;
 /// Smaller ones are mostly rim.
 const SIDE_MIN: usize = 256;
+/// Pixels read around what shows a chunk with its rim: patches and the aggregation reach out, and what stands beyond the rim is
+/// only looked at from the core.
+const MARGIN_PX: usize = 32;
 /// Windows begin and end on multiples of this, pixels: whole pixels of seven levels.
 const ALIGNED: i64 = 64;
 /// A part of an image less wide or high than this says nothing, pixels.
@@ -125,8 +127,8 @@ pub(crate) fn choose_side(
             width: side,
             height: side,
         };
-        let grown = grid.part(chunk.grown(rim(grid)))?;
-        let windows = images.iter().map(|o| image_span(o, &grown, range_m, WINDOW_MARGIN).map(aligned));
+        let grown = grid.part(chunk.grown(rim(config, grid)))?;
+        let windows = images.iter().map(|o| image_span(o, &grown, range_m, MARGIN_PX).map(aligned));
         Ok::<u64, PipelineError>(needed_mb(&windows.collect::<Result<Vec<_>, _>>()?, &grown))
     };
     if let Some(side) = config.chunk {
@@ -170,7 +172,7 @@ impl ChunkedScene<'_> {
     /// An image that cannot be read, a camera that fails, and [`PipelineError::Memory`] for a chunk that cannot be cut further.
     pub(crate) fn sweep(&self, core: Window) -> Result<Outcome, PipelineError> {
         let whole = Window::whole(self.grid.size.0, self.grid.size.1);
-        let grown = core.grown(rim(self.grid)).intersection(&whole).unwrap_or(core);
+        let grown = core.grown(rim(self.config, self.grid)).intersection(&whole).unwrap_or(core);
         let grid = self.grid.part(grown)?;
         let seen = self.seen(&grid)?;
         let own = |(i, sources): (usize, &Vec<usize>)| -> Vec<usize> {
@@ -248,7 +250,7 @@ impl ChunkedScene<'_> {
             }
             // Pixels beyond the image would be voids, which on coarse levels reach into it.
             let inside = Window::whole(o.size.0, o.size.1);
-            Ok(aligned(image_span(o, grid, range_m, WINDOW_MARGIN)?).intersection(&inside))
+            Ok(aligned(image_span(o, grid, range_m, MARGIN_PX)?).intersection(&inside))
         };
         self.images.iter().zip(seen).map(one).collect()
     }
@@ -295,8 +297,8 @@ impl ChunkedScene<'_> {
 }
 
 /// Cells around a core.
-fn rim(grid: &OutputGrid) -> usize {
-    (SURROUNDINGS_M / grid.gsd_m).ceil() as usize
+fn rim(config: &DsmConfig, grid: &OutputGrid) -> usize {
+    (surroundings_m(config.fill) / grid.gsd_m).ceil() as usize
 }
 
 fn aligned(w: Window) -> Window {

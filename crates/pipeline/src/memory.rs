@@ -11,13 +11,18 @@ use crate::error::PipelineError;
 const DEFAULT_MB: u64 = 4000;
 /// What the libraries take before anything is done, GDAL's blocks and the program's buffers among it, bytes.
 const BASE: u64 = 200_000_000;
-/// Bytes per pixel of a view from its reading to its placement: the image with its pyramid (16/3), the heights of two
-/// levels with deviation, confidence and support (16 + 4), the hypotheses' ranges (6) with what they are found from (4),
-/// and the placed vertices, which come when the ranges have gone (20 − 10).
-const BYTES_PER_PIXEL: u64 = 46;
-/// Bytes per cell of the grid: four results twice, before and after the clean-up (26), with a void's surroundings in up to
+/// Bytes per pixel of all views while one is swept: the image with its pyramid (16/3), the heights of two levels with
+/// deviation, confidence and support (16 + 4), the hypotheses' ranges (6) with what they are found from (4).
+const SWEPT_BYTES_PER_PIXEL: u64 = 36;
+/// … while they are placed on the grid: the image, the heights (16), the vertices (20), and what says which pixels count (5).
+const PLACED_BYTES_PER_PIXEL: u64 = 47;
+/// … and when only the vertices are left.
+const VERTEX_BYTES_PER_PIXEL: u64 = 20;
+/// Bytes per cell while views are placed: what no view can see.
+const PLACED_BYTES_PER_CELL: u64 = 2;
+/// Bytes per cell at the end: four results twice, before and after the clean-up (26), with a void's surroundings in up to
 /// half of the cells (48).
-const BYTES_PER_CELL: u64 = 74;
+const FUSED_BYTES_PER_CELL: u64 = 74;
 /// Bytes per pixel of one block in work: about 24 hypotheses, each a cost and a sum, plus layout.
 const BYTES_PER_BLOCK_PIXEL: u64 = 24 * 3 + 9;
 /// Pixels of a whole block with its margins.
@@ -33,8 +38,14 @@ pub(crate) fn needed_mb(pixels: &[u64], cells: u64) -> u64 {
     let all = pixels.iter().fold(0, |sum: u64, p| sum.saturating_add(*p));
     let largest = pixels.iter().copied().max().unwrap_or(0);
     let blocks = BYTES_PER_BLOCK_PIXEL * BLOCK_PIXELS.min(largest) * rayon::current_num_threads() as u64;
-    let bytes = all.saturating_mul(BYTES_PER_PIXEL).saturating_add(cells.saturating_mul(BYTES_PER_CELL));
-    BASE.saturating_add(blocks).saturating_add(bytes) / 1_000_000
+    let stage =
+        |per_pixel: u64, per_cell: u64| all.saturating_mul(per_pixel).saturating_add(cells.saturating_mul(per_cell));
+    let stages = [
+        stage(SWEPT_BYTES_PER_PIXEL, 0).saturating_add(blocks),
+        stage(PLACED_BYTES_PER_PIXEL, PLACED_BYTES_PER_CELL),
+        stage(VERTEX_BYTES_PER_PIXEL, FUSED_BYTES_PER_CELL),
+    ];
+    BASE.saturating_add(stages.into_iter().fold(0, u64::max)) / 1_000_000
 }
 
 /// Refuses what does not fit the limit.

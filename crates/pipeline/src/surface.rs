@@ -43,7 +43,18 @@ const SUPPORT_MIN: f32 = 0.2;
 const CONFIDENCE_MIN: f32 = 0.1;
 
 /// Ground around a cell that decides what it holds, metres: speckle is judged, then voids are filled from this far.
-pub(crate) const SURROUNDINGS_M: f64 = FILL_REACH_ALL_M + 2.0 * SPECKLE_SIDE_M;
+pub(crate) fn surroundings_m(fill: Fill) -> f64 {
+    fill_reach_m(fill).unwrap_or(0.0) + 2.0 * SPECKLE_SIDE_M
+}
+
+/// How far heights around a void are looked for; `None` where it stays.
+fn fill_reach_m(fill: Fill) -> Option<f64> {
+    match fill {
+        Fill::None => None,
+        Fill::Justified => Some(FILL_REACH_M),
+        Fill::All => Some(FILL_REACH_ALL_M),
+    }
+}
 
 /// What the surface is made with.
 #[derive(Clone, Copy)]
@@ -175,13 +186,9 @@ fn fuse(input: SurfaceInput<'_>, placed: Vec<PlacedView>, blind: &Grid<bool>, or
 
 /// How voids are filled on cells of `gsd` metres, if at all.
 fn fill_config(fill: Fill, gsd: f64) -> Option<FillConfig> {
-    let (reach_m, narrow_m) = match fill {
-        Fill::None => return None,
-        Fill::Justified => (FILL_REACH_M, FILL_NARROW_M),
-        Fill::All => (FILL_REACH_ALL_M, f64::INFINITY),
-    };
+    let narrow_m = if fill == Fill::All { f64::INFINITY } else { FILL_NARROW_M };
     Some(FillConfig {
-        reach_cells: (reach_m / gsd).ceil() as usize,
+        reach_cells: (fill_reach_m(fill)? / gsd).ceil() as usize,
         narrow_cells: (narrow_m / gsd) as f32,
         island_cells: (FILL_NARROW_M / gsd).powi(2) as usize,
         hidden_cells_per_m: (FILL_HIDDEN / gsd) as f32,
