@@ -170,23 +170,26 @@ fn read_row_with<S: Sums>(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize
     let step = reference.ranges.step_m;
     let gy = window.y + y as i64;
     let image = &reference.view.image.row(gy as usize)[window.x as usize..][..window.width];
-    let in_core = (gy >= core.y && gy < core.y + core.height as i64).then(|| (gy - core.y) as usize);
-    for (x, grey) in image.iter().enumerate() {
-        let (p, own) = (y * window.width + x, sums.pixel_and_more(x));
+    let row = y * window.width..(y + 1) * window.width;
+    let (low, best) = (&volume.low[row.clone()], &mut best[row.clone()]);
+    let costs = low.iter().zip(&volume.offsets[row]).zip(best);
+    let cy = usize::try_from(gy - core.y).ok().filter(|cy| *cy < core.height);
+    let mut rows = cy.map(|cy| [&mut out.height_m, &mut out.sigma_m, &mut out.confidence].map(|map| map.row_mut(cy)));
+    for ((x, grey), ((low, offset), best)) in image.iter().enumerate().zip(costs) {
+        let own = sums.pixel_and_more(x);
         let least = S::least(own.0, own.1);
-        best[p] = volume.costs[volume.offsets[p] as usize + least.1];
-        let Some(to) = in_core.and_then(|cy| Some((x.checked_sub((core.x - window.x) as usize)?, cy))) else {
-            continue;
-        };
+        *best = volume.costs[*offset as usize + least.1];
+        let to = x.wrapping_sub((core.x - window.x) as usize);
+        let Some([heights, sigmas, confidences]) = rows.as_mut().filter(|_| to < core.width) else { continue };
         // No picture, no height: blank parts agree at every height at which both images see them.
-        if to.0 >= core.width || grey.is_nan() {
+        if grey.is_nan() {
             continue;
         }
         if let Some(e) = soft_argmin::<S>(own, least, scale, config.cost_noise) {
-            let height_m = (f64::from(volume.low[p]) + f64::from(e.index)) * step;
-            out.height_m[to] = (height_m - out.origin_m) as f32;
-            out.sigma_m[to] = e.spread * step as f32;
-            out.confidence[to] = e.margin;
+            let height_m = (f64::from(*low) + f64::from(e.index)) * step;
+            heights[to] = (height_m - out.origin_m) as f32;
+            sigmas[to] = e.spread * step as f32;
+            confidences[to] = e.margin;
         }
     }
 }

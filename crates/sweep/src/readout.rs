@@ -38,12 +38,11 @@ pub(crate) fn soft_argmin<S: Sums>(
 ) -> Option<Estimate> {
     let reach = WINDOW.min(best).min(count - 1 - best);
     // A window cut on one side by the range's end would pull the mean inward: both sides are cut alike.
-    let (from, to) = (best - reach, best + reach + 1);
-    let above = |i: usize| f32::from(sums[i] - least);
-    let curvature = if reach == 0 { 0.0 } else { 0.5 * (above(best - 1) + above(best + 1)) };
-    let outside = S::least_outside(sums, count, from, to);
+    let outside = S::least_outside(sums, count, best - reach, best + reach + 1);
     let outside = if outside == u16::MAX { scale } else { f32::from(outside - least) };
     let margin = (outside / scale).min(1.0);
+    let above = sides((sums, least), best, reach);
+    let curvature = 0.5 * (above[0] + above[BEHIND]);
     if curvature == 0.0 && margin == 0.0 {
         return None;
     }
@@ -51,20 +50,39 @@ pub(crate) fn soft_argmin<S: Sums>(
         return Some(Estimate { index: best as f32, spread: WINDOW as f32, margin });
     }
     let cold = 1.0 / (2.0 * curvature * DEVIATION * DEVIATION);
-    // Side by side: those before the best, and those behind it.
-    let mut weights = [0.0f32; 2 * WINDOW];
-    for i in 0..reach {
-        (weights[i], weights[WINDOW + i]) = (-above(best - 1 - i) * cold, -above(best + 1 + i) * cold);
-    }
-    weights.iter_mut().for_each(|w| *w = exp(*w));
+    let weights = above.map(|above| exp(-above * cold));
     let (mut weight, mut first) = (1.0f32, 0.0f32);
-    for i in 0..reach {
-        let (before, behind) = (weights[i], weights[WINDOW + i]);
+    for i in 0..WINDOW {
+        let inside = |weight: f32| if i < reach { weight } else { 0.0 };
+        let (before, behind) = (inside(weights[i]), inside(weights[BEHIND + i]));
         weight += before + behind;
         first += (i + 1) as f32 * (behind - before);
     }
     let spread = (noise * scale / (2.0 * curvature)).sqrt().min(WINDOW as f32);
     Some(Estimate { index: best as f32 + first / weight, spread, margin })
+}
+
+/// Where in a register's lanes the sums behind the best one begin; those before it begin with the first lane.
+const BEHIND: usize = 4;
+
+/// How far the sums around the best one are above it, the nearest first, up to `reach` on each side: 0 further on.
+#[inline(always)]
+fn sides((sums, least): (&[u16], u16), best: usize, reach: usize) -> [f32; 2 * BEHIND] {
+    let mut above = [0.0; 2 * BEHIND];
+    if reach == WINDOW {
+        // Most are: one check of bounds.
+        let window = &sums[best - WINDOW..][..2 * WINDOW + 1];
+        for i in 0..WINDOW {
+            above[i] = f32::from(window[WINDOW - 1 - i] - least);
+            above[BEHIND + i] = f32::from(window[WINDOW + 1 + i] - least);
+        }
+    } else {
+        for i in 0..reach {
+            above[i] = f32::from(sums[best - 1 - i] - least);
+            above[BEHIND + i] = f32::from(sums[best + 1 + i] - least);
+        }
+    }
+    above
 }
 
 /// `e^x` for x ≤ 0 to a relative 4e-6: a power of two, and a polynomial for what is left of the exponent. The library's
@@ -117,6 +135,27 @@ mod tests {
             }
             let raised: Vec<u16> = sums.iter().map(|s| s + addend).collect();
             prop_assert_eq!(read(&raised, 1016.0, 0.02), found);
+        }
+    }
+
+    proptest! {
+        /// Hypothesis by hypothesis, with the library's exponential.
+        #[test]
+        fn the_mean_is_that_of_the_definition(sums in prop::collection::vec(0..900u16, 1..30)) {
+            let (count, least) = (sums.len(), *sums.iter().min().unwrap());
+            let best = sums.iter().position(|s| *s == least).unwrap();
+            let reach = WINDOW.min(best).min(count - 1 - best);
+            let above = |i: usize| f64::from(sums[i] - least);
+            let curvature = if reach == 0 { 0.0 } else { 0.5 * (above(best - 1) + above(best + 1)) };
+            let weight = |i: usize| match curvature {
+                0.0 => f64::from(u8::from(i == best)),
+                _ => (-above(i) / (2.0 * curvature * f64::from(DEVIATION).powi(2))).exp(),
+            };
+            let window = best - reach..best + reach + 1;
+            let mean = window.clone().map(|i| weight(i) * i as f64).sum::<f64>() / window.map(weight).sum::<f64>();
+            if let Some(e) = read(&sums, 1016.0, 0.02) {
+                prop_assert!((f64::from(e.index) - mean).abs() < 1e-4, "{} for {mean}", e.index);
+            }
         }
     }
 

@@ -41,17 +41,17 @@ mod avx2 {
     impl Sums for super::super::Avx2 {
         #[inline(always)]
         fn least(sums: &[u16], count: usize) -> (u16, usize) {
-            assert!(sums.len() >= count + WORDS && count <= usize::from(u16::MAX));
+            assert!(sums.len() >= count + WORDS && (1..=usize::from(u16::MAX)).contains(&count));
             // SAFETY: as above.
             unsafe {
                 let mut least = _mm256_set1_epi16(-1);
                 let mut at = 0;
-                while at < count {
-                    let others =
-                        _mm256_cmpeq_epi16(_mm256_subs_epu16(splat(count - at), lanes()), _mm256_setzero_si256());
-                    least = _mm256_min_epu16(least, _mm256_or_si256(load(sums, at), others));
+                while at + WORDS < count {
+                    least = _mm256_min_epu16(least, load(sums, at));
                     at += WORDS;
                 }
+                let last = _mm256_or_si256(load(sums, at), others(count - at));
+                let least = _mm256_min_epu16(least, last);
                 let least = least_lane(least);
                 let mut at = 0;
                 loop {
@@ -70,20 +70,20 @@ mod avx2 {
             assert!(sums.len() >= count + WORDS && from <= to && to <= count && count <= usize::from(u16::MAX));
             // SAFETY: as above.
             unsafe {
-                let mut least = _mm256_set1_epi16(-1);
-                let window = splat(to - from);
+                let (all, window) = (_mm256_set1_epi16(-1), splat(to - from));
+                let mut least = all;
+                // Numbers before the window become great ones, as there are none below 0.
+                let mut place = _mm256_sub_epi16(lanes(), splat(from));
                 let mut at = 0;
-                while at < count {
-                    let zero = _mm256_setzero_si256();
-                    let others = _mm256_cmpeq_epi16(_mm256_subs_epu16(splat(count - at), lanes()), zero);
-                    // Numbers before the window become great ones, as there are none below 0.
-                    let place = _mm256_sub_epi16(_mm256_add_epi16(lanes(), splat(at)), splat(from));
-                    let inside = _mm256_andnot_si256(
-                        _mm256_cmpeq_epi16(_mm256_subs_epu16(window, place), zero),
-                        _mm256_set1_epi16(-1),
-                    );
-                    let hidden = _mm256_or_si256(others, inside);
-                    least = _mm256_min_epu16(least, _mm256_or_si256(load(sums, at), hidden));
+                loop {
+                    let away = _mm256_cmpeq_epi16(_mm256_min_epu16(place, window), window);
+                    let seen = _mm256_blendv_epi8(all, load(sums, at), away);
+                    if at + WORDS >= count {
+                        least = _mm256_min_epu16(least, _mm256_or_si256(seen, others(count - at)));
+                        break;
+                    }
+                    least = _mm256_min_epu16(least, seen);
+                    place = _mm256_add_epi16(place, splat(WORDS));
                     at += WORDS;
                 }
                 least_lane(least)
@@ -101,6 +101,25 @@ mod avx2 {
     fn lanes() -> __m256i {
         // SAFETY: as above.
         unsafe { _mm256_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15) }
+    }
+
+    /// All bits in the lanes behind the first `count`.
+    ///
+    /// # Safety
+    /// They are no more than there are lanes.
+    #[inline(always)]
+    unsafe fn others(count: usize) -> __m256i {
+        static OTHERS: [u16; 2 * WORDS] = {
+            let mut out = [0; 2 * WORDS];
+            let mut i = WORDS;
+            while i < 2 * WORDS {
+                out[i] = u16::MAX;
+                i += 1;
+            }
+            out
+        };
+        // SAFETY: the caller's.
+        unsafe { _mm256_loadu_si256(OTHERS.as_ptr().add(WORDS - count).cast()) }
     }
 
     /// # Safety
