@@ -5,7 +5,7 @@
 
 use super::bytes::{Bytes, Instructions};
 use super::pixel::{Backward, Forward, Pixel, Store, lanes};
-use super::rows::{FAR, HALF, LANES, Links, MORE, ONE, Pixels, RUN, Range, Row, TWO};
+use super::rows::{FAR, GUARD, HALF, LANES, Links, MORE, ONE, Pixels, RUN, Range, Row, TWO};
 
 /// What a row of pixels is computed from, and where its results go.
 pub(crate) struct Task<'a> {
@@ -132,8 +132,10 @@ fn extend_pixels<I: Instructions, S: Store>(
                         let along = last.moved(q, p, along_aside);
                         for (d, (upper, aside)) in pixel.upper.iter_mut().zip(&mut *aside).enumerate() {
                             let entry = start + i + if S::BACKWARD { 2 - d } else { d };
-                            let paths = rows.from[d].add(above.place[entry] as usize);
-                            *upper = moved(above.range(entry), paths, p, aside);
+                            let q = above.range(entry);
+                            if p.beyond(q) >= GUARD as i32 {
+                                *upper = moved(q, rows.from[d].add(above.place[entry] as usize), p, aside);
+                            }
                         }
                         last.extend_more(along, pixel);
                         done += 1;

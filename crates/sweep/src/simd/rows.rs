@@ -224,4 +224,10 @@ impl Range {
     pub(super) fn count(self) -> usize {
         self.high.wrapping_sub(self.low) as usize
     }
+
+    /// By how many heights a pixel searches beyond another's.
+    #[inline(always)]
+    pub(super) fn beyond(self, other: Self) -> i32 {
+        other.low.wrapping_sub(self.low).max(self.high.wrapping_sub(other.high))
+    }
 }
