@@ -64,7 +64,7 @@ pub fn bicubic_along(grid: &Grid<f32>, from: [f64; 2], step: [f64; 2], out: &mut
         let first = (k * LANES) as f64;
         let at = |axis: usize| std::array::from_fn(|i| from[axis] + step[axis] * (first + i as f64));
         let (columns, rows): ([f64; LANES], [f64; LANES]) = (at(0), at(1));
-        // Positions between two that have all their pixels have them too.
+        // Positions between two that have all their pixels have them too; those between two beyond one side have no value.
         if [0, LANES - 1].into_iter().all(|i| has_all_pixels(grid, [columns[i], rows[i]])) {
             let inside = bicubic_inside(grid, columns, rows);
             match <&mut [f32; LANES]>::try_from(&mut *values) {
@@ -76,11 +76,21 @@ pub fn bicubic_along(grid: &Grid<f32>, from: [f64; 2], step: [f64; 2], out: &mut
             }
         } else {
             values.fill(f32::NAN);
+            if are_beyond(&columns, grid.width()) || are_beyond(&rows, grid.height()) {
+                continue;
+            }
         }
         for (i, value) in values.iter_mut().enumerate().filter(|(_, value)| !value.is_finite()) {
             *value = bicubic(grid, columns[i], rows[i]);
         }
     }
+}
+
+/// Whether positions along a line all lie before the first pixel, or all behind the last one.
+#[inline(always)]
+fn are_beyond(positions: &[f64; LANES], length: usize) -> bool {
+    let [first, .., last] = positions;
+    (*first < 0.0 && *last < 0.0) || (*first > length as f64 - 1.0 && *last > length as f64 - 1.0)
 }
 
 #[inline(always)]

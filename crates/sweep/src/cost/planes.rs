@@ -33,8 +33,9 @@ impl Planes {
     pub(super) fn fit(&mut self, width: usize, area: usize) {
         self.width = width;
         self.stride = area.next_multiple_of(CHUNK) + CACHE_LINE;
-        self.costs.resize(PLANES_AT_ONCE * self.stride, 0);
-        self.columns.resize(width.next_multiple_of(COLUMNS) * DEPTH, [0; ROWS]);
+        // What a smaller part does not need is kept for the next larger one: filling it anew takes longer than the planes.
+        self.costs.resize((PLANES_AT_ONCE * self.stride).max(self.costs.len()), 0);
+        self.columns.resize((width.next_multiple_of(COLUMNS) * DEPTH).max(self.columns.len()), [0; ROWS]);
     }
 
     /// The `i`th plane: whole chunks.
