@@ -63,7 +63,7 @@ pub(crate) struct TileScratch {
     sums: Vec<u16>,
     weights: Vec<u16>,
     planes: Planes,
-    parts: Vec<(Window, (i32, i32))>,
+    parts: Vec<SweptPart>,
 }
 
 /// Brings differences of grey values to the unit that counts fully: of the image's contrast, or of its noise where that is more.
@@ -114,7 +114,7 @@ fn sweep_planes(
     parts.clear();
     divide(reference.ranges, tile, planes, &mut parts);
     for part in &parts {
-        scratch.sweep_part(reference, *part, tile, config, block);
+        scratch.sweep_part(reference, part, tile, config, block);
     }
     scratch.parts = parts;
     Ok(())
@@ -134,28 +134,37 @@ fn plane_span(ranges: &Ranges, tile: Window) -> (i32, i32) {
     span
 }
 
-/// Appends the parts in which a tile is swept at the least cost, each with those of `planes` that its pixels ask for, as beside
-/// a wall between two roofs; returns that cost, in pixels.
-fn divide(ranges: &Ranges, tile: Window, planes: (i32, i32), parts: &mut Vec<(Window, (i32, i32))>) -> usize {
-    let asked = plane_span(ranges, tile);
+/// A part of a tile, and the planes that it is swept through: all that its pixels ask for, or some of them.
+struct SweptPart {
+    window: Window,
+    planes: (i32, i32),
+    is_all: bool,
+}
+
+/// Appends the parts in which a tile is swept at the least cost, each through those of `planes` that its pixels ask for, as
+/// beside a wall between two roofs; returns that cost, in pixels, and what all its pixels ask for.
+fn divide(ranges: &Ranges, tile: Window, planes: (i32, i32), parts: &mut Vec<SweptPart>) -> (usize, (i32, i32)) {
+    let first = parts.len();
+    let (divided, asked) = if tile.width.max(tile.height) >= 2 * TILE_MIN {
+        let [(a, p), (b, q)] = halves(tile).map(|half| divide(ranges, half, planes, parts));
+        (a + b, (p.0.min(q.0), p.1.max(q.1)))
+    } else {
+        (usize::MAX, plane_span(ranges, tile))
+    };
     let own = (asked.0.max(planes.0), asked.1.min(planes.1));
     if own.0 >= own.1 {
-        return 0;
+        return (0, asked);
     }
     // Parts cost their margins again, and registers are filled up.
     let width = tile.width + 2 * CENSUS_REACH;
     let area = (width + width.next_multiple_of(OVERHANG)) / 2 * (tile.height + 2 * CENSUS_REACH);
     let whole = (own.1 - own.0) as usize * (area + PLANE_PIXELS) + area;
-    let first = parts.len();
-    if tile.width.max(tile.height) >= 2 * TILE_MIN {
-        let divided = halves(tile).into_iter().map(|half| divide(ranges, half, own, parts)).sum();
-        if divided < whole {
-            return divided;
-        }
+    if divided < whole {
+        return (divided, asked);
     }
     parts.truncate(first);
-    parts.push((tile, own));
-    whole
+    parts.push(SweptPart { window: tile, planes: own, is_all: own == asked });
+    (whole, asked)
 }
 
 /// The local maps of a tile to all sources, or in which direction one of them is over the bound.
@@ -247,17 +256,18 @@ impl TileScratch {
         self.pair_costs.resize_with(pairs, Vec::new);
     }
 
-    /// Fills the costs of a part of the tile for those of its pixels' hypotheses that lie among `planes`.
+    /// Fills the costs of a part of the tile for those of its pixels' hypotheses that lie among its planes.
     fn sweep_part(
         &mut self,
         reference: Reference<'_>,
-        (part, planes): (Window, (i32, i32)),
+        swept: &SweptPart,
         tile: Window,
         config: &CostConfig,
         block: &mut BlockCosts<'_>,
     ) {
+        let (part, planes) = (swept.window, swept.planes);
         self.look_at(reference, part);
-        let is_all = planes == plane_span(reference.ranges, part) && (planes.1 - planes.0) as usize <= PLANES_AT_ONCE;
+        let is_all = swept.is_all && (planes.1 - planes.0) as usize <= PLANES_AT_ONCE;
         let padded = Part {
             within: [part.x - tile.x, part.y - tile.y],
             width: part.width + 2 * CENSUS_REACH,
