@@ -6,21 +6,21 @@
 //! result does not depend on how the work is divided.
 //!
 //! # Where the time goes
-//! Of the samples of `perf record`, grouped by symbol, in `skysweep dsm` (default preset, two cores of AMD EPYC, 2026-11-21), in percent, for the seven views of
-//! JAX_068 and for the Pléiades triplet of the quarry:
+//! Samples of `perf record` in `skysweep dsm` by `benches/profile/shares.py` (default preset, two cores of AMD EPYC, 2026-11-22), in
+//! percent, for the seven views of JAX_068 and for the Pléiades triplet of the quarry:
 //!
 //! | stage | seven views | triplet |
 //! |---|--:|--:|
-//! | costs: shifted pictures, census, differences, columns to pixels | 25 | 17 |
-//! | sources laid over tiles (and over views, for the tie points), pyramids | 15 | 8 |
-//! | tie points, adjustment, cameras | 19 | 7 |
-//! | consistency | 10 | 5 |
-//! | read-out, support, ranges | 5 | 9 |
-//! | aggregation | 5 | 7 |
-//! | fusion, speckle, filling, confidence, pictures | 4 | 12 |
-//! | the operating system: pages, files | 9 | 17 |
-//! | compression of the results | 2 | 9 |
-//! | the rest, below a percent each | 6 | 9 |
+//! | tie points, adjustment, probe, cameras | 21 | 6 |
+//! | costs: shifted pictures, census, differences, planes to pixels | 17 | 11 |
+//! | sources laid over tiles and views, pyramids | 13 | 5 |
+//! | read-out, support, ranges | 8 | 12 |
+//! | consistency | 8 | 4 |
+//! | fusion, speckle, filling, confidence, pictures | 7 | 16 |
+//! | aggregation | 5 | 5 |
+//! | the operating system: pages, copies, libraries | 12 | 22 |
+//! | files, projections | 6 | 15 |
+//! | the rest | 4 | 4 |
 //!
 //! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; on a slow evening of the host):
 //! 0.4 · 10⁹ hypotheses per second and source for the costs, 0.58 · 10⁹ for the aggregation over eight directions, 0.15 · 10⁹ for a
