@@ -26,7 +26,7 @@ use crate::tie_windows::{Character, match_in_windows};
 const STEP_M: f64 = 50.0;
 
 /// Pixels read around what the bounds ask for, full resolution: patches, aggregation and pointing errors reach out.
-pub(crate) const WINDOW_MARGIN: usize = 96;
+const WINDOW_MARGIN: usize = 96;
 
 /// What is known before the pointing: the first geometry, the pairs that can give heights, and the ties.
 pub(crate) struct Looked {

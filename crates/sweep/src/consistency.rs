@@ -124,7 +124,7 @@ impl Pixels {
     }
 
     fn put(&mut self, x: usize, q: [f64; 2]) {
-        (self.right[x], self.below[x]) = ((q[0] + 1.0).floor() as i32, (q[1] + 1.0).floor() as i32);
+        (self.right[x], self.below[x]) = behind(q);
     }
 }
 
@@ -132,8 +132,14 @@ impl Pixels {
 fn follow_row(map: &TileMap, first: [f64; 2], height_m: &[f32], origin_m: f64, right: &mut [i32], below: &mut [i32]) {
     for (x, ((right, below), h)) in right.iter_mut().zip(below).zip(height_m).enumerate() {
         let q = map.at([first[0] + x as f64, first[1]], origin_m + f64::from(*h));
-        (*right, *below) = ((q[0] + 1.0).floor() as i32, (q[1] + 1.0).floor() as i32);
+        (*right, *below) = behind(q);
     }
+}
+
+/// The pixel to the right of a position and below it.
+#[inline(always)]
+fn behind(q: [f64; 2]) -> (i32, i32) {
+    ((q[0] + 1.0).floor() as i32, (q[1] + 1.0).floor() as i32)
 }
 
 /// Source pixels per metre of height.

@@ -25,7 +25,6 @@ pub(crate) struct Coarse {
 }
 
 /// A place tried: its correlation, height, and position in the laid picture's frame.
-#[derive(Clone, Copy)]
 struct Candidate {
     correlation: f32,
     height_m: f64,
@@ -59,7 +58,7 @@ impl Coarse {
                 }
             }
         }
-        let best = found.iter().copied().reduce(|best, c| if c.correlation >= best.correlation { c } else { best })?;
+        let best = found.iter().max_by(|a, b| a.correlation.total_cmp(&b.correlation))?;
         // Places within two pixels are the same peak.
         let apart = |c: &&Candidate| (c.place[0] - best.place[0]).abs().max((c.place[1] - best.place[1]).abs()) > 2;
         let rival = found.iter().filter(apart).map(|c| c.correlation).fold(-1.0f32, f32::max);

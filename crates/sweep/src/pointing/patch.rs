@@ -71,7 +71,7 @@ fn product(values: &[f32], stride: usize, picture: &Grid<f32>, at: (usize, usize
 #[multiversion(targets("x86_64+avx2"))]
 fn moments(values: &[f32], side: usize, picture: &Grid<f32>, at: (usize, usize)) -> [f32; 3] {
     let (mut sum, mut square, mut product) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
-    for (own, other) in rows(values, side.next_multiple_of(LANES), picture, at) {
+    for (own, other) in rows(values, padded(side), picture, at) {
         for (k, (a, b)) in own.iter().zip(other).enumerate() {
             for i in 0..LANES {
                 // What lies behind the patch does not count, whatever it is.

@@ -295,23 +295,18 @@ static LANE: [u8; 2 * MIDDLE as usize + 16] = {
 };
 
 /// All bits where [`LANE`] names none.
-static OUTSIDE: [u8; 2 * MIDDLE as usize + 16] = {
-    let mut out = [u8::MAX; 2 * MIDDLE as usize + 16];
-    let mut i = 0;
-    while i < 16 {
-        out[MIDDLE as usize + i] = 0;
-        i += 1;
-    }
-    out
-};
+static OUTSIDE: [u8; 2 * MIDDLE as usize + 16] = outside(16);
 
 /// The same for thirty-two lanes.
-static OUTSIDE_OF_BOTH: [u8; 2 * MIDDLE as usize + 32] = {
-    let mut out = [u8::MAX; 2 * MIDDLE as usize + 32];
+static OUTSIDE_OF_BOTH: [u8; 2 * MIDDLE as usize + 32] = outside(32);
+
+/// All bits but in so many bytes from [`MIDDLE`] on.
+const fn outside<const N: usize>(lanes: usize) -> [u8; N] {
+    let mut out = [u8::MAX; N];
     let mut i = 0;
-    while i < 32 {
+    while i < lanes {
         out[MIDDLE as usize + i] = 0;
         i += 1;
     }
     out
-};
+}
