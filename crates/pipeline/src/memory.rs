@@ -12,8 +12,8 @@ const DEFAULT_MB: u64 = 4000;
 /// What the libraries take before anything is done, GDAL's blocks and the program's buffers among it, bytes.
 const BASE: u64 = 200_000_000;
 /// Bytes per pixel of all views while one is swept: the image with its pyramid (16/3), the heights of two levels with
-/// deviation, confidence and support (16 + 4), the hypotheses' ranges (6) with what they are found from (4).
-const SWEPT_BYTES_PER_PIXEL: u64 = 36;
+/// deviation, confidence and support (16 + 4), the hypotheses' ranges and steep surfaces (10) with what they are found from (4).
+const SWEPT_BYTES_PER_PIXEL: u64 = 40;
 /// … while they are placed on the grid: the image, the heights (16), the vertices (20), and what says which pixels count (5).
 const PLACED_BYTES_PER_PIXEL: u64 = 47;
 /// … and when only the vertices are left.
@@ -23,8 +23,10 @@ const PLACED_BYTES_PER_CELL: u64 = 2;
 /// Bytes per cell at the end: four results twice, before and after the clean-up (26), with a void's surroundings in up to
 /// half of the cells (48).
 const FUSED_BYTES_PER_CELL: u64 = 74;
-/// Bytes per pixel of one block in work: about 24 hypotheses, each a cost and a sum, plus layout.
-const BYTES_PER_BLOCK_PIXEL: u64 = 24 * 3 + 9;
+/// Bytes per pixel of one block in work: about 24 hypotheses, half as many again where a scene is rich in heights, with a byte of
+/// cost each and one of what the first four directions add; and first heights, steep surfaces and offsets (12), edges and the
+/// best costs (2).
+const BYTES_PER_BLOCK_PIXEL: u64 = 36 * 2 + 14;
 /// Pixels of a whole block with its margins.
 const BLOCK_PIXELS: u64 = 1120 * 1120;
 

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::SweepError;
 use crate::cost::{COST_MAX, CostConfig, Reference, SourceLevel};
-use crate::readout::soft_argmin;
+use crate::readout::{Estimates, Modes, RUN};
 use crate::semiglobal::{Penalties, RowSums, Volume};
 use crate::simd::Anywhere;
 #[cfg(target_arch = "x86_64")]
@@ -82,8 +82,8 @@ pub fn sweep_level(
         return Ok(parts.remove(0));
     }
     let mut out = HeightMap::empty(width, height, origin_m);
-    for (core, part) in cores.iter().zip(&parts) {
-        out.put(*core, part);
+    for (core, part) in cores.iter().zip(parts) {
+        out.put(*core, &part);
     }
     Ok(out)
 }
@@ -171,26 +171,34 @@ fn read_row_with<S: Sums>(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize
     let gy = window.y + y as i64;
     let image = &reference.view.image.row(gy as usize)[window.x as usize..][..window.width];
     let row = y * window.width..(y + 1) * window.width;
-    let (low, best) = (&volume.low[row.clone()], &mut best[row.clone()]);
-    let costs = low.iter().zip(&volume.offsets[row]).zip(best);
-    let cy = usize::try_from(gy - core.y).ok().filter(|cy| *cy < core.height);
-    let mut rows = cy.map(|cy| [&mut out.height_m, &mut out.sigma_m, &mut out.confidence].map(|map| map.row_mut(cy)));
-    for ((x, grey), ((low, offset), best)) in image.iter().enumerate().zip(costs) {
-        let own = sums.pixel_and_more(x);
-        let least = S::least(own.0, own.1);
-        *best = volume.costs[*offset as usize + least.1];
-        let to = x.wrapping_sub((core.x - window.x) as usize);
-        let Some([heights, sigmas, confidences]) = rows.as_mut().filter(|_| to < core.width) else { continue };
-        // No picture, no height: blank parts agree at every height at which both images see them.
-        if grey.is_nan() {
-            continue;
+    let (low, offsets, best) = (&volume.low[row.clone()], &volume.offsets[row.clone()], &mut best[row]);
+    let first = (core.x - window.x) as usize;
+    let inner = usize::try_from(gy - core.y).ok().filter(|cy| *cy < core.height);
+    let mut modes = Modes::new();
+    for start in (0..window.width).step_by(RUN) {
+        let run = start..(start + RUN).min(window.width);
+        let inside = run.start.max(first)..run.end.min(first + core.width);
+        let inside = if inner.is_some() { inside } else { 0..0 };
+        for (i, x) in run.enumerate() {
+            let own = sums.pixel_and_more(x);
+            let least = S::least(own.0, own.1);
+            best[x] = volume.costs[offsets[x] as usize + least.1];
+            if inside.contains(&x) {
+                modes.put::<S>(i, own, least);
+            }
         }
-        if let Some(e) = soft_argmin::<S>(own, least, scale, config.cost_noise) {
-            let height_m = (f64::from(*low) + f64::from(e.index)) * step;
-            heights[to] = (height_m - out.origin_m) as f32;
-            sigmas[to] = e.spread * step as f32;
-            confidences[to] = e.margin;
+        let Some(cy) = inner.filter(|_| !inside.is_empty()) else { continue };
+        let Estimates { index, spread, margin } = modes.estimates(scale, config.cost_noise);
+        let (from, to) = (inside.start - start..inside.end - start, inside.start - first..inside.end - first);
+        let heights = out.height_m.row_mut(cy)[to.clone()].iter_mut().zip(&index[from.clone()]);
+        for ((height, index), (low, grey)) in heights.zip(low[inside.clone()].iter().zip(&image[inside])) {
+            let height_m = (f64::from(*low) + f64::from(*index)) * step;
+            // No picture, no height: blank parts agree at every height at which both images see them.
+            *height = if grey.is_nan() { f32::NAN } else { (height_m - out.origin_m) as f32 };
         }
+        let sigmas = out.sigma_m.row_mut(cy)[to.clone()].iter_mut().zip(&spread[from.clone()]);
+        sigmas.for_each(|(sigma, spread)| *sigma = spread * step as f32);
+        out.confidence.row_mut(cy)[to].copy_from_slice(&margin[from]);
     }
 }
 
@@ -306,6 +314,27 @@ mod tests {
     fn three_views(size: usize) -> Vec<View> {
         let cameras = [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| leaning_camera(size, p));
         cameras.map(|c| view_of_plane(c, size, 7.3)).to_vec()
+    }
+
+    /// A core that begins between two runs of pixels, and ends in one, has the heights that the whole window has there.
+    #[test]
+    fn a_block_reads_its_core_where_it_is() {
+        let views = three_views(130);
+        let ranges = Ranges::uniform(130, 130, 1.0, (-10.0, 30.0));
+        let (reference, sources) = (reference(&views, &ranges), [views[1].on_level(1, 0)]);
+        let config = config(Aggregation::Variance);
+        let block = |core| sweep_block(reference, &sources, core, 0.0, &config).unwrap();
+        // With its margin the core's window is the whole image.
+        let core = Window { x: 45, y: 41, width: 43, height: 46 };
+        let (part, whole) = (block(core), block(Window::whole(130, 130)));
+        fn maps(map: &HeightMap) -> [&Grid<f32>; 4] {
+            [&map.height_m, &map.sigma_m, &map.confidence, &map.support]
+        }
+        let bits = |map: &Grid<f32>| map.data().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert!(part.height_m.data().iter().filter(|h| h.is_finite()).count() > 1500);
+        for (part, whole) in maps(&part).into_iter().zip(maps(&whole)) {
+            assert_eq!(bits(part), bits(&whole.window(core, f32::NAN)));
+        }
     }
 
     #[test]

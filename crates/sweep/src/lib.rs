@@ -22,8 +22,9 @@
 //! | files, projections | 6 | 15 |
 //! | the rest | 4 | 4 |
 //!
-//! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each): 0.9 to 1.0 · 10⁹ hypotheses per second and
-//! source for the costs, 1.2 · 10⁹ for the aggregation over eight directions, 0.32 · 10⁹ for a level of a pair as a whole. In scenes
+//! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each): 0.8 to 1.0 · 10⁹ hypotheses per second and
+//! source for the costs, 1.1 to 1.2 · 10⁹ for the aggregation over eight directions, 0.33 to 0.38 · 10⁹ for a level of a
+//! pair as a whole. In scenes
 //! a pixel has ten to twenty hypotheses, so that what is done once per pixel counts as much as the vectors: ranges that follow
 //! the heights save more than faster kernels would.
 

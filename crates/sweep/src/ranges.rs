@@ -14,6 +14,8 @@ pub struct Ranges {
     pub low: Grid<i32>,
     /// Number of hypotheses of each pixel, at least one.
     pub count: Grid<u16>,
+    /// The hypothesis at which the coarser level found a steep surface; [`NOT_STEEP`] elsewhere.
+    pub steep: Grid<i32>,
 }
 
 /// How far around a coarse pixel heights count, coarse pixels: a patch that holds an edge sees the upper surface's height up to
@@ -25,11 +27,27 @@ const REACH_MAX: usize = 16;
 /// coarser height is itself off by up to a step.
 const MARGIN_STEPS: f64 = 3.0;
 
+/// No steep surface is expected.
+pub const NOT_STEEP: i32 = i32::MIN;
+/// Surfaces that climb by more hypotheses than this from pixel to pixel are two: three are a slope of 1.5 pixels of parallax per
+/// pixel, at which a view hardly sees the surface that another one sees.
+pub const CLIMB_MAX: i32 = 3;
+/// Climbs beyond this are steep, hypotheses per pixel: gentler surfaces cost a step every other pixel, less than the noise of a
+/// coarse height handed down would do harm.
+const STEEP: f32 = 0.5;
+/// A climb whose halves differ by this factor is a jump, or noise.
+const UNEVEN: f32 = 2.0;
+
 impl Ranges {
     /// The same range of heights for every pixel.
     pub fn uniform(width: usize, height: usize, step_m: f64, (lo_m, hi_m): (f64, f64)) -> Self {
         let (low, count) = span(lo_m, hi_m, step_m);
-        Self { step_m, low: Grid::filled(width, height, low), count: Grid::filled(width, height, count) }
+        Self {
+            step_m,
+            low: Grid::filled(width, height, low),
+            count: Grid::filled(width, height, count),
+            steep: Grid::filled(width, height, NOT_STEEP),
+        }
     }
 
     /// Ranges of a level from the heights of the next coarser one (metres, NaN where unknown): the least and greatest
@@ -63,7 +81,39 @@ impl Ranges {
                 }
             }
         }
+        out.expect_steep(coarse, origin_m);
         out
+    }
+
+    /// Takes over the coarser level's surface where it is steep.
+    fn expect_steep(&mut self, coarse: &Grid<f32>, origin_m: f64) {
+        let (width, height) = (self.steep.width(), self.steep.height());
+        let steps = |height_m: f32| height_m / self.step_m as f32;
+        // Along the map's border no slope has two sides.
+        for y in 2..coarse.height().saturating_sub(2) {
+            let rows = [y - 2, y - 1, y, y + 1, y + 2].map(|y| coarse.row(y));
+            for x in 2..coarse.width().saturating_sub(2) {
+                let own = rows[2][x];
+                let lines = [[rows[2][x - 2], own, rows[2][x + 2]], [rows[0][x], own, rows[4][x]]];
+                let slopes = lines.map(|line| steps(slope(line)));
+                if slopes[0].hypot(slopes[1]) <= STEEP {
+                    continue;
+                }
+                for (dy, fine_y) in (0..2).map(|dy| (dy, 2 * y + dy)).filter(|(_, y)| *y < height) {
+                    for (dx, fine_x) in (0..2).map(|dx| (dx, 2 * x + dx)).filter(|(_, x)| *x < width) {
+                        // The next coarse pixels in the direction of the fine one; what is across a jump is another surface.
+                        let (row, column) = (rows[1 + 2 * dy], x + 2 * dx - 1);
+                        let near = |height_m: f32| {
+                            if steps((height_m - own).abs()) <= 2.0 * CLIMB_MAX as f32 { height_m } else { own }
+                        };
+                        let sides = near(rows[2][column]) + near(row[x]);
+                        let height_m = (9.0 * own + 3.0 * sides + near(row[column])) / 16.0;
+                        let hypothesis = (origin_m + f64::from(height_m)) / self.step_m;
+                        self.steep[(fine_x, fine_y)] = hypothesis.round() as i32;
+                    }
+                }
+            }
+        }
     }
 
     /// One hypothesis, which is never looked at, for the pixels where the image has no value.
@@ -79,6 +129,22 @@ impl Ranges {
     pub fn evaluations(&self) -> u64 {
         self.count.data().iter().map(|&n| u64::from(n)).sum()
     }
+}
+
+/// By how many hypotheses a surface climbs from one pixel to the next, by where it is expected at each; by none where it is not
+/// steep, or the one ends and another begins.
+#[inline(always)]
+pub(crate) fn climb_of(from: i32, to: i32) -> i32 {
+    let climb = to.wrapping_sub(from);
+    if climb.wrapping_add(CLIMB_MAX) as u32 <= 2 * CLIMB_MAX as u32 { climb } else { 0 }
+}
+
+/// A coarse height and those two pixels before and behind it say by how much the surface climbs per fine pixel; 0 where it is
+/// uneven or one is not known.
+fn slope([before, own, behind]: [f32; 3]) -> f32 {
+    let (before, behind) = (own - before, behind - own);
+    let (less, more) = (before.abs().min(behind.abs()), before.abs().max(behind.abs()));
+    if before * behind > 0.0 && more < UNEVEN * less { (before + behind) / 8.0 } else { 0.0 }
 }
 
 /// Lattice indices that cover a height interval: first, and how many.
@@ -156,5 +222,27 @@ mod tests {
         assert_eq!((r.low[(50, 30)], r.count[(50, 30)]), (4, 7));
         let none = Ranges::from_coarser(4, 4, 1.0, &Grid::filled(2, 2, f32::NAN), 0.0, (-100.0, 100.0), 1);
         assert_eq!((none.low[(0, 0)], none.count[(0, 0)]), (-100, 201));
+    }
+
+    #[test]
+    fn steep_surfaces_are_expected_where_they_go_on_and_gentle_ones_and_walls_are_not() {
+        let map = |of: &dyn Fn(f32, f32) -> f32| {
+            Grid::from_vec(12, 12, (0..144).map(|i| of((i % 12) as f32, (i / 12) as f32)).collect()).unwrap()
+        };
+        let steep = |coarse: &Grid<f32>| Ranges::from_coarser(24, 24, 0.5, coarse, 100.125, (0.0, 400.0), 1).steep;
+        // A metre per coarse pixel is a hypothesis per fine one, whose middle lies a quarter of a coarse pixel beside that one's.
+        let [right, down] = [steep(&map(&|x, _| x)), steep(&map(&|_, y| y))];
+        for (x, y) in (4..20).flat_map(|y| (4..20).map(move |x| (x, y))) {
+            assert_eq!((right[(x, y)], down[(x, y)]), (200 + x as i32, 200 + y as i32), "at ({x}, {y})");
+        }
+        // The foot of a wall beside a slope is the slope's.
+        let beside = steep(&map(&|x, y| if x < 6.0 { y } else { y + 40.0 }));
+        assert!((4..20).all(|y| beside[(11, y)] == 200 + y as i32 && beside[(12, y)] == 280 + y as i32));
+        assert_eq!(climb_of(beside[(11, 8)], beside[(12, 8)]), 0);
+        let none = |map: Grid<f32>| steep(&map).data().iter().all(|h| *h == NOT_STEEP);
+        assert!(none(map(&|x, _| 0.4 * x)) && none(map(&|x, _| if x < 6.0 { 0.0 } else { 9.0 })));
+        assert!(none(map(&|_, _| f32::NAN)));
+        assert_eq!((climb_of(NOT_STEEP, 5), climb_of(5, NOT_STEEP), climb_of(NOT_STEEP, NOT_STEEP)), (0, 0, 0));
+        assert_eq!((climb_of(5, 8), climb_of(8, 5), climb_of(5, 9)), (3, -3, 0));
     }
 }

@@ -5,6 +5,10 @@
 //! meet at equal heights; a height that the previous pixel did not search can only be reached by a jump. P2 falls where
 //! the image has an edge. Path costs are bytes, cut at 255.
 //!
+//! Steps make flat surfaces cheap, and steep ones dear: a quarry's face is cut short. Where the coarser level found a steep surface,
+//! it is its climb from q to p that costs nothing, and k counts from there: a surface orientation prior (Scharstein, Taniai and
+//! Sinha 2017, SGM-P) that leaves flat ones alone, whose noise it would hand down.
+//!
 //! What the first four paths add to the cost is kept in bytes too, halved and rounded up.
 
 use multiversion::multiversion;
@@ -46,6 +50,8 @@ pub(crate) struct Volume<'a> {
     pub(crate) height: usize,
     /// First hypothesis of each pixel.
     pub(crate) low: &'a [i32],
+    /// Where a steep surface is expected at each pixel ([`crate::ranges::Ranges::steep`]).
+    pub(crate) steep: &'a [i32],
     /// Where each pixel's costs begin; one entry more than there are pixels.
     pub(crate) offsets: &'a [u32],
     /// The costs, and [`LANES`] entries that belong to no pixel.
@@ -168,7 +174,8 @@ impl Sweep {
 impl Volume<'_> {
     fn row(&self, y: usize) -> Pixels<'_> {
         let row = y * self.width..(y + 1) * self.width;
-        Pixels { low: &self.low[row.clone()], offsets: self.row_offsets(y), edges: &self.edges[row] }
+        let (low, steep) = (&self.low[row.clone()], &self.steep[row.clone()]);
+        Pixels { low, steep, offsets: self.row_offsets(y), edges: &self.edges[row] }
     }
 
     /// Where the costs of a row's pixels begin, and those of the next row.
@@ -193,18 +200,13 @@ fn jump_penalty(p: Penalties, edge: u8) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ranges::{CLIMB_MAX, NOT_STEEP};
 
     /// The recurrence as it is written in the module's text, over a full lattice, without ranges or guards; path costs are
     /// cut at 255, and what those from above and from the left add rounded up to an even number.
-    fn reference(
-        width: usize,
-        height: usize,
-        low: &[i32],
-        counts: &[usize],
-        costs: &[Vec<u8>],
-        edges: &[u8],
-        p: Penalties,
-    ) -> Vec<Vec<u32>> {
+    fn reference(volume: &Volume<'_>, costs: &[Vec<u8>], p: Penalties) -> Vec<Vec<u32>> {
+        let Volume { width, height, low, steep, edges, .. } = *volume;
+        let counts: Vec<usize> = costs.iter().map(Vec::len).collect();
         let mut sums: [Vec<Vec<u32>>; 2] = std::array::from_fn(|_| counts.iter().map(|&n| vec![0; n]).collect());
         for (dx, dy) in [(1i64, 0i64), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)] {
             let mut paths: Vec<Vec<u32>> = vec![Vec::new(); width * height];
@@ -219,7 +221,9 @@ mod tests {
                     let row = (0..counts[at]).map(|d| {
                         let c = u32::from(costs[at][d]);
                         let Some(q) = q else { return c };
-                        let k = low[at] + d as i32;
+                        let both = steep[q] != NOT_STEEP && steep[at] != NOT_STEEP;
+                        let climb = if both { steep[at] - steep[q] } else { 0 };
+                        let k = low[at] + d as i32 - if climb.abs() <= CLIMB_MAX { climb } else { 0 };
                         let path = |k: i32| {
                             let i = k - low[q];
                             if i >= 0 && (i as usize) < counts[q] { paths[q][i as usize] } else { 1 << 20 }
@@ -289,17 +293,49 @@ mod tests {
         let flat: Vec<u8> = [costs.concat(), vec![0; LANES]].concat();
         let p = Penalties { step: 30, jump: 125, jump_at_edge: 60 };
         let edges: Vec<u8> = (0..width * height).map(|_| random(256) as u8).collect();
-        let volume = Volume { width, height, low: &low, offsets: &offsets, costs: &flat, edges: &edges };
-        let expected = reference(width, height, &low, &counts, &costs, &edges, p);
-        for (name, extend_row) in ROWS {
-            let mut sums = vec![Vec::new(); width * height];
-            aggregate_with(&volume, p, &mut Vec::new(), extend_row, |y, row| {
-                (0..width).for_each(|x| sums[y * width + x] = row.pixel(x).iter().map(|&s| u32::from(s)).collect());
-            });
-            for (at, (sums, expected)) in sums.iter().zip(&expected).enumerate() {
-                let (x, y) = (at % width, at / width);
-                assert_eq!(sums, expected, "{name}, ({x}, {y}) of {width} x {height}, {} first heights", low[at]);
+        // A surface that climbs to the right and upwards, breaks off, and is not steep here and there.
+        let climbing = |i: usize| {
+            let (x, y) = ((i % width) as i32, (i / width) as i32);
+            if random(9) > 0 { x - 2 * y + if x > 5 { 10 } else { 0 } } else { NOT_STEEP }
+        };
+        let climbing = (0..width * height).map(climbing).collect();
+        for steep in [vec![NOT_STEEP; width * height], climbing] {
+            let volume =
+                Volume { width, height, low: &low, steep: &steep, offsets: &offsets, costs: &flat, edges: &edges };
+            let expected = reference(&volume, &costs, p);
+            for (name, extend_row) in ROWS {
+                let mut sums = vec![Vec::new(); width * height];
+                aggregate_with(&volume, p, &mut Vec::new(), extend_row, |y, row| {
+                    (0..width).for_each(|x| sums[y * width + x] = row.pixel(x).iter().map(|&s| u32::from(s)).collect());
+                });
+                for (at, (sums, expected)) in sums.iter().zip(&expected).enumerate() {
+                    let (x, y) = (at % width, at / width);
+                    assert_eq!(sums, expected, "{name}, ({x}, {y}) of {width} x {height}, {} first heights", low[at]);
+                }
             }
         }
+    }
+
+    /// Pictures that say nothing but for every fifth pixel: what lies between follows the surface that is expected.
+    #[test]
+    fn a_steep_surface_is_followed_where_it_is_expected() {
+        let (width, height, count) = (24, 3, 40);
+        let (low, edges) = (vec![0; width * height], vec![0; width * height]);
+        let offsets: Vec<u32> = (0..=(width * height) as u32).map(|i| i * count).collect();
+        let tells = |i: usize, k: u32| if i % width % 5 == 2 && k as usize != i % width + 4 { 100 } else { 0 };
+        let costs = (0..width * height).flat_map(|i| (0..count).map(move |k| tells(i, k)));
+        let costs: Vec<u8> = costs.chain([0; LANES]).collect();
+        let followed = |steep: &[i32]| {
+            let volume = Volume { width, height, low: &low, steep, offsets: &offsets, costs: &costs, edges: &edges };
+            let mut right = 0;
+            aggregate(&volume, Penalties::default(), &mut Vec::new(), |_, row| {
+                let best = |x: usize| row.pixel(x).iter().enumerate().min_by_key(|(_, sum)| **sum).map(|(k, _)| k);
+                right += (0..width).filter(|x| best(*x) == Some(x + 4)).count();
+            });
+            right
+        };
+        let climbing: Vec<i32> = (0..width * height).map(|i| (i % width) as i32).collect();
+        assert_eq!(followed(&climbing), width * height);
+        assert!(followed(&vec![NOT_STEEP; width * height]) < width * height / 2);
     }
 }

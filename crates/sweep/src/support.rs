@@ -46,10 +46,9 @@ fn contrast_of_row(rows: [&[f32]; 3], scale: f32, out: &mut [f32]) {
 
 fn share(best: &[u8], contrast: &[f32], width: usize) -> Vec<f32> {
     // In units of the cost, so that the sums over the window are exact; 81 costs fit 16 bits.
-    let costs: Vec<u16> = best.iter().zip(contrast).map(|(b, c)| if c.is_nan() { 0 } else { u16::from(*b) }).collect();
-    let held: Vec<u16> =
-        contrast.iter().map(|c| if c.is_nan() { 0 } else { (c * f32::from(COST_MAX)).round() as u16 }).collect();
-    let (costs, held) = (window_sums(&costs, width, REACH), window_sums(&held, width, REACH));
+    let cost = |i: usize| if contrast[i].is_nan() { 0 } else { u16::from(best[i]) };
+    let held = |i: usize| if contrast[i].is_nan() { 0 } else { (contrast[i] * f32::from(COST_MAX)).round() as u16 };
+    let (costs, held) = (window_sums(best.len(), width, REACH, cost), window_sums(best.len(), width, REACH, held));
     let share = |(cost, held): (&u16, &u16)| match held {
         0 => 0.0,
         _ => (1.0 - f32::from(*cost) / f32::from(*held)).max(0.0),

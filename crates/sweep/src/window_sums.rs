@@ -3,36 +3,44 @@
 use std::iter::Sum;
 use std::ops::{AddAssign, SubAssign};
 
-/// Sums over the square of half width `reach` around every value of rows of `width`, as much of it as there is. Running sums:
-/// exact for integers, to rounding for others.
-pub(crate) fn window_sums<T>(values: &[T], width: usize, reach: usize) -> Vec<T>
+/// Sums over the square of half width `reach` around every one of `count` values in rows of `width`, as much of it as there is;
+/// `value` tells the one at an index. Running sums: exact for integers, to rounding for others.
+pub(crate) fn window_sums<T>(count: usize, width: usize, reach: usize, value: impl Fn(usize) -> T) -> Vec<T>
 where
     T: Copy + Default + AddAssign + SubAssign + Sum<T>,
 {
-    let mut rows = vec![T::default(); values.len()];
-    if values.is_empty() {
-        return rows;
+    if count == 0 {
+        return Vec::new();
     }
-    let height = values.len() / width;
-    for (to, from) in rows.chunks_exact_mut(width).zip(values.chunks_exact(width)) {
-        let mut sum: T = from[..reach.min(width)].iter().copied().sum();
+    let height = count / width;
+    let mut values = vec![T::default(); width];
+    let mut sum_row = |y: usize, to: &mut [T]| {
+        values.iter_mut().enumerate().for_each(|(x, v)| *v = value(y * width + x));
+        let mut sum: T = values[..reach.min(width)].iter().copied().sum();
         for (x, to) in to.iter_mut().enumerate() {
-            sum += from.get(x + reach).copied().unwrap_or_default();
+            sum += values.get(x + reach).copied().unwrap_or_default();
             *to = sum;
-            sum -= x.checked_sub(reach).map_or(T::default(), |left| from[left]);
+            sum -= x.checked_sub(reach).map_or(T::default(), |left| values[left]);
         }
-    }
-    let row = |y: usize| &rows[y * width..(y + 1) * width];
+    };
+    // The rows that a square covers, one after the other in turn: the next one takes the place of the first.
+    let turns = (2 * reach + 1).min(height);
+    let mut rows = vec![T::default(); turns * width];
+    let place = |y: usize| (y % turns) * width..(y % turns + 1) * width;
     let mut sums = vec![T::default(); width];
-    (0..reach.min(height)).for_each(|y| sums.iter_mut().zip(row(y)).for_each(|(s, v)| *s += *v));
-    let mut out = vec![T::default(); values.len()];
-    for (y, to) in out.chunks_exact_mut(width).enumerate() {
+    let mut enter = |y: usize, rows: &mut [T], sums: &mut [T]| {
+        sum_row(y, &mut rows[place(y)]);
+        sums.iter_mut().zip(&rows[place(y)]).for_each(|(s, v)| *s += *v);
+    };
+    (0..reach.min(height)).for_each(|y| enter(y, &mut rows, &mut sums));
+    let mut out = Vec::with_capacity(count);
+    for y in 0..height {
         if y + reach < height {
-            sums.iter_mut().zip(row(y + reach)).for_each(|(s, v)| *s += *v);
+            enter(y + reach, &mut rows, &mut sums);
         }
-        to.copy_from_slice(&sums);
+        out.extend_from_slice(&sums);
         if let Some(above) = y.checked_sub(reach) {
-            sums.iter_mut().zip(row(above)).for_each(|(s, v)| *s -= *v);
+            sums.iter_mut().zip(&rows[place(above)]).for_each(|(s, v)| *s -= *v);
         }
     }
     out
@@ -44,8 +52,18 @@ mod tests {
 
     #[test]
     fn sums_are_those_of_the_window() {
-        let sums = window_sums(&(0..15).map(f64::from).collect::<Vec<_>>(), 5, 1);
+        let sums = window_sums(15, 5, 1, |i| i as f64);
         assert_eq!((sums[0], sums[5 + 2], sums[2 * 5 + 4]), (12.0, 63.0, 44.0));
-        assert_eq!(window_sums(&[1u16, 2, 3], 3, 7), [6, 6, 6]);
+        assert_eq!(window_sums(3, 3, 7, |i| i as u16 + 1), [6, 6, 6]);
+        assert!(window_sums(0, 3, 7, |i| i as u16).is_empty());
+        // Rows in turn, more of them than a square covers.
+        let (width, height) = (7i64, 23i64);
+        let value = |i: usize| ((i * i * 31) % 101) as i64;
+        for (i, sum) in window_sums((width * height) as usize, width as usize, 2, value).iter().enumerate() {
+            let (x, y) = (i as i64 % width, i as i64 / width);
+            let square = (y - 2..=y + 2).flat_map(|v| (x - 2..=x + 2).map(move |u| (u, v)));
+            let inside = square.filter(|(u, v)| (0..width).contains(u) && (0..height).contains(v));
+            assert_eq!(*sum, inside.map(|(u, v)| value((v * width + u) as usize)).sum::<i64>(), "at ({x}, {y})");
+        }
     }
 }

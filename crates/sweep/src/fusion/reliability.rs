@@ -21,11 +21,12 @@ pub fn reliability(height_m: &Grid<f32>, agreement: &Grid<f32>, reach: usize, sa
     let known = |h: &f32| if h.is_nan() { 0.0 } else { 1.0 };
     let value = |h: &f32| if h.is_nan() { 0.0 } else { f64::from(*h) };
     let (width, height) = (height_m.width(), height_m.height());
-    let sums = |grid: Grid<f64>| window_sums(grid.data(), width, reach);
-    let count = sums(height_m.map(known));
-    let sum = sums(height_m.map(value));
-    let squares = sums(height_m.map(|h| value(h).powi(2)));
-    let agreed = sums(agreement.map(value));
+    let heights = height_m.data();
+    let sums = |of: &dyn Fn(usize) -> f64| window_sums(heights.len(), width, reach, of);
+    let count = sums(&|i| known(&heights[i]));
+    let sum = sums(&|i| value(&heights[i]));
+    let squares = sums(&|i| value(&heights[i]).powi(2));
+    let agreed = sums(&|i| value(&agreement.data()[i]));
     let mut out = height_m.clone();
     for (i, out) in out.data_mut().iter_mut().enumerate().filter(|(_, h)| !h.is_nan()) {
         let n = count[i];

@@ -103,8 +103,9 @@ fn extend_pixels<I: Instructions, S: Store>(
         let mut done = 0;
         while done < many {
             let (first, class) = (order(done), links.class[order(done)]);
-            // SAFETY: places are those that `Row::place` made room for, with whole registers and guards behind the last; costs and
-            // results are as many as the row's hypotheses and a register more, as `extend_row` checks.
+            // SAFETY: places are those that `Row::place` made room for, with whole registers and guards behind the last; what is read of
+            // the row before begins less than a guard before a pixel's path costs and counts less than a guard behind them, or is moved
+            // aside; costs and results are as many as the row's hypotheses and a register more, as `extend_row` checks.
             unsafe {
                 // Each kind has a loop of its own, for the sake of its registers.
                 macro_rules! each {
@@ -128,11 +129,12 @@ fn extend_pixels<I: Instructions, S: Store>(
                         let i = first;
                         let mut pixel = rows.pixel(&links, start, i);
                         let p = here.range(start + i + 1);
-                        let q = here.range(if S::BACKWARD { start + i + 2 } else { start + i });
+                        let q =
+                            here.range(if S::BACKWARD { start + i + 2 } else { start + i }).climbed(links.climbs[0][i]);
                         let along = last.moved(q, p, along_aside);
                         for (d, (upper, aside)) in pixel.upper.iter_mut().zip(&mut *aside).enumerate() {
                             let entry = start + i + if S::BACKWARD { 2 - d } else { d };
-                            let q = above.range(entry);
+                            let q = above.range(entry).climbed(links.climbs[d + 1][i]);
                             if p.beyond(q) >= GUARD as i32 {
                                 *upper = moved(q, rows.from[d].add(above.place[entry] as usize), p, aside);
                             }

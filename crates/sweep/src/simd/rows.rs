@@ -5,6 +5,8 @@
 
 use multiversion::multiversion;
 
+use crate::ranges::climb_of;
+
 /// The cost of heights that a pixel does not search. Others reach it only where the worst cost and the penalty of a jump do
 /// together, and are cut.
 pub(super) const FAR: u8 = u8::MAX;
@@ -23,6 +25,8 @@ pub(super) const REACH: i32 = LANES as i32 + 1;
 pub(crate) struct Pixels<'a> {
     /// First hypothesis of each.
     pub(crate) low: &'a [i32],
+    /// Where a steep surface is expected at each ([`crate::ranges::Ranges::steep`]).
+    pub(crate) steep: &'a [i32],
     /// Where the costs of each begin, and those of the next row.
     pub(crate) offsets: &'a [u32],
     /// Strength of the edge at each.
@@ -43,6 +47,8 @@ pub(crate) struct Row {
     /// Each pixel's first hypothesis, and the one behind its last.
     pub(super) low: Vec<i32>,
     pub(super) high: Vec<i32>,
+    /// Where a steep surface is expected at it.
+    pub(super) steep: Vec<i32>,
     /// Where its path costs are.
     pub(super) place: Vec<i32>,
     /// The penalty of a jump at it; between two pixels it is the lower one of theirs.
@@ -58,11 +64,12 @@ impl Row {
     /// Slices of different lengths, a pixel without hypotheses, or more hypotheses than a row can have.
     #[inline(always)]
     pub(crate) fn place(&mut self, pixels: Pixels<'_>, backward: bool, jump: impl Fn(u8) -> u8) {
-        let Pixels { low, offsets, edges } = pixels;
+        let Pixels { low, steep, offsets, edges } = pixels;
         let width = low.len();
-        assert!(width > 0 && offsets.len() == width + 1 && edges.len() == width);
+        assert!(width > 0 && offsets.len() == width + 1 && edges.len() == width && steep.len() == width);
         self.resize(width);
         self.low[1..=width].copy_from_slice(low);
+        self.steep[1..=width].copy_from_slice(steep);
         self.jump[1..=width].iter_mut().zip(edges).for_each(|(to, edge)| *to = jump(*edge));
         let (first, end) = (offsets[0], offsets[width]);
         let (from, to) = (&offsets[..width], &offsets[1..]);
@@ -86,7 +93,7 @@ impl Row {
                 from.wrapping_sub(first) as i32 + guard * (pixel + 1)
             };
         }
-        for of_each in [&mut self.low, &mut self.high, &mut self.place] {
+        for of_each in [&mut self.low, &mut self.high, &mut self.steep, &mut self.place] {
             (of_each[0], of_each[width + 1]) = (of_each[1], of_each[width]);
         }
         (self.jump[0], self.jump[width + 1]) = (0, 0);
@@ -100,7 +107,7 @@ impl Row {
 
     fn resize(&mut self, width: usize) {
         let entries = width.next_multiple_of(RUN) + 2;
-        for of_each in [&mut self.low, &mut self.high, &mut self.place] {
+        for of_each in [&mut self.low, &mut self.high, &mut self.steep, &mut self.place] {
             of_each.resize(entries, 0);
         }
         self.jump.resize(entries, 0);
@@ -120,7 +127,8 @@ impl Row {
     }
 }
 
-/// What the pixels of a run have to do with those before them.
+/// What the pixels of a run have to do with those before them, whose heights count as higher by the climb of a steep surface between
+/// the two: all that is said of neighbours' heights here is meant so.
 pub(super) struct Links {
     /// How each is worked on.
     pub(super) class: [u32; RUN],
@@ -129,6 +137,8 @@ pub(super) struct Links {
     pub(super) costs: [u32; RUN],
     pub(super) before: [u32; RUN],
     pub(super) to: [u32; RUN],
+    /// The climbs to it, hypotheses: along the row and from the three pixels of the row before.
+    pub(super) climbs: [[i32; RUN]; 4],
     /// The path costs of the three in the row before at the height below its first one, in each direction's.
     pub(super) from: [[u32; RUN]; 3],
     /// By how many heights it begins higher than the pixel before it along the row, up to [`REACH`].
@@ -152,8 +162,8 @@ pub(super) const OTHER: u32 = 4;
 impl Links {
     pub(super) fn new() -> Self {
         let none = [0; RUN];
-        let (from, jumps) = ([none; 3], [[0; RUN]; 4]);
-        Self { class: none, count: none, costs: none, before: none, to: none, from, by: [0; RUN], jumps }
+        let (climbs, from, jumps) = ([[0; RUN]; 4], [none; 3], [[0; RUN]; 4]);
+        Self { class: none, count: none, costs: none, before: none, to: none, climbs, from, by: [0; RUN], jumps }
     }
 
     /// Those of the run from the pixel `start` on.
@@ -168,12 +178,18 @@ fn link(links: &mut Links, above: &Row, here: &Row, start: usize, backward: bool
     // Those before it are those behind it in the order of the image.
     let others = if backward { [2, 2, 1, 0] } else { [0, 0, 1, 2] }.map(|d| start + d);
     let (q_low, q_high) = (run(&here.low, others[0]), run(&here.high, others[0]));
+    let steep = run(&here.steep, start + 1);
+    for (d, (climbs, other)) in links.climbs.iter_mut().zip(others).enumerate() {
+        let other = run(if d == 0 { &here.steep } else { &above.steep }, other);
+        climbs.iter_mut().zip(steep.iter().zip(other)).for_each(|(climb, (to, from))| *climb = climb_of(*from, *to));
+    }
     let mut beyond = [i32::MIN; RUN];
-    for (from, other) in links.from.iter_mut().zip(&others[1..]) {
+    for ((from, other), climbs) in links.from.iter_mut().zip(&others[1..]).zip(&links.climbs[1..]) {
         let (q_low, q_high, q_place) = (run(&above.low, *other), run(&above.high, *other), run(&above.place, *other));
         for i in 0..RUN {
-            let lower = q_low[i].wrapping_sub(low[i]);
-            beyond[i] = beyond[i].max(lower).max(high[i].wrapping_sub(q_high[i]));
+            let (q_low, q_high) = (q_low[i].wrapping_add(climbs[i]), q_high[i].wrapping_add(climbs[i]));
+            let lower = q_low.wrapping_sub(low[i]);
+            beyond[i] = beyond[i].max(lower).max(high[i].wrapping_sub(q_high));
             from[i] = q_place[i].wrapping_sub(lower).wrapping_sub(1) as u32;
         }
     }
@@ -182,7 +198,7 @@ fn link(links: &mut Links, above: &Row, here: &Row, start: usize, backward: bool
     let mut guards = guard * if backward { here.width as i32 - start as i32 } else { start as i32 + 1 };
     for i in 0..RUN {
         let (count, q_count) = (high[i].wrapping_sub(low[i]), q_high[i].wrapping_sub(q_low[i]));
-        let by = low[i].wrapping_sub(q_low[i]);
+        let by = low[i].wrapping_sub(q_low[i].wrapping_add(links.climbs[0][i]));
         let registers = |count: i32| (count + lanes - 1) / lanes;
         let few = if count.max(q_count) > lanes / 2 { ONE } else { HALF };
         let two = if count > lanes && count.max(q_count) <= 2 * lanes { TWO } else { OTHER };
@@ -223,6 +239,11 @@ impl Range {
     #[inline(always)]
     pub(super) fn count(self) -> usize {
         self.high.wrapping_sub(self.low) as usize
+    }
+
+    #[inline(always)]
+    pub(super) fn climbed(self, by: i32) -> Self {
+        Self { low: self.low.wrapping_add(by), high: self.high.wrapping_add(by) }
     }
 
     /// By how many heights a pixel searches beyond another's.
