@@ -1,10 +1,12 @@
-//! Cost and memory of large scenes: `cargo bench --bench scale [-- SIDE… --memory MB --preset NAME --runs N --folder DIR --out DIR]`.
+//! Cost and memory of large scenes: `cargo bench --bench scale [-- SIDE… --memory MB --preset NAME --folder DIR --out DIR]`.
 //!
 //! Pairs of SIDE × SIDE pixels (4096, 8192, 12288 and 20000 when none is named) show a town that repeats itself every
 //! 2048 pixels (see `town`), as a GDAL mosaic (VRT) of one rendered tile per view: pixels are decoded window by window as from
 //! any file, and a pair of 800 megapixels takes 30 MB of disk. The release binary runs as a user would run it with `--memory`.
 //! Processor seconds, wall seconds and the largest resident memory of the command go to `benches/results/scale.md`, with the
-//! error against the town's own heights; nothing is aligned. Results of runs with named sides are written only with --out.
+//! error against the town's own heights; nothing is aligned. A side that is named several times is run as often, and has its mean:
+//! machines are slower at times, and `4096 20000 4096` tells that from cost that grows. Results of runs with named sides are
+//! written only with --out.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
@@ -33,13 +35,11 @@ fn main() -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for &side in &arguments.sides {
         let images = mosaics(folder, &tiles, side)?;
-        for _ in 0..arguments.runs {
-            let row = measure(folder, &images, side, &arguments)?;
-            println!("{}", line(&row));
-            rows.push(row);
-        }
+        let row = measure(folder, &images, side, &arguments)?;
+        println!("{}", line(&row));
+        rows.push(row);
     }
-    let text = markdown(&rows, &arguments);
+    let text = markdown(&means(rows)?, &arguments);
     println!("{text}");
     if let Some(out) = &arguments.out {
         std::fs::write(out.join("scale.md"), text)?;
@@ -51,7 +51,6 @@ struct Arguments {
     sides: Vec<usize>,
     memory_mb: u64,
     preset: String,
-    runs: usize,
     folder: Option<PathBuf>,
     out: Option<PathBuf>,
     asked: String,
@@ -63,7 +62,6 @@ fn arguments() -> anyhow::Result<Arguments> {
         sides: Vec::new(),
         memory_mb: 2000,
         preset: "balanced".to_owned(),
-        runs: 1,
         folder: None,
         out: None,
         asked: given.join(" "),
@@ -74,7 +72,6 @@ fn arguments() -> anyhow::Result<Arguments> {
         match argument.as_str() {
             "--memory" => found.memory_mb = value()?.parse()?,
             "--preset" => found.preset.clone_from(value()?),
-            "--runs" => found.runs = value()?.parse::<usize>()?.max(1),
             "--folder" => found.folder = Some(value()?.into()),
             "--out" => found.out = Some(value()?.into()),
             side => found.sides.push(side.parse().with_context(|| format!("{side} is no side in pixels"))?),
@@ -137,7 +134,8 @@ fn mosaics(folder: &Path, tiles: &[PathBuf], side: usize) -> anyhow::Result<Vec<
 struct Row {
     side: usize,
     chunks: String,
-    cpu_s: f64,
+    user_s: f64,
+    system_s: f64,
     wall_s: f64,
     peak_mb: f64,
     mae_m: f64,
@@ -149,6 +147,11 @@ impl Row {
     /// Both images.
     fn megapixels(&self) -> f64 {
         LOOKS.len() as f64 * (self.side * self.side) as f64 / 1e6
+    }
+
+    /// User and system seconds per megapixel.
+    fn cost(&self) -> f64 {
+        (self.user_s + self.system_s) / self.megapixels()
     }
 }
 
@@ -176,7 +179,7 @@ fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments
     let report: Value = serde_json::from_slice(&output.stdout)?;
     let times = errors.lines().find_map(|l| l.strip_prefix("times ")).context("bash printed no times")?;
     let seconds: Vec<f64> = times.split(' ').map(str::parse).collect::<Result<_, _>>()?;
-    let [user, system, wall_s] = seconds[..] else { anyhow::bail!("bash printed other times: {times}") };
+    let [user_s, system_s, wall_s] = seconds[..] else { anyhow::bail!("bash printed other times: {times}") };
     let (mae_m, right) = errors_of(&out.join("dsm/dsm.tif"), side)?;
     let chunk = |name: &str| report["chunks"][name].as_u64();
     let chunks = match (chunk("done"), chunk("side")) {
@@ -184,7 +187,7 @@ fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments
         _ => "1 (at once)".to_owned(),
     };
     let peak_mb = report["peak_memory_mb"].as_f64().unwrap_or(f64::NAN);
-    Ok(Row { side, chunks, cpu_s: user + system, wall_s, peak_mb, mae_m, right })
+    Ok(Row { side, chunks, user_s, system_s, wall_s, peak_mb, mae_m, right })
 }
 
 /// Mean absolute error of the cells with a height, metres, and the share of all that are right to a metre, percent.
@@ -215,15 +218,35 @@ fn errors_of(dsm: &Path, side: usize) -> anyhow::Result<(f64, f64)> {
     Ok((sum / known as f64, 100.0 * right as f64 / all as f64))
 }
 
+/// One row for each side, the smallest first, with the mean of its times and the greatest peak; all else is the same in all runs.
+fn means(mut rows: Vec<Row>) -> anyhow::Result<Vec<Row>> {
+    rows.sort_by_key(|r| r.side);
+    let mut out: Vec<Row> = Vec::new();
+    for runs in rows.chunk_by(|a, b| a.side == b.side) {
+        let results = |r: &Row| (r.chunks.clone(), r.mae_m.to_bits(), r.right.to_bits());
+        ensure!(runs.iter().all(|r| results(r) == results(&runs[0])), "runs of {} pixels differ", runs[0].side);
+        let mean = |of: fn(&Row) -> f64| runs.iter().map(of).sum::<f64>() / runs.len() as f64;
+        out.push(Row {
+            chunks: runs[0].chunks.clone(),
+            user_s: mean(|r| r.user_s),
+            system_s: mean(|r| r.system_s),
+            wall_s: mean(|r| r.wall_s),
+            peak_mb: runs.iter().map(|r| r.peak_mb).fold(0.0, f64::max),
+            ..runs[0]
+        });
+    }
+    Ok(out)
+}
+
 fn line(r: &Row) -> String {
-    let per = |v: f64| v / r.megapixels();
     format!(
-        "| {} | {:.0} | {} | {:.0} | {:.3} | {:.0} | {:.0} | {:.3} | {:.2} |",
+        "| {} | {:.0} | {} | {:.0} | {:.0} | {:.3} | {:.0} | {:.0} | {:.3} | {:.2} |",
         r.side,
         r.megapixels(),
         r.chunks,
-        r.cpu_s,
-        per(r.cpu_s),
+        r.user_s,
+        r.system_s,
+        r.cost(),
         r.wall_s,
         r.peak_mb,
         r.mae_m,
@@ -239,16 +262,15 @@ fn markdown(rows: &[Row], arguments: &Arguments) -> String {
          {}, `--memory {}`; the images are mosaics of one rendered tile per view (a town that repeats itself every {PERIOD} \
          pixels; see `benches/scale/town.rs`), the truth is the town's own height function, nothing is aligned. \
          CPU is user and system time of the command, megapixels are those of both images, peak is the largest \
-         resident memory.\n\n\
-         | side px | Mpx | chunks | CPU s | CPU s/Mpx | wall s | peak MB | MAE m | < 1 m % |\n|--:|--:|:--|--:|--:|--:|--:|--:|--:|\n",
+         resident memory; sides that were run several times have the means of their times.\n\n\
+         | side px | Mpx | chunks | user s | system s | CPU s/Mpx | wall s | peak MB | MAE m | < 1 m % |\n|--:|--:|:--|--:|--:|--:|--:|--:|--:|--:|\n",
         arguments.asked,
         town::GSD_M,
         arguments.preset,
         arguments.memory_mb
     );
     rows.iter().for_each(|r| out += &(line(r) + "\n"));
-    let costs: Vec<f64> =
-        rows.iter().filter(|r| !r.chunks.contains("at once")).map(|r| r.cpu_s / r.megapixels()).collect();
+    let costs: Vec<f64> = rows.iter().filter(|r| !r.chunks.contains("at once")).map(Row::cost).collect();
     let peaks: Vec<f64> = rows.iter().filter(|r| !r.chunks.contains("at once")).map(|r| r.peak_mb).collect();
     let spread = |v: &[f64]| {
         let (lo, hi) = v.iter().fold((f64::INFINITY, 0.0f64), |a, x| (a.0.min(*x), a.1.max(*x)));
