@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use geodesy::{Crs, VerticalDatum};
 use io::points::{GriddedPoints, PointCloud, PointsError, is_point_cloud};
-use las::point::Classification;
+use las::point::{Classification, Format};
 use las::{Builder, Point, Transform, Vector, Version, Writer};
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -30,9 +30,13 @@ fn points() -> Vec<Point> {
 }
 
 fn write(folder: &TempDir, name: &str, crs: Option<Crs>, points: &[Point]) -> PathBuf {
+    write_as(Format::new(6).unwrap(), folder, name, crs, points)
+}
+
+fn write_as(format: Format, folder: &TempDir, name: &str, crs: Option<Crs>, points: &[Point]) -> PathBuf {
     let path = folder.path().join(name);
     let mut builder = Builder::from(Version::new(1, 4));
-    builder.point_format = las::point::Format::new(6).unwrap();
+    builder.point_format = format;
     builder.point_format.is_compressed = name.ends_with("laz");
     let axis = |offset| Transform { scale: 0.001, offset };
     builder.transforms = Vector { x: axis(WEST), y: axis(NORTH), z: axis(0.0) };
@@ -100,6 +104,46 @@ fn an_extended_record_that_does_not_fit_is_refused_before_it_is_read() {
     bytes[120..128].copy_from_slice(&(u64::MAX / 2).to_le_bytes());
     std::fs::write(&path, bytes).unwrap();
     assert!(gridded(&path).unwrap_err().to_string().contains("extended record"));
+}
+
+#[test]
+fn chunks_that_do_not_fit_are_refused_before_they_are_read() {
+    let folder = TempDir::new().unwrap();
+    let path = write(&folder, "cloud.laz", None, &points());
+    let whole = std::fs::read(&path).unwrap();
+    let data = u32::from_le_bytes(whole[96..100].try_into().unwrap()) as usize;
+    let table = u64::from_le_bytes(whole[data..data + 8].try_into().unwrap()) as usize;
+    let layers = data + 8 + 30 + 4;
+    for (at, size, said) in [(table + 4, u32::MAX, "chunks of points"), (layers, u32::MAX, "bytes of points from")] {
+        let mut bytes = whole.clone();
+        bytes[at..at + 4].copy_from_slice(&size.to_le_bytes());
+        std::fs::write(&path, bytes).unwrap();
+        let error = gridded(&path).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
+    std::fs::write(&path, &whole[..layers]).unwrap();
+    assert!(matches!(gridded(&path), Err(PointsError::Damaged { .. })));
+}
+
+#[test]
+fn compressed_points_of_every_form_and_of_several_chunks_are_read() {
+    let folder = TempDir::new().unwrap();
+    let many = 120_000;
+    for (number, extra_bytes) in [(1, 0), (3, 2), (6, 0), (7, 3), (8, 0)] {
+        let format = Format { extra_bytes, ..Format::new(number).unwrap() };
+        let points: Vec<Point> = (0..many)
+            .map(|i| Point {
+                gps_time: format.has_gps_time.then_some(f64::from(i)),
+                color: format.has_color.then(Default::default),
+                nir: format.has_nir.then_some(7),
+                extra_bytes: vec![1; usize::from(extra_bytes)],
+                ..point(f64::from(i % 400) * 0.5, f64::from(i / 400) * 0.5, f64::from(i % 97), 2)
+            })
+            .collect();
+        let found = gridded(&write_as(format, &folder, "many.laz", None, &points)).unwrap();
+        assert_eq!((found.points, found.left_out), (many as u64, 0), "format {number}");
+        assert_eq!(found.dem.heights[(3, 0)], 3.0, "format {number}");
+    }
 }
 
 proptest! {

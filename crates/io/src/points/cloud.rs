@@ -1,20 +1,21 @@
 //! Reading a cloud and laying it on a grid.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use geodesy::VerticalDatum;
-use las::{PointDataBuilder, Reader};
+use las::{Header, PointDataBuilder, Reader};
 use raster::{GeoTransform, Grid};
 
 use super::crs::{Stated, stated};
 use super::{PointsError, preflight};
 use crate::raster::Dem;
 
-/// Points read at a time.
+/// Most points read at a time, and most bytes: a point may take up to 64 KiB.
 const BATCH: u64 = 1 << 16;
+const BATCH_BYTES: u64 = 1 << 24;
 /// Classes of points that are no surface: low noise, high noise.
 const NOISE: [u8; 2] = [7, 18];
 /// Most cells of a grid, and most for every point.
@@ -73,7 +74,11 @@ impl PointCloud {
         let file = File::open(&path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         let mut file = BufReader::new(file);
-        preflight::check(&mut file, length).map_err(|reason| PointsError::damaged(&path, reason))?;
+        let damaged = |reason| PointsError::damaged(&path, reason);
+        preflight::check(&mut file, length).map_err(damaged)?;
+        let header = guarded(&path, || Header::new(&mut file))?;
+        preflight::check_chunks(&mut file, &header, length).map_err(damaged)?;
+        file.rewind().map_err(unreadable)?;
         let reader = guarded(&path, || Reader::new(file))?;
         let stated = stated(reader.header()).map_err(|source| PointsError::Crs { path: path.clone(), source })?;
         Ok(Self { path, reader, stated })
@@ -173,9 +178,10 @@ impl PointCloud {
 
     fn each(&mut self, mut take: impl FnMut(SurfacePoint)) -> Result<(u64, u64), PointsError> {
         let mut batch = PointDataBuilder::new().for_header(self.reader.header()).build();
+        let at_once = (BATCH_BYTES / u64::from(self.reader.header().point_format().len().max(1))).min(BATCH);
         let (mut points, mut left_out) = (0u64, 0u64);
         loop {
-            let read = guarded(&self.path, || self.reader.fill_points(BATCH, &mut batch))?;
+            let read = guarded(&self.path, || self.reader.fill_points(at_once, &mut batch))?;
             if read == 0 {
                 return Ok((points, left_out));
             }

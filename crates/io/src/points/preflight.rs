@@ -1,8 +1,15 @@
-//! The numbers in a LAS header that decide how much is allocated, checked against the file before the decoder believes them.
+//! The numbers of a LAS or LAZ file that decide how much is allocated, checked against its length before the decoder believes
+//! them: an allocation that fails ends the process, no error comes of it.
 //!
-//! Offsets are those of the LAS 1.4 R15 specification, table 3 (public header block) and section 2.7 (extended records).
+//! Offsets are those of the LAS 1.4 R15 specification, table 3 (public header block) and section 2.7 (extended records); those of
+//! compressed points are LASzip's: where the table of chunks stands, the chunks, the table.
 
 use std::io::{Read, Seek, SeekFrom};
+
+use las::Header;
+use las::laz::is_laszip_vlr;
+use laz::LazVlr;
+use laz::laszip::{ChunkTable, LazItemType};
 
 /// Bytes of the largest header.
 const HEADER: usize = 375;
@@ -10,6 +17,9 @@ const HEADER: usize = 375;
 const EXTENDED_RECORD: u64 = 60;
 /// More points than this do not fit into any file's length below 2⁶³ bytes.
 const POINTS_MAX: u64 = 1 << 40;
+
+/// LASzip's oldest way of compressing: no chunks, no table of them.
+const POINT_WISE: [u8; 2] = 1u16.to_le_bytes();
 
 /// Says what is wrong with the header of a file of `length` bytes; the reader is left at the start.
 pub(super) fn check(read: &mut (impl Read + Seek), length: u64) -> Result<(), String> {
@@ -47,11 +57,79 @@ fn check_extended(read: &mut (impl Read + Seek), header: &[u8], length: u64) -> 
     if start.saturating_add(EXTENDED_RECORD) > length {
         return Err(past_end());
     }
-    let mut record = [0u8; EXTENDED_RECORD as usize];
-    read.seek(SeekFrom::Start(start)).map_err(|e| e.to_string())?;
-    read.read_exact(&mut record).map_err(|e| e.to_string())?;
-    let data = u64_at(&record, 20).unwrap_or(u64::MAX);
+    let data = bytes_at(read, SeekFrom::Start(start + 20)).map_or(u64::MAX, u64::from_le_bytes);
     if data > length - start - EXTENDED_RECORD { Err(past_end()) } else { Ok(()) }
+}
+
+/// Says what is wrong with the table of compressed points' chunks or with a chunk of a file of `length` bytes; `read` stands where the
+/// points begin.
+pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, length: u64) -> Result<(), String> {
+    let Some(record) = header.vlrs().iter().find(|record| is_laszip_vlr(record)) else { return Ok(()) };
+    let form = LazVlr::from_buffer(&record.data).map_err(|error| error.to_string())?;
+    let (point_bytes, stated) = (form.items_size(), u64::from(header.point_format().len()));
+    if point_bytes != stated {
+        return Err(format!("compressed points of {point_bytes} bytes, the header says {stated}"));
+    }
+    let failed = |error: std::io::Error| error.to_string();
+    if !record.data.starts_with(&POINT_WISE) {
+        let data = read.stream_position().map_err(failed)?;
+        check_chunk_count(read, data, point_bytes, length)?;
+        read.seek(SeekFrom::Start(data)).map_err(failed)?;
+        ChunkTable::read_from(&mut *read, &form)
+            .map_err(|error| format!("the table of the points' chunks: {error}"))?;
+    }
+    check_layers(read, &form, header.number_of_points(), length)
+}
+
+/// Every chunk begins with a point that is not compressed.
+fn check_chunk_count(read: &mut (impl Read + Seek), data: u64, point_bytes: u64, length: u64) -> Result<(), String> {
+    let mut place = |from| Some(i64::from_le_bytes(bytes_at(read, from)?)).filter(|&at| at > data as i64);
+    // A writer that could not go back put the place of the table behind it.
+    let table = place(SeekFrom::Start(data)).or_else(|| place(SeekFrom::End(-8)));
+    let chunks =
+        table.and_then(|table| bytes_at(read, SeekFrom::Start(table as u64 + 4))).map_or(0, u32::from_le_bytes);
+    if u64::from(chunks).saturating_mul(point_bytes) > length {
+        return Err(format!("{chunks} chunks of points in a file of {length} bytes"));
+    }
+    Ok(())
+}
+
+/// Says where a chunk's layers do not fit; `read` stands at the first chunk. Chunks in layers (point formats 6 to 10) begin with a point,
+/// how many there are, and how many bytes each layer has; the next chunk follows the last layer.
+fn check_layers(read: &mut (impl Read + Seek), form: &LazVlr, points: u64, length: u64) -> Result<(), String> {
+    let mut layers = 0;
+    for item in form.items() {
+        layers += match item.item_type() {
+            LazItemType::Point14 => 9,
+            LazItemType::RGB14 | LazItemType::WavePacket14 => 1,
+            LazItemType::RGBNIR14 => 2,
+            LazItemType::Byte14(count) => usize::from(count),
+            _ => return Ok(()),
+        };
+    }
+    let mut at = read.stream_position().map_err(|error| error.to_string())?;
+    let (mut left, mut sizes) = (points, vec![0u8; 4 * layers]);
+    while left > 0 {
+        let count = bytes_at(read, SeekFrom::Start(at + form.items_size())).map(u32::from_le_bytes);
+        let Some(count) = count.filter(|_| read.read_exact(&mut sizes).is_ok()) else {
+            return Err(format!("it ends at byte {length}, {left} points before the last"));
+        };
+        let held: u64 = sizes.chunks_exact(4).filter_map(|size| u32_at(size, 0)).map(u64::from).sum();
+        at += form.items_size() + 4 + sizes.len() as u64;
+        if held > length - at {
+            return Err(format!("{held} bytes of points from byte {at} on, the file has {length}"));
+        }
+        at += held;
+        let count = if form.uses_variable_size_chunks() { count } else { form.chunk_size() };
+        left = left.saturating_sub(u64::from(count.max(1)));
+    }
+    Ok(())
+}
+
+/// The bytes at a place, if it is in the file.
+fn bytes_at<const N: usize>(read: &mut (impl Read + Seek), from: SeekFrom) -> Option<[u8; N]> {
+    let mut bytes = [0; N];
+    read.seek(from).and_then(|_| read.read_exact(&mut bytes)).ok().map(|()| bytes)
 }
 
 fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
