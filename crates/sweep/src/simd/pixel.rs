@@ -4,6 +4,7 @@
 //! byte, and so does half of four.
 
 use super::bytes::Bytes;
+use super::fetch;
 use super::rows::{FAR, GUARD, LANES};
 
 /// The greatest penalty of a jump.
@@ -12,6 +13,8 @@ pub(crate) const JUMP_MAX: u8 = 127;
 /// Where the results of a pixel go.
 pub(super) trait Store: Copy {
     const BACKWARD: bool;
+    /// Asks for the memory of the results of a pixel whose costs are the row's from `own` on, which need not be the row's.
+    fn fetch(self, own: usize);
     /// That of the pixel whose costs are the row's from `own` on, with so many before it in the order of the row.
     ///
     /// # Safety
@@ -35,6 +38,11 @@ impl Store for Forward {
     const BACKWARD: bool = false;
 
     #[inline(always)]
+    fn fetch(self, own: usize) {
+        fetch(self.0.wrapping_add(own));
+    }
+
+    #[inline(always)]
     unsafe fn pixel(self, own: usize, _: usize) -> Self {
         // SAFETY: as above.
         Self(unsafe { self.0.add(own) })
@@ -49,6 +57,11 @@ impl Store for Forward {
 
 impl Store for Backward {
     const BACKWARD: bool = true;
+
+    #[inline(always)]
+    fn fetch(self, own: usize) {
+        fetch(self.0.wrapping_add(own));
+    }
 
     #[inline(always)]
     unsafe fn pixel(self, own: usize, before: usize) -> Self {
