@@ -58,7 +58,7 @@ pub fn bicubic(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
 const LANES: usize = 8;
 
 /// [`bicubic`] at `from`, `from + step`, … (column, row), but for the order of the sums.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
 pub fn bicubic_along(grid: &Grid<f32>, from: [f64; 2], step: [f64; 2], out: &mut [f32]) {
     for (k, values) in out.chunks_mut(LANES).enumerate() {
         let first = (k * LANES) as f64;
