@@ -7,6 +7,7 @@ use raster::Window;
 use super::tile::{BlockCosts, CENSUS_REACH};
 use crate::ranges::Ranges;
 use crate::simd::census::CHUNK;
+use crate::simd::fetch;
 use crate::simd::transpose::{COLUMNS, ROWS, transpose};
 
 /// Planes that are computed before their costs go to the pixels: most parts of a tile need no more, and they fit into the
@@ -58,11 +59,14 @@ pub(super) fn scatter(
     let (bx, by) = ((part.x - block.window.x) as usize, (part.y - block.window.y) as usize);
     for y in 0..part.height {
         let at = (y + CENSUS_REACH) * planes.width + CENSUS_REACH;
+        let offsets = &block.offsets[(by + y) * block.window.width + bx..][..part.width + 1];
+        // The way to the pixels waits for their memory otherwise.
+        let targets = &block.costs[offsets[0] as usize..offsets[part.width] as usize];
+        targets.iter().step_by(CACHE_LINE).for_each(|target| fetch(target));
         let columns = &mut planes.columns[..part.width.next_multiple_of(COLUMNS) * DEPTH];
         transpose(&planes.costs[at..], planes.stride, count, DEPTH, columns);
         let low = &ranges.low.row(part.y as usize + y)[part.x as usize..][..part.width];
         let asked = &ranges.count.row(part.y as usize + y)[part.x as usize..][..part.width];
-        let offsets = &block.offsets[(by + y) * block.window.width + bx..][..part.width + 1];
         let pixels = low.iter().zip(asked).zip(offsets).zip(columns.as_chunks::<DEPTH>().0);
         if is_all {
             let behind = offsets[part.width] as usize;
