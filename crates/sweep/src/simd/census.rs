@@ -5,13 +5,15 @@
 
 use multiversion::multiversion;
 use multiversion::target::match_target;
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::{__m256i, __m512i};
 
-/// Bytes that are worked on together.
-pub(crate) const CHUNK: usize = 32;
+/// Bytes that are worked on together: the longest register, or two.
+pub(crate) const CHUNK: usize = 64;
 
 /// Bytes that do not cross cache lines.
 #[derive(Clone, Copy)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 struct Chunk([u8; CHUNK]);
 
 type Chunks = Vec<Chunk>;
@@ -81,26 +83,29 @@ pub(crate) fn picture_cost(picture: &[i16], b: &Census, width: usize, room: &mut
     compare_picture(picture, b, width, room, out);
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
 fn grade(picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
     match_target! {
-        "x86_64+avx2" => registers::grade(picture, width, grades),
+        "x86_64+avx512vl" => registers::grade::<__m512i>(picture, width, grades),
+        "x86_64+avx2" => registers::grade::<__m256i>(picture, width, grades),
         _ => plain::grade(picture, width, grades),
     }
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
 fn compare_census(a: &Census, b: &Census, width: usize, apart: &mut [Chunks; 4], out: &mut [u8]) {
     match_target! {
-        "x86_64+avx2" => registers::compare_census(a, b, width, apart, out),
+        "x86_64+avx512vl" => registers::compare_census::<__m512i>(a, b, width, apart, out),
+        "x86_64+avx2" => registers::compare_census::<__m256i>(a, b, width, apart, out),
         _ => plain::compare(a, b, width, apart, out),
     }
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
 fn compare_picture(picture: &[i16], b: &Census, width: usize, room: &mut Room, out: &mut [u8]) {
     match_target! {
-        "x86_64+avx2" => registers::compare_picture(picture, b, width, &mut room.apart, out),
+        "x86_64+avx512vl" => registers::compare_picture::<__m512i>(picture, b, width, &mut room.apart, out),
+        "x86_64+avx2" => registers::compare_picture::<__m256i>(picture, b, width, &mut room.apart, out),
         _ => plain::compare_picture(picture, b, width, room, out),
     }
 }
@@ -150,76 +155,78 @@ mod plain {
     }
 }
 
-/// For functions that are compiled for AVX2, and nowhere else.
+/// For functions that are compiled for the instructions of `V`, and nowhere else.
 #[cfg(target_arch = "x86_64")]
 mod registers {
     use super::*;
-    use std::arch::x86_64::*;
+    use crate::simd::wide::Wide;
 
-    /// Chunks whose differences are computed before they are summed: what has just been written cannot be read elsewhere in the
-    /// register at once.
+    /// Registers of differences that are computed before they are summed: what has just been written cannot be read elsewhere in
+    /// the register at once.
     const BAND: usize = 16;
 
-    // SAFETY of all blocks below: the instructions are those of AVX2, for whose functions alone this is; every register that is
-    // read or written lies in a slice whose length is checked.
+    // SAFETY of all blocks below: every register that is read or written lies in a slice whose length is checked.
 
     #[inline(always)]
-    pub(super) fn grade(picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
-        let count = grades[0].len();
-        assert!(picture.len() > count * CHUNK + width && grades.iter().all(|g| g.len() == count));
-        for k in 0..count {
+    pub(super) fn grade<V: Wide>(picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
+        let len = grades[0].len() * CHUNK;
+        assert!(picture.len() > len + width && grades.iter().all(|g| g.len() * CHUNK == len));
+        for at in (0..len).step_by(V::BYTES) {
             // SAFETY: as above.
             unsafe {
-                let own = grades_at(picture.as_ptr().add(k * CHUNK), width);
+                let own = grades_at::<V>(picture.as_ptr().add(at), width);
                 for (to, own) in grades.iter_mut().zip(own) {
-                    put(to, k, own);
+                    own.store(start_mut(to).add(at));
                 }
             }
         }
     }
 
     #[inline(always)]
-    pub(super) fn compare_census(a: &Census, b: &Census, width: usize, apart: &mut [Chunks; 4], out: &mut [u8]) {
+    pub(super) fn compare_census<V: Wide>(
+        a: &Census,
+        b: &Census,
+        width: usize,
+        apart: &mut [Chunks; 4],
+        out: &mut [u8],
+    ) {
         assert!(a.grades.iter().all(|g| g.len() * CHUNK == b.len()));
         // SAFETY: as above.
-        unsafe { compare(|k| chunks(&a.grades, k), b, width, apart, out) }
+        unsafe { compare::<V>(|at| all_at(&a.grades, at), b, width, apart, out) }
     }
 
     #[inline(always)]
-    pub(super) fn compare_picture(picture: &[i16], b: &Census, width: usize, apart: &mut [Chunks; 4], out: &mut [u8]) {
+    pub(super) fn compare_picture<V: Wide>(
+        picture: &[i16],
+        b: &Census,
+        width: usize,
+        apart: &mut [Chunks; 4],
+        out: &mut [u8],
+    ) {
         assert!(picture.len() > b.len() + width);
         // SAFETY: as above.
-        unsafe { compare(|k| grades_at(picture.as_ptr().add(k * CHUNK), width), b, width, apart, out) }
+        unsafe { compare::<V>(|at| grades_at(picture.as_ptr().add(at), width), b, width, apart, out) }
     }
 
     #[inline(always)]
-    unsafe fn chunk(chunks: &[Chunk], k: usize) -> __m256i {
+    fn start(chunks: &Chunks) -> *const u8 {
+        chunks.as_ptr().cast()
+    }
+
+    #[inline(always)]
+    fn start_mut(chunks: &mut Chunks) -> *mut u8 {
+        chunks.as_mut_ptr().cast()
+    }
+
+    #[inline(always)]
+    unsafe fn all_at<V: Wide>([p, q, r, s]: &[Chunks; 4], at: usize) -> [V; 4] {
         // SAFETY: as above.
-        unsafe { _mm256_load_si256(chunks.as_ptr().add(k).cast()) }
+        unsafe { [p, q, r, s].map(|grades| V::load(start(grades).add(at))) }
     }
 
+    /// The four grades of the pixels from `at` on, which [`Wide::in_order`] brings into their order.
     #[inline(always)]
-    unsafe fn chunks([p, q, r, s]: &[Chunks; 4], k: usize) -> [__m256i; 4] {
-        // SAFETY: as above.
-        unsafe { [chunk(p, k), chunk(q, k), chunk(r, k), chunk(s, k)] }
-    }
-
-    /// A chunk that begins `by` bytes before the `k`th.
-    #[inline(always)]
-    unsafe fn before(chunks: &[Chunk], k: usize, by: usize) -> __m256i {
-        // SAFETY: as above.
-        unsafe { _mm256_loadu_si256(chunks.as_ptr().add(k).cast::<u8>().sub(by).cast()) }
-    }
-
-    #[inline(always)]
-    unsafe fn put(chunks: &mut [Chunk], k: usize, chunk: __m256i) {
-        // SAFETY: as above.
-        unsafe { _mm256_store_si256(chunks.as_mut_ptr().add(k).cast(), chunk) }
-    }
-
-    /// The four grades of the pixels from `at` on, which [`in_order`] brings into their order.
-    #[inline(always)]
-    unsafe fn grades_at(at: *const i16, width: usize) -> [__m256i; 4] {
+    unsafe fn grades_at<V: Wide>(at: *const i16, width: usize) -> [V; 4] {
         // SAFETY: as above.
         unsafe {
             let (own, right) = (values(at), values(at.add(1)));
@@ -229,81 +236,63 @@ mod registers {
     }
 
     #[inline(always)]
-    unsafe fn values(at: *const i16) -> [__m256i; 2] {
+    unsafe fn values<V: Wide>(at: *const i16) -> [V; 2] {
         // SAFETY: as above.
-        unsafe { [_mm256_loadu_si256(at.cast()), _mm256_loadu_si256(at.add(CHUNK / 2).cast())] }
+        unsafe { [V::load(at), V::load(at.add(V::BYTES / 2))] }
     }
 
     #[inline(always)]
-    unsafe fn codes(to: [__m256i; 2], from: [__m256i; 2]) -> __m256i {
-        // SAFETY: as above.
-        unsafe {
-            _mm256_xor_si256(
-                _mm256_packs_epi16(_mm256_subs_epi16(to[0], from[0]), _mm256_subs_epi16(to[1], from[1])),
-                _mm256_set1_epi8(-128),
-            )
-        }
-    }
-
-    /// Packing takes the halves of two registers in turn.
-    #[inline(always)]
-    unsafe fn in_order(packed: __m256i) -> __m256i {
-        // SAFETY: as above.
-        unsafe { _mm256_permute4x64_epi64::<0b11_01_10_00>(packed) }
+    fn codes<V: Wide>(to: [V; 2], from: [V; 2]) -> V {
+        to[0].minus_words_cut(from[0]).pack(to[1].minus_words_cut(from[1])).xor(V::splat(-128))
     }
 
     #[inline(always)]
-    unsafe fn compare(
-        own: impl Fn(usize) -> [__m256i; 4],
+    unsafe fn compare<V: Wide>(
+        own: impl Fn(usize) -> [V; 4],
         b: &Census,
         width: usize,
         apart: &mut [Chunks; 4],
         out: &mut [u8],
     ) {
-        let (count, lead) = (b.grades[0].len(), (width + 1).div_ceil(CHUNK));
-        assert!(b.grades.iter().all(|g| g.len() == count) && out.len() >= count * CHUNK);
-        assert!(apart.iter().all(|d| d.len() == lead + count));
-        for first in (0..count).step_by(BAND) {
-            let band = first..count.min(first + BAND);
-            for k in band.clone() {
+        let (len, lead) = (b.len(), (width + 1).next_multiple_of(CHUNK));
+        assert!(b.grades.iter().all(|g| g.len() * CHUNK == len) && out.len() >= len);
+        assert!(apart.iter().all(|d| d.len() * CHUNK == lead + len));
+        for first in (0..len).step_by(BAND * V::BYTES) {
+            let band = (first..len.min(first + BAND * V::BYTES)).step_by(V::BYTES);
+            for at in band.clone() {
                 // SAFETY: as above.
-                unsafe { differ(own(k), chunks(&b.grades, k), lead + k, apart) };
+                unsafe { differ(own(at), all_at(&b.grades, at), lead + at, apart) };
             }
-            for k in band {
+            for at in band {
                 // SAFETY: as above.
-                unsafe { _mm256_storeu_si256(out.as_mut_ptr().add(k * CHUNK).cast(), cost(apart, lead + k, width)) };
+                unsafe { cost::<V>(apart, lead + at, width).store(out.as_mut_ptr().add(at)) };
             }
         }
     }
 
     /// The means of those differences of which a pixel needs two of the same place, and those along the falling diagonal.
     #[inline(always)]
-    unsafe fn differ(a: [__m256i; 4], b: [__m256i; 4], k: usize, apart: &mut [Chunks; 4]) {
-        // SAFETY: as above.
-        unsafe {
-            let apart_of = |j: usize| _mm256_sub_epi8(_mm256_max_epu8(a[j], b[j]), _mm256_min_epu8(a[j], b[j]));
-            let (right, below, falling, rising) = (apart_of(0), apart_of(1), apart_of(2), apart_of(3));
-            let means = [_mm256_avg_epu8(right, below), _mm256_avg_epu8(right, rising), _mm256_avg_epu8(below, rising)];
-            let all = [means[0], means[1], means[2], falling];
-            apart
-                .iter_mut()
-                .zip(all)
-                .for_each(|(to, d)| _mm256_store_si256(to.as_mut_ptr().add(k).cast(), in_order(d)));
+    unsafe fn differ<V: Wide>(a: [V; 4], b: [V; 4], at: usize, apart: &mut [Chunks; 4]) {
+        let apart_of = |j: usize| a[j].max(b[j]).minus(a[j].min(b[j]));
+        let (right, below, falling, rising) = (apart_of(0), apart_of(1), apart_of(2), apart_of(3));
+        let all = [right.average(below), right.average(rising), below.average(rising), falling];
+        for (to, d) in apart.iter_mut().zip(all) {
+            // SAFETY: as above.
+            unsafe { d.in_order().store(start_mut(to).add(at)) };
         }
     }
 
-    /// The costs of a chunk from the differences to all eight neighbours.
+    /// The costs of a register's pixels from the differences to all eight neighbours.
     #[inline(always)]
-    unsafe fn cost([here, left, above, falling]: &[Chunks; 4], k: usize, width: usize) -> __m256i {
+    unsafe fn cost<V: Wide>([here, left, above, falling]: &[Chunks; 4], at: usize, width: usize) -> V {
         // SAFETY: as above; the chunks before the first have room for what lies a row and a pixel before it.
-        unsafe {
-            let beside = _mm256_avg_epu8(chunk(here, k), before(left, k, 1));
-            let across = _mm256_avg_epu8(before(falling, k, width + 1), chunk(falling, k));
-            let sum = _mm256_adds_epu8(beside, _mm256_avg_epu8(before(above, k, width), across));
-            let half = _mm256_and_si256(_mm256_srli_epi16::<1>(sum), _mm256_set1_epi8(0x7f));
-            let sixteenth = _mm256_and_si256(_mm256_srli_epi16::<4>(sum), _mm256_set1_epi8(0x0f));
-            _mm256_sub_epi8(half, sixteenth)
-        }
+        let bytes = |of: &Chunks, before: usize| unsafe { V::load(start(of).add(at - before)) };
+        let beside = bytes(here, 0).average(bytes(left, 1));
+        let across = bytes(falling, width + 1).average(bytes(falling, 0));
+        let sum = beside.plus(bytes(above, width).average(across));
+        let half = sum.right(1).and(V::splat(0x7f));
+        let sixteenth = sum.right(4).and(V::splat(0x0f));
+        half.minus(sixteenth)
     }
 }
 

@@ -14,6 +14,8 @@ pub(crate) mod rows;
 pub(crate) mod shift;
 pub(crate) mod sums;
 pub(crate) mod transpose;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;

@@ -2,6 +2,8 @@
 
 use multiversion::multiversion;
 use multiversion::target::match_target;
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::{__m256i, __m512i};
 
 /// A picture of `stride` columns per row, with [`OVERHANG`] values behind it.
 #[derive(Clone, Copy)]
@@ -15,7 +17,7 @@ pub(crate) const OVERHANG: usize = 16;
 
 /// `out[y][x] = Σ wy[j] wx[i] picture[y0 + y + j][x0 + x + i]`: a whole tile shifted by one sub-pixel vector; weights in 2¹⁵ths,
 /// each product rounded. `out` is for [`OVERHANG`] values more; `rows` is room.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
 pub(crate) fn shift_bicubic(
     picture: Picture<'_>,
     at: (usize, usize),
@@ -25,7 +27,8 @@ pub(crate) fn shift_bicubic(
     out: &mut [i16],
 ) {
     match_target! {
-        "x86_64+avx2" => registers::shift(picture, at, weights, (width, height), rows, out),
+        "x86_64+avx512vl" => registers::shift::<__m512i>(picture, at, weights, (width, height), rows, out),
+        "x86_64+avx2" => registers::shift::<__m256i>(picture, at, weights, (width, height), rows, out),
         _ => shift(picture, at, weights, (width, height), rows, out),
     }
 }
@@ -60,64 +63,81 @@ fn weigh(from: &[i16], apart: usize, [p, q, r, s]: [i16; 4], out: &mut [i16]) {
     }
 }
 
-/// For functions that are compiled for AVX2, and nowhere else.
+/// For functions that are compiled for the instructions of `V`, and nowhere else.
 #[cfg(target_arch = "x86_64")]
 mod registers {
     use super::{OVERHANG, Picture};
-    use std::arch::x86_64::*;
+    use crate::simd::wide::Wide;
+    use std::arch::x86_64::__m256i;
 
     /// [`super::shift`] by strips as wide as a register, down the rows: what is summed along a row stays in registers until
     /// the three rows below are there.
     #[inline(always)]
-    pub(super) fn shift(
+    pub(super) fn shift<V: Wide>(
         picture: Picture<'_>,
         (x0, y0): (usize, usize),
-        (wx, wy): ([i16; 4], [i16; 4]),
+        weights: ([i16; 4], [i16; 4]),
         (width, height): (usize, usize),
         _: &mut Vec<i16>,
         out: &mut [i16],
     ) {
-        // SAFETY of all blocks below: the instructions are those of AVX2, for whose functions alone this is; every register that
-        // is read or written lies in a slice whose length is checked.
-        // SAFETY: as above.
-        let (wx, wy) = unsafe { (wx.map(|w| _mm256_set1_epi16(w)), wy.map(|w| _mm256_set1_epi16(w))) };
         let stride = picture.stride;
         let from = &picture.data[y0 * stride + x0..][..(height + 2) * stride + width.next_multiple_of(OVERHANG) + 3];
         let out = &mut out[..(height - 1) * width + width.next_multiple_of(OVERHANG)];
-        // The last strip's overhang lies where the first one writes later.
-        for x in (0..width).step_by(OVERHANG).rev() {
-            // SAFETY: as above.
-            unsafe {
-                let from = from.as_ptr().add(x);
-                let (mut a, mut b) = (along(from, wx), along(from.add(stride), wx));
-                let mut c = along(from.add(2 * stride), wx);
-                for y in 0..height {
-                    let d = along(from.add((y + 3) * stride), wx);
-                    _mm256_storeu_si256(out.as_mut_ptr().add(y * width + x).cast(), weigh([a, b, c, d], wy));
-                    (a, b, c) = (b, c, d);
-                }
+        let columns = V::BYTES / 2;
+        let rest = width % columns;
+        // The last strip's overhang lies where the others write later; it is no wider than it must be.
+        let last = width - rest;
+        // SAFETY: no strip reaches beyond whole registers of [`OVERHANG`], for which there is room.
+        unsafe {
+            if rest > OVERHANG {
+                strip::<V>((from, stride), weights, (out, width), last, height);
+            } else if rest > 0 {
+                strip::<__m256i>((from, stride), weights, (out, width), last, height);
+            }
+            for x in (0..last).step_by(columns).rev() {
+                strip::<V>((from, stride), weights, (out, width), x, height);
+            }
+        }
+    }
+
+    /// The strip from the column `x` on.
+    ///
+    /// # Safety
+    /// The slices hold the register that begins there in the last row, and `from` three values and three rows more.
+    #[inline(always)]
+    unsafe fn strip<V: Wide>(
+        (from, stride): (&[i16], usize),
+        (wx, wy): ([i16; 4], [i16; 4]),
+        (out, width): (&mut [i16], usize),
+        x: usize,
+        height: usize,
+    ) {
+        let (wx, wy) = (wx.map(V::splat_word), wy.map(V::splat_word));
+        // SAFETY: the caller's.
+        unsafe {
+            let (from, out) = (from.as_ptr().add(x), out.as_mut_ptr().add(x));
+            let (mut a, mut b) = (along(from, wx), along(from.add(stride), wx));
+            let mut c = along(from.add(2 * stride), wx);
+            for y in 0..height {
+                let d = along(from.add((y + 3) * stride), wx);
+                weigh([a, b, c, d], wy).store(out.add(y * width));
+                (a, b, c) = (b, c, d);
             }
         }
     }
 
     /// The weighted sums of four values of a row, from each on.
     #[inline(always)]
-    unsafe fn along(from: *const i16, weights: [__m256i; 4]) -> __m256i {
+    unsafe fn along<V: Wide>(from: *const i16, weights: [V; 4]) -> V {
         // SAFETY: as above.
-        unsafe {
-            let (a, b) = (_mm256_loadu_si256(from.cast()), _mm256_loadu_si256(from.add(1).cast()));
-            let (c, d) = (_mm256_loadu_si256(from.add(2).cast()), _mm256_loadu_si256(from.add(3).cast()));
-            weigh([a, b, c, d], weights)
-        }
+        unsafe { weigh([V::load(from), V::load(from.add(1)), V::load(from.add(2)), V::load(from.add(3))], weights) }
     }
 
     #[inline(always)]
-    unsafe fn weigh([a, b, c, d]: [__m256i; 4], [p, q, r, s]: [__m256i; 4]) -> __m256i {
-        // SAFETY: as above.
-        unsafe {
-            let outer = _mm256_add_epi16(_mm256_mulhrs_epi16(a, p), _mm256_mulhrs_epi16(d, s));
-            _mm256_adds_epi16(_mm256_add_epi16(outer, _mm256_mulhrs_epi16(b, q)), _mm256_mulhrs_epi16(c, r))
-        }
+    fn weigh<V: Wide>([a, b, c, d]: [V; 4], [p, q, r, s]: [V; 4]) -> V {
+        let outer = a.times_words(p).add_words(d.times_words(s));
+        outer.add_words(b.times_words(q)).add_words_cut(c.times_words(r))
     }
 }
 
