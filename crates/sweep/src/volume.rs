@@ -93,10 +93,11 @@ fn layout(ranges: &Ranges, window: Window) -> Result<(Vec<i32>, Vec<u32>), Sweep
     offsets.push(next);
     for y in window.y as usize..window.y as usize + window.height {
         low.extend_from_slice(&ranges.low.row(y)[window.x as usize..][..window.width]);
-        for count in &ranges.count.row(y)[window.x as usize..][..window.width] {
+        let counts = &ranges.count.row(y)[window.x as usize..][..window.width];
+        offsets.extend(counts.iter().map(|count| {
             next += u32::from(*count);
-            offsets.push(next);
-        }
+            next
+        }));
         if next > HYPOTHESES_MAX {
             return Err(SweepError::TooManyHypotheses { limit: HYPOTHESES_MAX });
         }
@@ -118,10 +119,18 @@ fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
     let mut known: Vec<f32> = rows.flatten().copied().filter(|g| g.is_finite()).collect();
     let middle = known.len() / 2;
     let typical = if known.is_empty() { 0.0 } else { *known.select_nth_unstable_by(middle, f32::total_cmp).1 };
-    // Gradients up to twice the typical one are texture; from eight times on they are edges.
-    let unit = typical.max(noise).max(f32::MIN_POSITIVE);
-    let grade = |g: &f32| if g.is_finite() { (((g / unit - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as u8 } else { 0 };
-    gradient.iter().map(grade).collect()
+    let mut edges = vec![0; gradient.len()];
+    grade_edges(&gradient, typical.max(noise).max(f32::MIN_POSITIVE), &mut edges);
+    edges
+}
+
+/// Gradients up to twice the typical one are texture; from eight times on they are edges.
+#[multiversion(targets("x86_64+avx2"))]
+fn grade_edges(gradient: &[f32], typical: f32, out: &mut [u8]) {
+    for (edge, g) in out.iter_mut().zip(gradient) {
+        let grade = (((g / typical - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as i32 as u8;
+        *edge = if g.is_finite() { grade } else { 0 };
+    }
 }
 
 /// The greater of the differences to the right and to the lower neighbour; the last column may have no right one.
