@@ -155,9 +155,10 @@ struct Reader<'a> {
     out: HeightMap,
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
 fn read_row(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize, sums: RowSums<'_>) {
     match_target! {
+        "x86_64+avx512vl" => read_row_with::<Avx2>(reader, volume, y, sums),
         "x86_64+avx2" => read_row_with::<Avx2>(reader, volume, y, sums),
         _ => read_row_with::<Anywhere>(reader, volume, y, sums),
     };
