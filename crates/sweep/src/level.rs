@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::SweepError;
 use crate::cost::{COST_MAX, CostConfig, Reference, SourceLevel};
-use crate::readout::{Estimates, Modes, RUN};
+use crate::readout::{Estimates, Modes, TOGETHER};
 use crate::semiglobal::{Penalties, RowSums, Volume};
 use crate::simd::Anywhere;
 #[cfg(target_arch = "x86_64")]
@@ -176,8 +176,8 @@ fn read_row_with<S: Sums>(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize
     let first = (core.x - window.x) as usize;
     let inner = usize::try_from(gy - core.y).ok().filter(|cy| *cy < core.height);
     let mut modes = Modes::new();
-    for start in (0..window.width).step_by(RUN) {
-        let run = start..(start + RUN).min(window.width);
+    for start in (0..window.width).step_by(TOGETHER) {
+        let run = start..(start + TOGETHER).min(window.width);
         let inside = run.start.max(first)..run.end.min(first + core.width);
         let inside = if inner.is_some() { inside } else { 0..0 };
         for (i, x) in run.enumerate() {

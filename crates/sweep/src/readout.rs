@@ -10,7 +10,7 @@
 use crate::simd::sums::Sums;
 
 /// Pixels whose modes are read together: whole registers of any kind.
-pub(crate) const RUN: usize = 32;
+pub(crate) const TOGETHER: usize = 32;
 /// Hypotheses on each side of the best that belong to its mode.
 const WINDOW: usize = 3;
 /// Deviation of the weights for a parabolic mode, hypotheses: the least that keeps the mean unbiased, so that the
@@ -22,26 +22,26 @@ const NONE: u16 = u16::MAX;
 /// What the aggregated costs of a run of pixels say around their best hypotheses.
 pub(crate) struct Modes {
     /// Places of the best hypotheses.
-    best: [u16; RUN],
+    best: [u16; TOGETHER],
     /// How far the sums before and behind the best are above it, the nearest first.
-    above: [[[u16; RUN]; WINDOW]; 2],
+    above: [[[u16; TOGETHER]; WINDOW]; 2],
     /// How far the best sum outside of the window is above it.
-    outside: [u16; RUN],
+    outside: [u16; TOGETHER],
 }
 
 /// What they say of the heights.
 pub(crate) struct Estimates {
     /// Positions of the heights, in hypotheses from the first; NaN where all hypotheses are as good, which says nothing.
-    pub(crate) index: [f32; RUN],
+    pub(crate) index: [f32; TOGETHER],
     /// Standard deviations of the positions, in hypotheses.
-    pub(crate) spread: [f32; RUN],
+    pub(crate) spread: [f32; TOGETHER],
     /// How much worse the best hypothesis outside the window is, relative to the cost scale, 0 to 1.
-    pub(crate) margin: [f32; RUN],
+    pub(crate) margin: [f32; TOGETHER],
 }
 
 impl Modes {
     pub(crate) fn new() -> Self {
-        Self { best: [0; RUN], above: [[[NONE; RUN]; WINDOW]; 2], outside: [NONE; RUN] }
+        Self { best: [0; TOGETHER], above: [[[NONE; TOGETHER]; WINDOW]; 2], outside: [NONE; TOGETHER] }
     }
 
     /// Takes the `count` sums of the pixel at `i`, of which that at `best` is the first of the least, with those of others behind
@@ -74,9 +74,9 @@ impl Modes {
     /// relative to it, which turns the mode's curvature into the deviation of its position.
     #[inline(always)]
     pub(crate) fn estimates(&self, scale: f32, noise: f32) -> Estimates {
-        let mut out = Estimates { index: [0.0; RUN], spread: [0.0; RUN], margin: [0.0; RUN] };
+        let mut out = Estimates { index: [0.0; TOGETHER], spread: [0.0; TOGETHER], margin: [0.0; TOGETHER] };
         let [before, behind] = &self.above;
-        for i in 0..RUN {
+        for i in 0..TOGETHER {
             let outside = if self.outside[i] == NONE { scale } else { f32::from(self.outside[i]) };
             let margin = (outside / scale).min(1.0);
             // Both are there or none is.
@@ -120,6 +120,7 @@ mod tests {
     use super::*;
     use crate::simd::Anywhere;
     use crate::simd::sums::WORDS;
+    use crate::testing::random;
     use proptest::prelude::*;
 
     /// One pixel's position, deviation and margin.
@@ -151,13 +152,9 @@ mod tests {
 
     #[test]
     fn a_pixel_says_the_same_among_others_as_alone() {
-        let mut state = 1u32;
-        let mut random = |n: u32| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) % n
-        };
+        let mut random = random();
         let pixels: Vec<Vec<u16>> =
-            (0..RUN).map(|_| (0..1 + random(24)).map(|_| random(900) as u16).collect()).collect();
+            (0..TOGETHER).map(|_| (0..1 + random(24)).map(|_| random(900) as u16).collect()).collect();
         let mut modes = Modes::new();
         pixels.iter().enumerate().for_each(|(i, sums)| put(&mut modes, i, sums));
         for (i, sums) in pixels.iter().enumerate() {

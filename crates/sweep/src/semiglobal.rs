@@ -201,6 +201,7 @@ fn jump_penalty(p: Penalties, edge: u8) -> u8 {
 mod tests {
     use super::*;
     use crate::ranges::{CLIMB_MAX, NOT_STEEP};
+    use crate::testing::random;
 
     /// The recurrence as it is written in the module's text, over a full lattice, without ranges or guards; path costs are
     /// cut at 255, and what those from above and from the left add rounded up to an even number.
@@ -249,14 +250,6 @@ mod tests {
         (0..width * height).map(pixel).collect()
     }
 
-    fn random() -> impl FnMut(u32) -> u32 {
-        let mut state = 12345u32;
-        move |n: u32| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) % n
-        }
-    }
-
     /// Neighbours that search quite other heights, nearly the same ones, and the same.
     #[test]
     fn equals_the_textbook_recurrence_with_ranges_that_differ() {
@@ -278,6 +271,12 @@ mod tests {
             compare_with_the_recurrence((70, 4), |x, _| if x / 20 == 1 { (4, count) } else { (-3, count + 9) });
             compare_with_the_recurrence((12, 6), |_, y| if y < 3 { (-3, count) } else { (6, count) });
         }
+    }
+
+    #[test]
+    #[should_panic(expected = "hypotheses that begin at 1073741824")]
+    fn absurd_heights_are_refused() {
+        compare_with_the_recurrence((9, 7), |x, _| (if x == 3 { 1 << 30 } else { 0 }, 7));
     }
 
     const ROWS: [(&str, ExtendRow); 2] =

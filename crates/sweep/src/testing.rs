@@ -35,6 +35,15 @@ pub(crate) fn leaning_camera(size: usize, parallax: [f64; 2]) -> RpcCamera {
     })
 }
 
+/// Numbers below the one asked for, always the same ones (a linear congruential generator; Numerical Recipes, 7.1).
+pub(crate) fn random() -> impl FnMut(u32) -> u32 {
+    let mut state = 12345u32;
+    move |n| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) % n
+    }
+}
+
 /// A smooth texture over the ground, different everywhere, with detail down to a few pixels.
 fn texture(east_m: f64, north_m: f64) -> f32 {
     let wave = |a: f64, b: f64, c: f64| (a * east_m + b * north_m + c).sin();

@@ -18,15 +18,13 @@ const INTERPOLATED: f64 = 0.1;
 /// `agreement` is 0 to 1 where a height was observed and 0 elsewhere; the window reaches `reach` cells to each side, and heights
 /// that deviate by `same_surface_m` halve it.
 pub fn reliability(height_m: &Grid<f32>, agreement: &Grid<f32>, reach: usize, same_surface_m: f64) -> Grid<f32> {
-    let known = |h: &f32| if h.is_nan() { 0.0 } else { 1.0 };
-    let value = |h: &f32| if h.is_nan() { 0.0 } else { f64::from(*h) };
+    let value = |h: f32| if h.is_nan() { 0.0 } else { f64::from(h) };
     let (width, height) = (height_m.width(), height_m.height());
     let heights = height_m.data();
-    let sums = |of: &dyn Fn(usize) -> f64| window_sums(heights.len(), width, reach, of);
-    let count = sums(&|i| known(&heights[i]));
-    let sum = sums(&|i| value(&heights[i]));
-    let squares = sums(&|i| value(&heights[i]).powi(2));
-    let agreed = sums(&|i| value(&agreement.data()[i]));
+    let count = window_sums(heights.len(), width, reach, |i| f64::from(u8::from(!heights[i].is_nan())));
+    let sum = window_sums(heights.len(), width, reach, |i| value(heights[i]));
+    let squares = window_sums(heights.len(), width, reach, |i| value(heights[i]).powi(2));
+    let agreed = window_sums(heights.len(), width, reach, |i| value(agreement.data()[i]));
     let mut out = height_m.clone();
     for (i, out) in out.data_mut().iter_mut().enumerate().filter(|(_, h)| !h.is_nan()) {
         let n = count[i];

@@ -312,7 +312,7 @@ mod tests {
         census.fill(&a, width, area);
         other.fill(&b, width, area);
         let mut room = Room::default();
-        let mut costs = [(); 3].map(|()| vec![0; area.next_multiple_of(CHUNK)]);
+        let mut costs = vec![vec![0; area.next_multiple_of(CHUNK)]; 3];
         census_cost(&census, &other, width, &mut room, &mut costs[0]);
         picture_cost(&a, &other, width, &mut room, &mut costs[1]);
         let mut plain = [Census::default(), Census::default()];
@@ -321,6 +321,19 @@ mod tests {
             plain::grade(picture, width, &mut plain.grades);
         }
         plain::compare(&plain[0], &plain[1], width, &mut room.apart, &mut costs[2]);
+        #[cfg(target_arch = "x86_64")]
+        if std::is_x86_feature_detected!("avx2") {
+            let mut graded = [Census::default(), Census::default()];
+            for (graded, picture) in graded.iter_mut().zip([&a, &b]) {
+                graded.grades.iter_mut().for_each(|g| fit(g, area.div_ceil(CHUNK)));
+                registers::grade::<__m256i>(picture, width, &mut graded.grades);
+            }
+            let [own, other] = &graded;
+            let mut further = vec![vec![0; area.next_multiple_of(CHUNK)]; 2];
+            registers::compare_census::<__m256i>(own, other, width, &mut room.apart, &mut further[0]);
+            registers::compare_picture::<__m256i>(&a, other, width, &mut room.apart, &mut further[1]);
+            costs.extend(further);
+        }
         for y in 1..height - 1 {
             for x in 1..width - 1 {
                 let i = y * width + x;
@@ -330,7 +343,11 @@ mod tests {
                 let expected = (sum / 8.0).min(128.0) * 112.0 / 128.0;
                 // Means of two are rounded upwards.
                 assert!((-0.7..2.0).contains(&(f64::from(costs[0][i]) - expected)), "{} {expected}", costs[0][i]);
-                assert!(costs.iter().all(|c| c[i] == costs[0][i]), "{:?}", [costs[0][i], costs[1][i], costs[2][i]]);
+                assert!(
+                    costs.iter().all(|c| c[i] == costs[0][i]),
+                    "{:?}",
+                    costs.iter().map(|c| c[i]).collect::<Vec<_>>()
+                );
             }
         }
     }

@@ -17,6 +17,8 @@ pub(crate) const LANES: usize = 32;
 pub(super) const GUARD: usize = 8;
 /// Pixels whose links are worked out together.
 pub(super) const RUN: usize = 64;
+/// How far from 0 a pixel's hypotheses may begin: two pixels' differ by what 32 bits hold.
+const FARTHEST: u32 = 1 << 29;
 /// Registers whose lanes are moved this far have none of them left.
 pub(super) const REACH: i32 = LANES as i32 + 1;
 
@@ -61,7 +63,7 @@ impl Row {
     /// Makes room for the pixels, `backward` for the last one first; `jump` is the penalty of a jump by the edge.
     ///
     /// # Panics
-    /// Slices of different lengths, a pixel without hypotheses, or more hypotheses than a row can have.
+    /// Slices of different lengths, a pixel without hypotheses or with those of absurd heights, or more of them than a row can have.
     #[inline(always)]
     pub(crate) fn place(&mut self, pixels: Pixels<'_>, backward: bool, jump: impl Fn(u8) -> u8) {
         let Pixels { low, steep, offsets, edges } = pixels;
@@ -74,13 +76,14 @@ impl Row {
         let (first, end) = (offsets[0], offsets[width]);
         let (from, to) = (&offsets[..width], &offsets[1..]);
         let high = self.high[1..=width].iter_mut().zip(low);
-        let (mut fewest, mut most) = (i32::MAX, 0);
+        let (mut fewest, mut most, mut farthest) = (i32::MAX, 0, 0);
         for ((high, low), (from, to)) in high.zip(from.iter().zip(to)) {
             let count = to.wrapping_sub(*from) as i32;
-            (fewest, most) = (count.min(fewest), count.max(most));
+            (fewest, most, farthest) = (count.min(fewest), count.max(most), low.unsigned_abs().max(farthest));
             *high = low.wrapping_add(count);
         }
         assert!(fewest > 0, "a pixel of {fewest} hypotheses");
+        assert!(farthest <= FARTHEST, "hypotheses that begin at {farthest}");
         (self.count, self.most) = (end.wrapping_sub(first) as usize, most as usize);
         // A register that overhangs and two more; guards reach as far.
         let len = self.count + GUARD * (width + 1) + 2 * LANES;

@@ -147,7 +147,8 @@ mod tests {
 
     #[test]
     fn a_shifted_picture_is_the_weighted_sum_of_sixteen_values() {
-        let (stride, width, height) = (29, 21, 5);
+        // Two strips of the longest registers and a shorter one.
+        let (stride, width, height) = (79, 71, 5);
         let data: Vec<i16> = (0..stride * 12 + OVERHANG as i32).map(|i| ((i * 977) % 16_001 - 8_000) as i16).collect();
         let (wx, wy) = ([-2048, 18_000, 19_000, -2184], [-1000, 30_000, 4_000, -232]);
         let at = |x: usize, y: usize| f64::from(data[y * stride as usize + x]);
@@ -156,6 +157,12 @@ mod tests {
         shift_bicubic(picture, (4, 2), (wx, wy), (width, height), &mut rows, &mut out);
         shift(picture, (4, 2), (wx, wy), (width, height), &mut rows, &mut plain);
         assert_eq!(out[..plain.len()], plain);
+        #[cfg(target_arch = "x86_64")]
+        if std::is_x86_feature_detected!("avx2") {
+            out.fill(0);
+            registers::shift::<__m256i>(picture, (4, 2), (wx, wy), (width, height), &mut rows, &mut out);
+            assert_eq!(out[..plain.len()], plain);
+        }
         let rounded = |v: f64, w: i16| (v * f64::from(w) / 32_768.0 + 0.5).floor();
         for y in 0..height {
             for x in 0..width {
