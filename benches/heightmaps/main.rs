@@ -9,6 +9,8 @@
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
+#[path = "../common/machine.rs"]
+mod machine;
 mod town;
 
 use std::fmt::Write as _;
@@ -60,7 +62,7 @@ fn main() -> anyhow::Result<()> {
     }
     let rows: Vec<Value> =
         READINGS.iter().zip(&mut seconds).zip(&errors).map(|((r, s), e)| row(r, s, e, &arguments)).collect();
-    let result = json!({ "machine": machine(), "tiles": arguments.tiles, "runs": arguments.runs, "threads": 2, "readings": rows });
+    let result = json!({ "machine": machine::machine(), "tiles": arguments.tiles, "runs": arguments.runs, "threads": 2, "readings": rows });
     let text = markdown(&result);
     println!("{text}");
     if let Some(out) = &arguments.out {
@@ -212,12 +214,4 @@ fn markdown(result: &Value) -> String {
         );
     }
     text + "\n    cargo bench --bench heightmaps\n"
-}
-
-/// Processor and cores.
-fn machine() -> String {
-    let cores = std::thread::available_parallelism().map_or(0, usize::from);
-    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split(':').nth(1));
-    format!("{} cores of {}", cores, model.map_or("an unknown processor", str::trim))
 }

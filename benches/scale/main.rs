@@ -10,6 +10,8 @@
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
+#[path = "../common/machine.rs"]
+mod machine;
 mod town;
 
 use std::fmt::Write as _;
@@ -255,16 +257,16 @@ fn line(r: &Row) -> String {
 }
 
 fn markdown(rows: &[Row], arguments: &Arguments) -> String {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let mut out = format!(
         "# Large scenes\n\n\
-         Written by `cargo bench --bench scale -- {}` on {cores} cores. A pair of SIDE × SIDE pixels at {} m, preset \
+         Written by `cargo bench --bench scale -- {}` on {}. A pair of SIDE × SIDE pixels at {} m, preset \
          {}, `--memory {}`; the images are mosaics of one rendered tile per view (a town that repeats itself every {PERIOD} \
          pixels; see `benches/scale/town.rs`), the truth is the town's own height function, nothing is aligned. \
          CPU is user and system time of the command, megapixels are those of both images, peak is the largest \
          resident memory; sides that were run several times have the means of their times.\n\n\
          | side px | Mpx | chunks | user s | system s | CPU s/Mpx | wall s | peak MB | MAE m | < 1 m % |\n|--:|--:|:--|--:|--:|--:|--:|--:|--:|--:|\n",
         arguments.asked,
+        machine::machine(),
         town::GSD_M,
         arguments.preset,
         arguments.memory_mb

@@ -9,6 +9,8 @@
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
+#[path = "../common/machine.rs"]
+mod machine;
 mod matrix;
 mod peers;
 mod plot;

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::machine::machine;
 use crate::matrix::{DEFAULT, Reached, Row};
 use crate::peers::Peer;
 use crate::plot;
@@ -175,12 +176,4 @@ fn goal(goal: &Reached) -> String {
 fn date() -> String {
     let output = Command::new("date").args(["-u", "+%Y-%m-%d"]).output();
     output.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned()).unwrap_or_default()
-}
-
-/// Processor and cores.
-fn machine() -> String {
-    let cores = std::thread::available_parallelism().map_or(0, usize::from);
-    let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split(':').nth(1));
-    format!("{} cores of {}", cores, model.map_or("an unknown processor", str::trim))
 }
