@@ -1,4 +1,4 @@
-//! The README's table says what `make bench` measured: every number of skysweep's in it is read from `benches/results/scenes.json`.
+//! The README's table says what `make bench` measured: skysweep's column is that of `benches/results/scenes.json`, line by line.
 
 use std::path::Path;
 
@@ -85,6 +85,11 @@ fn the_table_says_what_was_measured() {
         expected.push((before, "CPU", format!("{balanced:.1} s (fast: {fast:.1} s)")));
     }
     expected.push(("Pléiades pair, pyramid", "CPU", format!("{:.1} s", of("phr_gizeh", "balanced").cpu_s())));
+    let khufu = of("phr_gizeh", "balanced");
+    let faces = ["east_deg", "south_deg", "west_deg"].map(|face| format!("{:.2}°", khufu.metric(face)));
+    expected.push(("Pléiades pair, pyramid", "faces", faces.join(", ")));
+    let table = readme.lines().skip_while(|line| !line.starts_with("| scene |")).skip(2);
+    assert_eq!(table.take_while(|line| line.starts_with('|')).count(), expected.len(), "lines of the table");
     for (before, label, expected) in expected {
         assert_eq!(own_column(&readme, before, label), expected, "{before}, {label}");
     }

@@ -123,6 +123,30 @@ fn chunks_that_do_not_fit_are_refused_before_they_are_read() {
     }
     std::fs::write(&path, &whole[..layers]).unwrap();
     assert!(matches!(gridded(&path), Err(PointsError::Damaged { .. })));
+    // The form of the compressed points: in its record, behind 34 bytes, each item's type, size and version.
+    let record = whole.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
+    let mut bytes = whole;
+    bytes[record + 52 + 34 + 2] = 40;
+    std::fs::write(&path, bytes).unwrap();
+    let error = gridded(&path).unwrap_err().to_string();
+    assert!(error.contains("40 bytes of Point14"), "{error}");
+}
+
+#[test]
+fn a_cloud_without_points_has_none_and_a_record_of_compression_alone_compresses_nothing() {
+    let folder = TempDir::new().unwrap();
+    let empty = write(&folder, "empty.laz", None, &[]);
+    assert!(gridded(&empty).is_err());
+    let mut bytes = std::fs::read(write(&folder, "cloud.las", None, &points())).unwrap();
+    let compressed = std::fs::read(write(&folder, "cloud.laz", None, &points())).unwrap();
+    let data = |bytes: &[u8]| u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize;
+    let (own, records) = (data(&bytes), compressed[375..data(&compressed)].to_vec());
+    bytes.splice(own..own, records.iter().copied());
+    bytes[96..100].copy_from_slice(&((own + records.len()) as u32).to_le_bytes());
+    bytes[100..104].copy_from_slice(&1u32.to_le_bytes());
+    let path = folder.path().join("stale.las");
+    std::fs::write(&path, bytes).unwrap();
+    assert_eq!(gridded(&path).unwrap().points, 5);
 }
 
 #[test]

@@ -24,9 +24,9 @@
 //!
 //! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; AMD EPYC of family 26 with AVX-512): 2.1 to 2.2 ·
 //! 10⁹ hypotheses per second and source for the costs, 2.1 to 2.3 · 10⁹ for the aggregation over eight directions, 0.66 to 0.75 · 10⁹
-//! for a level of a pair as a whole. A fourth to a third of it comes of asking for memory ahead, costs gain a fifth from AVX-512, and
-//! the aggregation nothing. In scenes a pixel has ten to twenty hypotheses, so that what is done once per pixel counts as much as the
-//! vectors: ranges that follow the heights save more than faster kernels would.
+//! for a level of a pair as a whole. The aggregation waits for memory, which is asked for ahead, and gains nothing from registers of
+//! AVX-512; the costs gain a fifth. In scenes a pixel has ten to twenty hypotheses, so that what is done once per pixel counts as much
+//! as the vectors: ranges that follow the heights save more than faster kernels would.
 
 pub mod consistency;
 pub mod cost;
@@ -69,6 +69,16 @@ pub enum SweepError {
     #[error("a block of the image has more than {limit} height hypotheses; give a narrower --height-range")]
     TooManyHypotheses {
         /// The most that a block may have.
+        limit: u32,
+    },
+    /// Heights that no surface has.
+    #[error(
+        "the height range begins {farthest} hypotheses from the ellipsoid, at most {limit} are expected; give a --height-range on Earth"
+    )]
+    HeightsTooFar {
+        /// How far, in hypotheses.
+        farthest: u32,
+        /// The most that it may be.
         limit: u32,
     },
     /// The local map between two images could not be brought under its error bound.

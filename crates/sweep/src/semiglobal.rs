@@ -22,7 +22,7 @@ use crate::simd::paths::{Results, Room, Task, extend_row};
 use crate::simd::pixel::JUMP_MAX;
 use crate::simd::rows::{Pixels, Row};
 
-pub(crate) use crate::simd::rows::LANES;
+pub(crate) use crate::simd::rows::{FARTHEST, LANES};
 
 /// Penalties in units of the cost ([`crate::cost::COST_MAX`] = worst).
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,7 +8,7 @@ use crate::SweepError;
 use crate::cost::{BlockCosts, CostConfig, Reference, SourceLevel, TileScratch, sweep_tile};
 use crate::level::tiles;
 use crate::ranges::{NOT_STEEP, Ranges};
-use crate::semiglobal::{LANES, Penalties, RowSums, Volume, aggregate};
+use crate::semiglobal::{FARTHEST, LANES, Penalties, RowSums, Volume, aggregate};
 
 /// A window with more hypotheses than this would take more than 2 GB.
 const HYPOTHESES_MAX: u32 = 700_000_000;
@@ -92,7 +92,12 @@ fn layout(ranges: &Ranges, window: Window) -> Result<(Vec<i32>, Vec<u32>), Sweep
     let mut next = 0u32;
     offsets.push(next);
     for y in window.y as usize..window.y as usize + window.height {
-        low.extend_from_slice(&ranges.low.row(y)[window.x as usize..][..window.width]);
+        let lows = &ranges.low.row(y)[window.x as usize..][..window.width];
+        let farthest = lows.iter().fold(0, |farthest, low| low.unsigned_abs().max(farthest));
+        if farthest > FARTHEST {
+            return Err(SweepError::HeightsTooFar { farthest, limit: FARTHEST });
+        }
+        low.extend_from_slice(lows);
         let counts = &ranges.count.row(y)[window.x as usize..][..window.width];
         offsets.extend(counts.iter().map(|count| {
             next += u32::from(*count);
@@ -124,11 +129,11 @@ fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
     edges
 }
 
-/// Gradients up to twice the typical one are texture; from eight times on they are edges.
+/// Gradients up to twice the typical one, the `unit`, are texture; from eight times on they are edges.
 #[multiversion(targets("x86_64+avx2"))]
-fn grade_edges(gradient: &[f32], typical: f32, out: &mut [u8]) {
+fn grade_edges(gradient: &[f32], unit: f32, out: &mut [u8]) {
     for (edge, g) in out.iter_mut().zip(gradient) {
-        let grade = (((g / typical - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as i32 as u8;
+        let grade = (((g / unit - 2.0) / 6.0).clamp(0.0, 1.0) * 255.0) as i32 as u8;
         *edge = if g.is_finite() { grade } else { 0 };
     }
 }

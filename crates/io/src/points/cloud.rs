@@ -77,7 +77,7 @@ impl PointCloud {
         let damaged = |reason| PointsError::damaged(&path, reason);
         preflight::check(&mut file, length).map_err(damaged)?;
         let header = guarded(&path, || Header::new(&mut file))?;
-        preflight::check_chunks(&mut file, &header, length).map_err(damaged)?;
+        guarded(&path, || preflight::check_chunks(&mut file, &header, length))?;
         file.rewind().map_err(unreadable)?;
         let reader = guarded(&path, || Reader::new(file))?;
         let stated = stated(reader.header()).map_err(|source| PointsError::Crs { path: path.clone(), source })?;
@@ -230,7 +230,7 @@ fn place(geotransform: &GeoTransform, x: f64, y: f64) -> Option<(usize, usize)> 
 }
 
 /// Runs the decoder. It indexes by numbers that it reads, so damaged input may make it panic: that is the input's fault.
-fn guarded<T>(path: &Path, decode: impl FnOnce() -> las::Result<T>) -> Result<T, PointsError> {
+fn guarded<T, E: ToString>(path: &Path, decode: impl FnOnce() -> Result<T, E>) -> Result<T, PointsError> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(error)) => Err(PointsError::damaged(path, error)),

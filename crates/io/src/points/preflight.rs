@@ -62,23 +62,32 @@ fn check_extended(read: &mut (impl Read + Seek), header: &[u8], length: u64) -> 
 }
 
 /// Says what is wrong with the table of compressed points' chunks or with a chunk of a file of `length` bytes; `read` stands where the
-/// points begin.
+/// points begin. What the decoder does with damaged numbers on the way may panic.
 pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, length: u64) -> Result<(), String> {
-    let Some(record) = header.vlrs().iter().find(|record| is_laszip_vlr(record)) else { return Ok(()) };
+    let record = header.vlrs().iter().find(|record| is_laszip_vlr(record));
+    let Some(record) = record.filter(|_| header.point_format().is_compressed) else { return Ok(()) };
     let form = LazVlr::from_buffer(&record.data).map_err(|error| error.to_string())?;
-    let (point_bytes, stated) = (form.items_size(), u64::from(header.point_format().len()));
-    if point_bytes != stated {
-        return Err(format!("compressed points of {point_bytes} bytes, the header says {stated}"));
+    let layout = Layout::of(&form)?;
+    let stated = u64::from(header.point_format().len());
+    if layout.point_bytes != stated {
+        return Err(format!("compressed points of {} bytes, the header says {stated}", layout.point_bytes));
+    }
+    if record.data.starts_with(&POINT_WISE) {
+        return layout.check_chunks(read, |_| u64::MAX, header.number_of_points(), length);
     }
     let failed = |error: std::io::Error| error.to_string();
-    if !record.data.starts_with(&POINT_WISE) {
-        let data = read.stream_position().map_err(failed)?;
-        check_chunk_count(read, data, point_bytes, length)?;
-        read.seek(SeekFrom::Start(data)).map_err(failed)?;
-        ChunkTable::read_from(&mut *read, &form)
-            .map_err(|error| format!("the table of the points' chunks: {error}"))?;
-    }
-    check_layers(read, &form, header.number_of_points(), length)
+    let data = read.stream_position().map_err(failed)?;
+    check_chunk_count(read, data, stated, length)?;
+    read.seek(SeekFrom::Start(data)).map_err(failed)?;
+    let table = ChunkTable::read_from(&mut *read, &form);
+    let table = table.map_err(|error| format!("the table of the points' chunks: {error}"))?;
+    // Those of chunks of one size are all as large as that, and there are as many as there must be.
+    let points_of = |chunk: usize| match table.as_ref().get(chunk) {
+        Some(entry) => entry.point_count,
+        None if form.uses_variable_size_chunks() => 0,
+        None => u64::from(form.chunk_size()),
+    };
+    layout.check_chunks(read, points_of, header.number_of_points(), length)
 }
 
 /// Every chunk begins with a point that is not compressed.
@@ -94,36 +103,68 @@ fn check_chunk_count(read: &mut (impl Read + Seek), data: u64, point_bytes: u64,
     Ok(())
 }
 
-/// Says where a chunk's layers do not fit; `read` stands at the first chunk. Chunks in layers (point formats 6 to 10) begin with a point,
-/// how many there are, and how many bytes each layer has; the next chunk follows the last layer.
-fn check_layers(read: &mut (impl Read + Seek), form: &LazVlr, points: u64, length: u64) -> Result<(), String> {
-    let mut layers = 0;
-    for item in form.items() {
-        layers += match item.item_type() {
-            LazItemType::Point14 => 9,
-            LazItemType::RGB14 | LazItemType::WavePacket14 => 1,
-            LazItemType::RGBNIR14 => 2,
-            LazItemType::Byte14(count) => usize::from(count),
-            _ => return Ok(()),
-        };
-    }
-    let mut at = read.stream_position().map_err(|error| error.to_string())?;
-    let (mut left, mut sizes) = (points, vec![0u8; 4 * layers]);
-    while left > 0 {
-        let count = bytes_at(read, SeekFrom::Start(at + form.items_size())).map(u32::from_le_bytes);
-        let Some(count) = count.filter(|_| read.read_exact(&mut sizes).is_ok()) else {
-            return Err(format!("it ends at byte {length}, {left} points before the last"));
-        };
-        let held: u64 = sizes.chunks_exact(4).filter_map(|size| u32_at(size, 0)).map(u64::from).sum();
-        at += form.items_size() + 4 + sizes.len() as u64;
-        if held > length - at {
-            return Err(format!("{held} bytes of points from byte {at} on, the file has {length}"));
+/// Bytes of a point, and of how many layers a chunk is: none where its points follow one another.
+struct Layout {
+    point_bytes: u64,
+    layers: usize,
+}
+
+impl Layout {
+    fn of(form: &LazVlr) -> Result<Self, String> {
+        let mut out = Self { point_bytes: 0, layers: 0 };
+        for item in form.items() {
+            let (bytes, layers) = match item.item_type() {
+                LazItemType::Byte(count) => (count, 0),
+                LazItemType::Point10 => (20, 0),
+                LazItemType::GpsTime => (8, 0),
+                LazItemType::RGB12 => (6, 0),
+                LazItemType::WavePacket13 => (29, 0),
+                LazItemType::Point14 => (30, 9),
+                LazItemType::RGB14 => (6, 1),
+                LazItemType::RGBNIR14 => (8, 2),
+                LazItemType::WavePacket14 => (29, 1),
+                LazItemType::Byte14(count) => (count, usize::from(count)),
+            };
+            if item.size() != bytes {
+                return Err(format!("compressed points with {} bytes of {:?}", item.size(), item.item_type()));
+            }
+            out.point_bytes += u64::from(bytes);
+            out.layers += layers;
         }
-        at += held;
-        let count = if form.uses_variable_size_chunks() { count } else { form.chunk_size() };
-        left = left.saturating_sub(u64::from(count.max(1)));
+        Ok(out)
     }
-    Ok(())
+
+    /// Says where a chunk's layers do not fit; `read` stands at the first chunk. Chunks in layers (point formats 6 to 10) begin with a
+    /// point, how many they hold, and how many bytes each layer has; the next chunk follows the last layer. The decoder takes
+    /// `points_of` each from a chunk, whatever that says.
+    fn check_chunks(
+        &self,
+        read: &mut (impl Read + Seek),
+        points_of: impl Fn(usize) -> u64,
+        points: u64,
+        length: u64,
+    ) -> Result<(), String> {
+        if self.layers == 0 {
+            return Ok(());
+        }
+        let mut at = read.stream_position().map_err(|error| error.to_string())?;
+        let (mut left, mut chunk, mut sizes) = (points, 0, vec![0u8; 4 * self.layers]);
+        while left > 0 {
+            let place = SeekFrom::Start(at + self.point_bytes + 4);
+            if read.seek(place).and_then(|_| read.read_exact(&mut sizes)).is_err() {
+                return Err(format!("it ends at byte {length}, {left} points before the last"));
+            }
+            let held: u64 = sizes.chunks_exact(4).filter_map(|size| u32_at(size, 0)).map(u64::from).sum();
+            at += self.point_bytes + 4 + sizes.len() as u64;
+            if held > length.saturating_sub(at) {
+                return Err(format!("{held} bytes of points from byte {at} on, the file has {length}"));
+            }
+            at += held;
+            left = left.saturating_sub(points_of(chunk).max(1));
+            chunk += 1;
+        }
+        Ok(())
+    }
 }
 
 /// The bytes at a place, if it is in the file.

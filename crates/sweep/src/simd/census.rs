@@ -83,28 +83,28 @@ pub(crate) fn picture_cost(picture: &[i16], b: &Census, width: usize, room: &mut
     compare_picture(picture, b, width, room, out);
 }
 
-#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512bw", "x86_64+avx2"))]
 fn grade(picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
     match_target! {
-        "x86_64+avx512vl" => registers::grade::<__m512i>(picture, width, grades),
+        "x86_64+avx512bw" => registers::grade::<__m512i>(picture, width, grades),
         "x86_64+avx2" => registers::grade::<__m256i>(picture, width, grades),
         _ => plain::grade(picture, width, grades),
     }
 }
 
-#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512bw", "x86_64+avx2"))]
 fn compare_census(a: &Census, b: &Census, width: usize, apart: &mut [Chunks; 4], out: &mut [u8]) {
     match_target! {
-        "x86_64+avx512vl" => registers::compare_census::<__m512i>(a, b, width, apart, out),
+        "x86_64+avx512bw" => registers::compare_census::<__m512i>(a, b, width, apart, out),
         "x86_64+avx2" => registers::compare_census::<__m256i>(a, b, width, apart, out),
         _ => plain::compare(a, b, width, apart, out),
     }
 }
 
-#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512bw", "x86_64+avx2"))]
 fn compare_picture(picture: &[i16], b: &Census, width: usize, room: &mut Room, out: &mut [u8]) {
     match_target! {
-        "x86_64+avx512vl" => registers::compare_picture::<__m512i>(picture, b, width, &mut room.apart, out),
+        "x86_64+avx512bw" => registers::compare_picture::<__m512i>(picture, b, width, &mut room.apart, out),
         "x86_64+avx2" => registers::compare_picture::<__m256i>(picture, b, width, &mut room.apart, out),
         _ => plain::compare_picture(picture, b, width, room, out),
     }
@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn the_cost_is_the_mean_difference_to_eight_neighbours() {
-        let (width, height) = (37, 23);
+        let (width, height) = (37, 61);
         let area = width * height;
         let picture = |factor: usize| -> Vec<i16> {
             (0..area + overhang(width)).map(|i| ((i * factor) % 331) as i16 / 2 - 80).collect()

@@ -1,4 +1,5 @@
-//! Bytes and words side by side: AVX2 where the machine has it, plain arrays elsewhere, with the same results.
+//! Bytes and words side by side: AVX2 where the machine has it, AVX-512 where that gains something, plain arrays elsewhere, with the
+//! same results.
 //!
 //! The only unsafe module of the crate.
 #![allow(unsafe_code)]
@@ -31,4 +32,6 @@ pub(crate) fn fetch<T>(at: *const T) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         _mm_prefetch::<_MM_HINT_T0>(at.cast());
     }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = at;
 }

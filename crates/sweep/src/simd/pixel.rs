@@ -13,7 +13,8 @@ pub(crate) const JUMP_MAX: u8 = 127;
 /// Where the results of a pixel go.
 pub(super) trait Store: Copy {
     const BACKWARD: bool;
-    /// Asks for the memory of the results of a pixel whose costs are the row's from `own` on, which need not be the row's.
+    /// Asks for the memory of what the first half of the directions adds at a pixel whose costs are the row's from `own` on; it need
+    /// not be one of the row's.
     fn fetch(self, own: usize);
     /// That of the pixel whose costs are the row's from `own` on, with so many before it in the order of the row.
     ///

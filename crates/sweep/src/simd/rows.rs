@@ -18,7 +18,7 @@ pub(super) const GUARD: usize = 8;
 /// Pixels whose links are worked out together.
 pub(super) const RUN: usize = 64;
 /// How far from 0 a pixel's hypotheses may begin: two pixels' differ by what 32 bits hold.
-const FARTHEST: u32 = 1 << 29;
+pub(crate) const FARTHEST: u32 = 1 << 29;
 /// Registers whose lanes are moved this far have none of them left.
 pub(super) const REACH: i32 = LANES as i32 + 1;
 

@@ -17,7 +17,7 @@ pub(crate) const OVERHANG: usize = 16;
 
 /// `out[y][x] = Σ wy[j] wx[i] picture[y0 + y + j][x0 + x + i]`: a whole tile shifted by one sub-pixel vector; weights in 2¹⁵ths,
 /// each product rounded. `out` is for [`OVERHANG`] values more; `rows` is room.
-#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512bw", "x86_64+avx2"))]
 pub(crate) fn shift_bicubic(
     picture: Picture<'_>,
     at: (usize, usize),
@@ -27,7 +27,7 @@ pub(crate) fn shift_bicubic(
     out: &mut [i16],
 ) {
     match_target! {
-        "x86_64+avx512vl" => registers::shift::<__m512i>(picture, at, weights, (width, height), rows, out),
+        "x86_64+avx512bw" => registers::shift::<__m512i>(picture, at, weights, (width, height), rows, out),
         "x86_64+avx2" => registers::shift::<__m256i>(picture, at, weights, (width, height), rows, out),
         _ => shift(picture, at, weights, (width, height), rows, out),
     }
@@ -147,8 +147,12 @@ mod tests {
 
     #[test]
     fn a_shifted_picture_is_the_weighted_sum_of_sixteen_values() {
-        // Two strips of the longest registers and a shorter one.
-        let (stride, width, height) = (79, 71, 5);
+        // Strips of the longest registers with nothing left, with half a register left and less, and with more.
+        [64, 71, 53, 16, 21, 5].into_iter().for_each(shifted);
+    }
+
+    fn shifted(width: usize) {
+        let (stride, height) = (width as i32 + 8, 5);
         let data: Vec<i16> = (0..stride * 12 + OVERHANG as i32).map(|i| ((i * 977) % 16_001 - 8_000) as i16).collect();
         let (wx, wy) = ([-2048, 18_000, 19_000, -2184], [-1000, 30_000, 4_000, -232]);
         let at = |x: usize, y: usize| f64::from(data[y * stride as usize + x]);

@@ -1,5 +1,6 @@
-//! Registers of bytes and of words of 16 bits, as long as the machine has them: for functions that are compiled for their
-//! instructions, and nowhere else.
+//! Registers of bytes and of words of 16 bits, as long as the machine has them (AVX2, or AVX-512 with its instructions for bytes and
+//! words, BW): for functions that are compiled for their instructions, and nowhere else. `multiversion` takes AVX-512 only from Ice
+//! Lake and Zen 4 on: before, it slows the processor's clock.
 
 use std::arch::x86_64::*;
 
@@ -19,7 +20,7 @@ pub(super) trait Wide: Copy {
     /// The lesser ones of unsigned bytes, and the greater ones.
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
-    /// Differences of bytes.
+    /// Differences of unsigned bytes, 0 where they are less.
     fn minus(self, other: Self) -> Self;
     /// Sums of unsigned bytes, 255 where they are more.
     fn plus(self, other: Self) -> Self;
@@ -108,7 +109,7 @@ wide!(
     xor = _mm256_xor_si256,
     min = _mm256_min_epu8,
     max = _mm256_max_epu8,
-    minus = _mm256_sub_epi8,
+    minus = _mm256_subs_epu8,
     plus = _mm256_adds_epu8,
     average = _mm256_avg_epu8,
     add_words = _mm256_add_epi16,
@@ -131,7 +132,7 @@ wide!(
     xor = _mm512_xor_si512,
     min = _mm512_min_epu8,
     max = _mm512_max_epu8,
-    minus = _mm512_sub_epi8,
+    minus = _mm512_subs_epu8,
     plus = _mm512_adds_epu8,
     average = _mm512_avg_epu8,
     add_words = _mm512_add_epi16,
