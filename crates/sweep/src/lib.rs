@@ -22,8 +22,8 @@
 //! | files, projections | 6 | 15 |
 //! | the rest | 4 | 4 |
 //!
-//! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; AMD EPYC of family 26 with AVX-512): 2.1 to 2.2 ·
-//! 10⁹ hypotheses per second and source for the costs, 2.1 to 2.3 · 10⁹ for the aggregation over eight directions, 0.66 to 0.75 · 10⁹
+//! The kernels on one thread (`make bench-kernels`: 512² pixels, 64 hypotheses each; AMD EPYC of family 26 with AVX-512): 2.0 to 2.2 ·
+//! 10⁹ hypotheses per second and source for the costs, 2.1 to 2.3 · 10⁹ for the aggregation over eight directions, 0.60 to 0.77 · 10⁹
 //! for a level of a pair as a whole. The aggregation waits for memory, which is asked for ahead, and gains nothing from registers of
 //! AVX-512; the costs gain a fifth. In scenes a pixel has ten to twenty hypotheses, so that what is done once per pixel counts as much
 //! as the vectors: ranges that follow the heights save more than faster kernels would.
