@@ -1,4 +1,5 @@
-//! The README's table says what `make bench` measured: skysweep's column is that of `benches/results/scenes.json`, line by line.
+//! The README says what the benches measured: skysweep's column of its table is that of `benches/results/scenes.json`, line by line,
+//! S2P's accuracy is that of its peers, and sentences below the table are held to it and to `benches/results/scale.md`.
 
 use std::path::Path;
 
@@ -30,26 +31,36 @@ impl Measured<'_> {
     }
 }
 
-/// What skysweep's column says on the line for `label` in or after that of the scene `before`, without emphasis.
-fn own_column(readme: &str, before: &str, label: &str) -> String {
+/// The columns of skysweep and S2P.
+const OWN: usize = 3;
+const S2P: usize = 4;
+
+/// What a column says on the line for `label` in or after that of the scene `before`, without emphasis.
+fn cell(readme: &str, before: &str, label: &str, column: usize) -> String {
     let lines = readme.lines().skip_while(|line| !line.starts_with(&format!("| {before}")));
     let named = |line: &&str| line.split('|').nth(2).is_some_and(|column| column.trim().starts_with(label));
     let line = lines.take_while(|line| line.starts_with('|')).find(named);
     let line = line.unwrap_or_else(|| panic!("no line \"{label}\" in or after \"{before}\""));
-    line.split('|').nth(3).unwrap().replace("**", "").trim().to_owned()
+    line.split('|').nth(column).unwrap().replace("**", "").trim().to_owned()
+}
+
+fn read() -> (String, Value) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    let results = std::fs::read(root.join("benches/results/scenes.json")).unwrap();
+    (readme, serde_json::from_slice(&results).unwrap())
+}
+
+fn measured<'a>(results: &'a Value, scene: &str, preset: &str) -> Measured<'a> {
+    let mut rows = results["rows"].as_array().unwrap().iter();
+    let row = rows.find(|row| row["scene"] == scene && row["preset"] == preset);
+    Measured { row: row.unwrap_or_else(|| panic!("no {scene} with {preset}")) }
 }
 
 #[test]
 fn the_table_says_what_was_measured() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
-    let results = std::fs::read(root.join("benches/results/scenes.json")).unwrap();
-    let results: Value = serde_json::from_slice(&results).unwrap();
-    let of = |scene: &str, preset: &str| {
-        let mut rows = results["rows"].as_array().unwrap().iter();
-        let row = rows.find(|row| row["scene"] == scene && row["preset"] == preset);
-        Measured { row: row.unwrap_or_else(|| panic!("no {scene} with {preset}")) }
-    };
+    let (readme, results) = read();
+    let of = |scene: &str, preset: &str| measured(&results, scene, preset);
     let mut expected = Vec::new();
     for (before, scene, label, preset) in [
         ("JAX_068, WorldView-3", "jax_068 7 views", "MAE", "balanced"),
@@ -91,6 +102,48 @@ fn the_table_says_what_was_measured() {
     let table = readme.lines().skip_while(|line| !line.starts_with("| scene |")).skip(2);
     assert_eq!(table.take_while(|line| line.starts_with('|')).count(), expected.len(), "lines of the table");
     for (before, label, expected) in expected {
-        assert_eq!(own_column(&readme, before, label), expected, "{before}, {label}");
+        assert_eq!(cell(&readme, before, label, OWN), expected, "{before}, {label}");
+    }
+}
+
+#[test]
+fn the_column_of_s2p_says_what_is_known_of_it() {
+    let (readme, results) = read();
+    for (before, views) in [
+        ("JAX_068, WorldView-3", &[1, 2, 3, 4, 5, 6, 7][..]),
+        ("JAX_068, views 001-003-004", &[1, 3, 4]),
+        ("JAX_068, views 002-005-006", &[2, 5, 6]),
+        ("JAX_068, views 001-003 ", &[1, 3]),
+        ("JAX_068, views 002-003", &[2, 3]),
+    ] {
+        let mut peers = results["peers"].as_array().unwrap().iter();
+        let peer = peers.find(|peer| peer["tool"] == "S2P" && peer["views"] == serde_json::json!(views)).unwrap();
+        let [mae, right, covered] = ["mae", "completeness_1", "valid_ratio"].map(|name| peer[name].as_f64().unwrap());
+        let expected = format!("{mae:.2} m, {:.1} %, {:.1} %", 100.0 * right, 100.0 * covered);
+        assert_eq!(cell(&readme, before, "MAE", S2P), expected, "{before}");
+    }
+}
+
+#[test]
+fn the_sentences_below_the_table_say_what_was_measured() {
+    let (readme, results) = read();
+    let text = readme.split_whitespace().collect::<Vec<_>>().join(" ");
+    let right = |scene: &str| 100.0 * measured(&results, scene, "balanced").metric("completeness_1");
+    let town = measured(&results, "town", "balanced");
+    let (nmad_cm, mae_m) = (100.0 * town.metric("nmad"), town.metric("mae"));
+    let scale = include_str!("../benches/results/scale.md");
+    let largest = scale.lines().find(|line| line.starts_with("| 20000 |")).unwrap();
+    let number = |column: usize| largest.split('|').nth(column).unwrap().trim().parse::<f64>().unwrap();
+    let (cost, minutes) = (number(6), number(7) / 60.0);
+    let spread = scale.split("the greatest cost per megapixel is ").nth(1).unwrap().split(" % above").next().unwrap();
+    for sentence in [
+        format!("NMAD of {nmad_cm:.0} cm, an MAE of {mae_m:.2} m and {:.1} % of all cells", right("town")),
+        format!("{:.0} % of the simulated hills are right to a metre", right("hills")),
+        format!("a quarry's faces, {:.0} %", right("quarry")),
+        format!(
+            "takes {minutes:.0} minutes in 2 GB: {cost:.1} CPU seconds per megapixel, as smaller pairs do to {spread} %"
+        ),
+    ] {
+        assert!(text.contains(&sentence), "the README does not say \"{sentence}\"");
     }
 }

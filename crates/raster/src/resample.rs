@@ -98,6 +98,12 @@ fn has_all_pixels(grid: &Grid<f32>, [column, row]: [f64; 2]) -> bool {
     column >= 1.0 && row >= 1.0 && column < grid.width() as f64 - 3.0 && row < grid.height() as f64 - 3.0
 }
 
+/// Four values by the weights of the `i`th position.
+#[inline(always)]
+fn weigh(weights: &[[f32; LANES]; 4], i: usize, [p, q, r, s]: [f32; 4]) -> f32 {
+    weights[0][i] * p + weights[1][i] * q + weights[2][i] * r + weights[3][i] * s
+}
+
 /// The bicubic values where all sixteen pixels of each are there; whatever comes of it where some are not finite.
 #[inline(always)]
 fn bicubic_inside(grid: &Grid<f32>, columns: [f64; LANES], rows: [f64; LANES]) -> [f32; LANES] {
@@ -124,12 +130,12 @@ fn bicubic_inside(grid: &Grid<f32>, columns: [f64; LANES], rows: [f64; LANES]) -
             let row = |j: usize| &pixels[j * width + k..j * width + k + LANES];
             let (p, q, r, s) = (row(0), row(1), row(2), row(3));
             for i in 0..LANES {
-                sums[i] = wv[0][i] * p[i] + wv[1][i] * q[i] + wv[2][i] * r[i] + wv[3][i] * s[i];
+                sums[i] = weigh(&wv, i, [p[i], q[i], r[i], s[i]]);
             }
         }
         let mut out = [0.0; LANES];
         for (i, out) in out.iter_mut().enumerate() {
-            *out = wu[0][i] * sums[0][i] + wu[1][i] * sums[1][i] + wu[2][i] * sums[2][i] + wu[3][i] * sums[3][i];
+            *out = weigh(&wu, i, [sums[0][i], sums[1][i], sums[2][i], sums[3][i]]);
         }
         return out;
     }
@@ -139,12 +145,10 @@ fn bicubic_inside(grid: &Grid<f32>, columns: [f64; LANES], rows: [f64; LANES]) -
         let row = |j: usize| &pixels[j * width..j * width + 4];
         let (p, q, r, s) = (row(0), row(1), row(2), row(3));
         for k in 0..4 {
-            sums[k] = wv[0][i] * p[k] + wv[1][i] * q[k] + wv[2][i] * r[k] + wv[3][i] * s[k];
+            sums[k] = weigh(&wv, i, [p[k], q[k], r[k], s[k]]);
         }
     }
-    std::array::from_fn(|i| {
-        wu[0][i] * sums[i][0] + wu[1][i] * sums[i][1] + wu[2][i] * sums[i][2] + wu[3][i] * sums[i][3]
-    })
+    std::array::from_fn(|i| weigh(&wu, i, sums[i]))
 }
 
 /// A grid filled from another through a map of positions, rows in parallel.

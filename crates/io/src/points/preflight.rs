@@ -17,7 +17,6 @@ const HEADER: usize = 375;
 const EXTENDED_RECORD: u64 = 60;
 /// More points than this do not fit into any file's length below 2⁶³ bytes.
 const POINTS_MAX: u64 = 1 << 40;
-
 /// LASzip's oldest way of compressing: no chunks, no table of them.
 const POINT_WISE: [u8; 2] = 1u16.to_le_bytes();
 
@@ -73,7 +72,7 @@ pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, lengt
         return Err(format!("compressed points of {} bytes, the header says {stated}", layout.point_bytes));
     }
     if record.data.starts_with(&POINT_WISE) {
-        return layout.check_chunks(read, |_| u64::MAX, header.number_of_points(), length);
+        return layout.check_layers(read, |_| u64::MAX, header.number_of_points(), length);
     }
     let failed = |error: std::io::Error| error.to_string();
     let data = read.stream_position().map_err(failed)?;
@@ -81,13 +80,11 @@ pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, lengt
     read.seek(SeekFrom::Start(data)).map_err(failed)?;
     let table = ChunkTable::read_from(&mut *read, &form);
     let table = table.map_err(|error| format!("the table of the points' chunks: {error}"))?;
-    // Those of chunks of one size are all as large as that, and there are as many as there must be.
-    let points_of = |chunk: usize| match table.as_ref().get(chunk) {
-        Some(entry) => entry.point_count,
-        None if form.uses_variable_size_chunks() => 0,
-        None => u64::from(form.chunk_size()),
+    let points_of = |chunk: usize| {
+        let of_variable = || table.as_ref().get(chunk).map_or(0, |entry| entry.point_count);
+        if form.uses_variable_size_chunks() { of_variable() } else { u64::from(form.chunk_size()) }
     };
-    layout.check_chunks(read, points_of, header.number_of_points(), length)
+    layout.check_layers(read, points_of, header.number_of_points(), length)
 }
 
 /// Every chunk begins with a point that is not compressed.
@@ -137,7 +134,7 @@ impl Layout {
     /// Says where a chunk's layers do not fit; `read` stands at the first chunk. Chunks in layers (point formats 6 to 10) begin with a
     /// point, how many they hold, and how many bytes each layer has; the next chunk follows the last layer. The decoder takes
     /// `points_of` each from a chunk, whatever that says.
-    fn check_chunks(
+    fn check_layers(
         &self,
         read: &mut (impl Read + Seek),
         points_of: impl Fn(usize) -> u64,
