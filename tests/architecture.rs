@@ -11,34 +11,42 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::{Metadata, MetadataCommand, Package};
 
 /// The floor of every crate, those to come included, so that a new crate lands where the design has it.
-const FLOORS: [(&str, u8); 15] = [
-    ("skysweep-geodesy", 0),
-    ("skysweep-raster", 0),
-    ("skysweep-mesh", 0),
-    ("skysweep-camera", 1),
-    ("skysweep-bvh", 1),
-    ("skysweep-sweep", 2),
-    ("skysweep-priors", 2),
-    ("skysweep-bev", 2),
-    ("skysweep-eval", 2),
-    ("skysweep-simulate", 2),
-    ("skysweep-io", 3),
-    ("skysweep-pipeline", 4),
-    ("skysweep-report", 4),
-    ("skysweep", 5),
-    ("skysweep-python", 5),
+const FLOORS: [(&str, u8); 23] = [
+    ("skysweep-numeric", 0),
+    ("skysweep-geodesy", 1),
+    ("skysweep-raster", 1),
+    ("skysweep-crs", 2),
+    ("skysweep-camera", 2),
+    ("skysweep-bvh", 2),
+    ("skysweep-gaussian", 2),
+    ("skysweep-city", 3),
+    ("skysweep-occlusion", 3),
+    ("skysweep-sweep", 4),
+    ("skysweep-eval", 4),
+    ("skysweep-simulate", 4),
+    ("skysweep-priors", 4),
+    ("skysweep-heightmap", 4),
+    ("skysweep-groundview", 4),
+    ("skysweep-ortho", 4),
+    ("skysweep-splats", 4),
+    ("skysweep-colmap", 4),
+    ("skysweep-io", 5),
+    ("skysweep-report", 6),
+    ("skysweep-jobs", 7),
+    ("skysweep", 8),
+    ("skysweep-python", 8),
 ];
 
 /// Foreign packages that only one crate may use: (package, its home).
 const HOMES: [(&str, &str); 4] = [
     ("gdal", "skysweep-io"),
     ("gdal-sys", "skysweep-io"),
-    ("proj", "skysweep-geodesy"),
-    ("proj-sys", "skysweep-geodesy"),
+    ("proj", "skysweep-crs"),
+    ("proj-sys", "skysweep-crs"),
 ];
 
 /// Folders under `crates/` whose sources may touch the file system.
-const FILE_CRATES: [&str; 3] = ["io", "pipeline", "cli"];
+const FILE_CRATES: [&str; 3] = ["io", "jobs", "cli"];
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -60,7 +68,7 @@ fn broken_arrow(floors: &BTreeMap<&str, u8>, from: &str, to: &str) -> Option<Str
     }
     Some(format!(
         "{from} (floor {above}) depends on {to} (floor {below}): an arrow goes only to a lower floor; \
-         move the shared type down, or do the joining in pipeline or cli"
+         move the shared type down, or do the joining in jobs"
     ))
 }
 
@@ -175,7 +183,7 @@ fn files_are_touched_only_where_files_live() {
         .filter(|path| path.starts_with(root().join("crates")) && !may(path))
         .filter(|path| !is_test_source(path.strip_prefix(root()).unwrap_or(path)))
         .filter(|path| names_std_fs(&fs::read_to_string(path).expect("a source is readable")))
-        .map(|path| format!("{}: std::fs is for io, pipeline and cli; take bytes or a grid instead", path.display()))
+        .map(|path| format!("{}: std::fs is for io, jobs and cli; take bytes or a grid instead", path.display()))
         .collect();
     report(&broken);
 }

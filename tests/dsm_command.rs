@@ -102,7 +102,7 @@ fn options_are_obeyed() {
         .stderr(predicate::str::contains("\"event\":\"stage\""));
     let part = io::raster::read_dem(out.join("dsm/dsm.tif")).unwrap();
     assert_eq!((part.heights.width(), part.heights.height()), (120, 90));
-    assert_eq!(part.vertical, Some(geodesy::VerticalDatum::Egm96));
+    assert_eq!(part.vertical, Some(crs::VerticalDatum::Egm96));
     // The same ground above another datum: they differ by the undulation, the same one everywhere.
     let mut differences = Vec::new();
     for row in 0..part.heights.height() {
@@ -115,8 +115,8 @@ fn options_are_obeyed() {
     }
     differences.sort_by(f64::total_cmp);
     let undulation = differences[differences.len() / 2];
-    let converter = geodesy::HeightConverter::new(geodesy::VerticalDatum::Egm96).unwrap();
-    let projection = geodesy::MapProjection::from_epsg(dem.horizontal_epsg.unwrap()).unwrap();
+    let converter = crs::HeightConverter::new(crs::VerticalDatum::Egm96).unwrap();
+    let projection = crs::MapProjection::from_epsg(dem.horizontal_epsg.unwrap()).unwrap();
     let (lon, lat) = projection.lonlat_from_map(x, y).unwrap();
     let expected = converter.ellipsoid_from_datum(lon, lat, 0.0).unwrap();
     // Pairs of views leave the common height to the weak prior on pointing; half a metre is its size here.

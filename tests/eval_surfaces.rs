@@ -112,9 +112,8 @@ fn the_origin_of_a_ply_is_added_and_systems_are_brought_together() {
         .concat(),
     );
     // The middle of the square in UTM 33N, as PROJ has it.
-    let to = geodesy::MapProjection::from_epsg(25833).unwrap();
-    let (lon, lat) =
-        geodesy::MapProjection::from_epsg(25832).unwrap().lonlat_from_map(EAST + 5.0, NORTH + 3.0).unwrap();
+    let to = crs::MapProjection::from_epsg(25833).unwrap();
+    let (lon, lat) = crs::MapProjection::from_epsg(25832).unwrap().lonlat_from_map(EAST + 5.0, NORTH + 3.0).unwrap();
     let there = to.map_from_lonlat(lon, lat).unwrap();
     let header = "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\n";
     let origin = format!("comment origin {} {} 0\ncomment crs EPSG:25833\n", there.x, there.y);

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use bvh::{Bvh, Ray};
 use camera::ImagePoint;
 use common::skysweep;
-use geodesy::MapProjection;
+use crs::MapProjection;
 use io::colmap::read_with_points;
 use io::raster::{Dem, ImageSource, read_dem, write_png_rgb};
 use io::splat_ply::LocalOrigin;

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use common::skysweep;
-use geodesy::{Crs, MapProjection, VerticalDatum};
+use crs::{Crs, MapProjection, VerticalDatum};
 use io::raster::{Band, BandData, CogRaster, Dem, ImageSource, read_dem, write_cog};
 use io::splat_ply::LocalOrigin;
 use predicates::prelude::*;
@@ -336,7 +336,7 @@ fn heights_above_a_geoid_are_brought_to_the_ellipsoid() {
     let crs = Crs { horizontal: 32631, vertical: VerticalDatum::Egm96 };
     let bands = [Band { description: "height_m", data: BandData::F32(&dsm.heights) }];
     write_cog(&above_geoid, &CogRaster::new(&bands, dsm.geotransform, crs), false).unwrap();
-    let converter = geodesy::HeightConverter::new(VerticalDatum::Egm96).unwrap();
+    let converter = crs::HeightConverter::new(VerticalDatum::Egm96).unwrap();
     let undulation = converter.ellipsoid_from_datum(5.4, 43.53, 0.0).unwrap();
     let camera = |path: &Path| number(&tags(path), "CAMERA_HEIGHT_M");
     let plain = camera(&map(&folder, &town("dsm.tif"), &["--size", "64"]));

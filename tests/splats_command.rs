@@ -30,7 +30,7 @@ fn psnr_by_truth(scene: &Path, rendering: &Path, range: &Value, view: &str) -> (
     let source = ImageSource::open(&truth).unwrap();
     let heights = source.read_luma(source.window()).unwrap().luma;
     let dsm = read_dem(scene.join("truth/dsm.tif")).unwrap();
-    let projection = geodesy::MapProjection::from_epsg(dsm.horizontal_epsg.unwrap()).unwrap();
+    let projection = crs::MapProjection::from_epsg(dsm.horizontal_epsg.unwrap()).unwrap();
     let (low, high) = (range[0].as_f64().unwrap(), range[1].as_f64().unwrap());
     let (mut sum, mut count) = (0.0, 0);
     for row in 0..heights.height() {

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use bvh::Target;
-use mesh::{MeshConfig, TriangleMesh};
+use city::{MeshConfig, TriangleMesh};
 use priors::{MapConfig, PriorMaps, PriorModel, Rays, View, Visibility, VisibilityConfig};
 use scene::Scene;
 use serde_json::{Value, json};
@@ -49,7 +49,7 @@ fn main() -> anyhow::Result<()> {
 
 fn time(city: &Path) -> anyhow::Result<Value> {
     let mut clock = Clock::default();
-    let file = clock.time(|| io::city::read(&city.join("3dbag_5910.city.json")))?;
+    let file = clock.time(|| io::citymodel::read(&city.join("3dbag_5910.city.json")))?;
     clock.time(|| TriangleMesh::from_model(&file.model, &MeshConfig::default()))?;
     drop(file);
     let load = clock.json();
@@ -121,7 +121,7 @@ fn targets(scene: &Scene, view: &View) -> Vec<Target> {
 
 /// A model whose objects are all buildings.
 fn arranged(path: &Path) -> anyhow::Result<PriorModel> {
-    let model = io::city::read(path)?.model;
+    let model = io::citymodel::read(path)?.model;
     let meshed = TriangleMesh::from_model(&model, &MeshConfig::default())?;
     Ok(PriorModel::new(meshed.mesh, &vec![true; model.objects.len()])?)
 }

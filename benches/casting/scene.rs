@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use camera::{Lens, Pose};
+use city::{ModelPoint, SurfaceClass};
 use io::colmap::{self, ColmapModel};
 use io::npy::{self, NpyData};
-use mesh::{ModelPoint, SurfaceClass};
 use priors::{PriorModel, Sample, View};
 use serde_json::Value;
 

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, ensure};
-use geodesy::{Crs, MapProjection};
+use crs::{Crs, MapProjection};
 use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use raster::{GeoTransform, Grid};
 use serde_json::{Value, json};

@@ -199,7 +199,7 @@ fn errors_of(dsm: &Path, side: usize) -> anyhow::Result<(f64, f64)> {
     for top in (0..info.height).step_by(512) {
         let strip = Window { x: 0, y: top as i64, width: info.width, height: 512.min(info.height - top) };
         let dem = read_dem_window(dsm, strip)?;
-        let projection = geodesy::MapProjection::from_epsg(dem.horizontal_epsg.context("the DSM has no CRS")?)?;
+        let projection = crs::MapProjection::from_epsg(dem.horizontal_epsg.context("the DSM has no CRS")?)?;
         for row in (0..dem.heights.height()).step_by(EVERY) {
             let columns: Vec<usize> = (0..dem.heights.width()).step_by(EVERY).collect();
             let places = columns.iter().map(|&c| dem.geotransform.map_from_cell(c as f64, row as f64));

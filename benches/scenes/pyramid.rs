@@ -17,7 +17,7 @@ type Plane = Vector3<f64>;
 pub(crate) fn measure(dsm: &Path) -> anyhow::Result<Vec<(String, f64)>> {
     let dem = io::raster::read_dem(dsm)?;
     let epsg = dem.horizontal_epsg.unwrap_or(32636);
-    let apex = geodesy::MapProjection::from_epsg(epsg)?.map_from_lonlat(APEX.0, APEX.1)?;
+    let apex = crs::MapProjection::from_epsg(epsg)?.map_from_lonlat(APEX.0, APEX.1)?;
     let mut points = Vec::new();
     for row in 0..dem.heights.height() {
         for column in 0..dem.heights.width() {

@@ -6,9 +6,9 @@ mod world;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use bev::align::{AlignConfig, Alignment, NoiseLevel, PointPair, align, spread_ratio};
 use camera::Similarity;
-use geodesy::VerticalDatum;
+use colmap::align::{AlignConfig, Alignment, NoiseLevel, PointPair, align, spread_ratio};
+use crs::VerticalDatum;
 use io::colmap::{ColmapEncoding, ColmapModel, ColmapPoint, ColmapView};
 use io::splat_ply::LocalOrigin;
 use serde_json::{Value, json};

@@ -8,9 +8,9 @@ mod report;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use city::{Effect, Lod, LodChoice, MeshConfig, Meshed, ObjectStatus, Scope, TriangleMesh};
 use clap::ValueEnum;
-use io::city::{CityError, CityFile, CityJsonOptions, MeshFormat, write_cityjson, write_footprints, write_mesh};
-use mesh::{Effect, Lod, LodChoice, MeshConfig, Meshed, ObjectStatus, Scope, TriangleMesh};
+use io::citymodel::{CityError, CityFile, CityJsonOptions, MeshFormat, write_cityjson, write_footprints, write_mesh};
 
 use crate::{Outcome, print};
 use report::Report;
@@ -136,14 +136,14 @@ fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
 }
 
 fn read(input: &Input) -> anyhow::Result<(CityFile, Meshed)> {
-    let file = io::city::read(&input.file)?;
+    let file = io::citymodel::read(&input.file)?;
     let config = MeshConfig {
         lod: input.lod.map_or_else(LodChoice::default, LodChoice::Only),
         scope: if input.all_objects { Scope::Everything } else { Scope::Buildings },
     };
     let mut meshed = TriangleMesh::from_model(&file.model, &config)?;
     if input.report.is_some() {
-        meshed.defects.extend(mesh::check_solids(&file.model, &config)?);
+        meshed.defects.extend(city::check_solids(&file.model, &config)?);
     }
     tracing::info!("{}: {}, {} triangles", file.source.display(), file.format, meshed.mesh.triangles.len());
     Ok((file, meshed))
@@ -160,7 +160,7 @@ fn write_report(input: &Input, report: &Report<'_>) -> anyhow::Result<()> {
 fn outcome(file: &CityFile, meshed: &Meshed) -> Outcome {
     let unusable = meshed.objects.iter().any(|object| object.status == ObjectStatus::Unusable);
     let dropped =
-        |defect: &mesh::Defect| defect.effect == Effect::Dropped && defect.code != mesh::DefectCode::NotASurface;
+        |defect: &city::Defect| defect.effect == Effect::Dropped && defect.code != city::DefectCode::NotASurface;
     if unusable || file.defects.iter().any(dropped) { Outcome::Partial } else { Outcome::Complete }
 }
 

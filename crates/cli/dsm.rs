@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use geodesy::{CrsRequest, VerticalDatum};
-use pipeline::{DsmConfig, DsmReport, Fill, Preset};
+use crs::{CrsRequest, VerticalDatum};
+use jobs::dsm::{DsmConfig, DsmReport, Fill, Preset};
 
 use crate::progress::{ProgressStyle, Watcher};
 use crate::{Global, Outcome};
@@ -150,7 +150,7 @@ impl Args {
 
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let watcher = Watcher::new(args.progress, global);
-    let outcome = pipeline::run_dsm(&args.config(), &watcher);
+    let outcome = jobs::dsm::run_dsm(&args.config(), &watcher);
     watcher.finish();
     let report = outcome.context("no DSM was made")?;
     if args.json {

@@ -14,8 +14,8 @@ mod vertical;
 use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
+use crs::VerticalDatum;
 use eval::{Alignment, EvalConfig, EvalInput, Evaluation, evaluate};
-use geodesy::VerticalDatum;
 use report::{EvaluationReport, Protocol};
 
 use crate::{Global, Outcome, print};

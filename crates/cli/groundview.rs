@@ -16,7 +16,7 @@ mod surface;
 use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
-use geodesy::VerticalDatum;
+use crs::VerticalDatum;
 
 use crate::progress::{ProgressStyle, Watcher};
 use crate::stand::StandArgs;

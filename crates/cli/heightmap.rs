@@ -14,8 +14,8 @@ mod unproject;
 use std::path::PathBuf;
 
 use anyhow::bail;
-use geodesy::{CrsRequest, VerticalDatum};
-use mesh::Lod;
+use city::Lod;
+use crs::{CrsRequest, VerticalDatum};
 
 use crate::progress::ProgressStyle;
 use crate::stand::StandArgs;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use geodesy::{HeightConverter, MapProjection, VerticalDatum};
+use crs::{HeightConverter, MapProjection, VerticalDatum};
 use io::raster::{Dem, read_dem};
 
 /// A surface model that has been read.

@@ -10,7 +10,7 @@ mod view;
 
 use std::path::PathBuf;
 
-use geodesy::VerticalDatum;
+use crs::VerticalDatum;
 
 use crate::progress::{ProgressStyle, Watcher};
 use crate::{Global, Outcome, print, threads};

@@ -18,9 +18,9 @@ use std::path::PathBuf;
 
 use ::priors::{PriorModel, Samples, View, Visibility, Visible, buildings_of, sample};
 use anyhow::{Context, bail};
-use io::city::CityFile;
-use mesh::{LodChoice, MeshConfig, Meshed, ObjectStatus, Scope, TriangleMesh};
-use pipeline::Progress as _;
+use city::{LodChoice, MeshConfig, Meshed, ObjectStatus, Scope, TriangleMesh};
+use io::citymodel::CityFile;
+use jobs::dsm::Progress as _;
 use report::PriorsReport;
 
 use crate::progress::Watcher;
@@ -108,7 +108,7 @@ fn unusable(meshed: &Meshed) -> usize {
 }
 
 fn read_model(args: &Args) -> anyhow::Result<(CityFile, Meshed)> {
-    let file = io::city::read(&args.model)?;
+    let file = io::citymodel::read(&args.model)?;
     let config = MeshConfig {
         lod: args.lod.map_or_else(LodChoice::default, LodChoice::Only),
         scope: if args.all_objects { Scope::Everything } else { Scope::Buildings },

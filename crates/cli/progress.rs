@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
-use pipeline::{Choice, Progress};
+use jobs::dsm::{Choice, Progress};
 
 use crate::Global;
 

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use ::simulate::{PRESETS, Simulation, SimulationConfig, View};
 use anyhow::{Context, bail};
-use geodesy::Crs;
-use io::city::{CityJsonOptions, write_cityjson};
+use crs::Crs;
+use io::citymodel::{CityJsonOptions, write_cityjson};
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapView};
 use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc};
 

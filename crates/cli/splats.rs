@@ -6,15 +6,13 @@ mod render;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use bev::splats::{
-    ColourFit, DivisionConfig, RpcSplatCamera, SplatConfig, SplatReport, SplatView, Surface, make_splats,
-};
 use camera::RpcCamera;
-use geodesy::VerticalDatum;
+use crs::VerticalDatum;
 use io::raster::{ImageSource, read_dem, write_png_rgb};
 use io::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
 use raster::Grid;
 use serde_json::Value;
+use splats::{ColourFit, DivisionConfig, RpcSplatCamera, SplatConfig, SplatReport, SplatView, Surface, make_splats};
 
 use crate::corrections::Corrections;
 use crate::{Global, Outcome, map_surface, print};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
-use bev::split::{Choice, Split, SplitConfig, points_of_views, split};
+use colmap::split::{Choice, Split, SplitConfig, points_of_views, split};
 use io::colmap::{ColmapModel, ColmapPoint};
 use serde_json::{Value, json};
 

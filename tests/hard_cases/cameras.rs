@@ -1,7 +1,7 @@
 //! RPCs that are extreme as numbers: the same cameras, written in other ways, and cameras that fail somewhere.
 
 use camera::Rpc;
-use pipeline::PipelineError;
+use jobs::dsm::PipelineError;
 
 use crate::stage::{EASY, Look, Shot, Stage, triplet};
 

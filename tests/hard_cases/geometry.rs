@@ -1,6 +1,6 @@
 //! Baselines, overlaps, places and cameras.
 
-use pipeline::PipelineError;
+use jobs::dsm::PipelineError;
 
 use crate::stage::{EASY, Shot, Stage, look, median, triplet};
 

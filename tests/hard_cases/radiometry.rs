@@ -1,7 +1,7 @@
 //! Pixels that say little, nothing, or something else in every view.
 
 use eval::Alignment;
-use pipeline::{Fill, PipelineError};
+use jobs::dsm::{Fill, PipelineError};
 use raster::Grid;
 
 use crate::stage::{EASY, Shot, Stage, look, noise_3d, rolling, triplet, uniform, village, weathered};

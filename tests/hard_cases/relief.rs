@@ -1,7 +1,7 @@
 //! Surfaces that rise fast, and ranges of heights that do not hold them.
 
 use eval::Alignment;
-use pipeline::PipelineError;
+use jobs::dsm::PipelineError;
 
 use crate::stage::{EASY, Stage, rolling, triplet, village};
 

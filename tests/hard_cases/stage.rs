@@ -9,11 +9,12 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use camera::{ImagePoint, Rpc};
+use crs::MapProjection;
 use eval::{Alignment, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
-use geodesy::{MapProjection, meridian_radius_m, prime_vertical_radius_m};
+use geodesy::{meridian_radius_m, prime_vertical_radius_m};
 use io::raster::{Band, BandData, Dem, read_dem, write_image_with_rpc};
+use jobs::dsm::{DsmConfig, DsmReport, PipelineError, Silent, run_dsm};
 use nalgebra::Vector3;
-use pipeline::{DsmConfig, DsmReport, PipelineError, Silent, run_dsm};
 use raster::Grid;
 use tempfile::TempDir;
 

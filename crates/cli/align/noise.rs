@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
-use bev::align::{AlignConfig, Alignment, Disturbance, NoiseConfig, NoiseLevel, PointPair, disturbed, sensitivity};
 use camera::Similarity;
+use colmap::align::{AlignConfig, Alignment, Disturbance, NoiseConfig, NoiseLevel, PointPair, disturbed, sensitivity};
 
 /// Options of the harness.
 #[derive(Debug, clap::Args)]

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use anyhow::{bail, ensure};
-use bev::align::PointPair;
-use geodesy::{HeightConverter, MapProjection, VerticalDatum, utm_epsg};
+use colmap::align::PointPair;
+use crs::{HeightConverter, MapProjection, VerticalDatum};
+use geodesy::utm_epsg;
 use io::colmap::ColmapModel;
 use io::control::{ControlPosition, Place, Subject};
 use io::splat_ply::LocalOrigin;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use io::city::CityFile;
-use mesh::{Defect, Meshed, ObjectStatus};
+use city::{Defect, Meshed, ObjectStatus};
+use io::citymodel::CityFile;
 use serde_json::{Value, json};
 
 /// A model and what became of it.
@@ -104,7 +104,7 @@ impl<'a> Report<'a> {
         self.file.defects.iter().chain(&self.meshed.defects)
     }
 
-    fn defect_counts(&self) -> BTreeMap<(mesh::DefectCode, String), usize> {
+    fn defect_counts(&self) -> BTreeMap<(city::DefectCode, String), usize> {
         count(self.defects().map(|defect| (defect.code, defect.effect.to_string())))
     }
 
@@ -128,7 +128,7 @@ impl<'a> Report<'a> {
     }
 }
 
-fn lod_name(lod: Option<mesh::Lod>) -> String {
+fn lod_name(lod: Option<city::Lod>) -> String {
     lod.map_or_else(|| "unstated".to_owned(), |lod| lod.to_string())
 }
 

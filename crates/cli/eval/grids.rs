@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
+use crs::{CrsIdentity, MapProjection};
 use eval::{CellMap, bilinear, nearest};
-use geodesy::{CrsIdentity, MapProjection, meridian_radius_m, prime_vertical_radius_m};
+use geodesy::{meridian_radius_m, prime_vertical_radius_m};
 use io::raster::{Dem, ImageSource};
 use raster::{GeoTransform, Grid};
 

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use geodesy::Crs;
+use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, write_cog, write_png_rgb};
 use io::write_bytes;
 use report::{EvaluationReport, error_picture};

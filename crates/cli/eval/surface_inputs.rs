@@ -1,10 +1,10 @@
 //! Two surfaces from files, brought to one coordinate system, one vertical datum and one local origin, all in f64.
 
 use anyhow::{Context, bail, ensure};
+use city::{MeshConfig, Scope};
+use crs::{HeightConverter, MapProjection, VerticalDatum};
 use eval::Surface;
-use geodesy::{HeightConverter, MapProjection, VerticalDatum};
 use io::surfaces::SurfaceFile;
-use mesh::{MeshConfig, Scope};
 
 use super::Args;
 
@@ -25,7 +25,7 @@ pub(super) struct SurfaceInputs {
 impl SurfaceInputs {
     pub(super) fn read(args: &Args) -> anyhow::Result<Self> {
         let scope = if args.surface.all_objects { Scope::Everything } else { Scope::Buildings };
-        let lod = args.surface.lod.map(mesh::LodChoice::Only).unwrap_or_default();
+        let lod = args.surface.lod.map(city::LodChoice::Only).unwrap_or_default();
         let config = MeshConfig { lod, scope };
         let mut test = io::surfaces::read(&args.test, &config)?;
         let mut reference = io::surfaces::read(&args.reference, &config)?;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
+use city::Lod;
 use eval::{SurfaceComparison, SurfaceConfig, compare_surfaces};
-use mesh::Lod;
 use report::EvaluationReport;
 use serde_json::{Value, json};
 

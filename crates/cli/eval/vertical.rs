@@ -5,8 +5,8 @@
 //! does not: a geoid taken for the ellipsoid would be an error of tens of metres.
 
 use anyhow::{Context, bail};
+use crs::{HeightConverter, VerticalDatum};
 use eval::{Alignment, MetresFromCells, convert_heights};
-use geodesy::{HeightConverter, VerticalDatum};
 use io::raster::Dem;
 
 use super::grids::{definition, metres_per_unit, projection};

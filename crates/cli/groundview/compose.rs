@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use bev::ground::compose;
+use groundview::compose;
 use io::raster::{ImageSource, SampleType, write_png_rgb};
 use raster::Grid;
 

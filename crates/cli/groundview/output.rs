@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use bev::ground::{GROUND, GroundView, Panorama, SKY, Viewer, render, visible_cells};
 use camera::ImagePoint;
+use groundview::{GROUND, GroundView, Panorama, SKY, Viewer, render, visible_cells};
 use io::colmap::{ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
 use io::npy;
 use io::raster::{Band, BandData, ImageSource, MapTile, write_map_tile, write_png_gray, write_png_rgb};
-use pipeline::Progress;
+use jobs::dsm::Progress;
 use raster::Grid;
 use report::{depth_preview, normal_preview, side_by_side};
 use serde::Serialize;

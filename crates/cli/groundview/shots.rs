@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use bev::ground::{Panorama, level_pose};
 use camera::{Lens, Pose};
+use groundview::{Panorama, level_pose};
 use io::positions::read_positions;
 use serde::Serialize;
 

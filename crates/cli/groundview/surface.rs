@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
-use bev::ground::{Ground, HeightField, MeshGround, Met};
 use bvh::Ray;
-use geodesy::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
+use city::{MeshConfig, TriangleMesh};
+use crs::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
+use groundview::{Ground, HeightField, MeshGround, Met};
 use io::splat_ply::LocalOrigin;
-use mesh::{MeshConfig, TriangleMesh};
 use raster::GeoTransform;
 
 use crate::map_surface;
@@ -51,7 +51,7 @@ impl Surface {
 
     fn raster(path: &Path, vertical: Option<VerticalDatum>) -> anyhow::Result<Self> {
         let map_surface::MapSurface { dem, projection } = map_surface::read(path, vertical)?;
-        let origin = bev::splats::Surface::middle(&dem.heights, dem.geotransform)
+        let origin = splats::Surface::middle(&dem.heights, dem.geotransform)
             .with_context(|| format!("the surface has no height: {}", path.display()))?;
         let heights = dem.heights.map(|&h| (f64::from(h) - origin[2]) as f32);
         let field = HeightField::new(heights, dem.geotransform, origin)
@@ -60,7 +60,7 @@ impl Surface {
     }
 
     fn model(path: &Path, vertical: Option<VerticalDatum>) -> anyhow::Result<Self> {
-        let file = io::city::read(path)?;
+        let file = io::citymodel::read(path)?;
         let mut mesh = TriangleMesh::from_model(&file.model, &MeshConfig::default())?.mesh;
         ensure!(
             !mesh.triangles.is_empty(),

@@ -5,8 +5,9 @@ use std::str::FromStr;
 use std::sync::{Arc, Mutex};
 
 use anyhow::Context;
-use bev::heightmap::{MapSystem, Reading, TileRequest};
-use geodesy::{MapProjection, utm_epsg};
+use crs::MapProjection;
+use geodesy::utm_epsg;
+use heightmap::{MapSystem, Reading, TileRequest};
 
 use super::MakeArgs;
 use crate::stand::Stand;

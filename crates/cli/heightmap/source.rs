@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use bev::heightmap::{
+use bvh::Bvh;
+use city::{LodChoice, MeshConfig, Scope, TriangleMesh};
+use crs::{CrsIdentity, CrsRequest, HeightConverter, MapProjection, VerticalDatum};
+use heightmap::{
     HighestPoints, MapSystem, PointTiles, Reading, SourceMap, TileFrame, TileMap, TileRequest, confidence_from_grid,
     heights_from_grid, heights_from_triangles,
 };
-use bvh::Bvh;
-use geodesy::{CrsIdentity, CrsRequest, HeightConverter, MapProjection, VerticalDatum};
 use io::points::{PointCloud, is_point_cloud};
 use io::raster::{ImageSource, read_dem, read_dem_window};
-use mesh::{LodChoice, MeshConfig, Scope, TriangleMesh};
 use raster::{GeoTransform, Grid, Window};
 
 use super::MakeArgs;
@@ -223,7 +223,7 @@ pub(super) struct ModelSource {
 
 impl ModelSource {
     fn open(path: &Path, args: &MakeArgs) -> anyhow::Result<Self> {
-        let file = io::city::read(path)?;
+        let file = io::citymodel::read(path)?;
         let config = MeshConfig {
             lod: args.lod.map_or_else(LodChoice::default, LodChoice::Only),
             scope: if args.all_objects { Scope::Everything } else { Scope::Buildings },

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use bev::heightmap::{GROUND_REACH_M, HeightMapError, Reading, ground_height, mean_distance_m};
+use heightmap::{GROUND_REACH_M, HeightMapError, Reading, ground_height, mean_distance_m};
 use io::raster::{Band, BandData, MapTile, write_map_tile, write_png_rgb};
 use raster::{Grid, Light};
 use serde::Serialize;
@@ -194,7 +194,7 @@ fn stamp(path: &Path) -> String {
 
 /// The raster of confidences that is asked for; `None` where the source itself is to tell.
 fn confidence(asked: &Path, source_path: &Path, source: &Source) -> anyhow::Result<Option<RasterSource>> {
-    let open = |path: &Path| RasterSource::open(path, None, Some(geodesy::VerticalDatum::Ellipsoid));
+    let open = |path: &Path| RasterSource::open(path, None, Some(crs::VerticalDatum::Ellipsoid));
     if asked != Path::new(AUTO) {
         return open(asked).map(Some);
     }

@@ -3,16 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use bev::heightmap::{camera_points, map_points};
-use bev::splats::{DivisionConfig, Surface, picture_splats, stretched};
 use clap::ValueEnum;
-use geodesy::{Crs, LonLatHeight, MapProjection, TransverseMercator, utm_epsg};
+use crs::{Crs, MapProjection};
+use geodesy::{LonLatHeight, TransverseMercator, utm_epsg};
+use heightmap::{camera_points, map_points};
 use io::ply::{PlyPoint, write_points};
 use io::points::write_las;
 use io::raster::{ImageSource, SampleType};
 use io::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
 use raster::{GeoTransform, Grid};
 use serde_json::json;
+use splats::{DivisionConfig, Surface, picture_splats, stretched};
 
 use super::tags::Tags;
 use crate::{Global, Outcome, print};

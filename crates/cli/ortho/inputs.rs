@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use bev::ortho::{Eyeline, GridGround};
 use camera::{ImageCorrection, RpcCamera};
-use geodesy::{HeightConverter, MapProjection, VerticalDatum};
+use crs::{HeightConverter, MapProjection, VerticalDatum};
 use io::raster::{Dem, ImageSource, read_dem};
+use occlusion::{Eyeline, GridGround};
 use raster::GeoTransform;
 
 use super::Args;

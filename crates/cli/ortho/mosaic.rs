@@ -1,10 +1,11 @@
 //! The ortho, block by block: each cell from the image that sees it most steeply, grey values brought together before.
 
 use anyhow::Context;
-use bev::ortho::{Balance, Pair, Sight, Surface, balance, best_view};
 use geodesy::LonLatHeight;
 use io::raster::Dem;
-use pipeline::Progress;
+use jobs::dsm::Progress;
+use occlusion::Surface;
+use ortho::{Balance, Pair, Sight, balance, best_view};
 use raster::Grid;
 use rayon::prelude::*;
 

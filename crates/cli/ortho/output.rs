@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use bev::ortho::Balance;
-use geodesy::Crs;
+use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, SampleType, write_cog};
+use ortho::Balance;
 use raster::Grid;
 use serde::Serialize;
 

@@ -1,9 +1,10 @@
 //! What one image has to say about some cells: whether it sees them, and the values of its bands.
 
-use bev::ortho::{Eyeline, Sight, Surface};
 use camera::ImagePoint;
 use geodesy::LonLatHeight;
 use io::raster::ImageSource;
+use occlusion::{Eyeline, Surface};
+use ortho::Sight;
 use raster::{Grid, Window, bicubic};
 use rayon::prelude::*;
 

@@ -6,11 +6,11 @@ use std::path::Path;
 
 use ::priors::{PriorModel, Sample, SampleConfig, Samples, Schedule, View, Visible, error_curve, initial_splats};
 use anyhow::Context;
-use io::city::CityFile;
+use city::{CityModel, SurfaceClass, TriangleMesh};
+use io::citymodel::CityFile;
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint};
 use io::ply::{self, PlyPoint};
 use io::splat_ply::{self, LocalOrigin, SplatForm, SplatLayout};
-use mesh::{CityModel, SurfaceClass, TriangleMesh};
 use report::{ErrorRow, PriorsReport};
 use serde_json::{Value, json};
 

@@ -5,7 +5,7 @@
 
 use anyhow::Context;
 use camera::Similarity;
-use mesh::ModelPoint;
+use city::ModelPoint;
 use serde_json::{Value, json};
 
 use super::cameras::Cameras;
@@ -75,7 +75,7 @@ impl Frame {
     }
 
     /// The sidecar of the dataset.
-    pub(super) fn describe(&self, crs: &mesh::CrsReference) -> Value {
+    pub(super) fn describe(&self, crs: &city::CrsReference) -> Value {
         let back = self.camera_from_model.inverse();
         let part = |s: &Similarity, translation: [f64; 3]| json!({ "scale": s.scale(), "rotation": s.rotation(), "translation": translation });
         json!({

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use ::priors::{
     Amount, ClassWeights, DepthKind, MapConfig, NormalFrame, SampleConfig, Spacing as Placement, VisibilityConfig,
 };
+use city::{Lod, SurfaceClass};
 use clap::ValueEnum;
-use geodesy::{CrsRequest, VerticalDatum};
-use mesh::{Lod, SurfaceClass};
+use crs::{CrsRequest, VerticalDatum};
 
 use crate::progress::ProgressStyle;
 

@@ -9,11 +9,11 @@ use ::priors::{
 };
 use anyhow::{Context, bail};
 use camera::{ImageCorrection, RpcCamera};
-use geodesy::CrsRequest;
-use io::city::CityFile;
+use city::CrsReference;
+use crs::CrsRequest;
+use io::citymodel::CityFile;
 use io::raster::{Band, BandData, ImageSource, write_image_with_rpc, write_png_rgb};
-use mesh::CrsReference;
-use pipeline::Progress as _;
+use jobs::dsm::Progress as _;
 use raster::NO_DATA;
 use report::{SatellitePriorsReport, SatelliteRow, ViewPictures, depth_preview, normal_preview};
 use serde_json::{Value, json};

@@ -9,14 +9,14 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use bev::splats::{LensSplatCamera, Rendering, RpcSplatCamera, SplatCamera, psnr_db, render, ssim};
 use camera::RpcCamera;
-use geodesy::MapProjection;
+use crs::MapProjection;
 use io::npy;
 use io::raster::{ImageSource, write_png_gray, write_png_rgb};
 use io::splat_ply::{LocalOrigin, SplatFile};
 use raster::Grid;
 use serde::Serialize;
+use splats::{LensSplatCamera, Rendering, RpcSplatCamera, SplatCamera, psnr_db, render, ssim};
 
 use crate::corrections::Corrections;
 use crate::progress::{ProgressStyle, Watcher};
@@ -128,7 +128,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn all(mut self, progress: &dyn pipeline::Progress) -> anyhow::Result<Vec<ViewReport>> {
+    fn all(mut self, progress: &dyn jobs::dsm::Progress) -> anyhow::Result<Vec<ViewReport>> {
         let model = self.args.cameras.as_deref().map(|folder| placed_model::read(folder, &self.origin)).transpose()?;
         progress.begin("views", self.args.images.len() + model.as_ref().map_or(0, |model| model.views.len()));
         for path in &self.args.images {

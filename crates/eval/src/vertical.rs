@@ -4,7 +4,7 @@
 //! it is evaluated on a lattice of cells and interpolated bilinearly (geoid grids are 15′ and more apart). For grids of coarse
 //! cells the lattice is finer, down to every cell.
 
-use geodesy::{GeodesyError, HeightConverter, MapProjection};
+use crs::{CrsError, HeightConverter, MapProjection};
 use raster::{GeoTransform, Grid};
 
 /// Largest distance of the lattice's nodes, metres on the ground.
@@ -26,7 +26,7 @@ pub fn convert_heights(
     projection: &MapProjection,
     from: &HeightConverter,
     to: &HeightConverter,
-) -> Result<(), GeodesyError> {
+) -> Result<(), CrsError> {
     let spacing = (SPACING_M / cell_m).clamp(1.0, SPACING_CELLS).floor() as usize;
     let (width, height) = (heights.width(), heights.height());
     let nodes = lattice(width, height, spacing, geotransform, projection, from, to)?;
@@ -50,7 +50,7 @@ fn lattice(
     projection: &MapProjection,
     from: &HeightConverter,
     to: &HeightConverter,
-) -> Result<Grid<f64>, GeodesyError> {
+) -> Result<Grid<f64>, CrsError> {
     let mut nodes = Grid::filled(width / spacing + 2, height / spacing + 2, 0.0);
     for j in 0..nodes.height() {
         let at = |i: usize| geotransform.map_from_cell((i * spacing) as f64, (j * spacing) as f64);
@@ -70,7 +70,7 @@ fn between(nodes: &Grid<f64>, i: usize, j: usize, u: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geodesy::VerticalDatum;
+    use crs::VerticalDatum;
 
     #[test]
     fn the_lattice_agrees_with_the_conversion_of_each_cell_and_back() {

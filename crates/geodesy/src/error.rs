@@ -1,27 +1,9 @@
-//! What can go wrong between coordinate reference systems.
+//! What can go wrong with positions.
 
-use std::path::PathBuf;
-
-/// A coordinate reference system, a projection or a height conversion that cannot be had.
+/// A position that is not on the Earth, or that a map does not hold.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GeodesyError {
-    /// The text names no CRS in a form that is read here.
-    #[error(
-        "'{text}' is no coordinate reference system: expected an EPSG code (EPSG:32617 or 32617, with +CODE for heights), 'utm' or 'auto'"
-    )]
-    UnknownCrs {
-        /// The text as given.
-        text: String,
-    },
-    /// The text names no vertical datum.
-    #[error(
-        "'{text}' is no vertical datum: expected 'ellipsoid', 'egm96', 'egm2008' or an EPSG code such as EPSG:5773"
-    )]
-    UnknownVerticalDatum {
-        /// The text as given.
-        text: String,
-    },
     /// Longitude or latitude is not a position on the Earth.
     #[error("longitude {lon_deg}, latitude {lat_deg} is no position: expected finite degrees with |latitude| <= 90")]
     InvalidPosition {
@@ -29,18 +11,6 @@ pub enum GeodesyError {
         lon_deg: f64,
         /// Latitude, degrees.
         lat_deg: f64,
-    },
-    /// PROJ knows no way between two systems.
-    #[error(
-        "no transformation from {source_crs} to {target_crs} ({reason}): name another CRS, or install the grids that PROJ asks for"
-    )]
-    NoTransformation {
-        /// Where from.
-        source_crs: String,
-        /// Where to.
-        target_crs: String,
-        /// PROJ's own words.
-        reason: String,
     },
     /// A point lies outside the domain of the projection.
     #[error("({x}, {y}) lies outside the domain of {crs}: expected a position that the projection can represent")]
@@ -51,29 +21,5 @@ pub enum GeodesyError {
         y: f64,
         /// The CRS of the map.
         crs: String,
-    },
-    /// A geoid grid is needed and not installed.
-    #[error(
-        "heights above {datum} need one of the geoid grids {candidates}, and none was found: put one into ~/.local/share/proj or into PROJ's own folder, or give its path (PROJ_DATA replaces the folders that PROJ searches: list its own there too)"
-    )]
-    MissingGrid {
-        /// The datum asked for.
-        datum: String,
-        /// File names that were tried.
-        candidates: String,
-    },
-    /// A geoid grid named by the user cannot be used.
-    #[error("the geoid grid cannot be used ({reason}): expected a GTX or GeoTIFF grid that PROJ reads: {}", path.display())]
-    UnusableGrid {
-        /// The file as named.
-        path: PathBuf,
-        /// PROJ's own words.
-        reason: String,
-    },
-    /// Coordinate slices have different lengths.
-    #[error("coordinate slices of lengths {lengths:?}: expected equal lengths")]
-    LengthMismatch {
-        /// The lengths found.
-        lengths: Vec<usize>,
     },
 }

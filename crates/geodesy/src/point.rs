@@ -19,3 +19,12 @@ impl LonLatHeight {
         Self { lon_deg, lat_deg, height_m }
     }
 }
+
+/// A position on a map, in the units of its CRS.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MapPoint {
+    /// Easting (or longitude).
+    pub x: f64,
+    /// Northing (or latitude).
+    pub y: f64,
+}

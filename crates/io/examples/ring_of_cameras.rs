@@ -17,7 +17,7 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [model, out, rest @ ..] = arguments.as_slice() else { panic!("usage: ring_of_cameras MODEL OUT [COUNT]") };
     let count: u32 = rest.first().map_or(8, |text| text.parse().expect("a number of cameras"));
-    let (low, high) = io::city::read(Path::new(model)).expect("a city model").model.bounds().expect("surfaces");
+    let (low, high) = io::citymodel::read(Path::new(model)).expect("a city model").model.bounds().expect("surfaces");
     let radius = 0.5 * (high.x - low.x).max(high.y - low.y);
     let middle = [0.5 * (low.x + high.x), 0.5 * (low.y + high.y), low.z].map(f64::floor);
     let lens = Lens::new(

@@ -3,7 +3,7 @@
 //! Readers convert to the toolkit's one convention (centre of the upper-left pixel at 0, 0; metres above the ellipsoid)
 //! and say so; writers put a file under its name only when it is complete.
 
-pub mod city;
+pub mod citymodel;
 pub mod colmap;
 pub mod control;
 mod lines;

@@ -6,10 +6,10 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use geodesy::{CrsIdentity, VerticalDatum};
-use mesh::{MeshConfig, ObjectStatus, TriangleMesh};
+use city::{MeshConfig, ObjectStatus, TriangleMesh};
+use crs::{CrsIdentity, VerticalDatum};
 
-use crate::city::{self, CityError};
+use crate::citymodel::{self, CityError};
 use crate::points::{PointCloud, PointsError, is_point_cloud};
 use crate::splat_ply::{LocalOrigin, SplatPlyError};
 
@@ -87,13 +87,13 @@ fn is_ply(bytes: &[u8]) -> bool {
 /// Reads a surface; `config` says which objects and levels of a city model are used.
 ///
 /// # Errors
-/// What [`city::read`] and [`PointCloud`] report, an origin file that is none, a model none of whose objects has triangles.
+/// What [`citymodel::read`] and [`PointCloud`] report, an origin file that is none, a model none of whose objects has triangles.
 pub fn read(path: impl AsRef<Path>, config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
     let path = path.as_ref();
     if is_point_cloud(path) {
         return cloud(path);
     }
-    let bytes = city::content(path)?;
+    let bytes = citymodel::content(path)?;
     if is_ply(&bytes) {
         return ply(path, &bytes, config);
     }
@@ -119,7 +119,7 @@ fn cloud(path: &Path) -> Result<SurfaceFile, SurfaceFileError> {
 }
 
 fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
-    let points = city::ply_points(bytes).map_err(|fault| fault.at(path))?;
+    let points = citymodel::ply_points(bytes).map_err(|fault| fault.at(path))?;
     let mut surface = if points.has_faces {
         city_model(path, config)?
     } else {
@@ -156,8 +156,8 @@ fn numbers(text: &str) -> Option<[f64; 3]> {
 }
 
 fn city_model(path: &Path, config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
-    let file = city::read(path)?;
-    let wrong = |error: mesh::ModelError| SurfaceFileError::Nothing { path: path.to_owned(), what: error.to_string() };
+    let file = citymodel::read(path)?;
+    let wrong = |error: city::ModelError| SurfaceFileError::Nothing { path: path.to_owned(), what: error.to_string() };
     let meshed = TriangleMesh::from_model(&file.model, config).map_err(wrong)?;
     let used = meshed.objects.iter().filter(|object| matches!(object.status, ObjectStatus::Used { .. })).count();
     let what = format!("none of {} objects has triangles of the level of detail asked for", meshed.objects.len());

@@ -4,11 +4,11 @@
 
 use std::path::{Path, PathBuf};
 
-use io::city::{CityError, CityFile, CityFormat, read};
-use mesh::{
+use city::{
     DefectCode, GeometryKind, MeshConfig, ModelPoint, ObjectStatus, Role, Scope, SurfaceClass, TriangleMesh,
     check_solids,
 };
+use io::citymodel::{CityError, CityFile, CityFormat, read};
 
 fn read_bytes(bytes: impl AsRef<[u8]>) -> Result<CityFile, CityError> {
     let folder = tempfile::tempdir().unwrap();

@@ -4,10 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use io::city::{CityError, CityFile, CityFormat, CityJsonOptions, read, write_cityjson};
-use mesh::{
+use city::{
     CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, ModelPoint, ObjectKind, Surface, SurfaceClass,
 };
+use io::citymodel::{CityError, CityFile, CityFormat, CityJsonOptions, read, write_cityjson};
 
 fn read_text(text: &str) -> Result<CityFile, CityError> {
     let folder = tempfile::tempdir().unwrap();

@@ -9,7 +9,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use mesh::{
+use city::{
     CityModel, CityObject, CrsReference, DefectCode, Geometry, GeometryKind, MeshConfig, ModelPoint, ObjectKind, Scope,
     Surface, SurfaceClass, TriangleMesh, VertexPool, check_solids,
 };
@@ -141,7 +141,7 @@ fn solids_and_parts() {
         ("test_cityjson/torus.city.json", &[]),
         ("test_cityjson/several_lods_valid.json", &[]),
     ] {
-        assert_eq!(codes(&io::city::read(&city.join(name)).unwrap().model), expected, "{name}");
+        assert_eq!(codes(&io::citymodel::read(&city.join(name)).unwrap().model), expected, "{name}");
     }
 }
 
@@ -151,7 +151,7 @@ fn buildings_of_3dbag_are_valid_where_val3dity_says_so() {
     let Some(city) = folder("..") else { return };
     let path = city.join("3dbag_5910.city.json");
     let document: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    let model = io::city::read(&path).unwrap().model;
+    let model = io::citymodel::read(&path).unwrap().model;
     let config = MeshConfig::default();
     let meshed = TriangleMesh::from_model(&model, &config).unwrap();
     let mut found: HashMap<usize, BTreeSet<u16>> = HashMap::new();

@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 
 use bvh::{Bvh, DepthImage, Eye, MISS, Target};
 use camera::{ImagePoint, Lens};
+use city::{MeshConfig, ModelPoint, TriangleMesh};
 use io::colmap::{self, ColmapModel};
-use mesh::{MeshConfig, ModelPoint, TriangleMesh};
 
 /// The reference's offset from the tile's coordinates.
 const OFFSET: ModelPoint = ModelPoint::new(85_320.0, 446_656.0, 0.0);
@@ -52,7 +52,7 @@ impl Scene {
             Triangles::Reference => ("peer_reference/mesh_local.ply", ModelPoint::default()),
             Triangles::Tile => ("3dbag_5910.city.json", OFFSET),
         };
-        let tile = io::city::read(&city.join(name)).unwrap();
+        let tile = io::citymodel::read(&city.join(name)).unwrap();
         let meshed = TriangleMesh::from_model(&tile.model, &MeshConfig::default()).unwrap();
         let folder = city.join("peer_reference");
         Some(Self {
@@ -212,7 +212,7 @@ fn national_coordinates_change_nothing() {
         eprintln!("skipped: ../shared/data/city is not there");
         return;
     }
-    let near = io::city::read(&tile).unwrap().model;
+    let near = io::citymodel::read(&tile).unwrap().model;
     let config = MeshConfig::default();
     let expected = TriangleMesh::from_model(&near, &config).unwrap();
     // To where EPSG:25832 has Munich, and to the same place with the zone before the easting.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use geodesy::{Crs, VerticalDatum};
+use crs::{Crs, VerticalDatum};
 use io::points::{GriddedPoints, PointCloud, PointsError, is_point_cloud};
 use las::point::{Classification, Format};
 use las::{Builder, Point, Transform, Vector, Version, Writer};

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use camera::Rpc;
-use geodesy::{Crs, VerticalDatum};
+use crs::{Crs, VerticalDatum};
 use io::raster::{
     Band, BandData, CogRaster, ImageSource, LumaRule, RasterError, SampleType, read_dem, read_dem_window, write_cog,
     write_image_with_rpc, write_png_gray, write_png_rgb,

@@ -6,13 +6,13 @@
 pub enum PriorsError {
     /// A mesh that contradicts itself.
     #[error(transparent)]
-    Mesh(#[from] mesh::ModelError),
+    Mesh(#[from] city::ModelError),
     /// A mesh that rays cannot be cast at.
     #[error(transparent)]
     Bvh(#[from] bvh::BvhError),
     /// A place that the map of the model does not have, or a map that cannot be had.
     #[error(transparent)]
-    Geodesy(#[from] geodesy::GeodesyError),
+    Geodesy(#[from] crs::CrsError),
     /// A model that does not say in which map it is.
     #[error("the model does not say in which map it is ({crs}), expected an EPSG code")]
     MapUnknown {
@@ -29,7 +29,7 @@ pub enum PriorsError {
     #[error("the model reaches beyond where heights above {datum} are known")]
     BeyondDatum {
         /// What the heights are above.
-        datum: geodesy::VerticalDatum,
+        datum: crs::VerticalDatum,
     },
     /// A model without triangles.
     #[error("the model has no triangle that an image could see")]

@@ -9,7 +9,7 @@ use raster::Grid;
 use rayon::prelude::*;
 
 use crate::{PriorModel, Rays, View};
-use mesh::vector::dot;
+use city::vector::dot;
 
 /// What depth means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,7 +52,7 @@ pub struct PriorMaps {
     pub depth_m: Grid<f32>,
     /// Unit normals, turned to the camera; zero where no building is seen.
     pub normal: Grid<[f32; 3]>,
-    /// Number of the surface's class ([`mesh::SurfaceClass`]); [`MISSING_CLASS`] where no building is seen.
+    /// Number of the surface's class ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no building is seen.
     pub class: Grid<u8>,
     /// Index of the object in the model plus one; [`NO_OBJECT`] where no building is seen.
     pub object: Grid<u32>,

@@ -1,11 +1,11 @@
 //! The triangles of a city model with their areas and normals, arranged for rays.
 
 use bvh::Bvh;
-use mesh::{CityModel, Role, TriangleMesh};
+use city::{CityModel, Role, TriangleMesh};
 use rayon::prelude::*;
 
 use crate::PriorsError;
-use mesh::vector::{Vector, cross, norm, sub, unit};
+use city::vector::{Vector, cross, norm, sub, unit};
 
 /// Triangles lower than this take the normal of their surface: their own would be made of the rounding of their corners.
 const SLIVER_M: f64 = 1e-3;
@@ -29,7 +29,7 @@ impl PriorModel {
     pub fn new(mesh: TriangleMesh, is_building: &[bool]) -> Result<Self, PriorsError> {
         mesh.validate()?;
         let bvh = Bvh::new(&mesh.positions, &mesh.triangles)?;
-        let known = |surface: &mesh::MeshSurface| is_building.get(surface.object as usize).copied();
+        let known = |surface: &city::MeshSurface| is_building.get(surface.object as usize).copied();
         if let Some(surface) = mesh.surfaces.iter().find(|surface| known(surface).is_none()) {
             return Err(PriorsError::Objects { flags: is_building.len(), object: surface.object });
         }
@@ -108,7 +108,7 @@ fn normals(mesh: &TriangleMesh) -> Vec<Vector> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use mesh::{MeshSurface, ModelPoint, SurfaceClass};
+    use city::{MeshSurface, ModelPoint, SurfaceClass};
 
     use super::*;
 

@@ -2,8 +2,8 @@
 //!
 //! RPCs count from the WGS 84 ellipsoid, so the heights of the model go there first.
 
-use geodesy::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
-use mesh::{CrsReference, TriangleMesh};
+use city::{CrsReference, TriangleMesh};
+use crs::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
 
 use crate::PriorsError;
 

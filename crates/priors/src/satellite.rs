@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::maps::{MISSING_CLASS, NO_OBJECT};
 use crate::{PriorModel, PriorsError};
-use mesh::vector::{along, dot, norm};
+use city::vector::{along, dot, norm};
 
 /// The maps of one image, all of its size.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +25,7 @@ pub struct SatelliteMaps {
     pub distance_m: Grid<f32>,
     /// East, north, up; unit normals turned to the sensor, zero where no building is seen.
     pub normal: Grid<[f32; 3]>,
-    /// Number of the surface's class ([`mesh::SurfaceClass`]); [`MISSING_CLASS`] where no building is seen.
+    /// Number of the surface's class ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no building is seen.
     pub class: Grid<u8>,
     /// Index of the object in the model plus one; [`NO_OBJECT`] where no building is seen.
     pub object: Grid<u32>,

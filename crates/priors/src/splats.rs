@@ -4,10 +4,10 @@
 //! disks of two deviations are those that an adaptive sample keeps within its error. Across the surface it is a hundredth
 //! of that (2DGS has no third scale). The opacity is 0.1, with which 3DGS begins as well: training has to bring it up.
 
-use mesh::Splat;
+use gaussian::Splat;
 
 use crate::Sample;
-use mesh::vector::{Vector, cross, unit};
+use city::vector::{Vector, cross, unit};
 
 /// Opacity of a splat that nothing has been learned about.
 const OPACITY: f32 = 0.1;
@@ -48,11 +48,11 @@ fn from_up(normal: Vector) -> [f64; 4] {
 
 #[cfg(test)]
 mod tests {
-    use mesh::SurfaceClass;
+    use city::SurfaceClass;
     use proptest::prelude::*;
 
     use super::*;
-    use mesh::vector::{norm, sub};
+    use city::vector::{norm, sub};
 
     fn point(normal: Vector) -> Sample {
         Sample {

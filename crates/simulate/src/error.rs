@@ -38,7 +38,7 @@ pub enum SimulateError {
     Fit(#[from] camera::FitError),
     /// The scene lies where there is no map.
     #[error("the scene's place cannot be mapped")]
-    Geodesy(#[from] geodesy::GeodesyError),
+    Geodesy(#[from] crs::CrsError),
 }
 
 fn names() -> String {

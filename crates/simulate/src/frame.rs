@@ -1,6 +1,7 @@
 //! The scene frame: metres of the map grid around the scene's centre.
 
-use geodesy::{LonLatHeight, MapProjection, utm_epsg};
+use crs::{CrsError, MapProjection};
+use geodesy::{LonLatHeight, utm_epsg};
 use nalgebra::Vector3;
 
 use crate::SimulateError;
@@ -20,7 +21,7 @@ impl SceneFrame {
     /// # Errors
     /// A position where no map projection is defined.
     pub fn new(lon_deg: f64, lat_deg: f64, cell_m: f64) -> Result<Self, SimulateError> {
-        let epsg = utm_epsg(lon_deg, lat_deg)?;
+        let epsg = utm_epsg(lon_deg, lat_deg).map_err(CrsError::from)?;
         let projection = MapProjection::from_epsg(epsg)?;
         let map = projection.map_from_lonlat(lon_deg, lat_deg)?;
         let origin_m = [map.x, map.y].map(|c| (c / cell_m).round() * cell_m);

@@ -5,7 +5,7 @@
 //! `Building`; of several, a `Building` without geometry whose blocks are its `BuildingPart`s, each on top of the other
 //! or wall to wall. Parapets, chimneys and plant rooms are left out, as LoD2 does.
 
-use mesh::{
+use city::{
     CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, ModelPoint, ObjectKind, Surface, SurfaceClass,
     VertexPool,
 };

@@ -5,8 +5,8 @@
 //! meets nothing before, the vehicles of its date included.
 
 use camera::{ImagePoint, Rpc};
+use city::CityModel;
 use geodesy::LonLatHeight;
-use mesh::CityModel;
 use nalgebra::Vector3;
 use raster::{GeoTransform, Grid};
 use rayon::prelude::*;

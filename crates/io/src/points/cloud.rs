@@ -5,7 +5,7 @@ use std::io::{BufReader, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use geodesy::VerticalDatum;
+use crs::VerticalDatum;
 use las::{Header, PointDataBuilder, Reader};
 use raster::{GeoTransform, Grid};
 

@@ -1,6 +1,6 @@
 //! The coordinate system of a LAS file: a WKT record, else GeoTIFF keys.
 
-use geodesy::{CrsIdentity, GeodesyError, VerticalDatum};
+use crs::{CrsError, CrsIdentity, VerticalDatum};
 use las::Header;
 use las::crs::{GeoTiffCrs, GeoTiffData};
 
@@ -20,7 +20,7 @@ pub(super) struct Stated {
 }
 
 /// Reads what the header says; a file without a coordinate system says nothing.
-pub(super) fn stated(header: &Header) -> Result<Stated, GeodesyError> {
+pub(super) fn stated(header: &Header) -> Result<Stated, CrsError> {
     let nothing = Stated { definition: None, horizontal_epsg: None, vertical: None, height_unit_m: 1.0 };
     if let Some(wkt) = header.get_wkt_crs_bytes() {
         let wkt = String::from_utf8_lossy(wkt).trim_matches(['\0', ' ', '\n']).to_owned();

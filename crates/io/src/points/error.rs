@@ -63,7 +63,7 @@ pub enum PointsError {
         /// The file.
         path: PathBuf,
         /// What geodesy says.
-        source: geodesy::GeodesyError,
+        source: crs::CrsError,
     },
 }
 

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use geodesy::Crs;
+use crs::Crs;
 use las::point::{Classification, Format};
 use las::{Builder, Point, Transform, Vector, Version, Writer};
 

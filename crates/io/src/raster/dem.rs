@@ -6,8 +6,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crs::{CrsIdentity, VerticalDatum};
 use gdal::{Dataset, Metadata};
-use geodesy::{CrsIdentity, VerticalDatum};
 use raster::{GeoTransform, Grid, Window};
 
 use super::geotiff::VERTICAL_DATUM;

@@ -74,7 +74,7 @@ pub enum RasterError {
         /// The file.
         path: PathBuf,
         /// What geodesy says.
-        source: geodesy::GeodesyError,
+        source: crs::CrsError,
     },
 }
 

@@ -10,10 +10,10 @@
 use std::path::Path;
 
 use camera::Rpc;
+use crs::Crs;
 use gdal::raster::{Buffer, GdalType, RasterCreationOptions};
 use gdal::spatial_ref::SpatialRef;
 use gdal::{Dataset, DriverManager, Metadata};
-use geodesy::Crs;
 use raster::{GeoTransform, Grid, NO_DATA};
 
 use super::{RasterError, with_gdal, write_whole};

@@ -182,7 +182,7 @@ impl RasterSpool {
 mod tests {
     use super::*;
     use crate::raster::{Band, CogRaster, read_dem, write_cog};
-    use geodesy::{Crs, VerticalDatum};
+    use crs::{Crs, VerticalDatum};
     use raster::GeoTransform;
 
     /// Windows in any order, some never put, give the file that a grid in memory gives.

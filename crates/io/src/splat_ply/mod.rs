@@ -14,7 +14,7 @@ mod write;
 
 use std::path::{Path, PathBuf};
 
-use mesh::{Splat, SplatDefect};
+use gaussian::{Splat, SplatDefect};
 
 use crate::raster::RasterError;
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use mesh::Splat;
+use gaussian::Splat;
 
 use super::{LocalOrigin, SH_C0, SplatFile, SplatForm, SplatLayout, SplatPlyError, invalid};
 

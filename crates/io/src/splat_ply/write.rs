@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use mesh::Splat;
+use gaussian::Splat;
 
 use super::{LocalOrigin, SH_C0, SH_DEGREE_MAX, SplatLayout, SplatPlyError, invalid};
 use crate::raster::{RasterError, write_whole};

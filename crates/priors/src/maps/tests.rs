@@ -1,12 +1,12 @@
 //! Maps of a box on a road, against what geometry says of them.
 
 use camera::{Lens, LensModel};
-use mesh::SurfaceClass;
+use city::SurfaceClass;
 
 use super::*;
 use crate::model::tests::{cuboid, joined};
 use crate::view::tests::{nadir, pinhole};
-use mesh::vector::norm;
+use city::vector::norm;
 
 /// A box of 8 × 6 × 3 m that is a building, on a large slab that is none.
 fn model() -> PriorModel {

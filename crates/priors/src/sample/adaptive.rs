@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::creases::Creases;
 use super::{Amount, LIMIT, Purpose, Sample, SampleConfig, on_triangle, positive};
 use crate::{PriorModel, PriorsError};
-use mesh::vector::{Vector, cross, norm, sub};
+use city::vector::{Vector, cross, norm, sub};
 
 /// A piece is small enough when it is no longer than this many spacings.
 const PIECE: f64 = 0.7;

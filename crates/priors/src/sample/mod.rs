@@ -9,12 +9,12 @@ mod creases;
 mod poisson;
 mod weights;
 
-use mesh::SurfaceClass;
+use city::SurfaceClass;
 use rayon::prelude::*;
 
 use crate::random::Stream;
 use crate::{PriorModel, PriorsError};
-use mesh::vector::Vector;
+use city::vector::Vector;
 
 pub use adaptive::{ErrorCurve, error_curve};
 pub use weights::ClassWeights;

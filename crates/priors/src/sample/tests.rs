@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::model::tests::{cuboid, joined};
-use mesh::vector::{along, dot, norm, sub};
-use mesh::{ModelPoint, TriangleMesh};
+use city::vector::{along, dot, norm, sub};
+use city::{ModelPoint, TriangleMesh};
 
 const SPACINGS: [Spacing; 3] = [Spacing::Random, Spacing::Stratified, Spacing::PoissonDisk];
 
@@ -47,7 +47,7 @@ fn points_lie_on_their_triangles_and_fill_them() {
             let normal = model.normal(point.triangle as usize);
             assert!(dot(sub(point.position, a), normal).abs() < 1e-12);
             for (from, to) in [(a, b), (b, c), (c, a)] {
-                let side = mesh::vector::cross(sub(to, from), sub(point.position, from));
+                let side = city::vector::cross(sub(to, from), sub(point.position, from));
                 assert!(dot(side, normal) > -1e-9);
             }
             if point.class == SurfaceClass::Roof {
@@ -141,7 +141,7 @@ fn tower(radius: f64, height: f64, sides: usize) -> TriangleMesh {
         let (a, b) = (2 * i as u32, 2 * ((i + 1) % sides) as u32);
         mesh.triangles.extend([[a, b, b + 1], [a, b + 1, a + 1]]);
         mesh.surface_of.extend([i as u32; 2]);
-        mesh.surfaces.push(mesh::MeshSurface { object: 0, class: SurfaceClass::Wall });
+        mesh.surfaces.push(city::MeshSurface { object: 0, class: SurfaceClass::Wall });
     }
     mesh
 }
@@ -153,8 +153,8 @@ fn to_mesh(mesh: &TriangleMesh, position: [f64; 3]) -> f64 {
 
 fn to_triangle(p: [f64; 3], corners: [[f64; 3]; 3]) -> f64 {
     let [a, b, c] = corners;
-    let normal = mesh::vector::unit(mesh::vector::cross(sub(b, a), sub(c, a))).unwrap();
-    let inside = |from, to| dot(mesh::vector::cross(sub(to, from), sub(p, from)), normal) >= 0.0;
+    let normal = city::vector::unit(city::vector::cross(sub(b, a), sub(c, a))).unwrap();
+    let inside = |from, to| dot(city::vector::cross(sub(to, from), sub(p, from)), normal) >= 0.0;
     if inside(a, b) && inside(b, c) && inside(c, a) {
         return dot(sub(p, a), normal).abs();
     }
@@ -178,8 +178,8 @@ fn adaptive_disks_stay_within_the_error() {
         let mut worst = 0.0f64;
         for point in made.points.iter().step_by(7) {
             let normal = point.normal.map(f64::from);
-            let side = mesh::vector::unit(mesh::vector::cross(normal, [0.3, 0.5, 0.7])).unwrap();
-            let other = mesh::vector::cross(normal, side);
+            let side = city::vector::unit(city::vector::cross(normal, [0.3, 0.5, 0.7])).unwrap();
+            let other = city::vector::cross(normal, side);
             for step in 0..8 {
                 let (sin, cos) = (f64::from(step) * std::f64::consts::FRAC_PI_4).sin_cos();
                 let radius = f64::from(point.spacing_m);

@@ -1,6 +1,6 @@
 //! What the classes of surfaces count in a sample.
 
-use mesh::SurfaceClass;
+use city::SurfaceClass;
 
 use super::positive;
 use crate::PriorsError;

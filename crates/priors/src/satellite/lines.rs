@@ -6,10 +6,10 @@
 
 use bvh::Ray;
 use camera::{ImagePoint, RpcCamera};
-use geodesy::MapProjection;
+use crs::MapProjection;
 
 use crate::{PriorModel, PriorsError};
-use mesh::vector::{Vector, along, dot, norm, sub, unit};
+use city::vector::{Vector, along, dot, norm, sub, unit};
 
 /// Spacings of the lattice that are tried, pixels.
 const STEPS: [usize; 4] = [64, 16, 4, 1];

@@ -1,12 +1,13 @@
 //! A box in UTM zone 31 under an affine RPC that looks at it from the west.
 
 use camera::{ImageCorrection, ImagePoint, Rpc, RpcCamera};
-use geodesy::{LonLatHeight, MapProjection};
-use mesh::{ModelPoint, SurfaceClass, TriangleMesh};
+use city::{ModelPoint, SurfaceClass, TriangleMesh};
+use crs::MapProjection;
+use geodesy::LonLatHeight;
 
 use super::*;
 use crate::model::tests::cuboid;
-use mesh::vector::sub;
+use city::vector::sub;
 
 const PLACE: LonLatHeight = LonLatHeight { lon_deg: 5.4, lat_deg: 43.53, height_m: 200.0 };
 const SIZE: (usize, usize) = (150, 120);

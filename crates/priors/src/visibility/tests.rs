@@ -27,9 +27,9 @@ fn seen(model: &PriorModel, samples: &[Sample], views: &[View], config: Visibili
 
 /// A camera that looks at a point.
 fn looking_at(centre: [f64; 3], at: [f64; 3]) -> View {
-    let forward = mesh::vector::unit(sub(at, centre)).unwrap();
-    let right = mesh::vector::unit(mesh::vector::cross(forward, [0.0, 0.0, 1.0])).unwrap();
-    let down = mesh::vector::cross(forward, right);
+    let forward = city::vector::unit(sub(at, centre)).unwrap();
+    let right = city::vector::unit(city::vector::cross(forward, [0.0, 0.0, 1.0])).unwrap();
+    let down = city::vector::cross(forward, right);
     View { lens: pinhole(200, 150, 120.0), pose: camera::Pose { rotation: [right, down, forward], centre } }
 }
 
@@ -40,7 +40,7 @@ fn only_roofs_are_seen_from_straight_above() {
     let view = nadir([9.0, 4.0, 60.0], pinhole(300, 300, 500.0));
     let all = VisibilityConfig { min_views: 1, max_incidence_deg: Some(80.0), ..VisibilityConfig::default() };
     let visible = seen(&model, &samples, &[view], all);
-    let is_roof = |s: &Sample| s.class == mesh::SurfaceClass::Roof;
+    let is_roof = |s: &Sample| s.class == city::SurfaceClass::Roof;
     assert_eq!(visible.points.len(), samples.iter().filter(|s| is_roof(s)).count());
     assert!(visible.points.iter().all(|&p| is_roof(&samples[p as usize])));
     assert_eq!(visible.per_view[0].visible, visible.points.len());
@@ -61,7 +61,7 @@ fn two_views_are_needed_by_default() {
     assert!(visible.points.len() > 200);
     for (&point, observations) in visible.points.iter().zip(&visible.observations) {
         let sample = &samples[point as usize];
-        assert_eq!(sample.class, mesh::SurfaceClass::Roof, "{sample:?}");
+        assert_eq!(sample.class, city::SurfaceClass::Roof, "{sample:?}");
         assert_eq!(observations.iter().map(|o| o.view).collect::<Vec<_>>(), [0, 1]);
     }
     let none = seen(&model, &samples, &views, VisibilityConfig { near_m: 60.0, ..VisibilityConfig::default() });
@@ -76,7 +76,7 @@ fn the_best_observations_are_kept() {
     let views = heights.map(|h| nadir([4.0, 3.0, h], pinhole(400, 400, 150.0)));
     let config = VisibilityConfig { max_observations: 2, ..VisibilityConfig::default() };
     let visible = seen(&model, &samples, &views, config);
-    let low = |p: u32| samples[p as usize].object == 0 && samples[p as usize].class == mesh::SurfaceClass::Roof;
+    let low = |p: u32| samples[p as usize].object == 0 && samples[p as usize].class == city::SurfaceClass::Roof;
     let mut checked = 0;
     for (&point, observations) in visible.points.iter().zip(&visible.observations) {
         if low(point) {

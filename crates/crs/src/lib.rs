@@ -1,0 +1,16 @@
+//! Coordinate reference systems: their identity, map projections and vertical datums.
+//!
+//! Angles are degrees and heights metres above the WGS 84 ellipsoid unless a name says otherwise.
+//! PROJ is called in this crate and nowhere else, and its C interface in one private module. PROJ's network access
+//! is switched off: a grid is read from the local disk or reported as missing.
+
+mod error;
+mod identity;
+mod proj_handle;
+mod projection;
+mod vertical;
+
+pub use error::CrsError;
+pub use identity::{Crs, CrsIdentity, CrsRequest, VerticalDatum};
+pub use projection::MapProjection;
+pub use vertical::HeightConverter;

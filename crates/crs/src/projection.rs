@@ -1,0 +1,216 @@
+//! Map coordinates from longitude and latitude, and back, through PROJ.
+//!
+//! Degrees of WGS 84 on one side; on the other the CRS's own units with axes easting, northing (or longitude,
+//! latitude: the traditional GIS order, whatever the authority says). Heights are not touched; see
+//! [`crate::HeightConverter`]. A [`MapProjection`] is `Send` and `Sync`; its batch calls take an exclusive PROJ handle
+//! once per call, so threads work side by side when they pass slices.
+
+use geodesy::{GeodesyError, MapPoint};
+
+use crate::CrsError;
+use crate::proj_handle::{Direction, Pool, Recipe, metres_per_unit};
+
+/// The way between WGS 84 longitude, latitude and a map CRS.
+#[derive(Debug)]
+pub struct MapProjection {
+    definition: String,
+    metres_per_unit: Option<f64>,
+    pool: Pool,
+}
+
+impl MapProjection {
+    /// The projection of an EPSG code.
+    ///
+    /// # Errors
+    /// [`CrsError::NoTransformation`] when PROJ does not know the code or a way to it from WGS 84.
+    pub fn from_epsg(code: u32) -> Result<Self, CrsError> {
+        Self::from_definition(&format!("EPSG:{code}"))
+    }
+
+    /// The projection of any CRS that PROJ reads: `EPSG:n`, WKT, PROJJSON. The vertical part of a compound CRS is
+    /// set aside. Transformations of unknown accuracy ("ballpark") are refused.
+    ///
+    /// # Errors
+    /// [`CrsError::NoTransformation`] when PROJ does not know the CRS or a way to it from WGS 84.
+    pub fn from_definition(definition: &str) -> Result<Self, CrsError> {
+        let fails = |reason| CrsError::NoTransformation {
+            source_crs: "EPSG:4326".to_owned(),
+            target_crs: first_line(definition),
+            reason,
+        };
+        let recipe = Recipe::Horizontal { source: "EPSG:4326".to_owned(), target: definition.to_owned() };
+        let metres_per_unit = metres_per_unit(definition).map_err(fails)?;
+        let pool = Pool::new(recipe).map_err(fails)?;
+        Ok(Self { definition: definition.to_owned(), metres_per_unit, pool })
+    }
+
+    /// The definition that this projection was made from.
+    pub fn definition(&self) -> &str {
+        &self.definition
+    }
+
+    /// Metres per unit of `x` and `y`; `None` for a geographic CRS, whose units are degrees.
+    pub fn metres_per_unit(&self) -> Option<f64> {
+        self.metres_per_unit
+    }
+
+    /// Map position of a longitude and latitude in degrees.
+    ///
+    /// # Errors
+    /// [`GeodesyError::OutsideDomain`] where the projection is not defined.
+    pub fn map_from_lonlat(&self, lon_deg: f64, lat_deg: f64) -> Result<MapPoint, CrsError> {
+        let (x, y) = self.one(Direction::Forward, lon_deg, lat_deg)?;
+        Ok(MapPoint { x, y })
+    }
+
+    /// Longitude and latitude in degrees of a map position.
+    ///
+    /// # Errors
+    /// [`GeodesyError::OutsideDomain`] where the projection is not defined.
+    pub fn lonlat_from_map(&self, x: f64, y: f64) -> Result<(f64, f64), CrsError> {
+        self.one(Direction::Inverse, x, y)
+    }
+
+    /// Turns longitudes into x and latitudes into y, in place. Returns how many points lie outside the domain: those
+    /// become NaN.
+    ///
+    /// # Errors
+    /// [`CrsError::LengthMismatch`]; [`CrsError::NoTransformation`] when a further PROJ handle cannot be made.
+    pub fn map_from_lonlat_slices(&self, lon_to_x: &mut [f64], lat_to_y: &mut [f64]) -> Result<usize, CrsError> {
+        self.many(Direction::Forward, lon_to_x, lat_to_y)
+    }
+
+    /// Turns x into longitudes and y into latitudes, in place. Returns how many points lie outside the domain: those
+    /// become NaN.
+    ///
+    /// # Errors
+    /// As [`Self::map_from_lonlat_slices`].
+    pub fn lonlat_from_map_slices(&self, x_to_lon: &mut [f64], y_to_lat: &mut [f64]) -> Result<usize, CrsError> {
+        self.many(Direction::Inverse, x_to_lon, y_to_lat)
+    }
+
+    fn one(&self, direction: Direction, x: f64, y: f64) -> Result<(f64, f64), CrsError> {
+        let (mut xs, mut ys) = ([x], [y]);
+        match self.many(direction, &mut xs, &mut ys)? {
+            0 => Ok((xs[0], ys[0])),
+            _ => Err(GeodesyError::OutsideDomain { x, y, crs: first_line(&self.definition) }.into()),
+        }
+    }
+
+    fn many(&self, direction: Direction, x: &mut [f64], y: &mut [f64]) -> Result<usize, CrsError> {
+        if x.len() != y.len() {
+            return Err(CrsError::LengthMismatch { lengths: vec![x.len(), y.len()] });
+        }
+        self.pool.apply(direction, x, y, &mut []).map_err(|reason| CrsError::NoTransformation {
+            source_crs: "EPSG:4326".to_owned(),
+            target_crs: first_line(&self.definition),
+            reason,
+        })
+    }
+}
+
+impl Clone for MapProjection {
+    /// A projection with PROJ handles of its own, made on first use.
+    fn clone(&self) -> Self {
+        Self { definition: self.definition.clone(), metres_per_unit: self.metres_per_unit, pool: self.pool.duplicate() }
+    }
+}
+
+/// Enough of a definition to recognise it: WKT runs over many lines.
+fn first_line(definition: &str) -> String {
+    let line = definition.lines().next().unwrap_or_default();
+    line.chars().take(80).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn round_trips_in_utm_ups_and_degrees() {
+        for (code, lon, lat) in [
+            (32617, -81.66, 30.34),
+            (32740, 55.6, -21.1),
+            (5041, 100.0, 85.0),
+            (5042, -179.99, -88.0),
+            (4326, 7.5, 3.0),
+        ] {
+            let projection = MapProjection::from_epsg(code).unwrap();
+            let map = projection.map_from_lonlat(lon, lat).unwrap();
+            let (lon_back, lat_back) = projection.lonlat_from_map(map.x, map.y).unwrap();
+            assert!((lon_back - lon).abs() < 1e-10 && (lat_back - lat).abs() < 1e-10, "{code}");
+        }
+    }
+
+    proptest! {
+        /// In the zone that is chosen for a place, at any latitude and on both sides of the antimeridian.
+        #[test]
+        fn any_place_survives_its_own_zone(lon in -180.0..180.0f64, lat in -89.9..89.9f64, dx in -2e4..2e4f64, dy in -2e4..2e4f64) {
+            let projection = MapProjection::from_epsg(geodesy::utm_epsg(lon, lat).unwrap()).unwrap();
+            let at = projection.map_from_lonlat(lon, lat).unwrap();
+            let (lon_back, lat_back) = projection.lonlat_from_map(at.x + dx, at.y + dy).unwrap();
+            let back = projection.map_from_lonlat(lon_back, lat_back).unwrap();
+            prop_assert!((back.x - at.x - dx).abs() < 1e-4 && (back.y - at.y - dy).abs() < 1e-4, "{back:?} {at:?}");
+        }
+    }
+
+    #[test]
+    fn a_scene_on_the_antimeridian_stays_in_one_piece() {
+        let projection = MapProjection::from_epsg(32701).unwrap();
+        let west = projection.map_from_lonlat(179.999, -17.0).unwrap();
+        let east = projection.map_from_lonlat(-179.999, -17.0).unwrap();
+        assert!(east.x - west.x > 200.0 && east.x - west.x < 220.0, "{west:?} {east:?}");
+        let (lon, _) = projection.lonlat_from_map(west.x, west.y).unwrap();
+        assert!((lon - 179.999).abs() < 1e-9, "{lon}");
+    }
+
+    #[test]
+    fn compound_and_geographic_systems_keep_their_horizontal_part() {
+        let plain = MapProjection::from_epsg(32617).unwrap();
+        let compound = MapProjection::from_definition("EPSG:32617+5773").unwrap();
+        assert_eq!(plain.map_from_lonlat(-81.0, 30.0), compound.map_from_lonlat(-81.0, 30.0));
+        assert_eq!(plain.metres_per_unit(), Some(1.0));
+        assert_eq!(MapProjection::from_epsg(4326).unwrap().metres_per_unit(), None);
+        let feet = MapProjection::from_epsg(2236).unwrap().metres_per_unit().unwrap();
+        assert!((feet - 0.3048).abs() < 1e-5);
+        let degrees = MapProjection::from_epsg(4326).unwrap().map_from_lonlat(-81.0, 30.0).unwrap();
+        assert_eq!(degrees, MapPoint { x: -81.0, y: 30.0 });
+    }
+
+    #[test]
+    fn what_cannot_be_projected_is_an_error() {
+        assert!(matches!(MapProjection::from_epsg(1), Err(CrsError::NoTransformation { .. })));
+        assert!(matches!(MapProjection::from_definition("a\0b"), Err(CrsError::NoTransformation { .. })));
+        let projection = MapProjection::from_epsg(32617).unwrap();
+        for (lon, lat) in [(f64::NAN, 0.0), (0.0, 200.0), (f64::INFINITY, 10.0)] {
+            assert!(
+                matches!(
+                    projection.map_from_lonlat(lon, lat),
+                    Err(CrsError::Position(GeodesyError::OutsideDomain { .. }))
+                ),
+                "{lon}"
+            );
+        }
+        let (mut xs, mut ys) = ([-81.0, f64::NAN], [30.0, 30.0]);
+        assert_eq!(projection.map_from_lonlat_slices(&mut xs, &mut ys), Ok(1));
+        assert!(xs[0].is_finite() && xs[1].is_nan() && ys[1].is_nan());
+        assert!(projection.map_from_lonlat_slices(&mut xs, &mut [1.0]).is_err());
+    }
+
+    #[test]
+    fn threads_share_one_projection() {
+        let projection = MapProjection::from_epsg(32617).unwrap();
+        let expected = projection.map_from_lonlat(-81.0, 30.0).unwrap();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..100 {
+                        assert_eq!(projection.map_from_lonlat(-81.0, 30.0).unwrap(), expected);
+                    }
+                });
+            }
+        });
+        assert_eq!(projection.clone().map_from_lonlat(-81.0, 30.0).unwrap(), expected);
+    }
+}

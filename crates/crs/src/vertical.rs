@@ -1,0 +1,198 @@
+//! Heights above the ellipsoid ↔ heights above a geoid or another vertical CRS.
+//!
+//! H = h − N(λ, φ): the orthometric height is the ellipsoidal one minus the geoid's undulation. EGM96 and EGM2008 are
+//! read from PROJ's grids by bilinear interpolation (`vgridshift`); other vertical CRSs go through PROJ's database with
+//! ballpark transformations forbidden. A grid that is not there is an error when the converter is made, never a height
+//! passed through; a point outside the grid is an error (single) or NaN with a count (batch).
+
+use std::path::Path;
+
+use crate::proj_handle::{Direction, Pool, Recipe};
+use geodesy::GeodesyError;
+
+use crate::{CrsError, VerticalDatum};
+
+/// File names of the EGM96 grid, as PROJ and older distributions have it.
+const EGM96_GRIDS: [&str; 2] = ["us_nga_egm96_15.tif", "egm96_15.gtx"];
+/// File names of the EGM2008 grid.
+const EGM2008_GRIDS: [&str; 2] = ["us_nga_egm08_25.tif", "egm08_25.gtx"];
+
+/// Converts heights between the WGS 84 ellipsoid and one vertical datum. `Send` and `Sync`.
+#[derive(Debug)]
+pub struct HeightConverter {
+    datum: VerticalDatum,
+    /// Forward subtracts the undulation; `None` for the ellipsoid itself.
+    pool: Option<Pool>,
+}
+
+impl HeightConverter {
+    /// The converter to and from a datum, with the grids that PROJ finds (its own folder, `PROJ_DATA`, `PROJ_LIB`).
+    ///
+    /// # Errors
+    /// [`CrsError::MissingGrid`] when the geoid's grid is not installed, [`CrsError::NoTransformation`] when PROJ
+    /// knows no way from the ellipsoid to an EPSG code.
+    pub fn new(datum: VerticalDatum) -> Result<Self, CrsError> {
+        let pool = match datum {
+            VerticalDatum::Ellipsoid => None,
+            VerticalDatum::Egm96 => Some(first_grid(datum, &EGM96_GRIDS)?),
+            VerticalDatum::Egm2008 => Some(first_grid(datum, &EGM2008_GRIDS)?),
+            VerticalDatum::Epsg(code) => Some(through_database(code)?),
+        };
+        Ok(Self { datum, pool })
+    }
+
+    /// The converter for a datum whose geoid grid is a file of the user's (GTX or GeoTIFF).
+    ///
+    /// # Errors
+    /// [`CrsError::UnusableGrid`] when PROJ cannot read the file.
+    pub fn with_grid(datum: VerticalDatum, grid: &Path) -> Result<Self, CrsError> {
+        let unusable = |reason: String| CrsError::UnusableGrid { path: grid.to_owned(), reason };
+        let name = grid.to_str().ok_or_else(|| unusable("the path is not UTF-8".to_owned()))?;
+        if name.contains(['"', ',', '+']) {
+            return Err(unusable("PROJ takes no path with a quote, a comma or a plus sign".to_owned()));
+        }
+        let pool = Pool::new(Recipe::Pipeline(grid_pipeline(name))).map_err(unusable)?;
+        Ok(Self { datum, pool: Some(pool) })
+    }
+
+    /// The datum at the far end.
+    pub fn datum(&self) -> VerticalDatum {
+        self.datum
+    }
+
+    /// Height above the datum of a height above the ellipsoid, metres, at a position in degrees.
+    ///
+    /// # Errors
+    /// [`GeodesyError::OutsideDomain`] where the grid has no value.
+    pub fn datum_from_ellipsoid(&self, lon_deg: f64, lat_deg: f64, height_m: f64) -> Result<f64, CrsError> {
+        self.one(Direction::Forward, lon_deg, lat_deg, height_m)
+    }
+
+    /// Height above the ellipsoid of a height above the datum, metres, at a position in degrees.
+    ///
+    /// # Errors
+    /// [`GeodesyError::OutsideDomain`] where the grid has no value.
+    pub fn ellipsoid_from_datum(&self, lon_deg: f64, lat_deg: f64, height_m: f64) -> Result<f64, CrsError> {
+        self.one(Direction::Inverse, lon_deg, lat_deg, height_m)
+    }
+
+    /// [`Self::datum_from_ellipsoid`] over slices, in place. Returns how many heights became NaN; those that were NaN
+    /// before are counted too.
+    ///
+    /// # Errors
+    /// [`CrsError::LengthMismatch`]; [`CrsError::NoTransformation`] when a further PROJ handle cannot be made.
+    pub fn datum_from_ellipsoid_slices(
+        &self,
+        lon_deg: &[f64],
+        lat_deg: &[f64],
+        height_m: &mut [f64],
+    ) -> Result<usize, CrsError> {
+        self.many(Direction::Forward, lon_deg, lat_deg, height_m)
+    }
+
+    /// [`Self::ellipsoid_from_datum`] over slices, in place. Returns how many heights became NaN.
+    ///
+    /// # Errors
+    /// As [`Self::datum_from_ellipsoid_slices`].
+    pub fn ellipsoid_from_datum_slices(
+        &self,
+        lon_deg: &[f64],
+        lat_deg: &[f64],
+        height_m: &mut [f64],
+    ) -> Result<usize, CrsError> {
+        self.many(Direction::Inverse, lon_deg, lat_deg, height_m)
+    }
+
+    fn one(&self, direction: Direction, lon: f64, lat: f64, height: f64) -> Result<f64, CrsError> {
+        let mut heights = [height];
+        match self.many(direction, &[lon], &[lat], &mut heights)? {
+            0 => Ok(heights[0]),
+            _ => Err(GeodesyError::OutsideDomain { x: lon, y: lat, crs: self.datum.to_string() }.into()),
+        }
+    }
+
+    fn many(&self, direction: Direction, lon: &[f64], lat: &[f64], height: &mut [f64]) -> Result<usize, CrsError> {
+        if lon.len() != lat.len() || lon.len() != height.len() {
+            return Err(CrsError::LengthMismatch { lengths: vec![lon.len(), lat.len(), height.len()] });
+        }
+        let Some(pool) = &self.pool else {
+            return Ok(height.iter().filter(|h| !h.is_finite()).count());
+        };
+        let (mut x, mut y) = (lon.to_vec(), lat.to_vec());
+        pool.apply(direction, &mut x, &mut y, height).map_err(|reason| no_way(&self.datum.to_string(), reason))
+    }
+}
+
+/// The first grid of a list that PROJ can open.
+fn first_grid(datum: VerticalDatum, names: &[&str]) -> Result<Pool, CrsError> {
+    names
+        .iter()
+        .find_map(|name| Pool::new(Recipe::Pipeline(grid_pipeline(name))).ok())
+        .ok_or_else(|| CrsError::MissingGrid { datum: datum.to_string(), candidates: names.join(", ") })
+}
+
+/// Longitude, latitude in degrees and a height: forward subtracts the grid's value.
+fn grid_pipeline(grid: &str) -> String {
+    format!(
+        "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad \
+         +step +proj=vgridshift +grids=\"{grid}\" +multiplier=-1 \
+         +step +proj=unitconvert +xy_in=rad +xy_out=deg"
+    )
+}
+
+/// The way to a vertical CRS by PROJ's database. PROJ makes it even where its grids are missing and fails at the
+/// points, so the caller sees every height as lost and none as unchanged.
+fn through_database(code: u32) -> Result<Pool, CrsError> {
+    let target = format!("EPSG:4326+{code}");
+    let recipe = Recipe::Spatial { source: "EPSG:4979".to_owned(), target: target.clone() };
+    Pool::new(recipe).map_err(|reason| no_way(&target, reason))
+}
+
+fn no_way(target: &str, reason: String) -> CrsError {
+    CrsError::NoTransformation { source_crs: "EPSG:4979".to_owned(), target_crs: target.to_owned(), reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ellipsoid_changes_nothing() {
+        let none = HeightConverter::new(VerticalDatum::Ellipsoid).unwrap();
+        assert_eq!(none.datum_from_ellipsoid(10.0, 20.0, 30.0), Ok(30.0));
+        assert!(none.datum_from_ellipsoid(10.0, 20.0, f64::NAN).is_err());
+    }
+
+    #[test]
+    fn a_missing_grid_is_named_and_never_passed_over() {
+        let error = HeightConverter::new(VerticalDatum::Egm2008).err();
+        if let Some(error) = error {
+            assert!(error.to_string().contains("us_nga_egm08_25.tif"), "{error}");
+        }
+        // NAVD 88 needs grids that differ by region: without them the height must be lost, not kept.
+        if let Ok(converter) = HeightConverter::new(VerticalDatum::Epsg(3855)) {
+            let height = converter.datum_from_ellipsoid(-81.66, 30.34, 0.0);
+            assert!(height != Ok(0.0), "the height came through unchanged");
+        }
+        let path = Path::new("/nonexistent/grid.gtx");
+        assert!(matches!(HeightConverter::with_grid(VerticalDatum::Egm2008, path), Err(CrsError::UnusableGrid { .. })));
+    }
+
+    #[test]
+    fn both_directions_undo_each_other_and_slices_agree() {
+        let converter = HeightConverter::new(VerticalDatum::Egm96).unwrap();
+        let lon = [-81.66, 55.6, 179.95, -179.95, 0.0];
+        let lat = [30.34, -21.1, 10.0, 10.0, 89.9];
+        let mut heights = [12.5, 2340.0, -3.0, 0.0, 100.0];
+        let before = heights;
+        assert_eq!(converter.datum_from_ellipsoid_slices(&lon, &lat, &mut heights), Ok(0));
+        for i in 0..lon.len() {
+            assert_eq!(converter.datum_from_ellipsoid(lon[i], lat[i], before[i]), Ok(heights[i]));
+        }
+        assert_eq!(converter.ellipsoid_from_datum_slices(&lon, &lat, &mut heights), Ok(0));
+        for i in 0..lon.len() {
+            assert!((heights[i] - before[i]).abs() < 1e-9);
+        }
+        assert!(converter.datum_from_ellipsoid(f64::NAN, 0.0, 0.0).is_err());
+    }
+}

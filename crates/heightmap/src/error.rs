@@ -1,0 +1,78 @@
+//! What can go wrong with a height map.
+
+use crs::CrsError;
+use geodesy::GeodesyError;
+
+/// A height map that cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum HeightMapError {
+    /// The size or the resolution make no tile.
+    #[error(
+        "a tile of {size} x {size} pixels at {resolution_px_per_m} px/m: expected 1 to {most} pixels a side, and up to {widest_m} m"
+    )]
+    Tile {
+        /// Pixels along each side.
+        size: usize,
+        /// Pixels per metre.
+        resolution_px_per_m: f64,
+        /// Most pixels along a side.
+        most: usize,
+        /// Longest side, metres.
+        widest_m: f64,
+    },
+    /// The heading is no angle.
+    #[error("the heading is {heading_deg}, expected degrees clockwise from north")]
+    Heading {
+        /// As given.
+        heading_deg: f64,
+    },
+    /// The map of a CRS bends too much for an affine georeference.
+    #[error(
+        "EPSG:{epsg} bends the tile by {off_px:.3} px, at most {limit_px} px can be written as a geotransform: use --crs local"
+    )]
+    Bent {
+        /// The CRS asked for.
+        epsg: u32,
+        /// How far a corner is off, pixels.
+        off_px: f64,
+        /// The limit.
+        limit_px: f64,
+    },
+    /// A CRS that is no map in metres.
+    #[error("EPSG:{epsg} is no map in metres: use --crs local, utm or another projected CRS")]
+    NotMetric {
+        /// The CRS asked for.
+        epsg: u32,
+    },
+    /// The way between the tile and the source is not defined somewhere.
+    #[error("the source's coordinate system is not defined over the whole tile: choose another source or position")]
+    OutsideSource,
+    /// The datum's grid is not there, or not here.
+    #[error(
+        "heights above {datum} cannot be converted here (PROJ has no grid for them): install PROJ's grid, or say \
+         --source-vertical ellipsoid to take them as they are"
+    )]
+    NoDatum {
+        /// What the source's heights are above.
+        datum: String,
+    },
+    /// There is no surface under the camera.
+    #[error(
+        "the source has no height within {reach_m} m of the camera at {lon_deg}, {lat_deg}: give --dtm or --camera-height"
+    )]
+    NoGround {
+        /// How far was searched, metres.
+        reach_m: f64,
+        /// Longitude of the camera.
+        lon_deg: f64,
+        /// Latitude of the camera.
+        lat_deg: f64,
+    },
+    /// A coordinate reference system that cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// A position that is not on the Earth.
+    #[error(transparent)]
+    Position(#[from] GeodesyError),
+}

@@ -1,0 +1,414 @@
+//! The walk over the elements: what each one means where it stands, and what it leaves behind.
+
+use std::collections::HashMap;
+
+use city::{CityModel, Defect, DefectCode, GeometryKind, Lod, ModelPoint, ObjectKind, SurfaceClass, VertexPool};
+
+use super::assemble::{Group, Member, Named, Polygon, Target, assemble};
+use super::implicit::{Field, Implicit};
+use super::{Attributes, attribute};
+use crate::citymodel::CityFault;
+use crate::citymodel::builder::Builder;
+use crate::citymodel::crs_name::crs_reference;
+
+/// Properties whose child is a city object: of the model, and of a building, bridge or tunnel in CityGML 1 to 3.
+const OBJECT_PROPERTIES: [&str; 22] = [
+    "cityObjectMember",
+    "featureMember",
+    "consistsOfBuildingPart",
+    "outerBuildingInstallation",
+    "interiorBuildingInstallation",
+    "interiorRoom",
+    "interiorFurniture",
+    "roomInstallation",
+    "buildingPart",
+    "buildingInstallation",
+    "buildingRoom",
+    "buildingFurniture",
+    "buildingSubdivision",
+    "buildingConstructiveElement",
+    "consistsOfBridgePart",
+    "outerBridgeInstallation",
+    "outerBridgeConstruction",
+    "bridgePart",
+    "bridgeInstallation",
+    "consistsOfTunnelPart",
+    "outerTunnelInstallation",
+    "tunnelPart",
+];
+/// Properties whose child is a surface with a class.
+const SURFACE_PROPERTIES: [&str; 4] = ["boundedBy", "boundary", "opening", "fillingSurface"];
+/// Elements of a polygon's boundary, GML 2 and 3.
+const OUTER: [&str; 2] = ["exterior", "outerBoundaryIs"];
+const INNER: [&str; 2] = ["interior", "innerBoundaryIs"];
+
+/// Walks over the elements of a document.
+#[derive(Debug, Default)]
+pub(super) struct Walker {
+    builder: Builder,
+    pool: VertexPool,
+    stack: Vec<Frame>,
+    /// The object that the walk is in, and the class of the boundary surface.
+    object: Option<usize>,
+    class: SurfaceClass,
+    srs_name: Option<String>,
+    groups: Vec<Group>,
+    polygons: Vec<Polygon>,
+    named: HashMap<String, Named>,
+    /// Where the walk is inside of a geometry.
+    geometry: Option<Progress>,
+}
+
+/// An open element.
+#[derive(Debug)]
+struct Frame {
+    name: String,
+    id: Option<String>,
+    /// Dimension of coordinates, where it says so.
+    dimension: Option<usize>,
+    mark: Mark,
+}
+
+/// What the end of an element must undo or finish.
+#[derive(Debug)]
+enum Mark {
+    Nothing,
+    Object {
+        before: Option<usize>,
+    },
+    Class {
+        before: SurfaceClass,
+    },
+    Geometry,
+    /// Surfaces that can be linked to as a whole, with the first of their members.
+    Members {
+        first: usize,
+    },
+    Orientable {
+        before: bool,
+    },
+    Polygon,
+    Ring,
+    Positions {
+        text: String,
+    },
+    /// Text of an implicit geometry.
+    Implicit {
+        field: Field,
+        text: String,
+    },
+}
+
+/// The state inside of a geometry property.
+#[derive(Debug, Default)]
+struct Progress {
+    solids: u32,
+    shell: u32,
+    turned: bool,
+    polygon: Option<OpenPolygon>,
+    implicit: Option<Implicit>,
+}
+
+#[derive(Debug)]
+struct OpenPolygon {
+    rings: Vec<Vec<u32>>,
+    ring: Option<Vec<f64>>,
+    problem: Option<(DefectCode, String)>,
+    unclosed: usize,
+    line: usize,
+}
+
+impl Walker {
+    pub(super) fn depth(&self) -> usize {
+        self.stack.len()
+    }
+
+    pub(super) fn start(&mut self, name: &str, attributes: &Attributes, line: usize) -> Result<(), CityFault> {
+        if self.srs_name.is_none() {
+            self.srs_name = attribute(attributes, "srsName").map(str::to_owned);
+        }
+        let id = attribute(attributes, "id").map(str::to_owned);
+        let dimension = attribute(attributes, "srsDimension").and_then(|text| text.parse().ok());
+        let mark = if self.geometry.is_some() {
+            self.start_in_geometry(name, attributes, line)
+        } else {
+            self.start_outside(name, id.as_deref(), attribute(attributes, "href"), line)
+        };
+        self.stack.push(Frame { name: name.to_owned(), id, dimension, mark });
+        Ok(())
+    }
+
+    fn parent(&self) -> &str {
+        self.stack.last().map_or("", |frame| &frame.name)
+    }
+
+    fn start_outside(&mut self, name: &str, id: Option<&str>, link: Option<&str>, line: usize) -> Mark {
+        if OBJECT_PROPERTIES.contains(&self.parent()) {
+            let id = id.map_or_else(|| format!("{name} in line {line}"), str::to_owned);
+            let object = self.builder.object(id, ObjectKind::new(name.to_owned()));
+            if let Some(parent) = self.object {
+                let parent = self.builder.object_mut(parent).id.clone();
+                self.builder.parent(object, parent);
+            }
+            return Mark::Object { before: self.object.replace(object) };
+        }
+        if SURFACE_PROPERTIES.contains(&self.parent()) && name != "Envelope" && name != "Null" {
+            let before = std::mem::replace(&mut self.class, SurfaceClass::from_name(name));
+            return Mark::Class { before };
+        }
+        match (self.object, lod_of_property(name)) {
+            (Some(object), Some(lod)) => {
+                let kind = GeometryKind::MultiSurface;
+                let in_boundary = self.class != SurfaceClass::Unclassified;
+                self.groups.push(Group { object, lod, kind, in_boundary, members: Vec::new(), implicit: None, line });
+                let implicit = name.ends_with("ImplicitRepresentation").then(Implicit::default);
+                let is_link_to_surfaces = implicit.is_none();
+                self.geometry = Some(Progress { implicit, ..Progress::default() });
+                if let Some(link) = link.filter(|_| is_link_to_surfaces) {
+                    self.member(Target::Link(link.to_owned()), line);
+                }
+                Mark::Geometry
+            }
+            _ => Mark::Nothing,
+        }
+    }
+
+    fn start_in_geometry(&mut self, name: &str, attributes: &Attributes, line: usize) -> Mark {
+        let in_polygon = self.geometry.as_ref().is_some_and(|g| g.polygon.is_some());
+        let parent = self.parent().to_owned();
+        let first = self.groups.last().map_or(0, |group| group.members.len());
+        if let Some(field) = self.field(name).filter(|_| !in_polygon) {
+            return Mark::Implicit { field, text: String::new() };
+        }
+        let in_reference = name == "referencePoint" || parent == "referencePoint";
+        if let (Some(link), false) = (attribute(attributes, "href"), in_polygon || in_reference) {
+            self.member(Target::Link(link.to_owned()), line);
+        }
+        let (Some(progress), Some(group)) = (&mut self.geometry, self.groups.last_mut()) else { return Mark::Nothing };
+        match name {
+            "Solid" => {
+                group.kind = if group.kind.is_solid() { group.kind } else { GeometryKind::Solid };
+                (progress.solids, progress.shell) = (progress.solids + 1, 0);
+                Mark::Members { first }
+            }
+            "MultiSolid" => {
+                group.kind = GeometryKind::MultiSolid;
+                Mark::Members { first }
+            }
+            "CompositeSolid" => {
+                group.kind = GeometryKind::CompositeSolid;
+                Mark::Members { first }
+            }
+            "ImplicitGeometry" => {
+                progress.implicit.get_or_insert_default();
+                Mark::Nothing
+            }
+            "OrientableSurface" => {
+                let turned = attribute(attributes, "orientation") == Some("-");
+                let before = progress.turned;
+                progress.turned ^= turned;
+                Mark::Orientable { before }
+            }
+            "Polygon" | "Triangle" | "Rectangle" | "PolygonPatch" if !in_polygon => {
+                let (rings, ring) = (Vec::new(), None);
+                progress.polygon = Some(OpenPolygon { rings, ring, problem: None, unclosed: 0, line });
+                Mark::Polygon
+            }
+            "LinearRing" => match &mut progress.polygon {
+                Some(polygon) => {
+                    polygon.ring = Some(Vec::new());
+                    Mark::Ring
+                }
+                None => Mark::Nothing,
+            },
+            "posList" | "pos" | "coordinates" if in_polygon => Mark::Positions { text: String::new() },
+            _ if !in_polygon && parent == "Solid" && INNER.contains(&name) => {
+                progress.shell += 1;
+                Mark::Members { first }
+            }
+            _ if !in_polygon && !OUTER.contains(&name) => Mark::Members { first },
+            _ => Mark::Nothing,
+        }
+    }
+
+    /// What an element says about an implicit geometry.
+    fn field(&self, name: &str) -> Option<Field> {
+        self.geometry.as_ref()?.implicit.as_ref()?;
+        Field::of(name, self.stack.iter().map(|frame| frame.name.as_str()))
+    }
+
+    pub(super) fn text(&mut self, text: &str) {
+        let frame = self.stack.last_mut();
+        if let Some(Mark::Positions { text: so_far } | Mark::Implicit { text: so_far, .. }) = frame.map(|f| &mut f.mark)
+        {
+            so_far.push_str(text);
+        }
+    }
+
+    pub(super) fn end(&mut self) {
+        let Some(frame) = self.stack.pop() else { return };
+        match frame.mark {
+            Mark::Nothing => {}
+            Mark::Object { before } => self.object = before,
+            Mark::Class { before } => self.class = before,
+            Mark::Geometry => self.end_geometry(),
+            Mark::Members { first } => self.name_members(frame.id, first),
+            Mark::Orientable { before } => {
+                if let Some(progress) = &mut self.geometry {
+                    progress.turned = before;
+                }
+                let last = self.groups.last().map_or(0, |group| group.members.len());
+                self.name_members(frame.id, last.saturating_sub(1));
+            }
+            Mark::Polygon => self.end_polygon(frame.id),
+            Mark::Ring => self.end_ring(),
+            Mark::Positions { text } => {
+                let dimension = frame.dimension.or_else(|| self.stack.iter().rev().find_map(|frame| frame.dimension));
+                self.positions(&text, &frame.name, dimension.unwrap_or(3));
+            }
+            Mark::Implicit { field, text } => {
+                if let Some(implicit) = self.geometry.as_mut().and_then(|g| g.implicit.as_mut()) {
+                    implicit.take(field, &text);
+                }
+            }
+        }
+    }
+
+    /// Adds a member to the geometry that the walk is in.
+    fn member(&mut self, target: Target, line: usize) {
+        if let (Some(progress), Some(group)) = (&self.geometry, self.groups.last_mut()) {
+            let (shell, turned, class) = (progress.shell, progress.turned, self.class);
+            let solid = progress.solids.saturating_sub(1);
+            group.members.push(Member { target, solid, shell, turned, class, line });
+        }
+    }
+
+    fn name_members(&mut self, id: Option<String>, first: usize) {
+        let last = self.groups.last().map_or(0, |group| group.members.len());
+        if let (Some(id), true) = (id, first < last) {
+            let group = self.groups.len() - 1;
+            self.named.entry(id).or_insert(Named::Members { group, first, last });
+        }
+    }
+
+    fn end_geometry(&mut self) {
+        let Some(Progress { implicit, .. }) = self.geometry.take() else { return };
+        let Some(group) = self.groups.last_mut() else { return };
+        if !group.members.is_empty() {
+            group.implicit = implicit;
+            return;
+        }
+        let (code, detail) = match implicit {
+            Some(implicit) => implicit.without_shape(),
+            None => (DefectCode::EmptyPrimitive, "no surface".to_owned()),
+        };
+        let (object, place) = (group.object, format!("line {}", group.line));
+        self.builder.dropped(code, object, place, detail);
+        self.groups.pop();
+    }
+
+    /// Takes the numbers of a position or a list of them.
+    fn positions(&mut self, text: &str, element: &str, dimension: usize) {
+        let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.as_mut()) else { return };
+        let Some(ring) = &mut polygon.ring else { return };
+        if dimension != 3 {
+            let detail = format!("coordinates of {dimension} dimensions");
+            polygon.problem.get_or_insert((DefectCode::NotSupported, detail));
+            return;
+        }
+        // GML 2 separates the numbers of a tuple by commas.
+        let commas = element == "coordinates";
+        let words = text.split(|c: char| c.is_whitespace() || (commas && c == ',')).filter(|word| !word.is_empty());
+        for word in words {
+            match word.parse::<f64>() {
+                Ok(number) => ring.push(number),
+                Err(_) => {
+                    let word: String = word.chars().take(20).collect();
+                    polygon.problem.get_or_insert((DefectCode::CoordinateOutOfRange, format!("{word:?}")));
+                    return;
+                }
+            }
+        }
+    }
+
+    fn end_ring(&mut self) {
+        let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.as_mut()) else { return };
+        let numbers = polygon.ring.take().unwrap_or_default();
+        let (points, rest) = numbers.as_chunks::<3>();
+        if !rest.is_empty() {
+            let detail = format!("{} numbers are no positions of three", numbers.len());
+            polygon.problem.get_or_insert((DefectCode::CoordinateOutOfRange, detail));
+            return;
+        }
+        let open = match points {
+            [first, between @ .., last] if first == last && !between.is_empty() => &points[..points.len() - 1],
+            _ => {
+                polygon.unclosed += 1;
+                points
+            }
+        };
+        let mut ring = Vec::with_capacity(open.len());
+        for &point in open {
+            let known = self.builder.vertex_count();
+            let index = self.pool.index(ModelPoint::from(point));
+            let index =
+                index.filter(|&i| (i as usize) < known || self.builder.vertex(ModelPoint::from(point)).is_some());
+            match index.filter(|&index| self.builder.is_usable(index)) {
+                Some(index) => ring.push(index),
+                None => {
+                    polygon.problem.get_or_insert((DefectCode::CoordinateOutOfRange, format!("{point:?}")));
+                    return;
+                }
+            }
+        }
+        polygon.rings.push(ring);
+    }
+
+    fn end_polygon(&mut self, id: Option<String>) {
+        let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.take()) else { return };
+        let object = self.groups.last().map_or(0, |group| group.object);
+        let place = || match &id {
+            Some(id) => format!("line {}, {id}", polygon.line),
+            None => format!("line {}", polygon.line),
+        };
+        let nothing =
+            polygon.rings.is_empty().then(|| (DefectCode::EmptyPrimitive, "a polygon without rings".to_owned()));
+        let usable = match polygon.problem.or(nothing) {
+            Some((code, detail)) => {
+                self.builder.dropped(code, object, place(), detail);
+                false
+            }
+            None => true,
+        };
+        if usable && polygon.unclosed > 0 {
+            self.builder.note(DefectCode::RingNotClosed, Some(object), place(), "");
+        }
+        let rings = if usable { polygon.rings } else { Vec::new() };
+        let number = self.polygons.len();
+        self.polygons.push(Polygon { rings, class: self.class });
+        if let Some(id) = id.clone() {
+            if self.named.contains_key(&id) {
+                self.builder.note(DefectCode::DuplicateId, Some(object), place(), "a polygon");
+            }
+            self.named.entry(id).or_insert(Named::Polygon(number));
+        }
+        if usable {
+            self.member(Target::Polygon(number), polygon.line);
+        }
+    }
+
+    pub(super) fn finish(mut self) -> Result<(CityModel, Vec<Defect>), CityFault> {
+        self.builder.set_crs(crs_reference(self.srs_name.as_deref().unwrap_or_default()));
+        assemble(&mut self.builder, &self.groups, self.polygons, &self.named)?;
+        Ok(self.builder.finish())
+    }
+}
+
+/// The level of a property such as `lod2MultiSurface`; `None` for others and for those that hold no surfaces.
+fn lod_of_property(name: &str) -> Option<Lod> {
+    let rest = name.strip_prefix("lod")?;
+    let digit = rest.bytes().next().filter(u8::is_ascii_digit)?;
+    let curves = ["TerrainIntersection", "Curve", "Network", "Point", "RoofEdge"];
+    let holds_surfaces = !curves.iter().any(|curve| rest.contains(curve)) || rest.contains("RoofEdge");
+    holds_surfaces.then(|| Lod::new(digit - b'0', None))
+}

@@ -1,0 +1,139 @@
+//! The surfaces of a CityJSON geometry: nested boundaries unrolled, semantics laid beside them.
+
+use city::{DefectCode, Geometry, GeometryKind, Lod, Surface, SurfaceClass};
+
+use super::schema::{Nested, Semantics, Shape};
+use crate::citymodel::builder::Builder;
+
+/// Where a geometry is in the file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    pub(super) object: usize,
+    pub(super) geometry: usize,
+}
+
+impl Place {
+    fn text(self) -> String {
+        format!("geometry {}", self.geometry)
+    }
+
+    fn surface(self, surface: usize) -> String {
+        format!("geometry {}, surface {surface}", self.geometry)
+    }
+}
+
+/// The kind of a geometry of surfaces; `None` for points and lines.
+pub(super) fn surface_kind(name: &str) -> Option<GeometryKind> {
+    use GeometryKind::{CompositeSolid, CompositeSurface, MultiSolid, MultiSurface, Solid};
+    [MultiSurface, CompositeSurface, Solid, MultiSolid, CompositeSolid].into_iter().find(|kind| kind.name() == name)
+}
+
+/// Adds a geometry to its object; surfaces that cannot be used become defects.
+pub(super) fn add(builder: &mut Builder, shape: &Shape, vertex_at: impl FnMut(u64) -> Option<u32>, place: Place) {
+    let name = shape.kind.as_deref().unwrap_or_default();
+    let Some(kind) = surface_kind(name) else {
+        let detail = if name.is_empty() { "the geometry has no type" } else { name };
+        return builder.dropped(DefectCode::NotASurface, place.object, place.text(), detail);
+    };
+    let mut unroll = Unroll { builder, vertex_at, place, found: Vec::new() };
+    let depth = match kind {
+        GeometryKind::MultiSurface | GeometryKind::CompositeSurface => 0,
+        GeometryKind::Solid => 1,
+        GeometryKind::MultiSolid | GeometryKind::CompositeSolid => 2,
+    };
+    unroll.level(&shape.boundaries, depth, (0, 0), shape.semantics.as_ref().map(|s| (s, &s.values)));
+    let surfaces = unroll.found;
+    if surfaces.is_empty() {
+        return builder.dropped(DefectCode::EmptyPrimitive, place.object, place.text(), "");
+    }
+    let lod = lod_of(builder, shape, place);
+    let mut geometry = Geometry::new(lod, kind);
+    geometry.surfaces = surfaces;
+    builder.object_mut(place.object).geometries.push(geometry);
+}
+
+fn lod_of(builder: &mut Builder, shape: &Shape, place: Place) -> Option<Lod> {
+    let text = shape.lod.as_ref().map(ToString::to_string);
+    let lod = text.as_deref().and_then(|text| text.parse().ok());
+    if lod.is_none() {
+        builder.note(DefectCode::LodUnknown, Some(place.object), place.text(), text.unwrap_or_default());
+    }
+    lod
+}
+
+struct Unroll<'a, F> {
+    builder: &'a mut Builder,
+    vertex_at: F,
+    place: Place,
+    found: Vec<Surface>,
+}
+
+type Values<'a> = Option<(&'a Semantics, &'a Nested)>;
+
+impl<F: FnMut(u64) -> Option<u32>> Unroll<'_, F> {
+    /// Walks down `depth` levels of solids and shells to lists of surfaces.
+    fn level(&mut self, boundaries: &Nested, depth: u8, (solid, shell): (u32, u32), values: Values<'_>) {
+        if matches!(boundaries, Nested::List(list) if list.is_empty()) && depth == 1 {
+            let place = format!("{}, solid {solid}", self.place.text());
+            self.builder.dropped(DefectCode::EmptyPrimitive, self.place.object, place, "");
+        }
+        for (i, below) in boundaries.list().iter().enumerate() {
+            let number = i as u32;
+            let value = values.and_then(|(semantics, nested)| Some((semantics, nested.list().get(i)?)));
+            match depth {
+                0 => self.surface(below, (solid, shell), value),
+                1 => self.level(below, 0, (solid, number), value),
+                _ => self.level(below, depth - 1, (number, 0), value),
+            }
+        }
+    }
+
+    fn surface(&mut self, rings: &Nested, (solid, shell): (u32, u32), value: Values<'_>) {
+        let number = self.found.len();
+        match self.rings(rings) {
+            Ok(rings) => {
+                let class = value.map_or(SurfaceClass::Unclassified, |(s, value)| self.class(s, value, number));
+                self.found.push(Surface { rings, class, solid, shell });
+            }
+            Err((code, detail)) => {
+                self.builder.dropped(code, self.place.object, self.place.surface(number), detail);
+            }
+        }
+    }
+
+    fn rings(&mut self, rings: &Nested) -> Result<Vec<Vec<u32>>, (DefectCode, String)> {
+        let list = rings.list();
+        if list.is_empty() {
+            return Err((DefectCode::EmptyPrimitive, "a surface without rings".to_owned()));
+        }
+        list.iter().map(|ring| ring.list().iter().map(|index| self.vertex(index)).collect()).collect()
+    }
+
+    fn vertex(&mut self, index: &Nested) -> Result<u32, (DefectCode, String)> {
+        let Nested::Index(index) = *index else {
+            return Err((DefectCode::VertexOutOfRange, "a ring holds something that is no index".to_owned()));
+        };
+        let vertex =
+            (self.vertex_at)(index).ok_or_else(|| (DefectCode::VertexOutOfRange, format!("vertex {index}")))?;
+        if !self.builder.is_usable(vertex) {
+            return Err((DefectCode::CoordinateOutOfRange, format!("vertex {index}")));
+        }
+        Ok(vertex)
+    }
+
+    fn class(&mut self, semantics: &Semantics, value: &Nested, surface: usize) -> SurfaceClass {
+        let name = match value {
+            Nested::Null => return SurfaceClass::Unclassified,
+            Nested::Index(index) => usize::try_from(*index).ok().and_then(|i| semantics.surfaces.get(i)),
+            _ => None,
+        };
+        match name.and_then(|surface| surface.kind.as_deref()) {
+            Some(name) => SurfaceClass::from_name(name),
+            None => {
+                let place = self.place.surface(surface);
+                self.builder.note(DefectCode::SemanticsMismatch, Some(self.place.object), place, "");
+                SurfaceClass::Unclassified
+            }
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! CityJSON 1.0, 1.1 and 2.0, and CityJSON text sequences (CityJSONSeq), to and from a city model.
+//!
+//! A text that is no JSON, or whose members have the wrong type, is refused with its line and column. Inside a document
+//! a defect costs the surface it is in. Extensions, appearance and attributes are passed over.
+
+mod geometry;
+mod schema;
+mod template;
+mod write;
+
+use city::{ModelPoint, ObjectKind};
+
+use super::builder::Builder;
+use super::crs_name::crs_reference;
+use super::placement::Instances;
+use super::{CityFault, CityFormat, Parsed};
+use schema::{Document, Object, Pairs, Templates, Transform};
+
+pub use write::{CityJsonOptions, write_cityjson};
+
+/// Versions that are read; patch numbers may follow.
+const VERSIONS: [&str; 3] = ["1.0", "1.1", "2.0"];
+
+/// Reads a document, or the lines of a sequence.
+pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
+    let mut documents = serde_json::Deserializer::from_slice(text).into_iter::<Document>();
+    let first = match documents.next() {
+        Some(document) => document.map_err(syntax)?,
+        None => return Err(CityFault::invalid("the file is empty", "line 1")),
+    };
+    let version = check_head(&first)?;
+    let crs = first.metadata.and_then(|metadata| metadata.reference_system).unwrap_or_default();
+    let mut reader =
+        Reader { builder: Builder::default(), transform: first.transform, instances: Instances::default() };
+    reader.builder.set_crs(crs_reference(&crs));
+    reader.document(first.vertices, first.objects, first.templates.as_ref())?;
+    let mut features = 0;
+    for document in documents {
+        let place = format!("feature {}", features + 1);
+        reader.feature(document.map_err(syntax)?, first.templates.as_ref(), &place)?;
+        features += 1;
+    }
+    let format = if features == 0 { CityFormat::CityJson(version) } else { CityFormat::CityJsonSeq(version) };
+    let (model, defects) = reader.builder.finish();
+    Ok(Parsed { model, format, defects })
+}
+
+/// The error of serde_json as a fault with a place.
+fn syntax(error: serde_json::Error) -> CityFault {
+    let place = format!("line {}, column {}", error.line(), error.column());
+    let text = error.to_string();
+    let what = text.split(" at line ").next().unwrap_or_default();
+    CityFault::invalid(what, place)
+}
+
+/// The version of a document that can be read.
+fn check_head(document: &Document) -> Result<String, CityFault> {
+    match document.kind.as_deref() {
+        Some("CityJSON") => {}
+        Some("CityJSONFeature") => {
+            let what =
+                "a CityJSONFeature alone does not say where it is: put the CityJSON line of its sequence before it";
+            return Err(CityFault::unsupported(what, "type"));
+        }
+        Some(other) => {
+            let what = format!("the type is {:?}, expected CityJSON", shorten(other));
+            return Err(CityFault::unsupported(what, "type"));
+        }
+        None => return Err(CityFault::invalid("the type is missing, expected CityJSON", "type")),
+    }
+    let version = document.version.as_deref().unwrap_or_default();
+    if !VERSIONS.iter().any(|known| version == *known || version.starts_with(&format!("{known}."))) {
+        let what = format!("version {:?} of CityJSON, 1.0 to 2.0 are read: upgrade it with cjio", shorten(version));
+        return Err(CityFault::unsupported(what, "version"));
+    }
+    Ok(version.to_owned())
+}
+
+fn shorten(text: &str) -> String {
+    text.chars().take(40).collect()
+}
+
+struct Reader {
+    builder: Builder,
+    transform: Option<Transform>,
+    instances: Instances,
+}
+
+impl Reader {
+    fn feature(&mut self, feature: Document, shared: Option<&Templates>, place: &str) -> Result<(), CityFault> {
+        if feature.kind.as_deref() != Some("CityJSONFeature") {
+            return Err(CityFault::invalid("expected a CityJSONFeature", place));
+        }
+        if self.transform.is_none() {
+            let what = "the first line of the sequence has no transform, so its features have no coordinates";
+            return Err(CityFault::invalid(what, "line 1"));
+        }
+        self.document(feature.vertices, feature.objects, shared)
+    }
+
+    /// Adds the objects of a document; `vertices` are those that its boundaries count.
+    fn document(
+        &mut self,
+        vertices: Vec<[f64; 3]>,
+        objects: Option<Pairs<Object>>,
+        templates: Option<&Templates>,
+    ) -> Result<(), CityFault> {
+        let first = self.builder.vertex_count();
+        let count = vertices.len();
+        for vertex in vertices {
+            let point = self.transform.map_or(vertex, |t| apply(t, vertex));
+            let added = self.builder.vertex(ModelPoint::from(point));
+            added.ok_or_else(|| CityFault::unsupported("more than 2^32 vertices", "vertices"))?;
+        }
+        for (id, object) in objects.into_iter().flat_map(|pairs| pairs.0) {
+            let kind = object.kind.unwrap_or_else(|| "Unknown".to_owned());
+            let index = self.builder.object(id, ObjectKind::new(kind));
+            if let Some(parent) = object.parents.as_ref().and_then(|parents| parents.first()) {
+                self.builder.parent(index, parent.as_str());
+            }
+            for (number, shape) in object.geometry.iter().flatten().enumerate() {
+                let place = geometry::Place { object: index, geometry: number };
+                if shape.kind.as_deref() == Some("GeometryInstance") {
+                    let (builder, vertices) = (&mut self.builder, first..first + count);
+                    template::add_instance(builder, &mut self.instances, shape, templates, vertices, place)?;
+                } else {
+                    let vertex_at = |i: u64| usize::try_from(i).ok().filter(|&i| i < count).map(|i| (first + i) as u32);
+                    geometry::add(&mut self.builder, shape, vertex_at, place);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn apply(transform: Transform, vertex: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| vertex[i] * transform.scale[i] + transform.translate[i])
+}

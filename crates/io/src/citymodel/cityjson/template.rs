@@ -1,0 +1,79 @@
+//! Geometry templates: a shape with its own vertices, placed at a vertex of the model by a 4 × 4 matrix (row by row).
+
+use std::ops::Range;
+
+use city::DefectCode;
+
+use super::geometry::{Place, add};
+use super::schema::{Nested, Shape, Templates};
+use crate::citymodel::CityFault;
+use crate::citymodel::builder::Builder;
+use crate::citymodel::placement::{Instances, Placement};
+
+/// Adds an instance as a geometry of its own. `vertices` are those of the document in the model.
+pub(super) fn add_instance(
+    builder: &mut Builder,
+    instances: &mut Instances,
+    instance: &Shape,
+    templates: Option<&Templates>,
+    vertices: Range<usize>,
+    place: Place,
+) -> Result<(), CityFault> {
+    let at = format!("geometry {}", place.geometry);
+    let found = template(instance, templates).and_then(|(shape, all)| {
+        let [Nested::Index(anchor)] = instance.boundaries.list() else { return Err("one vertex as boundaries") };
+        let anchor = usize::try_from(*anchor).ok().filter(|&i| i < vertices.len());
+        let anchor = anchor.ok_or("a vertex of the model as boundaries")?;
+        Ok((shape, all, (vertices.start + anchor) as u32, matrix(instance)?))
+    });
+    let (shape, positions, anchor, matrix) = match found {
+        Ok(found) => found,
+        Err(missing) => {
+            let detail = format!("an instance needs {missing}");
+            builder.dropped(DefectCode::UnresolvedReference, place.object, at, detail);
+            return Ok(());
+        }
+    };
+    if !builder.is_usable(anchor) {
+        builder.dropped(DefectCode::CoordinateOutOfRange, place.object, at, "");
+        return Ok(());
+    }
+    let placement = Placement { matrix, origin: builder.position(anchor) };
+    let used = used_vertices(shape, positions.len());
+    let index_of =
+        instances.place(builder, &placement, used.into_iter().map(|index| (index as u64, positions[index])), &at)?;
+    add(builder, shape, |index| index_of.get(&index).copied(), place);
+    Ok(())
+}
+
+type Found<'a> = (&'a Shape, &'a [[f64; 3]]);
+
+fn template<'a>(instance: &Shape, templates: Option<&'a Templates>) -> Result<Found<'a>, &'static str> {
+    let index = instance.template.and_then(|index| usize::try_from(index).ok());
+    let shape = index.and_then(|index| templates?.templates.get(index)).ok_or("a template that is in the file")?;
+    if shape.kind.as_deref() == Some("GeometryInstance") {
+        return Err("a template that is no instance itself");
+    }
+    Ok((shape, templates.map_or(&[], |t| &t.vertices)))
+}
+
+fn matrix(instance: &Shape) -> Result<[f64; 16], &'static str> {
+    let matrix = instance.matrix.as_deref().and_then(|m| <[f64; 16]>::try_from(m).ok());
+    matrix.ok_or("a transformationMatrix of 16 numbers")
+}
+
+/// The vertices that a shape uses, ascending; indices that are not there are left for [`add`] to report.
+fn used_vertices(shape: &Shape, count: usize) -> Vec<usize> {
+    let mut used = Vec::new();
+    let mut open = vec![&shape.boundaries];
+    while let Some(nested) = open.pop() {
+        match nested {
+            Nested::List(list) => open.extend(list),
+            Nested::Index(index) => used.extend(usize::try_from(*index).ok().filter(|&i| i < count)),
+            Nested::Null | Nested::Other => {}
+        }
+    }
+    used.sort_unstable();
+    used.dedup();
+    used
+}

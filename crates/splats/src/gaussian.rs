@@ -1,0 +1,135 @@
+//! The Gaussian of a block.
+//!
+//! The block's sides become tangents T₁, T₂ on its plane, and the covariance is k² (T₁ T₁ᵀ + T₂ T₂ᵀ) with k the spread; from above, its
+//! footprint is k sides along columns and rows whatever the slope. Tangents of a plane that slopes both ways are not at right
+//! angles, so the own axes are the eigenvectors within the plane. The third is the normal, with a small thickness.
+
+use gaussian::{Splat, quaternion_of_axes};
+
+use super::{Block, Surface};
+
+/// How blocks become Gaussians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaussianConfig {
+    /// Standard deviation in sides of the block.
+    pub spread: f64,
+    /// Standard deviation along the normal, metres.
+    pub thickness_m: f64,
+    /// Opacity of a splat with full confidence.
+    pub opacity_max: f64,
+    /// Opacity of a splat without any.
+    pub opacity_min: f64,
+}
+
+impl Default for GaussianConfig {
+    /// Half a side: neighbours cross at 0.6 of their peak, and the corners between four are covered to 84 %.
+    fn default() -> Self {
+        Self { spread: 0.5, thickness_m: 0.02, opacity_max: 0.99, opacity_min: 0.3 }
+    }
+}
+
+impl GaussianConfig {
+    /// The opacity of a confidence in 0 to 1; full where it is not known.
+    pub fn opacity(&self, confidence: f64) -> f64 {
+        let share = if confidence.is_finite() { confidence.clamp(0.0, 1.0) } else { 1.0 };
+        self.opacity_min + (self.opacity_max - self.opacity_min) * share
+    }
+}
+
+/// The splat of a block.
+pub fn splat_of_block(
+    surface: &Surface<'_>,
+    block: &Block,
+    colour: [f32; 3],
+    confidence: f64,
+    config: &GaussianConfig,
+) -> Splat {
+    let [by_column, by_row] = surface.steps();
+    let side =
+        |step: [f64; 2], rise: f64, cells: usize| [step[0], step[1], rise].map(|c| c * cells as f64 * config.spread);
+    let first = side(by_column, block.plane.by_column_m, block.width);
+    let second = side(by_row, block.plane.by_row_m, block.height);
+    let (axes, scales) = own_axes(first, second);
+    let [column, row] = block.middle();
+    let scale = |s: f64| s.max(1e-4) as f32;
+    Splat {
+        position: surface.position(column, row, block.plane.middle_m).map(|c| c as f32),
+        scale_m: [scale(scales[0]), scale(scales[1]), scale(config.thickness_m)],
+        rotation: quaternion_of_axes(axes).map(|q| q as f32),
+        colour,
+        opacity: config.opacity(confidence).clamp(1e-3, 1.0 - 1e-3) as f32,
+    }
+}
+
+/// Own axes (the normal upwards) and standard deviations along the first two, from two tangents.
+fn own_axes(first: [f64; 3], second: [f64; 3]) -> ([[f64; 3]; 3], [f64; 2]) {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let unit = |a: [f64; 3]| {
+        let length = dot(a, a).sqrt().max(f64::MIN_POSITIVE);
+        a.map(|c| c / length)
+    };
+    let mut normal = unit(cross(first, second));
+    if normal[2] < 0.0 {
+        normal = normal.map(|c| -c);
+    }
+    let e1 = unit(first);
+    let e2 = cross(normal, e1);
+    // The covariance within the plane, in the frame (e1, e2).
+    let [a, b, d] = {
+        let (u, v) = ([dot(first, e1), dot(second, e1)], [dot(first, e2), dot(second, e2)]);
+        [u[0] * u[0] + u[1] * u[1], u[0] * v[0] + u[1] * v[1], v[0] * v[0] + v[1] * v[1]]
+    };
+    let angle = 0.5 * (2.0 * b).atan2(a - d);
+    let (sin, cos) = angle.sin_cos();
+    let t1 = [0, 1, 2].map(|i| cos * e1[i] + sin * e2[i]);
+    let t2 = cross(normal, t1);
+    let along = |s: f64, c: f64| (a * c * c + 2.0 * b * s * c + d * s * s).max(0.0).sqrt();
+    ([t1, t2, normal], [along(sin, cos), along(cos, -sin)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Plane;
+    use proptest::prelude::*;
+    use raster::{GeoTransform, Grid};
+
+    proptest! {
+        /// The covariance from above is that of the block, and the normal that of the plane, for turned grids too.
+        #[test]
+        fn the_gaussian_lies_on_its_block(
+            slope in prop::array::uniform2(-1.0..1.0f64), width in 1..20usize, height in 1..20usize, turn in 0.0..6.3f64,
+        ) {
+            let heights = Grid::filled(32, 32, 0.0f32);
+            let (s, c) = turn.sin_cos();
+            let transform = GeoTransform([10.0, 0.5 * c, 0.5 * s, 20.0, 0.5 * s, -0.5 * c]);
+            let surface = Surface::new(&heights, transform, [10.0, 20.0, 0.0]);
+            let plane = Plane { middle_m: 3.0, by_column_m: 0.5 * slope[0], by_row_m: 0.5 * slope[1] };
+            let block = Block { column: 2, row: 3, width, height, plane };
+            let config = GaussianConfig::default();
+            let splat = splat_of_block(&surface, &block, [0.5; 3], 1.0, &config);
+            prop_assert!(splat.validate().is_ok());
+            let axes = splat.axes();
+            let [step_c, step_r] = surface.steps();
+            let covariance = |i: usize, j: usize| {
+                (0..2).map(|k| f64::from(splat.scale_m[k]).powi(2) * axes[k][i] * axes[k][j]).sum::<f64>()
+            };
+            for (i, j) in [(0, 0), (0, 1), (1, 1)] {
+                let expected = 0.25 * ((width * width) as f64 * step_c[i] * step_c[j] + (height * height) as f64 * step_r[i] * step_r[j]);
+                prop_assert!((covariance(i, j) - expected).abs() < 1e-4 * (width * width + height * height) as f64);
+            }
+            let normal = splat.normal();
+            let tangent = [step_c[0], step_c[1], plane.by_column_m];
+            prop_assert!((0..3).map(|i| normal[i] * tangent[i]).sum::<f64>().abs() < 1e-5);
+            prop_assert!(normal[2] > 0.0);
+        }
+    }
+
+    #[test]
+    fn confidence_becomes_opacity() {
+        let config = GaussianConfig::default();
+        assert_eq!((config.opacity(0.0), config.opacity(2.0), config.opacity(f64::NAN)), (0.3, 0.99, 0.99));
+    }
+}

@@ -1,0 +1,433 @@
+//! From a surface and its images to splats, with a report of count against error.
+//!
+//! Cells that a view sees take its image's values; views are brought to the gain and offset of the view that sees most (median
+//! and interquartile range over the cells both see), and a cell's colour is the median of its views. The display range is
+//! that of the cells' colours without their extreme 0.25 %. Blocks are cut by heights and these colours, and the splats' colours
+//! are then fitted to the images themselves.
+
+use crs::CrsError;
+use gaussian::Splat;
+use raster::{Grid, Interpolation, sample};
+use serde::Serialize;
+
+use super::colour::FitView;
+use super::{
+    Block, ColourFit, DivisionConfig, GaussianConfig, HeightErrors, MapSplatCamera, Rendering, RpcSplatCamera, Surface,
+    divide, fit_colours, height_errors, psnr_db, render, splat_of_block, ssim, uniform, visible_cells, visible_pixels,
+};
+
+/// Share of the cells' colours that is left out at each end of the display range.
+const TAIL: f64 = 0.0025;
+/// Sides of the uniform splats that the count is compared with, cells.
+const CURVE_SIDES: [usize; 6] = [1, 2, 3, 4, 6, 8];
+
+/// How splats are made.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SplatConfig {
+    /// Bounds of the blocks.
+    pub division: DivisionConfig,
+    /// From blocks to Gaussians.
+    pub gaussian: GaussianConfig,
+    /// From images to colours.
+    pub colour: ColourFit,
+    /// Squares of this many cells instead of blocks under bounds.
+    pub uniform_side: Option<usize>,
+    /// Also measure uniform splats of several sizes.
+    pub compare: bool,
+}
+
+/// An image of the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct SplatView<'a> {
+    /// Its camera.
+    pub camera: RpcSplatCamera<'a>,
+    /// Red, green, blue in the image's own units, NaN where there is no value.
+    pub image: &'a Grid<[f32; 3]>,
+}
+
+/// Splats and what is known of them.
+#[derive(Debug, Clone)]
+pub struct SplatScene {
+    /// The splats, metres from the surface's origin.
+    pub splats: Vec<Splat>,
+    /// The block of each splat.
+    pub blocks: Vec<Block>,
+    /// Per image the splats as it sees them, in the display range.
+    pub renderings: Vec<Grid<[f32; 3]>>,
+    /// Numbers.
+    pub report: SplatReport,
+}
+
+/// Count against error.
+#[derive(Debug, Clone, Serialize)]
+pub struct SplatReport {
+    /// Cells with a height: as many as one splat per cell would be.
+    pub cells: usize,
+    /// Splats made.
+    pub splats: usize,
+    /// Largest distance of a height from the plane of its splat, metres.
+    pub plane_error_max_m: f64,
+    /// Heights rendered straight from above against the surface: mean by weight.
+    pub mean_height: Option<HeightErrors>,
+    /// … and at half of the weight.
+    pub median_height: Option<HeightErrors>,
+    /// What 0 and 1 of the display range are in the reference image's units, per channel.
+    pub display_range: [[f32; 2]; 3],
+    /// Per image how well the splats render back into it.
+    pub views: Vec<ViewReport>,
+    /// Uniform splats of several sizes, when asked for.
+    pub uniform: Vec<CurvePoint>,
+    /// Uniform splats needed for the same root mean square error of mean heights, when asked for: interpolated in the logarithms, at
+    /// most one per cell.
+    pub uniform_at_equal_rmse: Option<f64>,
+}
+
+/// One image.
+#[derive(Debug, Clone, Serialize)]
+pub struct ViewReport {
+    /// Share of the cells with a height that the view sees.
+    pub seen: f64,
+    /// Pixels that show seen cells; the numbers below are over these.
+    pub pixels: usize,
+    /// Peak signal-to-noise ratio, decibels, peak 1 of the display range.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity.
+    pub ssim: Option<f64>,
+    /// Mean accumulated weight.
+    pub coverage: f64,
+    /// Factor from this image's units to the reference's, per channel.
+    pub gain: [f32; 3],
+    /// Offset, likewise.
+    pub offset: [f32; 3],
+}
+
+/// Splats of one size.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CurvePoint {
+    /// Side of the squares, cells.
+    pub side: usize,
+    /// How many.
+    pub splats: usize,
+    /// Root mean square error of mean heights, metres.
+    pub rmse_m: f64,
+}
+
+/// Why no splats were made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SplatError {
+    /// Nothing to make splats of.
+    #[error("the surface has no height: no splats can be made")]
+    NoHeights,
+    /// A bound that bounds nothing.
+    #[error("{name} is {value}, expected a positive number")]
+    Bound {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A grid beside the surface that is not on it.
+    #[error("{what} has {found:?} cells, the surface {expected:?}: both must lie on one grid")]
+    Size {
+        /// Which.
+        what: &'static str,
+        /// Its columns and rows.
+        found: (usize, usize),
+        /// The surface's.
+        expected: (usize, usize),
+    },
+    /// An image that shows nothing of the surface.
+    #[error("image {number} shows no cell of the surface: is it of another place?")]
+    Elsewhere {
+        /// Its position in the list, from 1.
+        number: usize,
+    },
+    /// A geotransform without an inverse.
+    #[error("the geotransform of the surface is singular")]
+    Singular,
+    /// PROJ's words.
+    #[error(transparent)]
+    Geodesy(#[from] CrsError),
+}
+
+/// Makes splats of a surface and its images. `confidence` is per cell in 0 to 1, NaN where unknown.
+///
+/// # Errors
+/// A surface without heights, a bound that is not positive, a confidence of another size, an image of another place.
+pub fn make_splats(
+    surface: &Surface<'_>,
+    confidence: Option<&Grid<f32>>,
+    views: &[SplatView<'_>],
+    config: &SplatConfig,
+) -> Result<SplatScene, SplatError> {
+    check(surface, confidence, config)?;
+    let mut seen = Vec::with_capacity(views.len());
+    for (number, view) in (1..).zip(views) {
+        let one = Seen::new(surface, view)?;
+        if !one.shows.data().contains(&true) {
+            return Err(SplatError::Elsewhere { number });
+        }
+        seen.push(one);
+    }
+    let balance = balance(&seen);
+    let colours = cell_colours(surface, &seen, &balance);
+    let range = display_range(&colours);
+    let shown = colours.map(|c| displayed(*c, &range));
+    let blocks = match config.uniform_side {
+        Some(side) => uniform(surface, side),
+        None => divide(surface, (!views.is_empty()).then_some(&shown), &config.division, &config.gaussian),
+    };
+    let mut splats: Vec<Splat> =
+        blocks.iter().map(|block| first_splat(surface, block, &shown, confidence, &config.gaussian)).collect();
+    let images: Vec<Grid<[f32; 3]>> = views
+        .iter()
+        .zip(&balance)
+        .map(|(view, (gain, offset))| {
+            view.image
+                .map(|p| displayed([0, 1, 2].map(|i| gain[i] * p[i] + offset[i]), &range).map(|c| c.clamp(0.0, 1.0)))
+        })
+        .collect();
+    let mut fits = Vec::with_capacity(views.len());
+    for ((view, image), seen) in views.iter().zip(&images).zip(&seen) {
+        fits.push(FitView::new(&splats, &view.camera, image, &seen.shows)?);
+    }
+    fit_colours(&mut splats, &fits, &config.colour);
+    let mut report = heights_report(surface, &blocks, &splats, config)?;
+    report.display_range = range;
+    let mut renderings = Vec::with_capacity(views.len());
+    for (((fit, image), seen), balance) in fits.iter().zip(&images).zip(&seen).zip(&balance) {
+        let rendering = fit.render(&splats);
+        report.views.push(view_report(&rendering, image, seen, *balance, report.cells));
+        renderings.push(rendering.colour);
+    }
+    Ok(SplatScene { splats, blocks, renderings, report })
+}
+
+pub(super) fn check(
+    surface: &Surface<'_>,
+    confidence: Option<&Grid<f32>>,
+    config: &SplatConfig,
+) -> Result<(), SplatError> {
+    let bounds = [
+        ("the bound on heights", config.division.error_m),
+        ("the bound on colours", config.division.colour_error),
+        ("the spread", config.gaussian.spread),
+    ];
+    if let Some((name, value)) = bounds.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
+        return Err(SplatError::Bound { name, value });
+    }
+    let expected = (surface.heights().width(), surface.heights().height());
+    match confidence.map(|c| (c.width(), c.height())) {
+        Some(found) if found != expected => Err(SplatError::Size { what: "the confidence", found, expected }),
+        _ if surface.heights().data().iter().any(|h| h.is_finite()) => Ok(()),
+        _ => Err(SplatError::NoHeights),
+    }
+}
+
+/// What a view sees.
+struct Seen {
+    /// Values of the seen cells in the image's units, NaN elsewhere.
+    values: Grid<[f32; 3]>,
+    cells: usize,
+    /// Pixels that show them.
+    shows: Grid<bool>,
+}
+
+impl Seen {
+    fn new(surface: &Surface<'_>, view: &SplatView<'_>) -> Result<Self, SplatError> {
+        let visible = visible_cells(surface, view.camera.towards_sensor());
+        let channels = [0, 1, 2].map(|i| view.image.map(|p| p[i]));
+        let (width, height) = (visible.width(), visible.height());
+        let mut values = Grid::filled(width, height, [f32::NAN; 3]);
+        let mut cells = 0;
+        for row in 0..height {
+            let columns: Vec<usize> = (0..width).filter(|&column| visible[(column, row)]).collect();
+            let position = |&column: &usize| {
+                surface.position(column as f64, row as f64, surface.local_height(column as i64, row as i64))
+            };
+            let pixels = view.camera.pixels(columns.iter().map(position))?;
+            for (&column, [u, v]) in columns.iter().zip(pixels) {
+                let value = [0, 1, 2].map(|i| sample(&channels[i], u, v, Interpolation::Bilinear));
+                if value.iter().all(|c| c.is_finite()) {
+                    values[(column, row)] = value;
+                    cells += 1;
+                }
+            }
+        }
+        let shows = visible_pixels(surface, &visible, &view.camera)?;
+        Ok(Self { values, cells, shows })
+    }
+}
+
+type Balance = ([f32; 3], [f32; 3]);
+
+/// Gain and offset of every view that bring it to the one that sees most.
+fn balance(seen: &[Seen]) -> Vec<Balance> {
+    let Some(reference) = seen.iter().enumerate().rev().max_by_key(|(_, s)| s.cells).map(|(i, _)| i) else {
+        return Vec::new();
+    };
+    let one = |(i, view): (usize, &Seen)| {
+        let (mut gain, mut offset) = ([1.0; 3], [0.0; 3]);
+        for channel in (0..3).filter(|_| i != reference) {
+            let pairs = view.values.data().iter().zip(seen[reference].values.data());
+            let both = pairs.map(|(a, b)| (a[channel], b[channel])).filter(|(a, b)| a.is_finite() && b.is_finite());
+            let (mut own, mut other): (Vec<f32>, Vec<f32>) = both.unzip();
+            if let (Some(own), Some(other)) = (quartiles(&mut own), quartiles(&mut other)) {
+                gain[channel] = if own[2] > own[0] { (other[2] - other[0]) / (own[2] - own[0]) } else { 1.0 };
+                offset[channel] = other[1] - gain[channel] * own[1];
+            }
+        }
+        (gain, offset)
+    };
+    seen.iter().enumerate().map(one).collect()
+}
+
+fn quartiles(values: &mut [f32]) -> Option<[f32; 3]> {
+    (values.len() >= 8).then(|| [0.25, 0.5, 0.75].map(|share| order_statistic(values, share)))
+}
+
+fn order_statistic(values: &mut [f32], share: f64) -> f32 {
+    let at = (share * (values.len() - 1) as f64).round() as usize;
+    *values.select_nth_unstable_by(at, f32::total_cmp).1
+}
+
+/// The median over the views that see a cell, in the reference's units; NaN where none does.
+fn cell_colours(surface: &Surface<'_>, seen: &[Seen], balance: &[Balance]) -> Grid<[f32; 3]> {
+    let (width, height) = (surface.heights().width(), surface.heights().height());
+    let mut colours = Grid::filled(width, height, [f32::NAN; 3]);
+    let mut values = Vec::with_capacity(seen.len());
+    for (at, colour) in colours.data_mut().iter_mut().enumerate() {
+        for (channel, colour) in colour.iter_mut().enumerate() {
+            values.clear();
+            let views = seen.iter().zip(balance);
+            let all = views.map(|(s, (gain, offset))| gain[channel] * s.values.data()[at][channel] + offset[channel]);
+            values.extend(all.filter(|v| v.is_finite()));
+            values.sort_unstable_by(f32::total_cmp);
+            let n = values.len();
+            if n > 0 {
+                *colour = 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+            }
+        }
+    }
+    colours
+}
+
+pub(super) fn display_range(colours: &Grid<[f32; 3]>) -> [[f32; 2]; 3] {
+    [0, 1, 2].map(|channel| {
+        let mut values: Vec<f32> = colours.data().iter().map(|c| c[channel]).filter(|c| c.is_finite()).collect();
+        if values.is_empty() {
+            return [0.0, 1.0];
+        }
+        let [low, high] = [TAIL, 1.0 - TAIL].map(|share| order_statistic(&mut values, share));
+        if high > low { [low, high] } else { [low, low + 1.0] }
+    })
+}
+
+pub(super) fn displayed(colour: [f32; 3], range: &[[f32; 2]; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|i| (colour[i] - range[i][0]) / (range[i][1] - range[i][0]))
+}
+
+/// The splat of a block with the mean of its cells' colours and confidences; middle grey where no view sees any.
+pub(super) fn first_splat(
+    surface: &Surface<'_>,
+    block: &Block,
+    colours: &Grid<[f32; 3]>,
+    confidence: Option<&Grid<f32>>,
+    config: &GaussianConfig,
+) -> Splat {
+    let (mut sum, mut count) = ([0.0f32; 3], 0);
+    let (mut trust, mut trusted) = (0.0, 0);
+    for row in block.row..block.row + block.height {
+        for column in block.column..block.column + block.width {
+            let colour = colours[(column, row)];
+            if colour.iter().all(|c| c.is_finite()) {
+                (0..3).for_each(|i| sum[i] += colour[i].clamp(0.0, 1.0));
+                count += 1;
+            }
+            if let Some(c) = confidence.map(|c| c[(column, row)]).filter(|c| c.is_finite()) {
+                (trust, trusted) = (trust + f64::from(c), trusted + 1);
+            }
+        }
+    }
+    let colour = if count > 0 { sum.map(|s| s / count as f32) } else { [0.5; 3] };
+    let trust = if trusted > 0 { trust / f64::from(trusted) } else { f64::NAN };
+    splat_of_block(surface, block, colour, trust, config)
+}
+
+fn heights_report(
+    surface: &Surface<'_>,
+    blocks: &[Block],
+    splats: &[Splat],
+    config: &SplatConfig,
+) -> Result<SplatReport, SplatError> {
+    let camera = MapSplatCamera::new(surface).ok_or(SplatError::Singular)?;
+    let rendering = render(splats, &camera)?;
+    let height = surface.origin()[2];
+    let errors = |found: &Grid<f32>| height_errors(found, surface.heights(), height);
+    let mean_height = errors(&rendering.mean_height_m);
+    let mut curve = Vec::new();
+    for side in CURVE_SIDES.into_iter().filter(|_| config.compare) {
+        let gaussian = GaussianConfig { opacity_min: config.gaussian.opacity_max, ..config.gaussian };
+        let some: Vec<Splat> =
+            uniform(surface, side).iter().map(|b| splat_of_block(surface, b, [0.5; 3], 1.0, &gaussian)).collect();
+        if let Some(found) = errors(&render(&some, &camera)?.mean_height_m) {
+            curve.push(CurvePoint { side, splats: some.len(), rmse_m: found.rmse_m });
+        }
+    }
+    Ok(SplatReport {
+        cells: surface.heights().data().iter().filter(|h| h.is_finite()).count(),
+        splats: splats.len(),
+        plane_error_max_m: blocks.iter().map(|block| plane_error(surface, block)).fold(0.0, f64::max),
+        mean_height,
+        median_height: errors(&rendering.median_height_m),
+        display_range: [[0.0, 1.0]; 3],
+        views: Vec::new(),
+        uniform_at_equal_rmse: mean_height.and_then(|errors| count_at(&curve, errors.rmse_m)),
+        uniform: curve,
+    })
+}
+
+fn plane_error(surface: &Surface<'_>, block: &Block) -> f64 {
+    let rows = block.row..block.row + block.height;
+    let cells = rows.flat_map(|row| (block.column..block.column + block.width).map(move |column| (column, row)));
+    let error = |(column, row): (usize, usize)| {
+        surface.local_height(column as i64, row as i64) - block.height_at(column as f64, row as f64)
+    };
+    cells.map(|cell| error(cell).abs()).fold(0.0, f64::max)
+}
+
+/// The number of uniform splats at an error, between the points of the curve.
+fn count_at(curve: &[CurvePoint], rmse_m: f64) -> Option<f64> {
+    let (first, last) = (curve.first()?, curve.last()?);
+    if rmse_m <= first.rmse_m {
+        return Some(first.splats as f64);
+    }
+    let between = curve.windows(2).find(|pair| pair[0].rmse_m <= rmse_m && rmse_m <= pair[1].rmse_m);
+    Some(between.map_or(last.splats as f64, |pair| {
+        let [a, b] = [pair[0], pair[1]];
+        let span = (b.rmse_m / a.rmse_m).ln();
+        let share = if span > 0.0 { (rmse_m / a.rmse_m).ln() / span } else { 0.0 };
+        (a.splats as f64).powf(1.0 - share) * (b.splats as f64).powf(share)
+    }))
+}
+
+fn view_report(
+    rendering: &Rendering,
+    image: &Grid<[f32; 3]>,
+    seen: &Seen,
+    (gain, offset): Balance,
+    cells: usize,
+) -> ViewReport {
+    let pixels = seen.shows.data().iter().filter(|s| **s).count();
+    let covered = rendering.coverage.data().iter().zip(seen.shows.data()).filter(|(_, s)| **s);
+    ViewReport {
+        seen: seen.cells as f64 / cells.max(1) as f64,
+        pixels,
+        psnr_db: psnr_db(&rendering.colour, image, &seen.shows),
+        ssim: ssim(&rendering.colour, image, &seen.shows),
+        coverage: covered.map(|(c, _)| f64::from(*c)).sum::<f64>() / pixels.max(1) as f64,
+        gain,
+        offset,
+    }
+}
