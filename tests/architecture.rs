@@ -38,12 +38,8 @@ const FLOORS: [(&str, u8); 23] = [
 ];
 
 /// Foreign packages that only one crate may use: (package, its home).
-const HOMES: [(&str, &str); 4] = [
-    ("gdal", "skysweep-io"),
-    ("gdal-sys", "skysweep-io"),
-    ("proj", "skysweep-crs"),
-    ("proj-sys", "skysweep-crs"),
-];
+const HOMES: [(&str, &str); 4] =
+    [("gdal", "skysweep-io"), ("gdal-sys", "skysweep-io"), ("proj", "skysweep-crs"), ("proj-sys", "skysweep-crs")];
 
 /// Folders under `crates/` whose sources may touch the file system.
 const FILE_CRATES: [&str; 3] = ["io", "jobs", "cli"];

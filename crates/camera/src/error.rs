@@ -35,14 +35,6 @@ pub enum CameraError {
     /// The image does not change in one direction on the ground, so that the inverse does not exist.
     #[error("the camera's Jacobian is singular at this point")]
     Singular,
-    /// The slices given to a batch function differ in length.
-    #[error("slices of {found} elements found where {expected} were expected: give all of them the same length")]
-    Length {
-        /// Length of the first input.
-        expected: usize,
-        /// The length that differs from it.
-        found: usize,
-    },
 }
 
 /// Why coefficients are no usable RPC.

@@ -25,8 +25,8 @@ impl Rpc {
         check_reach(l, p)?;
         let by_unit = [1.0 / self.long_scale, 1.0 / self.lat_scale, 1.0 / self.height_scale];
         let row = |num: &[f64; 20], den: &[f64; 20], scale: f64| {
-            let [n, n_l, n_p] = plane_gradient::<false>(&at_height::<false>(num, h), l, p);
-            let [d, d_l, d_p] = plane_gradient::<false>(&at_height::<false>(den, h), l, p);
+            let [n, n_l, n_p] = plane_gradient(&at_height(num, h), l, p);
+            let [d, d_l, d_p] = plane_gradient(&at_height(den, h), l, p);
             check_ratio(n, d)?;
             let (n_h, d_h) = (derivative_by_height(num, l, p, h), derivative_by_height(den, l, p, h));
             let by = |n_x: f64, d_x: f64, unit: f64| scale * (n_x - n / d * d_x) / d * unit;

@@ -4,19 +4,15 @@
 //! at (0, 0). Ground coordinates are [`geodesy::LonLatHeight`]: degrees, and metres above the WGS 84 ellipsoid.
 //!
 //! - [`Rpc`] projects and localises, [`RpcPlane`] does so at one height, [`RpcCamera`] adds an [`ImageCorrection`].
-//! - [`TileInterpolant`] replaces a chain of cameras on a tile, with a measured error.
 //! - [`RpcFit`] fits an RPC to correspondences or to any camera.
 //! - [`Rpc::validate`] tells coefficients that can be a camera from those that cannot, [`Rpc::domain`] where they hold.
 
-mod batch;
 mod camera;
 mod correction;
 mod domain;
 mod error;
 mod fit;
-mod interpolant;
 mod jacobian;
-mod kernel;
 mod localize;
 mod perspective;
 mod plane;
@@ -31,7 +27,6 @@ pub use correction::ImageCorrection;
 pub use domain::ValidityDomain;
 pub use error::{CameraError, Key, RpcError};
 pub use fit::{Correspondence, FitError, RpcFit};
-pub use interpolant::{DEFAULT_TOLERANCE_PX, InterpolantError, RowInterpolant, TileExtent, TileInterpolant};
 pub use jacobian::ImageFromGroundJacobian;
 pub use perspective::{Lens, LensError, LensModel, Pose};
 pub use plane::{EXTRAPOLATION_MAX, RpcPlane};

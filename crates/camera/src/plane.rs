@@ -54,12 +54,7 @@ impl Rpc {
     /// The model at one height, metres above the ellipsoid.
     pub fn plane(&self, height_m: f64) -> RpcPlane {
         let h = (height_m - self.height_off) / self.height_scale;
-        let ratio = |off, scale, num, den| PlaneRatio {
-            off,
-            scale,
-            num: at_height::<false>(num, h),
-            den: at_height::<false>(den, h),
-        };
+        let ratio = |off, scale, num, den| PlaneRatio { off, scale, num: at_height(num, h), den: at_height(den, h) };
         RpcPlane {
             height_m,
             long_off: self.long_off,
@@ -122,16 +117,16 @@ impl PlaneSample {
 
 impl PlaneRatio {
     fn value(&self, l: f64, p: f64) -> Result<f64, CameraError> {
-        let n = plane_value::<false>(&self.num, l, p);
-        let d = plane_value::<false>(&self.den, l, p);
+        let n = plane_value(&self.num, l, p);
+        let d = plane_value(&self.den, l, p);
         check_ratio(n, d)?;
         Ok(self.off + self.scale * (n / d))
     }
 
     /// Value, derivatives by L and P, denominator.
     fn gradient(&self, l: f64, p: f64) -> Result<(f64, [f64; 2], f64), CameraError> {
-        let [n, n_l, n_p] = plane_gradient::<false>(&self.num, l, p);
-        let [d, d_l, d_p] = plane_gradient::<false>(&self.den, l, p);
+        let [n, n_l, n_p] = plane_gradient(&self.num, l, p);
+        let [d, d_l, d_p] = plane_gradient(&self.den, l, p);
         check_ratio(n, d)?;
         let r = n / d;
         Ok((self.off + self.scale * r, [self.scale * (n_l - r * d_l) / d, self.scale * (n_p - r * d_p) / d], d))

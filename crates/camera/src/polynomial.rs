@@ -1,29 +1,27 @@
-//! The RPC00B cubic and its derivatives, written once for the scalar and the vectorised forms.
+//! The RPC00B cubic and its derivatives.
 //!
 //! Terms: 1, L, P, H, LP, LH, PH, L², P², H², PLH, L³, LP², LH², L²P, P³, PH², L²H, P²H, H³ of the normalised
-//! longitude, latitude and height. `FMA` chooses fused multiply-add where the processor has it: such results differ
-//! in the last bits from those without.
+//! longitude, latitude and height.
 
-/// `a · b + c`.
+/// Returns `a · b + c` with two roundings. A fused multiply-add would give other last bits on processors that have it.
 #[inline(always)]
-pub(crate) fn mul_add<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FMA { a.mul_add(b, c) } else { a * b + c }
+fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+    a * b + c
 }
 
 /// A cubic at one normalised height: 1, L, P, LP, L², P², L³, LP², L²P, P³.
 pub(crate) type PlaneCubic = [f64; 10];
 
-/// The ten terms left of a cubic when the height is fixed; exact.
+/// Returns the ten coefficients that are left when the height of a cubic is fixed. The reduction is exact.
 #[inline(always)]
-pub(crate) fn at_height<const FMA: bool>(c: &[f64; 20], h: f64) -> PlaneCubic {
-    let f = mul_add::<FMA>;
+pub(crate) fn at_height(c: &[f64; 20], h: f64) -> PlaneCubic {
     [
-        f(h, f(h, f(h, c[19], c[9]), c[3]), c[0]),
-        f(h, f(h, c[13], c[5]), c[1]),
-        f(h, f(h, c[16], c[6]), c[2]),
-        f(h, c[10], c[4]),
-        f(h, c[17], c[7]),
-        f(h, c[18], c[8]),
+        mul_add(h, mul_add(h, mul_add(h, c[19], c[9]), c[3]), c[0]),
+        mul_add(h, mul_add(h, c[13], c[5]), c[1]),
+        mul_add(h, mul_add(h, c[16], c[6]), c[2]),
+        mul_add(h, c[10], c[4]),
+        mul_add(h, c[17], c[7]),
+        mul_add(h, c[18], c[8]),
         c[11],
         c[12],
         c[14],
@@ -33,27 +31,25 @@ pub(crate) fn at_height<const FMA: bool>(c: &[f64; 20], h: f64) -> PlaneCubic {
 
 /// Value of a cubic whose height has been fixed.
 #[inline(always)]
-pub(crate) fn plane_value<const FMA: bool>(q: &PlaneCubic, l: f64, p: f64) -> f64 {
-    let f = mul_add::<FMA>;
+pub(crate) fn plane_value(q: &PlaneCubic, l: f64, p: f64) -> f64 {
     // Nested in P, each coefficient a polynomial of L.
-    let q0 = f(l, f(l, f(l, q[6], q[4]), q[1]), q[0]);
-    let q1 = f(l, f(l, q[8], q[3]), q[2]);
-    let q2 = f(l, q[7], q[5]);
-    f(p, f(p, f(p, q[9], q2), q1), q0)
+    let q0 = mul_add(l, mul_add(l, mul_add(l, q[6], q[4]), q[1]), q[0]);
+    let q1 = mul_add(l, mul_add(l, q[8], q[3]), q[2]);
+    let q2 = mul_add(l, q[7], q[5]);
+    mul_add(p, mul_add(p, mul_add(p, q[9], q2), q1), q0)
 }
 
 /// Value of a cubic whose height has been fixed, and its derivatives by L and P.
 #[inline(always)]
-pub(crate) fn plane_gradient<const FMA: bool>(q: &PlaneCubic, l: f64, p: f64) -> [f64; 3] {
-    let f = mul_add::<FMA>;
-    let q0 = f(l, f(l, f(l, q[6], q[4]), q[1]), q[0]);
-    let q1 = f(l, f(l, q[8], q[3]), q[2]);
-    let q2 = f(l, q[7], q[5]);
-    let value = f(p, f(p, f(p, q[9], q2), q1), q0);
-    let d0 = f(l, f(l, 3.0 * q[6], 2.0 * q[4]), q[1]);
-    let d1 = f(l, 2.0 * q[8], q[3]);
-    let d_l = f(p, f(p, q[7], d1), d0);
-    let d_p = f(p, f(p, 3.0 * q[9], 2.0 * q2), q1);
+pub(crate) fn plane_gradient(q: &PlaneCubic, l: f64, p: f64) -> [f64; 3] {
+    let q0 = mul_add(l, mul_add(l, mul_add(l, q[6], q[4]), q[1]), q[0]);
+    let q1 = mul_add(l, mul_add(l, q[8], q[3]), q[2]);
+    let q2 = mul_add(l, q[7], q[5]);
+    let value = mul_add(p, mul_add(p, mul_add(p, q[9], q2), q1), q0);
+    let d0 = mul_add(l, mul_add(l, 3.0 * q[6], 2.0 * q[4]), q[1]);
+    let d1 = mul_add(l, 2.0 * q[8], q[3]);
+    let d_l = mul_add(p, mul_add(p, q[7], d1), d0);
+    let d_p = mul_add(p, mul_add(p, 3.0 * q[9], 2.0 * q2), q1);
     [value, d_l, d_p]
 }
 
@@ -105,10 +101,10 @@ mod tests {
             (4.0 * d(0.05) - d(0.1)) / 3.0
         };
         for (l, p, h) in [(0.3, -0.7, 0.9), (-1.2, 0.4, -0.6), (0.0, 1.0, 2.0)] {
-            let q = at_height::<false>(&c, h);
-            let [value, d_l, d_p] = plane_gradient::<false>(&q, l, p);
+            let q = at_height(&c, h);
+            let [value, d_l, d_p] = plane_gradient(&q, l, p);
             assert!((value - sum(l, p, h)).abs() < 1e-12);
-            assert!((plane_value::<true>(&at_height::<true>(&c, h), l, p) - value).abs() < 1e-12);
+            assert!((plane_value(&at_height(&c, h), l, p) - value).abs() < 1e-12);
             assert!((d_l - derivative(&|e| sum(l + e, p, h))).abs() < 1e-10);
             assert!((d_p - derivative(&|e| sum(l, p + e, h))).abs() < 1e-10);
             assert!((derivative_by_height(&c, l, p, h) - derivative(&|e| sum(l, p, h + e))).abs() < 1e-10);
