@@ -1,18 +1,48 @@
-//! How an error reaches the user: `error: what happened`, then one indented line per cause, on standard error.
+//! How an error reaches the user: `error: what happened`, one indented line per cause, and a hint that names an option.
 
+use std::fmt;
 use std::io::{ErrorKind, Write};
 
-/// Whether the reader of our output went away (`skysweep … | head`), which is no error of ours.
+/// Hint for an output that exists.
+pub(crate) const OVERWRITE: &str = "nothing was written: give --overwrite to replace it";
+
+/// Advice that names options of the command line; errors of the library do not know them.
+#[derive(Debug)]
+struct Hint(String);
+
+impl fmt::Display for Hint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// Adds a hint to an error of the library, where there is one.
+pub(crate) fn with_hint<E>(error: E, hint: Option<impl Into<String>>) -> anyhow::Error
+where
+    E: std::error::Error + Send + Sync + 'static,
+{
+    match hint {
+        Some(hint) => anyhow::Error::new(error).context(Hint(hint.into())),
+        None => error.into(),
+    }
+}
+
+/// Whether the reader of our output went away (`skysweep … | head`), which is not our error.
 pub(crate) fn is_closed_pipe(e: &anyhow::Error) -> bool {
     e.chain().filter_map(|cause| cause.downcast_ref::<std::io::Error>()).any(|io| io.kind() == ErrorKind::BrokenPipe)
 }
 
-/// Writes the error and its causes to standard error.
+/// Writes the error, its causes and its hint to standard error.
 pub(crate) fn report(e: &anyhow::Error) {
-    let mut text = format!("error: {e}\n");
-    for cause in e.chain().skip(1) {
+    let hint = e.downcast_ref::<Hint>();
+    let mut causes = e.chain().skip(usize::from(hint.is_some()));
+    let mut text = causes.next().map(|first| format!("error: {first}\n")).unwrap_or_default();
+    for cause in causes {
         text.push_str(&format!("  caused by: {cause}\n"));
     }
-    // Where even standard error is closed, the exit code is all that is left to say it with.
+    if let Some(hint) = hint {
+        text.push_str(&format!("  hint: {hint}\n"));
+    }
+    // Where even standard error is closed, only the exit code is left.
     let _ = std::io::stderr().write_all(text.as_bytes());
 }

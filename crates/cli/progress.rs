@@ -100,3 +100,20 @@ impl Progress for Watcher {
         }
     }
 }
+
+/// Passes the warnings of a job without visible stages to the log.
+pub(crate) struct Log;
+
+impl Progress for Log {
+    fn begin(&self, _: &str, _: usize) {}
+
+    fn step(&self) {}
+
+    fn choice(&self, choice: &Choice) {
+        tracing::info!("{}: {} ({})", choice.name, choice.value, choice.reason);
+    }
+
+    fn warn(&self, text: &str) {
+        tracing::warn!("{text}");
+    }
+}

@@ -1,18 +1,25 @@
 //! `skysweep rpc`: show, use and convert RPC camera models.
 //!
-//! Image coordinates are sample (column) and line (row) with the centre of the upper-left pixel at (0, 0); ground
-//! coordinates are WGS 84 longitude and latitude in degrees and the height above the ellipsoid in metres.
+//! `project` and `localize` take one point from the options, or many from a file or standard input. A point without an
+//! answer gives `nan nan` (in JSON an `error`), a line on standard error, and exit code 1 at the end.
 
-mod info;
-mod points;
-
+use std::fmt::Write as _;
+use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use camera::ImagePoint;
 use clap::ValueEnum;
-use io::rpc::{Existing, RpcFile, RpcFormat};
+use geodesy::LonLatHeight;
+use io::rpc::{RpcFormat, RpcWriteError};
+use jobs::rpc::{
+    RpcConvertConfig, RpcDirection, RpcError, RpcInfoConfig, RpcInfoReport, RpcLineAnswer, RpcLinesConfig, RpcPoint,
+    RpcPointsConfig, RpcQuery,
+};
+use serde_json::{Value, json};
 
-use crate::Outcome;
+use crate::error::{OVERWRITE, with_hint};
+use crate::progress::Log;
+use crate::{Outcome, print};
 
 /// Arguments of `skysweep rpc`.
 #[derive(Debug, clap::Args)]
@@ -24,16 +31,66 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     /// Show the RPC of a file: format, offsets and scales, validity box, ground sampling distance, viewing angles.
-    Info(info::Args),
+    Info(InfoArgs),
     /// Project ground points into the image.
-    Project(points::ProjectArgs),
+    Project(ProjectArgs),
     /// Find the ground point that is seen at an image position, at a given height.
-    Localize(points::LocalizeArgs),
+    Localize(LocalizeArgs),
     /// Write the RPC in another format.
     Convert(ConvertArgs),
 }
 
-/// Arguments of `skysweep rpc convert`.
+#[derive(Debug, clap::Args)]
+struct InfoArgs {
+    /// RPC file, or image with an RPC.
+    file: PathBuf,
+    /// Print JSON for programs.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+struct ProjectArgs {
+    /// RPC file, or image with an RPC.
+    file: PathBuf,
+    /// Longitude, degrees.
+    #[arg(long, requires_all = ["lat", "height"], allow_negative_numbers = true)]
+    lon: Option<f64>,
+    /// Latitude, degrees.
+    #[arg(long, requires = "lon", allow_negative_numbers = true)]
+    lat: Option<f64>,
+    /// Height above the WGS 84 ellipsoid, metres.
+    #[arg(long, requires = "lon", allow_negative_numbers = true)]
+    height: Option<f64>,
+    /// File with a point per line: longitude latitude height; - is standard input [default: -].
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["lon", "lat", "height"])]
+    points: Option<PathBuf>,
+    /// Print one JSON object per point.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+struct LocalizeArgs {
+    /// RPC file, or image with an RPC.
+    file: PathBuf,
+    /// Column; 0 is the centre of the first.
+    #[arg(long, requires_all = ["line", "height"], allow_negative_numbers = true)]
+    sample: Option<f64>,
+    /// Row; 0 is the centre of the first.
+    #[arg(long, requires = "sample", allow_negative_numbers = true)]
+    line: Option<f64>,
+    /// Height above the WGS 84 ellipsoid, metres.
+    #[arg(long, requires = "sample", allow_negative_numbers = true)]
+    height: Option<f64>,
+    /// File with a point per line: sample line height; - is standard input [default: -].
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["sample", "line", "height"])]
+    points: Option<PathBuf>,
+    /// Print one JSON object per point.
+    #[arg(long)]
+    json: bool,
+}
+
 #[derive(Debug, clap::Args)]
 struct ConvertArgs {
     /// RPC file, or image with an RPC.
@@ -62,46 +119,149 @@ enum OutputFormat {
 /// Runs `skysweep rpc`.
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     match &args.command {
-        Command::Info(args) => info::run(args),
-        Command::Project(args) => points::project(args),
-        Command::Localize(args) => points::localize(args),
+        Command::Info(args) => info(args),
+        Command::Project(args) => project(args),
+        Command::Localize(args) => localize(args),
         Command::Convert(args) => convert(args),
     }
 }
 
-/// Reads the RPC of a file and tells its warnings to the log.
-fn read(path: &Path) -> anyhow::Result<RpcFile> {
-    let file = io::rpc::read(path)?;
-    for warning in &file.warnings {
-        tracing::warn!("{}: {warning}", file.source.display());
+fn info(args: &InfoArgs) -> anyhow::Result<Outcome> {
+    let report = jobs::rpc::info(&RpcInfoConfig::new(args.file.clone()), &Log)?;
+    tracing::info!("{}: {}", report.source, report.format);
+    if args.json {
+        print::json(&report)?;
+    } else {
+        print::text(&info_text(&report))?;
     }
-    tracing::info!("{}: {}", file.source.display(), file.format);
-    Ok(file)
+    Ok(Outcome::Complete)
 }
 
 fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
-    let format = match args.format {
-        Some(OutputFormat::Text) => RpcFormat::Text,
-        Some(OutputFormat::Rpb) => RpcFormat::Rpb,
-        Some(OutputFormat::Json) => RpcFormat::Json,
-        None => format_of(&args.output)?,
-    };
-    let file = read(&args.file)?;
-    let existing = if args.overwrite { Existing::Replace } else { Existing::Keep };
-    match io::rpc::write(&args.output, &file.rpc, format, existing) {
-        Err(e @ io::rpc::RpcWriteError::Exists { .. }) => {
-            Err(e).context("nothing was written: give --overwrite to replace")
-        }
-        result => Ok(result.map(|()| Outcome::Complete)?),
-    }
+    let mut config = RpcConvertConfig::new(args.file.clone(), args.output.clone());
+    config.overwrite = args.overwrite;
+    config.format = args.format.map(|format| match format {
+        OutputFormat::Text => RpcFormat::Text,
+        OutputFormat::Rpb => RpcFormat::Rpb,
+        OutputFormat::Json => RpcFormat::Json,
+    });
+    let report = jobs::rpc::convert(&config, &Log).map_err(|error| {
+        let hint = match &error {
+            RpcError::Write(RpcWriteError::Exists { .. }) => Some(OVERWRITE),
+            RpcError::UnknownEnding { .. } => Some("give --format text, rpb or json"),
+            _ => None,
+        };
+        with_hint(error, hint)
+    })?;
+    tracing::info!("{}: {}", report.source.display(), report.source_format);
+    Ok(Outcome::Complete)
 }
 
-fn format_of(output: &Path) -> anyhow::Result<RpcFormat> {
-    let ending = output.extension().map(|e| e.to_string_lossy().to_lowercase());
-    match ending.as_deref() {
-        Some("txt" | "rpc") => Ok(RpcFormat::Text),
-        Some("rpb") => Ok(RpcFormat::Rpb),
-        Some("json") => Ok(RpcFormat::Json),
-        _ => bail!("no format belongs to the ending of {}: give --format text, rpb or json", output.display()),
+fn project(args: &ProjectArgs) -> anyhow::Result<Outcome> {
+    let query = match (args.lon, args.lat, args.height) {
+        (Some(lon), Some(lat), Some(height)) => Some(RpcQuery::Project(LonLatHeight::new(lon, lat, height))),
+        _ => None,
+    };
+    answer(&args.file, RpcDirection::Project, query, args.points.as_deref(), args.json)
+}
+
+fn localize(args: &LocalizeArgs) -> anyhow::Result<Outcome> {
+    let query = match (args.sample, args.line, args.height) {
+        (Some(sample), Some(line), Some(height_m)) => {
+            Some(RpcQuery::Localize { image: ImagePoint::new(sample, line), height_m })
+        }
+        _ => None,
+    };
+    answer(&args.file, RpcDirection::Localize, query, args.points.as_deref(), args.json)
+}
+
+fn answer(
+    file: &Path,
+    direction: RpcDirection,
+    query: Option<RpcQuery>,
+    points: Option<&Path>,
+    json: bool,
+) -> anyhow::Result<Outcome> {
+    if let Some(query) = query {
+        let report = jobs::rpc::points(&RpcPointsConfig::new(file.to_owned(), vec![query]), &Log)?;
+        let lines: String = report.points.iter().map(|point| point_line(direction, point, json) + "\n").collect();
+        print::text(&lines)?;
+        return Ok(Outcome::Complete);
     }
+    let mut input: Box<dyn BufRead> = match points.filter(|path| *path != Path::new("-")) {
+        Some(path) => jobs::rpc::open_lines(path)?,
+        None => Box::new(std::io::stdin().lock()),
+    };
+    let mut output = std::io::BufWriter::new(std::io::stdout().lock());
+    let mut receive = |answer: RpcLineAnswer| {
+        let text = match &answer.point {
+            Ok(point) => point_line(direction, point, json),
+            Err(e) => {
+                tracing::warn!("line {}: {e}", answer.line);
+                if json { json!({ "error": e.to_string() }).to_string() } else { "nan nan".to_owned() }
+            }
+        };
+        writeln!(output, "{text}")
+    };
+    let config = RpcLinesConfig::new(file.to_owned(), direction);
+    let report = jobs::rpc::answer_lines(&config, &mut *input, &mut receive, &Log)?;
+    output.flush()?;
+    if report.failed == 0 {
+        return Ok(Outcome::Complete);
+    }
+    tracing::error!("{} points have no answer", report.failed);
+    Ok(Outcome::Partial)
+}
+
+fn point_line(direction: RpcDirection, RpcPoint { ground, image }: &RpcPoint, json: bool) -> String {
+    let (lon, lat, height) = (ground.lon_deg, ground.lat_deg, ground.height_m);
+    let (sample, line) = (image.sample, image.line);
+    let value: Value = match direction {
+        RpcDirection::Project if !json => return format!("{sample:.9} {line:.9}"),
+        RpcDirection::Localize if !json => return format!("{lon:.12} {lat:.12} {height}"),
+        RpcDirection::Project => {
+            json!({ "lon_deg": lon, "lat_deg": lat, "height_m": height, "sample": sample, "line": line })
+        }
+        RpcDirection::Localize => {
+            json!({ "sample": sample, "line": line, "lon_deg": lon, "lat_deg": lat, "height_m": height })
+        }
+    };
+    value.to_string()
+}
+
+fn info_text(info: &RpcInfoReport) -> String {
+    let rpc = &info.rpc;
+    let mut out = String::new();
+    let mut row = |name: &str, value: String| {
+        let _ = writeln!(out, "{name:<12}{value}");
+    };
+    row("file", info.file.clone());
+    row("format", info.format.to_string());
+    if info.source != info.file {
+        row("source", info.source.clone());
+    }
+    for (name, off, scale, unit) in [
+        ("line", rpc.line_off, rpc.line_scale, "px"),
+        ("sample", rpc.samp_off, rpc.samp_scale, "px"),
+        ("latitude", rpc.lat_off, rpc.lat_scale, "deg"),
+        ("longitude", rpc.long_off, rpc.long_scale, "deg"),
+        ("height", rpc.height_off, rpc.height_scale, "m"),
+    ] {
+        row(name, format!("offset {off}, scale {scale} {unit}"));
+    }
+    for (name, error) in [("bias error", rpc.err_bias_m), ("rand error", rpc.err_rand_m)] {
+        if let Some(error) = error {
+            row(name, format!("{error} m"));
+        }
+    }
+    let v = &info.validity;
+    row("valid for", format!("longitude {:.6} to {:.6} deg", v.lon_deg[0], v.lon_deg[1]));
+    row("", format!("latitude {:.6} to {:.6} deg", v.lat_deg[0], v.lat_deg[1]));
+    row("", format!("height {:.1} to {:.1} m above the ellipsoid", v.height_m[0], v.height_m[1]));
+    if let Some(c) = &info.centre {
+        row("centre", format!("sample {:.2}, line {:.2}", c.image.sample, c.image.line));
+        row("GSD", format!("{:.3} m along the sample, {:.3} m along the line", c.gsd_sample_m, c.gsd_line_m));
+        row("view", format!("incidence {:.2} deg, sensor at azimuth {:.1} deg", c.incidence_deg, c.azimuth_deg));
+    }
+    out
 }

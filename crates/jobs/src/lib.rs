@@ -2,4 +2,6 @@
 
 pub mod dsm;
 mod error;
+pub mod files;
 pub mod progress;
+pub mod rpc;

@@ -10,6 +10,10 @@ pub trait Progress: Sync {
     fn choice(&self, choice: &Choice);
     /// Something the user should know, though the job goes on.
     fn warn(&self, text: &str);
+    /// Whether the job is to stop at its next step.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// An automatic or given choice and why it was made.

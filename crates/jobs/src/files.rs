@@ -1,0 +1,74 @@
+//! What all jobs do with files in the same way: refuse to replace, make folders, read text, write JSON.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use io::raster::RasterError;
+use serde::Serialize;
+
+/// A file or folder that a job could not read or write.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileError {
+    /// The output exists and the configuration does not allow to replace it.
+    #[error("the output exists already: {}", path.display())]
+    Exists {
+        /// The file that would be replaced.
+        path: PathBuf,
+    },
+    /// A file cannot be read.
+    #[error("cannot read the file: {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Reason given by the operating system.
+        source: std::io::Error,
+    },
+    /// A folder cannot be read or made.
+    #[error("cannot make the folder: {}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// Reason given by the operating system.
+        source: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(RasterError),
+    /// A report cannot be written as JSON.
+    #[error("cannot write the report as JSON")]
+    Json(#[from] serde_json::Error),
+}
+
+impl From<RasterError> for FileError {
+    fn from(error: RasterError) -> Self {
+        match error {
+            RasterError::Exists { path } => Self::Exists { path },
+            other => Self::Write(other),
+        }
+    }
+}
+
+/// Fails when `path` exists and must not be replaced, so that a job stops before it computes.
+pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), FileError> {
+    if !overwrite && path.symlink_metadata().is_ok() {
+        return Err(FileError::Exists { path: path.to_owned() });
+    }
+    Ok(())
+}
+
+/// Makes a folder and the folders above it.
+pub(crate) fn create_folder(path: &Path) -> Result<(), FileError> {
+    fs::create_dir_all(path).map_err(|source| FileError::Folder { path: path.to_owned(), source })
+}
+
+/// Reads a text file.
+pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
+    fs::read_to_string(path).map_err(|source| FileError::Read { path: path.to_owned(), source })
+}
+
+/// Writes a value as indented JSON with a newline at the end. The file appears complete or not at all.
+pub(crate) fn write_json(path: &Path, value: &impl Serialize, overwrite: bool) -> Result<(), FileError> {
+    let text = serde_json::to_string_pretty(value)? + "\n";
+    Ok(io::write_bytes(path, text.as_bytes(), overwrite)?)
+}

@@ -1,0 +1,90 @@
+//! Why an RPC job ends without a result.
+
+use std::path::PathBuf;
+
+use camera::CameraError;
+use io::rpc::{RpcReadError, RpcWriteError};
+
+/// An RPC job that could not be done.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RpcError {
+    /// The file holds no RPC that can be used.
+    #[error(transparent)]
+    Read(Box<RpcReadError>),
+    /// The RPC cannot be written.
+    #[error(transparent)]
+    Write(#[from] RpcWriteError),
+    /// The ending of the output file belongs to no format.
+    #[error(
+        "no RPC format belongs to the ending of {}: expected .txt, .rpc, .rpb or .json, or a stated format",
+        path.display()
+    )]
+    UnknownEnding {
+        /// The output file.
+        path: PathBuf,
+    },
+    /// The camera model has no answer for a point.
+    #[error("the RPC has no answer for the point {point:?}")]
+    NoAnswer {
+        /// The three numbers of the query.
+        point: [f64; 3],
+        /// Reason given by the camera model.
+        source: CameraError,
+    },
+    /// A file of points cannot be opened.
+    #[error("cannot read the points of {}", path.display())]
+    Points {
+        /// The file.
+        path: PathBuf,
+        /// Reason given by the operating system.
+        source: std::io::Error,
+    },
+    /// A line of the points cannot be read or does not hold three numbers.
+    #[error("line {line} of the points")]
+    Line {
+        /// Number of the line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        source: LineFault,
+    },
+    /// The receiver of the answers failed.
+    #[error("cannot pass on the answers")]
+    Output(#[source] std::io::Error),
+    /// The job was cancelled.
+    #[error("the job was cancelled")]
+    Cancelled,
+}
+
+impl From<RpcReadError> for RpcError {
+    fn from(error: RpcReadError) -> Self {
+        Self::Read(Box::new(error))
+    }
+}
+
+/// What is wrong with a line of points.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LineFault {
+    /// The line cannot be read.
+    #[error("cannot read the line")]
+    Unreadable(#[from] std::io::Error),
+    /// The line is longer than three numbers can be.
+    #[error("the line has {limit} characters or more, expected three numbers")]
+    TooLong {
+        /// Largest permitted length.
+        limit: u64,
+    },
+    /// The line has fewer or more than three words.
+    #[error("found {found:?}, expected three numbers")]
+    NotThree {
+        /// The line.
+        found: String,
+    },
+    /// A word of the line is not a number.
+    #[error("found {found:?}, expected a number")]
+    NotANumber {
+        /// The word.
+        found: String,
+    },
+}

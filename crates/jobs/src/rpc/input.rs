@@ -1,0 +1,17 @@
+//! Reading the RPC that a job works on.
+
+use std::path::Path;
+
+use io::rpc::RpcFile;
+
+use super::error::RpcError;
+use crate::progress::Progress;
+
+/// Reads the RPC of a file and passes the reader's warnings on.
+pub(super) fn read(path: &Path, progress: &dyn Progress) -> Result<RpcFile, RpcError> {
+    let file = io::rpc::read(path)?;
+    for warning in &file.warnings {
+        progress.warn(&format!("{}: {warning}", file.source.display()));
+    }
+    Ok(file)
+}

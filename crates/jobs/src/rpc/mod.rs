@@ -1,0 +1,17 @@
+//! The RPC jobs: describe the RPC of a file, project and localize points with it, and write it in another format.
+//!
+//! Image coordinates are sample (column) and line (row); the centre of the upper-left pixel is (0, 0). Ground coordinates
+//! are WGS 84 longitude and latitude in degrees, and metres above the ellipsoid.
+
+mod convert;
+mod error;
+mod info;
+mod input;
+mod lines;
+mod points;
+
+pub use convert::{RpcConvertConfig, RpcConvertReport, convert};
+pub use error::RpcError;
+pub use info::{RpcCentre, RpcInfoConfig, RpcInfoReport, RpcValidity, info};
+pub use lines::{RpcLineAnswer, RpcLinesConfig, RpcLinesReport, answer_lines, open_lines};
+pub use points::{RpcDirection, RpcPoint, RpcPointsConfig, RpcPointsReport, RpcQuery, points};
