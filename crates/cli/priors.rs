@@ -20,7 +20,7 @@ use ::priors::{PriorModel, Samples, View, Visibility, Visible, buildings_of, sam
 use anyhow::{Context, bail};
 use city::{LodChoice, MeshConfig, Meshed, ObjectStatus, Scope, TriangleMesh};
 use io::citymodel::CityFile;
-use jobs::dsm::Progress as _;
+use numeric::Progress as _;
 use report::PriorsReport;
 
 use crate::progress::Watcher;

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
-use jobs::dsm::{Choice, Progress};
+use numeric::{Choice, Progress};
 
 use crate::Global;
 
@@ -52,16 +52,6 @@ impl Watcher {
     #[allow(clippy::print_stderr, reason = "this is the command's own channel to the user")]
     fn say(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
-    }
-}
-
-impl simulate::Progress for Watcher {
-    fn begin(&self, stage: &str, steps: usize) {
-        Progress::begin(self, stage, steps);
-    }
-
-    fn step(&self) {
-        Progress::step(self);
     }
 }
 

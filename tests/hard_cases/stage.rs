@@ -13,8 +13,9 @@ use crs::MapProjection;
 use eval::{Alignment, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use geodesy::{meridian_radius_m, prime_vertical_radius_m};
 use io::raster::{Band, BandData, Dem, read_dem, write_image_with_rpc};
-use jobs::dsm::{DsmConfig, DsmReport, PipelineError, Silent, run_dsm};
+use jobs::dsm::{DsmConfig, DsmReport, PipelineError, run_dsm};
 use nalgebra::Vector3;
+use numeric::Silent;
 use raster::Grid;
 use tempfile::TempDir;
 

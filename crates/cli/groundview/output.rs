@@ -8,7 +8,7 @@ use groundview::{GROUND, GroundView, Panorama, SKY, Viewer, render, visible_cell
 use io::colmap::{ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
 use io::npy;
 use io::raster::{Band, BandData, ImageSource, MapTile, write_map_tile, write_png_gray, write_png_rgb};
-use jobs::dsm::Progress;
+use numeric::Progress;
 use raster::Grid;
 use report::{depth_preview, normal_preview, side_by_side};
 use serde::Serialize;

@@ -94,7 +94,7 @@ struct Run<'a> {
 impl Run<'_> {
     fn all(&self, rows: &[PositionRow], global: Global) -> anyhow::Result<Report> {
         let watcher = Watcher::new(self.args.progress, global);
-        jobs::dsm::Progress::begin(&watcher, "height maps", rows.len());
+        numeric::Progress::begin(&watcher, "height maps", rows.len());
         let mut maps = Vec::with_capacity(rows.len());
         for group in rows.chunks(self.maker.source.batch(&self.maker.settings)) {
             maps.extend(self.group(group, &watcher)?);
@@ -124,7 +124,7 @@ impl Run<'_> {
                 }
             };
             if fate.is_some() {
-                jobs::dsm::Progress::step(watcher);
+                numeric::Progress::step(watcher);
             }
             fates.push(fate);
             open.extend(stand.map(|stand| (row, stand)));
@@ -133,7 +133,7 @@ impl Run<'_> {
         let laid = self.maker.source.lay(&self.maker.settings, &stands);
         let finish = |((row, stand), laid): (&(&PositionRow, Stand), anyhow::Result<_>)| {
             let made = laid.and_then(|laid| self.maker.finish(stand, laid, &self.path(row)));
-            jobs::dsm::Progress::step(watcher);
+            numeric::Progress::step(watcher);
             match made {
                 Ok(made) => Fate::Made(Box::new(made)),
                 Err(error) => Fate::Failed { reason: format!("{error:#}") },

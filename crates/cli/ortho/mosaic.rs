@@ -3,7 +3,7 @@
 use anyhow::Context;
 use geodesy::LonLatHeight;
 use io::raster::Dem;
-use jobs::dsm::Progress;
+use numeric::Progress;
 use occlusion::Surface;
 use ortho::{Balance, Pair, Sight, balance, best_view};
 use raster::Grid;

@@ -7,7 +7,7 @@ use ::priors::{DepthKind, PriorMaps, Rays};
 use anyhow::{Context, bail};
 use io::npy::{self, NpyArray, NpyData};
 use io::raster::{Band, BandData, DepthScale, write_depth_png, write_map, write_png_gray, write_png_rgb};
-use jobs::dsm::Progress as _;
+use numeric::Progress as _;
 use raster::{Grid, NO_DATA};
 use report::{ViewPictures, ViewRow, depth_preview, mask_preview, normal_preview, side_by_side};
 

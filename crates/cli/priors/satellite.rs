@@ -13,7 +13,7 @@ use city::CrsReference;
 use crs::CrsRequest;
 use io::citymodel::CityFile;
 use io::raster::{Band, BandData, ImageSource, write_image_with_rpc, write_png_rgb};
-use jobs::dsm::Progress as _;
+use numeric::Progress as _;
 use raster::NO_DATA;
 use report::{SatellitePriorsReport, SatelliteRow, ViewPictures, depth_preview, normal_preview};
 use serde_json::{Value, json};

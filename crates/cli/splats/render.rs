@@ -128,7 +128,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn all(mut self, progress: &dyn jobs::dsm::Progress) -> anyhow::Result<Vec<ViewReport>> {
+    fn all(mut self, progress: &dyn numeric::Progress) -> anyhow::Result<Vec<ViewReport>> {
         let model = self.args.cameras.as_deref().map(|folder| placed_model::read(folder, &self.origin)).transpose()?;
         progress.begin("views", self.args.images.len() + model.as_ref().map_or(0, |model| model.views.len()));
         for path in &self.args.images {

@@ -3,5 +3,4 @@
 pub mod dsm;
 mod error;
 pub mod files;
-pub mod progress;
 pub mod rpc;

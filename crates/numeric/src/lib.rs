@@ -1,1 +1,5 @@
-//! Numbers that every crate needs: seeded random numbers, order statistics, small vectors, progress and cancellation.
+//! Small tools that every crate needs: progress and cancellation.
+
+mod progress;
+
+pub use progress::{CancelFlag, Cancellable, Cancelled, Choice, Progress, Silent};

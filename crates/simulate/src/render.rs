@@ -10,11 +10,11 @@ use raster::Grid;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::sensor::PointSpread;
 use crate::sight::Sight;
 use crate::texture::Texture;
+use numeric::Progress;
 
 /// Share of the light that comes from the whole sky and reaches shadows too.
 const SKY: f64 = 0.3;
@@ -64,7 +64,7 @@ impl<'a> LitScene<'a> {
         sight: &Sight,
         spread: &PointSpread,
         (width, height): (usize, usize),
-        progress: &impl Progress,
+        progress: &dyn Progress,
     ) -> Grid<f32> {
         let mut image = Grid::filled(width, height, 0f32);
         image.data_mut().par_chunks_mut(BAND * width).enumerate().for_each(|(band, rows)| {

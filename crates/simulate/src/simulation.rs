@@ -14,7 +14,6 @@ use crate::config::SimulationConfig;
 use crate::date::Date;
 use crate::error::SimulateError;
 use crate::frame::SceneFrame;
-use crate::progress::{Progress, Silent};
 use crate::random::derived;
 use crate::render::{BAND, LitScene};
 use crate::scene::Scene;
@@ -22,6 +21,7 @@ use crate::sensor::{PointSpread, Sensor};
 use crate::sight::Sight;
 use crate::texture::Texture;
 use crate::truth::{self, Truth, Witness};
+use numeric::{Progress, Silent};
 
 /// Scene beyond the area, metres, so that its edge sees houses and shadows as its middle does.
 const SURROUNDINGS_M: f64 = 60.0;
@@ -113,7 +113,7 @@ impl Simulation {
     ///
     /// # Errors
     /// Those of [`Self::new`].
-    pub fn with_progress(config: SimulationConfig, progress: &impl Progress) -> Result<Self, SimulateError> {
+    pub fn with_progress(config: SimulationConfig, progress: &dyn Progress) -> Result<Self, SimulateError> {
         config.validate()?;
         progress.begin("scene", 1);
         let frame = SceneFrame::new(config.lon_deg, config.lat_deg, config.gsd_m)?;
@@ -179,7 +179,7 @@ fn view(
     scene: &Scene,
     date: Date,
     index: usize,
-    progress: &impl Progress,
+    progress: &dyn Progress,
 ) -> Result<View, SimulateError> {
     let look = acquisition::look(config, index);
     let (low, high) = scene.height_range_m();

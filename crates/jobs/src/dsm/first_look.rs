@@ -20,7 +20,7 @@ use crate::dsm::scene::{Geometry, OVERLAP_MIN, Opened, read_views};
 use crate::dsm::setup::{self, EARTH_RANGE_M, OutputGrid};
 use crate::dsm::tie_windows::{Character, match_in_windows};
 use crate::error::PipelineError;
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// Heights between which overlaps are looked at, metres: footprints move by tens of metres over it.
 const STEP_M: f64 = 50.0;

@@ -20,7 +20,6 @@ mod surface;
 mod tie_windows;
 
 pub use crate::error::PipelineError;
-pub use crate::progress::{Choice, Progress, Silent};
 pub use config::{DsmConfig, Fill, Preset};
 pub use report::DsmReport;
 pub use run::run_dsm;

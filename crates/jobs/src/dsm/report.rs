@@ -7,7 +7,7 @@ use serde::Serialize;
 use sweep::pointing::{Adjustment, ModelOrder};
 
 use crate::dsm::geometry::PairGeometry;
-use crate::progress::Choice;
+use numeric::Choice;
 
 /// The JSON report of a DSM run.
 #[derive(Debug, Clone, Serialize)]

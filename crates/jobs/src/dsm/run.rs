@@ -25,7 +25,7 @@ use crate::dsm::setup::{self, Choices, EARTH_RANGE_M, OutputGrid};
 use crate::dsm::surface::{Counts, SurfaceInput, make_surface};
 use crate::dsm::tie_windows::Character;
 use crate::error::PipelineError;
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// Where no two views are further apart than this, heights are ten times less precise than positions, and the user is told.
 const ANGLE_WEAK_DEG: f64 = 3.0;

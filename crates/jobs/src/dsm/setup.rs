@@ -13,7 +13,7 @@ use crate::dsm::heights::SweepPlan;
 use crate::dsm::pointing::{PairTies, span_of};
 use crate::dsm::scene::{Geometry, Opened, angle_merit};
 use crate::error::PipelineError;
-use crate::progress::{Choice, Progress};
+use numeric::{Choice, Progress};
 
 /// Fewer tie points than this do not tell the scene's heights.
 pub(crate) const TIES_MIN: usize = 12;

@@ -14,7 +14,7 @@ use crate::dsm::pointing::{PairTies, heights_seen, match_pairs};
 use crate::dsm::scene::{Opened, read_view};
 use crate::dsm::setup::{OutputGrid, image_span, image_window};
 use crate::error::PipelineError;
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// Side of a window on the ground, cells of the grid.
 const SIDE: usize = 1024;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::RpcError;
 use super::input;
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// A conversion of the RPC of one file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,7 +63,7 @@ impl RpcConvertConfig {
 /// let image = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/view_1.tif");
 /// let folder = tempfile::tempdir()?;
 /// let config = RpcConvertConfig::new(image.into(), folder.path().join("view_1.json"));
-/// let report = convert(&config, &jobs::progress::Silent)?;
+/// let report = convert(&config, &numeric::Silent)?;
 /// assert_eq!(io::rpc::read(&report.output)?.rpc, io::rpc::read(image.as_ref())?.rpc);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::RpcError;
 use super::input;
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// The file whose RPC is described.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -87,7 +87,7 @@ impl RpcInfoConfig {
 /// ```
 /// use jobs::rpc::{RpcInfoConfig, info};
 /// let image = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/view_1.tif");
-/// let report = info(&RpcInfoConfig::new(image.into()), &jobs::progress::Silent)?;
+/// let report = info(&RpcInfoConfig::new(image.into()), &numeric::Silent)?;
 /// assert!(report.centre.is_some_and(|centre| centre.gsd_line_m > 0.1));
 /// # Ok::<(), jobs::rpc::RpcError>(())
 /// ```

@@ -5,7 +5,7 @@ use std::path::Path;
 use io::rpc::RpcFile;
 
 use super::error::RpcError;
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// Reads the RPC of a file and passes the reader's warnings on.
 pub(super) fn read(path: &Path, progress: &dyn Progress) -> Result<RpcFile, RpcError> {

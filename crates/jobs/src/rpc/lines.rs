@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::error::{LineFault, RpcError};
 use super::input;
 use super::points::{RpcDirection, RpcPoint, RpcQuery};
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// Longest line that is read, bytes. Three numbers are shorter.
 const LINE_MAX: u64 = 4096;
@@ -76,7 +76,7 @@ pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, RpcError> {
 /// let image = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/view_1.tif");
 /// let config = RpcLinesConfig::new(image.into(), RpcDirection::Localize);
 /// let mut lines = &b"# sample line height\n100 50 60\n120, 50, 60\n"[..];
-/// let report = answer_lines(&config, &mut lines, &mut |_| Ok(()), &jobs::progress::Silent)?;
+/// let report = answer_lines(&config, &mut lines, &mut |_| Ok(()), &numeric::Silent)?;
 /// assert_eq!((report.answered, report.failed), (2, 0));
 /// # Ok::<(), jobs::rpc::RpcError>(())
 /// ```

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::RpcError;
 use super::input;
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// Which way points go through the camera model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -104,9 +104,9 @@ impl RpcQuery {
 /// use jobs::rpc::{RpcPointsConfig, RpcQuery, points};
 /// let image = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/view_1.tif");
 /// let question = RpcQuery::Localize { image: ImagePoint::new(100.0, 50.0), height_m: 60.0 };
-/// let answer = points(&RpcPointsConfig::new(image.into(), vec![question]), &jobs::progress::Silent)?.points[0];
+/// let answer = points(&RpcPointsConfig::new(image.into(), vec![question]), &numeric::Silent)?.points[0];
 /// let back = RpcQuery::Project(answer.ground);
-/// let back = points(&RpcPointsConfig::new(image.into(), vec![back]), &jobs::progress::Silent)?.points[0];
+/// let back = points(&RpcPointsConfig::new(image.into(), vec![back]), &numeric::Silent)?.points[0];
 /// assert!((back.image.sample - 100.0).abs() < 1e-4);
 /// # Ok::<(), jobs::rpc::RpcError>(())
 /// ```
