@@ -1,5 +1,17 @@
-//! Small tools that every crate needs: progress and cancellation.
+//! Small tools that every crate needs.
+//!
+//! * [`random`]: seeded random numbers ([`SplitMix64`], [`RandomByIndex`]).
+//! * Order statistics: [`upper_median`], [`percentile`], [`upper_nmad`] and others.
+//! * [`vector`]: vectors of three numbers.
+//! * [`Progress`], [`Choice`] and [`Cancelled`]: what a long job reports, and how it is stopped.
 
+mod order;
 mod progress;
+pub mod random;
+pub mod vector;
 
+pub use order::{
+    Float, NMAD_FACTOR, middle_values, nearest_quantile, order_statistic, percentile, upper_median, upper_nmad,
+};
 pub use progress::{CancelFlag, Cancellable, Cancelled, Choice, Progress, Silent};
+pub use random::{RandomByIndex, SplitMix64};
