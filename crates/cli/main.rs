@@ -6,16 +6,13 @@
 
 mod align;
 mod city;
-mod corrections;
 mod dsm;
 mod error;
 mod eval;
 mod groundview;
 mod heightmap;
 mod log;
-mod map_surface;
 mod ortho;
-mod placed_model;
 mod print;
 mod priors;
 mod progress;
@@ -26,9 +23,11 @@ mod split;
 mod stand;
 mod threads;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{ArgAction, Parser, Subcommand};
+use jobs::corrections::CorrectionSource;
 
 /// Satellite surface models from RPC images.
 #[derive(Debug, Parser)]
@@ -93,6 +92,15 @@ pub(crate) enum Outcome {
     Complete,
     /// Parts failed, or a requested threshold was missed; the user has been told which.
     Partial,
+}
+
+/// Reads `--corrections`: a report, the word `none`, or nothing (the corrections of the run that made the surface).
+pub(crate) fn corrections_of(option: Option<&Path>) -> CorrectionSource {
+    match option {
+        None => CorrectionSource::SurfaceRun,
+        Some(word) if word.as_os_str() == "none" => CorrectionSource::Uncorrected,
+        Some(report) => CorrectionSource::Report(report.to_owned()),
+    }
 }
 
 fn main() -> ExitCode {

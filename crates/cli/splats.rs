@@ -14,8 +14,10 @@ use raster::Grid;
 use serde_json::Value;
 use splats::{ColourFit, DivisionConfig, RpcSplatCamera, SplatConfig, SplatReport, SplatView, Surface, make_splats};
 
-use crate::corrections::Corrections;
-use crate::{Global, Outcome, map_surface, print};
+use crate::progress::Log;
+use crate::{Global, Outcome, print};
+use jobs::corrections::Corrections;
+use jobs::map_surface;
 
 /// Arguments of `skysweep splats`.
 #[derive(Debug, clap::Args)]
@@ -123,13 +125,13 @@ fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::R
             path.display()
         );
     }
-    let read = map_surface::read(dsm, args.vertical)?;
+    let read = map_surface::read(dsm, args.vertical, &Log)?;
     let dem = &read.dem;
     let origin = Surface::middle(&dem.heights, dem.geotransform)
         .with_context(|| format!("the surface model has no height: {}", dsm.display()))?;
     let surface = Surface::new(&dem.heights, dem.geotransform, origin);
     let confidence = args.confidence.as_deref().map(confidence).transpose()?;
-    let corrections = Corrections::for_surface(dsm, args.corrections.as_deref())?;
+    let corrections = Corrections::for_surface(dsm, &crate::corrections_of(args.corrections.as_deref()))?;
     let images = args.images.iter().map(|path| image(path, &corrections)).collect::<anyhow::Result<Vec<_>>>()?;
     let mut views = Vec::with_capacity(images.len());
     for (path, image) in args.images.iter().zip(&images) {
@@ -176,7 +178,7 @@ fn image(path: &Path, corrections: &Corrections) -> anyhow::Result<Image> {
     let rpc = io::rpc::read_for_image(path)?;
     let source = ImageSource::open(path)?;
     let pixels = source.read_colour(source.window())?;
-    let correction = corrections.for_image(path);
+    let correction = corrections.for_image(path, &Log);
     Ok(Image { camera: RpcCamera { rpc: rpc.rpc, correction }, pixels })
 }
 

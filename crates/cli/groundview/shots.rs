@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use super::MakeArgs;
 use super::surface::Surface;
-use crate::placed_model;
 use crate::stand::Stand;
+use jobs::placed_model;
 
 /// Most columns of a panorama and pixels along a crop.
 const SIDE_MAX: usize = 16_384;

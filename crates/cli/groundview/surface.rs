@@ -10,7 +10,8 @@ use groundview::{Ground, HeightField, MeshGround, Met};
 use io::splat_ply::LocalOrigin;
 use raster::GeoTransform;
 
-use crate::map_surface;
+use crate::progress::Log;
+use jobs::map_surface;
 
 /// Where rays from above start, metres above the origin: higher than all there is.
 const FROM_ABOVE_M: f64 = 20_000.0;
@@ -50,7 +51,7 @@ impl Surface {
     }
 
     fn raster(path: &Path, vertical: Option<VerticalDatum>) -> anyhow::Result<Self> {
-        let map_surface::MapSurface { dem, projection } = map_surface::read(path, vertical)?;
+        let map_surface::MapSurface { dem, projection } = map_surface::read(path, vertical, &Log)?;
         let origin = splats::Surface::middle(&dem.heights, dem.geotransform)
             .with_context(|| format!("the surface has no height: {}", path.display()))?;
         let heights = dem.heights.map(|&h| (f64::from(h) - origin[2]) as f32);

@@ -10,7 +10,8 @@ use occlusion::{Eyeline, GridGround};
 use raster::GeoTransform;
 
 use super::Args;
-use crate::corrections::Corrections;
+use crate::progress::Log;
+use jobs::corrections::Corrections;
 
 /// Most cells of an ortho, and of all its bands.
 const CELLS_MAX: usize = 1 << 28;
@@ -68,7 +69,7 @@ impl Inputs {
         ensure!(!known.is_empty(), "the surface model has no heights: {}", path.display());
         let middle_m = known.iter().sum::<f64>() / known.len() as f64;
         let grid = OrthoGrid::new(args, &dsm, &projection)?;
-        let corrections = Corrections::for_surface(&args.dsm, args.corrections.as_deref())?;
+        let corrections = Corrections::for_surface(&args.dsm, &crate::corrections_of(args.corrections.as_deref()))?;
         let open = |path: &PathBuf| Image::open(path, &dsm, &projection, middle_m, &corrections);
         let images = args.images.iter().map(open).collect::<anyhow::Result<Vec<_>>>()?;
         let bands = images.first().map_or(0, |image| image.source.info().bands);
@@ -117,7 +118,7 @@ impl Image {
     ) -> anyhow::Result<Self> {
         let source = ImageSource::open(path)?;
         let rpc = io::rpc::read_for_image(path)?.rpc;
-        let correction = corrections.for_image(path);
+        let correction = corrections.for_image(path, &Log);
         let corrected = correction != ImageCorrection::IDENTITY;
         let camera = RpcCamera { rpc, correction };
         let size = (dsm.heights.width(), dsm.heights.height());

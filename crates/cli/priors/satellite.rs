@@ -21,8 +21,8 @@ use serde_json::{Value, json};
 use super::content::{labels, write_json};
 use super::folder::Folder;
 use super::options::Args;
-use crate::corrections::Corrections;
-use crate::progress::Watcher;
+use crate::progress::{Log, Watcher};
+use jobs::corrections::Corrections;
 
 /// Folders of maps.
 const FOLDERS: [&str; 7] = ["height", "distance", "normal", "mask", "class", "object", "previews"];
@@ -98,7 +98,7 @@ fn images(args: &Args, paths: &[PathBuf]) -> anyhow::Result<Vec<Image>> {
         }
         let rpc = io::rpc::read_for_image(path)?.rpc;
         let window = ImageSource::open(path)?.window();
-        let camera = RpcCamera { rpc, correction: corrections.for_image(path) };
+        let camera = RpcCamera { rpc, correction: corrections.for_image(path, &Log) };
         images.push(Image { path: path.clone(), stem, camera, size: (window.width, window.height) });
     }
     Ok(images)

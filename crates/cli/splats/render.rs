@@ -18,9 +18,10 @@ use raster::Grid;
 use serde::Serialize;
 use splats::{LensSplatCamera, Rendering, RpcSplatCamera, SplatCamera, psnr_db, render, ssim};
 
-use crate::corrections::Corrections;
-use crate::progress::{ProgressStyle, Watcher};
-use crate::{Global, Outcome, placed_model, print};
+use crate::progress::{Log, ProgressStyle, Watcher};
+use crate::{Global, Outcome, print};
+use jobs::corrections::Corrections;
+use jobs::placed_model;
 
 const REPORT: &str = "report.json";
 /// Least accumulated opacity of pixels that are compared.
@@ -156,7 +157,7 @@ impl Run<'_> {
         );
         let projection = MapProjection::from_definition(&self.origin.crs)?;
         let correction = self.args.corrections.as_deref().map(Corrections::read).transpose()?;
-        let correction = correction.unwrap_or_default().for_image(path);
+        let correction = correction.unwrap_or_default().for_image(path, &Log);
         let camera = RpcCamera { rpc: io::rpc::read_for_image(path)?.rpc, correction };
         let source = ImageSource::open(path)?;
         let pixels = source.read_colour(source.window())?;

@@ -1,6 +1,10 @@
 //! Every job of the toolkit as a function from a configuration to a report.
 
+pub mod corrections;
 pub mod dsm;
 mod error;
 pub mod files;
+pub mod map_surface;
+pub mod placed_model;
 pub mod rpc;
+pub mod threads;

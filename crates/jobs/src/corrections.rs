@@ -1,0 +1,120 @@
+//! The pointing corrections that an earlier DSM run found for its images, read from its report.
+
+use std::path::{Path, PathBuf};
+
+use camera::ImageCorrection;
+use serde::{Deserialize, Serialize};
+
+use numeric::Progress;
+
+/// Where the pointing corrections of the images come from.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum CorrectionSource {
+    /// From the report of the run that made the surface model, where the model lies in the folder of such a run.
+    #[default]
+    SurfaceRun,
+    /// From this report of a DSM run.
+    Report(PathBuf),
+    /// Nowhere: the RPCs are used as they are.
+    Uncorrected,
+}
+
+/// A report whose corrections cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CorrectionsError {
+    /// The report cannot be read.
+    #[error("cannot read the report with the pointing corrections ({source}): {}", path.display())]
+    Unreadable {
+        /// The report.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// The file is not a report of a DSM run.
+    #[error("the file is not the report of a DSM run with its images ({source}): {}", path.display())]
+    NotAReport {
+        /// The file.
+        path: PathBuf,
+        /// What the JSON reader found.
+        source: serde_json::Error,
+    },
+}
+
+/// Pointing corrections by image. An image that the run did not use, or did not correct, has none.
+#[derive(Debug, Default)]
+pub struct Corrections {
+    images: Vec<(PathBuf, ImageCorrection)>,
+}
+
+/// The part of a run's report that is read here.
+#[derive(Deserialize)]
+struct RunReport {
+    images: Vec<RunImage>,
+}
+
+#[derive(Deserialize)]
+struct RunImage {
+    path: PathBuf,
+    applied_correction: Option<ImageCorrection>,
+}
+
+impl Corrections {
+    /// Reads the corrections of a report.
+    ///
+    /// # Errors
+    /// [`CorrectionsError`] if the file cannot be read or is not the report of a DSM run.
+    pub fn read(path: &Path) -> Result<Self, CorrectionsError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| CorrectionsError::Unreadable { path: path.to_owned(), source })?;
+        let report: RunReport = serde_json::from_str(&text)
+            .map_err(|source| CorrectionsError::NotAReport { path: path.to_owned(), source })?;
+        let images = report.images.into_iter().filter_map(|image| Some((image.path, image.applied_correction?)));
+        Ok(Self { images: images.collect() })
+    }
+
+    /// Reads the corrections that belong to a surface model, which is a file or the folder of a DSM run.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn for_surface(surface: &Path, source: &CorrectionSource) -> Result<Self, CorrectionsError> {
+        match source {
+            CorrectionSource::Uncorrected => Ok(Self::default()),
+            CorrectionSource::Report(path) => Self::read(path),
+            CorrectionSource::SurfaceRun => {
+                report_of_run(surface).map_or_else(|| Ok(Self::default()), |path| Self::read(&path))
+            }
+        }
+    }
+
+    /// Returns the correction of an image, or the identity (with a warning) if the run did not use the image.
+    pub fn for_image(&self, path: &Path, progress: &dyn Progress) -> ImageCorrection {
+        self.find(path).unwrap_or_else(|| {
+            if !self.images.is_empty() {
+                progress.warn(&format!(
+                    "the run that the corrections come from did not use this image, so its RPC is used as it is: {}",
+                    path.display()
+                ));
+            }
+            ImageCorrection::IDENTITY
+        })
+    }
+
+    /// Finds an image by its path, or else by its file name where that is unique.
+    fn find(&self, path: &Path) -> Option<ImageCorrection> {
+        let same = |a: &Path, b: &Path| a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b);
+        let by_path = self.images.iter().find(|(other, _)| same(other, path));
+        let mut by_name = self.images.iter().filter(|(other, _)| other.file_name() == path.file_name());
+        let only = by_name.next().filter(|_| by_name.next().is_none());
+        by_path.or(only).map(|(_, correction)| *correction)
+    }
+}
+
+/// Returns the report of the run that a surface model belongs to, if there is one.
+fn report_of_run(surface: &Path) -> Option<PathBuf> {
+    let in_run = || surface.parent().filter(|folder| folder.file_name().is_some_and(|name| name == "dsm"));
+    let run = if surface.is_dir() { Some(surface) } else { in_run().and_then(Path::parent) };
+    run.map(|run| run.join("report/report.json")).filter(|report| report.is_file())
+}

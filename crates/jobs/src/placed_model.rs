@@ -1,0 +1,63 @@
+//! A COLMAP model placed on a map: the alignment job and the ground views write `origin.json` beside such a model.
+
+use std::path::{Path, PathBuf};
+
+use io::colmap::{ColmapError, ColmapModel};
+use io::splat_ply::LocalOrigin;
+
+/// A COLMAP model that cannot be placed on the map.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlacedModelError {
+    /// The model cannot be read.
+    #[error(transparent)]
+    Colmap(#[from] ColmapError),
+    /// There is no readable `origin.json`.
+    #[error("the model has no origin on a map ({source}); align it to a map first: {}", path.display())]
+    NoOrigin {
+        /// The file that was looked for.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// The file is not an origin.
+    #[error("the file is not an origin as skysweep writes it ({source}): {}", path.display())]
+    NotAnOrigin {
+        /// The file.
+        path: PathBuf,
+        /// What the JSON reader found.
+        source: serde_json::Error,
+    },
+    /// The cameras and the surface are on different maps.
+    #[error(
+        "the cameras are in {} above the {}, the surface is in {} above the {}; align the cameras to the surface's map",
+        cameras.crs, cameras.vertical, surface.crs, surface.vertical
+    )]
+    OtherMap {
+        /// The origin of the cameras.
+        cameras: Box<LocalOrigin>,
+        /// The origin of the surface.
+        surface: Box<LocalOrigin>,
+    },
+}
+
+/// Reads the cameras of a model and shifts them so that their positions are relative to `origin`.
+///
+/// # Errors
+/// [`PlacedModelError`] if the model or its origin cannot be read, or if it lies on another map.
+pub fn read(folder: &Path, origin: &LocalOrigin) -> Result<ColmapModel, PlacedModelError> {
+    let mut model = io::colmap::read(folder)?;
+    let path = folder.join("origin.json");
+    let text =
+        std::fs::read_to_string(&path).map_err(|source| PlacedModelError::NoOrigin { path: path.clone(), source })?;
+    let own: LocalOrigin =
+        serde_json::from_str(&text).map_err(|source| PlacedModelError::NotAnOrigin { path, source })?;
+    if own.crs != origin.crs || own.vertical != origin.vertical {
+        return Err(PlacedModelError::OtherMap { cameras: Box::new(own), surface: Box::new(origin.clone()) });
+    }
+    let shift = [0, 1, 2].map(|i| own.origin[i] - origin.origin[i]);
+    for view in &mut model.views {
+        view.pose.centre = [0, 1, 2].map(|i| view.pose.centre[i] + shift[i]);
+    }
+    Ok(model)
+}

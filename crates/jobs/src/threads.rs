@@ -1,0 +1,39 @@
+//! The worker threads of a job.
+
+/// Worker threads that cannot be started.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ThreadsError {
+    /// No thread was asked for.
+    #[error("the number of worker threads is 0, expected 1 or more")]
+    Zero,
+    /// The pool could not be made.
+    #[error("cannot start {threads} worker threads: {reason}")]
+    Start {
+        /// How many were asked for.
+        threads: usize,
+        /// The reason that the pool gave.
+        reason: String,
+    },
+}
+
+/// Runs `work` on a pool of `threads` workers, or on the caller's pool if no number is given.
+///
+/// # Errors
+/// [`ThreadsError`] if the pool cannot be started.
+#[allow(dead_code, reason = "the jobs that use it follow")]
+pub(crate) fn install<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T, ThreadsError> {
+    let Some(threads) = threads else { return Ok(work()) };
+    if threads == 0 {
+        return Err(ThreadsError::Zero);
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| ThreadsError::Start { threads, reason: e.to_string() })?;
+    Ok(pool.install(work))
+}
+
+/// Returns the number of workers that encoders may use: the given number, or all cores.
+#[allow(dead_code, reason = "the jobs that use it follow")]
+pub(crate) fn count(threads: Option<usize>) -> usize {
+    threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
