@@ -1,8 +1,11 @@
-//! Holds the rules of `crates/README.md`: the floors, the homes of GDAL and PROJ, where files are touched, and that every
-//! source file says what it does.
+//! Holds the rules of `crates/README.md`: the floors, the homes of GDAL and PROJ, where files are touched, no circles of
+//! files, one name for one public type, a thin command line, and that every source says what it does.
 //!
-//! The dependencies are read from `cargo metadata --no-deps`, so no network is needed. The sources are scanned as text:
-//! comments do not count, and neither does what follows the first `#[cfg(test)]` of a file.
+//! The dependencies are read from `cargo metadata --no-deps`, so no network is needed. Where sources are scanned as text,
+//! comments and what follows the first `#[cfg(test)]` of a file do not count.
+
+mod circles;
+mod names;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -98,14 +101,19 @@ fn is_test_source(path: &Path) -> bool {
     in_folder || path.file_stem().is_some_and(|stem| stem == "tests" || stem == "testing")
 }
 
-/// Whether the code of a source (no comments, nothing after the first `#[cfg(test)]`) names `std::fs`.
-fn names_std_fs(text: &str) -> bool {
+/// The code of a source without comments, white space and what follows the first `#[cfg(test)]`.
+fn product_code(text: &str) -> String {
     let product = text.split("#[cfg(test)]").next().unwrap_or_default();
-    let code: String = product
+    product
         .lines()
         .filter(|line| !line.trim_start().starts_with("//"))
         .flat_map(|line| line.chars().filter(|c| !c.is_whitespace()))
-        .collect();
+        .collect()
+}
+
+/// Whether the code of a source (no comments, nothing after the first `#[cfg(test)]`) names `std::fs`.
+fn names_std_fs(text: &str) -> bool {
+    let code = product_code(text);
     let grouped = code.match_indices("std::{").any(|(start, head)| {
         let group = &code[start + head.len()..];
         let group = &group[..group.find(';').unwrap_or(group.len())];
@@ -180,6 +188,99 @@ fn files_are_touched_only_where_files_live() {
         .filter(|path| !is_test_source(path.strip_prefix(root()).unwrap_or(path)))
         .filter(|path| names_std_fs(&fs::read_to_string(path).expect("a source is readable")))
         .map(|path| format!("{}: std::fs is for io, jobs and cli; take bytes or a grid instead", path.display()))
+        .collect();
+    report(&broken);
+}
+
+/// Sources of the crates, without tests, benches and examples.
+fn product_sources() -> Vec<PathBuf> {
+    let in_crates = |path: &PathBuf| path.starts_with(root().join("crates"));
+    let is_product = |path: &PathBuf| !is_test_source(path.strip_prefix(root()).unwrap_or(path));
+    all_sources().into_iter().filter(in_crates).filter(is_product).collect()
+}
+
+#[test]
+fn no_files_of_a_crate_use_each_other_in_a_circle() {
+    let mut roots: Vec<PathBuf> = fs::read_dir(root().join("crates"))
+        .expect("crates/ is there")
+        .flatten()
+        .flat_map(|entry| ["src/lib.rs", "lib.rs", "main.rs"].map(|file| entry.path().join(file)))
+        .filter(|path| path.is_file())
+        .collect();
+    roots.sort();
+    assert!(roots.len() > 15, "only {} crates found", roots.len());
+    let name = |path: &Path| path.strip_prefix(root()).unwrap_or(path).display().to_string();
+    let broken: Vec<String> = roots
+        .iter()
+        .flat_map(|file| circles::circles(file))
+        .map(|circle| circle.iter().map(|path| name(path)).collect::<Vec<_>>().join(", "))
+        .map(|circle| format!("{circle}: move what they share into a file below them"))
+        .collect();
+    report(&broken);
+}
+
+#[test]
+fn no_public_type_has_the_name_of_another() {
+    let mut types = names::PublicTypes::default();
+    product_sources().iter().for_each(|path| types.add(path));
+    let broken: Vec<String> =
+        types.repeated().map(|(name, files)| format!("{name} is defined in {files:?}: one name, one thing")).collect();
+    report(&broken);
+}
+
+#[test]
+fn errors_of_the_library_name_no_command_line_flags() {
+    let in_library = |path: &&PathBuf| !path.starts_with(root().join("crates/cli"));
+    let broken: Vec<String> = product_sources()
+        .iter()
+        .filter(in_library)
+        .flat_map(|path| {
+            names::errors_with_flags(path).into_iter().map(move |text| format!("{}: {text}", path.display()))
+        })
+        .collect();
+    report(&broken);
+    assert!(names::names_flag("give --gsd") && !names::names_flag("a -- b"));
+}
+
+/// The command line parses and prints. Whatever takes time or writes files is a job of the library.
+#[test]
+fn the_command_line_parses_and_prints_and_does_nothing_else() {
+    let files: Vec<PathBuf> =
+        product_sources().into_iter().filter(|path| path.starts_with(root().join("crates/cli"))).collect();
+    let text = |path: &PathBuf| fs::read_to_string(path).expect("a source is readable");
+    let lines: usize = files.iter().map(|path| text(path).lines().count()).sum();
+    assert!(files.len() > 10 && lines <= 3000, "{} files with {lines} lines, at most 3000 are allowed", files.len());
+    const FORBIDDEN: [&str; 9] = [
+        "rayon",
+        "ThreadPool",
+        "fs::write",
+        "File::create",
+        "OpenOptions",
+        "create_dir",
+        "fs::rename",
+        "fs::remove",
+        "io::atomic",
+    ];
+    let broken: Vec<String> = files
+        .iter()
+        .flat_map(|path| {
+            let code = product_code(&text(path));
+            FORBIDDEN.into_iter().filter(move |word| code.contains(word)).map(move |word| (path, word))
+        })
+        .map(|(path, word)| format!("{} uses {word}: that belongs to a job", path.display()))
+        .collect();
+    report(&broken);
+}
+
+#[test]
+fn lines_are_at_most_120_columns_wide() {
+    let broken: Vec<String> = all_sources()
+        .iter()
+        .flat_map(|path| {
+            let text = fs::read_to_string(path).expect("a source is readable");
+            let wide = text.lines().enumerate().filter(|(_, line)| line.chars().count() > 120);
+            wide.map(|(row, _)| format!("{}:{}", path.display(), row + 1)).collect::<Vec<_>>()
+        })
         .collect();
     report(&broken);
 }
