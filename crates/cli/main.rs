@@ -6,9 +6,11 @@
 
 mod align;
 mod city;
+mod completions;
 mod dsm;
 mod error;
 mod eval;
+mod global;
 mod groundview;
 mod heightmap;
 mod log;
@@ -26,8 +28,10 @@ mod threads;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use jobs::corrections::CorrectionSource;
+
+use crate::global::{Global, Outcome};
 
 /// Satellite surface models from RPC images.
 #[derive(Debug, Parser)]
@@ -39,30 +43,14 @@ struct Cli {
     command: Command,
 }
 
-/// Options that every subcommand takes.
-#[derive(Debug, Clone, Copy, clap::Args)]
-pub(crate) struct Global {
-    /// Print errors only.
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
-    quiet: bool,
-    /// Print more: -v says what is done, -vv everything.
-    #[arg(short, long, global = true, action = ArgAction::Count)]
-    verbose: u8,
-}
-
-impl Global {
-    /// Whether only errors are to be printed.
-    pub(crate) fn is_quiet(self) -> bool {
-        self.quiet
-    }
-}
-
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Bring a COLMAP model to the world by GPS or point pairs.
     Align(Box<align::Args>),
     /// Show and convert city models.
     City(city::Args),
+    /// Print a completion script for a shell.
+    Completions(completions::CompletionArgs),
     /// Make a surface model from satellite images.
     Dsm(Box<dsm::Args>),
     /// Measure how far a surface model is from a reference.
@@ -73,6 +61,8 @@ enum Command {
     Heightmap(Box<heightmap::Args>),
     /// Lay satellite images on a surface model, hidden cells marked.
     Ortho(Box<ortho::Args>),
+    /// Print the manual page of a command.
+    Man(completions::ManArgs),
     /// Make depth, normal and mask priors of a city model for the cameras of a scene.
     Priors(Box<priors::Args>),
     /// Show, use and convert RPC camera models.
@@ -83,15 +73,6 @@ enum Command {
     Splats(Box<splats::Args>),
     /// Choose context and target views of a COLMAP model by their overlap.
     Split(split::Args),
-}
-
-/// How a command ended that was not stopped by an error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Outcome {
-    /// All that was asked for is done.
-    Complete,
-    /// Parts failed, or a requested threshold was missed; the user has been told which.
-    Partial,
 }
 
 /// Reads `--corrections`: a report, the word `none`, or nothing (the corrections of the run that made the surface).
@@ -121,11 +102,13 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Align(args) => align::run(args, cli.global),
         Command::City(args) => city::run(args),
+        Command::Completions(args) => completions::completions(args, &mut Cli::command()),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
         Command::Groundview(args) => groundview::run(args, cli.global),
         Command::Heightmap(args) => heightmap::run(args, cli.global),
         Command::Ortho(args) => ortho::run(args, cli.global),
+        Command::Man(args) => completions::man(args, Cli::command()),
         Command::Priors(args) => priors::run(args, cli.global),
         Command::Rpc(args) => rpc::run(args),
         Command::Simulate(args) => simulate::run(args, cli.global),

@@ -2,9 +2,14 @@
 
 use std::io::Write;
 
+/// Writes bytes as they are.
+pub(crate) fn bytes(bytes: &[u8]) -> anyhow::Result<()> {
+    Ok(std::io::stdout().write_all(bytes)?)
+}
+
 /// Writes text as it is.
 pub(crate) fn text(text: &str) -> anyhow::Result<()> {
-    Ok(std::io::stdout().write_all(text.as_bytes())?)
+    bytes(text.as_bytes())
 }
 
 /// Writes a value as indented JSON.

@@ -1,0 +1,30 @@
+//! What every command shares: the options that all of them take, and how a command can end.
+
+use clap::ArgAction;
+
+/// Options that every command takes.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(crate) struct Global {
+    /// Print errors only.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub(crate) quiet: bool,
+    /// Print more: -v says what is done, -vv everything.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub(crate) verbose: u8,
+}
+
+impl Global {
+    /// Whether only errors are to be printed.
+    pub(crate) fn is_quiet(self) -> bool {
+        self.quiet
+    }
+}
+
+/// How a command ended that was not stopped by an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// All that was asked for is done.
+    Complete,
+    /// Parts failed, or a requested threshold was missed; the user has been told which.
+    Partial,
+}

@@ -1,0 +1,65 @@
+//! Satellite surface models from RPC images, and building priors from city models.
+//!
+//! This crate is a facade: it re-exports the crates of the toolkit under one name. Each crate holds one subject and
+//! documents its units, frames and sources.
+//!
+//! # Jobs
+//! [`jobs`] is what most programs need. Every job is a function from a configuration to a report, and the command
+//! `skysweep` is a thin caller of these functions.
+//!
+//! | module | makes |
+//! |---|---|
+//! | [`jobs::dsm`] | a digital surface model (DSM) from satellite images with RPCs |
+//! | [`jobs::eval`] | errors of a surface model against a reference |
+//! | [`jobs::ortho`] | true orthophotos, with hidden cells marked |
+//! | [`jobs::heightmap`] | bird's-eye height maps around a camera |
+//! | [`jobs::groundview`] | depths, normals and sky of cameras on the ground |
+//! | [`jobs::priors`] | depth, normal and mask maps of a city model for the cameras of a scene |
+//! | [`jobs::splats`] | Gaussian splats of a surface model and its images |
+//! | [`jobs::align`], [`jobs::split`] | COLMAP models brought to the world, context and target views |
+//! | [`jobs::city`], [`jobs::rpc`] | what city models and RPC files hold, and conversions of both |
+//! | [`jobs::simulate`] | scenes with exact truth, seen through RPC cameras |
+//!
+//! # Building blocks
+//! - Positions: [`geodesy`] (ellipsoid, local frames, UTM), [`crs`] (map projections and vertical datums through PROJ).
+//! - Cameras: [`camera`] (the RPC00B model and perspective lenses), [`colmap`] (sets of posed cameras).
+//! - Surfaces: [`raster`] (grids), [`city`] (city models), [`gaussian`] (splats), [`bvh`] (ray casting), [`occlusion`].
+//! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`], [`ortho`], [`splats`],
+//!   [`simulate`].
+//! - Files: [`io`] reads and writes every format, [`report`] makes pictures and pages.
+//! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
+//!
+//! # Example
+//! A camera's ground sampling distance, from the RPC that an image carries:
+//! ```
+//! use skysweep::{camera::RpcCamera, geodesy::LonLatHeight, io};
+//!
+//! let image = concat!(env!("CARGO_MANIFEST_DIR"), "/data-samples/town/view_1.tif");
+//! let camera = RpcCamera::new(io::rpc::read(image.as_ref())?.rpc);
+//! let centre = camera.rpc.domain().centre;
+//! let pixel = camera.project(LonLatHeight { height_m: 100.0, ..centre })?;
+//! assert!((camera.gsd_at(pixel, 100.0)?.mean_m() - 0.5).abs() < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub use bvh;
+pub use camera;
+pub use city;
+pub use colmap;
+pub use crs;
+pub use eval;
+pub use gaussian;
+pub use geodesy;
+pub use groundview;
+pub use heightmap;
+pub use io;
+pub use jobs;
+pub use numeric;
+pub use occlusion;
+pub use ortho;
+pub use priors;
+pub use raster;
+pub use report;
+pub use simulate;
+pub use splats;
+pub use sweep;
