@@ -1,5 +1,6 @@
 //! What comes out, against the stored results of Open3D and against rays that are tested against every triangle.
 
+use numeric::vector::{cross, dot, sub};
 use std::path::Path;
 
 use anyhow::{Context, bail};
@@ -118,7 +119,7 @@ fn nearest(model: &PriorModel, view: &View, rays: &Rays, pixel: usize) -> f64 {
     let direction = [0, 1, 2].map(|k| x * axes[0][k] + y * axes[1][k] + axes[2][k]);
     let depths = (0..model.mesh().triangles.len()).filter_map(|triangle| {
         let [a, b, c] = model.mesh().corners(triangle);
-        let (ab, ac, to) = (minus(b, a), minus(c, a), minus(view.pose.centre, a));
+        let (ab, ac, to) = (sub(b, a), sub(c, a), sub(view.pose.centre, a));
         let p = cross(direction, ac);
         let inverse = 1.0 / dot(ab, p);
         let (u, q) = (dot(to, p) * inverse, cross(to, ab));
@@ -126,16 +127,4 @@ fn nearest(model: &PriorModel, view: &View, rays: &Rays, pixel: usize) -> f64 {
         (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && z > 0.0).then_some(z)
     });
     depths.fold(f64::INFINITY, f64::min)
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

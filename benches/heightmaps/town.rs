@@ -2,6 +2,8 @@
 //!
 //! Metres east and north of the upper left corner; heights above the ellipsoid.
 
+use numeric::random::{hash64, unit_interval};
+
 /// Spacing of the houses.
 const BLOCK_M: f64 = 40.0;
 /// Height of the hills' middle.
@@ -38,13 +40,7 @@ fn house(x: f64, y: f64) -> Option<f64> {
     is_inside.then(|| 4.0 + 6.0 * key(4) + 0.7 * (width - across.abs()))
 }
 
-/// A number in 0 to 1 for a key (SplitMix64's mixing of each part).
+/// Returns a number in [0, 1) that depends on the key alone.
 pub(crate) fn uniform(key: [u64; 3]) -> f64 {
-    let mixed = key.iter().fold(0u64, |state, part| {
-        let mut z = state.wrapping_add(*part).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    });
-    (mixed >> 11) as f64 / (1u64 << 53) as f64
+    unit_interval(key.into_iter().fold(0u64, |state, part| hash64(state.wrapping_add(part))))
 }

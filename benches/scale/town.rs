@@ -5,6 +5,7 @@
 //! the ground is a step of [`PERIOD`] pixels in both images, so one rendered tile per view makes images of any size.
 
 use camera::{ImagePoint, Rpc};
+use numeric::random::{hash64, unit_interval};
 use raster::Grid;
 use rayon::prelude::*;
 
@@ -73,15 +74,9 @@ fn noise(seed: u64, p: [f64; 3], cell: f64) -> f64 {
     (0..8).map(corner).sum()
 }
 
-/// Uniform in [0, 1), by its key alone (splitmix64).
+/// Returns a number in [0, 1) that depends on the key alone.
 fn uniform(key: [u64; 4]) -> f64 {
-    let mix = |state: u64, k: u64| {
-        let z = (state ^ k).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
-    (key.into_iter().fold(0, mix) >> 11) as f64 / (1u64 << 53) as f64
+    unit_interval(key.into_iter().fold(0, |state, part| hash64(state ^ part)))
 }
 
 /// The tile that a view's image is made of, with noise of four digital numbers.

@@ -5,6 +5,7 @@
 //! to an extreme. Stage frame: x east, y north in metres from the centre, each proportional to longitude and latitude
 //! (so the frame is the same at any latitude and across the antimeridian), z metres above `ground_m`.
 
+use numeric::random::{hash64, unit_interval};
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
@@ -164,15 +165,9 @@ pub(crate) fn noise_3d(seed: u64, p: [f64; 3]) -> f64 {
     (0..8).map(corner).sum()
 }
 
-/// Uniform in [0, 1), by its key alone.
+/// Returns a number in [0, 1) that depends on the key alone.
 pub(crate) fn uniform(key: [u64; 4]) -> f64 {
-    let mix = |state: u64, k: u64| {
-        let z = (state ^ k).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
-    (key.into_iter().fold(0, mix) >> 11) as f64 / (1u64 << 53) as f64
+    unit_interval(key.into_iter().fold(0, |state, part| hash64(state ^ part)))
 }
 
 /// A direction from the scene to the sensor, and the sampling distance across it.

@@ -8,6 +8,7 @@
 
 use crate::eye::Eye;
 use crate::simd::Lanes;
+use numeric::vector::cross;
 
 /// Roundings of f32 between an exact linear function and its value: both factors, the products, the sums; with reserve.
 const ROUNDINGS: f64 = 6.0 * (f32::EPSILON as f64) / 2.0;
@@ -42,11 +43,6 @@ pub(crate) struct FastFacet {
     pub(crate) inverse_error: f32,
     /// The largest inverse depth of the triangle.
     pub(crate) nearest_inverse: f32,
-}
-
-#[inline(always)]
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[inline(always)]

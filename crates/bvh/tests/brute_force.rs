@@ -1,21 +1,8 @@
 //! Every way of casting rays against the same rays tested with every triangle, in f64 and by another formula.
 
 use bvh::{Bvh, BvhError, Eye, MISS, Ray, Target};
+use numeric::vector::{Vector, cross, dot, sub};
 use proptest::prelude::*;
-
-type Vector = [f64; 3];
-
-fn sub(a: Vector, b: Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
 
 /// Where a ray meets a triangle, after Möller and Trumbore (1997), and how far from its border in parts of its size.
 fn moller_trumbore(origin: Vector, direction: Vector, [a, b, c]: [Vector; 3]) -> Option<(f64, f64)> {

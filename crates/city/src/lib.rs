@@ -26,7 +26,6 @@ mod shell;
 mod triangle_mesh;
 mod triangulate;
 mod validity;
-pub mod vector;
 
 pub use class::SurfaceClass;
 pub use crs::CrsReference;

@@ -1,6 +1,6 @@
 //! Rings made fit for triangulation: repeated vertices and back-and-forth spikes go, planes are fitted by Newell's method.
 
-use crate::vector::{Vector, cross, dot, norm, scale, sub, unit};
+use numeric::vector::{Vector, cross, dot, norm, scale, sub, unit};
 
 /// The plane that fits a ring: a point on it and its unit normal, counter-clockwise seen against the normal.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@
 //! the polygons are turned until it does, and the sign of the enclosed volume says which side is out.
 
 use crate::sets::DisjointSets;
-use crate::vector::{Vector, add_cross, dot, sub};
 use crate::{DefectCode, Surface};
+use numeric::vector::{Vector, add_cross, dot, sub};
 
 /// What was found out about a shell.
 #[derive(Debug, Default)]

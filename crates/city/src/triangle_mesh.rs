@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use crate::select::{self, Chosen, LodChoice, ObjectStatus, Scope};
 use crate::shell;
 use crate::triangulate::{Triangulation, triangulate};
-use crate::vector::Vector;
 use crate::{CityModel, Defect, DefectCode, Effect, Geometry, Lod, ModelError, ModelPoint, Surface, SurfaceClass};
+use numeric::vector::Vector;
 
 /// Triangles with their surfaces.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -371,7 +371,7 @@ mod tests {
     fn volume(mesh: &TriangleMesh) -> f64 {
         let cone = |t: usize| {
             let [a, b, c] = mesh.corners(t);
-            crate::vector::dot(a, crate::vector::cross(b, c)) / 6.0
+            numeric::vector::dot(a, numeric::vector::cross(b, c)) / 6.0
         };
         (0..mesh.triangles.len()).map(cone).sum()
     }

@@ -13,7 +13,7 @@ use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation
 use crate::DefectCode;
 use crate::ears;
 use crate::ring::{Plane, clean};
-use crate::vector::{Vector, cross, dot, norm, sub, unit};
+use numeric::vector::{Vector, cross, dot, norm, sub, unit};
 
 mod faces;
 

@@ -12,8 +12,8 @@ use crate::resample::{bilinear, nearest};
 use crate::search::{Search, SearchSummary};
 use crate::sharpness::{Sharpness, sharpness};
 use crate::standing::{Standing, standing};
-use crate::statistics::percentile;
 use crate::terrain::{TerrainSource, estimated_terrain, terrain_from_ground};
+use numeric::percentile;
 use raster::Grid;
 use rayon::prelude::*;
 

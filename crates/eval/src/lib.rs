@@ -53,7 +53,7 @@ pub use resample::{bilinear, nearest};
 pub use search::SearchSummary;
 pub use sharpness::{REACH_M, Sharpness};
 pub use standing::{Overlap, Standing};
-pub use statistics::{ErrorStatistics, NMAD_FACTOR, OUTLIER_NMADS, RobustStatistics, percentile};
+pub use statistics::{ErrorStatistics, OUTLIER_NMADS, RobustStatistics};
 pub use surface::{
     DistanceStatistics, M3c2, NormalAngle, Surface, SurfaceComparison, SurfaceConfig, SurfaceError, ThresholdScore,
     VoxelOverlap, compare_surfaces,

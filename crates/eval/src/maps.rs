@@ -6,7 +6,8 @@
 
 use serde::Serialize;
 
-use crate::percentile;
+use numeric::percentile;
+use numeric::vector::unit;
 
 /// Factors of the shares δ₁, δ₂, δ₃ (Eigen, Puhrsch, Fergus 2014).
 const DELTA: f64 = 1.25;
@@ -178,11 +179,6 @@ impl PixelCounts {
 
 fn same_size(test: usize, reference: usize) -> Result<(), MapSizeError> {
     if test == reference { Ok(()) } else { Err(MapSizeError { test, reference }) }
-}
-
-fn unit(n: [f64; 3]) -> Option<[f64; 3]> {
-    let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
-    (length > 0.0 && length.is_finite()).then(|| n.map(|c| c / length))
 }
 
 /// From the chord: the arc cosine loses the small angles.

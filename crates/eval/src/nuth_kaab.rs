@@ -13,7 +13,7 @@
 use crate::align::MetresFromCells;
 use crate::error::EvalError;
 use crate::gradient::{gradients, steepness};
-use crate::statistics::{percentile, quick_nmad};
+use numeric::{percentile, upper_nmad};
 use raster::{Grid, reduce};
 use serde::Serialize;
 
@@ -187,7 +187,7 @@ fn cosine(bins: &mut [Vec<f64>]) -> Result<(f64, f64), EvalError> {
 
 fn nmad(differences: &Grid<f32>) -> f64 {
     let mut finite: Vec<f32> = differences.data().iter().copied().filter(|d| d.is_finite()).collect();
-    quick_nmad(&mut finite).unwrap_or(f64::INFINITY)
+    upper_nmad(&mut finite).unwrap_or(f64::INFINITY)
 }
 
 #[cfg(test)]

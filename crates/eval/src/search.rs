@@ -18,7 +18,8 @@ use crate::cell_map::CellMap;
 use crate::error::EvalError;
 use crate::resample::bilinear;
 use crate::smooth::smoothed;
-use crate::statistics::quick_nmad;
+use numeric::random::hash64;
+use numeric::upper_nmad;
 use raster::Grid;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -180,7 +181,7 @@ impl Search<'_> {
         let per_cell = (count / cells.len().max(1)).clamp(1, MOST_PER_CELL);
         let offset = |hash: u64| f64::from(hash as u32) / (f64::from(u32::MAX) + 1.0) - 0.5;
         let sample = |(i, k): (usize, usize)| {
-            let hash = mixed((i * MOST_PER_CELL + k) as u64);
+            let hash = hash64((i * MOST_PER_CELL + k) as u64);
             let (column, row) = ((i % columns) as f64 + offset(hash), (i / columns) as f64 + offset(hash >> 32));
             Some(Sample { column, row, height: bilinear(self.reference, column, row)? })
         };
@@ -195,7 +196,7 @@ impl Search<'_> {
         };
         let mut differences: Vec<f32> = samples.iter().filter_map(difference).collect();
         let n = differences.len();
-        Candidate { columns, rows, n, nmad: quick_nmad(&mut differences).unwrap_or(f64::INFINITY) }
+        Candidate { columns, rows, n, nmad: upper_nmad(&mut differences).unwrap_or(f64::INFINITY) }
     }
 
     /// Compass search: to the best of eight neighbours while it is better, then with half the step.
@@ -288,14 +289,6 @@ fn at_edge(steps: &[(i32, i32)], start: Candidate) -> bool {
 fn stratified(cells: &[usize], count: usize) -> impl Iterator<Item = usize> {
     let count = count.min(cells.len());
     let bound = move |k: usize| (k as u128 * cells.len() as u128 / count as u128) as usize;
-    let pick = move |k: usize| bound(k) + (mixed(k as u64) % (bound(k + 1) - bound(k)).max(1) as u64) as usize;
+    let pick = move |k: usize| bound(k) + (hash64(k as u64) % (bound(k + 1) - bound(k)).max(1) as u64) as usize;
     (0..count).filter_map(move |k| cells.get(pick(k)).copied())
-}
-
-/// The finaliser of SplitMix64 (Steele, Lea and Flood 2014): neighbouring numbers give unrelated ones.
-fn mixed(number: u64) -> u64 {
-    let z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

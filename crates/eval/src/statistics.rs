@@ -8,10 +8,8 @@
 //! The robust counterparts leave out what is farther than [`OUTLIER_NMADS`] NMADs from the median: the three-sigma rule of Höhle
 //! and Höhle with both of its parameters estimated robustly.
 
+use numeric::{NMAD_FACTOR, percentile};
 use serde::Serialize;
-
-/// What makes the median absolute deviation an estimate of a normal distribution's standard deviation.
-pub const NMAD_FACTOR: f64 = 1.4826;
 
 /// An error is an outlier when it is farther than this many NMADs from the median.
 pub const OUTLIER_NMADS: f64 = 3.0;
@@ -116,48 +114,11 @@ impl RobustStatistics {
     }
 }
 
-/// The `p`-th percentile (0 to 100) with linear interpolation, in linear time; the order of `values` is lost.
-/// `None` when there are no values.
-pub fn percentile(values: &mut [f64], p: f64) -> Option<f64> {
-    let last = values.len().checked_sub(1)?;
-    let at = (p / 100.0).clamp(0.0, 1.0) * last as f64;
-    let low = (at.floor() as usize).min(last);
-    let (_, &mut below, above) = values.select_nth_unstable_by(low, f64::total_cmp);
-    let next = above.iter().copied().min_by(f64::total_cmp).unwrap_or(below);
-    Some(below + (at - low as f64) * (next - below))
-}
-
-/// The NMAD of single-precision differences (of which the order is lost), for the search of a shift; `None` without values.
-/// For an even count the higher of the two middle values is taken: the criterion needs no interpolation.
-pub(crate) fn quick_nmad(differences: &mut [f32]) -> Option<f64> {
-    let middle = differences.len() / 2;
-    let median = upper_median(differences, middle)?;
-    differences.iter_mut().for_each(|d| *d = (*d - median).abs());
-    Some(NMAD_FACTOR * f64::from(upper_median(differences, middle)?))
-}
-
-fn upper_median(values: &mut [f32], middle: usize) -> Option<f32> {
-    if values.is_empty() {
-        return None;
-    }
-    Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use numeric::upper_nmad;
     use proptest::prelude::*;
-
-    #[test]
-    fn percentiles_of_four_values_are_those_of_numpy() {
-        // numpy.percentile([4, 1, 3, 2], p)
-        for (p, expected) in [(0.0, 1.0), (25.0, 1.75), (50.0, 2.5), (90.0, 3.7), (100.0, 4.0)] {
-            let found = percentile(&mut [4.0, 1.0, 3.0, 2.0], p).unwrap();
-            assert!((found - expected).abs() < 1e-12, "{p}: {found}");
-        }
-        assert_eq!(percentile(&mut [], 50.0), None);
-        assert_eq!(percentile(&mut [5.0], 90.0), Some(5.0));
-    }
 
     #[test]
     fn nothing_has_no_statistics() {
@@ -199,11 +160,11 @@ mod tests {
         }
 
         #[test]
-        fn the_quick_nmad_is_the_nmad_for_odd_counts(half in prop::collection::vec(-50.0..50.0f32, 0..100), one in -1.0..1.0f32) {
+        fn the_upper_nmad_is_the_nmad_for_odd_counts(half in prop::collection::vec(-50.0..50.0f32, 0..100), one in -1.0..1.0f32) {
             let mut values: Vec<f32> = half.iter().chain(&half).copied().chain([one]).collect();
             let mut wide: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
             let expected = ErrorStatistics::of(&mut wide).unwrap().nmad;
-            prop_assert!((quick_nmad(&mut values).unwrap() - expected).abs() < 1e-4);
+            prop_assert!((upper_nmad(&mut values).unwrap() - expected).abs() < 1e-4);
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::align::MetresFromCells;
 use crate::gradient::{gradients, steepness};
 use crate::opening::opened;
 use crate::resample::bilinear;
-use crate::statistics::percentile;
+use numeric::percentile;
 use raster::Grid;
 use serde::Serialize;
 

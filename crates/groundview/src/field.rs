@@ -7,7 +7,8 @@
 use bvh::Ray;
 use raster::{GeoTransform, Grid};
 
-use super::{Ground, Met, cross, unit};
+use super::{Ground, Met};
+use numeric::vector::{cross, normalized};
 
 /// How far beyond a square its triangles are still met, cells: a ray along an edge must not slip through.
 const EDGE: f64 = 1e-9;
@@ -158,7 +159,7 @@ impl Ground for HeightField {
             let next = leaves[axis].min(until).max(at);
             if let Some((t, [by_column, by_row])) = self.in_square(&course, square, [at, next]) {
                 let [column, row] = self.steps;
-                let normal = unit(cross([column[0], column[1], by_column], [row[0], row[1], by_row]));
+                let normal = normalized(cross([column[0], column[1], by_column], [row[0], row[1], by_row]));
                 let up = if normal[2] < 0.0 { normal.map(|c| -c) } else { normal };
                 return (t <= ray.end).then_some(Met { t, normal: up });
             }

@@ -31,12 +31,3 @@ pub trait Ground: Sync {
     /// The first of the surface that a ray meets between its origin (exclusive) and its end.
     fn meet(&self, ray: &bvh::Ray) -> Option<Met>;
 }
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(a: [f64; 3]) -> [f64; 3] {
-    let length = a.iter().map(|c| c * c).sum::<f64>().sqrt();
-    a.map(|c| c / length)
-}

@@ -2,7 +2,8 @@
 
 use bvh::{Bvh, BvhError, Ray};
 
-use super::{Ground, Met, cross, unit};
+use super::{Ground, Met};
+use numeric::vector::{cross, normalized};
 
 /// Triangles in metres from the local origin.
 #[derive(Debug)]
@@ -21,7 +22,7 @@ impl MeshGround {
         let normal = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|corner| positions[corner as usize]);
             let side = |p: [f64; 3]| [0, 1, 2].map(|i| p[i] - a[i]);
-            unit(cross(side(b), side(c)))
+            normalized(cross(side(b), side(c)))
         };
         Ok(Self { normals: triangles.iter().map(normal).collect(), bvh })
     }

@@ -26,8 +26,7 @@ pub const fn mix64(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Returns output number `index`, counted from 0, of the SplitMix64 sequence of `seed`. An index of `u64::MAX` stands for
-/// the state of the seed itself.
+/// Returns output number `index`, counted from 0, of the SplitMix64 sequence of `seed`.
 ///
 /// ```
 /// use numeric::random::{SplitMix64, splitmix64_at};

@@ -7,6 +7,7 @@
 //! alike, where a regression would draw every gain towards zero by the noise of one of them.
 
 use nalgebra::{DMatrix, DVector};
+use numeric::upper_median;
 
 /// Cuts of what does not fit.
 const ROUNDS: usize = 4;
@@ -138,7 +139,7 @@ impl Relation {
             let gain = if spread.0 > 0.0 && spread.1 > 0.0 { spread.1 / spread.0 } else { 1.0 };
             let residual = |v: &(f64, f64)| (v.1 - median.1) - gain * (v.0 - median.0);
             let mut sizes: Vec<f64> = kept.iter().map(|v| residual(v).abs()).collect();
-            let limit = CUT * SIGMA_PER_MAD * median_of(&mut sizes);
+            let limit = CUT * SIGMA_PER_MAD * upper_median(&mut sizes).unwrap_or(f64::NAN);
             if limit > 0.0 {
                 kept.retain(|v| residual(v).abs() <= limit);
             }
@@ -161,7 +162,7 @@ fn moments(values: &[(f64, f64)]) -> Option<((f64, f64), (f64, f64))> {
         let mut own: Vec<f64> = values.iter().map(pick).collect();
         let mean = own.iter().sum::<f64>() / own.len() as f64;
         let variance = own.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / own.len() as f64;
-        (median_of(&mut own), variance.sqrt())
+        (upper_median(&mut own).unwrap_or(f64::NAN), variance.sqrt())
     };
     let ((a, s), (b, t)) = (side(|v| v.0), side(|v| v.1));
     Some(((a, b), (s, t)))
@@ -176,14 +177,6 @@ fn correlation(values: &[(f64, f64)]) -> f64 {
         (ab, aa, bb) = (ab + x * y, aa + x * x, bb + y * y);
     }
     if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
-}
-
-fn median_of(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => f64::NAN,
-        _ => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
-    }
 }
 
 #[cfg(test)]

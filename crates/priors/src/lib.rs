@@ -15,7 +15,6 @@ mod error;
 mod maps;
 mod model;
 mod place;
-mod random;
 mod sample;
 mod satellite;
 mod schedule;

@@ -9,7 +9,7 @@ use raster::Grid;
 use rayon::prelude::*;
 
 use crate::{PriorModel, Rays, View};
-use city::vector::dot;
+use numeric::vector::dot;
 
 /// What depth means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

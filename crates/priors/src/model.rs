@@ -5,7 +5,7 @@ use city::{CityModel, Role, TriangleMesh};
 use rayon::prelude::*;
 
 use crate::PriorsError;
-use city::vector::{Vector, cross, norm, sub, unit};
+use numeric::vector::{Vector, cross, norm, sub, unit};
 
 /// Triangles lower than this take the normal of their surface: their own would be made of the rounding of their corners.
 const SLIVER_M: f64 = 1e-3;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::maps::{MISSING_CLASS, NO_OBJECT};
 use crate::{PriorModel, PriorsError};
-use city::vector::{along, dot, norm};
+use numeric::vector::{along, dot, norm};
 
 /// The maps of one image, all of its size.
 #[derive(Debug, Clone, PartialEq)]

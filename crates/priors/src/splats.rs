@@ -7,7 +7,7 @@
 use gaussian::Splat;
 
 use crate::Sample;
-use city::vector::{Vector, cross, unit};
+use numeric::vector::{Vector, cross, unit};
 
 /// Opacity of a splat that nothing has been learned about.
 const OPACITY: f32 = 0.1;
@@ -52,7 +52,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use city::vector::{norm, sub};
+    use numeric::vector::{norm, sub};
 
     fn point(normal: Vector) -> Sample {
         Sample {

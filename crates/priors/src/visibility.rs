@@ -11,7 +11,7 @@ use camera::ImagePoint;
 use rayon::prelude::*;
 
 use crate::{PriorModel, PriorsError, Sample, View};
-use city::vector::{dot, norm, sub};
+use numeric::vector::{dot, norm, sub};
 
 /// What it takes to be seen, and to be kept.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,6 +4,7 @@
 //! `cos(angle between the surface's normal and the sun)`, scaled to 1–255 as gdaldem does; 0 is no-data. A neighbour
 //! without height takes the centre's, so that pictures have no gaps wider than the data's.
 
+use numeric::nearest_quantile;
 use rayon::prelude::*;
 
 use crate::Grid;
@@ -100,12 +101,8 @@ pub fn coloured_relief(heights: &Grid<f32>, shade: &Grid<u8>, low_m: f32, high_m
 /// `None` without valid cells.
 pub fn height_percentiles(heights: &Grid<f32>, low: f64, high: f64) -> Option<(f32, f32)> {
     let mut valid: Vec<f32> = heights.data().iter().copied().filter(|h| h.is_finite()).collect();
-    let last = valid.len().checked_sub(1)?;
-    let mut at = |percent: f64| {
-        let rank = (percent.clamp(0.0, 100.0) / 100.0 * last as f64).round() as usize;
-        *valid.select_nth_unstable_by(rank, f32::total_cmp).1
-    };
-    Some((at(low), at(high)))
+    let mut at = |percent: f64| nearest_quantile(&mut valid, percent.clamp(0.0, 100.0) / 100.0);
+    Some((at(low)?, at(high)?))
 }
 
 /// The ramp's colour at a fraction, clamped to [0, 1].

@@ -8,7 +8,8 @@ use crate::config::{SimulationConfig, ViewDirection};
 use crate::date::Date;
 use crate::error::SimulateError;
 use crate::frame::SceneFrame;
-use crate::random::{Stream, derived};
+use crate::random::derived;
+use numeric::SplitMix64;
 
 /// Pixels around the area of the truth, for what leans out of it and for the pointing error.
 const MARGIN_PX: f64 = 12.0;
@@ -70,11 +71,11 @@ pub(crate) fn camera(
 /// What the given RPC projects too far: a translation at the middle of the image, and a drift along its lines.
 pub(crate) fn pointing(config: &SimulationConfig, index: usize, (width, height): (usize, usize)) -> ImageCorrection {
     let a = &config.acquisition;
-    let mut stream = Stream::new(derived(config.seed, 1000 + index as u64));
+    let mut stream = SplitMix64::new(derived(config.seed, 1000 + index as u64));
     let [shortest, longest] = a.pointing_error_px;
-    let length = stream.uniform(shortest, longest);
+    let length = stream.uniform_in(shortest, longest);
     let mut vector = |length: f64| {
-        let direction = stream.uniform(0.0, std::f64::consts::TAU);
+        let direction = stream.uniform_in(0.0, std::f64::consts::TAU);
         [length * direction.cos(), length * direction.sin()]
     };
     let translation_px = vector(length);

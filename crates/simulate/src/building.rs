@@ -5,9 +5,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::prism::{Block, Roof};
-use crate::random::Stream;
 use crate::streets::Streets;
 use crate::terrain::Terrain;
+use numeric::SplitMix64;
 
 /// Height and thickness of a parapet, metres.
 const PARAPET_M: [f64; 2] = [0.9, 0.4];
@@ -45,8 +45,8 @@ impl<'a> Builder<'a> {
     }
 
     /// A building under a flat (first probability), hipped (second) or gabled roof.
-    pub(crate) fn any_roof(&mut self, lot: &Lot, walls_m: f64, [flat, hipped]: [f64; 2], stream: &mut Stream) {
-        let (kind, pitch) = (stream.uniform(0.0, 1.0), stream.uniform(0.35, 0.75));
+    pub(crate) fn any_roof(&mut self, lot: &Lot, walls_m: f64, [flat, hipped]: [f64; 2], stream: &mut SplitMix64) {
+        let (kind, pitch) = (stream.uniform_in(0.0, 1.0), stream.uniform_in(0.35, 0.75));
         if kind < flat {
             self.flat(lot, walls_m, stream);
         } else if kind < flat + hipped {
@@ -57,14 +57,14 @@ impl<'a> Builder<'a> {
     }
 
     /// A flat roof with a parapet and a plant room.
-    pub(crate) fn flat(&mut self, lot: &Lot, walls_m: f64, stream: &mut Stream) {
+    pub(crate) fn flat(&mut self, lot: &Lot, walls_m: f64, stream: &mut SplitMix64) {
         let Some((ground, block)) = self.block(lot) else { return };
         let block = Block { roof: Roof::Flat { height_m: ground + walls_m }, ..block };
         let mut details = parapets(&block);
         let [u, v] = block.half_size_m;
-        let at = block.position(stream.uniform(-0.5, 0.5) * u, stream.uniform(-0.4, 0.4) * v);
-        let half_size_m = [stream.uniform(1.2, 0.3 * u + 1.2), stream.uniform(1.0, 0.25 * v + 1.0)];
-        details.push(on_roof(&block, at, half_size_m, block.top_m() + stream.uniform(1.8, 3.2)));
+        let at = block.position(stream.uniform_in(-0.5, 0.5) * u, stream.uniform_in(-0.4, 0.4) * v);
+        let half_size_m = [stream.uniform_in(1.2, 0.3 * u + 1.2), stream.uniform_in(1.0, 0.25 * v + 1.0)];
+        details.push(on_roof(&block, at, half_size_m, block.top_m() + stream.uniform_in(1.8, 3.2)));
         self.push(vec![block], details);
     }
 

@@ -4,8 +4,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config::SimulationConfig;
-use crate::random::{Stream, derived};
+use crate::random::derived;
 use crate::render::Sun;
+use numeric::SplitMix64;
 
 /// What all views of one date have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,8 +30,8 @@ impl Date {
         if index == 0 {
             return Self { index, sun: a.sun, gain: 1.0, offset: 0.0, gamma: 1.0 };
         }
-        let mut stream = Stream::new(derived(config.seed, 3000 + index as u64));
-        let mut differing = |spread: f64| stream.uniform(-spread, spread);
+        let mut stream = SplitMix64::new(derived(config.seed, 3000 + index as u64));
+        let mut differing = |spread: f64| stream.uniform_in(-spread, spread);
         let [elevation, azimuth] = a.sun_spread_deg;
         let elevation_deg = (a.sun.elevation_deg + differing(elevation)).clamp(Sun::LOWEST_DEG, 90.0);
         let azimuth_deg = (a.sun.azimuth_deg + differing(azimuth)).rem_euclid(360.0);

@@ -6,9 +6,10 @@ use crate::config::{SimulationConfig, VehiclesConfig};
 use crate::crown::Crown;
 use crate::noise::value_noise;
 use crate::prism::{Block, Roof};
-use crate::random::{Stream, derived, lattice};
+use crate::random::{derived, lattice};
 use crate::streets::Streets;
 use crate::terrain::Terrain;
+use numeric::SplitMix64;
 
 /// Width of the clumps in which trees stand, metres.
 const CLUMP_M: f64 = 45.0;
@@ -36,11 +37,11 @@ pub(crate) fn trees(
     let cell = (MEAN_CHANCE / density).sqrt();
     let count = (reach_m / cell).ceil() as i64;
     let tree = |i: i64, j: i64| {
-        let mut stream = Stream::new((lattice(seed, i, j) * (1u64 << 53) as f64) as u64);
-        let [x, y] = [i, j].map(|k| (k as f64 + stream.uniform(0.0, 1.0)) * cell);
+        let mut stream = SplitMix64::new((lattice(seed, i, j) * (1u64 << 53) as f64) as u64);
+        let [x, y] = [i, j].map(|k| (k as f64 + stream.uniform_in(0.0, 1.0)) * cell);
         let [low, high] = config.vegetation.height_m;
-        let height = low + (high - low) * stream.uniform(0.0, 1.0);
-        let radius_m = height * stream.uniform(0.2, 0.32);
+        let height = low + (high - low) * stream.uniform_in(0.0, 1.0);
+        let radius_m = height * stream.uniform_in(0.2, 0.32);
         let chance = MEAN_CHANCE * (1.0 + 1.2 * value_noise(seed, CLUMP_M, x, y));
         let stands = stream.chance(chance) && is_free(x, y) && is_clear(x, y, radius_m, &is_free);
         let shoulder_m = terrain.height(x, y) + 0.35 * height;

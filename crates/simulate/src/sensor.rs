@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::SensorConfig;
 use crate::date::Date;
-use crate::random::{Stream, lattice};
+use crate::random::lattice;
+use numeric::SplitMix64;
 
 /// The transfer of the pixel's box at the Nyquist frequency.
 const BOX_AT_NYQUIST: f64 = std::f64::consts::FRAC_2_PI;
@@ -53,7 +54,7 @@ impl Sensor {
         let electrons = radiance.max(0.0) * self.electrons_at_white;
         let sigma = (electrons + self.read_noise_electrons * self.read_noise_electrons).sqrt();
         let own = lattice(seed, column as i64, row as i64).to_bits();
-        let noisy = ((electrons + sigma * Stream::new(own).normal()) / self.electrons_at_white).max(0.0);
+        let noisy = ((electrons + sigma * SplitMix64::new(own).normal()) / self.electrons_at_white).max(0.0);
         let signal = if self.gamma == 1.0 { noisy } else { noisy.powf(self.gamma) };
         (self.offset + self.gain * signal).round().clamp(1.0, f64::from(self.dn_max)) as u16
     }

@@ -5,9 +5,10 @@
 
 use crate::building::{Builder, Building, Lot};
 use crate::config::{BuildingsConfig, SimulationConfig};
-use crate::random::{Stream, derived, lattice};
+use crate::random::{derived, lattice};
 use crate::streets::Streets;
 use crate::terrain::Terrain;
+use numeric::SplitMix64;
 
 /// Space between the carriageway and the lots, metres.
 const SIDEWALK_M: f64 = 2.5;
@@ -45,10 +46,10 @@ pub(crate) fn build(config: &SimulationConfig, terrain: &Terrain, reach_m: f64) 
             continue;
         }
         let place = if config.buildings.identical { (0, 1) } else { (i, j) };
-        let mut stream = Stream::new((lattice(seed, place.0, place.1) * (1u64 << 53) as f64) as u64);
+        let mut stream = SplitMix64::new((lattice(seed, place.0, place.1) * (1u64 << 53) as f64) as u64);
         if (i, j) == (0, 0) && config.buildings.landmark_height_m > 0.0 {
             town.landmark(centre);
-        } else if let Some(quarter) = drawn(&config.buildings, stream.uniform(0.0, 1.0)) {
+        } else if let Some(quarter) = drawn(&config.buildings, stream.uniform_in(0.0, 1.0)) {
             town.quarter(quarter, centre, &mut stream);
         }
     }
@@ -88,7 +89,7 @@ impl Town<'_> {
         0.5 * (self.config.street_spacing_m - self.config.street_width_m) - SIDEWALK_M
     }
 
-    fn quarter(&mut self, quarter: Quarter, centre: [f64; 2], stream: &mut Stream) {
+    fn quarter(&mut self, quarter: Quarter, centre: [f64; 2], stream: &mut SplitMix64) {
         match quarter {
             Quarter::Park => {}
             Quarter::Hall => self.hall(centre, stream),
@@ -108,74 +109,74 @@ impl Town<'_> {
         self.builder.stepped(&steps);
     }
 
-    fn hall(&mut self, centre: [f64; 2], stream: &mut Stream) {
+    fn hall(&mut self, centre: [f64; 2], stream: &mut SplitMix64) {
         let half = self.half_m();
-        let half_size = [stream.uniform(0.5, 0.85) * half, stream.uniform(0.35, 0.7) * half];
-        let lot = Lot { centre, half_size, turn_deg: stream.uniform(-4.0, 4.0) };
-        let walls = stream.uniform(HALL_M[0], HALL_M[1]);
+        let half_size = [stream.uniform_in(0.5, 0.85) * half, stream.uniform_in(0.35, 0.7) * half];
+        let lot = Lot { centre, half_size, turn_deg: stream.uniform_in(-4.0, 4.0) };
+        let walls = stream.uniform_in(HALL_M[0], HALL_M[1]);
         if stream.chance(0.3) {
             let upper = Lot { half_size: half_size.map(|h| 0.55 * h), ..lot };
-            self.builder.stepped(&[(lot, walls), (upper, walls + stream.uniform(3.0, 8.0))]);
+            self.builder.stepped(&[(lot, walls), (upper, walls + stream.uniform_in(3.0, 8.0))]);
         } else {
             self.builder.flat(&lot, walls, stream);
         }
     }
 
-    fn rows(&mut self, [u, v]: [f64; 2], stream: &mut Stream) {
+    fn rows(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
         let half = self.half_m();
         for side in [-1.0, 1.0] {
-            let half_size = [stream.uniform(0.6, 0.85) * half, stream.uniform(5.0, 6.5)];
+            let half_size = [stream.uniform_in(0.6, 0.85) * half, stream.uniform_in(5.0, 6.5)];
             let lot = Lot { centre: [u, v + side * 0.55 * half], half_size, turn_deg: 0.0 };
-            let walls = stream.uniform(ROW_M[0], ROW_M[1]);
+            let walls = stream.uniform_in(ROW_M[0], ROW_M[1]);
             self.builder.any_roof(&lot, walls, [0.3, 0.2], stream);
         }
     }
 
-    fn houses(&mut self, [u, v]: [f64; 2], stream: &mut Stream) {
+    fn houses(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
         let half = self.half_m();
         for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
             if stream.chance(0.15) {
                 continue;
             }
-            let place = |side: f64, stream: &mut Stream| side * half * stream.uniform(0.47, 0.57);
+            let place = |side: f64, stream: &mut SplitMix64| side * half * stream.uniform_in(0.47, 0.57);
             let centre = [u + place(a, stream), v + place(b, stream)];
-            let half_size = [stream.uniform(5.0, 8.0), stream.uniform(4.0, 5.0)];
-            let lot = Lot { centre, half_size, turn_deg: stream.uniform(-8.0, 8.0) };
-            let walls = stream.uniform(HOUSE_M[0], HOUSE_M[1]);
+            let half_size = [stream.uniform_in(5.0, 8.0), stream.uniform_in(4.0, 5.0)];
+            let lot = Lot { centre, half_size, turn_deg: stream.uniform_in(-8.0, 8.0) };
+            let walls = stream.uniform_in(HOUSE_M[0], HOUSE_M[1]);
             self.builder.any_roof(&lot, walls, [0.2, 0.35], stream);
         }
     }
 
     /// Four wings around a courtyard, wall to wall with the street.
-    fn courtyard(&mut self, [u, v]: [f64; 2], stream: &mut Stream) {
-        let (half, depth) = (self.half_m(), stream.uniform(5.0, 6.5));
-        let walls = stream.uniform(COURTYARD_M[0], COURTYARD_M[1]);
+    fn courtyard(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
+        let (half, depth) = (self.half_m(), stream.uniform_in(5.0, 6.5));
+        let walls = stream.uniform_in(COURTYARD_M[0], COURTYARD_M[1]);
         let turn_deg = 0.0;
         for side in [-1.0, 1.0] {
             let lot = Lot { centre: [u, v + side * (half - depth)], half_size: [half, depth], turn_deg };
-            self.builder.any_roof(&lot, walls + stream.uniform(-1.5, 1.5), [0.4, 0.0], stream);
+            self.builder.any_roof(&lot, walls + stream.uniform_in(-1.5, 1.5), [0.4, 0.0], stream);
         }
         for side in [-1.0, 1.0] {
             let half_size = [half - 2.0 * depth, depth];
             let lot = Lot { centre: [u + side * (half - depth), v], half_size, turn_deg: 90.0 };
-            self.builder.any_roof(&lot, walls + stream.uniform(-1.5, 1.5), [0.4, 0.0], stream);
+            self.builder.any_roof(&lot, walls + stream.uniform_in(-1.5, 1.5), [0.4, 0.0], stream);
         }
     }
 
     /// One tower on a podium, or two towers side by side.
-    fn towers(&mut self, [u, v]: [f64; 2], stream: &mut Stream) {
+    fn towers(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
         let half = self.half_m();
         let [low, high] = self.config.high_rise_height_m;
         if stream.chance(0.5) {
             let lot = Lot { centre: [u, v], half_size: [0.8 * half, 0.6 * half], turn_deg: 0.0 };
-            let tower = Lot { half_size: [stream.uniform(9.0, 14.0), stream.uniform(8.0, 11.0)], ..lot };
-            let height = stream.uniform(low, high);
-            return self.builder.stepped(&[(lot, stream.uniform(6.0, 12.0)), (tower, height)]);
+            let tower = Lot { half_size: [stream.uniform_in(9.0, 14.0), stream.uniform_in(8.0, 11.0)], ..lot };
+            let height = stream.uniform_in(low, high);
+            return self.builder.stepped(&[(lot, stream.uniform_in(6.0, 12.0)), (tower, height)]);
         }
         for side in [-1.0, 1.0] {
-            let half_size = [stream.uniform(6.5, 9.5), stream.uniform(6.5, 0.8 * half)];
+            let half_size = [stream.uniform_in(6.5, 9.5), stream.uniform_in(6.5, 0.8 * half)];
             let lot = Lot { centre: [u + side * 0.52 * half, v], half_size, turn_deg: 0.0 };
-            self.builder.flat(&lot, stream.uniform(low, high), stream);
+            self.builder.flat(&lot, stream.uniform_in(low, high), stream);
         }
     }
 

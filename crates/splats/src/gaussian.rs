@@ -5,6 +5,7 @@
 //! angles, so the own axes are the eigenvectors within the plane. The third is the normal, with a small thickness.
 
 use gaussian::{Splat, quaternion_of_axes};
+use numeric::vector::{cross, dot, norm};
 
 use super::{Block, Surface};
 
@@ -63,11 +64,8 @@ pub fn splat_of_block(
 
 /// Own axes (the normal upwards) and standard deviations along the first two, from two tangents.
 fn own_axes(first: [f64; 3], second: [f64; 3]) -> ([[f64; 3]; 3], [f64; 2]) {
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let unit = |a: [f64; 3]| {
-        let length = dot(a, a).sqrt().max(f64::MIN_POSITIVE);
+        let length = norm(a).max(f64::MIN_POSITIVE);
         a.map(|c| c / length)
     };
     let mut normal = unit(cross(first, second));

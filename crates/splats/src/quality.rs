@@ -3,6 +3,7 @@
 //! PSNR = −10 log₁₀ (mean squared error) for images in [0, 1]. SSIM (Wang et al. 2004) uses Gaussian windows of 11 px, σ 1.5 px, and
 //! the constants 0.01² and 0.03², on the mean of the channels; pixels that do not count have no weight in any window.
 
+use numeric::upper_median;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
 
@@ -34,14 +35,10 @@ pub fn height_errors(found: &Grid<f32>, truth: &Grid<f32>, truth_minus_found_m: 
         .map(|(&f, &t)| (f64::from(f) + truth_minus_found_m - f64::from(t)).abs())
         .filter(|e| e.is_finite())
         .collect();
-    if sizes.is_empty() {
-        return None;
-    }
     let count = sizes.len() as f64;
     let rmse_m = (sizes.iter().map(|e| e * e).sum::<f64>() / count).sqrt();
     let mae_m = sizes.iter().sum::<f64>() / count;
-    let middle = sizes.len() / 2;
-    let median_m = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let median_m = upper_median(&mut sizes)?;
     Some(HeightErrors { cells: sizes.len(), rmse_m, mae_m, median_m, share: count / there as f64 })
 }
 

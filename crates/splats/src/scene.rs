@@ -7,6 +7,7 @@
 
 use crs::CrsError;
 use gaussian::Splat;
+use numeric::{middle_values, nearest_quantile};
 use raster::{Grid, Interpolation, sample};
 use serde::Serialize;
 
@@ -284,12 +285,7 @@ fn balance(seen: &[Seen]) -> Vec<Balance> {
 }
 
 fn quartiles(values: &mut [f32]) -> Option<[f32; 3]> {
-    (values.len() >= 8).then(|| [0.25, 0.5, 0.75].map(|share| order_statistic(values, share)))
-}
-
-fn order_statistic(values: &mut [f32], share: f64) -> f32 {
-    let at = (share * (values.len() - 1) as f64).round() as usize;
-    *values.select_nth_unstable_by(at, f32::total_cmp).1
+    (values.len() >= 8).then(|| [0.25, 0.5, 0.75].map(|share| nearest_quantile(values, share).unwrap_or(f32::NAN)))
 }
 
 /// The median over the views that see a cell, in the reference's units; NaN where none does.
@@ -304,9 +300,8 @@ fn cell_colours(surface: &Surface<'_>, seen: &[Seen], balance: &[Balance]) -> Gr
             let all = views.map(|(s, (gain, offset))| gain[channel] * s.values.data()[at][channel] + offset[channel]);
             values.extend(all.filter(|v| v.is_finite()));
             values.sort_unstable_by(f32::total_cmp);
-            let n = values.len();
-            if n > 0 {
-                *colour = 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+            if let Some((low, high)) = middle_values(&values) {
+                *colour = 0.5 * (low + high);
             }
         }
     }
@@ -316,10 +311,9 @@ fn cell_colours(surface: &Surface<'_>, seen: &[Seen], balance: &[Balance]) -> Gr
 pub(super) fn display_range(colours: &Grid<[f32; 3]>) -> [[f32; 2]; 3] {
     [0, 1, 2].map(|channel| {
         let mut values: Vec<f32> = colours.data().iter().map(|c| c[channel]).filter(|c| c.is_finite()).collect();
-        if values.is_empty() {
+        let [Some(low), Some(high)] = [TAIL, 1.0 - TAIL].map(|share| nearest_quantile(&mut values, share)) else {
             return [0.0, 1.0];
-        }
-        let [low, high] = [TAIL, 1.0 - TAIL].map(|share| order_statistic(&mut values, share));
+        };
         if high > low { [low, high] } else { [low, low + 1.0] }
     })
 }

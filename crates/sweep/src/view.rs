@@ -2,6 +2,7 @@
 
 use crate::cost::SourceLevel;
 use camera::RpcCamera;
+use numeric::{order_statistic, upper_median};
 use raster::{Grid, Pyramid};
 
 /// Variance that an 8-bit quantisation alone leaves.
@@ -92,8 +93,7 @@ fn typical_difference(g: &Grid<f32>) -> f32 {
         (here - g[(x - 1, y)]).abs().max((here - g[(x, y - 1)]).abs())
     };
     let mut all: Vec<f32> = places.map(difference).filter(|d| d.is_finite()).collect();
-    let middle = all.len() / 2;
-    if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    upper_median(&mut all).unwrap_or(0.0)
 }
 
 /// Standard deviation of the noise: of the response to Immerkær's mask (1996), which smooth and straight structures do
@@ -115,11 +115,8 @@ fn noise_deviation(g: &Grid<f32>) -> f32 {
         }
     }
     let quarter = responses.len() / 4;
-    if responses.is_empty() {
-        return 0.0;
-    }
     // A quarter of a normal deviate lies within 0.3186 of its deviation.
-    *responses.select_nth_unstable_by(quarter, f32::total_cmp).1 / 0.3186
+    order_statistic(&mut responses, quarter).map_or(0.0, |response| response / 0.3186)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //! the semi-global aggregation makes of them.
 
 use multiversion::multiversion;
+use numeric::upper_median;
 use raster::{Grid, Window};
 
 use crate::SweepError;
@@ -122,8 +123,7 @@ fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
     // The median of a fourth of the rows, thousands of pixels even in a small block, is as good as that of all.
     let rows = gradient.chunks_exact(w.width).step_by(4);
     let mut known: Vec<f32> = rows.flatten().copied().filter(|g| g.is_finite()).collect();
-    let middle = known.len() / 2;
-    let typical = if known.is_empty() { 0.0 } else { *known.select_nth_unstable_by(middle, f32::total_cmp).1 };
+    let typical = upper_median(&mut known).unwrap_or(0.0);
     let mut edges = vec![0; gradient.len()];
     grade_edges(&gradient, typical.max(noise).max(f32::MIN_POSITIVE), &mut edges);
     edges

@@ -6,7 +6,7 @@
 
 use super::patch::{Bounds, Patch, Side};
 use super::{MAX_COMPARISONS, SHELL_TOLERANCE_M};
-use crate::vector::{Vector, cross, dot, norm, sub, unit};
+use numeric::vector::{Vector, cross, dot, norm, sub, unit};
 
 /// Comparisons of triangles that may still be made.
 #[derive(Debug)]

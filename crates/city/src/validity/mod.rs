@@ -20,11 +20,11 @@ use rayon::prelude::*;
 use crate::select;
 use crate::shell;
 use crate::triangle_mesh::positions_of;
-use crate::vector::Vector;
 use crate::{
     CityModel, Defect, DefectCode, Effect, Geometry, GeometryKind, MeshConfig, ModelError, ObjectKind, Surface,
 };
 use contact::{Budget, Contact};
+use numeric::vector::Vector;
 use patch::Patch;
 
 /// Surfaces nearer than this touch, metres.

@@ -2,7 +2,7 @@
 
 use crate::Surface;
 use crate::triangulate::triangulate;
-use crate::vector::{Vector, cross, dot, norm, sub};
+use numeric::vector::{Vector, cross, dot, norm, sub};
 
 /// Triangles of a closed surface.
 pub(super) struct Patch {

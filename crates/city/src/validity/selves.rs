@@ -6,7 +6,7 @@
 use super::contact::{normal, shared_face};
 use super::patch::{Bounds, Patch, distance, to_segment};
 use super::{MAX_COMPARISONS, OVERLAP_M, SHELL_TOLERANCE_M};
-use crate::vector::{Vector, dot, sub};
+use numeric::vector::{Vector, dot, sub};
 
 /// How many pairs of triangles meet; `None` when there are too many to compare.
 pub(super) fn meetings(shell: &Patch) -> Option<usize> {

@@ -7,7 +7,6 @@
 //! Positions are f64 in any unit; the world's are metres from a local origin.
 
 mod noise;
-mod random;
 mod robust;
 mod umeyama;
 

@@ -8,8 +8,8 @@
 use camera::Similarity;
 use serde::Serialize;
 
-use super::random::Random;
 use super::{AlignConfig, AlignError, Alignment, PointPair, align};
+use numeric::SplitMix64;
 
 /// Which noise, and how much.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +75,7 @@ pub fn disturbed(
     config: &AlignConfig,
 ) -> Result<Similarity, AlignError> {
     // Apart from the numbers that the search for inliers draws.
-    let mut random = Random::new(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
+    let mut random = SplitMix64::new(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
     match disturbance {
         Disturbance::TranslationM(sigma) => {
             let mut move_pair =

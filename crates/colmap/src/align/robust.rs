@@ -8,8 +8,8 @@
 
 use camera::Similarity;
 
-use super::random::Random;
 use super::{AlignError, PointPair, fit_similarity};
+use numeric::{SplitMix64, order_statistic, upper_median};
 
 /// Up to this many pairs every triple is tried.
 const ALL_TRIPLES: usize = 20;
@@ -98,7 +98,7 @@ fn triples(count: usize, config: &AlignConfig, consider: &mut impl FnMut([usize;
         }
         return;
     }
-    let mut random = Random::new(config.seed);
+    let mut random = SplitMix64::new(config.seed);
     for _ in 0..config.samples {
         let triple = [0; 3].map(|_| random.below(count));
         if triple[0] != triple[1] && triple[1] != triple[2] && triple[0] != triple[2] {
@@ -135,8 +135,8 @@ fn score(pairs: &[PointPair], similarity: &Similarity, threshold_m: Option<f64>)
 
 /// The residual that half of the pairs and the three that made the proposal stay below.
 fn half(mut residuals: Vec<f64>) -> f64 {
-    let at = (residuals.len() / 2 + 1).min(residuals.len() - 1);
-    *residuals.select_nth_unstable_by(at, f64::total_cmp).1
+    let at = (residuals.len() / 2 + 1).min(residuals.len().saturating_sub(1));
+    order_statistic(&mut residuals, at).unwrap_or(f64::INFINITY)
 }
 
 fn refine(
@@ -173,8 +173,7 @@ fn refine(
 
 fn median_of(residuals: &[f64], inliers: &[bool]) -> f64 {
     let mut inside: Vec<f64> = residuals.iter().zip(inliers).filter(|(_, inlier)| **inlier).map(|(r, _)| *r).collect();
-    let middle = inside.len() / 2;
-    if inside.is_empty() { 0.0 } else { *inside.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    upper_median(&mut inside).unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -190,7 +189,7 @@ mod tests {
 
     /// Cameras along a bent street, with noise (metres) and every third-or-so position wrong by tens of metres.
     fn pairs(count: usize, noise_m: f64, outliers: f64, seed: u64) -> Vec<PointPair> {
-        let mut random = Random::new(seed);
+        let mut random = SplitMix64::new(seed);
         let truth = planted();
         (0..count)
             .map(|i| {
@@ -246,7 +245,7 @@ mod tests {
 
     #[test]
     fn positions_of_other_images_agree_with_nothing() {
-        let mut random = Random::new(3);
+        let mut random = SplitMix64::new(3);
         let mut place = || [0; 3].map(|_| 100.0 * random.normal());
         let pairs: Vec<PointPair> = (0..40).map(|_| PointPair { source: place(), target: place() }).collect();
         let config = AlignConfig { threshold_m: Some(1.0), ..AlignConfig::default() };

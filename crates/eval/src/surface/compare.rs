@@ -9,7 +9,8 @@ use super::m3c2::{M3c2, m3c2};
 use super::normals::normals;
 use super::sample::Samples;
 use super::voxels::{VoxelOverlap, overlap};
-use super::{Surface, SurfaceConfig, SurfaceError, dot};
+use super::{Surface, SurfaceConfig, SurfaceError};
+use numeric::vector::dot;
 
 /// How far a surface is from a reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]

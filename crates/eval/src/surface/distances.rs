@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::percentile;
+use numeric::percentile;
 
 /// Distances from samples of one surface to the other, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

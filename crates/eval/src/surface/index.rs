@@ -3,7 +3,8 @@
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
-use super::{Surface, cross, dot, sub, unit};
+use super::Surface;
+use numeric::vector::{cross, dot, norm, sub, unit};
 
 /// A point with its index.
 pub(super) type Indexed = GeomWithData<[f64; 3], u32>;
@@ -64,8 +65,8 @@ impl SurfaceIndex {
     pub(super) fn nearest(&self, from: [f64; 3]) -> Option<Nearest> {
         match self {
             Self::Points(PointIndex(tree)) => tree.nearest_neighbor(&from).map(|found| {
-                let to = sub(*found.geom(), from);
-                Nearest { distance_m: dot(to, to).sqrt(), point: Some(found.data), normal: None }
+                let distance_m = norm(sub(*found.geom(), from));
+                Nearest { distance_m, point: Some(found.data), normal: None }
             }),
             Self::Triangles(tree) => tree.nearest_neighbor(&from).map(|found| Nearest {
                 distance_m: found.distance_2(&from).sqrt(),
@@ -90,8 +91,7 @@ impl Triangle {
 
     pub(super) fn area_m2(&self) -> f64 {
         let [a, b, c] = self.corners;
-        let normal = cross(sub(b, a), sub(c, a));
-        0.5 * dot(normal, normal).sqrt()
+        0.5 * norm(cross(sub(b, a), sub(c, a)))
     }
 
     /// The point with these weights of the second and third corner.
@@ -167,8 +167,7 @@ mod tests {
             let mut least = f64::INFINITY;
             for i in 0..=60 {
                 for j in 0..=60 - i {
-                    let to = sub(triangle.point(f64::from(i) / 60.0, f64::from(j) / 60.0), p);
-                    least = least.min(dot(to, to).sqrt());
+                    least = least.min(norm(sub(triangle.point(f64::from(i) / 60.0, f64::from(j) / 60.0), p)));
                 }
             }
             // The grid's points are on the triangle, at most a fraction of an edge apart.

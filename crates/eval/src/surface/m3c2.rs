@@ -8,11 +8,12 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::SurfaceConfig;
 use super::index::PointIndex;
 use super::normals::{normal, towards};
 use super::sample::Samples;
-use super::{SurfaceConfig, dot, sub};
-use crate::percentile;
+use numeric::percentile;
+use numeric::vector::{dot, sub};
 
 /// Normal quantile of a two-sided 95 %.
 const Z95: f64 = 1.96;

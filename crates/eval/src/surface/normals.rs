@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
 
 use super::index::PointIndex;
-use super::{dot, sub, unit};
+use numeric::vector::{dot, sub, unit};
 
 /// Fewer points than this have no plane.
 const LEAST_POINTS: usize = 3;

@@ -3,6 +3,8 @@
 //! Of n samples on a mesh the i-th lies in the i-th of n equal shares of the area, so that the density is even; inside its
 //! triangle it is uniform. Its random numbers depend on the seed and on i alone.
 
+use numeric::SplitMix64;
+use numeric::random::{GOLDEN_GAMMA, mix64};
 use rayon::prelude::*;
 
 use super::index::{Triangle, triangles};
@@ -48,19 +50,10 @@ fn on_mesh(triangles: &[Triangle], config: &SurfaceConfig) -> Option<Samples> {
     Some(Samples { points, normals: Some(normals), per_m2: Some(count as f64 / area) })
 }
 
-/// Three numbers in 0 … 1 that depend on a seed and an index (SplitMix64).
+/// Three numbers in [0, 1) that depend on a seed and an index.
 fn random(seed: u64, index: u64) -> [f64; 3] {
-    let mut state = mix(seed ^ 0x9e37_79b9_7f4a_7c15) ^ mix(index.wrapping_add(1));
-    [0; 3].map(|_: i32| {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        (mix(state) >> 11) as f64 / (1u64 << 53) as f64
-    })
-}
-
-fn mix(mut z: u64) -> u64 {
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    let mut random = SplitMix64::new(mix64(seed ^ GOLDEN_GAMMA) ^ mix64(index.wrapping_add(1)));
+    [0; 3].map(|_: i32| random.uniform())
 }
 
 #[cfg(test)]

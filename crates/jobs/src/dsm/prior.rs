@@ -1,5 +1,6 @@
 //! A city model as the prior of the height sweep: what each view would see of it.
 
+use numeric::upper_median;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -332,11 +333,7 @@ fn score(
         Some(found_at(map, x.div_euclid(side) + dx, y.div_euclid(side) + dy)? - prior)
     };
     let mut off: Vec<f32> = samples.iter().filter_map(difference).collect();
-    if off.is_empty() {
-        return None;
-    }
-    let middle = off.len() / 2;
-    let height_m = *off.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let height_m = upper_median(&mut off)?;
     if f64::from(height_m.abs()) > SEARCH_M {
         return None;
     }

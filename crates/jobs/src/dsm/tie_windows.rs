@@ -4,6 +4,7 @@
 //!
 //! Ties are given in pixels of the whole images. The heights seen in the first window with ties narrow the search of the rest.
 
+use numeric::upper_median;
 use raster::Window;
 use rayon::prelude::*;
 use sweep::View;
@@ -69,9 +70,7 @@ impl Character {
 }
 
 fn median(values: &[f32]) -> Option<f32> {
-    let mut values = values.to_vec();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
+    upper_median(&mut values.to_vec())
 }
 
 /// Ties of the pairs, best pair first, over heights in `search`, and the images' characters.

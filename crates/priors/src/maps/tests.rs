@@ -6,7 +6,7 @@ use city::SurfaceClass;
 use super::*;
 use crate::model::tests::{cuboid, joined};
 use crate::view::tests::{nadir, pinhole};
-use city::vector::norm;
+use numeric::vector::norm;
 
 /// A box of 8 × 6 × 3 m that is a building, on a large slab that is none.
 fn model() -> PriorModel {

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::creases::Creases;
 use super::{Amount, LIMIT, Purpose, Sample, SampleConfig, on_triangle, positive};
 use crate::{PriorModel, PriorsError};
-use city::vector::{Vector, cross, norm, sub};
+use numeric::vector::{Vector, cross, norm, sub};
 
 /// A piece is small enough when it is no longer than this many spacings.
 const PIECE: f64 = 0.7;
@@ -158,7 +158,7 @@ impl<'a> Work<'a> {
 
 fn on_pieces(model: &PriorModel, config: &SampleConfig, pieces: &[Piece], triangle: usize) -> Vec<Sample> {
     let mut points = Vec::new();
-    let mut reached = config.stream(Purpose::Share).unit(triangle as u64);
+    let mut reached = config.stream(Purpose::Share).uniform(triangle as u64);
     for piece in pieces {
         let before = reached.floor();
         reached += piece.share;

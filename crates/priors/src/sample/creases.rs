@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::LIMIT;
 use crate::{PriorModel, PriorsError};
-use city::vector::{Vector, along, cross, dot, norm, sub};
+use numeric::vector::{Vector, along, cross, dot, norm, sub};
 
 /// Normals closer than this belong to one plane (sine of the angle).
 const FLAT: f64 = 1e-4;

@@ -12,9 +12,9 @@ mod weights;
 use city::SurfaceClass;
 use rayon::prelude::*;
 
-use crate::random::Stream;
 use crate::{PriorModel, PriorsError};
-use city::vector::Vector;
+use numeric::RandomByIndex;
+use numeric::vector::Vector;
 
 pub use adaptive::{ErrorCurve, error_curve};
 pub use weights::ClassWeights;
@@ -121,8 +121,8 @@ enum Purpose {
 }
 
 impl SampleConfig {
-    fn stream(&self, purpose: Purpose) -> Stream {
-        Stream::new(self.seed, purpose as u64)
+    fn stream(&self, purpose: Purpose) -> RandomByIndex {
+        RandomByIndex::new(self.seed, purpose as u64)
     }
 
     /// What a triangle counts per area; 0 leaves it out.
@@ -236,7 +236,7 @@ impl<'a> Share<'a> {
 
     /// The i-th of independent points.
     fn independent(&self, index: u64, density: f64) -> Sample {
-        let number = |purpose| self.config.stream(purpose).unit(index);
+        let number = |purpose| self.config.stream(purpose).uniform(index);
         let triangle = self.triangle(number(Purpose::Triangle));
         self.point(triangle, [number(Purpose::First), number(Purpose::Second)], density)
     }
@@ -250,7 +250,7 @@ impl<'a> Share<'a> {
 
     fn stratified(&self, count: usize) -> Vec<Sample> {
         let density = self.density(count);
-        let place = |i: usize| (i as f64 + self.config.stream(Purpose::Triangle).unit(i as u64)) / count as f64;
+        let place = |i: usize| (i as f64 + self.config.stream(Purpose::Triangle).uniform(i as u64)) / count as f64;
         let triangles: Vec<usize> = (0..count).into_par_iter().map(|i| self.triangle(place(i))).collect();
         let first_of = |i: usize| triangles.partition_point(|&t| t < triangles[i]);
         let point = |i: usize| {
@@ -265,7 +265,7 @@ impl SampleConfig {
     /// The n-th of evenly spread places in a unit square: Roberts' R2 sequence, begun elsewhere for every triangle.
     fn even_place(&self, triangle: usize, n: usize) -> [f64; 2] {
         const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
-        let start = |axis: u64| self.stream(Purpose::Offset).unit(2 * triangle as u64 + axis);
+        let start = |axis: u64| self.stream(Purpose::Offset).uniform(2 * triangle as u64 + axis);
         [(start(0) + n as f64 * STEP[0]).fract(), (start(1) + n as f64 * STEP[1]).fract()]
     }
 }

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use super::{LIMIT, Sample, Share};
 use crate::PriorsError;
-use city::vector::{dot, norm, sub};
+use numeric::vector::{dot, norm, sub};
 use rayon::prelude::*;
 
 /// Points per r² of area where no further dart fits: 0.547 of the area in disks of radius r/2.

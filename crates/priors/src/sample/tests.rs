@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::model::tests::{cuboid, joined};
-use city::vector::{along, dot, norm, sub};
 use city::{ModelPoint, TriangleMesh};
+use numeric::vector::{along, dot, norm, sub};
 
 const SPACINGS: [Spacing; 3] = [Spacing::Random, Spacing::Stratified, Spacing::PoissonDisk];
 
@@ -47,7 +47,7 @@ fn points_lie_on_their_triangles_and_fill_them() {
             let normal = model.normal(point.triangle as usize);
             assert!(dot(sub(point.position, a), normal).abs() < 1e-12);
             for (from, to) in [(a, b), (b, c), (c, a)] {
-                let side = city::vector::cross(sub(to, from), sub(point.position, from));
+                let side = numeric::vector::cross(sub(to, from), sub(point.position, from));
                 assert!(dot(side, normal) > -1e-9);
             }
             if point.class == SurfaceClass::Roof {
@@ -153,8 +153,8 @@ fn to_mesh(mesh: &TriangleMesh, position: [f64; 3]) -> f64 {
 
 fn to_triangle(p: [f64; 3], corners: [[f64; 3]; 3]) -> f64 {
     let [a, b, c] = corners;
-    let normal = city::vector::unit(city::vector::cross(sub(b, a), sub(c, a))).unwrap();
-    let inside = |from, to| dot(city::vector::cross(sub(to, from), sub(p, from)), normal) >= 0.0;
+    let normal = numeric::vector::unit(numeric::vector::cross(sub(b, a), sub(c, a))).unwrap();
+    let inside = |from, to| dot(numeric::vector::cross(sub(to, from), sub(p, from)), normal) >= 0.0;
     if inside(a, b) && inside(b, c) && inside(c, a) {
         return dot(sub(p, a), normal).abs();
     }
@@ -178,8 +178,8 @@ fn adaptive_disks_stay_within_the_error() {
         let mut worst = 0.0f64;
         for point in made.points.iter().step_by(7) {
             let normal = point.normal.map(f64::from);
-            let side = city::vector::unit(city::vector::cross(normal, [0.3, 0.5, 0.7])).unwrap();
-            let other = city::vector::cross(normal, side);
+            let side = numeric::vector::unit(numeric::vector::cross(normal, [0.3, 0.5, 0.7])).unwrap();
+            let other = numeric::vector::cross(normal, side);
             for step in 0..8 {
                 let (sin, cos) = (f64::from(step) * std::f64::consts::FRAC_PI_4).sin_cos();
                 let radius = f64::from(point.spacing_m);

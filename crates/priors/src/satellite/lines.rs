@@ -9,7 +9,7 @@ use camera::{ImagePoint, RpcCamera};
 use crs::MapProjection;
 
 use crate::{PriorModel, PriorsError};
-use city::vector::{Vector, along, dot, norm, sub, unit};
+use numeric::vector::{Vector, along, dot, norm, sub, unit};
 
 /// Spacings of the lattice that are tried, pixels.
 const STEPS: [usize; 4] = [64, 16, 4, 1];

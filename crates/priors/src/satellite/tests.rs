@@ -7,7 +7,7 @@ use geodesy::LonLatHeight;
 
 use super::*;
 use crate::model::tests::cuboid;
-use city::vector::sub;
+use numeric::vector::sub;
 
 const PLACE: LonLatHeight = LonLatHeight { lon_deg: 5.4, lat_deg: 43.53, height_m: 200.0 };
 const SIZE: (usize, usize) = (150, 120);

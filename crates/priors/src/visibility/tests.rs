@@ -27,9 +27,9 @@ fn seen(model: &PriorModel, samples: &[Sample], views: &[View], config: Visibili
 
 /// A camera that looks at a point.
 fn looking_at(centre: [f64; 3], at: [f64; 3]) -> View {
-    let forward = city::vector::unit(sub(at, centre)).unwrap();
-    let right = city::vector::unit(city::vector::cross(forward, [0.0, 0.0, 1.0])).unwrap();
-    let down = city::vector::cross(forward, right);
+    let forward = numeric::vector::unit(sub(at, centre)).unwrap();
+    let right = numeric::vector::unit(numeric::vector::cross(forward, [0.0, 0.0, 1.0])).unwrap();
+    let down = numeric::vector::cross(forward, right);
     View { lens: pinhole(200, 150, 120.0), pose: camera::Pose { rotation: [right, down, forward], centre } }
 }
 

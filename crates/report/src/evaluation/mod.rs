@@ -7,7 +7,8 @@ mod numbers;
 mod tables;
 mod text;
 
-use eval::{Evaluation, Metrics, percentile, round_up};
+use eval::{Evaluation, Metrics, round_up};
+use numeric::percentile;
 use raster::Grid;
 
 use crate::class::class_title;

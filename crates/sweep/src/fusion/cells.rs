@@ -1,5 +1,6 @@
 //! One height per cell from several views' heights.
 
+use numeric::middle_values;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
@@ -128,8 +129,7 @@ fn fuse_cell(samples: &mut [Sample], same_surface_m: f32) -> Option<Cell> {
 }
 
 fn median(sorted: &[Sample]) -> Option<f32> {
-    let n = sorted.len();
-    let (low, high) = (sorted.get((n.max(1) - 1) / 2)?, sorted.get(n / 2)?);
+    let (low, high) = middle_values(sorted)?;
     Some(0.5 * (low.height_m + high.height_m))
 }
 

@@ -9,6 +9,7 @@
 use camera::{CameraError, ImageCorrection, ImagePoint, RpcCamera};
 use geodesy::LonLatHeight;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use numeric::upper_median;
 use rayon::prelude::*;
 
 /// One ground point seen in two or more views: (view, position in full-resolution pixels).
@@ -166,12 +167,8 @@ fn norm_px(r: &DVector<f64>) -> f64 {
 
 fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = residuals.collect();
-    if all.is_empty() {
-        return SCALE_MIN_PX;
-    }
-    let middle = all.len() / 2;
     // The median of |r| of a normal deviate is 0.6745 of its deviation.
-    (all.select_nth_unstable_by(middle, f64::total_cmp).1.to_owned() / 0.6745).max(SCALE_MIN_PX)
+    upper_median(&mut all).map_or(SCALE_MIN_PX, |median| (median / 0.6745).max(SCALE_MIN_PX))
 }
 
 /// Weights of the prior on every parameter. A view that is shifted by several times the prior's deviation is grossly
