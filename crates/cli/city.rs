@@ -3,17 +3,18 @@
 //! Exit code 1 when parts of the model were lost: objects none of whose surfaces could be used, or surfaces that the reader
 //! had to leave out. The report names every object of the file, used or not, with the reason.
 
-mod report;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::PathBuf;
 
-use std::path::{Path, PathBuf};
-
-use anyhow::{Context, bail};
-use city::{Effect, Lod, LodChoice, MeshConfig, Meshed, ObjectStatus, Scope, TriangleMesh};
+use city::{CrsReference, Lod};
 use clap::ValueEnum;
-use io::citymodel::{CityError, CityFile, CityJsonOptions, MeshFormat, write_cityjson, write_footprints, write_mesh};
+use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityJobError, CityOutputFormat, CitySummary};
+use jobs::files::FileError;
 
+use crate::error::{OVERWRITE, with_hint};
+use crate::progress::Log;
 use crate::{Outcome, print};
-use report::Report;
 
 /// Arguments of `skysweep city`.
 #[derive(Debug, clap::Args)]
@@ -42,8 +43,8 @@ struct Input {
     /// Use every object with surfaces, not only buildings.
     #[arg(long)]
     all_objects: bool,
-    /// Write what became of every object, with all defects, to this file (JSON). Only with it solids are checked for shells
-    /// that meet themselves, cavities that are none, and parts that overlap (codes 306, 4xx, 5xx, 601).
+    /// Write what became of every object, with all defects, to this file (JSON). Only with it solids are checked for
+    /// shells that meet themselves, cavities outside of their solid, and parts that overlap (codes 306, 4xx, 5xx, 601).
     #[arg(long, value_name = "REPORT.json")]
     report: Option<PathBuf>,
     /// Replace files that exist.
@@ -95,86 +96,88 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
 }
 
 fn info(args: &InfoArgs) -> anyhow::Result<Outcome> {
-    let (file, meshed) = read(&args.input)?;
-    let report = Report::new(&file, &meshed);
+    let mut config = CityInfoConfig::new(args.input.file.clone());
+    args.input.set(&mut config.input);
+    let summary = jobs::city::info(&config, &Log).map_err(hinted)?;
+    tell(&summary);
     if args.json {
-        print::json(&report.summary())?;
+        print::json(&summary)?;
     } else {
-        print::text(&report.to_text())?;
+        print::text(&summary_text(&summary))?;
     }
-    write_report(&args.input, &report)?;
-    Ok(outcome(&file, &meshed))
+    Ok(outcome(&summary))
 }
 
 fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
-    let format = match args.format {
-        Some(format) => format,
-        None => format_of(&args.output)?,
+    let mut config = CityConvertConfig::new(args.input.file.clone(), args.output.clone());
+    args.input.set(&mut config.input);
+    config.format = args.format.map(|format| match format {
+        Format::Obj => CityOutputFormat::Obj,
+        Format::Ply => CityOutputFormat::Ply,
+        Format::Glb => CityOutputFormat::Glb,
+        Format::Geojson => CityOutputFormat::Geojson,
+        Format::Cityjson => CityOutputFormat::Cityjson,
+    });
+    let report = jobs::city::convert(&config, &Log).map_err(hinted)?;
+    tell(&report.summary);
+    Ok(outcome(&report.summary))
+}
+
+impl Input {
+    fn set(&self, input: &mut CityInput) {
+        input.lod = self.lod;
+        input.all_objects = self.all_objects;
+        input.account = self.report.clone();
+        input.overwrite = self.overwrite;
+    }
+}
+
+fn hinted(error: CityJobError) -> anyhow::Error {
+    let hint = match &error {
+        CityJobError::File(FileError::Exists { .. }) => Some(OVERWRITE),
+        CityJobError::UnknownEnding { .. } => Some("give --format obj, ply, glb, geojson or cityjson"),
+        _ => None,
     };
-    let (file, meshed) = read(&args.input)?;
-    let (path, overwrite) = (&args.output, args.input.overwrite);
-    let triangles = |format| write_mesh(path, &file.model, &meshed.mesh, format, overwrite);
-    let written = match format {
-        Format::Obj => triangles(MeshFormat::Obj),
-        Format::Ply => triangles(MeshFormat::Ply),
-        Format::Glb => triangles(MeshFormat::Glb),
-        Format::Cityjson => {
-            write_cityjson(path, &file.model, &CityJsonOptions { overwrite, ..CityJsonOptions::default() })
+    with_hint(error, hint)
+}
+
+fn tell(summary: &CitySummary) {
+    tracing::info!("{}: {}, {} triangles", summary.source, summary.format, summary.triangles);
+}
+
+fn outcome(summary: &CitySummary) -> Outcome {
+    if summary.incomplete { Outcome::Partial } else { Outcome::Complete }
+}
+
+fn summary_text(summary: &CitySummary) -> String {
+    let mut text = format!("{}: {}\n", summary.source, summary.format);
+    let mut row = |name: &str, value: String| {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "  {name:<18}{value}");
+    };
+    let (name, epsg, vertical_epsg) = (summary.crs.name.clone(), summary.crs.epsg, summary.crs.vertical_epsg);
+    let shown_name = name.as_ref().filter(|_| epsg.is_some()).map(|name| format!(" ({name})")).unwrap_or_default();
+    row("reference system", format!("{}{shown_name}", CrsReference { name, epsg, vertical_epsg }));
+    match summary.bounds {
+        Some([low, high]) => {
+            row("from", format!("{:.3} {:.3} {:.3}", low[0], low[1], low[2]));
+            row("to", format!("{:.3} {:.3} {:.3}", high[0], high[1], high[2]));
         }
-        Format::Geojson => write_footprints(path, &file.model, &meshed.objects, overwrite).map(|count| {
-            if count.without > 0 {
-                tracing::warn!("{} objects have no surface that looks down, and no footprint", count.without);
-            }
-        }),
-    };
-    match written {
-        Err(e @ CityError::Exists { .. }) => return Err(e).context("nothing was written: give --overwrite to replace"),
-        written => written?,
+        None => row("extent", "no surfaces".to_owned()),
     }
-    write_report(&args.input, &Report::new(&file, &meshed))?;
-    Ok(outcome(&file, &meshed))
-}
-
-fn read(input: &Input) -> anyhow::Result<(CityFile, Meshed)> {
-    let file = io::citymodel::read(&input.file)?;
-    let config = MeshConfig {
-        lod: input.lod.map_or_else(LodChoice::default, LodChoice::Only),
-        scope: if input.all_objects { Scope::Everything } else { Scope::Buildings },
-    };
-    let mut meshed = TriangleMesh::from_model(&file.model, &config)?;
-    if input.report.is_some() {
-        meshed.defects.extend(city::check_solids(&file.model, &config)?);
+    row("objects", format!("{} ({})", summary.objects, listed(&summary.statuses)));
+    row("levels of detail", format!("{}; used: {}", listed(&summary.lods), listed(&summary.lods_used)));
+    row("triangles", format!("{} ({})", summary.triangles, listed(&summary.triangles_by_class)));
+    row("defects", if summary.defects.is_empty() { "none".to_owned() } else { String::new() });
+    for defect in &summary.defects {
+        row("", format!("{} × {} ({}), {}", defect.count, defect.code, defect.meaning, defect.effect));
     }
-    tracing::info!("{}: {}, {} triangles", file.source.display(), file.format, meshed.mesh.triangles.len());
-    Ok((file, meshed))
+    text
 }
 
-fn write_report(input: &Input, report: &Report<'_>) -> anyhow::Result<()> {
-    let Some(path) = &input.report else { return Ok(()) };
-    let text = serde_json::to_string_pretty(&report.full())? + "\n";
-    io::write_bytes(path, text.as_bytes(), input.overwrite)?;
-    Ok(())
-}
-
-/// Whether anything of the model was lost.
-fn outcome(file: &CityFile, meshed: &Meshed) -> Outcome {
-    let unusable = meshed.objects.iter().any(|object| object.status == ObjectStatus::Unusable);
-    let dropped =
-        |defect: &city::Defect| defect.effect == Effect::Dropped && defect.code != city::DefectCode::NotASurface;
-    if unusable || file.defects.iter().any(dropped) { Outcome::Partial } else { Outcome::Complete }
-}
-
-fn format_of(output: &Path) -> anyhow::Result<Format> {
-    let ending = output.extension().map(|e| e.to_string_lossy().to_lowercase());
-    match ending.as_deref() {
-        Some("obj") => Ok(Format::Obj),
-        Some("ply") => Ok(Format::Ply),
-        Some("glb") => Ok(Format::Glb),
-        Some("geojson") => Ok(Format::Geojson),
-        Some("json") => Ok(Format::Cityjson),
-        _ => bail!(
-            "no format belongs to the ending of {}: give --format obj, ply, glb, geojson or cityjson",
-            output.display()
-        ),
+fn listed(counts: &BTreeMap<String, usize>) -> String {
+    if counts.is_empty() {
+        return "none".to_owned();
     }
+    counts.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join(", ")
 }

@@ -34,7 +34,7 @@ pub enum FileError {
     },
     /// A file cannot be written.
     #[error(transparent)]
-    Write(RasterError),
+    Write(Box<dyn std::error::Error + Send + Sync>),
     /// A report cannot be written as JSON.
     #[error("cannot write the report as JSON")]
     Json(#[from] serde_json::Error),
@@ -44,8 +44,15 @@ impl From<RasterError> for FileError {
     fn from(error: RasterError) -> Self {
         match error {
             RasterError::Exists { path } => Self::Exists { path },
-            other => Self::Write(other),
+            other => Self::Write(other.into()),
         }
+    }
+}
+
+impl FileError {
+    /// Wraps the error of a writer of `io`.
+    pub(crate) fn write(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Write(error.into())
     }
 }
 

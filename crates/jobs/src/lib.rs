@@ -1,5 +1,7 @@
 //! Every job of the toolkit as a function from a configuration to a report.
 
+mod as_text;
+pub mod city;
 pub mod corrections;
 pub mod dsm;
 mod error;

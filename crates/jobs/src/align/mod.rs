@@ -1,0 +1,196 @@
+//! The alignment job: moves a COLMAP model to the world by GPS positions of its images or by points known in both.
+//!
+//! The moved model is in metres along the axes of a map, relative to the origin in `origin.json`.
+
+mod config;
+mod error;
+mod output;
+mod world;
+
+use std::path::{Path, PathBuf};
+
+use colmap::align::{
+    AlignConfig, Alignment, Disturbance, NoiseLevel, align, disturbed, sensitivity, spread_ratio,
+};
+use io::splat_ply::LocalOrigin;
+use serde::Serialize;
+
+pub use config::AlignJobConfig;
+pub use error::AlignJobError;
+pub use output::SimilarityParts;
+
+use crate::files;
+use crate::progress::Progress;
+use output::{ModelWithPoints, ModelWriter};
+use world::{KnownPositions, World};
+
+/// Ratio of the cameras' spread across their line to that along it, below which the job warns.
+const SPREAD_LOW: f64 = 0.05;
+
+/// Where a model lies in the world, and how well the positions agree.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct AlignJobReport {
+    /// Folder of the model.
+    pub model: String,
+    /// Table of the positions.
+    pub positions: String,
+    /// Origin that the moved model is relative to.
+    pub origin: LocalOrigin,
+    /// Similarity from the model to the world, relative to `origin`.
+    pub world_from_model: SimilarityParts,
+    /// Number of positions known in both frames.
+    pub pairs: usize,
+    /// Number of pairs within the threshold.
+    pub inliers: usize,
+    /// Number of positions whose image is not in the model.
+    pub positions_without_image: usize,
+    /// Largest residual of an inlier, metres.
+    pub threshold_m: f64,
+    /// Root mean square residual of the inliers, metres.
+    pub rmse_m: f64,
+    /// Spread of the positions across their line relative to that along it.
+    pub spread_across_line: f64,
+    /// Residual of every pair.
+    pub residuals: Vec<AlignResidual>,
+    /// Sensitivity to noise, one entry per level.
+    pub noise: Vec<NoiseLevel>,
+}
+
+/// Residual of one pair.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AlignResidual {
+    /// Name of the image, or number of the point.
+    pub name: String,
+    /// Distance between the position and the moved model, metres.
+    pub residual_m: f64,
+    /// Whether the pair is within the threshold.
+    pub inlier: bool,
+}
+
+/// Aligns a COLMAP model and writes the moved model with a report.
+///
+/// # Errors
+/// [`AlignJobError`]: an input that cannot be read, positions that determine no similarity, an output that exists.
+///
+/// ```
+/// use jobs::align::{AlignJobConfig, run};
+/// let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/cameras/sparse/0");
+/// let folder = tempfile::tempdir()?;
+/// let table = folder.path().join("gps.csv");
+/// let mut text = "name,easting,northing,height\n".to_owned();
+/// for view in io::colmap::read(model.as_ref())?.views {
+///     let [x, y, z] = view.pose.centre;
+///     text += &format!("{},{x},{y},{z}\n", view.name);
+/// }
+/// std::fs::write(&table, text)?;
+/// let mut config = AlignJobConfig::new(model.into(), table, folder.path().join("aligned"));
+/// config.crs_epsg = Some(32631);
+/// let report = run(&config, &jobs::progress::Silent)?;
+/// assert!((report.world_from_model.scale - 1.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobReport, AlignJobError> {
+    config.validate()?;
+    let report_path = config.output.join("align.json");
+    files::refuse_existing(&report_path, config.overwrite)?;
+    let model = read_model(&config.model, progress)?;
+    let positions = io::control::read(&config.positions)?;
+    let world = World::of(&positions, config.crs_epsg, config.vertical)?;
+    let known = world.known(&positions, &model.cameras)?;
+    let search = AlignConfig { threshold_m: config.threshold_m, seed: config.seed, ..AlignConfig::default() };
+    let alignment = align(&known.pairs, &search)
+        .map_err(|source| AlignJobError::Alignment { pairs: known.pairs.len(), source })?;
+    let noise = config.noise.as_ref();
+    let levels = noise.map(|noise| sensitivity(&known.pairs, &alignment, noise, &search)).unwrap_or_default();
+    if progress.is_cancelled() {
+        return Err(AlignJobError::Cancelled);
+    }
+    let report = report(config, &world, &known, &alignment, levels);
+    let writer =
+        ModelWriter { model: &model, origin: &world.origin, encoding: config.encoding, overwrite: config.overwrite };
+    writer.write(&config.output, &alignment.world_from_model)?;
+    write_under_noise(config, &known, &alignment, &search, &writer, progress)?;
+    files::write_json(&report_path, &report, config.overwrite)?;
+    warn_of(&report, progress);
+    Ok(report)
+}
+
+fn read_model(folder: &Path, progress: &dyn Progress) -> Result<ModelWithPoints, AlignJobError> {
+    let has_points = ["points3D.bin", "points3D.txt"].iter().any(|name| folder.join(name).is_file());
+    if has_points {
+        let (cameras, points) = io::colmap::read_with_points(folder)?;
+        return Ok(ModelWithPoints { cameras, points });
+    }
+    progress.warn(&format!("the model has no points3D: only its cameras are aligned: {}", folder.display()));
+    Ok(ModelWithPoints { cameras: io::colmap::read(folder)?, points: Vec::new() })
+}
+
+fn report(
+    config: &AlignJobConfig,
+    world: &World,
+    known: &KnownPositions,
+    alignment: &Alignment,
+    noise: Vec<NoiseLevel>,
+) -> AlignJobReport {
+    let residuals = known.names.iter().zip(&alignment.residuals_m).zip(&alignment.inliers);
+    let residual = |((name, &residual_m), &inlier): ((&String, &f64), &bool)| AlignResidual {
+        name: name.clone(),
+        residual_m,
+        inlier,
+    };
+    AlignJobReport {
+        model: config.model.display().to_string(),
+        positions: config.positions.display().to_string(),
+        origin: world.origin.clone(),
+        world_from_model: SimilarityParts::from(&alignment.world_from_model),
+        pairs: known.pairs.len(),
+        inliers: alignment.inlier_count(),
+        positions_without_image: known.unknown,
+        threshold_m: alignment.threshold_m,
+        rmse_m: alignment.rmse_m(),
+        spread_across_line: spread_ratio(known.pairs.iter().map(|p| p.source)),
+        residuals: residuals.map(residual).collect(),
+        noise,
+    }
+}
+
+/// Writes the models under noise to folders such as `translation_3m_seed_2` and `rotation_10deg_seed_1`.
+fn write_under_noise(
+    config: &AlignJobConfig,
+    known: &KnownPositions,
+    alignment: &Alignment,
+    search: &AlignConfig,
+    writer: &ModelWriter<'_>,
+    progress: &dyn Progress,
+) -> Result<(), AlignJobError> {
+    let (Some(noise), Some(folder)) = (&config.noise, &config.noise_output) else { return Ok(()) };
+    let translations =
+        noise.translation_m.iter().map(|&m| (Disturbance::TranslationM(m), format!("translation_{m}m")));
+    let rotations = noise.rotation_deg.iter().map(|&deg| (Disturbance::RotationDeg(deg), format!("rotation_{deg}deg")));
+    for (disturbance, name) in translations.chain(rotations) {
+        for seed in 1..=noise.seeds {
+            let path: PathBuf = folder.join(format!("{name}_seed_{seed}"));
+            match disturbed(&known.pairs, alignment, disturbance, seed, search) {
+                Ok(similarity) => writer.write(&path, &similarity)?,
+                Err(error) => progress.warn(&format!("{name}, seed {seed}: {error}")),
+            }
+        }
+    }
+    Ok(())
+}
+
+fn warn_of(report: &AlignJobReport, progress: &dyn Progress) {
+    let spread = report.spread_across_line;
+    if spread < SPREAD_LOW {
+        progress.warn(&format!(
+            "the positions lie almost on a line (spread {spread:.3}): the rotation about it is uncertain"
+        ));
+    }
+    if report.positions_without_image > 0 {
+        progress.warn(&format!(
+            "{} positions are of images that are not in the model",
+            report.positions_without_image
+        ));
+    }
+}

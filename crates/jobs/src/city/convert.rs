@@ -1,0 +1,69 @@
+//! Writing a city model in another format.
+
+use io::citymodel::{CityJsonOptions, MeshFormat, write_cityjson, write_footprints, write_mesh};
+use serde::Serialize;
+
+use super::account::{CityAccount, CitySummary};
+use super::config::{CityConvertConfig, CityOutputFormat};
+use super::error::CityJobError;
+use super::input::{self, OpenedCity};
+use crate::progress::Progress;
+
+/// What a conversion wrote.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct CityConvertReport {
+    /// Numbers about the model.
+    pub summary: CitySummary,
+    /// Format that was written.
+    pub format: CityOutputFormat,
+    /// Used objects that have no surface that looks down, and therefore no footprint; 0 for other formats.
+    pub without_footprint: usize,
+}
+
+/// Writes the triangles (OBJ, PLY, glTF), the footprints with heights (GeoJSON) or the objects (CityJSON 2.0) of a model.
+///
+/// # Errors
+/// [`CityJobError::UnknownEnding`], [`CityJobError::Read`], [`CityJobError::Model`], and [`CityJobError::File`] when an
+/// output exists or cannot be written.
+///
+/// ```
+/// use jobs::city::{CityConvertConfig, convert};
+/// let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/truth/buildings.city.json");
+/// let folder = tempfile::tempdir()?;
+/// let output = folder.path().join("town.obj");
+/// convert(&CityConvertConfig::new(model.into(), output.clone()), &jobs::progress::Silent)?;
+/// assert!(std::fs::read_to_string(output)?.contains("\nv "));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn convert(config: &CityConvertConfig, progress: &dyn Progress) -> Result<CityConvertReport, CityJobError> {
+    config.validate()?;
+    let format = config.output_format()?;
+    let opened = input::open(&config.input, progress)?;
+    let without_footprint = write(config, format, &opened)?;
+    if without_footprint > 0 {
+        progress.warn(&format!("{without_footprint} objects have no surface that looks down, and no footprint"));
+    }
+    let account = CityAccount::of(&opened);
+    account.write(&config.input)?;
+    Ok(CityConvertReport { summary: account.summary, format, without_footprint })
+}
+
+/// Writes the output and returns the number of objects without a footprint.
+fn write(config: &CityConvertConfig, format: CityOutputFormat, opened: &OpenedCity) -> Result<usize, CityJobError> {
+    let (path, overwrite) = (&config.output, config.input.overwrite);
+    let OpenedCity { file, meshed } = opened;
+    let triangles = |format| write_mesh(path, &file.model, &meshed.mesh, format, overwrite);
+    match format {
+        CityOutputFormat::Obj => triangles(MeshFormat::Obj)?,
+        CityOutputFormat::Ply => triangles(MeshFormat::Ply)?,
+        CityOutputFormat::Glb => triangles(MeshFormat::Glb)?,
+        CityOutputFormat::Cityjson => {
+            write_cityjson(path, &file.model, &CityJsonOptions { overwrite, ..CityJsonOptions::default() })?;
+        }
+        CityOutputFormat::Geojson => {
+            return Ok(write_footprints(path, &file.model, &meshed.objects, overwrite)?.without);
+        }
+    }
+    Ok(0)
+}

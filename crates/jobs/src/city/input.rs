@@ -1,0 +1,31 @@
+//! Reading a city model and making its triangles.
+
+use city::{LodChoice, MeshConfig, Meshed, Scope, TriangleMesh};
+use io::citymodel::CityFile;
+
+use super::config::CityInput;
+use super::error::CityJobError;
+use crate::progress::Progress;
+
+/// A model with its triangles.
+pub(super) struct OpenedCity {
+    pub(super) file: CityFile,
+    pub(super) meshed: Meshed,
+}
+
+/// Reads a model and makes its triangles. Solids are checked where an account is asked for.
+pub(super) fn open(input: &CityInput, progress: &dyn Progress) -> Result<OpenedCity, CityJobError> {
+    let file = io::citymodel::read(&input.file)?;
+    if progress.is_cancelled() {
+        return Err(CityJobError::Cancelled);
+    }
+    let config = MeshConfig {
+        lod: input.lod.map_or_else(LodChoice::default, LodChoice::Only),
+        scope: if input.all_objects { Scope::Everything } else { Scope::Buildings },
+    };
+    let mut meshed = TriangleMesh::from_model(&file.model, &config)?;
+    if input.account.is_some() {
+        meshed.defects.extend(city::check_solids(&file.model, &config)?);
+    }
+    Ok(OpenedCity { file, meshed })
+}

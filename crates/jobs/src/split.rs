@@ -1,0 +1,162 @@
+//! The split job: chooses context and target views of a COLMAP model by the overlap of what they see.
+
+use std::path::PathBuf;
+
+use colmap::split::{Choice, SplitConfig, SplitError, points_of_views, split};
+use io::colmap::{ColmapError, ColmapModel, ColmapPoint};
+use serde::{Deserialize, Serialize};
+
+use crate::files::{self, FileError};
+use crate::progress::Progress;
+
+/// A COLMAP model and the overlaps that are wanted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct SplitJobConfig {
+    /// Folder of a COLMAP model with its points.
+    pub model: PathBuf,
+    /// File for the report (JSON); not written when `None`.
+    pub output: Option<PathBuf>,
+    /// Number of context views.
+    pub contexts: usize,
+    /// Wanted overlap of each context with the contexts before it, as intersection over union.
+    pub context_iou: f64,
+    /// Wanted overlap of each target with the contexts, as intersection over union.
+    pub target_ious: Vec<f64>,
+    /// Name of the first context; the one with the best split when `None`.
+    pub first: Option<String>,
+    /// Whether an existing `output` may be replaced.
+    pub overwrite: bool,
+}
+
+/// The chosen views.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct SplitJobReport {
+    /// Folder of the model.
+    pub model: String,
+    /// Views to reconstruct from, in the order of choice.
+    pub contexts: Vec<SplitImage>,
+    /// Views to predict, in the order of the wanted overlaps.
+    pub targets: Vec<SplitImage>,
+    /// Sum of the absolute differences between wanted and found overlaps.
+    pub deviation: f64,
+}
+
+/// A chosen image.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SplitImage {
+    /// Name of the image.
+    pub image: String,
+    /// Overlap that was wanted; `None` for the first context.
+    pub wanted_iou: Option<f64>,
+    /// Largest overlap with a context chosen before; `None` for the first context.
+    pub iou: Option<f64>,
+}
+
+/// A split that could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SplitJobError {
+    /// The model cannot be read.
+    #[error(transparent)]
+    Model(#[from] ColmapError),
+    /// The report exists or cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// No image has the name of the first context.
+    #[error("no image of the model is called {name:?}")]
+    UnknownImage {
+        /// The name.
+        name: String,
+    },
+    /// More contexts than images.
+    #[error("{contexts} contexts of {images} images")]
+    TooManyContexts {
+        /// Number of contexts asked for.
+        contexts: usize,
+        /// Number of images in the model.
+        images: usize,
+    },
+    /// The overlaps cannot be served.
+    #[error(transparent)]
+    Split(#[from] SplitError),
+    /// The job was cancelled.
+    #[error("the job was cancelled")]
+    Cancelled,
+}
+
+impl SplitJobConfig {
+    /// Two contexts of overlap 0.15 and targets of 0.02 to 0.1: the narrow preset of Cross-View Splatter.
+    pub fn narrow(model: PathBuf) -> Self {
+        Self::preset(model, SplitConfig::narrow())
+    }
+
+    /// Two contexts of overlap 0.25 and targets of 0.03 to 0.15: the wide preset of Cross-View Splatter.
+    pub fn wide(model: PathBuf) -> Self {
+        Self::preset(model, SplitConfig::wide())
+    }
+
+    fn preset(model: PathBuf, preset: SplitConfig) -> Self {
+        let SplitConfig { contexts, context_iou, target_ious, .. } = preset;
+        Self { model, output: None, contexts, context_iou, target_ious, first: None, overwrite: false }
+    }
+}
+
+/// Chooses context and target views.
+///
+/// # Errors
+/// [`SplitJobError`]: a model without points, an unknown first image, overlaps that cannot be served, an output that exists.
+///
+/// ```
+/// use jobs::split::{SplitJobConfig, SplitJobError, run};
+/// // The cameras of the sample have no points, so they share nothing that could be compared.
+/// let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/cameras/sparse/0");
+/// let refused = run(&SplitJobConfig::narrow(model.into()), &jobs::progress::Silent);
+/// assert!(matches!(refused, Err(SplitJobError::Split(_) | SplitJobError::Model(_))));
+/// ```
+pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobReport, SplitJobError> {
+    let (model, points) = io::colmap::read_with_points(&config.model)?;
+    if progress.is_cancelled() {
+        return Err(SplitJobError::Cancelled);
+    }
+    let found = split(&points_by_view(&model, &points), &goal(config, &model)?)?;
+    let image = |choice: &Choice| SplitImage {
+        image: model.views[choice.view].name.clone(),
+        wanted_iou: choice.wanted_iou,
+        iou: choice.iou,
+    };
+    let report = SplitJobReport {
+        model: config.model.display().to_string(),
+        contexts: found.contexts.iter().map(image).collect(),
+        targets: found.targets.iter().map(image).collect(),
+        deviation: found.deviation,
+    };
+    if let Some(path) = &config.output {
+        files::write_json(path, &report, config.overwrite)?;
+    }
+    Ok(report)
+}
+
+/// The wanted overlaps with the first image as an index.
+fn goal(config: &SplitJobConfig, model: &ColmapModel) -> Result<SplitConfig, SplitJobError> {
+    let index = |name: &String| {
+        let found = model.views.iter().position(|view| view.name == *name);
+        found.ok_or_else(|| SplitJobError::UnknownImage { name: name.clone() })
+    };
+    if config.contexts > model.views.len() {
+        return Err(SplitJobError::TooManyContexts { contexts: config.contexts, images: model.views.len() });
+    }
+    Ok(SplitConfig {
+        contexts: config.contexts,
+        context_iou: config.context_iou,
+        target_ious: config.target_ious.clone(),
+        first: config.first.as_ref().map(index).transpose()?,
+    })
+}
+
+fn points_by_view(model: &ColmapModel, points: &[ColmapPoint]) -> Vec<Vec<u32>> {
+    let tracks: Vec<Vec<u32>> = points.iter().map(|point| point.track.iter().map(|seen| seen.view).collect()).collect();
+    points_of_views(model.views.len(), tracks.iter().map(Vec::as_slice))
+}
