@@ -2,18 +2,18 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, ensure};
-use colmap::split::{Choice, Split, SplitConfig, points_of_views, split};
-use io::colmap::{ColmapModel, ColmapPoint};
-use serde_json::{Value, json};
+use jobs::files::FileError;
+use jobs::split::{SplitImage, SplitJobConfig, SplitJobError, SplitJobReport};
 
+use crate::error::{OVERWRITE, with_hint};
+use crate::progress::Log;
 use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep split`.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Overlap is the intersection over union of the points of the model that two views see. Views are chosen \
-                        greedily, closest to what is wanted; with several contexts the largest overlap counts."
+                        greedily, closest to the wanted overlap; with several contexts the largest overlap counts."
 )]
 pub(crate) struct Args {
     /// Folder of a COLMAP model with its points.
@@ -53,64 +53,42 @@ enum Preset {
 
 /// Runs `skysweep split`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let (model, points) = io::colmap::read_with_points(&args.model)?;
-    let config = config(args, &model)?;
-    let found = split(&points_by_view(&model, &points), &config)?;
-    let report = report(args, &model, &found);
-    if let Some(path) = &args.output {
-        let text = serde_json::to_string_pretty(&report)? + "\n";
-        io::write_bytes(path, text.as_bytes(), args.overwrite)?;
-    }
+    let report = jobs::split::run(&config(args), &Log).map_err(|error| {
+        let exists = matches!(error, SplitJobError::File(FileError::Exists { .. }));
+        with_hint(error, exists.then_some(OVERWRITE))
+    })?;
     if args.json {
         print::json(&report)?;
     } else if !global.is_quiet() || args.output.is_none() {
-        print::text(&summary(&model, &found))?;
+        print::text(&summary(&report))?;
     }
     Ok(Outcome::Complete)
 }
 
-fn config(args: &Args, model: &ColmapModel) -> anyhow::Result<SplitConfig> {
-    let preset = match args.preset {
-        Preset::Narrow => SplitConfig::narrow(),
-        Preset::Wide => SplitConfig::wide(),
+fn config(args: &Args) -> SplitJobConfig {
+    let mut config = match args.preset {
+        Preset::Narrow => SplitJobConfig::narrow(args.model.clone()),
+        Preset::Wide => SplitJobConfig::wide(args.model.clone()),
     };
-    let index = |name: &String| {
-        let found = model.views.iter().position(|view| view.name == *name);
-        found.with_context(|| format!("no image of the model is called {name:?}"))
-    };
-    ensure!(args.contexts <= model.views.len(), "{} contexts of {} images", args.contexts, model.views.len());
-    Ok(SplitConfig {
-        contexts: args.contexts,
-        context_iou: args.context_iou.unwrap_or(preset.context_iou),
-        target_ious: args.target_ious.clone().unwrap_or(preset.target_ious),
-        first: args.first.as_ref().map(index).transpose()?,
-    })
+    config.contexts = args.contexts;
+    config.context_iou = args.context_iou.unwrap_or(config.context_iou);
+    if let Some(ious) = &args.target_ious {
+        config.target_ious.clone_from(ious);
+    }
+    config.first.clone_from(&args.first);
+    config.output.clone_from(&args.output);
+    config.overwrite = args.overwrite;
+    config
 }
 
-fn points_by_view(model: &ColmapModel, points: &[ColmapPoint]) -> Vec<Vec<u32>> {
-    let tracks: Vec<Vec<u32>> = points.iter().map(|point| point.track.iter().map(|seen| seen.view).collect()).collect();
-    points_of_views(model.views.len(), tracks.iter().map(Vec::as_slice))
-}
-
-fn report(args: &Args, model: &ColmapModel, found: &Split) -> Value {
-    let one = |choice: &Choice| json!({ "image": model.views[choice.view].name, "wanted_iou": choice.wanted_iou, "iou": choice.iou });
-    let all = |choices: &[Choice]| choices.iter().map(one).collect::<Vec<_>>();
-    json!({
-        "model": args.model.display().to_string(),
-        "contexts": all(&found.contexts),
-        "targets": all(&found.targets),
-        "deviation": found.deviation,
-    })
-}
-
-fn summary(model: &ColmapModel, found: &Split) -> String {
-    let line = |what: &str, choice: &Choice| {
-        let name = &model.views[choice.view].name;
-        match (choice.iou, choice.wanted_iou) {
+fn summary(report: &SplitJobReport) -> String {
+    let line = |what: &str, chosen: &SplitImage| {
+        let name = &chosen.image;
+        match (chosen.iou, chosen.wanted_iou) {
             (Some(iou), Some(wanted)) => format!("{what:10} {iou:.3} (wanted {wanted:.3})  {name}\n"),
             _ => format!("{what:10} first                  {name}\n"),
         }
     };
-    let contexts = found.contexts.iter().map(|choice| line("context", choice));
-    contexts.chain(found.targets.iter().map(|choice| line("target", choice))).collect()
+    let contexts = report.contexts.iter().map(|chosen| line("context", chosen));
+    contexts.chain(report.targets.iter().map(|chosen| line("target", chosen))).collect()
 }

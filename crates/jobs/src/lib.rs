@@ -1,5 +1,6 @@
 //! Every job of the toolkit as a function from a configuration to a report.
 
+pub mod align;
 mod as_text;
 pub mod city;
 pub mod corrections;
@@ -9,4 +10,6 @@ pub mod files;
 pub mod map_surface;
 pub mod placed_model;
 pub mod rpc;
+pub mod simulate;
+pub mod split;
 pub mod threads;

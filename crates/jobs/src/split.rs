@@ -7,7 +7,7 @@ use io::colmap::{ColmapError, ColmapModel, ColmapPoint};
 use serde::{Deserialize, Serialize};
 
 use crate::files::{self, FileError};
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// A COLMAP model and the overlaps that are wanted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -83,8 +83,8 @@ pub enum SplitJobError {
     #[error(transparent)]
     Split(#[from] SplitError),
     /// The job was cancelled.
-    #[error("the job was cancelled")]
-    Cancelled,
+    #[error(transparent)]
+    Cancelled(#[from] numeric::Cancelled),
 }
 
 impl SplitJobConfig {
@@ -113,14 +113,12 @@ impl SplitJobConfig {
 /// use jobs::split::{SplitJobConfig, SplitJobError, run};
 /// // The cameras of the sample have no points, so they share nothing that could be compared.
 /// let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/cameras/sparse/0");
-/// let refused = run(&SplitJobConfig::narrow(model.into()), &jobs::progress::Silent);
+/// let refused = run(&SplitJobConfig::narrow(model.into()), &numeric::Silent);
 /// assert!(matches!(refused, Err(SplitJobError::Split(_) | SplitJobError::Model(_))));
 /// ```
 pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobReport, SplitJobError> {
     let (model, points) = io::colmap::read_with_points(&config.model)?;
-    if progress.is_cancelled() {
-        return Err(SplitJobError::Cancelled);
-    }
+    progress.check_cancelled()?;
     let found = split(&points_by_view(&model, &points), &goal(config, &model)?)?;
     let image = |choice: &Choice| SplitImage {
         image: model.views[choice.view].name.clone(),

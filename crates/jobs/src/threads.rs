@@ -21,7 +21,6 @@ pub enum ThreadsError {
 ///
 /// # Errors
 /// [`ThreadsError`] if the pool cannot be started.
-#[allow(dead_code, reason = "the jobs that use it follow")]
 pub(crate) fn install<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T, ThreadsError> {
     let Some(threads) = threads else { return Ok(work()) };
     if threads == 0 {

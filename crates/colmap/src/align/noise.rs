@@ -6,13 +6,14 @@
 //! 5, 10, 15°, five seeds, mean and standard deviation.
 
 use camera::Similarity;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{AlignConfig, AlignError, Alignment, PointPair, align};
 use numeric::SplitMix64;
 
 /// Which noise, and how much.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct NoiseConfig {
     /// Standard deviations of the positions, metres.
     pub translation_m: Vec<f64>,

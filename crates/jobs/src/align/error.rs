@@ -66,6 +66,6 @@ pub enum AlignJobError {
         source: AlignError,
     },
     /// The job was cancelled.
-    #[error("the job was cancelled")]
-    Cancelled,
+    #[error(transparent)]
+    Cancelled(#[from] numeric::Cancelled),
 }

@@ -9,9 +9,7 @@ mod world;
 
 use std::path::{Path, PathBuf};
 
-use colmap::align::{
-    AlignConfig, Alignment, Disturbance, NoiseLevel, align, disturbed, sensitivity, spread_ratio,
-};
+use colmap::align::{AlignConfig, Alignment, Disturbance, NoiseLevel, align, disturbed, sensitivity, spread_ratio};
 use io::splat_ply::LocalOrigin;
 use serde::Serialize;
 
@@ -20,7 +18,7 @@ pub use error::AlignJobError;
 pub use output::SimilarityParts;
 
 use crate::files;
-use crate::progress::Progress;
+use numeric::Progress;
 use output::{ModelWithPoints, ModelWriter};
 use world::{KnownPositions, World};
 
@@ -86,7 +84,7 @@ pub struct AlignResidual {
 /// std::fs::write(&table, text)?;
 /// let mut config = AlignJobConfig::new(model.into(), table, folder.path().join("aligned"));
 /// config.crs_epsg = Some(32631);
-/// let report = run(&config, &jobs::progress::Silent)?;
+/// let report = run(&config, &numeric::Silent)?;
 /// assert!((report.world_from_model.scale - 1.0).abs() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -99,13 +97,11 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     let world = World::of(&positions, config.crs_epsg, config.vertical)?;
     let known = world.known(&positions, &model.cameras)?;
     let search = AlignConfig { threshold_m: config.threshold_m, seed: config.seed, ..AlignConfig::default() };
-    let alignment = align(&known.pairs, &search)
-        .map_err(|source| AlignJobError::Alignment { pairs: known.pairs.len(), source })?;
+    let alignment =
+        align(&known.pairs, &search).map_err(|source| AlignJobError::Alignment { pairs: known.pairs.len(), source })?;
     let noise = config.noise.as_ref();
     let levels = noise.map(|noise| sensitivity(&known.pairs, &alignment, noise, &search)).unwrap_or_default();
-    if progress.is_cancelled() {
-        return Err(AlignJobError::Cancelled);
-    }
+    progress.check_cancelled()?;
     let report = report(config, &world, &known, &alignment, levels);
     let writer =
         ModelWriter { model: &model, origin: &world.origin, encoding: config.encoding, overwrite: config.overwrite };
@@ -165,8 +161,7 @@ fn write_under_noise(
     progress: &dyn Progress,
 ) -> Result<(), AlignJobError> {
     let (Some(noise), Some(folder)) = (&config.noise, &config.noise_output) else { return Ok(()) };
-    let translations =
-        noise.translation_m.iter().map(|&m| (Disturbance::TranslationM(m), format!("translation_{m}m")));
+    let translations = noise.translation_m.iter().map(|&m| (Disturbance::TranslationM(m), format!("translation_{m}m")));
     let rotations = noise.rotation_deg.iter().map(|&deg| (Disturbance::RotationDeg(deg), format!("rotation_{deg}deg")));
     for (disturbance, name) in translations.chain(rotations) {
         for seed in 1..=noise.seeds {
@@ -188,9 +183,6 @@ fn warn_of(report: &AlignJobReport, progress: &dyn Progress) {
         ));
     }
     if report.positions_without_image > 0 {
-        progress.warn(&format!(
-            "{} positions are of images that are not in the model",
-            report.positions_without_image
-        ));
+        progress.warn(&format!("{} positions are of images that are not in the model", report.positions_without_image));
     }
 }

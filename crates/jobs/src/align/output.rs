@@ -36,11 +36,7 @@ pub struct SimilarityParts {
 
 impl From<&Similarity> for SimilarityParts {
     fn from(similarity: &Similarity) -> Self {
-        Self {
-            scale: similarity.scale(),
-            rotation: *similarity.rotation(),
-            translation: similarity.translation(),
-        }
+        Self { scale: similarity.scale(), rotation: similarity.rotation(), translation: similarity.translation() }
     }
 }
 

@@ -7,7 +7,7 @@ use super::account::{CityAccount, CitySummary};
 use super::config::{CityConvertConfig, CityOutputFormat};
 use super::error::CityJobError;
 use super::input::{self, OpenedCity};
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// What a conversion wrote.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -32,7 +32,7 @@ pub struct CityConvertReport {
 /// let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/truth/buildings.city.json");
 /// let folder = tempfile::tempdir()?;
 /// let output = folder.path().join("town.obj");
-/// convert(&CityConvertConfig::new(model.into(), output.clone()), &jobs::progress::Silent)?;
+/// convert(&CityConvertConfig::new(model.into(), output.clone()), &numeric::Silent)?;
 /// assert!(std::fs::read_to_string(output)?.contains("\nv "));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -30,8 +30,8 @@ pub enum CityJobError {
         path: PathBuf,
     },
     /// The job was cancelled.
-    #[error("the job was cancelled")]
-    Cancelled,
+    #[error(transparent)]
+    Cancelled(#[from] numeric::Cancelled),
 }
 
 impl From<CityError> for CityJobError {

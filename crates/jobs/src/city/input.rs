@@ -5,7 +5,7 @@ use io::citymodel::CityFile;
 
 use super::config::CityInput;
 use super::error::CityJobError;
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// A model with its triangles.
 pub(super) struct OpenedCity {
@@ -16,9 +16,7 @@ pub(super) struct OpenedCity {
 /// Reads a model and makes its triangles. Solids are checked where an account is asked for.
 pub(super) fn open(input: &CityInput, progress: &dyn Progress) -> Result<OpenedCity, CityJobError> {
     let file = io::citymodel::read(&input.file)?;
-    if progress.is_cancelled() {
-        return Err(CityJobError::Cancelled);
-    }
+    progress.check_cancelled()?;
     let config = MeshConfig {
         lod: input.lod.map_or_else(LodChoice::default, LodChoice::Only),
         scope: if input.all_objects { Scope::Everything } else { Scope::Buildings },

@@ -14,7 +14,7 @@ pub use config::{CityConvertConfig, CityInfoConfig, CityInput, CityOutputFormat}
 pub use convert::{CityConvertReport, convert};
 pub use error::CityJobError;
 
-use crate::progress::Progress;
+use numeric::Progress;
 
 /// Describes a city model and writes the account of every object where the configuration names a file for it.
 ///
@@ -24,7 +24,7 @@ use crate::progress::Progress;
 /// ```
 /// use jobs::city::{CityInfoConfig, info};
 /// let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/truth/buildings.city.json");
-/// let summary = info(&CityInfoConfig::new(model.into()), &jobs::progress::Silent)?;
+/// let summary = info(&CityInfoConfig::new(model.into()), &numeric::Silent)?;
 /// assert!(summary.triangles > 100 && !summary.incomplete);
 /// # Ok::<(), jobs::city::CityJobError>(())
 /// ```

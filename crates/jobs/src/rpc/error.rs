@@ -52,8 +52,8 @@ pub enum RpcError {
     #[error("cannot pass on the answers")]
     Output(#[source] std::io::Error),
     /// The job was cancelled.
-    #[error("the job was cancelled")]
-    Cancelled,
+    #[error(transparent)]
+    Cancelled(#[from] numeric::Cancelled),
 }
 
 impl From<RpcReadError> for RpcError {

@@ -89,9 +89,7 @@ pub fn answer_lines(
     let rpc = input::read(&config.file, progress)?.rpc;
     let mut report = RpcLinesReport::default();
     for line in 1.. {
-        if progress.is_cancelled() {
-            return Err(RpcError::Cancelled);
-        }
+        progress.check_cancelled()?;
         let at_line = |source| RpcError::Line { line, source };
         let Some(text) = next_line(input).map_err(at_line)? else { break };
         let Some(numbers) = parse(&text).map_err(at_line)? else { continue };

@@ -18,7 +18,8 @@ use super::{ColmapError, ColmapModel, ColmapPoint, is_inside, principal_point_in
 use crate::save::save;
 
 /// How the files are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ColmapEncoding {
     /// `.bin`.
     Binary,

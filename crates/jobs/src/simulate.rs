@@ -1,0 +1,210 @@
+//! The simulation job: a seeded scene seen through RPC cameras, with its exact surface.
+//!
+//! Writes `view_1.tif` … (with the RPC in the file), the record `scene.json`, the parameters `scene.toml`, and in `truth/`
+//! the rasters, the heights of every image and the buildings at LoD2. A flight adds perspective cameras in
+//! `cameras/sparse/0`, in map coordinates.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use ::simulate::{SceneRecord, SimulateError, Simulation, SimulationConfig, View};
+use camera::LensError;
+use crs::Crs;
+use io::citymodel::{CityJsonOptions, write_cityjson};
+use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapView};
+use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc};
+use numeric::Progress;
+use serde::{Deserialize, Serialize};
+
+use crate::files::{self, FileError};
+use crate::threads::{ThreadsError, install};
+
+/// A scene to be simulated and the folder for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct SimulateConfig {
+    /// The scene, its cameras and its radiometry.
+    pub scene: SimulationConfig,
+    /// Folder for the images and the truth.
+    pub output: PathBuf,
+    /// Number of perspective cameras around the scene; none when 0.
+    pub flight: u32,
+    /// Worker threads; one per core when `None`.
+    pub threads: Option<usize>,
+    /// Whether the files of an earlier simulation may be replaced.
+    pub overwrite: bool,
+}
+
+/// What was simulated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct SimulateReport {
+    /// The scene, as it is written to `scene.json`.
+    pub scene: SceneRecord,
+    /// Number of satellite views.
+    pub views: usize,
+    /// Number of perspective cameras.
+    pub flight: u32,
+    /// Folder of the files.
+    pub output: PathBuf,
+}
+
+/// A simulation that could not be made or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulateJobError {
+    /// The parameters describe no scene, or the cameras do not see it.
+    #[error(transparent)]
+    Scene(#[from] SimulateError),
+    /// A parameter file cannot be used.
+    #[error("in the parameter file: {}", path.display())]
+    Parameters {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: SimulateError,
+    },
+    /// The output folder holds files.
+    #[error("the output folder is not empty: {}", path.display())]
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A perspective camera cannot be made.
+    #[error(transparent)]
+    Flight(#[from] LensError),
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The threads cannot be started.
+    #[error(transparent)]
+    Threads(#[from] ThreadsError),
+    /// The job was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] numeric::Cancelled),
+}
+
+impl SimulateConfig {
+    /// A simulation of `scene` without a flight, in a folder that is empty.
+    pub fn new(scene: SimulationConfig, output: PathBuf) -> Self {
+        Self { scene, output, flight: 0, threads: None, overwrite: false }
+    }
+
+    /// Checks the parameters of the scene.
+    ///
+    /// # Errors
+    /// [`SimulateJobError::Scene`].
+    pub fn validate(&self) -> Result<(), SimulateJobError> {
+        Ok(self.scene.validate()?)
+    }
+}
+
+/// Reads the parameters of a scene from a TOML file.
+///
+/// # Errors
+/// [`SimulateJobError::File`] and [`SimulateJobError::Parameters`].
+pub fn read_scene(path: &Path) -> Result<SimulationConfig, SimulateJobError> {
+    let text = files::read_text(path)?;
+    SimulationConfig::from_toml(&text).map_err(|source| SimulateJobError::Parameters { path: path.to_owned(), source })
+}
+
+/// Simulates a scene and writes its images and its truth.
+///
+/// # Errors
+/// [`SimulateJobError`]: parameters out of range, a folder that is not empty, a file that cannot be written.
+///
+/// ```
+/// use jobs::simulate::{SimulateConfig, run};
+/// use simulate::SimulationConfig;
+/// let folder = tempfile::tempdir()?;
+/// let mut scene = SimulationConfig::preset("town")?;
+/// (scene.size_m, scene.gsd_m, scene.views) = (100.0, 2.0, 2);
+/// let report = run(&SimulateConfig::new(scene, folder.path().join("scene")), &numeric::Silent)?;
+/// assert!(report.views == 2 && report.output.join("truth/dsm.tif").is_file());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateReport, SimulateJobError> {
+    config.validate()?;
+    let output = &config.output;
+    if !config.overwrite && fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_some()) {
+        return Err(SimulateJobError::NotEmpty { path: output.clone() });
+    }
+    files::create_folder(&output.join("truth"))?;
+    let simulation = install(config.threads, || Simulation::with_progress(config.scene.clone(), progress))??;
+    progress.check_cancelled()?;
+    let writer = SceneWriter { simulation: &simulation, folder: output, overwrite: config.overwrite };
+    install(config.threads, || writer.write(config.flight))??;
+    Ok(SimulateReport {
+        scene: simulation.record(),
+        views: simulation.views.len(),
+        flight: config.flight,
+        output: output.clone(),
+    })
+}
+
+/// A simulation and the folder that it is written to.
+struct SceneWriter<'a> {
+    simulation: &'a Simulation,
+    folder: &'a Path,
+    overwrite: bool,
+}
+
+impl SceneWriter<'_> {
+    fn write(&self, flight: u32) -> Result<(), SimulateJobError> {
+        for (number, view) in (1..).zip(&self.simulation.views) {
+            self.write_view(number, view)?;
+        }
+        let truth = &self.simulation.truth;
+        self.write_map("dsm.tif", &[Band { description: "height_m", data: BandData::F32(&truth.dsm) }])?;
+        self.write_map("dtm.tif", &[Band { description: "height_m", data: BandData::F32(&truth.dtm) }])?;
+        self.write_map("classes.tif", &[Band { description: "class", data: BandData::U8(&truth.classes) }])?;
+        self.write_map("ortho.tif", &[Band { description: "reflectance_1e-4", data: BandData::U16(&truth.ortho) }])?;
+        let names: Vec<String> = (1..=truth.visibility.len()).map(|view| format!("seen_by_view_{view}")).collect();
+        let seen = names.iter().zip(&truth.visibility);
+        let seen = seen.map(|(name, grid)| Band { description: name, data: BandData::U8(grid) });
+        self.write_map("visibility.tif", &seen.collect::<Vec<_>>())?;
+        let options = CityJsonOptions { overwrite: self.overwrite, ..CityJsonOptions::default() };
+        write_cityjson(&self.folder.join("truth/buildings.city.json"), &truth.buildings, &options)
+            .map_err(FileError::write)?;
+        if flight > 0 {
+            self.write_flight(flight)?;
+        }
+        // The parameters and the record of an earlier simulation are replaced: the folder was checked at the start.
+        let parameters = self.simulation.config.to_toml()?;
+        io::write_bytes(self.folder.join("scene.toml"), parameters.as_bytes(), true).map_err(FileError::write)?;
+        Ok(files::write_json(&self.folder.join("scene.json"), &self.simulation.record(), true)?)
+    }
+
+    fn write_view(&self, number: usize, view: &View) -> Result<(), FileError> {
+        let image = [Band { description: "panchromatic", data: BandData::U16(&view.image) }];
+        let path = self.folder.join(format!("view_{number}.tif"));
+        write_image_with_rpc(path, &image, &view.rpc, Some(0.0), self.overwrite)?;
+        // Truth in the grid of the image keeps the true RPC, which turns a pixel and its height into a place.
+        let path = |what: &str| self.folder.join("truth").join(format!("{what}_{number}.tif"));
+        let heights = [Band { description: "height_m", data: BandData::F32(&view.heights) }];
+        let no_data = Some(f64::from(raster::NO_DATA));
+        write_image_with_rpc(path("heights"), &heights, &view.true_rpc, no_data, self.overwrite)?;
+        if let Some(cover) = &view.clouds {
+            let clouds = [Band { description: "cloud", data: BandData::U8(cover) }];
+            write_image_with_rpc(path("clouds"), &clouds, &view.true_rpc, None, self.overwrite)?;
+        }
+        Ok(())
+    }
+
+    fn write_flight(&self, count: u32) -> Result<(), SimulateJobError> {
+        let (lens, poses) = self.simulation.flight(count as usize)?;
+        let view = |(id, pose)| ColmapView { id, name: format!("flight_{id:02}.png"), lens: 0, pose };
+        let model = ColmapModel { lenses: vec![lens], views: (1..).zip(poses).map(view).collect() };
+        let folder = self.folder.join("cameras/sparse/0");
+        files::create_folder(&folder)?;
+        colmap::write(&folder, &model, &[], ColmapEncoding::Text, self.overwrite).map_err(FileError::write)?;
+        Ok(())
+    }
+
+    fn write_map(&self, name: &str, bands: &[Band<'_>]) -> Result<(), FileError> {
+        let truth = &self.simulation.truth;
+        let cog = CogRaster::new(bands, truth.geotransform, Crs::ellipsoidal(truth.epsg));
+        Ok(write_cog(self.folder.join("truth").join(name), &cog, self.overwrite)?)
+    }
+}
