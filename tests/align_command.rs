@@ -1,8 +1,6 @@
 //! `skysweep align` end to end: a planted similarity among right and wrong positions (made by NumPy and PROJ), the files it writes,
 //! the noise harness, a real model, and what is refused.
 
-#![allow(clippy::print_stderr, reason = "a test that skips says so")]
-
 mod common;
 
 use std::path::{Path, PathBuf};
@@ -116,11 +114,7 @@ fn noise_is_measured_and_its_models_are_written() {
 
 #[test]
 fn a_real_model_is_brought_to_a_map() {
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/city/colmap/bartoszek+test_colmap/sparse/0");
-    if !model.is_dir() {
-        eprintln!("skipped: {} is not there", model.display());
-        return;
-    }
+    let Some(model) = testing::shared_data("city/colmap/bartoszek+test_colmap/sparse/0") else { return };
     let folder = tempfile::tempdir().unwrap();
     let (before, points) = read_with_points(&model).unwrap();
     // Easting, northing, height of the cameras under a similarity of this test's own, one of them far off.

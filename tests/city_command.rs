@@ -194,10 +194,7 @@ fn files_that_are_no_city_model_end_with_2() {
 
 #[test]
 fn the_tile_of_the_yardsticks() {
-    let tile = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/city/3dbag_5910.city.json");
-    if !tile.is_file() {
-        return;
-    }
+    let Some(tile) = testing::shared_data("city/3dbag_5910.city.json") else { return };
     let bench = Bench::new("");
     let summary = stdout(&bench.run(&["info", "--json", tile.to_str().unwrap()]).code(0));
     let summary: Value = serde_json::from_str(&summary).unwrap();

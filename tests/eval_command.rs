@@ -1,7 +1,5 @@
 //! `skysweep eval` from files to exit code: grids, coordinate systems, datums, classes, thresholds and refusals.
 
-#![allow(clippy::print_stderr, reason = "a test that skips says so")]
-
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
@@ -290,12 +288,8 @@ fn bad_input_is_refused_in_one_message() {
 /// The LiDAR surface of Jacksonville, moved by its geotransform alone, and its classes, which carry no georeference.
 #[test]
 fn the_lidar_truth_is_brought_back_too() {
-    let truth = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/stereo/jax_068/truth");
+    let Some(truth) = testing::shared_data("stereo/jax_068/truth") else { return };
     let (reference, classes) = (truth.join("JAX_068_DSM_georef.tif"), truth.join("JAX_068_CLS.tif"));
-    if !reference.exists() {
-        eprintln!("skipped: {} is absent", reference.display());
-        return;
-    }
     let folder = TempDir::new().unwrap();
     let dem = read_dem(&reference).unwrap();
     let mut moved = dem.geotransform;

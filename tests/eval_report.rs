@@ -1,7 +1,5 @@
 //! The report of `skysweep eval`: where it goes, what it never replaces, and that a browser shows it.
 
-#![allow(clippy::print_stderr, reason = "a test that skips says so")]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -152,7 +150,7 @@ fn shown(browser: &Path, profile: &Path, page: &Path) -> Output {
 #[test]
 fn a_browser_shows_the_page_with_its_pictures_and_without_complaint() {
     let Some(browser) = chromium() else {
-        eprintln!("skipped: no Chromium on this machine (set CHROMIUM to one)");
+        testing::skip("Chromium is not installed (the variable CHROMIUM may name one)");
         return;
     };
     let (folder, run, reference) = run_folder();

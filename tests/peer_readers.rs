@@ -1,9 +1,7 @@
 //! What is written for trainers loads in other people's readers: pycolmap, Open3D, trimesh, NumPy.
 //!
-//! `benches/peers/check_priors.py` does the checks. It runs with the Python of `SKYSWEEP_PEERS_PYTHON`, else `python3`, and says
-//! with a line which packages are not there; without any Python the whole is skipped with a line.
-// A check that is skipped says so.
-#![allow(clippy::print_stderr)]
+//! `benches/peers/check_priors.py` does the checks. It runs with the Python that `SKYSWEEP_PEERS_PYTHON` names, else with
+//! `python3`. Packages that are not installed are skipped with a line each.
 
 use std::path::Path;
 use std::process::Command;
@@ -66,11 +64,11 @@ fn other_readers_load_what_is_written() {
     let python = std::env::var("SKYSWEEP_PEERS_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers/check_priors.py");
     let Ok(output) = Command::new(&python).arg(script).arg(folder.path()).output() else {
-        eprintln!("skipped: {python} does not run");
+        testing::skip(&format!("{python} does not run"));
         return;
     };
     let told = String::from_utf8_lossy(&output.stdout);
-    told.lines().filter(|line| line.starts_with("skip")).for_each(|line| eprintln!("{line}"));
+    told.lines().filter_map(|line| line.strip_prefix("skip ")).for_each(|line| testing::skip(line.trim()));
     assert!(output.status.success(), "{told}{}", String::from_utf8_lossy(&output.stderr));
     if told.lines().any(|line| line.starts_with("ok   NumPy")) {
         assert_eq!(told.lines().filter(|line| line.starts_with("ok   NumPy")).count(), 4, "{told}");

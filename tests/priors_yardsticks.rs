@@ -1,10 +1,7 @@
 //! Priors of a real tile against what Open3D (Embree) made of the same points and cameras, and the same tile at other
 //! coordinates.
 //!
-//! Reference: `../shared/data/city/peer_reference`, whose points are relative to an offset on whole metres; where that is
-//! absent the tests say so and pass.
-
-#![allow(clippy::print_stderr)]
+//! The reference is `city/peer_reference` of the shared data. Its points are relative to an offset of whole metres.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -22,12 +19,7 @@ const OFFSET: ModelPoint = ModelPoint::new(85_320.0, 446_656.0, 0.0);
 const COUNT_TOLERANCE: f64 = 1e-4;
 
 fn city() -> Option<PathBuf> {
-    let city = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/city");
-    if !city.is_dir() {
-        eprintln!("skipped: ../shared/data/city is not there");
-        return None;
-    }
-    Some(city)
+    testing::shared_data("city")
 }
 
 fn arranged(model: &CityModel) -> PriorModel {

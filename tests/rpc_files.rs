@@ -11,16 +11,6 @@ use std::path::{Path, PathBuf};
 use camera::Rpc;
 use io::rpc::{RpcReadError, read};
 
-#[allow(clippy::print_stderr, reason = "the line says why nothing was tested")]
-fn shared(folder: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(folder);
-    if !path.is_dir() {
-        eprintln!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
-}
-
 /// The fields of every line of the reference, by path.
 fn reference() -> BTreeMap<String, Vec<String>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/rpc_files.txt");
@@ -37,7 +27,7 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn every_file_is_read_or_refused_as_the_reference_says() {
-    let Some(root) = shared("rpc") else { return };
+    let Some(root) = testing::shared_data("rpc") else { return };
     let reference = reference();
     let mut seen = 0;
     for path in files_below(&root) {
@@ -67,7 +57,7 @@ fn every_file_is_read_or_refused_as_the_reference_says() {
 /// `peer_readers.txt` has a line per file: name size | reader:ok lon,lat | reader:Error | …
 #[test]
 fn what_another_reader_reads_ours_reads() {
-    let Some(root) = shared("rpc") else { return };
+    let Some(root) = testing::shared_data("rpc") else { return };
     let peers = fs::read_to_string(root.join("peer_readers.txt")).expect("the list of peer readers");
     let mut compared = 0;
     for line in peers.lines() {
@@ -117,7 +107,7 @@ fn check_same(root: &Path, a: &str, b: &str, relative: f64) {
 
 #[test]
 fn the_same_rpc_in_two_containers_has_the_same_numbers() {
-    let Some(root) = shared("rpc/gdal/autotest") else { return };
+    let Some(root) = testing::shared_data("rpc/gdal/autotest") else { return };
     check_same(&root, "gcore/data/md_dg.RPB", "gcore/data/md_dg.tif", 0.0);
     check_same(&root, "gcore/data/md_dg.RPB", "gcore/data/md_dg_2.XML", 1e-15);
     check_same(&root, "gcore/data/md_dg_2.XML", "gcore/data/md_dg_2.tif", 0.0);
@@ -136,7 +126,7 @@ fn the_same_rpc_in_two_containers_has_the_same_numbers() {
 /// OSSIM prints 15 digits.
 #[test]
 fn geom_counts_pixels_from_zero_where_dimap_counts_from_one() {
-    let Some(root) = shared("rpc/shareloc") else { return };
+    let Some(root) = testing::shared_data("rpc/shareloc") else { return };
     let image = "PHR1B_P_201709281038045_SEN_PRG_FC_178608-001";
     check_same(&root, &format!("{image}.geom"), &format!("RPC_{image}.XML"), 1e-14);
 }
@@ -144,7 +134,7 @@ fn geom_counts_pixels_from_zero_where_dimap_counts_from_one() {
 /// The originals have a `.geom` of the whole scene and the cut's origin in the geotransform; the other pair has tags.
 #[test]
 fn a_cut_of_a_geoms_scene_gets_the_rpc_of_the_cut() {
-    let Some(root) = shared("stereo/phr_gizeh") else { return };
+    let Some(root) = testing::shared_data("stereo/phr_gizeh") else { return };
     for image in ["img1", "img2"] {
         check_same(&root, &format!("{image}.tif"), &format!("{image}_rpc.tif"), 1e-14);
     }

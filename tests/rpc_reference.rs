@@ -15,16 +15,6 @@ const AGREEMENT_PX: f64 = 1e-9;
 /// Agreement of an image position with itself after localisation and projection, pixels.
 const ROUND_TRIP_PX: f64 = 1e-6;
 
-#[allow(clippy::print_stderr, reason = "the line says why nothing was tested")]
-fn shared() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    if !path.is_dir() {
-        eprintln!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
-}
-
 fn distance(a: ImagePoint, b: ImagePoint) -> f64 {
     (a.sample - b.sample).hypot(a.line - b.line)
 }
@@ -46,7 +36,7 @@ fn reference() -> BTreeMap<String, Vec<(LonLatHeight, ImagePoint)>> {
 
 #[test]
 fn projection_agrees_with_rpcm_on_every_file() {
-    let Some(root) = shared() else { return };
+    let Some(root) = testing::shared_data("") else { return };
     let reference = reference();
     assert!(reference.len() > 50);
     for (path, points) in reference {
@@ -74,7 +64,7 @@ fn cube(rpc: &Rpc) -> impl Iterator<Item = LonLatHeight> {
 
 #[test]
 fn localisation_inverts_projection_over_every_validity_cube() {
-    let Some(root) = shared() else { return };
+    let Some(root) = testing::shared_data("") else { return };
     let files = ["rpc", "stereo"].into_iter().flat_map(|folder| files_below(&root.join(folder)));
     let mut readable = 0;
     for (path, file) in files.filter_map(|path| io::rpc::read(&path).ok().map(|file| (path, file))) {

@@ -1,7 +1,5 @@
 //! `skysweep split` on real COLMAP models against a brute-force choice by Python sets, and what it refuses.
 
-#![allow(clippy::print_stderr, reason = "a test that skips says so")]
-
 mod common;
 
 use std::path::{Path, PathBuf};
@@ -25,11 +23,7 @@ fn names(report: &Value, key: &str) -> String {
 
 #[test]
 fn real_models_are_split_as_brute_force_does() {
-    let data = root().join("../shared/data/city/colmap");
-    if !data.is_dir() {
-        eprintln!("skipped: {} is not there", data.display());
-        return;
-    }
+    let Some(data) = testing::shared_data("city/colmap") else { return };
     let reference = std::fs::read_to_string(root().join("tests/reference/split/reference.txt")).unwrap();
     assert_eq!(reference.lines().count(), 12);
     for line in reference.lines() {

@@ -11,6 +11,8 @@
 
 #[path = "../common/machine.rs"]
 mod machine;
+#[path = "../common/places.rs"]
+mod places;
 mod town;
 
 use std::fmt::Write as _;
@@ -23,7 +25,6 @@ use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use raster::{GeoTransform, Grid};
 use serde_json::{Value, json};
 
-const SKYSWEEP: &str = env!("CARGO_BIN_EXE_skysweep");
 /// Cells along each side of the surface model.
 const CELLS: usize = 4096;
 const CELL_M: f64 = 0.5;
@@ -124,7 +125,7 @@ fn write_positions(path: &Path, tiles: usize, projection: &MapProjection) -> any
 /// Makes all tiles, and returns the seconds that a user waits and those of all processors.
 fn make(dsm: &Path, list: &Path, out: &Path, reading: &str, tiles: usize) -> anyhow::Result<[f64; 2]> {
     let (begun, used) = (std::time::Instant::now(), children_seconds()?);
-    let mut command = Command::new(SKYSWEEP);
+    let mut command = Command::new(places::skysweep());
     command.arg("heightmap").arg(dsm).arg("--positions").arg(list).arg("-o").arg(out);
     command.args(["--interpolation", reading, "--threads", "2", "--progress", "none", "--quiet"]);
     ensure!(command.status()?.success(), "{command:?} failed");

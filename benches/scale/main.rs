@@ -12,6 +12,8 @@
 
 #[path = "../common/machine.rs"]
 mod machine;
+#[path = "../common/places.rs"]
+mod places;
 mod town;
 
 use std::fmt::Write as _;
@@ -24,7 +26,6 @@ use raster::Window;
 use serde_json::Value;
 use town::{LOOKS, PERIOD};
 
-const SKYSWEEP: &str = env!("CARGO_BIN_EXE_skysweep");
 /// Every how many cells of a row, and rows, the error is looked at.
 const EVERY: usize = 3;
 
@@ -161,16 +162,9 @@ fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments
     let out = folder.join("out");
     // bash times the command and its threads; nothing in std does.
     let output = Command::new("bash")
-        .args([
-            "-c",
-            "TIMEFORMAT='times %U %S %R'; time \"$@\"",
-            "bash",
-            SKYSWEEP,
-            "dsm",
-            "--overwrite",
-            "--json",
-            "-q",
-        ])
+        .args(["-c", "TIMEFORMAT='times %U %S %R'; time \"$@\"", "bash"])
+        .arg(places::skysweep())
+        .args(["dsm", "--overwrite", "--json", "-q"])
         .args(["--progress", "none", "--gsd", &town::GSD_M.to_string(), "--preset", &arguments.preset])
         .args(["--memory", &arguments.memory_mb.to_string(), "-o"])
         .arg(&out)

@@ -1,11 +1,12 @@
-//! Speed against error: every preset on every scene (measured ones with all voids closed too), `cargo bench --bench scenes [-- NAME… --runs N --out DIR]`.
+//! Speed against error of every preset on every scene: `cargo bench --bench scenes [-- NAME… --runs N --out DIR]`.
 //!
-//! Simulated scenes are made first (`skysweep simulate`), real ones are read from `../shared/data/stereo` where that is. The
-//! release binary runs as a user would run it, with default options but for the preset. Runs alternate: all scenes and presets
-//! once, then all again, so that a machine that slows down slows them all. Accuracy is by `skysweep eval`. Medians go to
-//! `benches/results/scenes.json`, a table to `scenes.md`, plots to `scenes.svg`; when names
-//! choose only some scenes, nothing is written without --out. Results of CARS that
-//! `benches/peers/cars/run.sh` left in `benches/results/cars.json` join the table.
+//! Simulated scenes are made first (`skysweep simulate`). Real scenes are read from `../shared/data/stereo`, or from the folder
+//! that `SKYSWEEP_DATA` names. The release binary runs with default options except for the preset; scenes with a measured truth
+//! also run without filled voids and with all voids filled, so that other programs' surfaces are compared like with like. All
+//! scenes and presets run once, then all run again, so that a machine that slows down slows them all. `skysweep eval` measures the
+//! accuracy. Medians go to `benches/results/scenes.json`, tables to `scenes.md`, plots to `scenes.svg`. When names choose only
+//! some scenes, nothing is written without `--out`. Results of other programs come from `benches/results/peers.json` and
+//! `cars.json`. `make readme` then brings the numbers into the README and the guide.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
@@ -13,6 +14,8 @@
 mod machine;
 mod matrix;
 mod peers;
+#[path = "../common/places.rs"]
+mod places;
 mod plot;
 mod pyramid;
 mod run;
@@ -32,7 +35,7 @@ fn main() -> anyhow::Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let Arguments { wanted, runs, out } = arguments()?;
     let folder = tempfile::tempdir()?;
-    let data = root.join("../shared/data/stereo");
+    let data = places::shared_data().join("stereo");
     let mut all = scenes::simulated();
     if data.is_dir() {
         all.extend(scenes::real(&data));
@@ -43,7 +46,9 @@ fn main() -> anyhow::Result<()> {
     for scene in &mut all {
         scene.make(folder.path())?;
     }
-    let rows = matrix::measure(&all, folder.path(), runs)?;
+    let mut rows = matrix::measure(&all, folder.path(), runs)?;
+    let s2p_cpu_s = peers::s2p_cpu_s(root)?;
+    rows.iter_mut().for_each(|row| row.s2p_cpu_s = s2p_cpu_s.get(row.scene).copied());
     let results = table::Results::new(rows, peers::all(root, &data)?, runs, start.elapsed());
     println!("{}", results.markdown());
     match out.or_else(|| wanted.is_empty().then(|| root.join("benches/results"))) {

@@ -13,7 +13,10 @@ pub(crate) const PRESETS: [&str; 3] = ["fast", "balanced", "accurate"];
 /// The preset that goals are for.
 pub(crate) const DEFAULT: &str = "balanced";
 
-/// The default preset with every void closed: what other programs' filled surfaces compare with. On measured scenes.
+/// The presets without filled voids, in the order of [`PRESETS`]: what other programs' unfilled surfaces compare with. They run
+/// on measured scenes.
+pub(crate) const UNFILLED: [&str; 3] = ["fast --fill none", "balanced --fill none", "accurate --fill none"];
+/// The default preset with every void filled: what other programs' filled surfaces compare with. It runs on measured scenes.
 pub(crate) const FILLED: &str = "balanced --fill all";
 
 /// Share by which the median times of equal work differ.
@@ -42,6 +45,7 @@ pub(crate) struct Row {
     pub(crate) wall_s: f64,
     pub(crate) peak_mb: f64,
     pub(crate) metrics: Metrics,
+    /// User seconds of S2P on the same scene, where the shared data know them.
     pub(crate) s2p_cpu_s: Option<f64>,
     pub(crate) goals: Vec<Reached>,
     /// Another preset is at least as fast and as good in MAE and completeness, and better in one of the three.
@@ -84,7 +88,7 @@ impl Row {
             wall_s: median(|c| c.wall_s),
             peak_mb: median(|c| c.peak_mb),
             metrics,
-            s2p_cpu_s: scene.s2p_cpu_s,
+            s2p_cpu_s: None,
             goals: Vec::new(),
             dominated: false,
             runs,
@@ -103,7 +107,8 @@ impl Row {
         let pairs = || errors(other).into_iter().zip(errors(self));
         let faster = other.cpu_s < (1.0 - NOISE) * self.cpu_s;
         let not_slower = other.cpu_s <= (1.0 + NOISE) * self.cpu_s;
-        let comparable = self.scene == other.scene && self.preset != FILLED && other.preset != FILLED;
+        let fill = |row: &Self| row.preset.split_once(' ').map(|(_, fill)| fill);
+        let comparable = self.scene == other.scene && fill(self) == fill(other);
         let no_worse = comparable && not_slower && pairs().all(|(a, b)| a <= b);
         no_worse && (faster || pairs().any(|(a, b)| a < b))
     }
@@ -132,13 +137,16 @@ pub(crate) fn measure(scenes: &[Scene], folder: &Path, runs: usize) -> anyhow::R
 }
 
 fn presets(scene: &Scene) -> impl Iterator<Item = &'static str> + use<> {
-    let filled = matches!(scene.truth, Truth::Measured { .. }).then_some(FILLED);
-    PRESETS.into_iter().chain(filled)
+    let measured = matches!(scene.truth, Truth::Measured { .. });
+    let fills = UNFILLED.into_iter().chain([FILLED]).filter(move |_| measured);
+    PRESETS.into_iter().chain(fills)
 }
 
 fn accuracy(scene: &Scene, dsm: &Path) -> anyhow::Result<Metrics> {
-    let Truth::Pyramid { peer } = &scene.truth else { return run::evaluate(dsm, &scene.truth, &scene.folder) };
-    let mut both = pyramid::measure(dsm)?;
-    both.extend(pyramid::measure(peer)?.into_iter().map(|(name, value)| (format!("s2p_{name}"), value)));
-    Ok(both)
+    let Truth::Pyramid { peers } = &scene.truth else { return run::evaluate(dsm, &scene.truth, &scene.folder) };
+    let mut all = pyramid::measure(dsm)?;
+    for (prefix, peer) in peers {
+        all.extend(pyramid::measure(peer)?.into_iter().map(|(name, value)| (format!("{prefix}_{name}"), value)));
+    }
+    Ok(all)
 }

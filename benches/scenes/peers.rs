@@ -1,6 +1,9 @@
-//! What other programs make of the same images: `benches/peers/peers.json` (with where its numbers come from), and the results
-//! that `benches/peers/cars/run.sh` left in `benches/results/cars.json`.
+//! What other programs make of the same images.
+//!
+//! `benches/results/peers.json` is written by `benches/peers/peers.sh` and names its sources; `benches/results/cars.json` is
+//! written by `benches/peers/cars/run.sh`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -15,11 +18,15 @@ pub(crate) struct Peer {
     pub(crate) scene: String,
     /// What it was given, in words.
     pub(crate) input: String,
-    /// Numbers of the views used in `jax_068`; all of a simulated scene.
+    /// Numbers of the views used in `jax_068`. Empty for a simulated scene, of which all views are used.
     #[serde(default)]
     pub(crate) views: Vec<usize>,
-    pub(crate) cpu_s: f64,
-    /// What must be known of the processor time.
+    /// Whether voids were filled afterwards.
+    #[serde(default)]
+    pub(crate) filled: bool,
+    /// User seconds; none where the source gives none.
+    pub(crate) cpu_s: Option<f64>,
+    /// A restriction of the processor time, in words.
     #[serde(default)]
     pub(crate) cpu_note: String,
     /// Of all images together; from the images where the file does not say.
@@ -35,17 +42,29 @@ pub(crate) struct Peer {
 #[derive(Deserialize)]
 struct File {
     entries: Vec<Peer>,
+    /// User seconds of each tool on the scenes without a measured truth.
+    #[serde(default)]
+    cpu_s: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
-/// All that is known.
+fn read(path: &Path) -> anyhow::Result<Option<File>> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    Ok(Some(serde_json::from_str(&std::fs::read_to_string(path)?)?))
+}
+
+/// Returns the user seconds of S2P by scene.
+pub(crate) fn s2p_cpu_s(root: &Path) -> anyhow::Result<BTreeMap<String, f64>> {
+    let known = read(&root.join("benches/results/peers.json"))?.map(|file| file.cpu_s).unwrap_or_default();
+    Ok(known.into_iter().filter_map(|(scene, tools)| Some((scene, *tools.get("S2P")?))).collect())
+}
+
+/// Returns every known result on `jax_068` and on simulated scenes.
 pub(crate) fn all(root: &Path, data: &Path) -> anyhow::Result<Vec<Peer>> {
     let mut peers = Vec::new();
-    for name in ["benches/peers/peers.json", "benches/results/cars.json"] {
-        let path = root.join(name);
-        if path.is_file() {
-            let file: File = serde_json::from_str(&std::fs::read_to_string(&path)?)?;
-            peers.extend(file.entries);
-        }
+    for name in ["benches/results/peers.json", "benches/results/cars.json"] {
+        peers.extend(read(&root.join(name))?.into_iter().flat_map(|file| file.entries));
     }
     for peer in &mut peers {
         let images = scenes::jax_images(data, &peer.views);

@@ -1,12 +1,13 @@
 //! Processor seconds per megapixel against error and against incompleteness, with the Pareto front.
 //!
-//! Left what is missing in accuracy (MAE), right what is missing in completeness (share of the reference's cells without an error
-//! below 1 m); above the real scene with LiDAR truth and the peers on it, below the simulated scenes, where the presets' means over all scenes
-//! take the place of the front: scenes do not compete.
+//! The left plots show the error (MAE), the right plots the incompleteness (the share of the reference's cells without an error
+//! below 1 m). The upper plots show the real scene with LiDAR truth: skysweep's surfaces without filled voids beside other
+//! programs' unfilled surfaces. The lower plots show the simulated scenes with the default fill. There the line joins the presets'
+//! means over all scenes instead of a Pareto front, because scenes do not compete.
 
 use report::{Axis, Chart};
 
-use crate::matrix::{DEFAULT, PRESETS, Row};
+use crate::matrix::{PRESETS, Row, UNFILLED};
 use crate::peers::Peer;
 
 /// Mark of each preset, in the order of [`PRESETS`].
@@ -35,23 +36,23 @@ pub(crate) fn sheet(rows: &[Row], peers: &[Peer]) -> String {
     let mae = |row: &Row| row.metric("mae");
     let incomplete = |row: &Row| 100.0 * (1.0 - row.metric("completeness_1"));
     let peers_by = |error: fn(&Peer) -> f64| -> Vec<Point> {
-        peers.iter().filter(|p| p.scene == "jax_068").filter_map(|p| peer_point(p, error(p))).collect()
+        peers.iter().filter(|p| p.scene == "jax_068" && !p.filled).filter_map(|p| peer_point(p, error(p))).collect()
     };
     let jax = |title: &str, label: &str, error: fn(&Row) -> f64, peers: Vec<Point>| {
-        let mut all = series(rows, "measured", error);
+        let mut all = series(rows, "measured", UNFILLED, error);
         all.push(peers);
         let front = front(all.iter().flatten());
         plot(title, label, &all, &front)
     };
     let simulated = |title: &str, label: &str, error: fn(&Row) -> f64| {
-        let all = series(rows, "simulated", error);
+        let all = series(rows, "simulated", PRESETS, error);
         plot(title, label, &all, &means(&all))
     };
     let (metres, percent) = ("MAE, m", "cells not within 1 m, %");
     let charts = [
-        jax("JAX_068 against LiDAR: error", metres, mae, peers_by(|p| p.mae)),
+        jax("JAX_068 against LiDAR, no void filled: error", metres, mae, peers_by(|p| p.mae)),
         jax(
-            "JAX_068 against LiDAR: incompleteness",
+            "JAX_068 against LiDAR, no void filled: incompleteness",
             percent,
             incomplete,
             peers_by(|p| 100.0 * (1.0 - p.completeness_1)),
@@ -71,18 +72,18 @@ pub(crate) fn sheet(rows: &[Row], peers: &[Peer]) -> String {
     Chart::sheet(&charts, 2, &key)
 }
 
-fn series(rows: &[Row], truth: &str, error: fn(&Row) -> f64) -> Vec<Series> {
+fn series(rows: &[Row], truth: &str, presets: [&str; 3], error: fn(&Row) -> f64) -> Vec<Series> {
     let mut all: Vec<Series> = Vec::new();
     let mut scene = "";
     for row in rows.iter().filter(|row| row.truth == truth) {
-        let Some(preset) = PRESETS.iter().position(|preset| *preset == row.preset) else { continue };
+        let Some(preset) = presets.iter().position(|preset| *preset == row.preset) else { continue };
         if row.scene != scene {
             all.push(Series::new());
             scene = row.scene;
         }
         let mark = Mark::Preset(preset);
         let label =
-            if row.preset == DEFAULT { row.scene.trim_start_matches("jax_068 ").to_owned() } else { String::new() };
+            if row.preset == presets[1] { row.scene.trim_start_matches("jax_068 ").to_owned() } else { String::new() };
         let point = Point { cost: row.cpu_s_per_megapixel, error: error(row), label, mark };
         if let Some(series) = all.last_mut() {
             series.push(point);
@@ -95,7 +96,7 @@ fn peer_point(peer: &Peer, error: f64) -> Option<Point> {
     let views: Vec<String> = peer.views.iter().map(usize::to_string).collect();
     let few = views.len() <= 3;
     let label = format!("{} {}", peer.tool, if few { views.join("-") } else { format!("{} views", views.len()) });
-    Some(Point { cost: peer.cpu_s / peer.megapixels?, error, label, mark: Mark::Peer })
+    Some(Point { cost: peer.cpu_s? / peer.megapixels?, error, label, mark: Mark::Peer })
 }
 
 fn plot(title: &str, label: &str, all: &[Series], line: &[(f64, f64)]) -> Chart {

@@ -7,9 +7,8 @@ use anyhow::{Context, ensure};
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::places::skysweep;
 use crate::scenes::Truth;
-
-const SKYSWEEP: &str = env!("CARGO_BIN_EXE_skysweep");
 
 /// What one run took.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -30,7 +29,7 @@ fn checked(output: Output) -> anyhow::Result<Output> {
 /// Makes a simulated scene.
 pub(crate) fn simulate(arguments: &[&str], folder: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder)?;
-    let made = Command::new(SKYSWEEP).arg("simulate").args(arguments).arg("-o").arg(folder).arg("-q").output()?;
+    let made = Command::new(skysweep()).arg("simulate").args(arguments).arg("-o").arg(folder).arg("-q").output()?;
     checked(made).map(|_| ()).with_context(|| format!("skysweep simulate {}", arguments.join(" ")))
 }
 
@@ -38,7 +37,9 @@ pub(crate) fn simulate(arguments: &[&str], folder: &Path) -> anyhow::Result<()> 
 pub(crate) fn dsm(images: &[PathBuf], preset: &str, out: &Path) -> anyhow::Result<Cost> {
     // bash times the command and its threads; nothing in std does.
     let output = Command::new("bash")
-        .args(["-c", "TIMEFORMAT='times %U %R'; time \"$@\"", "bash", SKYSWEEP, "dsm", "--preset"])
+        .args(["-c", "TIMEFORMAT='times %U %R'; time \"$@\"", "bash"])
+        .arg(skysweep())
+        .args(["dsm", "--preset"])
         .args(preset.split(' '))
         .args(["--overwrite", "--json", "-q", "--progress", "none", "-o"])
         .arg(out)
@@ -59,7 +60,7 @@ pub(crate) type Metrics = Vec<(String, f64)>;
 /// Runs `skysweep eval --align xyz` and returns the metrics over all cells, `median_abs` (the median of |error|), `volume_iou` and
 /// `overreach`. In simulated scenes water does not count, and the true terrain is used.
 pub(crate) fn evaluate(dsm: &Path, truth: &Truth, folder: &Path) -> anyhow::Result<Metrics> {
-    let mut command = Command::new(SKYSWEEP);
+    let mut command = Command::new(skysweep());
     command.arg("eval").arg(dsm);
     match truth {
         Truth::Simulated => {

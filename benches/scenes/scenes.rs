@@ -13,8 +13,9 @@ pub(crate) enum Truth {
     Measured { path: PathBuf, vertical: &'static str },
     /// Another program's surface: a comparison, no truth.
     Peer { path: PathBuf, vertical: &'static str },
-    /// The pyramid of Khufu; `peer` is S2P's surface model of it, measured in the same way.
-    Pyramid { peer: PathBuf },
+    /// The pyramid of Khufu. `peers` are other programs' surface models of it (prefix of the metric, file), measured in the
+    /// same way.
+    Pyramid { peers: [(&'static str, PathBuf); 2] },
 }
 
 /// A promise for the default preset: name, least, greatest.
@@ -26,9 +27,7 @@ pub(crate) struct Scene {
     pub(crate) images: Vec<PathBuf>,
     pub(crate) truth: Truth,
     pub(crate) goals: &'static [Goal],
-    /// Processor seconds of S2P on the same scene (`../shared/data/README.md`), where it was run on it.
-    pub(crate) s2p_cpu_s: Option<f64>,
-    /// Arguments of `skysweep simulate` for a scene that is made.
+    /// Arguments of `skysweep simulate` for a simulated scene.
     simulation: &'static [&'static str],
     /// Where it is made.
     pub(crate) folder: PathBuf,
@@ -64,7 +63,6 @@ pub(crate) fn simulated() -> Vec<Scene> {
         images: Vec::new(),
         truth: Truth::Simulated,
         goals: &[],
-        s2p_cpu_s: None,
         simulation,
         folder: PathBuf::new(),
     };
@@ -84,30 +82,25 @@ pub(crate) fn real(data: &Path) -> Vec<Scene> {
     let numbered = |folder: &str, n: usize| -> Vec<PathBuf> {
         (1..=n).map(|i| data.join(format!("{folder}/img_0{i}.tif"))).collect()
     };
-    let scene = |name, images, truth, goals, s2p_cpu_s| Scene {
-        name,
-        images,
-        truth,
-        goals,
-        s2p_cpu_s,
-        simulation: &[],
-        folder: PathBuf::new(),
-    };
+    let scene =
+        |name, images, truth, goals| Scene { name, images, truth, goals, simulation: &[], folder: PathBuf::new() };
     vec![
-        scene("jax_068 7 views", jax(&[1, 2, 3, 4, 5, 6, 7]), lidar(), &SEVEN, None),
-        scene("jax_068 001-003-004", jax(&[1, 3, 4]), lidar(), &[], None),
-        scene("jax_068 002-005-006", jax(&[2, 5, 6]), lidar(), &[], None),
-        scene("jax_068 001-003", jax(&[1, 3]), lidar(), &PAIR, None),
-        scene("jax_068 002-003", jax(&[2, 3]), lidar(), &PAIR, None),
-        scene("jax_068 002-004", jax(&[2, 4]), lidar(), &[], None),
-        scene("s2p_pair", numbered("s2p_pair", 2), s2p("s2p_pair_default_0.5m.tif"), &S2P, Some(30.0)),
-        scene("s2p_triplet", numbered("s2p_triplet", 3), s2p("s2p_triplet_default_0.5m.tif"), &S2P, Some(48.0)),
+        scene("jax_068 7 views", jax(&[1, 2, 3, 4, 5, 6, 7]), lidar(), &SEVEN),
+        scene("jax_068 001-003-004", jax(&[1, 3, 4]), lidar(), &[]),
+        scene("jax_068 002-005-006", jax(&[2, 5, 6]), lidar(), &[]),
+        scene("jax_068 001-003", jax(&[1, 3]), lidar(), &PAIR),
+        scene("jax_068 002-003", jax(&[2, 3]), lidar(), &PAIR),
+        scene("jax_068 002-004", jax(&[2, 4]), lidar(), &[]),
+        scene("s2p_pair", numbered("s2p_pair", 2), s2p("s2p_pair_default_0.5m.tif"), &S2P),
+        scene("s2p_triplet", numbered("s2p_triplet", 3), s2p("s2p_triplet_default_0.5m.tif"), &S2P),
         scene(
             "phr_gizeh",
             vec![data.join("phr_gizeh/img1_rpc.tif"), data.join("phr_gizeh/img2_rpc.tif")],
-            Truth::Pyramid { peer: data.join("peers/s2p_gizeh_0.5m.tif") },
+            Truth::Pyramid {
+                peers: [("s2p", "s2p_gizeh_0.5m.tif"), ("cars", "cars_gizeh_0.5m.tif")]
+                    .map(|(prefix, file)| (prefix, data.join("peers").join(file))),
+            },
             &KHUFU,
-            Some(19.0),
         ),
     ]
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::machine::machine;
-use crate::matrix::{DEFAULT, Reached, Row};
+use crate::matrix::{Reached, Row, UNFILLED};
 use crate::peers::Peer;
 use crate::plot;
 use crate::run::at_coverage;
@@ -79,15 +79,16 @@ impl Results {
              | program | scene | input | CPU s | CPU s/Mpx | MAE | RMSE | NMAD | < 1 m % | coverage % |\n|---|---|---|---|---|---|---|---|---|---|\n",
         );
         for peer in &self.peers {
-            let per_megapixel = peer.megapixels.map_or("–".to_owned(), |mpx| format!("{:.1}", peer.cpu_s / mpx));
+            let known = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
+            let cpu = known(peer.cpu_s.map(|seconds| format!("{seconds:.0}")));
+            let per_megapixel = known(peer.cpu_s.zip(peer.megapixels).map(|(s, mpx)| format!("{:.1}", s / mpx)));
             let note = if peer.cpu_note.is_empty() { String::new() } else { format!(" ({})", peer.cpu_note) };
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {:.0}{note} | {per_megapixel} | {:.3} | {:.2} | {:.3} | {:.1} | {:.1} |",
+                "| {} | {} | {} | {cpu}{note} | {per_megapixel} | {:.3} | {:.2} | {:.3} | {:.1} | {:.1} |",
                 peer.tool,
                 peer.scene,
                 peer.input,
-                peer.cpu_s,
                 peer.mae,
                 peer.rmse,
                 peer.nmad,
@@ -98,20 +99,22 @@ impl Results {
         text
     }
 
-    /// The default preset when its least believed cells are dropped, beside other programs that cover less.
+    /// The unfilled surface of the default preset without its least believed cells, beside unfilled surfaces of other programs.
     fn coverage_table(&self) -> String {
         let mut text = String::from(
-            "\nAt the other's coverage: of skysweep's default preset the most believed cells (`dsm/confidence.tif`), as many as the next \
-             twentieth of the reference above what the other covers.\n\n\
+            "\nAt equal coverage: the cells that skysweep's default preset believes most (`dsm/confidence.tif`), no void filled. Their \
+             share of the reference is the other program's coverage, rounded up to the next twentieth.\n\n\
              | program | input | coverage % | MAE | < 1 m % | skysweep coverage % | MAE | < 1 m % |\n|---|---|---|---|---|---|---|---|\n",
         );
-        for peer in &self.peers {
+        for peer in self.peers.iter().filter(|peer| !peer.filled) {
             let names: Vec<String> = peer.views.iter().map(|v| format!("{v:03}")).collect();
             let scene = match names.len() {
                 7 => "jax_068 7 views".to_owned(),
                 _ => format!("jax_068 {}", names.join("-")),
             };
-            let Some(row) = self.rows.iter().find(|row| row.preset == DEFAULT && row.scene == scene) else { continue };
+            let Some(row) = self.rows.iter().find(|row| row.preset == UNFILLED[1] && row.scene == scene) else {
+                continue;
+            };
             let share = (20.0 * peer.valid_ratio).ceil() / 20.0;
             let mae = row.metric(&at_coverage("mae", share));
             if mae.is_nan() {

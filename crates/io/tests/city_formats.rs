@@ -1,6 +1,4 @@
 //! CityGML, OBJ and PLY: what they say is read, and files that are broken or hostile are refused with a number and a place.
-// A test that is skipped says so.
-#![allow(clippy::print_stderr)]
 
 use std::path::{Path, PathBuf};
 
@@ -399,11 +397,7 @@ fn hostile_ply_is_refused() {
 }
 
 fn city_data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/city");
-    if !folder.is_dir() {
-        eprintln!("skipped: ../shared/data/city is not there");
-    }
-    folder.is_dir().then_some(folder)
+    testing::shared_data("city")
 }
 
 fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {

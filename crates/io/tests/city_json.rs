@@ -1,6 +1,4 @@
 //! CityJSON and CityJSONSeq: what is read comes back, versions and shapes, and files that are broken or hostile.
-// A test that is skipped says so.
-#![allow(clippy::print_stderr)]
 
 use std::path::{Path, PathBuf};
 
@@ -227,18 +225,14 @@ fn models_that_cannot_be_written_are_refused() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// The folder of real city models, where it is there.
+/// Returns the folder of real city models.
 fn real_data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/city");
-    folder.is_dir().then_some(folder)
+    testing::shared_data("city")
 }
 
 #[test]
 fn the_3dbag_tile_is_read_whole() {
-    let Some(folder) = real_data() else {
-        eprintln!("skipped: ../shared/data/city is not there");
-        return;
-    };
+    let Some(folder) = real_data() else { return };
     let file = read(&folder.join("3dbag_5910.city.json")).unwrap();
     assert_eq!(file.model.crs.epsg, Some(7415));
     assert_eq!(file.model.objects.len(), 862);

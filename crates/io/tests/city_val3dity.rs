@@ -1,10 +1,7 @@
 //! The test files of val3dity, one per code of its catalogue: the code in the name of each is among those found.
 //!
-//! `../shared/data/city/val3dity`; where that is absent the tests say so and pass. Its `.poly` files hold one shell each; for
+//! The files lie in the shared data, `city/val3dity`. Its `.poly` files hold one shell each; for
 //! cavities the unit cube comes first.
-
-// A test that is skipped says so.
-#![allow(clippy::print_stderr)]
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -15,12 +12,7 @@ use city::{
 };
 
 fn folder(name: &str) -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/city/val3dity").join(name);
-    if !folder.is_dir() {
-        eprintln!("skipped: ../shared/data/city/val3dity is not there");
-        return None;
-    }
-    Some(folder)
+    testing::shared_data(&format!("city/val3dity/{name}"))
 }
 
 /// The codes found in a model, each once; but for 1004, the face that two solids share.

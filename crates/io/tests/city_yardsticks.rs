@@ -1,12 +1,8 @@
 //! The whole way from a CityJSON tile to depth maps and visible points, against what Open3D (Embree) made of the same input.
 //!
-//! Reference: `../shared/data/city/peer_reference` (its points and maps are relative to an offset that is on whole metres);
-//! where that is absent the tests say so and pass.
+//! The reference is `city/peer_reference` of the shared data. Its points and maps are relative to an offset of whole metres.
 //!
 //! Rays are cast at our triangles of the tile, and at the reference's own (`mesh_local.ply`): both must agree with it.
-
-// A test that is skipped says so.
-#![allow(clippy::print_stderr)]
 
 use std::path::{Path, PathBuf};
 
@@ -43,11 +39,7 @@ struct Scene {
 
 impl Scene {
     fn load(triangles: Triangles) -> Option<Self> {
-        let city = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/city");
-        if !city.is_dir() {
-            eprintln!("skipped: ../shared/data/city is not there");
-            return None;
-        }
+        let city = testing::shared_data("city")?;
         let (name, offset) = match triangles {
             Triangles::Reference => ("peer_reference/mesh_local.ply", ModelPoint::default()),
             Triangles::Tile => ("3dbag_5910.city.json", OFFSET),
@@ -207,11 +199,7 @@ fn visible_points_of_a_hundred_cameras() {
 
 #[test]
 fn national_coordinates_change_nothing() {
-    let tile = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/city/3dbag_5910.city.json");
-    if !tile.is_file() {
-        eprintln!("skipped: ../shared/data/city is not there");
-        return;
-    }
+    let Some(tile) = testing::shared_data("city/3dbag_5910.city.json") else { return };
     let near = io::citymodel::read(&tile).unwrap().model;
     let config = MeshConfig::default();
     let expected = TriangleMesh::from_model(&near, &config).unwrap();

@@ -1,7 +1,5 @@
 //! Rasters through files: what is written reads back, what is damaged is refused with a reason, real images open.
 
-#![allow(clippy::print_stdout)]
-
 use std::path::{Path, PathBuf};
 
 use camera::Rpc;
@@ -45,12 +43,7 @@ fn rpc() -> Rpc {
 }
 
 fn shared(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/stereo").join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: {} is not here", path.display());
-    None
+    testing::shared_data(&format!("stereo/{name}"))
 }
 
 #[test]

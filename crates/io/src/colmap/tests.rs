@@ -1,6 +1,4 @@
 //! COLMAP models in text and binary, broken and hostile ones among them.
-// A test that is skipped says so.
-#![allow(clippy::print_stderr)]
 
 use super::*;
 
@@ -128,11 +126,7 @@ fn a_folder_without_a_model() {
 
 #[test]
 fn real_models_are_read() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/city");
-    if !data.is_dir() {
-        eprintln!("skipped: ../shared/data/city is not there");
-        return;
-    }
+    let Some(data) = testing::shared_data("city") else { return };
     for (folder, lenses, views) in [
         ("colmap/Abu2005G+ARKit_To_3DGSFormat/sparse/0", 1, 20),
         ("colmap/bartoszek+test_colmap/sparse/0", 23, 23),
