@@ -1,5 +1,6 @@
 # skysweep: `make demo` shows it at work, `make test` and `make lint` are what CI runs.
-# Rust (1.95 or newer) has to be there; the system packages below are installed when they are missing.
+# Rust must be installed in the version that Cargo.toml names or newer. `make setup` (and `make demo`, which calls it) installs the
+# system packages that are missing, with apt-get. No other target installs anything: it names `make setup` instead.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -11,37 +12,44 @@ SKYSWEEP := target/release/skysweep
 TOWN := data-samples/town
 DEMO := out/demo
 
-.PHONY: help setup demo test lint bench bench-kernels
+# Fails when Cargo is absent; sets MISSING to what else is needed to build.
+define FIND_MISSING
+command -v cargo > /dev/null || { echo "error: cargo not found: install Rust from https://rustup.rs, then run make again" >&2; exit 2; }
+MISSING=
+for tool in pkg-config c++; do command -v "$$tool" > /dev/null || MISSING="$$MISSING $$tool"; done
+for library in gdal proj sqlite3; do pkg-config --exists "$$library" 2> /dev/null || MISSING="$$MISSING $$library.pc"; done
+endef
+
+.PHONY: help setup check demo test lint readme bench bench-kernels
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
 
-setup: ## install the system packages that are missing (Debian, Ubuntu: apt)
-	@command -v cargo > /dev/null || { echo "error: cargo not found: install Rust from https://rustup.rs, then run make again" >&2; exit 2; }
-	have_all() { command -v pkg-config c++ > /dev/null && pkg-config --exists gdal proj sqlite3; }
-	have_all && exit 0
+setup: ## install the system packages that are missing (Debian, Ubuntu: apt-get, with sudo unless you are root)
+	@$(FIND_MISSING)
+	[ -n "$$MISSING" ] || exit 0
 	if ! command -v apt-get > /dev/null; then
-	  echo "error: GDAL >= 3.4, PROJ >= 9.1, SQLite (with headers), pkg-config and a C++ compiler are needed;" \
-	    "this system has no apt-get: install them with its own package manager, then run make again" >&2
+	  echo "error: missing:$$MISSING. GDAL >= 3.4, PROJ >= 9.1 and SQLite (each with headers), pkg-config and a C++ compiler are" \
+	    "needed. This system has no apt-get: install them with its own package manager, then run make again" >&2
 	  exit 2
 	fi
 	SUDO=; [ "$$(id -u)" = 0 ] || SUDO=sudo
-	MISSING=; for p in $(PACKAGES); do
-	  dpkg-query -W -f '$${Status}' "$$p" 2> /dev/null | grep -q 'ok installed' || MISSING="$$MISSING $$p"
+	WANTED=; for p in $(PACKAGES); do
+	  dpkg-query -W -f '$${Status}' "$$p" 2> /dev/null | grep -q 'ok installed' || WANTED="$$WANTED $$p"
 	done
-	echo "installing system packages with apt-get:$${MISSING:- $(PACKAGES)}"
+	echo "installing system packages with apt-get:$${WANTED:- $(PACKAGES)}"
 	$$SUDO apt-get update -qq
-	$$SUDO env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $${MISSING:-$(PACKAGES)} > /dev/null
-	have_all || { echo "error: after the installation pkg-config still does not find gdal, proj and sqlite3" >&2; exit 2; }
+	$$SUDO env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $${WANTED:-$(PACKAGES)} > /dev/null
+	$(FIND_MISSING)
+	[ -z "$$MISSING" ] || { echo "error: after the installation these are still missing:$$MISSING" >&2; exit 2; }
 
-$(SKYSWEEP): setup FORCE
+check:
+	@$(FIND_MISSING)
+	[ -z "$$MISSING" ] || { echo "error: missing:$$MISSING. Run 'make setup', which installs the system packages" >&2; exit 2; }
+
+demo: setup ## a surface model of the sample town, its accuracy and its picture, in out/demo
 	@cargo build --release --bin skysweep
-
-.PHONY: FORCE
-FORCE:
-
-demo: $(SKYSWEEP) ## a surface model of the sample town, its accuracy and its picture, in out/demo
-	@$(SKYSWEEP) dsm $(TOWN)/view_*.tif -o $(DEMO) --overwrite
+	$(SKYSWEEP) dsm $(TOWN)/view_*.tif -o $(DEMO) --overwrite
 	echo
 	echo "against the true surface:"
 	$(SKYSWEEP) eval $(DEMO)/dsm/dsm.tif $(TOWN)/truth/dsm.tif --align xyz
@@ -50,16 +58,19 @@ demo: $(SKYSWEEP) ## a surface model of the sample town, its accuracy and its pi
 	echo "picture        $(DEMO)/dsm/relief.png"
 	echo "report         $(DEMO)/report/report.json"
 
-test: setup ## unit, property, integration and documentation tests
+test: check ## unit, property, integration and documentation tests
 	@cargo test --workspace
 
-lint: setup ## format, clippy on every target (benches too), documentation; warnings are errors
+lint: check ## format, clippy on every target (benches too), documentation; warnings are errors
 	@cargo fmt --all --check
 	cargo clippy --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 
-bench: setup ## speed against error: every preset on every scene; writes benches/results (about 12 minutes)
+readme: check ## bring the numbers of benches/results into README.md and docs
+	@SKYSWEEP_WRITE_NUMBERS=1 cargo test --quiet --test readme_numbers
+
+bench: check ## speed against error: every preset on every scene; writes benches/results (about 15 minutes)
 	@cargo bench --bench scenes
 
-bench-kernels: setup ## criterion benches of the kernels
+bench-kernels: check ## criterion benches of the kernels
 	@cargo bench --workspace --exclude skysweep

@@ -1,7 +1,7 @@
 //! Every RPC of the shared collection projects as rpcm does, and is inverted over its whole validity cube.
 //!
-//! `reference/rpc_rpcm.txt` holds rpcm's projections, written by `reference/rpc_rpcm.py`. The collection is not part of
-//! the repository: without it the tests print a line and end.
+//! `reference/rpc_rpcm.txt` holds the projections of rpcm, written by `reference/rpc_rpcm.py`. The collection is part of the
+//! shared data.
 
 use std::collections::BTreeMap;
 use std::fs;
