@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::machine::machine;
-use crate::matrix::{Reached, Row, UNFILLED};
+use crate::matrix::{DEFAULT, Reached, Row};
 use crate::peers::Peer;
 use crate::plot;
 use crate::run::at_coverage;
@@ -99,11 +99,12 @@ impl Results {
         text
     }
 
-    /// The unfilled surface of the default preset without its least believed cells, beside unfilled surfaces of other programs.
+    /// The default preset without its least believed cells, beside unfilled surfaces of other programs.
     fn coverage_table(&self) -> String {
         let mut text = String::from(
-            "\nAt equal coverage: the cells that skysweep's default preset believes most (`dsm/confidence.tif`), no void filled. Their \
-             share of the reference is the other program's coverage, rounded up to the next twentieth.\n\n\
+            "\nAt equal coverage: the cells that skysweep's default preset believes most (`dsm/confidence.tif`), filled cells among them, \
+             beside unfilled surfaces of other programs. Their share of the reference is the other program's coverage, rounded up to \
+             the next twentieth.\n\n\
              | program | input | coverage % | MAE | < 1 m % | skysweep coverage % | MAE | < 1 m % |\n|---|---|---|---|---|---|---|---|\n",
         );
         for peer in self.peers.iter().filter(|peer| !peer.filled) {
@@ -112,7 +113,7 @@ impl Results {
                 7 => "jax_068 7 views".to_owned(),
                 _ => format!("jax_068 {}", names.join("-")),
             };
-            let Some(row) = self.rows.iter().find(|row| row.preset == UNFILLED[1] && row.scene == scene) else {
+            let Some(row) = self.rows.iter().find(|row| row.preset == DEFAULT && row.scene == scene) else {
                 continue;
             };
             let share = (20.0 * peer.valid_ratio).ceil() / 20.0;

@@ -41,7 +41,9 @@ impl Results {
 
     /// S2P's result on views of JAX_068, if the shared data know one.
     pub(crate) fn s2p(&self, views: &[u64], filled: bool) -> Option<&Value> {
-        let is_wanted = |peer: &&Value| peer["tool"] == "S2P" && peer["views"] == *views && peer["filled"] == filled;
+        let is_wanted = |peer: &&Value| {
+            peer["tool"] == "S2P" && peer["views"] == serde_json::json!(views) && peer["filled"] == filled
+        };
         self.peers["entries"].as_array().expect("entries").iter().find(is_wanted)
     }
 }
