@@ -4,7 +4,7 @@ use camera::ImagePoint;
 use nalgebra::Vector3;
 use raster::Grid;
 use rayon::prelude::*;
-use simulate::{Ray, Simulation, Sun, SurfaceClass, View};
+use simulate::{SceneRay, SimulatedView, Simulation, Sun, TruthClass};
 use sweep::HeightMap;
 
 /// Names, in the order of the columns.
@@ -91,23 +91,23 @@ impl Kinds {
         }
         let at = (column as usize, row as usize);
         let class = *simulation.truth.classes.get(at.0, at.1)?;
-        if class == SurfaceClass::Water as u8 {
+        if class == TruthClass::Water as u8 {
             return None;
         }
         let is_shaded = || {
             let to_sun = sun.direction();
-            let ray = Ray { origin: point + to_sun * ABOVE_M, direction: to_sun * CASTER_M };
+            let ray = SceneRay { origin: point + to_sun * ABOVE_M, direction: to_sun * CASTER_M };
             simulation.scene.first_point(&ray, 1.0).is_some()
         };
         Some(if self.seen[at] < views {
             0
         } else if self.edge[at] {
             1
-        } else if class == SurfaceClass::Vegetation as u8 {
+        } else if class == TruthClass::Vegetation as u8 {
             2
         } else if is_shaded() {
             3
-        } else if class == SurfaceClass::Building as u8 {
+        } else if class == TruthClass::Building as u8 {
             4
         } else {
             5
@@ -116,7 +116,7 @@ impl Kinds {
 
     /// The heights of the views against what their pixels see.
     pub(crate) fn of_pixels(&self, simulation: &Simulation, heights: &[HeightMap]) -> Tally {
-        let of_view = |(view, map): (&View, &HeightMap)| {
+        let of_view = |(view, map): (&SimulatedView, &HeightMap)| {
             let (w, h) = (map.height_m.width(), map.height_m.height());
             let error = |i: usize| {
                 let (x, y) = (i % w, i / w);

@@ -40,7 +40,7 @@ pub(crate) struct Scene<'a> {
 impl<'a> Scene<'a> {
     /// With the true RPCs, or those that a user gets.
     pub(crate) fn new(simulation: &'a Simulation, is_true: bool) -> anyhow::Result<Self> {
-        let view = |v: &simulate::View| {
+        let view = |v: &simulate::SimulatedView| {
             let rpc = if is_true { &v.true_rpc } else { &v.rpc };
             let image = v.image.map(|p| if *p == 0 { f32::NAN } else { f32::from(*p) });
             View::new(RpcCamera::new(rpc.clone()), image)
@@ -111,7 +111,7 @@ impl<'a> Scene<'a> {
 
     /// The true heights of all pixels.
     pub(crate) fn true_heights(&self) -> Vec<HeightMap> {
-        let map = |v: &simulate::View| {
+        let map = |v: &simulate::SimulatedView| {
             let mut out = HeightMap::empty(v.heights.width(), v.heights.height(), self.origin_m);
             out.height_m = v.heights.map(|h| (f64::from(*h) - self.origin_m) as f32);
             out.sigma_m = v.heights.map(|h| if h.is_nan() { f32::NAN } else { 0.1 });

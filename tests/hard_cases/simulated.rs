@@ -3,15 +3,15 @@
 
 use eval::{Alignment, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use raster::Grid;
-use simulate::{Simulation, SimulationConfig, SurfaceClass};
+use simulate::{Simulation, SimulationConfig, TruthClass};
 
 use crate::stage::{Score, Shot, Stage};
 
 /// Classes of the truth, as LAS numbers them and the simulator goes on.
-const GROUND: u8 = SurfaceClass::Ground as u8;
-const BUILDING: u8 = SurfaceClass::Building as u8;
-const WATER: u8 = SurfaceClass::Water as u8;
-const FOOTPRINT_EDGE: u8 = SurfaceClass::FootprintEdge as u8;
+const GROUND: u8 = TruthClass::Ground as u8;
+const BUILDING: u8 = TruthClass::Building as u8;
+const WATER: u8 = TruthClass::Water as u8;
+const FOOTPRINT_EDGE: u8 = TruthClass::FootprintEdge as u8;
 
 /// A preset of 120 m at half a metre.
 fn preset(name: &str) -> SimulationConfig {

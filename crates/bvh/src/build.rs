@@ -2,14 +2,42 @@
 //!
 //! Boxes are f32, rounded outwards from f64. The tree depends on the triangles alone, not on the number of threads.
 
-use crate::Bvh;
-use crate::node::{Child, LEAF_SIZE, Node, WIDTH};
+use crate::node::{Child, LEAF_SIZE, MAX_TRIANGLES, Node, WIDTH};
+use crate::tree::{Bvh, BvhError};
 
 const BINS: usize = 16;
 /// Below this depth the halves are split by number, so that no input makes the tree deep.
 const MAX_DEPTH: usize = 48;
 /// Ranges smaller than this are built on one thread.
 const PARALLEL_FROM: usize = 4096;
+
+/// Largest permitted size of a coordinate, metres.
+const EXTENT_LIMIT: f64 = 1e9;
+
+impl Bvh {
+    /// Builds the tree. `positions` are metres from a local origin, and `triangles` holds indices into them.
+    ///
+    /// # Errors
+    /// An index out of range, a position that is not finite or beyond 10⁹ m, or more than 2²⁷ triangles.
+    pub fn new(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<Self, BvhError> {
+        if triangles.len() > MAX_TRIANGLES {
+            return Err(BvhError::TooMany { triangles: triangles.len(), limit: MAX_TRIANGLES });
+        }
+        let mut corners = Vec::with_capacity(triangles.len());
+        for (number, triangle) in triangles.iter().enumerate() {
+            let mut found = [[0.0; 3]; 3];
+            for (at, &corner) in found.iter_mut().zip(triangle) {
+                let missing = BvhError::Corner { triangle: number, corner, positions: positions.len() };
+                *at = *positions.get(corner as usize).ok_or(missing)?;
+            }
+            if !found.as_flattened().iter().all(|c| c.abs() <= EXTENT_LIMIT) {
+                return Err(BvhError::Position { triangle: number, limit: EXTENT_LIMIT });
+            }
+            corners.push(found);
+        }
+        Ok(build(&corners))
+    }
+}
 
 #[derive(Debug, Clone, Copy)]
 struct Bounds {
@@ -74,7 +102,7 @@ fn round_down(value: f64) -> f32 {
 }
 
 /// Builds the tree of triangles.
-pub(crate) fn build(corners: &[[[f64; 3]; 3]]) -> Bvh {
+fn build(corners: &[[[f64; 3]; 3]]) -> Bvh {
     let item = |(i, corners): (usize, &[[f64; 3]; 3])| Item { bounds: Bounds::of(corners), triangle: i as u32 };
     let mut items: Vec<Item> = corners.iter().enumerate().map(item).collect();
     let mut nodes = Vec::new();

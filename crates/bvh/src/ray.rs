@@ -8,6 +8,9 @@ use crate::node::{Child, Node, WIDTH};
 use crate::setup::Facet;
 use crate::simd::{Kernel, Lanes, dispatch};
 
+/// The triangle index of a ray that meets nothing.
+pub const MISS: u32 = u32::MAX;
+
 /// A ray: positions are `origin + t · direction`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {

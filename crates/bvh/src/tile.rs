@@ -6,9 +6,9 @@
 
 use crate::Bvh;
 use crate::eye::Eye;
+use crate::ray::MISS;
 use crate::setup::{Facet, FastFacet, values};
 use crate::simd::Lanes;
-use crate::view::MISS;
 
 /// Lanes of a group.
 pub(crate) const LANES: usize = 8;

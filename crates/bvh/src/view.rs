@@ -7,13 +7,11 @@ use rayon::prelude::*;
 
 use crate::Bvh;
 use crate::eye::{Eye, Target};
+use crate::ray::MISS;
 use crate::setup::{Facet, value};
 use crate::simd::dispatch;
 use crate::tile::{LANES, Question, RAYS, SUBTILE, Tile};
 use crate::traverse::{TileCast, Visit};
-
-/// The index of no triangle.
-pub const MISS: u32 = u32::MAX;
 
 /// Side of an image tile, pixels.
 const TILE_SIDE: usize = 32;

@@ -3,7 +3,7 @@
 use geodesy::LonLatHeight;
 
 use crate::Rpc;
-use crate::plane::short_way;
+use crate::limits::short_way;
 
 /// A box around a centre; it may lie across the antimeridian.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,7 @@
 use geodesy::LonLatHeight;
 use nalgebra::{DMatrix, DVector};
 
-use crate::plane::short_way;
+use crate::limits::short_way;
 use crate::polynomial::terms;
 use crate::{CameraError, ImagePoint, Rpc, RpcCamera, ValidityDomain};
 

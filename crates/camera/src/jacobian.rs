@@ -2,7 +2,7 @@
 
 use geodesy::LonLatHeight;
 
-use crate::plane::{check_ratio, check_reach};
+use crate::limits::{check_ratio, check_reach};
 use crate::polynomial::{at_height, derivative_by_height, plane_gradient};
 use crate::{CameraError, Rpc, RpcCamera};
 

@@ -10,7 +10,8 @@
 
 use geodesy::LonLatHeight;
 
-use crate::plane::{EXTRAPOLATION_MAX, PlaneSample, RpcPlane};
+use crate::limits::EXTRAPOLATION_MAX;
+use crate::plane::{PlaneSample, RpcPlane};
 use crate::{CameraError, ImagePoint, Rpc};
 
 /// Localisation stops when the image residual is below this, well under any use of it.

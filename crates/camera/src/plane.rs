@@ -2,19 +2,13 @@
 //!
 //! A sweep asks for many points on one height plane, and localisation searches on one: both use this form.
 //! Heights are metres above the ellipsoid; points whose normalised longitude or latitude exceeds
-//! [`EXTRAPOLATION_MAX`] and points at a pole are errors.
+//! [`EXTRAPOLATION_MAX`](crate::EXTRAPOLATION_MAX) and points at a pole are errors.
 
 use geodesy::LonLatHeight;
 
+use crate::limits::{check_ratio, check_reach, short_way};
 use crate::polynomial::{PlaneCubic, at_height, plane_gradient, plane_value};
 use crate::{CameraError, ImagePoint, Rpc};
-
-/// Denominators smaller than this are poles: real sensors keep them within a few percent of 1.
-pub(crate) const DENOMINATOR_MIN: f64 = 1e-6;
-
-/// Largest normalised longitude or latitude that is projected or returned. The polynomials are fitted on [−1, 1];
-/// crops and tall scenes reach somewhat beyond it, and nothing sensible lies past several half-widths.
-pub const EXTRAPOLATION_MAX: f64 = 8.0;
 
 /// An RPC restricted to one height.
 #[derive(Debug, Clone, PartialEq)]
@@ -131,38 +125,4 @@ impl PlaneRatio {
         let r = n / d;
         Ok((self.off + self.scale * r, [self.scale * (n_l - r * d_l) / d, self.scale * (n_p - r * d_p) / d], d))
     }
-}
-
-/// A longitude difference brought into ±180°, for longitudes given within ±360°.
-#[inline(always)]
-pub(crate) fn short_way(d_lon: f64) -> f64 {
-    let shift = if d_lon > 180.0 {
-        -360.0
-    } else if d_lon < -180.0 {
-        360.0
-    } else {
-        0.0
-    };
-    d_lon + shift
-}
-
-pub(crate) fn check_ratio(n: f64, d: f64) -> Result<(), CameraError> {
-    if !(n.is_finite() && d.is_finite()) {
-        return Err(CameraError::NotFinite);
-    }
-    if d.abs() < DENOMINATOR_MIN {
-        return Err(CameraError::Denominator { denominator: d.abs() });
-    }
-    Ok(())
-}
-
-pub(crate) fn check_reach(l: f64, p: f64) -> Result<(), CameraError> {
-    let normalised = l.abs().max(p.abs());
-    if !(l.is_finite() && p.is_finite()) {
-        return Err(CameraError::NotFinite);
-    }
-    if normalised > EXTRAPOLATION_MAX {
-        return Err(CameraError::OutsideDomain { normalised, limit: EXTRAPOLATION_MAX });
-    }
-    Ok(())
 }

@@ -8,7 +8,7 @@
 use geodesy::LonLatHeight;
 use serde::{Deserialize, Serialize};
 
-use crate::plane::{DENOMINATOR_MIN, short_way};
+use crate::limits::{DENOMINATOR_MIN, short_way};
 use crate::{CameraError, ImagePoint, Key, RpcError};
 
 /// The RPC00B coefficients of one image, in this toolkit's image coordinates (upper-left pixel centre at 0, 0).

@@ -7,7 +7,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::simulate::{SceneRecord, SimulateError, Simulation, SimulationConfig, View};
+use ::simulate::{SceneRecord, SimulateError, SimulatedView, Simulation, SimulationConfig};
 use camera::LensError;
 use crs::Crs;
 use io::citymodel::{CityJsonOptions, write_cityjson};
@@ -176,7 +176,7 @@ impl SceneWriter<'_> {
         Ok(files::write_json(&self.folder.join("scene.json"), &self.simulation.record(), true)?)
     }
 
-    fn write_view(&self, number: usize, view: &View) -> Result<(), FileError> {
+    fn write_view(&self, number: usize, view: &SimulatedView) -> Result<(), FileError> {
         let image = [Band { description: "panchromatic", data: BandData::U16(&view.image) }];
         let path = self.folder.join(format!("view_{number}.tif"));
         write_image_with_rpc(path, &image, &view.rpc, Some(0.0), self.overwrite)?;

@@ -4,7 +4,7 @@ use camera::{ImageCorrection, ImagePoint};
 use nalgebra::Vector3;
 
 use crate::camera_model::{Look, PhysicalCamera};
-use crate::config::{SimulationConfig, ViewDirection};
+use crate::config::{LookAngles, SimulationConfig};
 use crate::date::Date;
 use crate::error::SimulateError;
 use crate::frame::SceneFrame;
@@ -31,14 +31,14 @@ pub(crate) fn look(config: &SimulationConfig, index: usize) -> Look {
     }
 }
 
-fn on_pass(config: &SimulationConfig, index: usize) -> ViewDirection {
+fn on_pass(config: &SimulationConfig, index: usize) -> LookAngles {
     let a = &config.acquisition;
     let along = a.along_track_deg.to_radians().tan() * (1.0 - 2.0 * index as f64 / (config.views - 1) as f64);
     let across = a.across_track_deg.to_radians().tan() * (std::f64::consts::FRAC_PI_2 * index as f64).sin();
     let incidence_deg = along.hypot(across).atan().to_degrees();
     // The first view is taken before the sensor passes: it looks ahead, and is seen from behind the heading.
     let azimuth_deg = (a.heading_deg + 180.0 + across.atan2(along).to_degrees()).rem_euclid(360.0);
-    ViewDirection { incidence_deg, azimuth_deg }
+    LookAngles { incidence_deg, azimuth_deg }
 }
 
 /// The camera and the size of an image that holds the whole area at both heights (low, high).

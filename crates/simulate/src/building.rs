@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::prism::{Block, Roof};
+use crate::prism::{BuildingBlock, Roof};
 use crate::streets::Streets;
 use crate::terrain::Terrain;
 use numeric::SplitMix64;
@@ -18,9 +18,9 @@ const CHIMNEY_M: [f64; 2] = [1.2, 0.45];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Building {
     /// Its blocks: each stands on the ground or on the one before.
-    pub parts: Vec<Block>,
+    pub parts: Vec<BuildingBlock>,
     /// Parapets, chimneys, plant rooms.
-    pub details: Vec<Block>,
+    pub details: Vec<BuildingBlock>,
 }
 
 /// A rectangle in street coordinates to build on.
@@ -59,7 +59,7 @@ impl<'a> Builder<'a> {
     /// A flat roof with a parapet and a plant room.
     pub(crate) fn flat(&mut self, lot: &Lot, walls_m: f64, stream: &mut SplitMix64) {
         let Some((ground, block)) = self.block(lot) else { return };
-        let block = Block { roof: Roof::Flat { height_m: ground + walls_m }, ..block };
+        let block = BuildingBlock { roof: Roof::Flat { height_m: ground + walls_m }, ..block };
         let mut details = parapets(&block);
         let [u, v] = block.half_size_m;
         let at = block.position(stream.uniform_in(-0.5, 0.5) * u, stream.uniform_in(-0.4, 0.4) * v);
@@ -81,11 +81,11 @@ impl<'a> Builder<'a> {
     /// Flat roofs one above the other: (lot, height above the ground), each inside the one before.
     pub(crate) fn stepped(&mut self, steps: &[(Lot, f64)]) {
         let Some((ground, _)) = steps.first().and_then(|(lot, _)| self.block(lot)) else { return };
-        let mut parts: Vec<Block> = Vec::new();
+        let mut parts: Vec<BuildingBlock> = Vec::new();
         for (lot, height) in steps {
             let Some((_, block)) = self.block(lot) else { return };
-            let base_m = parts.last().map_or(block.base_m, Block::top_m);
-            parts.push(Block { base_m, roof: Roof::Flat { height_m: ground + height }, ..block });
+            let base_m = parts.last().map_or(block.base_m, BuildingBlock::top_m);
+            parts.push(BuildingBlock { base_m, roof: Roof::Flat { height_m: ground + height }, ..block });
         }
         let details = parts.iter().flat_map(parapets).collect();
         self.push(parts, details);
@@ -100,7 +100,7 @@ impl<'a> Builder<'a> {
         };
         let Some((ground, block)) = self.block(&lot) else { return };
         let eaves_m = ground + walls_m;
-        let block = Block { roof: roof(eaves_m, eaves_m + pitch * block.half_size_m[1]), ..block };
+        let block = BuildingBlock { roof: roof(eaves_m, eaves_m + pitch * block.half_size_m[1]), ..block };
         let [u, v] = block.half_size_m;
         // On the ridge, a third of its length from the middle, a little down the slope.
         let at = block.position(0.33 * (u - v).max(0.3 * u), 0.12 * v);
@@ -108,33 +108,33 @@ impl<'a> Builder<'a> {
         self.push(vec![block], vec![chimney]);
     }
 
-    fn push(&mut self, parts: Vec<Block>, details: Vec<Block>) {
+    fn push(&mut self, parts: Vec<BuildingBlock>, details: Vec<BuildingBlock>) {
         let details = if self.with_details { details } else { Vec::new() };
         self.buildings.push(Building { parts, details });
     }
 
     /// The ground at the middle of a lot and a block without a roof on it; `None` where a corner is in the water.
-    fn block(&self, lot: &Lot) -> Option<(f64, Block)> {
+    fn block(&self, lot: &Lot) -> Option<(f64, BuildingBlock)> {
         let centre_m = self.streets.scene_from_street(lot.centre[0], lot.centre[1]);
         let ground = self.terrain.height(centre_m[0], centre_m[1]);
         let direction_deg = self.streets.turn_deg + lot.turn_deg;
         let roof = Roof::Flat { height_m: ground };
-        let block = Block { centre_m, half_size_m: lot.half_size, direction_deg, base_m: ground, roof };
+        let block = BuildingBlock { centre_m, half_size_m: lot.half_size, direction_deg, base_m: ground, roof };
         let corners = block.corners();
         let dry = corners.iter().all(|[x, y]| !self.terrain.is_water(*x, *y));
         let base_m = corners.iter().map(|[x, y]| self.terrain.height(*x, *y)).fold(ground, f64::min);
-        dry.then_some((ground, Block { base_m, ..block }))
+        dry.then_some((ground, BuildingBlock { base_m, ..block }))
     }
 }
 
 /// A box on a roof.
-fn on_roof(below: &Block, centre_m: [f64; 2], half_size_m: [f64; 2], top_m: f64) -> Block {
+fn on_roof(below: &BuildingBlock, centre_m: [f64; 2], half_size_m: [f64; 2], top_m: f64) -> BuildingBlock {
     let (direction_deg, base_m) = (below.direction_deg, below.eaves_m());
-    Block { centre_m, half_size_m, direction_deg, base_m, roof: Roof::Flat { height_m: top_m } }
+    BuildingBlock { centre_m, half_size_m, direction_deg, base_m, roof: Roof::Flat { height_m: top_m } }
 }
 
 /// The parapets along the four edges of a flat roof.
-fn parapets(block: &Block) -> Vec<Block> {
+fn parapets(block: &BuildingBlock) -> Vec<BuildingBlock> {
     let ([u, v], [height, thickness]) = (block.half_size_m, PARAPET_M);
     let half = 0.5 * thickness;
     let edges = [

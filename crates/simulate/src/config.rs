@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::render::Sun;
+use crate::sun::Sun;
 
 /// A scene, its views and its sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,7 +34,7 @@ pub struct SimulationConfig {
     /// What drives and parks on it.
     pub vehicles: VehiclesConfig,
     /// What it looks like.
-    pub surface: SurfaceConfig,
+    pub surface: AppearanceConfig,
     /// From where and when the views are taken.
     pub acquisition: AcquisitionConfig,
     /// With what.
@@ -141,7 +141,7 @@ pub enum GroundCover {
 /// Patterns and their contrast.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SurfaceConfig {
+pub struct AppearanceConfig {
     /// What the ground is covered with.
     pub cover: GroundCover,
     /// Contrast of all patterns: 1 for a usual scene, near 0 for one without texture.
@@ -162,7 +162,7 @@ pub enum CameraModel {
 /// A direction to the sensor, as seen from the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ViewDirection {
+pub struct LookAngles {
     /// Angle between the line of sight and the vertical at the scene, degrees.
     pub incidence_deg: f64,
     /// Direction from the scene to the sensor, degrees clockwise from north.
@@ -182,7 +182,7 @@ pub struct AcquisitionConfig {
     /// Largest view to the side, degrees: the views of a pass weave between both sides.
     pub across_track_deg: f64,
     /// The views one by one, instead of the pass: as many as `views`, or empty.
-    pub looks: Vec<ViewDirection>,
+    pub looks: Vec<LookAngles>,
     /// Smallest and largest length of the translation by which each view's RPC points wrong, pixels.
     pub pointing_error_px: [f64; 2],
     /// How much that error changes from the first to the last line, pixels.

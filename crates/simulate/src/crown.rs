@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use crate::Ray;
+use crate::SceneRay;
 
 /// A crown; lengths are metres, heights above the ellipsoid of the Earth.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +33,7 @@ impl Crown {
     }
 
     /// Where a ray from outside enters, and the outward unit normal there: the first parameter in (0, `t_max`).
-    pub(crate) fn enter(&self, ray: &Ray, t_max: f64) -> Option<(f64, Vector3<f64>)> {
+    pub(crate) fn enter(&self, ray: &SceneRay, t_max: f64) -> Option<(f64, Vector3<f64>)> {
         let (r, h) = (self.radius_m, self.dome_m);
         // In units in which the cylinder and the ellipsoid have radius 1.
         let o = Vector3::new(
@@ -74,7 +74,7 @@ mod tests {
             x in -9.0..9.0f64, y in -9.0..9.0f64, dx in -1.2..1.2f64, dy in -1.2..1.2f64,
         ) {
             let crown = Crown { centre_m: [1.0, -0.5], radius_m: 3.0, shoulder_m: 4.0, dome_m: 5.0 };
-            let ray = Ray { origin: Vector3::new(x, y, 12.0), direction: Vector3::new(dx, dy, -1.0) };
+            let ray = SceneRay { origin: Vector3::new(x, y, 12.0), direction: Vector3::new(dx, dy, -1.0) };
             let inside = |t: f64| {
                 let p = ray.at(t);
                 crown.height(p.x, p.y).is_some_and(|z| p.z < z)

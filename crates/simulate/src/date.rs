@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::SimulationConfig;
 use crate::random::derived;
-use crate::render::Sun;
+use crate::sun::Sun;
 use numeric::SplitMix64;
 
 /// What all views of one date have in common.

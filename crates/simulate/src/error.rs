@@ -1,6 +1,6 @@
 //! Why a scene cannot be made.
 
-use crate::presets::PRESETS;
+use crate::preset_names::PRESETS;
 
 /// A configuration that makes no scene, or a place where none can be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

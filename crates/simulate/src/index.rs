@@ -1,7 +1,7 @@
 //! What a ray can meet, in the order in which it can: square buckets of the plane, walked along the ray (Amanatides and Woo
 //! 1987). Each knows the height under which everything in it lies, so that a ray passes over most of them.
 
-use crate::Ray;
+use crate::SceneRay;
 
 /// Side of a bucket, metres: a few trees, a part of a house.
 pub(crate) const BUCKET_M: f64 = 8.0;
@@ -65,7 +65,7 @@ impl Buckets {
     }
 
     /// The part of a stretch in which a ray is not above all ground of the bucket.
-    pub(crate) fn near_ground(&self, ray: &Ray, stretch: Stretch) -> Option<(f64, f64)> {
+    pub(crate) fn near_ground(&self, ray: &SceneRay, stretch: Stretch) -> Option<(f64, f64)> {
         let (z, dz) = (ray.origin.z, ray.direction.z);
         let crossing = (self.ground_tops[stretch.bucket] - z) / dz;
         let (t_in, t_out) = match dz {
@@ -82,7 +82,7 @@ impl Buckets {
     }
 
     /// Visits the buckets in which a ray comes low enough to meet something, until `visit` gives a value.
-    pub(crate) fn walk<T>(&self, ray: &Ray, t_max: f64, mut visit: impl FnMut(Stretch) -> Option<T>) -> Option<T> {
+    pub(crate) fn walk<T>(&self, ray: &SceneRay, t_max: f64, mut visit: impl FnMut(Stretch) -> Option<T>) -> Option<T> {
         let (mut t, end) = self.clipped(ray, t_max)?;
         let start = ray.at(t);
         let mut at = [self.along(start.x), self.along(start.y)];
@@ -118,7 +118,7 @@ impl Buckets {
     }
 
     /// The part of [0, `t_max`] in which a ray is over the buckets.
-    fn clipped(&self, ray: &Ray, t_max: f64) -> Option<(f64, f64)> {
+    fn clipped(&self, ray: &SceneRay, t_max: f64) -> Option<(f64, f64)> {
         let (low, high) = (self.corner_m, -self.corner_m);
         let (mut enter, mut leave) = (0.0_f64, t_max);
         for (origin, direction) in [(ray.origin.x, ray.direction.x), (ray.origin.y, ray.direction.y)] {
@@ -163,7 +163,7 @@ mod tests {
             x in -70.0..70.0f64, y in -70.0..70.0f64, dx in -3.0..3.0f64, dy in -3.0..3.0f64,
         ) {
             let (extents, buckets) = posts();
-            let ray = Ray { origin: Vector3::new(x, y, 20.0), direction: Vector3::new(dx, dy, -1.0) };
+            let ray = SceneRay { origin: Vector3::new(x, y, 20.0), direction: Vector3::new(dx, dy, -1.0) };
             let mut visited = std::collections::BTreeSet::new();
             let mut last = 0.0;
             buckets.walk(&ray, 20.0, |stretch| {

@@ -28,6 +28,7 @@ mod lod2;
 mod noise;
 mod parameters;
 mod planting;
+mod preset_names;
 mod presets;
 mod prism;
 mod random;
@@ -38,6 +39,7 @@ mod sensor;
 mod sight;
 mod simulation;
 mod streets;
+mod sun;
 mod terrain;
 mod texture;
 mod town;
@@ -46,19 +48,19 @@ mod truth;
 pub use building::Building;
 pub use camera_model::Look;
 pub use config::{
-    AcquisitionConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, QuarterWeights, SensorConfig,
-    SimulationConfig, SurfaceConfig, TerrainConfig, VegetationConfig, VehiclesConfig, ViewDirection,
+    AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, LookAngles,
+    QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
 };
 pub use date::Date;
 pub use error::SimulateError;
 pub use frame::SceneFrame;
-pub use presets::PRESETS;
-pub use prism::{Block, Roof};
-pub use ray::Ray;
-pub use render::Sun;
-pub use scene::{Scene, SurfaceClass};
+pub use preset_names::PRESETS;
+pub use prism::{BuildingBlock, Roof};
+pub use ray::SceneRay;
+pub use scene::{Scene, TruthClass};
 pub use sensor::Sensor;
-pub use sight::Sight;
-pub use simulation::{SceneRecord, Simulation, View, ViewRecord};
+pub use sight::SightLines;
+pub use simulation::{SceneRecord, SimulatedView, Simulation, ViewRecord};
+pub use sun::Sun;
 pub use terrain::Terrain;
 pub use truth::{ORTHO_SCALE, Truth};

@@ -12,7 +12,7 @@ use city::{
 
 use crate::building::Building;
 use crate::frame::SceneFrame;
-use crate::prism::{Block, Roof};
+use crate::prism::{BuildingBlock, Roof};
 
 /// The model of buildings.
 pub(crate) fn model(buildings: &[Building], frame: &SceneFrame) -> CityModel {
@@ -38,7 +38,7 @@ pub(crate) fn model(buildings: &[Building], frame: &SceneFrame) -> CityModel {
 }
 
 /// The outer shell of a block.
-fn solid(block: &Block, frame: &SceneFrame, pool: &mut VertexPool) -> Geometry {
+fn solid(block: &BuildingBlock, frame: &SceneFrame, pool: &mut VertexPool) -> Geometry {
     let mut geometry = Geometry::new(Some(Lod::new(2, None)), GeometryKind::Solid);
     for (class, ring) in faces(block) {
         let corners = ring.into_iter().map(|[u, v, z]| {
@@ -55,7 +55,7 @@ fn solid(block: &Block, frame: &SceneFrame, pool: &mut VertexPool) -> Geometry {
 }
 
 /// The faces of a block as rings of (along, across, height).
-fn faces(block: &Block) -> Vec<(SurfaceClass, Vec<[f64; 3]>)> {
+fn faces(block: &BuildingBlock) -> Vec<(SurfaceClass, Vec<[f64; 3]>)> {
     let [u, v] = block.half_size_m;
     let (base, eaves, top) = (block.base_m, block.eaves_m(), block.top_m());
     let plan = [[-u, -v], [u, -v], [u, v], [-u, v]];

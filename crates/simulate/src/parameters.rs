@@ -5,7 +5,7 @@
 
 use crate::config::SimulationConfig;
 use crate::error::SimulateError;
-use crate::render::Sun;
+use crate::sun::Sun;
 
 /// The key of a parameter file that names the preset it starts from.
 const PRESET_KEY: &str = "preset";
@@ -156,7 +156,7 @@ fn overlay(base: &mut toml::Table, over: toml::Table) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::presets::PRESETS;
+    use crate::preset_names::PRESETS;
 
     #[test]
     fn every_preset_is_valid_and_survives_its_own_parameter_file() {

@@ -5,7 +5,7 @@
 use crate::config::{SimulationConfig, VehiclesConfig};
 use crate::crown::Crown;
 use crate::noise::value_noise;
-use crate::prism::{Block, Roof};
+use crate::prism::{BuildingBlock, Roof};
 use crate::random::{derived, lattice};
 use crate::streets::Streets;
 use crate::terrain::Terrain;
@@ -63,7 +63,7 @@ pub(crate) fn vehicles(
     terrain: &Terrain,
     seed: u64,
     reach_m: f64,
-) -> Vec<Block> {
+) -> Vec<BuildingBlock> {
     if streets.half_width_m == 0.0 || config.parked_share == 0.0 {
         return Vec::new();
     }
@@ -90,7 +90,7 @@ fn vehicle(
     (family, line, place, lane): (i64, i64, i64, i64),
     seed: u64,
     reach_m: f64,
-) -> Option<Block> {
+) -> Option<BuildingBlock> {
     let kerb = streets.half_width_m - 1.3 * CAR_M[1];
     let across = [kerb, -kerb, 0.35 * streets.half_width_m][lane as usize];
     let along = (place as f64 + 0.5 + 0.1 * (lattice(seed, place, lane) - 0.5)) * PLACE_M;
@@ -103,7 +103,7 @@ fn vehicle(
     }
     let ground = terrain.height(x, y);
     let roof = Roof::Flat { height_m: ground + CAR_M[2] };
-    Some(Block {
+    Some(BuildingBlock {
         centre_m: [x, y],
         half_size_m: [CAR_M[0], CAR_M[1]],
         direction_deg: streets.turn_deg + turn,

@@ -1,24 +1,11 @@
 //! Named scenes. Each is the town with what makes it that scene, so that only the difference is stated.
 
 use crate::config::{
-    AcquisitionConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, QuarterWeights, SensorConfig,
-    SimulationConfig, SurfaceConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
+    AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, QuarterWeights,
+    SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
 };
 use crate::error::SimulateError;
-use crate::render::Sun;
-
-/// Name and description of every preset.
-pub const PRESETS: [(&str, &str); 9] = [
-    ("town", "houses, rows and halls on gentle ground, one stepped tower of 35 m"),
-    ("dense-city", "closed blocks of five to seven storeys around courtyards, narrow streets"),
-    ("high-rise", "towers of 60 to 150 m in a flat town"),
-    ("hills", "steep forested hills"),
-    ("quarry", "a pit of 60 m with benches in rock"),
-    ("fields", "flat fields with parcels and crop rows, few trees"),
-    ("harbour", "quays, sheds and water"),
-    ("repetitive-roofs", "the same sheds again and again, at the same distance"),
-    ("low-texture", "the town under a veil: an eighth of the contrast"),
-];
+use crate::sun::Sun;
 
 impl Default for SimulationConfig {
     /// The preset `town`.
@@ -35,7 +22,7 @@ impl Default for SimulationConfig {
             buildings: BuildingsConfig::default(),
             vegetation: VegetationConfig { trees_per_ha: 25.0, height_m: [4.0, 11.0] },
             vehicles: VehiclesConfig { parked_share: 0.35 },
-            surface: SurfaceConfig { cover: GroundCover::Town, contrast: 1.0 },
+            surface: AppearanceConfig { cover: GroundCover::Town, contrast: 1.0 },
             acquisition: AcquisitionConfig::default(),
             sensor: SensorConfig::default(),
             clouds: CloudsConfig { share: 0.0, extent_m: 120.0, masked: true },
@@ -126,7 +113,7 @@ impl SimulationConfig {
             "fields" => fields(town),
             "harbour" => harbour(town),
             "repetitive-roofs" => repetitive_roofs(town),
-            "low-texture" => Self { surface: SurfaceConfig { contrast: 0.12, ..town.surface }, ..town },
+            "low-texture" => Self { surface: AppearanceConfig { contrast: 0.12, ..town.surface }, ..town },
             _ => return Err(SimulateError::UnknownPreset { found: name.to_owned() }),
         })
     }
@@ -156,7 +143,7 @@ fn high_rise(town: SimulationConfig) -> SimulationConfig {
 fn hills(town: SimulationConfig) -> SimulationConfig {
     let terrain = TerrainConfig { relief_m: 60.0, wavelength_m: 380.0, roughness: 0.35, ..town.terrain };
     let vegetation = VegetationConfig { trees_per_ha: 260.0, height_m: [6.0, 22.0] };
-    let surface = SurfaceConfig { cover: GroundCover::Forest, ..town.surface };
+    let surface = AppearanceConfig { cover: GroundCover::Forest, ..town.surface };
     SimulationConfig {
         ground_height_m: 640.0,
         terrain,
@@ -170,14 +157,14 @@ fn hills(town: SimulationConfig) -> SimulationConfig {
 fn quarry(town: SimulationConfig) -> SimulationConfig {
     let terrain = TerrainConfig { pit_depth_m: 60.0, bench_height_m: 12.0, roughness: 0.4, ..town.terrain };
     let vegetation = VegetationConfig { trees_per_ha: 6.0, ..town.vegetation };
-    let surface = SurfaceConfig { cover: GroundCover::Rock, ..town.surface };
+    let surface = AppearanceConfig { cover: GroundCover::Rock, ..town.surface };
     SimulationConfig { terrain, vegetation, surface, buildings: unbuilt(town.buildings), ..town }
 }
 
 fn fields(town: SimulationConfig) -> SimulationConfig {
     let terrain = TerrainConfig { relief_m: 0.6, roughness: 0.25, ..town.terrain };
     let vegetation = VegetationConfig { trees_per_ha: 1.5, ..town.vegetation };
-    let surface = SurfaceConfig { cover: GroundCover::Fields, ..town.surface };
+    let surface = AppearanceConfig { cover: GroundCover::Fields, ..town.surface };
     SimulationConfig { terrain, vegetation, surface, buildings: unbuilt(town.buildings), ..town }
 }
 

@@ -6,7 +6,7 @@
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::Ray;
+use crate::SceneRay;
 
 /// The roof of a block; heights are metres above the ellipsoid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -36,7 +36,7 @@ pub enum Roof {
 
 /// An upright prism over a rectangle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Block {
+pub struct BuildingBlock {
     /// Centre of the rectangle, scene frame, metres.
     pub centre_m: [f64; 2],
     /// Half the length along the long axis and half the width across it, metres.
@@ -63,7 +63,7 @@ pub(crate) enum Face {
 /// A block with its trigonometry done: the form that rays meet.
 #[derive(Debug, Clone)]
 pub(crate) struct Prism {
-    pub(crate) block: Block,
+    pub(crate) block: BuildingBlock,
     along: Vector2<f64>,
     planes: [Plane; 8],
     count: usize,
@@ -77,7 +77,7 @@ struct Plane {
     face: Face,
 }
 
-impl Block {
+impl BuildingBlock {
     /// Highest point of the roof, metres above the ellipsoid.
     pub fn top_m(&self) -> f64 {
         match self.roof {
@@ -113,7 +113,7 @@ impl Block {
 }
 
 impl Prism {
-    pub(crate) fn new(block: Block) -> Self {
+    pub(crate) fn new(block: BuildingBlock) -> Self {
         let (sin, cos) = block.direction_deg.to_radians().sin_cos();
         let (u, v) = (Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0));
         let [half_u, half_v] = block.half_size_m;
@@ -173,7 +173,7 @@ impl Prism {
 
     /// Where a ray enters the solid, the outward unit normal there, and through which face: the first parameter in
     /// (0, `t_max`). A ray that starts inside does not enter.
-    pub(crate) fn enter(&self, ray: &Ray, t_max: f64) -> Option<(f64, Vector3<f64>, Face)> {
+    pub(crate) fn enter(&self, ray: &SceneRay, t_max: f64) -> Option<(f64, Vector3<f64>, Face)> {
         let [x, y] = self.block.centre_m;
         let start = Vector3::new(ray.origin.x - x, ray.origin.y - y, ray.origin.z);
         let (mut enter, mut leave, mut through) = (0.0, t_max, None);
@@ -203,7 +203,7 @@ mod tests {
     use super::*;
 
     fn house(direction_deg: f64, roof: Roof) -> Prism {
-        Prism::new(Block { centre_m: [3.0, -2.0], half_size_m: [9.0, 5.0], direction_deg, base_m: 0.0, roof })
+        Prism::new(BuildingBlock { centre_m: [3.0, -2.0], half_size_m: [9.0, 5.0], direction_deg, base_m: 0.0, roof })
     }
 
     const GABLED: Roof = Roof::Gabled { eaves_m: 6.0, ridge_m: 9.0 };
@@ -230,7 +230,7 @@ mod tests {
             roof in 0usize..3,
         ) {
             let prism = house(direction, [FLAT, GABLED, HIPPED][roof]);
-            let ray = Ray { origin: Vector3::new(x, y, 30.0), direction: Vector3::new(dx, dy, -1.0) };
+            let ray = SceneRay { origin: Vector3::new(x, y, 30.0), direction: Vector3::new(dx, dy, -1.0) };
             let inside = |t: f64| {
                 let p = ray.at(t);
                 prism.roof_height(p.x, p.y).is_some_and(|z| p.z < z)

@@ -8,11 +8,11 @@ use camera::ImagePoint;
 use nalgebra::Vector3;
 use raster::Grid;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::scene::Scene;
 use crate::sensor::PointSpread;
-use crate::sight::Sight;
+use crate::sight::SightLines;
+use crate::sun::Sun;
 use crate::texture::Texture;
 use numeric::Progress;
 
@@ -22,28 +22,6 @@ const SKY: f64 = 0.3;
 pub(crate) const BAND: usize = 32;
 /// Radiance where a line of sight leaves the scene.
 const BEYOND: f64 = 0.1;
-
-/// Where the light comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sun {
-    /// Height above the horizon, degrees; at least [`Sun::LOWEST_DEG`].
-    pub elevation_deg: f64,
-    /// Direction towards it, degrees clockwise from north.
-    pub azimuth_deg: f64,
-}
-
-impl Sun {
-    /// Below this elevation shadows are longer than what surrounds the scene.
-    pub const LOWEST_DEG: f64 = 15.0;
-
-    /// Unit vector towards the sun (east, north, up).
-    pub fn direction(&self) -> Vector3<f64> {
-        let (up, level) = self.elevation_deg.to_radians().sin_cos();
-        let (east, north) = self.azimuth_deg.to_radians().sin_cos();
-        Vector3::new(level * east, level * north, up)
-    }
-}
 
 /// A scene in its light.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +39,7 @@ impl<'a> LitScene<'a> {
     /// The radiance of `width × height` pixels, in units of a white surface under full light.
     pub(crate) fn image(
         &self,
-        sight: &Sight,
+        sight: &SightLines,
         spread: &PointSpread,
         (width, height): (usize, usize),
         progress: &dyn Progress,
@@ -75,7 +53,7 @@ impl<'a> LitScene<'a> {
     }
 
     /// The rows from `first` on.
-    fn band(&self, sight: &Sight, spread: &PointSpread, width: usize, first: usize, rows: &mut [f32]) {
+    fn band(&self, sight: &SightLines, spread: &PointSpread, width: usize, first: usize, rows: &mut [f32]) {
         let (n, taps) = (spread.subpixels, spread.weights.len());
         let at = |k: usize| (k as f64 - spread.reach as f64 + 0.5) / n as f64 - 0.5;
         let count = rows.len() / width;
@@ -100,7 +78,7 @@ impl<'a> LitScene<'a> {
     }
 
     /// Radiance at an image position.
-    fn radiance(&self, sight: &Sight, at: ImagePoint) -> f64 {
+    fn radiance(&self, sight: &SightLines, at: ImagePoint) -> f64 {
         let Some(hit) = self.scene.first_hit(&sight.ray(at), 1.0) else { return BEYOND };
         let facing = hit.normal.dot(&self.to_sun);
         let lit = facing > 0.0 && !self.scene.in_shadow(&hit.point, &hit.normal, &self.to_sun);

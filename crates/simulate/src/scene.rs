@@ -8,13 +8,13 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::Ray;
+use crate::SceneRay;
 use crate::building::Building;
 use crate::config::SimulationConfig;
 use crate::crown::Crown;
 use crate::index::{Buckets, Extent, Stretch};
 use crate::planting;
-use crate::prism::{Block, Face, Prism};
+use crate::prism::{BuildingBlock, Face, Prism};
 use crate::random::derived;
 use crate::streets::Streets;
 use crate::terrain::Terrain;
@@ -24,7 +24,7 @@ use crate::town;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 #[non_exhaustive]
-pub enum SurfaceClass {
+pub enum TruthClass {
     /// Bare ground.
     Ground = 2,
     /// A tree.
@@ -109,7 +109,7 @@ impl Scene {
         let buildings = town::build(config, &terrain, reach_m);
         let paint =
             |index: usize| derived(config.seed, 100 + if config.buildings.identical { 0 } else { index as u64 });
-        let solid = |block: &Block, index| Solid::block(*block, Material::Building, paint(index));
+        let solid = |block: &BuildingBlock, index| Solid::block(*block, Material::Building, paint(index));
         let solids: Vec<Solid> = buildings
             .iter()
             .enumerate()
@@ -117,7 +117,7 @@ impl Scene {
             .collect();
         let mut scene = Self::of(terrain, Streets::new(&config.buildings), buildings, solids, reach_m);
         let is_free =
-            |x: f64, y: f64| scene.surface(x, y).1 == SurfaceClass::Ground && !scene.streets.is_carriageway(x, y);
+            |x: f64, y: f64| scene.surface(x, y).1 == TruthClass::Ground && !scene.streets.is_carriageway(x, y);
         let crowns = planting::trees(config, &scene.terrain, reach_m, is_free);
         scene.add((0u64..).zip(crowns).map(|(index, crown)| Solid {
             shape: Shape::Crown(crown),
@@ -175,9 +175,9 @@ impl Scene {
     }
 
     /// Height and class of the upper surface at a position.
-    pub fn surface(&self, x: f64, y: f64) -> (f64, SurfaceClass) {
+    pub fn surface(&self, x: f64, y: f64) -> (f64, TruthClass) {
         let mut height = self.terrain.height(x, y);
-        let mut class = if self.terrain.is_water(x, y) { SurfaceClass::Water } else { SurfaceClass::Ground };
+        let mut class = if self.terrain.is_water(x, y) { TruthClass::Water } else { TruthClass::Ground };
         for solid in self.buckets.members(self.buckets.at(x, y)).iter().map(|i| &self.solids[*i as usize]) {
             if let Some(top) = solid.height(x, y).filter(|top| *top > height) {
                 (height, class) = (top, solid.class());
@@ -189,18 +189,18 @@ impl Scene {
     /// The first point of the surface on a ray from above it, with t in (0, `t_max`).
     ///
     /// `None` when the ray does not come to the surface before `t_max`, or leaves the scene.
-    pub fn first_point(&self, ray: &Ray, t_max: f64) -> Option<Vector3<f64>> {
+    pub fn first_point(&self, ray: &SceneRay, t_max: f64) -> Option<Vector3<f64>> {
         self.first(ray, t_max).map(|meeting| ray.at(meeting.t))
     }
 
-    pub(crate) fn first_hit(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
+    pub(crate) fn first_hit(&self, ray: &SceneRay, t_max: f64) -> Option<Hit> {
         let meeting = self.first(ray, t_max)?;
         let point = ray.at(meeting.t);
         let normal = meeting.normal.unwrap_or_else(|| self.terrain.normal(point.x, point.y));
         Some(Hit { point, normal, part: meeting.part })
     }
 
-    fn first(&self, ray: &Ray, t_max: f64) -> Option<Meeting> {
+    fn first(&self, ray: &SceneRay, t_max: f64) -> Option<Meeting> {
         let mut closest: Option<Meeting> = None;
         self.buckets.walk(ray, t_max, |stretch| {
             for &index in self.buckets.members(stretch.bucket) {
@@ -216,7 +216,7 @@ impl Scene {
     }
 
     /// Where a ray meets the ground of a bucket before `limit`.
-    fn ground_on(&self, ray: &Ray, stretch: Stretch, limit: f64) -> Option<f64> {
+    fn ground_on(&self, ray: &SceneRay, stretch: Stretch, limit: f64) -> Option<f64> {
         let (t_in, t_out) = self.buckets.near_ground(ray, stretch)?;
         let t_out = t_out.min(limit);
         if t_in <= t_out { self.terrain.intersect(ray, t_in, t_out) } else { None }
@@ -228,7 +228,7 @@ impl Scene {
 
     /// Whether something stands between a point of the surface and the sun.
     pub(crate) fn in_shadow(&self, point: &Vector3<f64>, normal: &Vector3<f64>, to_sun: &Vector3<f64>) -> bool {
-        let ray = Ray { origin: point + normal * LIFT_M, direction: *to_sun };
+        let ray = SceneRay { origin: point + normal * LIFT_M, direction: *to_sun };
         let t_max = ((self.height_range_m.1 - point.z) / to_sun.z).max(0.0) + LIFT_M;
         let blocked = |&index: &u32| self.solids[index as usize].meet(index as usize, &ray, t_max).is_some();
         self.buckets
@@ -242,15 +242,15 @@ impl Scene {
 }
 
 impl Solid {
-    fn block(block: Block, material: Material, paint: u64) -> Self {
+    fn block(block: BuildingBlock, material: Material, paint: u64) -> Self {
         Self { shape: Shape::Prism(Box::new(Prism::new(block))), material, paint }
     }
 
-    fn class(&self) -> SurfaceClass {
+    fn class(&self) -> TruthClass {
         match self.material {
-            Material::Building => SurfaceClass::Building,
-            Material::Tree => SurfaceClass::Vegetation,
-            Material::Vehicle => SurfaceClass::Ground,
+            Material::Building => TruthClass::Building,
+            Material::Tree => TruthClass::Vegetation,
+            Material::Vehicle => TruthClass::Ground,
         }
     }
 
@@ -270,7 +270,7 @@ impl Solid {
         Extent { low, high, top_m }
     }
 
-    fn meet(&self, index: usize, ray: &Ray, t_max: f64) -> Option<Meeting> {
+    fn meet(&self, index: usize, ray: &SceneRay, t_max: f64) -> Option<Meeting> {
         let meeting = |t, normal, part| Meeting { t, normal: Some(normal), part };
         match &self.shape {
             Shape::Prism(prism) => {
@@ -291,7 +291,7 @@ mod tests {
     }
 
     /// The first point below the surface on a march with a small step, refined by bisection.
-    fn marched(scene: &Scene, ray: &Ray, t_max: f64) -> Option<Vector3<f64>> {
+    fn marched(scene: &Scene, ray: &SceneRay, t_max: f64) -> Option<Vector3<f64>> {
         let below = |t: f64| {
             let p = ray.at(t);
             p.z < scene.surface(p.x, p.y).0
@@ -312,7 +312,7 @@ mod tests {
         Some(ray.at(under))
     }
 
-    fn corner_is_thin(scene: &Scene, ray: &Ray, point: &Vector3<f64>) -> bool {
+    fn corner_is_thin(scene: &Scene, ray: &SceneRay, point: &Vector3<f64>) -> bool {
         let p = point + ray.direction.normalize() * 0.02;
         p.z > scene.surface(p.x, p.y).0
     }
@@ -326,8 +326,9 @@ mod tests {
             for k in 0..400 {
                 let (x, y) = (f64::from(k % 20) * 9.7 - 95.0, f64::from(k / 20) * 9.3 - 95.0);
                 let direction = Vector3::new(0.35, -0.2, -1.0);
-                let ray = Ray { origin: Vector3::new(x, y, high + 1.0) - direction * 0.5 * (high - low), direction };
-                let ray = Ray { origin: Vector3::new(ray.origin.x, ray.origin.y, high + 1.0), ..ray };
+                let ray =
+                    SceneRay { origin: Vector3::new(x, y, high + 1.0) - direction * 0.5 * (high - low), direction };
+                let ray = SceneRay { origin: Vector3::new(ray.origin.x, ray.origin.y, high + 1.0), ..ray };
                 let t_max = high + 2.0 - low;
                 let hit = scene.first_hit(&ray, t_max).expect("the ray ends below the lowest ground");
                 let reference = marched(&scene, &ray, t_max).expect("the march does too");
@@ -350,7 +351,8 @@ mod tests {
             let (mut counts, mut wrong) = ([0; 2], 0);
             for k in 0..900 {
                 let (x, y) = (f64::from(k % 30) * 5.1 - 75.0, f64::from(k / 30) * 4.9 - 75.0);
-                let down = Ray { origin: Vector3::new(x, y, scene.height_range_m().1 + 1.0), direction: -Vector3::z() };
+                let down =
+                    SceneRay { origin: Vector3::new(x, y, scene.height_range_m().1 + 1.0), direction: -Vector3::z() };
                 let hit = scene.first_hit(&down, 1e3).unwrap();
                 let shadow = hit.normal.dot(&to_sun) <= 0.0 || scene.in_shadow(&hit.point, &hit.normal, &to_sun);
                 let from = hit.point + hit.normal * 0.001;

@@ -9,14 +9,14 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::camera_model::PhysicalCamera;
 use crate::frame::SceneFrame;
-use crate::{Ray, SimulateError};
+use crate::{SceneRay, SimulateError};
 
 /// Distance between lattice nodes, pixels.
 const STEP_PX: f64 = 16.0;
 
 /// Rays for every position of an image.
 #[derive(Debug, Clone)]
-pub struct Sight {
+pub struct SightLines {
     columns: usize,
     rows: usize,
     high_m: f64,
@@ -25,7 +25,7 @@ pub struct Sight {
     nodes: Vec<[Vector2<f64>; 2]>,
 }
 
-impl Sight {
+impl SightLines {
     /// The rays of an image of `width × height` pixels between two heights (low, high), metres above the ellipsoid.
     ///
     /// # Errors
@@ -52,7 +52,7 @@ impl Sight {
     }
 
     /// The ray of an image position: it starts at the upper height (t = 0) and reaches the lower one at t = 1.
-    pub fn ray(&self, at: ImagePoint) -> Ray {
+    pub fn ray(&self, at: ImagePoint) -> SceneRay {
         let (column, s) = cell(at.sample, self.columns);
         let (row, t) = cell(at.line, self.rows);
         let node = |level: usize| {
@@ -63,7 +63,7 @@ impl Sight {
         };
         let (high, low) = (node(0), node(1));
         let origin = Vector3::new(high.x, high.y, self.high_m);
-        Ray { origin, direction: Vector3::new(low.x, low.y, self.low_m) - origin }
+        SceneRay { origin, direction: Vector3::new(low.x, low.y, self.low_m) - origin }
     }
 }
 
@@ -87,7 +87,7 @@ mod tests {
             let look = Look { incidence_deg: 24.0, azimuth_deg: 300.0, heading_deg: 190.0, gsd_m: 0.5 };
             let centre = frame.ground_from_scene(Vector3::new(0.0, 0.0, 200.0)).unwrap();
             let camera = PhysicalCamera::new(camera, &look, centre, (900, 700));
-            let sight = Sight::new(&camera, &frame, (900, 700), (190.0, 490.0)).unwrap();
+            let sight = SightLines::new(&camera, &frame, (900, 700), (190.0, 490.0)).unwrap();
             let rpc = camera.fitted((140.0, 540.0)).unwrap().rpc;
             for (sample, line) in [(-0.5, -0.5), (899.5, 699.5), (7.3, 692.1), (451.9, 350.2), (888.8, 3.0)] {
                 let at = ImagePoint::new(sample, line);

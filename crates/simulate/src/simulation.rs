@@ -18,7 +18,7 @@ use crate::random::derived;
 use crate::render::{BAND, LitScene};
 use crate::scene::Scene;
 use crate::sensor::{PointSpread, Sensor};
-use crate::sight::Sight;
+use crate::sight::SightLines;
 use crate::texture::Texture;
 use crate::truth::{self, Truth, Witness};
 use numeric::{Progress, Silent};
@@ -32,7 +32,7 @@ const ORDINARY_M: f64 = 30.0;
 
 /// One simulated image.
 #[derive(Debug, Clone)]
-pub struct View {
+pub struct SimulatedView {
     /// Digital numbers; 0 is no-data.
     pub image: Grid<u16>,
     /// The RPC that a user gets: the true one with the pointing error.
@@ -46,7 +46,7 @@ pub struct View {
     pub clouds: Option<Grid<u8>>,
     /// How it was taken.
     pub record: ViewRecord,
-    sight: Sight,
+    sight: SightLines,
 }
 
 /// How a view was taken.
@@ -76,7 +76,7 @@ pub struct Simulation {
     /// Where the surface lies.
     pub frame: SceneFrame,
     /// The images.
-    pub views: Vec<View>,
+    pub views: Vec<SimulatedView>,
     /// The truth.
     pub truth: Truth,
 }
@@ -127,7 +127,7 @@ impl Simulation {
         }
         progress.begin("truth", 1);
         let witnesses: Vec<_> =
-            views.iter().map(|view: &View| Witness::new(&dates[view.record.date.index], view)).collect();
+            views.iter().map(|view: &SimulatedView| Witness::new(&dates[view.record.date.index], view)).collect();
         let truth = Truth::new(&config, &frame, &scene, &witnesses)?;
         progress.step();
         Ok(Self { config, scene, frame, views, truth })
@@ -148,15 +148,15 @@ impl Simulation {
     }
 }
 
-impl View {
+impl SimulatedView {
     /// The lines of sight through which the image was rendered, in the scene frame.
-    pub fn sight(&self) -> &Sight {
+    pub fn sight(&self) -> &SightLines {
         &self.sight
     }
 }
 
 impl<'a> Witness<'a> {
-    fn new(scene: &'a Scene, view: &'a View) -> Self {
+    fn new(scene: &'a Scene, view: &'a SimulatedView) -> Self {
         Self { scene, sight: &view.sight, rpc: &view.true_rpc, size: (view.image.width(), view.image.height()) }
     }
 }
@@ -180,12 +180,12 @@ fn view(
     date: Date,
     index: usize,
     progress: &dyn Progress,
-) -> Result<View, SimulateError> {
+) -> Result<SimulatedView, SimulateError> {
     let look = acquisition::look(config, index);
     let (low, high) = scene.height_range_m();
     let (camera, size) = acquisition::camera(config, frame, &look, (low, high))?;
     let fitted = camera.fitted((low - RPC_HEIGHT_MARGIN_M, high + RPC_HEIGHT_MARGIN_M))?;
-    let sight = Sight::new(&camera, frame, size, (low - 1.0, high + 1.0))?;
+    let sight = SightLines::new(&camera, frame, size, (low - 1.0, high + 1.0))?;
     progress.begin(&format!("view {}", index + 1), size.1.div_ceil(BAND));
     let texture = Texture::new(config.seed, 1 + index as u64, config.surface);
     let spread = PointSpread::new(&config.sensor);
@@ -205,7 +205,7 @@ fn view(
     };
     let clouds = opacity.map(|cover| cover.map(|o| u8::from(*o > 0.0)));
     let heights = truth::image_heights(scene, &sight, size);
-    Ok(View { image, rpc, true_rpc: fitted.rpc, heights, clouds, record, sight })
+    Ok(SimulatedView { image, rpc, true_rpc: fitted.rpc, heights, clouds, record, sight })
 }
 
 /// The digital numbers of a view; `seed` is that of the noise.

@@ -9,7 +9,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::Ray;
+use crate::SceneRay;
 use crate::config::{SimulationConfig, TerrainConfig};
 use crate::index::BUCKET_M;
 use crate::noise::value_noise;
@@ -97,7 +97,7 @@ impl Terrain {
     }
 
     /// The first parameter in [`t_in`, `t_out`] at which a ray over the lattice goes from above the ground to below it.
-    pub(crate) fn intersect(&self, ray: &Ray, t_in: f64, t_out: f64) -> Option<f64> {
+    pub(crate) fn intersect(&self, ray: &SceneRay, t_in: f64, t_out: f64) -> Option<f64> {
         let mut t = t_in;
         // Each step crosses one patch; a ray along a patch's edge is nudged over it by rounding, hence the bound.
         for _ in 0..4 * self.posts {
@@ -116,7 +116,7 @@ impl Terrain {
     }
 
     /// Where a ray leaves the patch (i, j) that it is in at `t`: just beyond the edge, so that the next patch is found.
-    fn leaves(&self, ray: &Ray, i: usize, j: usize, t: f64) -> f64 {
+    fn leaves(&self, ray: &SceneRay, i: usize, j: usize, t: f64) -> f64 {
         let along = |index: usize, origin: f64, direction: f64| {
             let edge = self.corner_m + (index + usize::from(direction > 0.0)) as f64 * POST_M;
             if direction == 0.0 { f64::INFINITY } else { (edge - origin) / direction }
@@ -125,7 +125,7 @@ impl Terrain {
         edge.max(t) + 1e-9 / ray.direction.norm()
     }
 
-    fn meet(&self, ray: &Ray, i: usize, j: usize, t_in: f64, t_out: f64) -> Option<f64> {
+    fn meet(&self, ray: &SceneRay, i: usize, j: usize, t_in: f64, t_out: f64) -> Option<f64> {
         let [a, b, c, d] = self.patch(i, j);
         let (z_in, z_out) = (ray.at(t_in).z - self.base_m, ray.at(t_out).z - self.base_m);
         let top = a.max(a + b).max(a + c).max(a + b + c + d);
@@ -243,7 +243,7 @@ mod tests {
         ) {
             let terrain = terrain(["town", "hills", "quarry", "harbour"][which]);
             let (low, high) = terrain.height_range_m();
-            let ray = Ray { origin: Vector3::new(x, y, high + 1.0), direction: Vector3::new(dx, dy, -1.0) };
+            let ray = SceneRay { origin: Vector3::new(x, y, high + 1.0), direction: Vector3::new(dx, dy, -1.0) };
             let t_max = high + 2.0 - low;
             let step = 2e-3;
             let below = |t: f64| { let p = ray.at(t); p.z < terrain.height(p.x, p.y) };

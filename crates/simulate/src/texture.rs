@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use crate::config::{GroundCover, SurfaceConfig};
+use crate::config::{AppearanceConfig, GroundCover};
 use crate::noise::{detail, value_noise};
 use crate::prism::{Face, Prism, Roof};
 use crate::random::{derived, lattice};
@@ -21,12 +21,12 @@ const PARCEL_M: [f64; 2] = [110.0, 64.0];
 pub(crate) struct Texture {
     seed: u64,
     waves: u64,
-    surface: SurfaceConfig,
+    surface: AppearanceConfig,
 }
 
 impl Texture {
     /// The reflectance of a seed; `view` tells the waves of one view from those of another.
-    pub(crate) fn new(seed: u64, view: u64, surface: SurfaceConfig) -> Self {
+    pub(crate) fn new(seed: u64, view: u64, surface: AppearanceConfig) -> Self {
         let seed = derived(seed, 3);
         Self { seed, waves: derived(seed, view), surface }
     }

@@ -11,13 +11,13 @@ use nalgebra::Vector3;
 use raster::{GeoTransform, Grid};
 use rayon::prelude::*;
 
-use crate::Ray;
+use crate::SceneRay;
 use crate::config::SimulationConfig;
 use crate::error::SimulateError;
 use crate::frame::SceneFrame;
 use crate::lod2;
-use crate::scene::{Scene, SurfaceClass};
-use crate::sight::Sight;
+use crate::scene::{Scene, TruthClass};
+use crate::sight::SightLines;
 use crate::texture::Texture;
 
 /// Reflectance 1 in [`Truth::ortho`].
@@ -34,7 +34,7 @@ pub struct Truth {
     pub dsm: Grid<f32>,
     /// Height of the bare ground, under buildings and trees too, metres above the ellipsoid.
     pub dtm: Grid<f32>,
-    /// Class of the upper surface (see [`SurfaceClass`]).
+    /// Class of the upper surface (see [`TruthClass`]).
     pub classes: Grid<u8>,
     /// Per view 1 where it sees the cell's point of the upper surface, else 0.
     pub visibility: Vec<Grid<u8>>,
@@ -52,7 +52,7 @@ pub struct Truth {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Witness<'a> {
     pub(crate) scene: &'a Scene,
-    pub(crate) sight: &'a Sight,
+    pub(crate) sight: &'a SightLines,
     pub(crate) rpc: &'a Rpc,
     pub(crate) size: (usize, usize),
 }
@@ -137,13 +137,13 @@ fn stored(height_m: f64) -> f32 {
 }
 
 /// The class of a cell: that of its centre, or the edge of a footprint where a corner tells that a façade goes through.
-fn class(scene: &Scene, [x, y]: [f64; 2], cell_m: f64) -> SurfaceClass {
-    let is_building = |class| class == SurfaceClass::Building;
+fn class(scene: &Scene, [x, y]: [f64; 2], cell_m: f64) -> TruthClass {
+    let is_building = |class| class == TruthClass::Building;
     let centre = scene.surface(x, y).1;
     let half = 0.5 * cell_m;
     let corner = |(dx, dy): (f64, f64)| is_building(scene.surface(x + dx * half, y + dy * half).1);
     let differs = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(corner).contains(&!is_building(centre));
-    if differs { SurfaceClass::FootprintEdge } else { centre }
+    if differs { TruthClass::FootprintEdge } else { centre }
 }
 
 fn reflectance_from_above(scene: &Scene, texture: &Texture, [x, y]: [f64; 2], cell_m: f64) -> u16 {
@@ -152,14 +152,14 @@ fn reflectance_from_above(scene: &Scene, texture: &Texture, [x, y]: [f64; 2], ce
     let mut sum = 0.0;
     for k in 0..ORTHO_SUBCELLS * ORTHO_SUBCELLS {
         let origin = Vector3::new(x + offset(k % ORTHO_SUBCELLS), y + offset(k / ORTHO_SUBCELLS), high + 1.0);
-        let down = Ray { origin, direction: -Vector3::z() };
+        let down = SceneRay { origin, direction: -Vector3::z() };
         sum += scene.first_hit(&down, high - low + 2.0).map_or(0.0, |hit| texture.reflectance(scene, &hit));
     }
     (sum / (ORTHO_SUBCELLS * ORTHO_SUBCELLS) as f64 * ORTHO_SCALE).round() as u16
 }
 
 /// The height, metres above the ellipsoid, of what each pixel's centre sees; NaN where that is nothing.
-pub(crate) fn image_heights(scene: &Scene, sight: &Sight, (width, height): (usize, usize)) -> Grid<f32> {
+pub(crate) fn image_heights(scene: &Scene, sight: &SightLines, (width, height): (usize, usize)) -> Grid<f32> {
     let height_at = |k: usize| {
         let at = ImagePoint::new((k % width) as f64, (k / width) as f64);
         scene.first_point(&sight.ray(at), 1.0).map_or(f32::NAN, |point| stored(point.z))

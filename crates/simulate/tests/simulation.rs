@@ -5,7 +5,7 @@ use camera::ImagePoint;
 use nalgebra::Vector3;
 use raster::Grid;
 use simulate::{
-    CameraModel, CloudsConfig, SensorConfig, Simulation, SimulationConfig, SurfaceClass, View, ViewDirection,
+    CameraModel, CloudsConfig, LookAngles, SensorConfig, SimulatedView, Simulation, SimulationConfig, TruthClass,
 };
 
 fn small(preset: &str) -> SimulationConfig {
@@ -42,11 +42,11 @@ fn the_truth_is_the_height_function_on_the_map() {
         let ground = simulation.scene.terrain().height(x - x0, y - y0);
         assert!((f64::from(truth.dsm[(column, row)]) - height).abs() < 5e-4);
         assert!((f64::from(truth.dtm[(column, row)]) - ground).abs() < 5e-4);
-        assert!([class as u8, SurfaceClass::FootprintEdge as u8].contains(&truth.classes[(column, row)]));
+        assert!([class as u8, TruthClass::FootprintEdge as u8].contains(&truth.classes[(column, row)]));
     }
-    let count = |class: SurfaceClass| truth.classes.data().iter().filter(|c| **c == class as u8).count();
-    assert!((1000..8000).contains(&count(SurfaceClass::Building)), "{}", count(SurfaceClass::Building));
-    assert!(count(SurfaceClass::FootprintEdge) > 300 && count(SurfaceClass::Vegetation) > 50);
+    let count = |class: TruthClass| truth.classes.data().iter().filter(|c| **c == class as u8).count();
+    assert!((1000..8000).contains(&count(TruthClass::Building)), "{}", count(TruthClass::Building));
+    assert!(count(TruthClass::FootprintEdge) > 300 && count(TruthClass::Vegetation) > 50);
     assert!(truth.dsm.data().iter().zip(truth.dtm.data()).all(|(s, t)| s >= t));
 }
 
@@ -116,7 +116,12 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Where the ortho patch around a cell is found in a view, relative to where the true RPC projects it, pixels.
-fn found_offset(simulation: &Simulation, view: &View, image: &Grid<f32>, cell: (usize, usize)) -> Option<[f64; 2]> {
+fn found_offset(
+    simulation: &Simulation,
+    view: &SimulatedView,
+    image: &Grid<f32>,
+    cell: (usize, usize),
+) -> Option<[f64; 2]> {
     const RADIUS: usize = 6;
     let truth = &simulation.truth;
     let [x0, y0] = simulation.frame.origin_m();
@@ -163,9 +168,9 @@ fn truth_points_are_found_in_the_views_where_they_project() {
         config.vegetation.trees_per_ha = 0.0;
         config.acquisition.camera = camera;
         config.acquisition.looks = vec![
-            ViewDirection { incidence_deg: 24.0, azimuth_deg: 20.0 },
-            ViewDirection { incidence_deg: 3.0, azimuth_deg: 100.0 },
-            ViewDirection { incidence_deg: 18.0, azimuth_deg: 230.0 },
+            LookAngles { incidence_deg: 24.0, azimuth_deg: 20.0 },
+            LookAngles { incidence_deg: 3.0, azimuth_deg: 100.0 },
+            LookAngles { incidence_deg: 18.0, azimuth_deg: 230.0 },
         ];
         let simulation = Simulation::new(config).unwrap();
         for view in &simulation.views {
@@ -211,7 +216,7 @@ fn views_converge_and_every_rpc_points_a_little_wrong() {
     let mut config = SimulationConfig { views: 5, ..small("town") };
     config.acquisition.pointing_drift_px = 0.8;
     let simulation = Simulation::new(config).unwrap();
-    let tangent = |v: &View| v.record.look.towards_sensor() / v.record.look.towards_sensor().z;
+    let tangent = |v: &SimulatedView| v.record.look.towards_sensor() / v.record.look.towards_sensor().z;
     let base = (tangent(&simulation.views[0]) - tangent(&simulation.views[4])).norm();
     assert!((base - 2.0 * 16.5_f64.to_radians().tan()).abs() < 0.02, "base over height {base}");
     for view in &simulation.views {
@@ -262,7 +267,7 @@ fn dates_have_another_sun_other_vehicles_and_another_radiometry() {
     config.views = 4;
     config.acquisition.dates = 2;
     // All four look alike, so that what differs between them is the date.
-    config.acquisition.looks = vec![ViewDirection { incidence_deg: 5.0, azimuth_deg: 100.0 }; 4];
+    config.acquisition.looks = vec![LookAngles { incidence_deg: 5.0, azimuth_deg: 100.0 }; 4];
     let simulation = Simulation::new(config).unwrap();
     let dates: Vec<usize> = simulation.views.iter().map(|v| v.record.date.index).collect();
     assert_eq!(dates, [0, 0, 1, 1]);
@@ -307,14 +312,14 @@ fn every_preset_makes_its_scene() {
         let (low, high) = heights.iter().fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
         let relief = f64::from(high - low);
         assert!((lowest_relief..highest_relief).contains(&relief), "{preset}: {relief} m");
-        let share = |class: SurfaceClass| {
+        let share = |class: TruthClass| {
             let count = simulation.truth.classes.data().iter().filter(|c| **c == class as u8).count();
             count as f64 / heights.len() as f64
         };
         match preset {
-            "harbour" => assert!((0.2..0.5).contains(&share(SurfaceClass::Water))),
-            "hills" => assert!(share(SurfaceClass::Vegetation) > 0.3, "{}", share(SurfaceClass::Vegetation)),
-            "dense-city" | "repetitive-roofs" => assert!(share(SurfaceClass::Building) > 0.2),
+            "harbour" => assert!((0.2..0.5).contains(&share(TruthClass::Water))),
+            "hills" => assert!(share(TruthClass::Vegetation) > 0.3, "{}", share(TruthClass::Vegetation)),
+            "dense-city" | "repetitive-roofs" => assert!(share(TruthClass::Building) > 0.2),
             _ => {}
         }
         for view in &simulation.views {
