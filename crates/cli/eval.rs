@@ -1,34 +1,31 @@
 //! `skysweep eval`: how far a surface model is from a reference.
 //!
-//! What is compared follows from the files: height grids (the reference may be a LAS cloud), surfaces (both are meshes, city models or
-//! clouds), or maps in the pixels of a camera (both are `.npy`, or `--maps` says so).
-
-mod grids;
-mod inputs;
-mod maps;
-mod output;
-mod surface_inputs;
-mod surfaces;
-mod vertical;
+//! The files decide what is compared: height grids (the reference may be a LAS cloud), surfaces (both are meshes, city models
+//! or clouds), or maps in the pixels of a camera (both are `.npy`, or `--maps` names their kind).
 
 use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
+use city::Lod;
 use crs::VerticalDatum;
-use eval::{Alignment, EvalConfig, EvalInput, Evaluation, evaluate};
-use report::{EvaluationReport, Protocol};
+use eval::{Alignment, EvalConfig, SurfaceConfig};
+use jobs::eval::{
+    EvalJobError, EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, GridEvalReport, MapEvalConfig,
+    MinCompleteness, SurfaceEvalConfig,
+};
+use jobs::files::FileError;
 
+use crate::error::{OVERWRITE, with_hint};
+use crate::progress::Log;
 use crate::{Global, Outcome, print};
-use inputs::Inputs;
-use output::Target;
 
 /// Arguments of `skysweep eval`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The surface model that is evaluated, on any grid; a mesh, city model or cloud (OBJ, PLY, CityJSON, CityGML, LAS, LAZ) where
-    /// REF is one, too; or a map of depths, normals or a mask (.npy).
+    /// Surface model to evaluate, on any grid; or a mesh, city model or cloud (OBJ, PLY, CityJSON, CityGML, LAS, LAZ) if REF
+    /// is one, too; or a map of depths, normals or a mask (.npy).
     test: PathBuf,
-    /// What is believed, of the same kind; a LAS or LAZ cloud may stand for a grid, errors are then measured at its cells.
+    /// Reference of the same kind. For a grid it may also be a LAS or LAZ cloud; errors are then measured at its cells.
     #[arg(value_name = "REF")]
     reference: PathBuf,
     /// What is removed before the comparison [default: xyz for grids; surfaces and maps are compared as they are].
@@ -46,27 +43,27 @@ pub(crate) struct Args {
     /// Raster on any grid: only cells where it is not zero count (read at the nearest cell).
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
-    /// Terrain model, for what stands above it [default: from the class ground, else estimated from REF].
+    /// Terrain model, to find what stands above it [default: from the class ground, else estimated from REF].
     #[arg(long, value_name = "FILE")]
     dtm: Option<PathBuf>,
-    /// How far each cell of TEST is to be believed, more is better, on its grid (dsm/confidence.tif): rows for what remains when
-    /// the least believed cells are dropped, 95 to 50 % of REF's cells.
+    /// Confidence of each cell of TEST, on its grid, more is better (dsm/confidence.tif). Adds rows for the most confident
+    /// 95 to 50 % of REF's cells.
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
-    /// Least height above the terrain of what stands, in metres.
+    /// Least height above the terrain of cells that count as standing, in metres.
     #[arg(long, value_name = "METRES", default_value_t = EvalConfig::default().standing_m)]
     standing_m: f64,
-    /// Side of the cells into which a point cloud REF is laid, in metres [default: TEST's].
+    /// Side of the cells into which a point cloud REF is gridded, in metres [default: TEST's].
     #[arg(long, value_name = "METRES")]
     ref_cell: Option<f64>,
     /// Thresholds in metres: of completeness_T and pag_T [default: 0.5,1,2.5,7.5], or of precision, recall and F-score of
     /// surfaces [default: 0.1,0.2,0.5,1].
     #[arg(long, value_name = "METRES", value_delimiter = ',')]
     thresholds: Vec<f64>,
-    /// What TEST's heights are above, where the file does not say or is wrong: ellipsoid, egm96, egm2008 or EPSG:n.
+    /// Vertical datum of TEST's heights, if the file names none or a wrong one: ellipsoid, egm96, egm2008 or EPSG:n.
     #[arg(long, value_name = "DATUM")]
     test_vertical: Option<VerticalDatum>,
-    /// What REF's heights are above, likewise.
+    /// Vertical datum of REF's heights, likewise.
     #[arg(long, value_name = "DATUM")]
     ref_vertical: Option<VerticalDatum>,
     /// Folder for report.html, report.json and the error map [default: RUN/eval for a surface model RUN/dsm/dsm.tif that
@@ -82,23 +79,56 @@ pub(crate) struct Args {
     /// Write the errors (test − reference, metres) on the reference grid to this file.
     #[arg(long, value_name = "OUT.tif")]
     error_map: Option<PathBuf>,
-    /// Replace files that exist, also those that no evaluation wrote.
+    /// Replace files that exist, also files that no evaluation wrote.
     #[arg(long)]
     overwrite: bool,
     /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    surface: surfaces::SurfaceArgs,
+    surface: SurfaceArgs,
     /// The files are maps of this kind in the pixels of one camera [default: found by shape and type of .npy files].
     #[arg(long, value_enum, value_name = "KIND")]
-    maps: Option<maps::MapKind>,
-    /// Exit with 1 when the MAE over all cells is above this, in metres; of surfaces the mean distance of TEST to REF.
+    maps: Option<MapKind>,
+    /// Exit with 1 if the MAE over all cells is above this, in metres; for surfaces the mean distance of TEST to REF.
     #[arg(long, value_name = "METRES")]
     max_mae: Option<f64>,
-    /// Exit with 1 when the completeness over all cells is below this share (0 to 1), at 1 m unless T says otherwise.
+    /// Exit with 1 if the completeness over all cells is below this share (0 to 1), at 1 m unless T names another threshold.
     #[arg(long, value_name = "[T=]SHARE", value_delimiter = ',')]
     min_completeness: Vec<LeastCompleteness>,
+}
+
+/// Options for surfaces that are not grids.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Surfaces (meshes, city models, clouds)")]
+struct SurfaceArgs {
+    /// Samples per square metre of a mesh, up to a million in all.
+    #[arg(long, value_name = "N", default_value_t = SurfaceConfig::default().samples_per_m2)]
+    samples_per_m2: f64,
+    /// Seed of the samples.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    sample_seed: u64,
+    /// D of M3C2: diameter in which normals are estimated, in metres.
+    #[arg(long, value_name = "METRES", default_value_t = SurfaceConfig::default().normal_scale_m)]
+    normal_scale: f64,
+    /// d of M3C2: diameter of its cylinders, in metres.
+    #[arg(long, value_name = "METRES", default_value_t = SurfaceConfig::default().cylinder_m)]
+    cylinder: f64,
+    /// Length of the cylinders on either side, in metres.
+    #[arg(long, value_name = "METRES", default_value_t = SurfaceConfig::default().cylinder_reach_m)]
+    cylinder_reach: f64,
+    /// Registration error, part of M3C2's level of detection, in metres.
+    #[arg(long, value_name = "METRES", default_value_t = 0.0)]
+    registration: f64,
+    /// Edge of the voxels of the volumetric overlap, in metres.
+    #[arg(long, value_name = "METRES", default_value_t = SurfaceConfig::default().voxel_m)]
+    voxel: f64,
+    /// Level of detail of city models, such as 2.2 [default: the highest of each object up to 2.x].
+    #[arg(long, value_name = "LOD")]
+    lod: Option<Lod>,
+    /// Use every object of a city model that has surfaces, not only buildings.
+    #[arg(long)]
+    all_objects: bool,
 }
 
 /// `--align`.
@@ -110,7 +140,7 @@ enum Align {
     Z,
     /// The translation with the least NMAD, then the median of the differences.
     Xyz,
-    /// The translation that slopes and aspects tell (Nuth and Kääb 2011), then the median of the differences.
+    /// The translation that follows from slopes and aspects (Nuth and Kääb 2011), then the median of the differences.
     NuthKaab,
 }
 
@@ -125,24 +155,42 @@ impl From<Align> for Alignment {
     }
 }
 
-/// A completeness that must be reached.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct LeastCompleteness {
-    threshold_m: f64,
-    share: f64,
+/// `--maps`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum MapKind {
+    /// Depths, one number a pixel; 0, NaN and infinity are no depth.
+    Depth,
+    /// Normals, three numbers a pixel; zeros are no normal.
+    Normals,
+    /// Masks; every value but 0 is set.
+    Mask,
 }
+
+impl From<MapKind> for jobs::eval::MapKind {
+    fn from(kind: MapKind) -> Self {
+        match kind {
+            MapKind::Depth => Self::Depth,
+            MapKind::Normals => Self::Normals,
+            MapKind::Mask => Self::Mask,
+        }
+    }
+}
+
+/// `--min-completeness`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LeastCompleteness(MinCompleteness);
 
 impl std::str::FromStr for LeastCompleteness {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (threshold, share) = text.split_once('=').unwrap_or(("1", text));
-        let number = |part: &str| part.trim().parse::<f64>().map_err(|_| format!("\"{part}\" is no number"));
+        let number = |part: &str| part.trim().parse::<f64>().map_err(|_| format!("\"{part}\" is not a number"));
         let (threshold_m, share) = (number(threshold)?, number(share)?);
         if !(0.0..=1.0).contains(&share) {
-            return Err(format!("{share} is no share: expected 0 to 1"));
+            return Err(format!("{share} is not a share: expected 0 to 1"));
         }
-        Ok(Self { threshold_m, share })
+        Ok(Self(MinCompleteness { threshold_m, share }))
     }
 }
 
@@ -151,13 +199,14 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if let Some(max_mae) = args.max_mae {
         ensure!(max_mae >= 0.0, "--max-mae is {max_mae}, expected a number of metres");
     }
-    let both = |is: fn(&PathBuf) -> bool| is(&args.test) && is(&args.reference);
-    let missed = if args.maps.is_some() || both(|path| io::maps::is_npy(path)) {
-        maps::run(args)?
-    } else if both(|path| io::surfaces::is_surface(path)) {
-        surfaces::run(args, global)?
-    } else {
-        grids(args, global)?
+    let kind = match args.maps {
+        Some(_) => EvalKind::Maps,
+        None => jobs::eval::detect_kind(&args.test, &args.reference),
+    };
+    let missed = match kind {
+        EvalKind::Maps => maps(args)?,
+        EvalKind::Surfaces => surfaces(args, global)?,
+        _ => grids(args, global)?,
     };
     missed.iter().for_each(|line| tracing::error!("{line}"));
     Ok(if missed.is_empty() { Outcome::Complete } else { Outcome::Partial })
@@ -182,116 +231,135 @@ fn refuse_grid_options(args: &Args, what: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Compares height grids; the requirements that were missed.
+fn requirements(args: &Args) -> EvalRequirements {
+    EvalRequirements {
+        max_mae: args.max_mae,
+        min_completeness: args.min_completeness.iter().map(|least| least.0).collect(),
+    }
+}
+
+/// Compares height grids and returns the requirements that were missed.
 fn grids(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
-    let (config, target) = (config(args), Target::of(args));
-    output::check(args, target.as_ref())?;
-    let inputs = Inputs::read(args, config.alignment)?;
-    let input = EvalInput {
-        classes: inputs.classes.as_ref().map(|(classes, _)| classes),
-        mask: inputs.mask.as_ref(),
-        terrain: inputs.terrain.as_ref(),
-        confidence: inputs.confidence.as_ref(),
-        ..EvalInput::new(
-            &inputs.test.heights,
-            &inputs.reference.heights,
-            &inputs.test_from_reference,
-            inputs.metres_from_cells,
-        )
-    };
-    let found = evaluate(&input, &config)?;
-    let protocol = protocol(args, config, &inputs, &found);
-    let report = EvaluationReport { protocol: &protocol, found: &found, reference: &inputs.reference.heights };
-    let written = output::write(args, target.as_ref(), &inputs, &report)?;
+    let report = jobs::eval::compare_grids(&grid_config(args), &Log).map_err(hinted)?;
     if args.json {
-        print::json(&report.json())?;
+        print::json(&report)?;
     } else {
         print::text(&report.table())?;
         if !global.is_quiet() {
-            print::text(&(written.join("\n") + "\n"))?;
+            print::text(&(written(args, &report).join("\n") + "\n"))?;
         }
     }
-    Ok(protocol.missed)
+    Ok(report.missed().to_vec())
 }
 
-/// What the numbers mean, from arguments and inputs.
-fn protocol(args: &Args, config: EvalConfig, inputs: &Inputs, found: &Evaluation) -> Protocol {
-    let reference = &inputs.reference;
-    let crs = match (reference.horizontal_epsg, &reference.crs_wkt) {
-        (Some(code), _) => format!("EPSG:{code}"),
-        (None, Some(_)) => "a coordinate system without an EPSG code".into(),
-        (None, None) => "no coordinate system".into(),
+fn grid_config(args: &Args) -> GridEvalConfig {
+    let mut config = GridEvalConfig::new(args.test.clone(), args.reference.clone());
+    config.alignment = args.align.unwrap_or(Align::Xyz).into();
+    config.search_m = args.search_m;
+    if !args.thresholds.is_empty() {
+        config.thresholds_m = args.thresholds.clone();
+    }
+    config.classes = args.classes.clone();
+    config.skip = args.skip.clone();
+    config.mask = args.mask.clone();
+    config.terrain = args.dtm.clone();
+    config.confidence = args.confidence.clone();
+    config.standing_m = args.standing_m;
+    config.reference_cell_m = args.ref_cell;
+    config.test_vertical = args.test_vertical;
+    config.reference_vertical = args.ref_vertical;
+    config.target = match (&args.output, args.no_report) {
+        (Some(folder), _) => EvalTarget::Folder(folder.clone()),
+        (None, true) => EvalTarget::Nowhere,
+        (None, false) => EvalTarget::RunFolder,
     };
-    let name = |path: &PathBuf| path.display().to_string();
-    Protocol {
-        test: name(&args.test),
-        reference: name(&args.reference),
-        size: (reference.heights.width(), reference.heights.height()),
-        cell_m: inputs.metres_from_cells.cell_size_m(),
-        crs,
-        horizontal_epsg: reference.horizontal_epsg,
-        vertical: inputs.vertical.clone(),
-        classes: inputs.classes.as_ref().map(|(_, source)| source.clone()),
-        mask: args.mask.as_ref().map(name),
-        terrain: args.dtm.as_ref().map(name),
-        notes: inputs.notes.iter().cloned().chain(notes(found, &config)).collect(),
-        missed: missed(args, found),
-        config,
-    }
+    config.page = args.html.clone();
+    config.error_map = args.error_map.clone();
+    config.overwrite = args.overwrite;
+    config.requirements = requirements(args);
+    config
 }
 
-fn config(args: &Args) -> EvalConfig {
-    let mut thresholds_m = if args.thresholds.is_empty() { vec![0.5, 1.0, 2.5, 7.5] } else { args.thresholds.clone() };
-    thresholds_m.extend(args.min_completeness.iter().map(|least| least.threshold_m));
-    thresholds_m.sort_by(f64::total_cmp);
-    thresholds_m.dedup();
-    EvalConfig {
-        alignment: args.align.unwrap_or(Align::Xyz).into(),
-        search_m: args.search_m,
-        thresholds_m,
-        skip: args.skip.clone(),
-        standing_m: args.standing_m,
-    }
-}
-
-/// What a reader of the numbers must know.
-fn notes(found: &Evaluation, config: &EvalConfig) -> Vec<String> {
-    /// Below this, the NMAD hardly depends on the shift.
-    const FLAT: f64 = 1.02;
-    let mut notes = Vec::new();
-    if let Some(search) = found.search {
-        if search.at_edge {
-            notes.push(format!(
-                "the best shift is at the edge of the search ({} m): the true one may be outside, see --search-m",
-                search.radius_m
-            ));
+/// Names the files that were written, one a line.
+fn written(args: &Args, report: &GridEvalReport) -> Vec<String> {
+    let mut lines = Vec::new();
+    lines.extend(report.error_map.as_ref().map(|path| format!("error map  {}", path.display())));
+    lines.extend(report.page.as_ref().map(|path| format!("page       {}", path.display())));
+    match &report.report_page {
+        Some(page) => lines.push(format!("report     {}", page.display())),
+        None if report.report_failure.is_none() && args.html.is_none() && !args.no_report => {
+            lines.push("report     none; -o DIR writes one (page, JSON, error map)".to_owned());
         }
-        if search.contrast < FLAT {
-            notes.push(
-                "the ground is too flat for a horizontal shift to be found: the one reported is arbitrary".into(),
-            );
+        None => {}
+    }
+    lines
+}
+
+/// Compares surfaces and returns the requirements that were missed.
+fn surfaces(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
+    refuse_grid_options(args, "surfaces")?;
+    let report = jobs::eval::evaluate_surfaces(&surface_config(args), &Log).map_err(hinted)?;
+    if args.json {
+        print::json(&report)?;
+    } else {
+        print::text(&report.table())?;
+        if let (Some(path), false) = (&report.written, global.is_quiet()) {
+            print::text(&format!("report     {}\n", path.display()))?;
         }
     }
-    if let Some(nk) = found.nuth_kaab.filter(|nk| !nk.converged) {
-        notes.push(format!(
-            "nuth-kaab did not settle (last correction {:.3} m, NMAD {:.3} m before and {:.3} m after): compare with --align xyz",
-            nk.last_step_m, nk.nmad_before_m, nk.nmad_after_m
-        ));
-    }
-    if !config.skip.is_empty() && found.skipped_cells == 0 {
-        notes.push("no valid reference cell has a skipped class".into());
-    }
-    notes
+    Ok(report.missed().to_vec())
 }
 
-/// The requirements that are not met, in words.
-fn missed(args: &Args, found: &Evaluation) -> Vec<String> {
-    let mae = found.overall.errors.map_or(f64::INFINITY, |errors| errors.mae);
-    let mae = args.max_mae.filter(|&most| mae > most).map(|most| format!("mae is {mae:.3} m, allowed are {most} m"));
-    let completeness = args.min_completeness.iter().filter_map(|least| {
-        let share = found.overall.completeness(least.threshold_m).unwrap_or(0.0);
-        let LeastCompleteness { threshold_m, share: needed } = least;
-        (share < *needed).then(|| format!("completeness_{threshold_m} is {share:.4}, required are {needed}"))
-    });
-    mae.into_iter().chain(completeness).collect()
+fn surface_config(args: &Args) -> SurfaceEvalConfig {
+    let given = &args.surface;
+    let mut config = SurfaceEvalConfig::new(args.test.clone(), args.reference.clone());
+    if !args.thresholds.is_empty() {
+        config.thresholds_m = args.thresholds.clone();
+    }
+    config.samples_per_m2 = given.samples_per_m2;
+    config.sample_seed = given.sample_seed;
+    config.normal_scale_m = given.normal_scale;
+    config.cylinder_m = given.cylinder;
+    config.cylinder_reach_m = given.cylinder_reach;
+    config.registration_m = given.registration;
+    config.voxel_m = given.voxel;
+    config.lod = given.lod;
+    config.all_objects = given.all_objects;
+    config.test_vertical = args.test_vertical;
+    config.reference_vertical = args.ref_vertical;
+    config.output = args.output.clone();
+    config.overwrite = args.overwrite;
+    config.requirements = requirements(args);
+    config
+}
+
+/// Compares maps and returns the requirements that were missed.
+fn maps(args: &Args) -> anyhow::Result<Vec<String>> {
+    refuse_grid_options(args, "maps")?;
+    ensure!(args.output.is_none(), "maps are compared on the terminal or with --json: leave -o out");
+    ensure!(args.min_completeness.is_empty(), "--min-completeness is not for maps: leave it out");
+    let mut config = MapEvalConfig::new(args.test.clone(), args.reference.clone());
+    config.kind = args.maps.map(Into::into);
+    config.max_mae = args.max_mae;
+    let report = jobs::eval::compare_maps(&config, &Log).map_err(hinted)?;
+    if args.json {
+        print::json(&report)?;
+    } else {
+        print::text(&report.table())?;
+    }
+    Ok(report.missed)
+}
+
+/// Adds the option that helps with an error.
+fn hinted(error: EvalJobError) -> anyhow::Error {
+    let hint = match &error {
+        EvalJobError::ForeignFile { .. } | EvalJobError::File(FileError::Exists { .. }) => Some(OVERWRITE),
+        EvalJobError::DatumUnknown { unknown: "test", .. } => Some("give --test-vertical"),
+        EvalJobError::DatumUnknown { .. } => Some("give --ref-vertical"),
+        EvalJobError::NoEpsgForErrorMap => Some("leave --error-map out"),
+        EvalJobError::MapChannels { .. } => Some("name their kind with --maps"),
+        EvalJobError::Grids(eval::EvalError::SkipWithoutClasses) => Some("give --classes"),
+        _ => None,
+    };
+    with_hint(error, hint)
 }

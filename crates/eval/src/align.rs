@@ -1,10 +1,10 @@
 //! What is removed before two surfaces are compared.
 
 use raster::GeoTransform;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How the evaluated surface is moved onto the reference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Alignment {

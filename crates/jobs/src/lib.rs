@@ -6,6 +6,8 @@ pub mod city;
 pub mod corrections;
 pub mod dsm;
 mod error;
+mod error_text;
+pub mod eval;
 pub mod files;
 pub mod map_surface;
 pub mod placed_model;

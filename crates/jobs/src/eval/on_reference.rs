@@ -1,35 +1,44 @@
-//! From the cells of the reference to those of another file: surfaces, terrain, classes, masks.
+//! Rasters on other grids, read at the cells of the reference: surfaces, terrain, classes, masks.
 
 use std::path::Path;
 
-use anyhow::{Context, bail, ensure};
 use crs::{CrsIdentity, MapProjection};
 use eval::{CellMap, bilinear, nearest};
 use geodesy::{meridian_radius_m, prime_vertical_radius_m};
 use io::raster::{Dem, ImageSource};
 use raster::{GeoTransform, Grid};
 
-/// Most cells of a class raster.
+use super::error::EvalJobError;
+
+/// Most cells that are read from a class raster or mask.
 const CELLS_MAX: usize = 1 << 30;
 
-/// The name of a file's CRS for PROJ; `None` where it has none.
+/// Returns the coordinate reference system of a file as PROJ takes it.
 pub(super) fn definition(dem: &Dem) -> Option<String> {
     dem.horizontal_epsg.map(|code| format!("EPSG:{code}")).or_else(|| dem.crs_wkt.clone())
 }
 
-pub(super) fn projection(definition: &str, path: &Path) -> anyhow::Result<MapProjection> {
-    MapProjection::from_definition(definition).with_context(|| format!("its coordinate system: {}", path.display()))
+/// Makes the projection of a file's coordinate reference system.
+pub(super) fn projection(definition: &str, path: &Path) -> Result<MapProjection, EvalJobError> {
+    MapProjection::from_definition(definition).map_err(EvalJobError::file_crs(path))
 }
 
-/// Metres per map unit of a surface along x and y, at its middle.
-pub(super) fn metres_per_unit(dem: &Dem) -> anyhow::Result<(f64, f64)> {
+/// Returns the metres per map unit of a surface along x and y, at its middle.
+pub(super) fn metres_per_unit(dem: &Dem) -> Result<(f64, f64), EvalJobError> {
     let (column, row) = (dem.heights.width() as f64 / 2.0, dem.heights.height() as f64 / 2.0);
     let lat_deg = dem.geotransform.map_from_cell(column, row).1;
     metres_per_unit_at(definition(dem).as_deref(), lat_deg, &dem.path)
 }
 
-/// … of a coordinate system: the same everywhere on a map, those of the latitude for degrees; 1 where there is none.
-pub(super) fn metres_per_unit_at(definition: Option<&str>, lat_deg: f64, path: &Path) -> anyhow::Result<(f64, f64)> {
+/// Returns the metres per unit of a coordinate reference system along x and y.
+///
+/// The scale of a projected map is the same everywhere; degrees are measured on the ellipsoid at `lat_deg`. Without a
+/// coordinate reference system the unit is taken as the metre.
+pub(super) fn metres_per_unit_at(
+    definition: Option<&str>,
+    lat_deg: f64,
+    path: &Path,
+) -> Result<(f64, f64), EvalJobError> {
     let Some(definition) = definition else { return Ok((1.0, 1.0)) };
     if let Some(metres) = projection(definition, path)?.metres_per_unit() {
         return Ok((metres, metres));
@@ -39,13 +48,16 @@ pub(super) fn metres_per_unit_at(definition: Option<&str>, lat_deg: f64, path: &
     Ok((east * per_degree, meridian_radius_m(lat_deg) * per_degree))
 }
 
-/// The map from the cells of the reference to those of a grid with a CRS of its own (or, without, that of the reference).
+/// Returns the map from the cells of the reference to the cells of another grid.
+///
+/// A grid without a coordinate reference system is taken to be in the one of the reference. The map holds for `margin`
+/// cells beyond the reference.
 pub(super) fn cell_map(
     reference: &Dem,
     other: &GeoTransform,
     other_crs: Option<String>,
     margin: usize,
-) -> anyhow::Result<CellMap> {
+) -> Result<CellMap, EvalJobError> {
     let (from, to) = match (definition(reference), other_crs) {
         (Some(from), Some(to)) if from != to => (from, to),
         _ => return Ok(CellMap::affine(&reference.geotransform, other)?),
@@ -60,8 +72,8 @@ pub(super) fn cell_map(
     Ok(CellMap::projected(&reference.geotransform, other, size, margin, project)?)
 }
 
-/// Another surface at the cells of the reference.
-pub(super) fn surface_on_reference(other: &Dem, reference: &Dem) -> anyhow::Result<Grid<f32>> {
+/// Reads another surface at the cells of the reference, bilinearly.
+pub(super) fn surface_on_reference(other: &Dem, reference: &Dem) -> Result<Grid<f32>, EvalJobError> {
     let map = cell_map(reference, &other.geotransform, definition(other), 0)?;
     let mut on_reference = Grid::filled(reference.heights.width(), reference.heights.height(), f32::NAN);
     for row in 0..on_reference.height() {
@@ -73,36 +85,41 @@ pub(super) fn surface_on_reference(other: &Dem, reference: &Dem) -> anyhow::Resu
     Ok(on_reference)
 }
 
-/// The whole numbers of a raster at the cells of the reference, each from the nearest cell; `what` it is, in a word.
+/// Reads the whole numbers of a raster at the cells of the reference, each from the nearest cell. `what` names the
+/// raster in messages.
 pub(super) fn numbers_on_reference(
     path: &Path,
-    what: &str,
+    what: &'static str,
     reference: &Dem,
     notes: &mut Vec<String>,
-) -> anyhow::Result<Grid<Option<i32>>> {
+) -> Result<Grid<Option<i32>>, EvalJobError> {
+    let unusable = |found: String| EvalJobError::NumberRaster { what, found, path: path.to_owned() };
     let source = ImageSource::open(path)?;
     let info = source.info();
-    ensure!(info.bands == 1, "{} bands, expected the one of a {what} raster: {}", info.bands, path.display());
+    if info.bands != 1 {
+        return Err(unusable(format!("has {} bands, expected one", info.bands)));
+    }
     let cells = info.width.saturating_mul(info.height);
-    ensure!(cells <= CELLS_MAX, "{cells} cells, at most 2^30 are read from a {what} raster: {}", path.display());
-    let own = whole_numbers(&source.read_luma(source.window())?.luma, what, path)?;
+    if cells > CELLS_MAX {
+        return Err(unusable(format!("has {cells} cells, at most 2^30 are read")));
+    }
+    let own = whole_numbers(&source.read_luma(source.window())?.luma).map_err(unusable)?;
     let (width, height) = (reference.heights.width(), reference.heights.height());
     let Some(geotransform) = info.geotransform else {
-        ensure!(
-            (own.width(), own.height()) == (width, height),
-            "the {what} raster has no georeference and {} x {} cells, the reference {width} x {height}: give one that names \
-             its position: {}",
-            own.width(),
-            own.height(),
-            path.display()
-        );
+        if (own.width(), own.height()) != (width, height) {
+            return Err(unusable(format!(
+                "has no georeference and {} x {} cells, the reference {width} x {height}: use one that names its position",
+                own.width(),
+                own.height()
+            )));
+        }
         notes.push(format!(
             "the {what} raster has no georeference: taken as on the grid of the reference, which has its size"
         ));
         return Ok(own);
     };
     let crs = info.crs_wkt.as_deref().map(|wkt| {
-        Ok::<_, anyhow::Error>(match CrsIdentity::of(wkt)?.horizontal {
+        Ok::<_, EvalJobError>(match CrsIdentity::of(wkt)?.horizontal {
             Some(code) => format!("EPSG:{code}"),
             None => wkt.to_owned(),
         })
@@ -118,10 +135,11 @@ pub(super) fn numbers_on_reference(
     Ok(on_reference)
 }
 
-fn whole_numbers(values: &Grid<f32>, what: &str, path: &Path) -> anyhow::Result<Grid<Option<i32>>> {
+/// Converts samples to whole numbers; NaN becomes `None`.
+fn whole_numbers(values: &Grid<f32>) -> Result<Grid<Option<i32>>, String> {
     let whole = |&value: &f32| (value.is_finite() && value.fract() == 0.0).then_some(value as i32);
     if let Some(odd) = values.data().iter().find(|v| v.is_finite() && whole(v).is_none()) {
-        bail!("the {what} raster holds {odd}, expected whole numbers: {}", path.display());
+        return Err(format!("holds {odd}, expected whole numbers"));
     }
     Ok(values.map(whole))
 }

@@ -1,37 +1,38 @@
 //! One vertical datum for all surfaces of an evaluation.
 //!
-//! Two stated datums are converted into each other. Where one side does not state its own, heights above a geoid are refused until it
-//! is named; heights above the ellipsoid are taken as shared when the alignment removes a vertical offset, and refused when it
-//! does not: a geoid taken for the ellipsoid would be an error of tens of metres.
+//! If both files name a datum, the heights of the test are converted to the datum of the reference. If only one file names
+//! its datum, and this is a geoid, the comparison is refused until the other datum is named. If it is the ellipsoid, both are
+//! taken as above the ellipsoid when the alignment removes a vertical offset, and the comparison is refused when it does
+//! not: a geoid taken for the ellipsoid would be an error of tens of metres.
 
-use anyhow::{Context, bail};
 use crs::{HeightConverter, VerticalDatum};
 use eval::{Alignment, MetresFromCells, convert_heights};
 use io::raster::Dem;
 
-use super::grids::{definition, metres_per_unit, projection};
+use super::error::EvalJobError;
+use super::on_reference::{definition, metres_per_unit, projection};
 
-/// What the heights of the two are above, as far as files and options say.
-pub(super) struct Stated {
+/// Vertical datums of the two surfaces, where the files or the configuration name them.
+pub(super) struct StatedDatums {
     pub(super) test: Option<VerticalDatum>,
     pub(super) reference: Option<VerticalDatum>,
 }
 
-impl Stated {
-    /// Brings the test heights to the reference's datum, which is returned.
+impl StatedDatums {
+    /// Converts the test heights to the datum of the reference, and returns that datum.
     pub(super) fn reconcile(
         &self,
         test: &mut Dem,
         alignment: Alignment,
         notes: &mut Vec<String>,
-    ) -> anyhow::Result<Option<VerticalDatum>> {
-        let unstated = |what: &str, other: &str, option: &str, datum: VerticalDatum| {
+    ) -> Result<Option<VerticalDatum>, EvalJobError> {
+        let unstated = |unknown: &'static str, known: &'static str, datum: VerticalDatum| {
             if datum != VerticalDatum::Ellipsoid || alignment == Alignment::None {
-                bail!(
-                    "the {other}'s heights are above {datum}, the {what} does not say what its own are above: give {option}"
-                );
+                return Err(EvalJobError::DatumUnknown { known, unknown, datum });
             }
-            Ok(format!("the {what} does not say what its heights are above: taken as the ellipsoid, as the {other}'s"))
+            Ok(format!(
+                "the {unknown} does not say what its heights are above: taken as the ellipsoid, as the {known}'s"
+            ))
         };
         let (test_datum, reference_datum) = match (self.test, self.reference) {
             (None, None) => {
@@ -40,11 +41,11 @@ impl Stated {
             }
             (Some(test), Some(reference)) => (test, reference),
             (Some(datum), None) => {
-                notes.push(unstated("reference", "test", "--ref-vertical", datum)?);
+                notes.push(unstated("reference", "test", datum)?);
                 (datum, datum)
             }
             (None, Some(datum)) => {
-                notes.push(unstated("test", "reference", "--test-vertical", datum)?);
+                notes.push(unstated("test", "reference", datum)?);
                 (datum, datum)
             }
         };
@@ -56,12 +57,12 @@ impl Stated {
     }
 }
 
-/// Brings a terrain model to the datum of the reference; one that states none is taken as being there already.
+/// Converts a terrain model to the datum of the reference. A model that names no datum is taken to be in it already.
 pub(super) fn bring_terrain(
     terrain: &mut Dem,
     datum: Option<VerticalDatum>,
     notes: &mut Vec<String>,
-) -> anyhow::Result<()> {
+) -> Result<(), EvalJobError> {
     match (terrain.vertical, datum) {
         (Some(from), Some(to)) if from != to => {
             convert(terrain, from, to)?;
@@ -73,13 +74,9 @@ pub(super) fn bring_terrain(
     Ok(())
 }
 
-fn convert(dem: &mut Dem, from: VerticalDatum, to: VerticalDatum) -> anyhow::Result<()> {
-    let definition = definition(dem).with_context(|| {
-        format!(
-            "heights can be converted from {from} to {to} only in a known coordinate system, there is none: {}",
-            dem.path.display()
-        )
-    })?;
+fn convert(dem: &mut Dem, from: VerticalDatum, to: VerticalDatum) -> Result<(), EvalJobError> {
+    let definition =
+        definition(dem).ok_or_else(|| EvalJobError::NoCrsForHeights { path: dem.path.clone(), from, to })?;
     let (along_columns, along_rows) = MetresFromCells::new(&dem.geotransform, metres_per_unit(dem)?).cell_size_m();
     let projection = projection(&definition, &dem.path)?;
     let (from, to) = (HeightConverter::new(from)?, HeightConverter::new(to)?);

@@ -1,0 +1,12 @@
+//! Errors as text for reports.
+
+/// Returns the text of an error and of all its causes, separated by colons.
+pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        text = format!("{text}: {error}");
+        cause = error.source();
+    }
+    text
+}

@@ -1,0 +1,133 @@
+//! Writes the outputs of a comparison of height grids: the report folder, the page alone, the error map.
+//!
+//! A surface model inside the folder of a DSM run (`RUN/dsm/dsm.tif`, with `RUN/report/report.json` beside it) can have its
+//! report in `RUN/eval` without being asked. Files of an earlier evaluation are replaced; other files are not, unless the
+//! configuration allows it.
+
+use std::path::{Path, PathBuf};
+
+use crs::Crs;
+use io::raster::{Band, BandData, CogRaster, write_cog, write_png_rgb};
+use io::write_bytes;
+use numeric::Progress;
+use report::{EvaluationReport, error_picture};
+
+use super::error::EvalJobError;
+use super::grid_config::{EvalTarget, GridEvalConfig};
+use super::grid_inputs::GridInputs;
+use super::report_folder::{REPORT_JSON, check_ours};
+use crate::files::{self, FileError};
+
+const ERROR_MAP: &str = "error_map.tif";
+const ERROR_PICTURE: &str = "error_map.png";
+/// The page is written last, so that a folder with a page is complete.
+const PAGE: &str = "report.html";
+
+/// Folder that the report is written to.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Target {
+    folder: PathBuf,
+    /// Whether the folder follows from the place of the test, and nobody asked for it. Then a failure is a warning.
+    automatic: bool,
+}
+
+/// What became of the report folder.
+#[derive(Debug, Default)]
+pub(super) struct Written {
+    /// The page in the folder.
+    pub(super) page: Option<PathBuf>,
+    /// Reason why the automatic report was not written.
+    pub(super) failure: Option<String>,
+}
+
+impl Target {
+    /// Returns the folder that the configuration asks for, or that the place of the test suggests.
+    pub(super) fn of(config: &GridEvalConfig) -> Option<Self> {
+        match &config.target {
+            EvalTarget::Nowhere => None,
+            EvalTarget::Folder(folder) => Some(Self { folder: folder.clone(), automatic: false }),
+            EvalTarget::RunFolder => {
+                let dsm = config.test.parent().filter(|p| p.file_name().is_some_and(|name| name == "dsm"));
+                let run = dsm?.parent()?;
+                let is_run = run.join("report/report.json").is_file() && run.join("used_config.toml").is_file();
+                is_run.then(|| Self { folder: run.join("eval"), automatic: true })
+            }
+        }
+    }
+
+    /// Refuses to replace files that no evaluation wrote.
+    fn check(&self, overwrite: bool) -> Result<(), EvalJobError> {
+        let taken = [REPORT_JSON, ERROR_MAP, ERROR_PICTURE, PAGE].map(|name| self.folder.join(name));
+        check_ours(&self.folder, &taken, overwrite)
+    }
+}
+
+/// Refuses before the work what would fail after it.
+pub(super) fn check(config: &GridEvalConfig, target: Option<&Target>) -> Result<(), EvalJobError> {
+    for path in config.error_map.iter().chain(&config.page) {
+        files::refuse_existing(path, config.overwrite)?;
+    }
+    target.filter(|target| !target.automatic).map_or(Ok(()), |target| target.check(config.overwrite))
+}
+
+/// Writes the outputs that were asked for, and the report folder.
+pub(super) fn write(
+    config: &GridEvalConfig,
+    target: Option<&Target>,
+    inputs: &GridInputs,
+    report: &EvaluationReport<'_>,
+    progress: &dyn Progress,
+) -> Result<Written, EvalJobError> {
+    if let Some(path) = &config.error_map {
+        let horizontal = inputs.reference.horizontal_epsg.ok_or(EvalJobError::NoEpsgForErrorMap)?;
+        write_error_map(path, horizontal, inputs, report, config.overwrite)?;
+    }
+    if let Some(path) = &config.page {
+        write_bytes(path, report.html()?.as_bytes(), config.overwrite).map_err(FileError::from)?;
+    }
+    let Some(target) = target else { return Ok(Written::default()) };
+    match write_folder(target, inputs, report, config.overwrite) {
+        Ok(page) => Ok(Written { page: Some(page), failure: None }),
+        Err(error) if target.automatic => {
+            let failure = crate::error_text::with_causes(&error);
+            progress.warn(&format!("no report was written: {failure}"));
+            Ok(Written { page: None, failure: Some(failure) })
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Writes the report folder and returns its page.
+fn write_folder(
+    target: &Target,
+    inputs: &GridInputs,
+    report: &EvaluationReport<'_>,
+    overwrite: bool,
+) -> Result<PathBuf, EvalJobError> {
+    target.check(overwrite)?;
+    let folder = &target.folder;
+    files::create_folder(folder)?;
+    // The JSON comes first, so that an interrupted evaluation is recognised as one.
+    files::write_json(&folder.join(REPORT_JSON), &report.json(), true)?;
+    if let Some(horizontal) = inputs.reference.horizontal_epsg {
+        write_error_map(&folder.join(ERROR_MAP), horizontal, inputs, report, true)?;
+    }
+    let picture = error_picture(&report.found.errors, report.reference, report.error_range_m());
+    write_png_rgb(folder.join(ERROR_PICTURE), &picture, true).map_err(FileError::from)?;
+    let page = folder.join(PAGE);
+    write_bytes(&page, report.html()?.as_bytes(), true).map_err(FileError::from)?;
+    Ok(page)
+}
+
+/// Writes the errors as a GeoTIFF on the grid of the reference.
+fn write_error_map(
+    path: &Path,
+    horizontal: u32,
+    inputs: &GridInputs,
+    report: &EvaluationReport<'_>,
+    overwrite: bool,
+) -> Result<(), EvalJobError> {
+    let bands = [Band { description: "error_m", data: BandData::F32(&report.found.errors) }];
+    let raster = CogRaster::new(&bands, inputs.reference.geotransform, Crs::ellipsoidal(horizontal));
+    Ok(write_cog(path, &raster, overwrite).map_err(FileError::from)?)
+}
