@@ -40,7 +40,8 @@ pub(crate) fn report(e: &anyhow::Error) {
     for cause in causes {
         text.push_str(&format!("  caused by: {cause}\n"));
     }
-    if let Some(hint) = hint {
+    let overwrite = || text.contains(io::atomic::OUTPUT_EXISTS).then(|| OVERWRITE.to_owned());
+    if let Some(hint) = hint.map(Hint::to_string).or_else(overwrite) {
         text.push_str(&format!("  hint: {hint}\n"));
     }
     // Where even standard error is closed, only the exit code is left.

@@ -10,14 +10,14 @@ use std::path::{Path, PathBuf};
 use camera::ImagePoint;
 use clap::ValueEnum;
 use geodesy::LonLatHeight;
-use io::rpc::{RpcFormat, RpcWriteError};
+use io::rpc::RpcFormat;
 use jobs::rpc::{
     RpcConvertConfig, RpcDirection, RpcError, RpcInfoConfig, RpcInfoReport, RpcLineAnswer, RpcLinesConfig, RpcPoint,
     RpcPointsConfig, RpcQuery,
 };
 use serde_json::{Value, json};
 
-use crate::error::{OVERWRITE, with_hint};
+use crate::error::with_hint;
 use crate::progress::Log;
 use crate::{Outcome, print};
 
@@ -147,7 +147,6 @@ fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
     });
     let report = jobs::rpc::convert(&config, &Log).map_err(|error| {
         let hint = match &error {
-            RpcError::Write(RpcWriteError::Exists { .. }) => Some(OVERWRITE),
             RpcError::UnknownEnding { .. } => Some("give --format text, rpb or json"),
             _ => None,
         };

@@ -3,6 +3,7 @@
 //! Readers convert to the toolkit's one convention (centre of the upper-left pixel at 0, 0; metres above the ellipsoid)
 //! and say so; writers put a file under its name only when it is complete.
 
+pub mod atomic;
 pub mod citymodel;
 pub mod colmap;
 pub mod control;
@@ -14,11 +15,9 @@ pub mod points;
 pub mod positions;
 pub mod raster;
 pub mod rpc;
-mod save;
 pub mod similarity;
 pub mod splat_ply;
 pub mod surfaces;
 pub mod transforms;
 
-pub use raster::write_bytes;
-pub use save::SaveError;
+pub use atomic::{SaveError, write_bytes};

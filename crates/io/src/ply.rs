@@ -5,8 +5,8 @@
 
 use std::path::Path;
 
-use crate::SaveError;
-use crate::save::save;
+use crate::atomic::SaveError;
+use crate::atomic::write_stream;
 
 /// A point with its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,7 @@ pub fn write_points(
     comments: &[String],
     overwrite: bool,
 ) -> Result<(), SaveError> {
-    save(path.as_ref(), overwrite, |out| {
+    write_stream(path.as_ref(), overwrite, |out| {
         let count = points.len();
         writeln!(out, "ply\nformat binary_little_endian 1.0")?;
         for comment in comments {

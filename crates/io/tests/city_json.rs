@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use city::{
     CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, ModelPoint, ObjectKind, Surface, SurfaceClass,
 };
+use io::SaveError;
 use io::citymodel::{CityError, CityFile, CityFormat, CityJsonOptions, read, write_cityjson};
 
 fn read_text(text: &str) -> Result<CityFile, CityError> {
@@ -205,7 +206,7 @@ fn what_is_written_is_read_back() {
         }
     }
     let again = write_cityjson(&path, &model, &CityJsonOptions::default());
-    assert!(matches!(again, Err(CityError::Exists { .. })));
+    assert!(matches!(again, Err(CityError::NotWritten(SaveError::Exists { .. }))));
     write_cityjson(&path, &model, &CityJsonOptions { overwrite: true, ..CityJsonOptions::default() }).unwrap();
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing else is left in the folder");
 }

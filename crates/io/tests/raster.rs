@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use camera::Rpc;
 use crs::{Crs, VerticalDatum};
+use io::SaveError;
 use io::raster::{
     Band, BandData, CogRaster, ImageSource, LumaRule, RasterError, SampleType, read_dem, read_dem_window, write_cog,
     write_image_with_rpc, write_png_gray, write_png_rgb,
@@ -102,7 +103,10 @@ fn nothing_is_replaced_without_leave_and_failures_leave_nothing() {
     let crs = Crs::ellipsoidal(32631);
     let one = [Band { description: "a", data: BandData::U8(&small) }];
     let uneven = [one[0], Band { description: "b", data: BandData::U8(&large) }];
-    assert!(matches!(write_cog(&path, &CogRaster::new(&one, place, crs), false), Err(RasterError::Exists { .. })));
+    assert!(matches!(
+        write_cog(&path, &CogRaster::new(&one, place, crs), false),
+        Err(RasterError::NotWritten(SaveError::Exists { .. }))
+    ));
     let error = write_cog(&path, &CogRaster::new(&uneven, place, crs), true);
     assert!(matches!(error, Err(RasterError::InconsistentBands { .. })));
     let error = write_cog(&path, &CogRaster::new(&[], place, crs), true);
@@ -115,10 +119,10 @@ fn nothing_is_replaced_without_leave_and_failures_leave_nothing() {
     assert_eq!(ImageSource::open(&path).unwrap().info().sample, SampleType::U8);
     let nowhere = folder.path().join("no/such/folder/out.tif");
     let error = write_cog(&nowhere, &CogRaster::new(&one, place, crs), false);
-    assert!(matches!(error, Err(RasterError::Unwritable { .. })));
+    assert!(matches!(error, Err(RasterError::NotWritten(SaveError::Unwritable { .. }))));
     assert!(matches!(
         write_cog(folder.path(), &CogRaster::new(&one, place, crs), true),
-        Err(RasterError::Unwritable { .. })
+        Err(RasterError::NotWritten(SaveError::Unwritable { .. }))
     ));
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use io::rpc::{Existing, Fault, RpcFormat, RpcReadError, TEXT_LIMIT, read, read_for_image, to_text, write};
+use io::rpc::{Fault, RpcFormat, RpcReadError, TEXT_LIMIT, read, read_for_image, to_text, write};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
@@ -273,12 +273,12 @@ fn files_beside_an_image_are_found_without_regard_to_case() {
 fn writing_keeps_or_replaces_and_leaves_nothing_else() {
     let folder = TempDir::new().expect("a folder");
     let path = folder.path().join("a.json");
-    write(&path, &plain(), RpcFormat::Json, Existing::Keep).expect("a new file");
-    assert!(write(&path, &plain(), RpcFormat::Text, Existing::Keep).is_err());
+    write(&path, &plain(), RpcFormat::Json, false).expect("a new file");
+    assert!(write(&path, &plain(), RpcFormat::Text, false).is_err());
     assert_eq!(read(&path).expect("the first").format, RpcFormat::Json);
-    write(&path, &plain(), RpcFormat::Text, Existing::Replace).expect("replaced");
+    write(&path, &plain(), RpcFormat::Text, true).expect("replaced");
     assert_eq!(read(&path).expect("the second").format, RpcFormat::Text);
-    assert!(write(&path, &plain(), RpcFormat::Dimap, Existing::Replace).is_err());
+    assert!(write(&path, &plain(), RpcFormat::Dimap, true).is_err());
     assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 1);
 }
 

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use io::SaveError;
 use io::raster::RasterError;
 use serde::Serialize;
 
@@ -43,7 +44,16 @@ pub enum FileError {
 impl From<RasterError> for FileError {
     fn from(error: RasterError) -> Self {
         match error {
-            RasterError::Exists { path } => Self::Exists { path },
+            RasterError::NotWritten(error) => error.into(),
+            other => Self::Write(other.into()),
+        }
+    }
+}
+
+impl From<SaveError> for FileError {
+    fn from(error: SaveError) -> Self {
+        match error {
+            SaveError::Exists { path } => Self::Exists { path },
             other => Self::Write(other.into()),
         }
     }
@@ -58,10 +68,7 @@ impl FileError {
 
 /// Fails when `path` exists and must not be replaced, so that a job stops before it computes.
 pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), FileError> {
-    if !overwrite && path.symlink_metadata().is_ok() {
-        return Err(FileError::Exists { path: path.to_owned() });
-    }
-    Ok(())
+    Ok(io::atomic::refuse_existing(path, overwrite)?)
 }
 
 /// Makes a folder and the folders above it.

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use city::DefectCode;
 
+use crate::atomic::SaveError;
+
 /// A file that is no city model, or one that breaks the rules of its format.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -34,20 +36,9 @@ pub enum CityError {
         /// What is wrong and where.
         fault: CityFault,
     },
-    /// The output exists.
-    #[error("the output exists already: choose another name or pass --overwrite: {}", .path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The output cannot be written.
-    #[error("cannot write the file ({reason}): {}", .path.display())]
-    Unwritable {
-        /// The file.
-        path: PathBuf,
-        /// What stands in the way.
-        reason: String,
-    },
+    /// The file was not written.
+    #[error(transparent)]
+    NotWritten(#[from] SaveError),
 }
 
 /// What is wrong with the content of a file, with the number in the catalogue and the place.

@@ -13,7 +13,6 @@ mod export;
 mod obj;
 mod placement;
 mod ply;
-mod save;
 
 use std::fmt;
 use std::path::{Path, PathBuf};

@@ -22,7 +22,7 @@ use camera::{Lens, LensError, LensModel, Pose};
 pub use points::{ColmapObservation, ColmapPoint, read_with_points};
 pub use write::{ColmapEncoding, write};
 
-use crate::save::SaveError;
+use crate::atomic::SaveError;
 
 /// Files are read up to this size, bytes: images come with all their points.
 const SIZE_LIMIT: u64 = 4 << 30;

@@ -4,7 +4,7 @@ use camera::{ImagePoint, Lens, LensModel, Pose};
 use proptest::prelude::*;
 
 use super::*;
-use crate::SaveError;
+use crate::atomic::SaveError;
 
 fn observation(view: u32, sample: f64, line: f64) -> ColmapObservation {
     ColmapObservation { view, pixel: ImagePoint { sample, line } }

@@ -8,8 +8,8 @@ mod header;
 
 use std::path::{Path, PathBuf};
 
-use crate::SaveError;
-use crate::save::save;
+use crate::atomic::SaveError;
+use crate::atomic::write_stream;
 
 /// Files are read up to this size, bytes.
 const SIZE_LIMIT: u64 = 8 << 30;
@@ -173,7 +173,7 @@ pub fn write<T: NpyNumber>(
         return Err(NpyError::Shape { path: path.to_owned(), shape: shape.to_vec(), numbers: numbers.len() });
     }
     let header = header::encode(T::DESCRIPTION, shape);
-    Ok(save(path, overwrite, |out| {
+    Ok(write_stream(path, overwrite, |out| {
         out.write_all(&header)?;
         let mut bytes = Vec::with_capacity(CHUNK * size_of::<T>());
         for chunk in numbers.chunks(CHUNK) {

@@ -9,7 +9,8 @@ use crs::Crs;
 use las::point::{Classification, Format};
 use las::{Builder, Point, Transform, Vector, Version, Writer};
 
-use crate::raster::{RasterError, write_whole};
+use crate::atomic::write_path;
+use crate::raster::RasterError;
 
 /// Coordinates of a LAS file are whole numbers of this, metres.
 const UNIT_M: f64 = 0.001;
@@ -19,7 +20,7 @@ const CLASS: u8 = 0;
 /// Writes points (x, y, height, metres) as LAS, or LAZ by the ending.
 ///
 /// # Errors
-/// [`RasterError::Exists`] without `overwrite`; [`RasterError::Unwritable`], also for points further apart than the format holds
+/// [`RasterError::NotWritten`], also for a file that exists without `overwrite` and for points further apart than the format holds
 /// (2,147 km) or that are not finite; [`RasterError::Crs`] for an unknown code.
 pub fn write_las(path: &Path, points: &[[f64; 3]], crs: Crs, overwrite: bool) -> Result<(), RasterError> {
     let wkt = crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
@@ -29,7 +30,7 @@ pub fn write_las(path: &Path, points: &[[f64; 3]], crs: Crs, overwrite: bool) ->
     if points.iter().flatten().any(|c| !c.is_finite()) {
         return Err(RasterError::unwritable(path, "a point is not finite"));
     }
-    write_whole(path, overwrite, |made| {
+    write_path(path, overwrite, |made| {
         let mut builder = Builder::from(Version::new(1, 4));
         builder.date = None;
         builder.generating_software = "skysweep".to_owned();

@@ -11,7 +11,8 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Encoder, EncodingError};
 use raster::Grid;
 
-use super::{RasterError, write_whole};
+use super::RasterError;
+use crate::atomic::write_path;
 
 /// Largest value of a pixel.
 const STEPS: f64 = u16::MAX as f64;
@@ -40,7 +41,7 @@ impl DepthScale {
 /// Writes depths, metres, and says how long a step is; what is not finite or not positive has no depth.
 ///
 /// # Errors
-/// [`RasterError::Exists`] without `overwrite`; [`RasterError::Unwritable`], also for depths that do not fit the scale.
+/// [`RasterError::NotWritten`], also for a file that exists without `overwrite` and for depths that do not fit the scale.
 pub fn write_depth_png(
     path: impl AsRef<Path>,
     depth_m: &Grid<f32>,
@@ -60,7 +61,7 @@ pub fn write_depth_png(
     let side = |length: usize| u32::try_from(length).ok().filter(|&length| length > 0);
     let size = side(depth_m.width()).zip(side(depth_m.height()));
     let size = size.ok_or_else(|| RasterError::unwritable(path, "the map has no pixels, or too many for a PNG"))?;
-    write_whole(path, overwrite, |made| {
+    write_path(path, overwrite, |made| {
         encode(made, size, step_m, &bytes).map_err(|error| RasterError::unwritable(path, error))
     })?;
     Ok(step_m)
@@ -80,6 +81,7 @@ fn encode(path: &Path, (width, height): (u32, u32), step_m: f64, bytes: &[u8]) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::atomic::SaveError;
 
     #[test]
     fn depths_lead_back_within_half_a_step() {
@@ -97,7 +99,7 @@ mod tests {
         let values: Vec<u16> = bytes.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
         assert_eq!(values, [0, 0, 0, 1, 12_346, 65_535]);
         let again = write_depth_png(&path, &map, DepthScale::Fit, false);
-        assert!(matches!(again, Err(RasterError::Exists { .. })));
+        assert!(matches!(again, Err(RasterError::NotWritten(SaveError::Exists { .. }))));
     }
 
     #[test]
@@ -113,7 +115,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let map = Grid::from_vec(1, 1, vec![70.0]).unwrap();
         let refused = write_depth_png(folder.path().join("d.png"), &map, DepthScale::Step(0.001), false);
-        assert!(matches!(refused, Err(RasterError::Unwritable { .. })));
+        assert!(matches!(refused, Err(RasterError::NotWritten(SaveError::Unwritable { .. }))));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

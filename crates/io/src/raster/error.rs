@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::atomic::SaveError;
+
 /// A raster file that cannot be read or written. Paths come last in the text; GDAL's own words are in `reason`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -46,20 +48,9 @@ pub enum RasterError {
         /// What can be read.
         expected: &'static str,
     },
-    /// The output exists.
-    #[error("the output exists already: choose another name or pass --overwrite: {}", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The output cannot be written.
-    #[error("cannot write the file ({reason}): {}", path.display())]
-    Unwritable {
-        /// The file.
-        path: PathBuf,
-        /// The system's or GDAL's words.
-        reason: String,
-    },
+    /// The file was not written: it exists, or the system or GDAL refused.
+    #[error(transparent)]
+    NotWritten(#[from] SaveError),
     /// The data handed over cannot make a raster.
     #[error("the bands do not make one raster ({reason}): {}", path.display())]
     InconsistentBands {
@@ -80,7 +71,7 @@ pub enum RasterError {
 
 impl RasterError {
     pub(crate) fn unwritable(path: &Path, reason: impl ToString) -> Self {
-        Self::Unwritable { path: path.to_owned(), reason: reason.to_string() }
+        Self::NotWritten(SaveError::unwritable(path, reason))
     }
 
     pub(crate) fn damaged(path: &Path, reason: impl ToString) -> Self {

@@ -16,7 +16,8 @@ use gdal::spatial_ref::SpatialRef;
 use gdal::{Dataset, DriverManager, Metadata};
 use raster::{GeoTransform, Grid, NO_DATA};
 
-use super::{RasterError, with_gdal, write_whole};
+use super::{RasterError, with_gdal};
+use crate::atomic::write_path;
 
 /// Metadata item that names what heights are measured from.
 pub(super) const VERTICAL_DATUM: &str = "VERTICAL_DATUM";
@@ -102,12 +103,12 @@ impl<'a> CogRaster<'a> {
 /// Writes a Cloud-Optimised GeoTIFF.
 ///
 /// # Errors
-/// [`RasterError::Exists`] without `overwrite`; [`RasterError::InconsistentBands`] when there is no band or bands differ
-/// in size or type; [`RasterError::Crs`] for codes that PROJ does not know; [`RasterError::Unwritable`].
+/// [`RasterError::NotWritten`] without `overwrite`; [`RasterError::InconsistentBands`] when there is no band or bands differ
+/// in size or type; [`RasterError::Crs`] for codes that PROJ does not know; [`RasterError::NotWritten`].
 pub fn write_cog(path: impl AsRef<Path>, raster: &CogRaster<'_>, overwrite: bool) -> Result<(), RasterError> {
     let path = path.as_ref();
     raster.crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
-    write_whole(path, overwrite, |made| {
+    write_path(path, overwrite, |made| {
         let mut memory = in_memory(path, raster.bands, raster.no_data)?;
         // Left to the COG driver, they would take a way through a file.
         let factors = overview_factors(memory.raster_size());
@@ -174,7 +175,7 @@ pub fn write_image_with_rpc(
     overwrite: bool,
 ) -> Result<(), RasterError> {
     let path = path.as_ref();
-    write_whole(path, overwrite, |made| {
+    write_path(path, overwrite, |made| {
         let mut memory = in_memory(path, bands, no_data)?;
         let options = plain_options(bands);
         with_gdal(|| {
@@ -199,7 +200,7 @@ pub fn write_map(
     overwrite: bool,
 ) -> Result<(), RasterError> {
     let path = path.as_ref();
-    write_whole(path, overwrite, |made| {
+    write_path(path, overwrite, |made| {
         let mut memory = in_memory(path, bands, no_data)?;
         let options = plain_options(bands);
         with_gdal(|| {

@@ -4,7 +4,6 @@
 //! convention (the centre of the upper-left pixel is 0, 0). Only local files are read, and nothing that a file names
 //! on a network is fetched. A file appears under its final name when it is complete.
 
-mod atomic;
 mod colour;
 mod dem;
 mod depth_png;
@@ -17,7 +16,6 @@ mod source;
 mod spool;
 mod tile;
 
-pub use atomic::write_bytes;
 pub use dem::{Dem, read_dem, read_dem_window};
 pub use depth_png::{DepthScale, write_depth_png};
 pub use error::RasterError;
@@ -28,5 +26,4 @@ pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use tile::{MapTile, write_map_tile};
 
-pub(crate) use atomic::write_whole;
 pub(crate) use gdal_setup::{open_dataset, prepare_gdal, with_gdal};

@@ -5,12 +5,13 @@ use std::path::Path;
 use image::{ExtendedColorType, ImageFormat};
 use raster::Grid;
 
-use super::{RasterError, write_whole};
+use super::RasterError;
+use crate::atomic::write_path;
 
 /// Writes a grey picture.
 ///
 /// # Errors
-/// [`RasterError::Exists`] without `overwrite`, [`RasterError::Unwritable`].
+/// [`RasterError::NotWritten`], also for a file that exists without `overwrite`.
 pub fn write_png_gray(path: impl AsRef<Path>, picture: &Grid<u8>, overwrite: bool) -> Result<(), RasterError> {
     write(path.as_ref(), picture.data(), picture.width(), picture.height(), ExtendedColorType::L8, overwrite)
 }
@@ -18,7 +19,7 @@ pub fn write_png_gray(path: impl AsRef<Path>, picture: &Grid<u8>, overwrite: boo
 /// Writes a colour picture; pixels are red, green, blue.
 ///
 /// # Errors
-/// [`RasterError::Exists`] without `overwrite`, [`RasterError::Unwritable`].
+/// [`RasterError::NotWritten`], also for a file that exists without `overwrite`.
 pub fn write_png_rgb(path: impl AsRef<Path>, picture: &Grid<[u8; 3]>, overwrite: bool) -> Result<(), RasterError> {
     let bytes = picture.data().as_flattened();
     write(path.as_ref(), bytes, picture.width(), picture.height(), ExtendedColorType::Rgb8, overwrite)
@@ -37,7 +38,7 @@ fn write(
     if width == 0 || height == 0 {
         return Err(RasterError::unwritable(path, "the picture has no pixels"));
     }
-    write_whole(path, overwrite, |made| {
+    write_path(path, overwrite, |made| {
         image::save_buffer_with_format(made, bytes, width, height, colour, ImageFormat::Png)
             .map_err(|error| RasterError::unwritable(path, error))
     })

@@ -12,7 +12,8 @@ use raster::{Grid, NO_DATA, Window};
 
 use super::geotiff::{BandData, CogPlace, finish_cog};
 use super::source::read_as;
-use super::{RasterError, Sampling, with_gdal, write_whole};
+use super::{RasterError, Sampling, with_gdal};
+use crate::atomic::write_path;
 
 /// Side of a spool's tiles, cells.
 pub const SPOOL_TILE: usize = 256;
@@ -53,7 +54,7 @@ impl RasterSpool {
     /// Makes an empty spool of `size` (columns, rows); an older file of the name is replaced.
     ///
     /// # Errors
-    /// [`RasterError::Unwritable`].
+    /// [`RasterError::NotWritten`].
     pub fn create(path: impl AsRef<Path>, size: (usize, usize), band: SpoolBand<'_>) -> Result<Self, RasterError> {
         let path = path.as_ref().to_owned();
         let tile = SPOOL_TILE.to_string();
@@ -106,7 +107,7 @@ impl RasterSpool {
     /// Writes cells whose first one is at `(column, row)`.
     ///
     /// # Errors
-    /// [`RasterError::InconsistentBands`] for another type of cells or a window outside, [`RasterError::Unwritable`].
+    /// [`RasterError::InconsistentBands`] for another type of cells or a window outside, [`RasterError::NotWritten`].
     pub fn put(&mut self, at: (usize, usize), cells: BandData<'_>) -> Result<(), RasterError> {
         match (cells, self.is_float) {
             (BandData::F32(grid), true) => self.write(at, grid, |v| if v.is_nan() { NO_DATA } else { v }),
@@ -118,7 +119,7 @@ impl RasterSpool {
     /// All that was put is on the disk when this returns.
     ///
     /// # Errors
-    /// [`RasterError::Unwritable`].
+    /// [`RasterError::NotWritten`].
     pub fn flush(&mut self) -> Result<(), RasterError> {
         with_gdal(|| self.dataset.flush_cache()).map_err(|reason| RasterError::unwritable(&self.path, reason))
     }
@@ -145,7 +146,7 @@ impl RasterSpool {
         let path = path.as_ref();
         self.flush()?;
         let sampling = if self.is_float { Sampling::Average } else { Sampling::Nearest };
-        write_whole(path, overwrite, |made| {
+        write_path(path, overwrite, |made| {
             finish_cog(&mut self.dataset, place, sampling, made).map_err(|reason| RasterError::unwritable(path, reason))
         })?;
         let spool = self.path.clone();

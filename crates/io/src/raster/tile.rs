@@ -12,7 +12,8 @@ use gdal::spatial_ref::SpatialRef;
 use raster::{GeoTransform, NO_DATA};
 
 use super::geotiff::{Band, BandData, VERTICAL_DATUM, copy, in_memory};
-use super::{RasterError, with_gdal, write_whole};
+use super::{RasterError, with_gdal};
+use crate::atomic::write_path;
 
 /// Rows of a strip.
 const STRIP_ROWS: &str = "128";
@@ -35,12 +36,12 @@ pub struct MapTile<'a> {
 /// Writes a map as a GeoTIFF; NaN becomes −32768 in float bands, integer bands have no no-data value.
 ///
 /// # Errors
-/// [`RasterError::Exists`] without `overwrite`; [`RasterError::InconsistentBands`]; [`RasterError::Unwritable`], also for a CRS
+/// [`RasterError::NotWritten`] without `overwrite`; [`RasterError::InconsistentBands`]; [`RasterError::NotWritten`], also for a CRS
 /// that GDAL does not read.
 pub fn write_map_tile(path: impl AsRef<Path>, tile: &MapTile<'_>, overwrite: bool) -> Result<(), RasterError> {
     let path = path.as_ref();
     let float = matches!(tile.bands.first(), Some(Band { data: BandData::F32(_), .. }));
-    write_whole(path, overwrite, |made| {
+    write_path(path, overwrite, |made| {
         let mut memory = in_memory(path, tile.bands, float.then_some(f64::from(NO_DATA)))?;
         let options = [
             ("COMPRESS", "DEFLATE"),

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use super::RpcFormat;
+use crate::atomic::SaveError;
 
 /// What is wrong with the content of a file, with the key and the line it was found on (text formats, from 1).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -204,18 +205,7 @@ pub enum RpcWriteError {
         /// The format asked for.
         format: RpcFormat,
     },
-    /// The file is there and replacing it was not asked for.
-    #[error("the file exists, ask for it to be replaced: {}", .path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file system refused.
-    #[error("cannot write {}", .path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: std::io::Error,
-    },
+    /// The file was not written.
+    #[error(transparent)]
+    NotWritten(#[from] SaveError),
 }

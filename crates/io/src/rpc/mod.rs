@@ -35,8 +35,7 @@ use camera::Rpc;
 pub use error::{Attempt, Fault, RpcReadError, RpcWriteError};
 pub use file::TEXT_LIMIT;
 pub use format::RpcFormat;
-pub(crate) use write::set_usual_permissions;
-pub use write::{Existing, to_text, write};
+pub use write::{to_text, write};
 
 use detect::Found;
 use file::Content;

@@ -4,7 +4,6 @@
 //! only when it is complete.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 
 use camera::Rpc;
@@ -13,40 +12,17 @@ use serde_json::{Map, Value};
 use super::draft::{POLYS, Poly, REQUIRED, RPC00B};
 use super::error::RpcWriteError;
 use super::{RpcFormat, json, rpb};
-
-/// What to do with a file that is already there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Existing {
-    /// Leave it and report an error.
-    Keep,
-    /// Put the new one in its place.
-    Replace,
-}
+use crate::atomic::write_bytes_synced;
 
 /// Writes `rpc` to `path` as [`RpcFormat::Text`], [`RpcFormat::Rpb`] or [`RpcFormat::Json`].
 ///
+/// The content is on the disk before the file gets its name.
+///
 /// # Errors
-/// Another format, a file that is there and is to be kept, or an error of the file system. Nothing is left behind.
-pub fn write(path: &Path, rpc: &Rpc, format: RpcFormat, existing: Existing) -> Result<(), RpcWriteError> {
+/// [`RpcWriteError::Format`] for another format; [`RpcWriteError::NotWritten`], also for a file that exists without `overwrite`.
+pub fn write(path: &Path, rpc: &Rpc, format: RpcFormat, overwrite: bool) -> Result<(), RpcWriteError> {
     let text = to_text(rpc, format)?;
-    let io = |source| RpcWriteError::Io { path: path.to_owned(), source };
-    let exists = || RpcWriteError::Exists { path: path.to_owned() };
-    if existing == Existing::Keep && path.symlink_metadata().is_ok() {
-        return Err(exists());
-    }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    set_usual_permissions(&mut builder);
-    let mut file = builder.prefix(".skysweep-").tempfile_in(folder).map_err(io)?;
-    file.write_all(text.as_bytes()).map_err(io)?;
-    file.as_file().sync_all().map_err(io)?;
-    match existing {
-        Existing::Replace => file.persist(path).map(drop).map_err(|e| io(e.error)),
-        Existing::Keep => file.persist_noclobber(path).map(drop).map_err(|e| match e.error.kind() {
-            std::io::ErrorKind::AlreadyExists => exists(),
-            _ => io(e.error),
-        }),
-    }
+    Ok(write_bytes_synced(path, text.as_bytes(), overwrite)?)
 }
 
 /// The text of an RPC file.
@@ -61,16 +37,6 @@ pub fn to_text(rpc: &Rpc, format: RpcFormat) -> Result<String, RpcWriteError> {
         format => Err(RpcWriteError::Format { format }),
     }
 }
-
-/// Temporary files are private by default; a finished RPC file is as readable as any other.
-#[cfg(unix)]
-pub(crate) fn set_usual_permissions(builder: &mut tempfile::Builder<'_, '_>) {
-    use std::os::unix::fs::PermissionsExt;
-    builder.permissions(std::fs::Permissions::from_mode(0o666));
-}
-
-#[cfg(not(unix))]
-pub(crate) fn set_usual_permissions(_: &mut tempfile::Builder<'_, '_>) {}
 
 /// The scalars in the order of [`RPC00B`], the two errors only where they are known.
 fn scalars(rpc: &Rpc) -> [Option<f64>; 12] {

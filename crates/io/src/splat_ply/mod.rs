@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use gaussian::{Splat, SplatDefect};
 
-use crate::raster::RasterError;
+use crate::atomic::SaveError;
 
 pub use origin::{LocalOrigin, origin_path};
 pub use read::read;
@@ -120,9 +120,9 @@ pub enum SplatPlyError {
         /// Its defect.
         source: SplatDefect,
     },
-    /// The file exists or cannot be written.
+    /// The file was not written.
     #[error(transparent)]
-    Output(#[from] RasterError),
+    NotWritten(#[from] SaveError),
 }
 
 fn invalid(path: &Path, what: impl Into<String>) -> SplatPlyError {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::{SplatPlyError, invalid};
-use crate::raster::write_bytes;
+use crate::atomic::write_bytes;
 
 /// Where local positions are counted from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

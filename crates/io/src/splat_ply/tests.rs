@@ -83,7 +83,7 @@ fn nothing_is_replaced_and_no_nonsense_is_written() {
     let path = folder.path().join("s.ply");
     write(&path, &splats(), &origin(), SplatLayout::default(), false).unwrap();
     let again = write(&path, &splats(), &origin(), SplatLayout::default(), false);
-    assert!(matches!(again, Err(SplatPlyError::Output(RasterError::Exists { .. }))));
+    assert!(matches!(again, Err(SplatPlyError::NotWritten(SaveError::Exists { .. }))));
     let other = folder.path().join("t.ply");
     let mut broken = splats();
     broken[1].opacity = f32::NAN;

@@ -1,13 +1,12 @@
 //! Splats out.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
 use gaussian::Splat;
 
 use super::{LocalOrigin, SH_C0, SH_DEGREE_MAX, SplatLayout, SplatPlyError, invalid};
-use crate::raster::{RasterError, write_whole};
+use crate::atomic::{refuse_existing, write_stream};
 
 /// Writes splats, and their origin beside them.
 ///
@@ -28,22 +27,13 @@ pub fn write(
     for (index, splat) in splats.iter().enumerate() {
         splat.validate().map_err(|source| SplatPlyError::Splat { path: path.to_owned(), index, source })?;
     }
-    if !overwrite && path.symlink_metadata().is_ok() {
-        return Err(RasterError::Exists { path: path.to_owned() }.into());
-    }
+    refuse_existing(path, overwrite)?;
     // The splats come last: where they are, their origin is.
     origin.write_beside(path, overwrite)?;
-    Ok(write_whole(path, overwrite, |made| {
-        let written = File::create(made).and_then(|file| {
-            let mut out = BufWriter::new(file);
-            body(&mut out, splats, layout)?;
-            out.flush()
-        });
-        written.map_err(|error| RasterError::unwritable(path, error.kind()))
-    })?)
+    Ok(write_stream(path, overwrite, |out| body(out, splats, layout))?)
 }
 
-fn body(out: &mut impl Write, splats: &[Splat], layout: SplatLayout) -> std::io::Result<()> {
+fn body(out: &mut dyn Write, splats: &[Splat], layout: SplatLayout) -> std::io::Result<()> {
     writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", splats.len())?;
     for name in layout.properties() {
         writeln!(out, "property float {name}")?;

@@ -37,7 +37,7 @@ pub enum CityJobError {
 impl From<CityError> for CityJobError {
     fn from(error: CityError) -> Self {
         match error {
-            CityError::Exists { path } => Self::File(FileError::Exists { path }),
+            CityError::NotWritten(error) => Self::File(error.into()),
             other => Self::Read(other),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::rpc::{Existing, RpcFormat};
+use io::rpc::RpcFormat;
 use serde::{Deserialize, Serialize};
 
 use super::error::RpcError;
@@ -71,8 +71,7 @@ pub fn convert(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<Rpc
     config.validate()?;
     let format = config.format.map_or_else(|| format_of(&config.output), Ok)?;
     let file = input::read(&config.file, progress)?;
-    let existing = if config.overwrite { Existing::Replace } else { Existing::Keep };
-    io::rpc::write(&config.output, &file.rpc, format, existing)?;
+    io::rpc::write(&config.output, &file.rpc, format, config.overwrite)?;
     Ok(RpcConvertReport { source: file.source, source_format: file.format, output: config.output.clone(), format })
 }
 

@@ -9,8 +9,8 @@ use std::path::Path;
 use city::{CityModel, CityObject, Geometry, GeometryKind, ModelPoint, Role, Surface, SurfaceClass};
 use serde_json::{Map, Value, json};
 
+use crate::atomic::write_stream;
 use crate::citymodel::crs_name::ogc_url;
-use crate::citymodel::save::save;
 use crate::citymodel::{CityError, CityFault};
 
 /// How a CityJSON file is written.
@@ -35,10 +35,10 @@ impl Default for CityJsonOptions {
 /// file system refuses. Nothing is left behind.
 pub fn write_cityjson(path: &Path, model: &CityModel, options: &CityJsonOptions) -> Result<(), CityError> {
     let document = document(model, options.scale).map_err(|fault| fault.at(path))?;
-    save(path, options.overwrite, |out| {
+    Ok(write_stream(path, options.overwrite, |out| {
         serde_json::to_writer(&mut *out, &document)?;
         out.write_all(b"\n")
-    })
+    })?)
 }
 
 fn document(model: &CityModel, scale: f64) -> Result<Value, CityFault> {

@@ -9,7 +9,7 @@ use city::{CityModel, ModelPoint, ObjectReport, ObjectStatus, Surface, SurfaceCl
 use crs::MapProjection;
 use serde_json::{Value, json};
 
-use crate::citymodel::save::save;
+use crate::atomic::write_stream;
 use crate::citymodel::{CityError, CityFault};
 
 /// What was written.
@@ -28,7 +28,7 @@ pub struct Footprints {
 ///
 /// # Errors
 /// A model without a known reference system, or with coordinates outside of it (refused with numbers 1010, 1011 and
-/// 1002); [`CityError::Exists`] without `overwrite`, [`CityError::Unwritable`].
+/// 1002); [`CityError::NotWritten`]: the file exists and `overwrite` is false, or the system refuses.
 pub fn write_footprints(
     path: &Path,
     model: &CityModel,
@@ -36,7 +36,7 @@ pub fn write_footprints(
     overwrite: bool,
 ) -> Result<Footprints, CityError> {
     let (features, count) = features(model, reports).map_err(|fault| fault.at(path))?;
-    save(path, overwrite, |out| {
+    write_stream(path, overwrite, |out| {
         out.write_all(b"{\"type\":\"FeatureCollection\",\"features\":[")?;
         for (number, feature) in features.iter().enumerate() {
             out.write_all(if number == 0 { b"\n" } else { b",\n" })?;

@@ -14,7 +14,8 @@ use std::path::Path;
 use city::{CityModel, TriangleMesh};
 
 use super::error::CityError;
-use super::save::save;
+use crate::atomic::SaveError;
+use crate::atomic::write_stream;
 
 pub use footprints::{Footprints, write_footprints};
 
@@ -32,7 +33,8 @@ pub enum MeshFormat {
 /// Writes the triangles of `model` that are in `mesh`.
 ///
 /// # Errors
-/// [`CityError::Exists`] without `overwrite`, [`CityError::Unwritable`], also where a format cannot hold that many triangles.
+/// [`CityError::NotWritten`]: the file exists and `overwrite` is false, the system refuses, or the format cannot hold that many
+/// triangles.
 pub fn write_mesh(
     path: &Path,
     model: &CityModel,
@@ -41,15 +43,16 @@ pub fn write_mesh(
     overwrite: bool,
 ) -> Result<(), CityError> {
     let export = Export { model, mesh };
-    let too_large = |reason: String| CityError::Unwritable { path: path.to_owned(), reason };
-    match format {
-        MeshFormat::Obj => save(path, overwrite, |out| obj::write(out, &export)),
-        MeshFormat::Ply => save(path, overwrite, |out| ply::write(out, &export)),
+    let too_large = |reason: String| SaveError::unwritable(path, reason);
+    let written = match format {
+        MeshFormat::Obj => write_stream(path, overwrite, |out| obj::write(out, &export)),
+        MeshFormat::Ply => write_stream(path, overwrite, |out| ply::write(out, &export)),
         MeshFormat::Glb => {
             let (json, binary) = glb::encode(&export).map_err(too_large)?;
-            save(path, overwrite, |out| glb::write(out, &json, &binary))
+            write_stream(path, overwrite, |out| glb::write(out, &json, &binary))
         }
-    }
+    };
+    Ok(written?)
 }
 
 /// A model and triangles of it.

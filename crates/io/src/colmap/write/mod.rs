@@ -15,7 +15,7 @@ use std::path::Path;
 use camera::{ImagePoint, Lens};
 
 use super::{ColmapError, ColmapModel, ColmapPoint, is_inside, principal_point_index};
-use crate::save::save;
+use crate::atomic::{refuse_existing, write_stream};
 
 /// How the files are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -49,13 +49,11 @@ pub fn write(
         ColmapEncoding::Text => "txt",
     };
     let file = |name: &str, make: &dyn Fn(&mut dyn Write) -> std::io::Result<()>| {
-        save(&folder.join(format!("{name}.{extension}")), overwrite, make)
+        write_stream(&folder.join(format!("{name}.{extension}")), overwrite, make)
     };
-    // What exists is found before anything is replaced.
-    let names = ["points3D", "cameras", "images"];
-    let taken = names.map(|name| folder.join(format!("{name}.{extension}")));
-    if let Some(path) = taken.into_iter().find(|path| !overwrite && path.symlink_metadata().is_ok()) {
-        return Err(crate::SaveError::Exists { path }.into());
+    // Nothing is written when one of the files exists.
+    for name in ["points3D", "cameras", "images"] {
+        refuse_existing(&folder.join(format!("{name}.{extension}")), overwrite)?;
     }
     match encoding {
         ColmapEncoding::Binary => {
