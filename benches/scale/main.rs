@@ -127,7 +127,7 @@ fn mosaics(folder: &Path, tiles: &[PathBuf], side: usize) -> anyhow::Result<Vec<
         }
         std::fs::write(&path, xml + "</VRTRasterBand>\n</VRTDataset>\n")?;
         let sidecar = folder.join(format!("view_{view}_{side}_RPC.TXT"));
-        io::rpc::write(&sidecar, &town::rpc(look, side), io::rpc::RpcFormat::Text, io::rpc::Existing::Replace)?;
+        io::rpc::write(&sidecar, &town::rpc(look, side), io::rpc::RpcFormat::Text, true)?;
         out.push(path);
     }
     Ok(out)
