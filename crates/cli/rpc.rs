@@ -7,11 +7,7 @@ use std::fmt::Write as _;
 use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 
-<<<<<<< HEAD
 use camera::ImagePoint;
-=======
-use anyhow::bail;
->>>>>>> 62993d0 (Call sites of the atomic writer)
 use clap::ValueEnum;
 use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
