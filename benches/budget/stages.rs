@@ -1,15 +1,16 @@
 //! The stages of a run, each with what it is to find given or not.
 
-use camera::RpcCamera;
+use camera::{ImagePoint, RpcCamera};
+use geodesy::MapPoint;
 use raster::Grid;
 use rayon::prelude::*;
 use simulate::Simulation;
+use sweep::aggregation::Penalties;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::cost::{Aggregation, Reference, SourceLevel};
+use sweep::cost::Aggregation;
 use sweep::fusion::{FusionConfig, GridFrame, fuse_views, place_view};
 use sweep::ranges::{EDGE_REACH, Ranges};
-use sweep::semiglobal::Penalties;
-use sweep::{HeightMap, LevelConfig, View, source_from_reference, sweep_level};
+use sweep::{HeightMap, LevelConfig, Reference, SweepView, ViewLevel, source_from_reference, sweep_level};
 
 /// That of the default preset.
 const STEP_PX: f64 = 0.5;
@@ -32,7 +33,7 @@ pub(crate) enum Known {
 /// A simulation as the sweep sees it.
 pub(crate) struct Scene<'a> {
     simulation: &'a Simulation,
-    views: Vec<View>,
+    views: Vec<SweepView>,
     step_m: f64,
     origin_m: f64,
 }
@@ -43,18 +44,18 @@ impl<'a> Scene<'a> {
         let view = |v: &simulate::SimulatedView| {
             let rpc = if is_true { &v.true_rpc } else { &v.rpc };
             let image = v.image.map(|p| if *p == 0 { f32::NAN } else { f32::from(*p) });
-            View::new(RpcCamera::new(rpc.clone()), image)
+            SweepView::new(RpcCamera::new(rpc.clone()), image)
         };
-        let views: Vec<View> = simulation.views.iter().map(view).collect();
+        let views: Vec<SweepView> = simulation.views.iter().map(view).collect();
         let (low, high) = simulation.scene.height_range_m();
         let origin_m = 0.5 * (low + high);
         let mut parallax = 0.0f64;
         for (i, a) in views.iter().enumerate() {
             for b in &views[..i] {
-                let centre = [a.levels[0].width() as f64 / 2.0, a.levels[0].height() as f64 / 2.0];
+                let centre = ImagePoint::new(a.levels[0].width() as f64 / 2.0, a.levels[0].height() as f64 / 2.0);
                 let at = |h| source_from_reference(&a.camera, &b.camera, 0, centre, h);
                 let (p, q) = (at(origin_m)?, at(origin_m + 10.0)?);
-                parallax = parallax.max((q[0] - p[0]).hypot(q[1] - p[1]) / 10.0);
+                parallax = parallax.max((q.sample - p.sample).hypot(q.line - p.line) / 10.0);
             }
         }
         Ok(Self { simulation, views, step_m: STEP_PX / parallax, origin_m })
@@ -99,7 +100,7 @@ impl<'a> Scene<'a> {
 
     fn sweep(&self, index: usize, level: usize, ranges: &Ranges, known: Known) -> anyhow::Result<HeightMap> {
         let at = |index: usize| self.views[index].on_level(index, level);
-        let sources: Vec<SourceLevel<'_>> = (0..self.views.len()).filter(|&i| i != index).map(at).collect();
+        let sources: Vec<ViewLevel<'_>> = (0..self.views.len()).filter(|&i| i != index).map(at).collect();
         let mut config = LevelConfig::default();
         config.cost.aggregation = Aggregation::of_sources(sources.len());
         if known == Known::RangeAlone {
@@ -128,7 +129,8 @@ impl<'a> Scene<'a> {
         let all: Vec<Heights<'_>> =
             maps.iter().enumerate().map(|(index, map)| Heights { index, view: &self.views[index], map }).collect();
         let [x, y] = self.simulation.frame.origin_m();
-        let map_from_ground = |g| self.simulation.frame.scene_from_ground(g).ok().map(|p| [p.x + x, p.y + y]);
+        let map_from_ground =
+            |g| self.simulation.frame.scene_from_ground(g).ok().map(|p| MapPoint { x: p.x + x, y: p.y + y });
         let frame = GridFrame { geotransform: truth.geotransform, map_from_ground: &map_from_ground };
         let cell_m = self.simulation.config.gsd_m;
         let mut placed = Vec::new();

@@ -8,10 +8,10 @@ use std::hint::black_box;
 use camera::{Rpc, RpcCamera};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use raster::{Grid, Window};
-use sweep::cost::{CostConfig, Reference, SourceLevel};
+use sweep::aggregation::Penalties;
+use sweep::cost::CostConfig;
 use sweep::ranges::Ranges;
-use sweep::semiglobal::Penalties;
-use sweep::{CostVolume, LevelConfig, View, sweep_level};
+use sweep::{CostVolume, LevelConfig, Reference, SweepView, ViewLevel, sweep_level};
 
 /// Side of the images: a block with its margin is larger than the caches.
 const SIZE: usize = 512;
@@ -44,13 +44,13 @@ fn camera(parallax: [f64; 2]) -> RpcCamera {
 }
 
 /// Views of a textured plane at height 0, where all cameras agree.
-fn views() -> Vec<View> {
+fn views() -> Vec<SweepView> {
     let texture = |i: usize| {
         let (x, y) = ((i % SIZE) as f32, (i / SIZE) as f32);
         500.0 + 90.0 * ((0.9 * x).sin() + (1.1 * y + 0.3 * x).sin() + (0.13 * x * y / 40.0).sin())
     };
     let image = Grid::from_vec(SIZE, SIZE, (0..SIZE * SIZE).map(texture).collect()).expect("a square image");
-    [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| View::new(camera(p), image.clone())).into()
+    [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| SweepView::new(camera(p), image.clone())).into()
 }
 
 fn kernels(c: &mut Criterion) {
@@ -62,7 +62,7 @@ fn kernels(c: &mut Criterion) {
     let mut group = c.benchmark_group("sweep");
     group.sample_size(20);
     for count in [1, 2] {
-        let sources: Vec<SourceLevel<'_>> = (1..=count).map(|i| views[i].on_level(i, 0)).collect();
+        let sources: Vec<ViewLevel<'_>> = (1..=count).map(|i| views[i].on_level(i, 0)).collect();
         group.throughput(Throughput::Elements(evaluations * count as u64));
         group.bench_function(BenchmarkId::new("cost per source", count), |b| {
             let mut room = Vec::new();

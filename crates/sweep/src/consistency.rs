@@ -8,10 +8,11 @@ use multiversion::multiversion;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
-use crate::SweepError;
-use crate::geometry::{TileMap, source_from_reference};
-use crate::level::{HeightMap, paste, tiles};
-use crate::view::View;
+use crate::error::SweepError;
+use crate::geometry::{LocalMap, source_column_row};
+use crate::height_map::{HeightMap, height_span};
+use crate::tiles::{paste, tiles};
+use crate::view::SweepView;
 
 /// Parameters of the check.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +38,7 @@ pub struct Heights<'a> {
     /// Its place among the views.
     pub index: usize,
     /// The view.
-    pub view: &'a View,
+    pub view: &'a SweepView,
     /// Its heights on the level.
     pub map: &'a HeightMap,
 }
@@ -82,9 +83,9 @@ fn count_in_tile(
 ) -> Result<(), SweepError> {
     let Some(range) = height_span(reference.map, w) else { return Ok(()) };
     let corners = [w.x as f64, w.y as f64, (w.x + w.width as i64 - 1) as f64, (w.y + w.height as i64 - 1) as f64];
-    let exact = |p, h| source_from_reference(&reference.view.camera, &source.view.camera, level, p, h);
+    let exact = |p, h| source_column_row(&reference.view.camera, &source.view.camera, level, p, h);
     // A source whose camera does not reach the tile has nothing to say there.
-    let Ok(map) = TileMap::fit(corners, range, exact) else { return Ok(()) };
+    let Ok(map) = LocalMap::fit(corners, range, exact) else { return Ok(()) };
     let fits = map.max_error_px <= config.map_tolerance_px;
     let parallax = parallax_per_metre(&map);
     let tolerance_m = (config.tolerance_px / parallax.max(f64::MIN_POSITIVE)) as f32;
@@ -119,7 +120,7 @@ struct Pixels {
 
 impl Pixels {
     /// The row that begins at `first`, at its heights above the origin.
-    fn follow(&mut self, map: &TileMap, first: [f64; 2], height_m: &[f32], origin_m: f64) {
+    fn follow(&mut self, map: &LocalMap, first: [f64; 2], height_m: &[f32], origin_m: f64) {
         follow_row(map, first, height_m, origin_m, &mut self.right, &mut self.below);
     }
 
@@ -129,7 +130,7 @@ impl Pixels {
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn follow_row(map: &TileMap, first: [f64; 2], height_m: &[f32], origin_m: f64, right: &mut [i32], below: &mut [i32]) {
+fn follow_row(map: &LocalMap, first: [f64; 2], height_m: &[f32], origin_m: f64, right: &mut [i32], below: &mut [i32]) {
     for (x, ((right, below), h)) in right.iter_mut().zip(below).zip(height_m).enumerate() {
         let q = map.at([first[0] + x as f64, first[1]], origin_m + f64::from(*h));
         (*right, *below) = behind(q);
@@ -143,7 +144,7 @@ fn behind(q: [f64; 2]) -> (i32, i32) {
 }
 
 /// Source pixels per metre of height.
-fn parallax_per_metre(map: &TileMap) -> f64 {
+fn parallax_per_metre(map: &LocalMap) -> f64 {
     let h = map.mid_height_m();
     let (a, b) = (map.at([0.0, 0.0], h - 0.5), map.at([0.0, 0.0], h + 0.5));
     (b[0] - a[0]).hypot(b[1] - a[1])
@@ -165,16 +166,4 @@ fn agrees(map: &Grid<f32>, (right, below): (&i32, &i32), wanted: f32, tolerance_
         return near(a) | near(b) | near(c) | near(d);
     }
     rows.into_iter().any(|y| map.row(y)[columns.clone()].iter().any(|h| near(*h)))
-}
-
-/// Least and greatest height in a window.
-pub(crate) fn height_span(map: &HeightMap, w: Window) -> Option<(f64, f64)> {
-    let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
-    for y in 0..w.height {
-        for h in &map.height_m.row(w.y as usize + y)[w.x as usize..][..w.width] {
-            lo = lo.min(*h);
-            hi = hi.max(*h);
-        }
-    }
-    (lo <= hi).then(|| (map.origin_m + f64::from(lo), map.origin_m + f64::from(hi)))
 }

@@ -7,40 +7,54 @@
 use camera::{CameraError, ImagePoint, RpcCamera};
 use raster::{level_from_level0, level0_from_level};
 
-/// Where the point seen at `(u, v)` of the reference, at `height_m`, is in the source; both on pyramid level `level`.
+/// Projects a reference pixel at a height into the source image.
+///
+/// `at` and the result are positions on pyramid level `level`; `height_m` is metres above the ellipsoid.
 ///
 /// # Errors
-/// Those of the two cameras.
+/// Returns the error of the camera that fails: the reference in localising, the source in projecting.
 pub fn source_from_reference(
     reference: &RpcCamera,
     source: &RpcCamera,
     level: u32,
-    [u, v]: [f64; 2],
+    at: ImagePoint,
+    height_m: f64,
+) -> Result<ImagePoint, CameraError> {
+    let at = ImagePoint::new(level0_from_level(at.sample, level), level0_from_level(at.line, level));
+    let p = source.project(reference.localize(at, height_m)?)?;
+    Ok(ImagePoint::new(level_from_level0(p.sample, level), level_from_level0(p.line, level)))
+}
+
+/// [`source_from_reference`] for kernels, which hold positions as (column, row).
+pub(crate) fn source_column_row(
+    reference: &RpcCamera,
+    source: &RpcCamera,
+    level: u32,
+    [column, row]: [f64; 2],
     height_m: f64,
 ) -> Result<[f64; 2], CameraError> {
-    let at = ImagePoint::new(level0_from_level(u, level), level0_from_level(v, level));
-    let p = source.project(reference.localize(at, height_m)?)?;
-    Ok([level_from_level0(p.sample, level), level_from_level0(p.line, level)])
+    let at = source_from_reference(reference, source, level, ImagePoint::new(column, row), height_m)?;
+    Ok([at.sample, at.line])
 }
 
 /// A local map from a tile of the reference and a height to the source: see the module's text.
 #[derive(Debug, Clone, Copy)]
-pub struct TileMap {
+pub(crate) struct LocalMap {
     centre: [f64; 2],
     linear: [[f64; 2]; 2],
     mid_height_m: f64,
     /// Source position of the tile's centre: constant, per metre, per square metre; for column and row.
     by_height: [[f64; 3]; 2],
     /// Largest distance to the exact chain over the check points, pixels.
-    pub max_error_px: f64,
+    pub(crate) max_error_px: f64,
 }
 
-impl TileMap {
+impl LocalMap {
     /// Fits the map on the box `[x0, x1] × [y0, y1]` (pixel centres) and the height range, and measures its error.
     ///
     /// # Errors
     /// Those of the exact chain.
-    pub fn fit(
+    pub(crate) fn fit(
         [x0, y0, x1, y1]: [f64; 4],
         (h_lo, h_hi): (f64, f64),
         exact: impl Fn([f64; 2], f64) -> Result<[f64; 2], CameraError>,
@@ -73,7 +87,7 @@ impl TileMap {
 
     /// The source position of a reference position at a height.
     #[inline(always)]
-    pub fn at(&self, p: [f64; 2], height_m: f64) -> [f64; 2] {
+    pub(crate) fn at(&self, p: [f64; 2], height_m: f64) -> [f64; 2] {
         let c = self.centre_at(height_m);
         let d = [p[0] - self.centre[0], p[1] - self.centre[1]];
         [
@@ -84,7 +98,7 @@ impl TileMap {
 
     /// How far, in *reference* pixels, the source image laid over the reference at the middle height must be shifted
     /// to lie over it at `height_m`; `None` when the linear part is singular.
-    pub fn shift_at(&self, height_m: f64) -> Option<[f64; 2]> {
+    pub(crate) fn shift_at(&self, height_m: f64) -> Option<[f64; 2]> {
         let (c, m) = (self.centre_at(height_m), self.centre_at(self.mid_height_m));
         self.solve([c[0] - m[0], c[1] - m[1]])
     }
@@ -104,7 +118,7 @@ impl TileMap {
     }
 
     /// The height about which [`Self::shift_at`] counts.
-    pub fn mid_height_m(&self) -> f64 {
+    pub(crate) fn mid_height_m(&self) -> f64 {
         self.mid_height_m
     }
 
@@ -119,7 +133,7 @@ impl TileMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::leaning_camera;
+    use crate::testing::camera::leaning_camera;
     use proptest::prelude::*;
 
     proptest! {
@@ -127,16 +141,16 @@ mod tests {
         #[test]
         fn the_chain_there_and_back_ends_where_it_began(u in 0.0..200.0f64, v in 0.0..200.0f64, h in -50.0..150.0f64, level in 0..4u32) {
             let (a, b) = (leaning_camera(400, [0.4, -0.1]), leaning_camera(400, [-0.2, 0.5]));
-            let there = source_from_reference(&a, &b, level, [u, v], h).unwrap();
-            let back = source_from_reference(&b, &a, level, there, h).unwrap();
+            let there = source_column_row(&a, &b, level, [u, v], h).unwrap();
+            let back = source_column_row(&b, &a, level, there, h).unwrap();
             prop_assert!((back[0] - u).abs() < 1e-6 && (back[1] - v).abs() < 1e-6, "{back:?}");
         }
 
         #[test]
         fn the_local_map_keeps_its_stated_error(u in 0.0..63.0f64, v in 0.0..63.0f64, t in 0.0..1.0f64) {
             let (a, b) = (leaning_camera(400, [0.4, -0.1]), leaning_camera(400, [-0.2, 0.5]));
-            let exact = |p, h| source_from_reference(&a, &b, 0, p, h);
-            let map = TileMap::fit([0.0, 0.0, 63.0, 63.0], (-20.0, 80.0), exact).unwrap();
+            let exact = |p, h| source_column_row(&a, &b, 0, p, h);
+            let map = LocalMap::fit([0.0, 0.0, 63.0, 63.0], (-20.0, 80.0), exact).unwrap();
             let h = -20.0 + 100.0 * t;
             let (e, m) = (exact([u, v], h).unwrap(), map.at([u, v], h));
             prop_assert!((e[0] - m[0]).hypot(e[1] - m[1]) <= map.max_error_px + 1e-6);

@@ -7,18 +7,21 @@ use std::cell::Cell;
 
 use multiversion::multiversion;
 use multiversion::target::match_target;
-use raster::{Grid, Window};
+use raster::Window;
 use rayon::prelude::*;
 
-use crate::SweepError;
-use crate::cost::{COST_MAX, CostConfig, Reference, SourceLevel};
-use crate::readout::{Estimates, Modes, TOGETHER};
-use crate::semiglobal::{Penalties, RowSums, Volume};
+use crate::aggregation::{Penalties, RowSums, Volume};
+use crate::cost::{COST_MAX, CostConfig};
+use crate::error::SweepError;
+use crate::height_map::HeightMap;
+use crate::readout::{Estimates, Modes, Sums, TOGETHER};
+use crate::reference::Reference;
 use crate::simd::Anywhere;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::Avx2;
-use crate::simd::sums::Sums;
 use crate::support::agreed_share;
+use crate::tiles::tiles;
+use crate::view::ViewLevel;
 use crate::volume::CostVolume;
 
 /// Side of a block's core, pixels.
@@ -46,29 +49,13 @@ impl Default for LevelConfig {
     }
 }
 
-/// Heights of one view on one level, with their reliability.
-#[derive(Debug, Clone)]
-pub struct HeightMap {
-    /// What `height_m` counts from, metres above the ellipsoid.
-    pub origin_m: f64,
-    /// Height per pixel minus the origin, metres; NaN where there is none.
-    pub height_m: Grid<f32>,
-    /// Standard deviation of the height by the spread of its mode, metres.
-    pub sigma_m: Grid<f32>,
-    /// 0 (a second height is as good) to 1.
-    pub confidence: Grid<f32>,
-    /// Share of the picture's contrast around each pixel that the views agree on at its height, 0 to 1; next to 0 no
-    /// picture stands behind the height, only its surroundings.
-    pub support: Grid<f32>,
-}
-
 /// Sweeps one view against its sources.
 ///
 /// # Errors
 /// A camera that fails inside the scene, or is not smooth at the scale of a tile.
 pub fn sweep_level(
     reference: Reference<'_>,
-    sources: &[SourceLevel<'_>],
+    sources: &[ViewLevel<'_>],
     origin_m: f64,
     config: &LevelConfig,
 ) -> Result<HeightMap, SweepError> {
@@ -88,25 +75,9 @@ pub fn sweep_level(
     Ok(out)
 }
 
-/// The windows of side `side` that cover `area`, row after row; the last ones may be smaller.
-pub(crate) fn tiles(area: Window, side: usize) -> Vec<Window> {
-    let mut out = Vec::new();
-    for y in (0..area.height).step_by(side) {
-        for x in (0..area.width).step_by(side) {
-            out.push(Window {
-                x: area.x + x as i64,
-                y: area.y + y as i64,
-                width: side.min(area.width - x),
-                height: side.min(area.height - y),
-            });
-        }
-    }
-    out
-}
-
 fn sweep_block(
     reference: Reference<'_>,
-    sources: &[SourceLevel<'_>],
+    sources: &[ViewLevel<'_>],
     core: Window,
     origin_m: f64,
     config: &LevelConfig,
@@ -221,63 +192,30 @@ impl Reader<'_> {
     }
 }
 
-impl HeightMap {
-    /// A map without any height.
-    pub fn empty(width: usize, height: usize, origin_m: f64) -> Self {
-        Self {
-            origin_m,
-            height_m: Grid::filled(width, height, f32::NAN),
-            sigma_m: Grid::filled(width, height, f32::NAN),
-            confidence: Grid::filled(width, height, 0.0),
-            support: Grid::filled(width, height, 0.0),
-        }
-    }
-
-    /// Makes a pixel one without a height.
-    fn clear(&mut self, at: (usize, usize)) {
-        self.height_m[at] = f32::NAN;
-        self.sigma_m[at] = f32::NAN;
-        self.confidence[at] = 0.0;
-        self.support[at] = 0.0;
-    }
-
-    fn put(&mut self, at: Window, part: &Self) {
-        paste(&mut self.height_m, at, &part.height_m);
-        paste(&mut self.sigma_m, at, &part.sigma_m);
-        paste(&mut self.confidence, at, &part.confidence);
-        paste(&mut self.support, at, &part.support);
-    }
-}
-
-/// Copies `part` into `whole` at the window `at`, which lies inside.
-pub(crate) fn paste<T: Copy>(whole: &mut Grid<T>, at: Window, part: &Grid<T>) {
-    for y in 0..at.height {
-        whole.row_mut(at.y as usize + y)[at.x as usize..][..at.width].copy_from_slice(part.row(y));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cost::Aggregation;
     use crate::ranges::Ranges;
-    use crate::testing::{leaning_camera, view_of_plane};
-    use crate::view::View;
+    use crate::testing::camera::leaning_camera;
+    use crate::testing::plane::view_of_plane;
+    use crate::view::SweepView;
+    use raster::Grid;
 
     fn config(aggregation: Aggregation) -> LevelConfig {
         let cost = CostConfig { aggregation, ..CostConfig::default() };
         LevelConfig { cost, ..LevelConfig::default() }
     }
 
-    fn reference<'a>(views: &'a [View], ranges: &'a Ranges) -> Reference<'a> {
+    fn reference<'a>(views: &'a [SweepView], ranges: &'a Ranges) -> Reference<'a> {
         Reference { view: views[0].on_level(0, 0), level: 0, ranges, prior: None }
     }
 
     /// Errors of the inner pixels, in steps, for a plane at a height between two hypotheses.
-    fn errors(views: &[View], height_m: f64, aggregation: Aggregation) -> Vec<f64> {
+    fn errors(views: &[SweepView], height_m: f64, aggregation: Aggregation) -> Vec<f64> {
         let size = views[0].levels[0].width();
         let ranges = Ranges::uniform(size, size, 1.0, (-10.0, 30.0));
-        let sources: Vec<SourceLevel<'_>> = (1..views.len()).map(|i| views[i].on_level(i, 0)).collect();
+        let sources: Vec<ViewLevel<'_>> = (1..views.len()).map(|i| views[i].on_level(i, 0)).collect();
         let map = sweep_level(reference(views, &ranges), &sources, 0.0, &config(aggregation)).unwrap();
         let inner = 30..size - 30;
         let at = |x: usize, y: usize| f64::from(map.height_m[(x, y)]) - height_m;
@@ -298,10 +236,10 @@ mod tests {
         }
     }
 
-    fn swept(views: &[View], order: &[usize]) -> HeightMap {
+    fn swept(views: &[SweepView], order: &[usize]) -> HeightMap {
         let (w, h) = (views[0].levels[0].width(), views[0].levels[0].height());
         let ranges = Ranges::uniform(w, h, 1.0, (-10.0, 30.0));
-        let sources: Vec<SourceLevel<'_>> = order.iter().map(|&i| views[i].on_level(i, 0)).collect();
+        let sources: Vec<ViewLevel<'_>> = order.iter().map(|&i| views[i].on_level(i, 0)).collect();
         sweep_level(reference(views, &ranges), &sources, 0.0, &config(Aggregation::Variance)).unwrap()
     }
 
@@ -312,7 +250,7 @@ mod tests {
         same as f64 / a.height_m.data().len() as f64
     }
 
-    fn three_views(size: usize) -> Vec<View> {
+    fn three_views(size: usize) -> Vec<SweepView> {
         let cameras = [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| leaning_camera(size, p));
         cameras.map(|c| view_of_plane(c, size, 7.3)).to_vec()
     }
@@ -347,10 +285,10 @@ mod tests {
     #[test]
     fn gain_and_offset_of_each_view_do_not_matter() {
         let views = three_views(100);
-        let changed: Vec<View> = [(2.0f32, 30.0f32), (7.0, -90.0), (1.5, 400.0)]
+        let changed: Vec<SweepView> = [(2.0f32, 30.0f32), (7.0, -90.0), (1.5, 400.0)]
             .iter()
             .zip(&views)
-            .map(|((gain, offset), v)| View::new(v.camera.clone(), v.levels[0].map(|x| gain * x + offset)))
+            .map(|((gain, offset), v)| SweepView::new(v.camera.clone(), v.levels[0].map(|x| gain * x + offset)))
             .collect();
         assert!(same(&swept(&views, &[1, 2]), &swept(&changed, &[1, 2])) > 0.99);
     }
@@ -361,8 +299,8 @@ mod tests {
         let views = three_views(192);
         let cut = Window { x: 64, y: 64, width: 128, height: 128 };
         let origin = camera::ImagePoint::new(64.0, 64.0);
-        let parts: Vec<View> =
-            views.iter().map(|v| View::new(v.camera.cropped(origin), v.levels[0].window(cut, f32::NAN))).collect();
+        let parts: Vec<SweepView> =
+            views.iter().map(|v| SweepView::new(v.camera.cropped(origin), v.levels[0].window(cut, f32::NAN))).collect();
         let inner = Window { x: 20, y: 20, width: 88, height: 88 };
         let whole = swept(&views, &[1, 2]).height_m.window(cut, f32::NAN).window(inner, f32::NAN);
         let part = swept(&parts, &[1, 2]).height_m.window(inner, f32::NAN);
@@ -374,7 +312,7 @@ mod tests {
     fn blank_and_missing_images_give_no_height() {
         let cameras = [[0.0, 0.0], [0.5, 0.1]].map(|p| leaning_camera(80, p));
         for value in [100.0f32, f32::NAN] {
-            let views = cameras.clone().map(|c| View::new(c, Grid::filled(80, 80, value)));
+            let views = cameras.clone().map(|c| SweepView::new(c, Grid::filled(80, 80, value)));
             let ranges = Ranges::uniform(80, 80, 1.0, (-10.0, 30.0));
             let config = config(Aggregation::Variance);
             let map = sweep_level(reference(&views, &ranges), &[views[1].on_level(1, 0)], 0.0, &config).unwrap();

@@ -8,7 +8,8 @@
 use multiversion::multiversion;
 use raster::Window;
 
-use crate::cost::{COST_MAX, SourceLevel, census_scale};
+use crate::cost::{COST_MAX, census_scale};
+use crate::view::ViewLevel;
 use crate::window_sums::window_sums;
 
 /// Half width of the window, pixels: 81 patches bring the spread of a mean at chance down to a few percent.
@@ -16,12 +17,12 @@ const REACH: usize = 4;
 
 /// For each pixel of the window the share of contrast agreed on, 0 to 1; `best` are the costs of its pixels at the hypotheses with
 /// the least sums.
-pub(crate) fn agreed_share(best: &[u8], view: &SourceLevel<'_>, window: Window) -> Vec<f32> {
+pub(crate) fn agreed_share(best: &[u8], view: &ViewLevel<'_>, window: Window) -> Vec<f32> {
     share(best, &census_contrast(view, window), window.width)
 }
 
 /// Mean absolute graded census of every pixel, 0 to 1; NaN where the image is invalid.
-fn census_contrast(view: &SourceLevel<'_>, window: Window) -> Vec<f32> {
+fn census_contrast(view: &ViewLevel<'_>, window: Window) -> Vec<f32> {
     let scale = census_scale(view);
     let padded = view.image.window(window.grown(1), f32::NAN);
     let mut out = vec![0.0; window.width * window.height];

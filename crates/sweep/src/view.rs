@@ -1,6 +1,5 @@
 //! A view: an image pyramid with its camera.
 
-use crate::cost::SourceLevel;
 use camera::RpcCamera;
 use numeric::{order_statistic, upper_median};
 use raster::{Grid, Pyramid};
@@ -14,7 +13,7 @@ const LEVELS_MAX: usize = 16;
 
 /// One image of the scene. Invalid pixels (no-data, masked) are NaN on every level.
 #[derive(Debug, Clone)]
-pub struct View {
+pub struct SweepView {
     /// The camera of level 0, corrected.
     pub camera: RpcCamera,
     /// Level 0 is the full resolution; each level halves the one before it.
@@ -25,7 +24,7 @@ pub struct View {
     pub contrast: Vec<f32>,
 }
 
-impl View {
+impl SweepView {
     /// A view of an image, NaN where invalid.
     pub fn new(camera: RpcCamera, mut image: Grid<f32>) -> Self {
         // One kind of NaN: the census tells it by its bits.
@@ -52,8 +51,8 @@ impl View {
     }
 
     /// What the sweep takes of it on a level; `index` is its place among the views.
-    pub fn on_level(&self, index: usize, level: usize) -> SourceLevel<'_> {
-        SourceLevel {
+    pub fn on_level(&self, index: usize, level: usize) -> ViewLevel<'_> {
+        ViewLevel {
             index,
             image: &self.levels[level],
             camera: &self.camera,
@@ -80,6 +79,21 @@ impl View {
     pub fn noise_at(&self, level: usize) -> f32 {
         self.noise / (1 << level) as f32
     }
+}
+
+/// A source view on the level being swept.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewLevel<'a> {
+    /// Its place among the views.
+    pub index: usize,
+    /// Its image on this level, NaN where invalid.
+    pub image: &'a Grid<f32>,
+    /// Its camera.
+    pub camera: &'a RpcCamera,
+    /// Its noise on this level, grey values.
+    pub noise: f32,
+    /// Its typical difference between neighbouring pixels on this level, grey values.
+    pub contrast: f32,
 }
 
 /// Median of the greater of the differences to the left and to the upper neighbour; 0 for an image without any.
@@ -127,7 +141,9 @@ mod tests {
     fn a_pixel_is_blank_where_its_whole_patch_has_one_value() {
         let value = |i: usize| if (2..6).contains(&(i % 9)) && i / 9 < 5 { 255.0 } else { (i * i % 251) as f32 };
         let image = Grid::from_vec(9, 8, (0..72).map(value).collect()).unwrap();
-        let blank = View { levels: vec![image], ..View::absent(crate::testing::leaning_camera(9, [0.0; 2])) }.blank(0);
+        let blank =
+            SweepView { levels: vec![image], ..SweepView::absent(crate::testing::camera::leaning_camera(9, [0.0; 2])) }
+                .blank(0);
         let expected = |i: usize| (3..5).contains(&(i % 9)) && (1..4).contains(&(i / 9));
         assert!((0..72).all(|i| blank.data()[i] == expected(i)), "{blank:?}");
     }

@@ -5,11 +5,13 @@ use multiversion::multiversion;
 use numeric::upper_median;
 use raster::{Grid, Window};
 
-use crate::SweepError;
-use crate::cost::{BlockCosts, CostConfig, Reference, SourceLevel, TileScratch, sweep_tile};
-use crate::level::tiles;
+use crate::aggregation::{FARTHEST, LANES, Penalties, RowSums, Volume, aggregate};
+use crate::cost::{BlockCosts, CostConfig, TileScratch, sweep_tile};
+use crate::error::SweepError;
 use crate::ranges::{NOT_STEEP, Ranges};
-use crate::semiglobal::{FARTHEST, LANES, Penalties, RowSums, Volume, aggregate};
+use crate::reference::Reference;
+use crate::tiles::tiles;
+use crate::view::ViewLevel;
 
 /// A window with more hypotheses than this would take more than 2 GB.
 const HYPOTHESES_MAX: u32 = 700_000_000;
@@ -34,7 +36,7 @@ impl CostVolume {
     /// A camera that fails inside the scene, or is not smooth at the scale of a tile; more hypotheses than fit into memory.
     pub fn compute(
         reference: Reference<'_>,
-        sources: &[SourceLevel<'_>],
+        sources: &[ViewLevel<'_>],
         window: Window,
         config: &CostConfig,
         room: Vec<u8>,

@@ -11,7 +11,7 @@
 
 use raster::Window;
 use rayon::prelude::*;
-use sweep::View;
+use sweep::SweepView;
 
 use crate::dsm::config::{DsmConfig, Tuning};
 use crate::dsm::heights::{SweepPlan, sweep_scene};
@@ -259,10 +259,10 @@ impl ChunkedScene<'_> {
     fn views(
         &self,
         windows: &[Option<Window>],
-        read: impl Fn(&Opened, Window) -> Result<View, PipelineError> + Sync,
-    ) -> Result<Vec<View>, PipelineError> {
+        read: impl Fn(&Opened, Window) -> Result<SweepView, PipelineError> + Sync,
+    ) -> Result<Vec<SweepView>, PipelineError> {
         let one = |((o, w), character): ((&Opened, &Option<Window>), &Character)| {
-            let Some(window) = w else { return Ok(View::absent(o.camera.clone())) };
+            let Some(window) = w else { return Ok(SweepView::absent(o.camera.clone())) };
             let mut view = read(o, *window)?;
             character.lend(&mut view);
             Ok(view)

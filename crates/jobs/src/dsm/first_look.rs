@@ -7,7 +7,7 @@
 
 use camera::RpcCamera;
 use raster::Window;
-use sweep::View;
+use sweep::SweepView;
 use sweep::pointing::TieConfig;
 
 use crate::dsm::chunks;
@@ -48,7 +48,7 @@ pub(crate) struct Looked {
 /// The images' pixels.
 pub(crate) enum Pixels {
     /// All that are used.
-    Whole(Vec<View>),
+    Whole(Vec<SweepView>),
     /// Too many to hold at once: what windows of them told.
     ByChunk(Vec<Character>),
 }

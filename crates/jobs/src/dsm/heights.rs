@@ -5,9 +5,9 @@
 
 use rayon::prelude::*;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::cost::{Aggregation, Reference, SourceLevel};
+use sweep::cost::Aggregation;
 use sweep::ranges::Ranges;
-use sweep::{HeightMap, LevelConfig, Prior, SweepError, View, sweep_level};
+use sweep::{HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, ViewLevel, sweep_level};
 
 use crate::dsm::prior::{self, Findings, ViewPrior};
 
@@ -55,7 +55,7 @@ pub(crate) struct SceneHeights {
 /// # Errors
 /// Those of [`sweep_level`].
 pub(crate) fn sweep_scene(
-    views: &[View],
+    views: &[SweepView],
     plan: &SweepPlan,
     done: &(dyn Fn() + Sync),
 ) -> Result<SceneHeights, SweepError> {
@@ -94,7 +94,7 @@ pub(crate) fn sweep_scene(
 }
 
 fn sweep_view(
-    views: &[View],
+    views: &[SweepView],
     plan: &SweepPlan,
     index: usize,
     level: usize,
@@ -119,7 +119,7 @@ fn sweep_view(
         Some(prior) => prior.widened(ranges),
         None => ranges,
     };
-    let sources: Vec<SourceLevel<'_>> = plan.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
+    let sources: Vec<ViewLevel<'_>> = plan.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
     let mut config = plan.level;
     config.cost.aggregation = Aggregation::of_sources(sources.len());
     let reference = Reference { view: reference, level: level as u32, ranges: &ranges, prior };
@@ -129,7 +129,7 @@ fn sweep_view(
 
 /// On a coarse level, a height that no other view shares is forgotten, unless nothing around it is known either.
 fn drop_lone_heights(
-    views: &[View],
+    views: &[SweepView],
     plan: &SweepPlan,
     maps: &[HeightMap],
     level: u32,

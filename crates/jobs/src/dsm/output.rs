@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use crs::{Crs, HeightConverter, VerticalDatum};
 use io::raster::{Band, BandData, CogPlace, CogRaster, RasterSpool, SpoolBand, write_cog};
 use raster::{Grid, NO_DATA, Window};
-use sweep::fusion::Surface;
+use sweep::fusion::FusedSurface;
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::report::DsmReport;
@@ -52,9 +52,9 @@ pub(crate) const FILLED: u8 = 1;
 const VOID: u8 = 255;
 
 impl Product {
-    pub(crate) fn new(fused: Surface, filled: Grid<bool>, origin_m: f64) -> Self {
+    pub(crate) fn new(fused: FusedSurface, filled: Grid<bool>, origin_m: f64) -> Self {
         let mut marks = filled.map(|f| if *f { FILLED } else { 0 });
-        let Surface { height_m, mut sigma_m, mut views, mut confidence } = fused;
+        let FusedSurface { height_m, mut sigma_m, mut views, mut confidence } = fused;
         for (i, h) in height_m.data().iter().enumerate() {
             if h.is_nan() {
                 marks.data_mut()[i] = VOID;

@@ -2,7 +2,7 @@
 //! whose pointing is grossly off.
 
 use camera::ImageCorrection;
-use sweep::View;
+use sweep::SweepView;
 
 use crate::dsm::pointing::PairTies;
 
@@ -27,8 +27,9 @@ pub(crate) fn same_picture(ties: &[PairTies], origins: &[[f64; 2]], needed: usiz
     let same = |t: &PairTies| {
         let (a, b) = (origins[t.reference], origins[t.source]);
         let apart = |tie: &sweep::pointing::Tie| {
-            let d: [f64; 2] = std::array::from_fn(|i| tie.source[i] + b[i] - tie.reference[i] - a[i]);
-            d[0].hypot(d[1])
+            let samples = tie.source.sample + b[0] - tie.reference.sample - a[0];
+            let lines = tie.source.line + b[1] - tie.reference.line - a[1];
+            samples.hypot(lines)
         };
         let close = t.ties.iter().filter(|t| apart(t) < SAME_PX).count();
         t.ties.len() >= needed && 10 * close >= 9 * t.ties.len()
@@ -48,7 +49,7 @@ pub(crate) fn grossly_off(corrections: &[ImageCorrection]) -> Vec<(usize, f64)> 
 }
 
 /// Whether a picture has any contrast.
-pub(crate) fn is_blank(view: &View) -> bool {
+pub(crate) fn is_blank(view: &SweepView) -> bool {
     let mut values = view.levels[0].data().iter().filter(|v| v.is_finite());
     let first = values.next();
     values.all(|v| Some(v) == first)
@@ -57,12 +58,13 @@ pub(crate) fn is_blank(view: &View) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use camera::ImagePoint;
     use sweep::pointing::Tie;
 
     fn ties(reference: usize, source: usize, apart_px: f64) -> PairTies {
         let tie = |i: usize| {
-            let at = [i as f64 * 7.0, i as f64 * 3.0];
-            Tie { reference: at, source: [at[0] + apart_px, at[1]], correlation: 0.9 }
+            let at = ImagePoint::new(i as f64 * 7.0, i as f64 * 3.0);
+            Tie { reference: at, source: ImagePoint::new(at.sample + apart_px, at.line), correlation: 0.9 }
         };
         PairTies { reference, source, ties: (0..20).map(tie).collect() }
     }

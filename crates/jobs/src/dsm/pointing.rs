@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use camera::{ImagePoint, RpcCamera};
-use sweep::View;
+use camera::RpcCamera;
+use sweep::SweepView;
 
 use crate::dsm::setup::TIES_MIN;
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Tie, TieConfig, Track, adjust, match_pair};
@@ -28,7 +28,7 @@ pub(crate) struct PairTies {
 /// Matches the pairs, given best first. A few points of the first one with enough ties narrow the height range of the others, and
 /// all of them that of the other pairs. A pair that gives too few is searched again for a gross pointing error.
 pub(crate) fn match_pairs(
-    views: &[View],
+    views: &[SweepView],
     pairs: &[(usize, usize)],
     range_m: (f64, f64),
     config: &TieConfig,
@@ -65,20 +65,20 @@ pub(crate) fn match_pairs(
 }
 
 /// Those of a pair's ties that one correction brings together: a wide search finds more that is alike by chance.
-fn verified(views: &[View], pair: PairTies) -> PairTies {
+fn verified(views: &[SweepView], pair: PairTies) -> PairTies {
     let (adjustment, tracks) = adjust_views(views, std::slice::from_ref(&pair), &shifts());
     if adjustment.residual_px.1 > WIDE_RESIDUAL_PX {
         return PairTies { ties: Vec::new(), ..pair };
     }
     let fits = |t: &&Tie| {
-        let at = |track: &Track| track.first().is_some_and(|(_, p)| [p.sample, p.line] == t.reference);
+        let at = |track: &Track| track.first().is_some_and(|(_, p)| *p == t.reference);
         tracks.iter().zip(&adjustment.ground).any(|(track, ground)| ground.is_some() && at(track))
     };
     PairTies { ties: pair.ties.iter().filter(fits).copied().collect(), ..pair }
 }
 
 /// The span of the heights of one pair's ties, the outliers left out.
-pub(crate) fn heights_seen(views: &[View], pair: &PairTies) -> Option<(f64, f64)> {
+pub(crate) fn heights_seen(views: &[SweepView], pair: &PairTies) -> Option<(f64, f64)> {
     if pair.ties.len() < TIES_MIN {
         return None;
     }
@@ -104,7 +104,7 @@ pub(crate) fn span_of(adjustment: &Adjustment, min: usize) -> Option<(f64, f64)>
 }
 
 /// Joins the pairs' ties to tracks and adjusts all views: see [`adjust_cameras`].
-fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
+fn adjust_views(views: &[SweepView], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
     let cameras: Vec<_> = views.iter().map(|v| v.camera.clone()).collect();
     let sizes: Vec<_> = views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect();
     adjust_cameras(&cameras, &sizes, pairs, config)
@@ -121,11 +121,11 @@ pub(crate) fn adjust_cameras(
     let mut by_corner: BTreeMap<(usize, u64, u64), Track> = BTreeMap::new();
     for pair in pairs {
         for tie in &pair.ties {
-            let [s, l] = tie.reference;
+            let corner = tie.reference;
             let track = by_corner
-                .entry((pair.reference, s.to_bits(), l.to_bits()))
-                .or_insert_with(|| vec![(pair.reference, ImagePoint::new(s, l))]);
-            track.push((pair.source, ImagePoint::new(tie.source[0], tie.source[1])));
+                .entry((pair.reference, corner.sample.to_bits(), corner.line.to_bits()))
+                .or_insert_with(|| vec![(pair.reference, corner)]);
+            track.push((pair.source, tie.source));
         }
     }
     let tracks: Vec<Track> = by_corner.into_values().collect();

@@ -8,7 +8,7 @@ use city::{MeshConfig, TriangleMesh};
 use priors::{LinesOfSight, ModelPlace, NO_OBJECT, PriorModel, SatelliteMaps, buildings_of};
 use raster::Grid;
 use rayon::prelude::*;
-use sweep::{HeightMap, View};
+use sweep::{HeightMap, SweepView};
 
 use crate::dsm::report::{LeftOut, PriorReport};
 use crate::dsm::setup::Choices;
@@ -78,8 +78,8 @@ impl CityPrior {
     ///
     /// # Errors
     /// An image that is too large for maps.
-    pub(crate) fn seen_from(&self, views: &[View], gsd_m: f64) -> Result<Vec<Option<ViewPrior>>, PipelineError> {
-        let seen = |view: &View| {
+    pub(crate) fn seen_from(&self, views: &[SweepView], gsd_m: f64) -> Result<Vec<Option<ViewPrior>>, PipelineError> {
+        let seen = |view: &SweepView| {
             let size = view.levels.first().map_or((0, 0), |image| (image.width(), image.height()));
             if size.0 == 0 || size.1 == 0 {
                 return Ok(None);

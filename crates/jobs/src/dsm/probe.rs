@@ -6,8 +6,9 @@
 //!
 //! For a chunk of a large scene the same sweep tells its whole range: see [`seen_range`].
 
+use camera::ImagePoint;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::{HeightMap, SweepError, View, source_from_reference};
+use sweep::{HeightMap, SweepError, SweepView, source_from_reference};
 
 use crate::dsm::heights::{SceneHeights, SweepPlan, sweep_scene};
 
@@ -45,7 +46,7 @@ pub(crate) struct Extended {
 /// # Errors
 /// Those of the consistency check.
 pub(crate) fn extended_range(
-    views: &[View],
+    views: &[SweepView],
     plan: &SweepPlan,
     gsd_m: f64,
     sides: &[usize],
@@ -77,7 +78,7 @@ pub(crate) fn level_of(gsd_m: f64, sides: &[usize]) -> usize {
 /// # Errors
 /// Those of the consistency check.
 pub(crate) fn seen_range(
-    views: &[View],
+    views: &[SweepView],
     plan: &SweepPlan,
     level: usize,
     usual_m: (f64, f64),
@@ -93,7 +94,7 @@ fn extremes(heights: &[f64]) -> (f64, f64) {
 /// The heights of pixels that nothing speaks against, among those that are asked for. An unusual height says nothing where the
 /// other view does not show what the pixel would be at a usual one: a likeness is then the best that there is.
 fn sure_heights(
-    views: &[View],
+    views: &[SweepView],
     plan: &SweepPlan,
     level: usize,
     usual_m: (f64, f64),
@@ -126,11 +127,12 @@ fn sure_heights(
 }
 
 /// Whether another view shows what a pixel of a level sees, if that is at any height of a range.
-fn shows(view: &View, other: &Heights<'_>, level: usize, (x, y): (usize, usize), range_m: (f64, f64)) -> bool {
-    let size = [other.map.height_m.width(), other.map.height_m.height()];
+fn shows(view: &SweepView, other: &Heights<'_>, level: usize, (x, y): (usize, usize), range_m: (f64, f64)) -> bool {
+    let (width, height) = (other.map.height_m.width(), other.map.height_m.height());
+    let is_within = |at: f64, size: usize| (0.0..=size as f64 - 1.0).contains(&at);
     let is_inside = |h: f64| {
-        source_from_reference(&view.camera, &other.view.camera, level as u32, [x as f64, y as f64], h)
-            .is_ok_and(|q| (0..2).all(|axis| (0.0..=size[axis] as f64 - 1.0).contains(&q[axis])))
+        source_from_reference(&view.camera, &other.view.camera, level as u32, ImagePoint::new(x as f64, y as f64), h)
+            .is_ok_and(|q| is_within(q.sample, width) && is_within(q.line, height))
     };
     is_inside(range_m.0) && is_inside(range_m.1)
 }

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use camera::{ImagePoint, RpcCamera};
 use raster::Window;
-use sweep::View;
+use sweep::SweepView;
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
 
 use crate::dsm::chunks::{self, ChunkTotal, ChunkedScene, Outcome};
@@ -165,7 +165,12 @@ impl<'a> Job<'a> {
     }
 
     /// Sweeps all views and writes the surface.
-    fn at_once(mut self, scene: &Scene<'_>, views: Vec<View>, drawn: impl Drawn) -> Result<DsmReport, PipelineError> {
+    fn at_once(
+        mut self,
+        scene: &Scene<'_>,
+        views: Vec<SweepView>,
+        drawn: impl Drawn,
+    ) -> Result<DsmReport, PipelineError> {
         let Scene { geometry, sources, tuning, grid, coarsest, .. } = scene;
         let found = (sources.as_slice(), geometry);
         let range = setup::with_towers(self.config, scene.range, &views, found, *coarsest, tuning, &mut self.choices)?;

@@ -6,7 +6,7 @@ use camera::{CameraError, ImagePoint, RpcCamera};
 use geodesy::{EnuFrame, LonLatHeight};
 use raster::{Grid, Window};
 use rayon::prelude::*;
-use sweep::View;
+use sweep::SweepView;
 
 use crate::dsm::geometry::{PairGeometry, footprint, local_polygon, overlap_share, pair_geometry};
 use crate::error::PipelineError;
@@ -46,17 +46,17 @@ fn open_one(path: &Path) -> Result<Opened, PipelineError> {
 }
 
 /// Reads a window of an image (all of it for `None`), with its pyramid; the camera is moved to the window.
-pub(crate) fn read_view(image: &Opened, window: Option<Window>) -> Result<View, PipelineError> {
+pub(crate) fn read_view(image: &Opened, window: Option<Window>) -> Result<SweepView, PipelineError> {
     let source = io::raster::ImageSource::open(&image.path)?;
     let window = window.unwrap_or(Window::whole(image.size.0, image.size.1));
     let mut image_grid = source.read_luma(window)?.luma;
     mask_black(&mut image_grid);
     let camera = image.camera.cropped(ImagePoint::new(window.x as f64, window.y as f64));
-    Ok(View::new(camera, image_grid))
+    Ok(SweepView::new(camera, image_grid))
 }
 
 /// Reads one pyramid level of a window, whose first pixel is one of the level's too; the camera is moved to the window.
-pub(crate) fn read_coarse_view(image: &Opened, window: Window, level: usize) -> Result<View, PipelineError> {
+pub(crate) fn read_coarse_view(image: &Opened, window: Window, level: usize) -> Result<SweepView, PipelineError> {
     let source = io::raster::ImageSource::open(&image.path)?;
     let mut picture = source.read_luma(window)?.luma;
     mask_black(&mut picture);
@@ -64,7 +64,7 @@ pub(crate) fn read_coarse_view(image: &Opened, window: Window, level: usize) -> 
         picture = raster::reduce(&picture);
     }
     let camera = image.camera.cropped(ImagePoint::new(window.x as f64, window.y as f64));
-    Ok(View::from_level(camera, level, picture))
+    Ok(SweepView::from_level(camera, level, picture))
 }
 
 /// Side of a square of nothing but zeros that no sensor's dark noise leaves, pixels.
@@ -95,7 +95,7 @@ pub(crate) fn read_views(
     images: &[Opened],
     windows: &[Option<Window>],
     done: &(dyn Fn() + Sync),
-) -> Result<Vec<View>, PipelineError> {
+) -> Result<Vec<SweepView>, PipelineError> {
     let read = |(image, window): (&Opened, &Option<Window>)| {
         let view = read_view(image, *window);
         done();

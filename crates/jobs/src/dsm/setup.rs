@@ -185,7 +185,7 @@ fn widest_parallax(sources: &[Vec<usize>], geometry: &Geometry) -> f64 {
 pub(crate) fn with_towers(
     config: &DsmConfig,
     range_m: (f64, f64),
-    views: &[sweep::View],
+    views: &[sweep::SweepView],
     (sources, geometry): (&[Vec<usize>], &Geometry),
     gsd_m: f64,
     tuning: &Tuning,
@@ -431,9 +431,9 @@ pub(crate) fn middle_height(adjustment: &Adjustment, range: (f64, f64)) -> f64 {
 }
 
 /// For each pyramid level that all views have, the shortest side of any view on it, pixels; absent views do not count.
-pub(crate) fn smallest_sides(views: &[sweep::View]) -> Vec<usize> {
-    let is_there = |v: &&sweep::View| v.levels.iter().any(|l| !l.data().is_empty());
-    let there: Vec<&sweep::View> = views.iter().filter(is_there).collect();
+pub(crate) fn smallest_sides(views: &[sweep::SweepView]) -> Vec<usize> {
+    let is_there = |v: &&sweep::SweepView| v.levels.iter().any(|l| !l.data().is_empty());
+    let there: Vec<&sweep::SweepView> = views.iter().filter(is_there).collect();
     let levels = there.iter().map(|v| v.levels.len()).min().unwrap_or(0);
     let side = |level: usize| there.iter().map(|v| v.levels[level].width().min(v.levels[level].height())).min();
     (0..levels).filter_map(side).collect()

@@ -9,7 +9,7 @@ use sweep::fusion::{
     FillConfig, FusionConfig, GridFrame, PlacedView, fill_voids, fuse_views, mark_cells, place_view, reliability,
     remove_speckle,
 };
-use sweep::{HeightMap, View};
+use sweep::{HeightMap, SweepView};
 
 use crate::dsm::config::{DsmConfig, Fill};
 use crate::dsm::heights::{SceneHeights, SweepPlan};
@@ -105,7 +105,7 @@ impl Counts {
 /// A camera that fails inside the scene.
 pub(crate) fn make_surface(
     input: SurfaceInput<'_>,
-    views: Vec<View>,
+    views: Vec<SweepView>,
     heights: SceneHeights,
     done: &dyn Fn(),
 ) -> Result<(Product, Counts), PipelineError> {
@@ -117,9 +117,8 @@ pub(crate) fn make_surface(
         .filter(|(i, _)| !plan.sources[*i].is_empty())
         .map(|(index, map)| Heights { index, view: &views[index], map })
         .collect();
-    let lonlat =
-        |g: geodesy::LonLatHeight| grid.projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok().map(|p| [p.x, p.y]);
-    let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &lonlat };
+    let map_from_ground = |g: geodesy::LonLatHeight| grid.projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok();
+    let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &map_from_ground };
     let level = plan.bottom_level as u32;
     let jump_m = same_surface_m(plan, grid);
     let mut placed = Vec::with_capacity(all.len());

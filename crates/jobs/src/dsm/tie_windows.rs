@@ -4,10 +4,11 @@
 //!
 //! Ties are given in pixels of the whole images. The heights seen in the first window with ties narrow the search of the rest.
 
+use camera::ImagePoint;
 use numeric::upper_median;
 use raster::Window;
 use rayon::prelude::*;
-use sweep::View;
+use sweep::SweepView;
 use sweep::pointing::TieConfig;
 
 use crate::dsm::pictures;
@@ -46,7 +47,7 @@ pub(crate) struct Character {
 }
 
 impl Character {
-    fn learn(&mut self, view: &View) {
+    fn learn(&mut self, view: &SweepView) {
         self.has_picture |= !pictures::is_blank(view);
         self.noise.push(view.noise);
         self.contrast.resize(self.contrast.len().max(view.contrast.len()), Vec::new());
@@ -59,7 +60,7 @@ impl Character {
     }
 
     /// Gives a view of a part of the image the noise and contrast of the whole.
-    pub(crate) fn lend(&self, view: &mut View) {
+    pub(crate) fn lend(&self, view: &mut SweepView) {
         if let Some(noise) = median(&self.noise) {
             view.noise = noise;
         }
@@ -94,10 +95,10 @@ pub(crate) fn match_in_windows(
     progress.begin("matching tie points", places.len());
     for place in places {
         let windows = windows(images, &grid.part(place)?, range)?;
-        let views: Vec<View> = images
+        let views: Vec<SweepView> = images
             .par_iter()
             .zip(&windows)
-            .map(|(o, w)| w.map_or_else(|| Ok(View::absent(o.camera.clone())), |w| read_view(o, Some(w))))
+            .map(|(o, w)| w.map_or_else(|| Ok(SweepView::absent(o.camera.clone())), |w| read_view(o, Some(w))))
             .collect::<Result<_, PipelineError>>()?;
         let is_there = |i: usize| windows[i].is_some();
         (0..images.len()).filter(|&i| is_there(i)).for_each(|i| characters[i].learn(&views[i]));
@@ -111,11 +112,12 @@ pub(crate) fn match_in_windows(
         }
         for pair in found {
             let own = out.iter_mut().find(|p| (p.reference, p.source) == (pair.reference, pair.source));
-            let origin = |i: usize| windows[i].map_or([0.0; 2], |w| [w.x as f64, w.y as f64]);
+            let origin =
+                |i: usize| windows[i].map_or(ImagePoint::default(), |w| ImagePoint::new(w.x as f64, w.y as f64));
             let (a, b) = (origin(pair.reference), origin(pair.source));
             let moved = pair.ties.iter().map(|t| sweep::pointing::Tie {
-                reference: [t.reference[0] + a[0], t.reference[1] + a[1]],
-                source: [t.source[0] + b[0], t.source[1] + b[1]],
+                reference: ImagePoint::new(t.reference.sample + a.sample, t.reference.line + a.line),
+                source: ImagePoint::new(t.source.sample + b.sample, t.source.line + b.line),
                 ..*t
             });
             own.into_iter().for_each(|p| p.ties.extend(moved.clone()));

@@ -4,7 +4,7 @@
 
 use multiversion::multiversion;
 
-use super::COST_MAX;
+use super::config::COST_MAX;
 
 /// The cost of a pair that cannot be compared: more than any that can, so that it comes last.
 pub(crate) const INVALID: u8 = 255;
@@ -55,7 +55,7 @@ fn mean_of(values: &[f32], step: usize) -> f32 {
 fn round(values: &[f32], mean: f32, scale: f32, out: &mut [i16]) -> bool {
     let mut has_nan = 0;
     for (o, v) in out.iter_mut().zip(values) {
-        // `clamp` passes a NaN on, whose lowest bits are 0: `View` keeps no others.
+        // `clamp` passes a NaN on, whose lowest bits are 0: `SweepView` keeps no others.
         *o = (((v - mean) * scale).clamp(-GREY_MAX, GREY_MAX) + ROUND).to_bits() as i16;
         has_nan |= i32::from(v.is_nan());
     }
@@ -128,10 +128,10 @@ fn divide(sums: &[u16], weights: &[u16], out: &mut [u8]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::laid::Part;
+    use super::super::census::{CHUNK, Census, Room, census_cost, overhang};
+    use super::super::part::Part;
     use super::super::voids::Voids;
     use super::*;
-    use crate::simd::census::{CHUNK, Census, Room, census_cost, overhang};
     use proptest::prelude::*;
 
     const SIDE: usize = 3;

@@ -2,13 +2,14 @@
 
 use raster::{Window, bicubic_along, cubic_weights};
 
-use super::SourceLevel;
+use super::census::{Census, Room as Apart, census_cost, overhang, picture_cost};
 use super::kernels::{self, FULL};
-use super::tile::{CENSUS_REACH, census_scale};
+use super::part::{CENSUS_REACH, Part};
+use super::scale::census_scale;
+use super::shift::{OVERHANG, Picture, shift_bicubic};
 use super::voids::Voids;
-use crate::geometry::TileMap;
-use crate::simd::census::{Census, Room as Apart, census_cost, overhang, picture_cost};
-use crate::simd::shift::{OVERHANG, Picture, shift_bicubic};
+use crate::geometry::LocalMap;
+use crate::view::ViewLevel;
 
 /// Pixels that the cubic interpolation takes in a row.
 const CUBIC_TAPS: usize = 4;
@@ -16,7 +17,7 @@ const CUBIC_TAPS: usize = 4;
 /// A source laid over the tile, and the census of its shifted form for the current plane.
 #[derive(Default)]
 pub(super) struct Laid {
-    map: Option<TileMap>,
+    map: Option<LocalMap>,
     picture: Vec<i16>,
     /// Where the census of a pixel that is moved here holds a void.
     voids: Voids,
@@ -36,27 +37,12 @@ pub(super) struct Room {
     apart: Apart,
 }
 
-/// A part of a tile with its margin.
-#[derive(Clone, Copy)]
-pub(super) struct Part {
-    /// Where it begins in the tile with its margin.
-    pub(super) within: [i64; 2],
-    pub(super) width: usize,
-    pub(super) height: usize,
-}
-
-impl Part {
-    pub(super) fn area(self) -> usize {
-        self.width * self.height
-    }
-}
-
 impl Laid {
     /// Resamples the source over the padded tile at the map's middle height, wide enough for all heights.
     pub(super) fn lay_over(
         &mut self,
-        source: &SourceLevel<'_>,
-        map: Option<TileMap>,
+        source: &ViewLevel<'_>,
+        map: Option<LocalMap>,
         padded: Window,
         (h_lo, h_hi): (f64, f64),
         grey: &mut Vec<f32>,

@@ -4,11 +4,11 @@
 use multiversion::multiversion;
 use raster::Window;
 
-use super::tile::{BlockCosts, CENSUS_REACH};
+use super::census::CHUNK;
+use super::part::CENSUS_REACH;
+use super::transpose::{COLUMNS, ROWS, transpose};
 use crate::ranges::Ranges;
-use crate::simd::census::CHUNK;
-use crate::simd::fetch;
-use crate::simd::transpose::{COLUMNS, ROWS, transpose};
+use crate::simd::prefetch::fetch;
 
 /// Planes that are computed before their costs go to the pixels: most parts of a tile need no more, and they fit into the
 /// second cache.
@@ -17,6 +17,14 @@ pub(super) const PLANES_AT_ONCE: usize = 64;
 const DEPTH: usize = PLANES_AT_ONCE / ROWS + 1;
 /// Bytes.
 const CACHE_LINE: usize = 64;
+
+/// Where a block's costs go: pixel `(x, y)` of `window` has its hypotheses at `offsets[y · width + x]`.
+pub(crate) struct BlockCosts<'a> {
+    pub(crate) window: Window,
+    pub(crate) offsets: &'a [u32],
+    /// With as many entries behind them that belong to no pixel as a register holds.
+    pub(crate) costs: &'a mut [u8],
+}
 
 /// Costs of a few planes of a part of a tile with its margin.
 #[derive(Default)]

@@ -1,55 +1,23 @@
 //! One tile of the reference: all height planes, all sources.
 
-use multiversion::multiversion;
 use raster::{Grid, Window};
 
+use super::census::{CHUNK, Census, overhang};
+use super::config::{Aggregation, COST_MAX, CostConfig};
+use super::division::{SweptPart, TILE_MIN, divide, halves, plane_span};
 use super::kernels::{self, FULL, INVALID};
-use super::laid::{Laid, Part, Room};
-use super::planes::{PLANES_AT_ONCE, Planes, scatter};
+use super::laid::{Laid, Room};
+use super::part::{CENSUS_REACH, Part};
+use super::planes::{BlockCosts, PLANES_AT_ONCE, Planes, scatter};
+use super::scale::census_scale;
 use super::voids::Voids;
-use super::{Aggregation, COST_MAX, CostConfig, SourceLevel};
-use crate::SweepError;
-use crate::geometry::{TileMap, source_from_reference};
-use crate::prior::Prior;
-use crate::ranges::Ranges;
-use crate::simd::census::{CHUNK, Census, overhang};
-use crate::simd::shift::OVERHANG;
-use crate::view::QUANTISATION_VARIANCE;
+use crate::error::SweepError;
+use crate::geometry::{LocalMap, source_column_row};
+use crate::reference::Reference;
+use crate::view::ViewLevel;
 
-/// A tile is not divided below this side: an RPC that is not smooth over eight pixels is broken.
-const TILE_MIN: usize = 8;
 /// … nor below this many heights.
 const PLANES_MIN: i32 = 4;
-/// The census looks at the eight neighbours, as MicMac's patches in cities do: the aggregation brings the support that they
-/// lack, and roofs keep their edges.
-pub(super) const CENSUS_REACH: usize = 1;
-/// What a plane costs beside its pixels, in pixels.
-const PLANE_PIXELS: usize = 256;
-/// The difference that counts fully, in typical differences of the image: half of them then take part in full. Measured
-/// on simulated towns of one and of several dates and on the LiDAR truth of JAX_068, where 0.3 to 0.7 are alike.
-const FULL_DIFFERENCE: f32 = 0.5;
-
-/// The reference on the level being swept.
-#[derive(Debug, Clone, Copy)]
-pub struct Reference<'a> {
-    /// Its image and camera.
-    pub view: SourceLevel<'a>,
-    /// The level of its pyramid.
-    pub level: u32,
-    /// The hypotheses of its pixels.
-    pub ranges: &'a Ranges,
-    /// What is known of its heights beforehand.
-    pub prior: Option<Prior<'a>>,
-}
-
-/// Where a block's costs go: pixel `(x, y)` of `window` has its hypotheses at `offsets[y · width + x]`.
-pub(crate) struct BlockCosts<'a> {
-    pub(crate) window: Window,
-    pub(crate) offsets: &'a [u32],
-    /// With as many entries behind them that belong to no pixel as a register holds.
-    pub(crate) costs: &'a mut [u8],
-}
-
 /// Buffers that a thread reuses from tile to tile.
 #[derive(Default)]
 pub(crate) struct TileScratch {
@@ -66,15 +34,10 @@ pub(crate) struct TileScratch {
     parts: Vec<SweptPart>,
 }
 
-/// Brings differences of grey values to the unit that counts fully: of the image's contrast, or of its noise where that is more.
-pub(crate) fn census_scale(view: &SourceLevel<'_>) -> f32 {
-    1.0 / (FULL_DIFFERENCE * view.contrast).max(view.noise).max(QUANTISATION_VARIANCE.sqrt())
-}
-
 /// Fills the costs of `tile` (a part of the block, in image coordinates) for every pixel's own hypotheses.
 pub(crate) fn sweep_tile(
     reference: Reference<'_>,
-    sources: &[SourceLevel<'_>],
+    sources: &[ViewLevel<'_>],
     tile: Window,
     config: &CostConfig,
     scratch: &mut TileScratch,
@@ -87,7 +50,7 @@ pub(crate) fn sweep_tile(
 /// Fills the costs of the tile's pixels for those of their hypotheses that lie among `planes`.
 fn sweep_planes(
     reference: Reference<'_>,
-    sources: &[SourceLevel<'_>],
+    sources: &[ViewLevel<'_>],
     (tile, planes): (Window, (i32, i32)),
     config: &CostConfig,
     scratch: &mut TileScratch,
@@ -120,56 +83,9 @@ fn sweep_planes(
     Ok(())
 }
 
-/// First plane and one past the last that any pixel of the tile asks for.
-#[multiversion(targets("x86_64+avx2"))]
-fn plane_span(ranges: &Ranges, tile: Window) -> (i32, i32) {
-    let mut span = (i32::MAX, i32::MIN);
-    for y in tile.y as usize..tile.y as usize + tile.height {
-        let low = &ranges.low.row(y)[tile.x as usize..][..tile.width];
-        let count = &ranges.count.row(y)[tile.x as usize..][..tile.width];
-        for (low, count) in low.iter().zip(count) {
-            span = (span.0.min(*low), span.1.max(low + i32::from(*count)));
-        }
-    }
-    span
-}
-
-/// A part of a tile, and the planes that it is swept through: all that its pixels ask for, or some of them.
-struct SweptPart {
-    window: Window,
-    planes: (i32, i32),
-    is_all: bool,
-}
-
-/// Appends the parts in which a tile is swept at the least cost, each through those of `planes` that its pixels ask for, as
-/// beside a wall between two roofs; returns that cost, in pixels, and what all its pixels ask for.
-fn divide(ranges: &Ranges, tile: Window, planes: (i32, i32), parts: &mut Vec<SweptPart>) -> (usize, (i32, i32)) {
-    let first = parts.len();
-    let (divided, asked) = if tile.width.max(tile.height) >= 2 * TILE_MIN {
-        let [(a, p), (b, q)] = halves(tile).map(|half| divide(ranges, half, planes, parts));
-        (a + b, (p.0.min(q.0), p.1.max(q.1)))
-    } else {
-        (usize::MAX, plane_span(ranges, tile))
-    };
-    let own = (asked.0.max(planes.0), asked.1.min(planes.1));
-    if own.0 >= own.1 {
-        return (0, asked);
-    }
-    // Parts cost their margins again, and registers are filled up.
-    let width = tile.width + 2 * CENSUS_REACH;
-    let area = (width + width.next_multiple_of(OVERHANG)) / 2 * (tile.height + 2 * CENSUS_REACH);
-    let whole = (own.1 - own.0) as usize * (area + PLANE_PIXELS) + area;
-    if divided < whole {
-        return (divided, asked);
-    }
-    parts.truncate(first);
-    parts.push(SweptPart { window: tile, planes: own, is_all: own == asked });
-    (whole, asked)
-}
-
 /// The local maps of a tile to all sources, or in which direction one of them is over the bound.
 enum Fitted {
-    Maps(Vec<Option<TileMap>>),
+    Maps(Vec<Option<LocalMap>>),
     /// The tile must be divided.
     RoughAcross,
     /// The heights must be divided.
@@ -179,7 +95,7 @@ enum Fitted {
 /// The local maps to all sources. A source whose camera does not reach the tile has no map: it sees nothing there.
 fn fit_maps(
     reference: Reference<'_>,
-    sources: &[SourceLevel<'_>],
+    sources: &[ViewLevel<'_>],
     tile: Window,
     planes: (i32, i32),
     config: &CostConfig,
@@ -194,14 +110,14 @@ fn fit_maps(
     ];
     let mut maps = Vec::with_capacity(sources.len());
     for s in sources {
-        let exact = |p, h| source_from_reference(reference.view.camera, s.camera, reference.level, p, h);
-        let Ok(map) = TileMap::fit(corners, heights, exact) else {
+        let exact = |p, h| source_column_row(reference.view.camera, s.camera, reference.level, p, h);
+        let Ok(map) = LocalMap::fit(corners, heights, exact) else {
             maps.push(None);
             continue;
         };
         if map.max_error_px > config.map_tolerance_px {
             let centre = [0.5 * (corners[0] + corners[2]), 0.5 * (corners[1] + corners[3])];
-            let along = TileMap::fit([centre[0], centre[1], centre[0], centre[1]], heights, exact);
+            let along = LocalMap::fit([centre[0], centre[1], centre[0], centre[1]], heights, exact);
             let is_along = along.is_ok_and(|m| m.max_error_px > 0.5 * config.map_tolerance_px);
             if is_along && planes.1 - planes.0 > PLANES_MIN {
                 return Ok(Fitted::RoughAlong);
@@ -221,23 +137,12 @@ fn fit_maps(
     Ok(Fitted::Maps(maps))
 }
 
-/// The two halves of a tile across its longer side.
-fn halves(t: Window) -> [Window; 2] {
-    if t.width >= t.height {
-        let w = t.width / 2;
-        [Window { width: w, ..t }, Window { x: t.x + w as i64, width: t.width - w, ..t }]
-    } else {
-        let h = t.height / 2;
-        [Window { height: h, ..t }, Window { y: t.y + h as i64, height: t.height - h, ..t }]
-    }
-}
-
 impl TileScratch {
     fn prepare(
         &mut self,
         reference: Reference<'_>,
-        sources: &[SourceLevel<'_>],
-        maps: &[Option<TileMap>],
+        sources: &[ViewLevel<'_>],
+        maps: &[Option<LocalMap>],
         tile: Window,
         planes: (i32, i32),
         config: &CostConfig,

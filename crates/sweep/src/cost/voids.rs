@@ -3,9 +3,8 @@
 use multiversion::multiversion;
 
 use super::kernels::INVALID;
-use super::laid::Part;
-use super::tile::CENSUS_REACH;
-use crate::simd::raise::raise;
+use super::part::{CENSUS_REACH, Part};
+use super::raise::raise;
 
 /// Marks of what holds a void: [`INVALID`] there, 0 elsewhere; none at all where there is no void.
 #[derive(Default)]

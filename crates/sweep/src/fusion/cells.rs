@@ -5,7 +5,7 @@ use raster::{Grid, Window};
 use rayon::prelude::*;
 
 use super::mesh::{PlacedView, ViewSurface};
-use crate::level::{paste, tiles};
+use crate::tiles::{paste, tiles};
 
 /// Parameters of the fusion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +20,7 @@ pub struct FusionConfig {
 
 /// The fused surface.
 #[derive(Debug, Clone)]
-pub struct Surface {
+pub struct FusedSurface {
     /// Height above the origin, metres; NaN in voids.
     pub height_m: Grid<f32>,
     /// Standard deviation, metres; NaN in voids.
@@ -50,16 +50,16 @@ struct Cell {
 }
 
 /// Fuses the views on a grid of `size` (columns, rows), tile by tile.
-pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionConfig) -> Surface {
+pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionConfig) -> FusedSurface {
     let windows = tiles(Window::whole(size.0, size.1), config.tile.max(1));
-    let parts: Vec<Surface> = windows
+    let parts: Vec<FusedSurface> = windows
         .par_iter()
         .map(|w| {
             let surfaces: Vec<ViewSurface> = views.iter().map(|v| v.rasterise(*w, config.tear_m)).collect();
             fuse(&surfaces, (w.width, w.height), config.same_surface_m)
         })
         .collect();
-    let mut out = Surface::empty(size);
+    let mut out = FusedSurface::empty(size);
     for (w, part) in windows.iter().zip(&parts) {
         paste(&mut out.height_m, *w, &part.height_m);
         paste(&mut out.sigma_m, *w, &part.sigma_m);
@@ -69,7 +69,7 @@ pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionCon
     out
 }
 
-impl Surface {
+impl FusedSurface {
     fn empty((columns, rows): (usize, usize)) -> Self {
         Self {
             height_m: Grid::filled(columns, rows, f32::NAN),
@@ -81,8 +81,8 @@ impl Surface {
 }
 
 /// Fuses the views' surfaces on one window of the grid.
-fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> Surface {
-    let mut out = Surface::empty(size);
+fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> FusedSurface {
+    let mut out = FusedSurface::empty(size);
     let mut samples = Vec::with_capacity(surfaces.len());
     for i in 0..size.0 * size.1 {
         samples.clear();

@@ -1,22 +1,23 @@
 //! One view's heights on the map grid.
 
-use geodesy::LonLatHeight;
+use geodesy::{LonLatHeight, MapPoint};
 use multiversion::multiversion;
 use raster::{GeoTransform, Grid, Window, level0_from_level};
 use rayon::prelude::*;
 
-use crate::SweepError;
-use crate::consistency::{Heights, height_span};
-use crate::geometry::TileMap;
-use crate::level::{paste, tiles};
+use crate::consistency::Heights;
+use crate::error::SweepError;
+use crate::geometry::LocalMap;
+use crate::height_map::height_span;
 use crate::ranges::extremes;
+use crate::tiles::{paste, tiles};
 
 /// The output grid: its placement and the map projection.
 pub struct GridFrame<'a> {
     /// Placement of the cells.
     pub geotransform: GeoTransform,
     /// Map coordinates of a ground point; `None` where the projection has none.
-    pub map_from_ground: &'a (dyn Fn(LonLatHeight) -> Option<[f64; 2]> + Sync),
+    pub map_from_ground: &'a (dyn Fn(LonLatHeight) -> Option<MapPoint> + Sync),
 }
 
 /// One view's surface on the grid.
@@ -201,13 +202,13 @@ fn place_tile(
     let exact = |[u, v]: [f64; 2], h: f64| {
         let at = camera::ImagePoint::new(level0_from_level(u, level), level0_from_level(v, level));
         let ground = heights.view.camera.localize(at, h)?;
-        let [x, y] = (frame.map_from_ground)(ground).ok_or(camera::CameraError::NotFinite)?;
+        let MapPoint { x, y } = (frame.map_from_ground)(ground).ok_or(camera::CameraError::NotFinite)?;
         let (column, row) = frame.geotransform.cell_from_map(x, y).ok_or(camera::CameraError::NotFinite)?;
         Ok([column, row])
     };
     let corners = [w.x as f64, w.y as f64, (w.x + w.width as i64 - 1) as f64, (w.y + w.height as i64 - 1) as f64];
     let failed = |source| SweepError::Camera { view: heights.index, source };
-    let local = TileMap::fit(corners, range, exact).map_err(failed)?;
+    let local = LocalMap::fit(corners, range, exact).map_err(failed)?;
     // A twentieth of a cell is invisible in the result; a tile over it is placed exactly.
     let fits = local.max_error_px <= 0.05;
     let mut out = Grid::filled(w.width, w.height, NO_VERTEX);
@@ -292,8 +293,9 @@ impl ViewSurface {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::level::HeightMap;
-    use crate::testing::{leaning_camera, view_of_plane};
+    use crate::height_map::HeightMap;
+    use crate::testing::camera::leaning_camera;
+    use crate::testing::plane::view_of_plane;
 
     const SIZE: usize = 80;
     const METRES_PER_DEGREE: f64 = 111_320.0;
@@ -307,7 +309,8 @@ mod tests {
         }
         let heights = Heights { index: 0, view: &view, map: &map };
         let to_map = move |g: LonLatHeight| {
-            Some([false_origin[0] + g.lon_deg * METRES_PER_DEGREE, false_origin[1] + g.lat_deg * METRES_PER_DEGREE])
+            let (east, north) = (g.lon_deg * METRES_PER_DEGREE, g.lat_deg * METRES_PER_DEGREE);
+            Some(MapPoint { x: false_origin[0] + east, y: false_origin[1] + north })
         };
         let geotransform = GeoTransform::north_up(false_origin[0] - 20.0, false_origin[1] + 20.0, 0.5);
         let frame = GridFrame { geotransform, map_from_ground: &to_map };

@@ -11,7 +11,7 @@ mod mesh;
 mod reliability;
 mod speckle;
 
-pub use cells::{FusionConfig, Surface, fuse_views};
+pub use cells::{FusedSurface, FusionConfig, fuse_views};
 pub use fill::{FillConfig, fill_voids};
 pub use mesh::{GridFrame, PlacedView, mark_cells, place_view};
 pub use reliability::reliability;

@@ -316,7 +316,7 @@ fn linearised(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::leaning_camera;
+    use crate::testing::camera::leaning_camera;
 
     const SIZE: usize = 400;
 

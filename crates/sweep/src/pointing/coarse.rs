@@ -6,14 +6,14 @@
 use raster::{Grid, bicubic_along};
 
 use super::moments::{patch_moments, remove_mean};
+use super::pair::{Pair, TieConfig};
 use super::patch::{Patch, padded};
-use super::ties::{Pair, TieConfig};
-use crate::geometry::TileMap;
+use crate::geometry::LocalMap;
 use crate::view::QUANTISATION_VARIANCE;
 
 /// A source laid over the reference, ready to be searched.
 pub(crate) struct Coarse {
-    map: TileMap,
+    map: LocalMap,
     /// Reference position of the laid picture's first pixel.
     origin: [i64; 2],
     /// As many columns of zeros behind it as a patch reads; 0 where invalid.
@@ -36,7 +36,7 @@ impl Coarse {
         let reference = &pair.reference.levels[level];
         let source = &pair.source.levels[level];
         let corners = [0.0, 0.0, reference.width() as f64 - 1.0, reference.height() as f64 - 1.0];
-        let map = TileMap::fit(corners, range_m, |p, h| pair.chain(p, level, h)).ok()?;
+        let map = LocalMap::fit(corners, range_m, |p, h| pair.chain(p, level, h)).ok()?;
         let band = (config.band_px / f64::from(1u32 << level)).ceil() as i32;
         let places = places(&map, range_m, band)?;
         let side = 2 * config.radius as usize + 1;
@@ -77,7 +77,7 @@ impl Coarse {
 }
 
 /// Where the height trajectory leads, in steps of about a pixel: whole pixels from a patch's own place, up to `band` to its sides.
-fn places(map: &TileMap, range_m: (f64, f64), band: i32) -> Option<Vec<(f64, Vec<[i64; 2]>)>> {
+fn places(map: &LocalMap, range_m: (f64, f64), band: i32) -> Option<Vec<(f64, Vec<[i64; 2]>)>> {
     let (from, to) = (map.shift_at(range_m.0)?, map.shift_at(range_m.1)?);
     let along = [to[0] - from[0], to[1] - from[1]];
     let length = along[0].hypot(along[1]);
@@ -94,7 +94,7 @@ fn places(map: &TileMap, range_m: (f64, f64), band: i32) -> Option<Vec<(f64, Vec
 
 /// The source resampled to the reference's frame at the map's middle height and `more` void columns behind it, with the place of
 /// its first pixel.
-fn lay_over(source: &Grid<f32>, map: &TileMap, more: usize) -> Option<([i64; 2], Grid<f32>)> {
+fn lay_over(source: &Grid<f32>, map: &LocalMap, more: usize) -> Option<([i64; 2], Grid<f32>)> {
     let (w, h) = (source.width() as f64 - 1.0, source.height() as f64 - 1.0);
     let mut span = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     for corner in [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]] {

@@ -6,8 +6,10 @@ mod adjust;
 mod coarse;
 mod interest;
 mod moments;
+mod pair;
 mod patch;
 mod ties;
 
 pub use adjust::{AdjustConfig, Adjustment, ModelOrder, Track, adjust};
-pub use ties::{Tie, TieConfig, match_pair};
+pub use pair::{Tie, TieConfig};
+pub use ties::match_pair;

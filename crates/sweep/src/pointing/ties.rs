@@ -4,64 +4,23 @@
 //! error; a match must be better than any other place by a margin. It is then followed down the pyramid, located to a
 //! fraction of a pixel, and kept when the search back from the source returns to where it came from.
 
-use camera::{CameraError, RpcCamera};
+use camera::{CameraError, ImagePoint, RpcCamera};
 use raster::{Grid, bicubic_along, level_from_level0, level0_from_level};
 use rayon::prelude::*;
 
 use super::coarse::Coarse;
 use super::interest::corners;
 use super::moments::remove_mean;
+use super::pair::{Pair, Tie, TieConfig};
 use super::patch::{Patch, padded, parabola_peak};
-use crate::geometry::source_from_reference;
-use crate::view::View;
-
-/// One correspondence, in full-resolution image coordinates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tie {
-    /// Position in the reference (sample, line).
-    pub reference: [f64; 2],
-    /// Position in the source (sample, line).
-    pub source: [f64; 2],
-    /// Correlation of the two patches at full resolution.
-    pub correlation: f32,
-}
-
-/// Parameters of the tie-point search.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TieConfig {
-    /// Corners tried per pair of views.
-    pub points: usize,
-    /// Half width of the patches, pixels of the level.
-    pub radius: i32,
-    /// Largest pointing error across the trajectory, full-resolution pixels.
-    pub band_px: f64,
-    /// Least correlation on the coarse level and at full resolution.
-    pub correlation: f32,
-    /// By how much the best place on the coarse level must beat every other one.
-    pub margin: f32,
-    /// The coarse level has at least this many pixels on its shorter side.
-    pub coarse_side: usize,
-}
-
-impl Default for TieConfig {
-    /// `radius` 7 is 15 × 15 pixels, the usual compromise of uniqueness against relief. `band_px` covers what
-    /// providers state for pointing (CE90 of several metres) several times over.
-    fn default() -> Self {
-        Self { points: 600, radius: 7, band_px: 24.0, correlation: 0.7, margin: 0.08, coarse_side: 160 }
-    }
-}
+use crate::geometry::source_column_row;
+use crate::view::SweepView;
 
 /// How far the search back may end from where it started, pixels.
 const RETURN_PX: f64 = 1.0;
 
-/// Two views, and the levels on which they are matched.
-pub(crate) struct Pair<'a> {
-    pub(crate) reference: &'a View,
-    pub(crate) source: &'a View,
-}
-
 /// Tie points of a pair; heights in `range_m` are considered.
-pub fn match_pair(reference: &View, source: &View, range_m: (f64, f64), config: &TieConfig) -> Vec<Tie> {
+pub fn match_pair(reference: &SweepView, source: &SweepView, range_m: (f64, f64), config: &TieConfig) -> Vec<Tie> {
     let top = coarse_level(reference, config).min(source.levels.len() - 1);
     let image = &reference.levels[top];
     let cell = ((image.width() * image.height()) as f64 / config.points as f64).sqrt().ceil().max(4.0) as usize;
@@ -71,7 +30,7 @@ pub fn match_pair(reference: &View, source: &View, range_m: (f64, f64), config: 
     points.par_iter().filter_map(|&p| pair.follow(p, top, &coarse, config)).collect()
 }
 
-fn coarse_level(view: &View, config: &TieConfig) -> usize {
+fn coarse_level(view: &SweepView, config: &TieConfig) -> usize {
     let enough = |g: &&Grid<f32>| g.width().min(g.height()) >= config.coarse_side;
     view.levels.iter().take_while(enough).count().saturating_sub(1)
 }
@@ -104,14 +63,10 @@ impl Pair<'_> {
         let start = [full[0] - back_predicted[0], full[1] - back_predicted[1]];
         let (end, _) = back.refine(found, 0, height_m, start, config)?;
         ((end[0] - start[0]).hypot(end[1] - start[1]) < RETURN_PX).then_some(Tie {
-            reference: full,
-            source: found,
+            reference: ImagePoint::new(full[0], full[1]),
+            source: ImagePoint::new(found[0], found[1]),
             correlation,
         })
-    }
-
-    pub(crate) fn chain(&self, at: [f64; 2], level: usize, height_m: f64) -> Result<[f64; 2], CameraError> {
-        source_from_reference(&self.reference.camera, &self.source.camera, level as u32, at, height_m)
     }
 
     /// The offset of best correlation within two pixels of `start`, to a fraction of a pixel. The source is sampled once in
@@ -172,7 +127,7 @@ impl LocalFrame {
         [u, v]: [f64; 2],
         height_m: f64,
     ) -> Result<Self, CameraError> {
-        let chain = |p| source_from_reference(reference, source, level as u32, p, height_m);
+        let chain = |p| source_column_row(reference, source, level as u32, p, height_m);
         // Eight pixels: wide enough for differences to be exact, narrow enough to be local.
         let d = 8.0;
         let (l, r, t, b) = (chain([u - d, v])?, chain([u + d, v])?, chain([u, v - d])?, chain([u, v + d])?);

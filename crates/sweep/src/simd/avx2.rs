@@ -1,7 +1,6 @@
 //! Bytes in registers of AVX2: for functions that are compiled for it, and nowhere else.
 
-use super::bytes::{Bytes, Instructions};
-use super::rows::REACH;
+use super::bytes::{Bytes, Instructions, REACH};
 use std::arch::x86_64::*;
 
 /// The instructions of AVX2.

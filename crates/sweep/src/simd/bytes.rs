@@ -1,7 +1,7 @@
 //! Lanes of unsigned bytes, and what the path costs need of them: as an array on any machine, in registers in [`super::avx2`].
 
-#[cfg(test)]
-use super::rows::REACH;
+/// Registers whose lanes are moved this far have none of them left.
+pub(crate) const REACH: i32 = 33;
 
 /// Lanes of unsigned bytes.
 pub(crate) trait Bytes: Copy {
@@ -31,7 +31,7 @@ pub(crate) trait Bytes: Copy {
     fn ahead(self, next: Self) -> Self;
     /// The lanes one less than `by` further back, `by`, and one more, and 255 where there are none.
     /// # Safety
-    /// It is by no more than [`super::rows::REACH`] either way.
+    /// It is by no more than [`REACH`] either way.
     unsafe fn around(self, by: i32) -> [Self; 3];
     /// The first lane.
     fn first(self) -> Self::First;

@@ -6,32 +6,11 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-mod bytes;
-pub(crate) mod census;
-pub(crate) mod paths;
-pub(crate) mod pixel;
-pub(crate) mod raise;
-pub(crate) mod rows;
-pub(crate) mod shift;
-pub(crate) mod sums;
-pub(crate) mod transpose;
+pub(crate) mod bytes;
+pub(crate) mod prefetch;
 #[cfg(target_arch = "x86_64")]
-mod wide;
+pub(crate) mod wide;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
-pub(crate) use bytes::{Anywhere, Instructions};
-
-/// Asks for the memory of an element that is wanted soon, which need not be one's own; where machines do not take such hints
-/// that means nothing.
-#[inline(always)]
-pub(crate) fn fetch<T>(at: *const T) {
-    // SAFETY: a hint reads nothing.
-    #[cfg(target_arch = "x86_64")]
-    unsafe {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        _mm_prefetch::<_MM_HINT_T0>(at.cast());
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = at;
-}
+pub(crate) use bytes::{Anywhere, Bytes, Instructions};

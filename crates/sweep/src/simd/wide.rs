@@ -5,7 +5,7 @@
 use std::arch::x86_64::*;
 
 /// A register of bytes, or of half as many words.
-pub(super) trait Wide: Copy {
+pub(crate) trait Wide: Copy {
     const BYTES: usize;
     /// # Safety
     /// A register's bytes can be read.

@@ -3,10 +3,14 @@
 //! The path costs along the row of up to [`LANES`] hypotheses stay in a register: what has just been written cannot be read one
 //! lane off without waiting for the memory.
 
-use super::bytes::{Bytes, Instructions};
-use super::fetch;
-use super::pixel::{Backward, Forward, Pixel, Store, lanes};
-use super::rows::{FAR, GUARD, HALF, LANES, Links, MORE, ONE, Pixels, RUN, Range, Row, TWO};
+#![allow(unsafe_code)]
+
+use super::layout::{FAR, GUARD, LANES, Pixels, RUN, Range, Row};
+use super::links::{HALF, Links, MORE, ONE, TWO};
+use super::pixel::{Pixel, lanes};
+use super::store::{Backward, Forward, Store};
+use crate::simd::prefetch::fetch;
+use crate::simd::{Bytes, Instructions};
 
 /// Costs and results that are asked for before their turn: half a microsecond ahead, several times what memory takes. The machine
 /// itself looks ahead to the end of a page only.
@@ -50,7 +54,7 @@ impl Room {
 }
 
 /// Places the pixels in `here` and extends four paths to each; `above` is the row before, of as many. `jump` is the penalty of a
-/// jump by the edge, at most [`super::pixel::JUMP_MAX`].
+/// jump by the edge, at most [`super::penalties::JUMP_MAX`].
 ///
 /// # Panics
 /// Slices that are not as long as [`Task`] and [`Results`] say, and rows of different widths.
@@ -236,7 +240,7 @@ impl<I: Instructions> Last<I> {
     /// A pixel of [`HALF`].
     ///
     /// # Safety
-    /// What [`Pixel`] says, and `by` is up to [`super::rows::REACH`].
+    /// What [`Pixel`] says, and `by` is up to [`crate::simd::bytes::REACH`].
     #[inline(always)]
     unsafe fn extend_half<S: Store>(&mut self, by: i32, pixel: Pixel<'_, S>) {
         // SAFETY: the caller's.
@@ -252,7 +256,7 @@ impl<I: Instructions> Last<I> {
     /// A pixel of [`ONE`].
     ///
     /// # Safety
-    /// What [`Pixel`] says, and `by` is up to [`super::rows::REACH`].
+    /// What [`Pixel`] says, and `by` is up to [`crate::simd::bytes::REACH`].
     #[inline(always)]
     unsafe fn extend_one<S: Store>(&mut self, by: i32, pixel: Pixel<'_, S>) {
         let (last, far) = (self.two[0], I::One::splat(FAR));

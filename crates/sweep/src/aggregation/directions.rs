@@ -1,89 +1,17 @@
-//! Semi-global aggregation (Hirschmüller 2008) over height hypotheses that differ from pixel to pixel.
-//!
-//! Along each of eight directions, `L(p, k) = C(p, k) + min(L(q, k), L(q, k ± 1) + P1, min L(q) + P2) − min L(q)` with q
-//! the pixel before p; the result is ΣL. Hypotheses are indices on one height lattice, so pixels with different ranges
-//! meet at equal heights; a height that the previous pixel did not search can only be reached by a jump. P2 falls where
-//! the image has an edge. Path costs are bytes, cut at 255.
-//!
-//! Steps make flat surfaces cheap, and steep ones dear: a quarry's face is cut short. Where the coarser level found a steep surface,
-//! it is its climb from q to p that costs nothing, and k counts from there: a surface orientation prior (Scharstein, Taniai and
-//! Sinha 2017, SGM-P) that leaves flat ones alone, whose noise it would hand down.
-//!
-//! What the first four paths add to the cost is kept in bytes too, halved and rounded up.
+//! The eight directions of the aggregation, four at a time.
 
 use multiversion::multiversion;
 use multiversion::target::match_target;
 
+use super::block::Volume;
+use super::layout::{LANES, Pixels, Row};
+use super::penalties::{Penalties, jump_penalty};
+use super::row::{Results, Room, Task, extend_row};
+use super::row_sums::RowSums;
 use crate::simd::Anywhere;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::Avx2;
 use crate::simd::Instructions;
-use crate::simd::paths::{Results, Room, Task, extend_row};
-use crate::simd::pixel::JUMP_MAX;
-use crate::simd::rows::{Pixels, Row};
-
-pub(crate) use crate::simd::rows::{FARTHEST, LANES};
-
-/// Penalties in units of the cost ([`crate::cost::COST_MAX`] = worst).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Penalties {
-    /// For a change of one step.
-    pub step: u8,
-    /// For a jump, where the image is flat; at most 127, more counts as that.
-    pub jump: u8,
-    /// For a jump, across the strongest edges.
-    pub jump_at_edge: u8,
-}
-
-impl Default for Penalties {
-    /// Measured on simulated towns and the LiDAR truth of JAX_068: a step costs about a quarter of the worst cost, so that noise
-    /// does not ripple a roof; a jump a little more than the worst cost, and no more than a step across an image edge,
-    /// where roofs end. The proportions are those of CARS and S2P (8 to 32 of 24 bits).
-    fn default() -> Self {
-        Self { step: 32, jump: 124, jump_at_edge: 32 }
-    }
-}
-
-/// A block of pixels with their hypotheses, row after row.
-pub(crate) struct Volume<'a> {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    /// First hypothesis of each pixel.
-    pub(crate) low: &'a [i32],
-    /// Where a steep surface is expected at each pixel ([`crate::ranges::Ranges::steep`]).
-    pub(crate) steep: &'a [i32],
-    /// Where each pixel's costs begin; one entry more than there are pixels.
-    pub(crate) offsets: &'a [u32],
-    /// The costs, and [`LANES`] entries that belong to no pixel.
-    pub(crate) costs: &'a [u8],
-    /// Strength of the image gradient at each pixel relative to the noise and contrast, 0 (flat) to 255 (edge).
-    pub(crate) edges: &'a [u8],
-}
-
-/// Sums of path costs of one row; what the first four directions add is rounded up to an even number.
-#[derive(Debug, Clone, Copy)]
-pub struct RowSums<'a> {
-    sums: &'a [u16],
-    /// Of the row's pixels among all costs, and where the next row's begin.
-    offsets: &'a [u32],
-}
-
-impl RowSums<'_> {
-    /// Those of the pixel at `x`.
-    pub fn pixel(&self, x: usize) -> &[u16] {
-        let (sums, count) = self.pixel_and_more(x);
-        &sums[..count]
-    }
-
-    /// Those of the pixel at `x` with [`LANES`] more behind them, and how many they are.
-    #[inline(always)]
-    pub(crate) fn pixel_and_more(&self, x: usize) -> (&[u16], usize) {
-        // The last pixel comes first.
-        let end = self.offsets[self.offsets.len() - 1];
-        let (first, count) = (end - self.offsets[x + 1], self.offsets[x + 1] - self.offsets[x]);
-        (&self.sums[first as usize..][..count as usize + LANES], count as usize)
-    }
-}
 
 /// The sums of the path costs over eight directions: `read` is given every row, the last one first. `forward` is for what the
 /// first four directions add.
@@ -120,7 +48,7 @@ fn aggregate_with(
     for y in (0..volume.height).rev() {
         let first = volume.row_offsets(y)[0] as usize;
         sweep.extend(volume, y, Results::Backward(&forward[first..], &mut sums));
-        read(y, RowSums { sums: &sums, offsets: volume.row_offsets(y) });
+        read(y, RowSums::new(&sums, volume.row_offsets(y)));
     }
 }
 
@@ -171,37 +99,11 @@ impl Sweep {
     }
 }
 
-impl Volume<'_> {
-    fn row(&self, y: usize) -> Pixels<'_> {
-        let row = y * self.width..(y + 1) * self.width;
-        let (low, steep) = (&self.low[row.clone()], &self.steep[row.clone()]);
-        Pixels { low, steep, offsets: self.row_offsets(y), edges: &self.edges[row] }
-    }
-
-    /// Where the costs of a row's pixels begin, and those of the next row.
-    fn row_offsets(&self, y: usize) -> &[u32] {
-        &self.offsets[y * self.width..(y + 1) * self.width + 1]
-    }
-
-    /// The most hypotheses of a row.
-    fn row_capacity(&self) -> usize {
-        let row = |y: usize| self.offsets[(y + 1) * self.width] - self.offsets[y * self.width];
-        (0..self.height).map(row).max().unwrap_or(0) as usize
-    }
-}
-
-/// The jump penalty at a pixel: the stronger its edge is, the lower. Between two pixels it is the lower one of theirs.
-#[inline(always)]
-fn jump_penalty(p: Penalties, edge: u8) -> u8 {
-    let range = u16::from(p.jump.saturating_sub(p.jump_at_edge));
-    (p.jump - ((range * u16::from(edge)) / 255) as u8).min(JUMP_MAX)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::ranges::{CLIMB_MAX, NOT_STEEP};
-    use crate::testing::random;
+    use crate::testing::random::random;
 
     /// The recurrence as it is written in the module's text, over a full lattice, without ranges or guards; path costs are
     /// cut at 255, and what those from above and from the left add rounded up to an even number.

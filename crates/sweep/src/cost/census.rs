@@ -3,6 +3,8 @@
 //! Pictures and all that comes of them are rows one directly after the other, so that registers go on across their ends;
 //! what that gives in the first and last columns and rows, which lack a neighbour, means nothing.
 
+#![allow(unsafe_code)]
+
 use multiversion::multiversion;
 use multiversion::target::match_target;
 #[cfg(target_arch = "x86_64")]

@@ -1,5 +1,7 @@
 //! The least of a pixel's sums, and the least outside of a window of them.
 
+#![allow(unsafe_code)]
+
 /// Words that are read at once: a pixel's sums are followed by as many others.
 pub(crate) const WORDS: usize = 16;
 
@@ -18,7 +20,7 @@ pub(crate) trait Sums {
     fn least_outside(sums: &[u16], count: usize, from: usize, to: usize) -> u16;
 }
 
-impl Sums for super::Anywhere {
+impl Sums for crate::simd::Anywhere {
     #[inline(always)]
     fn least(sums: &[u16], count: usize) -> (u16, usize) {
         let first = |best: (u16, usize), (place, sum): (usize, &u16)| if *sum < best.0 { (*sum, place) } else { best };
@@ -38,7 +40,7 @@ mod avx2 {
 
     // SAFETY of all blocks below: the instructions are those of AVX2, for whose functions alone this is; what is read lies in the
     // slice, whose length is checked.
-    impl Sums for super::super::Avx2 {
+    impl Sums for crate::simd::Avx2 {
         #[inline(always)]
         fn least(sums: &[u16], count: usize) -> (u16, usize) {
             assert!(sums.len() >= count + WORDS && (1..=usize::from(u16::MAX)).contains(&count));

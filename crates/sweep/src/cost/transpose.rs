@@ -1,5 +1,7 @@
 //! Rows of bytes turned into columns.
 
+#![allow(unsafe_code)]
+
 use multiversion::multiversion;
 use multiversion::target::match_target;
 

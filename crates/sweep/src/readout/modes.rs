@@ -7,7 +7,7 @@
 //! and its mean over whole hypotheses is k₀ to a thousandth only if that deviation is near a step. A fixed temperature
 //! is too cold for sharp modes and locks heights to the lattice.
 
-use crate::simd::sums::Sums;
+use super::least::Sums;
 
 /// Pixels whose modes are read together: whole registers of any kind.
 pub(crate) const TOGETHER: usize = 32;
@@ -117,10 +117,10 @@ fn exp(x: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::least::WORDS;
     use super::*;
     use crate::simd::Anywhere;
-    use crate::simd::sums::WORDS;
-    use crate::testing::random;
+    use crate::testing::random::random;
     use proptest::prelude::*;
 
     /// One pixel's position, deviation and margin.

@@ -1,5 +1,7 @@
 //! A picture shifted by a sub-pixel vector: bicubic, in 16-bit integers.
 
+#![allow(unsafe_code)]
+
 use multiversion::multiversion;
 use multiversion::target::match_target;
 #[cfg(target_arch = "x86_64")]

@@ -1,5 +1,7 @@
 //! Bytes raised where others are marked.
 
+#![allow(unsafe_code)]
+
 use multiversion::multiversion;
 use multiversion::target::match_target;
 
