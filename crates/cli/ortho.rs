@@ -1,19 +1,14 @@
-//! `skysweep ortho`: images laid on a surface model so that every cell shows its own point, hidden cells marked.
-//!
-//! Beside `OUT.tif` stands `OUT_mask.tif`: band 1 says what a cell is (0 seen, 1 hidden in every image that reaches it, 2 outside
-//! the images, 255 without a height), band 2 which image it comes from (from 1; 0 is none).
-
-mod inputs;
-mod mosaic;
-mod output;
-mod view;
+//! `skysweep ortho`: images laid on a surface model so that every cell shows its own ground point, hidden cells marked.
 
 use std::path::PathBuf;
 
 use crs::VerticalDatum;
+use jobs::files::FileError;
+use jobs::ortho::{OrthoConfig, OrthoError};
 
+use crate::error::{OVERWRITE, with_hint};
 use crate::progress::{ProgressStyle, Watcher};
-use crate::{Global, Outcome, print, threads};
+use crate::{Global, Outcome, corrections_of, print};
 
 /// Arguments of `skysweep ortho`.
 #[derive(Debug, clap::Args)]
@@ -37,20 +32,20 @@ pub(crate) struct Args {
     /// Area in the surface model's map [default: all of it].
     #[arg(long, num_args = 4, value_names = ["X_MIN", "Y_MIN", "X_MAX", "Y_MAX"], allow_negative_numbers = true)]
     bounds: Option<Vec<f64>>,
-    /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default: those of the run that made
-    /// the surface model, for the images that it used].
+    /// Pointing corrections of the images: the report of a run of skysweep dsm, or none [default: from the run that made the
+    /// surface model, for the images that it used].
     #[arg(long, value_name = "report.json|none")]
     corrections: Option<PathBuf>,
-    /// What the surface model's heights are above, where the file does not say or is wrong.
+    /// Vertical datum of the surface model, if the file names none or a wrong one.
     #[arg(long, value_name = "DATUM")]
     dsm_vertical: Option<VerticalDatum>,
-    /// How far the surface must stand above a line of sight to hide what is behind, metres.
+    /// Height by which the surface must stand above a line of sight to hide what is behind it, metres.
     #[arg(long, value_name = "METRES", default_value_t = 0.05)]
     tolerance: f64,
     /// Leave the images' grey values as they are.
     #[arg(long)]
     no_balance: bool,
-    /// Fill cells that are hidden in every image with what stands before them, instead of no-data.
+    /// Fill cells that are hidden in every image with what hides them, instead of no-data.
     #[arg(long)]
     keep_hidden: bool,
     /// Worker threads [default: all cores].
@@ -69,17 +64,43 @@ pub(crate) struct Args {
 
 /// Runs `skysweep ortho`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    output::check(args)?;
-    threads::start(args.threads)?;
-    let inputs = inputs::Inputs::open(args)?;
     let watcher = Watcher::new(args.progress, global);
-    let made = mosaic::make(&inputs, args, &watcher);
+    let report = jobs::ortho::run(&args.config(), &watcher);
     watcher.finish();
-    let report = output::write(args, &inputs, &made?)?;
+    let report = report.map_err(hinted)?;
     if args.json {
         print::json(&report)?;
     } else if !global.is_quiet() {
         print::text(&report.text())?;
     }
     Ok(Outcome::Complete)
+}
+
+impl Args {
+    fn config(&self) -> OrthoConfig {
+        let mut config = OrthoConfig::new(self.images.clone(), self.dsm.clone(), self.output.clone());
+        config.cell_m = self.gsd;
+        config.bounds = self.bounds.as_ref().and_then(|bounds| bounds.as_slice().try_into().ok());
+        config.corrections = corrections_of(self.corrections.as_deref());
+        config.surface_vertical = self.dsm_vertical;
+        config.tolerance_m = self.tolerance;
+        config.balance = !self.no_balance;
+        config.keep_hidden = self.keep_hidden;
+        config.threads = self.threads;
+        config.overwrite = self.overwrite;
+        config
+    }
+}
+
+/// Adds the option that helps with an error.
+fn hinted(error: OrthoError) -> anyhow::Error {
+    let hint = match &error {
+        OrthoError::File(FileError::Exists { .. }) => Some(OVERWRITE),
+        OrthoError::Balance(_) => Some("give --no-balance"),
+        OrthoError::TooLarge { .. } => Some("give --bounds or a larger --gsd"),
+        OrthoError::Value { name: "the cell size", .. } => Some("see --gsd"),
+        OrthoError::Value { name: "the tolerance", .. } => Some("see --tolerance"),
+        _ => None,
+    };
+    with_hint(error, hint)
 }

@@ -10,6 +10,7 @@ mod error_text;
 pub mod eval;
 pub mod files;
 pub mod map_surface;
+pub mod ortho;
 pub mod placed_model;
 pub mod rpc;
 pub mod simulate;

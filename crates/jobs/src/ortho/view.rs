@@ -1,4 +1,4 @@
-//! What one image has to say about some cells: whether it sees them, and the values of its bands.
+//! Looks at cells through one image: whether the image sees them, and the values of its bands there.
 
 use camera::ImagePoint;
 use geodesy::LonLatHeight;
@@ -8,38 +8,39 @@ use ortho::Sight;
 use raster::{Grid, Window, bicubic};
 use rayon::prelude::*;
 
-use super::inputs::Image;
+use super::error::OrthoError;
+use super::inputs::OrthoImage;
 
-/// Pixels around those that are needed, for the interpolation.
+/// Margin around the needed pixels, for the bicubic interpolation, pixels.
 const MARGIN: usize = 3;
-/// Most pixels of an image that are read at once: an image far finer than the ortho is read by fewer cells.
+/// Most pixels of an image that are read at once. An image much finer than the ortho is read for fewer cells at a time.
 const PIXELS_MAX: usize = 1 << 27;
 
 /// A cell of the ortho.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
-    /// Position in the surface model.
+    /// Column and row in the surface model.
     pub(super) in_dsm: [f64; 2],
     pub(super) ground: LonLatHeight,
 }
 
-/// Some cells in one image.
+/// Cells as one image sees them.
 pub(super) struct Seen {
     pub(super) sights: Vec<Sight>,
-    /// Per band the values; NaN where the image has none.
+    /// Values by band; NaN where the image has none.
     pub(super) values: Vec<Vec<f32>>,
 }
 
-/// Looks at cells through an image. Hidden cells have the values of what stands before them.
+/// Looks at cells through an image. Hidden cells get the values of what hides them.
 pub(super) fn look(
     surface: &Surface<'_>,
-    image: &Image,
+    image: &OrthoImage,
     cells: &[Option<Cell>],
     tolerance_m: f64,
-) -> anyhow::Result<Seen> {
+) -> Result<Seen, OrthoError> {
     let (width, height) = (image.source.info().width as f64 - 1.0, image.source.info().height as f64 - 1.0);
     let inside = |p: &ImagePoint| (0.0..=width).contains(&p.sample) && (0.0..=height).contains(&p.line);
-    // The image's file cannot be shared among threads, its geometry can.
+    // Threads can share the geometry of the image, but not its open file.
     let (camera, eyeline) = (&image.camera, &image.eyeline);
     let places: Vec<Option<ImagePoint>> =
         cells.par_iter().map(|cell| camera.project(cell.as_ref()?.ground).ok().filter(inside)).collect();
@@ -60,6 +61,7 @@ pub(super) fn look(
     Ok(Seen { sights, values })
 }
 
+/// Finds out whether the surface hides a cell from the image.
 fn sight(surface: &Surface<'_>, eyeline: &Eyeline, cell: &Cell, tolerance_m: f64) -> Sight {
     let [column, row] = cell.in_dsm;
     let towards = eyeline.per_metre(column, row);
@@ -70,8 +72,8 @@ fn sight(surface: &Surface<'_>, eyeline: &Eyeline, cell: &Cell, tolerance_m: f64
     }
 }
 
-/// The values of all bands at places of an image.
-fn values(source: &ImageSource, places: &[Option<ImagePoint>]) -> anyhow::Result<Vec<Vec<f32>>> {
+/// Reads the values of all bands at image points.
+fn values(source: &ImageSource, places: &[Option<ImagePoint>]) -> Result<Vec<Vec<f32>>, OrthoError> {
     let bands = source.info().bands;
     let Some(window) = window(places) else { return Ok(vec![vec![f32::NAN; places.len()]; bands]) };
     let pixels = window.width.saturating_mul(window.height);
@@ -89,14 +91,15 @@ fn values(source: &ImageSource, places: &[Option<ImagePoint>]) -> anyhow::Result
     (1..=bands).map(band).collect()
 }
 
-fn halves(source: &ImageSource, places: &[Option<ImagePoint>]) -> anyhow::Result<Vec<Vec<f32>>> {
+/// Reads the values in two halves.
+fn halves(source: &ImageSource, places: &[Option<ImagePoint>]) -> Result<Vec<Vec<f32>>, OrthoError> {
     let (first, second) = places.split_at(places.len() / 2);
     let (mut first, second) = (values(source, first)?, values(source, second)?);
     first.iter_mut().zip(second).for_each(|(all, rest)| all.extend(rest));
     Ok(first)
 }
 
-/// The pixels that places need.
+/// Returns the window of pixels that image points need; `None` without a point.
 fn window(places: &[Option<ImagePoint>]) -> Option<Window> {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for place in places.iter().flatten() {

@@ -1,6 +1,5 @@
-//! The ortho, block by block: each cell from the image that sees it most steeply, grey values brought together before.
+//! Makes the ortho block by block: each cell comes from the image that sees it most steeply.
 
-use anyhow::Context;
 use geodesy::LonLatHeight;
 use io::raster::Dem;
 use numeric::Progress;
@@ -9,52 +8,40 @@ use ortho::{Balance, Pair, Sight, balance, best_view};
 use raster::Grid;
 use rayon::prelude::*;
 
-use super::Args;
-use super::inputs::{Inputs, OrthoGrid};
+use super::config::OrthoConfig;
+use super::error::OrthoError;
+use super::inputs::{OrthoGrid, OrthoInputs};
+use super::states::{HIDDEN, OUTSIDE, OrthoCounts, SEEN, VOID};
 use super::view::{Cell, Seen, look};
-use crate::progress::Watcher;
 
 /// Side of a block, cells.
 const BLOCK: usize = 512;
-/// Cells from which grey values are compared.
+/// Number of cells, spread over the ortho, whose grey values are compared.
 const COMPARED: usize = 60_000;
 
-/// What a cell is.
-pub(super) const SEEN: u8 = 0;
-pub(super) const HIDDEN: u8 = 1;
-pub(super) const OUTSIDE: u8 = 2;
-pub(super) const VOID: u8 = 255;
-
-/// A true ortho.
+/// An ortho.
 pub(super) struct Ortho {
-    /// NaN where there is no value.
+    /// Values by band, NaN where there is none.
     pub(super) bands: Vec<Grid<f32>>,
-    /// One of [`SEEN`], [`HIDDEN`], [`OUTSIDE`], [`VOID`].
+    /// [`SEEN`], [`HIDDEN`], [`OUTSIDE`] or [`VOID`].
     pub(super) state: Grid<u8>,
-    /// The image, from 1; 0 where there is none.
+    /// Number of the image, from 1; 0 where there is none.
     pub(super) view: Grid<u8>,
-    /// Per image and band.
+    /// Gains and offsets by image and band.
     pub(super) balances: Vec<Vec<Balance>>,
-    /// Per image the cells that it sees, those that are hidden in it, and those that it gave.
-    pub(super) counts: Vec<Counts>,
-}
-
-#[derive(Debug, Clone, Copy, Default, serde::Serialize)]
-pub(super) struct Counts {
-    pub(super) seen: usize,
-    pub(super) hidden: usize,
-    pub(super) used: usize,
+    /// Counts of cells by image.
+    pub(super) counts: Vec<OrthoCounts>,
 }
 
 /// Makes the ortho.
-pub(super) fn make(inputs: &Inputs, args: &Args, watcher: &Watcher) -> anyhow::Result<Ortho> {
+pub(super) fn make(inputs: &OrthoInputs, config: &OrthoConfig, progress: &dyn Progress) -> Result<Ortho, OrthoError> {
     let surface = Surface::new(&inputs.dsm.heights, inputs.cell_m);
-    let work = Work { inputs, args, surface: &surface };
+    let work = Work { inputs, tolerance_m: config.tolerance_m, surface: &surface };
     let bands = inputs.images[0].source.info().bands;
-    let balances = if args.no_balance || inputs.images.len() < 2 {
+    let balances = if !config.balance || inputs.images.len() < 2 {
         vec![vec![Balance::NONE; bands]; inputs.images.len()]
     } else {
-        work.balances(bands, watcher)?
+        work.balances(bands, progress)?
     };
     let (width, height) = (inputs.grid.width, inputs.grid.height);
     let mut ortho = Ortho {
@@ -62,15 +49,16 @@ pub(super) fn make(inputs: &Inputs, args: &Args, watcher: &Watcher) -> anyhow::R
         state: Grid::filled(width, height, VOID),
         view: Grid::filled(width, height, 0),
         balances,
-        counts: vec![Counts::default(); inputs.images.len()],
+        counts: vec![OrthoCounts::default(); inputs.images.len()],
     };
     let blocks = work.blocks();
-    watcher.begin("ortho", blocks.len());
+    progress.begin("ortho", blocks.len());
     for block in blocks {
+        progress.check_cancelled()?;
         let cells = work.cells(&block, 1);
         let seen = work.look(&cells)?;
-        ortho.take(&block, &cells, &seen, args.keep_hidden);
-        watcher.step();
+        ortho.take(&block, &cells, &seen, config.keep_hidden);
+        progress.step();
     }
     Ok(ortho)
 }
@@ -83,13 +71,15 @@ struct Block {
     height: usize,
 }
 
+/// What every block needs.
 struct Work<'a> {
-    inputs: &'a Inputs,
-    args: &'a Args,
+    inputs: &'a OrthoInputs,
+    tolerance_m: f64,
     surface: &'a Surface<'a>,
 }
 
 impl Work<'_> {
+    /// Divides the ortho into blocks, row by row.
     fn blocks(&self) -> Vec<Block> {
         let grid = &self.inputs.grid;
         let starts = |cells: usize| (0..cells).step_by(BLOCK);
@@ -102,7 +92,7 @@ impl Work<'_> {
         starts(grid.height).flat_map(|top| starts(grid.width).map(move |left| block(left, top))).collect()
     }
 
-    /// The cells of a block, every `stride`-th along both axes of the ortho; `None` without a height.
+    /// Returns every `stride`-th cell of a block along both axes of the ortho; `None` for a cell without a height.
     fn cells(&self, block: &Block, stride: usize) -> Vec<Option<Cell>> {
         let on = |first: usize, length: usize| (first.next_multiple_of(stride)..first + length).step_by(stride);
         let rows: Vec<usize> = on(block.top, block.height).collect();
@@ -113,13 +103,14 @@ impl Work<'_> {
             .collect()
     }
 
-    fn look(&self, cells: &[Option<Cell>]) -> anyhow::Result<Vec<Seen>> {
+    /// Looks at cells through every image.
+    fn look(&self, cells: &[Option<Cell>]) -> Result<Vec<Seen>, OrthoError> {
         let images = self.inputs.images.iter();
-        images.map(|image| look(self.surface, image, cells, self.args.tolerance)).collect()
+        images.map(|image| look(self.surface, image, cells, self.tolerance_m)).collect()
     }
 
-    /// Gains and offsets from cells all over the ortho.
-    fn balances(&self, bands: usize, watcher: &Watcher) -> anyhow::Result<Vec<Vec<Balance>>> {
+    /// Computes gains and offsets by image and band, from cells all over the ortho.
+    fn balances(&self, bands: usize, progress: &dyn Progress) -> Result<Vec<Vec<Balance>>, OrthoError> {
         let images = self.inputs.images.len();
         let cells = self.inputs.grid.width as f64 * self.inputs.grid.height as f64;
         let stride = (cells / COMPARED as f64).sqrt().ceil().max(1.0) as usize;
@@ -131,8 +122,9 @@ impl Work<'_> {
         }
         let mut first = vec![0usize; images];
         let blocks = self.blocks();
-        watcher.begin("grey values", blocks.len());
+        progress.begin("grey values", blocks.len());
         for block in blocks {
+            progress.check_cancelled()?;
             let cells = self.cells(&block, stride);
             let seen = self.look(&cells)?;
             for k in 0..cells.len() {
@@ -143,16 +135,16 @@ impl Work<'_> {
             for (band, pairs) in pairs.iter_mut().enumerate() {
                 pairs.iter_mut().for_each(|pair| compare(pair, band, &seen));
             }
-            watcher.step();
+            progress.step();
         }
         let reference = (0..images).max_by_key(|&i| (first[i], std::cmp::Reverse(i))).unwrap_or(0);
         let solved = pairs.iter().map(|pairs| balance(images, reference, pairs)).collect::<Result<Vec<_>, _>>();
-        let solved = solved.context("give --no-balance")?;
+        let solved = solved?;
         Ok((0..images).map(|image| solved.iter().map(|band| band[image]).collect()).collect())
     }
 }
 
-/// The cells of an ortho on its surface.
+/// Finds the ground points of the cells.
 struct Ground<'a> {
     grid: &'a OrthoGrid,
     dsm: &'a Dem,
@@ -160,7 +152,7 @@ struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// `None` where the surface has no height.
+    /// Returns a cell with its ground point; `None` if the surface has no height there.
     fn cell(&self, column: usize, row: usize) -> Option<Cell> {
         let Self { grid, dsm, .. } = self;
         let (c, r) = (column as f64, row as f64);
@@ -185,7 +177,7 @@ fn compare(pair: &mut Pair, band: usize, seen: &[Seen]) {
 }
 
 impl Ortho {
-    /// Takes the cells of a block from the images.
+    /// Fills the cells of a block from the images.
     fn take(&mut self, block: &Block, cells: &[Option<Cell>], seen: &[Seen], keep_hidden: bool) {
         for (counts, seen) in self.counts.iter_mut().zip(seen) {
             counts.seen += seen.sights.iter().filter(|s| matches!(s, Sight::Seen { .. })).count();

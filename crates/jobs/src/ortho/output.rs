@@ -1,111 +1,120 @@
-//! The files of an ortho: its bands in the images' sample type, the mask, and what is told.
+//! Writes an ortho with its mask and makes the report. The ortho has the sample type of the images.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::bail;
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, SampleType, write_cog};
 use ortho::Balance;
 use raster::Grid;
 use serde::Serialize;
 
-use super::Args;
-use super::inputs::Inputs;
-use super::mosaic::{Counts, HIDDEN, OUTSIDE, Ortho, SEEN, VOID};
+use super::config::OrthoConfig;
+use super::error::OrthoError;
+use super::inputs::OrthoInputs;
+use super::mosaic::Ortho;
+use super::states::{HIDDEN, OUTSIDE, OrthoCounts, SEEN, VOID};
+use crate::files::FileError;
+use crate::threads;
 
-/// Value of cells without data in integer orthos; those with data begin at 1.
+/// No-data value of integer orthos. Values begin at 1.
 const INTEGER_VOID: f32 = 0.0;
 
-/// What was made.
-#[derive(Debug, Serialize)]
-pub(super) struct Report {
-    ortho: PathBuf,
-    mask: PathBuf,
-    size: (usize, usize),
-    bands: usize,
-    cells_seen: usize,
-    cells_hidden: usize,
-    cells_outside: usize,
-    cells_void: usize,
-    images: Vec<ImageReport>,
+/// A finished ortho.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct OrthoReport {
+    /// File of the ortho.
+    pub ortho: PathBuf,
+    /// File of the mask.
+    pub mask: PathBuf,
+    /// Columns and rows.
+    pub size: (usize, usize),
+    /// Bands of the ortho.
+    pub bands: usize,
+    /// Cells that show their own ground point.
+    pub cells_seen: usize,
+    /// Cells that are hidden in every image that reaches them.
+    pub cells_hidden: usize,
+    /// Cells that no image reaches.
+    pub cells_outside: usize,
+    /// Cells without a height.
+    pub cells_void: usize,
+    /// The images, in the order of the configuration.
+    pub images: Vec<OrthoPart>,
 }
 
-#[derive(Debug, Serialize)]
-struct ImageReport {
-    path: PathBuf,
-    /// At the middle of the surface model.
-    incidence_deg: f64,
-    corrected: bool,
+/// An image of an ortho.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct OrthoPart {
+    /// The image.
+    pub path: PathBuf,
+    /// Angle from the vertical at the middle of the surface model, degrees.
+    pub incidence_deg: f64,
+    /// Whether the pointing was corrected.
+    pub corrected: bool,
+    /// Cells that the image sees, hides and gives.
     #[serde(flatten)]
-    counts: Counts,
-    balance: Vec<Balance>,
-}
-
-/// The mask beside an ortho.
-fn mask_path(ortho: &Path) -> PathBuf {
-    let stem = ortho.file_stem().unwrap_or_default().to_string_lossy();
-    ortho.with_file_name(format!("{stem}_mask.tif"))
-}
-
-/// Refuses before the work what would fail after it.
-pub(super) fn check(args: &Args) -> anyhow::Result<()> {
-    for path in [&args.output, &mask_path(&args.output)] {
-        if !args.overwrite && path.symlink_metadata().is_ok() {
-            bail!("the output exists already: choose another name or pass --overwrite: {}", path.display());
-        }
-    }
-    Ok(())
+    pub counts: OrthoCounts,
+    /// Gain and offset by band.
+    pub balance: Vec<Balance>,
 }
 
 /// Writes the mask, then the ortho.
-pub(super) fn write(args: &Args, inputs: &Inputs, made: &Ortho) -> anyhow::Result<Report> {
+pub(super) fn write(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho) -> Result<OrthoReport, OrthoError> {
     let crs = Crs::ellipsoidal(inputs.epsg);
-    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let mask = mask_path(&args.output);
+    let threads = threads::count(config.threads);
+    let mask = config.mask();
     let mask_bands = [
         Band { description: "0_seen_1_hidden_2_outside_255_no_height", data: BandData::U8(&made.state) },
         Band { description: "image_from_1", data: BandData::U8(&made.view) },
     ];
     let raster = CogRaster { threads, ..CogRaster::new(&mask_bands, inputs.grid.geotransform, crs) };
-    write_cog(&mask, &raster, args.overwrite)?;
+    write_cog(&mask, &raster, config.overwrite).map_err(FileError::from)?;
     let names: Vec<String> = (1..=made.bands.len()).map(|band| format!("band_{band}")).collect();
     match sample_type(inputs) {
         SampleType::U8 => {
             let grids: Vec<Grid<u8>> = made.bands.iter().map(|b| b.map(|&v| whole(v, 255.0) as u8)).collect();
             let bands: Vec<Band<'_>> = named(&names, &grids, BandData::U8);
-            ortho(args, inputs, &bands, Some(f64::from(INTEGER_VOID)), threads)?;
+            write_ortho(config, inputs, &bands, Some(f64::from(INTEGER_VOID)), threads)?;
         }
         SampleType::U16 => {
             let grids: Vec<Grid<u16>> = made.bands.iter().map(|b| b.map(|&v| whole(v, 65_535.0) as u16)).collect();
             let bands: Vec<Band<'_>> = named(&names, &grids, BandData::U16);
-            ortho(args, inputs, &bands, Some(f64::from(INTEGER_VOID)), threads)?;
+            write_ortho(config, inputs, &bands, Some(f64::from(INTEGER_VOID)), threads)?;
         }
         _ => {
             let bands: Vec<Band<'_>> = named(&names, &made.bands, BandData::F32);
-            ortho(args, inputs, &bands, Some(f64::from(raster::NO_DATA)), threads)?;
+            write_ortho(config, inputs, &bands, Some(f64::from(raster::NO_DATA)), threads)?;
         }
     }
-    Ok(report(args, inputs, made, mask))
+    Ok(report(config, inputs, made, mask))
 }
 
 fn named<'a, T>(names: &'a [String], grids: &'a [Grid<T>], data: fn(&'a Grid<T>) -> BandData<'a>) -> Vec<Band<'a>> {
     names.iter().zip(grids).map(|(description, grid)| Band { description, data: data(grid) }).collect()
 }
 
-fn ortho(args: &Args, inputs: &Inputs, bands: &[Band<'_>], no_data: Option<f64>, threads: usize) -> anyhow::Result<()> {
+fn write_ortho(
+    config: &OrthoConfig,
+    inputs: &OrthoInputs,
+    bands: &[Band<'_>],
+    no_data: Option<f64>,
+    threads: usize,
+) -> Result<(), OrthoError> {
     let crs = Crs::ellipsoidal(inputs.epsg);
     let overviews = io::raster::Sampling::Average;
     let raster = CogRaster { no_data, threads, overviews, ..CogRaster::new(bands, inputs.grid.geotransform, crs) };
-    Ok(write_cog(&args.output, &raster, args.overwrite)?)
+    Ok(write_cog(&config.output, &raster, config.overwrite).map_err(FileError::from)?)
 }
 
-/// A sample that an integer type holds, 0 where there is none.
+/// Rounds a sample to the range of an integer type; NaN becomes no-data.
 fn whole(value: f32, most: f32) -> f32 {
     if value.is_nan() { INTEGER_VOID } else { value.round().clamp(1.0, most) }
 }
 
-/// The type that holds the samples of all images.
-fn sample_type(inputs: &Inputs) -> SampleType {
+/// Returns the smallest type that holds the samples of all images.
+fn sample_type(inputs: &OrthoInputs) -> SampleType {
     let types = inputs.images.iter().map(|image| image.source.info().sample);
     types.fold(SampleType::U8, |widest, next| match (widest, next) {
         (SampleType::U8, SampleType::U8) => SampleType::U8,
@@ -114,19 +123,19 @@ fn sample_type(inputs: &Inputs) -> SampleType {
     })
 }
 
-fn report(args: &Args, inputs: &Inputs, made: &Ortho, mask: PathBuf) -> Report {
+fn report(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho, mask: PathBuf) -> OrthoReport {
     let count = |state: u8| made.state.data().iter().filter(|&&s| s == state).count();
     let middle = (inputs.dsm.heights.width() as f64 / 2.0, inputs.dsm.heights.height() as f64 / 2.0);
     let images = inputs.images.iter().zip(&made.counts).zip(&made.balances);
-    let images = images.map(|((image, counts), balance)| ImageReport {
+    let images = images.map(|((image, counts), balance)| OrthoPart {
         path: image.source.path().to_owned(),
         incidence_deg: image.eyeline.incidence_deg(middle.0, middle.1),
         corrected: image.corrected,
         counts: *counts,
         balance: balance.clone(),
     });
-    Report {
-        ortho: args.output.clone(),
+    OrthoReport {
+        ortho: config.output.clone(),
         mask,
         size: (inputs.grid.width, inputs.grid.height),
         bands: made.bands.len(),
@@ -138,8 +147,9 @@ fn report(args: &Args, inputs: &Inputs, made: &Ortho, mask: PathBuf) -> Report {
     }
 }
 
-impl Report {
-    pub(super) fn text(&self) -> String {
+impl OrthoReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
         let cells = self.size.0 * self.size.1;
         let share = |n: usize| 100.0 * n as f64 / cells.max(1) as f64;
         let mut text = format!(

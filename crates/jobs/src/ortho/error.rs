@@ -1,0 +1,120 @@
+//! Reasons why an ortho cannot be made.
+
+use std::path::PathBuf;
+
+use crs::CrsError;
+
+use crate::corrections::CorrectionsError;
+use crate::files::FileError;
+
+/// An ortho that cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OrthoError {
+    /// A setting is outside of its range.
+    #[error("{name} is {found}, expected {expected}")]
+    Value {
+        /// Name of the setting in words.
+        name: &'static str,
+        /// Value that was given.
+        found: String,
+        /// Values that are accepted.
+        expected: &'static str,
+    },
+    /// A raster cannot be read.
+    #[error(transparent)]
+    Raster(#[from] io::raster::RasterError),
+    /// An image has no usable RPC.
+    #[error(transparent)]
+    Rpc(Box<io::rpc::RpcReadError>),
+    /// The surface model's coordinate reference system has no EPSG code.
+    #[error("the surface model's coordinate system has no EPSG code: {}", path.display())]
+    NoEpsg {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The surface model is in degrees.
+    #[error("the surface model is in degrees, expected a projected map: {}", path.display())]
+    InDegrees {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The surface model is empty.
+    #[error("the surface model has no heights: {}", path.display())]
+    NoHeights {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// Coordinates or heights cannot be converted.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// The pointing corrections cannot be read.
+    #[error(transparent)]
+    Corrections(#[from] CorrectionsError),
+    /// An image does not see the surface.
+    #[error("the image does not see the surface model: {}", path.display())]
+    NotSeen {
+        /// The image.
+        path: PathBuf,
+        /// What the geometry of the image lacks.
+        source: occlusion::EyelineError,
+    },
+    /// Images have different numbers of bands.
+    #[error("{found} bands, expected the {expected} of the first image: {}", path.display())]
+    Bands {
+        /// The image.
+        path: PathBuf,
+        /// Its bands.
+        found: usize,
+        /// Bands of the first image.
+        expected: usize,
+    },
+    /// The area has no cells or too many.
+    #[error("from {low} to {high} there are {cells} cells of {cell_m} m, expected 1 to 2^28")]
+    Extent {
+        /// Lower bound on the map.
+        low: f64,
+        /// Upper bound on the map.
+        high: f64,
+        /// Number of cells.
+        cells: f64,
+        /// Cell size, metres.
+        cell_m: f64,
+    },
+    /// The ortho does not fit in memory.
+    #[error("{width} x {height} cells of {bands} bands, at most 2^28 in all: choose a smaller area or larger cells")]
+    TooLarge {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Bands.
+        bands: usize,
+    },
+    /// The grey values cannot be brought together.
+    #[error("the grey values of the images cannot be brought together")]
+    Balance(#[from] ortho::BalanceError),
+    /// An output exists or cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The worker threads cannot be started.
+    #[error(transparent)]
+    Threads(#[from] crate::threads::ThreadsError),
+    /// The job was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] numeric::Cancelled),
+}
+
+impl OrthoError {
+    /// A setting outside of its range.
+    pub(super) fn value(name: &'static str, found: impl ToString, expected: &'static str) -> Self {
+        Self::Value { name, found: found.to_string(), expected }
+    }
+}
+
+impl From<io::rpc::RpcReadError> for OrthoError {
+    fn from(error: io::rpc::RpcReadError) -> Self {
+        // Boxed, because it is several times larger than the other variants.
+        Self::Rpc(Box::new(error))
+    }
+}

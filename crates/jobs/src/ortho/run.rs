@@ -1,0 +1,40 @@
+//! Runs the ortho job.
+
+use numeric::Progress;
+
+use super::config::OrthoConfig;
+use super::error::OrthoError;
+use super::inputs::OrthoInputs;
+use super::output::OrthoReport;
+use super::{mosaic, output};
+use crate::{files, threads};
+
+/// Makes an ortho and writes it with its mask.
+///
+/// # Errors
+/// [`OrthoError`]: files that cannot be read, images that do not see the surface, outputs that exist.
+///
+/// ```
+/// use jobs::ortho::{OrthoConfig, run};
+/// use numeric::Silent;
+///
+/// let town = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town");
+/// let folder = tempfile::tempdir()?;
+/// let images = vec![format!("{town}/view_1.tif").into()];
+/// let surface = format!("{town}/truth/dsm.tif").into();
+/// let mut config = OrthoConfig::new(images, surface, folder.path().join("ortho.tif"));
+/// config.cell_m = Some(5.0);
+/// let report = run(&config, &Silent)?;
+/// assert!(report.cells_seen > report.cells_hidden);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn run(config: &OrthoConfig, progress: &dyn Progress) -> Result<OrthoReport, OrthoError> {
+    config.validate()?;
+    files::refuse_existing(&config.output, config.overwrite)?;
+    files::refuse_existing(&config.mask(), config.overwrite)?;
+    threads::install(config.threads, || {
+        let inputs = OrthoInputs::open(config, progress)?;
+        let made = mosaic::make(&inputs, config, progress)?;
+        output::write(config, &inputs, &made)
+    })?
+}
