@@ -1,18 +1,21 @@
-//! COLMAP's binary files: little-endian, counts first.
+//! Reads COLMAP's binary files: little-endian numbers, each list after its count.
 
 use camera::LensModel;
 
-use super::points::RawPoint;
-use super::{Fault, ImagePoints, RawCamera, RawImage};
+use super::error::Fault;
+use super::raw::{ImagePoints, RawCamera, RawImage, RawObservation, RawPoint};
 
-/// Bytes of a camera without its parameters, of an image without name and points, of a point in an image, of a point in
-/// space without its track, and of an element of the track.
+/// Size of a camera record without its parameters, bytes.
 const CAMERA_BYTES: usize = 24;
+/// Size of an image record without the characters of its name and without its points, bytes.
 const IMAGE_BYTES: usize = 73;
+/// Size of a point in an image record, bytes: two f64 and the identifier of the 3D point.
 const IMAGE_POINT_BYTES: usize = 24;
+/// Size of a 3D point record without its track, bytes.
 const POINT_BYTES: usize = 51;
+/// Size of an element of a track, bytes.
 const TRACK_BYTES: usize = 8;
-/// Longest image name.
+/// Length at which an image name must have ended, bytes.
 const NAME_LIMIT: usize = 4096;
 
 pub(super) fn cameras(bytes: &[u8]) -> Result<Vec<RawCamera>, Fault> {
@@ -40,15 +43,18 @@ fn point(bytes: &mut Bytes<'_>) -> Result<RawPoint, Fault> {
     let [r, g, b] = bytes.take::<3>()?;
     let error_px = bytes.f64()?;
     let count = bytes.count("observations", TRACK_BYTES)?;
-    let track = (0..count).map(|_| Ok((bytes.u32()?, bytes.u32()?))).collect::<Result<_, _>>()?;
+    let track = (0..count).map(|_| Ok(RawObservation { image: bytes.u32()?, index: bytes.u32()? }));
+    let track = track.collect::<Result<_, _>>()?;
     Ok(RawPoint { position, color: [r, g, b], error_px, track, place })
 }
 
 fn camera(bytes: &mut Bytes<'_>) -> Result<RawCamera, Fault> {
     let place = bytes.place();
     let (id, number) = (bytes.u32()?, bytes.u32()?);
-    let model = LensModel::from_number(number)
-        .ok_or_else(|| Fault { what: format!("{number} is no camera model of COLMAP"), place: place.clone() })?;
+    let model = LensModel::from_number(number).ok_or_else(|| Fault {
+        what: format!("{number} is not the number of a COLMAP camera model"),
+        place: place.clone(),
+    })?;
     let (width, height) = (bytes.u64()?, bytes.u64()?);
     let parameters = (0..model.parameter_count()).map(|_| bytes.f64()).collect::<Result<_, _>>()?;
     Ok(RawCamera { id, model, width, height, parameters, place })
@@ -65,7 +71,7 @@ fn image(bytes: &mut Bytes<'_>, keep: ImagePoints) -> Result<RawImage, Fault> {
     let name = bytes.text()?;
     let count = bytes.u64()?;
     let points = match keep {
-        ImagePoints::PassOver => {
+        ImagePoints::Skip => {
             bytes.skip(count.checked_mul(IMAGE_POINT_BYTES as u64), "the points of an image")?;
             Vec::new()
         }
@@ -83,6 +89,7 @@ fn image(bytes: &mut Bytes<'_>, keep: ImagePoints) -> Result<RawImage, Fault> {
     Ok(RawImage { id, quaternion: [w, x, y, z], translation: [tx, ty, tz], camera, name, points, place })
 }
 
+/// A cursor over the bytes of a file.
 struct Bytes<'a> {
     all: &'a [u8],
     at: usize,
@@ -116,13 +123,16 @@ impl Bytes<'_> {
         self.take().map(f64::from_le_bytes)
     }
 
-    /// A count of things that take at least `each` bytes: more than the file can hold is refused.
+    /// Reads a count of records of at least `each` bytes, and refuses more than the rest of the file can hold.
     fn count(&mut self, what: &str, each: usize) -> Result<u64, Fault> {
         let place = self.place();
         let count = self.u64()?;
         let room = (self.all.len() - self.at) / each;
         if count > room as u64 {
-            return Err(Fault { what: format!("{count} {what} are announced, and there is room for {room}"), place });
+            return Err(Fault {
+                what: format!("the file announces {count} {what}, the rest of it has room for {room}"),
+                place,
+            });
         }
         Ok(count)
     }
@@ -135,7 +145,7 @@ impl Bytes<'_> {
         Ok(text)
     }
 
-    /// Where so many bytes end, if the file holds them.
+    /// Returns the offset after the next `count` bytes, if the file holds them.
     fn after(&self, count: Option<u64>, what: &str) -> Result<usize, Fault> {
         let room = (self.all.len() - self.at) as u64;
         let count = count.filter(|&count| count <= room).ok_or_else(|| self.ends(what))?;

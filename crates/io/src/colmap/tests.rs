@@ -1,4 +1,6 @@
-//! COLMAP models in text and binary, broken and hostile ones among them.
+//! Reads valid, broken and hostile COLMAP models in text and binary.
+
+use std::path::Path;
 
 use super::*;
 
@@ -76,7 +78,7 @@ fn text_and_binary_give_the_same_model() {
 fn broken_text_is_refused_with_its_line() {
     refused(read_text("1 PINHOLE 640 480 500 510 320", IMAGES), "4 parameters, found 3", "line 1");
     refused(read_text("1 PINHOLE 640 480 1 1 1 1 1", IMAGES), "4 parameters, found 5", "line 1");
-    refused(read_text("\n1 EYE 640 480", IMAGES), "no camera model", "line 2");
+    refused(read_text("\n1 EYE 640 480", IMAGES), "not the name of a COLMAP camera model", "line 2");
     refused(read_text("1 PINHOLE 640 x", IMAGES), "expected a number", "line 1");
     refused(read_text("1 PINHOLE 18446744073709551615 480 1 1 1 1", IMAGES), "pixels", "line 1");
     refused(read_text("1 PINHOLE 640 480 NaN 1 1 1", IMAGES), "parameter 0", "line 1");
@@ -114,7 +116,7 @@ fn broken_binaries_are_refused_with_their_byte() {
     }
     let mut odd = cameras.clone();
     odd[12] = 99;
-    refused(read_binary(&odd, &images), "99 is no camera model", "byte 8");
+    refused(read_binary(&odd, &images), "99 is not the number of a COLMAP camera model", "byte 8");
 }
 
 #[test]

@@ -1,9 +1,12 @@
-//! COLMAP's text files: one line per camera, two per image (the second holds its points and may be empty).
+//! Reads COLMAP's text files: one line per camera and per point, two per image.
+//!
+//! The second line of an image holds its points and may be empty.
 
 use camera::LensModel;
 
-use super::points::RawPoint;
-use super::{Fault, ImagePoints, RawCamera, RawImage, shorten};
+use super::convention::shorten;
+use super::error::Fault;
+use super::raw::{ImagePoints, RawCamera, RawImage, RawObservation, RawPoint};
 
 pub(super) fn cameras(text: &str) -> Result<Vec<RawCamera>, Fault> {
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
@@ -32,7 +35,7 @@ pub(super) fn points(text: &str) -> Result<Vec<RawPoint>, Fault> {
 }
 
 fn point(words: &mut Words<'_>) -> Result<RawPoint, Fault> {
-    words.number::<u64>("the point's number")?;
+    words.number::<u64>("the identifier of the point")?;
     let (mut position, mut color) = ([0.0; 3], [0; 3]);
     for value in &mut position {
         *value = words.number("the position")?;
@@ -43,7 +46,8 @@ fn point(words: &mut Words<'_>) -> Result<RawPoint, Fault> {
     let error_px = words.number("the error")?;
     let mut track = Vec::new();
     while !words.rest().is_empty() {
-        track.push((words.number("an image of the track")?, words.number("a point of the track")?));
+        let image = words.number("an image of the track")?;
+        track.push(RawObservation { image, index: words.number("a point of the track")? });
     }
     Ok(RawPoint { position, color, error_px, track, place: words.place() })
 }
@@ -52,16 +56,16 @@ fn image_points(words: &mut Words<'_>) -> Result<Vec<[f64; 2]>, Fault> {
     let mut points = Vec::new();
     while !words.rest().is_empty() {
         points.push([words.number("a point of the image")?, words.number("a point of the image")?]);
-        words.number::<i64>("the number of a point")?;
+        words.number::<i64>("the identifier of a point")?;
     }
     Ok(points)
 }
 
 fn camera(words: &mut Words<'_>) -> Result<RawCamera, Fault> {
-    let id = words.number("the camera's number")?;
+    let id = words.number("the identifier of the camera")?;
     let name = words.next("the model")?;
     let model = LensModel::from_name(name)
-        .ok_or_else(|| words.fault(format!("{:?} is no camera model of COLMAP", shorten(name))))?;
+        .ok_or_else(|| words.fault(format!("{:?} is not the name of a COLMAP camera model", shorten(name))))?;
     let (width, height) = (words.number("the width")?, words.number("the height")?);
     let mut parameters = Vec::new();
     while parameters.len() <= model.parameter_count() && !words.rest().is_empty() {
@@ -71,14 +75,14 @@ fn camera(words: &mut Words<'_>) -> Result<RawCamera, Fault> {
 }
 
 fn image(words: &mut Words<'_>) -> Result<RawImage, Fault> {
-    let id = words.number("the image's number")?;
+    let id = words.number("the identifier of the image")?;
     let mut pose = [0.0; 7];
     for value in &mut pose {
         *value = words.number("the pose")?;
     }
-    let camera = words.number("the camera's number")?;
+    let camera = words.number("the identifier of the camera")?;
     let [w, x, y, z, tx, ty, tz] = pose;
-    // Names may hold spaces.
+    // A name may contain spaces, so it is the rest of the line.
     let name = words.rest().to_owned();
     Ok(RawImage {
         id,
@@ -91,7 +95,7 @@ fn image(words: &mut Words<'_>) -> Result<RawImage, Fault> {
     })
 }
 
-/// The words of a line.
+/// A cursor over the words of a line.
 struct Words<'a> {
     rest: &'a str,
     line: usize,

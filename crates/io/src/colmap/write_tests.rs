@@ -1,4 +1,4 @@
-//! Models there and back in both encodings, and models that no file can hold.
+//! Writes models in both encodings and reads them back; refuses models that no file can hold.
 
 use camera::{ImagePoint, Lens, LensModel, Pose};
 use proptest::prelude::*;
@@ -76,7 +76,7 @@ fn the_text_is_what_colmap_reads() {
     };
     assert_eq!(lines("cameras.txt")[0], "1 PINHOLE 640 480 500.1 510.2 320.0 239.75");
     assert_eq!(lines("images.txt")[0], "7 1.0 0.0 0.0 0.0 1.0 2.0 3.0 1 a b.png");
-    // The second line of an image names the points in their order; tracks name the place in that line.
+    // The second line of an image lists its points in the order of the model; tracks give the index in that line.
     assert_eq!(lines("images.txt")[1], "0.625 0.75 1 639.9 0.5 3");
     assert_eq!(lines("points3D.txt")[0], "1 0.3333333333333333 -2e-300 690123.456 1 128 255 0.25 9 0 7 0");
     assert_eq!(lines("points3D.txt")[2], "3 1.0 2.0 3.0 1 128 255 0.25 7 1 3 0");
@@ -95,14 +95,14 @@ fn models_that_no_file_can_hold_are_refused() {
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
-    refused(|model, _| model.views[1].lens = 3, "lens 3 of 3");
-    refused(|model, _| model.views[1].id = 7, "two images");
+    refused(|model, _| model.views[1].lens = 3, "names lens 3, the model has 3 lenses");
+    refused(|model, _| model.views[1].id = 7, "belongs to two images");
     for name in ["../../x", "", "/a", "a\nb", " a", "a\\b"] {
         refused(|model, _| model.views[0].name = name.to_owned(), "image name");
     }
     refused(|model, _| model.views[0].pose.centre[1] = f64::NAN, "pose");
     refused(|_, points| points[0].position[0] = f64::INFINITY, "point 0");
-    refused(|_, points| points[0].track[1].view = 3, "view 3 of 3");
+    refused(|_, points| points[0].track[1].view = 3, "names view 3 of 3");
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("frames.bin"), b"").unwrap();
     let (model, points) = model();
@@ -122,12 +122,12 @@ fn hostile_points_are_refused() {
         std::fs::write(&path, &whole[..end]).unwrap();
         assert!(read_with_points(folder.path()).is_err(), "{end}");
     }
-    // The counts of points and of a track, its image and its point, a coordinate.
+    // Offsets of the number of points, the length of a track, its image, its point, and a coordinate.
     let changes: [(usize, &[u8], &str); 5] = [
         (0, &[0xff; 8], "room for"),
         (51, &[0xff; 8], "room for"),
-        (59, &[0xee; 4], "no point"),
-        (63, &[0xff; 4], "no point"),
+        (59, &[0xee; 4], "there is no point with this number"),
+        (63, &[0xff; 4], "there is no point with this number"),
         (16, &[0xff; 8], "not finite"),
     ];
     for (at, bytes, words) in changes {
@@ -161,7 +161,7 @@ proptest! {
                 prop_assert_eq!(found.track.len(), point.track.len());
                 for (found, seen) in found.track.iter().zip(&point.track) {
                     prop_assert_eq!(found.view, seen.view);
-                    // Half a pixel is added and taken away again.
+                    // Writing adds half a pixel and reading subtracts it.
                     prop_assert!((found.pixel.sample - seen.pixel.sample).abs() < 1e-13 * 600.0);
                     prop_assert!((found.pixel.line - seen.pixel.line).abs() < 1e-13 * 600.0);
                 }

@@ -1,28 +1,29 @@
-//! The origin of local positions, as JSON beside the file that holds them.
+//! The origin of local positions, as JSON beside the file with the positions.
 //!
 //! `{"crs": "EPSG:32631", "vertical": "ellipsoid", "origin": [x, y, z], "axes": ["easting", "northing", "height"], "unit":
-//! "metre"}`: a local position p is at `origin + p` in the CRS, its third coordinate a height above the vertical datum.
+//! "metre"}`: the local position p lies at `origin + p` in the CRS. The third coordinate is a height above the vertical
+//! datum.
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{SplatPlyError, invalid};
+use super::error::{SplatPlyError, invalid};
 use crate::atomic::write_bytes;
 
-/// Where local positions are counted from.
+/// Point of a map that local positions are relative to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocalOrigin {
-    /// A projected CRS: `EPSG:n`, WKT or PROJJSON.
+    /// Projected CRS: `EPSG:n`, WKT or PROJJSON.
     pub crs: String,
-    /// What heights are measured from: `ellipsoid`, `egm96`, …
+    /// Vertical datum of the heights: `ellipsoid`, `egm96`, …
     pub vertical: String,
-    /// Easting, northing and height of (0, 0, 0), metres.
+    /// Easting, northing and height of the local position (0, 0, 0), metres.
     pub origin: [f64; 3],
-    /// The axes by name; written for readers.
+    /// Names of the axes, for people who read the file.
     #[serde(default = "axes")]
     pub axes: [String; 3],
-    /// The unit of all lengths; written for readers.
+    /// Unit of all lengths, for people who read the file.
     #[serde(default = "metre")]
     pub unit: String,
 }
@@ -36,23 +37,24 @@ fn metre() -> String {
 }
 
 impl LocalOrigin {
-    /// An origin in a projected CRS whose unit is the metre.
+    /// Creates an origin in a projected CRS whose unit is the metre.
     pub fn new(crs: impl Into<String>, vertical: impl Into<String>, origin: [f64; 3]) -> Self {
         Self { crs: crs.into(), vertical: vertical.into(), origin, axes: axes(), unit: metre() }
     }
 
-    /// Writes it beside a file; see [`origin_path`].
+    /// Writes the origin beside a file, to [`origin_path`].
     ///
     /// # Errors
-    /// As [`Self::write`].
+    /// The errors of [`Self::write`].
     pub fn write_beside(&self, file: &Path, overwrite: bool) -> Result<(), SplatPlyError> {
         self.write(&origin_path(file), overwrite)
     }
 
-    /// Writes it to a file of its own.
+    /// Writes the origin to a file.
     ///
     /// # Errors
-    /// An origin that is not finite; a file that exists or cannot be written.
+    /// [`SplatPlyError::Invalid`] when the origin is not finite, [`SplatPlyError::NotWritten`] when the file exists and
+    /// `overwrite` is false, or cannot be written.
     pub fn write(&self, path: &Path, overwrite: bool) -> Result<(), SplatPlyError> {
         if !self.origin.iter().all(|c| c.is_finite()) {
             return Err(invalid(path, "the origin is not finite"));
@@ -61,16 +63,17 @@ impl LocalOrigin {
         Ok(write_bytes(path, (text + "\n").as_bytes(), overwrite)?)
     }
 
-    /// Reads the origin beside a file; `None` when there is none.
+    /// Reads the origin beside a file, or returns `None` when no such file exists.
     ///
     /// # Errors
-    /// A file that cannot be read, or that is no origin.
+    /// [`SplatPlyError::Unreadable`] when the system cannot read the file, [`SplatPlyError::Invalid`] when it is not an
+    /// origin.
     pub fn read_beside(file: &Path) -> Result<Option<Self>, SplatPlyError> {
         let path = origin_path(file);
         match std::fs::read_to_string(&path) {
             Ok(text) => {
                 let origin: Self = serde_json::from_str(&text)
-                    .map_err(|error| invalid(&path, format!("not an origin as skysweep writes it ({error})")))?;
+                    .map_err(|error| invalid(&path, format!("the file is not an origin as skysweep writes it ({error})")))?;
                 Ok(Some(origin))
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
@@ -79,7 +82,7 @@ impl LocalOrigin {
     }
 }
 
-/// `splats.ply` → `splats.origin.json`.
+/// Returns the path of the origin of a file: `splats.origin.json` for `splats.ply`.
 pub fn origin_path(file: &Path) -> PathBuf {
     file.with_extension("origin.json")
 }

@@ -1,37 +1,86 @@
-//! Splats in. Properties are found by name, so files of other programs are read as well; what is not known is passed over.
+//! Reads splats. Properties are found by name, so that files of other programs can be read. Unknown ones are skipped.
 
 use std::collections::HashMap;
 use std::path::Path;
 
 use gaussian::Splat;
 
-use super::{LocalOrigin, SH_C0, SplatFile, SplatForm, SplatLayout, SplatPlyError, invalid};
+use super::error::{SplatPlyError, invalid};
+use super::layout::{SH_C0, SH_DEGREE_MAX, SplatForm, SplatLayout};
+use super::origin::LocalOrigin;
 
-/// Longest header that is searched for its end.
+/// Longest header that is searched for its end, bytes.
 const HEADER_LIMIT: usize = 1 << 20;
-/// Thickness of a disc, in parts of its smaller scale.
+/// Thickness of a disc as a fraction of its smaller scale.
 const DISC_THICKNESS: f32 = 1e-3;
 
-/// Where the numbers of one splat are.
+/// Splats from a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SplatFile {
+    /// The splats. Discs get a third scale of a thousandth of their smaller one.
+    pub splats: Vec<Splat>,
+    /// Properties of the file.
+    pub layout: SplatLayout,
+    /// Origin of the positions, when a file with it lies beside.
+    pub origin: Option<LocalOrigin>,
+}
+
+/// The header of a file.
 struct Header {
+    /// Number of splats.
     count: u64,
-    /// Byte offset and size of each float property of a row.
-    floats: HashMap<String, (usize, usize)>,
+    /// The float properties by name.
+    floats: HashMap<String, Column>,
+    /// Size of a row, bytes.
     row: usize,
+    /// Byte offset of the first row.
     body: usize,
 }
 
-/// Reads splats and the origin beside them.
+/// Place of a number within a row.
+#[derive(Debug, Clone, Copy)]
+struct Column {
+    /// Byte offset in the row.
+    at: usize,
+    /// Size in bytes: 4 or 8.
+    size: usize,
+}
+
+/// Reads the splats of a file, and the origin beside it.
 ///
 /// # Errors
-/// A file that cannot be read, is no little-endian binary PLY of Gaussians, or is shorter than its header says; a splat with
-/// numbers that make none; an origin that is none.
+/// - [`SplatPlyError::Unreadable`] when the system cannot read the file or its origin.
+/// - [`SplatPlyError::Invalid`] when the file is not a little-endian binary PLY of Gaussians, is shorter than its header
+///   announces, holds a splat that fails [`Splat::validate`], or the origin beside it is broken.
+///
+/// # Examples
+/// ```
+/// use gaussian::Splat;
+/// use io::splat_ply::{LocalOrigin, SplatLayout, read, write};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("roof.ply");
+/// let splat = Splat {
+///     position: [1.0, 2.0, 3.0],
+///     scale_m: [0.5, 0.5, 0.01],
+///     rotation: [1.0, 0.0, 0.0, 0.0],
+///     colour: [0.8, 0.3, 0.2],
+///     opacity: 0.75,
+/// };
+/// let origin = LocalOrigin::new("EPSG:32631", "ellipsoid", [690_000.0, 4_820_000.0, 180.0]);
+/// write(&path, &[splat], &origin, SplatLayout::default(), false)?;
+///
+/// let file = read(&path)?;
+/// assert_eq!(file.splats[0].position, [1.0, 2.0, 3.0]);
+/// assert_eq!(file.origin, Some(origin));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
     let bytes = std::fs::read(path).map_err(|source| SplatPlyError::Unreadable { path: path.to_owned(), source })?;
     let header = header(&bytes).map_err(|what| invalid(path, what))?;
     let room = (bytes.len() - header.body) / header.row.max(1);
     if header.row == 0 || header.count > room as u64 {
-        let what = format!("{} splats are announced, and the file has room for {room}", header.count);
+        let what = format!("the header announces {} splats, the file has room for {room}", header.count);
         return Err(invalid(path, what));
     }
     let columns = Columns::of(&header).map_err(|what| invalid(path, what))?;
@@ -48,8 +97,8 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
 fn header(bytes: &[u8]) -> Result<Header, String> {
     let text = &bytes[..bytes.len().min(HEADER_LIMIT)];
     let mark = b"end_header\n";
-    let end = text.windows(mark.len()).position(|w| w == mark).ok_or("no PLY header was found")?;
-    let text = std::str::from_utf8(&text[..end]).map_err(|_| "the PLY header is no text")?;
+    let end = text.windows(mark.len()).position(|w| w == mark).ok_or("the file has no PLY header")?;
+    let text = std::str::from_utf8(&text[..end]).map_err(|_| "the PLY header is not text")?;
     let mut lines = text.lines();
     if lines.next().map(str::trim) != Some("ply") {
         return Err("the file does not begin with \"ply\"".to_owned());
@@ -62,19 +111,19 @@ fn header(bytes: &[u8]) -> Result<Header, String> {
             ["format", name, _] => binary = name == "binary_little_endian",
             ["element", name, count] => {
                 if element.is_none() {
-                    header.count = count.parse().map_err(|_| format!("the count {count:?} is no number"))?;
+                    header.count = count.parse().map_err(|_| format!("the number of elements is {count:?}, expected a whole number"))?;
                     element = Some(name == "vertex");
                 } else {
                     element = Some(false);
                 }
             }
             ["property", kind, name] if element == Some(true) => header.property(kind, name)?,
-            ["property", ..] if element == Some(true) => return Err("a vertex has a list, splats have none".to_owned()),
+            ["property", ..] if element == Some(true) => return Err("a vertex has a list property, expected numbers only".to_owned()),
             _ => {}
         }
     }
     if !binary {
-        return Err("the PLY is not binary_little_endian".to_owned());
+        return Err("the format of the PLY is not binary_little_endian, which splats have".to_owned());
     }
     Ok(header)
 }
@@ -86,39 +135,39 @@ impl Header {
             "short" | "ushort" | "int16" | "uint16" => 2,
             "int" | "uint" | "int32" | "uint32" | "float" | "float32" => 4,
             "double" | "float64" => 8,
-            _ => return Err(format!("{kind:?} is no type of PLY")),
+            _ => return Err(format!("{kind:?} is not a PLY type")),
         };
         if matches!(kind, "float" | "float32" | "double" | "float64") {
-            self.floats.insert(name.to_owned(), (self.row, size));
+            self.floats.insert(name.to_owned(), Column { at: self.row, size });
         }
         self.row += size;
         Ok(())
     }
 }
 
-/// Where each number of a splat stands in a row.
+/// Places of the numbers of a splat within a row.
 struct Columns {
-    position: [(usize, usize); 3],
-    colour: [(usize, usize); 3],
-    opacity: (usize, usize),
-    scale: [(usize, usize); 3],
-    rotation: [(usize, usize); 4],
+    position: [Column; 3],
+    colour: [Column; 3],
+    opacity: Column,
+    scale: [Column; 3],
+    rotation: [Column; 4],
     layout: SplatLayout,
 }
 
 impl Columns {
     fn of(header: &Header) -> Result<Self, String> {
         let column = |name: &str| {
-            let missing = || format!("the vertices have no float property {name:?}: not a file of splats");
+            let missing = || format!("the vertices have no float property {name:?}, so this is not a file of splats");
             header.floats.get(name).copied().ok_or_else(missing)
         };
         let numbered = |name: &str, i: usize| column(&format!("{name}_{i}"));
         let (first, second) = (numbered("scale", 0)?, numbered("scale", 1)?);
         let third = numbered("scale", 2).ok();
         let rest = header.floats.keys().filter(|name| name.starts_with("f_rest_")).count();
-        let degree = (0..=super::SH_DEGREE_MAX)
+        let degree = (0..=SH_DEGREE_MAX)
             .find(|&sh_degree| SplatLayout { sh_degree, ..SplatLayout::default() }.rest() == rest)
-            .ok_or_else(|| format!("{rest} f_rest properties are no degree of harmonics"))?;
+            .ok_or_else(|| format!("found {rest} f_rest properties, expected 0, 9, 24 or 45 (harmonics of degree 0 to 3)"))?;
         Ok(Self {
             position: [column("x")?, column("y")?, column("z")?],
             colour: [numbered("f_dc", 0)?, numbered("f_dc", 1)?, numbered("f_dc", 2)?],
@@ -133,13 +182,13 @@ impl Columns {
     }
 
     fn splat(&self, row: &[u8]) -> Splat {
-        let value = |(at, size): (usize, usize)| match *row[at..at + size].as_ref() {
+        let value = |Column { at, size }: Column| match *row[at..at + size].as_ref() {
             [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
             [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
             _ => f64::NAN,
         };
         let rotation = self.rotation.map(value);
-        // Trainers keep quaternions of any length and bring them to 1 when they use them.
+        // Trainers store quaternions of any length and normalise them when they use them.
         let length = rotation.iter().map(|q| q * q).sum::<f64>().sqrt();
         let mut scale_m = self.scale.map(|s| value(s).exp() as f32);
         if self.layout.form == SplatForm::Discs {
@@ -151,7 +200,7 @@ impl Columns {
             scale_m,
             rotation: rotation.map(|q| (q / length) as f32),
             colour: self.colour.map(|c| (0.5 + SH_C0 * value(c)) as f32),
-            // Logits beyond ±17 round to 0 or 1 in f32, which have none.
+            // Logits beyond ±17 round to an opacity of 0 or 1 in f32, which has no finite logit.
             opacity: (opacity as f32).clamp(f32::MIN_POSITIVE, 1.0 - f32::EPSILON),
         }
     }

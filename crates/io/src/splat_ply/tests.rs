@@ -1,6 +1,9 @@
-//! Round trips, the layout that loaders expect, and files that are none.
+//! Round trips, the layout that loaders expect, and files that are not splats.
+
+use gaussian::Splat;
 
 use super::*;
+use crate::atomic::SaveError;
 use proptest::prelude::*;
 
 fn origin() -> LocalOrigin {
@@ -51,7 +54,7 @@ fn every_layout_comes_back() {
     }
 }
 
-/// What the loader of the original 3DGS code computes, written out by hand for the first splat.
+/// Compares the first splat with what the loader of the original 3DGS code expects, computed by hand.
 #[test]
 fn the_bytes_are_those_that_trainers_expect() {
     let folder = tempfile::tempdir().unwrap();
@@ -90,7 +93,7 @@ fn nothing_is_replaced_and_no_nonsense_is_written() {
     let refused = write(&other, &broken, &origin(), SplatLayout::default(), false);
     assert!(matches!(refused, Err(SplatPlyError::Splat { index: 1, .. })));
     let degree = SplatLayout { sh_degree: 4, ..SplatLayout::default() };
-    assert!(write(&other, &splats(), &origin(), degree, false).unwrap_err().to_string().contains("degree 4"));
+    assert!(write(&other, &splats(), &origin(), degree, false).unwrap_err().to_string().contains("the degree of the harmonics is 4"));
     assert!(!other.exists() && !origin_path(&other).exists());
 }
 
@@ -103,15 +106,15 @@ fn files_that_are_no_splats_are_refused_with_the_reason() {
         let error = read(&path).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     };
-    refused(b"", "no PLY header");
+    refused(b"", "has no PLY header");
     refused(b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", "binary_little_endian");
     refused(b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty float x\nend_header\n", "\"scale_0\"");
-    refused(b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty list uchar int i\nend_header\n", "list");
+    refused(b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty list uchar int i\nend_header\n", "list property");
     write(&path, &splats(), &origin(), SplatLayout::default(), true).unwrap();
     let good = std::fs::read(&path).unwrap();
     refused(&good[..good.len() - 1], "room for 1");
     let many = String::from_utf8_lossy(&good[..60]).replace("vertex 2", "vertex 18446744073709551615");
-    refused(&[many.as_bytes(), &good[60..]].concat(), "are announced");
+    refused(&[many.as_bytes(), &good[60..]].concat(), "announces");
     std::fs::write(origin_path(&path), "{}").unwrap();
     std::fs::write(&path, &good).unwrap();
     assert!(read(&path).unwrap_err().to_string().contains("not an origin"));

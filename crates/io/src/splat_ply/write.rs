@@ -1,17 +1,21 @@
-//! Splats out.
+//! Writes splats.
 
 use std::io::Write;
 use std::path::Path;
 
 use gaussian::Splat;
 
-use super::{LocalOrigin, SH_C0, SH_DEGREE_MAX, SplatLayout, SplatPlyError, invalid};
+use super::error::{SplatPlyError, invalid};
+use super::layout::{SH_C0, SH_DEGREE_MAX, SplatLayout};
+use super::origin::LocalOrigin;
 use crate::atomic::{refuse_existing, write_stream};
 
 /// Writes splats, and their origin beside them.
 ///
 /// # Errors
-/// A degree above [`SH_DEGREE_MAX`], a splat that is none, a file that exists (without `overwrite`) or cannot be written.
+/// - [`SplatPlyError::Invalid`] when the degree of the harmonics is above [`SH_DEGREE_MAX`] or the origin is not finite.
+/// - [`SplatPlyError::Splat`] when a splat fails [`Splat::validate`].
+/// - [`SplatPlyError::NotWritten`] when a file exists and `overwrite` is false, or cannot be written.
 pub fn write(
     path: &Path,
     splats: &[Splat],
@@ -21,14 +25,14 @@ pub fn write(
 ) -> Result<(), SplatPlyError> {
     if layout.sh_degree > SH_DEGREE_MAX {
         let what =
-            format!("harmonics of degree {} were asked for, at most {SH_DEGREE_MAX} are known", layout.sh_degree);
+            format!("the degree of the harmonics is {}, expected 0 to {SH_DEGREE_MAX}", layout.sh_degree);
         return Err(invalid(path, what));
     }
     for (index, splat) in splats.iter().enumerate() {
         splat.validate().map_err(|source| SplatPlyError::Splat { path: path.to_owned(), index, source })?;
     }
     refuse_existing(path, overwrite)?;
-    // The splats come last: where they are, their origin is.
+    // The splats are written last, so that a file of splats always has its origin.
     origin.write_beside(path, overwrite)?;
     Ok(write_stream(path, overwrite, |out| body(out, splats, layout))?)
 }

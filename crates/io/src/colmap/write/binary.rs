@@ -1,8 +1,10 @@
-//! COLMAP's binary files: little-endian, counts first.
+//! Writes COLMAP's binary files: little-endian numbers, each list after its count.
 
 use std::io::{Result, Write};
 
-use super::{ColmapModel, ColmapPoint, Numbering, Seen, parameters};
+use super::observations::{ImageObservations, Numbering};
+use crate::colmap::convention::colmap_parameters;
+use crate::colmap::model::{ColmapModel, ColmapPoint};
 
 pub(super) fn cameras(out: &mut dyn Write, model: &ColmapModel) -> Result<()> {
     out.write_all(&(model.lenses.len() as u64).to_le_bytes())?;
@@ -11,12 +13,12 @@ pub(super) fn cameras(out: &mut dyn Write, model: &ColmapModel) -> Result<()> {
         out.write_all(&lens.model().number().to_le_bytes())?;
         out.write_all(&(lens.width() as u64).to_le_bytes())?;
         out.write_all(&(lens.height() as u64).to_le_bytes())?;
-        floats(out, &parameters(lens))?;
+        floats(out, &colmap_parameters(lens))?;
     }
     Ok(())
 }
 
-pub(super) fn images(out: &mut dyn Write, model: &ColmapModel, seen: &Seen) -> Result<()> {
+pub(super) fn images(out: &mut dyn Write, model: &ColmapModel, seen: &ImageObservations) -> Result<()> {
     out.write_all(&(model.views.len() as u64).to_le_bytes())?;
     for (index, view) in model.views.iter().enumerate() {
         out.write_all(&view.id.to_le_bytes())?;

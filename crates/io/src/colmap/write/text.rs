@@ -1,20 +1,22 @@
-//! COLMAP's text files. Numbers are the shortest that read back to the same f64.
+//! Writes COLMAP's text files. Numbers have the fewest digits that read back to the same f64.
 
 use std::io::{Result, Write};
 
-use super::{ColmapModel, ColmapPoint, Numbering, Seen, parameters};
+use super::observations::{ImageObservations, Numbering};
+use crate::colmap::convention::colmap_parameters;
+use crate::colmap::model::{ColmapModel, ColmapPoint};
 
 pub(super) fn cameras(out: &mut dyn Write, model: &ColmapModel) -> Result<()> {
     writeln!(out, "# Cameras, one a line: CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n# {}", model.lenses.len())?;
     for (number, lens) in (1u32..).zip(&model.lenses) {
         write!(out, "{number} {} {} {}", lens.model().name(), lens.width(), lens.height())?;
-        floats(out, &parameters(lens))?;
+        floats(out, &colmap_parameters(lens))?;
         writeln!(out)?;
     }
     Ok(())
 }
 
-pub(super) fn images(out: &mut dyn Write, model: &ColmapModel, seen: &Seen) -> Result<()> {
+pub(super) fn images(out: &mut dyn Write, model: &ColmapModel, seen: &ImageObservations) -> Result<()> {
     writeln!(out, "# Images, two lines each: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; then X Y POINT3D_ID …")?;
     writeln!(out, "# {}", model.views.len())?;
     for (index, view) in model.views.iter().enumerate() {
@@ -52,7 +54,7 @@ pub(super) fn points(out: &mut dyn Write, model: &ColmapModel, points: &[ColmapP
     Ok(())
 }
 
-/// With a blank before each.
+/// Writes each value after a space.
 fn floats(out: &mut dyn Write, values: &[f64]) -> Result<()> {
     values.iter().try_for_each(|value| write!(out, " {value:?}"))
 }

@@ -1,0 +1,32 @@
+//! Finds a file of a model, text or binary, and parses it.
+
+use std::path::{Path, PathBuf};
+
+use super::error::{ColmapError, Fault};
+
+/// Largest file that is read, bytes. `images` is the largest one, because it lists every observation.
+const SIZE_LIMIT: u64 = 4 << 30;
+
+/// Reads `name.bin`, or else `name.txt`, and returns its path and its records.
+pub(super) fn load<T>(
+    folder: &Path,
+    name: &'static str,
+    from_binary: impl Fn(&[u8]) -> Result<Vec<T>, Fault>,
+    from_text: impl Fn(&str) -> Result<Vec<T>, Fault>,
+) -> Result<(PathBuf, Vec<T>), ColmapError> {
+    let [binary, text] = ["bin", "txt"].map(|extension| folder.join(format!("{name}.{extension}")));
+    let path = [&binary, &text].into_iter().find(|path| path.is_file());
+    let path = path.ok_or_else(|| ColmapError::Missing { folder: folder.to_owned(), name })?.clone();
+    let unreadable = |source| ColmapError::Unreadable { path: path.clone(), source };
+    let size = std::fs::metadata(&path).map_err(unreadable)?.len();
+    if size > SIZE_LIMIT {
+        let what = format!("the file has {size} bytes, at most {SIZE_LIMIT} are read");
+        return Err(Fault { what, place: "size".to_owned() }.at(&path));
+    }
+    let bytes = std::fs::read(&path).map_err(unreadable)?;
+    let parsed = if path == binary { from_binary(&bytes) } else { from_text(&String::from_utf8_lossy(&bytes)) };
+    match parsed {
+        Ok(parsed) => Ok((path, parsed)),
+        Err(fault) => Err(fault.at(&path)),
+    }
+}
