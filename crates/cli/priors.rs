@@ -18,7 +18,7 @@ use std::path::PathBuf;
 
 use ::priors::{PriorModel, Samples, View, Visibility, Visible, buildings_of, sample};
 use anyhow::{Context, bail};
-use city::{LodChoice, MeshConfig, Meshed, ObjectStatus, Scope, TriangleMesh};
+use city::{LodChoice, MeshConfig, MeshedModel, ObjectStatus, Scope, TriangleMesh};
 use io::citymodel::CityFile;
 use numeric::Progress as _;
 use report::PriorsReport;
@@ -103,11 +103,11 @@ fn make(args: &Args, watcher: &Watcher) -> anyhow::Result<(PriorsReport, usize)>
 }
 
 /// How many objects could not be used.
-fn unusable(meshed: &Meshed) -> usize {
+fn unusable(meshed: &MeshedModel) -> usize {
     meshed.objects.iter().filter(|object| object.status == ObjectStatus::Unusable).count()
 }
 
-fn read_model(args: &Args) -> anyhow::Result<(CityFile, Meshed)> {
+fn read_model(args: &Args) -> anyhow::Result<(CityFile, MeshedModel)> {
     let file = io::citymodel::read(&args.model)?;
     let config = MeshConfig {
         lod: args.lod.map_or_else(LodChoice::default, LodChoice::Only),

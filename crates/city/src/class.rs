@@ -1,26 +1,26 @@
-//! What a surface is: the semantics of CityGML's boundary surfaces.
+//! Classes of surfaces: the semantics of CityGML's boundary surfaces.
 
 use std::fmt;
 
-/// The class of a surface, with a stable number for class maps.
+/// Class of a surface. Its number is stable and is used in class maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 #[repr(u8)]
 #[non_exhaustive]
 pub enum SurfaceClass {
-    /// The file does not say.
+    /// The file names no class.
     #[default]
     Unclassified = 0,
-    /// The building's bottom.
+    /// The bottom of a building.
     Ground = 1,
     /// Roof.
     Roof = 2,
     /// Outer wall.
     Wall = 3,
-    /// A virtual surface that closes a solid and is not built.
+    /// A virtual surface that closes a solid and does not exist in reality.
     Closure = 4,
-    /// A ceiling seen from outside (below an oriel).
+    /// A ceiling that is visible from outside, such as the underside of an oriel.
     OuterCeiling = 5,
-    /// A floor walked on outside (a loggia).
+    /// A floor outside, such as the floor of a loggia.
     OuterFloor = 6,
     /// Window.
     Window = 7,
@@ -28,11 +28,11 @@ pub enum SurfaceClass {
     Door = 8,
     /// A wall, floor or ceiling inside the building.
     Interior = 9,
-    /// A class that is none of a building's surfaces, such as a traffic area.
+    /// A class that no surface of a building has, such as a traffic area.
     Other = 10,
 }
 
-/// Classes by their number, with the names of CityGML and CityJSON.
+/// Classes in the order of their numbers, with their names in CityGML and CityJSON.
 const NAMES: [(SurfaceClass, &str); 11] = [
     (SurfaceClass::Unclassified, "Unclassified"),
     (SurfaceClass::Ground, "GroundSurface"),
@@ -48,12 +48,12 @@ const NAMES: [(SurfaceClass, &str); 11] = [
 ];
 
 impl SurfaceClass {
-    /// Every class, in the order of the numbers.
+    /// Iterates over all classes in the order of their numbers.
     pub fn all() -> impl Iterator<Item = Self> {
         NAMES.iter().map(|&(class, _)| class)
     }
 
-    /// The class of a CityGML or CityJSON name; names that are no building surface are [`SurfaceClass::Other`].
+    /// Returns the class with a CityGML or CityJSON name, or [`SurfaceClass::Other`] for an unknown name.
     pub fn from_name(name: &str) -> Self {
         match name {
             "CeilingSurface" | "FloorSurface" => Self::Interior,
@@ -63,12 +63,12 @@ impl SurfaceClass {
         }
     }
 
-    /// The name in CityGML and CityJSON (`RoofSurface`).
+    /// Returns the name in CityGML and CityJSON, such as `RoofSurface`.
     pub fn name(self) -> &'static str {
         NAMES[self as usize].1
     }
 
-    /// The class of a number.
+    /// Returns the class with a number, if there is one.
     pub fn from_number(number: u8) -> Option<Self> {
         NAMES.get(usize::from(number)).map(|&(class, _)| class)
     }

@@ -1,34 +1,34 @@
-//! The coordinate reference system as a model's file names it.
+//! The coordinate reference system that the file of a model names.
 
 use std::fmt;
 
-/// A reference to a coordinate reference system: its codes where the file names them, and its own words.
+/// Reference to a coordinate reference system, by EPSG codes and by the name in the file.
 ///
-/// All fields empty means that the file does not say where it is.
+/// All fields are `None` when the file names no reference system.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct CrsReference {
-    /// What stands in the file.
+    /// Name as it stands in the file.
     pub name: Option<String>,
-    /// EPSG code of the horizontal CRS, or of the compound CRS that holds both.
+    /// EPSG code of the horizontal CRS, or of the compound CRS of both.
     pub epsg: Option<u32>,
-    /// EPSG code of the vertical CRS where it is named apart.
+    /// EPSG code of the vertical CRS, when it is named separately.
     pub vertical_epsg: Option<u32>,
 }
 
 impl CrsReference {
-    /// A reference by EPSG code; `vertical` only where the first code is horizontal alone.
+    /// Creates a reference from EPSG codes. Give `vertical` only when `epsg` is a horizontal CRS.
     pub fn from_epsg(epsg: u32, vertical: Option<u32>) -> Self {
         Self { name: None, epsg: Some(epsg), vertical_epsg: vertical }
     }
 
-    /// Whether the file said nothing about its CRS.
+    /// Returns whether the file names no CRS.
     pub fn is_missing(&self) -> bool {
         *self == Self::default()
     }
 }
 
 impl fmt::Display for CrsReference {
-    /// `EPSG:7415`, `EPSG:25832+7837`, the file's own words, or `unknown`.
+    /// Writes `EPSG:7415`, `EPSG:25832+7837`, the name in the file, or `unknown`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.epsg, self.vertical_epsg, &self.name) {
             (Some(code), None, _) => write!(f, "EPSG:{code}"),

@@ -1,22 +1,22 @@
-//! The catalogue of defects: what can be wrong with a city model, each with a stable number.
+//! The catalogue of the defects of city models, each with a stable number.
 //!
-//! Numbers below 1000 are those of val3dity's catalogue (Ledoux 2018, doi:10.1186/s40965-018-0043-x) with the same
-//! meaning; what it has no number for starts at 1001.
+//! Numbers below 1000 have the same meaning as in val3dity's catalogue (Ledoux 2018, doi:10.1186/s40965-018-0043-x).
+//! Defects that val3dity has no number for start at 1001.
 
 use std::fmt;
 
-/// A kind of defect by its number in the catalogue.
+/// Kind of a defect, by its number in the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u16)]
 #[non_exhaustive]
 pub enum DefectCode {
     /// A ring has fewer than three different vertices.
     TooFewPoints = 101,
-    /// A vertex is repeated in a row.
+    /// A ring repeats a vertex directly.
     ConsecutivePointsSame = 102,
-    /// The first and the last vertex of a ring that must be closed differ.
+    /// The first and last vertex of a ring differ, in a format that requires them to be equal.
     RingNotClosed = 103,
-    /// A ring meets itself.
+    /// A ring touches or crosses itself.
     RingSelfIntersection = 104,
     /// Two rings of a polygon cross or share an edge.
     RingIntersection = 201,
@@ -24,11 +24,11 @@ pub enum DefectCode {
     DuplicateRings = 202,
     /// A vertex lies off the best-fit plane.
     NonPlanarDistance = 203,
-    /// A triangle of the polygon looks another way than the polygon.
+    /// The normal of a triangle of the polygon deviates from the normal of the polygon.
     NonPlanarNormals = 204,
-    /// Rings touch so that the inside of the polygon falls into several pieces.
+    /// Rings touch and cut the interior of the polygon into pieces.
     InteriorDisconnected = 205,
-    /// A hole lies outside of the outer ring.
+    /// A hole lies outside the outer ring.
     InnerRingOutside = 206,
     /// A hole lies in another hole.
     InnerRingsNested = 207,
@@ -36,31 +36,31 @@ pub enum DefectCode {
     OrientationRingsSame = 208,
     /// A shell has fewer than four polygons.
     TooFewPolygons = 301,
-    /// A shell has edges that only one polygon uses.
+    /// A shell has edges that belong to only one polygon.
     ShellNotClosed = 302,
-    /// An edge is used by more than two polygons of a shell, or the polygons around a vertex are no single fan.
+    /// An edge belongs to more than two polygons of a shell, or the polygons around a vertex form several fans.
     NonManifold = 303,
-    /// A shell falls into several pieces.
+    /// A shell consists of several pieces.
     MultipleComponents = 305,
-    /// Polygons of a shell meet elsewhere than along the edges they share.
+    /// Polygons of a shell touch or cross where they do not share an edge.
     ShellSelfIntersection = 306,
-    /// Some polygons of a shell look to the wrong side.
+    /// Some polygons of a shell face the wrong side.
     WrongOrientation = 307,
-    /// Two shells of a solid cross, or share a piece of a face.
+    /// Two shells of a solid cross or share part of a face.
     ShellsIntersect = 401,
     /// Two shells of a solid are the same.
     DuplicateShells = 402,
-    /// A cavity lies outside of its solid, or in another cavity.
+    /// A cavity lies outside its solid, or in another cavity.
     InnerShellOutside = 403,
-    /// Shells touch so that the inside of the solid falls into several pieces.
+    /// Shells touch and cut the interior of the solid into pieces.
     SolidInteriorDisconnected = 404,
-    /// All polygons of a shell look to the wrong side.
+    /// All polygons of a shell face the wrong side.
     WrongOrientationShell = 405,
     /// Two solids of a composite solid overlap.
     SolidsIntersect = 501,
     /// Two solids of a composite solid are the same.
     DuplicateSolids = 502,
-    /// The solids of a composite solid do not hang together by faces.
+    /// The solids of a composite solid are not connected by shared faces.
     SolidsDisconnected = 503,
     /// Parts of a building overlap.
     PartsOverlap = 601,
@@ -70,64 +70,64 @@ pub enum DefectCode {
     InvalidFile = 901,
     /// A geometry or a part of it has no surfaces.
     EmptyPrimitive = 902,
-    /// The format, or a thing in it, is not supported.
+    /// The format, or an element of it, is not supported.
     NotSupported = 904,
-    /// A ring names a vertex that is not there.
+    /// A ring names a vertex that does not exist.
     VertexOutOfRange = 1001,
-    /// A coordinate is no finite number of reasonable size.
+    /// A coordinate is not finite, or too large.
     CoordinateOutOfRange = 1002,
     /// A polygon has no area.
     ZeroArea = 1003,
-    /// A polygon occurs a second time in its object.
+    /// An object has the same polygon twice.
     DuplicatePolygon = 1004,
-    /// A geometry of points or lines.
+    /// A geometry consists of points or lines.
     NotASurface = 1005,
-    /// A reference to something that is not in the file.
+    /// A reference leads to something that is not in the file.
     UnresolvedReference = 1006,
-    /// An identifier occurs a second time.
+    /// Two elements have the same identifier.
     DuplicateId = 1007,
-    /// Semantics that do not fit the geometry.
+    /// The semantics do not fit the geometry.
     SemanticsMismatch = 1008,
-    /// A level of detail that is missing or no number.
+    /// The level of detail is missing or not a number.
     LodUnknown = 1009,
-    /// The file does not say which reference system its coordinates are in.
+    /// The file does not name the reference system of its coordinates.
     CrsMissing = 1010,
-    /// The reference system is named in a way that gives no EPSG code.
+    /// The name of the reference system gives no EPSG code.
     CrsUnknown = 1011,
-    /// A polygon that could not be cut into triangles.
+    /// A polygon cannot be cut into triangles.
     NotTriangulated = 1012,
-    /// Something that is too large to be checked.
+    /// A geometry is too large to be checked.
     NotChecked = 1013,
 }
 
-/// What a defect did to the thing it was found in.
+/// Consequence of a defect for the element that has it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Effect {
-    /// Nothing: it is used as it is.
+    /// None: the element is used as it is.
     Noted,
-    /// It was mended without moving a vertex.
+    /// The element was repaired without moving a vertex.
     Repaired,
-    /// It is left out.
+    /// The element is left out.
     Dropped,
 }
 
-/// A defect that was found.
+/// A defect of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Defect {
-    /// What kind.
+    /// Kind of the defect.
     pub code: DefectCode,
-    /// What was done.
+    /// Consequence of the defect.
     pub effect: Effect,
-    /// Index in [`CityModel::objects`](crate::CityModel::objects), where an object is concerned.
+    /// Index in [`CityModel::objects`](crate::CityModel::objects), if the defect belongs to an object.
     pub object: Option<usize>,
-    /// Where: `geometry 0, surface 12` or a place in the file.
+    /// Place within the object (`geometry 0, surface 12`) or within the file.
     pub place: String,
-    /// Details, empty where the code says it all.
+    /// Details; may be empty.
     pub detail: String,
 }
 
 impl DefectCode {
-    /// Every code, ascending.
+    /// All codes, ascending.
     pub const ALL: [Self; 44] = [
         Self::TooFewPoints,
         Self::ConsecutivePointsSame,
@@ -175,64 +175,66 @@ impl DefectCode {
         Self::NotChecked,
     ];
 
-    /// The number in the catalogue.
+    /// Returns the number in the catalogue.
     pub fn number(self) -> u16 {
         self as u16
     }
 
-    /// A short sentence.
+    /// Returns the meaning as a short sentence.
     pub fn meaning(self) -> &'static str {
         match self {
             Self::TooFewPoints => "a ring has fewer than three different vertices",
-            Self::ConsecutivePointsSame => "a vertex is repeated in a row",
+            Self::ConsecutivePointsSame => "a ring repeats a vertex directly",
             Self::RingNotClosed => "a ring is not closed",
-            Self::RingSelfIntersection => "a ring meets itself",
+            Self::RingSelfIntersection => "a ring touches or crosses itself",
             Self::RingIntersection => "two rings of a polygon cross or share an edge",
             Self::DuplicateRings => "two rings of a polygon are the same",
             Self::NonPlanarDistance => "a vertex lies off the polygon's plane",
-            Self::NonPlanarNormals => "a part of the polygon looks another way than the polygon",
-            Self::InteriorDisconnected => "touching rings cut the polygon's inside into pieces",
-            Self::InnerRingOutside => "a hole lies outside of the outer ring",
+            Self::NonPlanarNormals => "the normal of a part of the polygon deviates from the polygon's normal",
+            Self::InteriorDisconnected => "touching rings cut the polygon's interior into pieces",
+            Self::InnerRingOutside => "a hole lies outside the outer ring",
             Self::InnerRingsNested => "a hole lies in another hole",
             Self::OrientationRingsSame => "a hole turns the same way as the outer ring",
             Self::TooFewPolygons => "a shell has fewer than four polygons",
             Self::ShellNotClosed => "a shell is not closed",
-            Self::NonManifold => "an edge or a vertex joins more polygons of a shell than go around it once",
-            Self::MultipleComponents => "a shell falls into several pieces",
-            Self::ShellSelfIntersection => "polygons of a shell meet elsewhere than along their edges",
-            Self::WrongOrientation => "polygons of a shell look to the wrong side",
-            Self::ShellsIntersect => "two shells of a solid cross or share a piece of a face",
+            Self::NonManifold => {
+                "an edge belongs to more than two polygons of a shell, or the polygons around a vertex form several fans"
+            }
+            Self::MultipleComponents => "a shell consists of several pieces",
+            Self::ShellSelfIntersection => "polygons of a shell touch or cross where they do not share an edge",
+            Self::WrongOrientation => "polygons of a shell face the wrong side",
+            Self::ShellsIntersect => "two shells of a solid cross or share part of a face",
             Self::DuplicateShells => "two shells of a solid are the same",
-            Self::InnerShellOutside => "a cavity lies outside of its solid, or in another cavity",
-            Self::SolidInteriorDisconnected => "touching shells cut the solid's inside into pieces",
-            Self::WrongOrientationShell => "all polygons of a shell look to the wrong side",
+            Self::InnerShellOutside => "a cavity lies outside its solid, or in another cavity",
+            Self::SolidInteriorDisconnected => "touching shells cut the solid's interior into pieces",
+            Self::WrongOrientationShell => "all polygons of a shell face the wrong side",
             Self::SolidsIntersect => "two solids of a composite solid overlap",
             Self::DuplicateSolids => "two solids of a composite solid are the same",
-            Self::SolidsDisconnected => "the solids of a composite solid do not hang together",
+            Self::SolidsDisconnected => "the solids of a composite solid are not connected by shared faces",
             Self::PartsOverlap => "parts of a building overlap",
             Self::NoGeometry => "an object has no geometry",
             Self::InvalidFile => "the file breaks the rules of its format",
             Self::EmptyPrimitive => "a geometry or a part of it has no surfaces",
             Self::NotSupported => "not supported",
-            Self::VertexOutOfRange => "a ring names a vertex that is not there",
-            Self::CoordinateOutOfRange => "a coordinate is no finite number of reasonable size",
+            Self::VertexOutOfRange => "a ring names a vertex that does not exist",
+            Self::CoordinateOutOfRange => "a coordinate is not finite, or too large",
             Self::ZeroArea => "a polygon has no area",
-            Self::DuplicatePolygon => "a polygon occurs a second time in its object",
-            Self::NotASurface => "a geometry of points or lines",
-            Self::UnresolvedReference => "a reference to something that is not in the file",
-            Self::DuplicateId => "an identifier occurs a second time",
+            Self::DuplicatePolygon => "an object has the same polygon twice",
+            Self::NotASurface => "a geometry consists of points or lines",
+            Self::UnresolvedReference => "a reference leads to something that is not in the file",
+            Self::DuplicateId => "two elements have the same identifier",
             Self::SemanticsMismatch => "the semantics do not fit the geometry",
-            Self::LodUnknown => "the level of detail is missing or no number",
+            Self::LodUnknown => "the level of detail is missing or not a number",
             Self::CrsMissing => "the file does not name its reference system",
             Self::CrsUnknown => "the reference system's name gives no EPSG code",
-            Self::NotTriangulated => "a polygon could not be cut into triangles",
-            Self::NotChecked => "too large to be checked",
+            Self::NotTriangulated => "a polygon cannot be cut into triangles",
+            Self::NotChecked => "the geometry is too large to be checked",
         }
     }
 }
 
 impl fmt::Display for DefectCode {
-    /// `203 (a vertex lies off the polygon's plane)`.
+    /// Writes the number and the meaning: `203 (a vertex lies off the polygon's plane)`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} ({})", self.number(), self.meaning())
     }

@@ -1,12 +1,14 @@
-//! A ring cut by ears: the corner whose triangle holds no other corner goes, then the next is tried.
+//! Triangulation of a ring by ear clipping: a corner whose triangle contains no other corner is cut off, then the next.
 //!
-//! For the plane a Delaunay triangulation is the better choice. A polygon that is off its plane is a different surface under
-//! every triangulation, and there is no right one: cutting it the way that other tools do (Meisters 1975, in the order of
-//! the widely used `earcut`) makes the surface the same as theirs.
+//! A Delaunay triangulation is the better choice for a planar polygon. A polygon that is not planar is a different
+//! surface under every triangulation, and none of them is right. Ear clipping (Meisters 1975), in the order of the
+//! widely used library `earcut`, gives the same surface as other tools.
 
 use std::cmp::Ordering;
 
-/// The triangles of a counter-clockwise ring without holes; `None` when no ear is found, as in rings that meet themselves.
+/// Cuts a counter-clockwise ring without holes into triangles.
+///
+/// Returns `None` when no ear is left, which happens in rings that intersect themselves.
 pub(crate) fn cut(ring: &[[f64; 2]]) -> Option<Vec<[usize; 3]>> {
     let count = ring.len();
     let mut next: Vec<usize> = (0..count).map(|i| (i + 1) % count).collect();
@@ -30,11 +32,12 @@ pub(crate) fn cut(ring: &[[f64; 2]]) -> Option<Vec<[usize; 3]>> {
     (triangles.len() + 2 == count).then_some(triangles)
 }
 
-/// Twice the area of a triangle, positive counter-clockwise.
+/// Returns twice the area of a triangle, positive when it is counter-clockwise.
 fn area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 }
 
+/// Returns whether the triangle at corner `ear` is convex and contains no other corner.
 fn is_ear(ring: &[[f64; 2]], before: usize, ear: usize, after: usize, previous: &[usize], next: &[usize]) -> bool {
     let [a, b, c] = [ring[before], ring[ear], ring[after]];
     if area(a, b, c).partial_cmp(&0.0) != Some(Ordering::Greater) {
@@ -43,7 +46,7 @@ fn is_ear(ring: &[[f64; 2]], before: usize, ear: usize, after: usize, previous: 
     let mut at = next[after];
     while at != before {
         let p = ring[at];
-        // Only a corner that turns inwards can be the first inside.
+        // If any corner is inside, then a reflex one is, so the others need no test.
         let inside = area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 && area(c, a, p) >= 0.0;
         if inside && p != a && area(ring[previous[at]], p, ring[next[at]]) <= 0.0 {
             return false;

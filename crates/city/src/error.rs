@@ -1,51 +1,53 @@
-//! What can be inconsistent in a model.
+//! Inconsistencies in a model.
 
-/// A model that no reader of this toolkit would return, or a name that is none.
+/// An inconsistent model or mesh, or the text of a level of detail that is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
-    /// A level of detail that is no number.
-    #[error("{text:?} is no level of detail: expected 2, or refined 2.2")]
+    /// The text of a level of detail is not a number with at most one decimal.
+    #[error(
+        "{text:?} is not a level of detail, expected one digit, or two with a point between them, such as 2 or 2.2"
+    )]
     Lod {
-        /// What was found (its beginning).
+        /// Beginning of the text.
         text: String,
     },
-    /// A vertex at NaN or infinity.
+    /// A vertex has a coordinate that is NaN or infinite.
     #[error("vertex {vertex} has a coordinate that is not a finite number")]
     NotFinite {
         /// Index of the vertex.
         vertex: usize,
     },
-    /// A ring that names a vertex that is not there.
-    #[error("a ring of object {object:?} names vertex {index}, and the model has {vertices}")]
+    /// A ring names a vertex that does not exist.
+    #[error("a ring of object {object:?} names vertex {index}, the model has {vertices} vertices")]
     VertexIndex {
-        /// The object's id.
+        /// Identifier of the object.
         object: String,
-        /// The index.
+        /// Index of the vertex.
         index: u32,
-        /// How many vertices there are.
+        /// Number of vertices in the model.
         vertices: usize,
     },
-    /// A parent that is not there.
+    /// An object names a parent that does not exist.
     #[error("the parent of object {object:?} is not in the model")]
     ParentIndex {
-        /// The object's id.
+        /// Identifier of the object.
         object: String,
     },
-    /// An object that is its own ancestor.
+    /// An object is its own ancestor.
     #[error("object {object:?} is a part of itself")]
     ParentCircle {
-        /// The object's id.
+        /// Identifier of the object.
         object: String,
     },
-    /// A surface without rings.
+    /// A surface has no rings.
     #[error("a surface of object {object:?} has no outer ring")]
     NoRing {
-        /// The object's id.
+        /// Identifier of the object.
         object: String,
     },
-    /// A triangle without corners or surface.
-    #[error("triangle {triangle} names a corner or a surface that is not there")]
+    /// A triangle names a corner or a surface that does not exist.
+    #[error("triangle {triangle} names a corner or a surface that does not exist")]
     Triangle {
         /// Index of the triangle.
         triangle: usize,

@@ -1,55 +1,57 @@
-//! What a city object is, by its CityJSON name.
+//! Kinds of city objects.
 
 use std::borrow::Cow;
 use std::fmt;
 
-/// The kind of a city object by its CityJSON name (`BuildingPart`); CityGML's names are the same but for older spellings.
+/// Kind of a city object: its CityJSON name, such as `BuildingPart`.
+///
+/// CityGML uses the same names, apart from older spellings.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ObjectKind(Cow<'static, str>);
 
-/// What an object is to a building.
+/// Role of an object in a building.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Role {
+pub enum BuildingRole {
     /// A building.
     Building,
-    /// A part of a building that stands for a piece of it (`BuildingPart`, `BuildingUnit`).
+    /// A piece of a building (`BuildingPart`, `BuildingUnit`).
     Part,
-    /// Something attached outside (chimney, dormer, balcony, outer stairs).
+    /// Something attached to the outside of a building: chimney, dormer, balcony, outer stairs.
     Installation,
-    /// Something inside (room, furniture, storey).
+    /// Something inside a building: room, furniture, storey.
     Interior,
-    /// No building: bridges, roads, relief, vegetation, …
+    /// Not related to a building: bridge, road, relief, vegetation, …
     Other,
 }
 
 impl ObjectKind {
-    /// A building.
+    /// Kind of a building.
     pub const BUILDING: Self = Self(Cow::Borrowed("Building"));
-    /// A part of a building.
+    /// Kind of a part of a building.
     pub const BUILDING_PART: Self = Self(Cow::Borrowed("BuildingPart"));
-    /// An installation on a building.
+    /// Kind of an installation on a building.
     pub const BUILDING_INSTALLATION: Self = Self(Cow::Borrowed("BuildingInstallation"));
 
-    /// The kind of a name as it stands in a file.
+    /// Creates a kind from its name in a file.
     pub fn new(name: impl Into<Cow<'static, str>>) -> Self {
         Self(name.into())
     }
 
-    /// The name.
+    /// Returns the name.
     pub fn name(&self) -> &str {
         &self.0
     }
 
-    /// What the object is to a building.
-    pub fn role(&self) -> Role {
+    /// Returns the role of objects of this kind in a building.
+    pub fn role(&self) -> BuildingRole {
         match self.name() {
-            "Building" => Role::Building,
-            "BuildingPart" | "BuildingUnit" => Role::Part,
-            "BuildingInstallation" | "BuildingConstructiveElement" => Role::Installation,
+            "Building" => BuildingRole::Building,
+            "BuildingPart" | "BuildingUnit" => BuildingRole::Part,
+            "BuildingInstallation" | "BuildingConstructiveElement" => BuildingRole::Installation,
             "BuildingRoom" | "Room" | "BuildingStorey" | "BuildingFurniture" | "IntBuildingInstallation" => {
-                Role::Interior
+                BuildingRole::Interior
             }
-            _ => Role::Other,
+            _ => BuildingRole::Other,
         }
     }
 }

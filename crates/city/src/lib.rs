@@ -1,13 +1,13 @@
-//! City models: objects with surfaces and semantics, and the triangles made of them.
+//! City models: objects with classified surfaces, and the triangles made of them.
 //!
-//! A [`CityModel`] is what a file says: objects with an id, a kind and a parent, and per level of detail the polygons
-//! of their surfaces with a [`SurfaceClass`]. Coordinates are f64 in the reference system of the model (for every use in
-//! this toolkit: metres, east, north, up). Readers and writers are in the crate `io`.
+//! A [`CityModel`] holds the content of a file: objects with an identifier, a kind and a parent, and per level of detail
+//! the polygons of their surfaces, each with a [`SurfaceClass`]. Coordinates are f64 in the reference system of the
+//! model. Everywhere in this toolkit that is metres east, north and up. The crate `io` reads and writes the files.
 //!
-//! [`TriangleMesh::from_model`] makes triangles of it: one level of detail per object, polygons with holes by constrained
-//! Delaunay triangulation, solids checked. Whatever is wrong is a [`Defect`] with a number, and every object of the model
-//! has a status: used, or why not. [`check_solids`] adds what only a report needs: shells that meet themselves, cavities, solids
-//! and parts that overlap.
+//! [`TriangleMesh::from_model`] makes triangles: it picks one level of detail per object, cuts polygons with holes by
+//! constrained Delaunay triangulation and checks the solids. Each problem is a [`Defect`] with a number of the
+//! catalogue, and each object has an [`ObjectStatus`] that says whether it was used. [`check_solids`] runs the slow
+//! checks that only a report needs: shells that intersect themselves, cavities, overlapping solids and building parts.
 
 mod class;
 mod crs;
@@ -17,6 +17,7 @@ mod error;
 mod kind;
 mod lod;
 mod model;
+mod piece;
 mod point;
 mod pool;
 mod ring;
@@ -31,12 +32,12 @@ pub use class::SurfaceClass;
 pub use crs::CrsReference;
 pub use defect::{Defect, DefectCode, Effect};
 pub use error::ModelError;
-pub use kind::{ObjectKind, Role};
+pub use kind::{BuildingRole, ObjectKind};
 pub use lod::Lod;
-pub use model::{CityModel, CityObject, Geometry, GeometryKind, Surface};
+pub use model::{CityModel, CityObject, Geometry, GeometryKind, SurfacePolygon};
 pub use point::ModelPoint;
 pub use pool::VertexPool;
 pub use select::{LodChoice, ObjectStatus, Scope};
-pub use triangle_mesh::{MeshConfig, MeshSurface, Meshed, ObjectReport, TriangleMesh};
-pub use triangulate::{Finding, Triangulation, triangulate};
+pub use triangle_mesh::{MeshConfig, MeshSurface, MeshedModel, ObjectReport, TriangleMesh};
+pub use triangulate::{PolygonFinding, Triangulation, triangulate};
 pub use validity::check_solids;

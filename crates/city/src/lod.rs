@@ -1,13 +1,13 @@
-//! Levels of detail, with the decimals of the refined scheme of Biljecki et al. (2016): 1.2, 2.2, …
+//! Levels of detail, with the decimals of the refined scheme of Biljecki et al. (2016), such as 1.2 and 2.2.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::ModelError;
 
-/// A level of detail: `2`, or refined as `2.2`.
+/// Level of detail: `2`, or refined as `2.2`.
 ///
-/// Ordered by the numbers, where a plain `2` is the coarsest of the twos.
+/// The order is that of the numbers, and a plain `2` is coarser than any `2.x`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Lod {
     major: u8,
@@ -15,22 +15,22 @@ pub struct Lod {
 }
 
 impl Lod {
-    /// A level of detail; `minor` is the refinement.
+    /// Creates a level of detail; `minor` is the refinement.
     pub const fn new(major: u8, minor: Option<u8>) -> Self {
         Self { major, minor }
     }
 
-    /// The level, 0 to 4 in practice.
+    /// Returns the level, which is 0 to 4 in practice.
     pub const fn major(self) -> u8 {
         self.major
     }
 
-    /// The refinement, where there is one.
+    /// Returns the refinement, if there is one.
     pub const fn minor(self) -> Option<u8> {
         self.minor
     }
 
-    /// Whether a choice as `2` or `2.2` takes this level: a plain `2` takes every refinement of it.
+    /// Returns whether `chosen` covers this level. A plain `2` covers each of its refinements, `2.2` only itself.
     pub fn matches(self, chosen: Self) -> bool {
         self.major == chosen.major && (chosen.minor.is_none() || chosen.minor == self.minor)
     }
@@ -39,7 +39,10 @@ impl Lod {
 impl FromStr for Lod {
     type Err = ModelError;
 
-    /// Reads `2`, `2.2`, and `2.0` as `2` refined by 0.
+    /// Parses `2` and `2.2`. `2.0` is a refinement of `2`, and is not equal to it.
+    ///
+    /// # Errors
+    /// [`ModelError::Lod`] for any other text.
     fn from_str(text: &str) -> Result<Self, ModelError> {
         let digit = |part: &str| match part.as_bytes() {
             [b @ b'0'..=b'9'] => Some(b - b'0'),

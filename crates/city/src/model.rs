@@ -1,82 +1,83 @@
 //! The city model: objects, their geometries per level of detail, and the polygons of their surfaces.
 //!
-//! Vertices are held once for the whole model and rings are indices into them. A ring is open: its last vertex is not its
-//! first. The first ring of a surface is its outer boundary, counter-clockwise seen from outside; the others are holes.
+//! All surfaces share one list of vertices, and rings are indices into it. A ring is open: it does not repeat its first
+//! vertex at the end. The first ring of a surface is its outer boundary, counter-clockwise seen from outside. The other
+//! rings are holes.
 
 use crate::{CrsReference, Lod, ModelError, ModelPoint, ObjectKind, SurfaceClass};
 
-/// A city model as a file holds it.
+/// Content of a city model file.
 #[derive(Debug, Clone, Default)]
 pub struct CityModel {
-    /// Where the coordinates are.
+    /// Reference system of the coordinates.
     pub crs: CrsReference,
-    /// The vertices of all surfaces.
+    /// Vertices of all surfaces.
     pub vertices: Vec<ModelPoint>,
-    /// The objects, in the order of the file.
+    /// Objects in the order of the file.
     pub objects: Vec<CityObject>,
 }
 
 /// An object of the city: a building, a part of one, a road.
 #[derive(Debug, Clone)]
 pub struct CityObject {
-    /// Its identifier in the file.
+    /// Identifier in the file.
     pub id: String,
-    /// What it is.
+    /// Kind of the object.
     pub kind: ObjectKind,
-    /// Index in [`CityModel::objects`] of the object it is a part of.
+    /// Index in [`CityModel::objects`] of the object that this one is a part of.
     pub parent: Option<usize>,
-    /// Its shapes, at most a few: one per level of detail, or several of one level.
+    /// Shapes of the object. A level of detail may have several.
     pub geometries: Vec<Geometry>,
 }
 
 /// A shape of an object at one level of detail.
 #[derive(Debug, Clone)]
 pub struct Geometry {
-    /// Level of detail, where the file says.
+    /// Level of detail, if the file names it.
     pub lod: Option<Lod>,
-    /// Whether the surfaces bound a solid.
+    /// How the surfaces belong together.
     pub kind: GeometryKind,
-    /// The surfaces; those of a solid are ordered by [`Surface::solid`] and [`Surface::shell`].
-    pub surfaces: Vec<Surface>,
+    /// Surfaces; in a solid they are ordered by [`SurfacePolygon::solid`] and [`SurfacePolygon::shell`].
+    pub surfaces: Vec<SurfacePolygon>,
 }
 
 /// How the surfaces of a geometry belong together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum GeometryKind {
-    /// Surfaces that claim no connection.
+    /// Surfaces that need not be connected.
     MultiSurface,
-    /// Surfaces that claim to be connected.
+    /// Connected surfaces.
     CompositeSurface,
-    /// One solid with an outer shell and possibly inner ones.
+    /// One solid with an outer shell and any number of cavities.
     Solid,
     /// Several solids.
     MultiSolid,
-    /// Several solids that claim to touch.
+    /// Several solids that share faces.
     CompositeSolid,
 }
 
-/// A polygon with a class.
+/// Polygon of a surface, with its class.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Surface {
-    /// Outer ring and holes: indices of vertices, without the repeated last one.
+pub struct SurfacePolygon {
+    /// Outer ring and holes: indices of vertices; the first one is not repeated at the end.
     pub rings: Vec<Vec<u32>>,
-    /// What the surface is.
+    /// Class of the surface.
     pub class: SurfaceClass,
-    /// Which solid of the geometry it bounds, 0 for geometries that are no solids.
+    /// Number of the solid that it bounds within the geometry; 0 when the geometry is not a solid.
     pub solid: u32,
-    /// Which shell of the solid it belongs to: 0 is the outer one.
+    /// Number of its shell within the solid; 0 is the outer shell.
     pub shell: u32,
 }
 
 impl CityModel {
-    /// An empty model.
+    /// Creates an empty model.
     pub fn new(crs: CrsReference) -> Self {
         Self { crs, ..Self::default() }
     }
 
-    /// The smallest and the largest coordinates of the vertices that any surface uses.
+    /// Returns the lowest and the highest coordinates of the vertices that a surface uses.
     ///
-    /// `None` without a finite vertex in use.
+    /// Returns `None` when no surface uses a finite vertex.
     pub fn bounds(&self) -> Option<(ModelPoint, ModelPoint)> {
         let rings = self.surfaces().flat_map(|surface| surface.rings.iter().flatten());
         let used = rings.filter_map(|&i| self.vertices.get(i as usize)).filter(|p| p.is_finite());
@@ -89,15 +90,15 @@ impl CityModel {
         })
     }
 
-    /// Every surface of every geometry.
-    pub fn surfaces(&self) -> impl Iterator<Item = &Surface> {
+    /// Iterates over the surfaces of all geometries.
+    pub fn surfaces(&self) -> impl Iterator<Item = &SurfacePolygon> {
         self.objects.iter().flat_map(|object| &object.geometries).flat_map(|geometry| &geometry.surfaces)
     }
 
-    /// Index of the building that an object belongs to: its topmost ancestor, or itself.
+    /// Returns the index of the topmost ancestor of an object, or `object` itself when it has no parent.
     pub fn root(&self, object: usize) -> usize {
         let mut at = object;
-        // A chain longer than the number of objects is a circle, which `validate` reports.
+        // A longer chain than this is a circle, which `validate` reports.
         for _ in 0..self.objects.len() {
             match self.objects.get(at).and_then(|o| o.parent) {
                 Some(parent) => at = parent,
@@ -107,11 +108,11 @@ impl CityModel {
         object
     }
 
-    /// Checks what every user of a model may rely on.
+    /// Checks the invariants of a model: coordinates are finite, indices are in range, each surface has an outer ring,
+    /// and no object is its own ancestor.
     ///
     /// # Errors
-    /// A coordinate that is not finite, an index of a vertex or a parent that is out of range, a circle of parents, or a
-    /// surface without an outer ring.
+    /// [`ModelError`] with the first violation.
     pub fn validate(&self) -> Result<(), ModelError> {
         if let Some(vertex) = self.vertices.iter().position(|p| !p.is_finite()) {
             return Err(ModelError::NotFinite { vertex });
@@ -130,9 +131,9 @@ impl CityModel {
         }
     }
 
-    /// An object that is its own ancestor, in time proportional to the number of objects.
+    /// Finds an object that is its own ancestor, in time proportional to the number of objects.
     fn parent_circle(&self) -> Option<usize> {
-        // 0 is unseen; any other number is the walk that came by first.
+        // 0 means unseen; any other number is the walk that reached the object first, plus one.
         let mut seen = vec![0usize; self.objects.len()];
         for start in 0..self.objects.len() {
             let mut at = Some(start);
@@ -147,7 +148,7 @@ impl CityModel {
         None
     }
 
-    fn validate_surface(&self, surface: &Surface, object: &str) -> Result<(), ModelError> {
+    fn validate_surface(&self, surface: &SurfacePolygon, object: &str) -> Result<(), ModelError> {
         if surface.rings.is_empty() {
             return Err(ModelError::NoRing { object: object.to_owned() });
         }
@@ -161,26 +162,26 @@ impl CityModel {
 }
 
 impl CityObject {
-    /// An object without parent and geometry.
+    /// Creates an object without parent and geometry.
     pub fn new(id: impl Into<String>, kind: ObjectKind) -> Self {
         Self { id: id.into(), kind, parent: None, geometries: Vec::new() }
     }
 }
 
 impl Geometry {
-    /// A geometry without surfaces.
+    /// Creates a geometry without surfaces.
     pub fn new(lod: Option<Lod>, kind: GeometryKind) -> Self {
         Self { lod, kind, surfaces: Vec::new() }
     }
 }
 
 impl GeometryKind {
-    /// Whether the surfaces bound volumes.
+    /// Returns whether the surfaces bound volumes.
     pub fn is_solid(self) -> bool {
         matches!(self, Self::Solid | Self::MultiSolid | Self::CompositeSolid)
     }
 
-    /// The name in CityGML and CityJSON.
+    /// Returns the name in CityGML and CityJSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::MultiSurface => "MultiSurface",
@@ -192,8 +193,8 @@ impl GeometryKind {
     }
 }
 
-impl Surface {
-    /// A surface of a geometry's first solid and outer shell.
+impl SurfacePolygon {
+    /// Creates a surface of the first solid and its outer shell.
     pub fn new(rings: Vec<Vec<u32>>, class: SurfaceClass) -> Self {
         Self { rings, class, solid: 0, shell: 0 }
     }
@@ -213,7 +214,7 @@ mod tests {
         ];
         let mut object = CityObject::new("a", ObjectKind::BUILDING);
         let mut geometry = Geometry::new(Some(Lod::new(2, None)), GeometryKind::MultiSurface);
-        geometry.surfaces.push(Surface::new(vec![vec![0, 1, 2]], SurfaceClass::Roof));
+        geometry.surfaces.push(SurfacePolygon::new(vec![vec![0, 1, 2]], SurfaceClass::Roof));
         object.geometries.push(geometry);
         model.objects.push(object);
         model

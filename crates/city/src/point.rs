@@ -1,6 +1,6 @@
 //! Positions in the reference system of a city model.
 
-/// A position in the reference system of the model, f64: usually metres east, north and up.
+/// Position in the reference system of the model, usually metres east, north and up.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ModelPoint {
     /// First coordinate, usually easting.
@@ -12,17 +12,17 @@ pub struct ModelPoint {
 }
 
 impl ModelPoint {
-    /// A position.
+    /// Creates a position.
     pub const fn new(x: f64, y: f64, z: f64) -> Self {
         Self { x, y, z }
     }
 
-    /// Whether no coordinate is NaN or infinite.
+    /// Returns whether all coordinates are finite.
     pub fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite() && self.z.is_finite()
     }
 
-    /// The vector from `origin` to this position.
+    /// Returns the vector from `origin` to this position.
     pub fn from_origin(self, origin: Self) -> [f64; 3] {
         [self.x - origin.x, self.y - origin.y, self.z - origin.z]
     }

@@ -1,13 +1,14 @@
-//! The vertices of a model, each position held once.
+//! A list of vertices that holds each position once.
 //!
-//! Formats without shared vertices (CityGML) repeat a corner in every polygon; putting equal coordinates on one index
-//! makes shared edges visible to the topology checks. Equal means bit for bit (and −0 as 0): no tolerance moves a vertex.
+//! Formats without shared vertices (CityGML) repeat a corner in every polygon. Equal coordinates get the same index here,
+//! which makes shared edges visible to the topology checks. Equality is bit for bit, and −0 equals 0. No tolerance is
+//! applied, so no vertex moves.
 
 use std::collections::HashMap;
 
 use crate::ModelPoint;
 
-/// Collects vertices and gives equal positions the same index.
+/// A list of vertices in which equal positions share an index.
 #[derive(Debug, Clone, Default)]
 pub struct VertexPool {
     vertices: Vec<ModelPoint>,
@@ -15,14 +16,14 @@ pub struct VertexPool {
 }
 
 impl VertexPool {
-    /// An empty pool.
+    /// Creates an empty pool.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The index of a position, new or known.
+    /// Returns the index of a position, and adds the position if it is new.
     ///
-    /// `None` when the indices of 32 bits are used up.
+    /// Returns `None` when all 32-bit indices are used.
     pub fn index(&mut self, point: ModelPoint) -> Option<u32> {
         let key = [point.x, point.y, point.z].map(|c| (c + 0.0).to_bits());
         if let Some(&index) = self.index_of.get(&key) {
@@ -34,12 +35,12 @@ impl VertexPool {
         Some(index)
     }
 
-    /// The positions in the order of their indices.
+    /// Returns the positions in the order of their indices.
     pub fn vertices(&self) -> &[ModelPoint] {
         &self.vertices
     }
 
-    /// The positions in the order of their indices.
+    /// Returns the positions in the order of their indices, and consumes the pool.
     pub fn into_vertices(self) -> Vec<ModelPoint> {
         self.vertices
     }

@@ -1,20 +1,23 @@
-//! Rings made fit for triangulation: repeated vertices and back-and-forth spikes go, planes are fitted by Newell's method.
+//! Prepares rings for triangulation: fits a plane by Newell's method, and removes repeated vertices and spikes.
 
 use numeric::vector::{Vector, cross, dot, norm, scale, sub, unit};
 
-/// The plane that fits a ring: a point on it and its unit normal, counter-clockwise seen against the normal.
+/// Plane fitted to a ring. The ring is counter-clockwise when the normal points at the viewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Plane {
+    /// A point of the plane: the mean of the vertices.
     pub(crate) point: Vector,
+    /// Unit normal.
     pub(crate) normal: Vector,
-    /// Area of the ring's projection onto the plane, square metres.
+    /// Area of the projection of the ring onto the plane, square metres.
     pub(crate) area: f64,
 }
 
 impl Plane {
-    /// The plane through the mean of the vertices with Newell's normal.
+    /// Fits the plane through the mean of the vertices with Newell's normal.
     ///
-    /// `None` for rings whose area is lost in the rounding of their size: fewer than three vertices, all on a line.
+    /// Returns `None` when the area of the ring is lost in the rounding of its size: fewer than three vertices, or all of
+    /// them on a line.
     pub(crate) fn of_ring(ring: &[Vector]) -> Option<Self> {
         let first = *ring.first()?;
         let local = |i: usize| sub(ring[i % ring.len()], first);
@@ -31,15 +34,15 @@ impl Plane {
         Some(Self { point, normal: unit(doubled)?, area })
     }
 
-    /// Signed distance of a point.
+    /// Returns the signed distance of a point, positive on the side of the normal.
     pub(crate) fn distance(&self, point: Vector) -> f64 {
         dot(self.normal, sub(point, self.point))
     }
 
-    /// Two unit vectors in the plane that make a right-handed frame with the normal.
+    /// Returns two unit vectors in the plane that form a right-handed frame with the normal.
     pub(crate) fn axes(&self) -> (Vector, Vector) {
         let n = self.normal;
-        // The axis that the normal is least along keeps the cross product long.
+        // The coordinate axis with the smallest component of the normal keeps the cross product long.
         let least = (0..3).min_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs())).unwrap_or(0);
         let mut axis = [0.0; 3];
         axis[least] = 1.0;
@@ -48,16 +51,16 @@ impl Plane {
     }
 }
 
-/// What cleaning found in a ring.
+/// Counts of what cleaning removed from a ring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Cleaned {
-    /// Vertices repeated in a row.
+    /// Vertices that repeated the one before.
     pub(crate) repeated: usize,
-    /// Tips of edges that lead back over themselves.
+    /// Tips of spikes a → b → a.
     pub(crate) spikes: usize,
 }
 
-/// Removes vertices repeated in a row (around the end too) and tips a → b → a, in place.
+/// Removes vertices that repeat the one before, and the tips b of spikes a → b → a, also across the end of the ring.
 pub(crate) fn clean(ring: &mut Vec<u32>, same: impl Fn(u32, u32) -> bool) -> Cleaned {
     let mut found = Cleaned::default();
     let mut kept: Vec<u32> = Vec::with_capacity(ring.len());
@@ -84,6 +87,7 @@ pub(crate) fn clean(ring: &mut Vec<u32>, same: impl Fn(u32, u32) -> bool) -> Cle
     found
 }
 
+/// Appends a vertex to a clean ring, unless it repeats the last one or ends a spike.
 fn push_clean(kept: &mut Vec<u32>, vertex: u32, same: &impl Fn(u32, u32) -> bool, found: &mut Cleaned) {
     if kept.last().is_some_and(|&last| same(last, vertex)) {
         found.repeated += 1;

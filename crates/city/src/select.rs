@@ -1,23 +1,23 @@
-//! Which geometries of a model are used: the objects in scope, and one level of detail for each.
+//! Selects the geometries of a model: the objects in scope, and one level of detail for each.
 //!
-//! By default the highest level up to 2.x of every object of a building. A LoD0 footprint stands for no shape and is only
-//! taken when asked for. A building is left to its parts where they are more detailed than it is itself.
+//! The default is the highest level up to 2.x of every object of a building. A LoD0 footprint is not a shape and is only
+//! used when it is asked for. A building whose parts are more detailed than itself is replaced by its parts.
 
-use crate::{CityModel, CityObject, Geometry, Lod, Role};
+use crate::{BuildingRole, CityModel, CityObject, Geometry, Lod};
 
-/// The level of detail to use.
+/// Choice of the level of detail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LodChoice {
-    /// Of every object the highest level whose first number is at most this, and at least 1.
+    /// The highest level of every object whose first number is at least 1 and at most this.
     Highest(u8),
-    /// This level only; a plain 2 takes the highest of its refinements.
+    /// This level only; a plain 2 stands for the highest of its refinements.
     Only(Lod),
 }
 
-/// The objects to use.
+/// Choice of the objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Scope {
-    /// Buildings, their parts and what is attached to them outside.
+    /// Buildings, their parts and their outer installations.
     #[default]
     Buildings,
     /// Every object that has surfaces.
@@ -30,39 +30,39 @@ impl Default for LodChoice {
     }
 }
 
-/// Whether an object is used, and why not.
+/// Whether an object is used, and if not, why.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ObjectStatus {
-    /// With this many triangles.
+    /// The object is used.
     Used {
-        /// The triangles.
+        /// Number of its triangles.
         triangles: usize,
     },
-    /// It has no geometry of surfaces.
+    /// The object has no geometry of surfaces.
     NoGeometry,
-    /// It is no building, and buildings were asked for.
+    /// The object does not belong to a building, and only buildings were asked for.
     OutOfScope,
-    /// None of its levels of detail is the one asked for.
+    /// The object does not have the level of detail that was asked for.
     NoSuchLod {
-        /// The levels it has, ascending.
+        /// Levels that the object has, ascending.
         available: Vec<Lod>,
     },
-    /// Its parts show it in more detail.
+    /// The parts of the object show it in more detail.
     ReplacedByParts,
-    /// None of its surfaces could be used; the defects say why.
+    /// None of the surfaces could be used; the defects say why.
     Unusable,
 }
 
-/// The level of an object's geometries that are used; `None` inside for geometries without a level.
+/// Level of the geometries that are used, or why none is. `Ok(None)` selects the geometries without a level.
 pub(crate) type Chosen = Result<Option<Lod>, ObjectStatus>;
 
-/// Decides for every object.
+/// Decides for each object of the model.
 pub(crate) fn choose(model: &CityModel, choice: LodChoice, scope: Scope) -> Vec<Chosen> {
     let mut chosen: Vec<Chosen> = model.objects.iter().map(|object| of_object(object, choice, scope)).collect();
     let mut best_part: Vec<Option<Lod>> = vec![None; model.objects.len()];
     for (object, chosen) in model.objects.iter().zip(&chosen) {
-        let (Ok(Some(lod)), Role::Part) = (chosen, object.kind.role()) else { continue };
+        let (Ok(Some(lod)), BuildingRole::Part) = (chosen, object.kind.role()) else { continue };
         let mut parent = object.parent;
         for _ in 0..model.objects.len() {
             let Some(index) = parent else { break };
@@ -82,7 +82,7 @@ pub(crate) fn choose(model: &CityModel, choice: LodChoice, scope: Scope) -> Vec<
 }
 
 fn of_object(object: &CityObject, choice: LodChoice, scope: Scope) -> Chosen {
-    let outside = matches!(object.kind.role(), Role::Other | Role::Interior);
+    let outside = matches!(object.kind.role(), BuildingRole::Other | BuildingRole::Interior);
     if scope == Scope::Buildings && outside {
         return Err(ObjectStatus::OutOfScope);
     }
@@ -107,7 +107,7 @@ fn of_object(object: &CityObject, choice: LodChoice, scope: Scope) -> Chosen {
     }
 }
 
-/// The geometries of an object at a level.
+/// Iterates over the geometries of an object at a level, with their indices.
 pub(crate) fn geometries(object: &CityObject, lod: Option<Lod>) -> impl Iterator<Item = (usize, &Geometry)> {
     object.geometries.iter().enumerate().filter(move |(_, geometry)| geometry.lod == lod)
 }

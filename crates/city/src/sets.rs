@@ -1,17 +1,17 @@
-//! Sets of numbers that are joined one pair at a time (union-find with halved paths).
+//! Disjoint sets of numbers (union-find with path halving).
 
-/// The numbers up to a count, in sets that share nothing.
+/// A partition of the numbers below a count into sets.
 pub(crate) struct DisjointSets {
     parent: Vec<usize>,
 }
 
 impl DisjointSets {
-    /// Sets of one number each.
+    /// Creates one set per number.
     pub(crate) fn new(count: usize) -> Self {
         Self { parent: (0..count).collect() }
     }
 
-    /// The number that stands for the set of another.
+    /// Returns the representative of the set that contains `at`.
     pub(crate) fn head(&mut self, mut at: usize) -> usize {
         while self.parent[at] != at {
             self.parent[at] = self.parent[self.parent[at]];
@@ -20,14 +20,14 @@ impl DisjointSets {
         at
     }
 
-    /// Joins the sets of two numbers; whether they were two.
+    /// Joins the sets of two numbers, and returns whether they were different sets.
     pub(crate) fn join(&mut self, a: usize, b: usize) -> bool {
         let (a, b) = (self.head(a), self.head(b));
         self.parent[a] = b;
         a != b
     }
 
-    /// How many sets there are.
+    /// Returns the number of sets.
     pub(crate) fn count(&self) -> usize {
         self.parent.iter().enumerate().filter(|(at, parent)| at == *parent).count()
     }

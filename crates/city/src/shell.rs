@@ -1,33 +1,54 @@
-//! The shells of solids: closed or not, and which of their polygons look the wrong way.
+//! Checks whether the shells of solids are closed, and turns polygons that face the wrong side.
 //!
-//! Every edge of a closed shell is used by two polygons, once in each direction. Where that holds but for the directions,
-//! the polygons are turned until it does, and the sign of the enclosed volume says which side is out.
+//! Two polygons use every edge of a closed shell, once in each direction. Where only the directions are wrong, polygons
+//! are turned until neighbours agree. The sign of the enclosed volume then tells which side is outside.
 
 use crate::sets::DisjointSets;
-use crate::{DefectCode, Surface};
+use crate::{DefectCode, SurfacePolygon};
 use numeric::vector::{Vector, add_cross, dot, sub};
 
-/// What was found out about a shell.
+/// Result of the check of a shell.
 #[derive(Debug, Default)]
 pub(crate) struct ShellCheck {
-    /// Which of the surfaces are to be turned around.
+    /// Per surface whether it must be turned around.
     pub(crate) turn: Vec<bool>,
-    /// Defects of the shell with details; wrong orientations are repaired by `turn`.
+    /// Defects of the shell with details. `turn` repairs wrong orientations.
     pub(crate) found: Vec<(DefectCode, String)>,
 }
 
-/// An edge of a polygon: its vertices ascending, whether it runs that way, and the polygon.
-type Edge = (u32, u32, bool, u32);
+/// An edge of a polygon. Sorting brings the edges between the same two vertices together.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Edge {
+    low: u32,
+    high: u32,
+    /// Whether the polygon runs from `low` to `high`.
+    ascending: bool,
+    polygon: u32,
+}
 
-/// Checks a shell of `surfaces`; `outer` is false for the shell of a cavity.
-pub(crate) fn check(surfaces: &[&Surface], outer: bool, position: impl Fn(u32) -> Vector) -> ShellCheck {
+impl Edge {
+    fn joins_the_same(&self, other: &Self) -> bool {
+        (self.low, self.high) == (other.low, other.high)
+    }
+}
+
+/// Two polygons that share an edge.
+struct Neighbours {
+    a: usize,
+    b: usize,
+    /// Whether both run along the edge in the same direction, so that one of them must be turned.
+    disagree: bool,
+}
+
+/// Checks the shell that `surfaces` form; `outer` is false for the shell of a cavity.
+pub(crate) fn check(surfaces: &[&SurfacePolygon], outer: bool, position: impl Fn(u32) -> Vector) -> ShellCheck {
     let mut out = ShellCheck { turn: vec![false; surfaces.len()], found: Vec::new() };
     if surfaces.len() < 4 {
         out.found.push((DefectCode::TooFewPolygons, format!("{}", surfaces.len())));
         return out;
     }
     let edges = sorted_edges(surfaces);
-    let groups = || edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
+    let groups = || edges.chunk_by(Edge::joins_the_same);
     let open = groups().filter(|group| group.len() == 1).count();
     let crowded = groups().filter(|group| group.len() > 2).count();
     if open > 0 {
@@ -43,11 +64,15 @@ pub(crate) fn check(surfaces: &[&Surface], outer: bool, position: impl Fn(u32) -
         }
         return out;
     }
-    let pairs: Vec<(usize, usize, bool)> =
-        groups().map(|g| (g[0].3 as usize, g[1].3 as usize, g[0].2 == g[1].2)).collect();
+    let pair = |group: &[Edge]| Neighbours {
+        a: group[0].polygon as usize,
+        b: group[1].polygon as usize,
+        disagree: group[0].ascending == group[1].ascending,
+    };
+    let pairs: Vec<Neighbours> = groups().map(pair).collect();
     let Some((component, count)) = orient(surfaces.len(), &pairs, &mut out.turn) else {
         out.turn.fill(false);
-        out.found.push((DefectCode::NonManifold, "the surface has one side only".to_owned()));
+        out.found.push((DefectCode::NonManifold, "the surface has only one side".to_owned()));
         return out;
     };
     if count > 1 {
@@ -63,10 +88,10 @@ pub(crate) fn check(surfaces: &[&Surface], outer: bool, position: impl Fn(u32) -
     out
 }
 
-/// What is wrong with surfaces that claim to be connected, but to enclose nothing.
-pub(crate) fn check_sheet(surfaces: &[&Surface]) -> Vec<(DefectCode, String)> {
+/// Checks surfaces that should be connected without enclosing a volume.
+pub(crate) fn check_sheet(surfaces: &[&SurfacePolygon]) -> Vec<(DefectCode, String)> {
     let edges = sorted_edges(surfaces);
-    let crowded = edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).filter(|group| group.len() > 2).count();
+    let crowded = edges.chunk_by(Edge::joins_the_same).filter(|group| group.len() > 2).count();
     let pieces = pieces(surfaces.len(), &edges);
     let mut found = Vec::new();
     if crowded > 0 {
@@ -78,36 +103,37 @@ pub(crate) fn check_sheet(surfaces: &[&Surface]) -> Vec<(DefectCode, String)> {
     found
 }
 
-fn sorted_edges(surfaces: &[&Surface]) -> Vec<Edge> {
+fn sorted_edges(surfaces: &[&SurfacePolygon]) -> Vec<Edge> {
     let mut edges: Vec<Edge> = Vec::new();
     for (number, surface) in surfaces.iter().enumerate() {
         for ring in &surface.rings {
             let next = ring.iter().cycle().skip(1);
             let pairs = ring.iter().zip(next).filter(|(a, b)| a != b);
-            edges.extend(pairs.map(|(&a, &b)| (a.min(b), a.max(b), a < b, number as u32)));
+            let polygon = number as u32;
+            edges.extend(pairs.map(|(&a, &b)| Edge { low: a.min(b), high: a.max(b), ascending: a < b, polygon }));
         }
     }
     edges.sort_unstable();
     edges
 }
 
-/// How many pieces polygons form that hang together by edges.
+/// Counts the pieces that the polygons form when those that share an edge are joined.
 fn pieces(count: usize, edges: &[Edge]) -> usize {
     let mut sets = DisjointSets::new(count);
-    for pair in edges.windows(2).filter(|pair| (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1)) {
-        sets.join(pair[0].3 as usize, pair[1].3 as usize);
+    for pair in edges.windows(2).filter(|pair| pair[0].joins_the_same(&pair[1])) {
+        sets.join(pair[0].polygon as usize, pair[1].polygon as usize);
     }
     sets.count()
 }
 
-/// Turns polygons until neighbours agree; the connected component of each and how many there are.
+/// Turns polygons until neighbours agree, and returns the connected component of each and the number of components.
 ///
-/// `None` for a surface with one side, such as a Möbius strip.
-fn orient(count: usize, pairs: &[(usize, usize, bool)], turn: &mut [bool]) -> Option<(Vec<usize>, usize)> {
+/// Returns `None` for a surface with only one side, such as a Möbius strip.
+fn orient(count: usize, pairs: &[Neighbours], turn: &mut [bool]) -> Option<(Vec<usize>, usize)> {
     let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); count];
-    for &(a, b, against) in pairs {
-        neighbours[a].push((b, against));
-        neighbours[b].push((a, against));
+    for &Neighbours { a, b, disagree } in pairs {
+        neighbours[a].push((b, disagree));
+        neighbours[b].push((a, disagree));
     }
     let mut component = vec![usize::MAX; count];
     let mut components = 0;
@@ -118,12 +144,12 @@ fn orient(count: usize, pairs: &[(usize, usize, bool)], turn: &mut [bool]) -> Op
         component[start] = components;
         let mut open = vec![start];
         while let Some(at) = open.pop() {
-            for &(next, against) in &neighbours[at] {
+            for &(next, disagree) in &neighbours[at] {
                 if component[next] == usize::MAX {
                     component[next] = components;
-                    turn[next] = turn[at] ^ against;
+                    turn[next] = turn[at] ^ disagree;
                     open.push(next);
-                } else if turn[next] != turn[at] ^ against {
+                } else if turn[next] != turn[at] ^ disagree {
                     return None;
                 }
             }
@@ -133,8 +159,9 @@ fn orient(count: usize, pairs: &[(usize, usize, bool)], turn: &mut [bool]) -> Op
     Some((component, components))
 }
 
+/// Turns each component as a whole so that an outer shell faces away from its volume, and a cavity towards it.
 fn turn_outwards(
-    surfaces: &[&Surface],
+    surfaces: &[&SurfacePolygon],
     component: &[usize],
     count: usize,
     outer: bool,
@@ -152,8 +179,8 @@ fn turn_outwards(
     }
 }
 
-/// Six times the volume of the cone from `reference` over a polygon, positive where it looks away.
-fn flux(surface: &Surface, reference: Vector, position: &impl Fn(u32) -> Vector) -> f64 {
+/// Returns six times the volume of the cone from `reference` to a polygon, positive when the polygon faces away from it.
+fn flux(surface: &SurfacePolygon, reference: Vector, position: &impl Fn(u32) -> Vector) -> f64 {
     let of_ring = |ring: &Vec<u32>| {
         let Some(&first) = ring.first() else { return 0.0 };
         let at = |i: u32| sub(position(i), reference);
@@ -184,8 +211,8 @@ mod tests {
     const CUBE: [[u32; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
 
     fn checked(faces: &[Vec<u32>], outer: bool) -> (Vec<bool>, Vec<u16>) {
-        let surfaces: Vec<Surface> =
-            faces.iter().map(|ring| Surface::new(vec![ring.clone()], SurfaceClass::Wall)).collect();
+        let surfaces: Vec<SurfacePolygon> =
+            faces.iter().map(|ring| SurfacePolygon::new(vec![ring.clone()], SurfaceClass::Wall)).collect();
         let check = check(&surfaces.iter().collect::<Vec<_>>(), outer, |i| {
             let corner = CORNERS[i as usize % 8];
             [corner[0] + 50.0 * f64::from(i / 8), corner[1] + 70.0, corner[2] - 9.0]
@@ -226,8 +253,8 @@ mod tests {
     #[test]
     fn a_sheet_hangs_together_and_branches_nowhere() {
         let codes = |faces: &[Vec<u32>]| -> Vec<u16> {
-            let surfaces: Vec<Surface> =
-                faces.iter().map(|ring| Surface::new(vec![ring.clone()], SurfaceClass::Roof)).collect();
+            let surfaces: Vec<SurfacePolygon> =
+                faces.iter().map(|ring| SurfacePolygon::new(vec![ring.clone()], SurfaceClass::Roof)).collect();
             let found = check_sheet(&surfaces.iter().collect::<Vec<_>>());
             found.iter().map(|(code, _)| code.number()).collect()
         };

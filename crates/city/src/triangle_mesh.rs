@@ -1,78 +1,96 @@
 //! The triangles of a city model, each with its surface, class and object.
 //!
-//! Positions are f64 metres from a recorded origin on whole metres, laid on a lattice of 1 µm: the same model at other
-//! coordinates (another zone, another offset in whole metres) gives bit for bit the same triangles. Triangles are
-//! counter-clockwise seen from outside where the solids allow to tell. The result is the same for any number of threads.
-
-use std::collections::HashMap;
+//! Positions are f64 metres from a recorded origin on whole metres, rounded to 1 µm. The same model at other coordinates
+//! (another zone, another offset in whole metres) gives bit for bit the same triangles. Triangles of solids are
+//! counter-clockwise seen from outside. The result does not depend on the number of threads.
 
 use rayon::prelude::*;
 
+use crate::piece::{Piece, PieceDefect};
 use crate::select::{self, Chosen, LodChoice, ObjectStatus, Scope};
-use crate::shell;
-use crate::triangulate::{Triangulation, triangulate};
-use crate::{CityModel, Defect, DefectCode, Effect, Geometry, Lod, ModelError, ModelPoint, Surface, SurfaceClass};
+use crate::{CityModel, Defect, DefectCode, Effect, Lod, ModelError, ModelPoint, SurfaceClass};
 use numeric::vector::Vector;
 
-/// Triangles with their surfaces.
+/// Triangles of a city model with their surfaces.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Position in the model's reference system that the others are relative to; whole metres.
+    /// Origin of the positions in the reference system of the model, on whole metres.
     pub origin: ModelPoint,
     /// Corners, metres from the origin.
     pub positions: Vec<[f64; 3]>,
-    /// Indices of corners.
+    /// Corners of each triangle, as indices of positions.
     pub triangles: Vec<[u32; 3]>,
-    /// Per triangle the index of its surface.
+    /// Surface of each triangle, as index of `surfaces`.
     pub surface_of: Vec<u32>,
-    /// The surfaces.
+    /// Surfaces that have triangles.
     pub surfaces: Vec<MeshSurface>,
 }
 
-/// A surface that triangles were made of.
+/// Object and class of a surface that triangles were made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MeshSurface {
     /// Index of the object in the model.
     pub object: u32,
-    /// Its class.
+    /// Class of the surface.
     pub class: SurfaceClass,
 }
 
-/// What is made into triangles.
+/// Choice of the geometries that are made into triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MeshConfig {
-    /// Level of detail.
+    /// Level of detail of each object.
     pub lod: LodChoice,
-    /// Which objects.
+    /// Objects.
     pub scope: Scope,
 }
 
-/// The triangles of a model, with an account of every object.
+/// Triangles of a model, with a report on each object.
 #[derive(Debug, Clone)]
-pub struct Meshed {
-    /// The triangles.
+pub struct MeshedModel {
+    /// Triangles.
     pub mesh: TriangleMesh,
-    /// Per object of the model the level that was used, and whether it was.
+    /// Report on each object, in the order of the model.
     pub objects: Vec<ObjectReport>,
-    /// What was wrong, in the order of the objects.
+    /// Defects in the order of the objects.
     pub defects: Vec<Defect>,
 }
 
-/// What became of an object.
+/// Report on an object.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ObjectReport {
-    /// The level of detail that was used; `None` where none was, or where the file names none.
+    /// Level of detail that was used; `None` when the object was not used or the file names no level.
     pub lod: Option<Lod>,
     /// Whether it was used.
     pub status: ObjectStatus,
 }
 
 impl TriangleMesh {
-    /// Makes triangles of a model's surfaces.
+    /// Makes triangles of the surfaces of a model.
     ///
     /// # Errors
-    /// A model that fails [`CityModel::validate`].
-    pub fn from_model(model: &CityModel, config: &MeshConfig) -> Result<Meshed, ModelError> {
+    /// The errors of [`CityModel::validate`].
+    ///
+    /// # Examples
+    /// ```
+    /// use city::{
+    ///     CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, MeshConfig, ModelPoint, ObjectKind,
+    ///     SurfaceClass, SurfacePolygon, TriangleMesh,
+    /// };
+    ///
+    /// let mut model = CityModel::new(CrsReference::from_epsg(25832, Some(7837)));
+    /// model.vertices = [[0.0, 0.0, 5.0], [4.0, 0.0, 5.0], [4.0, 3.0, 5.0], [0.0, 3.0, 5.0]].map(ModelPoint::from).to_vec();
+    /// let mut roof = Geometry::new(Some(Lod::new(2, None)), GeometryKind::MultiSurface);
+    /// roof.surfaces.push(SurfacePolygon::new(vec![vec![0, 1, 2, 3]], SurfaceClass::Roof));
+    /// let mut house = CityObject::new("house", ObjectKind::BUILDING);
+    /// house.geometries.push(roof);
+    /// model.objects.push(house);
+    ///
+    /// let meshed = TriangleMesh::from_model(&model, &MeshConfig::default())?;
+    /// assert_eq!(meshed.mesh.triangles.len(), 2);
+    /// assert_eq!(meshed.mesh.surface(0).class, SurfaceClass::Roof);
+    /// # Ok::<(), city::ModelError>(())
+    /// ```
+    pub fn from_model(model: &CityModel, config: &MeshConfig) -> Result<MeshedModel, ModelError> {
         model.validate()?;
         let chosen = select::choose(model, config.lod, config.scope);
         let origin = origin(model, &chosen);
@@ -93,7 +111,7 @@ impl TriangleMesh {
                 (Err(status), _) => status,
                 (Ok(_), piece) => merger.add(index, piece.unwrap_or_default(), &position, &mut defects),
             };
-            // A building may leave the geometry to its parts.
+            // A building without geometry is complete when its parts have some.
             if status == ObjectStatus::NoGeometry && !has_parts[index] {
                 defects.push(Defect {
                     code: DefectCode::NoGeometry,
@@ -105,30 +123,30 @@ impl TriangleMesh {
             }
             objects.push(ObjectReport { lod, status });
         }
-        Ok(Meshed { mesh: merger.mesh, objects, defects })
+        Ok(MeshedModel { mesh: merger.mesh, objects, defects })
     }
 
-    /// The corners of a triangle.
+    /// Returns the corners of a triangle, metres from the origin.
     ///
     /// # Panics
-    /// When there is no such triangle, or the mesh fails [`TriangleMesh::validate`].
+    /// Panics when the triangle does not exist, or the mesh fails [`TriangleMesh::validate`].
     pub fn corners(&self, triangle: usize) -> [[f64; 3]; 3] {
         self.triangles[triangle].map(|corner| self.positions[corner as usize])
     }
 
-    /// The surface of a triangle.
+    /// Returns the surface of a triangle.
     ///
     /// # Panics
-    /// As [`TriangleMesh::corners`].
+    /// Panics when the triangle does not exist, or the mesh fails [`TriangleMesh::validate`].
     pub fn surface(&self, triangle: usize) -> MeshSurface {
         self.surfaces[self.surface_of[triangle] as usize]
     }
 
-    /// Checks what every user of a mesh may rely on.
+    /// Checks the invariants of a mesh.
     ///
     /// # Errors
-    /// A position that is not finite, an index of a corner or a surface that is out of range, or a triangle without a
-    /// surface.
+    /// [`ModelError::NotFinite`] for a position that is not finite, [`ModelError::Triangle`] for a triangle without a
+    /// surface, or with an index of a corner or a surface that is out of range.
     pub fn validate(&self) -> Result<(), ModelError> {
         if let Some(vertex) = self.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
             return Err(ModelError::NotFinite { vertex });
@@ -145,7 +163,7 @@ impl TriangleMesh {
     }
 }
 
-/// The middle of what is used, on whole metres; of the model where nothing is.
+/// Returns the middle of the geometries that are used, rounded down to whole metres; zero when none is used.
 fn origin(model: &CityModel, chosen: &[Chosen]) -> ModelPoint {
     let mut bounds: Option<(Vector, Vector)> = None;
     for (object, lod) in model.objects.iter().zip(chosen).filter_map(|(o, c)| Some((o, *c.as_ref().ok()?))) {
@@ -160,17 +178,17 @@ fn origin(model: &CityModel, chosen: &[Chosen]) -> ModelPoint {
         }
     }
     bounds.map_or(ModelPoint::default(), |(low, high)| {
-        // Coordinates that carry the noise of an offset must not decide between two origins: round on a nanometre first.
+        // Rounding to a nanometre first keeps the rounding errors of an offset from deciding between two origins.
         ModelPoint::from([0, 1, 2].map(|i| ((0.5e9 * (low[i] + high[i])).round() / 1e9).floor()))
     })
 }
 
-/// Where the vertices of a model are, metres from an origin, on the lattice of micrometres.
+/// Returns the places of the vertices, metres from an origin, rounded to a micrometre.
 fn positions(model: &CityModel, origin: ModelPoint) -> impl Fn(u32) -> Vector + '_ {
     move |i| micrometres(model.vertices[i as usize].from_origin(origin))
 }
 
-/// Where the vertices of a model are in the frame that its triangles have.
+/// Returns the places of the vertices in the frame of the triangles that [`TriangleMesh::from_model`] makes.
 pub(crate) fn positions_of<'a>(model: &'a CityModel, chosen: &[Chosen]) -> impl Fn(u32) -> Vector + 'a {
     positions(model, origin(model, chosen))
 }
@@ -179,92 +197,15 @@ fn micrometres(position: Vector) -> Vector {
     position.map(|c| (c * 1e6).round() / 1e6)
 }
 
-/// The triangles of one object, with the vertices of the model as corners.
-#[derive(Debug, Default)]
-struct Piece {
-    polygons: Vec<(SurfaceClass, Triangulation)>,
-    defects: Vec<(DefectCode, Effect, String, String)>,
-}
-
-impl Piece {
-    fn new(model: &CityModel, object: usize, lod: Option<Lod>, position: &impl Fn(u32) -> Vector) -> Self {
-        let mut piece = Self::default();
-        let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
-        for (number, geometry) in select::geometries(&model.objects[object], lod) {
-            let turn = piece.check_shells(geometry, number, position);
-            for (index, surface) in geometry.surfaces.iter().enumerate() {
-                let place = || format!("geometry {number}, surface {index}");
-                match known.entry(sorted_corners(surface)) {
-                    std::collections::hash_map::Entry::Occupied(first) => {
-                        piece.merge_class(*first.get(), surface.class);
-                        piece.defects.push((DefectCode::DuplicatePolygon, Effect::Dropped, place(), String::new()));
-                    }
-                    std::collections::hash_map::Entry::Vacant(entry) => {
-                        entry.insert(piece.polygons.len());
-                        piece.add(surface, turn[index], position, &place);
-                    }
-                }
-            }
-        }
-        piece
-    }
-
-    /// The same polygon may come with a class in one geometry and without in another.
-    fn merge_class(&mut self, polygon: usize, class: SurfaceClass) {
-        if let Some((known, _)) = self.polygons.get_mut(polygon).filter(|(c, _)| *c == SurfaceClass::Unclassified) {
-            *known = class;
-        }
-    }
-
-    fn add(&mut self, surface: &Surface, turn: bool, position: &impl Fn(u32) -> Vector, place: &impl Fn() -> String) {
-        let mut cut = triangulate(&surface.rings, position);
-        for finding in std::mem::take(&mut cut.findings) {
-            let effect = if finding.dropped { Effect::Dropped } else { Effect::Noted };
-            self.defects.push((finding.code, effect, place(), finding.detail));
-        }
-        if turn {
-            cut.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        }
-        self.polygons.push((surface.class, cut));
-    }
-
-    /// Per surface of a geometry whether it must be turned; only solids can tell.
-    fn check_shells(&mut self, geometry: &Geometry, number: usize, position: &impl Fn(u32) -> Vector) -> Vec<bool> {
-        let mut turn = vec![false; geometry.surfaces.len()];
-        if !geometry.kind.is_solid() {
-            return turn;
-        }
-        let mut start = 0;
-        for members in geometry.surfaces.chunk_by(|a, b| (a.solid, a.shell) == (b.solid, b.shell)) {
-            let (solid, number_of_shell) = (members[0].solid, members[0].shell);
-            let check = shell::check(&members.iter().collect::<Vec<_>>(), number_of_shell == 0, position);
-            turn[start..start + members.len()].copy_from_slice(&check.turn);
-            start += members.len();
-            for (code, detail) in check.found {
-                let turned = matches!(code, DefectCode::WrongOrientation | DefectCode::WrongOrientationShell);
-                let effect = if turned { Effect::Repaired } else { Effect::Noted };
-                let place = format!("geometry {number}, solid {solid}, shell {number_of_shell}");
-                self.defects.push((code, effect, place, detail));
-            }
-        }
-        turn
-    }
-}
-
-/// What two polygons with the same corners share, whatever their order.
-fn sorted_corners(surface: &Surface) -> Vec<u32> {
-    let mut corners: Vec<u32> = surface.rings.iter().flatten().copied().collect();
-    corners.sort_unstable();
-    corners
-}
-
-/// Puts the pieces together, each vertex of the model once.
+/// Joins the triangles of the objects into one mesh.
 struct Merger {
     mesh: TriangleMesh,
+    /// Per vertex of the model its corner in the mesh; `u32::MAX` while it has none.
     corner_of: Vec<u32>,
 }
 
 impl Merger {
+    /// Adds the triangles of an object, and returns its status.
     fn add(
         &mut self,
         object: usize,
@@ -290,7 +231,7 @@ impl Merger {
                 self.mesh.surface_of.push(surface);
             }
         }
-        defects.extend(piece.defects.into_iter().map(|(code, effect, place, detail)| Defect {
+        defects.extend(piece.defects.into_iter().map(|PieceDefect { code, effect, place, detail }| Defect {
             code,
             effect,
             object: Some(object),
@@ -303,6 +244,7 @@ impl Merger {
         }
     }
 
+    /// Returns the corner of a vertex of the model, and adds it if it is new.
     fn corner(&mut self, vertex: u32, position: &impl Fn(u32) -> Vector) -> u32 {
         let corner = &mut self.corner_of[vertex as usize];
         if *corner == u32::MAX {
@@ -316,9 +258,9 @@ impl Merger {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CityObject, CrsReference, GeometryKind, ObjectKind};
+    use crate::{CityObject, CrsReference, Geometry, GeometryKind, ObjectKind, SurfacePolygon};
 
-    /// A house with a ridge (triangles, quadrilaterals), its front wall with a hole, one face turned and one repeated.
+    /// Makes a house with a ridge and a hole in its front wall. One face is turned, another one is repeated.
     fn house(offset: Vector) -> CityModel {
         let mut model = CityModel::new(CrsReference::default());
         let corners = [
@@ -352,26 +294,26 @@ mod tests {
         ];
         let mut geometry = Geometry::new("2.2".parse().ok(), GeometryKind::Solid);
         for (rings, class) in faces {
-            geometry.surfaces.push(Surface::new(rings.iter().map(|ring| ring.to_vec()).collect(), class));
+            geometry.surfaces.push(SurfacePolygon::new(rings.iter().map(|ring| ring.to_vec()).collect(), class));
         }
         geometry.surfaces[8].rings[0].reverse();
         let mut object = CityObject::new("house", ObjectKind::BUILDING);
         let mut repeated = Geometry::new("2.2".parse().ok(), GeometryKind::MultiSurface);
-        repeated.surfaces.push(Surface::new(vec![vec![9, 8, 4, 5]], SurfaceClass::Unclassified));
+        repeated.surfaces.push(SurfacePolygon::new(vec![vec![9, 8, 4, 5]], SurfaceClass::Unclassified));
         object.geometries = vec![geometry, repeated];
         model.objects.push(object);
         model
     }
 
-    fn meshed(offset: Vector) -> Meshed {
+    fn meshed(offset: Vector) -> MeshedModel {
         TriangleMesh::from_model(&house(offset), &MeshConfig::default()).unwrap()
     }
 
-    /// Six times the enclosed volume: right only if every triangle looks outwards.
+    /// Returns the enclosed volume, which is only right when every triangle faces outwards.
     fn volume(mesh: &TriangleMesh) -> f64 {
         let cone = |t: usize| {
             let [a, b, c] = mesh.corners(t);
-            numeric::vector::dot(a, numeric::vector::cross(b, c)) / 6.0
+            numeric::vector::dot(a, crate::vector::cross(b, c)) / 6.0
         };
         (0..mesh.triangles.len()).map(cone).sum()
     }
@@ -405,7 +347,7 @@ mod tests {
         model.objects.push(CityObject::new("empty", ObjectKind::BUILDING));
         let mut flat = model.objects[0].clone();
         flat.geometries.truncate(1);
-        flat.geometries[0].surfaces = vec![Surface::new(vec![vec![0, 1, 0]], SurfaceClass::Roof)];
+        flat.geometries[0].surfaces = vec![SurfacePolygon::new(vec![vec![0, 1, 0]], SurfaceClass::Roof)];
         model.objects.push(flat);
         let out = TriangleMesh::from_model(&model, &MeshConfig::default()).unwrap();
         assert_eq!(out.objects[1].status, ObjectStatus::NoGeometry);

@@ -1,47 +1,62 @@
-//! A Gaussian on a surface: SkySplat's G = {μ, S, R, C, α}, in values that a person can read.
+//! A Gaussian on a surface: SkySplat's G = {μ, S, R, C, α}, in plain units.
 //!
-//! Positions are metres from a local origin that is recorded beside them (f32 after subtraction). The covariance is
-//! R S Sᵀ Rᵀ; the third own axis is the surface normal. How trainers store it (logarithms, logits, harmonics) is the
-//! business of `io`.
+//! Positions are metres from a local origin, which is recorded beside them, so that f32 is precise enough. The covariance
+//! is R S Sᵀ Rᵀ. The third principal axis is the surface normal. The crate `io` converts to the logarithms, logits and
+//! harmonics that trainers store.
 
 /// An oriented Gaussian with a colour and an opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Splat {
     /// Centre μ, metres from the local origin: east, north, up.
     pub position: [f32; 3],
-    /// Standard deviations along the own axes S, metres, all positive; the third is along the normal.
+    /// Standard deviations S along the principal axes, metres, all positive; the third is along the normal.
     pub scale_m: [f32; 3],
-    /// Unit quaternion R (w, x, y, z) from the own axes to the world's.
+    /// Unit quaternion R (w, x, y, z), the rotation from the principal axes to the world.
     pub rotation: [f32; 4],
-    /// Red, green, blue C; what is displayed is 0 to 1.
+    /// Colour C: red, green, blue; the displayed range is 0 to 1.
     pub colour: [f32; 3],
     /// Opacity α at the centre, strictly between 0 and 1.
     pub opacity: f32,
 }
 
-/// What makes a [`Splat`] none.
+/// Why a [`Splat`] is not a valid Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SplatDefect {
-    /// A number that is not finite.
-    #[error("a number of the splat is not finite")]
+    /// A value is NaN or infinite.
+    #[error("a value of the splat is not finite")]
     NotFinite,
-    /// A standard deviation that is zero or negative.
+    /// A standard deviation is zero or negative.
     #[error("a scale of the splat is not positive")]
     Scale,
-    /// A quaternion whose length is not 1 within a thousandth.
-    #[error("the quaternion of the splat has not the length 1")]
+    /// The length of the quaternion differs from 1 by more than a thousandth.
+    #[error("the length of the splat's quaternion is not 1")]
     Rotation,
-    /// An opacity that has no logit.
+    /// The opacity is not strictly between 0 and 1, so that it has no logit.
     #[error("the opacity of the splat is not strictly between 0 and 1")]
     Opacity,
 }
 
 impl Splat {
-    /// Checks that the numbers are a Gaussian.
+    /// Checks that the values describe a Gaussian.
     ///
     /// # Errors
-    /// The first defect found.
+    /// [`SplatDefect`] with the first defect found.
+    ///
+    /// # Examples
+    /// ```
+    /// use gaussian::{Splat, SplatDefect};
+    ///
+    /// let splat = Splat {
+    ///     position: [0.0, 0.0, 10.0],
+    ///     scale_m: [0.5, 0.5, 0.01],
+    ///     rotation: [1.0, 0.0, 0.0, 0.0],
+    ///     colour: [0.8, 0.3, 0.2],
+    ///     opacity: 0.9,
+    /// };
+    /// assert_eq!(splat.validate(), Ok(()));
+    /// assert_eq!(Splat { opacity: 1.0, ..splat }.validate(), Err(SplatDefect::Opacity));
+    /// ```
     pub fn validate(&self) -> Result<(), SplatDefect> {
         let groups: [&[f32]; 5] = [&self.position, &self.scale_m, &self.rotation, &self.colour, &[self.opacity]];
         if !groups.concat().iter().all(|v| v.is_finite()) {
@@ -60,7 +75,7 @@ impl Splat {
         Ok(())
     }
 
-    /// The own axes in the world, as columns: two tangents and the normal.
+    /// Returns the principal axes in the world: two tangents and the normal.
     pub fn axes(&self) -> [[f64; 3]; 3] {
         let [w, x, y, z] = self.rotation.map(f64::from);
         [
@@ -70,16 +85,24 @@ impl Splat {
         ]
     }
 
-    /// The surface normal: the third own axis.
+    /// Returns the surface normal, which is the third principal axis.
     pub fn normal(&self) -> [f64; 3] {
         self.axes()[2]
     }
 }
 
-/// The unit quaternion (w, x, y, z) of the rotation whose columns are three orthonormal, right-handed axes.
+/// Returns the unit quaternion (w, x, y, z) of the rotation whose columns are three orthonormal, right-handed axes.
 ///
-/// After Shepperd (J. Guidance and Control 1, 1978): the largest component is computed first, so none is lost.
-/// w is not negative.
+/// The method of Shepperd (J. Guidance and Control 1, 1978) computes the largest component first, which keeps the others
+/// precise. The component w is not negative.
+///
+/// # Examples
+/// ```
+/// // A quarter turn about the vertical axis.
+/// let q = gaussian::quaternion_of_axes([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+/// let half = 0.5f64.sqrt();
+/// assert!((q[0] - half).abs() < 1e-15 && (q[3] - half).abs() < 1e-15);
+/// ```
 pub fn quaternion_of_axes(axes: [[f64; 3]; 3]) -> [f64; 4] {
     let [a, b, c] = axes;
     let squares =
@@ -134,7 +157,7 @@ mod tests {
             let unit = q.map(|c| (sign * c / length) as f32);
             let axes = Splat { rotation: unit, ..splat() }.axes();
             let back = quaternion_of_axes(axes);
-            // Near w = 0 the sign is free.
+            // Near w = 0 rounding decides the sign.
             let same: f64 = (0..4).map(|i| back[i] * f64::from(unit[i])).sum();
             prop_assert!((same.abs() - 1.0).abs() < 1e-6, "{unit:?} {back:?}");
             let cross = [

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use city::{
-    CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, ModelPoint, ObjectKind, Surface, SurfaceClass,
+    CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, ModelPoint, ObjectKind, SurfaceClass,
+    SurfacePolygon,
 };
 use io::SaveError;
 use io::citymodel::{CityError, CityFile, CityFormat, CityJsonOptions, read, write_cityjson};
@@ -169,7 +170,7 @@ fn model_of_all_kinds() -> CityModel {
         let solids = if matches!(kind, MultiSolid | CompositeSolid) { 2 } else { 1 };
         for solid in 0..solids {
             for shell in 0..if kind.is_solid() { 2 } else { 1 } {
-                geometry.surfaces.extend(faces.iter().enumerate().map(|(i, ring)| Surface {
+                geometry.surfaces.extend(faces.iter().enumerate().map(|(i, ring)| SurfacePolygon {
                     rings: vec![ring.to_vec()],
                     class: [SurfaceClass::Ground, SurfaceClass::Roof, SurfaceClass::Unclassified][i % 3],
                     solid,

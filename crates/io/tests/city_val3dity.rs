@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use city::{
     CityModel, CityObject, CrsReference, DefectCode, Geometry, GeometryKind, MeshConfig, ModelPoint, ObjectKind, Scope,
-    Surface, SurfaceClass, TriangleMesh, VertexPool, check_solids,
+    SurfaceClass, SurfacePolygon, TriangleMesh, VertexPool, check_solids,
 };
 
 fn folder(name: &str) -> Option<PathBuf> {
@@ -27,7 +27,7 @@ fn codes(model: &CityModel) -> Vec<u16> {
 }
 
 /// A shell from a `.poly` file: vertices, then faces as a count of rings (and of points in holes, which are left out).
-fn shell(path: &Path, number: u32, pool: &mut VertexPool) -> Vec<Surface> {
+fn shell(path: &Path, number: u32, pool: &mut VertexPool) -> Vec<SurfacePolygon> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines().map(|line| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
     let mut next = || lines.find(|line| !line.is_empty()).unwrap();
@@ -51,7 +51,7 @@ fn shell(path: &Path, number: u32, pool: &mut VertexPool) -> Vec<Surface> {
             (0..holes).for_each(|_| {
                 next();
             });
-            Surface { shell: number, ..Surface::new(rings, SurfaceClass::Unclassified) }
+            SurfacePolygon { shell: number, ..SurfacePolygon::new(rings, SurfaceClass::Unclassified) }
         })
         .collect()
 }

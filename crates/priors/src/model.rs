@@ -1,7 +1,7 @@
 //! The triangles of a city model with their areas and normals, arranged for rays.
 
 use bvh::Bvh;
-use city::{CityModel, Role, TriangleMesh};
+use city::{BuildingRole, CityModel, TriangleMesh};
 use rayon::prelude::*;
 
 use crate::PriorsError;
@@ -80,8 +80,8 @@ impl PriorModel {
 pub fn buildings_of(model: &CityModel) -> Vec<bool> {
     let roles = || model.objects.iter().map(|object| object.kind.role());
     // OBJ and PLY know no kinds: what stands in them is what priors are wanted of.
-    let is_named = roles().any(|role| role != Role::Other);
-    roles().map(|role| !is_named || !matches!(role, Role::Other | Role::Interior)).collect()
+    let is_named = roles().any(|role| role != BuildingRole::Other);
+    roles().map(|role| !is_named || !matches!(role, BuildingRole::Other | BuildingRole::Interior)).collect()
 }
 
 /// A vector along the normal, twice the area long.

@@ -1,11 +1,11 @@
-//! Walks from face to face of a constrained triangulation: which are inside, and whether they hang together.
+//! Walks from face to face of a constrained triangulation: finds the faces inside, and counts connected pieces.
 
 use spade::Triangulation as _;
 use spade::handles::{FixedFaceHandle, InnerTag};
 
-use super::Cdt;
+use super::plane::Cdt;
 
-/// Which faces an odd number of constraints separates from the outside, by walking from face to face.
+/// Returns per face whether an odd number of constraints separates it from the outside.
 pub(super) fn faces_by_parity(cdt: &Cdt) -> Vec<bool> {
     let mut parity: Vec<Option<bool>> = vec![None; cdt.num_all_faces()];
     let mut open: Vec<(FixedFaceHandle<InnerTag>, bool)> = Vec::new();
@@ -25,7 +25,7 @@ pub(super) fn faces_by_parity(cdt: &Cdt) -> Vec<bool> {
     parity.into_iter().map(|inside| inside.unwrap_or(false)).collect()
 }
 
-/// How many pieces the faces inside form that no constraint parts.
+/// Counts the pieces that the faces inside form when constraints separate them.
 pub(super) fn pieces_inside(cdt: &Cdt, inside: &[bool]) -> usize {
     let mut open_to_visit = inside.to_vec();
     let mut pieces = 0;

@@ -1,9 +1,9 @@
-//! Polygons of all kinds: the area that their triangles cover, and what is found wrong with them.
+//! Checks for polygons of all kinds the area of their triangles and their defects.
 
 use super::*;
 use proptest::prelude::*;
 
-/// Rings in a tilted plane far from the axes; the area that the triangles cover, and what was found.
+/// Cuts rings in a tilted plane away from the origin, and returns the area of the triangles and the defects.
 fn cut(rings: &[&[[f64; 2]]]) -> (f64, Vec<u16>) {
     let (u, v) = ([0.6, 0.0, 0.8], [0.0, 1.0, 0.0]);
     let lift = |p: &[f64; 2]| [0, 1, 2].map(|i| 100.0 + p[0] * u[i] + p[1] * v[i]);

@@ -1,14 +1,14 @@
-//! How two closed surfaces lie to each other: beside, touching, sharing faces, reaching into each other.
+//! The relation of two closed surfaces: apart, touching, sharing faces, or reaching into each other.
 //!
-//! Every edge of one surface is cut where it goes through a triangle of the other, and the pieces are inside, outside or on
-//! it. Surfaces whose edges lie in each other's faces are told apart by the faces that they share: two that look the same way
-//! have their insides on the same side.
+//! Each edge of one surface is cut where it passes through a triangle of the other. The pieces are then inside, outside or
+//! on the other surface. Surfaces whose edges lie in each other's faces are distinguished by the faces that they share:
+//! when both face the same way, their interiors are on the same side.
 
+use super::limits::{MAX_COMPARISONS, SHELL_TOLERANCE_M};
 use super::patch::{Bounds, Patch, Side};
-use super::{MAX_COMPARISONS, SHELL_TOLERANCE_M};
 use numeric::vector::{Vector, cross, dot, norm, sub, unit};
 
-/// Comparisons of triangles that may still be made.
+/// The number of comparisons of triangles that are left.
 #[derive(Debug)]
 pub(super) struct Budget {
     left: usize,
@@ -19,29 +19,32 @@ impl Budget {
         Self { left: MAX_COMPARISONS }
     }
 
-    /// Takes some; `None` when there are not so many left.
+    /// Takes some comparisons, or returns `None` when too few are left.
     pub(super) fn spend(&mut self, comparisons: usize) -> Option<()> {
         self.left = self.left.checked_sub(comparisons)?;
         Some(())
     }
 }
 
-/// How surfaces A and B lie to each other.
+/// The relation of surfaces A and B.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Contact {
-    /// Some of A is inside B; outside of it.
+    /// Part of A is inside B.
     pub(super) a_inside: bool,
+    /// Part of A is outside B.
     pub(super) a_outside: bool,
-    /// Some of B is inside A; outside of it.
+    /// Part of B is inside A.
     pub(super) b_inside: bool,
+    /// Part of B is outside A.
     pub(super) b_outside: bool,
-    /// They share a piece of a face and look the same way; opposite ways.
+    /// They share part of a face, and face the same way there.
     pub(super) same_face: bool,
+    /// They share part of a face, and face opposite ways there.
     pub(super) opposite_face: bool,
 }
 
 impl Contact {
-    /// Compares two surfaces; `None` when that takes more than the budget.
+    /// Compares two surfaces, or returns `None` when that exceeds the budget.
     pub(super) fn of(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option<Self> {
         budget.spend(1)?;
         let mut contact = Self { a_outside: true, b_outside: true, ..Self::default() };
@@ -64,23 +67,23 @@ impl Contact {
         Some(contact)
     }
 
-    /// Whether the insides of two solids, each looking outwards, have something in common.
+    /// Returns whether the interiors of two solids, each facing outwards, overlap.
     pub(super) fn interiors_meet(&self) -> bool {
         self.a_inside || self.b_inside || self.same_face
     }
 
-    /// Whether neither leaves the other's surface.
+    /// Returns whether the surfaces are equal: each lies on the other.
     pub(super) fn is_same(&self) -> bool {
         !(self.a_inside || self.a_outside || self.b_inside || self.b_outside)
     }
 
-    /// Whether they share a piece of a face.
+    /// Returns whether the surfaces share part of a face.
     pub(super) fn shares_face(&self) -> bool {
         self.same_face || self.opposite_face
     }
 }
 
-/// Whether some of the edges of `a` is inside of `b`, and outside.
+/// Returns whether parts of the edges of `a` are inside `b`, and whether parts are outside.
 fn pieces(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option<(bool, bool)> {
     let (mut inside, mut outside) = (false, false);
     for (_, [p, q]) in a.edges() {
@@ -105,7 +108,7 @@ fn pieces(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option
     Some((inside, outside))
 }
 
-/// The fractions of an edge at its ends and where it goes through a plane of a triangle close by, ascending.
+/// Returns the fractions along an edge of its ends and of its crossings with the planes of nearby triangles, ascending.
 fn cuts([p, q]: [Vector; 2], b: &Patch) -> Vec<f64> {
     let edge = Bounds::of([p, q]);
     let mut cuts = vec![0.0, 1.0];
@@ -121,7 +124,7 @@ fn cuts([p, q]: [Vector; 2], b: &Patch) -> Vec<f64> {
     cuts
 }
 
-/// The unit normal of a triangle; `None` for one that is thinner than the tolerance.
+/// Returns the unit normal of a triangle, or `None` when it is thinner than the tolerance.
 pub(super) fn normal(&[a, b, c]: &[Vector; 3]) -> Option<Vector> {
     let (e, f, g) = (sub(b, a), sub(c, a), sub(c, b));
     let doubled = cross(e, f);
@@ -129,7 +132,9 @@ pub(super) fn normal(&[a, b, c]: &[Vector; 3]) -> Option<Vector> {
     (norm(doubled) > SHELL_TOLERANCE_M * longest).then(|| unit(doubled)).flatten()
 }
 
-/// Whether two triangles in one plane share more than their borders, and then whether they look the same way.
+/// Returns whether two triangles face the same way, when they lie in one plane and share more than their borders.
+///
+/// Returns `None` when they do not overlap.
 pub(super) fn shared_face(s: &[Vector; 3], t: &[Vector; 3], tolerance_m: f64) -> Option<bool> {
     let (n, m) = (normal(s)?, normal(t)?);
     let off = |n: Vector, of: &[Vector; 3], others: &[Vector; 3]| {
@@ -144,7 +149,7 @@ pub(super) fn shared_face(s: &[Vector; 3], t: &[Vector; 3], tolerance_m: f64) ->
     (area > tolerance_m * around).then(|| dot(n, m) > 0.0)
 }
 
-/// The part of `t` that is within the sides of `s`, whose normal is `n` (Sutherland and Hodgman 1974).
+/// Clips `t` to the sides of `s`, whose normal is `n` (Sutherland and Hodgman 1974).
 fn clipped(s: &[Vector; 3], t: &[Vector; 3], n: Vector) -> Vec<Vector> {
     let mut polygon = t.to_vec();
     for i in 0..3 {

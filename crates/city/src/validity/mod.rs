@@ -1,15 +1,16 @@
-//! What is wrong with the solids of a model: val3dity's codes 303 (at a vertex), 306, 4xx, 5xx and 601; and with composite
-//! surfaces: 303 and 305.
+//! Checks solids for val3dity's codes 303 (at a vertex), 306, 4xx, 5xx and 601, and composite surfaces for 303 and 305.
 //!
-//! These checks compare triangles with triangles and are made for a report; loading a model does not pay for them. They build
-//! upon each other as in val3dity (Ledoux 2018): only closed shells are searched for meetings with themselves, only sound
-//! shells are compared within a solid, only sound solids with each other. Nothing is changed by what is found.
+//! The checks compare triangles with triangles, which is slow. They are made for a report, and reading a model does not
+//! run them. They build upon each other as in val3dity (Ledoux 2018): only closed shells are searched for
+//! self-intersections, only valid shells are compared within a solid, and only valid solids with each other. The model is
+//! not changed.
 //!
-//! Surfaces that are nearer than [`SHELL_TOLERANCE_M`] touch. Polygons go through each other, and solids overlap, when one
-//! reaches into the other by more than [`OVERLAP_M`]: coordinates on millimetres make neighbours that overlap by less, and no
-//! one builds walls to a millimetre.
+//! Surfaces nearer than [`SHELL_TOLERANCE_M`](limits::SHELL_TOLERANCE_M) touch. Polygons intersect, and solids overlap,
+//! when one reaches into the other by more than [`OVERLAP_M`].
 
+mod body;
 mod contact;
+mod limits;
 mod patch;
 mod selves;
 mod solids;
@@ -21,24 +22,19 @@ use crate::select;
 use crate::shell;
 use crate::triangle_mesh::positions_of;
 use crate::{
-    CityModel, Defect, DefectCode, Effect, Geometry, GeometryKind, MeshConfig, ModelError, ObjectKind, Surface,
+    CityModel, Defect, DefectCode, Effect, Geometry, GeometryKind, MeshConfig, ModelError, ObjectKind, SurfacePolygon,
 };
+use body::{Body, MemberDefect};
 use contact::{Budget, Contact};
+use limits::OVERLAP_M;
 use numeric::vector::Vector;
 use patch::Patch;
 
-/// Surfaces nearer than this touch, metres.
-const SHELL_TOLERANCE_M: f64 = 5e-6;
-/// What overlaps by less are neighbours, metres.
-const OVERLAP_M: f64 = 1e-3;
-/// Comparisons of triangles that a shell, the shells of a solid, the solids of a geometry and those of a building may cost.
-const MAX_COMPARISONS: usize = 30_000_000;
-
-/// Checks the solids that [`TriangleMesh::from_model`](crate::TriangleMesh::from_model) makes triangles of, and nothing
-/// that it checks itself.
+/// Checks the solids that [`TriangleMesh::from_model`](crate::TriangleMesh::from_model) makes triangles of, and returns
+/// the defects that it does not report itself.
 ///
 /// # Errors
-/// A model that fails [`CityModel::validate`].
+/// The errors of [`CityModel::validate`].
 pub fn check_solids(model: &CityModel, config: &MeshConfig) -> Result<Vec<Defect>, ModelError> {
     model.validate()?;
     let chosen = select::choose(model, config.lod, config.scope);
@@ -67,15 +63,7 @@ pub fn check_solids(model: &CityModel, config: &MeshConfig) -> Result<Vec<Defect
     Ok(defects)
 }
 
-/// A sound solid, its triangles looking away from its inside.
-struct Body {
-    object: usize,
-    geometry: usize,
-    solid: u32,
-    surface: Patch,
-}
-
-/// What was found in the solids of an object, and those that are sound.
+/// Defects of the solids of an object, and its valid solids.
 #[derive(Default)]
 struct Checked {
     defects: Vec<Defect>,
@@ -87,6 +75,7 @@ impl Checked {
         self.defects.push(Defect { code, effect: Effect::Noted, object: Some(object), place, detail });
     }
 
+    /// Checks the shells and solids of a geometry.
     fn geometry(&mut self, object: usize, number: usize, geometry: &Geometry, position: &impl Fn(u32) -> Vector) {
         if geometry.kind == GeometryKind::CompositeSurface {
             let found = shell::check_sheet(&geometry.surfaces.iter().collect::<Vec<_>>());
@@ -103,21 +92,21 @@ impl Checked {
             let Some(surface) = self.solid(object, &place, solid, position) else { continue };
             self.bodies.push(Body { object, geometry: number, solid: solid[0].solid, surface });
         }
-        // Only a composite solid claims that its solids are neighbours.
+        // Only the solids of a composite solid must be neighbours.
         if geometry.kind != GeometryKind::CompositeSolid {
             return;
         }
-        for (code, solid, detail) in solids::compare(&self.bodies[first..]) {
+        for MemberDefect { code, member: solid, detail } in solids::compare(&self.bodies[first..]) {
             self.report(object, code, format!("geometry {number}, solid {solid}"), detail);
         }
     }
 
-    /// The surface of a solid that nothing is wrong with.
+    /// Returns the surface of a solid, or `None` when the solid has a defect.
     fn solid(
         &mut self,
         object: usize,
         place: &str,
-        solid: &[Surface],
+        solid: &[SurfacePolygon],
         position: &impl Fn(u32) -> Vector,
     ) -> Option<Patch> {
         let mut shells = Vec::new();
@@ -134,18 +123,18 @@ impl Checked {
         }
         let found = solids::compare_shells(&shells);
         sound = found.is_empty();
-        for (code, shell, detail) in found {
+        for MemberDefect { code, member: shell, detail } in found {
             self.report(object, code, format!("{place}, shell {shell}"), detail);
         }
         sound.then(|| Patch::joined(shells))
     }
 
-    /// A closed shell that does not meet itself.
+    /// Returns the surface of a shell, or `None` when the shell is not closed or intersects itself.
     fn shell(
         &mut self,
         object: usize,
         place: String,
-        members: &[&Surface],
+        members: &[&SurfacePolygon],
         position: &impl Fn(u32) -> Vector,
     ) -> Option<Patch> {
         let check = shell::check(members, members[0].shell == 0, position);
@@ -172,7 +161,7 @@ impl Checked {
     }
 }
 
-/// Finds parts of a building that overlap: its own solids and those of its parts, of one object or of two.
+/// Finds solids of a building and its parts that overlap.
 fn compare_parts(model: &CityModel, bodies: Vec<Body>, defects: &mut Vec<Defect>) {
     let is_part = |body: &Body| {
         let kind = &model.objects[body.object].kind;

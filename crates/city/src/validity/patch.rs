@@ -1,6 +1,7 @@
-//! A closed surface as triangles: where a point is to it, by the winding number (Jacobson et al. 2013) and the distance.
+//! A closed surface as triangles. A point is inside, outside or on it by its winding number (Jacobson et al. 2013) and
+//! its distance.
 
-use crate::Surface;
+use crate::SurfacePolygon;
 use crate::triangulate::triangulate;
 use numeric::vector::{Vector, cross, dot, norm, sub};
 
@@ -8,22 +9,22 @@ use numeric::vector::{Vector, cross, dot, norm, sub};
 pub(super) struct Patch {
     /// Corners of the triangles, metres.
     pub(super) corners: Vec<[Vector; 3]>,
-    /// Their vertices in the model: equal numbers are equal places.
+    /// Vertices of the triangles in the model; equal indices have equal places.
     pub(super) vertices: Vec<[u32; 3]>,
-    /// The polygon that each triangle belongs to.
+    /// Polygon that each triangle belongs to.
     pub(super) polygon: Vec<u32>,
-    /// What encloses all.
+    /// Bounding box of all corners.
     pub(super) bounds: Bounds,
 }
 
-/// A box along the axes.
+/// Axis-aligned bounding box, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
     pub(super) low: Vector,
     pub(super) high: Vector,
 }
 
-/// Where a point is to a closed surface.
+/// Side of a closed surface that a point is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
     Inside,
@@ -40,15 +41,15 @@ impl Bounds {
         })
     }
 
-    /// Whether two boxes are nearer than `by` along every axis.
+    /// Returns whether two boxes are nearer than `by` along every axis.
     pub(super) fn meets(&self, other: &Self, by: f64) -> bool {
         (0..3).all(|i| self.low[i] <= other.high[i] + by && other.low[i] <= self.high[i] + by)
     }
 }
 
 impl Patch {
-    /// The triangles of polygons, those with `turn` turned around; `None` for polygons whose edges cross.
-    pub(super) fn new(surfaces: &[&Surface], turn: &[bool], position: &impl Fn(u32) -> Vector) -> Option<Self> {
+    /// Cuts polygons into triangles and turns those with `turn`. Returns `None` when edges of a polygon cross.
+    pub(super) fn new(surfaces: &[&SurfacePolygon], turn: &[bool], position: &impl Fn(u32) -> Vector) -> Option<Self> {
         let (mut vertices, mut polygon) = (Vec::new(), Vec::new());
         for (number, (surface, &turn)) in surfaces.iter().zip(turn).enumerate() {
             let cut = triangulate(&surface.rings, position);
@@ -65,7 +66,7 @@ impl Patch {
         Some(Self { corners, vertices, polygon, bounds })
     }
 
-    /// The surfaces of the shells of one solid.
+    /// Joins the shells of one solid.
     pub(super) fn joined(shells: Vec<Self>) -> Self {
         let bounds = Bounds::of(shells.iter().flat_map(|shell| [shell.bounds.low, shell.bounds.high]));
         let mut all = Self { corners: Vec::new(), vertices: Vec::new(), polygon: Vec::new(), bounds };
@@ -78,8 +79,9 @@ impl Patch {
         all
     }
 
-    /// Where a point is: on the surface when it is nearer than `tolerance_m`. Which way the triangles look does not matter
-    /// for a single shell.
+    /// Returns the side that a point is on. A point nearer than `tolerance_m` is on the surface.
+    ///
+    /// The orientation of a single shell does not matter.
     pub(super) fn side(&self, point: Vector, tolerance_m: f64) -> Side {
         let here = Bounds { low: point, high: point };
         if !self.bounds.meets(&here, tolerance_m) {
@@ -93,7 +95,7 @@ impl Patch {
         if turns.abs() > 0.5 { Side::Inside } else { Side::Outside }
     }
 
-    /// Every edge of the triangles once: its vertices and where they are.
+    /// Returns each edge of the triangles once: its vertices and their places.
     pub(super) fn edges(&self) -> Vec<([u32; 2], [Vector; 2])> {
         let of_triangle = |(vertices, corners): (&[u32; 3], &[Vector; 3])| {
             [(0, 1), (1, 2), (2, 0)].map(|(i, k)| {
@@ -108,7 +110,7 @@ impl Patch {
     }
 }
 
-/// The solid angle of a triangle seen from a point (Van Oosterom and Strackee 1983), positive seen from its back.
+/// Returns the solid angle of a triangle seen from a point (Van Oosterom and Strackee 1983), positive from its back.
 fn solid_angle(from: Vector, triangle: &[Vector; 3]) -> f64 {
     let [a, b, c] = triangle.map(|corner| sub(corner, from));
     let (la, lb, lc) = (norm(a), norm(b), norm(c));
@@ -116,7 +118,7 @@ fn solid_angle(from: Vector, triangle: &[Vector; 3]) -> f64 {
     2.0 * volume.atan2(la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
 }
 
-/// Distance of a point from a triangle.
+/// Returns the distance of a point from a triangle.
 pub(super) fn distance(point: Vector, &[a, b, c]: &[Vector; 3]) -> f64 {
     let normal = cross(sub(b, a), sub(c, a));
     let beside = |from: Vector, to: Vector| dot(cross(sub(to, from), sub(point, from)), normal) < 0.0;
@@ -127,7 +129,7 @@ pub(super) fn distance(point: Vector, &[a, b, c]: &[Vector; 3]) -> f64 {
     [(a, b), (b, c), (c, a)].into_iter().map(|(from, to)| to_segment(point, from, to)).fold(f64::INFINITY, f64::min)
 }
 
-/// Distance of a point from the line between two others.
+/// Returns the distance of a point from a line segment.
 pub(super) fn to_segment(point: Vector, from: Vector, to: Vector) -> f64 {
     let along = sub(to, from);
     let square = dot(along, along);

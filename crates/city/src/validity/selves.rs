@@ -1,14 +1,14 @@
-//! Where a shell meets itself: triangles of different polygons that have more in common than the vertices they share.
+//! Finds self-intersections of a shell: triangles of different polygons that meet elsewhere than at shared vertices.
 //!
-//! Candidates come from a sweep along the longest side of the shell, over boxes. An edge that goes through a polygon within a
-//! millimetre of its border has been rounded there.
+//! A sweep of bounding boxes along the longest side of the shell finds the candidates. An edge that passes through a
+//! polygon within a millimetre of its border does not count, because rounding of the coordinates can cause that.
 
 use super::contact::{normal, shared_face};
+use super::limits::{MAX_COMPARISONS, OVERLAP_M, SHELL_TOLERANCE_M};
 use super::patch::{Bounds, Patch, distance, to_segment};
-use super::{MAX_COMPARISONS, OVERLAP_M, SHELL_TOLERANCE_M};
 use numeric::vector::{Vector, dot, sub};
 
-/// How many pairs of triangles meet; `None` when there are too many to compare.
+/// Counts the pairs of triangles that meet. Returns `None` when there are too many to compare.
 pub(super) fn meetings(shell: &Patch) -> Option<usize> {
     let extent = sub(shell.bounds.high, shell.bounds.low);
     let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
@@ -33,7 +33,7 @@ pub(super) fn meetings(shell: &Patch) -> Option<usize> {
     Some(found)
 }
 
-/// A shell, and which of the edges of its triangles are on the border of their polygon (edge i begins at corner i).
+/// A shell, and per triangle which of its edges are on the border of its polygon. Edge i begins at corner i.
 struct Shell<'a> {
     patch: &'a Patch,
     borders: Vec<[bool; 3]>,
@@ -58,7 +58,9 @@ fn meet(shell: &Shell<'_>, a: usize, b: usize) -> bool {
     goes_through(shell, a, b) || goes_through(shell, b, a) || shared_face(s, t, OVERLAP_M).is_some()
 }
 
-/// Whether a corner of triangle `a` lies on triangle `b`, or an edge goes through it; corners that `b` has too are no news.
+/// Returns whether a corner of triangle `a` lies on triangle `b`, or an edge of `a` passes through it.
+///
+/// Corners that both triangles have do not count.
 fn goes_through(&Shell { patch: shell, ref borders }: &Shell<'_>, a: usize, b: usize) -> bool {
     let (corners, triangle) = (&shell.corners[a], &shell.corners[b]);
     let Some(normal) = normal(triangle) else { return false };

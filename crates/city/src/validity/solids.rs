@@ -1,35 +1,38 @@
-//! Shells within a solid (401 to 404), and solids within a geometry (501 to 503).
+//! Compares the shells of a solid (401 to 404), and the solids of a composite solid (501 to 503).
 
 use std::collections::HashMap;
 
+use super::body::{Body, MemberDefect};
 use super::contact::{Budget, Contact};
+use super::limits::{OVERLAP_M, SHELL_TOLERANCE_M};
 use super::patch::{Patch, Side};
-use super::{Body, OVERLAP_M, SHELL_TOLERANCE_M};
 use crate::DefectCode;
 use crate::sets::DisjointSets;
 
-/// What is wrong between the shells of a solid, whose first one is the outer: code, shell, details.
-pub(super) fn compare_shells(shells: &[Patch]) -> Vec<(DefectCode, usize, String)> {
+/// Compares the shells of a solid. The first one is the outer shell.
+pub(super) fn compare_shells(shells: &[Patch]) -> Vec<MemberDefect> {
     let (mut found, mut budget) = (Vec::new(), Budget::new());
+    let defect = |code, index: usize, detail: String| MemberDefect { code, member: index as u32, detail };
     for (index, shell) in shells.iter().enumerate().skip(1) {
         for (other, earlier) in shells[..index].iter().enumerate() {
             let Some(contact) = Contact::of(earlier, shell, SHELL_TOLERANCE_M, &mut budget) else {
-                found.push((DefectCode::NotChecked, index, "4xx, from here on: too many triangles".to_owned()));
+                let detail = "4xx, from here on: too many triangles".to_owned();
+                found.push(defect(DefectCode::NotChecked, index, detail));
                 return found;
             };
             if let Some(code) = wrong_between(&contact, other == 0) {
-                found.push((code, index, format!("and shell {other}")));
+                found.push(defect(code, index, format!("and shell {other}")));
             }
         }
     }
     if found.is_empty() {
         let cut_off = (1..shells.len()).filter(|&index| touches_all_around(shells, index));
-        found.extend(cut_off.map(|index| (DefectCode::SolidInteriorDisconnected, index, String::new())));
+        found.extend(cut_off.map(|index| defect(DefectCode::SolidInteriorDisconnected, index, String::new())));
     }
     found
 }
 
-/// What is wrong with shell B beside shell A, the outer one or another cavity.
+/// Returns the defect of shell B, a cavity, in relation to shell A, which is the outer shell or another cavity.
 fn wrong_between(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
     if contact.is_same() {
         return Some(DefectCode::DuplicateShells);
@@ -38,11 +41,11 @@ fn wrong_between(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
         return Some(DefectCode::ShellsIntersect);
     }
     let nested = contact.a_inside || contact.b_inside;
-    // A cavity must be in the outer shell, and in no other cavity.
+    // A cavity must be inside the outer shell and outside the other cavities.
     (a_is_outer != contact.b_inside || (nested && !a_is_outer)).then_some(DefectCode::InnerShellOutside)
 }
 
-/// Whether edges of a cavity that lie on earlier shells close a circle: what is inside of it is cut off.
+/// Returns whether edges of a cavity that lie on earlier shells close a circle, which cuts off the interior within it.
 fn touches_all_around(shells: &[Patch], index: usize) -> bool {
     let mut number_of: HashMap<u32, usize> = HashMap::new();
     let touching: Vec<[usize; 2]> = shells[index]
@@ -64,21 +67,23 @@ fn touches_all_around(shells: &[Patch], index: usize) -> bool {
     touching.into_iter().any(|[a, b]| !joined.join(a, b))
 }
 
-/// What is wrong between the solids of a composite solid: code, solid, details.
-pub(super) fn compare(bodies: &[Body]) -> Vec<(DefectCode, u32, String)> {
+/// Compares the solids of a composite solid.
+pub(super) fn compare(bodies: &[Body]) -> Vec<MemberDefect> {
     let (mut found, mut budget) = (Vec::new(), Budget::new());
     let mut joined = DisjointSets::new(bodies.len());
+    let defect = |code, member, detail| MemberDefect { code, member, detail };
     for (index, b) in bodies.iter().enumerate() {
         for (other, a) in bodies[..index].iter().enumerate() {
             let and = format!("and solid {}", a.solid);
             match Contact::of(&a.surface, &b.surface, OVERLAP_M, &mut budget) {
                 None => {
-                    found.push((DefectCode::NotChecked, b.solid, "5xx, from here on: too many triangles".to_owned()));
+                    let detail = "5xx, from here on: too many triangles".to_owned();
+                    found.push(defect(DefectCode::NotChecked, b.solid, detail));
                     return found;
                 }
-                Some(contact) if contact.is_same() => found.push((DefectCode::DuplicateSolids, b.solid, and)),
+                Some(contact) if contact.is_same() => found.push(defect(DefectCode::DuplicateSolids, b.solid, and)),
                 Some(contact) if contact.interiors_meet() => {
-                    found.push((DefectCode::SolidsIntersect, b.solid, and));
+                    found.push(defect(DefectCode::SolidsIntersect, b.solid, and));
                 }
                 Some(contact) if contact.opposite_face => {
                     joined.join(index, other);
@@ -90,7 +95,7 @@ pub(super) fn compare(bodies: &[Body]) -> Vec<(DefectCode, u32, String)> {
     let pieces = joined.count();
     if pieces > 1 && found.is_empty() {
         let last = bodies.last().map_or(0, |body| body.solid);
-        found.push((DefectCode::SolidsDisconnected, last, format!("{pieces} pieces")));
+        found.push(defect(DefectCode::SolidsDisconnected, last, format!("{pieces} pieces")));
     }
     found
 }

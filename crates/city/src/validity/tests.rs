@@ -1,12 +1,12 @@
-//! One small model per code, and none for models that only look odd.
+//! Checks one small model per code, and unusual models without a defect.
 
 use super::*;
 use crate::{CityObject, CrsReference, ModelPoint, SurfaceClass, VertexPool};
 
-/// The faces of a box, looking outwards.
+/// Corners of the faces of a box, facing outwards.
 const FACES: [[usize; 4]; 6] = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
 
-/// Faces by the places of their corners.
+/// The places of the corners of each face.
 type Faces = Vec<Vec<Vector>>;
 
 fn block(low: Vector, high: Vector) -> Faces {
@@ -14,7 +14,7 @@ fn block(low: Vector, high: Vector) -> Faces {
     FACES.iter().map(|face| face.iter().map(|&i| corner(i)).collect()).collect()
 }
 
-/// A pyramid over a ring that is counter-clockwise seen from above.
+/// Makes a pyramid over a ring that is counter-clockwise seen from above.
 fn pyramid(base: &[Vector], tip: Vector) -> Faces {
     let next = |i: usize| base[(i + 1) % base.len()];
     let sides = (0..base.len()).map(|i| vec![base[i], next(i), tip]);
@@ -29,7 +29,7 @@ fn cube() -> Faces {
     block([0.0; 3], [1.0; 3])
 }
 
-/// Solids of shells, each the first one outside, as one geometry.
+/// Builds models of solids. The first shell of a solid is the outer one.
 struct Builder {
     model: CityModel,
     pool: VertexPool,
@@ -49,8 +49,8 @@ impl Builder {
                 for face in faces {
                     let far = |p: &Vector| ModelPoint::new(p[0] + 606_000.0, p[1] + 4_887_000.0, p[2] + 500.0);
                     let ring = face.iter().map(|p| self.pool.index(far(p)).unwrap()).collect();
-                    let surface = Surface::new(vec![ring], SurfaceClass::Wall);
-                    shape.surfaces.push(Surface { solid: solid as u32, shell: shell as u32, ..surface });
+                    let surface = SurfacePolygon::new(vec![ring], SurfaceClass::Wall);
+                    shape.surfaces.push(SurfacePolygon { solid: solid as u32, shell: shell as u32, ..surface });
                 }
             }
         }
@@ -66,7 +66,7 @@ impl Builder {
     }
 }
 
-/// What is found in one solid.
+/// Compares the codes found in one solid.
 #[track_caller]
 fn solid(shells: &[Faces], expected: &[u16]) {
     let building = Builder::new().object(ObjectKind::BUILDING, None, GeometryKind::Solid, &[shells]);
@@ -92,7 +92,7 @@ fn sound_solids() {
 
 #[test]
 fn shells_that_meet_themselves() {
-    // A roof whose tip reaches through the floor; one that only touches it; two cubes that share one vertex.
+    // The tip of a roof is above the floor, below it, and on it; then two cubes share one vertex.
     let roof = |tip: f64| {
         let mut faces = cube();
         faces.remove(1);
@@ -104,7 +104,7 @@ fn shells_that_meet_themselves() {
     solid(&[roof(-0.5)], &[306]);
     solid(&[roof(0.0)], &[306]);
     solid(&[[cube(), block([1.0; 3], [2.0; 3])].concat()], &[303]);
-    // A fin folded back onto the face it grows from.
+    // A second block reaches through a face of the cube.
     solid(&[[cube(), block([0.5, 0.5, 0.5], [1.5, 0.8, 0.8])].concat()], &[306]);
 }
 
@@ -129,11 +129,11 @@ fn solids_of_a_composite() {
     composite(&[&at(0.0), &at(0.0), &at(1.0)], &[502]);
     composite(&[&at(0.0), &at(1.5)], &[503]);
     composite(&[&at(0.0), &[block([1.0; 3], [2.0; 3])]], &[503]);
-    // What fills a cavity is a neighbour.
+    // A solid that fills a cavity is a neighbour.
     let hollow = [cube(), block([0.2; 3], [0.8; 3])];
     composite(&[&hollow, &[block([0.2; 3], [0.8; 3])]], &[]);
     composite(&[&hollow, &[block([0.2; 3], [0.9; 3])]], &[501]);
-    // A geometry of several solids claims nothing about them.
+    // The solids of a multi-solid may overlap.
     let many = Builder::new().object(ObjectKind::BUILDING, None, GeometryKind::MultiSolid, &[&at(0.0), &at(0.5)]);
     assert_eq!(many.codes(), []);
 }

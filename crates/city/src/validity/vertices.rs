@@ -1,11 +1,11 @@
-//! Vertices at which a closed shell touches itself: the polygons around one must form one fan.
+//! Finds vertices at which a closed shell touches itself: the polygons around a vertex must form one fan.
 
-use crate::Surface;
+use crate::SurfacePolygon;
 use crate::sets::DisjointSets;
 
-/// How many vertices have several fans around them, in a shell whose every edge is used by two polygons.
-pub(super) fn pinched(surfaces: &[&Surface]) -> usize {
-    // A spoke is an edge seen from one of its ends; the two corners that have it are neighbours in a fan.
+/// Counts the vertices with several fans around them. Every edge of the shell must belong to two polygons.
+pub(super) fn pinched(surfaces: &[&SurfacePolygon]) -> usize {
+    // A spoke is an edge seen from one of its ends. The two corners that share a spoke are neighbours in a fan.
     let mut spokes: Vec<([u32; 2], usize)> = Vec::new();
     let mut vertex_of: Vec<u32> = Vec::new();
     for ring in surfaces.iter().flat_map(|surface| &surface.rings) {

@@ -1,24 +1,26 @@
-//! A city model under construction: objects found by id, surfaces checked as they come, defects collected.
+//! Builds a city model from the elements of a file: finds objects by identifier, checks vertices and collects defects.
 
 use std::collections::{HashMap, HashSet};
 
 use city::{CityModel, CityObject, CrsReference, Defect, DefectCode, Effect, ModelPoint, ObjectKind};
 
-/// Coordinates beyond this are taken for errors: the Earth, in feet, ends well before.
+/// Largest absolute coordinate. Coordinates on the Earth are smaller, even in feet.
 const COORDINATE_LIMIT: f64 = 1e8;
 
-/// Collects objects, vertices and defects.
+/// A city model under construction.
 #[derive(Debug, Default)]
 pub(super) struct Builder {
     model: CityModel,
     defects: Vec<Defect>,
     object_of: HashMap<String, usize>,
-    /// Vertices whose coordinates are unusable; they stand at zero and no surface may use them.
+    /// Vertices with invalid coordinates. They are stored as zero, and no surface may use them.
     unusable: HashSet<u32>,
+    /// Objects and the identifiers of their parents.
     parents: Vec<(usize, String)>,
 }
 
 impl Builder {
+    /// Sets the reference system, and notes when it is missing or unknown.
     pub(super) fn set_crs(&mut self, crs: CrsReference) {
         if crs.is_missing() {
             self.note(DefectCode::CrsMissing, None, "file", "");
@@ -28,7 +30,7 @@ impl Builder {
         self.model.crs = crs;
     }
 
-    /// Adds an object and gives its index; a known id is noted and the first object keeps it.
+    /// Adds an object and returns its index. A repeated identifier is noted and stays with the first object.
     pub(super) fn object(&mut self, id: impl Into<String>, kind: ObjectKind) -> usize {
         let (id, index) = (id.into(), self.model.objects.len());
         if self.object_of.contains_key(&id) {
@@ -44,12 +46,12 @@ impl Builder {
         &mut self.model.objects[object]
     }
 
-    /// Names the parent of an object; it may come later in the file.
+    /// Names the parent of an object. The parent may follow later in the file.
     pub(super) fn parent(&mut self, object: usize, parent: impl Into<String>) {
         self.parents.push((object, parent.into()));
     }
 
-    /// Adds a vertex; `None` when the indices of 32 bits are used up.
+    /// Adds a vertex and returns its index, or `None` when all 32-bit indices are used.
     pub(super) fn vertex(&mut self, point: ModelPoint) -> Option<u32> {
         let index = u32::try_from(self.model.vertices.len()).ok().filter(|&i| i < u32::MAX)?;
         let usable = [point.x, point.y, point.z].iter().all(|c| c.abs() <= COORDINATE_LIMIT);
@@ -64,15 +66,17 @@ impl Builder {
         self.model.vertices.len()
     }
 
-    /// Position of a vertex that was added.
+    /// Returns the position of a vertex.
     pub(super) fn position(&self, index: u32) -> ModelPoint {
         self.model.vertices[index as usize]
     }
 
+    /// Returns whether the coordinates of a vertex are valid.
     pub(super) fn is_usable(&self, vertex: u32) -> bool {
         !self.unusable.contains(&vertex)
     }
 
+    /// Adds a defect without consequence.
     pub(super) fn note(
         &mut self,
         code: DefectCode,
@@ -83,6 +87,7 @@ impl Builder {
         self.defect(code, Effect::Noted, object, place, detail);
     }
 
+    /// Adds a defect because of which an element is left out.
     pub(super) fn dropped(
         &mut self,
         code: DefectCode,
@@ -93,7 +98,7 @@ impl Builder {
         self.defect(code, Effect::Dropped, Some(object), place, detail);
     }
 
-    pub(super) fn defect(
+    fn defect(
         &mut self,
         code: DefectCode,
         effect: Effect,
@@ -104,7 +109,7 @@ impl Builder {
         self.defects.push(Defect { code, effect, object, place: place.into(), detail: detail.into() });
     }
 
-    /// The model with its parents linked, and the defects.
+    /// Links the parents, and returns the model and its defects.
     pub(super) fn finish(mut self) -> (CityModel, Vec<Defect>) {
         for (object, parent) in std::mem::take(&mut self.parents) {
             match self.object_of.get(&parent) {
@@ -119,9 +124,9 @@ impl Builder {
         (self.model, self.defects)
     }
 
-    /// Objects that are parts of themselves through others lose their parent.
+    /// Removes a parent from each circle of parents.
     fn cut_circles(&mut self) {
-        // Colour 0 is unseen, 1 is on the way up from the current object, 2 is known to end.
+        // Colours: 0 unseen, 1 on the way up from the current object, 2 without a circle above.
         let mut colour = vec![0u8; self.model.objects.len()];
         for start in 0..colour.len() {
             let mut way = Vec::new();

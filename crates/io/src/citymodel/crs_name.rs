@@ -1,34 +1,35 @@
-//! Names of reference systems as city models write them, taken apart into EPSG codes.
+//! EPSG codes from the names of reference systems in city models.
 //!
-//! Read are OGC's URLs and URNs (`http://www.opengis.net/def/crs/EPSG/0/7415`, `urn:ogc:def:crs:EPSG::25832`, compound
-//! `urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::7837` and `…/crs-compound?1=…&2=…`), `EPSG:25832`, and the names of the
-//! German surveys (`urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH`). Anything else keeps its name and gets no code.
+//! These names are known: OGC's URLs and URNs (`http://www.opengis.net/def/crs/EPSG/0/7415`,
+//! `urn:ogc:def:crs:EPSG::25832`, compound `urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::7837` and
+//! `…/crs-compound?1=…&2=…`), `EPSG:25832`, and the names of the German surveys
+//! (`urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH`). Any other name is kept without a code.
 
 use city::CrsReference;
 
-/// German vertical systems by the name of the surveys' working group (AdV) and their EPSG codes.
+/// German vertical systems: their names by the working group of the surveys (AdV), and their EPSG codes.
 const ADV_HEIGHTS: [(&str, u32); 4] =
     [("DE_DHHN2016_NH", 7837), ("DE_DHHN92_NH", 5783), ("DE_DHHN85_NOH", 5784), ("DE_DHHN12_NOH", 7699)];
 
-/// The reference of a name in a file.
+/// Returns the reference with the name in a file.
 pub(super) fn crs_reference(name: &str) -> CrsReference {
     let name = name.trim();
     let (epsg, vertical_epsg) = adv_codes(name).unwrap_or_else(|| ogc_codes(name));
     CrsReference { name: (!name.is_empty()).then(|| name.chars().take(200).collect()), epsg, vertical_epsg }
 }
 
-/// `urn:adv:crs:ETRS89_UTM32*DE_DHHN92_NH`: UTM or Gauss-Krüger, and heights.
+/// Returns the horizontal and vertical codes of a German name: UTM or Gauss-Krüger, and a height system.
 fn adv_codes(name: &str) -> Option<(Option<u32>, Option<u32>)> {
     let rest = strip_prefix_ignoring_case(name, "urn:adv:crs:")?;
     let (plane, height) = rest.split_once('*').unwrap_or((rest, ""));
     let zone = |prefix: &str| plane.strip_prefix(prefix).and_then(|z| z.parse::<u32>().ok());
     let horizontal = match (zone("ETRS89_UTM"), zone("DE_DHDN_3GK")) {
         (Some(zone @ 28..=38), _) => Some(25800 + zone),
-        // The first digit of the strip follows `3GK`, and a second one may name the survey's realisation.
+        // The first digit after `3GK` is the strip. A second digit may name the realisation of a survey.
         (_, Some(strip)) => leading_digit(strip).filter(|s| (2..=5).contains(s)).map(|s| 31464 + s),
         _ => None,
     };
-    // The geoid model may follow.
+    // A geoid model may follow the height system.
     let height = height.split('*').next().unwrap_or_default();
     let vertical = ADV_HEIGHTS.iter().find(|(known, _)| *known == height).map(|&(_, code)| code);
     Some((horizontal, vertical))
@@ -38,14 +39,14 @@ fn leading_digit(number: u32) -> Option<u32> {
     number.to_string().chars().next()?.to_digit(10)
 }
 
-/// The first and second EPSG code in an OGC name.
+/// Returns the first and the second EPSG code of an OGC name.
 fn ogc_codes(name: &str) -> (Option<u32>, Option<u32>) {
     let mut codes = name.split([',', '&', '+']).filter_map(epsg_code);
     let first = codes.next();
     (first, codes.next())
 }
 
-/// The code of one part: what follows `EPSG` and its separators and version.
+/// Returns the code in a part of a name: the number after `EPSG`, its separators and its version.
 fn epsg_code(part: &str) -> Option<u32> {
     let lower = part.to_ascii_lowercase();
     let after = match lower.rfind("epsg") {
@@ -62,7 +63,7 @@ fn strip_prefix_ignoring_case<'a>(text: &'a str, prefix: &str) -> Option<&'a str
     head.eq_ignore_ascii_case(prefix).then(|| &text[prefix.len()..])
 }
 
-/// OGC's URL of a reference, as CityJSON 2.0 writes it; `None` without an EPSG code.
+/// Returns OGC's URL of a reference, as CityJSON 2.0 has it, or `None` without an EPSG code.
 pub(super) fn ogc_url(crs: &CrsReference) -> Option<String> {
     let url = |code: u32| format!("https://www.opengis.net/def/crs/EPSG/0/{code}");
     match (crs.epsg?, crs.vertical_epsg) {

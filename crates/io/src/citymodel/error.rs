@@ -1,4 +1,4 @@
-//! Why a city model was not read or written: each refusal has a number of the catalogue and a place.
+//! Why a city model was not read or written. Each fault of a file has a number of the catalogue and a place.
 
 use std::path::{Path, PathBuf};
 
@@ -6,50 +6,50 @@ use city::DefectCode;
 
 use crate::atomic::SaveError;
 
-/// A file that is no city model, or one that breaks the rules of its format.
+/// Why a city model was not read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CityError {
-    /// The file cannot be opened or read.
-    #[error("cannot read the file ({source}): check the name and the permissions: {}", .path.display())]
+    /// The system cannot read the file.
+    #[error("cannot read the file ({source}), check its name and permissions: {}", .path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's answer.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// Larger than is read into memory.
-    #[error("the file has {bytes} bytes, city models are read up to {limit}: cut it into tiles: {}", .path.display())]
+    /// The file is larger than the limit.
+    #[error("the file has {bytes} bytes, at most {limit} are read, cut it into tiles: {}", .path.display())]
     TooLarge {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its size.
+        /// Size of the file, bytes.
         bytes: u64,
-        /// The limit.
+        /// Largest size that is read, bytes.
         limit: u64,
     },
-    /// The content is refused.
+    /// The content of the file is invalid or not supported.
     #[error("{fault}: {}", .path.display())]
     Refused {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong and where.
+        /// The fault and its place.
         fault: CityFault,
     },
-    /// The file was not written.
+    /// The file exists or cannot be written.
     #[error(transparent)]
     NotWritten(#[from] SaveError),
 }
 
-/// What is wrong with the content of a file, with the number in the catalogue and the place.
+/// A fault of the content of a file, with its number in the catalogue and its place.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("error {}: {what} ({place})", .code.number())]
 pub struct CityFault {
-    /// Number in the catalogue of defects.
+    /// Kind of the fault in the catalogue of defects.
     pub code: DefectCode,
-    /// What was found and expected.
+    /// What was found, and what was expected.
     pub what: String,
-    /// `line 7, column 12`, or the way to the element.
+    /// Place in the file, such as `line 7, column 12`, or the name of an element.
     pub place: String,
 }
 
@@ -58,16 +58,22 @@ impl CityFault {
         Self { code, what: what.into(), place: place.into() }
     }
 
-    /// A fault of the format's rules (901).
+    /// Creates a fault for a file that breaks the rules of its format (901).
     pub(super) fn invalid(what: impl Into<String>, place: impl Into<String>) -> Self {
         Self::new(DefectCode::InvalidFile, what, place)
     }
 
-    /// Something that is not read here (904).
+    /// Creates a fault for a file or element that is not supported (904).
     pub(super) fn unsupported(what: impl Into<String>, place: impl Into<String>) -> Self {
         Self::new(DefectCode::NotSupported, what, place)
     }
 
+    /// Creates a fault of the format in a line.
+    pub(super) fn in_line(what: impl Into<String>, line: usize) -> Self {
+        Self::invalid(what, format!("line {line}"))
+    }
+
+    /// Adds the path of the file.
     pub(crate) fn at(self, path: &Path) -> CityError {
         CityError::Refused { path: path.to_owned(), fault: self }
     }

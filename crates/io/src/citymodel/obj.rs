@@ -1,19 +1,22 @@
-//! Wavefront OBJ: vertices and polygons. Objects and groups become city objects, materials named after CityGML's surfaces
-//! (`usemtl RoofSurface`) their classes. Material files are not opened, lines and curves are passed over. A comment
-//! `# crs EPSG:n` at the top names the reference system.
+//! Reads Wavefront OBJ: vertices and polygons.
+//!
+//! Objects and groups become city objects. Materials with the names of CityGML's surfaces (`usemtl RoofSurface`) become
+//! classes. Material files are not opened, lines and curves are skipped. A comment `# crs EPSG:n` at the top names the
+//! reference system.
 
 use std::collections::HashMap;
 
-use city::{CrsReference, DefectCode, Geometry, GeometryKind, ModelPoint, ObjectKind, Surface, SurfaceClass};
+use city::{CrsReference, DefectCode, Geometry, GeometryKind, ModelPoint, ObjectKind, SurfaceClass, SurfacePolygon};
 
 use super::builder::Builder;
 use super::crs_name::crs_reference;
-use super::{CityFault, CityFormat, Parsed};
+use super::error::CityFault;
+use super::format::{CityFormat, Parsed};
 
-/// Words that a line of an OBJ file may begin with.
+/// Keywords at the beginning of a line.
 const KEYWORDS: [&str; 12] = ["v", "vt", "vn", "vp", "f", "o", "g", "s", "l", "p", "mtllib", "usemtl"];
 
-/// Whether the first line with content could be one of an OBJ file.
+/// Returns whether the first line that is neither empty nor a comment begins with a keyword of OBJ.
 pub(super) fn looks_like(text: &[u8]) -> bool {
     let head = String::from_utf8_lossy(&text[..text.len().min(100_000)]);
     let mut words = head.lines().filter_map(|line| line.split_whitespace().next());
@@ -30,7 +33,7 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
         if joined.is_empty() {
             number = index + 1;
         }
-        // A backslash at the end of a line continues it on the next.
+        // A backslash at the end of a line continues it on the next line.
         if let Some(head) = line.trim_end().strip_suffix('\\') {
             joined.push_str(head);
             joined.push(' ');
@@ -48,7 +51,7 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
     Ok(Parsed { model, format: CityFormat::Obj, defects })
 }
 
-/// The reference system in a comment `# crs EPSG:n` at the top, as this program writes it.
+/// Returns the reference system in a comment `# crs EPSG:n` at the top, as [`write_mesh`](super::write_mesh) writes it.
 fn stated_crs(text: &str) -> CrsReference {
     let comments = text.lines().map_while(|line| line.strip_prefix('#'));
     let name = comments.filter_map(|line| line.trim().strip_prefix("crs ")).next().unwrap_or("unknown");
@@ -58,13 +61,15 @@ fn stated_crs(text: &str) -> CrsReference {
 #[derive(Default)]
 struct Reader {
     builder: Builder,
-    /// The object that faces go to, and its number by name.
+    /// Object that the next faces belong to.
     object: Option<usize>,
+    /// Objects by name.
     object_of: HashMap<String, usize>,
     class: SurfaceClass,
 }
 
 impl Reader {
+    /// Reads a line.
     fn line(&mut self, line: &str, number: usize) -> Result<(), CityFault> {
         let line = line.split('#').next().unwrap_or_default();
         let mut words = line.split_whitespace();
@@ -88,6 +93,7 @@ impl Reader {
         }
     }
 
+    /// Returns the object with a name, and adds it if it is new.
     fn object(&mut self, name: &str) -> usize {
         if let Some(&object) = self.object_of.get(name) {
             return object;
@@ -98,21 +104,26 @@ impl Reader {
         object
     }
 
+    /// Adds a vertex.
     fn vertex<'a>(&mut self, words: impl Iterator<Item = &'a str>, number: usize) -> Result<(), CityFault> {
         let place = || format!("line {number}");
         let mut point = [0.0; 3];
         let mut words = words;
         for coordinate in &mut point {
-            let word = words.next().ok_or_else(|| CityFault::invalid("a vertex has three coordinates", place()))?;
+            let word =
+                words.next().ok_or_else(|| CityFault::invalid("a vertex has fewer than three coordinates", place()))?;
             *coordinate = word.parse().map_err(|_| {
                 let word: String = word.chars().take(20).collect();
-                CityFault::invalid(format!("{word:?} is no coordinate"), place())
+                CityFault::invalid(format!("found {word:?}, expected a coordinate"), place())
             })?;
         }
         let added = self.builder.vertex(ModelPoint::from(point));
-        added.map(drop).ok_or_else(|| CityFault::unsupported("more than 2^32 vertices", place()))
+        added
+            .map(drop)
+            .ok_or_else(|| CityFault::unsupported("the model has more than 2^32 vertices, cut it into tiles", place()))
     }
 
+    /// Adds a polygon to the current object.
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>, number: usize) {
         let object = match self.object {
             Some(object) => object,
@@ -124,21 +135,21 @@ impl Reader {
         match ring {
             Err(word) => {
                 let word: String = word.chars().take(40).collect();
-                let detail = format!("vertex {word:?} of {count}");
+                let detail = format!("vertex {word:?}, {count} vertices so far");
                 self.builder.dropped(DefectCode::VertexOutOfRange, object, place(), detail);
             }
             Ok(ring) if !ring.iter().all(|&vertex| self.builder.is_usable(vertex)) => {
                 self.builder.dropped(DefectCode::CoordinateOutOfRange, object, place(), "");
             }
             Ok(ring) => {
-                let surface = Surface::new(vec![ring], self.class);
+                let surface = SurfacePolygon::new(vec![ring], self.class);
                 self.builder.object_mut(object).geometries[0].surfaces.push(surface);
             }
         }
     }
 }
 
-/// The vertex of `7`, `7/1/2` or `-1` (counted from the last one), from 0.
+/// Returns the index, from 0, of the vertex in `7`, `7/1/2` (counted from 1) or `-1` (counted from the last vertex).
 fn index(word: &str, count: usize) -> Option<u32> {
     let number: i64 = word.split('/').next()?.parse().ok()?;
     let index = if number < 0 { number.checked_add(i64::try_from(count).ok()?)? } else { number - 1 };

@@ -1,15 +1,18 @@
-//! PLY meshes, text and binary: the positions of `vertex` and the polygons of `face`. Everything else is passed over, but for the
-//! comments `origin x y z`, which the positions are relative to, and `crs EPSG:n`; where both stand, as this program writes
-//! them, the `class` of a face is that of its surface.
+//! Reads PLY meshes, text and binary: the positions of `vertex` and the polygons of `face`.
+//!
+//! Two comments are read: `origin x y z`, which the positions are relative to, and `crs EPSG:n`. When a file has both, as
+//! the files of this toolkit do, the property `class` of a face is the class of its surface. Everything else is skipped.
 //!
 //! Counts are checked against the size of the file before anything is allocated.
 
-use city::{CrsReference, DefectCode, Geometry, GeometryKind, ModelPoint, ObjectKind, Surface, SurfaceClass};
+use city::{CrsReference, DefectCode, Geometry, GeometryKind, ModelPoint, ObjectKind, SurfaceClass, SurfacePolygon};
 
 use super::builder::Builder;
 use super::crs_name::crs_reference;
-use super::{CityFault, CityFormat, Parsed};
+use super::error::CityFault;
+use super::format::{CityFormat, Parsed};
 
+/// Returns whether a file begins like a PLY file.
 pub(super) fn looks_like(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")
 }
@@ -33,16 +36,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     Ok(Parsed { model, format: CityFormat::Ply, defects })
 }
 
-/// The points of a file, and what its comments say.
+/// The points of a file, and its comments.
 #[derive(Debug)]
 pub(crate) struct PlyPoints {
     pub(crate) positions: Vec<[f64; 3]>,
     pub(crate) comments: Vec<String>,
-    /// Whether there are polygons, too.
+    /// Whether the file has polygons too.
     pub(crate) has_faces: bool,
 }
 
-/// The vertices as they stand in the file, for clouds: one that is not finite is a fault.
+/// Reads the vertices of a cloud, without adding an origin. A position that is not finite is a fault.
 pub(crate) fn points(bytes: &[u8]) -> Result<PlyPoints, CityFault> {
     let header = header(bytes)?;
     let mut body = Body { bytes, at: header.end, encoding: header.encoding };
@@ -54,7 +57,10 @@ pub(crate) fn points(bytes: &[u8]) -> Result<PlyPoints, CityFault> {
         for number in 0..if axes.is_empty() { 0 } else { element.count } {
             let point = body.record(element, &axes)?;
             if is_vertex && !point.iter().all(|c| c.is_finite()) {
-                return Err(CityFault::invalid(format!("the position {point:?}"), format!("vertex {number}")));
+                return Err(CityFault::invalid(
+                    format!("the position {point:?} is not finite"),
+                    format!("vertex {number}"),
+                ));
             }
             if is_vertex {
                 positions.push(point);
@@ -71,7 +77,7 @@ enum Encoding {
     Big,
 }
 
-/// A type of number.
+/// Type of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Number {
     Int { bytes: usize, signed: bool },
@@ -81,7 +87,7 @@ enum Number {
 #[derive(Debug)]
 struct Property {
     name: String,
-    /// Type of the count, for lists.
+    /// Type of the count, if the property is a list.
     count: Option<Number>,
     value: Number,
 }
@@ -98,25 +104,26 @@ struct Header {
     encoding: Encoding,
     elements: Vec<Element>,
     comments: Vec<String>,
-    /// Where the data begin.
+    /// Byte offset of the data.
     end: usize,
 }
 
 impl Header {
-    fn said(&self, key: &str) -> Option<&str> {
+    /// Returns the value of a comment that begins with `key`.
+    fn comment(&self, key: &str) -> Option<&str> {
         self.comments.iter().find_map(|comment| comment.strip_prefix(key)).map(str::trim)
     }
 
-    /// What the positions are relative to.
+    /// Returns the origin of the positions.
     fn origin(&self) -> Option<[f64; 3]> {
-        let numbers = self.said("origin ")?.split_whitespace().map(|word| word.parse::<f64>().ok());
+        let numbers = self.comment("origin ")?.split_whitespace().map(|word| word.parse::<f64>().ok());
         let numbers = <[f64; 3]>::try_from(numbers.collect::<Option<Vec<_>>>()?).ok()?;
         numbers.iter().all(|c| c.is_finite()).then_some(numbers)
     }
 
-    /// The reference system; that of a model without one is `unknown`.
+    /// Returns the reference system. The name `unknown` stands for none.
     fn crs(&self) -> Option<CrsReference> {
-        let name = self.said("crs ")?;
+        let name = self.comment("crs ")?;
         Some(if name == "unknown" { CrsReference::default() } else { crs_reference(name) })
     }
 }
@@ -148,9 +155,9 @@ fn header(bytes: &[u8]) -> Result<Header, CityFault> {
     for number in 1.. {
         let place = format!("line {number}");
         let rest = &bytes[at..];
-        // No header line is longer than this, and a file without line ends is not searched to its end.
+        // The limit keeps a file without line ends from being searched to its end.
         let end = rest.iter().take(4096).position(|&b| b == b'\n');
-        let end = end.ok_or_else(|| CityFault::invalid("the header has no end", place.clone()))?;
+        let end = end.ok_or_else(|| CityFault::invalid("the header has no end_header line", place.clone()))?;
         let line = String::from_utf8_lossy(&rest[..end]).into_owned();
         at += end + 1;
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -160,17 +167,25 @@ fn header(bytes: &[u8]) -> Result<Header, CityFault> {
                     "ascii" => Encoding::Ascii,
                     "binary_little_endian" => Encoding::Little,
                     "binary_big_endian" => Encoding::Big,
-                    _ => return Err(CityFault::unsupported("the format is none of PLY's", place)),
+                    _ => {
+                        return Err(CityFault::unsupported(
+                            "the format is not one of ascii, binary_little_endian and binary_big_endian",
+                            place,
+                        ));
+                    }
                 });
             }
             ["element", name, count] => {
-                let count = count.parse().map_err(|_| CityFault::invalid("the count is no number", place))?;
+                let count = count
+                    .parse()
+                    .map_err(|_| CityFault::invalid("the number of elements is not a whole number", place))?;
                 elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
             }
             ["property", ..] => {
                 let found = property(&words).zip(elements.last_mut());
-                let (property, element) =
-                    found.ok_or_else(|| CityFault::invalid("a property that PLY does not know", place))?;
+                let (property, element) = found.ok_or_else(|| {
+                    CityFault::invalid("the property is not valid in PLY, or stands before the first element", place)
+                })?;
                 element.properties.push(property);
             }
             ["comment", ..] => comments.push(words[1..].join(" ")),
@@ -178,7 +193,7 @@ fn header(bytes: &[u8]) -> Result<Header, CityFault> {
             _ => {}
         }
     }
-    let encoding = encoding.ok_or_else(|| CityFault::invalid("the header names no format", "header"))?;
+    let encoding = encoding.ok_or_else(|| CityFault::invalid("the header has no format line", "header"))?;
     Ok(Header { encoding, elements, comments, end: at })
 }
 
@@ -193,10 +208,12 @@ fn property(words: &[&str]) -> Option<Property> {
     }
 }
 
+/// Reads elements into a model.
 struct Reader<'a> {
     body: Body<'a>,
     builder: Builder,
     origin: [f64; 3],
+    /// Whether the `class` of a face is the class of a surface.
     has_classes: bool,
 }
 
@@ -231,7 +248,9 @@ impl Reader<'_> {
             if is_vertex {
                 let point = [0, 1, 2].map(|i| point[i] + self.origin[i]);
                 let added = self.builder.vertex(ModelPoint::from(point));
-                added.ok_or_else(|| CityFault::unsupported("more than 2^32 vertices", "header"))?;
+                added.ok_or_else(|| {
+                    CityFault::unsupported("the model has more than 2^32 vertices, cut it into tiles", "header")
+                })?;
             }
         }
         Ok(())
@@ -243,21 +262,21 @@ impl Reader<'_> {
         let index = |corner: f64| (corner >= 0.0 && corner < count as f64).then_some(corner as u32).ok_or(corner);
         match corners.into_iter().map(index).collect::<Result<Vec<u32>, f64>>() {
             Err(corner) => {
-                let detail = format!("vertex {corner} of {count}");
+                let detail = format!("vertex {corner}, {count} vertices so far");
                 self.builder.dropped(DefectCode::VertexOutOfRange, object, place(), detail);
             }
             Ok(ring) if !ring.iter().all(|&vertex| self.builder.is_usable(vertex)) => {
                 self.builder.dropped(DefectCode::CoordinateOutOfRange, object, place(), "");
             }
             Ok(ring) => {
-                let surface = Surface::new(vec![ring], class);
+                let surface = SurfacePolygon::new(vec![ring], class);
                 self.builder.object_mut(object).geometries[0].surfaces.push(surface);
             }
         }
     }
 }
 
-/// The data after the header.
+/// A cursor over the data after the header.
 struct Body<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -265,29 +284,30 @@ struct Body<'a> {
 }
 
 impl Body<'_> {
+    /// Returns the number of bytes left.
     fn room(&self) -> usize {
         self.bytes.len() - self.at
     }
 
-    /// Checks that the file can hold an element as often as it says; which of its properties are x, y, z.
+    /// Checks that the rest of the file can hold all of an element, and returns per property the axis that it is.
     fn check(&self, element: &Element) -> Result<Vec<Option<usize>>, CityFault> {
         if element.count == 0 {
             return Ok(Vec::new());
         }
         let (smallest, room) = (self.smallest(element), self.room());
         if smallest == 0 || element.count > (room / smallest) as u64 {
-            let what = format!("{} of {} are announced, and {room} bytes are left", element.count, element.name);
+            let what = format!("the header announces {} of {}, {room} bytes are left", element.count, element.name);
             return Err(CityFault::invalid(what, "header"));
         }
         let axis_of = |p: &Property| ["x", "y", "z"].iter().position(|axis| *axis == p.name && p.count.is_none());
         let axes: Vec<Option<usize>> = element.properties.iter().map(axis_of).collect();
         if element.name == "vertex" && (0..3).any(|axis| !axes.contains(&Some(axis))) {
-            return Err(CityFault::invalid("the vertices have no x, y and z", "header"));
+            return Err(CityFault::invalid("the vertices do not have the properties x, y and z", "header"));
         }
         Ok(axes)
     }
 
-    /// An element's position; everything else in it is passed over.
+    /// Reads the position of an element, and skips its other properties.
     fn record(&mut self, element: &Element, axes: &[Option<usize>]) -> Result<[f64; 3], CityFault> {
         let mut point = [0.0; 3];
         for (property, axis) in element.properties.iter().zip(axes) {
@@ -300,7 +320,7 @@ impl Body<'_> {
         Ok(point)
     }
 
-    /// The fewest bytes that an element can take: a digit and a separator per number in text.
+    /// Returns the smallest size of an element, bytes: a number takes at least one byte in text.
     fn smallest(&self, element: &Element) -> usize {
         let each = |p: &Property| match self.encoding {
             Encoding::Ascii => 1,
@@ -313,7 +333,7 @@ impl Body<'_> {
         CityFault::invalid("the file ends in the middle of its data", format!("byte {}", self.at))
     }
 
-    /// A list's numbers, kept only where they are wanted.
+    /// Reads a list. Returns its numbers only with `keep`.
     fn list(&mut self, count: Number, value: Number, keep: bool) -> Result<Vec<f64>, CityFault> {
         let count = self.number(count)?;
         let least = if self.encoding == Encoding::Ascii { 1 } else { value.bytes() };
@@ -360,7 +380,10 @@ impl Body<'_> {
         let word = std::str::from_utf8(&rest[start..start + length]).unwrap_or_default();
         let place = format!("byte {}", self.at + start);
         let number = word.parse().map_err(|_| {
-            CityFault::invalid(format!("{:?} is no number", word.chars().take(20).collect::<String>()), place)
+            CityFault::invalid(
+                format!("found {:?}, expected a number", word.chars().take(20).collect::<String>()),
+                place,
+            )
         })?;
         self.at += start + length;
         Ok(number)

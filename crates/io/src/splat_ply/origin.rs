@@ -72,8 +72,9 @@ impl LocalOrigin {
         let path = origin_path(file);
         match std::fs::read_to_string(&path) {
             Ok(text) => {
-                let origin: Self = serde_json::from_str(&text)
-                    .map_err(|error| invalid(&path, format!("the file is not an origin as skysweep writes it ({error})")))?;
+                let origin: Self = serde_json::from_str(&text).map_err(|error| {
+                    invalid(&path, format!("the file is not an origin as skysweep writes it ({error})"))
+                })?;
                 Ok(Some(origin))
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),

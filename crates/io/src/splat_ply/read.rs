@@ -111,14 +111,18 @@ fn header(bytes: &[u8]) -> Result<Header, String> {
             ["format", name, _] => binary = name == "binary_little_endian",
             ["element", name, count] => {
                 if element.is_none() {
-                    header.count = count.parse().map_err(|_| format!("the number of elements is {count:?}, expected a whole number"))?;
+                    header.count = count
+                        .parse()
+                        .map_err(|_| format!("the number of elements is {count:?}, expected a whole number"))?;
                     element = Some(name == "vertex");
                 } else {
                     element = Some(false);
                 }
             }
             ["property", kind, name] if element == Some(true) => header.property(kind, name)?,
-            ["property", ..] if element == Some(true) => return Err("a vertex has a list property, expected numbers only".to_owned()),
+            ["property", ..] if element == Some(true) => {
+                return Err("a vertex has a list property, expected numbers only".to_owned());
+            }
             _ => {}
         }
     }
@@ -167,7 +171,9 @@ impl Columns {
         let rest = header.floats.keys().filter(|name| name.starts_with("f_rest_")).count();
         let degree = (0..=SH_DEGREE_MAX)
             .find(|&sh_degree| SplatLayout { sh_degree, ..SplatLayout::default() }.rest() == rest)
-            .ok_or_else(|| format!("found {rest} f_rest properties, expected 0, 9, 24 or 45 (harmonics of degree 0 to 3)"))?;
+            .ok_or_else(|| {
+                format!("found {rest} f_rest properties, expected 0, 9, 24 or 45 (harmonics of degree 0 to 3)")
+            })?;
         Ok(Self {
             position: [column("x")?, column("y")?, column("z")?],
             colour: [numbered("f_dc", 0)?, numbered("f_dc", 1)?, numbered("f_dc", 2)?],

@@ -93,7 +93,12 @@ fn nothing_is_replaced_and_no_nonsense_is_written() {
     let refused = write(&other, &broken, &origin(), SplatLayout::default(), false);
     assert!(matches!(refused, Err(SplatPlyError::Splat { index: 1, .. })));
     let degree = SplatLayout { sh_degree: 4, ..SplatLayout::default() };
-    assert!(write(&other, &splats(), &origin(), degree, false).unwrap_err().to_string().contains("the degree of the harmonics is 4"));
+    assert!(
+        write(&other, &splats(), &origin(), degree, false)
+            .unwrap_err()
+            .to_string()
+            .contains("the degree of the harmonics is 4")
+    );
     assert!(!other.exists() && !origin_path(&other).exists());
 }
 
@@ -109,7 +114,10 @@ fn files_that_are_no_splats_are_refused_with_the_reason() {
     refused(b"", "has no PLY header");
     refused(b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", "binary_little_endian");
     refused(b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty float x\nend_header\n", "\"scale_0\"");
-    refused(b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty list uchar int i\nend_header\n", "list property");
+    refused(
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty list uchar int i\nend_header\n",
+        "list property",
+    );
     write(&path, &splats(), &origin(), SplatLayout::default(), true).unwrap();
     let good = std::fs::read(&path).unwrap();
     refused(&good[..good.len() - 1], "room for 1");

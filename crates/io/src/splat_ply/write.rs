@@ -24,8 +24,7 @@ pub fn write(
     overwrite: bool,
 ) -> Result<(), SplatPlyError> {
     if layout.sh_degree > SH_DEGREE_MAX {
-        let what =
-            format!("the degree of the harmonics is {}, expected 0 to {SH_DEGREE_MAX}", layout.sh_degree);
+        let what = format!("the degree of the harmonics is {}, expected 0 to {SH_DEGREE_MAX}", layout.sh_degree);
         return Err(invalid(path, what));
     }
     for (index, splat) in splats.iter().enumerate() {

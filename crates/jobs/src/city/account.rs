@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use city::{CityModel, Defect, DefectCode, Effect, Lod, Meshed, ObjectStatus};
+use city::{CityModel, Defect, DefectCode, Effect, Lod, MeshedModel, ObjectStatus};
 use serde::Serialize;
 
 use super::config::CityInput;
@@ -216,7 +216,7 @@ fn lods(model: &CityModel) -> BTreeMap<String, usize> {
     count(geometries.map(|geometry| lod_name(geometry.lod)))
 }
 
-fn lods_used(meshed: &Meshed) -> BTreeMap<String, usize> {
+fn lods_used(meshed: &MeshedModel) -> BTreeMap<String, usize> {
     let used = meshed.objects.iter().filter(|object| matches!(object.status, ObjectStatus::Used { .. }));
     count(used.map(|object| lod_name(object.lod)))
 }

@@ -1,6 +1,6 @@
 //! Reading a city model and making its triangles.
 
-use city::{LodChoice, MeshConfig, Meshed, Scope, TriangleMesh};
+use city::{LodChoice, MeshConfig, MeshedModel, Scope, TriangleMesh};
 use io::citymodel::CityFile;
 
 use super::config::CityInput;
@@ -10,7 +10,7 @@ use numeric::Progress;
 /// A model with its triangles.
 pub(super) struct OpenedCity {
     pub(super) file: CityFile,
-    pub(super) meshed: Meshed,
+    pub(super) meshed: MeshedModel,
 }
 
 /// Reads a model and makes its triangles. Solids are checked where an account is asked for.

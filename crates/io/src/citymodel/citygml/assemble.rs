@@ -1,37 +1,38 @@
-//! Geometries put together after the walk: links followed, classes given, surfaces that a solid holds not repeated.
+//! Assembles the geometries after the walk: follows links, assigns classes, and drops surfaces that a solid repeats.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use city::{DefectCode, Geometry, GeometryKind, Lod, ModelPoint, Surface, SurfaceClass};
+use city::{DefectCode, Geometry, GeometryKind, Lod, ModelPoint, SurfaceClass, SurfacePolygon};
 
 use super::implicit::Implicit;
-use crate::citymodel::CityFault;
 use crate::citymodel::builder::Builder;
+use crate::citymodel::error::CityFault;
 use crate::citymodel::placement::Instances;
 
-/// A link may lead to surfaces that are links themselves, this many times in a row.
+/// Limit of the depth of links that lead to links.
 const LINK_DEPTH_MAX: usize = 4;
-/// Members that the links of a file may make: linked sets of links multiply.
+/// Limit of the links that are followed in a file. Links to sets of links multiply.
 const LINKED_MAX: usize = 10_000_000;
 
-/// A polygon; without rings where it could not be used.
+/// A polygon. It has no rings when it cannot be used.
 #[derive(Debug)]
 pub(super) struct Polygon {
     pub(super) rings: Vec<Vec<u32>>,
     pub(super) class: SurfaceClass,
 }
 
-/// The geometry of a property.
+/// The geometry of a property of an object.
 #[derive(Debug)]
 pub(super) struct Group {
     pub(super) object: usize,
     pub(super) lod: Lod,
     pub(super) kind: GeometryKind,
-    /// Whether it is that of a boundary surface.
+    /// Whether it belongs to a boundary surface.
     pub(super) in_boundary: bool,
     pub(super) members: Vec<Member>,
-    /// How its surfaces are placed, where their coordinates are not those of the model.
+    /// Placement of its surfaces, when they have their own coordinates.
     pub(super) implicit: Option<Implicit>,
+    /// Line of the property in the file.
     pub(super) line: usize,
 }
 
@@ -46,26 +47,25 @@ pub(super) struct Member {
     pub(super) line: usize,
 }
 
+/// The polygon of a member.
 #[derive(Debug, Clone)]
 pub(super) enum Target {
+    /// Index of a polygon.
     Polygon(usize),
     /// The value of a `xlink:href`.
     Link(String),
 }
 
-/// What an id stands for.
+/// The element with an identifier.
 #[derive(Debug)]
 pub(super) enum Named {
+    /// Index of a polygon.
     Polygon(usize),
-    /// Members of a group.
-    Members {
-        group: usize,
-        first: usize,
-        last: usize,
-    },
+    /// A range of the members of a group.
+    Members { group: usize, first: usize, last: usize },
 }
 
-/// A member whose links are followed.
+/// A member after its links have been followed.
 #[derive(Debug, Clone, Copy)]
 struct Resolved {
     polygon: usize,
@@ -82,25 +82,7 @@ pub(super) fn assemble(
     mut polygons: Vec<Polygon>,
     named: &HashMap<String, Named>,
 ) -> Result<(), CityFault> {
-    let mut links = Links { groups, named, followed: 0 };
-    let mut resolved: Vec<Vec<Resolved>> = Vec::with_capacity(groups.len());
-    for group in groups {
-        let mut found = Vec::with_capacity(group.members.len());
-        for member in &group.members {
-            if let Err(link) = links.follow(member, 0, &mut found)? {
-                let detail = format!("xlink {:?}", link.chars().take(80).collect::<String>());
-                builder.dropped(DefectCode::UnresolvedReference, group.object, format!("line {}", member.line), detail);
-            }
-        }
-        // A boundary surface may link to the polygon of a solid, and gives it its class all the same.
-        for member in &found {
-            let polygon = &mut polygons[member.polygon];
-            if polygon.class == SurfaceClass::Unclassified {
-                polygon.class = member.class;
-            }
-        }
-        resolved.push(found);
-    }
+    let resolved = resolve(builder, groups, &mut polygons, named)?;
     let in_solids: HashSet<(usize, Lod, usize)> = groups
         .iter()
         .zip(&resolved)
@@ -122,7 +104,7 @@ pub(super) fn assemble(
             continue;
         }
         let alone = found.iter().filter(|member| !in_solids.contains(&(group.object, group.lod, member.polygon)));
-        let surfaces: Vec<Surface> = alone.filter_map(surface).collect();
+        let surfaces: Vec<SurfacePolygon> = alone.filter_map(surface).collect();
         if group.in_boundary {
             let all = boundaries.entry((group.object, group.lod));
             let all = all.or_insert_with(|| Geometry::new(Some(group.lod), GeometryKind::MultiSurface));
@@ -139,7 +121,36 @@ pub(super) fn assemble(
     Ok(())
 }
 
-/// Adds the surfaces of an implicit geometry, with vertices of their own.
+/// Follows the links of all groups, and gives unclassified polygons the class of their members.
+fn resolve(
+    builder: &mut Builder,
+    groups: &[Group],
+    polygons: &mut [Polygon],
+    named: &HashMap<String, Named>,
+) -> Result<Vec<Vec<Resolved>>, CityFault> {
+    let mut links = Links { groups, named, followed: 0 };
+    let mut resolved: Vec<Vec<Resolved>> = Vec::with_capacity(groups.len());
+    for group in groups {
+        let mut found = Vec::with_capacity(group.members.len());
+        for member in &group.members {
+            if let Err(link) = links.follow(member, 0, &mut found)? {
+                let detail = format!("xlink {:?}", link.chars().take(80).collect::<String>());
+                builder.dropped(DefectCode::UnresolvedReference, group.object, format!("line {}", member.line), detail);
+            }
+        }
+        // A boundary surface also classifies a polygon that belongs to a solid and that it only links to.
+        for member in &found {
+            let polygon = &mut polygons[member.polygon];
+            if polygon.class == SurfaceClass::Unclassified {
+                polygon.class = member.class;
+            }
+        }
+        resolved.push(found);
+    }
+    Ok(resolved)
+}
+
+/// Adds an instance of an implicit geometry. Its surfaces get their own vertices.
 fn add_instance(
     builder: &mut Builder,
     instances: &mut Instances,
@@ -177,21 +188,28 @@ fn add_instance(
     Ok(())
 }
 
+/// Adds a geometry to its object, unless it has no surfaces.
 fn add(builder: &mut Builder, object: usize, geometry: Geometry) {
     if !geometry.surfaces.is_empty() {
         builder.object_mut(object).geometries.push(geometry);
     }
 }
 
-/// The surface of a member; `None` for polygons that could not be used, which was reported.
-fn surface(polygon: &Polygon, member: &Resolved) -> Option<Surface> {
+/// Returns the surface of a member, or `None` for a polygon that cannot be used, which has been reported.
+fn surface(polygon: &Polygon, member: &Resolved) -> Option<SurfacePolygon> {
     let mut rings = polygon.rings.clone();
     if member.turned {
         rings.iter_mut().for_each(|ring| ring.reverse());
     }
-    (!rings.is_empty()).then_some(Surface { rings, class: polygon.class, solid: member.solid, shell: member.shell })
+    (!rings.is_empty()).then_some(SurfacePolygon {
+        rings,
+        class: polygon.class,
+        solid: member.solid,
+        shell: member.shell,
+    })
 }
 
+/// Follows links, and counts them.
 struct Links<'a> {
     groups: &'a [Group],
     named: &'a HashMap<String, Named>,
@@ -199,7 +217,7 @@ struct Links<'a> {
 }
 
 impl<'a> Links<'a> {
-    /// Follows a member to its polygons; the link that leads nowhere, if one does.
+    /// Follows a member to its polygons. The inner error is a link that leads nowhere.
     fn follow(
         &mut self,
         member: &'a Member,
@@ -216,7 +234,7 @@ impl<'a> Links<'a> {
         };
         self.followed += 1;
         if self.followed > LINKED_MAX {
-            let what = format!("the links of the file lead to more than {LINKED_MAX} surfaces");
+            let what = format!("the file has more than {LINKED_MAX} links to surfaces, counting links behind links");
             return Err(CityFault::unsupported(what, format!("line {}", member.line)));
         }
         let target = link.strip_prefix('#').and_then(|id| self.named.get(id));

@@ -1,6 +1,6 @@
-//! Implicit geometries: a shape with coordinates of its own, placed by a 4 × 4 matrix (row by row) and a reference point.
+//! Implicit geometries: shapes with their own coordinates, placed by a 4 × 4 matrix in row order and a reference point.
 //!
-//! The shape is in the file, there or behind a link. One of a library, in another file, is never opened.
+//! The shape is inside the element, or elsewhere in the file behind a link. A library in another file is never opened.
 
 use city::{DefectCode, ModelPoint};
 
@@ -8,17 +8,17 @@ use crate::citymodel::placement::Placement;
 
 const IDENTITY: [f64; 16] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 
-/// What an implicit geometry says besides its shape.
+/// The elements of an implicit geometry apart from its shape.
 #[derive(Debug, Default)]
 pub(super) struct Implicit {
     matrix: Option<Vec<f64>>,
     reference: Option<Vec<f64>>,
     library: Option<String>,
-    /// A number that is none.
+    /// A word where a number was expected.
     broken: Option<String>,
 }
 
-/// An element of an implicit geometry with text.
+/// An element with text in an implicit geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Field {
     Matrix,
@@ -27,7 +27,7 @@ pub(super) enum Field {
 }
 
 impl Field {
-    /// The field of an element, inside of `parents` (the next one last).
+    /// Returns the field that an element is, within its `parents` (innermost last).
     pub(super) fn of<'a>(name: &str, mut parents: impl DoubleEndedIterator<Item = &'a str>) -> Option<Self> {
         match name {
             "transformationMatrix" => Some(Self::Matrix),
@@ -41,7 +41,7 @@ impl Field {
 }
 
 impl Implicit {
-    /// Takes the text of a field.
+    /// Stores the text of a field.
     pub(super) fn take(&mut self, field: Field, text: &str) {
         if field == Field::Library {
             self.library = Some(text.trim().chars().take(80).collect());
@@ -61,24 +61,27 @@ impl Implicit {
         }
     }
 
-    /// Why there is no shape.
+    /// Returns the defect of an implicit geometry without a shape.
     pub(super) fn without_shape(&self) -> (DefectCode, String) {
         match &self.library {
             Some(name) => (
                 DefectCode::NotSupported,
-                format!("an implicit geometry in another file, {name:?}, which is not opened"),
+                format!("the shape of an implicit geometry is in another file, {name:?}, which is not opened"),
             ),
             None => (DefectCode::EmptyPrimitive, "an implicit geometry without a shape".to_owned()),
         }
     }
 
-    /// Where the shape goes.
+    /// Returns the placement of the shape.
     ///
     /// # Errors
-    /// A code and what is missing.
+    /// The defect that keeps it from being placed.
     pub(super) fn placement(&self) -> Result<Placement, (DefectCode, String)> {
         if let Some(word) = &self.broken {
-            return Err((DefectCode::CoordinateOutOfRange, format!("{word:?} in an implicit geometry")));
+            return Err((
+                DefectCode::CoordinateOutOfRange,
+                format!("found {word:?} in an implicit geometry, expected a number"),
+            ));
         }
         let missing = |what: &str| (DefectCode::UnresolvedReference, format!("an implicit geometry needs {what}"));
         let matrix = match &self.matrix {

@@ -1,17 +1,18 @@
-//! The walk over the elements: what each one means where it stands, and what it leaves behind.
+//! Walks over the elements of a document, and collects objects, polygons and geometries.
 
 use std::collections::HashMap;
 
 use city::{CityModel, Defect, DefectCode, GeometryKind, Lod, ModelPoint, ObjectKind, SurfaceClass, VertexPool};
 
 use super::assemble::{Group, Member, Named, Polygon, Target, assemble};
+use super::attributes::Attributes;
 use super::implicit::{Field, Implicit};
-use super::{Attributes, attribute};
-use crate::citymodel::CityFault;
 use crate::citymodel::builder::Builder;
 use crate::citymodel::crs_name::crs_reference;
+use crate::citymodel::error::CityFault;
 
-/// Properties whose child is a city object: of the model, and of a building, bridge or tunnel in CityGML 1 to 3.
+/// Properties whose child is a city object: properties of the model, and of buildings, bridges and tunnels in CityGML
+/// 1 to 3.
 const OBJECT_PROPERTIES: [&str; 22] = [
     "cityObjectMember",
     "featureMember",
@@ -38,24 +39,26 @@ const OBJECT_PROPERTIES: [&str; 22] = [
 ];
 /// Properties whose child is a surface with a class.
 const SURFACE_PROPERTIES: [&str; 4] = ["boundedBy", "boundary", "opening", "fillingSurface"];
-/// Elements of a polygon's boundary, GML 2 and 3.
+/// Elements of the outer boundary of a polygon or solid, GML 3 and 2.
 const OUTER: [&str; 2] = ["exterior", "outerBoundaryIs"];
+/// Elements of an inner boundary of a polygon or solid, GML 3 and 2.
 const INNER: [&str; 2] = ["interior", "innerBoundaryIs"];
 
-/// Walks over the elements of a document.
+/// The state of the walk.
 #[derive(Debug, Default)]
 pub(super) struct Walker {
     builder: Builder,
     pool: VertexPool,
     stack: Vec<Frame>,
-    /// The object that the walk is in, and the class of the boundary surface.
+    /// Object that the walk is in.
     object: Option<usize>,
+    /// Class of the boundary surface that the walk is in.
     class: SurfaceClass,
     srs_name: Option<String>,
     groups: Vec<Group>,
     polygons: Vec<Polygon>,
     named: HashMap<String, Named>,
-    /// Where the walk is inside of a geometry.
+    /// State within a geometry property, while the walk is in one.
     geometry: Option<Progress>,
 }
 
@@ -64,12 +67,12 @@ pub(super) struct Walker {
 struct Frame {
     name: String,
     id: Option<String>,
-    /// Dimension of coordinates, where it says so.
+    /// Value of its `srsDimension`.
     dimension: Option<usize>,
     mark: Mark,
 }
 
-/// What the end of an element must undo or finish.
+/// What the end of an element undoes or finishes.
 #[derive(Debug)]
 enum Mark {
     Nothing,
@@ -80,7 +83,7 @@ enum Mark {
         before: SurfaceClass,
     },
     Geometry,
-    /// Surfaces that can be linked to as a whole, with the first of their members.
+    /// Surfaces that a link can lead to as a whole, from this member on.
     Members {
         first: usize,
     },
@@ -99,7 +102,7 @@ enum Mark {
     },
 }
 
-/// The state inside of a geometry property.
+/// State within a geometry property.
 #[derive(Debug, Default)]
 struct Progress {
     solids: u32,
@@ -109,30 +112,37 @@ struct Progress {
     implicit: Option<Implicit>,
 }
 
+/// A polygon that the walk is in.
 #[derive(Debug)]
 struct OpenPolygon {
+    /// Complete rings.
     rings: Vec<Vec<u32>>,
+    /// Coordinates of the open ring.
     ring: Option<Vec<f64>>,
+    /// First defect that makes the polygon unusable.
     problem: Option<(DefectCode, String)>,
+    /// Number of rings that are not closed.
     unclosed: usize,
     line: usize,
 }
 
 impl Walker {
+    /// Returns the number of open elements.
     pub(super) fn depth(&self) -> usize {
         self.stack.len()
     }
 
+    /// Begins an element.
     pub(super) fn start(&mut self, name: &str, attributes: &Attributes, line: usize) -> Result<(), CityFault> {
         if self.srs_name.is_none() {
-            self.srs_name = attribute(attributes, "srsName").map(str::to_owned);
+            self.srs_name = attributes.get("srsName").map(str::to_owned);
         }
-        let id = attribute(attributes, "id").map(str::to_owned);
-        let dimension = attribute(attributes, "srsDimension").and_then(|text| text.parse().ok());
+        let id = attributes.get("id").map(str::to_owned);
+        let dimension = attributes.get("srsDimension").and_then(|text| text.parse().ok());
         let mark = if self.geometry.is_some() {
             self.start_in_geometry(name, attributes, line)
         } else {
-            self.start_outside(name, id.as_deref(), attribute(attributes, "href"), line)
+            self.start_outside(name, id.as_deref(), attributes.get("href"), line)
         };
         self.stack.push(Frame { name: name.to_owned(), id, dimension, mark });
         Ok(())
@@ -142,6 +152,7 @@ impl Walker {
         self.stack.last().map_or("", |frame| &frame.name)
     }
 
+    /// Begins an element outside a geometry: an object, a boundary surface, or a geometry property.
     fn start_outside(&mut self, name: &str, id: Option<&str>, link: Option<&str>, line: usize) -> Mark {
         if OBJECT_PROPERTIES.contains(&self.parent()) {
             let id = id.map_or_else(|| format!("{name} in line {line}"), str::to_owned);
@@ -173,6 +184,7 @@ impl Walker {
         }
     }
 
+    /// Begins an element within a geometry property.
     fn start_in_geometry(&mut self, name: &str, attributes: &Attributes, line: usize) -> Mark {
         let in_polygon = self.geometry.as_ref().is_some_and(|g| g.polygon.is_some());
         let parent = self.parent().to_owned();
@@ -181,7 +193,7 @@ impl Walker {
             return Mark::Implicit { field, text: String::new() };
         }
         let in_reference = name == "referencePoint" || parent == "referencePoint";
-        if let (Some(link), false) = (attribute(attributes, "href"), in_polygon || in_reference) {
+        if let (Some(link), false) = (attributes.get("href"), in_polygon || in_reference) {
             self.member(Target::Link(link.to_owned()), line);
         }
         let (Some(progress), Some(group)) = (&mut self.geometry, self.groups.last_mut()) else { return Mark::Nothing };
@@ -204,7 +216,7 @@ impl Walker {
                 Mark::Nothing
             }
             "OrientableSurface" => {
-                let turned = attribute(attributes, "orientation") == Some("-");
+                let turned = attributes.get("orientation") == Some("-");
                 let before = progress.turned;
                 progress.turned ^= turned;
                 Mark::Orientable { before }
@@ -231,12 +243,13 @@ impl Walker {
         }
     }
 
-    /// What an element says about an implicit geometry.
+    /// Returns the field of an implicit geometry that an element is.
     fn field(&self, name: &str) -> Option<Field> {
         self.geometry.as_ref()?.implicit.as_ref()?;
         Field::of(name, self.stack.iter().map(|frame| frame.name.as_str()))
     }
 
+    /// Adds text to the open element, if its text is read.
     pub(super) fn text(&mut self, text: &str) {
         let frame = self.stack.last_mut();
         if let Some(Mark::Positions { text: so_far } | Mark::Implicit { text: so_far, .. }) = frame.map(|f| &mut f.mark)
@@ -245,6 +258,7 @@ impl Walker {
         }
     }
 
+    /// Ends the open element.
     pub(super) fn end(&mut self) {
         let Some(frame) = self.stack.pop() else { return };
         match frame.mark {
@@ -274,7 +288,7 @@ impl Walker {
         }
     }
 
-    /// Adds a member to the geometry that the walk is in.
+    /// Adds a member to the open geometry.
     fn member(&mut self, target: Target, line: usize) {
         if let (Some(progress), Some(group)) = (&self.geometry, self.groups.last_mut()) {
             let (shell, turned, class) = (progress.shell, progress.turned, self.class);
@@ -283,6 +297,7 @@ impl Walker {
         }
     }
 
+    /// Gives an identifier to the members of the open geometry from `first` on.
     fn name_members(&mut self, id: Option<String>, first: usize) {
         let last = self.groups.last().map_or(0, |group| group.members.len());
         if let (Some(id), true) = (id, first < last) {
@@ -291,6 +306,7 @@ impl Walker {
         }
     }
 
+    /// Ends a geometry property, and drops it when it has no surface.
     fn end_geometry(&mut self) {
         let Some(Progress { implicit, .. }) = self.geometry.take() else { return };
         let Some(group) = self.groups.last_mut() else { return };
@@ -300,23 +316,23 @@ impl Walker {
         }
         let (code, detail) = match implicit {
             Some(implicit) => implicit.without_shape(),
-            None => (DefectCode::EmptyPrimitive, "no surface".to_owned()),
+            None => (DefectCode::EmptyPrimitive, "the property has no surface".to_owned()),
         };
         let (object, place) = (group.object, format!("line {}", group.line));
         self.builder.dropped(code, object, place, detail);
         self.groups.pop();
     }
 
-    /// Takes the numbers of a position or a list of them.
+    /// Adds the numbers of `pos`, `posList` or `coordinates` to the open ring.
     fn positions(&mut self, text: &str, element: &str, dimension: usize) {
         let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.as_mut()) else { return };
         let Some(ring) = &mut polygon.ring else { return };
         if dimension != 3 {
-            let detail = format!("coordinates of {dimension} dimensions");
+            let detail = format!("coordinates have {dimension} dimensions, expected 3");
             polygon.problem.get_or_insert((DefectCode::NotSupported, detail));
             return;
         }
-        // GML 2 separates the numbers of a tuple by commas.
+        // GML 2 separates the numbers of a tuple with commas.
         let commas = element == "coordinates";
         let words = text.split(|c: char| c.is_whitespace() || (commas && c == ',')).filter(|word| !word.is_empty());
         for word in words {
@@ -331,12 +347,13 @@ impl Walker {
         }
     }
 
+    /// Ends a ring: makes vertices of its coordinates.
     fn end_ring(&mut self) {
         let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.as_mut()) else { return };
         let numbers = polygon.ring.take().unwrap_or_default();
         let (points, rest) = numbers.as_chunks::<3>();
         if !rest.is_empty() {
-            let detail = format!("{} numbers are no positions of three", numbers.len());
+            let detail = format!("a ring has {} numbers, which is not a multiple of three", numbers.len());
             polygon.problem.get_or_insert((DefectCode::CoordinateOutOfRange, detail));
             return;
         }
@@ -364,6 +381,7 @@ impl Walker {
         polygon.rings.push(ring);
     }
 
+    /// Ends a polygon, and reports it when it cannot be used.
     fn end_polygon(&mut self, id: Option<String>) {
         let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.take()) else { return };
         let object = self.groups.last().map_or(0, |group| group.object);
@@ -397,6 +415,7 @@ impl Walker {
         }
     }
 
+    /// Assembles the geometries, and returns the model and its defects.
     pub(super) fn finish(mut self) -> Result<(CityModel, Vec<Defect>), CityFault> {
         self.builder.set_crs(crs_reference(self.srs_name.as_deref().unwrap_or_default()));
         assemble(&mut self.builder, &self.groups, self.polygons, &self.named)?;
@@ -404,7 +423,7 @@ impl Walker {
     }
 }
 
-/// The level of a property such as `lod2MultiSurface`; `None` for others and for those that hold no surfaces.
+/// Returns the level of a property such as `lod2MultiSurface`, or `None` for a property without surfaces.
 fn lod_of_property(name: &str) -> Option<Lod> {
     let rest = name.strip_prefix("lod")?;
     let digit = rest.bytes().next().filter(u8::is_ascii_digit)?;

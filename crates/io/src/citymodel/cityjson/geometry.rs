@@ -1,11 +1,11 @@
-//! The surfaces of a CityJSON geometry: nested boundaries unrolled, semantics laid beside them.
+//! The surfaces of a CityJSON geometry, from its nested boundaries and semantics.
 
-use city::{DefectCode, Geometry, GeometryKind, Lod, Surface, SurfaceClass};
+use city::{DefectCode, Geometry, GeometryKind, Lod, SurfaceClass, SurfacePolygon};
 
 use super::schema::{Nested, Semantics, Shape};
 use crate::citymodel::builder::Builder;
 
-/// Where a geometry is in the file.
+/// Object and number of a geometry, for its defects.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub(super) object: usize,
@@ -22,13 +22,13 @@ impl Place {
     }
 }
 
-/// The kind of a geometry of surfaces; `None` for points and lines.
+/// Returns the kind of a geometry of surfaces, or `None` for points and lines.
 pub(super) fn surface_kind(name: &str) -> Option<GeometryKind> {
     use GeometryKind::{CompositeSolid, CompositeSurface, MultiSolid, MultiSurface, Solid};
     [MultiSurface, CompositeSurface, Solid, MultiSolid, CompositeSolid].into_iter().find(|kind| kind.name() == name)
 }
 
-/// Adds a geometry to its object; surfaces that cannot be used become defects.
+/// Adds a geometry to its object. Surfaces that cannot be used become defects.
 pub(super) fn add(builder: &mut Builder, shape: &Shape, vertex_at: impl FnMut(u64) -> Option<u32>, place: Place) {
     let name = shape.kind.as_deref().unwrap_or_default();
     let Some(kind) = surface_kind(name) else {
@@ -41,7 +41,12 @@ pub(super) fn add(builder: &mut Builder, shape: &Shape, vertex_at: impl FnMut(u6
         GeometryKind::Solid => 1,
         GeometryKind::MultiSolid | GeometryKind::CompositeSolid => 2,
     };
-    unroll.level(&shape.boundaries, depth, (0, 0), shape.semantics.as_ref().map(|s| (s, &s.values)));
+    unroll.level(
+        &shape.boundaries,
+        depth,
+        Member { solid: 0, shell: 0 },
+        shape.semantics.as_ref().map(|s| (s, &s.values)),
+    );
     let surfaces = unroll.found;
     if surfaces.is_empty() {
         return builder.dropped(DefectCode::EmptyPrimitive, place.object, place.text(), "");
@@ -61,39 +66,49 @@ fn lod_of(builder: &mut Builder, shape: &Shape, place: Place) -> Option<Lod> {
     lod
 }
 
+/// Numbers of the solid and the shell that a surface belongs to.
+#[derive(Clone, Copy)]
+struct Member {
+    solid: u32,
+    shell: u32,
+}
+
+/// The walk over the boundaries of a geometry.
 struct Unroll<'a, F> {
     builder: &'a mut Builder,
     vertex_at: F,
     place: Place,
-    found: Vec<Surface>,
+    found: Vec<SurfacePolygon>,
 }
 
+/// The semantics of a geometry, and their values at the level of the walk.
 type Values<'a> = Option<(&'a Semantics, &'a Nested)>;
 
 impl<F: FnMut(u64) -> Option<u32>> Unroll<'_, F> {
-    /// Walks down `depth` levels of solids and shells to lists of surfaces.
-    fn level(&mut self, boundaries: &Nested, depth: u8, (solid, shell): (u32, u32), values: Values<'_>) {
+    /// Descends `depth` levels of solids and shells to the lists of surfaces.
+    fn level(&mut self, boundaries: &Nested, depth: u8, member: Member, values: Values<'_>) {
         if matches!(boundaries, Nested::List(list) if list.is_empty()) && depth == 1 {
-            let place = format!("{}, solid {solid}", self.place.text());
+            let place = format!("{}, solid {}", self.place.text(), member.solid);
             self.builder.dropped(DefectCode::EmptyPrimitive, self.place.object, place, "");
         }
         for (i, below) in boundaries.list().iter().enumerate() {
             let number = i as u32;
             let value = values.and_then(|(semantics, nested)| Some((semantics, nested.list().get(i)?)));
             match depth {
-                0 => self.surface(below, (solid, shell), value),
-                1 => self.level(below, 0, (solid, number), value),
-                _ => self.level(below, depth - 1, (number, 0), value),
+                0 => self.surface(below, member, value),
+                1 => self.level(below, 0, Member { shell: number, ..member }, value),
+                _ => self.level(below, depth - 1, Member { solid: number, shell: 0 }, value),
             }
         }
     }
 
-    fn surface(&mut self, rings: &Nested, (solid, shell): (u32, u32), value: Values<'_>) {
+    /// Adds a surface, or a defect when it cannot be used.
+    fn surface(&mut self, rings: &Nested, Member { solid, shell }: Member, value: Values<'_>) {
         let number = self.found.len();
         match self.rings(rings) {
             Ok(rings) => {
                 let class = value.map_or(SurfaceClass::Unclassified, |(s, value)| self.class(s, value, number));
-                self.found.push(Surface { rings, class, solid, shell });
+                self.found.push(SurfacePolygon { rings, class, solid, shell });
             }
             Err((code, detail)) => {
                 self.builder.dropped(code, self.place.object, self.place.surface(number), detail);
@@ -111,7 +126,7 @@ impl<F: FnMut(u64) -> Option<u32>> Unroll<'_, F> {
 
     fn vertex(&mut self, index: &Nested) -> Result<u32, (DefectCode, String)> {
         let Nested::Index(index) = *index else {
-            return Err((DefectCode::VertexOutOfRange, "a ring holds something that is no index".to_owned()));
+            return Err((DefectCode::VertexOutOfRange, "a ring has an element that is not an index".to_owned()));
         };
         let vertex =
             (self.vertex_at)(index).ok_or_else(|| (DefectCode::VertexOutOfRange, format!("vertex {index}")))?;

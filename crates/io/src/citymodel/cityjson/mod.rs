@@ -1,7 +1,7 @@
-//! CityJSON 1.0, 1.1 and 2.0, and CityJSON text sequences (CityJSONSeq), to and from a city model.
+//! Reads CityJSON 1.0, 1.1 and 2.0 and CityJSON text sequences (CityJSONSeq), and writes CityJSON 2.0.
 //!
-//! A text that is no JSON, or whose members have the wrong type, is refused with its line and column. Inside a document
-//! a defect costs the surface it is in. Extensions, appearance and attributes are passed over.
+//! A text that is not JSON, or has members of the wrong type, is refused with its line and column. Any other defect costs
+//! only the surface that has it. Extensions, appearance and attributes are skipped.
 
 mod geometry;
 mod schema;
@@ -12,13 +12,14 @@ use city::{ModelPoint, ObjectKind};
 
 use super::builder::Builder;
 use super::crs_name::crs_reference;
+use super::error::CityFault;
+use super::format::{CityFormat, Parsed};
 use super::placement::Instances;
-use super::{CityFault, CityFormat, Parsed};
 use schema::{Document, Object, Pairs, Templates, Transform};
 
 pub use write::{CityJsonOptions, write_cityjson};
 
-/// Versions that are read; patch numbers may follow.
+/// Versions that are read. A patch number may follow.
 const VERSIONS: [&str; 3] = ["1.0", "1.1", "2.0"];
 
 /// Reads a document, or the lines of a sequence.
@@ -45,7 +46,7 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
     Ok(Parsed { model, format, defects })
 }
 
-/// The error of serde_json as a fault with a place.
+/// Converts an error of serde_json to a fault with a place.
 fn syntax(error: serde_json::Error) -> CityFault {
     let place = format!("line {}, column {}", error.line(), error.column());
     let text = error.to_string();
@@ -53,13 +54,12 @@ fn syntax(error: serde_json::Error) -> CityFault {
     CityFault::invalid(what, place)
 }
 
-/// The version of a document that can be read.
+/// Checks type and version of the first document, and returns the version.
 fn check_head(document: &Document) -> Result<String, CityFault> {
     match document.kind.as_deref() {
         Some("CityJSON") => {}
         Some("CityJSONFeature") => {
-            let what =
-                "a CityJSONFeature alone does not say where it is: put the CityJSON line of its sequence before it";
+            let what = "a CityJSONFeature alone has no coordinates, put the CityJSON line of its sequence before it";
             return Err(CityFault::unsupported(what, "type"));
         }
         Some(other) => {
@@ -70,7 +70,10 @@ fn check_head(document: &Document) -> Result<String, CityFault> {
     }
     let version = document.version.as_deref().unwrap_or_default();
     if !VERSIONS.iter().any(|known| version == *known || version.starts_with(&format!("{known}."))) {
-        let what = format!("version {:?} of CityJSON, 1.0 to 2.0 are read: upgrade it with cjio", shorten(version));
+        let what = format!(
+            "the version of CityJSON is {:?}, expected 1.0 to 2.0, upgrade the file with cjio",
+            shorten(version)
+        );
         return Err(CityFault::unsupported(what, "version"));
     }
     Ok(version.to_owned())
@@ -87,9 +90,10 @@ struct Reader {
 }
 
 impl Reader {
+    /// Adds the objects of a line of a sequence.
     fn feature(&mut self, feature: Document, shared: Option<&Templates>, place: &str) -> Result<(), CityFault> {
         if feature.kind.as_deref() != Some("CityJSONFeature") {
-            return Err(CityFault::invalid("expected a CityJSONFeature", place));
+            return Err(CityFault::invalid("the line is not a CityJSONFeature", place));
         }
         if self.transform.is_none() {
             let what = "the first line of the sequence has no transform, so its features have no coordinates";
@@ -98,7 +102,7 @@ impl Reader {
         self.document(feature.vertices, feature.objects, shared)
     }
 
-    /// Adds the objects of a document; `vertices` are those that its boundaries count.
+    /// Adds the objects of a document. Its boundaries are indices of `vertices`.
     fn document(
         &mut self,
         vertices: Vec<[f64; 3]>,
@@ -110,7 +114,9 @@ impl Reader {
         for vertex in vertices {
             let point = self.transform.map_or(vertex, |t| apply(t, vertex));
             let added = self.builder.vertex(ModelPoint::from(point));
-            added.ok_or_else(|| CityFault::unsupported("more than 2^32 vertices", "vertices"))?;
+            added.ok_or_else(|| {
+                CityFault::unsupported("the model has more than 2^32 vertices, cut it into tiles", "vertices")
+            })?;
         }
         for (id, object) in objects.into_iter().flat_map(|pairs| pairs.0) {
             let kind = object.kind.unwrap_or_else(|| "Unknown".to_owned());

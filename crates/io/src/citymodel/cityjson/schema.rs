@@ -1,4 +1,4 @@
-//! What is read of a CityJSON document, as serde sees it; everything else in it is passed over.
+//! The members of a CityJSON document that are read. Other members are skipped.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -77,7 +77,7 @@ pub(super) struct Templates {
     pub(super) vertices: Vec<[f64; 3]>,
 }
 
-/// A level of detail: text since version 1.1, a number before.
+/// Level of detail: text since version 1.1, a number before.
 #[derive(Debug, serde::Deserialize)]
 #[serde(untagged)]
 pub(super) enum LodText {
@@ -94,7 +94,7 @@ impl fmt::Display for LodText {
     }
 }
 
-/// The members of a JSON object in the order of the file, repeated names included.
+/// The members of a JSON object in the order of the file, including repeated names.
 #[derive(Debug)]
 pub(super) struct Pairs<T>(pub(super) Vec<(String, T)>);
 
@@ -123,19 +123,19 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Pairs<T> {
 /// Indices in nested arrays of any depth.
 #[derive(Debug, Default, PartialEq)]
 pub(super) enum Nested {
-    /// `null`, or nothing.
+    /// `null`, or a missing member.
     #[default]
     Null,
     /// An index.
     Index(u64),
-    /// Something that is no index: a negative or broken number, text, an object.
+    /// Something else: a number that is negative or not whole, text, an object.
     Other,
     /// An array.
     List(Vec<Nested>),
 }
 
 impl Nested {
-    /// The elements; none where it is no array.
+    /// Returns the elements of an array, and nothing for other values.
     pub(super) fn list(&self) -> &[Nested] {
         match self {
             Self::List(list) => list,

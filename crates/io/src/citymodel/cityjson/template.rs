@@ -1,4 +1,4 @@
-//! Geometry templates: a shape with its own vertices, placed at a vertex of the model by a 4 × 4 matrix (row by row).
+//! Geometry templates: shapes with their own vertices, placed at a vertex of the model by a 4 × 4 matrix in row order.
 
 use std::ops::Range;
 
@@ -6,11 +6,11 @@ use city::DefectCode;
 
 use super::geometry::{Place, add};
 use super::schema::{Nested, Shape, Templates};
-use crate::citymodel::CityFault;
 use crate::citymodel::builder::Builder;
+use crate::citymodel::error::CityFault;
 use crate::citymodel::placement::{Instances, Placement};
 
-/// Adds an instance as a geometry of its own. `vertices` are those of the document in the model.
+/// Adds an instance as a geometry. `vertices` is the range of the document's vertices in the model.
 pub(super) fn add_instance(
     builder: &mut Builder,
     instances: &mut Instances,
@@ -46,13 +46,14 @@ pub(super) fn add_instance(
     Ok(())
 }
 
+/// A template, and the vertices of all templates.
 type Found<'a> = (&'a Shape, &'a [[f64; 3]]);
 
 fn template<'a>(instance: &Shape, templates: Option<&'a Templates>) -> Result<Found<'a>, &'static str> {
     let index = instance.template.and_then(|index| usize::try_from(index).ok());
-    let shape = index.and_then(|index| templates?.templates.get(index)).ok_or("a template that is in the file")?;
+    let shape = index.and_then(|index| templates?.templates.get(index)).ok_or("a template of the file")?;
     if shape.kind.as_deref() == Some("GeometryInstance") {
-        return Err("a template that is no instance itself");
+        return Err("a template that is not an instance itself");
     }
     Ok((shape, templates.map_or(&[], |t| &t.vertices)))
 }
@@ -62,7 +63,7 @@ fn matrix(instance: &Shape) -> Result<[f64; 16], &'static str> {
     matrix.ok_or("a transformationMatrix of 16 numbers")
 }
 
-/// The vertices that a shape uses, ascending; indices that are not there are left for [`add`] to report.
+/// Returns the vertices that a shape uses, ascending. [`add`] reports indices that do not exist.
 fn used_vertices(shape: &Shape, count: usize) -> Vec<usize> {
     let mut used = Vec::new();
     let mut open = vec![&shape.boundaries];

@@ -1,24 +1,24 @@
-//! CityJSON 2.0 out of a city model.
+//! Writes CityJSON 2.0.
 //!
-//! Coordinates are whole multiples of the scale (1 mm unless asked otherwise), counted from a corner of the model; vertices
-//! that fall on the same place become one. The classes that CityJSON has no name for are written without semantics.
+//! Coordinates are whole multiples of the scale (1 mm by default), counted from a corner of the model. Vertices that get
+//! the same coordinates are merged. Classes that CityJSON has no name for are written without semantics.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use city::{CityModel, CityObject, Geometry, GeometryKind, ModelPoint, Role, Surface, SurfaceClass};
+use city::{BuildingRole, CityModel, CityObject, Geometry, GeometryKind, ModelPoint, SurfaceClass, SurfacePolygon};
 use serde_json::{Map, Value, json};
 
 use crate::atomic::write_stream;
 use crate::citymodel::crs_name::ogc_url;
-use crate::citymodel::{CityError, CityFault};
+use crate::citymodel::error::{CityError, CityFault};
 
-/// How a CityJSON file is written.
+/// Options for writing a CityJSON file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CityJsonOptions {
-    /// Resolution of the coordinates in their own unit.
+    /// Resolution of the coordinates, in their unit.
     pub scale: f64,
-    /// Replace a file that is there.
+    /// Whether an existing file is replaced.
     pub overwrite: bool,
 }
 
@@ -31,8 +31,21 @@ impl Default for CityJsonOptions {
 /// Writes a model as CityJSON 2.0.
 ///
 /// # Errors
-/// A model that fails [`CityModel::validate`] or whose objects share an id, a scale that is not positive, and what the
-/// file system refuses. Nothing is left behind.
+/// - [`CityError::Refused`] when the model fails [`CityModel::validate`], two objects share an identifier, or the scale is
+///   not positive.
+/// - [`CityError::NotWritten`] when the file exists and `overwrite` is false, or the system refuses to write.
+///
+/// # Examples
+/// ```
+/// use io::citymodel::{CityJsonOptions, read, write_cityjson};
+///
+/// let folder = tempfile::tempdir()?;
+/// let (obj, json) = (folder.path().join("roof.obj"), folder.path().join("roof.city.json"));
+/// std::fs::write(&obj, "v 0 0 3\nv 4 0 3\nv 0 4 3\no house\nusemtl RoofSurface\nf 1 2 3\n")?;
+/// write_cityjson(&json, &read(&obj)?.model, &CityJsonOptions::default())?;
+/// assert_eq!(read(&json)?.model.objects[0].id, "house");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_cityjson(path: &Path, model: &CityModel, options: &CityJsonOptions) -> Result<(), CityError> {
     let document = document(model, options.scale).map_err(|fault| fault.at(path))?;
     Ok(write_stream(path, options.overwrite, |out| {
@@ -59,7 +72,7 @@ fn document(model: &CityModel, scale: f64) -> Result<Value, CityFault> {
     for (index, object) in model.objects.iter().enumerate() {
         let value = object_value(model, object, children.get(&index), &mut lattice);
         if objects.insert(object.id.clone(), value).is_some() {
-            let what = format!("two objects have the id {:?}, and CityJSON allows one", object.id);
+            let what = format!("two objects have the identifier {:?}, CityJSON allows only one", object.id);
             return Err(CityFault::new(city::DefectCode::DuplicateId, what, "model"));
         }
     }
@@ -76,7 +89,7 @@ fn document(model: &CityModel, scale: f64) -> Result<Value, CityFault> {
     Ok(document)
 }
 
-/// Vertices on whole multiples of the scale.
+/// The vertices of the file, on whole multiples of the scale.
 struct Lattice {
     scale: f64,
     translate: [f64; 3],
@@ -96,8 +109,8 @@ impl Lattice {
 }
 
 fn object_value(model: &CityModel, object: &CityObject, children: Option<&Vec<&str>>, lattice: &mut Lattice) -> Value {
-    // CityJSON 2.0 knows no room outside of a building and no part without a parent: a lone part is a building.
-    let lone_part = object.parent.is_none() && object.kind.role() == Role::Part;
+    // CityJSON 2.0 does not allow a part without a parent, so a lone part is written as a building.
+    let lone_part = object.parent.is_none() && object.kind.role() == BuildingRole::Part;
     let mut value = json!({ "type": if lone_part { "Building" } else { object.kind.name() } });
     if let Some(parent) = object.parent {
         value["parents"] = json!([model.objects[parent].id]);
@@ -115,11 +128,11 @@ fn geometry_value(model: &CityModel, geometry: &Geometry, lattice: &mut Lattice)
     classes.sort_unstable();
     classes.dedup();
     classes.retain(|class| !matches!(class, SurfaceClass::Unclassified | SurfaceClass::Other));
-    let boundary = |surface: &Surface, lattice: &mut Lattice| -> Value {
+    let boundary = |surface: &SurfacePolygon, lattice: &mut Lattice| -> Value {
         let vertex = |&i: &u32| model.vertices[i as usize];
         surface.rings.iter().map(|ring| ring.iter().map(|i| lattice.index(vertex(i))).collect::<Value>()).collect()
     };
-    let semantic = |surface: &Surface| json!(classes.binary_search(&surface.class).ok());
+    let semantic = |surface: &SurfacePolygon| json!(classes.binary_search(&surface.class).ok());
     let boundaries = nest(geometry, |surface| boundary(surface, lattice));
     let lod = geometry.lod.map_or_else(|| "2".to_owned(), |lod| lod.to_string());
     let mut value = json!({ "type": geometry.kind.name(), "lod": lod, "boundaries": boundaries });
@@ -130,17 +143,17 @@ fn geometry_value(model: &CityModel, geometry: &Geometry, lattice: &mut Lattice)
     value
 }
 
-/// One value per surface, in the arrays of solids and shells that the kind of the geometry asks for.
-fn nest(geometry: &Geometry, mut each: impl FnMut(&Surface) -> Value) -> Value {
-    let groups = |surfaces: &[&Surface], key: fn(&Surface) -> u32| -> Vec<Vec<usize>> {
+/// Nests one value per surface in arrays of solids and shells, as the kind of the geometry requires.
+fn nest(geometry: &Geometry, mut each: impl FnMut(&SurfacePolygon) -> Value) -> Value {
+    let groups = |surfaces: &[&SurfacePolygon], key: fn(&SurfacePolygon) -> u32| -> Vec<Vec<usize>> {
         let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (i, surface) in surfaces.iter().enumerate() {
             members.entry(key(surface)).or_default().push(i);
         }
         members.into_values().collect()
     };
-    let all: Vec<&Surface> = geometry.surfaces.iter().collect();
-    let mut solid = |members: Vec<&Surface>| -> Value {
+    let all: Vec<&SurfacePolygon> = geometry.surfaces.iter().collect();
+    let mut solid = |members: Vec<&SurfacePolygon>| -> Value {
         let shells = groups(&members, |surface| surface.shell);
         shells.into_iter().map(|shell| shell.into_iter().map(|i| each(members[i])).collect::<Value>()).collect()
     };

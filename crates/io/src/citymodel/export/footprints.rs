@@ -1,34 +1,35 @@
-//! Footprints of the objects with their heights, as GeoJSON (RFC 7946: longitude and latitude, WGS 84).
+//! Writes the footprints of the objects with their heights as GeoJSON (RFC 7946: longitude and latitude, WGS 84).
 //!
-//! The footprint of an object are its ground surfaces, or where none is classed as such, its surfaces that look down. Rings
-//! of a multi-surface may touch: they are written as they are, and not dissolved.
+//! The footprint of an object consists of its ground surfaces, or if it has none, of its surfaces that face down. Polygons
+//! that touch are not merged.
 
 use std::path::Path;
 
-use city::{CityModel, ModelPoint, ObjectReport, ObjectStatus, Surface, SurfaceClass};
+use city::{CityModel, ModelPoint, ObjectReport, ObjectStatus, SurfaceClass, SurfacePolygon};
 use crs::MapProjection;
 use serde_json::{Value, json};
 
 use crate::atomic::write_stream;
-use crate::citymodel::{CityError, CityFault};
+use crate::citymodel::error::{CityError, CityFault};
 
-/// What was written.
+/// Counts of the objects in a file of footprints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Footprints {
     /// Objects with a footprint.
     pub written: usize,
-    /// Objects that were used and have no surface that looks down.
+    /// Objects that were used and have no surface that faces down.
     pub without: usize,
 }
 
-/// Writes the footprints of the objects that `reports` (one per object) say are used, at their level of detail.
+/// Writes the footprints of the objects that are used according to `reports`, at their level of detail.
 ///
-/// Properties: `id`, `kind`, `parent`, `lod`, and in metres above the model's vertical datum `ground_m`, `top_m`, and their
-/// difference `height_m`.
+/// `reports` has one entry per object. The properties of a footprint are `id`, `kind`, `parent`, `lod`, the heights
+/// `ground_m` and `top_m` in metres above the vertical datum of the model, and their difference `height_m`.
 ///
 /// # Errors
-/// A model without a known reference system, or with coordinates outside of it (refused with numbers 1010, 1011 and
-/// 1002); [`CityError::NotWritten`]: the file exists and `overwrite` is false, or the system refuses.
+/// - [`CityError::Refused`] when the model has no known reference system (1010, 1011), or coordinates that it cannot
+///   project (1002).
+/// - [`CityError::NotWritten`] when the file exists and `overwrite` is false, or the system refuses to write.
 pub fn write_footprints(
     path: &Path,
     model: &CityModel,
@@ -51,7 +52,10 @@ fn features(model: &CityModel, reports: &[ObjectReport]) -> Result<(Vec<Value>, 
     use city::DefectCode::{CrsMissing, CrsUnknown};
     let Some(code) = model.crs.epsg else {
         let code = if model.crs.is_missing() { CrsMissing } else { CrsUnknown };
-        let what = format!("GeoJSON is in longitude and latitude, and the model's reference system is {}", model.crs);
+        let what = format!(
+            "GeoJSON needs a model with a known reference system, the reference system of this one is {}",
+            model.crs
+        );
         return Err(CityFault::new(code, what, "model"));
     };
     let projection = MapProjection::from_definition(&format!("EPSG:{code}"))
@@ -63,7 +67,7 @@ fn features(model: &CityModel, reports: &[ObjectReport]) -> Result<(Vec<Value>, 
             continue;
         }
         let geometries = object.geometries.iter().filter(|geometry| geometry.lod == report.lod);
-        let surfaces: Vec<&Surface> = geometries.flat_map(|geometry| &geometry.surfaces).collect();
+        let surfaces: Vec<&SurfacePolygon> = geometries.flat_map(|geometry| &geometry.surfaces).collect();
         let heights = surfaces.iter().flat_map(|s| s.rings.iter().flatten()).map(|&i| position(model, i).z);
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
         let polygons: Result<Vec<Value>, CityFault> =
@@ -100,17 +104,17 @@ fn position(model: &CityModel, vertex: u32) -> ModelPoint {
 }
 
 /// The ground surfaces, or those that look down.
-fn bottom<'a>(model: &CityModel, surfaces: &[&'a Surface]) -> Vec<&'a Surface> {
-    let ground = |surface: &&&Surface| surface.class == SurfaceClass::Ground;
-    let classed: Vec<&Surface> = surfaces.iter().filter(ground).copied().collect();
+fn bottom<'a>(model: &CityModel, surfaces: &[&'a SurfacePolygon]) -> Vec<&'a SurfacePolygon> {
+    let ground = |surface: &&&SurfacePolygon| surface.class == SurfaceClass::Ground;
+    let classed: Vec<&SurfacePolygon> = surfaces.iter().filter(ground).copied().collect();
     if !classed.is_empty() {
         return classed;
     }
     surfaces.iter().filter(|surface| looks_down(model, surface)).copied().collect()
 }
 
-/// Whether the outer ring runs clockwise seen from above, and is flatter than 45 degrees.
-fn looks_down(model: &CityModel, surface: &Surface) -> bool {
+/// Returns whether the outer ring is clockwise seen from above, and its slope is below 45 degrees.
+fn looks_down(model: &CityModel, surface: &SurfacePolygon) -> bool {
     let Some(ring) = surface.rings.first().filter(|ring| ring.len() >= 3) else { return false };
     let origin = position(model, ring[0]);
     let at = |i: usize| position(model, ring[i % ring.len()]).from_origin(origin);
@@ -123,8 +127,8 @@ fn looks_down(model: &CityModel, surface: &Surface) -> bool {
     -normal[2] > normal[0].hypot(normal[1])
 }
 
-/// Rings as GeoJSON wants them: closed, the outer one counter-clockwise seen from above, the others clockwise.
-fn polygon(model: &CityModel, surface: &Surface, projection: &MapProjection) -> Result<Value, CityFault> {
+/// Returns the rings as GeoJSON: closed, the outer ring counter-clockwise seen from above, holes clockwise.
+fn polygon(model: &CityModel, surface: &SurfacePolygon, projection: &MapProjection) -> Result<Value, CityFault> {
     let ring = |(number, ring): (usize, &Vec<u32>)| -> Result<Value, CityFault> {
         let mut points: Vec<[f64; 2]> = Vec::with_capacity(ring.len() + 1);
         for &vertex in ring {
@@ -132,7 +136,7 @@ fn polygon(model: &CityModel, surface: &Surface, projection: &MapProjection) -> 
             let (lon, lat) = projection
                 .lonlat_from_map(at.x, at.y)
                 .map_err(|error| CityFault::new(city::DefectCode::CoordinateOutOfRange, error.to_string(), "model"))?;
-            // 1e-8 degrees are a millimetre.
+            // 1e-8 degrees are about a millimetre.
             points.push([lon, lat].map(|degrees| (degrees * 1e8).round() / 1e8));
         }
         let turn = |i: usize| {

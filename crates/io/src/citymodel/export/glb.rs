@@ -1,8 +1,8 @@
-//! glTF 2.0 in one binary file: a node and a mesh per city object, a primitive and a colour per class.
+//! Writes glTF 2.0 as one binary file: a node and a mesh per city object, a primitive and a colour per class.
 //!
-//! glTF has y up: (x, y, z) of the model become (x, z, −y). Positions are f32 metres from the origin, which stands with the
-//! reference system in the asset's extras. Corners are shared within an object; faces have no normals, so viewers shade
-//! them flat.
+//! The y axis of glTF points up: (x, y, z) of the model becomes (x, z, −y). Positions are f32 metres from the origin, which
+//! the extras of the asset hold together with the reference system. The triangles of an object share their corners. Faces
+//! have no normals, so that viewers shade them flat.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -10,14 +10,14 @@ use std::io::Write;
 use city::SurfaceClass;
 use serde_json::{Value, json};
 
-use super::Export;
+use super::source::Export;
 
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// The JSON and the binary part.
+/// Returns the JSON chunk and the binary chunk.
 pub(super) fn encode(export: &Export<'_>) -> Result<(Vec<u8>, Vec<u8>), String> {
     let mut scene = Scene::default();
     let materials: Vec<SurfaceClass> = SurfaceClass::all().collect();
@@ -35,7 +35,7 @@ pub(super) fn encode(export: &Export<'_>) -> Result<(Vec<u8>, Vec<u8>), String> 
         "scenes": [{}],
         "materials": materials.iter().map(|&class| material(class)).collect::<Value>(),
     });
-    // glTF allows no empty lists.
+    // glTF does not allow empty lists.
     if !scene.nodes.is_empty() {
         document["scenes"] = json!([{ "nodes": (0..scene.nodes.len()).collect::<Vec<_>>() }]);
         document["nodes"] = Value::Array(scene.nodes);
@@ -46,14 +46,15 @@ pub(super) fn encode(export: &Export<'_>) -> Result<(Vec<u8>, Vec<u8>), String> 
     }
     let mut text = document.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
-    // The header, two chunk headers, and both chunks.
+    // 28 bytes are the header and the two chunk headers.
     let total = 28 + text.len() + scene.binary.len();
     if u32::try_from(total).is_err() {
-        return Err(format!("a glTF file holds up to 4 GiB, this one would have {total} bytes: write PLY"));
+        return Err(format!("a glTF file holds at most 4 GiB, this one would have {total} bytes, write PLY instead"));
     }
     Ok((text, scene.binary))
 }
 
+/// Writes the header and both chunks.
 pub(super) fn write(out: &mut dyn Write, json: &[u8], binary: &[u8]) -> std::io::Result<()> {
     let mut put = |number: usize| out.write_all(&(number as u32).to_le_bytes());
     let binary_chunk = if binary.is_empty() { 0 } else { 8 + binary.len() };
@@ -71,6 +72,7 @@ pub(super) fn write(out: &mut dyn Write, json: &[u8], binary: &[u8]) -> std::io:
     Ok(())
 }
 
+/// The lists of the JSON document, and the binary chunk.
 #[derive(Default)]
 struct Scene {
     nodes: Vec<Value>,
@@ -81,6 +83,7 @@ struct Scene {
 }
 
 impl Scene {
+    /// Adds an object with its triangles.
     fn add(
         &mut self,
         export: &Export<'_>,
@@ -113,6 +116,7 @@ impl Scene {
         self.meshes.push(json!({ "primitives": primitives }));
     }
 
+    /// Adds positions and returns the index of their accessor.
     fn positions(&mut self, positions: &[[f32; 3]]) -> usize {
         let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
             [0, 1, 2].map(|axis| positions.iter().fold(start, |bound, p| pick(bound, p[axis])))
@@ -126,6 +130,7 @@ impl Scene {
         self.accessors.len() - 1
     }
 
+    /// Adds corners and returns the index of their accessor.
     fn indices(&mut self, indices: &[u32]) -> usize {
         let view = self.view(indices.iter().flat_map(|i| i.to_le_bytes()), ELEMENT_ARRAY_BUFFER);
         self.accessors.push(json!({
@@ -134,6 +139,7 @@ impl Scene {
         self.accessors.len() - 1
     }
 
+    /// Adds bytes and returns the index of their buffer view.
     fn view(&mut self, bytes: impl Iterator<Item = u8>, target: u32) -> usize {
         let start = self.binary.len();
         self.binary.extend(bytes);
@@ -143,7 +149,7 @@ impl Scene {
     }
 }
 
-/// Red roofs, light walls, brown ground: linear RGB.
+/// Returns the material of a class. Colours are linear RGB.
 fn material(class: SurfaceClass) -> Value {
     let colour = match class {
         SurfaceClass::Roof => [0.6, 0.12, 0.08],

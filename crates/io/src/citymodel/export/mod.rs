@@ -1,40 +1,40 @@
-//! Triangles of a city model for other programs: OBJ, PLY, glTF; and footprints as GeoJSON.
+//! Writes the triangles of a city model as OBJ, PLY or glTF, and its footprints as GeoJSON.
 //!
-//! Formats whose numbers are f32 (PLY, glTF) hold positions relative to the mesh's origin, which stands in the file; OBJ has
-//! whole coordinates. Files appear under their name when they are complete.
+//! Formats with f32 (PLY, glTF) hold positions relative to the origin of the mesh, which is written into the file. OBJ
+//! holds full coordinates. A file appears under its name when it is complete.
 
 mod footprints;
 mod glb;
 mod obj;
 mod ply;
+mod source;
 
-use std::io::Write;
 use std::path::Path;
 
 use city::{CityModel, TriangleMesh};
 
 use super::error::CityError;
-use crate::atomic::SaveError;
-use crate::atomic::write_stream;
+use crate::atomic::{SaveError, write_stream};
+use source::Export;
 
 pub use footprints::{Footprints, write_footprints};
 
-/// A format that triangles are written in.
+/// Format for triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MeshFormat {
-    /// Wavefront OBJ: an object per city object, a material name per class.
+    /// Wavefront OBJ: one object per city object, one material name per class.
     Obj,
-    /// PLY, binary, little-endian: faces with `class` (number of [`city::SurfaceClass`]) and `object` (index).
+    /// Binary little-endian PLY: faces with `class` (number of the [`city::SurfaceClass`]) and `object` (index).
     Ply,
-    /// glTF 2.0 binary: a node per city object, a primitive per class; y is up.
+    /// Binary glTF 2.0: one node per city object, one primitive per class; y is up.
     Glb,
 }
 
-/// Writes the triangles of `model` that are in `mesh`.
+/// Writes the triangles `mesh` of `model`.
 ///
 /// # Errors
-/// [`CityError::NotWritten`]: the file exists and `overwrite` is false, the system refuses, or the format cannot hold that many
-/// triangles.
+/// [`CityError::NotWritten`] when the file exists and `overwrite` is false, the system refuses to write, or the mesh is too
+/// large for the format.
 pub fn write_mesh(
     path: &Path,
     model: &CityModel,
@@ -53,43 +53,4 @@ pub fn write_mesh(
         }
     };
     Ok(written?)
-}
-
-/// A model and triangles of it.
-struct Export<'a> {
-    model: &'a CityModel,
-    mesh: &'a TriangleMesh,
-}
-
-impl Export<'_> {
-    /// Runs of triangles of one object, with its index; the triangles of a mesh are in the order of the objects.
-    fn objects(&self) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
-        let object = |triangle: usize| self.mesh.surface(triangle).object as usize;
-        let mut start = 0;
-        std::iter::from_fn(move || {
-            let first = (start < self.mesh.triangles.len()).then(|| object(start))?;
-            let count = (start..self.mesh.triangles.len()).take_while(|&t| object(t) == first).count();
-            let range = start..start + count;
-            start = range.end;
-            Some((first, range))
-        })
-    }
-
-    /// An identifier on one line, without spaces.
-    fn name(&self, object: usize) -> String {
-        let id = self.model.objects.get(object).map_or("", |object| object.id.as_str());
-        id.chars().map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c }).collect()
-    }
-
-    /// Lines about where the coordinates are.
-    fn remarks(&self) -> [String; 2] {
-        let origin = self.mesh.origin;
-        let crs: String = self.model.crs.to_string().chars().filter(|c| !c.is_control()).collect();
-        [format!("crs {crs}"), format!("origin {} {} {}", origin.x, origin.y, origin.z)]
-    }
-}
-
-fn line(out: &mut dyn Write, text: std::fmt::Arguments<'_>) -> std::io::Result<()> {
-    out.write_fmt(text)?;
-    out.write_all(b"\n")
 }

@@ -1,10 +1,10 @@
-//! Wavefront OBJ with whole coordinates (to 1 µm) and the classes as material names.
+//! Writes Wavefront OBJ with full coordinates, rounded to 1 µm, and the classes as material names.
 
 use std::io::Write;
 
 use city::SurfaceClass;
 
-use super::{Export, line};
+use super::source::{Export, line};
 
 pub(super) fn write(out: &mut dyn Write, export: &Export<'_>) -> std::io::Result<()> {
     let (mesh, origin) = (export.mesh, export.mesh.origin);

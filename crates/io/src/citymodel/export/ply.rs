@@ -1,8 +1,8 @@
-//! PLY, binary, little-endian; positions are f32 metres from the origin that the comments name.
+//! Writes binary little-endian PLY. Positions are f32 metres from the origin in the comments.
 
 use std::io::Write;
 
-use super::{Export, line};
+use super::source::{Export, line};
 
 pub(super) fn write(out: &mut dyn Write, export: &Export<'_>) -> std::io::Result<()> {
     let mesh = export.mesh;
