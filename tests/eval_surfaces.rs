@@ -122,7 +122,10 @@ fn the_origin_of_a_ply_is_added_and_systems_are_brought_together() {
     let found = json(&[], &test, &reference);
     near(&found["result"]["accuracy"]["max_m"], 0.25, 1e-6);
     let notes = found["protocol"]["notes"].to_string();
-    assert!(notes.contains("projected from EPSG:25833 to EPSG:25832") && notes.contains("which was added"), "{notes}");
+    assert!(
+        notes.contains("projected from EPSG:25833 to EPSG:25832") && notes.contains("was added to its positions"),
+        "{notes}"
+    );
 }
 
 #[test]
@@ -148,7 +151,7 @@ fn what_cannot_be_compared_is_refused() {
     let low = roof_obj(&folder, "low.obj", 0.0);
     skysweep(&["--align", "xyz"], &low, &low).code(2).stderr(contains("--align is for height grids"));
     skysweep(&["--voxel", "0"], &low, &low).code(2).stderr(contains("the edge of the voxels is 0"));
-    skysweep(&["--lod", "2.2"], &low, &low).code(2).stderr(contains("none of 1 objects"));
+    skysweep(&["--lod", "2.2"], &low, &low).code(2).stderr(contains("none of the 1 objects"));
     let nothing = write(&folder, "nothing.obj", b"v 0 0 0\n");
     skysweep(&[], &nothing, &low).code(2).stderr(contains("nothing.obj"));
     let hostile = write(

@@ -1,21 +1,22 @@
-//! Points for Gaussian splatting trainers: PLY, binary little-endian, `x y z nx ny nz` as float and `red green blue` as uchar.
+//! Writes points for Gaussian splatting trainers: binary little-endian PLY with `x y z nx ny nz` as float and
+//! `red green blue` as uchar.
 //!
-//! These are the properties, in the order, that the readers of 3DGS and 2DGS ask for (a file without normals stops them).
-//! Positions are f32 relative to an origin that stands in the comments, so that map coordinates lose nothing.
+//! The readers of 3DGS and 2DGS require these properties in this order, and fail without normals. Positions are f32
+//! relative to an origin in the comments, so that they stay precise on a map.
 
 use std::path::Path;
 
 use crate::atomic::SaveError;
 use crate::atomic::write_stream;
 
-/// A point with its surface.
+/// Point with a normal and a colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlyPoint {
     /// Position relative to the origin of the file.
     pub position: [f32; 3],
-    /// Unit normal; zeros where there is none.
+    /// Unit normal; zeros when it is unknown.
     pub normal: [f32; 3],
-    /// Red, green, blue.
+    /// Colour: red, green, blue.
     pub color: [u8; 3],
 }
 
@@ -23,11 +24,23 @@ const PROPERTIES: &str = "property float x\nproperty float y\nproperty float z\n
     property float nx\nproperty float ny\nproperty float nz\n\
     property uchar red\nproperty uchar green\nproperty uchar blue\n";
 
-/// Writes points; `comments` are kept as they are, a line each (`origin x y z`, `crs …`).
+/// Writes points, and one comment line per entry of `comments` (`origin x y z`, `crs …`).
 ///
 /// # Errors
-/// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`], also for an iterator that is shorter or longer than it
-/// says.
+/// - [`SaveError::Exists`] when the file exists and `overwrite` is false.
+/// - [`SaveError::Unwritable`] when the system refuses to write, or the iterator yields another number of points than
+///   its length.
+///
+/// # Examples
+/// ```
+/// use io::ply::{PlyPoint, write_points};
+///
+/// let folder = tempfile::tempdir()?;
+/// let point = PlyPoint { position: [1.0, 2.0, 3.0], normal: [0.0, 0.0, 1.0], color: [200, 80, 60] };
+/// let comments = ["origin 690000 4820000 0".to_owned(), "crs EPSG:32631".to_owned()];
+/// write_points(folder.path().join("points3D.ply"), [point].into_iter(), &comments, false)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_points(
     path: impl AsRef<Path>,
     points: impl ExactSizeIterator<Item = PlyPoint>,

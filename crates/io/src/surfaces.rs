@@ -1,7 +1,7 @@
-//! Surfaces from files, for comparing them: city models and meshes (CityJSON, CityGML, OBJ, PLY), clouds (PLY, LAS, LAZ).
+//! Reads surfaces for comparison: city models and meshes (CityJSON, CityGML, OBJ, PLY) and clouds (PLY, LAS, LAZ).
 //!
-//! Positions come out in the coordinates of the file's reference system, f64. PLY files that hold positions relative to an
-//! origin say so in a comment `origin x y z` (and `crs …`), or in `NAME.origin.json` beside; it is added here.
+//! Positions are f64 in the reference system of the file. A PLY file may hold positions relative to an origin, which is in
+//! a comment `origin x y z` (with `crs …`), or beside it in `NAME.origin.json`. The origin is added to the positions.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -13,54 +13,56 @@ use crate::citymodel::{self, CityError};
 use crate::points::{PointCloud, PointsError, is_point_cloud};
 use crate::splat_ply::{LocalOrigin, SplatPlyError};
 
-/// Clouds are read up to this many points.
+/// Largest number of points of a cloud.
 const POINTS_MAX: u64 = 200_000_000;
 
-/// A surface of a file.
+/// A surface from a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceFile {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// `CityJSON 2.0`, `LAS point cloud`, …
+    /// Name of the format: `CityJSON 2.0`, `LAS point cloud`, …
     pub format: String,
-    /// Points, or the corners of the triangles, in the file's reference system.
+    /// Points, or corners of the triangles, in the reference system of the file.
     pub positions: Vec<[f64; 3]>,
-    /// Indices of corners; empty for a cloud.
+    /// Corners of each triangle, as indices of positions; empty for a cloud.
     pub triangles: Vec<[u32; 3]>,
-    /// The reference system for PROJ, where the file names one.
+    /// Definition of the reference system for PROJ, if the file names one.
     pub crs: Option<String>,
     /// EPSG code of the horizontal CRS, if known.
     pub horizontal_epsg: Option<u32>,
-    /// What heights are measured from, if the file says.
+    /// Vertical datum of the heights, if the file names it.
     pub vertical: Option<VerticalDatum>,
-    /// What a reader of numbers about it must know.
+    /// Notes that a report on the surface must show.
     pub notes: Vec<String>,
 }
 
-/// A surface that was not read.
+/// Why a surface was not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceFileError {
-    /// A city model or mesh.
+    /// A city model or mesh was not read.
     #[error(transparent)]
     City(#[from] CityError),
-    /// A cloud.
+    /// A cloud was not read.
     #[error(transparent)]
     Points(#[from] PointsError),
-    /// The origin beside a file.
+    /// The origin beside a file was not read.
     #[error(transparent)]
     Origin(#[from] SplatPlyError),
-    /// A model that has no triangles.
+    /// The model has no triangles, or the cloud no points.
     #[error("{what}: {}", .path.display())]
     Nothing {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What was found.
+        /// What was found, and what was expected.
         what: String,
     },
 }
 
-/// Whether a file holds a surface that is no grid, by its first bytes (OBJ and XML by their names, too).
+/// Returns whether a file holds a surface that is not a raster.
+///
+/// The first bytes decide; OBJ and XML are also recognised by the extension.
 pub fn is_surface(path: impl AsRef<Path>) -> bool {
     let path = path.as_ref();
     if is_point_cloud(path) {
@@ -73,7 +75,7 @@ pub fn is_surface(path: impl AsRef<Path>) -> bool {
     let extension = path.extension().and_then(|name| name.to_str()).unwrap_or_default().to_ascii_lowercase();
     match text.first() {
         Some(b'{') => true,
-        // Rasters may be XML as well (VRT).
+        // A raster may be XML too (VRT).
         Some(b'<') => matches!(&*extension, "gml" | "xml" | "citygml"),
         Some(_) => extension == "obj" || is_ply(first),
         None => false,
@@ -84,10 +86,12 @@ fn is_ply(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")
 }
 
-/// Reads a surface; `config` says which objects and levels of a city model are used.
+/// Reads a surface. `config` selects the objects and the levels of detail of a city model.
 ///
 /// # Errors
-/// What [`citymodel::read`] and [`PointCloud`] report, an origin file that is none, a model none of whose objects has triangles.
+/// - [`SurfaceFileError::City`] and [`SurfaceFileError::Points`] when the file cannot be read.
+/// - [`SurfaceFileError::Origin`] when the origin beside the file is invalid.
+/// - [`SurfaceFileError::Nothing`] when no object has triangles, or a cloud has no points.
 pub fn read(path: impl AsRef<Path>, config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
     let path = path.as_ref();
     if is_point_cloud(path) {
@@ -101,6 +105,7 @@ pub fn read(path: impl AsRef<Path>, config: &MeshConfig) -> Result<SurfaceFile, 
     city_model(path, config)
 }
 
+/// Reads a LAS or LAZ cloud.
 fn cloud(path: &Path) -> Result<SurfaceFile, SurfaceFileError> {
     let cloud = PointCloud::open(path)?;
     let (crs, horizontal_epsg, vertical) =
@@ -118,6 +123,7 @@ fn cloud(path: &Path) -> Result<SurfaceFile, SurfaceFileError> {
     })
 }
 
+/// Reads a PLY file as mesh or cloud, and adds its origin.
 fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
     let points = citymodel::ply_points(bytes).map_err(|fault| fault.at(path))?;
     let mut surface = if points.has_faces {
@@ -127,8 +133,9 @@ fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, Su
         let format = "PLY point cloud".to_owned();
         SurfaceFile { path: path.to_owned(), format, positions: points.positions, ..SurfaceFile::empty() }
     };
-    let said = |key: &str| points.comments.iter().find_map(|line| line.strip_prefix(key)).map(str::trim);
-    let commented = said("origin ").and_then(numbers).map(|origin| (origin, said("crs ").map(str::to_owned), None));
+    let comment = |key: &str| points.comments.iter().find_map(|line| line.strip_prefix(key)).map(str::trim);
+    let commented =
+        comment("origin ").and_then(numbers).map(|origin| (origin, comment("crs ").map(str::to_owned), None));
     let beside = || -> Result<_, SplatPlyError> {
         let found = LocalOrigin::read_beside(path)?;
         Ok(found.map(|found| (found.origin, Some(found.crs), found.vertical.parse().ok())))
@@ -139,28 +146,29 @@ fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, Su
         None => beside()?,
     };
     if let Some((origin, crs, vertical)) = placed {
-        // A mesh has been read with the origin of its comments.
+        // The reader of meshes has added an origin in the comments already.
         let by = if points.has_faces && is_commented { [0.0; 3] } else { origin };
         surface.positions.iter_mut().for_each(|p| (0..3).for_each(|i| p[i] += by[i]));
         surface.name_crs(crs.filter(|name| name != "unknown"));
         surface.vertical = vertical.or(surface.vertical);
-        surface.notes.push(format!("its positions are relative to {origin:?}, which was added: {}", path.display()));
+        surface.notes.push(format!("the origin {origin:?} was added to its positions: {}", path.display()));
     }
     Ok(surface)
 }
 
-/// Three finite numbers.
+/// Parses three finite numbers.
 fn numbers(text: &str) -> Option<[f64; 3]> {
     let numbers: Vec<f64> = text.split_whitespace().map(str::parse).collect::<Result<_, _>>().ok()?;
     <[f64; 3]>::try_from(numbers).ok().filter(|origin| origin.iter().all(|c| c.is_finite()))
 }
 
+/// Reads a city model or mesh as triangles.
 fn city_model(path: &Path, config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
     let file = citymodel::read(path)?;
     let wrong = |error: city::ModelError| SurfaceFileError::Nothing { path: path.to_owned(), what: error.to_string() };
     let meshed = TriangleMesh::from_model(&file.model, config).map_err(wrong)?;
     let used = meshed.objects.iter().filter(|object| matches!(object.status, ObjectStatus::Used { .. })).count();
-    let what = format!("none of {} objects has triangles of the level of detail asked for", meshed.objects.len());
+    let what = format!("none of the {} objects has triangles at the selected level of detail", meshed.objects.len());
     nothing_if(meshed.mesh.triangles.is_empty(), path, &what)?;
     let o = meshed.mesh.origin;
     let positions = meshed.mesh.positions.iter().map(|p| [p[0] + o.x, p[1] + o.y, p[2] + o.z]).collect();
@@ -198,7 +206,7 @@ impl SurfaceFile {
         }
     }
 
-    /// Takes a definition that PROJ reads; any other is noted.
+    /// Sets the reference system, or adds a note when PROJ does not know it.
     fn name_crs(&mut self, definition: Option<String>) {
         let Some(definition) = definition else { return };
         match CrsIdentity::of(&definition) {
@@ -207,7 +215,7 @@ impl SurfaceFile {
                 self.vertical = identity.vertical;
                 self.crs = Some(identity.horizontal.map_or(definition, |code| format!("EPSG:{code}")));
             }
-            Err(_) => self.notes.push(format!("its reference system {definition:?} is not known to PROJ")),
+            Err(_) => self.notes.push(format!("PROJ does not know its reference system {definition:?}")),
         }
     }
 }

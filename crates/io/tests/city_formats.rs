@@ -1,9 +1,9 @@
-//! CityGML, OBJ and PLY: what they say is read, and files that are broken or hostile are refused with a number and a place.
+//! Reads CityGML, OBJ and PLY, and refuses invalid and hostile files with a number and a place.
 
 use std::path::{Path, PathBuf};
 
 use city::{
-    DefectCode, GeometryKind, MeshConfig, ModelPoint, ObjectStatus, Role, Scope, SurfaceClass, TriangleMesh,
+    BuildingRole, DefectCode, GeometryKind, MeshConfig, ModelPoint, ObjectStatus, Scope, SurfaceClass, TriangleMesh,
     check_solids,
 };
 use io::citymodel::{CityError, CityFile, CityFormat, read};
@@ -19,7 +19,7 @@ fn codes(file: &CityFile) -> Vec<u16> {
     file.defects.iter().map(|defect| defect.code.number()).collect()
 }
 
-/// The number, the place and the words of a refusal.
+/// Compares the number, the place and the words of a refusal.
 #[track_caller]
 fn refused(bytes: impl AsRef<[u8]>, code: u16, place: &str, words: &str) {
     match read_bytes(bytes) {
@@ -38,7 +38,7 @@ fn polygon(id: &str, ring: &str) -> String {
     )
 }
 
-/// A CityGML document of some version around the content of a building.
+/// Makes a CityGML document around the content of a building.
 fn gml(version: &str, content: &str) -> String {
     format!(
         "<?xml version=\"1.0\"?>\n<core:CityModel xmlns:core=\"http://www.opengis.net/citygml/{version}\" \
@@ -92,7 +92,7 @@ fn a_solid_takes_its_classes_from_the_surfaces_it_links_to() {
         assert_eq!((file.model.crs.epsg, file.model.crs.vertical_epsg), (Some(25832), Some(7837)));
         assert!(file.defects.is_empty(), "{:?}", file.defects);
         let object = &file.model.objects[0];
-        assert_eq!((object.id.as_str(), object.kind.role(), object.geometries.len()), ("b", Role::Building, 1));
+        assert_eq!((object.id.as_str(), object.kind.role(), object.geometries.len()), ("b", BuildingRole::Building, 1));
         assert_eq!(object.geometries[0].kind, GeometryKind::Solid);
         assert_eq!(classes(&file, 0), [Ground, Wall, Wall, Roof]);
         assert_eq!(file.model.vertices.len(), 4);
@@ -170,7 +170,7 @@ fn broken_polygons_cost_themselves() {
     assert_eq!(codes(&read_bytes(flat.replace("srsDimension=\"3\"", "srsDimension=\"2\"")).unwrap()), [904, 902]);
 }
 
-/// An implicit geometry: what is said of its placement, and its shape.
+/// Makes an implicit geometry of the elements of its placement and its shape.
 fn implicit(placement: &str, shape: &str) -> String {
     format!(
         "<bldg:lod2ImplicitRepresentation><core:ImplicitGeometry>{placement}{shape}</core:ImplicitGeometry>\
@@ -183,7 +183,7 @@ fn implicit_geometries_are_placed() {
     let at = |x: f64| {
         format!("<core:referencePoint><gml:Point><gml:pos>{x} 5700000 30</gml:pos></gml:Point></core:referencePoint>")
     };
-    // A quarter turn to the left, twice as tall, a metre up.
+    // A quarter turn counter-clockwise, twice the height, one metre up.
     let matrix = "<core:transformationMatrix>0 -1 0 0 1 0 0 0 0 0 2 1 0 0 0 1</core:transformationMatrix>";
     let shape = format!(
         "<core:relativeGMLGeometry><gml:MultiSurface gml:id=\"shape\"><gml:surfaceMember>{}</gml:surfaceMember>\
@@ -249,7 +249,7 @@ fn hostile_xml_is_refused() {
     refused(&laughs, 901, "line 2", "DTD");
     refused("<!DOCTYPE x SYSTEM \"file:///etc/passwd\"><x/>", 901, "line 1", "DTD");
     refused(gml("2.0", &format!("{}{}", "<a>".repeat(100_000), "</a>".repeat(100_000))), 901, "line 4", "nested");
-    refused(gml("2.0", "<a>"), 901, "line 4", "broken XML");
+    refused(gml("2.0", "<a>"), 901, "line 4", "invalid XML");
     let whole = gml("2.0", &boundaries());
     refused(&whole[..whole.len() - 30], 901, "line 4", "");
     refused("<core:IndoorFeatures/>", 904, "line 1", "IndoorFeatures");
@@ -262,7 +262,7 @@ fn hostile_xml_is_refused() {
 
 #[test]
 fn links_that_multiply_are_refused() {
-    // Each set links ten times to the one before: 10^9 surfaces at the end, if all were followed.
+    // Each set links ten times to the set before it, which makes 10^9 surfaces when all links are followed.
     let set = |i: usize, target: String| {
         let links = format!("<gml:surfaceMember xlink:href=\"#{target}\"/>").repeat(300);
         format!(
@@ -309,10 +309,10 @@ fn wavefront_obj() {
     assert_eq!(codes(&read_bytes("v 0 0 0\nv 1e300 0 0\nv 0 1 0\nf 1 2 3\n").unwrap()), [1010, 1002]);
     refused("v 0 0\n", 901, "line 1", "three coordinates");
     refused("# x\nv 0 0 zero\n", 901, "line 2", "zero");
-    refused("nothing of this kind", 904, "line 1", "none of");
+    refused("nothing of this kind", 904, "line 1", "neither CityJSON nor CityGML");
 }
 
-/// A PLY file of a triangle and a quadrilateral, with properties that are passed over.
+/// A PLY file of a triangle and a quadrilateral, with properties that are skipped.
 fn ply(format: &str) -> Vec<u8> {
     let mut bytes = format!(
         "ply\nformat {format} 1.0\ncomment x\nelement vertex 4\nproperty double x\nproperty uchar red\nproperty float y\n\
@@ -380,11 +380,11 @@ fn comments_say_where_a_mesh_is() {
 #[test]
 fn hostile_ply_is_refused() {
     let text = |from: &str, to: &str| String::from_utf8(ply("ascii")).unwrap().replacen(from, to, 1);
-    refused(text("vertex 4", "vertex 18446744073709551615"), 901, "header", "announced");
-    refused(text("vertex 4", "vertex 18446744073709551616"), 901, "line 4", "count");
-    refused(text("face 2", "face 4000000000"), 901, "header", "announced");
-    refused(text("property double x\n", ""), 901, "header", "no x, y and z");
-    refused(text("ascii", "morse"), 904, "line 2", "none of PLY's");
+    refused(text("vertex 4", "vertex 18446744073709551615"), 901, "header", "announces");
+    refused(text("vertex 4", "vertex 18446744073709551616"), 901, "line 4", "number of elements");
+    refused(text("face 2", "face 4000000000"), 901, "header", "announces");
+    refused(text("property double x\n", ""), 901, "header", "do not have the properties x, y and z");
+    refused(text("ascii", "morse"), 904, "line 2", "not one of ascii");
     refused(text("list uchar int", "list float int"), 901, "line 10", "property");
     refused(text("element vertex 4\n", ""), 901, "line 4", "property");
     assert_eq!(codes(&read_bytes(text("3 0 1 2", "3 0 1 9")).unwrap()), [1010, 1001]);
@@ -439,7 +439,7 @@ fn everything_there_is_loads_or_is_refused() {
 #[test]
 fn real_citygml() {
     let Some(folder) = city_data() else { return };
-    // Solids or buildings and polygons as counted by grep.
+    // The numbers of solids or buildings, and of polygons, were counted with grep.
     for (name, format, used, polygons) in [
         ("nrw/data/GML/LoD2_32_280_5657_1_NW.gml", "CityGML 1.0", 113, 1144),
         ("berlin/data/examples/gml_data/Block020023.gml", "CityGML 2.0", 4, 97),

@@ -1,4 +1,4 @@
-//! CityJSON and CityJSONSeq: what is read comes back, versions and shapes, and files that are broken or hostile.
+//! Reads and writes CityJSON and CityJSONSeq, and refuses invalid and hostile files.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ fn codes(file: &CityFile) -> Vec<u16> {
     file.defects.iter().map(|defect| defect.code.number()).collect()
 }
 
-/// The number and the place of a refusal.
+/// Returns the number and the place of a refusal.
 fn refusal(text: &str) -> (u16, String) {
     match read_text(text) {
         Err(CityError::Refused { fault, .. }) => (fault.code.number(), fault.place),
@@ -28,7 +28,7 @@ fn refusal(text: &str) -> (u16, String) {
     }
 }
 
-/// A document with one object and five vertices (m); `geometry` is its list.
+/// Makes a document with one object and five vertices; `geometry` is the list of its geometries.
 fn document(geometry: &str) -> String {
     format!(
         r#"{{"type":"CityJSON","version":"2.0",
@@ -53,7 +53,7 @@ fn a_solid_with_semantics() {
     let classes: Vec<_> = geometry.surfaces.iter().map(|surface| surface.class).collect();
     use SurfaceClass::{Ground, Roof, Unclassified};
     assert_eq!(classes, [Ground, Roof, Roof, Unclassified, Unclassified]);
-    assert_eq!(codes(&file), [1008], "the fifth surface names a semantic that is not there");
+    assert_eq!(codes(&file), [1008], "the fifth surface names a semantic that does not exist");
     assert_eq!(file.model.validate(), Ok(()));
 }
 
@@ -152,7 +152,7 @@ fn other_documents_are_refused_with_a_place() {
     assert!(read(Path::new("/nowhere/model.json")).unwrap_err().to_string().starts_with("cannot read"));
 }
 
-/// A model with every kind of geometry.
+/// Makes a model with every kind of geometry.
 fn model_of_all_kinds() -> CityModel {
     let mut model = CityModel::new(CrsReference::from_epsg(25832, Some(7837)));
     for (x, y, z) in [(0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0), (2, 2, 3)] {
@@ -227,7 +227,7 @@ fn models_that_cannot_be_written_are_refused() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// Returns the folder of real city models.
+/// Returns the folder of real city models, if it exists.
 fn real_data() -> Option<PathBuf> {
     testing::shared_data("city")
 }

@@ -1,7 +1,7 @@
-//! The test files of val3dity, one per code of its catalogue: the code in the name of each is among those found.
+//! Checks the test files of val3dity, one per code of its catalogue: the code in the name of a file must be found.
 //!
-//! The files lie in the shared data, `city/val3dity`. Its `.poly` files hold one shell each; for
-//! cavities the unit cube comes first.
+//! The files are in `city/val3dity` of the shared data. A `.poly` file holds one shell. For a cavity the unit cube is the
+//! outer shell.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ fn folder(name: &str) -> Option<PathBuf> {
     testing::shared_data(&format!("city/val3dity/{name}"))
 }
 
-/// The codes found in a model, each once; but for 1004, the face that two solids share.
+/// Returns the codes found in a model, each once, except 1004 (the face that two solids share).
 fn codes(model: &CityModel) -> Vec<u16> {
     let config = MeshConfig { scope: Scope::Everything, ..MeshConfig::default() };
     let mut found = TriangleMesh::from_model(model, &config).unwrap().defects;
@@ -26,7 +26,7 @@ fn codes(model: &CityModel) -> Vec<u16> {
     codes
 }
 
-/// A shell from a `.poly` file: vertices, then faces as a count of rings (and of points in holes, which are left out).
+/// Reads a shell from a `.poly` file: vertices, then faces with their number of rings. Points in holes are skipped.
 fn shell(path: &Path, number: u32, pool: &mut VertexPool) -> Vec<SurfacePolygon> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines().map(|line| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
@@ -67,17 +67,17 @@ fn solid(shells: &[&Path]) -> CityModel {
     CityModel { vertices: pool.into_vertices(), objects: vec![object], ..CityModel::new(CrsReference::default()) }
 }
 
-/// Files whose name is not what is to be found in them: the code that is, and why.
+/// Files with another code than in their name, and why.
 const OTHERWISE: [(&str, u16); 5] = [
     // The edges of the dangling face are open.
     ("303", 302),
-    // Said to be so for a solid.
+    // The name applies to the file as a solid.
     ("303_cs", 302),
-    // The catalogue has no 304 any more.
+    // The catalogue does not have the code 304 any more.
     ("304_1", 303),
-    // The file counts six of its seven faces.
+    // The file announces six of its seven faces.
     ("307_1", 302),
-    // Islands in holes, each a polygon of its own, one of them with a hole that turns the wrong way.
+    // The islands in holes are separate polygons; a hole of one of them has the wrong orientation.
     ("207_2", 208),
 ];
 
@@ -137,7 +137,7 @@ fn solids_and_parts() {
     }
 }
 
-/// 3DBAG publishes what val3dity found in each building, before its coordinates were rounded to millimetres.
+/// 3DBAG publishes the codes that val3dity found in each building before the coordinates were rounded to millimetres.
 #[test]
 fn buildings_of_3dbag_are_valid_where_val3dity_says_so() {
     let Some(city) = folder("..") else { return };
@@ -148,7 +148,7 @@ fn buildings_of_3dbag_are_valid_where_val3dity_says_so() {
     let meshed = TriangleMesh::from_model(&model, &config).unwrap();
     let mut found: HashMap<usize, BTreeSet<u16>> = HashMap::new();
     for defect in meshed.defects.iter().chain(&check_solids(&model, &config).unwrap()) {
-        // Vertices that rounding made the same.
+        // Rounding made vertices equal.
         let rounded = [DefectCode::TooFewPoints, DefectCode::ConsecutivePointsSame].contains(&defect.code);
         if let Some(object) = defect.object.filter(|_| !rounded) {
             found.entry(model.root(object)).or_default().insert(defect.code.number());
@@ -166,13 +166,13 @@ fn buildings_of_3dbag_are_valid_where_val3dity_says_so() {
     }
     let set = |codes: &[u16]| codes.iter().copied().collect::<BTreeSet<_>>();
     let expected = [
-        // Slivers of the same few centimetres, which are none for us as polygons of two vertices.
+        // Slivers of a few centimetres. We read a polygon with two different vertices as no polygon.
         ("19275", set(&[104]), set(&[306])),
-        // The same, found sound before rounding.
+        // The same case; val3dity found no defect before the coordinates were rounded.
         ("25101", set(&[]), set(&[306])),
-        // With edges used once beside those used thrice.
+        // Some edges belong to one polygon, others to three.
         ("32914", set(&[303]), set(&[302, 303])),
-        // The roof whose ring crosses itself by a quarter of a millimetre.
+        // The ring of a roof crosses itself by a quarter of a millimetre.
         ("33695", set(&[303]), set(&[104, 303])),
     ];
     assert_eq!(different, expected);

@@ -1,8 +1,10 @@
-//! The whole way from a CityJSON tile to depth maps and visible points, against what Open3D (Embree) made of the same input.
+//! Compares depth maps and visible points of a CityJSON tile with the results of Open3D (Embree) for the same input.
 //!
-//! The reference is `city/peer_reference` of the shared data. Its points and maps are relative to an offset of whole metres.
+//! The reference is in `city/peer_reference` of the shared data. Its points and maps are relative to an offset on whole
+//! metres.
 //!
-//! Rays are cast at our triangles of the tile, and at the reference's own (`mesh_local.ply`): both must agree with it.
+//! Rays are cast at our triangles of the tile, and at the triangles of the reference (`mesh_local.ply`). Both results must
+//! agree with the reference.
 
 use std::path::{Path, PathBuf};
 
@@ -11,28 +13,28 @@ use camera::{ImagePoint, Lens};
 use city::{MeshConfig, ModelPoint, TriangleMesh};
 use io::colmap::{self, ColmapModel};
 
-/// The reference's offset from the tile's coordinates.
+/// Offset of the reference from the coordinates of the tile.
 const OFFSET: ModelPoint = ModelPoint::new(85_320.0, 446_656.0, 0.0);
 const EPSILON_M: f64 = 0.05;
 
-/// Which triangles rays are cast at.
+/// The triangles that rays are cast at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Triangles {
-    /// Those that the reference was computed with.
+    /// The triangles of the reference.
     Reference,
-    /// Ours, of the CityJSON tile.
+    /// Our triangles of the CityJSON tile.
     Tile,
 }
 
-/// Depths agree within this on all but a few pixels.
+/// Largest difference of depths, except at a few pixels.
 const DEPTH_TOLERANCE_M: f32 = 1e-3;
-/// Counts agree within this part of them.
+/// Largest relative difference of counts.
 const COUNT_TOLERANCE: f64 = 1e-4;
 
 struct Scene {
     folder: PathBuf,
     bvh: Bvh,
-    /// From the reference's coordinates to those of the mesh.
+    /// Shift from the coordinates of the reference to those of the mesh.
     shift: [f64; 3],
     cameras: ColmapModel,
 }
@@ -59,7 +61,7 @@ impl Scene {
         serde_json::from_str(&std::fs::read_to_string(self.folder.join(name)).unwrap()).unwrap()
     }
 
-    /// The twenty cameras of the smaller yardstick.
+    /// The twenty cameras of the smaller comparison.
     fn subset(&self) -> Vec<usize> {
         let cameras = self.json("cams.json");
         cameras["idx20"].as_array().unwrap().iter().map(|v| v.as_u64().unwrap() as usize).collect()
@@ -81,14 +83,14 @@ impl Scene {
         })
     }
 
-    /// Which points a view sees: in the image, in front, and nothing before them but for ε.
+    /// Returns the points that a view sees: in the image, in front of the camera, and not occluded by more than ε.
     fn visible(&self, view: usize, points: &[[f64; 3]]) -> Vec<u32> {
         let (eye, lens) = (self.eye(view), self.lens(view));
         let (mut numbers, mut targets) = (Vec::new(), Vec::new());
         for (number, point) in points.iter().enumerate() {
             let [x, y, z] = eye.eye_from_world([0, 1, 2].map(|i| point[i] + self.shift[i]));
             let Some(pixel) = lens.project(x / z, y / z).filter(|_| z > 0.0) else { continue };
-            // From border to border of the image, whose first pixel begins half a pixel before its centre.
+            // The image begins half a pixel before the centre of its first pixel.
             let inside = |at: f64, size: usize| (-0.5..size as f64 - 0.5).contains(&at);
             if inside(pixel.sample, lens.width()) && inside(pixel.line, lens.height()) {
                 let distance = (x * x + y * y + z * z).sqrt();
@@ -101,7 +103,7 @@ impl Scene {
     }
 }
 
-/// The data of a C-ordered array of little-endian numbers.
+/// Reads the data of a C-ordered array of little-endian numbers.
 fn npy<const N: usize>(path: &Path) -> Vec<[u8; N]> {
     let bytes = std::fs::read(path).unwrap();
     let data = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
@@ -119,7 +121,7 @@ fn check_depth_maps(triangles: Triangles) {
             npy::<4>(&scene.folder.join(format!("{name}_z.npy"))).into_iter().map(f32::from_le_bytes).collect();
         let image = scene.depth(index_of(&scene, name));
         assert_eq!(expected.len(), image.depth.len());
-        // The stored maps have 0 where nothing is hit.
+        // The stored maps are 0 where no ray hits.
         let differs = |(&found, &expected): (&f32, &f32)| {
             if expected == 0.0 {
                 found.is_finite()
@@ -203,7 +205,7 @@ fn national_coordinates_change_nothing() {
     let near = io::citymodel::read(&tile).unwrap().model;
     let config = MeshConfig::default();
     let expected = TriangleMesh::from_model(&near, &config).unwrap();
-    // To where EPSG:25832 has Munich, and to the same place with the zone before the easting.
+    // The tile is moved to Munich in EPSG:25832, and to the same place with the zone number before the easting.
     for shift in [[606_000.0, 4_887_000.0, 500.0], [32_606_000.0, 4_887_000.0, 0.0]] {
         let mut far = near.clone();
         for vertex in &mut far.vertices {

@@ -1,4 +1,4 @@
-//! Point clouds as surface models: LAS and LAZ, coordinate systems, noise, and files that lie.
+//! Reads point clouds as grids: LAS and LAZ, reference systems, noise, and hostile files.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ fn point(x: f64, y: f64, z: f64, class: u8) -> Point {
     Point { x: WEST + x, y: NORTH - y, z, classification, gps_time: Some(0.0), ..Point::default() }
 }
 
-/// Four points: two in one cell, one of noise above all, one withheld.
+/// Makes points: two in one cell, a noise point above all others, a withheld one.
 fn points() -> Vec<Point> {
     let withheld = Point { is_withheld: true, ..point(0.2, 0.2, 70.0, 1) };
     vec![
@@ -114,7 +114,7 @@ fn chunks_that_do_not_fit_are_refused_before_they_are_read() {
     let data = u32::from_le_bytes(whole[96..100].try_into().unwrap()) as usize;
     let table = u64::from_le_bytes(whole[data..data + 8].try_into().unwrap()) as usize;
     let layers = data + 8 + 30 + 4;
-    for (at, size, said) in [(table + 4, u32::MAX, "chunks of points"), (layers, u32::MAX, "bytes of points from")] {
+    for (at, size, said) in [(table + 4, u32::MAX, "chunks in a file of"), (layers, u32::MAX, "bytes of points from")] {
         let mut bytes = whole.clone();
         bytes[at..at + 4].copy_from_slice(&size.to_le_bytes());
         std::fs::write(&path, bytes).unwrap();
@@ -123,13 +123,13 @@ fn chunks_that_do_not_fit_are_refused_before_they_are_read() {
     }
     std::fs::write(&path, &whole[..layers]).unwrap();
     assert!(matches!(gridded(&path), Err(PointsError::Damaged { .. })));
-    // The form of the compressed points: in its record, behind 34 bytes, each item's type, size and version.
+    // The record of LASzip has the type, size and version of each item of a point from byte 34 on.
     let record = whole.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
     let mut bytes = whole;
     bytes[record + 52 + 34 + 2] = 40;
     std::fs::write(&path, bytes).unwrap();
     let error = gridded(&path).unwrap_err().to_string();
-    assert!(error.contains("40 bytes of Point14"), "{error}");
+    assert!(error.contains("item Point14 of 40 bytes"), "{error}");
 }
 
 #[test]

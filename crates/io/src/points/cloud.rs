@@ -1,4 +1,4 @@
-//! Reading a cloud and laying it on a grid.
+//! Reads a cloud, as points or as a grid.
 
 use std::fs::File;
 use std::io::{BufReader, Seek};
@@ -13,31 +13,34 @@ use super::crs::{Stated, stated};
 use super::{PointsError, preflight};
 use crate::raster::Dem;
 
-/// Most points read at a time, and most bytes: a point may take up to 64 KiB.
+/// Largest number of points in a batch.
 const BATCH: u64 = 1 << 16;
+/// Largest size of a batch, bytes. A point may take up to 64 KiB.
 const BATCH_BYTES: u64 = 1 << 24;
-/// Classes of points that are no surface: low noise, high noise.
+/// Classes of points that do not belong to a surface: low noise, high noise.
 const NOISE: [u8; 2] = [7, 18];
-/// Most cells of a grid, and most for every point.
+/// Largest number of cells of a grid.
 const CELLS_MAX: u64 = 1 << 27;
+/// Largest number of cells per point.
 const CELLS_PER_POINT: u64 = 64;
+/// Number of cells that is allowed for any number of points.
 const CELLS_ALWAYS: u64 = 1 << 20;
 
-/// Whether a file is a LAS or LAZ one, by its first four bytes.
+/// Returns whether a file is LAS or LAZ, by its first four bytes.
 pub fn is_point_cloud(path: impl AsRef<Path>) -> bool {
     use std::io::Read;
     let mut magic = [0u8; 4];
     File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == *b"LASF"
 }
 
-/// A LAS or LAZ file that has been opened.
+/// An open LAS or LAZ file.
 pub struct PointCloud {
     path: PathBuf,
     reader: Reader,
     stated: Stated,
 }
 
-/// A point of a surface.
+/// Point of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
     /// Easting (or longitude), map units.
@@ -46,20 +49,20 @@ pub struct SurfacePoint {
     pub y: f64,
     /// Height above the file's datum, metres.
     pub height_m: f64,
-    /// Its class.
+    /// Class of the point in LAS.
     pub class: u8,
 }
 
-/// A cloud as a surface model.
+/// A grid made from a cloud.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GriddedPoints {
-    /// The highest point of every cell.
+    /// Height of the highest point of every cell, metres.
     pub dem: Dem,
-    /// The class of that point.
+    /// Class of that point.
     pub classes: Grid<Option<i32>>,
-    /// Points read.
+    /// Number of points read.
     pub points: u64,
-    /// Points left out: noise, withheld, or outside the extent that the header names.
+    /// Number of points left out: noise, withheld, or outside the extent in the header.
     pub left_out: u64,
 }
 
@@ -67,7 +70,9 @@ impl PointCloud {
     /// Opens a file and reads its header.
     ///
     /// # Errors
-    /// [`PointsError::Unreadable`], [`PointsError::Damaged`], [`PointsError::Crs`] for a system that PROJ does not read.
+    /// - [`PointsError::Unreadable`] when the system cannot read the file.
+    /// - [`PointsError::Damaged`] when the file is not LAS or LAZ, or its header does not fit its length.
+    /// - [`PointsError::Crs`] when PROJ cannot read the reference system.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, PointsError> {
         let path = path.as_ref().to_owned();
         let unreadable = |source| PointsError::Unreadable { path: path.clone(), source };
@@ -84,31 +89,43 @@ impl PointCloud {
         Ok(Self { path, reader, stated })
     }
 
-    /// The definition of its coordinate system for PROJ, if the file names one.
+    /// Returns the definition of the reference system for PROJ, if the file names one.
     pub fn crs_definition(&self) -> Option<&str> {
         self.stated.definition.as_deref()
     }
 
-    /// The middle of the extent that the header names, map units.
+    /// Returns the middle of the extent in the header (x, y), map units.
     pub fn centre(&self) -> (f64, f64) {
         let bounds = self.reader.header().bounds();
         (0.5 * (bounds.min.x + bounds.max.x), 0.5 * (bounds.min.y + bounds.max.y))
     }
 
-    /// The horizontal EPSG code that the file states, if any.
+    /// Returns the EPSG code of the horizontal reference system, if the file names it.
     pub fn horizontal_epsg(&self) -> Option<u32> {
         self.stated.horizontal_epsg
     }
 
-    /// What the heights are measured from, if the file says.
+    /// Returns the vertical datum of the heights, if the file names it.
     pub fn vertical(&self) -> Option<VerticalDatum> {
         self.stated.vertical
     }
 
-    /// All points in map units, heights in metres; those of the noise classes and withheld ones are left out.
+    /// Reads all points except noise and withheld ones: x and y in map units, heights in metres.
     ///
     /// # Errors
-    /// [`PointsError::Damaged`]; [`PointsError::NoPoints`]; [`PointsError::TooManyPoints`] above `most`.
+    /// - [`PointsError::TooManyPoints`] when the file announces more than `most` points.
+    /// - [`PointsError::Damaged`] when the points cannot be decoded.
+    /// - [`PointsError::NoPoints`] when no point is left.
+    ///
+    /// # Examples
+    /// ```no_run
+    /// use io::points::PointCloud;
+    ///
+    /// let cloud = PointCloud::open("lidar.laz")?;
+    /// println!("{:?}", cloud.horizontal_epsg());
+    /// let points = cloud.positions(10_000_000)?;
+    /// # Ok::<(), io::points::PointsError>(())
+    /// ```
     pub fn positions(mut self, most: u64) -> Result<Vec<[f64; 3]>, PointsError> {
         let announced = self.reader.header().number_of_points();
         if announced > most {
@@ -123,10 +140,14 @@ impl PointCloud {
         if found.is_empty() { Err(PointsError::NoPoints { path: self.path, points }) } else { Ok(found) }
     }
 
-    /// The highest point of every cell of `cell` (x, y) map units; cell corners fall on `anchor` plus whole cells.
+    /// Makes a grid with the highest point of every cell.
+    ///
+    /// `cell` is the size of a cell (x, y) in map units. The corners of the cells are whole cells away from `anchor` (x, y).
     ///
     /// # Errors
-    /// [`PointsError::Damaged`], [`PointsError::TooManyCells`], [`PointsError::NoPoints`].
+    /// - [`PointsError::TooManyCells`] when the extent has too many cells for the number of points.
+    /// - [`PointsError::Damaged`] when the extent is invalid or the points cannot be decoded.
+    /// - [`PointsError::NoPoints`] when no point is left.
     pub fn highest(mut self, cell: (f64, f64), anchor: (f64, f64)) -> Result<GriddedPoints, PointsError> {
         let (geotransform, width, height) = self.grid(cell, anchor)?;
         let mut heights = Grid::filled(width, height, f32::NAN);
@@ -160,18 +181,19 @@ impl PointCloud {
         Ok(GriddedPoints { dem, classes, points, left_out })
     }
 
-    /// The middle of the heights that the header names, metres; 0 where it names none.
+    /// Returns the middle of the heights in the header, metres, or 0 when they are not finite.
     pub fn middle_height_m(&self) -> f64 {
         let bounds = self.reader.header().bounds();
         let middle = 0.5 * (bounds.min.z + bounds.max.z) * self.stated.height_unit_m;
         if middle.is_finite() { middle } else { 0.0 }
     }
 
-    /// Hands over every point of the surface in the order of the file; returns how many were read, and how many of them were
-    /// noise, withheld or without a height.
+    /// Passes each point of the surface to `take`, in the order of the file.
+    ///
+    /// Returns the number of points read, and the number of those that were noise, withheld or without a finite height.
     ///
     /// # Errors
-    /// [`PointsError::Damaged`].
+    /// [`PointsError::Damaged`] when the points cannot be decoded.
     pub fn visit(mut self, take: impl FnMut(SurfacePoint)) -> Result<(u64, u64), PointsError> {
         self.each(take)
     }
@@ -199,12 +221,16 @@ impl PointCloud {
         }
     }
 
+    /// Returns the geotransform, the width and the height of the grid that covers the extent in the header.
     fn grid(&self, cell: (f64, f64), anchor: (f64, f64)) -> Result<(GeoTransform, usize, usize), PointsError> {
         let (bounds, points) = (self.reader.header().bounds(), self.reader.header().number_of_points());
         let extent = [bounds.min.x, bounds.min.y, bounds.max.x, bounds.max.y];
         let ordered = bounds.min.x <= bounds.max.x && bounds.min.y <= bounds.max.y;
         if !(ordered && extent.iter().all(|v| v.is_finite() && v.abs() < 1e12)) {
-            return Err(PointsError::damaged(&self.path, format!("its extent is {extent:?}")));
+            return Err(PointsError::damaged(
+                &self.path,
+                format!("the extent in the header is {extent:?}, expected finite numbers in ascending order"),
+            ));
         }
         let snapped = |value: f64, anchor: f64, cell: f64| anchor + ((value - anchor) / cell).floor() * cell;
         let left = snapped(bounds.min.x, anchor.0, cell.0);
@@ -219,7 +245,7 @@ impl PointCloud {
     }
 }
 
-/// The cell that holds a place of the map.
+/// Returns the cell (column, row) that contains a place of the map.
 fn place(geotransform: &GeoTransform, x: f64, y: f64) -> Option<(usize, usize)> {
     let (column, row) = geotransform.cell_from_map(x, y)?;
     let whole = |value: f64| {
@@ -229,11 +255,11 @@ fn place(geotransform: &GeoTransform, x: f64, y: f64) -> Option<(usize, usize)> 
     Some((whole(column)?, whole(row)?))
 }
 
-/// Runs the decoder. It indexes by numbers that it reads, so damaged input may make it panic: that is the input's fault.
+/// Runs the decoder. It uses numbers of the file as indices without checks, so a panic means that the file is damaged.
 fn guarded<T, E: ToString>(path: &Path, decode: impl FnOnce() -> Result<T, E>) -> Result<T, PointsError> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(error)) => Err(PointsError::damaged(path, error)),
-        Err(_) => Err(PointsError::damaged(path, "its points cannot be decoded")),
+        Err(_) => Err(PointsError::damaged(path, "the points cannot be decoded")),
     }
 }

@@ -1,17 +1,18 @@
-//! The coordinate system of a LAS file: a WKT record, else GeoTIFF keys.
+//! The coordinate reference system of a LAS file: a WKT record, or else GeoTIFF keys.
 
 use crs::{CrsError, CrsIdentity, VerticalDatum};
 use las::Header;
 use las::crs::{GeoTiffCrs, GeoTiffData};
 
-/// Key of the vertical unit, and metres per unit for its EPSG codes.
+/// GeoTIFF key of the vertical unit.
 const VERTICAL_UNITS: u16 = 4099;
+/// EPSG codes of vertical units, and metres per unit.
 const METRES_PER_UNIT: [(u16, f64); 3] = [(9001, 1.0), (9002, 0.3048), (9003, 1200.0 / 3937.0)];
 
-/// What a file says of its coordinates.
+/// The coordinate reference system of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stated {
-    /// WKT, or `EPSG:n`.
+    /// Definition: WKT, or `EPSG:n`.
     pub(super) definition: Option<String>,
     pub(super) horizontal_epsg: Option<u32>,
     pub(super) vertical: Option<VerticalDatum>,
@@ -19,7 +20,7 @@ pub(super) struct Stated {
     pub(super) height_unit_m: f64,
 }
 
-/// Reads what the header says; a file without a coordinate system says nothing.
+/// Reads the reference system from the header. All fields are empty when the file names none.
 pub(super) fn stated(header: &Header) -> Result<Stated, CrsError> {
     let nothing = Stated { definition: None, horizontal_epsg: None, vertical: None, height_unit_m: 1.0 };
     if let Some(wkt) = header.get_wkt_crs_bytes() {
@@ -32,7 +33,7 @@ pub(super) fn stated(header: &Header) -> Result<Stated, CrsError> {
     }
     match header.get_geotiff_crs() {
         Ok(Some(keys)) => Ok(from_keys(&keys, nothing)),
-        // Keys that cannot be read name no coordinate system, which the caller is told.
+        // Keys that cannot be read count as no reference system, which the caller reports.
         Ok(None) | Err(_) => Ok(nothing),
     }
 }

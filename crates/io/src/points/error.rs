@@ -1,68 +1,68 @@
-//! What can go wrong with a point cloud.
+//! Why a point cloud was not read.
 
 use std::path::{Path, PathBuf};
 
-/// A point cloud that cannot be read.
+/// Why a point cloud was not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PointsError {
-    /// The file is not there or may not be read.
-    #[error("cannot read the file ({source}): check the name and the permissions: {}", path.display())]
+    /// The system cannot read the file.
+    #[error("cannot read the file ({source}), check its name and permissions: {}", path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's answer.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The content is damaged, truncated, or of a kind that is not read.
-    #[error("not a readable LAS or LAZ file ({reason}): {}", path.display())]
+    /// The file is damaged, truncated, or of a kind that is not supported.
+    #[error("the file is not a readable LAS or LAZ file ({reason}): {}", path.display())]
     Damaged {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What was found.
         reason: String,
     },
-    /// No point makes a surface.
-    #[error("no point is left of {points} (noise and withheld points do not count): {}", path.display())]
+    /// No point is left.
+    #[error("none of the {points} points can be used (noise and withheld points do not count): {}", path.display())]
     NoPoints {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Points read.
+        /// Number of points read.
         points: u64,
     },
-    /// More points than are held in memory.
-    #[error("the cloud has {points} points, up to {most} are compared: thin it or cut it: {}", path.display())]
+    /// The cloud has more points than are held in memory.
+    #[error("the cloud has {points} points, at most {most} are read, thin it or cut it: {}", path.display())]
     TooManyPoints {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Points in the file.
+        /// Number of points in the file.
         points: u64,
-        /// The most.
+        /// Largest number of points.
         most: u64,
     },
-    /// The grid would be far larger than the cloud.
+    /// The grid would have many more cells than the cloud has points.
     #[error(
-        "the cloud's extent holds {cells:.0} cells of {cell} map units for {points} points, at most {most} are made: \
+        "the extent of the cloud has {cells:.0} cells of {cell} map units for {points} points, the limit is {most} cells, \
          use larger cells: {}", path.display()
     )]
     TooManyCells {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Cells of the extent.
+        /// Number of cells of the extent.
         cells: f64,
         /// Side of a cell, map units.
         cell: f64,
-        /// Points in the file.
+        /// Number of points in the file.
         points: u64,
-        /// The most cells for so many points.
+        /// Largest number of cells for this number of points.
         most: u64,
     },
     /// The coordinate reference system cannot be read.
-    #[error("coordinate reference system ({source}): {}", path.display())]
+    #[error("the coordinate reference system cannot be read ({source}): {}", path.display())]
     Crs {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What geodesy says.
+        /// Error of the crate `crs`.
         source: crs::CrsError,
     },
 }

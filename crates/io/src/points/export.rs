@@ -1,7 +1,7 @@
-//! Points out: LAS or LAZ on a map.
+//! Writes points as LAS or LAZ.
 //!
-//! LAS 1.4, format 6, coordinates to a millimetre from an offset on whole metres, the coordinate system as WKT; no date is
-//! written, so that the same points give the same bytes.
+//! The file is LAS 1.4 with point format 6. Coordinates are whole millimetres from an offset on whole metres. The
+//! reference system is written as WKT. No date is written, so that the same points give the same bytes.
 
 use std::path::Path;
 
@@ -12,16 +12,17 @@ use las::{Builder, Point, Transform, Vector, Version, Writer};
 use crate::atomic::write_path;
 use crate::raster::RasterError;
 
-/// Coordinates of a LAS file are whole numbers of this, metres.
+/// Resolution of the coordinates, metres.
 const UNIT_M: f64 = 0.001;
-/// Never classified.
+/// Class of all points: never classified.
 const CLASS: u8 = 0;
 
-/// Writes points (x, y, height, metres) as LAS, or LAZ by the ending.
+/// Writes points (x, y, height in metres) as LAS, or as LAZ when the extension of the path is `laz`.
 ///
 /// # Errors
-/// [`RasterError::NotWritten`], also for a file that exists without `overwrite` and for points further apart than the format holds
-/// (2,147 km) or that are not finite; [`RasterError::Crs`] for an unknown code.
+/// - [`RasterError::NotWritten`] when the file exists and `overwrite` is false, the system refuses to write, a point is not
+///   finite, or the points are farther apart than the format can hold (2,147 km).
+/// - [`RasterError::Crs`] when the reference system has no WKT.
 pub fn write_las(path: &Path, points: &[[f64; 3]], crs: Crs, overwrite: bool) -> Result<(), RasterError> {
     let wkt = crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
     let compressed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("laz"));

@@ -1,8 +1,10 @@
-//! The numbers of a LAS or LAZ file that decide how much is allocated, checked against its length before the decoder believes
-//! them: an allocation that fails ends the process, no error comes of it.
+//! Checks the numbers of a LAS or LAZ file that decide how much memory the decoder allocates.
 //!
-//! Offsets are those of the LAS 1.4 R15 specification, table 3 (public header block) and section 2.7 (extended records); those of
-//! compressed points are LASzip's: where the table of chunks stands, the chunks, the table.
+//! They are compared with the length of the file before the decoder uses them, because an allocation that fails ends the
+//! process without an error.
+//!
+//! The offsets are from the LAS 1.4 R15 specification: table 3 (public header block) and section 2.7 (extended records).
+//! Compressed points are in LASzip's layout: the offset of the chunk table, the chunks, the chunk table.
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -11,31 +13,33 @@ use las::laz::is_laszip_vlr;
 use laz::LazVlr;
 use laz::laszip::{ChunkTable, LazItemType};
 
-/// Bytes of the largest header.
+/// Size of the largest header, bytes.
 const HEADER: usize = 375;
-/// Bytes of an extended record before its data.
+/// Size of an extended record before its data, bytes.
 const EXTENDED_RECORD: u64 = 60;
-/// More points than this do not fit into any file's length below 2⁶³ bytes.
+/// Largest number of points. More do not fit into a file shorter than 2⁶³ bytes.
 const POINTS_MAX: u64 = 1 << 40;
-/// LASzip's oldest way of compressing: no chunks, no table of them.
+/// LASzip's oldest compressor, point-wise: it has neither chunks nor a chunk table.
 const POINT_WISE: [u8; 2] = 1u16.to_le_bytes();
 
-/// Says what is wrong with the header of a file of `length` bytes; the reader is left at the start.
+/// Checks the header of a file of `length` bytes, and returns what is wrong with it. Leaves the reader at the start.
 pub(super) fn check(read: &mut (impl Read + Seek), length: u64) -> Result<(), String> {
     let mut header = Vec::with_capacity(HEADER);
     let failed = |error: std::io::Error| error.to_string();
     read.by_ref().take(HEADER as u64).read_to_end(&mut header).map_err(failed)?;
     if header.get(..4) != Some(b"LASF") {
-        return Err("it does not begin with LASF".to_owned());
+        return Err("the file does not begin with LASF".to_owned());
     }
     let minor = header.get(25).copied().unwrap_or(0);
     let data = u64::from(u32_at(&header, 96).ok_or("the header is cut off")?);
     if data > length {
-        return Err(format!("points are said to begin at byte {data} of {length}"));
+        return Err(format!("the header puts the first point at byte {data}, the file has {length} bytes"));
     }
     let records = u64::from(u32_at(&header, 100).unwrap_or(0));
     if records.saturating_mul(54) > data {
-        return Err(format!("{records} variable length records do not fit before byte {data}"));
+        return Err(format!(
+            "the header announces {records} variable length records, they do not fit before byte {data}"
+        ));
     }
     if minor >= 4 {
         check_extended(read, &header, length)?;
@@ -46,13 +50,13 @@ pub(super) fn check(read: &mut (impl Read + Seek), length: u64) -> Result<(), St
 fn check_extended(read: &mut (impl Read + Seek), header: &[u8], length: u64) -> Result<(), String> {
     let points = u64_at(header, 247).unwrap_or(0);
     if points > POINTS_MAX {
-        return Err(format!("{points} points in a file of {length} bytes"));
+        return Err(format!("the header announces {points} points in a file of {length} bytes"));
     }
     let (start, count) = (u64_at(header, 235).unwrap_or(0), u32_at(header, 243).unwrap_or(0));
     if count == 0 {
         return Ok(());
     }
-    let past_end = || format!("an extended record at byte {start} of {length} does not fit");
+    let past_end = || format!("an extended record at byte {start} ends after byte {length}, the end of the file");
     if start.saturating_add(EXTENDED_RECORD) > length {
         return Err(past_end());
     }
@@ -60,8 +64,10 @@ fn check_extended(read: &mut (impl Read + Seek), header: &[u8], length: u64) -> 
     if data > length - start - EXTENDED_RECORD { Err(past_end()) } else { Ok(()) }
 }
 
-/// Says what is wrong with the table of compressed points' chunks or with a chunk of a file of `length` bytes; `read` stands where the
-/// points begin. What the decoder does with damaged numbers on the way may panic.
+/// Checks the chunk table and the chunks of compressed points of a file of `length` bytes, and returns what is wrong.
+///
+/// The reader must be at the first byte of the points. The decoder reads the chunk table here, and may panic on damaged
+/// numbers.
 pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, length: u64) -> Result<(), String> {
     let record = header.vlrs().iter().find(|record| is_laszip_vlr(record));
     let Some(record) = record.filter(|_| header.point_format().is_compressed) else { return Ok(()) };
@@ -69,7 +75,7 @@ pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, lengt
     let layout = Layout::of(&form)?;
     let stated = u64::from(header.point_format().len());
     if layout.point_bytes != stated {
-        return Err(format!("compressed points of {} bytes, the header says {stated}", layout.point_bytes));
+        return Err(format!("compressed points have {} bytes, the header announces {stated}", layout.point_bytes));
     }
     if record.data.starts_with(&POINT_WISE) {
         return layout.check_layers(read, |_| u64::MAX, header.number_of_points(), length);
@@ -79,7 +85,7 @@ pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, lengt
     check_chunk_count(read, data, stated, length)?;
     read.seek(SeekFrom::Start(data)).map_err(failed)?;
     let table = ChunkTable::read_from(&mut *read, &form);
-    let table = table.map_err(|error| format!("the table of the points' chunks: {error}"))?;
+    let table = table.map_err(|error| format!("the chunk table cannot be read: {error}"))?;
     let points_of = |chunk: usize| {
         let of_variable = || table.as_ref().get(chunk).map_or(0, |entry| entry.point_count);
         if form.uses_variable_size_chunks() { of_variable() } else { u64::from(form.chunk_size()) }
@@ -87,22 +93,24 @@ pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, lengt
     layout.check_layers(read, points_of, header.number_of_points(), length)
 }
 
-/// Every chunk begins with a point that is not compressed.
+/// Checks the number of chunks. Each chunk begins with an uncompressed point, which limits their number.
 fn check_chunk_count(read: &mut (impl Read + Seek), data: u64, point_bytes: u64, length: u64) -> Result<(), String> {
     let mut place = |from| Some(i64::from_le_bytes(bytes_at(read, from)?)).filter(|&at| at > data as i64);
-    // A writer that could not go back put the place of the table behind it.
+    // A writer that cannot seek puts the offset of the table at the end of the file.
     let table = place(SeekFrom::Start(data)).or_else(|| place(SeekFrom::End(-8)));
     let chunks =
         table.and_then(|table| bytes_at(read, SeekFrom::Start(table as u64 + 4))).map_or(0, u32::from_le_bytes);
     if u64::from(chunks).saturating_mul(point_bytes) > length {
-        return Err(format!("{chunks} chunks of points in a file of {length} bytes"));
+        return Err(format!("the chunk table announces {chunks} chunks in a file of {length} bytes"));
     }
     Ok(())
 }
 
-/// Bytes of a point, and of how many layers a chunk is: none where its points follow one another.
+/// Layout of compressed points.
 struct Layout {
+    /// Size of an uncompressed point, bytes.
     point_bytes: u64,
+    /// Number of layers of a chunk; 0 when the points of a chunk follow one another.
     layers: usize,
 }
 
@@ -123,7 +131,11 @@ impl Layout {
                 LazItemType::Byte14(count) => (count, usize::from(count)),
             };
             if item.size() != bytes {
-                return Err(format!("compressed points with {} bytes of {:?}", item.size(), item.item_type()));
+                return Err(format!(
+                    "compressed points have an item {1:?} of {0} bytes, which is not its size",
+                    item.size(),
+                    item.item_type()
+                ));
             }
             out.point_bytes += u64::from(bytes);
             out.layers += layers;
@@ -131,9 +143,11 @@ impl Layout {
         Ok(out)
     }
 
-    /// Says where a chunk's layers do not fit; `read` stands at the first chunk. Chunks in layers (point formats 6 to 10) begin with a
-    /// point, how many they hold, and how many bytes each layer has; the next chunk follows the last layer. The decoder takes
-    /// `points_of` each from a chunk, whatever that says.
+    /// Checks that the layers of each chunk fit into the file, and returns what is wrong. `read` is at the first chunk.
+    ///
+    /// A chunk in layers (point formats 6 to 10) begins with a point, the number of its points, and the size of each layer
+    /// in bytes. The next chunk follows its last layer. The decoder reads `points_of(chunk)` points from a chunk, whatever
+    /// number the chunk itself holds.
     fn check_layers(
         &self,
         read: &mut (impl Read + Seek),
@@ -149,12 +163,14 @@ impl Layout {
         while left > 0 {
             let place = SeekFrom::Start(at + self.point_bytes + 4);
             if read.seek(place).and_then(|_| read.read_exact(&mut sizes)).is_err() {
-                return Err(format!("it ends at byte {length}, {left} points before the last"));
+                return Err(format!("the file ends at byte {length}, {left} points are missing"));
             }
             let held: u64 = sizes.chunks_exact(4).filter_map(|size| u32_at(size, 0)).map(u64::from).sum();
             at += self.point_bytes + 4 + sizes.len() as u64;
             if held > length.saturating_sub(at) {
-                return Err(format!("{held} bytes of points from byte {at} on, the file has {length}"));
+                return Err(format!(
+                    "a chunk has {held} bytes of points from byte {at} on, the file has {length} bytes"
+                ));
             }
             at += held;
             left = left.saturating_sub(points_of(chunk).max(1));
@@ -164,7 +180,7 @@ impl Layout {
     }
 }
 
-/// The bytes at a place, if it is in the file.
+/// Reads the bytes at an offset, if the file holds them.
 fn bytes_at<const N: usize>(read: &mut (impl Read + Seek), from: SeekFrom) -> Option<[u8; N]> {
     let mut bytes = [0; N];
     read.seek(from).and_then(|_| read.read_exact(&mut bytes)).ok().map(|()| bytes)

@@ -1,15 +1,18 @@
-//! Cameras of nerfstudio, instant-ngp and Blender: `transforms.json`.
+//! Reads the cameras of nerfstudio, instant-ngp and Blender: `transforms.json`.
 //!
-//! A frame's `transform_matrix` is world from camera, with OpenGL's axes (x right, y up, z back); poses come out with
-//! COLMAP's (y down, z forward). Intrinsics stand in the frame or else in the file: `fl_x`, `fl_y`, or `camera_angle_x`,
-//! `camera_angle_y` with f = w / (2 tan(angle / 2)); `cx`, `cy` from the upper-left corner of the image, its middle where they
-//! are missing. Distortion: `k1`, `k2`, `p1`, `p2` (OPENCV), with `k3` as FULL_OPENCV, `k1` … `k4` of fisheyes.
+//! The `transform_matrix` of a frame maps from the camera to the world. Its camera axes are OpenGL's (x right, y up, z
+//! back). The poses that this module returns have COLMAP's axes (x right, y down, z forward). Intrinsics are in the frame,
+//! or else in the file:
 //!
-//! nerfstudio's `applied_transform` and `applied_scale` say how its world was made from the original one
-//! (new = scale · transform · original); they are undone, so that poses are in the world that a city model can be in.
+//! - focal length: `fl_x`, `fl_y`, or `camera_angle_x`, `camera_angle_y` with f = w / (2 tan(angle / 2))
+//! - principal point: `cx`, `cy` from the upper-left corner of the image; the middle of the image by default
+//! - distortion: `k1`, `k2`, `p1`, `p2` (OPENCV), also with `k3` (FULL_OPENCV), or `k1` to `k4` of a fisheye lens
 //!
-//! Matrices that shear, mirror or are singular, NaN, names that lead out of the folder, frames without a size or a focal
-//! length are refused with the number of the frame. No file that is named inside is opened.
+//! nerfstudio's `applied_transform` and `applied_scale` map the original world to the world of the file
+//! (new = scale · transform · original). They are undone, so that the poses are in the original world.
+//!
+//! Matrices that shear, mirror or are singular, numbers that are not finite, names that lead out of the folder, and frames
+//! without a size or a focal length are refused with the number of the frame. A file that is named inside is not opened.
 
 mod lens;
 mod schema;
@@ -21,63 +24,85 @@ use camera::{Lens, Pose, Similarity};
 use crate::colmap::{ColmapModel, ColmapView, is_inside};
 use schema::{File, Frame, Matrix};
 
-/// Files are read up to this size, bytes, and this many frames of them.
+/// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 512 << 20;
+/// Largest number of frames.
 const FRAMES_LIMIT: usize = 1 << 22;
 
 /// Why a `transforms.json` was not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TransformsError {
-    /// The file cannot be read.
+    /// The system cannot read the file.
     #[error("cannot read the file ({source}): {}", .path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's answer.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The content is refused.
+    /// The content of the file is invalid.
     #[error("{what} ({place}): {}", .path.display())]
     Invalid {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What was found and expected.
+        /// What was found, and what was expected.
         what: String,
-        /// The frame, counted from 0, or the line.
+        /// Place: the frame, counted from 0, or the part of the file.
         place: String,
     },
 }
 
-/// Reads the cameras of a `transforms.json`; frames are numbered from 1, equal lenses are shared.
+/// Reads the cameras of a `transforms.json`. Views get the identifiers 1, 2, … in the order of the frames.
 ///
-/// `size` is columns and rows of the images, for files that do not say (Blender's).
+/// `size` is the number of columns and rows of the images, for files without it, such as Blender's.
 ///
 /// # Errors
-/// A file that cannot be read or is too large, and what is wrong in it, with its place.
+/// [`TransformsError::Unreadable`] when the system cannot read the file, [`TransformsError::Invalid`] when it is too large
+/// or breaks the format.
+///
+/// # Examples
+/// ```
+/// let text = r#"{"w": 640, "h": 480, "fl_x": 500, "frames": [{"file_path": "a.png",
+///     "transform_matrix": [[1, 0, 0, 10], [0, 1, 0, 20], [0, 0, 1, 30], [0, 0, 0, 1]]}]}"#;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("transforms.json");
+/// std::fs::write(&path, text)?;
+/// let model = io::transforms::read(&path, None)?;
+/// assert_eq!(model.views[0].pose.centre, [10.0, 20.0, 30.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read(path: impl AsRef<Path>, size: Option<[usize; 2]>) -> Result<ColmapModel, TransformsError> {
     let path = path.as_ref();
     let unreadable = |source| TransformsError::Unreadable { path: path.to_owned(), source };
     let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
-    let invalid = |(what, place): Fault| TransformsError::Invalid { path: path.to_owned(), what, place };
+    let invalid = |Fault { what, place }| TransformsError::Invalid { path: path.to_owned(), what, place };
     if bytes > SIZE_LIMIT {
-        return Err(invalid((format!("{bytes} bytes, up to {SIZE_LIMIT} are read"), "size".to_owned())));
+        let what = format!("the file has {bytes} bytes, at most {SIZE_LIMIT} are read");
+        return Err(invalid(Fault { what, place: "size".to_owned() }));
     }
     parse(&std::fs::read(path).map_err(unreadable)?, size).map_err(invalid)
 }
 
-/// What is wrong, and where.
-type Fault = (String, String);
+/// A mistake in a file and its place, before the path of the file is known.
+#[derive(Debug)]
+struct Fault {
+    what: String,
+    place: String,
+}
 
 fn parse(bytes: &[u8], size: Option<[usize; 2]>) -> Result<ColmapModel, Fault> {
-    let file: File = serde_json::from_slice(bytes).map_err(|error| (error.to_string(), "JSON".to_owned()))?;
+    let file: File =
+        serde_json::from_slice(bytes).map_err(|error| Fault { what: error.to_string(), place: "JSON".to_owned() })?;
     if file.frames.len() > FRAMES_LIMIT {
-        return Err((format!("{} frames, up to {FRAMES_LIMIT} are read", file.frames.len()), "frames".to_owned()));
+        let what = format!("the file has {} frames, at most {FRAMES_LIMIT} are read", file.frames.len());
+        return Err(Fault { what, place: "frames".to_owned() });
     }
-    let original_from_file = undo_applied(&file).map_err(|what| (what, "applied_transform".to_owned()))?;
+    let original_from_file =
+        undo_applied(&file).map_err(|what| Fault { what, place: "applied_transform".to_owned() })?;
     let mut model = ColmapModel { lenses: Vec::new(), views: Vec::with_capacity(file.frames.len()) };
     for (number, frame) in file.frames.iter().enumerate() {
-        let placed = |what: String| (what, format!("frame {number}"));
+        let placed = |what: String| Fault { what, place: format!("frame {number}") };
         let lens = lens::of(&frame.intrinsics.or(&file.intrinsics), size).map_err(placed)?;
         let pose = original_from_file.move_pose(&pose(&frame.transform_matrix).map_err(placed)?);
         let lens = shared(&mut model.lenses, lens);
@@ -86,10 +111,12 @@ fn parse(bytes: &[u8], size: Option<[usize; 2]>) -> Result<ColmapModel, Fault> {
     Ok(model)
 }
 
-/// The index of a lens; frames with one camera follow each other, so only the last ones are looked at.
+/// Returns the index of a lens, and adds it if it is new.
+///
+/// Frames of one camera follow each other, so only the last lenses are compared.
 fn shared(lenses: &mut Vec<Lens>, lens: Lens) -> usize {
-    const LOOKED_AT: usize = 16;
-    let first = lenses.len().saturating_sub(LOOKED_AT);
+    const COMPARED: usize = 16;
+    let first = lenses.len().saturating_sub(COMPARED);
     lenses[first..].iter().position(|known| *known == lens).map_or_else(
         || {
             lenses.push(lens);
@@ -99,6 +126,7 @@ fn shared(lenses: &mut Vec<Lens>, lens: Lens) -> usize {
     )
 }
 
+/// Returns the name of the image of a frame, relative to the folder.
 fn name(frame: &Frame) -> Result<String, String> {
     let mut name = frame.file_path.as_str();
     while let Some(rest) = name.strip_prefix("./") {
@@ -111,21 +139,22 @@ fn name(frame: &Frame) -> Result<String, String> {
     Err(format!("the image name {shown:?} is empty or leads out of the folder"))
 }
 
+/// Returns the pose of a camera, with COLMAP's axes.
 fn pose(matrix: &Matrix) -> Result<Pose, String> {
     let world_from_gl = matrix.similarity().map_err(|what| format!("transform_matrix: {what}"))?;
     if (world_from_gl.scale() - 1.0).abs() > 1e-3 {
         return Err(format!(
-            "transform_matrix scales by {}, expected a rotation and a position",
+            "transform_matrix scales by {}, expected only a rotation and a position",
             world_from_gl.scale()
         ));
     }
     let r = world_from_gl.rotation();
-    // The camera's axes in the world are the columns; y and z change their sign from OpenGL to COLMAP.
+    // The columns are the camera axes in the world. From OpenGL to COLMAP, y and z change their sign.
     let axis = |i: usize, sign: f64| [sign * r[0][i], sign * r[1][i], sign * r[2][i]];
     Ok(Pose { rotation: [axis(0, 1.0), axis(1, -1.0), axis(2, -1.0)], centre: world_from_gl.translation() })
 }
 
-/// From the world of the file to the one before nerfstudio moved it.
+/// Returns the transform from the world of the file to the original world.
 fn undo_applied(file: &File) -> Result<Similarity, String> {
     let applied = file.applied_transform.as_ref().map(Matrix::similarity).transpose()?.unwrap_or(Similarity::IDENTITY);
     let scale = Similarity::new(file.applied_scale.unwrap_or(1.0), Similarity::IDENTITY.rotation(), [0.0; 3]);

@@ -1,4 +1,4 @@
-//! What stands in a `transforms.json`. Keys that mean nothing for cameras are passed over.
+//! The members of a `transforms.json` that describe cameras. Other members are skipped.
 
 use camera::Similarity;
 use serde::Deserialize;
@@ -22,7 +22,7 @@ pub(super) struct Frame {
     pub(super) intrinsics: Intrinsics,
 }
 
-/// Three or four rows of four.
+/// A matrix of three or four rows of four numbers.
 #[derive(Debug, Deserialize)]
 pub(super) struct Matrix(Vec<Vec<f64>>);
 
@@ -48,7 +48,7 @@ pub(super) struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// These, and where they are silent those of the file.
+    /// Returns these intrinsics, with those of the file for missing ones.
     pub(super) fn or(&self, file: &Self) -> Self {
         Self {
             camera_model: self.camera_model.clone().or_else(|| file.camera_model.clone()),
@@ -72,6 +72,7 @@ impl Intrinsics {
 }
 
 impl Matrix {
+    /// Returns the matrix as similarity, if its rows have the right lengths and the last one is 0 0 0 1.
     pub(super) fn similarity(&self) -> Result<Similarity, String> {
         let row = |i: usize| <[f64; 4]>::try_from(self.0.get(i)?.as_slice()).ok();
         let last_fits = self.0.get(3).is_none_or(|last| last.as_slice() == [0.0, 0.0, 0.0, 1.0]);
@@ -79,7 +80,8 @@ impl Matrix {
             (Some(a), Some(b), Some(c)) if last_fits && self.0.len() <= 4 => {
                 Similarity::from_matrix([a, b, c]).map_err(|error| error.to_string())
             }
-            _ => Err("the matrix has not three or four rows of four numbers, the last 0 0 0 1".to_owned()),
+            _ => Err("the matrix does not have three or four rows of four numbers, or its fourth row is not 0 0 0 1"
+                .to_owned()),
         }
     }
 }

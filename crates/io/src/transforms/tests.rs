@@ -1,4 +1,4 @@
-//! `transforms.json` as nerfstudio and Blender write it, and broken ones.
+//! Reads files as nerfstudio and Blender write them, and refuses invalid ones.
 
 use camera::{ImagePoint, LensModel};
 
@@ -27,7 +27,7 @@ fn opengl_axes_become_those_of_colmap() {
     let model = read_text(&text).unwrap();
     let pose = model.views[0].pose;
     close(pose.centre, [10.0, 20.0, 30.0]);
-    // An OpenGL camera looks along −z of its own, y is up.
+    // An OpenGL camera faces −z, its y axis points up.
     close(pose.camera_from_world([10.0, 20.0, 25.0]), [0.0, 0.0, 5.0]);
     close(pose.camera_from_world([10.0, 21.0, 30.0]), [0.0, -1.0, 0.0]);
     let lens = &model.lenses[0];
@@ -44,11 +44,11 @@ fn blender_has_an_angle_and_no_size() {
             {{"file_path": "./train/r_1", "rotation": 0.01, "transform_matrix": {UNIT}}}]}}"#
     );
     let model = parse(text.as_bytes(), Some([800, 800])).unwrap();
-    // The focal length that NeRF's loaders find for these scenes.
+    // The focal length that NeRF's loaders compute for these scenes.
     assert!((model.lenses[0].focal_px()[0] - 1111.111).abs() < 1e-3);
     assert_eq!((model.lenses.len(), model.views[1].name.as_str()), (1, "train/r_1"));
-    let (what, place) = read_text(&text).unwrap_err();
-    assert!(what.contains("give its size") && place == "frame 0", "{what}");
+    let Fault { what, place } = read_text(&text).unwrap_err();
+    assert!(what.contains("give the size") && place == "frame 0", "{what}");
 }
 
 #[test]
@@ -71,12 +71,12 @@ fn frames_may_have_lenses_of_their_own() {
 
 #[test]
 fn what_nerfstudio_applied_is_undone() {
-    // Its usual one: y and z swapped with a sign.
+    // The usual transform of nerfstudio swaps x and y and negates z.
     let applied = r#""applied_transform": [[0,1,0,0],[1,0,0,0],[0,0,-1,0]], "applied_scale": 2, "#;
     let text = one_frame(&format!("{SIMPLE}{applied}"), "[[1,0,0,2],[0,1,0,4],[0,0,1,6],[0,0,0,1]]");
     let pose = read_text(&text).unwrap().views[0].pose;
     close(pose.centre, [2.0, 1.0, -3.0]);
-    // The camera looked along −z of the moved world, which is +z of the original.
+    // The camera faces −z of the world of the file, which is +z of the original world.
     close(pose.rotation[2], [0.0, 0.0, 1.0]);
 }
 
@@ -84,7 +84,7 @@ fn what_nerfstudio_applied_is_undone() {
 fn hostile_files_are_refused_with_their_place() {
     #[track_caller]
     fn refused(text: &str, words: &str, place: &str) {
-        let (what, found) = read_text(text).unwrap_err();
+        let Fault { what, place: found } = read_text(text).unwrap_err();
         assert!(what.contains(words) && found == place, "{what} ({found})");
     }
     let matrix = |matrix: &str| one_frame(SIMPLE, matrix);
@@ -102,12 +102,12 @@ fn hostile_files_are_refused_with_their_place() {
     refused(&matrix("[[1,0.2,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), "no rotation", "frame 0");
     refused(&matrix("[[1,0,0],[0,1,0],[0,0,1]]"), "rows of four", "frame 0");
     refused(&matrix("[]"), "rows of four", "frame 0");
-    refused(&lens(r#""w": 640, "h": 480, "#), "no focal length", "frame 0");
-    refused(&lens(r#""w": 1e18, "h": 480, "fl_x": 1, "#), "side of", "frame 0");
-    refused(&lens(r#""w": 0.5, "h": 480, "fl_x": 1, "#), "side of", "frame 0");
-    refused(&lens(r#""w": 640, "fl_x": 1, "#), "give its size", "frame 0");
+    refused(&lens(r#""w": 640, "h": 480, "#), "the focal length is missing", "frame 0");
+    refused(&lens(r#""w": 1e18, "h": 480, "fl_x": 1, "#), "side of the image", "frame 0");
+    refused(&lens(r#""w": 0.5, "h": 480, "fl_x": 1, "#), "side of the image", "frame 0");
+    refused(&lens(r#""w": 640, "fl_x": 1, "#), "give the size", "frame 0");
     refused(&lens(r#""w": 64, "h": 48, "fl_x": -1, "#), "positive", "frame 0");
-    refused(&lens(r#""w": 64, "h": 48, "camera_angle_x": 4, "#), "expected 0 to", "frame 0");
+    refused(&lens(r#""w": 64, "h": 48, "camera_angle_x": 4, "#), "expected more than 0", "frame 0");
     refused(&lens(r#""w": 64, "h": 48, "fl_x": 1, "k4": 0.1, "#), "k4", "frame 0");
     refused(&lens(r#""w": 64, "h": 48, "fl_x": 1, "camera_model": "EQUIRECTANGULAR", "#), "EQUIRECT", "frame 0");
     refused(&lens(r#""w": 64, "h": 48, "fl_x": 1, "is_fisheye": true, "p1": 0.1, "#), "fisheye", "frame 0");
