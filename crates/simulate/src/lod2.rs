@@ -6,8 +6,8 @@
 //! or wall to wall. Parapets, chimneys and plant rooms are left out, as LoD2 does.
 
 use city::{
-    CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, ModelPoint, ObjectKind, Surface, SurfaceClass,
-    VertexPool,
+    CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, ModelPoint, ObjectKind, SurfaceClass,
+    SurfacePolygon, VertexPool,
 };
 
 use crate::building::Building;
@@ -49,7 +49,7 @@ fn solid(block: &BuildingBlock, frame: &SceneFrame, pool: &mut VertexPool) -> Ge
         });
         // Millions of blocks would be needed to run out of indices: a scene is at most 3 km wide.
         let ring = corners.filter_map(|corner| pool.index(corner)).collect();
-        geometry.surfaces.push(Surface::new(vec![ring], class));
+        geometry.surfaces.push(SurfacePolygon::new(vec![ring], class));
     }
     geometry
 }
@@ -110,7 +110,7 @@ mod tests {
     use crate::config::SimulationConfig;
     use crate::scene::Scene;
 
-    fn ring_points(model: &CityModel, surface: &Surface) -> Vec<Vector3<f64>> {
+    fn ring_points(model: &CityModel, surface: &SurfacePolygon) -> Vec<Vector3<f64>> {
         surface.rings[0].iter().map(|i| model.vertices[*i as usize]).map(|p| Vector3::new(p.x, p.y, p.z)).collect()
     }
 
