@@ -313,7 +313,7 @@ mod tests {
     fn volume(mesh: &TriangleMesh) -> f64 {
         let cone = |t: usize| {
             let [a, b, c] = mesh.corners(t);
-            numeric::vector::dot(a, crate::vector::cross(b, c)) / 6.0
+            numeric::vector::dot(a, numeric::vector::cross(b, c)) / 6.0
         };
         (0..mesh.triangles.len()).map(cone).sum()
     }

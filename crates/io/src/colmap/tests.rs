@@ -1,7 +1,5 @@
 //! Reads valid, broken and hostile COLMAP models in text and binary.
 
-use std::path::Path;
-
 use super::*;
 
 const CAMERAS: &str = "# comment\n7 PINHOLE 640 480 500 510 320 240\n9 SIMPLE_RADIAL 64 48 50 32 24 0.1\n";
