@@ -1,14 +1,16 @@
-//! The tree: binned surface-area heuristic from the top (Wald 2007), two children to a node, then opened up to eight.
+//! Building of the tree by the binned surface-area heuristic, from the top (Wald 2007).
 //!
-//! Boxes are f32, rounded outwards from f64. The tree depends on the triangles alone, not on the number of threads.
+//! Nodes first have two children and are then opened up to eight.
+//!
+//! Boxes are f32, rounded outwards from f64. The tree depends on the triangles alone and not on the number of threads.
 
 use crate::node::{Child, LEAF_SIZE, MAX_TRIANGLES, Node, WIDTH};
 use crate::tree::{Bvh, BvhError};
 
 const BINS: usize = 16;
-/// Below this depth the halves are split by number, so that no input makes the tree deep.
+/// From this depth on nodes are split into equal counts, so that no input makes the tree deep.
 const MAX_DEPTH: usize = 48;
-/// Ranges smaller than this are built on one thread.
+/// Ranges of fewer triangles than this are built on one thread.
 const PARALLEL_FROM: usize = 4096;
 
 /// Largest permitted size of a coordinate, metres.
@@ -51,7 +53,7 @@ struct Item {
     triangle: u32,
 }
 
-/// A tree with two children to a node.
+/// A binary tree.
 #[derive(Debug)]
 struct Tree {
     bounds: Bounds,
@@ -67,7 +69,7 @@ enum Kind {
 impl Bounds {
     const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
-    /// The box of a triangle, rounded outwards.
+    /// Returns the box of a triangle, rounded outwards.
     fn of(corners: &[[f64; 3]; 3]) -> Self {
         let bound =
             |axis: usize, pick: fn(f64, f64) -> f64| pick(pick(corners[0][axis], corners[1][axis]), corners[2][axis]);
@@ -84,13 +86,13 @@ impl Bounds {
         }
     }
 
-    /// Half the surface.
+    /// Returns half the surface of the box.
     fn area(self) -> f32 {
         let [x, y, z] = [0, 1, 2].map(|i| (self.high[i] - self.low[i]).max(0.0));
         x * y + y * z + z * x
     }
 
-    /// Twice the centre.
+    /// Returns twice the centre of the box.
     fn centre(&self, axis: usize) -> f32 {
         self.low[axis] + self.high[axis]
     }
@@ -101,7 +103,7 @@ fn round_down(value: f64) -> f32 {
     if f64::from(near) > value { near.next_down() } else { near }
 }
 
-/// Builds the tree of triangles.
+/// Builds the tree over the corners of the triangles.
 fn build(corners: &[[[f64; 3]; 3]]) -> Bvh {
     let item = |(i, corners): (usize, &[[f64; 3]; 3])| Item { bounds: Bounds::of(corners), triangle: i as u32 };
     let mut items: Vec<Item> = corners.iter().enumerate().map(item).collect();
@@ -131,7 +133,7 @@ fn split(items: &mut [Item], start: usize, depth: usize) -> Tree {
     Tree { bounds, kind: Kind::Pair(Box::new([left, right])) }
 }
 
-/// Halves by number along the longest axis.
+/// Splits into two equal counts along the longest axis.
 fn halve(items: &mut [Item], bounds: &Bounds) -> usize {
     let length = |axis: &usize| bounds.high[*axis] - bounds.low[*axis];
     let axis = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
@@ -141,7 +143,8 @@ fn halve(items: &mut [Item], bounds: &Bounds) -> usize {
     middle
 }
 
-/// Splits where the surface-area heuristic is lowest over all bins of all axes; `None` where all centres coincide.
+/// Splits where the surface-area heuristic is lowest over all bins of all axes. Returns `None` where all centres
+/// coincide.
 fn partition(items: &mut [Item]) -> Option<usize> {
     let (mut best_cost, mut best) = (f32::INFINITY, None);
     for axis in 0..3 {
@@ -157,7 +160,7 @@ fn partition(items: &mut [Item]) -> Option<usize> {
         }
     }
     let (bins, at) = best?;
-    // A stable partition keeps the order of the input, and with it the tree, independent of everything else.
+    // A stable partition keeps the order of the input, so that the tree depends on the input alone.
     let (left, right): (Vec<Item>, Vec<Item>) = items.iter().partition(|item| bins.bin(item) < at);
     items[..left.len()].copy_from_slice(&left);
     items[left.len()..].copy_from_slice(&right);
@@ -176,7 +179,7 @@ impl Binning {
         (((item.bounds.centre(self.axis) - self.low) * self.scale) as usize).min(BINS - 1)
     }
 
-    /// The lowest cost and the first bin of the right side.
+    /// Returns the lowest cost and the first bin of the right side.
     fn cheapest(&self, items: &[Item]) -> (f32, usize) {
         let mut bins = [(Bounds::EMPTY, 0u32); BINS];
         for item in items {
@@ -205,7 +208,7 @@ impl Binning {
     }
 }
 
-/// Writes a node for `tree` and those below it; the index of the node.
+/// Writes the node of `tree` and the nodes below it. Returns the index of the node.
 fn flatten(tree: &Tree, nodes: &mut Vec<Node>) -> usize {
     let mut open: Vec<&Tree> = match &tree.kind {
         Kind::Leaf { .. } => vec![tree],

@@ -1,25 +1,25 @@
-//! The nodes of the tree: eight boxes side by side in f32, rounded outwards.
+//! The nodes of the tree. A node holds eight boxes side by side, in f32 and rounded outwards.
 
-/// Children of a node.
+/// Number of children of a node.
 pub(crate) const WIDTH: usize = 8;
-/// Triangles that a leaf may hold.
+/// Largest number of triangles in a leaf.
 pub(crate) const LEAF_SIZE: usize = 4;
-/// Triangles that leaves can name: 27 bits of a child.
+/// Largest number of triangles: a leaf names its first one in 27 bits of a [`Child`].
 pub(crate) const MAX_TRIANGLES: usize = 1 << 27;
 
-/// Eight children: boxes by axis, and what they are.
+/// Eight children with their boxes.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
-    /// Lower corners, [axis][child]; +∞ where there is no child.
+    /// Lower corners, `[axis][child]`; +∞ where there is no child.
     pub(crate) low: [[f32; WIDTH]; 3],
-    /// Upper corners; −∞ where there is no child.
+    /// Upper corners, `[axis][child]`; −∞ where there is no child.
     pub(crate) high: [[f32; WIDTH]; 3],
-    /// What the children are.
+    /// Index or triangles of each child.
     pub(crate) children: [Child; WIDTH],
 }
 
-/// A node by its index, or a leaf: a range of triangles.
+/// The index of a node, or a leaf with its range of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Child(u32);
 
@@ -34,14 +34,14 @@ impl Child {
         Self(LEAF | (start as u32) << 3 | (count as u32 - 1))
     }
 
-    /// The triangles of a leaf.
+    /// Returns the triangles of a leaf, `None` for a node.
     #[inline(always)]
     pub(crate) fn triangles(self) -> Option<std::ops::Range<usize>> {
         let start = ((self.0 & !LEAF) >> 3) as usize;
         (self.0 & LEAF != 0).then(|| start..start + (self.0 & 7) as usize + 1)
     }
 
-    /// The index of a node.
+    /// Returns the index of a node.
     #[inline(always)]
     pub(crate) fn index(self) -> usize {
         self.0 as usize

@@ -1,46 +1,47 @@
 //! Single rays of any origin and direction: the closest hit and any hit.
 //!
-//! Boxes are tested eight at a time in f32 with bounds of the error, triangles in f64 with the edge functions of [`Facet`].
+//! Boxes are tested eight at a time in f32 with error bounds. Triangles are tested in f64 with the edge functions of
+//! [`Facet`].
 
 use crate::Bvh;
 use crate::eye::Eye;
 use crate::node::{Child, Node, WIDTH};
 use crate::setup::Facet;
-use crate::simd::{Kernel, Lanes, dispatch};
+use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// The triangle index of a ray that meets nothing.
 pub const MISS: u32 = u32::MAX;
 
-/// A ray: positions are `origin + t · direction`.
+/// A ray with the positions `origin + t · direction`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it starts, metres from the local origin.
+    /// Start, metres from the local origin.
     pub origin: [f64; 3],
-    /// Where it goes; need not be a unit vector.
+    /// Direction, of any length but zero.
     pub direction: [f64; 3],
-    /// Where it ends, in lengths of `direction`; may be infinite.
+    /// Largest t, in lengths of `direction`; may be infinite.
     pub end: f64,
 }
 
-/// What a ray meets.
+/// The closest triangle on a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Where, in lengths of the direction.
+    /// Parameter of the position, in lengths of the direction.
     pub t: f64,
     /// Index of the triangle.
     pub triangle: u32,
 }
 
 impl Bvh {
-    /// The first triangle that a ray meets between its origin (exclusive) and its end.
+    /// Returns the first triangle that a ray meets between its origin (exclusive) and its end.
     ///
-    /// A ray with a direction of zero or with numbers that are not finite meets nothing.
+    /// A ray meets nothing if its direction is zero or if a number is not finite.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         let search = Search::new(self, ray, false)?;
         dispatch(search)
     }
 
-    /// Whether a ray meets anything between its origin (exclusive) and its end.
+    /// Returns whether a ray meets a triangle between its origin (exclusive) and its end.
     pub fn any_hit(&self, ray: &Ray) -> bool {
         Search::new(self, ray, true).is_some_and(|search| dispatch(search).is_some())
     }
@@ -48,7 +49,7 @@ impl Bvh {
 
 struct Search<'a> {
     bvh: &'a Bvh,
-    /// The ray as the middle of an image, so that triangles are tested as everywhere else.
+    /// Frame whose forward axis is the ray, so that triangles are tested as they are for images.
     eye: Eye,
     /// Length of the direction.
     length: f64,
@@ -57,7 +58,7 @@ struct Search<'a> {
     slabs: [Slab; 3],
 }
 
-/// The ray along one axis: t = (position − start) · inverse, with `pad` added outwards against rounding.
+/// The ray along one axis: t = (position − start) · inverse. `pad` widens boxes outwards against rounding.
 #[derive(Debug, Clone, Copy)]
 struct Slab {
     start: f32,
@@ -75,7 +76,7 @@ impl<'a> Search<'a> {
         }
         let forward = d.map(|c| c / length);
         let slab = |axis: usize| {
-            // A direction along a box is moved off it by less than the padding.
+            // A ray parallel to a face of the box gets a tiny slope, whose effect is smaller than the padding.
             let steep = if forward[axis].abs() < 1e-9 { 1e-9f64.copysign(forward[axis]) } else { forward[axis] };
             let size = ray.origin[axis].abs().max(bvh.extent);
             let pad = (4.0 * f64::from(f32::EPSILON) + 3e-9) * size.max(1.0);
@@ -91,10 +92,10 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The children whose boxes the ray meets before `end`, and where it enters them (metres).
+    /// Returns the children whose boxes the ray meets before `end` as a bit mask, and where it enters each, metres.
     #[inline(always)]
-    fn touch<V: Lanes>(&self, node: &Node, end: f32) -> (u32, [f32; WIDTH]) {
-        let (mut enter, mut leave) = (V::splat(0.0), V::splat(end));
+    fn touch<I: InstructionSet>(&self, isa: I, node: &Node, end: f32) -> (u32, [f32; WIDTH]) {
+        let (mut enter, mut leave) = (isa.splat(0.0), isa.splat(end));
         for (axis, slab) in self.slabs.iter().enumerate() {
             let (near, far, pad) = if slab.inverse > 0.0 {
                 (&node.low[axis], &node.high[axis], slab.pad)
@@ -102,27 +103,27 @@ impl<'a> Search<'a> {
                 (&node.high[axis], &node.low[axis], -slab.pad)
             };
             let at = |corner: &[f32; WIDTH], pad: f32| {
-                V::load(corner).sub(V::splat(slab.start)).add(V::splat(pad)).mul(V::splat(slab.inverse))
+                isa.load(corner).sub(isa.splat(slab.start)).add(isa.splat(pad)).mul(isa.splat(slab.inverse))
             };
             enter = enter.max(at(near, -pad));
             leave = leave.min(at(far, pad));
         }
-        // Both are off by a few roundings of the quotient.
-        let (enter, leave) = (enter.mul(V::splat(0.999_998)), leave.mul(V::splat(1.000_002)));
+        // The factors cover a few roundings of the quotient.
+        let (enter, leave) = (enter.mul(isa.splat(0.999_998)), leave.mul(isa.splat(1.000_002)));
         let mut depths = [0.0; WIDTH];
         enter.store(&mut depths);
         (leave.above(enter).bits() | leave_equal(enter, leave), depths)
     }
 }
 
-/// Lanes where a box is entered and left at once, as a flat box may be.
+/// Returns the lanes in which a box is entered and left at the same t, as happens with flat boxes.
 #[inline(always)]
-fn leave_equal<V: Lanes>(enter: V, leave: V) -> u32 {
-    // Neither is above the other; a missing child is entered at infinity and left at minus infinity.
+fn leave_equal<L: Lanes>(enter: L, leave: L) -> u32 {
+    // Equal values are not above each other. A missing child is entered at +∞ and left at −∞.
     !(enter.above(leave).bits() | leave.above(enter).bits()) & 0xff
 }
 
-/// A frame whose forward axis is the ray.
+/// Makes a frame whose forward axis is the ray.
 fn frame(centre: [f64; 3], forward: [f64; 3]) -> Eye {
     let least = (0..3).min_by(|&a, &b| forward[a].abs().total_cmp(&forward[b].abs())).unwrap_or(0);
     let cross =
@@ -139,8 +140,8 @@ impl Kernel for Search<'_> {
     type Output = Option<Hit>;
 
     #[inline(always)]
-    fn run<V: Lanes>(self) -> Option<Hit> {
-        // (inverse depth, index): a larger inverse is nearer.
+    fn run<I: InstructionSet>(self, isa: I) -> Option<Hit> {
+        // The best hit so far as (inverse depth, index). A larger inverse depth is nearer.
         let mut best: Option<(f64, u32)> = None;
         let mut end = self.end;
         let mut stack: Vec<(Child, f32)> = Vec::with_capacity(64);
@@ -151,7 +152,7 @@ impl Kernel for Search<'_> {
             }
             let Some(triangles) = child.triangles() else {
                 let node = &self.bvh.nodes[child.index()];
-                let (mut open, depths) = self.touch::<V>(node, round_up(end));
+                let (mut open, depths) = self.touch(isa, node, round_up(end));
                 let first = stack.len();
                 while open != 0 {
                     let lane = open.trailing_zeros() as usize;

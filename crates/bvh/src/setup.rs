@@ -1,47 +1,49 @@
-//! A triangle seen from an eye: three planes through its edges and one through itself, as linear functions of (x, y).
+//! A triangle as an eye sees it: four linear functions of the image position (x, y).
+//!
+//! Three of them tell on which side of an edge a ray passes, the fourth is the inverse depth.
 //!
 //! With corners a, b, c in the frame of the eye, the ray (x, y, 1) passes an edge on the inner side where
-//! (x, y, 1) · (b × c) ≥ 0 (2D homogeneous rasterisation, Olano and Greer 1997). The inverse depth of the plane is linear
-//! as well: 1/t = (x, y, 1) · N / det with N = a × b + b × c + c × a and det = a · (b × c). The cross product of
-//! an edge is exactly the opposite for the neighbour that runs along it the other way; and a ray counts as inside within the
-//! rounding of that product (1e-15 of it), so none slips through between the triangles around a corner either.
+//! (x, y, 1) · (b × c) ≥ 0 (2D homogeneous rasterisation, Olano and Greer 1997). The inverse depth is linear too:
+//! 1/t = (x, y, 1) · N / det with N = a × b + b × c + c × a and det = a · (b × c). The neighbour of a triangle runs
+//! along their common edge the other way, so its cross product is exactly the negative one. A ray counts as inside
+//! within the rounding of that product (1e-15 of it), so that none slips through where several triangles meet.
 
 use crate::eye::Eye;
-use crate::simd::Lanes;
+use crate::simd::{InstructionSet, Lanes};
 use numeric::vector::cross;
 
-/// Roundings of f32 between an exact linear function and its value: both factors, the products, the sums; with reserve.
+/// Bound on the f32 rounding of a linear function: of both factors, the products and the sums, with a reserve.
 const ROUNDINGS: f64 = 6.0 * (f32::EPSILON as f64) / 2.0;
-/// A triangle is seen edge-on when the ratio of its volume with the eye to the box of it is below this.
+/// A triangle is edge-on if its volume with the eye is a smaller share of its bounding box than this.
 const EDGE_ON: f64 = 1e-14;
 
-/// Roundings of f64 in the value of an edge function, in parts of the product of its corners' distances.
+/// Bound on the f64 rounding of an edge function, as a share of the product of its corners' distances.
 const EDGE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// A linear function c + a·x + b·y.
+/// Coefficients of a linear function a·x + b·y + c.
 pub(crate) type Linear = [f64; 3];
 
-/// A triangle seen from an eye, exact (f64).
+/// A triangle as an eye sees it, in f64.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Facet {
-    /// Non-negative inside, per edge.
+    /// Edge functions, non-negative inside.
     pub(crate) edges: [Linear; 3],
-    /// What each edge function may be off by rounding, per 1 + |x| + |y|.
+    /// Rounding error of each edge function, per 1 + |x| + |y|.
     pub(crate) edge_slack: [f64; 3],
-    /// The inverse depth, 1/m.
+    /// Inverse depth, 1/m.
     pub(crate) inverse_depth: Linear,
     /// Lowest depth of the corners, metres; negative where one is behind the eye.
     pub(crate) nearest: f64,
 }
 
-/// The same in f32, with bounds of the error over the rays of a tile.
+/// The same functions in f32, with error bounds that hold for all rays of a tile.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FastFacet {
     pub(crate) edges: [[f32; 3]; 3],
     pub(crate) edge_error: [f32; 3],
     pub(crate) inverse_depth: [f32; 3],
     pub(crate) inverse_error: f32,
-    /// The largest inverse depth of the triangle.
+    /// Largest inverse depth of the triangle, 1/m.
     pub(crate) nearest_inverse: f32,
 }
 
@@ -50,14 +52,14 @@ fn norm1(a: [f64; 3]) -> f64 {
     a[0].abs() + a[1].abs() + a[2].abs()
 }
 
-/// The value of a linear function.
+/// Returns the value of a linear function.
 #[inline(always)]
 pub(crate) fn value(linear: &Linear, x: f64, y: f64) -> f64 {
     linear[2] + linear[0] * x + linear[1] * y
 }
 
 impl Facet {
-    /// The triangle as the eye sees it; `None` edge-on, when no ray meets its inside.
+    /// Returns the triangle as the eye sees it, `None` if it is edge-on and no ray can meet its inside.
     #[inline(always)]
     pub(crate) fn new(eye: &Eye, corners: &[[f64; 3]; 3]) -> Option<Self> {
         let [a, b, c] = corners.map(|corner| eye.eye_from_world(corner));
@@ -68,14 +70,14 @@ impl Facet {
             return None;
         }
         let edge_slack = [size_b * size_c, size_c * size_a, size_a * size_b].map(|product| EDGE_ROUNDING * product);
-        // Seen from the other side all signs turn around, which costs no rounding.
+        // For the other side of the triangle all signs are reversed, which is exact.
         let sign = if det < 0.0 { -1.0 } else { 1.0 };
         let (edges, inverse) = (edges.map(|edge| edge.map(|n| sign * n)), 1.0 / det.abs());
         let normal = [0, 1, 2].map(|i| edges[0][i] + edges[1][i] + edges[2][i]);
         Some(Self { edges, edge_slack, inverse_depth: normal.map(|n| n * inverse), nearest: a[2].min(b[2]).min(c[2]) })
     }
 
-    /// The inverse depth at which a ray meets the triangle.
+    /// Returns the inverse depth at which a ray meets the triangle, `None` if it does not.
     #[inline(always)]
     pub(crate) fn meets(&self, x: f64, y: f64) -> Option<f64> {
         let spread = 1.0 + x.abs() + y.abs();
@@ -84,7 +86,7 @@ impl Facet {
         (inside && inverse > 0.0).then_some(inverse)
     }
 
-    /// In f32, for rays with |x| ≤ `reach[0]` and |y| ≤ `reach[1]`.
+    /// Returns the functions in f32 with error bounds for rays with |x| ≤ `reach[0]` and |y| ≤ `reach[1]`.
     #[inline(always)]
     pub(crate) fn fast(&self, reach: [f64; 2]) -> FastFacet {
         let error = |l: &Linear, slack: f64| {
@@ -101,8 +103,8 @@ impl Facet {
     }
 }
 
-/// Eight values of a linear function in f32.
+/// Returns eight values of a linear function in f32.
 #[inline(always)]
-pub(crate) fn values<V: Lanes>(linear: &[f32; 3], x: V, y: V) -> V {
-    V::splat(linear[2]).add(V::splat(linear[0]).mul(x)).add(V::splat(linear[1]).mul(y))
+pub(crate) fn values<I: InstructionSet>(isa: I, linear: &[f32; 3], x: I::Lanes, y: I::Lanes) -> I::Lanes {
+    isa.splat(linear[2]).add(isa.splat(linear[0]).mul(x)).add(isa.splat(linear[1]).mul(y))
 }

@@ -1,16 +1,16 @@
-//! The rays of a tile: up to 1024 through one eye, in subtiles of 64, with the nearest triangle that each has met.
+//! The rays of a tile: up to 1024 rays through one eye, in subtiles of 64, with the nearest triangle of each.
 //!
-//! Inverse depths are kept, because they are linear over a triangle: larger is nearer, 0 is a miss. Each comes with a bound
-//! of its error; two that are closer than their errors are compared in f64. In the search for any hit, the inverse depth
-//! starts at that of the target and jumps to infinity when something is before it.
+//! Depths are stored as inverse depths, because these are linear over a triangle. A larger value is nearer, and 0 is
+//! a miss. Each has an error bound, and two that differ by less than their errors are compared in f64. When any hit
+//! suffices, the inverse depth starts at the target's and becomes infinite as soon as something lies before it.
 
 use crate::Bvh;
 use crate::eye::Eye;
 use crate::ray::MISS;
 use crate::setup::{Facet, FastFacet, values};
-use crate::simd::Lanes;
+use crate::simd::{InstructionSet, Lanes};
 
-/// Lanes of a group.
+/// Rays of a group: the lanes of one register.
 pub(crate) const LANES: usize = 8;
 /// Rays of a subtile.
 pub(crate) const SUBTILE: usize = 64;
@@ -22,40 +22,40 @@ pub(crate) const RAYS: usize = SUBTILE * SUBTILES;
 const GROUPS: usize = RAYS / LANES;
 const GROUPS_PER_SUBTILE: usize = SUBTILE / LANES;
 
-/// What is asked of the rays.
+/// The question that rays answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Question {
-    /// Which triangle is met first.
+    /// Which triangle is the first on the ray?
     Closest,
-    /// Whether any is met before the ray's end.
+    /// Does any triangle lie before the end of the ray?
     Any,
 }
 
-/// The rays of a tile and what they have met.
+/// The rays of a tile with the nearest triangles found so far.
 #[derive(Debug)]
 pub(crate) struct Tile {
     question: Question,
-    /// Exact directions.
+    /// Directions (x, y) in f64.
     pub(crate) exact: [[f64; 2]; RAYS],
-    /// Exact inverse depths of the rays' ends, for [`Question::Any`].
+    /// Inverse depths of the rays' ends in f64, for [`Question::Any`].
     ends: [f64; RAYS],
     x: [[f32; LANES]; GROUPS],
     y: [[f32; LANES]; GROUPS],
     inverse: [[f32; LANES]; GROUPS],
     error: [[f32; LANES]; GROUPS],
-    /// Position in the tree's order of the nearest triangle.
+    /// Number of the nearest triangle in the order of the leaves, [`MISS`] for none.
     pub(crate) met: [[u32; LANES]; GROUPS],
-    /// Bounds of the subtiles.
+    /// Bounds of the directions in each subtile.
     low_x: [[f32; LANES]; SUBTILES / LANES],
     high_x: [[f32; LANES]; SUBTILES / LANES],
     low_y: [[f32; LANES]; SUBTILES / LANES],
     high_y: [[f32; LANES]; SUBTILES / LANES],
-    /// The farthest of each subtile's rays: what is behind it cannot matter.
+    /// Smallest inverse depth in each subtile. A triangle behind it cannot be nearer for any ray.
     farthest: [[f32; LANES]; SUBTILES / LANES],
-    /// Bounds of the whole tile, x then y.
+    /// Lower bounds of all directions, x and y.
     pub(crate) low: [f32; 2],
     pub(crate) high: [f32; 2],
-    /// The farthest of all rays.
+    /// Smallest inverse depth of all rays.
     pub(crate) farthest_of_all: f32,
 }
 
@@ -81,9 +81,9 @@ impl Tile {
         })
     }
 
-    /// Lays new rays into the tile: (x, y, depth of the end) by number; `None` and what is not finite is no ray.
+    /// Loads new rays. `ray` gives (x, y, depth of the end) of a ray by its number, `None` for no ray.
     ///
-    /// Whether there is any.
+    /// Returns whether there is at least one ray.
     pub(crate) fn load(&mut self, ray: impl Fn(usize) -> Option<[f64; 3]>) -> bool {
         (self.low, self.high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         for subtile in 0..SUBTILES {
@@ -112,7 +112,7 @@ impl Tile {
                     self.error[group][lane] = inverse * f32::EPSILON;
                     farthest = farthest.min(inverse - inverse * f32::EPSILON);
                 }
-                // Nothing is nearer than infinitely near, so these lanes take no part.
+                // No triangle is nearer than an infinite inverse depth, so lanes without a ray find nothing.
                 None => {
                     (self.x[group][lane], self.y[group][lane]) = (0.0, 0.0);
                     self.inverse[group][lane] = f32::INFINITY;
@@ -129,24 +129,24 @@ impl Tile {
         }
     }
 
-    /// Largest |x| and |y| of the rays.
+    /// Returns the largest |x| and |y| of the rays.
     #[inline(always)]
     pub(crate) fn reach(&self) -> [f64; 2] {
         [0, 1].map(|axis| f64::from(self.low[axis].abs().max(self.high[axis].abs())))
     }
 
-    /// Meets a triangle with all rays.
+    /// Tests a triangle against all rays.
     #[inline(always)]
-    pub(crate) fn meet<V: Lanes>(&mut self, eye: &Eye, bvh: &Bvh, number: usize, reach: [f64; 2]) {
+    pub(crate) fn meet<I: InstructionSet>(&mut self, isa: I, eye: &Eye, bvh: &Bvh, number: usize, reach: [f64; 2]) {
         let Some(facet) = Facet::new(eye, &bvh.corners[number]) else { return };
         let fast = facet.fast(reach);
         let mut changed = false;
         for block in 0..SUBTILES / LANES {
-            let mut open = self.subtiles_in_reach::<V>(&fast, block);
+            let mut open = self.subtiles_in_reach(isa, &fast, block);
             while open != 0 {
                 let lane = open.trailing_zeros() as usize;
                 open &= open - 1;
-                changed |= self.meet_subtile::<V>(eye, bvh, number, &facet, &fast, block * LANES + lane);
+                changed |= self.meet_subtile(isa, eye, bvh, number, &facet, &fast, block * LANES + lane);
             }
         }
         if changed {
@@ -154,23 +154,24 @@ impl Tile {
         }
     }
 
-    /// The subtiles that a triangle may touch, and before what they have met.
+    /// Returns the subtiles of a block in which a triangle may be the nearest, as a bit mask.
     #[inline(always)]
-    fn subtiles_in_reach<V: Lanes>(&self, fast: &FastFacet, block: usize) -> u32 {
-        let (low_x, high_x) = (V::load(&self.low_x[block]), V::load(&self.high_x[block]));
-        let (low_y, high_y) = (V::load(&self.low_y[block]), V::load(&self.high_y[block]));
-        let mut inside = V::splat(fast.nearest_inverse).above(V::load(&self.farthest[block]));
+    fn subtiles_in_reach<I: InstructionSet>(&self, isa: I, fast: &FastFacet, block: usize) -> u32 {
+        let (low_x, high_x) = (isa.load(&self.low_x[block]), isa.load(&self.high_x[block]));
+        let (low_y, high_y) = (isa.load(&self.low_y[block]), isa.load(&self.high_y[block]));
+        let mut inside = isa.splat(fast.nearest_inverse).above(isa.load(&self.farthest[block]));
         for (edge, &error) in fast.edges.iter().zip(&fast.edge_error) {
             let x = if edge[0] > 0.0 { high_x } else { low_x };
             let y = if edge[1] > 0.0 { high_y } else { low_y };
-            inside = inside.and(values(edge, x, y).above(V::splat(-2.0 * error)));
+            inside = inside.and(values(isa, edge, x, y).above(isa.splat(-2.0 * error)));
         }
         inside.bits()
     }
 
     #[inline(always)]
-    fn meet_subtile<V: Lanes>(
+    fn meet_subtile<I: InstructionSet>(
         &mut self,
+        isa: I,
         eye: &Eye,
         bvh: &Bvh,
         number: usize,
@@ -180,15 +181,15 @@ impl Tile {
     ) -> bool {
         let mut changed = false;
         for group in subtile * GROUPS_PER_SUBTILE..(subtile + 1) * GROUPS_PER_SUBTILE {
-            let (x, y) = (V::load(&self.x[group]), V::load(&self.y[group]));
-            let edges = fast.edges.map(|edge| values(&edge, x, y));
-            let beyond = |i: usize, sign: f32| edges[i].above(V::splat(sign * fast.edge_error[i]));
+            let (x, y) = (isa.load(&self.x[group]), isa.load(&self.y[group]));
+            let edges = fast.edges.map(|edge| values(isa, &edge, x, y));
+            let beyond = |i: usize, sign: f32| edges[i].above(isa.splat(sign * fast.edge_error[i]));
             let maybe_inside = beyond(0, -1.0).and(beyond(1, -1.0)).and(beyond(2, -1.0));
             if maybe_inside.bits() == 0 {
                 continue;
             }
-            let (inverse, error) = (values(&fast.inverse_depth, x, y), V::splat(fast.inverse_error));
-            let (best, best_error) = (V::load(&self.inverse[group]), V::load(&self.error[group]));
+            let (inverse, error) = (values(isa, &fast.inverse_depth, x, y), isa.splat(fast.inverse_error));
+            let (best, best_error) = (isa.load(&self.inverse[group]), isa.load(&self.error[group]));
             let maybe = maybe_inside.and(inverse.add(error).above(best.sub(best_error)));
             let maybe_bits = maybe.bits();
             if maybe_bits == 0 {
@@ -196,7 +197,7 @@ impl Tile {
             }
             let certain = beyond(0, 1.0).and(beyond(1, 1.0)).and(beyond(2, 1.0));
             let certain = certain.and(inverse.sub(error).above(best.add(best_error)));
-            self.take(group, certain, inverse, error, number);
+            self.take(isa, group, certain, inverse, error, number);
             changed = true;
             let mut unsure = maybe_bits & !certain.bits();
             while unsure != 0 {
@@ -206,24 +207,32 @@ impl Tile {
             }
         }
         if changed {
-            self.update_farthest::<V>(subtile);
+            self.update_farthest(isa, subtile);
         }
         changed
     }
 
-    /// Notes a triangle for the lanes where it is certainly the nearest.
+    /// Stores a triangle for the lanes in which it is certainly the nearest.
     #[inline(always)]
-    fn take<V: Lanes>(&mut self, group: usize, lanes: V, inverse: V, error: V, number: usize) {
+    fn take<I: InstructionSet>(
+        &mut self,
+        isa: I,
+        group: usize,
+        lanes: I::Lanes,
+        inverse: I::Lanes,
+        error: I::Lanes,
+        number: usize,
+    ) {
         let (inverse, error) = match self.question {
             Question::Closest => (inverse, error),
-            Question::Any => (V::splat(f32::INFINITY), V::splat(0.0)),
+            Question::Any => (isa.splat(f32::INFINITY), isa.splat(0.0)),
         };
-        V::pick(lanes, inverse, V::load(&self.inverse[group])).store(&mut self.inverse[group]);
-        V::pick(lanes, error, V::load(&self.error[group])).store(&mut self.error[group]);
-        V::pick(lanes, V::splat_bits(number as u32), V::load_bits(&self.met[group])).store_bits(&mut self.met[group]);
+        lanes.pick(inverse, isa.load(&self.inverse[group])).store(&mut self.inverse[group]);
+        lanes.pick(error, isa.load(&self.error[group])).store(&mut self.error[group]);
+        lanes.pick(isa.splat_bits(number as u32), isa.load_bits(&self.met[group])).store_bits(&mut self.met[group]);
     }
 
-    /// Decides in f64 for one ray whether a triangle is met before what was met so far.
+    /// Decides in f64 for one ray whether a triangle is nearer than the nearest one so far.
     #[cold]
     #[inline(never)]
     fn decide(&mut self, eye: &Eye, bvh: &Bvh, number: usize, facet: &Facet, group: usize, lane: usize) {
@@ -250,10 +259,10 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn update_farthest<V: Lanes>(&mut self, subtile: usize) {
-        let mut lowest = V::splat(f32::INFINITY);
+    fn update_farthest<I: InstructionSet>(&mut self, isa: I, subtile: usize) {
+        let mut lowest = isa.splat(f32::INFINITY);
         for group in subtile * GROUPS_PER_SUBTILE..(subtile + 1) * GROUPS_PER_SUBTILE {
-            lowest = lowest.min(V::load(&self.inverse[group]).sub(V::load(&self.error[group])));
+            lowest = lowest.min(isa.load(&self.inverse[group]).sub(isa.load(&self.error[group])));
         }
         let mut lanes = [0.0; LANES];
         lowest.store(&mut lanes);

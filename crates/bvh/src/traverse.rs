@@ -1,20 +1,21 @@
-//! The way of a tile's rays through the tree: from near to far, past every box that is outside of the tile's pyramid or
-//! behind all that its rays have met.
+//! Traversal of the tree by the rays of a tile.
+//!
+//! Nodes are visited from near to far. Boxes outside the pyramid of the rays, and boxes behind all hits, are skipped.
 
 use crate::Bvh;
 use crate::eye::Eye;
 use crate::node::{Child, Node, WIDTH};
-use crate::simd::{Kernel, Lanes};
+use crate::simd::{InstructionSet, Kernel, Lanes};
 use crate::tile::Tile;
 
-/// A child that is still to be visited, with a lower bound of its depth.
+/// A child that is still to be visited, with a lower bound on its depth.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Visit {
     child: Child,
     depth: f32,
 }
 
-/// All rays of a tile through the tree.
+/// The traversal of the tree by all rays of a tile.
 pub(crate) struct TileCast<'a> {
     pub(crate) bvh: &'a Bvh,
     pub(crate) eye: &'a Eye,
@@ -22,7 +23,7 @@ pub(crate) struct TileCast<'a> {
     pub(crate) stack: &'a mut Vec<Visit>,
 }
 
-/// A linear function of a position in f32, with a bound of its error over the tree.
+/// A linear function of a position in f32, with an error bound that holds over the tree.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     normal: [f32; 3],
@@ -31,7 +32,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// The plane `normal · (p − centre)` for positions up to `extent`.
+    /// Makes the function `normal · (p − centre)` for coordinates up to `extent` in size.
     fn new(normal: [f64; 3], centre: [f64; 3], extent: f64) -> Self {
         let offset = -(normal[0] * centre[0] + normal[1] * centre[1] + normal[2] * centre[2]);
         let size = normal.iter().map(|n| n.abs()).sum::<f64>() * extent + offset.abs();
@@ -39,22 +40,22 @@ impl Plane {
         Self { normal: normal.map(|n| n as f32), offset: offset as f32, error }
     }
 
-    /// The largest (or smallest) value in each of a node's boxes.
+    /// Returns the largest (or smallest) value in each box of a node.
     #[inline(always)]
-    fn extreme<V: Lanes>(&self, node: &Node, largest: bool) -> V {
-        let mut sum = V::splat(self.offset);
+    fn extreme<I: InstructionSet>(&self, isa: I, node: &Node, largest: bool) -> I::Lanes {
+        let mut sum = isa.splat(self.offset);
         for axis in 0..3 {
             let corner = if (self.normal[axis] > 0.0) == largest { &node.high } else { &node.low };
-            // A factor of zero would make NaN of the infinite boxes where there is no child.
+            // Zero times the infinite box of a missing child would be NaN.
             if self.normal[axis] != 0.0 {
-                sum = sum.add(V::splat(self.normal[axis]).mul(V::load(&corner[axis])));
+                sum = sum.add(isa.splat(self.normal[axis]).mul(isa.load(&corner[axis])));
             }
         }
         sum
     }
 }
 
-/// The pyramid of a tile's rays: four sides, and the depth.
+/// The pyramid around the rays of a tile: four sides and the depth.
 struct Pyramid {
     sides: [Plane; 4],
     depth: Plane,
@@ -77,15 +78,15 @@ impl Pyramid {
         }
     }
 
-    /// The children that the pyramid may touch, and a lower bound of the depth of each.
+    /// Returns the children that the pyramid may touch as a bit mask, and a lower bound on the depth of each.
     #[inline(always)]
-    fn touch<V: Lanes>(&self, node: &Node) -> (u32, [f32; WIDTH]) {
-        let mut inside = self.depth.extreme::<V>(node, true).above(V::splat(-self.depth.error));
+    fn touch<I: InstructionSet>(&self, isa: I, node: &Node) -> (u32, [f32; WIDTH]) {
+        let mut inside = self.depth.extreme(isa, node, true).above(isa.splat(-self.depth.error));
         for side in &self.sides {
-            inside = inside.and(side.extreme::<V>(node, true).above(V::splat(-side.error)));
+            inside = inside.and(side.extreme(isa, node, true).above(isa.splat(-side.error)));
         }
         let mut depth = [0.0; WIDTH];
-        self.depth.extreme::<V>(node, false).sub(V::splat(self.depth.error)).store(&mut depth);
+        self.depth.extreme(isa, node, false).sub(isa.splat(self.depth.error)).store(&mut depth);
         (inside.bits(), depth)
     }
 }
@@ -94,7 +95,7 @@ impl Kernel for TileCast<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Lanes>(self) {
+    fn run<I: InstructionSet>(self, isa: I) {
         let Self { bvh, eye, tile, stack } = self;
         let pyramid = Pyramid::new(eye, tile, bvh.extent);
         let reach = tile.reach();
@@ -103,18 +104,18 @@ impl Kernel for TileCast<'_> {
             stack.push(Visit { child: Child::node(0), depth: 0.0 });
         }
         while let Some(Visit { child, depth }) = stack.pop() {
-            // Behind all that was met: 1.00001 covers the rounding of the product.
+            // The box is behind all hits. The factor 1.00001 covers the rounding of the product.
             if depth * tile.farthest_of_all > 1.000_01 {
                 continue;
             }
             if let Some(triangles) = child.triangles() {
                 for number in triangles {
-                    tile.meet::<V>(eye, bvh, number, reach);
+                    tile.meet(isa, eye, bvh, number, reach);
                 }
                 continue;
             }
             let node = &bvh.nodes[child.index()];
-            let (mut open, depths) = pyramid.touch::<V>(node);
+            let (mut open, depths) = pyramid.touch(isa, node);
             let first = stack.len();
             while open != 0 {
                 let lane = open.trailing_zeros() as usize;
@@ -125,7 +126,7 @@ impl Kernel for TileCast<'_> {
     }
 }
 
-/// Puts a visit among those from `first` on, the nearest last.
+/// Inserts a visit into the sorted part of the stack from `first` on, where the nearest is last.
 #[inline(always)]
 fn insert(stack: &mut Vec<Visit>, first: usize, visit: Visit) {
     stack.push(visit);

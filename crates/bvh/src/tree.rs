@@ -2,57 +2,57 @@
 
 use crate::node::Node;
 
-/// Triangles arranged for ray casting.
+/// Triangles in a bounding volume hierarchy.
 #[derive(Debug, Clone)]
 pub struct Bvh {
     pub(crate) nodes: Vec<Node>,
-    /// Corners in the order of the leaves, f64: the decisions of last resort are made on them.
+    /// Corners in the order of the leaves, in f64 for the final decisions.
     pub(crate) corners: Vec<[[f64; 3]; 3]>,
-    /// Index of each triangle as it was given.
+    /// Index of each triangle in the input.
     pub(crate) index_of: Vec<u32>,
-    /// Largest absolute coordinate, for the error bounds of the boxes.
+    /// Largest absolute coordinate, from which the error bounds of the boxes follow.
     pub(crate) extent: f64,
 }
 
-/// Triangles that rays cannot be cast at.
+/// Triangles that no tree can be built of.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BvhError {
-    /// A triangle names a corner that is not there.
-    #[error("triangle {triangle} names corner {corner}, and there are {positions}")]
+    /// A triangle names a position that does not exist.
+    #[error("triangle {triangle} refers to position {corner}, but there are only {positions} positions")]
     Corner {
         /// Index of the triangle.
         triangle: usize,
-        /// The corner.
+        /// Index of the position.
         corner: u32,
-        /// How many positions there are.
+        /// Number of positions.
         positions: usize,
     },
-    /// A corner at NaN, at infinity, or too far away for its box in f32.
-    #[error("a corner of triangle {triangle} is not within {limit:e} m of the origin: choose a local origin")]
+    /// A coordinate is NaN, infinite, or too large for a box in f32.
+    #[error("a corner of triangle {triangle} is not within {limit:e} m of the origin: subtract a local origin first")]
     Position {
         /// Index of the triangle.
         triangle: usize,
-        /// The largest distance.
+        /// Largest permitted coordinate, metres.
         limit: f64,
     },
-    /// More triangles than indices.
-    #[error("{triangles} triangles, at most {limit} can be searched: cut the model into tiles")]
+    /// More triangles than the tree can index.
+    #[error("found {triangles} triangles, expected at most {limit}: cut the model into tiles")]
     TooMany {
-        /// How many there are.
+        /// Number of triangles.
         triangles: usize,
-        /// The limit.
+        /// Largest permitted number.
         limit: usize,
     },
 }
 
 impl Bvh {
-    /// Number of triangles.
+    /// Returns the number of triangles.
     pub fn len(&self) -> usize {
         self.corners.len()
     }
 
-    /// Whether there are no triangles.
+    /// Returns whether there are no triangles.
     pub fn is_empty(&self) -> bool {
         self.corners.is_empty()
     }

@@ -1,7 +1,7 @@
-//! Many rays through one eye: the depth image of a camera, and which of many points are hidden.
+//! Many rays through one eye: the depth image of a camera, and the visibility of many points.
 //!
-//! Images are cut into tiles of 32 × 32 pixels, points are sorted into tiles along a Morton curve; a tile goes through
-//! the tree as one. Tiles run in parallel, each for itself.
+//! Images are cut into tiles of 32 × 32 pixels, and points are sorted into tiles along a Morton curve. The rays of a
+//! tile traverse the tree together. Tiles are independent and run in parallel.
 
 use rayon::prelude::*;
 
@@ -18,7 +18,7 @@ const TILE_SIDE: usize = 32;
 /// Side of a subtile, pixels.
 const SUBTILE_SIDE: usize = 8;
 
-/// What the rays of an image meet, row by row.
+/// Depth and nearest triangle of every pixel, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthImage {
     /// Number of columns.
@@ -32,10 +32,10 @@ pub struct DepthImage {
 }
 
 impl Bvh {
-    /// The nearest triangle of every pixel's ray, and its depth.
+    /// Returns the nearest triangle on every pixel's ray, and its depth.
     ///
-    /// `direction` gives the point (x, y) of the image plane at distance 1 that the ray of (column, row) goes through;
-    /// pixels without one, or with one that is not finite, miss.
+    /// `direction` maps (column, row) to the point (x, y) of the image plane at distance 1 through which the ray goes.
+    /// Pixels for which it is `None` or not finite are misses.
     pub fn cast_image(
         &self,
         eye: &Eye,
@@ -90,9 +90,9 @@ impl Bvh {
         }
     }
 
-    /// Which of the targets have a triangle before them; one bool per target.
+    /// Returns for each target whether a triangle lies before it.
     ///
-    /// Targets behind the eye (depth not positive) or that are not finite count as hidden.
+    /// Targets count as hidden if they are behind the eye (depth not positive) or not finite.
     pub fn occluded(&self, eye: &Eye, targets: &[Target]) -> Vec<bool> {
         let usable = |t: &Target| t.depth > 0.0 && t.depth.is_finite() && t.x.abs() < 1e6 && t.y.abs() < 1e6;
         if self.is_empty() || !eye.is_finite() {
@@ -119,7 +119,7 @@ impl Bvh {
     }
 }
 
-/// Where an image tile is.
+/// Position of a tile in its image.
 struct Place {
     left: usize,
     top: usize,
@@ -128,7 +128,7 @@ struct Place {
 }
 
 impl Place {
-    /// The pixel of a ray: subtiles of 8 × 8 pixels one after the other.
+    /// Returns the pixel of a ray. Rays are numbered by subtiles of 8 × 8 pixels.
     #[inline(always)]
     fn pixel(&self, ray: usize) -> Option<(usize, usize)> {
         let (subtile, inside) = (ray / SUBTILE, ray % SUBTILE);
@@ -139,7 +139,7 @@ impl Place {
     }
 }
 
-/// What a thread needs to cast tiles.
+/// Scratch buffers of one thread.
 struct Scratch {
     tile: Box<Tile>,
     stack: Vec<Visit>,
@@ -150,7 +150,7 @@ impl Scratch {
         Self { tile: Tile::new(question), stack: Vec::with_capacity(256) }
     }
 
-    /// Casts the rays of a tile; false where there are none.
+    /// Casts the rays of a tile. Returns false if the tile has none.
     fn cast(&mut self, bvh: &Bvh, eye: &Eye, ray: impl Fn(usize) -> Option<[f64; 3]>) -> bool {
         let any = self.tile.load(ray);
         if any {
@@ -160,7 +160,7 @@ impl Scratch {
     }
 }
 
-/// The facet of the pixel before: neighbours mostly see the same triangle.
+/// The facet of the previous pixel, kept because neighbours mostly see the same triangle.
 struct LastFacet {
     number: u32,
     facet: Option<Facet>,
@@ -176,7 +176,8 @@ impl LastFacet {
     }
 }
 
-/// The targets along a Morton curve over their bounds, so that neighbours in the order are neighbours in the image.
+/// Returns the order of the targets along a Morton curve over their bounds, so that neighbours in the order are
+/// neighbours in the image.
 fn morton_order(targets: &[Target]) -> Vec<u32> {
     let finite = || targets.iter().filter(|t| t.x.abs() < 1e6 && t.y.abs() < 1e6);
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -185,7 +186,7 @@ fn morton_order(targets: &[Target]) -> Vec<u32> {
         high = [high[0].max(target.x), high[1].max(target.y)];
     }
     let scale = [0, 1].map(|i| if high[i] > low[i] { 65_535.0 / (high[i] - low[i]) } else { 0.0 });
-    // Casting a float to an integer saturates, and takes NaN to zero.
+    // A cast from float to integer saturates and turns NaN into zero.
     let cell = |value: f64, axis: usize| spread(((value - low[axis]) * scale[axis]) as u16);
     let key = |i: usize| u64::from(cell(targets[i].x, 0) | cell(targets[i].y, 1) << 1) << 32 | i as u64;
     let mut keys: Vec<u64> = (0..targets.len()).into_par_iter().map(key).collect();
@@ -193,7 +194,7 @@ fn morton_order(targets: &[Target]) -> Vec<u32> {
     keys.into_iter().map(|key| key as u32).collect()
 }
 
-/// The bits of a number with a zero after each.
+/// Returns the bits of a number with a zero bit after each.
 fn spread(value: u16) -> u32 {
     let mut v = u32::from(value);
     v = (v | v << 8) & 0x00ff_00ff;
