@@ -1,6 +1,6 @@
-//! Buildings: blocks that stand on the ground or on each other, and the small things on their roofs.
+//! Buildings: blocks that stand on the ground or on each other, and details on their roofs.
 //!
-//! The blocks are what an LoD2 model holds; parapets, chimneys and plant rooms are details that it leaves out.
+//! An LoD2 model holds the blocks. Parapets, chimneys and plant rooms are details that it leaves out.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,13 +17,13 @@ const CHIMNEY_M: [f64; 2] = [1.2, 0.45];
 /// A building.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Building {
-    /// Its blocks: each stands on the ground or on the one before.
+    /// Blocks. Each stands on the ground or on the one before.
     pub parts: Vec<BuildingBlock>,
     /// Parapets, chimneys, plant rooms.
     pub details: Vec<BuildingBlock>,
 }
 
-/// A rectangle in street coordinates to build on.
+/// A rectangle to build on, in street coordinates.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lot {
     pub(crate) centre: [f64; 2],
@@ -31,7 +31,7 @@ pub(crate) struct Lot {
     pub(crate) turn_deg: f64,
 }
 
-/// Puts buildings on lots.
+/// Places buildings on lots.
 pub(crate) struct Builder<'a> {
     terrain: &'a Terrain,
     streets: Streets,
@@ -44,7 +44,7 @@ impl<'a> Builder<'a> {
         Self { terrain, streets, with_details, buildings: Vec::new() }
     }
 
-    /// A building under a flat (first probability), hipped (second) or gabled roof.
+    /// Places a building with a flat (first probability), hipped (second) or gabled roof.
     pub(crate) fn any_roof(&mut self, lot: &Lot, walls_m: f64, [flat, hipped]: [f64; 2], stream: &mut SplitMix64) {
         let (kind, pitch) = (stream.uniform_in(0.0, 1.0), stream.uniform_in(0.35, 0.75));
         if kind < flat {
@@ -56,7 +56,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// A flat roof with a parapet and a plant room.
+    /// Places a building with a flat roof, a parapet and a plant room.
     pub(crate) fn flat(&mut self, lot: &Lot, walls_m: f64, stream: &mut SplitMix64) {
         let Some((ground, block)) = self.block(lot) else { return };
         let block = BuildingBlock { roof: Roof::Flat { height_m: ground + walls_m }, ..block };
@@ -68,17 +68,17 @@ impl<'a> Builder<'a> {
         self.push(vec![block], details);
     }
 
-    /// Walls, a gabled roof of a pitch (metres per metre) and a chimney.
+    /// Places a building with a gabled roof of a pitch (metres per metre) and a chimney.
     pub(crate) fn gabled(&mut self, lot: &Lot, walls_m: f64, pitch: f64) {
         self.pitched(lot, walls_m, pitch, |eaves_m, ridge_m| Roof::Gabled { eaves_m, ridge_m });
     }
 
-    /// Walls, a hipped roof of a pitch (metres per metre) and a chimney.
+    /// Places a building with a hipped roof of a pitch (metres per metre) and a chimney.
     pub(crate) fn hipped(&mut self, lot: &Lot, walls_m: f64, pitch: f64) {
         self.pitched(lot, walls_m, pitch, |eaves_m, ridge_m| Roof::Hipped { eaves_m, ridge_m });
     }
 
-    /// Flat roofs one above the other: (lot, height above the ground), each inside the one before.
+    /// Places flat blocks on top of each other. Each is (lot, height above the ground) and lies inside the one before.
     pub(crate) fn stepped(&mut self, steps: &[(Lot, f64)]) {
         let Some((ground, _)) = steps.first().and_then(|(lot, _)| self.block(lot)) else { return };
         let mut parts: Vec<BuildingBlock> = Vec::new();
@@ -92,7 +92,7 @@ impl<'a> Builder<'a> {
     }
 
     fn pitched(&mut self, lot: &Lot, walls_m: f64, pitch: f64, roof: impl Fn(f64, f64) -> Roof) {
-        // The long axis carries the ridge.
+        // The ridge runs along the long axis.
         let [u, v] = lot.half_size;
         let lot = match u < v {
             true => Lot { half_size: [v, u], turn_deg: lot.turn_deg + 90.0, ..*lot },
@@ -113,7 +113,7 @@ impl<'a> Builder<'a> {
         self.buildings.push(Building { parts, details });
     }
 
-    /// The ground at the middle of a lot and a block without a roof on it; `None` where a corner is in the water.
+    /// Returns the ground height at the middle of a lot and a block without a roof. `None` if a corner lies in water.
     fn block(&self, lot: &Lot) -> Option<(f64, BuildingBlock)> {
         let centre_m = self.streets.scene_from_street(lot.centre[0], lot.centre[1]);
         let ground = self.terrain.height(centre_m[0], centre_m[1]);
@@ -127,13 +127,13 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// A box on a roof.
+/// Makes a box on a roof.
 fn on_roof(below: &BuildingBlock, centre_m: [f64; 2], half_size_m: [f64; 2], top_m: f64) -> BuildingBlock {
     let (direction_deg, base_m) = (below.direction_deg, below.eaves_m());
     BuildingBlock { centre_m, half_size_m, direction_deg, base_m, roof: Roof::Flat { height_m: top_m } }
 }
 
-/// The parapets along the four edges of a flat roof.
+/// Makes the parapets along the four edges of a flat roof.
 fn parapets(block: &BuildingBlock) -> Vec<BuildingBlock> {
     let ([u, v], [height, thickness]) = (block.half_size_m, PARAPET_M);
     let half = 0.5 * thickness;

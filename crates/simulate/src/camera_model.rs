@@ -1,13 +1,14 @@
-//! A satellite's camera over the scene: an agile pushbroom on a circular orbit over the turning Earth, or a frame camera.
+//! The camera of a satellite over the scene: an agile pushbroom on a circular orbit, or a frame camera.
 //!
-//! Geometry is in the tangent frame (east, north, up; metres) of the scene's centre C. The sensor stands at `P(0) = C + r u` for
-//! the line of sight u at the chosen incidence and azimuth, and moves on a circle about the Earth's centre with the speed of
-//! its orbit, less the ground's own motion. The pushbroom is steered so that its line sweeps the ground at a constant speed
-//! along the heading; a pixel of line l and sample s looks along `b(t) + (s − s₀) k a(t)`, with b towards the point steered
-//! at and a across it. The frame camera looks along `b(0) + (s − s₀) k a(0) + (l − l₀) k c(0)`.
+//! Geometry is in the tangent frame (east, north, up; metres) of the scene's centre C. At t = 0 the sensor is at
+//! `P(0) = C + r u`, where u is the line of sight at the chosen incidence and azimuth. It moves on a circle about the
+//! Earth's centre with the speed of its orbit relative to the ground, which moves too. The pushbroom is steered so that
+//! its line sweeps the ground at a constant speed along the heading. A pixel of line l and sample s looks along
+//! `b(t) + (s − s₀) k a(t)`, where b points to the target and a points across it. The frame camera looks along
+//! `b(0) + (s − s₀) k a(0) + (l − l₀) k c(0)`.
 //!
-//! Positions are found by following a ray to an ellipsoidal height, so that the curved Earth is in the camera and not in
-//! the RPC alone, which is fitted (see [`FittedCamera`]). Refraction is left out: it shifts an image, like pointing.
+//! A ray is followed to an ellipsoidal height, so that the camera includes the curvature of the Earth. The RPC is fitted
+//! to this camera (see [`FittedCamera`]). Refraction is left out, because it only shifts an image, as pointing does.
 
 use camera::{Correspondence, ImagePoint, Rpc, RpcFit};
 use geodesy::{EnuFrame, EnuPoint, LonLatHeight};
@@ -23,18 +24,18 @@ const ORBIT_M: f64 = 617_000.0;
 const EARTH_M: f64 = 6_371_000.0;
 /// Gravitational parameter of the Earth, m³/s².
 const GRAVITY: f64 = 3.986_004_418e14;
-/// Turn of the Earth, radians per second.
+/// Angular velocity of the Earth, radians per second.
 const EARTH_RATE: f64 = 7.292_115e-5;
-/// Positions along samples, lines and heights that the RPC is fitted to.
+/// Numbers of fit positions along samples, lines and heights.
 const LATTICE: [usize; 3] = [11, 11, 7];
-/// The RPC holds this share of the image's size beyond its edges.
+/// Share of the image size by which the domain of the RPC extends beyond the edges.
 const FIT_MARGIN: f64 = 0.1;
-/// A ray has reached a height when it is this close to it, metres.
+/// Tolerance on the height that a ray is followed to, metres.
 const TOLERANCE_M: f64 = 1e-7;
-/// Steps of a ray to a height; each leaves a thousandth of the distance.
+/// Largest number of steps to a height. Each step leaves a thousandth of the distance.
 const MAX_STEPS: usize = 12;
 
-/// Where the sensor is seen from the scene, and how finely it samples.
+/// The line of sight and the sampling distance of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Look {
     /// Angle between the line of sight and the vertical at the scene, degrees.
@@ -52,13 +53,13 @@ pub struct Look {
 pub(crate) struct PhysicalCamera {
     frame: EnuFrame,
     model: CameraModel,
-    /// Sensor at t = 0, the Earth's centre, the sensor's velocity there relative to the ground.
+    /// Sensor position at t = 0, the Earth's centre, and the sensor's velocity relative to the ground.
     position: Vector3<f64>,
     centre_of_orbit: Vector3<f64>,
     tangent: Vector3<f64>,
     rate: f64,
     earth_turn: Vector3<f64>,
-    /// Ground distance between lines along the heading, and the time between them.
+    /// Ground distance between lines along the heading, metres, and the time between them, seconds.
     step: Vector3<f64>,
     period_s: f64,
     left: Vector3<f64>,
@@ -66,16 +67,16 @@ pub(crate) struct PhysicalCamera {
     middle: ImagePoint,
 }
 
-/// An RPC with what it leaves of the physical camera.
+/// An RPC with its residual against the physical camera.
 #[derive(Debug, Clone)]
 pub(crate) struct FittedCamera {
     pub(crate) rpc: Rpc,
-    /// Largest distance between the two in the image, pixels, at other points than those of the fit.
+    /// Largest distance from the physical camera at points that were not used in the fit, pixels.
     pub(crate) max_px: f64,
 }
 
 impl Look {
-    /// Unit vector from the scene to the sensor (east, north, up).
+    /// Returns the unit vector from the scene to the sensor (east, north, up).
     pub fn towards_sensor(&self) -> Vector3<f64> {
         let (sin, cos) = self.incidence_deg.to_radians().sin_cos();
         let (east, north) = self.azimuth_deg.to_radians().sin_cos();
@@ -84,7 +85,7 @@ impl Look {
 }
 
 impl PhysicalCamera {
-    /// The camera of an image of `width × height` pixels with the scene's `centre` in its middle.
+    /// Makes the camera of an image of `width × height` pixels with the scene's `centre` in its middle.
     pub(crate) fn new(model: CameraModel, look: &Look, centre: LonLatHeight, (width, height): (usize, usize)) -> Self {
         let to_sensor = look.towards_sensor();
         let centre_of_orbit = Vector3::new(0.0, 0.0, -EARTH_M - centre.height_m);
@@ -95,14 +96,14 @@ impl PhysicalCamera {
         let position = to_sensor * range;
         let (east, north) = look.heading_deg.to_radians().sin_cos();
         let track = Vector3::new(east, north, 0.0);
-        // Sample numbers grow to the left of the flight, so that an image flown southwards has north up and east right.
+        // Samples grow to the left of the flight direction. An image flown southwards then has north up and east right.
         let left = Vector3::new(-north, east, 0.0);
         let outwards = (position - centre_of_orbit).normalize();
         let tangent = (track - outwards * outwards.dot(&track)).normalize();
         let rate = (GRAVITY / orbit.powi(3)).sqrt();
         let (sin, cos) = centre.lat_deg.to_radians().sin_cos();
         let earth_turn = Vector3::new(0.0, cos, sin) * EARTH_RATE;
-        // Lines are one sampling distance apart across the plane that a line of pixels looks along.
+        // Lines are one sampling distance apart, measured across the scan plane.
         let scan_normal = left.cross(&to_sensor).normalize();
         let step_m = look.gsd_m / scan_normal.dot(&track).abs();
         Self {
@@ -121,7 +122,7 @@ impl PhysicalCamera {
         }
     }
 
-    /// The ground position that an image position sees at an ellipsoidal height.
+    /// Returns the ground position that an image position sees at an ellipsoidal height.
     pub(crate) fn localize(&self, at: ImagePoint, height_m: f64) -> LonLatHeight {
         let (origin, direction) = self.line_of_sight(at);
         let direction = direction.normalize();
@@ -168,14 +169,14 @@ impl PhysicalCamera {
         on_orbit - self.earth_turn.cross(&arm) * t_s
     }
 
-    /// The RPC of this camera over its image and a range of heights (low, high), metres above the ellipsoid.
+    /// Fits an RPC to this camera over its image and a range of heights (low, high), metres above the ellipsoid.
     ///
     /// # Errors
-    /// When the fit fails, which a sensible look excludes.
+    /// The fit fails, which does not happen for usual lines of sight.
     pub(crate) fn fitted(&self, (low_m, high_m): (f64, f64)) -> Result<FittedCamera, SimulateError> {
         let rpc = RpcFit::to_correspondences(&self.lattice(LATTICE, (low_m, high_m)))?.rpc;
         let mut max_px: f64 = 0.0;
-        // Between the points of the fit, and without the margin's corners.
+        // Check points lie between the fit positions and leave out the corners of the margin.
         for c in self.lattice(LATTICE.map(|n| n + 1), (low_m, high_m)) {
             let p = rpc.project(c.ground)?;
             max_px = max_px.max((p.sample - c.image.sample).hypot(p.line - c.image.line));
@@ -255,12 +256,12 @@ mod tests {
     fn the_orbit_moves_the_pushbroom_while_it_scans() {
         let camera = PhysicalCamera::new(CameraModel::Pushbroom, &look(10.0, 10.0), CENTRE, (701, 701));
         let flown = camera.position_at(700.0 * camera.period_s) - camera.position;
-        // 350 m of ground are scanned while the sensor flies a tenth more on its wider circle.
+        // The sensor flies about a tenth farther than the 350 m of ground that it scans, because its circle is wider.
         assert!((350.0..420.0).contains(&flown.norm()), "{}", flown.norm());
         assert!(flown.y < 0.0);
     }
 
-    /// Two derivations of a pushbroom: a line of sight followed to the curved Earth, and the planes of a linear camera.
+    /// Compares two derivations of a pushbroom: rays followed to the curved Earth, and the planes of a linear camera.
     #[test]
     fn over_a_small_scene_the_pushbroom_is_the_linear_one() {
         let camera = PhysicalCamera::new(CameraModel::Pushbroom, &look(18.0, 40.0), CENTRE, (601, 601));

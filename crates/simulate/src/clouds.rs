@@ -1,4 +1,4 @@
-//! Clouds over an image: a cover of chosen share and extent, fixed to the view (clouds move between any two of them).
+//! Clouds over an image, with a chosen share and extent. Every view has its own, because clouds move between views.
 
 use raster::Grid;
 
@@ -7,12 +7,12 @@ use crate::noise::value_noise;
 
 /// Radiance of a thick cloud.
 pub(crate) const CLOUD_RADIANCE: f32 = 0.9;
-/// Width of a cloud's edge, in units of the noise.
+/// Width of the edge of a cloud, in units of the noise.
 const EDGE: f64 = 0.06;
-/// Distance between the pixels by which the share is set.
+/// Stride of the pixels from which the threshold for the share is found.
 const STRIDE: usize = 4;
 
-/// How much each pixel is hidden, [0, 1]; `None` under a clear sky.
+/// Returns the opacity of the clouds at each pixel, 0 to 1. `None` if there are none.
 pub(crate) fn opacity(
     config: &CloudsConfig,
     seed: u64,

@@ -1,7 +1,7 @@
-//! What to simulate: a parameter file (TOML) in types, with the default of every number and the range it may have.
+//! The configuration of a simulation: the types of a parameter file (TOML).
 //!
-//! Lengths are metres, angles degrees, heights above the WGS 84 ellipsoid. Everything random follows from `seed`. Unknown
-//! keys are refused; a missing key has the value of the preset that the file names (see [`crate::PRESETS`]).
+//! Lengths are metres, angles degrees, heights above the WGS 84 ellipsoid. All random numbers follow from `seed`.
+//! Unknown keys are errors. A missing key takes the value of the preset that the file names (see [`crate::PRESETS`]).
 
 use serde::{Deserialize, Serialize};
 
@@ -11,11 +11,11 @@ use crate::sun::Sun;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SimulationConfig {
-    /// Everything random follows from it.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Side of the square area whose truth is known, metres.
     pub size_m: f64,
-    /// Sampling distance of the images and cell of the truth, metres.
+    /// Sampling distance of the images and cell size of the truth, metres.
     pub gsd_m: f64,
     /// Number of views.
     pub views: usize,
@@ -25,21 +25,21 @@ pub struct SimulationConfig {
     pub lat_deg: f64,
     /// Mean height of the ground above the ellipsoid, metres.
     pub ground_height_m: f64,
-    /// The bare ground.
+    /// Bare ground.
     pub terrain: TerrainConfig,
-    /// What is built on it.
+    /// Streets and buildings.
     pub buildings: BuildingsConfig,
-    /// What grows on it.
+    /// Trees.
     pub vegetation: VegetationConfig,
-    /// What drives and parks on it.
+    /// Vehicles.
     pub vehicles: VehiclesConfig,
-    /// What it looks like.
+    /// Ground cover and contrast.
     pub surface: AppearanceConfig,
-    /// From where and when the views are taken.
+    /// Directions, dates and light of the views.
     pub acquisition: AcquisitionConfig,
-    /// With what.
+    /// Optics and detector.
     pub sensor: SensorConfig,
-    /// Through what.
+    /// Clouds.
     pub clouds: CloudsConfig,
 }
 
@@ -47,23 +47,23 @@ pub struct SimulationConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainConfig {
-    /// Largest departure of the widest undulation from the mean height, metres.
+    /// Amplitude of the widest undulation, metres.
     pub relief_m: f64,
-    /// Wavelength of the widest undulation, metres; each next octave has half of it.
+    /// Wavelength of the widest undulation, metres. Each further octave has half of it.
     pub wavelength_m: f64,
     /// Amplitude of each octave relative to the one before.
     pub roughness: f64,
     /// Depth of a pit in the middle of the scene, metres; 0 for none.
     pub pit_depth_m: f64,
-    /// Height of the benches that the ground is cut into, metres; 0 leaves it smooth.
+    /// Height of the benches into which the ground is cut, metres; 0 for smooth ground.
     pub bench_height_m: f64,
-    /// Share of the area that is water, at the side away from the land; 0 for none.
+    /// Share of the area that is water, on one side of the scene; 0 for none.
     pub water_share: f64,
-    /// Height of the land's edge above the water, metres.
+    /// Height of the quay above the water, metres.
     pub quay_height_m: f64,
 }
 
-/// A town along a grid of streets. Between four streets lies a quarter; its kind is drawn by the weights.
+/// A town along a grid of streets. The kind of each quarter between four streets is drawn by the weights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BuildingsConfig {
@@ -75,17 +75,17 @@ pub struct BuildingsConfig {
     pub street_width_m: f64,
     /// Height of a stepped tower in the middle of the scene, metres; 0 for none.
     pub landmark_height_m: f64,
-    /// Heights that towers of `high_rise` quarters may have, metres.
+    /// Lowest and highest tower of `high_rise` quarters, metres.
     pub high_rise_height_m: [f64; 2],
-    /// Parapets, chimneys and plant rooms on the roofs.
+    /// Whether roofs have parapets, chimneys and plant rooms.
     pub details: bool,
-    /// Every quarter is built, painted and planted alike: a repetitive scene.
+    /// Whether every quarter is built, painted and planted alike, which makes a repetitive scene.
     pub identical: bool,
     /// Weight of each kind of quarter.
     pub quarters: QuarterWeights,
 }
 
-/// Relative frequency of what stands between four streets; all zero builds nothing.
+/// Relative frequency of the kinds of quarters. If all are zero, nothing is built.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QuarterWeights {
@@ -111,19 +111,19 @@ pub struct QuarterWeights {
 pub struct VegetationConfig {
     /// Trees per hectare of free ground.
     pub trees_per_ha: f64,
-    /// Heights that they may have, metres.
+    /// Lowest and highest tree, metres.
     pub height_m: [f64; 2],
 }
 
-/// Vehicles along the streets: other ones on every date.
+/// Vehicles along the streets, different ones on every date.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VehiclesConfig {
-    /// Share of the parking places along the streets that are taken.
+    /// Share of the parking places that are taken.
     pub parked_share: f64,
 }
 
-/// What the ground is covered with where nothing else is.
+/// Cover of the bare ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -142,9 +142,9 @@ pub enum GroundCover {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AppearanceConfig {
-    /// What the ground is covered with.
+    /// Cover of the bare ground.
     pub cover: GroundCover,
-    /// Contrast of all patterns: 1 for a usual scene, near 0 for one without texture.
+    /// Contrast of all patterns: 1 for a usual scene, near 0 for a scene without texture.
     pub contrast: f64,
 }
 
@@ -159,7 +159,7 @@ pub enum CameraModel {
     Frame,
 }
 
-/// A direction to the sensor, as seen from the scene.
+/// The direction from the scene to the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LookAngles {
@@ -173,31 +173,31 @@ pub struct LookAngles {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AcquisitionConfig {
-    /// The camera.
+    /// Kind of camera.
     pub camera: CameraModel,
     /// Direction of flight, degrees clockwise from north; image lines follow it.
     pub heading_deg: f64,
-    /// Steepest view ahead and behind, degrees: the views of a pass run from the one to the other.
+    /// Largest angle ahead and behind, degrees. The views of a pass run from the one to the other.
     pub along_track_deg: f64,
-    /// Largest view to the side, degrees: the views of a pass weave between both sides.
+    /// Largest angle to the side, degrees. The views of a pass alternate between both sides.
     pub across_track_deg: f64,
-    /// The views one by one, instead of the pass: as many as `views`, or empty.
+    /// Lines of sight of the single views in place of a pass. Either empty or as many as `views`.
     pub looks: Vec<LookAngles>,
-    /// Smallest and largest length of the translation by which each view's RPC points wrong, pixels.
+    /// Smallest and largest pointing error of the delivered RPCs, pixels.
     pub pointing_error_px: [f64; 2],
-    /// How much that error changes from the first to the last line, pixels.
+    /// Change of the pointing error from the first to the last line, pixels.
     pub pointing_drift_px: f64,
-    /// Number of dates. The views are shared out in order; each date has its own light, vehicles and radiometry.
+    /// Number of dates. Views are distributed over them in order. Each date has its own light, vehicles and radiometry.
     pub dates: usize,
-    /// Where the light comes from on the first date.
+    /// Direction of the sunlight on the first date.
     pub sun: Sun,
-    /// How far the sun of another date may be from it, degrees: elevation, azimuth.
+    /// Largest difference of the sun on other dates: elevation and azimuth, degrees.
     pub sun_spread_deg: [f64; 2],
-    /// How much the gain of another date may differ, relative to 1.
+    /// Largest relative difference of the gain on other dates.
     pub gain_spread: f64,
-    /// How much the offset of another date may differ, as a share of the sensor's range.
+    /// Largest difference of the offset on other dates, as a share of the sensor's range.
     pub offset_spread: f64,
-    /// How much the gamma of another date may differ from 1.
+    /// Largest difference of gamma from 1 on other dates.
     pub gamma_spread: f64,
 }
 
@@ -209,26 +209,26 @@ pub struct SensorConfig {
     pub bits: u32,
     /// Modulation transfer at the Nyquist frequency, pixel box included.
     pub mtf_at_nyquist: f64,
-    /// Lines of sight along each side of a pixel.
+    /// Number of samples along each side of a pixel.
     pub subpixels: usize,
-    /// Electrons of a white surface under full light: the photon noise is the square root of the signal.
+    /// Electrons of a white surface under full light. The photon noise is the square root of the signal.
     pub electrons_at_white: f64,
     /// Standard deviation of the read noise, electrons.
     pub read_noise_electrons: f64,
-    /// Share of the sensor's range between black and a white surface under full light; above 1 clips.
+    /// Share of the sensor's range that a white surface under full light reaches. Values above 1 saturate.
     pub white_share: f64,
-    /// Share of the sensor's range that a black surface has: path radiance and dark current.
+    /// Value of a black surface as a share of the sensor's range: path radiance and dark current.
     pub offset_share: f64,
 }
 
-/// Clouds: every view has its own.
+/// Clouds, different ones in every view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CloudsConfig {
-    /// Share of each image that they hide.
+    /// Share of each image that is hidden.
     pub share: f64,
-    /// Their typical extent, metres.
+    /// Typical extent of a cloud, metres.
     pub extent_m: f64,
-    /// Whether the hidden pixels are no-data (0) in the image, as after a cloud mask, and not white.
+    /// Whether hidden pixels are no-data (0), as after a cloud mask. Otherwise they are white.
     pub masked: bool,
 }

@@ -1,22 +1,22 @@
 //! The opaque crown of a tree: half an ellipsoid on an upright cylinder that reaches the ground.
 //!
-//! A convex solid and a height function at once, so that what stands under the surface is never seen. A ray meets
-//! cylinder and ellipsoid at roots of quadratics.
+//! A crown is a convex solid and a height function at once, so that no ray sees anything under it. A ray meets the
+//! cylinder and the ellipsoid at roots of quadratic equations.
 
 use nalgebra::Vector3;
 
 use crate::SceneRay;
 
-/// A crown; lengths are metres, heights above the ellipsoid of the Earth.
+/// A crown. Lengths are metres, heights are above the ellipsoid of the Earth.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Crown {
-    /// Where the stem stands, scene frame.
+    /// Position of the stem, scene frame.
     pub(crate) centre_m: [f64; 2],
     /// Radius of the cylinder and of the ellipsoid.
     pub(crate) radius_m: f64,
-    /// Height at which the one ends and the other begins.
+    /// Height at which the cylinder ends and the ellipsoid begins.
     pub(crate) shoulder_m: f64,
-    /// Height of the dome over its shoulder.
+    /// Height of the dome above that level.
     pub(crate) dome_m: f64,
 }
 
@@ -25,17 +25,17 @@ impl Crown {
         self.shoulder_m + self.dome_m
     }
 
-    /// Height of the dome over a point; `None` beside it.
+    /// Returns the height of the dome over a point, `None` beside it.
     pub(crate) fn height(&self, x: f64, y: f64) -> Option<f64> {
         let (dx, dy) = ((x - self.centre_m[0]) / self.radius_m, (y - self.centre_m[1]) / self.radius_m);
         let inside = 1.0 - dx * dx - dy * dy;
         (inside >= 0.0).then(|| self.shoulder_m + self.dome_m * inside.sqrt())
     }
 
-    /// Where a ray from outside enters, and the outward unit normal there: the first parameter in (0, `t_max`).
+    /// Returns where a ray from outside enters, as the first parameter in (0, `t_max`), and the outward unit normal there.
     pub(crate) fn enter(&self, ray: &SceneRay, t_max: f64) -> Option<(f64, Vector3<f64>)> {
         let (r, h) = (self.radius_m, self.dome_m);
-        // In units in which the cylinder and the ellipsoid have radius 1.
+        // Coordinates are scaled so that the cylinder and the ellipsoid have radius 1.
         let o = Vector3::new(
             (ray.origin.x - self.centre_m[0]) / r,
             (ray.origin.y - self.centre_m[1]) / r,
@@ -56,7 +56,7 @@ impl Crown {
     }
 }
 
-/// The smaller root of a t² + 2 b t + c.
+/// Returns the smaller root of a t² + 2 b t + c.
 fn first_root(a: f64, b: f64, c: f64) -> Option<f64> {
     let discriminant = b * b - a * c;
     (discriminant >= 0.0 && a > 0.0).then(|| (-b - discriminant.sqrt()) / a)

@@ -1,5 +1,6 @@
-//! A date of acquisition: its light and its radiometry. The first date is as configured, the others differ within the
-//! configured spreads.
+//! A date of acquisition with its light and radiometry.
+//!
+//! The first date is as configured. The others differ from it within the configured spreads.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,23 +9,23 @@ use crate::random::derived;
 use crate::sun::Sun;
 use numeric::SplitMix64;
 
-/// What all views of one date have in common.
+/// Properties that all views of a date share.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Date {
-    /// Which, from 0.
+    /// Index of the date, from 0.
     pub index: usize,
-    /// Where the light comes from.
+    /// Direction of the sunlight.
     pub sun: Sun,
-    /// Gain relative to the sensor's.
+    /// Factor on the gain of the sensor.
     pub gain: f64,
-    /// Offset beyond the sensor's, as a share of its range.
+    /// Offset added to the sensor's, as a share of its range.
     pub offset: f64,
-    /// Exponent of the radiance.
+    /// Exponent applied to the radiance.
     pub gamma: f64,
 }
 
 impl Date {
-    /// The date of an index.
+    /// Makes the date of an index.
     pub(crate) fn new(config: &SimulationConfig, index: usize) -> Self {
         let a = &config.acquisition;
         if index == 0 {

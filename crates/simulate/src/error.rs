@@ -1,15 +1,15 @@
-//! Why a scene cannot be made.
+//! Errors of the simulation.
 
 use crate::preset_names::PRESETS;
 
-/// A configuration that makes no scene, or a place where none can be.
+/// A scene that cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulateError {
     /// A number of the configuration lies outside its range.
     #[error("{name} is {found}, expected {low} to {high}")]
     OutOfRange {
-        /// Which number.
+        /// Key of the number.
         name: &'static str,
         /// Its value.
         found: f64,
@@ -30,14 +30,14 @@ pub enum SimulateError {
         /// What is wrong, and where.
         text: String,
     },
-    /// A pixel has no line of sight.
+    /// A pixel does not see the ground.
     #[error("the simulated camera does not see the ground")]
     Camera(#[from] camera::CameraError),
-    /// The camera has no RPC.
-    #[error("the simulated camera cannot be written as an RPC")]
+    /// No RPC fits the camera.
+    #[error("no RPC could be fitted to the simulated camera")]
     Fit(#[from] camera::FitError),
-    /// The scene lies where there is no map.
-    #[error("the scene's place cannot be mapped")]
+    /// No map projection is defined at the place of the scene.
+    #[error("no map projection is defined at the place of the scene")]
     Geodesy(#[from] crs::CrsError),
 }
 

@@ -1,23 +1,23 @@
-//! Perspective cameras around a scene: what an aircraft or a drone would take of it, for priors and splats of its buildings.
+//! Perspective cameras around a scene, as a drone would fly them, for priors and splats of its buildings.
 //!
-//! Cameras stand on a circle around the middle of the scene, every other one nearer and steeper, and look at the middle. Poses
-//! are in the scene's map: easting, northing, metres above the ellipsoid.
+//! Cameras stand on a circle around the middle of the scene and look at it. Every second one is nearer and steeper.
+//! Poses are in the map of the scene: easting, northing, metres above the ellipsoid.
 
 use camera::{Lens, LensError, LensModel, Pose};
 
 use crate::Simulation;
 
-/// Columns and rows.
+/// Columns and rows of an image.
 const SIZE: [usize; 2] = [640, 480];
 const FOCAL_PX: f64 = 560.0;
-/// Distance from the middle and height above its ground, in sides of the scene; every other camera takes the second.
+/// Distance from the middle and height above the ground, as shares of the side of the scene. Cameras alternate.
 const STANDS: [[f64; 2]; 2] = [[0.75, 0.55], [0.35, 0.75]];
 
 impl Simulation {
-    /// `count` cameras of one lens around the scene, the first in the east, counter-clockwise.
+    /// Makes `count` cameras with one lens around the scene, counter-clockwise from the east.
     ///
     /// # Errors
-    /// None for the lens that is used; the type is that of [`Lens::new`].
+    /// None occurs for the lens that is used. The type is the one of [`Lens::new`].
     pub fn flight(&self, count: usize) -> Result<(Lens, Vec<Pose>), LensError> {
         let middle = [0, 1].map(|i| (SIZE[i] as f64 - 1.0) / 2.0);
         let lens = Lens::new(SIZE[0], SIZE[1], LensModel::Pinhole, &[FOCAL_PX, FOCAL_PX, middle[0], middle[1]])?;
@@ -32,7 +32,7 @@ impl Simulation {
     }
 }
 
-/// A camera at an offset from what it looks at, upright; the offset is not straight above.
+/// Makes an upright camera at an offset from its target. The offset must not be vertical.
 fn looking(target: [f64; 3], offset: [f64; 3]) -> Pose {
     let length = offset.iter().map(|c| c * c).sum::<f64>().sqrt();
     let forward = offset.map(|c| -c / length);

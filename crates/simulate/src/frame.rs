@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use crate::SimulateError;
 
-/// Where a scene lies: a UTM (or polar) grid, and the point of it that is the scene's origin.
+/// The place of a scene: a UTM (or polar) map, and the origin of the scene on it.
 #[derive(Debug, Clone)]
 pub struct SceneFrame {
     projection: MapProjection,
@@ -15,8 +15,10 @@ pub struct SceneFrame {
 }
 
 impl SceneFrame {
-    /// The frame around a position; the origin is moved to the nearest whole multiple of `cell_m` of the map, so that
-    /// rasters of that cell fit the map's grid.
+    /// Makes the frame around a position.
+    ///
+    /// The origin is moved to the nearest multiple of `cell_m` on the map, so that rasters of that cell size align with
+    /// the map grid.
     ///
     /// # Errors
     /// A position where no map projection is defined.
@@ -28,17 +30,17 @@ impl SceneFrame {
         Ok(Self { projection, epsg, origin_m })
     }
 
-    /// EPSG code of the map.
+    /// Returns the EPSG code of the map.
     pub fn epsg(&self) -> u32 {
         self.epsg
     }
 
-    /// Map coordinates of the origin, metres.
+    /// Returns the map coordinates of the origin, metres.
     pub fn origin_m(&self) -> [f64; 2] {
         self.origin_m
     }
 
-    /// The ground position of a point of the scene.
+    /// Returns the ground position of a point of the scene.
     ///
     /// # Errors
     /// A point where the map projection is not defined.
@@ -47,7 +49,7 @@ impl SceneFrame {
         Ok(LonLatHeight::new(lon, lat, p.z))
     }
 
-    /// The point of the scene at a ground position.
+    /// Returns the point of the scene at a ground position.
     ///
     /// # Errors
     /// A position where the map projection is not defined.

@@ -1,12 +1,13 @@
-//! What a ray can meet, in the order in which it can: square buckets of the plane, walked along the ray (Amanatides and Woo
-//! 1987). Each knows the height under which everything in it lies, so that a ray passes over most of them.
+//! An index of solids by square buckets of the plane, which a ray visits in order (Amanatides and Woo 1987).
+//!
+//! Each bucket stores its highest point, so that a ray skips most of them.
 
 use crate::SceneRay;
 
-/// Side of a bucket, metres: a few trees, a part of a house.
+/// Side of a bucket, metres. It holds a few trees or a part of a house.
 pub(crate) const BUCKET_M: f64 = 8.0;
 
-/// The box of the plane that holds an object, and its highest point.
+/// The bounding rectangle of an object and its highest point.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Extent {
     pub(crate) low: [f64; 2],
@@ -14,7 +15,7 @@ pub(crate) struct Extent {
     pub(crate) top_m: f64,
 }
 
-/// A stretch of a ray over one bucket.
+/// The part of a ray over one bucket.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stretch {
     pub(crate) bucket: usize,
@@ -22,7 +23,7 @@ pub(crate) struct Stretch {
     pub(crate) t_out: f64,
 }
 
-/// Buckets over a square around the origin.
+/// The buckets of a square around the origin.
 #[derive(Debug, Clone)]
 pub(crate) struct Buckets {
     corner_m: f64,
@@ -33,7 +34,7 @@ pub(crate) struct Buckets {
 }
 
 impl Buckets {
-    /// Buckets out to `reach_m` along both axes; `ground_top` gives the highest ground of a box.
+    /// Makes buckets out to `reach_m` along both axes. `ground_top` gives the highest ground of a rectangle.
     pub(crate) fn new(reach_m: f64, ground_top: impl Fn([f64; 2], [f64; 2]) -> f64, extents: &[Extent]) -> Self {
         let half = (reach_m / BUCKET_M).ceil();
         let (side, corner_m) = (2 * half as usize, -half * BUCKET_M);
@@ -59,12 +60,12 @@ impl Buckets {
         }
     }
 
-    /// The objects whose box touches a bucket.
+    /// Returns the objects whose rectangle touches a bucket.
     pub(crate) fn members(&self, bucket: usize) -> &[u32] {
         &self.members[bucket]
     }
 
-    /// The part of a stretch in which a ray is not above all ground of the bucket.
+    /// Returns the part of a stretch in which the ray is not above all ground of the bucket.
     pub(crate) fn near_ground(&self, ray: &SceneRay, stretch: Stretch) -> Option<(f64, f64)> {
         let (z, dz) = (ray.origin.z, ray.direction.z);
         let crossing = (self.ground_tops[stretch.bucket] - z) / dz;
@@ -76,12 +77,12 @@ impl Buckets {
         (t_in <= t_out).then_some((t_in, t_out))
     }
 
-    /// The bucket of a position, the nearest one for a position beyond them all.
+    /// Returns the bucket of a position, or the nearest one for a position outside.
     pub(crate) fn at(&self, x: f64, y: f64) -> usize {
         self.along(y) * self.side + self.along(x)
     }
 
-    /// Visits the buckets in which a ray comes low enough to meet something, until `visit` gives a value.
+    /// Visits the buckets in which a ray is low enough to meet something, until `visit` returns a value.
     pub(crate) fn walk<T>(&self, ray: &SceneRay, t_max: f64, mut visit: impl FnMut(Stretch) -> Option<T>) -> Option<T> {
         let (mut t, end) = self.clipped(ray, t_max)?;
         let start = ray.at(t);
@@ -117,7 +118,7 @@ impl Buckets {
         }
     }
 
-    /// The part of [0, `t_max`] in which a ray is over the buckets.
+    /// Returns the part of [0, `t_max`] in which a ray is over the buckets.
     fn clipped(&self, ray: &SceneRay, t_max: f64) -> Option<(f64, f64)> {
         let (low, high) = (self.corner_m, -self.corner_m);
         let (mut enter, mut leave) = (0.0_f64, t_max);
@@ -135,7 +136,7 @@ impl Buckets {
     }
 
     fn along(&self, coordinate: f64) -> usize {
-        // The cast saturates: what lies before the first bucket is in it.
+        // The cast saturates, so positions before the first bucket fall into it.
         (((coordinate - self.corner_m) / BUCKET_M) as usize).min(self.side - 1)
     }
 }

@@ -1,15 +1,24 @@
 //! Simulated acquisitions: seeded scenes with their exact surface, seen through RPC cameras.
 //!
-//! A [`Scene`] is terrain with buildings, trees and vehicles that rays meet exactly. A [`Simulation`] renders it through
-//! physical cameras (pushbroom or frame) to which RPCs are fitted, adds what light, air, optics and detector add (shadows,
-//! clouds, point spread, noise, quantisation, a pointing error in the RPC), and samples the truth: surface, terrain, classes, what
-//! each view sees, the height of every pixel, the scene from above, and the buildings as an LoD2 model. What an
-//! algorithm gets wrong on it is the algorithm's error.
+//! A [`Scene`] is terrain with buildings, trees and vehicles, and rays meet it analytically. A [`Simulation`] renders it
+//! through physical cameras (pushbroom or frame) to which RPCs are fitted. It adds shadows, clouds, point spread, noise,
+//! quantisation and a pointing error of the RPC. It also samples the truth: surface, terrain, classes, visibility in
+//! each view, the height of every pixel, the scene from above, and the buildings as an LoD2 model.
 //!
 //! [`SimulationConfig`] is a parameter file with named presets ([`PRESETS`]). The same configuration gives the same bytes
 //! for any number of threads.
 //!
 //! Scene frame: x east, y north in metres of the map grid from the scene's centre, z metres above the WGS 84 ellipsoid.
+//!
+//! ```
+//! use simulate::{Simulation, SimulationConfig};
+//!
+//! let config = SimulationConfig { size_m: 40.0, views: 2, ..SimulationConfig::preset("town")? };
+//! let scene = Simulation::new(config)?;
+//! assert_eq!(scene.views.len(), 2);
+//! assert_eq!(scene.truth.dsm.width(), 80);
+//! # Ok::<(), simulate::SimulateError>(())
+//! ```
 
 mod acquisition;
 mod building;

@@ -1,4 +1,4 @@
-//! A linear pushbroom camera, written as an RPC without any fit: what the physical one is held against.
+//! A linear pushbroom camera, written as an RPC without any fit. Tests compare the physical camera with it.
 //!
 //! A sensor that moves on a straight line at constant speed and attitude has `line = m₁·X`, `sample = m₂·X / m₃·X` for
 //! homogeneous points X (Gupta and Hartley 1997, "Linear pushbroom cameras"): a ratio of polynomials of degree one, which the RPC's

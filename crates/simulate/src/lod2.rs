@@ -1,4 +1,4 @@
-//! The buildings as an LoD2 city model: one solid per block, its surfaces named roof, wall and ground.
+//! The buildings as an LoD2 city model: one solid per block, with surfaces classed as roof, wall and ground.
 //!
 //! Coordinates are those of the map (east, north) and ellipsoidal heights, rounded to the millimetre that CityJSON will hold, so
 //! that equal corners are equal vertices. Rings run counter-clockwise seen from outside. A building of one block is a
@@ -14,7 +14,7 @@ use crate::building::Building;
 use crate::frame::SceneFrame;
 use crate::prism::{BuildingBlock, Roof};
 
-/// The model of buildings.
+/// Makes the model of buildings.
 pub(crate) fn model(buildings: &[Building], frame: &SceneFrame) -> CityModel {
     let mut model = CityModel::new(CrsReference::from_epsg(frame.epsg(), None));
     let mut pool = VertexPool::new();
@@ -37,7 +37,7 @@ pub(crate) fn model(buildings: &[Building], frame: &SceneFrame) -> CityModel {
     model
 }
 
-/// The outer shell of a block.
+/// Makes the outer shell of a block.
 fn solid(block: &BuildingBlock, frame: &SceneFrame, pool: &mut VertexPool) -> Geometry {
     let mut geometry = Geometry::new(Some(Lod::new(2, None)), GeometryKind::Solid);
     for (class, ring) in faces(block) {
@@ -47,14 +47,14 @@ fn solid(block: &BuildingBlock, frame: &SceneFrame, pool: &mut VertexPool) -> Ge
             let millimetres = |c: f64| (c * 1e3).round() / 1e3;
             ModelPoint::new(millimetres(x + east), millimetres(y + north), millimetres(z))
         });
-        // Millions of blocks would be needed to run out of indices: a scene is at most 3 km wide.
+        // A scene is at most 3 km wide, far too small for the millions of blocks that would exceed the indices.
         let ring = corners.filter_map(|corner| pool.index(corner)).collect();
         geometry.surfaces.push(SurfacePolygon::new(vec![ring], class));
     }
     geometry
 }
 
-/// The faces of a block as rings of (along, across, height).
+/// Returns the faces of a block as rings of (along, across, height).
 fn faces(block: &BuildingBlock) -> Vec<(SurfaceClass, Vec<[f64; 3]>)> {
     let [u, v] = block.half_size_m;
     let (base, eaves, top) = (block.base_m, block.eaves_m(), block.top_m());
@@ -91,7 +91,7 @@ fn faces(block: &BuildingBlock) -> Vec<(SurfaceClass, Vec<[f64; 3]>)> {
     faces
 }
 
-/// A ring without its repeated corners: a hipped roof over a square has a ridge of no length.
+/// Returns a ring without repeated corners. A hipped roof over a square has a ridge of length zero.
 fn without_repeats(mut ring: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
     ring.dedup();
     if ring.len() > 1 && ring.first() == ring.last() {

@@ -5,12 +5,12 @@
 
 use crate::random::lattice;
 
-/// Value noise in [−1, 1] with lattice cells of `cell_m` metres.
+/// Returns value noise in [−1, 1] with lattice cells of `cell_m` metres.
 pub(crate) fn value_noise(seed: u64, cell_m: f64, x: f64, y: f64) -> f64 {
     value_and_slope(seed, cell_m, x, y).0
 }
 
-/// [`value_noise`] and its derivatives with respect to x and y.
+/// Returns [`value_noise`] and its derivatives with respect to x and y.
 #[inline]
 pub(crate) fn value_and_slope(seed: u64, cell_m: f64, x: f64, y: f64) -> (f64, [f64; 2]) {
     let (u, v) = (x / cell_m, y / cell_m);
@@ -25,13 +25,13 @@ pub(crate) fn value_and_slope(seed: u64, cell_m: f64, x: f64, y: f64) -> (f64, [
     (low + t * (high - low), [by_u / cell_m, by_v / cell_m])
 }
 
-/// Detail at every scale from half a metre to half a block, in about [−1, 1].
+/// Returns noise with detail at every scale from half a metre to half a block, in about [−1, 1].
 pub(crate) fn detail(seed: u64, x: f64, y: f64) -> f64 {
     const OCTAVES: [(f64, f64); 6] = [(0.6, 0.24), (1.4, 0.22), (3.2, 0.18), (7.7, 0.14), (19.0, 0.12), (47.0, 0.10)];
     OCTAVES.iter().zip(0u64..).map(|((cell, share), k)| share * value_noise(seed.wrapping_add(k), *cell, x, y)).sum()
 }
 
-/// The integer below: `f64::floor` is a library call on baseline x86-64, and noise asks for nothing else.
+/// Returns the largest integer not above a value. `f64::floor` is a library call on baseline x86-64 and was the bottleneck.
 fn floor(x: f64) -> i64 {
     let towards_zero = x as i64;
     towards_zero - i64::from(x < towards_zero as f64)

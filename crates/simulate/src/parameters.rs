@@ -1,7 +1,7 @@
 //! Parameter files: TOML in, TOML out, and the range of every number.
 //!
-//! A file may name a `preset` that gives every key it leaves out (`town` where it names none). Unknown keys are
-//! refused with the list of those that exist.
+//! A file may name a `preset`, which supplies every missing key. The default preset is `town`. An unknown key is an error
+//! that lists the known keys.
 
 use crate::config::SimulationConfig;
 use crate::error::SimulateError;
@@ -9,13 +9,13 @@ use crate::sun::Sun;
 
 /// The key of a parameter file that names the preset it starts from.
 const PRESET_KEY: &str = "preset";
-/// A cell of the truth has a bit for each view.
+/// Largest number of views. A cell of the truth has a bit for each view.
 const MAX_VIEWS: f64 = 16.0;
-/// About 6 bytes are held for each: 2 GB.
+/// Largest number of pixels. Each takes about 6 bytes, 2 GB in all.
 const MAX_PIXELS: f64 = 3e8;
 
 impl SimulationConfig {
-    /// Reads a parameter file's text.
+    /// Reads the text of a parameter file.
     ///
     /// # Errors
     /// Text that is no TOML, an unknown preset, an unknown key, a value of the wrong type or out of range.
@@ -34,7 +34,7 @@ impl SimulationConfig {
         Ok(config)
     }
 
-    /// The parameter file of this configuration, every key stated.
+    /// Writes the parameter file of this configuration with every key.
     ///
     /// # Errors
     /// A seed beyond what TOML can hold (2⁶³ − 1).
@@ -141,7 +141,7 @@ fn within(name: &'static str, found: f64, low: f64, high: f64) -> Result<(), Sim
     }
 }
 
-/// Puts the values of `over` in the place of those of `base`, table by table.
+/// Replaces values of `base` by the values of `over`, table by table.
 fn overlay(base: &mut toml::Table, over: toml::Table) {
     for (key, value) in over {
         match (base.get_mut(&key), value) {

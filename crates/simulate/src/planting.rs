@@ -1,6 +1,6 @@
 //! Trees on free ground and vehicles along the streets.
 //!
-//! Both are placed on lattices, one cell at a time, so that a larger scene contains the smaller one.
+//! Both are placed on lattices, cell by cell, so that a larger scene contains the smaller one.
 
 use crate::config::{SimulationConfig, VehiclesConfig};
 use crate::crown::Crown;
@@ -13,16 +13,16 @@ use numeric::SplitMix64;
 
 /// Width of the clumps in which trees stand, metres.
 const CLUMP_M: f64 = 45.0;
-/// Chance of a place in a clump of mean density to carry a tree.
+/// Probability that a place in a clump of mean density has a tree.
 const MEAN_CHANCE: f64 = 0.45;
-/// Length and width of a vehicle, halved, and its height, metres.
+/// Half length, half width and height of a vehicle, metres.
 const CAR_M: [f64; 3] = [2.2, 0.9, 1.5];
 /// Length of a parking place along the street, metres.
 const PLACE_M: f64 = 6.0;
-/// Share of the places in the lanes that a moving vehicle is on.
+/// Share of the places in the lanes that hold a moving vehicle.
 const MOVING_SHARE: f64 = 0.04;
 
-/// Crowns on the ground that `is_free`, out to `reach_m`; about as many per hectare as configured.
+/// Returns crowns on free ground out to `reach_m`, about as many per hectare as configured.
 pub(crate) fn trees(
     config: &SimulationConfig,
     terrain: &Terrain,
@@ -50,13 +50,13 @@ pub(crate) fn trees(
     (-count..count).flat_map(|j| (-count..count).map(move |i| (i, j))).filter_map(|(i, j)| tree(i, j)).collect()
 }
 
-/// Whether a crown of a radius hangs over nothing but free ground.
+/// Returns whether a crown of a radius stands over free ground only.
 fn is_clear(x: f64, y: f64, radius_m: f64, is_free: impl Fn(f64, f64) -> bool) -> bool {
     let r = 0.8 * radius_m;
     [(r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r)].iter().all(|(dx, dy)| is_free(x + dx, y + dy))
 }
 
-/// The vehicles of a date: parked along the kerbs, and some on the lanes.
+/// Returns the vehicles of a date: parked along the kerbs, and some on the lanes.
 pub(crate) fn vehicles(
     config: &VehiclesConfig,
     streets: &Streets,

@@ -1,4 +1,4 @@
-//! Named scenes. Each is the town with what makes it that scene, so that only the difference is stated.
+//! Named scenes. Each is stated as its differences from the preset `town`.
 
 use crate::config::{
     AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, QuarterWeights,
@@ -46,7 +46,7 @@ impl Default for TerrainConfig {
 }
 
 impl Default for BuildingsConfig {
-    /// A town, its street grid turned against the map grid, so that roof edges do not fall along the rows of a raster.
+    /// A town whose street grid is rotated against the map grid, so that roof edges do not follow the rows of a raster.
     fn default() -> Self {
         Self {
             turn_deg: 17.0,
@@ -98,7 +98,7 @@ impl Default for SensorConfig {
 }
 
 impl SimulationConfig {
-    /// The scene of a name in [`PRESETS`].
+    /// Returns the configuration of a name in [`PRESETS`](crate::PRESETS).
     ///
     /// # Errors
     /// [`SimulateError::UnknownPreset`], which lists the names.
@@ -184,7 +184,7 @@ fn repetitive_roofs(town: SimulationConfig) -> SimulationConfig {
     SimulationConfig { terrain, buildings, vegetation, ..town }
 }
 
-/// No streets and no houses.
+/// Returns a configuration without streets and houses.
 fn unbuilt(town: BuildingsConfig) -> BuildingsConfig {
     let quarters = QuarterWeights::default();
     BuildingsConfig { street_width_m: 0.0, landmark_height_m: 0.0, quarters, ..town }

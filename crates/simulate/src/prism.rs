@@ -1,14 +1,14 @@
 //! A building block: an upright prism over a rectangle, under a flat, gabled or hipped roof.
 //!
-//! A convex solid, so that a ray meets it where the slabs of its planes overlap (Cyrus and Beck 1978): analytic, no marching.
-//! It reaches down without end; the ground hides what is below. Buildings with steps are several blocks.
+//! The block is a convex solid. A ray meets it where the slabs of its planes overlap (Cyrus and Beck 1978), without
+//! marching. It extends downwards without end, hidden by the ground. Stepped buildings are several blocks.
 
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::SceneRay;
 
-/// The roof of a block; heights are metres above the ellipsoid.
+/// The roof of a block. Heights are metres above the ellipsoid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "form", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -25,7 +25,7 @@ pub enum Roof {
         /// Height of the ridge.
         ridge_m: f64,
     },
-    /// Four equal slopes: a ridge as long as the block is longer than wide.
+    /// Four equal slopes. The ridge is as long as length minus width of the block.
     Hipped {
         /// Height of the lower edges.
         eaves_m: f64,
@@ -43,24 +43,24 @@ pub struct BuildingBlock {
     pub half_size_m: [f64; 2],
     /// Direction of the long axis, degrees counter-clockwise from east.
     pub direction_deg: f64,
-    /// Height of its foot, metres above the ellipsoid: the lowest ground around it, or the roof that it stands on.
+    /// Height of the base, metres above the ellipsoid: the lowest ground around the block, or the roof below it.
     pub base_m: f64,
-    /// What covers it.
+    /// Form and heights of the roof.
     pub roof: Roof,
 }
 
-/// Which side of a block a ray met.
+/// The side of a block that a ray met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Face {
-    /// A wall across the long axis: at its end (true) or its start.
+    /// A wall across the long axis, at its end (true) or its start.
     End(bool),
-    /// A wall along the long axis: on its left (true) or its right.
+    /// A wall along the long axis, on its left (true) or its right.
     Side(bool),
     /// A roof plane that falls along (true) or across the axis.
     Roof(bool),
 }
 
-/// A block with its trigonometry done: the form that rays meet.
+/// A block with its planes, ready for ray casting.
 #[derive(Debug, Clone)]
 pub(crate) struct Prism {
     pub(crate) block: BuildingBlock,
@@ -69,7 +69,7 @@ pub(crate) struct Prism {
     count: usize,
 }
 
-/// A half-space `normal · (x − centre) ≤ offset`, with the height 0 of the scene at its centre.
+/// A half-space `normal · (x − centre) ≤ offset`. The centre has height 0.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     normal: Vector3<f64>,
@@ -78,7 +78,7 @@ struct Plane {
 }
 
 impl BuildingBlock {
-    /// Highest point of the roof, metres above the ellipsoid.
+    /// Returns the highest point of the roof, metres above the ellipsoid.
     pub fn top_m(&self) -> f64 {
         match self.roof {
             Roof::Flat { height_m } => height_m,
@@ -86,7 +86,7 @@ impl BuildingBlock {
         }
     }
 
-    /// Height of the walls' upper edge along the long sides, metres above the ellipsoid.
+    /// Returns the height of the eaves along the long sides, metres above the ellipsoid.
     pub fn eaves_m(&self) -> f64 {
         match self.roof {
             Roof::Flat { height_m } => height_m,
@@ -94,19 +94,19 @@ impl BuildingBlock {
         }
     }
 
-    /// Scene position of a point given along and across the long axis from the centre.
+    /// Returns the scene position of a point given along and across the long axis from the centre.
     pub fn position(&self, u: f64, v: f64) -> [f64; 2] {
         let (sin, cos) = self.direction_deg.to_radians().sin_cos();
         [self.centre_m[0] + cos * u - sin * v, self.centre_m[1] + sin * u + cos * v]
     }
 
-    /// The corners of the rectangle, counter-clockwise seen from above.
+    /// Returns the corners of the rectangle, counter-clockwise seen from above.
     pub fn corners(&self) -> [[f64; 2]; 4] {
         let [u, v] = self.half_size_m;
         [self.position(-u, -v), self.position(u, -v), self.position(u, v), self.position(-u, v)]
     }
 
-    /// Metres that the roof falls per metre from the ridge.
+    /// Returns the slope of the roof, metres per metre.
     fn fall(&self) -> f64 {
         (self.top_m() - self.eaves_m()) / self.half_size_m[1]
     }
@@ -146,13 +146,13 @@ impl Prism {
         Self { block, along: Vector2::new(cos, sin), planes, count }
     }
 
-    /// Coordinates along and across the long axis, from the centre.
+    /// Returns coordinates along and across the long axis, from the centre.
     pub(crate) fn local(&self, x: f64, y: f64) -> [f64; 2] {
         let (dx, dy) = (x - self.block.centre_m[0], y - self.block.centre_m[1]);
         [self.along.x * dx + self.along.y * dy, self.along.x * dy - self.along.y * dx]
     }
 
-    /// Height of the roof over a point; `None` outside the rectangle.
+    /// Returns the height of the roof over a point, `None` outside the rectangle.
     pub(crate) fn roof_height(&self, x: f64, y: f64) -> Option<f64> {
         let [u, v] = self.local(x, y);
         let [to_end, to_side] = [self.block.half_size_m[0] - u.abs(), self.block.half_size_m[1] - v.abs()];
@@ -164,15 +164,16 @@ impl Prism {
         (to_end >= 0.0 && to_side >= 0.0).then(|| self.block.eaves_m() + self.block.fall() * rise)
     }
 
-    /// Half the sides of the axis-parallel box around the rectangle.
+    /// Returns half the sides of the axis-aligned bounding box.
     pub(crate) fn half_extent(&self) -> [f64; 2] {
         let [half_u, half_v] = self.block.half_size_m;
         let (c, s) = (self.along.x.abs(), self.along.y.abs());
         [c * half_u + s * half_v, s * half_u + c * half_v]
     }
 
-    /// Where a ray enters the solid, the outward unit normal there, and through which face: the first parameter in
-    /// (0, `t_max`). A ray that starts inside does not enter.
+    /// Returns where a ray enters the solid, the outward unit normal there, and the face.
+    ///
+    /// The place is the first parameter in (0, `t_max`). A ray that starts inside does not enter.
     pub(crate) fn enter(&self, ray: &SceneRay, t_max: f64) -> Option<(f64, Vector3<f64>, Face)> {
         let [x, y] = self.block.centre_m;
         let start = Vector3::new(ray.origin.x - x, ray.origin.y - y, ray.origin.z);

@@ -2,17 +2,17 @@
 
 use nalgebra::Vector3;
 
-/// A half-line `origin + t · direction`, t ≥ 0, in the scene frame (metres); the direction need not be of unit length.
+/// A half-line `origin + t · direction` with t ≥ 0, in the scene frame, metres. The direction may have any length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneRay {
-    /// Where it starts.
+    /// Start.
     pub origin: Vector3<f64>,
-    /// Where it goes per unit of t.
+    /// Direction: the displacement per unit of t.
     pub direction: Vector3<f64>,
 }
 
 impl SceneRay {
-    /// The point at a parameter.
+    /// Returns the point at a parameter.
     pub fn at(&self, t: f64) -> Vector3<f64> {
         self.origin + self.direction * t
     }

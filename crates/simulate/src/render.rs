@@ -1,8 +1,8 @@
 //! One view of a scene: rays through the pixels, Lambertian shading with cast shadows, and the point-spread function.
 //!
-//! Radiance = reflectance · (sky + (1 − sky) · max(0, n·s) · lit), sampled on a regular lattice finer than the pixels and
-//! weighted by the point-spread function. Rows are worked on in bands whose edges are computed twice, so that the image is the
-//! same for any number of threads.
+//! Radiance = reflectance · (sky + (1 − sky) · max(0, n·s) · lit). It is sampled on a regular lattice finer than the
+//! pixels and weighted by the point-spread function. Bands of rows are independent. The samples at their edges are
+//! computed twice, so that the image is the same for any number of threads.
 
 use camera::ImagePoint;
 use nalgebra::Vector3;
@@ -16,14 +16,14 @@ use crate::sun::Sun;
 use crate::texture::Texture;
 use numeric::Progress;
 
-/// Share of the light that comes from the whole sky and reaches shadows too.
+/// Share of the light that comes from the whole sky and so reaches shadows.
 const SKY: f64 = 0.3;
 /// Rows of a band.
 pub(crate) const BAND: usize = 32;
 /// Radiance where a line of sight leaves the scene.
 const BEYOND: f64 = 0.1;
 
-/// A scene in its light.
+/// A scene with its light.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LitScene<'a> {
     scene: &'a Scene,
@@ -36,7 +36,7 @@ impl<'a> LitScene<'a> {
         Self { scene, texture, to_sun: sun.direction() }
     }
 
-    /// The radiance of `width × height` pixels, in units of a white surface under full light.
+    /// Returns the radiance of `width × height` pixels, in units of a white surface under full light.
     pub(crate) fn image(
         &self,
         sight: &SightLines,
@@ -52,13 +52,13 @@ impl<'a> LitScene<'a> {
         image
     }
 
-    /// The rows from `first` on.
+    /// Renders the rows from `first` on.
     fn band(&self, sight: &SightLines, spread: &PointSpread, width: usize, first: usize, rows: &mut [f32]) {
         let (n, taps) = (spread.subpixels, spread.weights.len());
         let at = |k: usize| (k as f64 - spread.reach as f64 + 0.5) / n as f64 - 0.5;
         let count = rows.len() / width;
         let mut samples = vec![0f64; n * width + 2 * spread.reach];
-        // Lines of samples, each already weighted along the line.
+        // Rows of samples, already weighted along the row.
         let mut lines = vec![0f64; (n * count + 2 * spread.reach) * width];
         for (k, line) in lines.chunks_exact_mut(width).enumerate() {
             let y = first as f64 + at(k);
@@ -77,7 +77,7 @@ impl<'a> LitScene<'a> {
         }
     }
 
-    /// Radiance at an image position.
+    /// Returns the radiance at an image position.
     fn radiance(&self, sight: &SightLines, at: ImagePoint) -> f64 {
         let Some(hit) = self.scene.first_hit(&sight.ray(at), 1.0) else { return BEYOND };
         let facing = hit.normal.dot(&self.to_sun);

@@ -1,8 +1,8 @@
-//! The surface of a scene: terrain with buildings, trees and vehicles on it, as a height function and as something rays meet.
+//! The surface of a scene: terrain with buildings, trees and vehicles, as a height function and for ray casting.
 //!
 //! Scene frame: x east, y north (metres of the map grid, from the scene's centre), z metres above the WGS 84 ellipsoid.
-//! The surface is the upper envelope of all solids and the ground; there is nothing under it. Rays meet everything
-//! analytically, so that "hidden" and "in shadow" are exact.
+//! The surface is the upper envelope of all solids and the ground, with nothing below it. Rays meet everything
+//! analytically, so that occlusions and shadows are exact.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ use crate::streets::Streets;
 use crate::terrain::Terrain;
 use crate::town;
 
-/// What a point of the surface belongs to; the values are the ASPRS LAS classes.
+/// The class of a point of the surface. The values are the ASPRS LAS classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 #[non_exhaustive]
@@ -33,11 +33,11 @@ pub enum TruthClass {
     Building = 6,
     /// Water.
     Water = 9,
-    /// The edge of a building's footprint: a raster cell that a façade goes through (LAS leaves 64 and above to users).
+    /// A raster cell through which a façade goes, at the edge of a footprint. LAS leaves classes from 64 on to users.
     FootprintEdge = 64,
 }
 
-/// What a solid is made of.
+/// The kind of a solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Material {
     Building,
@@ -45,23 +45,23 @@ pub(crate) enum Material {
     Vehicle,
 }
 
-/// A solid's form.
+/// The shape of a solid.
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
     Prism(Box<Prism>),
     Crown(Crown),
 }
 
-/// Something on the ground.
+/// An object on the ground.
 #[derive(Debug, Clone)]
 pub(crate) struct Solid {
     pub(crate) shape: Shape,
     pub(crate) material: Material,
-    /// Seed of its own colours.
+    /// Seed of its colours.
     pub(crate) paint: u64,
 }
 
-/// Terrain and what is on it, known exactly.
+/// Terrain with everything on it, known exactly.
 #[derive(Debug, Clone)]
 pub struct Scene {
     terrain: Arc<Terrain>,
@@ -89,7 +89,7 @@ pub(crate) struct Hit {
     pub(crate) part: Part,
 }
 
-/// A ray's parameter where it meets something, and the normal where that is no ground.
+/// The parameter at which a ray meets something. The normal is missing for the ground, where it is computed later.
 #[derive(Debug, Clone, Copy)]
 struct Meeting {
     t: f64,
@@ -97,13 +97,13 @@ struct Meeting {
     part: Part,
 }
 
-/// What is built within reach may stand out of it by this much, metres.
+/// Largest distance by which a building may extend beyond the reach of the scene, metres.
 const OVERHANG_M: f64 = 50.0;
-/// A ray towards the sun starts this far off the surface, metres: more than rounding, less than any detail.
+/// Distance from the surface at which a ray towards the sun starts, metres: above rounding, below any detail.
 const LIFT_M: f64 = 1e-3;
 
 impl Scene {
-    /// The permanent scene (no vehicles) of a configuration, out to `reach_m` from its centre.
+    /// Makes the permanent scene (without vehicles) of a configuration, out to `reach_m` from its centre.
     pub(crate) fn new(config: &SimulationConfig, reach_m: f64) -> Self {
         let terrain = Terrain::new(config, reach_m + OVERHANG_M);
         let buildings = town::build(config, &terrain, reach_m);
@@ -145,7 +145,7 @@ impl Scene {
         }
     }
 
-    /// The scene of a date: this one with that date's vehicles.
+    /// Returns this scene with the vehicles of a date.
     pub(crate) fn on_date(&self, config: &SimulationConfig, date: usize) -> Self {
         let seed = derived(config.seed, 5000 + date as u64);
         let vehicles = planting::vehicles(&config.vehicles, &self.streets, &self.terrain, seed, self.reach_m);
@@ -154,27 +154,27 @@ impl Scene {
         scene
     }
 
-    /// The bare ground.
+    /// Returns the bare ground.
     pub fn terrain(&self) -> &Terrain {
         &self.terrain
     }
 
-    /// The buildings.
+    /// Returns the buildings.
     pub fn buildings(&self) -> &[Building] {
         &self.buildings
     }
 
-    /// How many trees there are.
+    /// Returns the number of trees.
     pub fn tree_count(&self) -> usize {
         self.solids.iter().filter(|s| s.material == Material::Tree).count()
     }
 
-    /// Bounds of the surface's height, metres above the ellipsoid.
+    /// Returns the lowest and highest point of the surface, metres above the ellipsoid.
     pub fn height_range_m(&self) -> (f64, f64) {
         self.height_range_m
     }
 
-    /// Height and class of the upper surface at a position.
+    /// Returns height and class of the upper surface at a position.
     pub fn surface(&self, x: f64, y: f64) -> (f64, TruthClass) {
         let mut height = self.terrain.height(x, y);
         let mut class = if self.terrain.is_water(x, y) { TruthClass::Water } else { TruthClass::Ground };
@@ -186,9 +186,9 @@ impl Scene {
         (height, class)
     }
 
-    /// The first point of the surface on a ray from above it, with t in (0, `t_max`).
+    /// Returns the first point of the surface on a ray that starts above it, with t in (0, `t_max`).
     ///
-    /// `None` when the ray does not come to the surface before `t_max`, or leaves the scene.
+    /// `None` if the ray does not reach the surface before `t_max`, or leaves the scene.
     pub fn first_point(&self, ray: &SceneRay, t_max: f64) -> Option<Vector3<f64>> {
         self.first(ray, t_max).map(|meeting| ray.at(meeting.t))
     }
@@ -215,7 +215,7 @@ impl Scene {
         closest
     }
 
-    /// Where a ray meets the ground of a bucket before `limit`.
+    /// Returns where a ray meets the ground of a bucket before `limit`.
     fn ground_on(&self, ray: &SceneRay, stretch: Stretch, limit: f64) -> Option<f64> {
         let (t_in, t_out) = self.buckets.near_ground(ray, stretch)?;
         let t_out = t_out.min(limit);
@@ -226,7 +226,7 @@ impl Scene {
         &self.solids[index]
     }
 
-    /// Whether something stands between a point of the surface and the sun.
+    /// Returns whether something stands between a point of the surface and the sun.
     pub(crate) fn in_shadow(&self, point: &Vector3<f64>, normal: &Vector3<f64>, to_sun: &Vector3<f64>) -> bool {
         let ray = SceneRay { origin: point + normal * LIFT_M, direction: *to_sun };
         let t_max = ((self.height_range_m.1 - point.z) / to_sun.z).max(0.0) + LIFT_M;
@@ -290,7 +290,7 @@ mod tests {
         Scene::new(&config, 200.0).on_date(&config, 0)
     }
 
-    /// The first point below the surface on a march with a small step, refined by bisection.
+    /// Returns the first point below the surface on a march with a small step, refined by bisection.
     fn marched(scene: &Scene, ray: &SceneRay, t_max: f64) -> Option<Vector3<f64>> {
         let below = |t: f64| {
             let p = ray.at(t);
@@ -333,7 +333,7 @@ mod tests {
                 let hit = scene.first_hit(&ray, t_max).expect("the ray ends below the lowest ground");
                 let reference = marched(&scene, &ray, t_max).expect("the march does too");
                 let apart = (hit.point - reference).norm();
-                // The march walks through a corner that is thinner than its step.
+                // The march misses corners that are thinner than its step.
                 assert!(apart < 0.01 || hit.point.z > reference.z, "{preset}: {apart} m apart at {x}, {y}");
                 assert!(apart < 0.01 || corner_is_thin(&scene, &ray, &hit.point), "{preset}: {apart} m at {x}, {y}");
                 assert!(hit.normal.dot(&ray.direction) < 1e-6 || hit.part == Part::Ground);

@@ -1,9 +1,8 @@
-//! From radiance to digital numbers: photon and read noise, then gain, gamma and offset, then 8 to 12 bits; and the
-//! point-spread function before all of it.
+//! The sensor: point-spread function, photon and read noise, gain, gamma and offset, quantisation to 8 to 12 bits.
 //!
-//! `DN = offset + gain · (electrons / electrons_at_white)^gamma`, electrons with the variance `signal + read noise²`. The
-//! modulation transfer is that of the pixel's box times a Gaussian whose width follows from the transfer at the Nyquist
-//! frequency: `m = sinc(1/2) · exp(−π² σ² / 2)`, σ in pixels.
+//! `DN = offset + gain · (electrons / electrons_at_white)^gamma`, where the electrons have the variance
+//! `signal + read noise²`. The modulation transfer is the one of the pixel's box times a Gaussian. The width of the
+//! Gaussian follows from the transfer at the Nyquist frequency: `m = sinc(1/2) · exp(−π² σ² / 2)`, σ in pixels.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,15 +11,15 @@ use crate::date::Date;
 use crate::random::lattice;
 use numeric::SplitMix64;
 
-/// The transfer of the pixel's box at the Nyquist frequency.
+/// Modulation transfer of the pixel's box at the Nyquist frequency.
 const BOX_AT_NYQUIST: f64 = std::f64::consts::FRAC_2_PI;
-/// Where the Gaussian ends, in units of its σ.
+/// Half width of the Gaussian, in units of its σ.
 const REACH_SIGMA: f64 = 3.5;
 
 /// The radiometry of one view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
-    /// Largest digital number; 0 is kept for no-data.
+    /// Largest digital number. 0 is reserved for no-data.
     pub dn_max: u16,
     /// Digital numbers between a black surface and a white one under full light.
     pub gain: f64,
@@ -35,7 +34,7 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// The sensor on a date.
+    /// Makes the sensor on a date.
     pub(crate) fn new(config: &SensorConfig, date: &Date) -> Self {
         let dn_max = ((1u32 << config.bits) - 1) as u16;
         let range = f64::from(dn_max);
@@ -49,7 +48,7 @@ impl Sensor {
         }
     }
 
-    /// The digital number of a pixel; the noise belongs to (seed, column, row).
+    /// Returns the digital number of a pixel. The noise depends on (seed, column, row) only.
     pub(crate) fn quantise(&self, radiance: f64, seed: u64, column: usize, row: usize) -> u16 {
         let electrons = radiance.max(0.0) * self.electrons_at_white;
         let sigma = (electrons + self.read_noise_electrons * self.read_noise_electrons).sqrt();
@@ -60,12 +59,12 @@ impl Sensor {
     }
 }
 
-/// Weights along one axis of the lines of sight around a pixel: it is separable.
+/// Weights of the samples around a pixel along one axis. The point-spread function is separable.
 #[derive(Debug, Clone)]
 pub(crate) struct PointSpread {
-    /// Lines of sight per pixel.
+    /// Samples per pixel.
     pub(crate) subpixels: usize,
-    /// Lines of sight before the pixel's own first one that count.
+    /// Number of samples before the first one inside the pixel.
     pub(crate) reach: usize,
     pub(crate) weights: Vec<f64>,
 }
@@ -76,7 +75,7 @@ impl PointSpread {
         let sigma = (-2.0 * (config.mtf_at_nyquist / BOX_AT_NYQUIST).ln()).max(0.0).sqrt() / std::f64::consts::PI;
         let reach = (REACH_SIGMA * sigma * n as f64).ceil() as usize;
         let offset = |k: usize| (k as f64 - reach as f64 + 0.5) / n as f64 - 0.5;
-        // The lines of sight in the pixel's box, each blurred by the Gaussian.
+        // The box of the pixel, blurred by the Gaussian.
         let weight = |k: usize| {
             let inside = (reach..reach + n).map(|b| (offset(k) - offset(b)) / sigma.max(1e-9));
             inside.map(|d| (-0.5 * d * d).exp()).sum::<f64>()

@@ -1,8 +1,9 @@
 //! The lines of sight of an image's pixels in the scene frame.
 //!
-//! A pixel's ray runs through its positions at two heights, above and below all of the scene; in the map's grid it is straight
-//! to 2 mm over 300 m of height (the ground's curvature under it; less with the square of the height). Positions are
-//! computed on a lattice of pixels and interpolated between: over 16 pixels camera and map projection bend by micrometres.
+//! The ray of a pixel runs through its positions at two heights, above and below the whole scene. On the map it is
+//! straight to 2 mm over 300 m of height. The deviation comes from the curvature of the Earth and falls with the square
+//! of the height. Positions are computed on a lattice of pixels and interpolated: over 16 pixels the camera and the map
+//! projection deviate from linear by micrometres.
 
 use camera::ImagePoint;
 use nalgebra::{Vector2, Vector3};
@@ -14,19 +15,19 @@ use crate::{SceneRay, SimulateError};
 /// Distance between lattice nodes, pixels.
 const STEP_PX: f64 = 16.0;
 
-/// Rays for every position of an image.
+/// The rays of all positions of an image.
 #[derive(Debug, Clone)]
 pub struct SightLines {
     columns: usize,
     rows: usize,
     high_m: f64,
     low_m: f64,
-    /// Positions at the two heights, node by node.
+    /// Positions at the two heights for every node.
     nodes: Vec<[Vector2<f64>; 2]>,
 }
 
 impl SightLines {
-    /// The rays of an image of `width × height` pixels between two heights (low, high), metres above the ellipsoid.
+    /// Makes the rays of an image of `width × height` pixels between two heights (low, high), metres above the ellipsoid.
     ///
     /// # Errors
     /// A position outside the map.
@@ -36,7 +37,7 @@ impl SightLines {
         (width, height): (usize, usize),
         (low_m, high_m): (f64, f64),
     ) -> Result<Self, SimulateError> {
-        // One more node than the last pixel needs: sub-pixel positions reach beyond its centre.
+        // Sub-pixel positions reach beyond the centre of the last pixel, which needs one more node.
         let count = |pixels: usize| (pixels as f64 / STEP_PX).ceil() as usize + 2;
         let (columns, rows) = (count(width), count(height));
         let node = |index: usize| {
@@ -51,7 +52,7 @@ impl SightLines {
         Ok(Self { columns, rows, high_m, low_m, nodes })
     }
 
-    /// The ray of an image position: it starts at the upper height (t = 0) and reaches the lower one at t = 1.
+    /// Returns the ray of an image position. It starts at the upper height (t = 0) and reaches the lower one at t = 1.
     pub fn ray(&self, at: ImagePoint) -> SceneRay {
         let (column, s) = cell(at.sample, self.columns);
         let (row, t) = cell(at.line, self.rows);
@@ -67,7 +68,7 @@ impl SightLines {
     }
 }
 
-/// The lattice cell of a coordinate and the position in it; beyond the lattice the outermost cell is continued.
+/// Returns the lattice cell of a coordinate and the position in it. Beyond the lattice the outermost cell is continued.
 fn cell(coordinate: f64, nodes: usize) -> (usize, f64) {
     let u = coordinate / STEP_PX + 0.5;
     let index = (u.floor().max(0.0) as usize).min(nodes - 2);

@@ -1,7 +1,7 @@
 //! A whole simulated acquisition: the scene, its views on one date or several, and the truth.
 //!
-//! Images are rendered through a physical camera. Each view's RPC is fitted to that camera and then made to point wrong by a
-//! planted translation and drift, as unadjusted RPCs do.
+//! Images are rendered through a physical camera. The RPC of each view is fitted to that camera and then given a known
+//! translation and drift, as unadjusted RPCs have.
 
 use camera::{ImageCorrection, Rpc, RpcCamera};
 use raster::Grid;
@@ -23,9 +23,9 @@ use crate::texture::Texture;
 use crate::truth::{self, Truth, Witness};
 use numeric::{Progress, Silent};
 
-/// Scene beyond the area, metres, so that its edge sees houses and shadows as its middle does.
+/// Width of the scene beyond the area, metres, so that houses and shadows surround its edge too.
 const SURROUNDINGS_M: f64 = 60.0;
-/// Heights above and below the scene for which the RPC is fitted too, metres.
+/// Margin above and below the scene over which the RPC is fitted too, metres.
 const RPC_HEIGHT_MARGIN_M: f64 = 50.0;
 /// The height of ordinary houses with their chimneys, and of trees, metres.
 const ORDINARY_M: f64 = 30.0;
@@ -33,18 +33,18 @@ const ORDINARY_M: f64 = 30.0;
 /// One simulated image.
 #[derive(Debug, Clone)]
 pub struct SimulatedView {
-    /// Digital numbers; 0 is no-data.
+    /// Digital numbers. 0 is no-data.
     pub image: Grid<u16>,
-    /// The RPC that a user gets: the true one with the pointing error.
+    /// The delivered RPC: the true one with the pointing error.
     pub rpc: Rpc,
     /// The RPC of the camera through which the image was rendered.
     pub true_rpc: Rpc,
-    /// Height, metres above the ellipsoid, of what the centre of each pixel sees behind the clouds; NaN where that is
-    /// nothing.
+    /// Height of the surface at the centre of each pixel, behind clouds too, metres above the ellipsoid. NaN where the
+    /// pixel sees no surface.
     pub heights: Grid<f32>,
-    /// 1 where clouds hide the scene, else 0; `None` under a clear sky.
+    /// 1 where clouds hide the scene, else 0. `None` without clouds.
     pub clouds: Option<Grid<u8>>,
-    /// How it was taken.
+    /// How the view was taken.
     pub record: ViewRecord,
     sight: SightLines,
 }
@@ -52,15 +52,15 @@ pub struct SimulatedView {
 /// How a view was taken.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ViewRecord {
-    /// Geometry.
+    /// Line of sight.
     pub look: Look,
-    /// When it was taken.
+    /// Date.
     pub date: Date,
     /// Radiometry.
     pub sensor: Sensor,
-    /// What the given RPC projects too far in the middle of the image, pixels (sample, line).
+    /// Pointing error of the delivered RPC in the middle of the image, pixels (sample, line).
     pub pointing_error_px: [f64; 2],
-    /// The same everywhere: `given = pointing(true)`.
+    /// Pointing error at every position: `delivered = pointing(true)`.
     pub pointing: ImageCorrection,
     /// Largest distance between the true RPC and the physical camera, pixels.
     pub rpc_fit_error_px: f64,
@@ -69,11 +69,11 @@ pub struct ViewRecord {
 /// Views and truth.
 #[derive(Debug, Clone)]
 pub struct Simulation {
-    /// The configuration that made it.
+    /// The configuration.
     pub config: SimulationConfig,
-    /// The permanent surface: without vehicles.
+    /// The permanent scene, without vehicles.
     pub scene: Scene,
-    /// Where the surface lies.
+    /// The place of the scene.
     pub frame: SceneFrame,
     /// The images.
     pub views: Vec<SimulatedView>,
@@ -81,7 +81,7 @@ pub struct Simulation {
     pub truth: Truth,
 }
 
-/// All that made a simulation, for a reader of its files.
+/// The parameters and properties of a simulation, written beside its files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneRecord {
     /// The configuration.
@@ -104,15 +104,15 @@ impl Simulation {
     /// Builds the scene, renders the views and samples the truth.
     ///
     /// # Errors
-    /// A configuration out of range, or a place that cannot be mapped.
+    /// A configuration out of range, or a place where no map projection is defined.
     pub fn new(config: SimulationConfig) -> Result<Self, SimulateError> {
         Self::with_progress(config, &Silent)
     }
 
-    /// [`Self::new`], which says how far it is.
+    /// Does the same as [`Self::new`] and reports its progress.
     ///
     /// # Errors
-    /// Those of [`Self::new`].
+    /// The same as for [`Self::new`].
     pub fn with_progress(config: SimulationConfig, progress: &dyn Progress) -> Result<Self, SimulateError> {
         config.validate()?;
         progress.begin("scene", 1);
@@ -133,7 +133,7 @@ impl Simulation {
         Ok(Self { config, scene, frame, views, truth })
     }
 
-    /// The record of what was made.
+    /// Returns the parameters and properties of the simulation.
     pub fn record(&self) -> SceneRecord {
         let (low, high) = self.scene.height_range_m();
         SceneRecord {
@@ -149,7 +149,7 @@ impl Simulation {
 }
 
 impl SimulatedView {
-    /// The lines of sight through which the image was rendered, in the scene frame.
+    /// Returns the lines of sight through which the image was rendered, in the scene frame.
     pub fn sight(&self) -> &SightLines {
         &self.sight
     }
@@ -161,7 +161,8 @@ impl<'a> Witness<'a> {
     }
 }
 
-/// How far from the centre the scene is built: the area, its surroundings, and what a slanted view sees beyond them.
+/// Returns the distance from the centre to which the scene is built: the area, its surroundings, and the part beyond
+/// them that slanted views see.
 fn reach_m(config: &SimulationConfig) -> f64 {
     let steepest = (0..config.views).map(|i| acquisition::look(config, i).incidence_deg).fold(0.0, f64::max);
     let towers = match config.buildings.quarters.high_rise > 0.0 {
@@ -208,7 +209,7 @@ fn view(
     Ok(SimulatedView { image, rpc, true_rpc: fitted.rpc, heights, clouds, record, sight })
 }
 
-/// The digital numbers of a view; `seed` is that of the noise.
+/// Returns the digital numbers of a view. `seed` is the seed of the noise.
 fn digital(
     radiance: &Grid<f32>,
     opacity: Option<&Grid<f32>>,

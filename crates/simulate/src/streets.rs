@@ -1,4 +1,4 @@
-//! The street grid: two families of parallel streets, which buildings keep free, vehicles use and the ground shows.
+//! The street grid: two families of parallel streets.
 
 use crate::config::BuildingsConfig;
 
@@ -10,7 +10,7 @@ pub(crate) struct Streets {
     pub(crate) turn_deg: f64,
     /// Distance between centre lines.
     pub(crate) spacing_m: f64,
-    /// Half the width of the carriageway; 0 where there are no streets.
+    /// Half the width of the carriageway, 0 without streets.
     pub(crate) half_width_m: f64,
 }
 
@@ -19,9 +19,9 @@ pub(crate) struct Streets {
 pub(crate) struct OnStreet {
     /// Signed distance from the centre line.
     pub(crate) across_m: f64,
-    /// Position along it.
+    /// Position along the street.
     pub(crate) along_m: f64,
-    /// The same two for the nearest street of the other family.
+    /// The same for the nearest street of the other family.
     pub(crate) to_crossing_m: f64,
 }
 
@@ -32,7 +32,7 @@ impl Streets {
         Self { sin, cos, turn_deg, spacing_m, half_width_m: 0.5 * config.street_width_m }
     }
 
-    /// Street coordinates (along the first family, along the second) of a position, metres.
+    /// Returns street coordinates (along the first family, along the second) of a position, metres.
     pub(crate) fn street_from_scene(&self, x: f64, y: f64) -> [f64; 2] {
         [self.cos * x + self.sin * y, self.cos * y - self.sin * x]
     }
@@ -41,7 +41,7 @@ impl Streets {
         [self.cos * u - self.sin * v, self.sin * u + self.cos * v]
     }
 
-    /// The nearest street.
+    /// Returns the nearest street.
     pub(crate) fn nearest(&self, x: f64, y: f64) -> OnStreet {
         let [u, v] = self.street_from_scene(x, y);
         let across = |c: f64| c - self.spacing_m * (c / self.spacing_m).round();
@@ -52,7 +52,7 @@ impl Streets {
         }
     }
 
-    /// Whether a position lies on a carriageway.
+    /// Returns whether a position lies on a carriageway.
     pub(crate) fn is_carriageway(&self, x: f64, y: f64) -> bool {
         self.nearest(x, y).across_m.abs() < self.half_width_m
     }

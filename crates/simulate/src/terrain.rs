@@ -1,8 +1,8 @@
-//! The bare ground: a lattice of heights with bilinear patches between, which rays meet exactly.
+//! The bare ground: bilinear patches between the posts of a lattice, which rays meet exactly.
 //!
-//! The lattice samples a sum of value noises (undulation), a pit, benches and water. With posts every metre the creases between
-//! patches turn by less than what a matcher can see, and steep faces are as steep as they are made. A patch is
-//! `a + bu + cv + duv`, so that a ray meets it at the root of a quadratic.
+//! The lattice samples a sum of value noises (undulation), a pit, benches and water. With posts every metre, the creases
+//! between patches are too small for a matcher to see, and steep faces keep their slope. A patch is
+//! `a + bu + cv + duv`, so that a ray meets it at the root of a quadratic equation.
 //!
 //! Scene frame: x east, y north (grid metres from the scene's centre), z metres above the ellipsoid.
 
@@ -17,14 +17,14 @@ use crate::random::derived;
 
 /// Distance between posts, metres.
 pub(crate) const POST_M: f64 = 1.0;
-/// Octaves end where a wave would be shorter than this, metres.
+/// Shortest wavelength of an octave, metres.
 const SHORTEST_WAVE_M: f64 = 16.0;
-/// Land is at least this much above the water, metres, so that height alone tells one from the other.
+/// Smallest height of land above the water, metres, so that the height alone separates the two.
 const FREEBOARD_M: f64 = 0.3;
 /// Half the width of the pier that reaches into the water, metres.
 const PIER_HALF_M: f64 = 16.0;
 
-/// Ground whose height is known everywhere.
+/// Ground with a known height everywhere.
 #[derive(Debug, Clone)]
 pub struct Terrain {
     corner_m: f64,
@@ -44,12 +44,12 @@ struct Relief<'a> {
 }
 
 impl Terrain {
-    /// The ground of a scene, out to `reach_m` from its centre along both axes; beyond, its edge continues.
+    /// Makes the ground of a scene out to `reach_m` from its centre along both axes. Beyond, the height at the edge continues.
     pub(crate) fn new(config: &SimulationConfig, reach_m: f64) -> Self {
         let turn = config.buildings.turn_deg.to_radians().sin_cos();
         let relief =
             Relief { config: &config.terrain, seed: derived(config.seed, 1), half_m: config.size_m / 2.0, turn };
-        // The buckets of the scene end at whole multiples of their side: no ray leaves the lattice before them.
+        // The buckets of the scene end at multiples of their side. The lattice reaches as far, so no ray leaves it earlier.
         let half = ((reach_m / BUCKET_M).ceil() * BUCKET_M / POST_M).ceil() + 2.0;
         let (posts, corner_m) = (2 * half as usize + 1, -half * POST_M);
         let at = |k: usize| corner_m + k as f64 * POST_M;
@@ -63,31 +63,31 @@ impl Terrain {
         Self { corner_m, posts, base_m, heights, range_m, water_m }
     }
 
-    /// Height above the ellipsoid, metres.
+    /// Returns the height above the ellipsoid, metres.
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let ((i, u), (j, v)) = (self.cell(x), self.cell(y));
         let [a, b, c, d] = self.patch(i, j);
         self.base_m + a + b * u + c * v + d * u * v
     }
 
-    /// The lowest and the highest ground.
+    /// Returns the lowest and the highest ground, metres above the ellipsoid.
     pub fn height_range_m(&self) -> (f64, f64) {
         self.range_m
     }
 
-    /// Whether the ground is a water surface.
+    /// Returns whether the ground is a water surface.
     pub fn is_water(&self, x: f64, y: f64) -> bool {
         self.water_m.is_some_and(|level| self.height(x, y) < level + 0.5 * FREEBOARD_M)
     }
 
-    /// Upward unit normal, over the patches around.
+    /// Returns the upward unit normal, smoothed over the neighbouring patches.
     pub(crate) fn normal(&self, x: f64, y: f64) -> Vector3<f64> {
         let by_x = self.height(x + POST_M, y) - self.height(x - POST_M, y);
         let by_y = self.height(x, y + POST_M) - self.height(x, y - POST_M);
         Vector3::new(-by_x, -by_y, 2.0 * POST_M).normalize()
     }
 
-    /// The highest ground of a box of the plane.
+    /// Returns the highest ground of a rectangle.
     pub(crate) fn top(&self, low: [f64; 2], high: [f64; 2]) -> f64 {
         let ((i0, _), (i1, _)) = (self.cell(low[0]), self.cell(high[0]));
         let ((j0, _), (j1, _)) = (self.cell(low[1]), self.cell(high[1]));
@@ -96,10 +96,10 @@ impl Terrain {
         self.base_m + f64::from(top)
     }
 
-    /// The first parameter in [`t_in`, `t_out`] at which a ray over the lattice goes from above the ground to below it.
+    /// Returns the first parameter in [`t_in`, `t_out`] at which a ray over the lattice goes below the ground.
     pub(crate) fn intersect(&self, ray: &SceneRay, t_in: f64, t_out: f64) -> Option<f64> {
         let mut t = t_in;
-        // Each step crosses one patch; a ray along a patch's edge is nudged over it by rounding, hence the bound.
+        // Each step crosses one patch. A ray along an edge may need more steps because of rounding, hence the bound.
         for _ in 0..4 * self.posts {
             let start = ray.at(t);
             let (i, j) = (self.cell(start.x).0, self.cell(start.y).0);
@@ -115,7 +115,7 @@ impl Terrain {
         None
     }
 
-    /// Where a ray leaves the patch (i, j) that it is in at `t`: just beyond the edge, so that the next patch is found.
+    /// Returns where a ray leaves the patch (i, j) that it is in at `t`, just beyond the edge, so that the next patch is found.
     fn leaves(&self, ray: &SceneRay, i: usize, j: usize, t: f64) -> f64 {
         let along = |index: usize, origin: f64, direction: f64| {
             let edge = self.corner_m + (index + usize::from(direction > 0.0)) as f64 * POST_M;
@@ -136,21 +136,21 @@ impl Terrain {
         let u = (point.x - self.corner_m) / POST_M - i as f64;
         let v = (point.y - self.corner_m) / POST_M - j as f64;
         let (du, dv) = (ray.direction.x / POST_M, ray.direction.y / POST_M);
-        // Height above the patch after s more of the ray: q0 + q1 s + q2 s².
+        // Height of the ray above the patch at t + s: q0 + q1 s + q2 s².
         let q0 = z_in - (a + b * u + c * v + d * u * v);
         let q1 = ray.direction.z - b * du - c * dv - d * (u * dv + v * du);
         let q2 = -d * du * dv;
         falls_to_zero(q0, q1, q2, t_out - t_in).map(|s| t_in + s)
     }
 
-    /// The patch index along one axis and the position in it; beyond the lattice the outermost patch's edge.
+    /// Returns the patch index along one axis and the position in it, clamped to the lattice.
     fn cell(&self, coordinate: f64) -> (usize, f64) {
         let u = ((coordinate - self.corner_m) / POST_M).clamp(0.0, (self.posts - 1) as f64);
         let index = (u as usize).min(self.posts - 2);
         (index, u - index as f64)
     }
 
-    /// Coefficients of 1, u, v, uv relative to the base height.
+    /// Returns the coefficients of 1, u, v, uv relative to the base height.
     fn patch(&self, i: usize, j: usize) -> [f64; 4] {
         let k = j * self.posts + i;
         let [h00, h10] = [self.heights[k], self.heights[k + 1]].map(f64::from);
@@ -159,7 +159,7 @@ impl Terrain {
     }
 }
 
-/// The first s in [0, `s_max`] at which q0 + q1 s + q2 s² is no longer positive.
+/// Returns the first s in [0, `s_max`] at which q0 + q1 s + q2 s² is no longer positive.
 fn falls_to_zero(q0: f64, q1: f64, q2: f64, s_max: f64) -> Option<f64> {
     if q0 <= 0.0 {
         return Some(0.0);
@@ -168,13 +168,13 @@ fn falls_to_zero(q0: f64, q1: f64, q2: f64, s_max: f64) -> Option<f64> {
     if discriminant < 0.0 {
         return None;
     }
-    // The smaller positive root without cancellation: q0 > 0, so 2 q0 / (−q1 + √Δ) is the first one reached by a falling curve.
+    // This form of the smaller positive root avoids cancellation: with q0 > 0 it is 2 q0 / (−q1 + √Δ).
     let s = 2.0 * q0 / (discriminant.sqrt() - q1);
     (s >= 0.0 && s <= s_max).then_some(s)
 }
 
 impl Relief<'_> {
-    /// Height relative to the mean ground, metres.
+    /// Returns the height relative to the mean ground, metres.
     fn height(&self, x: f64, y: f64) -> f64 {
         let land = self.benched(self.undulation(x, y) - self.pit(x, y));
         if self.config.water_share == 0.0 {
@@ -194,7 +194,7 @@ impl Relief<'_> {
         sum
     }
 
-    /// Depth below the surroundings: none at the rim, the full depth over the floor.
+    /// Returns the depth below the surroundings, metres: 0 at the rim, the full depth at the floor.
     fn pit(&self, x: f64, y: f64) -> f64 {
         if self.config.pit_depth_m == 0.0 {
             return 0.0;
@@ -204,7 +204,7 @@ impl Relief<'_> {
         self.config.pit_depth_m * inwards
     }
 
-    /// Benches: three quarters of each step are level, the rest is its face.
+    /// Cuts a height into benches. Three quarters of each step are level, the rest is its face.
     fn benched(&self, height: f64) -> f64 {
         let bench = self.config.bench_height_m;
         if bench == 0.0 {
@@ -212,7 +212,7 @@ impl Relief<'_> {
         }
         let step = (height / bench).floor();
         let face = ((height / bench - step - 0.75) / 0.25).clamp(0.0, 1.0);
-        // What is left of the slope keeps water from standing and roads from being mirrors.
+        // A part of the slope is kept, so that the level parts are not exactly flat.
         bench * (step + face) + 0.06 * (height - bench * (step + face))
     }
 
@@ -249,7 +249,7 @@ mod tests {
             let below = |t: f64| { let p = ray.at(t); p.z < terrain.height(p.x, p.y) };
             let marched = (0..).map(|i| f64::from(i) * step).take_while(|t| *t < t_max).find(|t| below(*t));
             match (terrain.intersect(&ray, 0.0, t_max), marched) {
-                // A march steps over a crest that is thinner than its step.
+                // The march misses crests that are thinner than its step.
                 (Some(t), Some(m)) => prop_assert!(m - t < 1.01 * step && t <= m || below(t + 1e-6), "{t}, marched {m}"),
                 (Some(t), None) => prop_assert!(below(t + 1e-6) || t > t_max - 2.0 * step),
                 (None, m) => prop_assert!(m.is_none(), "missed at {m:?}"),

@@ -1,7 +1,7 @@
-//! Diffuse reflectance of the surface, [0, 1]: procedural, fixed to the surface, with detail down to half a metre.
+//! Diffuse reflectance of the surface, 0 to 1. It is procedural, fixed to the surface, with detail down to half a metre.
 //!
-//! Each surface has its own pattern (streets with markings, parcels, strata, tiles, panels, windows, foliage) times
-//! multi-octave noise. Water alone is not fixed to the surface: its waves are others in every view.
+//! Each kind of surface has its own pattern (streets with markings, parcels, strata, tiles, panels, windows, foliage)
+//! times multi-octave noise. Only the waves of water differ between views.
 
 use nalgebra::Vector3;
 
@@ -11,12 +11,12 @@ use crate::prism::{Face, Prism, Roof};
 use crate::random::{derived, lattice};
 use crate::scene::{Hit, Material, Part, Scene, Shape, Solid};
 
-/// The reflectance that a scene without contrast has everywhere.
+/// Reflectance of a scene without contrast.
 const MEAN: f64 = 0.22;
-/// Sides of a field, metres.
+/// Length and width of a field, metres.
 const PARCEL_M: [f64; 2] = [110.0, 64.0];
 
-/// Reflectance of a scene in one view.
+/// The reflectance of a scene in one view.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Texture {
     seed: u64,
@@ -25,13 +25,13 @@ pub(crate) struct Texture {
 }
 
 impl Texture {
-    /// The reflectance of a seed; `view` tells the waves of one view from those of another.
+    /// Makes the reflectance of a seed. `view` selects the waves.
     pub(crate) fn new(seed: u64, view: u64, surface: AppearanceConfig) -> Self {
         let seed = derived(seed, 3);
         Self { seed, waves: derived(seed, view), surface }
     }
 
-    /// Reflectance at a hit.
+    /// Returns the reflectance at a hit.
     pub(crate) fn reflectance(&self, scene: &Scene, hit: &Hit) -> f64 {
         let value = match hit.part {
             Part::Ground => self.ground(scene, &hit.point),
@@ -73,7 +73,7 @@ impl Texture {
         }
     }
 
-    /// Parcels with their own tone and direction of rows, and tracks between them.
+    /// Returns the reflectance of parcels with their own tone and direction of rows, and tracks between them.
     fn field(&self, x: f64, y: f64) -> f64 {
         let [u, v] = [x + 0.12 * y, y - 0.09 * x];
         let (i, j) = ((u / PARCEL_M[0]).floor(), (v / PARCEL_M[1]).floor());
@@ -89,7 +89,7 @@ impl Texture {
 
     fn foliage(&self, tree: &Solid, point: &Vector3<f64>) -> f64 {
         let tone = 0.07 + 0.08 * lattice(tree.paint, 0, 0);
-        // Leaves hang in tufts: a pattern over the height as well as over the plan.
+        // The pattern of foliage depends on the height as well as on the position.
         let tufts = value_noise(tree.paint, 0.9, point.x + 0.7 * point.z, point.y - 0.6 * point.z);
         tone * (1.0 + 0.6 * tufts + 0.7 * detail(self.seed, point.x, point.y))
     }
@@ -122,12 +122,12 @@ fn roof(prism: &Prism, paint: u64, tone: f64, [u, v]: [f64; 2]) -> f64 {
     (0.2 + 0.22 * tone) * joint * mended * (1.0 + 0.7 * grain)
 }
 
-/// A façade with a window every few metres on every storey of 3 m.
+/// Returns the reflectance of a façade with a window every few metres on every storey of 3 m.
 fn wall(paint: u64, tone: f64, along: f64, above_ground: f64) -> f64 {
     let pitch = 2.2 + 1.2 * lattice(paint, 1, 0);
     let (in_bay, in_storey) = (along.rem_euclid(pitch), above_ground.rem_euclid(3.0));
     let window = (0.3 * pitch..0.72 * pitch).contains(&in_bay) && (0.9..2.4).contains(&in_storey);
-    // Panes reflect more or less sky; some have a blind.
+    // Panes reflect different parts of the sky, and some have a blind.
     let pane = 0.05 + 0.2 * lattice(paint, (along / pitch).floor() as i64, (above_ground / 3.0).floor() as i64).powi(3);
     let plaster = if window { pane } else { 0.28 + 0.2 * tone };
     plaster * (1.0 + 0.4 * detail(paint, along, above_ground))

@@ -1,7 +1,8 @@
-//! A town from a seed: along a grid of streets, quarters with houses, rows, halls, courtyards, towers or sheds, and one stepped
-//! tower in the middle.
+//! A town from a seed: quarters along a grid of streets, and one stepped tower in the middle.
 //!
-//! A quarter's seed follows from its place, so that a larger town contains the smaller one.
+//! A quarter has houses, rows, halls, a courtyard, towers or sheds.
+//!
+//! The seed of a quarter follows from its place, so that a larger town contains the smaller one.
 
 use crate::building::{Builder, Building, Lot};
 use crate::config::{BuildingsConfig, SimulationConfig};
@@ -10,16 +11,16 @@ use crate::streets::Streets;
 use crate::terrain::Terrain;
 use numeric::SplitMix64;
 
-/// Space between the carriageway and the lots, metres.
+/// Distance between the carriageway and the lots, metres.
 const SIDEWALK_M: f64 = 2.5;
-/// Heights of walls up to the eaves, metres.
+/// Lowest and highest walls up to the eaves, metres.
 const HALL_M: [f64; 2] = [6.0, 22.0];
 const ROW_M: [f64; 2] = [8.0, 14.0];
 const HOUSE_M: [f64; 2] = [4.0, 7.0];
 const COURTYARD_M: [f64; 2] = [15.0, 22.0];
 const SHED_M: f64 = 6.0;
 
-/// What stands between four streets.
+/// The kind of a quarter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Quarter {
     Park,
@@ -31,7 +32,7 @@ enum Quarter {
     Sheds,
 }
 
-/// The buildings of a scene, out to `reach_m` from its centre.
+/// Returns the buildings of a scene out to `reach_m` from its centre.
 pub(crate) fn build(config: &SimulationConfig, terrain: &Terrain, reach_m: f64) -> Vec<Building> {
     let streets = Streets::new(&config.buildings);
     let seed = derived(config.seed, 2);
@@ -56,7 +57,7 @@ pub(crate) fn build(config: &SimulationConfig, terrain: &Terrain, reach_m: f64) 
     town.builder.buildings
 }
 
-/// The kind of quarter that a number in [0, 1) falls on.
+/// Returns the kind of quarter that a number in [0, 1) selects.
 fn drawn(config: &BuildingsConfig, at: f64) -> Option<Quarter> {
     let q = &config.quarters;
     let weights = [
@@ -84,7 +85,7 @@ struct Town<'a> {
 }
 
 impl Town<'_> {
-    /// Half the side of the free ground between four streets.
+    /// Returns half the side of the free ground between four streets.
     fn half_m(&self) -> f64 {
         0.5 * (self.config.street_spacing_m - self.config.street_width_m) - SIDEWALK_M
     }
@@ -101,7 +102,7 @@ impl Town<'_> {
         }
     }
 
-    /// A podium, a tower on it and a penthouse on the tower.
+    /// Places a podium, a tower on it and a penthouse on the tower.
     fn landmark(&mut self, centre: [f64; 2]) {
         let height = self.config.landmark_height_m;
         let steps = [([20.0, 15.0], 9.0_f64.min(0.4 * height)), ([11.0, 9.0], 0.83 * height), ([5.0, 4.0], height)];
@@ -147,7 +148,7 @@ impl Town<'_> {
         }
     }
 
-    /// Four wings around a courtyard, wall to wall with the street.
+    /// Places four wings around a courtyard, directly at the street.
     fn courtyard(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
         let (half, depth) = (self.half_m(), stream.uniform_in(5.0, 6.5));
         let walls = stream.uniform_in(COURTYARD_M[0], COURTYARD_M[1]);
@@ -163,7 +164,7 @@ impl Town<'_> {
         }
     }
 
-    /// One tower on a podium, or two towers side by side.
+    /// Places one tower on a podium, or two towers side by side.
     fn towers(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
         let half = self.half_m();
         let [low, high] = self.config.high_rise_height_m;
@@ -180,7 +181,7 @@ impl Town<'_> {
         }
     }
 
-    /// Three long sheds under one roof shape.
+    /// Places three long sheds with the same roof.
     fn sheds(&mut self, [u, v]: [f64; 2]) {
         let half = self.half_m();
         let width = 2.0 * half / 3.0;

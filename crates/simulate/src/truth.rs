@@ -1,8 +1,8 @@
-//! The truth as rasters on the map grid: surface, terrain, classes, what each view sees, and the scene seen from above.
+//! The truth as rasters on the map grid: surface, terrain, classes, visibility in each view, and the view from above.
 //!
-//! Values belong to cell centres, heights are kept to a millimetre, and all are those of the permanent scene: vehicles are
-//! left out, as in a reference that was measured on another day. A view sees a cell when its own ray to the cell's point
-//! meets nothing before, the vehicles of its date included.
+//! Values belong to cell centres, and heights are rounded to a millimetre. The scene is the permanent one without
+//! vehicles, like a reference that was measured on another day. A view sees a cell if its ray to the point of the cell
+//! meets nothing before it, vehicles of its date included.
 
 use camera::{ImagePoint, Rpc};
 use city::CityModel;
@@ -20,11 +20,12 @@ use crate::scene::{Scene, TruthClass};
 use crate::sight::SightLines;
 use crate::texture::Texture;
 
-/// Reflectance 1 in [`Truth::ortho`].
+/// Value of the reflectance 1 in [`Truth::ortho`].
 pub const ORTHO_SCALE: f64 = 10_000.0;
-/// A point is seen when its ray ends this close to it, metres: the RPC's thousandth of a pixel on a steep slope.
+/// A point is visible if its ray ends within this distance of it, metres. It allows for the RPC's residual of a
+/// thousandth of a pixel on a steep slope.
 const SEEN_M: f64 = 0.03;
-/// Positions along each side of a cell of the ortho image.
+/// Samples along each side of a cell of the ortho image.
 const ORTHO_SUBCELLS: usize = 2;
 
 /// The surface as rasters.
@@ -36,19 +37,19 @@ pub struct Truth {
     pub dtm: Grid<f32>,
     /// Class of the upper surface (see [`TruthClass`]).
     pub classes: Grid<u8>,
-    /// Per view 1 where it sees the cell's point of the upper surface, else 0.
+    /// Per view: 1 where it sees the point of the upper surface at the cell centre, else 0.
     pub visibility: Vec<Grid<u8>>,
-    /// Reflectance seen from straight above, mean over the cell, in units of 1 / [`ORTHO_SCALE`].
+    /// Reflectance seen from directly above, mean over the cell, in units of 1 / [`ORTHO_SCALE`].
     pub ortho: Grid<u16>,
     /// The buildings at LoD2 in map coordinates.
     pub buildings: CityModel,
-    /// Where the cells lie on the map.
+    /// Geotransform of the cells.
     pub geotransform: GeoTransform,
     /// EPSG code of the map.
     pub epsg: u32,
 }
 
-/// What tells whether a view sees a point.
+/// A view for which visibility is tested.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Witness<'a> {
     pub(crate) scene: &'a Scene,
@@ -131,12 +132,12 @@ impl Witness<'_> {
     }
 }
 
-/// A height as rasters keep it: to 2⁻¹⁰ m, whose trailing zeros make files half as large.
+/// Returns a height rounded to 2⁻¹⁰ m. The trailing zero bits halve the size of compressed files.
 fn stored(height_m: f64) -> f32 {
     ((height_m * 1024.0).round() / 1024.0) as f32
 }
 
-/// The class of a cell: that of its centre, or the edge of a footprint where a corner tells that a façade goes through.
+/// Returns the class of a cell: the one of its centre, or the edge of a footprint where a façade goes through the cell.
 fn class(scene: &Scene, [x, y]: [f64; 2], cell_m: f64) -> TruthClass {
     let is_building = |class| class == TruthClass::Building;
     let centre = scene.surface(x, y).1;
@@ -158,7 +159,7 @@ fn reflectance_from_above(scene: &Scene, texture: &Texture, [x, y]: [f64; 2], ce
     (sum / (ORTHO_SUBCELLS * ORTHO_SUBCELLS) as f64 * ORTHO_SCALE).round() as u16
 }
 
-/// The height, metres above the ellipsoid, of what each pixel's centre sees; NaN where that is nothing.
+/// Returns the height of the surface at the centre of each pixel, metres above the ellipsoid. NaN where there is none.
 pub(crate) fn image_heights(scene: &Scene, sight: &SightLines, (width, height): (usize, usize)) -> Grid<f32> {
     let height_at = |k: usize| {
         let at = ImagePoint::new((k % width) as f64, (k / width) as f64);
