@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use heightmap::{GROUND_REACH_M, HeightMapError, Reading, ground_height, mean_distance_m};
-use io::raster::{Band, BandData, MapTile, write_map_tile, write_png_rgb};
+use io::raster::{Band, BandData, BandScale, MapTile, write_map_tile, write_png_rgb};
 use raster::{Grid, Light};
 use serde::Serialize;
 
@@ -244,7 +244,7 @@ fn write(
         bands: &bands,
         geotransform,
         crs,
-        height_from_value: Some((scale, tags.camera_height_m)),
+        height_from_value: Some(BandScale { scale, offset: tags.camera_height_m }),
         metadata: &tags.items(),
     };
     Ok(write_map_tile(path, &tile, overwrite)?)

@@ -1,19 +1,21 @@
 //! The one atomic writer: a file under its final name is complete.
 //!
-//! A file is made under a temporary name in the folder of its destination and then renamed. On any failure, and when the
-//! process is killed, the destination is as it was before. The new file has the usual permissions (0666 less the umask),
-//! not the private ones of temporary files.
+//! A file is made under a temporary name in the folder of its destination and then renamed. On any
+//! failure, and when the process is killed, the destination is as it was before. The new file has
+//! the usual permissions (0666 less the umask), not the private ones of temporary files.
 //!
-//! [`write_stream`] suits formats that are written from front to back. It never replaces a file that appears meanwhile,
-//! unless overwriting is allowed. [`write_path`] suits libraries that want a path (GDAL, LAS): it gives them a temporary
-//! folder, so that side files vanish with the folder. [`write_bytes`] takes content that is already in memory.
+//! [`write_stream`] suits formats that are written from front to back. It never replaces a file
+//! that appears meanwhile, unless overwriting is allowed. [`write_path`] suits libraries that want
+//! a path (GDAL, LAS): it gives them a temporary folder, so that side files vanish with the folder.
+//! [`write_bytes`] takes content that is already in memory.
 
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::Builder;
 
-/// The first words of [`SaveError::Exists`], by which a caller can recognise it inside other errors.
+/// The first words of [`SaveError::Exists`], by which a caller can recognise it inside other
+/// errors.
 pub const OUTPUT_EXISTS: &str = "the output exists already";
 
 /// A file that was not written.
@@ -56,7 +58,8 @@ enum Durability {
     Synced,
 }
 
-/// Checks that a file may be written to `path`: it does not exist, or `overwrite` allows to replace it.
+/// Checks that a file may be written to `path`: it does not exist, or `overwrite` allows to replace
+/// it.
 ///
 /// # Errors
 /// [`SaveError::Exists`], also for a dangling link.
@@ -83,7 +86,8 @@ pub(crate) fn write_bytes_synced(path: &Path, bytes: &[u8], overwrite: bool) -> 
 /// Writes what `make` puts into the stream to `path`. The stream is buffered.
 ///
 /// # Errors
-/// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`], also for an error of `make`.
+/// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`], also for an error of
+/// `make`.
 pub fn write_stream(
     path: &Path,
     overwrite: bool,

@@ -1,44 +1,48 @@
-//! Tables of control positions, known in the world: of images by name (GPS), or of points of a model, as CSV.
+//! Reading tables of control positions as CSV: the surveyed positions of images (GPS) or of points
+//! of a model.
 //!
-//! The first line names the columns, separated by commas, semicolons or tabs; case does not matter, further columns are passed over:
+//! The first line names the columns. Commas, semicolons or tabs separate them, letter case does not
+//! matter, and further columns are ignored:
 //!
-//! - what: `name` (or `image`, `file`, `filename`), or `x`, `y`, `z` of the model;
-//! - where: `lon`, `lat`, `height` (or `longitude`, `latitude`, `altitude`, `alt`, `h`), degrees and metres; or `easting`,
-//!   `northing`, `height` on a map.
+//! - the subject: `name` (or `image`, `file`, `filename`), or `x`, `y`, `z` in the frame of the
+//!   model;
+//! - its position: `lon`, `lat`, `height` (or `longitude`, `latitude`, `altitude`, `alt`, `h`),
+//!   degrees and metres; or `easting`, `northing`, `height` on a map.
 //!
-//! Empty lines and lines that begin with `#` are passed over.
+//! Empty lines and lines that begin with `#` are ignored.
 
 use std::path::{Path, PathBuf};
 
 use geodesy::LonLatHeight;
 
-/// Files are read up to this size, bytes.
+/// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 256 << 20;
 
-/// What a position is of.
+/// The thing whose position is known.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Subject {
-    /// The image of a name.
+    /// The image with this name.
     Image(String),
-    /// A place in the model.
+    /// The point with these coordinates in the frame of the model.
     Model([f64; 3]),
 }
 
-/// Where it is.
+/// A surveyed position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Place {
-    /// Degrees, and metres above whatever the table's heights are above.
+    /// A geographic position. The height is above the vertical datum of the table, which the caller
+    /// knows.
     Geographic(LonLatHeight),
     /// Easting, northing and height on a map, metres.
     Map([f64; 3]),
 }
 
-/// A line of the table.
+/// A row of the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlPosition {
-    /// What it is of.
+    /// The thing whose position is known.
     pub subject: Subject,
-    /// Where that is.
+    /// Its position.
     pub place: Place,
 }
 
@@ -51,7 +55,7 @@ pub enum ControlError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// A line that breaks the format.
@@ -59,7 +63,7 @@ pub enum ControlError {
     Invalid {
         /// The file.
         path: PathBuf,
-        /// What was found and expected.
+        /// The text found and the text expected.
         what: String,
         /// Number of the line, from 1.
         line: usize,
@@ -69,13 +73,14 @@ pub enum ControlError {
 /// Reads a table of positions.
 ///
 /// # Errors
-/// A file that cannot be read or is larger than 256 MiB; columns that are missing; a value that is no finite number; a latitude
-/// beyond the poles.
+/// [`ControlError::Unreadable`] when the system refuses. [`ControlError::Invalid`] for a file
+/// larger than 256 MiB, a missing column, a value that is not a finite number, an empty name, or a
+/// latitude beyond the poles.
 pub fn read(path: &Path) -> Result<Vec<ControlPosition>, ControlError> {
     let unreadable = |source| ControlError::Unreadable { path: path.to_owned(), source };
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     if size > SIZE_LIMIT {
-        let what = format!("the file has {size} bytes, up to {SIZE_LIMIT} are read");
+        let what = format!("the file has {size} bytes, expected at most {SIZE_LIMIT}");
         return Err(ControlError::Invalid { path: path.to_owned(), what, line: 1 });
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
@@ -86,19 +91,23 @@ pub fn read(path: &Path) -> Result<Vec<ControlPosition>, ControlError> {
     })
 }
 
+/// A defect: the number of the line, and the text found and expected.
 type Fault = (usize, String);
 
 fn parse(text: &str) -> Result<Vec<ControlPosition>, Fault> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let mut lines = lines.peekable();
-    let (number, first) = lines.next().ok_or_else(|| (1, "the table is empty".to_owned()))?;
+    let (number, first) = lines
+        .next()
+        .ok_or_else(|| (1, "the table is empty, expected a line with the names of the columns".to_owned()))?;
     let separator = [';', '\t'].into_iter().find(|&s| first.contains(s)).unwrap_or(',');
     let columns = Columns::of(&fields(first, separator)).map_err(|what| (number, what))?;
     lines.map(|(number, line)| columns.position(&fields(line, separator)).map_err(|what| (number, what))).collect()
 }
 
-/// The fields of a line; quotes protect separators and are doubled inside themselves.
+/// Splits a line into fields. A separator inside quotes does not count, and a quote inside quotes
+/// is doubled.
 fn fields(line: &str, separator: char) -> Vec<String> {
     let (mut fields, mut quoted) = (vec![String::new()], false);
     let mut characters = line.chars().peekable();
@@ -117,7 +126,7 @@ fn fields(line: &str, separator: char) -> Vec<String> {
     fields.iter().map(|field| field.trim().to_owned()).collect()
 }
 
-/// Where the values stand.
+/// Indices of the columns.
 struct Columns {
     subject: SubjectColumns,
     geographic: bool,
@@ -140,9 +149,7 @@ impl Columns {
             (Some(name), _) => SubjectColumns::Name(name),
             (None, Some(model)) => SubjectColumns::Model(model),
             _ => {
-                return Err(
-                    "no column name, and none of x, y and z: the table must say what its positions are of".to_owned()
-                );
+                return Err("the columns have neither name nor x, y and z, expected one of the two".to_owned());
             }
         };
         let height: &[&str] = &["height", "height_m", "altitude", "alt", "h", "elevation", "up"];
@@ -162,18 +169,20 @@ impl Columns {
         let text = |column: usize| fields.get(column).map(String::as_str).unwrap_or_default();
         let number = |column: usize| match text(column).parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("{:?} is no finite number", text(column).chars().take(40).collect::<String>())),
+            _ => Err(format!("{:?} is not a finite number", text(column).chars().take(40).collect::<String>())),
         };
         let three =
             |columns: [usize; 3]| Ok::<_, String>([number(columns[0])?, number(columns[1])?, number(columns[2])?]);
         let subject = match self.subject {
-            SubjectColumns::Name(column) if text(column).is_empty() => return Err("the name is empty".to_owned()),
+            SubjectColumns::Name(column) if text(column).is_empty() => {
+                return Err("the name is empty, expected the name of an image".to_owned());
+            }
             SubjectColumns::Name(column) => Subject::Image(text(column).to_owned()),
             SubjectColumns::Model(columns) => Subject::Model(three(columns)?),
         };
         let [a, b, height] = three(self.place)?;
         if self.geographic && (b.abs() > 90.0 || a.abs() > 360.0) {
-            return Err(format!("longitude {a} and latitude {b} are no place on Earth"));
+            return Err(format!("longitude {a} and latitude {b} are not on the Earth, expected degrees"));
         }
         let place = if self.geographic {
             Place::Geographic(LonLatHeight::new(a, b, height))
@@ -191,7 +200,9 @@ mod tests {
 
     #[test]
     fn names_and_points_on_earth_and_on_maps() {
-        let gps = parse("\u{feff}# drone\nImage, Latitude,longitude,note,ALT\n\"a,\"\"b\"\".jpg\", 43.5,5.4,x,180.25\n\nc.jpg,44,6,,1\n").unwrap();
+        let table = "\u{feff}# drone\nImage, Latitude,longitude,note,ALT\n\"a,\"\"b\"\".jpg\", 43.5,5.4,x,180.25\n\n\
+                     c.jpg,44,6,,1\n";
+        let gps = parse(table).unwrap();
         assert_eq!(gps.len(), 2);
         assert_eq!(gps[0].subject, Subject::Image("a,\"b\".jpg".to_owned()));
         assert_eq!(gps[0].place, Place::Geographic(LonLatHeight::new(5.4, 43.5, 180.25)));
@@ -204,12 +215,12 @@ mod tests {
     fn what_is_wrong_is_said_with_its_line() {
         for (text, line, words) in [
             ("", 1, "empty"),
-            ("lon,lat,height\n", 1, "no column name"),
+            ("lon,lat,height\n", 1, "neither name nor x"),
             ("name,lon,lat\n", 1, "expected lon, lat and height"),
-            ("name,lon,lat,height\na,1,2,3\n\nb,1,x,3\n", 4, "\"x\" is no finite number"),
-            ("name,lon,lat,height\na,1,2\n", 2, "\"\" is no finite number"),
-            ("name,lon,lat,height\na,1,2,nan\n", 2, "no finite number"),
-            ("name,lon,lat,height\na,1,92,3\n", 2, "no place on Earth"),
+            ("name,lon,lat,height\na,1,2,3\n\nb,1,x,3\n", 4, "\"x\" is not a finite number"),
+            ("name,lon,lat,height\na,1,2\n", 2, "\"\" is not a finite number"),
+            ("name,lon,lat,height\na,1,2,nan\n", 2, "not a finite number"),
+            ("name,lon,lat,height\na,1,92,3\n", 2, "not on the Earth"),
             ("name,lon,lat,height\n,1,2,3\n", 2, "the name is empty"),
         ] {
             let (found, what) = parse(text).unwrap_err();

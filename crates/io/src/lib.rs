@@ -1,7 +1,9 @@
-//! Every file format, in and out. GDAL lives here and nowhere else.
+//! Readers and writers of every file format. No other crate uses GDAL.
 //!
-//! Readers convert to the toolkit's one convention (centre of the upper-left pixel at 0, 0; metres above the ellipsoid)
-//! and say so; writers put a file under its name only when it is complete.
+//! Readers convert to the toolkit's convention: the centre of the upper-left pixel is (0, 0), and
+//! heights are metres above the ellipsoid unless a reader reports the vertical datum. Writers
+//! refuse to replace a file unless `overwrite` is set, and a file appears under its name only when
+//! it is complete ([`atomic`]).
 
 pub mod atomic;
 pub mod citymodel;

@@ -1,6 +1,6 @@
-//! Line numbers in a text that is read from front to back.
+//! Line numbers of a text that is read from front to back.
 
-/// Line numbers for growing positions, in one pass over the text.
+/// Finds the line of growing byte positions in one pass over the text.
 pub(crate) struct Lines<'a> {
     text: &'a str,
     position: usize,
@@ -8,12 +8,13 @@ pub(crate) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// At the start of a text.
+    /// Starts at the beginning of a text.
     pub(crate) fn new(text: &'a str) -> Self {
         Self { text, position: 0, line: 1 }
     }
 
-    /// The line of a byte, the first being 1; of the farthest one asked for where that is farther.
+    /// Returns the line, from 1, of the byte at `position`. A position before an earlier one gets
+    /// the line of the earlier one.
     pub(crate) fn at(&mut self, position: u64) -> usize {
         let position = usize::try_from(position).unwrap_or(usize::MAX).min(self.text.len());
         let passed = self.text.as_bytes().get(self.position..position).unwrap_or_default();

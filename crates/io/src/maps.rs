@@ -1,7 +1,8 @@
-//! Maps in the pixels of a camera (depths, normals, masks), from `.npy` or any raster, as f64.
+//! Reading maps in the pixels of a camera (depths, normals, masks) from `.npy` or any raster, as
+//! f64.
 //!
-//! No-data becomes NaN. A PNG of depths that carries its step (`depth_step_m`, see [`crate::raster::write_depth_png`]) comes out in
-//! metres, with 0 as no depth.
+//! No-data becomes NaN. A depth PNG with a step (`depth_step_m`, see
+//! [`crate::raster::write_depth_png`]) is converted to metres, where 0 is no depth.
 
 use std::path::{Path, PathBuf};
 
@@ -10,21 +11,21 @@ use raster::Window;
 use crate::npy::{self, NpyData, NpyError};
 use crate::raster::{ImageSource, RasterError, SampleType};
 
-/// Most numbers of a map.
+/// Most values of a map.
 const NUMBERS_MAX: usize = 1 << 30;
 
-/// A map.
+/// A map in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapFile {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Numbers of a pixel.
+    /// Values per pixel.
     pub channels: usize,
-    /// Row by row, the numbers of a pixel side by side.
+    /// Values row by row; the values of a pixel are adjacent.
     pub data: Vec<f64>,
-    /// Whether the numbers are truth values or 8 bits: a mask.
+    /// Whether the file has booleans or 8-bit numbers, as masks do.
     pub is_mask: bool,
 }
 
@@ -32,23 +33,26 @@ pub struct MapFile {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MapError {
-    /// An array.
+    /// A NumPy array was not read.
     #[error(transparent)]
     Npy(#[from] NpyError),
-    /// A raster.
+    /// A raster was not read.
     #[error(transparent)]
     Raster(#[from] RasterError),
-    /// Another shape than a map has.
-    #[error("the shape is {shape:?}, expected rows x columns, or rows x columns x channels, up to 2^30 numbers: {}", .path.display())]
+    /// The shape is not that of a map.
+    #[error(
+        "the shape is {shape:?}, expected rows x columns or rows x columns x channels, at most 2^30 numbers: {}",
+        .path.display()
+    )]
     Shape {
         /// The file.
         path: PathBuf,
-        /// What was found.
+        /// The shape found.
         shape: Vec<usize>,
     },
 }
 
-/// Whether a file is a NumPy array, by its first bytes.
+/// Whether the first bytes of a file are those of a NumPy array.
 pub fn is_npy(path: impl AsRef<Path>) -> bool {
     use std::io::Read;
     let mut magic = [0u8; 6];
@@ -58,7 +62,8 @@ pub fn is_npy(path: impl AsRef<Path>) -> bool {
 /// Reads a map.
 ///
 /// # Errors
-/// A file that is no map, or that cannot be read.
+/// [`MapError::Shape`] for an array or raster of another shape, or with more than 2³⁰ values;
+/// [`MapError::Npy`] and [`MapError::Raster`] for a file that cannot be read.
 pub fn read(path: impl AsRef<Path>) -> Result<MapFile, MapError> {
     let path = path.as_ref();
     if is_npy(path) { from_npy(path) } else { from_raster(path) }

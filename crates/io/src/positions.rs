@@ -1,18 +1,19 @@
-//! Lists of camera positions: CSV with a header line, or GeoJSON with points.
+//! Reading lists of camera positions: CSV with a header line, or GeoJSON with points.
 //!
-//! Columns (properties) by name, in any letter case: `lon`, `lat` (degrees; in GeoJSON the point's coordinates), and where
-//! wanted `id` (or `name`), `heading` (degrees clockwise from north) and `height_m` (of the camera, metres above the
-//! ellipsoid). Others are passed over. A row that cannot be used says why and does not spoil the rest; a list that is
-//! none is an error. CSV follows RFC 4180: commas, quotes doubled inside quotes.
+//! Columns (properties in GeoJSON) are found by name, in any letter case: `lon` and `lat` (degrees;
+//! in GeoJSON the coordinates of the point), and optionally `id` (or `name`), `heading` (degrees
+//! clockwise from north) and `height_m` (of the camera, metres above the ellipsoid). Others are
+//! ignored. A row that cannot be used carries the reason and the other rows are still read; a file
+//! that is not a list is an error. CSV follows RFC 4180: commas, quotes doubled inside quotes.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-/// Lists are read up to this size, bytes.
+/// Largest list that is read, bytes.
 const SIZE_LIMIT: u64 = 1 << 30;
-/// Longest id, bytes: it becomes the name of a file.
+/// Longest id, bytes; the id becomes the name of a file.
 const ID_LIMIT: usize = 200;
 
 /// A camera position.
@@ -22,18 +23,18 @@ pub struct Position {
     pub lon_deg: f64,
     /// Latitude, degrees.
     pub lat_deg: f64,
-    /// Degrees clockwise from north, where the list says.
+    /// Viewing direction, degrees clockwise from north, if given.
     pub heading_deg: Option<f64>,
-    /// Height of the camera, metres above the ellipsoid, where the list says.
+    /// Height of the camera, metres above the ellipsoid, if given.
     pub height_m: Option<f64>,
 }
 
 /// A row of a list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionRow {
-    /// Its id, or `row_N` counted from 1; safe as the name of a file and once in the list.
+    /// Its id, or `row_N` counted from 1. It is unique in the list and can be the name of a file.
     pub id: String,
-    /// The position, or why it is none.
+    /// The position, or the reason why the row cannot be used.
     pub position: Result<Position, String>,
 }
 
@@ -41,20 +42,20 @@ pub struct PositionRow {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PositionsError {
-    /// The file is not there or may not be read.
+    /// The file does not exist or may not be read.
     #[error("cannot read the list of positions ({source}): {}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// The file is no list of positions.
-    #[error("no list of positions ({what}): {}", path.display())]
+    /// The file is not a list of positions.
+    #[error("not a list of positions ({what}): {}", path.display())]
     Invalid {
         /// The file.
         path: PathBuf,
-        /// What was found and expected.
+        /// The content found and the content expected.
         what: String,
     },
 }
@@ -62,14 +63,15 @@ pub enum PositionsError {
 /// Reads a list of positions.
 ///
 /// # Errors
-/// A file that cannot be read, is longer than 1 GiB, has no rows or lacks a column; two rows with one id, or an id that cannot
-/// be the name of a file.
+/// [`PositionsError::Unreadable`] when the system refuses. [`PositionsError::Invalid`] for a file
+/// larger than 1 GiB, without rows or without a required column, for two rows with the same id, and
+/// for an id that cannot be the name of a file.
 pub fn read_positions(path: impl AsRef<Path>) -> Result<Vec<PositionRow>, PositionsError> {
     let path = path.as_ref();
     let unreadable = |source| PositionsError::Unreadable { path: path.to_owned(), source };
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     let rows = if size > SIZE_LIMIT {
-        Err(format!("it has {size} bytes, up to {SIZE_LIMIT} are read"))
+        Err(format!("it has {size} bytes, expected at most {SIZE_LIMIT}"))
     } else {
         let bytes = std::fs::read(path).map_err(unreadable)?;
         parse(&String::from_utf8_lossy(&bytes))
@@ -81,14 +83,14 @@ fn parse(text: &str) -> Result<Vec<PositionRow>, String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let rows = if text.trim_start().starts_with('{') { from_geojson(text)? } else { from_csv(text)? };
     if rows.is_empty() {
-        return Err("it has no rows".to_owned());
+        return Err("it has no rows, expected at least one".to_owned());
     }
     let mut seen = HashSet::new();
     for row in &rows {
         check_id(&row.id)?;
-        // Some file systems do not tell capitals.
+        // Some file systems ignore letter case.
         if !seen.insert(row.id.to_lowercase()) {
-            return Err(format!("the id {:?} occurs twice", row.id));
+            return Err(format!("the id {:?} occurs twice, expected one row per id", row.id));
         }
     }
     Ok(rows)
@@ -107,14 +109,14 @@ fn from_csv(text: &str) -> Result<Vec<PositionRow>, String> {
     let mut records = records(text).into_iter();
     let header: Vec<String> = records.next().unwrap_or_default().iter().map(|h| h.trim().to_lowercase()).collect();
     let column = |names: &[&str]| header.iter().position(|h| names.contains(&h.as_str()));
-    let missing = |name: &str| format!("its first line names no column {name:?}: expected lon and lat at least");
+    let missing = |name: &str| format!("its first line has no column {name:?}, expected at least lon and lat");
     let lon = column(&["lon", "longitude", "lon_deg"]).ok_or_else(|| missing("lon"))?;
     let lat = column(&["lat", "latitude", "lat_deg"]).ok_or_else(|| missing("lat"))?;
     let (id, heading, height) = (column(&["id", "name"]), column(&["heading", "heading_deg"]), column(&["height_m"]));
     let row = |(number, fields): (usize, Vec<String>)| {
         let field = |at: usize| fields.get(at).map(|f| f.trim()).unwrap_or_default();
         let number_in = |at: usize| {
-            field(at).parse::<f64>().map_err(|_| format!("{:?} in column {:?} is no number", field(at), header[at]))
+            field(at).parse::<f64>().map_err(|_| format!("{:?} in column {:?} is not a number", field(at), header[at]))
         };
         let if_there = |at: Option<usize>| at.filter(|&at| !field(at).is_empty()).map(number_in).transpose();
         let position = || {
@@ -132,7 +134,7 @@ fn from_csv(text: &str) -> Result<Vec<PositionRow>, String> {
     Ok((1..).zip(records).map(row).collect())
 }
 
-/// Lines and fields; empty lines are left out.
+/// Splits a CSV text into records of fields, without empty lines.
 fn records(text: &str) -> Vec<Vec<String>> {
     let (mut records, mut fields, mut field) = (Vec::new(), Vec::new(), String::new());
     let mut quoted = false;
@@ -163,9 +165,11 @@ fn records(text: &str) -> Vec<Vec<String>> {
 fn from_geojson(text: &str) -> Result<Vec<PositionRow>, String> {
     let value: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
     let features = match value["type"].as_str() {
-        Some("FeatureCollection") => value["features"].as_array().ok_or("its features are no list")?.as_slice(),
+        Some("FeatureCollection") => value["features"].as_array().ok_or("its features are not a list")?.as_slice(),
         Some("Feature") => std::slice::from_ref(&value),
-        other => return Err(format!("its type is {other:?}, expected FeatureCollection")),
+        other => {
+            return Err(format!("its type is {}, expected FeatureCollection or Feature", other.unwrap_or("missing")));
+        }
     };
     Ok((1..).zip(features).map(|(number, feature)| from_feature(number, feature)).collect())
 }
@@ -179,14 +183,15 @@ fn from_feature(number: usize, feature: &Value) -> PositionRow {
             .filter(|v| !v.is_null())
     };
     let number_in = |names: &[&str]| {
-        let as_number = |v: &Value| v.as_f64().ok_or_else(|| format!("{v} as {:?} is no number", names[0]));
+        let as_number =
+            |v: &Value| v.as_f64().ok_or_else(|| format!("the property {:?} is {v}, expected a number", names[0]));
         property(names).map(as_number).transpose()
     };
     let position = || {
         if feature["geometry"]["type"] != "Point" {
             return Err(format!("its geometry is {}, expected a Point", feature["geometry"]["type"]));
         }
-        let at = |i: usize| feature["geometry"]["coordinates"][i].as_f64().ok_or("its coordinates are no numbers");
+        let at = |i: usize| feature["geometry"]["coordinates"][i].as_f64().ok_or("its coordinates are not numbers");
         let position = Position {
             lon_deg: at(0)?,
             lat_deg: at(1)?,
@@ -200,13 +205,14 @@ fn from_feature(number: usize, feature: &Value) -> PositionRow {
     PositionRow { id: own.unwrap_or_else(|| format!("row_{number}")), position: position() }
 }
 
+/// Checks that a position is on the Earth and finite.
 fn usable(position: Position) -> Result<Position, String> {
     let Position { lon_deg, lat_deg, heading_deg, height_m } = position;
     if !(lon_deg.abs() <= 360.0 && lat_deg.abs() <= 90.0) {
-        return Err(format!("longitude {lon_deg}, latitude {lat_deg} is no position"));
+        return Err(format!("longitude {lon_deg}, latitude {lat_deg} is not on the Earth, expected degrees"));
     }
     match [heading_deg, height_m].into_iter().flatten().find(|v| !v.is_finite()) {
-        Some(odd) => Err(format!("{odd} is no heading or height")),
+        Some(odd) => Err(format!("a heading or height is {odd}, expected a finite number")),
         None => Ok(position),
     }
 }
@@ -221,11 +227,12 @@ mod tests {
 
     #[test]
     fn csv_is_read_with_quotes_empty_fields_and_bad_rows() {
-        let text = "\u{feff}ID,Lon,lat,heading,note\r\na,4.5,52,37,\"x, \"\"y\"\"\"\r\n\r\n\"b c\",4.6,52.1,,\nd,east,52,1,\n,5,95,1,\n";
+        let text = "\u{feff}ID,Lon,lat,heading,note\r\na,4.5,52,37,\"x, \"\"y\"\"\"\r\n\r\n\
+                    \"b c\",4.6,52.1,,\nd,east,52,1,\n,5,95,1,\n";
         let rows = parse(text).unwrap();
         assert_eq!(rows[0], PositionRow { id: "a".into(), position: Ok(at(4.5, 52.0, Some(37.0), None)) });
         assert_eq!(rows[1], PositionRow { id: "b c".into(), position: Ok(at(4.6, 52.1, None, None)) });
-        assert_eq!(rows[2].position, Err("\"east\" in column \"lon\" is no number".into()));
+        assert_eq!(rows[2].position, Err("\"east\" in column \"lon\" is not a number".into()));
         assert_eq!((rows[3].id.as_str(), rows[3].position.is_err(), rows.len()), ("row_4", true, 4));
     }
 

@@ -1,25 +1,32 @@
-//! The similarity between a model's frame and that of the cameras, as JSON.
+//! Reading the similarity from a model's frame to the frame of the cameras, as JSON.
 //!
-//! camera = s · R · (model + (0, 0, vertical offset)) + t. A file holds either the parts
+//! camera = s · R · (model + (0, 0, vertical offset)) + t. A file has either the parts
 //!
 //! ```json
-//! { "scale": 1.0, "rotation": [1, 0, 0, 0], "translation": [-690000.0, -5336000.0, 0.0], "vertical_offset_m": 45.2 }
+//! {
+//!   "scale": 1.0,
+//!   "rotation": [1, 0, 0, 0],
+//!   "translation": [-690000.0, -5336000.0, 0.0],
+//!   "vertical_offset_m": 45.2
+//! }
 //! ```
 //!
-//! (all but one may be left out; the rotation is a quaternion with w first, or three rows), or a matrix of four rows under
-//! `base_to_canonical`, `camera_from_model` or `matrix`, or that matrix alone. `canonical_to_base` and `model_from_camera` are
-//! the way back. The vertical offset, metres, is added to the model's heights: a geoid's height above the ellipsoid where
-//! the cameras have ellipsoidal heights. Unknown keys are refused.
+//! or a matrix of four rows under `base_to_canonical`, `camera_from_model` or `matrix`, or that
+//! matrix alone. At least one part is required; the rotation is a quaternion with w first, or three
+//! rows. A matrix under `canonical_to_base` or `model_from_camera` is the inverse. The vertical
+//! offset, metres, is added to the model's heights: it is the geoid's height above the ellipsoid
+//! when the model has heights above the geoid and the cameras have ellipsoidal heights. Unknown
+//! keys are refused.
 
 use std::path::{Path, PathBuf};
 
 use camera::{Pose, Similarity, SimilarityError};
 use serde::Deserialize;
 
-/// Files are read up to this size, bytes.
+/// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 1 << 20;
 
-/// A file that holds no similarity.
+/// A similarity that was not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimilarityFileError {
@@ -28,28 +35,28 @@ pub enum SimilarityFileError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// The file is no JSON, or has other keys than are read.
-    #[error("no similarity ({what}): {}", .path.display())]
+    /// The file is not JSON of the documented form.
+    #[error("not a similarity ({what}): {}", .path.display())]
     Invalid {
         /// The file.
         path: PathBuf,
-        /// What was found and expected.
+        /// The content found and the content expected.
         what: String,
     },
-    /// The numbers make none.
+    /// The numbers do not make a similarity.
     #[error("{source}: {}", .path.display())]
     Numbers {
         /// The file.
         path: PathBuf,
-        /// What is wrong with them.
+        /// The defect of the numbers.
         source: SimilarityError,
     },
 }
 
-/// Why a text is refused.
+/// A defect of the text or of its numbers.
 #[derive(Debug)]
 enum Fault {
     Text(String),
@@ -78,17 +85,20 @@ enum Rotation {
     Rows([[f64; 3]; 3]),
 }
 
-/// Reads the similarity from the model's frame to that of the cameras, the vertical offset included.
+/// Reads the similarity from the model's frame to the frame of the cameras, including the vertical
+/// offset.
 ///
 /// # Errors
-/// A file that cannot be read, is larger than 1 MiB, is no JSON of the form above, or whose numbers are no similarity: a scale
-/// that is not positive, a matrix that mirrors or shears, anything that is not finite.
+/// - [`SimilarityFileError::Unreadable`] when the system refuses.
+/// - [`SimilarityFileError::Invalid`] for a file larger than 1 MiB or not of the documented form.
+/// - [`SimilarityFileError::Numbers`] for a scale that is not positive, a matrix that mirrors or
+///   shears, and numbers that are not finite.
 pub fn read(path: impl AsRef<Path>) -> Result<Similarity, SimilarityFileError> {
     let path = path.as_ref();
     let unreadable = |source| SimilarityFileError::Unreadable { path: path.to_owned(), source };
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     if size > SIZE_LIMIT {
-        let what = format!("{size} bytes, up to {SIZE_LIMIT} are read");
+        let what = format!("it has {size} bytes, expected at most {SIZE_LIMIT}");
         return Err(SimilarityFileError::Invalid { path: path.to_owned(), what });
     }
     parse(&std::fs::read(path).map_err(unreadable)?).map_err(|fault| match fault {
@@ -109,8 +119,12 @@ fn parse(bytes: &[u8]) -> Result<Similarity, Fault> {
         (None, Some(rows), false) => matrix(rows)?.inverse(),
         (None, None, true) => of_parts(&parts)?,
         (None, None, false) if parts.vertical_offset_m.is_some() => Similarity::IDENTITY,
-        (None, None, false) => return Err(Fault::Text("no key of a similarity".to_owned())),
-        _ => return Err(Fault::Text("a matrix beside other parts, expected one or the other".to_owned())),
+        (None, None, false) => {
+            return Err(Fault::Text(
+                "it has no key of a similarity, expected scale, rotation, translation or a matrix".to_owned(),
+            ));
+        }
+        _ => return Err(Fault::Text("it has a matrix and other parts, expected one or the other".to_owned())),
     };
     let raised = [0.0, 0.0, parts.vertical_offset_m.unwrap_or(0.0)];
     let raise = Similarity::new(1.0, Similarity::IDENTITY.rotation(), raised).map_err(Fault::Numbers)?;
@@ -123,13 +137,13 @@ fn of_parts(parts: &Parts) -> Result<Similarity, Fault> {
         Some(Rotation::Rows(rows)) => rows,
         Some(Rotation::Quaternion(quaternion)) => {
             let pose = Pose::from_quaternion(quaternion, [0.0; 3]);
-            pose.ok_or_else(|| Fault::Text("the quaternion has no length or is not finite".to_owned()))?.rotation
+            pose.ok_or_else(|| Fault::Text("the quaternion is zero or not finite".to_owned()))?.rotation
         }
     };
     Similarity::new(parts.scale.unwrap_or(1.0), rotation, parts.translation.unwrap_or_default()).map_err(Fault::Numbers)
 }
 
-/// Three or four rows of four.
+/// Makes a similarity of three or four rows of four numbers.
 fn matrix(rows: &Rows) -> Result<Similarity, Fault> {
     let row = |i: usize| <[f64; 4]>::try_from(rows.get(i)?.as_slice()).ok();
     let last_fits = rows.get(3).is_none_or(|last| last.as_slice() == [0.0, 0.0, 0.0, 1.0]);
@@ -137,7 +151,9 @@ fn matrix(rows: &Rows) -> Result<Similarity, Fault> {
         (Some(a), Some(b), Some(c)) if last_fits && rows.len() <= 4 => {
             Similarity::from_matrix([a, b, c]).map_err(Fault::Numbers)
         }
-        _ => Err(Fault::Text("the matrix has not four rows of four numbers, the last 0 0 0 1".to_owned())),
+        _ => Err(Fault::Text(
+            "the matrix is of another form, expected four rows of four numbers, the last 0 0 0 1".to_owned(),
+        )),
     }
 }
 
@@ -160,7 +176,7 @@ mod tests {
         let p = [690_010.0, 5_336_020.0, 500.0];
         check(r#"{"translation": [-690000, -5336000, -500]}"#, p, [10.0, 20.0, 0.0]);
         check(r#"{"vertical_offset_m": 45.5}"#, p, [p[0], p[1], 545.5]);
-        // A quarter turn about z, then twice as large; the offset comes before both.
+        // A quarter turn about z and a scale of 2; the offset is added before both.
         let quarter =
             r#"{"scale": 2, "rotation": [0.7071067811865476, 0, 0, 0.7071067811865476], "vertical_offset_m": 1}"#;
         check(quarter, [1.0, 0.0, 0.0], [0.0, 2.0, 2.0]);

@@ -1,6 +1,7 @@
-//! Rasters through files: what is written reads back, what is damaged is refused with a reason, real images open.
+//! Rasters are written and read back, damaged files are refused with a reason, and real images
+//! open.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use camera::Rpc;
 use crs::{Crs, VerticalDatum};
@@ -20,7 +21,7 @@ fn same(a: &Grid<f32>, b: &Grid<f32>) -> bool {
     a.data().iter().zip(b.data()).all(|(x, y)| x == y || (x.is_nan() && y.is_nan())) && a.width() == b.width()
 }
 
-/// An RPC whose numbers do not survive a short decimal form.
+/// An RPC whose numbers need all digits of a double.
 fn rpc() -> Rpc {
     let series = |seed: f64| std::array::from_fn(|i| (seed + i as f64).sin() / 3.0 * 10_f64.powi(-(i as i32) / 2));
     Rpc {
@@ -73,7 +74,7 @@ fn a_cog_reads_back_with_its_place_and_datum() {
     assert_eq!(part.geotransform.map_from_cell(0.0, 0.0), place.map_from_cell(690.0, 0.0));
     assert_eq!(part.heights[(0, 0)], grid[(690, 0)]);
     let leftovers = std::fs::read_dir(folder.path()).unwrap().count();
-    assert_eq!(leftovers, 4, "something besides the four outputs was left behind");
+    assert_eq!(leftovers, 4, "expected nothing but the four outputs");
 }
 
 #[test]
@@ -140,7 +141,8 @@ fn an_image_keeps_its_rpc_to_the_last_bit() {
         let (_, text) = items.iter().find(|(k, _)| k == key).unwrap();
         text.split_whitespace().map(|t| t.parse().unwrap()).collect()
     };
-    // GDAL prints 15 significant digits when it turns the tag into text; the tag itself is checked below.
+    // GDAL prints 15 significant digits when it turns the tag into text; the tag itself is checked
+    // below.
     assert!((number("LINE_OFF")[0] - rpc.line_off).abs() < 1e-9);
     let mut tags = tiff::decoder::Decoder::new(std::fs::File::open(&path).unwrap()).unwrap();
     let tag = tags.get_tag_f64_vec(tiff::tags::Tag::Unknown(50844)).unwrap();
@@ -250,7 +252,8 @@ fn a_description_that_names_the_network_fetches_nothing() {
         format!("/vsis3/bucket/a.tif?endpoint={address}"),
     ] {
         let band = format!(
-            r#"<VRTRasterBand dataType="Byte" band="1"><SimpleSource><SourceFilename>{source}</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand>"#
+            r#"<VRTRasterBand dataType="Byte" band="1"><SimpleSource><SourceFilename>{source}</SourceFilename>
+            <SourceBand>1</SourceBand></SimpleSource></VRTRasterBand>"#
         );
         std::fs::write(&vrt, format!(r#"<VRTDataset rasterXSize="4" rasterYSize="4">{band}</VRTDataset>"#)).unwrap();
         assert!(ImageSource::open(&vrt).and_then(|s| s.read_luma(s.window())).is_err(), "{source}");
@@ -260,7 +263,7 @@ fn a_description_that_names_the_network_fetches_nothing() {
         format!("<GDAL_WMS><Service name=\"TMS\"><ServerUrl>http://{address}/${{z}}</ServerUrl></Service></GDAL_WMS>");
     std::fs::write(&wms, service).unwrap();
     assert!(ImageSource::open(&wms).is_err());
-    assert!(listener.accept().is_err(), "something connected");
+    assert!(listener.accept().is_err(), "expected no connection");
 }
 
 #[test]

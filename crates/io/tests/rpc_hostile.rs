@@ -1,4 +1,5 @@
-//! Broken and hostile RPC files: each is refused with an error that names the entry; none panics or takes long.
+//! Broken and hostile RPC files are refused with an error that names the entry. None panics or takes
+//! long.
 
 use std::path::PathBuf;
 
@@ -52,7 +53,7 @@ fn read_bytes(name: &str, bytes: &[u8]) -> Result<camera::Rpc, RpcReadError> {
     read(&path).map(|f| f.rpc)
 }
 
-/// The fault in a recognised file.
+/// Reads a file of a known format and returns its defect.
 fn fault(name: &str, content: &str) -> Fault {
     match read_bytes(name, content.as_bytes()) {
         Err(RpcReadError::Invalid { fault, .. }) => *fault,
@@ -74,10 +75,12 @@ fn dimap(profile: &str, first: Option<u32>) -> String {
         .map(|(k, v)| format!("<{k}>{}</{k}>", v.split(' ').next().unwrap_or("")))
         .collect();
     let domain = first.map_or(String::new(), |n| {
-        format!("<Direct_Model_Validity_Domain><FIRST_ROW>{n}</FIRST_ROW><FIRST_COL>{n}</FIRST_COL></Direct_Model_Validity_Domain>")
+        let first = format!("<FIRST_ROW>{n}</FIRST_ROW><FIRST_COL>{n}</FIRST_COL>");
+        format!("<Direct_Model_Validity_Domain>{first}</Direct_Model_Validity_Domain>")
     });
     format!(
-        "<Dimap_Document><Metadata_Identification><METADATA_PROFILE>{profile}</METADATA_PROFILE></Metadata_Identification>\
+        "<Dimap_Document>\
+         <Metadata_Identification><METADATA_PROFILE>{profile}</METADATA_PROFILE></Metadata_Identification>\
          <Rational_Function_Model><Global_RFM><Inverse_Model>{model}</Inverse_Model>\
          <RFM_Validity>{domain}{scalars}</RFM_Validity></Global_RFM></Rational_Function_Model></Dimap_Document>"
     )
@@ -200,8 +203,9 @@ fn a_virtual_raster_opens_no_source() {
         .collect();
     let vrt = |domain: &str| {
         format!(
-            "<VRTDataset rasterXSize=\"1\" rasterYSize=\"1\"><Metadata domain=\"{domain}\">{items}</Metadata><VRTRasterBand \
-             dataType=\"Byte\" band=\"1\"><SimpleSource><SourceFilename>/vsicurl/http://127.0.0.1:9/x.tif</SourceFilename>\
+            "<VRTDataset rasterXSize=\"1\" rasterYSize=\"1\"><Metadata domain=\"{domain}\">{items}</Metadata>\
+             <VRTRasterBand dataType=\"Byte\" band=\"1\">\
+             <SimpleSource><SourceFilename>/vsicurl/http://127.0.0.1:9/x.tif</SourceFilename>\
              </SimpleSource></VRTRasterBand></VRTDataset>"
         )
     };
@@ -216,7 +220,8 @@ fn an_adjusted_or_old_geom_is_refused() {
         (0..20).map(|i| format!("{name}_{i:02}:  {}\n", if i == one { 1.0 } else { 0.0 })).collect()
     };
     let geom = |extra: &str| {
-        let scalars = "line_off:  10\nsamp_off:  20\nlat_off:  45\nlong_off:  7\nheight_off:  0\nline_scale:  10\nsamp_scale:  20\n\
+        let scalars = "line_off:  10\nsamp_off:  20\nlat_off:  45\nlong_off:  7\nheight_off:  0\n\
+                       line_scale:  10\nsamp_scale:  20\n\
                        lat_scale:  1\nlong_scale:  1\nheight_scale:  100\n";
         let num = coefficients("line_num_coeff", 2) + &coefficients("samp_num_coeff", 1);
         let den = coefficients("line_den_coeff", 0) + &coefficients("samp_den_coeff", 0);
@@ -261,7 +266,7 @@ fn files_beside_an_image_are_found_without_regard_to_case() {
         let file = read_for_image(&path).expect(rpc_name);
         assert_eq!((file.rpc.line_num, file.source), (plain().line_num, folder.path().join(rpc_name)));
     }
-    // Where another tile lies in the scene is not in the RPC.
+    // The RPC does not have the position of other tiles in the scene.
     let folder = TempDir::new().expect("a folder");
     let tile = folder.path().join("IMG_X_R2C1.raw");
     std::fs::write(&tile, image).expect("an image");
@@ -293,12 +298,15 @@ prop_compose! {
         rest in prop::collection::vec(coefficient(), 76),
         bias in prop::option::of(0.0..10.0_f64),
     ) -> camera::Rpc {
-        let poly = |k: usize, first: [f64; 2]| std::array::from_fn(|i| if i < 2 { first[i] } else { rest[19 * k + i - 2] });
+        let poly = |k: usize, first: [f64; 2]| {
+            std::array::from_fn(|i| if i < 2 { first[i] } else { rest[19 * k + i - 2] })
+        };
         let mut line_num: [f64; 20] = poly(0, [0.0, 0.0]);
         line_num[2] = -3.0;
         camera::Rpc {
             line_off: off[0], samp_off: off[1], lat_off: off[2], long_off: off[3], height_off: off[4],
-            line_scale: scale[0], samp_scale: scale[1], lat_scale: scale[2], long_scale: scale[3], height_scale: scale[4],
+            line_scale: scale[0], samp_scale: scale[1], lat_scale: scale[2], long_scale: scale[3],
+            height_scale: scale[4],
             line_num, line_den: poly(1, [1.0, 1e-4]), samp_num: poly(2, [0.0, 5.0]), samp_den: poly(3, [1.0, 1e-4]),
             err_bias_m: bias, err_rand_m: bias,
         }
@@ -312,7 +320,8 @@ proptest! {
     fn what_is_written_reads_back_to_the_bit(rpc in any_rpc().prop_filter("a camera", |r| r.validate().is_ok())) {
         for format in [RpcFormat::Text, RpcFormat::Rpb, RpcFormat::Json] {
             let back = read_bytes("a", to_text(&rpc, format).expect("text").as_bytes()).expect("an RPC");
-            let errors_as_written = camera::Rpc { err_bias_m: back.err_bias_m, err_rand_m: back.err_rand_m, ..rpc.clone() };
+            let (err_bias_m, err_rand_m) = (back.err_bias_m, back.err_rand_m);
+            let errors_as_written = camera::Rpc { err_bias_m, err_rand_m, ..rpc.clone() };
             prop_assert_eq!(&back, &errors_as_written);
             prop_assert_eq!(back.err_bias_m.unwrap_or(0.0), rpc.err_bias_m.unwrap_or(0.0));
         }
@@ -328,7 +337,7 @@ proptest! {
         };
         let mut bytes = whole.into_bytes();
         let length = bytes.len() as f64;
-        // Ends inside the last polynomial at the latest, so that something is always missing.
+        // The text ends inside the last polynomial at the latest, so an entry is always missing.
         let short = &bytes[..(0.95 * cut * length) as usize];
         if kind < 3 {
             prop_assert!(read_bytes("a", short).is_err());

@@ -1,88 +1,25 @@
-//! NumPy's `.npy` files, version 1.0, C order: the maps that Gaussian splatting trainers read.
+//! NumPy's `.npy` files: the maps that Gaussian splatting trainers read.
 //!
-//! [`write()`] streams a slice without a second copy. [`read`] takes what NumPy writes for real numbers and bools in either byte
-//! order, and widens nothing; structured types, objects (pickles) and Fortran order beyond one axis are refused.
-//! No shape is believed before it is checked against the size of the file.
+//! [`write()`] writes version 1.0 in C order, and streams the slice without a copy. [`read`]
+//! accepts versions 1 to 3 with real numbers and booleans in either byte order, and keeps their
+//! type. Structured types, objects (pickles) and arrays in Fortran order with more than one axis
+//! are refused. The shape is checked against the size of the file before it is used.
 
+mod data;
 mod header;
 
 use std::path::{Path, PathBuf};
 
-use crate::atomic::SaveError;
-use crate::atomic::write_stream;
+use crate::atomic::{SaveError, write_stream};
 
-/// Files are read up to this size, bytes.
+pub use data::{NpyArray, NpyData, NpyNumber};
+
+/// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 8 << 30;
-/// Numbers that are turned into bytes at a time.
+/// Numbers converted to bytes at a time.
 const CHUNK: usize = 1 << 14;
 
-/// An array from a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NpyArray {
-    /// Lengths of the axes, the slowest first: rows, columns, channels.
-    pub shape: Vec<usize>,
-    /// The numbers in C order.
-    pub data: NpyData,
-}
-
-/// The numbers of an array.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum NpyData {
-    /// Single precision.
-    F32(Vec<f32>),
-    /// Double precision.
-    F64(Vec<f64>),
-    /// Truth values.
-    Bool(Vec<bool>),
-    /// 8 bits.
-    U8(Vec<u8>),
-    /// 16 bits.
-    U16(Vec<u16>),
-    /// 32 bits.
-    U32(Vec<u32>),
-    /// 32 bits, signed.
-    I32(Vec<i32>),
-    /// 64 bits, signed: NumPy's usual integer.
-    I64(Vec<i64>),
-}
-
-impl NpyData {
-    /// How many numbers there are.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::F32(v) => v.len(),
-            Self::F64(v) => v.len(),
-            Self::Bool(v) => v.len(),
-            Self::U8(v) => v.len(),
-            Self::U16(v) => v.len(),
-            Self::U32(v) => v.len(),
-            Self::I32(v) => v.len(),
-            Self::I64(v) => v.len(),
-        }
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The numbers as f64; truth values are 0 and 1.
-    pub fn to_f64(&self) -> Vec<f64> {
-        match self {
-            Self::F32(v) => v.iter().map(|&x| f64::from(x)).collect(),
-            Self::F64(v) => v.clone(),
-            Self::Bool(v) => v.iter().map(|&x| f64::from(u8::from(x))).collect(),
-            Self::U8(v) => v.iter().map(|&x| f64::from(x)).collect(),
-            Self::U16(v) => v.iter().map(|&x| f64::from(x)).collect(),
-            Self::U32(v) => v.iter().map(|&x| f64::from(x)).collect(),
-            Self::I32(v) => v.iter().map(|&x| f64::from(x)).collect(),
-            Self::I64(v) => v.iter().map(|&x| x as f64).collect(),
-        }
-    }
-}
-
-/// A file that is no such array, or that was not written.
+/// An array that was not read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NpyError {
@@ -91,25 +28,25 @@ pub enum NpyError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// The content is not what is read here.
-    #[error("not an array that is read here ({what}): {}", .path.display())]
+    /// The content is not an array of a supported type.
+    #[error("not a NumPy array that can be read ({what}): {}", .path.display())]
     Invalid {
         /// The file.
         path: PathBuf,
-        /// What was found and expected.
+        /// The content found and the content expected.
         what: String,
     },
-    /// The shape does not hold the numbers.
-    #[error("{numbers} numbers do not fill the shape {shape:?}: {}", .path.display())]
+    /// The shape does not have the number of values given.
+    #[error("found {numbers} numbers for the shape {shape:?}, expected its product: {}", .path.display())]
     Shape {
         /// The file.
         path: PathBuf,
         /// The shape.
         shape: Vec<usize>,
-        /// How many numbers there are.
+        /// Number of values.
         numbers: usize,
     },
     /// The file was not written.
@@ -117,51 +54,25 @@ pub enum NpyError {
     NotWritten(#[from] SaveError),
 }
 
-mod sealed {
-    pub trait Sealed {}
-}
-
-/// A type of numbers that [`write()`] takes: `f32`, `f64`, `bool`, `u8`, `u16`, `u32`.
-pub trait NpyNumber: sealed::Sealed + Copy {
-    /// NumPy's name for it.
-    #[doc(hidden)]
-    const DESCRIPTION: &'static str;
-    /// Appends its bytes, little-endian.
-    #[doc(hidden)]
-    fn append(self, bytes: &mut Vec<u8>);
-}
-
-macro_rules! number {
-    ($type:ty, $description:literal) => {
-        impl sealed::Sealed for $type {}
-        impl NpyNumber for $type {
-            const DESCRIPTION: &'static str = $description;
-            fn append(self, bytes: &mut Vec<u8>) {
-                bytes.extend_from_slice(&self.to_le_bytes());
-            }
-        }
-    };
-}
-
-number!(f32, "<f4");
-number!(f64, "<f8");
-number!(u8, "|u1");
-number!(u16, "<u2");
-number!(u32, "<u4");
-
-impl sealed::Sealed for bool {}
-impl NpyNumber for bool {
-    const DESCRIPTION: &'static str = "|b1";
-    fn append(self, bytes: &mut Vec<u8>) {
-        bytes.push(u8::from(self));
-    }
-}
-
-/// Writes numbers in C order with the lengths of their axes.
+/// Writes numbers in C order. `shape` has the lengths of the axes, the slowest first.
+///
+/// ```
+/// use io::npy::{self, NpyData};
+///
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("depth.npy");
+/// npy::write(&path, &[2, 3], &[1.0_f32, 2.0, 3.0, 4.0, 5.0, 6.0], false)?;
+///
+/// let array = npy::read(&path)?;
+/// assert_eq!(array.shape, [2, 3]);
+/// assert_eq!(array.data, NpyData::F32(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
-/// [`NpyError::Shape`] when the shape holds another number of numbers, [`NpyError::NotWritten`] for a file that exists without
-/// `overwrite` and for what the system refuses.
+/// [`NpyError::Shape`] when the product of `shape` is not the number of values;
+/// [`NpyError::NotWritten`] for a file that exists without `overwrite`, and when the system
+/// refuses.
 pub fn write<T: NpyNumber>(
     path: impl AsRef<Path>,
     shape: &[usize],
@@ -188,26 +99,27 @@ pub fn write<T: NpyNumber>(
 /// Reads an array.
 ///
 /// # Errors
-/// [`NpyError::Unreadable`]; [`NpyError::Invalid`] for what is no array file, ends early, goes on after its numbers, or is of
-/// another type or order than is read.
+/// [`NpyError::Unreadable`] when the system refuses; [`NpyError::Invalid`] for a file that is not
+/// an array file, ends early, continues after its numbers, or has another type or order than can be
+/// read.
 pub fn read(path: impl AsRef<Path>) -> Result<NpyArray, NpyError> {
     let path = path.as_ref();
     let unreadable = |source| NpyError::Unreadable { path: path.to_owned(), source };
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     let invalid = |what: String| NpyError::Invalid { path: path.to_owned(), what };
     if size > SIZE_LIMIT {
-        return Err(invalid(format!("{size} bytes, up to {SIZE_LIMIT} are read")));
+        return Err(invalid(format!("it has {size} bytes, expected at most {SIZE_LIMIT}")));
     }
     parse(&std::fs::read(path).map_err(unreadable)?).map_err(invalid)
 }
 
 fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
     let (header, body) = header::decode(bytes)?;
-    let count = product(&header.shape).ok_or("the shape holds more numbers than can be counted")?;
+    let count = product(&header.shape).ok_or("the shape has more numbers than can be counted")?;
     let expected = count.checked_mul(header.kind.bytes());
     if expected != Some(body.len()) {
         return Err(format!(
-            "the shape {:?} of {} does not fit {} bytes",
+            "the shape {:?} of {} does not fit {} bytes of data",
             header.shape,
             header.description,
             body.len()

@@ -1,10 +1,10 @@
-//! Arrays there and back, as NumPy writes them, and broken ones.
+//! Arrays are written and read back, as NumPy writes them, and broken ones are refused.
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// A file as NumPy writes it, with any header text.
+/// Makes a file as NumPy writes it, with any header text.
 fn file(version: u8, header: &str, body: &[u8]) -> Vec<u8> {
     let mut bytes = b"\x93NUMPY".to_vec();
     bytes.extend([version, 0]);
@@ -78,9 +78,9 @@ fn broken_files_are_refused() {
     refused(&plain("(5,)"), "does not fit 4 bytes");
     refused(&plain("(3,)"), "does not fit 4 bytes");
     refused(&plain("(18446744073709551615, 2)"), "more numbers");
-    refused(&plain("(99999999999999999999,)"), "of an axis");
-    refused(&plain("(-1,)"), "of an axis");
-    refused(&plain("4"), "no tuple");
+    refused(&plain("(99999999999999999999,)"), "length of an axis");
+    refused(&plain("(-1,)"), "length of an axis");
+    refused(&plain("4"), "not a tuple");
     refused(&plain(&format!("({})", "1, ".repeat(40))), "axes");
     refused(&file(1, &dictionary("'|O'", "False", "(1,)"), &[1]), "type");
     refused(&file(1, &dictionary("[('x', '<f4')]", "False", "(1,)"), &[0; 4]), "structured");

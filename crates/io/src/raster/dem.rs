@@ -1,8 +1,9 @@
-//! Surface and terrain models read whole or by window: heights, their grid and what they are measured from.
+//! Reading surface and terrain models, whole or by window: heights, their grid and their vertical
+//! datum.
 //!
-//! The vertical datum is reported as the file states it (in its CRS, else in the item `VERTICAL_DATUM`), and `None` where it does not: nothing is converted here.
-//! GDAL moves the georeference of "pixel is point" files by half a pixel, so the grid's positions are right for both
-//! kinds.
+//! Heights are not converted. The vertical datum is what the file states in its CRS, else in the
+//! metadata item `VERTICAL_DATUM`. GDAL moves the georeference of "pixel is point" files by half a
+//! pixel, so the grid's positions are right for "pixel is area" and "pixel is point".
 
 use std::path::{Path, PathBuf};
 
@@ -10,19 +11,20 @@ use crs::{CrsIdentity, VerticalDatum};
 use gdal::{Dataset, Metadata};
 use raster::{GeoTransform, Grid, Window};
 
+use super::error::RasterError;
+use super::gdal_setup::{open_dataset, with_gdal};
 use super::geotiff::VERTICAL_DATUM;
 use super::source::read_as;
-use super::{RasterError, open_dataset, with_gdal};
 
-/// More cells than this are not read at once (4 GiB of f32): name a window.
+/// Most cells that are read at once (4 GiB of f32).
 const CELLS_MAX: usize = 1 << 30;
 
 /// Heights on a georeferenced grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dem {
-    /// Where it came from.
+    /// The file.
     pub path: PathBuf,
-    /// Heights with the band's scale and offset applied; NaN where there is none.
+    /// Heights, metres, with the band's scale and offset applied. NaN is no-data.
     pub heights: Grid<f32>,
     /// Position of the grid (of the window that was read), in units of the CRS.
     pub geotransform: GeoTransform,
@@ -30,27 +32,30 @@ pub struct Dem {
     pub crs_wkt: Option<String>,
     /// EPSG code of the horizontal CRS, if known.
     pub horizontal_epsg: Option<u32>,
-    /// What the heights are measured from, if the file says.
+    /// Vertical datum of the heights, if the file states it.
     pub vertical: Option<VerticalDatum>,
-    /// The no-data value in the file.
+    /// No-data value of the file, if declared.
     pub no_data: Option<f64>,
 }
 
 /// Reads the first band of a raster as heights.
 ///
 /// # Errors
-/// Those of opening; [`RasterError::Unsupported`] without georeference or with more than 2³⁰ cells;
-/// [`RasterError::Damaged`] when GDAL cannot decode the cells; [`RasterError::Crs`] for a CRS that PROJ cannot read.
+/// - [`RasterError::Unreadable`], [`RasterError::NotLocal`] and [`RasterError::NotARaster`] when
+///   the file cannot be opened.
+/// - [`RasterError::Unsupported`] without bands or georeference, or with more than 2³⁰ cells.
+/// - [`RasterError::Damaged`] when GDAL cannot decode the cells.
+/// - [`RasterError::Crs`] for a CRS that PROJ cannot read.
 pub fn read_dem(path: impl AsRef<Path>) -> Result<Dem, RasterError> {
     let dataset = open_dataset(path.as_ref())?;
     let (width, height) = dataset.raster_size();
     read(path.as_ref(), &dataset, Window::whole(width, height))
 }
 
-/// As [`read_dem`], for the part of a window that lies inside the raster.
+/// Reads the part of a window that lies inside the raster, as [`read_dem`] does.
 ///
 /// # Errors
-/// As [`read_dem`]; [`RasterError::Unsupported`] when the window misses the raster.
+/// As [`read_dem`]; [`RasterError::Unsupported`] also when the window does not overlap the raster.
 pub fn read_dem_window(path: impl AsRef<Path>, window: Window) -> Result<Dem, RasterError> {
     read(path.as_ref(), &open_dataset(path.as_ref())?, window)
 }
@@ -59,16 +64,16 @@ fn read(path: &Path, dataset: &Dataset, window: Window) -> Result<Dem, RasterErr
     let unsupported = |found: String, expected| RasterError::Unsupported { path: path.to_owned(), found, expected };
     let (width, height) = dataset.raster_size();
     let inside = Window::whole(width, height).intersection(&window).ok_or_else(|| {
-        unsupported(format!("{width} x {height} cells and a window outside them"), "a window that meets the raster")
+        unsupported(format!("{width} x {height} cells and a window outside them"), "a window that overlaps the raster")
     })?;
     if inside.width.saturating_mul(inside.height) > CELLS_MAX {
         return Err(unsupported(
             format!("{} x {} cells", inside.width, inside.height),
-            "at most 2^30 cells at once: read a part",
+            "at most 2^30 cells at once: read a window",
         ));
     }
     if dataset.raster_count() == 0 {
-        return Err(unsupported("no band".to_owned(), "a band of heights"));
+        return Err(unsupported("no band".to_owned(), "at least one band of heights"));
     }
     let geotransform = with_gdal(|| dataset.geo_transform())
         .map_err(|_| unsupported("no georeference".to_owned(), "a geotransform"))?;
@@ -87,12 +92,12 @@ fn read(path: &Path, dataset: &Dataset, window: Window) -> Result<Dem, RasterErr
     })
 }
 
-/// The datum in the metadata item that this toolkit writes.
+/// Returns the datum in the metadata item that [`super::write_cog`] writes.
 fn stated_datum(dataset: &Dataset) -> Option<VerticalDatum> {
     dataset.metadata_item(VERTICAL_DATUM, "")?.parse().ok()
 }
 
-/// Band 1 in its physical unit, with NaN for void cells.
+/// Reads band 1 with its scale and offset applied, and its no-data value. NaN marks void cells.
 fn heights(path: &Path, dataset: &Dataset, inside: Window) -> Result<(Grid<f32>, Option<f64>), RasterError> {
     let damaged = |reason: String| RasterError::damaged(path, reason);
     let band = with_gdal(|| dataset.rasterband(1)).map_err(damaged)?;

@@ -1,9 +1,10 @@
-//! Depth maps as 16-bit PNG: whole steps of a stated length, 0 where there is no depth.
+//! Depth maps as 16-bit PNG: `depth = value × step`, and 0 where there is no depth.
 //!
-//! Depth = value × step. The step stands in the file as the text chunk `depth_step_m` (and `depth_no_data` = 0); programs that
-//! read PNGs without text need it told, so it is returned too. Half a step is the largest error, and a depth that does not
-//! fit 65,535 steps is refused and never cut off.
+//! The step is in the file as the text chunk `depth_step_m`, next to `depth_no_data` = 0. It is
+//! also returned, for programs that read PNGs without text. The largest error is half a step. A
+//! depth that does not fit into 65,535 steps is refused, not clipped.
 
+use std::fmt;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -11,23 +12,33 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Encoder, EncodingError};
 use raster::Grid;
 
-use super::RasterError;
+use super::error::RasterError;
 use crate::atomic::write_path;
 
-/// Largest value of a pixel.
+/// Largest value of a pixel, steps.
 const STEPS: f64 = u16::MAX as f64;
 
 /// Length of a step of a 16-bit depth map, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DepthScale {
-    /// This step, 0.001 for millimetres.
+    /// This step, metres (0.001 for millimetres).
     Step(f64),
-    /// A millimetre, or the smallest of 2, 5, 10, 20, … mm that holds the largest depth.
+    /// The smallest of 1, 2, 5, 10, 20, … mm that holds the largest depth.
     Fit,
 }
 
+impl fmt::Display for DepthScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Step(step_m) => write!(f, "{step_m} m"),
+            Self::Fit => f.write_str("any length"),
+        }
+    }
+}
+
 impl DepthScale {
-    /// The step for depths up to `largest_m`; `None` where they do not fit, or the step is no positive number.
+    /// Returns the step for depths up to `largest_m`; `None` when they do not fit or the given step
+    /// is not positive.
     pub fn step_m(self, largest_m: f64) -> Option<f64> {
         // A depth that rounds to the last step still fits.
         let holds = |step: &f64| largest_m <= *step * (STEPS + 0.5);
@@ -38,10 +49,12 @@ impl DepthScale {
     }
 }
 
-/// Writes depths, metres, and says how long a step is; what is not finite or not positive has no depth.
+/// Writes a depth map and returns the step, metres. Depths that are not finite or not positive are
+/// written as no depth.
 ///
 /// # Errors
-/// [`RasterError::NotWritten`], also for a file that exists without `overwrite` and for depths that do not fit the scale.
+/// [`RasterError::NotWritten`] for a file that exists without `overwrite`, for depths that do not
+/// fit the scale, for a map without pixels, and when the system refuses.
 pub fn write_depth_png(
     path: impl AsRef<Path>,
     depth_m: &Grid<f32>,
@@ -52,7 +65,7 @@ pub fn write_depth_png(
     let valid = |depth: f32| depth.is_finite() && depth > 0.0;
     let largest = depth_m.data().iter().copied().filter(|&d| valid(d)).fold(0.0, f32::max);
     let step_m = scale.step_m(f64::from(largest)).ok_or_else(|| {
-        let reason = format!("depths up to {largest} m do not fit 65535 steps of {scale:?}: choose a longer step");
+        let reason = format!("depths up to {largest} m do not fit into 65535 steps of {scale}: choose a longer step");
         RasterError::unwritable(path, reason)
     })?;
     let steps =
@@ -60,7 +73,9 @@ pub fn write_depth_png(
     let bytes: Vec<u8> = depth_m.data().iter().flat_map(|depth| steps(depth).to_be_bytes()).collect();
     let side = |length: usize| u32::try_from(length).ok().filter(|&length| length > 0);
     let size = side(depth_m.width()).zip(side(depth_m.height()));
-    let size = size.ok_or_else(|| RasterError::unwritable(path, "the map has no pixels, or too many for a PNG"))?;
+    let size = size.ok_or_else(|| {
+        RasterError::unwritable(path, "the map has no pixels or is too large, expected 1 to 2^32 - 1 columns and rows")
+    })?;
     write_path(path, overwrite, |made| {
         encode(made, size, step_m, &bytes).map_err(|error| RasterError::unwritable(path, error))
     })?;

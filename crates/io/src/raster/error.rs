@@ -1,23 +1,24 @@
-//! What can go wrong with a raster file.
+//! Errors of raster files.
 
 use std::path::{Path, PathBuf};
 
 use crate::atomic::SaveError;
 
-/// A raster file that cannot be read or written. Paths come last in the text; GDAL's own words are in `reason`.
+/// A raster file that cannot be read or written. The text ends with the path, and `reason` is
+/// GDAL's message.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RasterError {
-    /// The file is not there or may not be read.
+    /// The file does not exist or may not be read.
     #[error("cannot read the file ({source}): check the name and the permissions: {}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// The name points to a network or to a service.
-    #[error("the name points to a network or a service, and only local files are read: fetch it first: {}", path.display())]
+    /// The name leads to a network or a service.
+    #[error("the name leads to a network or a service, expected a local file: download it first: {}", path.display())]
     NotLocal {
         /// The name as given.
         path: PathBuf,
@@ -27,36 +28,36 @@ pub enum RasterError {
     NotARaster {
         /// The file.
         path: PathBuf,
-        /// GDAL's words.
+        /// GDAL's message.
         reason: String,
     },
-    /// GDAL opened the file and failed to read its content.
+    /// GDAL opened the file but cannot decode its content.
     #[error("the raster is damaged or truncated ({reason}): {}", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// GDAL's words.
+        /// GDAL's message.
         reason: String,
     },
-    /// The raster is of a kind that is not read here.
+    /// The raster is of a kind that is not supported.
     #[error("{found}, expected {expected}: {}", path.display())]
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What was found.
+        /// The property found.
         found: String,
-        /// What can be read.
+        /// The property required.
         expected: &'static str,
     },
     /// The file was not written: it exists, or the system or GDAL refused.
     #[error(transparent)]
     NotWritten(#[from] SaveError),
-    /// The data handed over cannot make a raster.
+    /// The given bands cannot make a raster.
     #[error("the bands do not make one raster ({reason}): {}", path.display())]
     InconsistentBands {
-        /// The file that was to be written.
+        /// The output.
         path: PathBuf,
-        /// What does not fit.
+        /// The property that does not fit.
         reason: String,
     },
     /// The coordinate reference system cannot be written or read.
@@ -64,7 +65,7 @@ pub enum RasterError {
     Crs {
         /// The file.
         path: PathBuf,
-        /// What geodesy says.
+        /// The error of PROJ.
         source: crs::CrsError,
     },
 }

@@ -1,8 +1,9 @@
-//! One place that tells GDAL how to behave, before anything is opened.
+//! Configuration of GDAL, done once before anything is opened.
 //!
-//! GDAL prints errors to stderr and can fetch what a file names (a VRT with a `/vsicurl/` source, a WMS description).
-//! Here its messages are collected per thread for our errors, the drivers that speak to networks are taken out, and
-//! the virtual network file systems accept no file name.
+//! By default GDAL prints errors to stderr and fetches what a file names (a VRT with a `/vsicurl/`
+//! source, a WMS description). Here its messages are collected per thread for our errors, the
+//! drivers that use a network are removed, and the virtual network file systems refuse every file
+//! name.
 
 use std::cell::RefCell;
 use std::path::Path;
@@ -11,10 +12,10 @@ use std::sync::Once;
 use gdal::errors::GdalError;
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, config};
 
-use super::RasterError;
+use super::error::RasterError;
 
-/// Drivers that reach a network or a data base from a description or a connection string. NetCDF is among them: a VRT may
-/// name `NETCDF:"http://…"`, which its library fetches by itself.
+/// Drivers that reach a network or a database through a description or a connection string. NetCDF
+/// is among them: a VRT may name `NETCDF:"http://…"`, which the NetCDF library fetches.
 const NETWORK_DRIVERS: [&str; 31] = [
     "WMS",
     "WMTS",
@@ -49,7 +50,7 @@ const NETWORK_DRIVERS: [&str; 31] = [
     "JPIPKAK",
 ];
 
-/// Beginnings of names that lead off this machine.
+/// Prefixes of names that lead to a network.
 const NETWORK_PREFIXES: [&str; 11] = [
     "/vsicurl",
     "/vsis3",
@@ -64,9 +65,9 @@ const NETWORK_PREFIXES: [&str; 11] = [
     "ftp",
 ];
 
-/// Megabytes of decoded blocks that GDAL keeps; its own default is a share of the machine's memory.
+/// GDAL's cache of decoded blocks, megabytes; GDAL's default is a share of the machine's memory.
 const CACHE_MB: &str = "128";
-/// More messages than this about one call say nothing new.
+/// Messages kept per call; further ones only repeat the cause.
 const MESSAGES_MAX: usize = 8;
 
 static READY: Once = Once::new();
@@ -75,15 +76,16 @@ thread_local! {
     static MESSAGES: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Makes GDAL quiet and local; every other use of GDAL in this crate comes after. Cheap when done already.
+/// Makes GDAL quiet and local. Every use of GDAL in this crate must come after; repeated calls are
+/// cheap.
 ///
-/// The handler is set once for the life of the process: replacing it would free the old one while another thread may be
-/// inside it.
+/// The error handler is set once for the life of the process, because replacing it would free the
+/// old one while another thread may be running it.
 pub(crate) fn prepare_gdal() {
     READY.call_once(prepare);
 }
 
-/// Runs something that calls GDAL, and turns a failure into GDAL's own words.
+/// Runs `call`, which calls GDAL. The error has GDAL's messages.
 pub(crate) fn with_gdal<T>(call: impl FnOnce() -> Result<T, GdalError>) -> Result<T, String> {
     prepare_gdal();
     MESSAGES.with_borrow_mut(Vec::clear);
@@ -96,7 +98,8 @@ pub(crate) fn with_gdal<T>(call: impl FnOnce() -> Result<T, GdalError>) -> Resul
 /// Opens a local raster for reading.
 ///
 /// # Errors
-/// [`RasterError::NotLocal`], [`RasterError::Unreadable`], [`RasterError::NotARaster`].
+/// [`RasterError::NotLocal`] for a name on a network; [`RasterError::Unreadable`] for a file that
+/// cannot be opened; [`RasterError::NotARaster`] for a file in no format that GDAL reads.
 pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
     let name = path.to_string_lossy();
     let inner = name.rsplit("/vsi").next().map(|tail| format!("/vsi{tail}")).unwrap_or_default();
@@ -106,7 +109,7 @@ pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
     }
     if !name.starts_with("/vsi") {
         let readable = std::fs::metadata(path).and_then(|meta| {
-            // A folder may be a raster to GDAL (SAFE, Zarr); a file must open.
+            // A folder may be a raster to GDAL (SAFE, Zarr).
             if meta.is_dir() { Ok(()) } else { std::fs::File::open(path).map(drop) }
         });
         readable.map_err(|source| RasterError::Unreadable { path: path.to_owned(), source })?;
@@ -117,7 +120,8 @@ pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
         .map_err(|reason| RasterError::NotARaster { path: path.to_owned(), reason })
 }
 
-/// `http:` and `/vsis3/` count, a local folder named `httpdata` does not.
+/// Whether `text` starts with `prefix` as a scheme: `http:` and `/vsis3/` do, a local folder named
+/// `httpdata` does not.
 fn starts_as_scheme(text: &str, prefix: &str) -> bool {
     let lower = text.get(..text.len().min(32)).unwrap_or_default().to_ascii_lowercase();
     lower.strip_prefix(prefix).is_some_and(|rest| {
@@ -134,7 +138,7 @@ fn prepare() {
             }
         });
     });
-    // A failure to set an option is one of text conversion and cannot happen with these constants.
+    // Setting an option fails only when the text has a NUL, which these constants have not.
     let set = |key, value| drop(config::set_config_option(key, value));
     set("CPL_VSIL_CURL_ALLOWED_FILENAME", "/vsicurl/nothing");
     set("GDAL_VRT_ENABLE_PYTHON", "NO");
@@ -149,7 +153,7 @@ fn prepare() {
     }
 }
 
-/// The message inside the crate's error, without the name of the C function.
+/// Returns the message inside an error of the crate `gdal`, without the name of the C function.
 fn plain_words(error: &GdalError) -> String {
     match error {
         GdalError::CplError { msg, .. } | GdalError::NullPointer { msg, .. } if !msg.is_empty() => msg.clone(),

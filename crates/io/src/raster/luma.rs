@@ -1,92 +1,58 @@
-//! One grey value per pixel, and the flags beside it.
+//! Luma and flags of the pixels of an image.
 //!
-//! Luma is Rec. 601, `0.299 R + 0.587 G + 0.114 B`, on the stored samples. A pixel has no data when the file's
-//! no-data value, mask or alpha says so in every band used, or when its value is no number; samples of 0 that no file
-//! metadata declares void are data. A pixel is saturated when a used band is at the largest value of its type (or of
-//! NBITS) in all pixels of some 2 × 2 block around it: a lone maximum is an ordinary bright pixel. The block looks one
-//! pixel past the window, so that flags do not depend on the tiling.
+//! A pixel has no data when the file's no-data value, mask or alpha declares it void in every band
+//! used, or when its luma is not finite. Samples of 0 that no metadata declares void are data. A
+//! pixel is saturated when a used band is at the largest value of its type (or of NBITS) in all
+//! pixels of some 2 × 2 block around it: a lone maximum is an ordinary bright pixel. The block
+//! reaches one pixel past the window, so that flags do not depend on the tiling.
 
-use gdal::Dataset;
-use gdal::raster::ColorInterpretation;
 use raster::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, Flags, Grid, Window};
 
-use super::{ImageSource, RasterError};
+use super::error::RasterError;
+use super::source::ImageSource;
 
-/// How the bands (counted from 1) become one value.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum LumaRule {
-    /// A single band, as it is.
-    Single(usize),
-    /// Rec. 601 luma of red, green, blue: the bands so named, else the first three of three or four.
-    Rgb([usize; 3]),
-    /// The mean of bands that have no colour known to us.
-    Mean(Vec<usize>),
-}
-
-impl LumaRule {
-    pub(super) fn of(dataset: &Dataset) -> Self {
-        let colours: Vec<_> = (1..=dataset.raster_count())
-            .map(|i| dataset.rasterband(i).map_or(ColorInterpretation::Undefined, |b| b.color_interpretation()))
-            .collect();
-        Self::from_colours(&colours)
-    }
-
-    fn from_colours(colours: &[ColorInterpretation]) -> Self {
-        use ColorInterpretation as Colour;
-        let find = |wanted: Colour| colours.iter().position(|c| *c == wanted).map(|i| i + 1);
-        let opaque: Vec<usize> = (1..=colours.len()).filter(|&i| colours[i - 1] != Colour::AlphaBand).collect();
-        match (find(Colour::RedBand), find(Colour::GreenBand), find(Colour::BlueBand), opaque.as_slice()) {
-            (Some(r), Some(g), Some(b), _) => Self::Rgb([r, g, b]),
-            (.., [only]) => Self::Single(*only),
-            (.., [r, g, b] | [r, g, b, _]) => Self::Rgb([*r, *g, *b]),
-            (.., []) => Self::Single(1),
-            (.., several) => Self::Mean(several.to_vec()),
-        }
-    }
-
-    /// The bands with their weights.
-    pub(super) fn weights(&self) -> Vec<(usize, f32)> {
-        match self {
-            Self::Single(band) => vec![(*band, 1.0)],
-            Self::Rgb([r, g, b]) => vec![(*r, 0.299), (*g, 0.587), (*b, 0.114)],
-            Self::Mean(bands) => bands.iter().map(|&b| (b, 1.0 / bands.len() as f32)).collect(),
-        }
-    }
-}
-
-/// Pixels of a window.
+/// Luma and flags of a window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LumaTile {
-    /// Values in the file's own units; NaN where there is none (no-data or outside).
+    /// Values in the file's units. NaN for no-data and outside the image.
     pub luma: Grid<f32>,
-    /// `raster::FLAG_NO_DATA`, `FLAG_OUTSIDE`, `FLAG_SATURATED` per pixel. Saturated pixels keep their value.
+    /// `raster::FLAG_NO_DATA`, `FLAG_OUTSIDE` or `FLAG_SATURATED` per pixel. Saturated pixels keep
+    /// their value.
     pub flags: Flags,
 }
 
-pub(super) fn read(source: &ImageSource, window: Window) -> Result<LumaTile, RasterError> {
-    let mut tile = LumaTile {
-        luma: Grid::filled(window.width, window.height, f32::NAN),
-        flags: Grid::filled(window.width, window.height, FLAG_OUTSIDE),
-    };
-    // One pixel more on each side, for the neighbourhood of the saturation rule.
-    let Some(inside) = source.window().intersection(&window.grown(1)) else {
-        return Ok(tile);
-    };
-    let (luma, flags) = read_inside(source, inside)?;
-    let Some(shared) = inside.intersection(&window) else {
-        return Ok(tile);
-    };
-    for y in shared.y..shared.y + shared.height as i64 {
-        let (from, to) = ((y - inside.y) as usize, (y - window.y) as usize);
-        let (a, b) = ((shared.x - inside.x) as usize, (shared.x - window.x) as usize);
-        tile.luma.row_mut(to)[b..b + shared.width].copy_from_slice(&luma.row(from)[a..a + shared.width]);
-        tile.flags.row_mut(to)[b..b + shared.width].copy_from_slice(&flags.row(from)[a..a + shared.width]);
+impl ImageSource {
+    /// Reads the luma of a window with the flags of each pixel. The window may reach outside the
+    /// image. Nothing is resampled.
+    ///
+    /// See [`LumaRule`](super::LumaRule) for the bands and [`LumaTile`] for the flags.
+    ///
+    /// # Errors
+    /// [`RasterError::Damaged`] when GDAL cannot decode the pixels.
+    pub fn read_luma(&self, window: Window) -> Result<LumaTile, RasterError> {
+        let mut tile = LumaTile {
+            luma: Grid::filled(window.width, window.height, f32::NAN),
+            flags: Grid::filled(window.width, window.height, FLAG_OUTSIDE),
+        };
+        // The saturation rule looks at 2 × 2 blocks, so one more pixel is read on each side.
+        let Some(inside) = self.window().intersection(&window.grown(1)) else {
+            return Ok(tile);
+        };
+        let (luma, flags) = read_inside(self, inside)?;
+        let Some(shared) = inside.intersection(&window) else {
+            return Ok(tile);
+        };
+        for y in shared.y..shared.y + shared.height as i64 {
+            let (from, to) = ((y - inside.y) as usize, (y - window.y) as usize);
+            let (a, b) = ((shared.x - inside.x) as usize, (shared.x - window.x) as usize);
+            tile.luma.row_mut(to)[b..b + shared.width].copy_from_slice(&luma.row(from)[a..a + shared.width]);
+            tile.flags.row_mut(to)[b..b + shared.width].copy_from_slice(&flags.row(from)[a..a + shared.width]);
+        }
+        Ok(tile)
     }
-    Ok(tile)
 }
 
-/// Luma and flags of a window inside the image.
+/// Reads luma and flags of a window inside the image.
 fn read_inside(source: &ImageSource, inside: Window) -> Result<(Grid<f32>, Flags), RasterError> {
     let info = source.info();
     let maximum = info.sample.maximum(info.bits);
@@ -118,6 +84,7 @@ fn read_inside(source: &ImageSource, inside: Window) -> Result<(Grid<f32>, Flags
     Ok((luma, flags))
 }
 
+/// Clears the no-data flag where a band has data.
 fn clear_where_valid(flags: &mut Flags, mask: &Grid<u8>) {
     for (flag, &valid) in flags.data_mut().iter_mut().zip(mask.data()) {
         if valid != 0 {
@@ -126,7 +93,7 @@ fn clear_where_valid(flags: &mut Flags, mask: &Grid<u8>) {
     }
 }
 
-/// Flags the pixels of every 2 × 2 block that is at the maximum throughout.
+/// Flags the pixels of every 2 × 2 block whose four values are at the maximum.
 fn flag_plateaus(values: &Grid<f32>, maximum: f32, flags: &mut Flags) {
     for row in 1..values.height() {
         let (above, below) = (values.row(row - 1), values.row(row));
@@ -144,20 +111,6 @@ fn flag_plateaus(values: &Grid<f32>, maximum: f32, flags: &mut Flags) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ColorInterpretation as C;
-
-    #[test]
-    fn bands_become_luma_by_colour_then_by_number() {
-        assert_eq!(LumaRule::from_colours(&[C::GrayIndex]), LumaRule::Single(1));
-        assert_eq!(LumaRule::from_colours(&[C::GrayIndex, C::AlphaBand]), LumaRule::Single(1));
-        assert_eq!(LumaRule::from_colours(&[C::BlueBand, C::GreenBand, C::RedBand]), LumaRule::Rgb([3, 2, 1]));
-        assert_eq!(LumaRule::from_colours(&[const { C::Undefined }; 4]), LumaRule::Rgb([1, 2, 3]));
-        assert_eq!(
-            LumaRule::from_colours(&[C::AlphaBand, C::Undefined, C::Undefined, C::Undefined]),
-            LumaRule::Rgb([2, 3, 4])
-        );
-        assert_eq!(LumaRule::from_colours(&[const { C::Undefined }; 2]), LumaRule::Mean(vec![1, 2]));
-    }
 
     #[test]
     fn a_lone_maximum_is_no_saturation() {

@@ -1,9 +1,12 @@
-//! Rasters in files: images and surface models read through GDAL, Cloud-Optimised GeoTIFFs and PNGs written.
+//! Raster files: images and surface models are read through GDAL, Cloud-Optimised GeoTIFFs and PNGs
+//! are written.
 //!
-//! GDAL's pixel corners are met here and in `raster::GeoTransform`: windows and images follow this toolkit's
-//! convention (the centre of the upper-left pixel is 0, 0). Only local files are read, and nothing that a file names
-//! on a network is fetched. A file appears under its final name when it is complete.
+//! Windows and images follow the toolkit's convention: the centre of the upper-left pixel is (0,
+//! 0). GDAL's convention (its corner) occurs only here and in `raster::GeoTransform`. Only local
+//! files are read, and nothing that a file names on a network is fetched. A file appears under its
+//! final name when it is complete.
 
+mod band;
 mod colour;
 mod dem;
 mod depth_png;
@@ -11,19 +14,22 @@ mod error;
 mod gdal_setup;
 mod geotiff;
 mod luma;
+mod luma_rule;
 mod png;
 mod source;
 mod spool;
 mod tile;
 
+pub use band::{Band, BandData};
 pub use dem::{Dem, read_dem, read_dem_window};
 pub use depth_png::{DepthScale, write_depth_png};
 pub use error::RasterError;
-pub use geotiff::{Band, BandData, CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
-pub use luma::{LumaRule, LumaTile};
+pub use geotiff::{CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
+pub use luma::LumaTile;
+pub use luma_rule::LumaRule;
 pub use png::{write_png_gray, write_png_rgb};
 pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
-pub use tile::{MapTile, write_map_tile};
+pub use tile::{BandScale, MapTile, write_map_tile};
 
-pub(crate) use gdal_setup::{open_dataset, prepare_gdal, with_gdal};
+pub(crate) use gdal_setup::{prepare_gdal, with_gdal};

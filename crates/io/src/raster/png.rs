@@ -1,25 +1,27 @@
-//! Pictures for people: 8-bit PNG, grey or RGB.
+//! Writing pictures for people: 8-bit PNG, grey or RGB.
 
 use std::path::Path;
 
 use image::{ExtendedColorType, ImageFormat};
 use raster::Grid;
 
-use super::RasterError;
+use super::error::RasterError;
 use crate::atomic::write_path;
 
 /// Writes a grey picture.
 ///
 /// # Errors
-/// [`RasterError::NotWritten`], also for a file that exists without `overwrite`.
+/// [`RasterError::NotWritten`] for a file that exists without `overwrite`, for a picture without
+/// pixels, and when the system refuses.
 pub fn write_png_gray(path: impl AsRef<Path>, picture: &Grid<u8>, overwrite: bool) -> Result<(), RasterError> {
     write(path.as_ref(), picture.data(), picture.width(), picture.height(), ExtendedColorType::L8, overwrite)
 }
 
-/// Writes a colour picture; pixels are red, green, blue.
+/// Writes a colour picture. Pixels are red, green, blue.
 ///
 /// # Errors
-/// [`RasterError::NotWritten`], also for a file that exists without `overwrite`.
+/// [`RasterError::NotWritten`] for a file that exists without `overwrite`, for a picture without
+/// pixels, and when the system refuses.
 pub fn write_png_rgb(path: impl AsRef<Path>, picture: &Grid<[u8; 3]>, overwrite: bool) -> Result<(), RasterError> {
     let bytes = picture.data().as_flattened();
     write(path.as_ref(), bytes, picture.width(), picture.height(), ExtendedColorType::Rgb8, overwrite)
@@ -33,10 +35,11 @@ fn write(
     colour: ExtendedColorType,
     overwrite: bool,
 ) -> Result<(), RasterError> {
-    let too_large = |_| RasterError::unwritable(path, "a PNG has at most 2^32 - 1 columns and rows");
+    let too_large =
+        |_| RasterError::unwritable(path, "the picture is too large, expected at most 2^32 - 1 columns and rows");
     let (width, height) = (u32::try_from(width).map_err(too_large)?, u32::try_from(height).map_err(too_large)?);
     if width == 0 || height == 0 {
-        return Err(RasterError::unwritable(path, "the picture has no pixels"));
+        return Err(RasterError::unwritable(path, "the picture has no pixels, expected at least one column and row"));
     }
     write_path(path, overwrite, |made| {
         image::save_buffer_with_format(made, bytes, width, height, colour, ImageFormat::Png)

@@ -1,7 +1,7 @@
 //! An image opened through GDAL, read by windows.
 //!
-//! An [`ImageSource`] is `Send` and not `Sync`, as GDAL's datasets are: give each thread its own with
-//! [`ImageSource::reopen`].
+//! An [`ImageSource`] is `Send` but not `Sync`, like GDAL's datasets: each thread needs its own,
+//! from [`ImageSource::reopen`].
 
 use std::path::{Path, PathBuf};
 
@@ -9,10 +9,11 @@ use gdal::raster::{GdalDataType, RasterBand};
 use gdal::{Dataset, Metadata};
 use raster::{GeoTransform, Grid, Window};
 
-use super::luma::{self, LumaRule, LumaTile};
-use super::{RasterError, colour, open_dataset, with_gdal};
+use super::error::RasterError;
+use super::gdal_setup::{open_dataset, with_gdal};
+use super::luma_rule::LumaRule;
 
-/// How samples are stored.
+/// Type of the stored samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SampleType {
@@ -28,18 +29,19 @@ pub enum SampleType {
     I32,
     /// Single precision.
     F32,
-    /// Double precision; read as single.
+    /// Double precision, read as single.
     F64,
 }
 
 impl SampleType {
-    /// The largest value that a saturated detector can give, for integer samples.
+    /// Returns the value of a saturated detector with `bits` significant bits; `None` for samples
+    /// that are not counts.
     pub(crate) fn maximum(self, bits: Option<u32>) -> Option<f32> {
         let full = match self {
             Self::U8 => 8,
             Self::U16 => 16,
             Self::I16 => 15,
-            // 32-bit samples hold computed values, not detector counts.
+            // 32-bit samples hold computed values, not counts of a detector.
             Self::U32 | Self::I32 | Self::F32 | Self::F64 => return None,
         };
         let used = bits.filter(|&b| b > 0 && b < full).unwrap_or(full);
@@ -47,7 +49,7 @@ impl SampleType {
     }
 }
 
-/// What is known of an image without reading its pixels.
+/// Properties of an image that are known without reading pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageInfo {
     /// Columns.
@@ -58,7 +60,7 @@ pub struct ImageInfo {
     pub bands: usize,
     /// Sample type of the first band.
     pub sample: SampleType,
-    /// Significant bits per sample where the file says (11 for most satellite images).
+    /// Significant bits per sample, if declared (11 for most satellite images).
     pub bits: Option<u32>,
     /// GDAL's name for the format.
     pub driver: String,
@@ -68,7 +70,7 @@ pub struct ImageInfo {
     pub geotransform: Option<GeoTransform>,
     /// No-data value of the first band, if declared.
     pub no_data: Option<f64>,
-    /// How one luma value is made of the bands.
+    /// The bands that make the luma.
     pub luma: LumaRule,
 }
 
@@ -80,11 +82,12 @@ pub struct ImageSource {
 }
 
 impl ImageSource {
-    /// Opens a local raster of any GDAL format.
+    /// Opens a local raster of any format that GDAL reads.
     ///
     /// # Errors
-    /// [`RasterError::Unreadable`], [`RasterError::NotLocal`], [`RasterError::NotARaster`], and
-    /// [`RasterError::Unsupported`] for rasters without bands and complex samples.
+    /// [`RasterError::Unreadable`]; [`RasterError::NotLocal`]; [`RasterError::NotARaster`];
+    /// [`RasterError::Unsupported`] for a raster without bands and for complex or 64-bit integer
+    /// samples.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RasterError> {
         let path = path.as_ref().to_owned();
         let dataset = open_dataset(&path)?;
@@ -92,7 +95,7 @@ impl ImageSource {
         Ok(Self { path, dataset, info })
     }
 
-    /// A handle of its own on the same file, for another thread.
+    /// Opens the same file again, for another thread.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -105,7 +108,7 @@ impl ImageSource {
         &self.path
     }
 
-    /// Size, type, georeference.
+    /// Size, sample type, georeference.
     pub fn info(&self) -> &ImageInfo {
         &self.info
     }
@@ -115,29 +118,26 @@ impl ImageSource {
         Window::whole(self.info.width, self.info.height)
     }
 
-    /// Metadata of a GDAL domain (`""`, `"RPC"`, `"IMD"`, …) as key and value.
+    /// Returns the metadata of a GDAL domain (`""`, `"RPC"`, `"IMD"`, …) as keys and values.
     pub fn metadata(&self, domain: &str) -> Vec<(String, String)> {
         let items = self.dataset.metadata_domain(domain).unwrap_or_default();
         items.iter().filter_map(|item| item.split_once('=')).map(|(k, v)| (k.to_owned(), v.to_owned())).collect()
     }
 
-    /// One grey value per pixel of a window, with what is known against each pixel. The window may reach outside the
-    /// image; nothing is resampled. See [`LumaRule`] for the bands and [`LumaTile`] for the flags.
+    /// Reads one band, counted from 1, over a window, in the stored values. NaN marks no-data and
+    /// the outside of the image.
     ///
     /// # Errors
+    /// [`RasterError::Unsupported`] for a band that the image does not have;
     /// [`RasterError::Damaged`] when GDAL cannot decode the pixels.
-    pub fn read_luma(&self, window: Window) -> Result<LumaTile, RasterError> {
-        luma::read(self, window)
-    }
-
-    /// One band (counted from 1) over a window, as it stands in the file; NaN outside the image and where the file has no data.
-    ///
-    /// # Errors
-    /// [`RasterError::Unsupported`] for a band that is not there; [`RasterError::Damaged`] when GDAL cannot decode the pixels.
     pub fn read_samples(&self, band: usize, window: Window) -> Result<Grid<f32>, RasterError> {
         if !(1..=self.info.bands).contains(&band) {
             let found = format!("band {band} of {}", self.info.bands);
-            return Err(RasterError::Unsupported { path: self.path.clone(), found, expected: "a band that is there" });
+            return Err(RasterError::Unsupported {
+                path: self.path.clone(),
+                found,
+                expected: "a band of the image, counted from 1",
+            });
         }
         let Some(inside) = self.window().intersection(&window) else {
             return Ok(Grid::filled(window.width, window.height, f32::NAN));
@@ -151,20 +151,13 @@ impl ImageSource {
         Ok(samples.window(Window { x, y, ..window }, f32::NAN))
     }
 
-    /// Red, green and blue of a window, which may reach outside the image; NaN where there is none. A single band is all three.
-    ///
-    /// # Errors
-    /// [`RasterError::Damaged`] when GDAL cannot decode the pixels.
-    pub fn read_colour(&self, window: Window) -> Result<Grid<[f32; 3]>, RasterError> {
-        colour::read(self, window)
-    }
-
-    /// One band (counted from 1) over a window inside the image, as f32 and untouched.
+    /// Reads the stored values of one band, counted from 1, over a window inside the image.
     pub(crate) fn read_band(&self, band: usize, inside: Window) -> Result<Grid<f32>, RasterError> {
         read_as(&self.path, &self.dataset, band, inside)
     }
 
-    /// GDAL's validity mask of a band over a window inside the image (0 is invalid); `None` when all is valid.
+    /// Reads GDAL's mask of a band, counted from 1, over a window inside the image: 0 is no-data.
+    /// `None` when all is data.
     pub(crate) fn read_mask(&self, band: usize, inside: Window) -> Result<Option<Grid<u8>>, RasterError> {
         let fails = |reason: String| RasterError::damaged(&self.path, reason);
         let flags = with_gdal(|| self.dataset.rasterband(band)?.mask_flags()).map_err(fails)?;
@@ -177,7 +170,7 @@ impl ImageSource {
     }
 }
 
-/// One band over a window inside a dataset.
+/// Reads one band, counted from 1, over a window inside a dataset.
 pub(super) fn read_as<T: Copy + gdal::raster::GdalType>(
     path: &Path,
     dataset: &Dataset,
@@ -200,7 +193,7 @@ fn read_buffer<T: Copy + gdal::raster::GdalType>(
 
 fn grid_of<T>(path: &Path, inside: Window, data: Vec<T>) -> Result<Grid<T>, RasterError> {
     Grid::from_vec(inside.width, inside.height, data)
-        .ok_or_else(|| RasterError::damaged(path, "GDAL returned another number of pixels than asked for"))
+        .ok_or_else(|| RasterError::damaged(path, "GDAL returned another number of pixels than requested"))
 }
 
 fn describe(path: &Path, dataset: &Dataset) -> Result<ImageInfo, RasterError> {
@@ -208,7 +201,10 @@ fn describe(path: &Path, dataset: &Dataset) -> Result<ImageInfo, RasterError> {
     let (width, height) = dataset.raster_size();
     let bands = dataset.raster_count();
     if bands == 0 || width == 0 || height == 0 {
-        return Err(unsupported(format!("{width} x {height} pixels in {bands} bands"), "at least one band of pixels"));
+        return Err(unsupported(
+            format!("{width} x {height} pixels in {bands} bands"),
+            "at least one band with pixels",
+        ));
     }
     let first = with_gdal(|| dataset.rasterband(1)).map_err(|reason| RasterError::damaged(path, reason))?;
     let sample = sample_type(first.band_type()).ok_or_else(|| {

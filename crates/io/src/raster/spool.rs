@@ -1,8 +1,9 @@
-//! Rasters that are made window by window on disk, for results that do not fit the memory.
+//! Rasters that are written window by window on disk, for results that do not fit into memory.
 //!
-//! A spool is an uncompressed tiled GeoTIFF whose unwritten tiles take no space and read as no-data. When all windows are
-//! there it is copied into a Cloud-Optimised GeoTIFF, block by block. Windows that begin and end on whole tiles
-//! ([`SPOOL_TILE`]) are written once; others cost a read of the tiles at their rim.
+//! A spool is an uncompressed tiled GeoTIFF. Its unwritten tiles take no space and read as no-data.
+//! When all windows are written, it is copied into a Cloud-Optimised GeoTIFF block by block.
+//! Windows that begin and end on tile borders ([`SPOOL_TILE`]) are written without reading; for
+//! other windows GDAL reads the tiles at their border first.
 
 use std::path::{Path, PathBuf};
 
@@ -10,15 +11,17 @@ use gdal::raster::{Buffer, GdalType, RasterCreationOptions};
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, Metadata};
 use raster::{Grid, NO_DATA, Window};
 
-use super::geotiff::{BandData, CogPlace, finish_cog};
+use super::band::BandData;
+use super::error::RasterError;
+use super::gdal_setup::with_gdal;
+use super::geotiff::{CogPlace, Sampling, finish_cog};
 use super::source::read_as;
-use super::{RasterError, Sampling, with_gdal};
 use crate::atomic::write_path;
 
-/// Side of a spool's tiles, cells.
+/// Side length of a spool's tiles, cells.
 pub const SPOOL_TILE: usize = 256;
 
-/// A raster of one band that grows on disk.
+/// A raster with one band that is filled on disk.
 pub struct RasterSpool {
     path: PathBuf,
     dataset: Dataset,
@@ -27,34 +30,35 @@ pub struct RasterSpool {
     is_float: bool,
 }
 
-/// What a spool holds.
+/// Properties of the band of a spool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpoolBand<'a> {
-    /// What a reader of the result sees as the band's name: `height_m`.
+    /// Name of the band with its unit, such as `height_m`.
     pub description: &'a str,
-    /// Single precision, where NaN is no-data, or bytes.
+    /// Whether cells are f32 (NaN is no-data); otherwise they are u8.
     pub is_float: bool,
-    /// What cells hold that no window was written to, and NaN becomes.
+    /// Value of cells that were not written. It also replaces NaN.
     pub no_data: f64,
 }
 
 impl<'a> SpoolBand<'a> {
-    /// Heights and other quantities.
+    /// A band of heights or other quantities, with no-data −32768.
     pub fn float(description: &'a str) -> Self {
         Self { description, is_float: true, no_data: f64::from(NO_DATA) }
     }
 
-    /// Masks and counts.
+    /// A band of masks or counts.
     pub fn bytes(description: &'a str, no_data: u8) -> Self {
         Self { description, is_float: false, no_data: f64::from(no_data) }
     }
 }
 
 impl RasterSpool {
-    /// Makes an empty spool of `size` (columns, rows); an older file of the name is replaced.
+    /// Creates an empty spool of `size` (columns, rows). An older file of the same name is
+    /// replaced.
     ///
     /// # Errors
-    /// [`RasterError::NotWritten`].
+    /// [`RasterError::NotWritten`] when GDAL or the system refuses.
     pub fn create(path: impl AsRef<Path>, size: (usize, usize), band: SpoolBand<'_>) -> Result<Self, RasterError> {
         let path = path.as_ref().to_owned();
         let tile = SPOOL_TILE.to_string();
@@ -82,11 +86,11 @@ impl RasterSpool {
         Ok(Self { path, dataset, size, is_float: band.is_float })
     }
 
-    /// Goes on with a spool that an earlier process left.
+    /// Opens a spool that an earlier process left, to continue it.
     ///
     /// # Errors
-    /// [`RasterError::NotARaster`] and [`RasterError::InconsistentBands`] when it is not the spool that [`Self::create`]
-    /// would make.
+    /// [`RasterError::NotARaster`] when GDAL cannot open it; [`RasterError::InconsistentBands`] for
+    /// another size or more than one band.
     pub fn reopen(path: impl AsRef<Path>, size: (usize, usize), band: SpoolBand<'_>) -> Result<Self, RasterError> {
         let path = path.as_ref().to_owned();
         let open_flags = GdalOpenFlags::GDAL_OF_RASTER | GdalOpenFlags::GDAL_OF_UPDATE;
@@ -104,30 +108,31 @@ impl RasterSpool {
         self.size
     }
 
-    /// Writes cells whose first one is at `(column, row)`.
+    /// Writes a window of cells with its first cell at `at` (column, row).
     ///
     /// # Errors
-    /// [`RasterError::InconsistentBands`] for another type of cells or a window outside, [`RasterError::NotWritten`].
+    /// [`RasterError::InconsistentBands`] for another cell type or a window that reaches outside;
+    /// [`RasterError::NotWritten`] when GDAL or the system refuses.
     pub fn put(&mut self, at: (usize, usize), cells: BandData<'_>) -> Result<(), RasterError> {
         match (cells, self.is_float) {
             (BandData::F32(grid), true) => self.write(at, grid, |v| if v.is_nan() { NO_DATA } else { v }),
             (BandData::U8(grid), false) => self.write(at, grid, |v| v),
-            _ => Err(self.unlike("the cells are of another type than the spool")),
+            _ => Err(self.inconsistent("the cells are of another type than the spool")),
         }
     }
 
-    /// All that was put is on the disk when this returns.
+    /// Writes everything that GDAL still holds in memory to the file.
     ///
     /// # Errors
-    /// [`RasterError::NotWritten`].
+    /// [`RasterError::NotWritten`] when GDAL or the system refuses.
     pub fn flush(&mut self) -> Result<(), RasterError> {
         with_gdal(|| self.dataset.flush_cache()).map_err(|reason| RasterError::unwritable(&self.path, reason))
     }
 
-    /// The cells of a window inside, NaN where there is no data.
+    /// Reads the cells of a window inside the spool. NaN is no-data.
     ///
     /// # Errors
-    /// [`RasterError::Damaged`].
+    /// [`RasterError::Damaged`] when GDAL cannot decode the cells.
     pub fn read(&self, inside: Window) -> Result<Grid<f32>, RasterError> {
         let no_data = with_gdal(|| Ok(self.dataset.rasterband(1)?.no_data_value()))
             .map_err(|reason| RasterError::damaged(&self.path, reason))?;
@@ -137,11 +142,12 @@ impl RasterSpool {
         Ok(cells)
     }
 
-    /// Copies what was put into a Cloud-Optimised GeoTIFF of the toolkit's form (see [`super::write_cog`]) and removes the
-    /// spool.
+    /// Copies the cells into a Cloud-Optimised GeoTIFF (as [`super::write_cog`] makes it) and
+    /// removes the spool.
     ///
     /// # Errors
-    /// Those of [`super::write_cog`].
+    /// [`RasterError::NotWritten`] for a file that exists without `overwrite`, and when GDAL or the
+    /// system refuses.
     pub fn into_cog(mut self, path: impl AsRef<Path>, place: CogPlace<'_>, overwrite: bool) -> Result<(), RasterError> {
         let path = path.as_ref();
         self.flush()?;
@@ -151,7 +157,7 @@ impl RasterSpool {
         })?;
         let spool = self.path.clone();
         drop(self);
-        // The result is complete; a spool that stays costs only space.
+        // The result is complete, so a spool that cannot be removed is not an error.
         let _ = std::fs::remove_file(spool);
         Ok(())
     }
@@ -164,7 +170,7 @@ impl RasterSpool {
     ) -> Result<(), RasterError> {
         let size = (grid.width(), grid.height());
         if at.0 + size.0 > self.size.0 || at.1 + size.1 > self.size.1 {
-            return Err(self.unlike("the window reaches outside the spool"));
+            return Err(self.inconsistent("the window reaches outside the spool"));
         }
         let cells = grid.data().iter().map(|&v| convert(v)).collect();
         with_gdal(|| {
@@ -174,7 +180,7 @@ impl RasterSpool {
         .map_err(|reason| RasterError::unwritable(&self.path, reason))
     }
 
-    fn unlike(&self, reason: &str) -> RasterError {
+    fn inconsistent(&self, reason: &str) -> RasterError {
         RasterError::InconsistentBands { path: self.path.clone(), reason: reason.to_owned() }
     }
 }
@@ -186,7 +192,7 @@ mod tests {
     use crs::{Crs, VerticalDatum};
     use raster::GeoTransform;
 
-    /// Windows in any order, some never put, give the file that a grid in memory gives.
+    /// Windows in any order, some of them missing, give the same file as a grid in memory.
     #[test]
     fn a_spool_becomes_the_raster_that_memory_would_give() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,18 +1,21 @@
-//! ALOS PRISM and AVNIR-2 RPC: one line of 1026 characters in columns of fixed width, no separators.
+//! RPC of ALOS PRISM and AVNIR-2: one line of 1026 characters in columns of fixed width, without
+//! separators.
 //!
-//! Offsets and scales in the order of RPC00B, then 4 × 20 coefficients of 12 characters. Image coordinates are taken
-//! as they stand, as GDAL does.
+//! The line has offsets and scales in the order of RPC00B, then 4 × 20 coefficients of 12
+//! characters. Image coordinates are used as they are, as GDAL does.
 
-use super::Parsed;
-use super::draft::{Draft, Entry, POLYS, REQUIRED, RPC00B};
+use super::draft::{Draft, Entry};
 use super::error::Fault;
+use super::names::{POLYS, REQUIRED, RPC00B};
+use super::rpc_file::Parsed;
 
-/// Characters of the ten scalars.
+/// Widths of the columns of the ten scalars, characters.
 const WIDTHS: [usize; 10] = [6, 5, 8, 9, 5, 6, 5, 8, 9, 5];
 const COEFFICIENT_WIDTH: usize = 12;
 const LENGTH: usize = 66 + 80 * COEFFICIENT_WIDTH;
 
-/// Whether the text is one long run of digits, signs, points and exponents, starting with the scalars.
+/// Whether the text is one long run of digits, signs, points and exponents, starting with the
+/// scalars.
 pub(super) fn recognise(text: &str) -> bool {
     let text = text.trim_end();
     text.len() > 66
@@ -24,7 +27,7 @@ pub(super) fn recognise(text: &str) -> bool {
 pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
     let text = text.trim_end();
     if text.len() != LENGTH {
-        let what = format!("the text has {} characters, expected {LENGTH}", text.len());
+        let what = format!("the line has {} characters, expected {LENGTH}", text.len());
         return Err(Fault::Syntax { what, line: Some(1) });
     }
     let mut draft = Draft::default();
@@ -45,5 +48,5 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
             draft.set_coefficient(poly, i, entry.number()?, entry)?;
         }
     }
-    Ok(Parsed { rpc: draft.finish(&RPC00B)?, warnings: Vec::new() })
+    Ok(Parsed::certain(draft.finish(&RPC00B)?))
 }

@@ -1,8 +1,10 @@
-//! The `RPB/IMAGE` block of DigitalGlobe's and Maxar's `.XML`; image coordinates count from 0.
+//! The `RPB/IMAGE` block of DigitalGlobe's and Maxar's `.XML`; image coordinates are counted from
+//! 0.
 
-use super::Parsed;
-use super::draft::{Draft, Entry, Field, Names};
+use super::draft::{Draft, Entry};
 use super::error::Fault;
+use super::names::{Field, Names};
+use super::rpc_file::Parsed;
 use super::xml;
 
 const NAMES: Names = Names {
@@ -21,7 +23,8 @@ const NAMES: Names = Names {
         "ERRRAND",
     ],
     polys: ["LINENUMCOEF", "LINEDENCOEF", "SAMPNUMCOEF", "SAMPDENCOEF"],
-    index: ("_", 1),
+    separator: "_",
+    first: 1,
 };
 
 /// Whether an XML document has an `RPB` element.
@@ -35,7 +38,9 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
     xml::walk(text, |leaf| {
         let entry = Entry { key: leaf.name(), text: leaf.text, line: Some(leaf.line) };
         if leaf.tail::<2>().is_some_and(|[parent, key]| parent == "RPB" && key == "SPECID") && leaf.text != "RPC00B" {
-            return Err(Fault::Unsupported { what: format!("SPECID is {:?}, expected RPC00B", leaf.text) });
+            return Err(Fault::Unsupported {
+                what: format!("SPECID is {:?}, expected RPC00B: only RPC00B is read", leaf.text),
+            });
         }
         let scalar = leaf.tail::<3>().is_some_and(|[rpb, image, _]| (rpb, image) == ("RPB", "IMAGE"));
         let list = leaf.tail::<4>().is_some_and(|[rpb, image, list, _]| {
@@ -46,5 +51,5 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
         }
         Ok(())
     })?;
-    Ok(Parsed { rpc: draft.finish(&NAMES)?, warnings: Vec::new() })
+    Ok(Parsed::certain(draft.finish(&NAMES)?))
 }

@@ -1,9 +1,13 @@
-//! `rpc info = { … }` of an ENVI header: 90 numbers in the order of RPC00B, then the tile's row and column offset
-//! and a flag. Image coordinates are taken as they stand, as GDAL does; a tile offset other than 0 is refused.
+//! `rpc info = { … }` of an ENVI header.
+//!
+//! The block has 90 numbers in the order of RPC00B, then the tile's row and column offset and a
+//! flag. Image coordinates are used as they are, as GDAL does. A tile offset other than 0 is
+//! refused.
 
-use super::Parsed;
-use super::draft::{Draft, Entry, POLYS, REQUIRED, RPC00B};
+use super::draft::{Draft, Entry};
 use super::error::Fault;
+use super::names::RPC00B;
+use super::rpc_file::Parsed;
 
 const KEY: &str = "rpc info";
 
@@ -18,7 +22,10 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
     let line = Some(1 + text.get(..start).unwrap_or_default().matches('\n').count());
     let block = text.get(start..).and_then(|t| t.split_once('{')).and_then(|(_, t)| t.split_once('}'));
     let Some((block, _)) = block else {
-        return Err(Fault::Syntax { what: format!("{KEY} is not enclosed in braces"), line });
+        return Err(Fault::Syntax {
+            what: format!("{KEY} is not followed by a list in braces, expected {KEY} = {{ … }}"),
+            line,
+        });
     };
     let entry = Entry { key: KEY, text: block, line };
     let values: [f64; 93] = entry.numbers(true)?;
@@ -27,27 +34,10 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
         let what = format!("the tile offset of {KEY} is not zero: export the RPC of the whole image");
         return Err(Fault::Unsupported { what });
     }
-    Ok(Parsed { rpc: from_slice(model, entry)?.finish(&RPC00B)?, warnings: Vec::new() })
+    Ok(Parsed::certain(Draft::from_values(model, entry)?.finish(&RPC00B)?))
 }
 
-/// The ten scalars and eighty coefficients of RPC00B, in its order.
-pub(super) fn from_slice(values: &[f64], entry: Entry<'_>) -> Result<Draft, Fault> {
-    let mut draft = Draft::default();
-    let mut values = values.iter();
-    let mut next = || values.next().copied().ok_or_else(|| Fault::Missing { key: entry.key.to_owned() });
-    for &scalar in REQUIRED {
-        draft.set(scalar, next()?, Entry { key: RPC00B.scalar(scalar), ..entry })?;
-    }
-    for poly in POLYS {
-        for i in 0..20 {
-            let key = RPC00B.coefficient(poly, i);
-            draft.set_coefficient(poly, i, next()?, Entry { key: &key, ..entry })?;
-        }
-    }
-    Ok(draft)
-}
-
-/// Where a line begins with the key.
+/// Returns the byte at which the first line with the key begins.
 fn position(text: &str) -> Option<usize> {
     let mut start = 0;
     for line in text.split_inclusive('\n') {

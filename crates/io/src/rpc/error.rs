@@ -1,35 +1,36 @@
-//! Why no RPC came out of a file, or none went into one.
+//! Errors of reading and writing RPC files.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use super::RpcFormat;
+use super::format::RpcFormat;
 use crate::atomic::SaveError;
 
-/// What is wrong with the content of a file, with the key and the line it was found on (text formats, from 1).
+/// A defect in the content of an RPC file, with the key and, in text formats, the number of the
+/// line from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A required entry is not there.
-    #[error("{key} is missing")]
+    /// A required entry is missing.
+    #[error("{key} is missing, expected one entry")]
     Missing {
-        /// The entry, as this format names it.
+        /// The entry, as the format names it.
         key: String,
     },
     /// An entry occurs twice.
-    #[error("{key} occurs a second time{}", At(.line))]
+    #[error("{key} occurs a second time{}: remove one", At(.line))]
     Duplicate {
         /// The entry.
         key: String,
-        /// Where.
+        /// Line.
         line: Option<usize>,
     },
     /// An entry that an RPC does not have, such as a 21st coefficient.
-    #[error("{key} is no entry of an RPC{}: a polynomial has the coefficients 1 to 20", At(.line))]
+    #[error("{key} is not an entry of an RPC{}, expected 20 coefficients per polynomial", At(.line))]
     Extra {
         /// The entry.
         key: String,
-        /// Where.
+        /// Line.
         line: Option<usize>,
     },
     /// Not a number.
@@ -37,19 +38,19 @@ pub enum Fault {
     NotANumber {
         /// The entry.
         key: String,
-        /// Where.
+        /// Line.
         line: Option<usize>,
-        /// What stands there (its beginning).
+        /// The text found (its beginning).
         text: String,
     },
     /// A comma where the decimal point belongs.
-    #[error("{key} is {text:?}{}: write the decimal point as a point, not as a comma", At(.line))]
+    #[error("{key} is {text:?}{}: write the decimal separator as a point, not as a comma", At(.line))]
     DecimalComma {
         /// The entry.
         key: String,
-        /// Where.
+        /// Line.
         line: Option<usize>,
-        /// What stands there.
+        /// The text found.
         text: String,
     },
     /// NaN or an infinity.
@@ -57,18 +58,18 @@ pub enum Fault {
     NotFinite {
         /// The entry.
         key: String,
-        /// Where.
+        /// Line.
         line: Option<usize>,
         /// The value.
         value: f64,
     },
     /// A scale of zero.
-    #[error("{key} is zero: a scale divides, so the RPC cannot be used")]
+    #[error("{key} is zero, expected a scale other than zero")]
     ZeroScale {
         /// The entry.
         key: String,
     },
-    /// All entries are there and are numbers, and together they are no camera.
+    /// All entries are numbers, but together they do not make a camera.
     #[error("{0}")]
     NoCamera(camera::RpcError),
     /// A list of coefficients of the wrong length.
@@ -76,25 +77,25 @@ pub enum Fault {
     Count {
         /// The list.
         key: String,
-        /// Where.
+        /// Line.
         line: Option<usize>,
-        /// How many there are; counting stops one past what is expected in text formats.
+        /// Number of values. Text formats stop counting at one more than `expected`.
         found: usize,
-        /// How many there should be.
+        /// Number of values required.
         expected: usize,
     },
     /// The file breaks the rules of its format.
     #[error("{what}{}", At(.line))]
     Syntax {
-        /// What was found and expected.
+        /// The text found and the text expected.
         what: String,
-        /// Where.
+        /// Line.
         line: Option<usize>,
     },
-    /// Something the format allows and this reader does not know how to honour.
+    /// Content that the format allows and this reader does not support.
     #[error("{what}")]
     Unsupported {
-        /// What, and what to do.
+        /// The content, and what to do.
         what: String,
     },
 }
@@ -108,12 +109,12 @@ impl fmt::Display for At<'_> {
     }
 }
 
-/// A format that was tried and why it was not that.
+/// A format or place that was tried, and why it had no RPC.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Attempt {
     /// The format, or the place looked at.
     pub what: String,
-    /// Why there was no RPC.
+    /// The reason why there was no RPC.
     pub why: String,
 }
 
@@ -123,7 +124,7 @@ impl Attempt {
     }
 }
 
-/// Why no RPC was read.
+/// An RPC that was not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RpcReadError {
@@ -132,43 +133,43 @@ pub enum RpcReadError {
     Io {
         /// The file.
         path: PathBuf,
-        /// The reason.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// A folder, pipe or device.
-    #[error("expected a file, found something else: {}", .path.display())]
+    /// The path is a folder, pipe or device.
+    #[error("expected a file, found a folder, pipe or device: {}", .path.display())]
     NotAFile {
-        /// What was given.
+        /// The path.
         path: PathBuf,
     },
-    /// Too large to be RPC text.
-    #[error("the file has {bytes} bytes, RPC text is read up to {limit} bytes: {}", .path.display())]
+    /// The text is larger than any RPC file.
+    #[error("the file has {bytes} bytes, expected at most {limit} bytes of RPC text: {}", .path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size.
+        /// Its size, bytes.
         bytes: u64,
-        /// The limit.
+        /// The limit, bytes.
         limit: u64,
     },
-    /// No known format in the file, and none beside it where it is an image.
+    /// No RPC in the file, nor beside it where it is an image.
     #[error("no RPC found (tried {}): {}", Tried(.tried), .path.display())]
     NotRpc {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// The formats and places tried.
         tried: Vec<Attempt>,
     },
-    /// The format was recognised and its content is broken.
-    #[error("{fault} in the RPC of {} (format {format}; formats ruled out before: {})", .path.display(), Tried(.tried))]
+    /// The format was recognised, but its content is broken.
+    #[error("{fault} in the RPC of {} (format {format}; formats tried before: {})", .path.display(), Tried(.tried))]
     Invalid {
         /// The file.
         path: PathBuf,
         /// The format.
         format: RpcFormat,
-        /// What is wrong.
+        /// The defect.
         fault: Box<Fault>,
-        /// The formats that were ruled out before this one.
+        /// The formats tried before this one.
         tried: Vec<Attempt>,
     },
 }
@@ -179,7 +180,7 @@ impl RpcReadError {
     }
 }
 
-/// The list of attempts in one line.
+/// A list of attempts on one line.
 struct Tried<'a>(&'a [Attempt]);
 
 impl fmt::Display for Tried<'_> {
@@ -195,12 +196,12 @@ impl fmt::Display for Tried<'_> {
     }
 }
 
-/// Why an RPC was not written.
+/// An RPC that was not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RpcWriteError {
-    /// The format is read only.
-    #[error("cannot write {format}: choose text, rpb or json")]
+    /// The format can be read but not written.
+    #[error("the format {format} can only be read: choose text, RPB or JSON")]
     Format {
         /// The format asked for.
         format: RpcFormat,

@@ -1,32 +1,33 @@
-//! Reading RPC text from disk: only regular files, only up to a limit, in UTF-8 or Latin-1.
+//! Reading RPC text from disk: regular files up to a limit, in UTF-8 or Latin-1.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::RpcReadError;
+use super::error::RpcReadError;
 
-/// The largest text that is read, bytes. The largest real one (a WorldView XML) has under 1 MB.
+/// The largest text that is read, bytes. The largest known one (a WorldView XML) has less than 1
+/// MB.
 pub const TEXT_LIMIT: u64 = 64 * 1024 * 1024;
 
-/// How much of a file decides whether it is text.
+/// Bytes at the start of a file that decide whether it is text.
 const HEAD: usize = 4096;
-/// A NITF header is text for longer than that.
+/// First bytes of NITF files, whose header is text and longer than [`HEAD`].
 const NITF: [&[u8]; 2] = [b"NITF0", b"NSIF0"];
 
-/// The content of a file as far as RPC readers care.
+/// The content of a file.
 pub(super) enum Content {
     Text(String),
-    /// Something with NUL bytes or the first letters of NITF: an image, or rubbish.
+    /// A file with NUL bytes or the first bytes of NITF, such as an image.
     Binary,
-    /// More bytes than are read as text.
+    /// A text of this size, bytes, which is above the limit.
     TooLarge(u64),
 }
 
-/// Reads a text file, or finds that it is none.
+/// Reads a file if it is text.
 pub(super) fn content(path: &Path) -> Result<Content, RpcReadError> {
     let io = |source| RpcReadError::Io { path: path.to_owned(), source };
-    // A pipe would block on opening, so look before.
+    // The type is checked first because opening a pipe would block.
     let metadata = std::fs::metadata(path).map_err(io)?;
     if !metadata.is_file() {
         return Err(RpcReadError::NotAFile { path: path.to_owned() });
@@ -47,7 +48,7 @@ pub(super) fn content(path: &Path) -> Result<Content, RpcReadError> {
     Ok(Content::Text(decode(bytes)))
 }
 
-/// UTF-8 without its byte order mark, else Latin-1, in which every byte is a character.
+/// Decodes UTF-8 without its byte order mark, else Latin-1, in which every byte is a character.
 fn decode(bytes: Vec<u8>) -> String {
     let text = String::from_utf8(bytes).unwrap_or_else(|e| e.as_bytes().iter().copied().map(char::from).collect());
     match text.strip_prefix('\u{feff}') {

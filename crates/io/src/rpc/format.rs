@@ -1,4 +1,4 @@
-//! The names of the containers in which an RPC can be found.
+//! The containers in which an RPC can be found.
 
 use std::fmt;
 
@@ -6,12 +6,13 @@ use serde::{Deserialize, Serialize};
 
 /// A container of RPC coefficients.
 ///
-/// Displayed in words for people, serialised in kebab case for programs.
+/// `Display` gives a name for people, serde a name in kebab case for programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum RpcFormat {
-    /// `KEY: value unit` lines: `_RPC.TXT`, `_rpc.txt`, `.rpc` of DigitalGlobe, IKONOS, Planet, SkySat, EROS, KOMPSAT, OrbView.
+    /// `KEY: value unit` lines: `_RPC.TXT`, `_rpc.txt`, `.rpc` of DigitalGlobe, IKONOS, Planet,
+    /// SkySat, EROS, KOMPSAT, OrbView.
     Text,
     /// DigitalGlobe's `.RPB`.
     Rpb,

@@ -1,11 +1,13 @@
 //! The `RPC` metadata domain in GDAL's own XML: virtual rasters and `.aux.xml`.
 //!
-//! Only the text of the document itself is read; sources named in it are not opened. Image coordinates count from 0
-//! as in RPC00B. A virtual raster is commonly written for the coordinates of its own pixels, so nothing is shifted.
+//! Only the document itself is read: sources named in it are not opened. Image coordinates are
+//! counted from 0 as in RPC00B. The RPC of a virtual raster usually has the coordinates of the
+//! raster's own pixels, so nothing is shifted.
 
-use super::Parsed;
-use super::draft::{Draft, Entry, RPC00B};
+use super::draft::{Draft, Entry};
 use super::error::Fault;
+use super::names::RPC00B;
+use super::rpc_file::Parsed;
 use super::xml;
 
 /// Whether the document has an RPC domain.
@@ -26,5 +28,5 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
         }
         Ok(())
     })?;
-    Ok(Parsed { rpc: draft.finish(&RPC00B)?, warnings: Vec::new() })
+    Ok(Parsed::certain(draft.finish(&RPC00B)?))
 }

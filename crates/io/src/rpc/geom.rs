@@ -1,12 +1,15 @@
-//! OSSIM's and OTB's `.geom`: `key:  value` lines of a whole sensor model, of which the RPC is a part.
+//! OSSIM's and OTB's `.geom`: `key:  value` lines of a whole sensor model, of which the RPC is a
+//! part.
 //!
-//! Image coordinates count from 0 at the centre of the upper-left pixel: the `.geom` of a Pléiades image has
-//! LINE_OFF one less than its DIMAP file, which counts from 1. Polynomial format A (RPC00A) has its terms in another
-//! order and is refused, as is a model with a non-zero adjustment, which would move it.
+//! Image coordinates are counted from 0 at the centre of the upper-left pixel: the LINE_OFF of a
+//! Pléiades image is one less in its `.geom` than in its DIMAP file, which counts from 1.
+//! Polynomial format A (RPC00A), whose terms are in another order, is refused. A model with a
+//! non-zero adjustment is refused too, because the adjustment moves the RPC.
 
-use super::Parsed;
-use super::draft::{Draft, Entry, Names};
+use super::draft::{Draft, Entry};
 use super::error::Fault;
+use super::names::Names;
+use super::rpc_file::Parsed;
 
 const NAMES: Names = Names {
     scalars: [
@@ -24,10 +27,11 @@ const NAMES: Names = Names {
         "rand_error",
     ],
     polys: ["line_num_coeff", "line_den_coeff", "samp_num_coeff", "samp_den_coeff"],
-    index: ("_", 0),
+    separator: "_",
+    first: 0,
 };
 
-/// Whether the text has OSSIM's lower-case, two-digit coefficients or its format letter.
+/// Whether the text has a `polynomial_format` or OSSIM's coefficient keys (lower case, two digits).
 pub(super) fn recognise(text: &str) -> bool {
     let is_ours = |key: &str| key == "polynomial_format" || NAMES.polys.iter().any(|p| key == format!("{p}_00"));
     text.lines().filter_map(|l| l.split_once(':')).any(|(key, _)| is_ours(key.trim()))
@@ -42,19 +46,20 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
         check_model(entry)?;
         draft.take(&NAMES, entry)?;
     }
-    Ok(Parsed { rpc: draft.finish(&NAMES)?, warnings: Vec::new() })
+    Ok(Parsed::certain(draft.finish(&NAMES)?))
 }
 
+/// Refuses a model that this reader cannot represent.
 fn check_model(entry: Entry<'_>) -> Result<(), Fault> {
     let unsupported = |what: String| Err(Fault::Unsupported { what });
     if entry.key == "polynomial_format" && !matches!(entry.text, "B" | "") {
-        return unsupported(format!("polynomial_format is {:?}, expected B (RPC00B)", entry.text));
+        return unsupported(format!("polynomial_format is {:?}, expected B (RPC00B): only RPC00B is read", entry.text));
     }
     let moves =
         entry.key.starts_with("adjustment_") && [".parameter", ".center"].iter().any(|e| entry.key.ends_with(e));
     if moves && entry.number()? != 0.0 {
         return unsupported(format!(
-            "{} is {}: OSSIM's adjustments are not applied here, write the adjusted RPC out with OSSIM first",
+            "{} is {}, expected 0: OSSIM's adjustments are not applied, so write the adjusted RPC with OSSIM first",
             entry.key, entry.text
         ));
     }

@@ -1,29 +1,34 @@
 //! The RPC that GDAL reports for an image.
 //!
-//! GDAL gives RPC metadata in the convention of RPC00B, whatever the driver: the centre of the upper-left pixel is (0, 0).
-//! Drivers that follow references inside a file, or talk to a network, are not used: an input file cannot make this
-//! reader fetch anything. Where a TIFF's tag 50844 and GDAL's metadata agree, the tag's doubles are taken, since GDAL prints
-//! them with 15 digits; where they differ (GDAL prefers files beside the image), GDAL's are, with a warning.
+//! GDAL gives RPC metadata in the convention of RPC00B, whatever the driver: the centre of the
+//! upper-left pixel is (0, 0). Drivers that follow references inside a file or use a network are
+//! disabled, so an input file cannot make this reader fetch anything. Where TIFF tag 50844 and
+//! GDAL's metadata agree, the tag's doubles are used, because GDAL prints them with 15 digits.
+//! Where they differ (GDAL prefers files beside the image), GDAL's numbers are used, with a
+//! warning.
 
 use std::path::Path;
 
 use camera::Rpc;
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, Metadata};
 
+use super::draft::{Draft, Entry};
+use super::error::{Attempt, Fault, RpcReadError};
+use super::format::RpcFormat;
+use super::names::RPC00B;
+use super::rpc_file::{Parsed, RpcFile};
+use super::tiff_tag;
 use crate::raster::{prepare_gdal, with_gdal};
 
-use super::draft::{Draft, Entry, RPC00B};
-use super::error::{Attempt, Fault};
-use super::{Parsed, RpcFile, RpcFormat, RpcReadError, tiff_tag};
-
-/// Drivers that open other files or collections that a file names; those of networks are taken out by [`with_gdal`].
+/// Drivers that open other files named in a file. [`with_gdal`] removes the drivers that use a
+/// network.
 const FOLLOWS_REFERENCES: [&str; 10] =
     ["VRT", "DERIVED", "GTI", "RasterLite", "SQLite", "GPKG", "TileDB", "PDF", "KMLSUPEROVERLAY", "RPFTOC"];
 
-/// What GDAL's answer may differ by from the tag it was printed from.
+/// Largest relative difference between a number and GDAL's print of it with 15 digits.
 const PRINTED_TOLERANCE: f64 = 1e-13;
 
-/// Opens an image read-only; the attempt says why it cannot be.
+/// Opens an image for reading. The error has GDAL's reason.
 pub(super) fn open(path: &Path) -> Result<Dataset, Attempt> {
     prepare_gdal();
     let names: Vec<String> = DriverManager::all().map(|d| d.short_name()).collect();
@@ -37,7 +42,7 @@ pub(super) fn open(path: &Path) -> Result<Dataset, Attempt> {
     with_gdal(|| Dataset::open_ex(path, options)).map_err(|reason| Attempt::new(RpcFormat::GdalMetadata, reason))
 }
 
-/// The RPC of an opened image; `None` when it has none.
+/// Reads the RPC of an opened image; `None` when it has none.
 pub(super) fn read(path: &Path, dataset: &Dataset) -> Result<Option<RpcFile>, RpcReadError> {
     let tag = if path.is_file() { tiff_tag::read(path)? } else { None };
     let invalid = |format, fault| RpcReadError::invalid(path, format, fault, Vec::new());
@@ -54,7 +59,7 @@ pub(super) fn read(path: &Path, dataset: &Dataset) -> Result<Option<RpcFile>, Rp
     match tag {
         Some(Ok(tag)) if agree(&tag.rpc, &reported.rpc) => Ok(Some(file(RpcFormat::TiffTag, tag))),
         Some(_) => {
-            let what = "TIFF tag 50844 differs from the RPC beside the image, which is used as GDAL does";
+            let what = "TIFF tag 50844 differs from the RPC beside the image: the latter is used, as GDAL does";
             reported.warnings.push(what.to_owned());
             Ok(Some(file(RpcFormat::GdalMetadata, reported)))
         }
@@ -67,11 +72,29 @@ fn parse(items: &[String]) -> Result<Parsed, Fault> {
     for (key, text) in items.iter().filter_map(|item| item.split_once('=')) {
         draft.take(&RPC00B, Entry { key, text, line: None })?;
     }
-    Ok(Parsed { rpc: draft.finish(&RPC00B)?, warnings: Vec::new() })
+    Ok(Parsed::certain(draft.finish(&RPC00B)?))
 }
 
-/// Whether two RPCs have the same numbers up to printing.
+/// Whether two RPCs have the same numbers up to GDAL's 15 digits.
 fn agree(a: &Rpc, b: &Rpc) -> bool {
     let close = |x: f64, y: f64| (x - y).abs() <= PRINTED_TOLERANCE * x.abs().max(y.abs());
-    super::numbers(a).zip(super::numbers(b)).all(|(x, y)| close(x, y))
+    numbers(a).zip(numbers(b)).all(|(x, y)| close(x, y))
+}
+
+/// All numbers of the projection, in the order of RPC00B.
+fn numbers(rpc: &Rpc) -> impl Iterator<Item = f64> + '_ {
+    let scalars = [
+        rpc.line_off,
+        rpc.samp_off,
+        rpc.lat_off,
+        rpc.long_off,
+        rpc.height_off,
+        rpc.line_scale,
+        rpc.samp_scale,
+        rpc.lat_scale,
+        rpc.long_scale,
+        rpc.height_scale,
+    ];
+    let polynomials = [&rpc.line_num, &rpc.line_den, &rpc.samp_num, &rpc.samp_den];
+    scalars.into_iter().chain(polynomials.into_iter().flatten().copied())
 }

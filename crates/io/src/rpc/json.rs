@@ -1,13 +1,17 @@
-//! RPC in JSON: rpcm's names (`row_offset`, `col_num`, …) or those of GeoTIFF (`LINE_OFF`, …), at the top level or
-//! under `rpc`. Image coordinates count from 0. Values are numbers, lists of numbers, or texts as GDAL writes them.
+//! RPC in JSON, at the top level or under `rpc`.
+//!
+//! The keys are rpcm's names (`row_offset`, `col_num`, …) or GeoTIFF's (`LINE_OFF`, …). Image
+//! coordinates are counted from 0. Values are numbers, lists of numbers, or strings as GDAL writes
+//! them.
 
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
-use super::Parsed;
-use super::draft::{Draft, Entry, Field, Names, RPC00B};
+use super::draft::{Draft, Entry};
 use super::error::Fault;
+use super::names::{Field, Names, RPC00B};
+use super::rpc_file::Parsed;
 
 /// The names of rpcm's dictionary.
 pub(super) const RPCM: Names = Names {
@@ -26,7 +30,8 @@ pub(super) const RPCM: Names = Names {
         "err_rand",
     ],
     polys: ["row_num", "row_den", "col_num", "col_den"],
-    index: ("_", 1),
+    separator: "_",
+    first: 1,
 };
 
 /// Whether the text starts like a JSON object and names an RPC.
@@ -52,7 +57,7 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
     for (key, node) in entries {
         take(&mut draft, names, key, node)?;
     }
-    Ok(Parsed { rpc: draft.finish(names)?, warnings: Vec::new() })
+    Ok(Parsed::certain(draft.finish(names)?))
 }
 
 fn take(draft: &mut Draft, names: &Names, key: &str, node: &Node) -> Result<(), Fault> {
@@ -79,10 +84,11 @@ fn take(draft: &mut Draft, names: &Names, key: &str, node: &Node) -> Result<(), 
     }
 }
 
-/// One more than a polynomial has: enough to see that a list is too long, whatever its length.
+/// Items of a list that are kept: one more than a polynomial has, which is enough to see that a
+/// list is too long.
 const ITEMS_KEPT: usize = 21;
 
-/// A JSON value that keeps what a map would lose: repeated keys.
+/// A JSON value that keeps repeated keys, which a map would lose.
 enum Node {
     Object(Vec<(String, Node)>),
     Array(Vec<Node>),
@@ -97,8 +103,8 @@ impl Node {
             Self::Object(_) => "an object",
             Self::Array(_) => "a list",
             Self::Number(_) => "a number",
-            Self::Text(_) => "a text",
-            Self::Other => "null or a truth value",
+            Self::Text(_) => "a string",
+            Self::Other => "null or a boolean",
         }
     }
 }

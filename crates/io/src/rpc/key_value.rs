@@ -1,14 +1,16 @@
 //! `KEY: value unit` lines: `_RPC.TXT` and its many relatives.
 //!
-//! The names are those of RPC00B, image coordinates count from 0. Entries that are no part of the model (the ground
-//! from image coefficients of "extended IKONOS" files, a satellite's name) are passed over; unknown ones with a warning.
+//! The keys are the names of RPC00B, and image coordinates are counted from 0. Known entries that
+//! are not part of the projection are ignored: the ground-from-image coefficients of "extended
+//! IKONOS" files, the satellite's name. Unknown entries are ignored with a warning.
 
-use super::Parsed;
-use super::draft::{Draft, Entry, Field, RPC00B};
+use super::draft::{Draft, Entry};
 use super::error::Fault;
+use super::names::{Field, RPC00B};
+use super::rpc_file::Parsed;
 
-/// Starts of names that belong to RPC files without being part of the projection.
-const PASSED_OVER: [&str; 10] = [
+/// Prefixes of the keys of RPC files that are not part of the projection.
+const IGNORED: [&str; 10] = [
     "LON_NUM_COEFF",
     "LON_DEN_COEFF",
     "LAT_NUM_COEFF",
@@ -40,19 +42,19 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
             return Err(Fault::Syntax { what, line });
         };
         let known = draft.take(&RPC00B, Entry { key, text: value, line })?;
-        if !known && !is_passed_over(key) {
-            warnings.push(format!("{key} (line {}) is not known and was passed over", i + 1));
+        if !known && !is_ignored(key) {
+            warnings.push(format!("{key} (line {}) is not an entry of an RPC and was ignored", i + 1));
         }
     }
     Ok(Parsed { rpc: draft.finish(&RPC00B)?, warnings })
 }
 
-/// Whether a name of RPC metadata says nothing about the projection.
-pub(super) fn is_passed_over(key: &str) -> bool {
-    PASSED_OVER.iter().any(|p| key.get(..p.len()).is_some_and(|head| head.eq_ignore_ascii_case(p)))
+/// Whether a known key is not part of the projection.
+fn is_ignored(key: &str) -> bool {
+    IGNORED.iter().any(|p| key.get(..p.len()).is_some_and(|head| head.eq_ignore_ascii_case(p)))
 }
 
-/// Key and value of a line; the separator is a colon or an equals sign.
+/// Splits a line into key and value at a colon or an equals sign.
 fn split(line: &str) -> Option<(&str, &str)> {
     let (key, value) = line.split_once([':', '='])?;
     let key = key.trim();

@@ -1,8 +1,9 @@
 //! DigitalGlobe's `.RPB`: `key = value;` statements in the group IMAGE, lists in parentheses.
 
-use super::Parsed;
-use super::draft::{Draft, Entry, Field, Names};
+use super::draft::{Draft, Entry};
 use super::error::Fault;
+use super::names::{Field, Names};
+use super::rpc_file::Parsed;
 
 /// The names of the RPB format, for reading and writing.
 pub(super) const NAMES: Names = Names {
@@ -21,10 +22,11 @@ pub(super) const NAMES: Names = Names {
         "errRand",
     ],
     polys: ["lineNumCoef", "lineDenCoef", "sampNumCoef", "sampDenCoef"],
-    index: ("_", 1),
+    separator: "_",
+    first: 1,
 };
 
-/// Whether the text has one of RPB's own entries, which RPC00B names differently.
+/// Whether the text has an entry whose name is RPB's and not RPC00B's.
 pub(super) fn recognise(text: &str) -> bool {
     let is_ours = |key: &str| NAMES.polys.contains(&key) || matches!(key, "sampOffset" | "latOffset" | "longOffset");
     text.lines().filter_map(|l| l.split_once('=')).any(|(key, _)| is_ours(key.trim()))
@@ -40,7 +42,10 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
             if matches!(content.trim().trim_end_matches(';'), "" | "END") {
                 continue;
             }
-            return Err(Fault::Syntax { what: "expected key = value;".to_owned(), line });
+            return Err(Fault::Syntax {
+                what: format!("found {:?}, expected key = value;", content.trim().chars().take(40).collect::<String>()),
+                line,
+            });
         };
         let (key, value) = (key.trim(), value.trim());
         let entry = Entry { key, text: value.trim_end_matches(';'), line };
@@ -56,18 +61,18 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
             }
         }
     }
-    Ok(Parsed { rpc: draft.finish(&NAMES)?, warnings: Vec::new() })
+    Ok(Parsed::certain(draft.finish(&NAMES)?))
 }
 
 fn check_kind(entry: Entry<'_>) -> Result<(), Fault> {
     let kind = entry.text.trim().trim_matches('"');
     if entry.key.eq_ignore_ascii_case("SpecId") && kind != "RPC00B" {
-        return Err(Fault::Unsupported { what: format!("SpecId is {kind:?}, expected RPC00B") });
+        return Err(Fault::Unsupported { what: format!("SpecId is {kind:?}, expected RPC00B: only RPC00B is read") });
     }
     Ok(())
 }
 
-/// The text between the parentheses that open in `first` or on a line after it.
+/// Returns the text between the parentheses that open in `first` or on a later line.
 fn list<'a>(
     key: &str,
     first: &'a str,
@@ -76,12 +81,12 @@ fn list<'a>(
 ) -> Result<String, Fault> {
     let mut list = String::new();
     let mut piece = first;
-    // Each piece is searched once: a scan of the whole list per line would be quadratic.
+    // Each line is searched once: searching the whole list per line would take quadratic time.
     while !piece.contains(')') {
         list.push_str(piece);
         list.push(' ');
         piece = rest.next().map(|(_, more)| more).ok_or_else(|| Fault::Syntax {
-            what: format!("the list {key} does not end: expected ')'"),
+            what: format!("the list {key} does not end, expected ')'"),
             line: Some(line),
         })?;
     }

@@ -1,42 +1,47 @@
-//! RPC files beside an image: `NAME_RPC.TXT`, `NAME.RPB`, DIMAP's `RPC_NAME.XML`, ALOS' `RPC-NAME.txt`, `NAME.geom`, ….
+//! RPC files beside an image: `NAME_RPC.TXT`, `NAME.RPB`, DIMAP's `RPC_NAME.XML`, ALOS'
+//! `RPC-NAME.txt`, `NAME.geom`, ….
 //!
-//! Names are compared without regard to case. Only files in the image's own folder are looked at.
+//! Letter case in names does not matter. Only files in the image's folder are considered.
 //!
-//! A `.geom` describes the scene that the image was cut from, as OTB has it: where the image has no map projection and its
-//! geotransform is a whole number of pixels, that is the origin of the cut, and the RPC is moved by it.
+//! A `.geom` describes the scene that the image was cut from (OTB's convention). An image without
+//! map projection whose geotransform is a shift by whole pixels is such a cut: the shift is its
+//! origin in the scene, and the RPC is moved by it.
 
 use std::path::{Path, PathBuf};
 
 use gdal::Dataset;
 
-use super::error::Attempt;
-use super::{RpcFile, RpcFormat, RpcReadError, read_text_file};
+use super::error::{Attempt, RpcReadError};
+use super::format::RpcFormat;
+use super::rpc_file::RpcFile;
+use super::text_file;
 
-/// Endings that follow the image's name without its extension, in the order of preference.
+/// Endings after the image's name without its extension, best first.
 const ENDINGS: [&str; 6] = ["_rpc.txt", ".rpb", ".xml", ".rpc", ".geom", ".json"];
 
-/// The RPC of the first file beside `image` that has one; `tried` receives the names that were looked for.
+/// Reads the RPC of the first file beside `image` that has one. Adds every other candidate to
+/// `tried`.
 pub(super) fn read(
     image: &Path,
     dataset: Option<&Dataset>,
     tried: &mut Vec<Attempt>,
 ) -> Result<Option<RpcFile>, RpcReadError> {
     for candidate in candidates(image, tried)? {
-        match read_text_file(&candidate) {
+        match text_file::read(&candidate) {
             Ok(mut file) => {
                 if file.format == RpcFormat::OssimGeom {
                     move_to_cut(&mut file, dataset);
                 }
                 return Ok(Some(file));
             }
-            Err(RpcReadError::NotRpc { .. }) => tried.push(Attempt::new(file_name(&candidate), "no RPC in it")),
+            Err(RpcReadError::NotRpc { .. }) => tried.push(Attempt::new(file_name(&candidate), "it has no RPC")),
             Err(e) => return Err(e),
         }
     }
     Ok(None)
 }
 
-/// Existing files whose names fit, best first.
+/// Returns the existing files whose names fit, best first.
 fn candidates(image: &Path, tried: &mut Vec<Attempt>) -> Result<Vec<PathBuf>, RpcReadError> {
     let stem = image.file_stem().map(|s| s.to_string_lossy().to_lowercase()).unwrap_or_default();
     let full = file_name(image).to_lowercase();
@@ -53,20 +58,23 @@ fn candidates(image: &Path, tried: &mut Vec<Attempt>) -> Result<Vec<PathBuf>, Rp
     found.sort();
     if found.is_empty() {
         let what = format!("files beside the image ({}, RPC_*.xml, RPC-*.txt)", ENDINGS.join(", "));
-        tried.push(Attempt::new(what, "none there"));
+        tried.push(Attempt::new(what, "there are none"));
     }
     Ok(found.into_iter().map(|(_, path)| path).collect())
 }
 
-/// How well a file name fits an image; all names in lower case, smaller is better.
+/// Ranks how well the file name `name` fits an image, smaller is better. All names are in lower
+/// case.
 fn rank(stem: &str, full: &str, name: &str) -> Option<usize> {
     let plain = name.strip_prefix(stem).and_then(|rest| ENDINGS.iter().position(|e| *e == rest));
     let aux = || (name.strip_prefix(full) == Some(".aux.xml")).then_some(ENDINGS.len());
     plain.or_else(aux).or_else(|| dimap(stem, name)).or_else(|| alos(stem, name))
 }
 
-/// `img_X_r1c1` belongs to `rpc_X.xml`, also where the image's name has more at its end (`_p` of Pléiades Neo).
-/// Other tiles do not: where they lie in the scene is not in the RPC file.
+/// Ranks DIMAP names: `rpc_X.xml` fits `img_X_r1c1`, also with more at the end of X (`_p` of
+/// Pléiades Neo).
+///
+/// It does not fit other tiles, because the RPC file does not have their position in the scene.
 fn dimap(stem: &str, name: &str) -> Option<usize> {
     let scene = stem.strip_prefix("img_")?.strip_suffix("_r1c1")?;
     let of_rpc = name.strip_prefix("rpc_")?.strip_suffix(".xml")?;
@@ -74,7 +82,7 @@ fn dimap(stem: &str, name: &str) -> Option<usize> {
     (rest.is_empty() || rest.starts_with('_')).then_some(ENDINGS.len() + 1 + rest.len())
 }
 
-/// `img-X` and `img-01-X` belong to `rpc-X.txt`.
+/// Ranks ALOS names: `rpc-X.txt` fits `img-X` and `img-01-X`.
 fn alos(stem: &str, name: &str) -> Option<usize> {
     let scene = stem.strip_prefix("img-")?;
     let of_rpc = name.strip_prefix("rpc-")?.strip_suffix(".txt")?;
@@ -83,19 +91,20 @@ fn alos(stem: &str, name: &str) -> Option<usize> {
     fits.then_some(ENDINGS.len() + 1)
 }
 
-/// Counts image coordinates from the cut's own first pixel.
+/// Moves the RPC so that image coordinates are counted from the first pixel of the cut.
 fn move_to_cut(file: &mut RpcFile, dataset: Option<&Dataset>) {
     let Some(dataset) = dataset.filter(|d| d.projection().is_empty()) else { return };
     let Ok([x, dx, rx, y, ry, dy]) = dataset.geo_transform() else { return };
     let is_cut = dx == 1.0 && dy.abs() == 1.0 && rx == 0.0 && ry == 0.0 && x.fract() == 0.0 && y.fract() == 0.0;
     if !is_cut {
-        let what = "the image has a geotransform that is no cut of the .geom's scene: the RPC is used as it is";
+        let what = "the geotransform is not a shift by whole pixels, so the image is not a cut of the .geom's scene: \
+                    the RPC is used as it is";
         file.warnings.push(what.to_owned());
     } else if (x, y) != (0.0, 0.0) {
         file.rpc.samp_off -= x;
         file.rpc.line_off -= y;
         file.warnings
-            .push(format!("the image is a cut at sample {x}, line {y} of the .geom's scene: the RPC was moved"));
+            .push(format!("the image is a cut of the .geom's scene at sample {x}, line {y}: the RPC was moved"));
     }
 }
 

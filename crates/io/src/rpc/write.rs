@@ -1,7 +1,6 @@
 //! Writing RPC files: RPC00B text, RPB, and JSON with rpcm's names.
 //!
-//! Numbers are written with the fewest digits that read back to the same double. The file appears under its name
-//! only when it is complete.
+//! Numbers are written with the fewest digits that read back to the same double.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,9 +8,10 @@ use std::path::Path;
 use camera::Rpc;
 use serde_json::{Map, Value};
 
-use super::draft::{POLYS, Poly, REQUIRED, RPC00B};
 use super::error::RpcWriteError;
-use super::{RpcFormat, json, rpb};
+use super::format::RpcFormat;
+use super::names::{POLYS, Poly, REQUIRED, RPC00B};
+use super::{json, rpb};
 use crate::atomic::write_bytes_synced;
 
 /// Writes `rpc` to `path` as [`RpcFormat::Text`], [`RpcFormat::Rpb`] or [`RpcFormat::Json`].
@@ -19,16 +19,17 @@ use crate::atomic::write_bytes_synced;
 /// The content is on the disk before the file gets its name.
 ///
 /// # Errors
-/// [`RpcWriteError::Format`] for another format; [`RpcWriteError::NotWritten`], also for a file that exists without `overwrite`.
+/// [`RpcWriteError::Format`] for another format; [`RpcWriteError::NotWritten`], also for a file
+/// that exists without `overwrite`.
 pub fn write(path: &Path, rpc: &Rpc, format: RpcFormat, overwrite: bool) -> Result<(), RpcWriteError> {
     let text = to_text(rpc, format)?;
     Ok(write_bytes_synced(path, text.as_bytes(), overwrite)?)
 }
 
-/// The text of an RPC file.
+/// Returns the text of an RPC file.
 ///
 /// # Errors
-/// A format other than text, RPB and JSON.
+/// [`RpcWriteError::Format`] for a format other than text, RPB and JSON.
 pub fn to_text(rpc: &Rpc, format: RpcFormat) -> Result<String, RpcWriteError> {
     match format {
         RpcFormat::Text => Ok(key_value(rpc)),
@@ -38,7 +39,7 @@ pub fn to_text(rpc: &Rpc, format: RpcFormat) -> Result<String, RpcWriteError> {
     }
 }
 
-/// The scalars in the order of [`RPC00B`], the two errors only where they are known.
+/// The scalars in the order of [`RPC00B`]. The two errors are `None` where they are unknown.
 fn scalars(rpc: &Rpc) -> [Option<f64>; 12] {
     [
         Some(rpc.line_off),
@@ -90,7 +91,7 @@ fn unit(key: &str) -> &'static str {
 
 fn rpb(rpc: &Rpc) -> String {
     let mut text = String::from("satId = \"????\";\nbandId = \"?\";\nSpecId = \"RPC00B\";\nBEGIN_GROUP = IMAGE\n");
-    // The format requires both errors; 0 is what providers write for unknown ones.
+    // The format requires both errors; providers write 0 for unknown ones.
     let _ = writeln!(text, "\terrBias = {};", rpc.err_bias_m.unwrap_or(0.0));
     let _ = writeln!(text, "\terrRand = {};", rpc.err_rand_m.unwrap_or(0.0));
     for (name, value) in rpb::NAMES.scalars.iter().zip(scalars(rpc).iter().flatten()).take(REQUIRED.len()) {

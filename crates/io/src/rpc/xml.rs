@@ -1,7 +1,7 @@
 //! A walk over the leaves of an XML document, with limits.
 //!
-//! Documents with a DTD are refused: no entity but the five predefined ones and character references is ever
-//! expanded, and nothing is fetched. Depth is limited; the size is that of the text, which the caller has limited.
+//! Documents with a DTD are refused. Only the five predefined entities and character references are
+//! expanded, and nothing is fetched. The depth is limited here, the size of the text by the caller.
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -9,9 +9,9 @@ use quick_xml::events::{BytesStart, Event};
 use super::error::Fault;
 use crate::lines::Lines;
 
-/// RPC documents are about six levels deep.
+/// Deepest nesting that is read; RPC documents have about six levels.
 const DEPTH_MAX: usize = 64;
-/// More attributes than any metadata format has.
+/// Most attributes of an element; no metadata format has that many.
 const ATTRIBUTES_MAX: usize = 256;
 
 /// An open element.
@@ -28,7 +28,7 @@ impl Element {
     }
 }
 
-/// An element without children, with its ancestors (the root first, itself last) and its text.
+/// An element without children: its path (the root first, itself last), its text and its line.
 #[derive(Debug)]
 pub(super) struct Leaf<'a> {
     pub(super) path: &'a [Element],
@@ -47,13 +47,13 @@ impl Leaf<'_> {
         Some(names)
     }
 
-    /// The leaf's own name.
+    /// The name of the leaf.
     pub(super) fn name(&self) -> &str {
         self.path.last().map_or("", |e| &e.name)
     }
 }
 
-/// The name of the root element, where the text starts like a document that has one.
+/// Returns the name of the root element, if there is one.
 pub(super) fn root(text: &str) -> Option<String> {
     let mut reader = Reader::from_str(text);
     loop {
@@ -100,7 +100,9 @@ pub(super) fn walk(text: &str, mut visit: impl FnMut(Leaf<'_>) -> Result<(), Fau
             Event::Text(t) if is_leaf => content.push_str(&t.xml10_content()),
             Event::CData(t) if is_leaf => content.push_str(&t.xml10_content()),
             Event::GeneralRef(r) => content.push(reference(&r.xml10_content(), line)?),
-            Event::DocType(_) => return Err(syntax("the XML has a DTD, which is refused".to_owned(), line)),
+            Event::DocType(_) => {
+                return Err(syntax("the XML has a DTD, which is refused: remove the DOCTYPE".to_owned(), line));
+            }
             Event::Eof if path.is_empty() => return Ok(()),
             Event::Eof => return Err(syntax(format!("the XML ends inside <{}>", path[path.len() - 1].name), line)),
             _ => {}
@@ -118,7 +120,7 @@ fn local_name(e: &BytesStart<'_>) -> String {
 
 fn element(e: &BytesStart<'_>, line: usize) -> Result<Element, Fault> {
     let mut attributes = Vec::new();
-    // The reader's own check for repeated names is quadratic in their number.
+    // The reader's check for repeated names takes quadratic time.
     for attribute in e.attributes().with_checks(false) {
         if attributes.len() == ATTRIBUTES_MAX {
             return Err(syntax(format!("an XML element has more than {ATTRIBUTES_MAX} attributes"), line));
@@ -132,7 +134,7 @@ fn element(e: &BytesStart<'_>, line: usize) -> Result<Element, Fault> {
     Ok(Element { name: local_name(e), attributes })
 }
 
-/// The character that `&name;` stands for.
+/// Returns the character that `&name;` stands for.
 fn reference(name: &str, line: usize) -> Result<char, Fault> {
     let code = |digits: &str, radix| u32::from_str_radix(digits, radix).ok().and_then(char::from_u32);
     let character = match name {
@@ -146,5 +148,5 @@ fn reference(name: &str, line: usize) -> Result<char, Fault> {
             None => None,
         },
     };
-    character.ok_or_else(|| syntax(format!("unknown XML entity &{name};"), line))
+    character.ok_or_else(|| syntax(format!("unknown XML entity &{name}; in the text"), line))
 }

@@ -1,0 +1,123 @@
+//! Finding the RPC of a file or of an image.
+
+use std::path::Path;
+
+use super::detect::{self, Found};
+use super::error::{Attempt, Fault, RpcReadError};
+use super::file::{self, Content};
+use super::format::RpcFormat;
+use super::rpc_file::{Parsed, RpcFile};
+use super::text_file::{finish, not_rpc, too_large};
+use super::{image, sidecar, tiff_tag};
+
+/// Reads the RPC of a file: an RPC file, metadata that contains one, or an image (as
+/// [`read_for_image`]).
+///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("scene_RPC.TXT");
+/// let scalars = "LINE_OFF: 100\nSAMP_OFF: 200\nLAT_OFF: 45\nLONG_OFF: 7\nHEIGHT_OFF: 300\n\
+///                LINE_SCALE: 100\nSAMP_SCALE: 200\nLAT_SCALE: 0.01\nLONG_SCALE: 0.02\n\
+///                HEIGHT_SCALE: 500\n";
+/// // Lines fall with the latitude (term 3 of RPC00B), samples grow with the longitude (term 2).
+/// let ones = [("LINE_NUM", 3, -1), ("LINE_DEN", 1, 1), ("SAMP_NUM", 2, 1), ("SAMP_DEN", 1, 1)];
+/// let mut text = scalars.to_owned();
+/// for (name, term, value) in ones {
+///     for i in 1..=20 {
+///         text += &format!("{name}_COEFF_{i}: {}\n", if i == term { value } else { 0 });
+///     }
+/// }
+/// std::fs::write(&path, text)?;
+///
+/// let file = io::rpc::read(&path)?;
+/// assert_eq!((file.format, file.rpc.line_off), (io::rpc::RpcFormat::Text, 100.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// Every variant of [`RpcReadError`].
+pub fn read(path: &Path) -> Result<RpcFile, RpcReadError> {
+    if is_gdal_virtual(path) {
+        return read_for_image(path);
+    }
+    match file::content(path)? {
+        Content::Binary => read_for_image(path),
+        Content::TooLarge(bytes) => Err(too_large(path, bytes)),
+        Content::Text(text) => match detect::detect(&text) {
+            Ok(found) => finish(path, found),
+            Err(tried) if detect::is_markup(&text) => Err(not_rpc(path, tried)),
+            Err(tried) => read_raw_image(path, tried),
+        },
+    }
+}
+
+/// Finds the RPC of an image: GDAL's `RPC` metadata, TIFF tag 50844, the text of a virtual raster,
+/// then files beside it.
+///
+/// # Errors
+/// Every variant of [`RpcReadError`] but [`RpcReadError::TooLarge`] for the image itself. A broken
+/// RPC in one place is an error, even where another place has a sound one.
+pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
+    let mut tried = Vec::new();
+    let mut dataset = None;
+    let mut markup = false;
+    if !is_gdal_virtual(path)
+        && let Content::Text(text) = file::content(path)?
+    {
+        markup = detect::is_markup(&text);
+        match detect::detect(&text) {
+            Ok(found) => return finish(path, found),
+            Err(formats) => tried = formats,
+        }
+    }
+    if !markup {
+        match image::open(path) {
+            Ok(opened) => {
+                if let Some(file) = image::read(path, &opened)? {
+                    return Ok(file);
+                }
+                tried.push(no_metadata());
+                dataset = Some(opened);
+            }
+            Err(attempt) => {
+                tried.push(attempt);
+                if let Some(result) = tag_alone(path)? {
+                    return finish(path, Found { format: RpcFormat::TiffTag, result, tried });
+                }
+            }
+        }
+    }
+    if !is_gdal_virtual(path)
+        && let Some(file) = sidecar::read(path, dataset.as_ref(), &mut tried)?
+    {
+        return Ok(file);
+    }
+    Err(not_rpc(path, tried))
+}
+
+/// Reads tag 50844 of a TIFF that GDAL does not open.
+fn tag_alone(path: &Path) -> Result<Option<Result<Parsed, Fault>>, RpcReadError> {
+    if is_gdal_virtual(path) { Ok(None) } else { tiff_tag::read(path) }
+}
+
+/// Reads an image that looks like text because its first bytes have no NUL; its header tells GDAL
+/// that it is raw.
+fn read_raw_image(path: &Path, mut tried: Vec<Attempt>) -> Result<RpcFile, RpcReadError> {
+    match image::open(path) {
+        Ok(dataset) => match image::read(path, &dataset)? {
+            Some(file) => return Ok(file),
+            None => tried.push(no_metadata()),
+        },
+        Err(attempt) => tried.push(attempt),
+    }
+    Err(not_rpc(path, tried))
+}
+
+fn no_metadata() -> Attempt {
+    Attempt::new(RpcFormat::GdalMetadata, "the image has no RPC metadata")
+}
+
+/// Whether the path is in one of GDAL's virtual file systems, which the caller asked for by name.
+fn is_gdal_virtual(path: &Path) -> bool {
+    path.to_str().is_some_and(|p| p.starts_with("/vsi"))
+}
