@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use anyhow::{bail, ensure};
 use city::Lod;
 use crs::VerticalDatum;
-use eval::{Alignment, EvalConfig, SurfaceConfig};
+use eval::{AlignmentMethod, EvalConfig, SurfaceComparisonConfig};
 use jobs::eval::{
     EvalJobError, EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, GridEvalReport, MapEvalConfig,
     MinCompleteness, SurfaceEvalConfig,
@@ -103,25 +103,25 @@ pub(crate) struct Args {
 #[command(next_help_heading = "Surfaces (meshes, city models, clouds)")]
 struct SurfaceArgs {
     /// Samples per square metre of a mesh, up to a million in all.
-    #[arg(long, value_name = "N", default_value_t = SurfaceConfig::default().samples_per_m2)]
+    #[arg(long, value_name = "N", default_value_t = SurfaceComparisonConfig::default().samples_per_m2)]
     samples_per_m2: f64,
     /// Seed of the samples.
     #[arg(long, value_name = "N", default_value_t = 0)]
     sample_seed: u64,
     /// D of M3C2: diameter in which normals are estimated, in metres.
-    #[arg(long, value_name = "METRES", default_value_t = SurfaceConfig::default().normal_scale_m)]
+    #[arg(long, value_name = "METRES", default_value_t = SurfaceComparisonConfig::default().normal_scale_m)]
     normal_scale: f64,
     /// d of M3C2: diameter of its cylinders, in metres.
-    #[arg(long, value_name = "METRES", default_value_t = SurfaceConfig::default().cylinder_m)]
+    #[arg(long, value_name = "METRES", default_value_t = SurfaceComparisonConfig::default().cylinder_m)]
     cylinder: f64,
     /// Length of the cylinders on either side, in metres.
-    #[arg(long, value_name = "METRES", default_value_t = SurfaceConfig::default().cylinder_reach_m)]
+    #[arg(long, value_name = "METRES", default_value_t = SurfaceComparisonConfig::default().cylinder_reach_m)]
     cylinder_reach: f64,
     /// Registration error, part of M3C2's level of detection, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 0.0)]
     registration: f64,
     /// Edge of the voxels of the volumetric overlap, in metres.
-    #[arg(long, value_name = "METRES", default_value_t = SurfaceConfig::default().voxel_m)]
+    #[arg(long, value_name = "METRES", default_value_t = SurfaceComparisonConfig::default().voxel_m)]
     voxel: f64,
     /// Level of detail of city models, such as 2.2 [default: the highest of each object up to 2.x].
     #[arg(long, value_name = "LOD")]
@@ -144,7 +144,7 @@ enum Align {
     NuthKaab,
 }
 
-impl From<Align> for Alignment {
+impl From<Align> for AlignmentMethod {
     fn from(align: Align) -> Self {
         match align {
             Align::None => Self::None,

@@ -78,7 +78,7 @@ fn a_sliver_of_overlap_has_heights_and_less_is_refused() {
     let (stage, shots, width_m) = strip(0.2);
     let outcome = stage.run(&shots, |_| {}).unwrap();
     let inside = |x: f64, _: f64| x.abs() < 0.5 * width_m - 5.0;
-    let score = stage.errors(&outcome, 45.0, eval::Alignment::None).over(inside);
+    let score = stage.errors(&outcome, 45.0, eval::AlignmentMethod::None).over(inside);
     score.expect("a fifth of the images", 0.85, 0.06);
     let (stage, shots, _) = strip(0.03);
     let refused = stage.run(&shots, |_| {}).err();

@@ -1,6 +1,6 @@
 //! Pixels that say little, nothing, or something else in every view.
 
-use eval::Alignment;
+use eval::AlignmentMethod;
 use jobs::dsm::{Fill, PipelineError};
 use raster::Grid;
 
@@ -44,14 +44,16 @@ fn a_saturated_roof_is_right_or_void() {
             s.image.data_mut().iter_mut().filter(|v| **v >= 2047).for_each(|v| *v = limit);
         }
         let outcome = stage.run(&shots, |_| {}).unwrap();
-        let errors = stage.errors(&outcome, 50.0, Alignment::None);
+        let errors = stage.errors(&outcome, 50.0, AlignmentMethod::None);
         let (inside, beside) = (errors.over(white), errors.over(|x, y| !white(x, y)));
         assert!(inside.wrong < 0.15, "{limit}: {inside:?}");
         beside.expect("beside the white", 0.95, 0.03);
         if limit == 2047 {
             let closed = stage.run(&shots, |config| config.fill = Fill::All).unwrap();
             let (before, after) = (&outcome.report.surface, &closed.report.surface);
-            assert!(inside.covered < 0.5 && stage.errors(&closed, 50.0, Alignment::None).over(white).covered == 1.0);
+            assert!(
+                inside.covered < 0.5 && stage.errors(&closed, 50.0, AlignmentMethod::None).over(white).covered == 1.0
+            );
             // What is closed on request is told as closed, and nothing else changes.
             assert!(before.observed == after.observed && before.filled + 1000 < after.filled, "{before:?} {after:?}");
             let open = stage.run(&shots, |config| config.fill = Fill::None).unwrap().report.surface;
@@ -88,7 +90,7 @@ fn where_all_views_are_void_there_is_no_height() {
             s.no_data = no_data;
         }
         let outcome = stage.run(&shots, |_| {}).unwrap();
-        let errors = stage.errors(&outcome, 50.0, Alignment::None);
+        let errors = stage.errors(&outcome, 50.0, AlignmentMethod::None);
         let (void, seen) = (errors.over(|x, _| x < -26.0), errors.over(|x, _| x > -18.0));
         assert!(void.covered < 0.02, "{no_data:?}: {void:?}");
         seen.expect("the part that is seen", 0.94, 0.03);
@@ -118,7 +120,7 @@ fn repeated_texture_is_not_taken_for_another_height() {
     let court = |x: f64, y: f64| x.abs() < 20.0 && y.abs() < 20.0;
     for views in [shots.clone(), vec![shots[0].clone(), shots[2].clone()]] {
         let outcome = stage.run(&views, |_| {}).unwrap();
-        let score = stage.errors(&outcome, 50.0, Alignment::None).over(court);
+        let score = stage.errors(&outcome, 50.0, AlignmentMethod::None).over(court);
         assert!(score.wrong < 0.05, "{} views: {score:?}", views.len());
         if views.len() == 3 {
             assert!(score.right > 0.9, "{score:?}");
@@ -138,7 +140,7 @@ fn glittering_water_is_void_or_level_and_the_land_is_right() {
         ..Stage::default()
     };
     let outcome = stage.run(&stage.shots(&triplet(0.5)), |_| {}).unwrap();
-    let errors = stage.errors(&outcome, 50.0, Alignment::None);
+    let errors = stage.errors(&outcome, 50.0, AlignmentMethod::None);
     let (water, land) = (errors.over(|_, y| y < -16.0), errors.over(|_, y| y > -9.0));
     land.expect("land", 0.94, 0.04);
     assert!(water.wrong < 0.06, "{water:?}");
@@ -181,6 +183,6 @@ fn four_dates_with_other_suns_cars_and_crops_give_one_surface() {
     let score = stage.score(&outcome);
     score.expect("four dates", 0.85, 0.07);
     // Roofs have neither crops nor cars on them.
-    let roofs = stage.errors(&outcome, 50.0, Alignment::None).over(|x, y| village(x, y) > rolling(x, y) + 2.0);
+    let roofs = stage.errors(&outcome, 50.0, AlignmentMethod::None).over(|x, y| village(x, y) > rolling(x, y) + 2.0);
     assert!(roofs.right > 0.85, "{roofs:?}");
 }

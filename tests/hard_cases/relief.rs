@@ -1,6 +1,6 @@
 //! Surfaces that rise fast, and ranges of heights that do not hold them.
 
-use eval::Alignment;
+use eval::AlignmentMethod;
 use jobs::dsm::PipelineError;
 
 use crate::stage::{EASY, Stage, rolling, triplet, village};
@@ -17,7 +17,7 @@ fn a_tower_of_130_m_survives() {
         ..Stage::default()
     };
     let outcome = stage.run(&stage.shots(&triplet(0.5)), |_| {}).unwrap();
-    let errors = stage.errors(&outcome, 70.0, Alignment::None);
+    let errors = stage.errors(&outcome, 70.0, AlignmentMethod::None);
     let roof = errors.over(|x, y| x.abs() < 14.0 && (y - 5.0).abs() < 14.0);
     let beside = errors.over(|x, _| x.abs() > 25.0);
     roof.expect("the roof", 0.9, 0.06);
@@ -50,7 +50,7 @@ fn a_range_far_above_the_scene_is_refused_with_the_heights_seen() {
 #[test]
 fn a_range_that_cuts_the_roofs_off_is_told_and_gives_no_false_roofs() {
     let outcome = EASY.stage.run(&EASY.shots, |c| c.height_range_m = Some((170.0, 188.0))).unwrap();
-    let errors = EASY.stage.errors(&outcome, 50.0, Alignment::None);
+    let errors = EASY.stage.errors(&outcome, 50.0, AlignmentMethod::None);
     let (above, ground) = (errors.over(|x, y| village(x, y) > 12.0), errors.over(|x, y| village(x, y) < 3.0));
     ground.expect("the ground", 0.9, 0.06);
     assert!(above.covered < 0.25, "{above:?}");

@@ -1,7 +1,7 @@
 //! The simulator's presets, small: what a stage with one difficulty does not have, all of them together. Pointing errors
 //! of one to three pixels are in every RPC, so scores are taken after a shift.
 
-use eval::{Alignment, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
+use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use raster::Grid;
 use simulate::{Simulation, SimulationConfig, TruthClass};
 
@@ -43,7 +43,7 @@ fn compared(config: SimulationConfig) -> Compared {
     let map = CellMap::affine(&truth.geotransform, &outcome.dem.geotransform).unwrap();
     let metres = MetresFromCells::new(&truth.geotransform, (1.0, 1.0));
     let input = EvalInput::new(&outcome.dem.heights, &truth.dsm, &map, metres);
-    let found = evaluate(&input, &EvalConfig { alignment: Alignment::Xyz, ..EvalConfig::default() }).unwrap();
+    let found = evaluate(&input, &EvalConfig { alignment: AlignmentMethod::Xyz, ..EvalConfig::default() }).unwrap();
     Compared { truth: truth.dsm.clone(), classes: truth.classes.clone(), errors: found.errors }
 }
 

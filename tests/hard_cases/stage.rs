@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 
 use camera::{ImagePoint, Rpc};
 use crs::MapProjection;
-use eval::{Alignment, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
+use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use geodesy::{meridian_radius_m, prime_vertical_radius_m};
 use io::raster::{Band, BandData, Dem, read_dem, write_image_with_rpc};
 use jobs::dsm::{DsmConfig, DsmReport, PipelineError, run_dsm};
@@ -313,7 +313,7 @@ impl Stage {
     }
 
     /// The error of every cell within `half_m` of the centre, after an alignment; NaN in voids and outside.
-    pub(crate) fn errors(&self, outcome: &Outcome, half_m: f64, alignment: Alignment) -> Errors {
+    pub(crate) fn errors(&self, outcome: &Outcome, half_m: f64, alignment: AlignmentMethod) -> Errors {
         let (dem, truth) = (&outcome.dem, self.truth(&outcome.dem, half_m));
         let map = CellMap::affine(&dem.geotransform, &dem.geotransform).expect("a grid on itself");
         let input = EvalInput::new(&dem.heights, &truth, &map, MetresFromCells::new(&dem.geotransform, (1.0, 1.0)));
@@ -324,12 +324,12 @@ impl Stage {
 
     /// Errors as they are, over 50 m around the centre.
     pub(crate) fn score(&self, outcome: &Outcome) -> Score {
-        self.errors(outcome, 50.0, Alignment::None).over(|_, _| true)
+        self.errors(outcome, 50.0, AlignmentMethod::None).over(|_, _| true)
     }
 
     /// Errors after the shift that pointing errors common to all views leave.
     pub(crate) fn aligned_score(&self, outcome: &Outcome) -> Score {
-        self.errors(outcome, 50.0, Alignment::Xyz).over(|_, _| true)
+        self.errors(outcome, 50.0, AlignmentMethod::Xyz).over(|_, _| true)
     }
 
     fn places(&self, dem: &Dem) -> Grid<[f64; 2]> {

@@ -1,56 +1,57 @@
-//! The same metrics for parts of the reference's cells: classes, slopes, edges.
+//! The metrics for parts of the reference's cells: classes, slopes, edges and the most confident
+//! cells.
 
 use crate::metrics::Metrics;
 use raster::Grid;
 use std::collections::BTreeMap;
 
-/// Bounds of the slope bins, degrees; a bin holds its lower bound.
+/// Bounds of the slope bins, degrees. A bin includes its lower bound.
 pub const SLOPE_BOUNDS_DEG: [f64; 8] = [0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0];
 
-/// The metrics of one class.
+/// Metrics of one class.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClassMetrics {
-    /// The class.
+    /// Class number.
     pub class: i32,
-    /// What was measured on its cells.
+    /// Metrics over its cells.
     pub metrics: Metrics,
 }
 
-/// The metrics of the cells whose slope in the reference is between two bounds.
+/// Metrics of the cells whose slope in the reference is between two bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlopeMetrics {
-    /// Lower bound, degrees, included.
+    /// Lower bound, degrees, inclusive.
     pub from_deg: f64,
-    /// Upper bound, degrees, not included but for the last.
+    /// Upper bound, degrees, exclusive except for the last bin.
     pub to_deg: f64,
-    /// What was measured on the cells.
+    /// Metrics over the cells.
     pub metrics: Metrics,
 }
 
-/// The metrics near and away from height jumps.
+/// Metrics near and away from height jumps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EdgeMetrics {
-    /// Within the edge zone.
+    /// Metrics within the edge zone.
     pub edge: Metrics,
-    /// Everywhere else.
+    /// Metrics everywhere else.
     pub rest: Metrics,
 }
 
-/// Shares of the reference's cells that are kept of a surface, the most believed first.
+/// Shares of the reference's cells for which the most confident cells of the test are kept.
 pub const COVERAGES: [f64; 10] = [0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.5];
 
-/// The metrics of the most believed cells.
+/// Metrics of the most confident cells of the test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoverageMetrics {
-    /// Their share of the reference's valid cells.
+    /// Share of the reference's valid cells that is kept.
     pub coverage: f64,
-    /// The least confidence among them.
+    /// Lowest confidence among the kept cells.
     pub confidence: f64,
-    /// What was measured on them; the others are voids.
+    /// Metrics over the kept cells. The other cells count as voids.
     pub metrics: Metrics,
 }
 
-/// The reference's valid cells with their errors, and how finely errors are counted.
+/// Reference, errors on the same grid, and the thresholds for counting errors.
 #[derive(Clone, Copy)]
 pub(crate) struct Cells<'a> {
     pub(crate) reference: &'a Grid<f32>,
@@ -59,7 +60,7 @@ pub(crate) struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    /// The metrics of the cells of each key; cells without a key are in none.
+    /// Returns the metrics of the cells of each key. Cells without a key are left out.
     fn by<K: Ord>(&self, key: impl Fn(usize) -> Option<K>) -> BTreeMap<K, Metrics> {
         let mut cells: BTreeMap<K, (usize, Vec<f64>)> = BTreeMap::new();
         for (i, (height, error)) in self.reference.data().iter().zip(self.errors.data()).enumerate() {
@@ -80,7 +81,7 @@ impl Cells<'_> {
         by_class.into_iter().map(|(class, metrics)| ClassMetrics { class, metrics }).collect()
     }
 
-    /// One entry for each of [`COVERAGES`] that the surface reaches.
+    /// Returns one entry for each of [`COVERAGES`] that the test reaches.
     pub(crate) fn per_coverage(&self, confidence: &Grid<f32>) -> Vec<CoverageMetrics> {
         let reference_cells = self.reference.data().iter().filter(|h| h.is_finite()).count();
         let cells = self.errors.data().iter().zip(confidence.data());
@@ -88,7 +89,8 @@ impl Cells<'_> {
             .filter(|(error, _)| error.is_finite())
             .map(|(error, confidence)| (if confidence.is_nan() { f32::NEG_INFINITY } else { *confidence }, *error))
             .collect();
-        // Stable: cells of one confidence stay in the order of the rows, whatever their errors.
+        // The sort is stable: cells of equal confidence keep the order of the rows, whatever their
+        // errors.
         known.sort_by(|a, b| b.0.total_cmp(&a.0));
         let of = |coverage: f64| {
             let count = (coverage * reference_cells as f64).round() as usize;
@@ -101,7 +103,8 @@ impl Cells<'_> {
         COVERAGES.into_iter().filter_map(of).collect()
     }
 
-    /// One entry per bin, the empty ones too, so that tables of different scenes have the same rows.
+    /// Returns one entry per bin. Empty bins are included, so that tables of different scenes have
+    /// the same rows.
     pub(crate) fn per_slope(&self, slopes_deg: &Grid<f32>) -> Vec<SlopeMetrics> {
         let bins = SLOPE_BOUNDS_DEG.len() - 1;
         let bin = |i: usize| {

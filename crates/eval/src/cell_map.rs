@@ -1,19 +1,20 @@
-//! From the cells of the reference grid to the cells of another grid.
+//! Map from the cells of the reference grid to the cells of another grid.
 //!
-//! In one coordinate system this is an affine map. Between two systems the exact projection is evaluated at the nodes of a
-//! lattice and interpolated bilinearly; the lattice is refined until the interpolation at the centres of its meshes is within
-//! [`TOLERANCE_CELLS`] of the exact projection. For UTM zones and 0.5 m cells, 16 cells apart, the difference is about 1e-6 m.
+//! In one coordinate system this is an affine map. Between two systems, the exact projection is
+//! evaluated at the nodes of a lattice and interpolated bilinearly. The lattice is refined until
+//! the interpolation at the centres of its meshes is within [`TOLERANCE_CELLS`] of the exact
+//! projection.
 
-use crate::EvalError;
+use crate::error::EvalError;
 use raster::{GeoTransform, Grid};
 
 /// Largest interpolation error of a projected map, in cells of the other grid.
 const TOLERANCE_CELLS: f64 = 1e-3;
 
-/// Distance of the lattice nodes at the start, in reference cells.
+/// First distance of the lattice nodes, in reference cells.
 const WIDEST_SPACING: usize = 16;
 
-/// Where a (fractional) cell of the reference lies in another grid, in cells of that grid.
+/// Map from fractional cells of the reference to cells of another grid.
 #[derive(Debug, Clone)]
 pub struct CellMap(Kind);
 
@@ -23,7 +24,8 @@ enum Kind {
     Lattice(Lattice),
 }
 
-/// Node (i, j) stands at the reference cell (i, j) · spacing − margin.
+/// Lattice of positions in the other grid. Node (i, j) stands at the reference cell (i, j) ·
+/// spacing − margin.
 #[derive(Debug, Clone)]
 struct Lattice {
     nodes: Grid<[f64; 2]>,
@@ -32,15 +34,19 @@ struct Lattice {
 }
 
 impl CellMap {
-    /// The map of a grid onto itself.
+    /// Returns the map of a grid onto itself.
+    ///
+    /// ```
+    /// assert_eq!(eval::CellMap::identity().position(3.0, 4.5), (3.0, 4.5));
+    /// ```
     pub const fn identity() -> Self {
         Self(Kind::Affine([0.0, 1.0, 0.0, 0.0, 0.0, 1.0]))
     }
 
-    /// The map between two grids in the same coordinate system.
+    /// Returns the map between two grids in the same coordinate system.
     ///
     /// # Errors
-    /// [`EvalError::SingularGeotransform`] when either grid's cells have no area.
+    /// [`EvalError::SingularGeotransform`] if the cells of either grid have no area.
     pub fn affine(reference: &GeoTransform, other: &GeoTransform) -> Result<Self, EvalError> {
         check(reference)?;
         check(other)?;
@@ -48,19 +54,22 @@ impl CellMap {
         let origin = other.cell_from_map(x, y).ok_or(EvalError::SingularGeotransform(other.0))?;
         let (r, o) = (&reference.0, &other.0);
         let det = o[1] * o[5] - o[2] * o[4];
-        // One step in the reference, in cells of the other grid; free of the rounding of large map coordinates.
+        // One step in the reference, in cells of the other grid. It avoids the rounding of large
+        // map coordinates.
         let step = |dx: f64, dy: f64| ((dx * o[5] - dy * o[2]) / det, (dy * o[1] - dx * o[4]) / det);
         let (right, down) = (step(r[1], r[4]), step(r[2], r[5]));
         Ok(Self(Kind::Affine([origin.0, right.0, down.0, origin.1, right.1, down.1])))
     }
 
-    /// The map between grids in two coordinate systems, of which `other_from_reference` projects map coordinates.
+    /// Returns the map between grids in two coordinate systems. `other_from_reference` projects map
+    /// coordinates.
     ///
-    /// `size` is the reference's (columns, rows); `margin` is how many cells beyond it the map must hold (the radius of a later
-    /// search, in cells). Where the projection gives `None`, so does the map.
+    /// `size` is the reference's (columns, rows). The map also holds `margin` cells beyond the
+    /// reference: set it to the radius of a later search, in cells. Positions where the projection
+    /// returns `None` are NaN.
     ///
     /// # Errors
-    /// [`EvalError::SingularGeotransform`] when either grid's cells have no area.
+    /// [`EvalError::SingularGeotransform`] if the cells of either grid have no area.
     pub fn projected(
         reference: &GeoTransform,
         other: &GeoTransform,
@@ -85,7 +94,7 @@ impl CellMap {
         }
     }
 
-    /// The cell of the other grid under a cell of the reference; NaN where there is none.
+    /// Returns the cell of the other grid under a cell of the reference, or NaN if there is none.
     pub fn position(&self, column: f64, row: f64) -> (f64, f64) {
         match &self.0 {
             Kind::Affine(c) => (c[0] + column * c[1] + row * c[2], c[3] + column * c[4] + row * c[5]),
@@ -116,7 +125,7 @@ impl Lattice {
     fn position(&self, column: f64, row: f64) -> (f64, f64) {
         let (x, y) = ((column + self.margin) / self.spacing, (row + self.margin) / self.spacing);
         let last = |count: usize| (count.max(2) - 2) as f64;
-        // Outside, the nearest mesh is continued.
+        // Outside the lattice, the nearest mesh is extrapolated.
         let (i, j) = (x.floor().clamp(0.0, last(self.nodes.width())), y.floor().clamp(0.0, last(self.nodes.height())));
         let (u, v) = (x - i, y - j);
         let node =
@@ -129,7 +138,8 @@ impl Lattice {
         (mix(0), mix(1))
     }
 
-    /// The largest error at the centres of the meshes, where a bilinear interpolation is worst.
+    /// Returns the largest error at the centres of the meshes, where bilinear interpolation is
+    /// worst.
     fn worst_error(&self, exact: &mut impl FnMut(f64, f64) -> Option<(f64, f64)>) -> f64 {
         let mut worst = 0.0f64;
         for j in 0..self.nodes.height() - 1 {
@@ -139,7 +149,8 @@ impl Lattice {
                 let (found, true_position) = (self.position(column, row), exact(column, row));
                 if let Some((x, y)) = true_position {
                     let error = (found.0 - x).hypot(found.1 - y);
-                    // A node without a projection beside a place with one: only a finer lattice can tell them apart.
+                    // One corner of the mesh has no projection although its centre has one. Only a
+                    // finer lattice can separate them.
                     worst = worst.max(if error.is_nan() { f64::INFINITY } else { error });
                 }
             }

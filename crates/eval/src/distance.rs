@@ -1,10 +1,11 @@
-//! The Euclidean distance of every cell to the nearest marked one, metres (Felzenszwalb and Huttenlocher 2012, Theory of
-//! Computing 8, 415-428): exact, in linear time, for cells of any side lengths.
+//! Euclidean distance of every cell to the nearest marked cell, in metres (Felzenszwalb and
+//! Huttenlocher 2012, Theory of Computing 8, 415-428). It is exact, takes linear time and allows
+//! any side lengths.
 
 use raster::Grid;
 use rayon::prelude::*;
 
-/// Distances between cell centres; infinite where nothing is marked.
+/// Returns the distances between cell centres. They are infinite if no cell is marked.
 pub(crate) fn distances_m(marked: &Grid<bool>, cell_size_m: (f64, f64)) -> Grid<f32> {
     let (width, height) = (marked.width(), marked.height());
     let columns = transposed(&marked.map(|&m| if m { 0.0 } else { f64::INFINITY }));
@@ -12,6 +13,16 @@ pub(crate) fn distances_m(marked: &Grid<bool>, cell_size_m: (f64, f64)) -> Grid<
     let both = squared(transposed(&along_columns), cell_size_m.0);
     debug_assert_eq!((both.width(), both.height()), (width, height));
     both.map(|d| d.sqrt() as f32)
+}
+
+/// One parabola of a lower envelope.
+struct Parabola {
+    /// Cell of its vertex.
+    foot: usize,
+    /// Squared distance at its vertex, square metres.
+    base: f64,
+    /// Position from which it is the lowest, in cells.
+    from: f64,
 }
 
 fn transposed(grid: &Grid<f64>) -> Grid<f64> {
@@ -23,33 +34,33 @@ fn transposed(grid: &Grid<f64>) -> Grid<f64> {
     turned
 }
 
-/// In every row, the lower envelope of the parabolas that stand on its cells.
+/// Replaces every row by the lower envelope of the parabolas that stand on its cells.
 fn squared(mut grid: Grid<f64>, spacing_m: f64) -> Grid<f64> {
     let width = grid.width().max(1);
     grid.data_mut().par_chunks_mut(width).for_each(|row| {
-        // Feet of the envelope's parabolas with the place from which each is the lowest, in cells.
-        let mut envelope: Vec<(usize, f64, f64)> = Vec::new();
+        // Parabolas of the envelope, from left to right.
+        let mut envelope: Vec<Parabola> = Vec::new();
         let square = spacing_m * spacing_m;
         for (foot, &base) in row.iter().enumerate().filter(|(_, base)| base.is_finite()) {
             let mut from = f64::NEG_INFINITY;
-            while let Some(&(other, other_base, other_from)) = envelope.last() {
-                let (q, p) = (foot as f64, other as f64);
-                from = ((base / square + q * q) - (other_base / square + p * p)) / (2.0 * (q - p));
-                if from > other_from {
+            while let Some(other) = envelope.last() {
+                let (q, p) = (foot as f64, other.foot as f64);
+                from = ((base / square + q * q) - (other.base / square + p * p)) / (2.0 * (q - p));
+                if from > other.from {
                     break;
                 }
                 envelope.pop();
                 from = f64::NEG_INFINITY;
             }
-            envelope.push((foot, base, from));
+            envelope.push(Parabola { foot, base, from });
         }
         let mut next = 0;
         for (cell, value) in row.iter_mut().enumerate() {
-            while envelope.get(next + 1).is_some_and(|&(_, _, from)| from < cell as f64) {
+            while envelope.get(next + 1).is_some_and(|parabola| parabola.from < cell as f64) {
                 next += 1;
             }
-            if let Some(&(foot, base, _)) = envelope.get(next) {
-                *value = base + square * (cell as f64 - foot as f64).powi(2);
+            if let Some(parabola) = envelope.get(next) {
+                *value = parabola.base + square * (cell as f64 - parabola.foot as f64).powi(2);
             }
         }
     });

@@ -1,36 +1,42 @@
-//! How errors are distributed, for plots: a histogram around zero and the share of cells within an error.
+//! Distribution of errors, for plots: a histogram around zero, and the number of cells within an
+//! error.
 
 use raster::Grid;
 use serde::Serialize;
 
-/// Bins of a histogram; odd, so that one is centred on zero.
+/// Number of bins of a histogram. It is odd, so that one bin is centred on zero.
 const BINS: usize = 81;
-/// Steps of the cumulative curve.
+/// Number of steps of the cumulative curve.
 const STEPS: usize = 100;
 
 /// Counts of errors in bins of equal width from −range to +range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Histogram {
-    /// Half of what the bins cover, metres.
+    /// Half of the range that the bins cover, metres.
     pub range_m: f64,
-    /// Errors per bin, from the most negative.
+    /// Number of errors per bin, from the most negative.
     pub counts: Vec<usize>,
-    /// Errors below −range.
+    /// Number of errors below −range.
     pub below: usize,
-    /// Errors above +range.
+    /// Number of errors above +range.
     pub above: usize,
 }
 
-/// How many cells have an error of at most so much.
+/// Number of cells with at most a given error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cumulative {
-    /// |error|, metres, rising from 0.
+    /// Absolute error, metres, rising from 0.
     pub error_m: Vec<f64>,
-    /// Cells with at most that error.
+    /// Number of cells with at most that error.
     pub cells: Vec<usize>,
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is not below a value; 1 for what is not positive.
+/// Returns the smallest of 1, 2 and 5 times a power of ten that is not below `value`. Returns 1 for
+/// values that are not positive.
+///
+/// ```
+/// assert_eq!(eval::round_up(1.2), 2.0);
+/// ```
 pub fn round_up(value: f64) -> f64 {
     if !(value.is_finite() && value > 0.0) {
         return 1.0;
@@ -43,7 +49,7 @@ pub fn round_up(value: f64) -> f64 {
         .unwrap_or(10.0 * decade)
 }
 
-/// The histogram of the finite errors.
+/// Counts the finite errors in bins from −`range_m` to +`range_m`.
 pub fn histogram(errors: &Grid<f32>, range_m: f64) -> Histogram {
     let mut found = Histogram { range_m, counts: vec![0; BINS], below: 0, above: 0 };
     let width = 2.0 * range_m / BINS as f64;
@@ -59,7 +65,7 @@ pub fn histogram(errors: &Grid<f32>, range_m: f64) -> Histogram {
     found
 }
 
-/// How many of the finite errors are within 0 … `range_m` in equal steps.
+/// Counts the finite errors of at most 0 … `range_m` metres, in equal steps.
 pub fn cumulative(errors: &Grid<f32>, range_m: f64) -> Cumulative {
     let step = range_m / STEPS as f64;
     let mut cells = vec![0usize; STEPS + 1];

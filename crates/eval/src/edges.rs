@@ -1,34 +1,36 @@
-//! Where a surface jumps: roof edges, walls, the outlines of trees.
+//! Height jumps of a surface: roof edges, walls, outlines of trees.
 //!
-//! A jump lies between two cells side by side whose heights differ by more than [`JUMP_M`] and by more than [`JUMP_STEEPNESS`]
-//! times their distance (so that a mountain side on a coarse grid is none). The edge zone holds the cells within [`ZONE_M`] or
-//! [`ZONE_CELLS`] cells of a jump, whichever is more: at 0.5 m cells the two cells on either side.
+//! A jump lies between two neighbouring cells whose heights differ by more than [`JUMP_M`] and by
+//! more than [`JUMP_STEEPNESS`] times their distance. The second condition excludes mountain sides
+//! on coarse grids. The edge zone holds the cells within [`ZONE_M`] or [`ZONE_CELLS`] cells of a
+//! jump, whichever is more. For cells of 0.5 m these are the two cells on either side.
 
 use crate::align::MetresFromCells;
 use crate::distance::distances_m;
 use raster::Grid;
 use serde::Serialize;
 
-/// Least height difference of a jump, metres.
+/// Lowest height difference of a jump, metres.
 pub const JUMP_M: f64 = 2.0;
-/// Least height difference of a jump over the distance of its cells.
+/// Lowest height difference of a jump divided by the distance of its cells.
 pub const JUMP_STEEPNESS: f64 = 2.0;
 /// Reach of the edge zone, metres.
 pub const ZONE_M: f64 = 1.0;
-/// Least reach of the edge zone, cells.
+/// Shortest reach of the edge zone, cells.
 pub const ZONE_CELLS: f64 = 2.0;
 
-/// What counts as an edge on a grid.
+/// Definition of an edge on a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EdgeRule {
-    /// Neighbours that differ by more than this, metres, along columns and rows.
+    /// Height difference between neighbours that makes a jump, along columns and along rows,
+    /// metres.
     pub jump_m: (f64, f64),
-    /// Cells that are within this of a jump belong to the zone, metres.
+    /// Distance from a jump within which a cell belongs to the edge zone, metres.
     pub zone_m: f64,
 }
 
 impl EdgeRule {
-    /// The rule for cells of these sides.
+    /// Returns the rule for cells of this size.
     pub fn of(metres_from_cells: MetresFromCells) -> Self {
         let (along_columns, along_rows) = metres_from_cells.cell_size_m();
         let jump = |side: f64| JUMP_M.max(JUMP_STEEPNESS * side);
@@ -39,7 +41,7 @@ impl EdgeRule {
     }
 }
 
-/// Which cells are within the edge zone of the surface. A jump lies half-way between its cells.
+/// Marks the cells within the edge zone of the surface. A jump lies half-way between its two cells.
 pub fn edge_zone(heights: &Grid<f32>, metres_from_cells: MetresFromCells) -> Grid<bool> {
     let rule = EdgeRule::of(metres_from_cells);
     let sides = metres_from_cells.cell_size_m();
@@ -49,14 +51,14 @@ pub fn edge_zone(heights: &Grid<f32>, metres_from_cells: MetresFromCells) -> Gri
         at_jump[b] = true;
     }
     let reach = rule.zone_m - 0.5 * sides.0.max(sides.1);
-    // A hair more, so that a cell at exactly the reach is inside whatever the rounding.
+    // The factor includes cells at exactly the reach, whatever the rounding.
     distances_m(&at_jump, sides).map(|&d| f64::from(d) <= reach * (1.0 + 1e-6))
 }
 
 /// A cell as (column, row).
 pub(crate) type Cell = (usize, usize);
 
-/// The pairs of neighbours with a jump between them, the higher cell first.
+/// Returns the pairs of neighbours with a jump between them, the higher cell first.
 pub(crate) fn jumps(heights: &Grid<f32>, rule: EdgeRule) -> impl Iterator<Item = (Cell, Cell)> {
     let cells = (0..heights.height()).flat_map(|row| (0..heights.width()).map(move |column| (column, row)));
     cells.flat_map(move |cell @ (column, row)| {
@@ -65,7 +67,7 @@ pub(crate) fn jumps(heights: &Grid<f32>, rule: EdgeRule) -> impl Iterator<Item =
     })
 }
 
-/// The two cells, the higher first, when they differ by more than `jump_m`.
+/// Returns the two cells, the higher first, if they differ by more than `jump_m`.
 fn ordered(heights: &Grid<f32>, a: Cell, b: Cell, jump_m: f64) -> Option<(Cell, Cell)> {
     let difference = f64::from(*heights.get(a.0, a.1)?) - f64::from(*heights.get(b.0, b.1)?);
     if difference > jump_m {

@@ -1,13 +1,13 @@
-//! What can be wrong with the input of an evaluation.
+//! Errors of an evaluation.
 
-/// Why an evaluation is refused.
+/// The reason why an evaluation is refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvalError {
     /// The reference has no valid cell left.
     #[error("the reference has no valid cell{}: check its no-data value, the mask and the skipped classes", skipped_text(*.skipped))]
     EmptyReference {
-        /// Valid cells that were left out because of their class or the mask.
+        /// Number of valid cells that the class or the mask excludes.
         skipped: usize,
     },
     /// No cell is valid in both surfaces.
@@ -16,38 +16,38 @@ pub enum EvalError {
          that each names its coordinate system"
     )]
     NoOverlap {
-        /// Valid cells of the reference.
+        /// Number of valid cells of the reference.
         reference_cells: usize,
     },
-    /// Too few common cells for a search of the shift.
+    /// Too few cells are valid in both surfaces to search for the shift.
     #[error(
         "{found} cells are valid in both surfaces, a search of the shift needs {needed}: use the alignment none or z"
     )]
     TooFewCells {
-        /// Cells valid in both, at the best shift.
+        /// Number of cells valid in both, at the best shift.
         found: usize,
-        /// The least number that is accepted.
+        /// Lowest number that is accepted.
         needed: usize,
     },
-    /// A raster that has to be on the reference grid is not.
+    /// A raster does not have the size of the grid that it belongs to.
     #[error(
         "the {what} grid has {found_width} x {found_height} cells, the reference {width} x {height}: \
          resample it onto the reference first"
     )]
     Shape {
-        /// Which raster.
+        /// Name of the raster.
         what: &'static str,
-        /// Columns found.
+        /// Number of columns found.
         found_width: usize,
-        /// Rows found.
+        /// Number of rows found.
         found_height: usize,
-        /// Columns expected.
+        /// Number of columns expected.
         width: usize,
-        /// Rows expected.
+        /// Number of rows expected.
         height: usize,
     },
-    /// Classes are to be skipped but none were given.
-    #[error("classes are to be skipped, but there are none: give a class raster (--classes)")]
+    /// Classes are to be skipped, but there is no class raster.
+    #[error("classes are to be skipped, but there is no class raster: give one")]
     SkipWithoutClasses,
     /// A geotransform cannot be inverted, or holds values that are not finite.
     #[error("the geotransform {0:?} cannot be inverted: a grid needs cells with an area")]
@@ -55,12 +55,12 @@ pub enum EvalError {
     /// A threshold or a radius is not a positive finite number.
     #[error("{name} is {value}, expected a positive number of metres")]
     NotPositive {
-        /// Which setting.
+        /// Name of the setting.
         name: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
     },
-    /// The ground has too little slope for Nuth and Kääb's method.
+    /// The ground has too little slope for the method of Nuth and Kääb.
     #[error(
         "the ground is too flat for the alignment nuth-kaab: {:.2} % of it is steeper than {slope_deg}° at cells of {cell_m:.1} m, \
          needed are {:.0} %: use the alignment xyz, z or none", 100.0 * share, 100.0 * needed
@@ -68,14 +68,14 @@ pub enum EvalError {
     TooFlat {
         /// Share of the cells that are steep enough, 0 to 1.
         share: f64,
-        /// The least share that is accepted.
+        /// Lowest share that is accepted, 0 to 1.
         needed: f64,
-        /// What counts as steep, degrees.
+        /// Slope from which a cell is steep, degrees.
         slope_deg: f64,
-        /// The cells at which the slope was taken, metres.
+        /// Size of the cells on which the slope was computed, metres.
         cell_m: f64,
     },
-    /// All slopes look the same way.
+    /// All slopes face one direction or its opposite.
     #[error(
         "the slopes all face one way or its opposite, which leaves the shift across open for the alignment nuth-kaab: \
          use the alignment xyz, z or none"
@@ -87,11 +87,11 @@ pub enum EvalError {
          use a smaller radius, or a coarser reference"
     )]
     SearchTooWide {
-        /// The radius asked for, metres.
+        /// Requested radius, metres.
         radius_m: f64,
-        /// Whole-cell shifts within it.
+        /// Number of whole-cell shifts within the radius.
         candidates: usize,
-        /// The most that are tried.
+        /// Highest number that is tried.
         most: usize,
     },
 }

@@ -1,6 +1,7 @@
-//! One surface against another: alignment, then errors over all cells, per class, per slope and at edges, and what stands above the terrain.
+//! Evaluation of one surface against another: alignment, then errors over all cells, per class, per
+//! slope and at edges, and the objects above the terrain.
 
-use crate::align::{Alignment, MetresFromCells, Shift};
+use crate::align::{AlignmentMethod, MetresFromCells, Shift};
 use crate::breakdown::{Cells, ClassMetrics, CoverageMetrics, EdgeMetrics, SlopeMetrics};
 use crate::cell_map::CellMap;
 use crate::edges::{EdgeRule, edge_zone};
@@ -17,38 +18,42 @@ use numeric::percentile;
 use raster::Grid;
 use rayon::prelude::*;
 
-/// The class of bare ground in the LAS specification.
+/// Class of bare ground in the LAS specification.
 const GROUND: i32 = 2;
-/// The class of buildings.
+/// Class of buildings in the LAS specification.
 const BUILDING: i32 = 6;
-/// The terrain is taken from the ground class when at least this share of the reference's cells has it.
+/// Lowest share of the reference's cells in the ground class from which the terrain is taken from
+/// that class.
 const LEAST_GROUND_SHARE: f64 = 0.02;
 
-/// What to compare. Heights are metres above the same vertical datum, cells that are not finite are void.
+/// Input of an evaluation. Heights are metres above the same vertical datum. Cells that are not
+/// finite are void.
 #[derive(Debug, Clone, Copy)]
 pub struct EvalInput<'a> {
-    /// The surface that is evaluated.
+    /// Evaluated surface.
     pub test: &'a Grid<f32>,
-    /// The surface that is believed; errors are measured at its cells.
+    /// Trusted surface. Errors are measured at its cells.
     pub reference: &'a Grid<f32>,
-    /// Where the reference's cells lie in the test grid. For [`Alignment::Xyz`] and [`Alignment::NuthKaab`] it must hold as far
-    /// outside the reference as the search reaches.
+    /// Positions of the reference's cells in the test grid. For [`AlignmentMethod::Xyz`] and
+    /// [`AlignmentMethod::NuthKaab`] it must hold as far outside the reference as the search
+    /// reaches.
     pub test_from_reference: &'a CellMap,
-    /// The size of the reference's cells.
+    /// Size and orientation of the reference's cells.
     pub metres_from_cells: MetresFromCells,
-    /// The class of each reference cell, on the reference grid; `None` where there is none.
+    /// Class of each reference cell, on the reference grid. `None` marks a cell without a class.
     pub classes: Option<&'a Grid<Option<i32>>>,
-    /// Which reference cells count, on the reference grid; all without one.
+    /// Reference cells that count, on the reference grid. All count without a mask.
     pub mask: Option<&'a Grid<bool>>,
-    /// The bare ground on the reference grid, above the same datum; without one it is taken from the ground class, or estimated.
+    /// Bare ground on the reference grid, above the same datum. Without it, the terrain is taken
+    /// from the ground class or estimated.
     pub terrain: Option<&'a Grid<f32>>,
-    /// How far each cell of the test is to be believed, on the test's grid, more is better: what remains when the least
-    /// believed are dropped.
+    /// Confidence of each cell of the test, on the test grid; higher is better. It is used to
+    /// evaluate the most confident cells alone.
     pub confidence: Option<&'a Grid<f32>>,
 }
 
 impl<'a> EvalInput<'a> {
-    /// Two surfaces and nothing else.
+    /// Returns the input with two surfaces and nothing else.
     pub fn new(
         test: &'a Grid<f32>,
         reference: &'a Grid<f32>,
@@ -68,25 +73,25 @@ impl<'a> EvalInput<'a> {
     }
 }
 
-/// How to compare.
+/// Settings of an evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvalConfig {
-    /// What is removed first.
-    pub alignment: Alignment,
+    /// Shift that is removed first.
+    pub alignment: AlignmentMethod,
     /// Radius of the horizontal search, metres.
     pub search_m: f64,
     /// Thresholds of `completeness_<t>` and `pag_<t>`, metres.
     pub thresholds_m: Vec<f64>,
-    /// Classes whose cells are left out of everything, the alignment too.
+    /// Classes whose cells are excluded from everything, including the alignment.
     pub skip: Vec<i32>,
-    /// Least height above the terrain of what stands, metres.
+    /// Lowest height above the terrain of a standing object, metres.
     pub standing_m: f64,
 }
 
 impl Default for EvalConfig {
     fn default() -> Self {
         Self {
-            alignment: Alignment::Xyz,
+            alignment: AlignmentMethod::Xyz,
             search_m: 5.0,
             thresholds_m: vec![0.5, 1.0, 2.5, 7.5],
             skip: Vec::new(),
@@ -95,44 +100,62 @@ impl Default for EvalConfig {
     }
 }
 
-/// What was found.
+/// Result of an evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
     /// The translation that was added to the test surface.
     pub shift: Shift,
-    /// How the horizontal part was found by [`Alignment::Xyz`].
+    /// Summary of the search of [`AlignmentMethod::Xyz`].
     pub search: Option<SearchSummary>,
-    /// How it was found by [`Alignment::NuthKaab`].
+    /// Summary of [`AlignmentMethod::NuthKaab`].
     pub nuth_kaab: Option<NuthKaabSummary>,
-    /// Over all cells that are not skipped.
+    /// Metrics over all cells that are not skipped.
     pub overall: Metrics,
-    /// Per class, in rising order; empty without classes.
+    /// Metrics per class, in rising order. Empty without classes.
     pub classes: Vec<ClassMetrics>,
-    /// Per slope of the reference; cells beside a void have none.
+    /// Metrics per slope of the reference. Cells beside a void have no slope.
     pub slopes: Vec<SlopeMetrics>,
-    /// What counts as an edge.
+    /// Definition of an edge.
     pub edge_rule: EdgeRule,
-    /// Near and away from the reference's height jumps.
+    /// Metrics near and away from the reference's height jumps.
     pub edges: EdgeMetrics,
-    /// The overreach at roof edges: of the building class where there is one, else of all that is level on both sides.
+    /// Overreach at roof edges: at edges of the building class if the reference has one, at all
+    /// edges with level sides otherwise.
     pub sharpness: Sharpness,
-    /// What stands above the terrain.
+    /// Completeness of the objects above the terrain.
     pub standing: Standing,
-    /// What remains of the surface when its least believed cells are dropped; empty without a confidence.
+    /// Metrics of the most confident cells. Empty without a confidence.
     pub coverages: Vec<CoverageMetrics>,
-    /// Valid cells of the reference that were left out because of their class or the mask.
+    /// Number of valid cells of the reference that the class or the mask excludes.
     pub skipped_cells: usize,
-    /// Test − reference after the alignment, metres, on the reference grid; NaN where either is void, or skipped.
+    /// Test − reference after the alignment, metres, on the reference grid. NaN where either is
+    /// void or skipped.
     pub errors: Grid<f32>,
-    /// The test surface after the alignment, on the reference grid; NaN where it is void.
+    /// Test surface after the alignment, on the reference grid. NaN where it is void.
     pub aligned: Grid<f32>,
 }
 
 /// Aligns the test surface with the reference and measures its errors.
 ///
+/// ```
+/// use eval::{CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
+/// use raster::{GeoTransform, Grid};
+///
+/// let reference = Grid::filled(40, 30, 120.0);
+/// let test = Grid::filled(40, 30, 120.5);
+/// let geotransform = GeoTransform::north_up(0.0, 0.0, 1.0);
+/// let cells = CellMap::affine(&geotransform, &geotransform)?;
+/// let metres = MetresFromCells::new(&geotransform, (1.0, 1.0));
+/// let config = EvalConfig { alignment: eval::AlignmentMethod::None, ..EvalConfig::default() };
+/// let found = evaluate(&EvalInput::new(&test, &reference, &cells, metres), &config)?;
+/// assert_eq!(found.overall.errors.map(|errors| errors.mean), Some(0.5));
+/// # Ok::<(), eval::EvalError>(())
+/// ```
+///
 /// # Errors
-/// When the settings are unusable, the reference is empty, the two share no cell, a grid has another shape than the reference, or
-/// the ground does not allow the alignment.
+/// [`EvalError`] if a setting is unusable, if the reference is empty, if the two surfaces share no
+/// cell, if a grid has another shape than the reference, or if the ground does not allow the
+/// alignment.
 pub fn evaluate(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Evaluation, EvalError> {
     check(input, config)?;
     let counted = counted(input, &config.skip);
@@ -142,13 +165,14 @@ pub fn evaluate(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Evaluation
     if reference_cells == 0 {
         return Err(EvalError::EmptyReference { skipped: skipped_cells });
     }
-    let (cells, search, nuth_kaab) = horizontal_shift(&EvalInput { reference: &counted, ..*input }, config)?;
+    let HorizontalShift { cells, search, nuth_kaab } =
+        horizontal_shift(&EvalInput { reference: &counted, ..*input }, config)?;
     let mut aligned = moved(input, cells);
     let mut errors = differences(&aligned, &counted);
     let offset = percentile(&mut finite(&errors), 50.0).ok_or(EvalError::NoOverlap { reference_cells })?;
     let (dx_m, dy_m) = input.metres_from_cells.apply(cells.0, cells.1);
     let mut shift = Shift { dx_m, dy_m, dz_m: 0.0 };
-    if config.alignment != Alignment::None {
+    if config.alignment != AlignmentMethod::None {
         shift.dz_m = 0.0 - offset;
         for grid in [&mut errors, &mut aligned] {
             grid.data_mut().iter_mut().for_each(|e| *e -= offset);
@@ -174,7 +198,8 @@ pub fn evaluate(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Evaluation
     })
 }
 
-/// The test's confidence at every reference cell, moved by `shift` reference cells.
+/// Returns the test's confidence at every reference cell. The test is moved by `shift` reference
+/// cells.
 fn confidences(input: &EvalInput<'_>, confidence: &Grid<f32>, shift: (f64, f64)) -> Grid<f32> {
     let (width, height) = (input.reference.width(), input.reference.height());
     let mut out = Grid::filled(width, height, f32::NAN);
@@ -216,7 +241,7 @@ fn check(input: &EvalInput<'_>, config: &EvalConfig) -> Result<(), EvalError> {
     Ok(())
 }
 
-/// The reference with the cells void that do not count.
+/// Returns the reference without the cells that the class or the mask excludes.
 fn counted(input: &EvalInput<'_>, skip: &[i32]) -> Grid<f32> {
     let mut reference = input.reference.clone();
     for (i, height) in reference.data_mut().iter_mut().enumerate() {
@@ -229,31 +254,39 @@ fn counted(input: &EvalInput<'_>, skip: &[i32]) -> Grid<f32> {
     reference
 }
 
-type Horizontal = ((f64, f64), Option<SearchSummary>, Option<NuthKaabSummary>);
+/// Horizontal shift, and the summary of the method that found it.
+#[derive(Default)]
+struct HorizontalShift {
+    /// Shift in reference cells.
+    cells: (f64, f64),
+    search: Option<SearchSummary>,
+    nuth_kaab: Option<NuthKaabSummary>,
+}
 
-fn horizontal_shift(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Horizontal, EvalError> {
+fn horizontal_shift(input: &EvalInput<'_>, config: &EvalConfig) -> Result<HorizontalShift, EvalError> {
     let (reference, metres_from_cells) = (input.reference, input.metres_from_cells);
     match config.alignment {
-        Alignment::None | Alignment::Z => Ok(((0.0, 0.0), None, None)),
-        Alignment::Xyz => {
+        AlignmentMethod::None | AlignmentMethod::Z => Ok(HorizontalShift::default()),
+        AlignmentMethod::Xyz => {
             let (test, test_from_reference) = (input.test, input.test_from_reference);
             let search = Search { reference, test, test_from_reference, metres_from_cells };
             let (cells, summary) = search.run(config.search_m)?;
-            Ok((cells, Some(summary), None))
+            Ok(HorizontalShift { cells, search: Some(summary), nuth_kaab: None })
         }
-        Alignment::NuthKaab => {
+        AlignmentMethod::NuthKaab => {
             let at = |shift| differences(&moved(input, shift), reference).map(|&d| d as f32);
             if at((0.0, 0.0)).data().iter().all(|d| d.is_nan()) {
                 let reference_cells = reference.data().iter().filter(|h| h.is_finite()).count();
                 return Err(EvalError::NoOverlap { reference_cells });
             }
             let (cells, summary) = NuthKaab { reference, metres_from_cells, differences: &at }.run(config.search_m)?;
-            Ok((cells, None, Some(summary)))
+            Ok(HorizontalShift { cells, search: None, nuth_kaab: Some(summary) })
         }
     }
 }
 
-/// The test at every reference cell, moved by `shift` reference cells; NaN where it is void.
+/// Returns the test at every reference cell, NaN where it is void. The test is moved by `shift`
+/// reference cells.
 fn moved(input: &EvalInput<'_>, shift: (f64, f64)) -> Grid<f64> {
     let mut heights = Grid::filled(input.reference.width(), input.reference.height(), f64::NAN);
     let width = input.reference.width().max(1);
@@ -266,7 +299,7 @@ fn moved(input: &EvalInput<'_>, shift: (f64, f64)) -> Grid<f64> {
     heights
 }
 
-/// Test − reference; NaN where either is void.
+/// Returns test − reference, NaN where either is void.
 fn differences(test: &Grid<f64>, reference: &Grid<f32>) -> Grid<f64> {
     let cells = test.data().iter().zip(reference.data());
     let cells = cells.map(|(test, &h)| if h.is_finite() { test - f64::from(h) } else { f64::NAN }).collect();
@@ -277,7 +310,8 @@ fn finite(errors: &Grid<f64>) -> Vec<f64> {
     errors.data().iter().copied().filter(|e| e.is_finite()).collect()
 }
 
-/// The overreach at the edges of buildings where their class is known, else at all edges.
+/// Measures the overreach at the edges of buildings if the reference has their class, at all edges
+/// otherwise.
 fn roof_edges(input: &EvalInput<'_>, counted: &Grid<f32>, aligned: &Grid<f32>) -> Sharpness {
     let classes = input.classes.filter(|classes| classes.data().contains(&Some(BUILDING)));
     let counts = |cell: (usize, usize)| {
@@ -306,7 +340,8 @@ fn standing_of(input: &EvalInput<'_>, config: &EvalConfig, counted: &Grid<f32>, 
     standing((input.reference, aligned), terrain, area, config.standing_m, counts)
 }
 
-/// The classes and how many cells of the reference are ground, when these are enough for a terrain.
+/// Returns the classes and the number of ground cells of the reference, if these are enough for a
+/// terrain.
 fn ground_cells<'a>(input: &EvalInput<'a>) -> Option<(&'a Grid<Option<i32>>, usize)> {
     let classes = input.classes?;
     let valid = || input.reference.data().iter().zip(classes.data()).filter(|(h, _)| h.is_finite());

@@ -1,12 +1,14 @@
-//! Slope and its direction: Horn's derivative (Proc. IEEE 69, 1981) over the eight neighbours with weights 1, 2, 1.
+//! Slope and aspect by Horn's derivative (Proc. IEEE 69, 1981): differences over the eight
+//! neighbours with weights 1, 2, 1.
 //!
-//! Gradients are metres per metre along the map's x and y axes. A cell whose 3 × 3 neighbourhood is not complete has none (NaN).
+//! Gradients are in metres per metre along the map's x and y axes. They are NaN if the 3 × 3
+//! neighbourhood is not complete.
 
 use crate::align::MetresFromCells;
 use raster::Grid;
 use rayon::prelude::*;
 
-/// The gradient of every cell along x and y; NaN where a neighbour is void or outside.
+/// Returns the gradient of every cell along x and y. It is NaN if a neighbour is void or outside.
 pub(crate) fn gradients(heights: &Grid<f32>, metres_from_cells: MetresFromCells) -> Grid<[f32; 2]> {
     let (width, height) = (heights.width(), heights.height());
     let mut found = Grid::filled(width, height, [f32::NAN; 2]);
@@ -31,12 +33,12 @@ pub(crate) fn gradients(heights: &Grid<f32>, metres_from_cells: MetresFromCells)
     found
 }
 
-/// The tangent of the slope.
+/// Returns the tangent of the slope.
 pub(crate) fn steepness(gradient: [f32; 2]) -> f64 {
     f64::from(gradient[0]).hypot(f64::from(gradient[1]))
 }
 
-/// The slope of every cell, degrees; NaN where its 3 × 3 neighbourhood is not complete.
+/// Returns the slope of every cell, degrees. It is NaN if the 3 × 3 neighbourhood is not complete.
 pub fn slope_deg(heights: &Grid<f32>, metres_from_cells: MetresFromCells) -> Grid<f32> {
     gradients(heights, metres_from_cells).map(|&g| steepness(g).atan().to_degrees() as f32)
 }

@@ -1,16 +1,18 @@
-//! How far one surface model is from another: co-registration and error metrics.
+//! Accuracy of one surface model against another: co-registration and error metrics.
 //!
-//! Two height grids go in, the evaluated one (*test*) and the one that is believed (*reference*), with the map that leads from
-//! the cells of the second to the cells of the first ([`CellMap`]); out comes an [`Evaluation`]: the shift that was removed,
-//! the errors over all cells, per class, per slope and at edges, the completeness in all its kinds, the overreach of roofs, and the
-//! error of every cell.
+//! [`evaluate`] compares two height grids: the evaluated one (the *test*) and the trusted one (the
+//! *reference*). A [`CellMap`] leads from the cells of the reference to the cells of the test. The
+//! resulting [`Evaluation`] holds the shift that was removed, the errors over all cells, per class,
+//! per slope and at edges, the kinds of completeness, the overreach of roofs, and the error of
+//! every cell.
 //!
-//! Surfaces that are no grids, meshes and point clouds, are compared by [`compare_surfaces`], maps in the pixels of a camera by
-//! [`compare_depths`], [`compare_normals`] and [`compare_masks`].
+//! [`compare_surfaces`] compares meshes and point clouds. [`compare_depths`], [`compare_normals`]
+//! and [`compare_masks`] compare maps in the pixels of one camera.
 //!
-//! Conventions: heights in metres above one and the same vertical datum; a cell that is not finite is void; cell centres are
-//! integers; an error is test − reference; a shift is what is *added to test* (x along the map's x axis, y along its y axis,
-//! z upwards). Nothing here reads a file or prints.
+//! Conventions: both heights are in metres above the same vertical datum. A cell that is not finite
+//! is void. Cell centres are integers. An error is test − reference. A shift is *added to the test*
+//! (x along the map's x axis, y along its y axis, z upwards). This crate reads no file and prints
+//! nothing.
 
 mod align;
 mod breakdown;
@@ -35,7 +37,7 @@ mod surface;
 mod terrain;
 mod vertical;
 
-pub use align::{Alignment, MetresFromCells, Shift};
+pub use align::{AlignmentMethod, MetresFromCells, Shift};
 pub use breakdown::{COVERAGES, ClassMetrics, CoverageMetrics, EdgeMetrics, SLOPE_BOUNDS_DEG, SlopeMetrics};
 pub use cell_map::CellMap;
 pub use distribution::{Cumulative, Histogram, cumulative, histogram, round_up};
@@ -55,8 +57,8 @@ pub use sharpness::{REACH_M, Sharpness};
 pub use standing::{Overlap, Standing};
 pub use statistics::{ErrorStatistics, OUTLIER_NMADS, RobustStatistics};
 pub use surface::{
-    DistanceStatistics, M3c2, NormalAngle, Surface, SurfaceComparison, SurfaceConfig, SurfaceError, ThresholdScore,
-    VoxelOverlap, compare_surfaces,
+    DistanceStatistics, LocalSurface, M3c2, NormalAngle, SurfaceComparison, SurfaceComparisonConfig, SurfaceError,
+    ThresholdScore, VoxelOverlap, compare_surfaces,
 };
 pub use terrain::{TerrainSource, WINDOW_M, estimated_terrain, terrain_from_ground};
 pub use vertical::convert_heights;

@@ -1,48 +1,49 @@
-//! Maps in the pixels of one camera against others: depths, normals, masks.
+//! Comparison of maps in the pixels of one camera: depths, normals, masks.
 //!
-//! A depth is there where it is finite and above zero (misses are written as 0, NaN or infinity); a normal where it is finite and
-//! not zero, whatever its length. Errors are test − reference over the pixels where both are there; how far the two agree on
-//! where something is, is told by the IoU of the valid pixels. Both maps are in the order of the same rows.
+//! A depth is valid if it is finite and above zero; misses are written as 0, NaN or infinity. A
+//! normal is valid if it is finite and not zero, whatever its length. Errors are test − reference
+//! over the pixels where both are valid. The IoU of the valid pixels measures how far both maps
+//! agree on where something is. Both maps list their pixels in the same order.
 
 use serde::Serialize;
 
 use numeric::percentile;
 use numeric::vector::unit;
 
-/// Factors of the shares δ₁, δ₂, δ₃ (Eigen, Puhrsch, Fergus 2014).
+/// Base of the thresholds δ₁, δ₂, δ₃ (Eigen, Puhrsch, Fergus 2014).
 const DELTA: f64 = 1.25;
 
-/// Maps of different sizes.
+/// The two maps have different sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the test has {test} pixels and the reference {reference}: expected maps of one camera")]
 pub struct MapSizeError {
-    /// Pixels of the test.
+    /// Number of pixels of the test.
     pub test: usize,
-    /// Pixels of the reference.
+    /// Number of pixels of the reference.
     pub reference: usize,
 }
 
-/// Which pixels have a value.
+/// Number of pixels with a value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PixelCounts {
-    /// All pixels.
+    /// Number of all pixels.
     pub pixels: usize,
-    /// Pixels with a value in the test.
+    /// Number of pixels with a value in the test.
     pub test: usize,
-    /// … in the reference.
+    /// Number of pixels with a value in the reference.
     pub reference: usize,
-    /// … in both.
+    /// Number of pixels with a value in both.
     pub both: usize,
-    /// Both over either; 1 where neither has any.
+    /// `both` divided by the number of pixels with a value in either; 1 if neither has any.
     pub iou: f64,
 }
 
-/// Errors of depths. The statistics are `None` where no pixel has both.
+/// Comparison of two depth maps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DepthComparison {
-    /// Which pixels have a depth.
+    /// Pixels with a depth.
     pub valid: PixelCounts,
-    /// The errors.
+    /// Errors over the pixels with both depths. `None` if there are no such pixels.
     pub errors: Option<DepthErrors>,
 }
 
@@ -51,26 +52,27 @@ pub struct DepthComparison {
 pub struct DepthErrors {
     /// Mean.
     pub bias: f64,
-    /// Mean of |e|.
+    /// Mean absolute error.
     pub mae: f64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rmse: f64,
-    /// Median of |e|.
+    /// Median absolute error.
     pub median_abs: f64,
-    /// Largest |e|.
+    /// Largest absolute error.
     pub max_abs: f64,
-    /// Mean of |e| / reference.
+    /// Mean of |e| divided by the reference.
     pub abs_rel: f64,
-    /// Shares of pixels where the larger of the two depths over the smaller is below 1.25, 1.25², 1.25³.
+    /// Shares of pixels where the larger depth divided by the smaller one is below 1.25, 1.25²,
+    /// 1.25³.
     pub delta: [f64; 3],
 }
 
-/// Errors of normals.
+/// Comparison of two normal maps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NormalComparison {
-    /// Which pixels have a normal.
+    /// Pixels with a normal.
     pub valid: PixelCounts,
-    /// The angles.
+    /// Angles over the pixels with both normals. `None` if there are no such pixels.
     pub angles: Option<AngleErrors>,
 }
 
@@ -81,29 +83,35 @@ pub struct AngleErrors {
     pub mean_deg: f64,
     /// Median.
     pub median_deg: f64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rmse_deg: f64,
     /// Largest.
     pub max_deg: f64,
-    /// Shares below 11.25°, 22.5°, 30°.
+    /// Shares of angles below 11.25°, 22.5° and 30°.
     pub within: [f64; 3],
 }
 
-/// Overlap of masks.
+/// Comparison of two masks.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MaskComparison {
-    /// Which pixels are set.
+    /// Pixels that are set.
     pub set: PixelCounts,
-    /// Share of the test's pixels that the reference has; 1 where there are none.
+    /// Share of the test's pixels that the reference has; 1 if the test has none.
     pub precision: f64,
-    /// Share of the reference's pixels that the test has; 1 where there are none.
+    /// Share of the reference's pixels that the test has; 1 if the reference has none.
     pub recall: f64,
 }
 
-/// Compares depths.
+/// Compares two depth maps.
+///
+/// ```
+/// let found = eval::compare_depths(&[1.0, 0.0, 3.0], &[1.5, 2.0, 3.0])?;
+/// assert_eq!((found.valid.both, found.errors.map(|e| e.mae)), (2, Some(0.25)));
+/// # Ok::<(), eval::MapSizeError>(())
+/// ```
 ///
 /// # Errors
-/// Maps of different sizes.
+/// [`MapSizeError`] if the maps have different sizes.
 pub fn compare_depths(test: &[f64], reference: &[f64]) -> Result<DepthComparison, MapSizeError> {
     same_size(test.len(), reference.len())?;
     let there = |depth: f64| depth.is_finite() && depth > 0.0;
@@ -129,10 +137,10 @@ pub fn compare_depths(test: &[f64], reference: &[f64]) -> Result<DepthComparison
     Ok(DepthComparison { valid, errors })
 }
 
-/// Compares normals.
+/// Compares two normal maps.
 ///
 /// # Errors
-/// Maps of different sizes.
+/// [`MapSizeError`] if the maps have different sizes.
 pub fn compare_normals(test: &[[f64; 3]], reference: &[[f64; 3]]) -> Result<NormalComparison, MapSizeError> {
     same_size(test.len(), reference.len())?;
     let pairs = || test.iter().zip(reference).map(|(&t, &r)| (unit(t), unit(r)));
@@ -149,10 +157,16 @@ pub fn compare_normals(test: &[[f64; 3]], reference: &[[f64; 3]]) -> Result<Norm
     Ok(NormalComparison { valid, angles })
 }
 
-/// Compares masks.
+/// Compares two masks.
+///
+/// ```
+/// let found = eval::compare_masks(&[true, true, false], &[true, false, false])?;
+/// assert_eq!((found.precision, found.recall), (0.5, 1.0));
+/// # Ok::<(), eval::MapSizeError>(())
+/// ```
 ///
 /// # Errors
-/// Maps of different sizes.
+/// [`MapSizeError`] if the masks have different sizes.
 pub fn compare_masks(test: &[bool], reference: &[bool]) -> Result<MaskComparison, MapSizeError> {
     same_size(test.len(), reference.len())?;
     let set = PixelCounts::of(test.iter().copied().zip(reference.iter().copied()));
@@ -181,7 +195,8 @@ fn same_size(test: usize, reference: usize) -> Result<(), MapSizeError> {
     if test == reference { Ok(()) } else { Err(MapSizeError { test, reference }) }
 }
 
-/// From the chord: the arc cosine loses the small angles.
+/// Returns the angle between two unit vectors, degrees. It is computed from the chord, because the
+/// arc cosine loses small angles.
 fn between_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
     let length = |sign: f64| (0..3).map(|i| (a[i] + sign * b[i]).powi(2)).sum::<f64>().sqrt();
     (2.0 * length(-1.0).atan2(length(1.0))).to_degrees()

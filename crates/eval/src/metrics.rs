@@ -1,29 +1,32 @@
-//! Accuracy and completeness of one set of reference cells.
+//! Accuracy and completeness over a set of reference cells.
 //!
-//! Three of the four things that the field calls completeness, by name, t in metres (the fourth is [`crate::Standing`]):
-//! `completeness_<t>`: share of the reference's valid cells that are estimated with |error| < t (voids are failures);
-//! `pag_<t>`: share of the cells valid in both with |error| < t;
-//! `valid_ratio`: share of the reference's valid cells with any value.
+//! The field uses the word completeness for four measures. Three of them are here, with t in
+//! metres; [`crate::Standing`] is the fourth:
+//! - `completeness_<t>`: share of the reference's valid cells with |error| < t. Voids count as
+//!   failures.
+//! - `pag_<t>`: share of the cells valid in both with |error| < t.
+//! - `valid_ratio`: share of the reference's valid cells with any value.
 
 use crate::statistics::{ErrorStatistics, RobustStatistics};
 
-/// What was measured on one set of cells.
+/// Metrics over one set of cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Metrics {
-    /// Valid cells of the reference.
+    /// Number of valid cells of the reference.
     pub reference_cells: usize,
-    /// Cells valid in both.
+    /// Number of cells valid in both.
     pub n: usize,
-    /// Errors over the cells valid in both; `None` when there are none.
+    /// Errors over the cells valid in both. `None` if there are no such cells.
     pub errors: Option<ErrorStatistics>,
-    /// The same without the outliers.
+    /// Errors without the outliers.
     pub robust: Option<RobustStatistics>,
-    /// For each threshold (metres), the number of cells with |error| below it.
+    /// For each threshold in metres, the number of cells with |error| below it.
     pub below: Vec<(f64, usize)>,
 }
 
 impl Metrics {
-    /// The metrics of finite `errors` (metres, their order is lost) on `reference_cells` valid cells of the reference.
+    /// Computes the metrics of finite `errors` (metres) on `reference_cells` valid cells of the
+    /// reference. The order of the errors is lost.
     pub fn of(errors: &mut [f64], reference_cells: usize, thresholds_m: &[f64]) -> Self {
         let below = thresholds_m.iter().map(|&t| (t, errors.iter().filter(|e| e.abs() < t).count())).collect();
         let all = ErrorStatistics::of(errors);
@@ -31,22 +34,26 @@ impl Metrics {
         Self { reference_cells, n: errors.len(), errors: all, robust, below }
     }
 
-    /// Share of the reference's valid cells with any value, 0 to 1; `None` without reference cells.
+    /// Returns the share of the reference's valid cells with any value, 0 to 1, or `None` without
+    /// reference cells.
     pub fn valid_ratio(&self) -> Option<f64> {
         share(self.n, self.reference_cells)
     }
 
-    /// Share of the reference's valid cells with an error below `threshold_m`; `None` when it is not among the thresholds.
+    /// Returns the share of the reference's valid cells with an error below `threshold_m`, or
+    /// `None` if it is not one of the thresholds.
     pub fn completeness(&self, threshold_m: f64) -> Option<f64> {
         share(self.count_below(threshold_m)?, self.reference_cells)
     }
 
-    /// Share of the cells valid in both with an error below `threshold_m`; `None` when it is not among the thresholds.
+    /// Returns the share of the cells valid in both with an error below `threshold_m`, or `None` if
+    /// it is not one of the thresholds.
     pub fn pag(&self, threshold_m: f64) -> Option<f64> {
         share(self.count_below(threshold_m)?, self.n)
     }
 
-    /// Every metric by its name, in a fixed order; what cannot be computed is `None`.
+    /// Returns every metric with its name, in a fixed order. Metrics that cannot be computed are
+    /// `None`.
     pub fn named(&self) -> Vec<(String, Option<f64>)> {
         let mut all = vec![
             ("reference_cells".to_owned(), Some(self.reference_cells as f64)),

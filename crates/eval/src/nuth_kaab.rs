@@ -1,14 +1,18 @@
-//! The horizontal translation between two surfaces from their slopes (Nuth and Kääb 2011, The Cryosphere 5, 271-290, eq. 2-4).
+//! Horizontal translation between two surfaces from their slopes (Nuth and Kääb 2011, The
+//! Cryosphere 5, 271-290, eq. 2-4).
 //!
-//! A surface that is displaced by d differs from the reference by dh = −d · ∇h + dz: divided by the tangent of the slope, dh
-//! is a cosine over the direction of the slope, whose amplitude and phase are the displacement. As in the paper: bins of 5° of
-//! the aspect, the median of each, a cosine through them (weighted by their cells), and again from the corrected surface until
-//! nothing changes.
+//! A surface that is displaced by d differs from the reference by dh = −d · ∇h + dz. Divided by the
+//! tangent of the slope, dh is a cosine of the aspect. Its amplitude and phase are the
+//! displacement. As in the paper, the differences are collected in bins of 5° of the aspect, a
+//! cosine is fitted to the medians of the bins (weighted by their cells), and the fit is repeated
+//! on the corrected surface until nothing changes.
 //!
-//! The relation holds while the displacement is smaller than the forms of the ground. So the differences are reduced to cells as
-//! long as the search radius first, where a town is a few hills, and then refined level by level to the cells of the
-//! reference. It needs slopes, in more than one direction: [`EvalError::TooFlat`] and [`EvalError::OneWaySlopes`] say where they
-//! are missing, measured at the coarsest level, where noise makes none.
+//! The relation holds while the displacement is smaller than the forms of the ground. So the
+//! differences are first reduced to cells as large as the search radius, where a town is a few
+//! hills. The shift is then refined level by level down to the cells of the reference. The method
+//! needs slopes in more than one direction. [`EvalError::TooFlat`] and [`EvalError::OneWaySlopes`]
+//! report where they are missing. Both are measured at the coarsest level, where noise adds no
+//! slope.
 
 use crate::align::MetresFromCells;
 use crate::error::EvalError;
@@ -17,58 +21,60 @@ use numeric::{percentile, upper_nmad};
 use raster::{Grid, reduce};
 use serde::Serialize;
 
-/// Bins of the aspect, as in the paper.
+/// Number of bins of the aspect, as in the paper.
 const BINS: usize = 72;
-/// Slopes that are used, degrees.
+/// Lowest slope that is used, degrees.
 const STEEP_DEG: f64 = 3.0;
-/// Share of the coarsest cells that must be steep.
+/// Lowest share of steep cells at the coarsest level.
 const LEAST_STEEP_SHARE: f64 = 0.02;
-/// Least number of steep cells that are common to both.
+/// Lowest number of steep cells that are valid in both surfaces.
 const LEAST_CELLS: usize = 50;
-/// Fewest cells of a bin.
+/// Lowest number of cells of a bin.
 const LEAST_PER_BIN: usize = 5;
-/// Least ratio of the squared axes of the normal matrix: below it the slopes face one way.
+/// Lowest ratio of the squared axes of the normal matrix. Below it the slopes face one way.
 const LEAST_AXES: f64 = 0.02;
-/// No level is coarser than this many cells on its shorter side.
+/// Lowest number of cells on the shorter side of a level.
 const LEAST_SIDE: usize = 24;
-/// Iterations per level, and the step at which one ends, in cells of the level.
+/// Highest number of iterations per level.
 const MOST_ITERATIONS: usize = 12;
+/// Step at which the iterations of a level end, in cells of the level.
 const LAST_STEP_CELLS: f64 = 0.004;
 
-/// What Nuth and Kääb's method found on its way.
+/// Summary of the method of Nuth and Kääb.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NuthKaabSummary {
-    /// Reductions of the coarsest level.
+    /// Number of reductions to the coarsest level.
     pub levels: usize,
-    /// Corrections made.
+    /// Number of corrections.
     pub iterations: usize,
-    /// Share of the coarsest cells that are steep enough.
+    /// Share of the cells at the coarsest level that are steep enough.
     pub steep_share: f64,
-    /// The last correction, metres.
+    /// Length of the last correction, metres.
     pub last_step_m: f64,
-    /// Whether the corrections came to an end and lowered the NMAD.
+    /// Whether the corrections converged and lowered the NMAD.
     pub converged: bool,
-    /// NMAD of the differences before, metres.
+    /// NMAD of the differences before the alignment, metres.
     pub nmad_before_m: f64,
-    /// NMAD of the differences after, metres.
+    /// NMAD of the differences after the alignment, metres.
     pub nmad_after_m: f64,
 }
 
-/// The reference, and the differences (test − reference) for a shift of the test in reference cells.
+/// Input of the method.
 pub(crate) struct NuthKaab<'a> {
     pub(crate) reference: &'a Grid<f32>,
     pub(crate) metres_from_cells: MetresFromCells,
+    /// Returns test − reference for a shift of the test in reference cells.
     pub(crate) differences: &'a dyn Fn((f64, f64)) -> Grid<f32>,
 }
 
-/// A level's steepness and direction of the rise.
+/// Gradients of the reference on one level.
 struct Level {
     slopes: Grid<[f32; 2]>,
     cell_m: f64,
 }
 
 impl NuthKaab<'_> {
-    /// The shift in reference cells that is added to the test surface.
+    /// Returns the shift, in reference cells, that is added to the test surface.
     pub(crate) fn run(&self, search_m: f64) -> Result<((f64, f64), NuthKaabSummary), EvalError> {
         let levels = self.levels(search_m);
         let before = (self.differences)((0.0, 0.0));
@@ -124,7 +130,7 @@ fn is_steep(slope: [f32; 2]) -> bool {
     steepness(slope) >= STEEP_DEG.to_radians().tan()
 }
 
-/// The share of the coarsest level's common cells that are steep.
+/// Returns the share of steep cells among the cells of the coarsest level that are valid in both.
 fn steep_share(levels: &[Level], differences: &Grid<f32>) -> Result<f64, EvalError> {
     let Some(coarsest) = levels.last() else { return Ok(0.0) };
     let differences = reduced(differences.clone(), levels.len() - 1);
@@ -143,7 +149,7 @@ fn steep_share(levels: &[Level], differences: &Grid<f32>) -> Result<f64, EvalErr
 }
 
 impl Level {
-    /// The translation, metres along x and y, that the differences ask for.
+    /// Returns the shift, in metres along x and y, that fits the differences.
     fn step(&self, differences: &Grid<f32>) -> Result<(f64, f64), EvalError> {
         let mut all: Vec<f64> = differences.data().iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect();
         let offset = percentile(&mut all, 50.0).unwrap_or(0.0);
@@ -158,13 +164,14 @@ impl Level {
             }
         }
         let step = cosine(&mut bins)?;
-        // Beyond a cell of its level the relation is no longer a line.
+        // The relation is linear only within about one cell of the level.
         let most = (1.5 * self.cell_m / step.0.hypot(step.1)).min(1.0);
         Ok((step.0 * most, step.1 * most))
     }
 }
 
-/// Fits `A cos + B sin + C` to the medians of the bins; (A, B) is what undoes the displacement.
+/// Fits `A cos + B sin + C` to the medians of the bins. (A, B) is the shift that undoes the
+/// displacement.
 fn cosine(bins: &mut [Vec<f64>]) -> Result<(f64, f64), EvalError> {
     let count = bins.len() as f64;
     let mut normal = nalgebra::Matrix3::<f64>::zeros();

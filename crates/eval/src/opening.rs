@@ -1,15 +1,17 @@
-//! Grey-scale opening with a square window: the highest of the lowest heights, which takes away what is narrower than the window.
+//! Grey-scale opening with a square window: the maximum of the local minima. It removes structures
+//! narrower than the window.
 //!
-//! Each pass along rows or columns takes three comparisons a cell for any window (van Herk 1992, Pattern Recognition
-//! Letters 13, 517-521). Voids neither lower nor raise a neighbour.
+//! Each pass along rows or columns takes three comparisons per cell for any window size (van Herk
+//! 1992, Pattern Recognition Letters 13, 517-521). Voids neither lower nor raise a neighbour.
 
 use raster::Grid;
 use rayon::prelude::*;
 
-/// The surface opened by a window of `2 · radius + 1` cells; void where the window holds no height at all.
+/// Opens the surface with a window of `2 · radius + 1` cells. The result is void where the window
+/// holds no height.
 pub(crate) fn opened(heights: &Grid<f32>, radius: usize) -> Grid<f32> {
     let lowest = both_ways(&heights.map(|&h| if h.is_finite() { h } else { f32::INFINITY }), radius, f32::min);
-    // What no window could lower must not raise its neighbours.
+    // A cell whose window holds no height must not raise its neighbours.
     let lowest = lowest.map(|&h| if h.is_finite() { h } else { f32::NEG_INFINITY });
     both_ways(&lowest, radius, f32::max).map(|&h| if h.is_finite() { h } else { f32::NAN })
 }
@@ -39,7 +41,8 @@ fn along_rows(grid: &Grid<f32>, radius: usize, pick: fn(f32, f32) -> f32) -> Gri
     picked
 }
 
-/// The extreme of every window: within blocks of a window's length, extremes from the block's start and from its end are run up.
+/// Computes the extreme of every window from the running extremes of blocks of the window's length,
+/// from the start and from the end of each block.
 fn running(row: &[f32], radius: usize, pick: fn(f32, f32) -> f32, out: &mut [f32]) {
     let block = 2 * radius + 1;
     let mut from_start = row.to_vec();
@@ -51,7 +54,8 @@ fn running(row: &[f32], radius: usize, pick: fn(f32, f32) -> f32, out: &mut [f32
     let last = row.len() - 1;
     for (i, out) in out.iter_mut().enumerate() {
         let (first, end) = (i.saturating_sub(radius), (i + radius).min(last));
-        // A window cut off at the row's start lies within the first block, one cut off at its end may lie within one block too.
+        // A window cut off at the start of the row lies within the first block. One cut off at its
+        // end may lie within one block too.
         *out = if first / block == end / block {
             row[first..=end].iter().copied().fold(row[i], pick)
         } else {

@@ -1,12 +1,14 @@
-//! Reading a grid between its cells.
+//! Interpolation of grids with voids.
 //!
-//! A position has a value exactly where its *nearest* cell has one, and the value is the bilinear mean over those of the four
-//! neighbours that are valid, their weights scaled to one. So no-data never enters a mean, and voids neither grow nor shrink
-//! when a surface is shifted by part of a cell: coverage and completeness do not depend on the phase of the two grids.
+//! A position has a value exactly if its *nearest* cell has one. The value is the bilinear mean of
+//! the valid cells among the four neighbours, with their weights scaled to a sum of one. So no-data
+//! never enters a mean, and voids neither grow nor shrink when a surface is shifted by part of a
+//! cell. Coverage and completeness do not depend on the phase of the two grids.
 
 use raster::Grid;
 
-/// The height at a fractional cell position, or `None` where the nearest cell is void or outside.
+/// Returns the height at a fractional cell position, or `None` if the nearest cell is void or
+/// outside.
 pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
     let (left, top) = (column.floor(), row.floor());
     let (u, v) = (column - left, row - top);
@@ -19,7 +21,8 @@ pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
     for (right, low) in [(false, false), (true, false), (false, true), (true, true)] {
         let weight = if right { u } else { 1.0 - u } * if low { v } else { 1.0 - v };
         if let Some(value) = corner(right, low) {
-            // Relative to the nearest cell: a constant surface comes back exactly.
+            // The sum is relative to the nearest cell, so that a constant surface is reproduced
+            // exactly.
             sum += weight * (value - nearest);
             weights += weight;
         }
@@ -27,13 +30,15 @@ pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
     Some(nearest + sum / weights)
 }
 
-/// The cell nearest to a fractional position, or `None` outside the grid. Halves go to the higher index.
+/// Returns the cell nearest to a fractional position, or `None` outside the grid. Halves go to the
+/// higher index.
 pub fn nearest<T: Copy>(grid: &Grid<T>, column: f64, row: f64) -> Option<T> {
     let (column, row) = (whole((column + 0.5).floor())?, whole((row + 0.5).floor())?);
     grid.get(usize::try_from(column).ok()?, usize::try_from(row).ok()?).copied()
 }
 
-/// A whole-valued float as an index; `None` for NaN and for what no grid can hold.
+/// Converts a whole-valued float to an index. Returns `None` for NaN and for values that no grid
+/// can hold.
 fn whole(value: f64) -> Option<i64> {
     (value.abs() < 1e15).then_some(value as i64)
 }

@@ -1,17 +1,20 @@
-//! The horizontal translation between two surfaces: the one with the least NMAD of their differences.
+//! Horizontal translation between two surfaces with the least NMAD of their differences.
 //!
-//! All whole-cell shifts within a radius are tried on a sample of the reference's cells; the best few are compared on a larger
-//! sample; the winner is refined by a compass search down to 1/64 cell and a paraboloid around its end. The NMAD does not see the vertical shift, and
-//! ignores up to half of the cells (vegetation, changes, gross errors).
+//! All whole-cell shifts within a radius are tried on a sample of the reference's cells. The best
+//! few are compared on a larger sample. The best of these is refined by a compass search down to
+//! 1/64 cell and by a paraboloid around its end. The NMAD does not depend on the vertical shift,
+//! and it ignores up to half of the cells (vegetation, changes, gross errors).
 //!
-//! Reading a noisy surface between its cells smooths it, most of all half-way: compared at the cell centres, shifts by half a
-//! cell would win on any noisy surface. And sharp edges, sampled on one lattice, agree best at whole cells. So the refinement
-//! compares both surfaces after the same low-pass filter, at places scattered within the cells: neither effect is left
-//! (on the noisy town of the tests, 0.5 m cells: 1 to 2 cm instead of 5 to 20). Errors are measured on the unsmoothed surfaces.
+//! Interpolation smooths a noisy surface, most of all half-way between cells: compared at the cell
+//! centres, shifts by half a cell would win on any noisy surface. Sharp edges that are sampled on
+//! one lattice agree best at whole cells. So the refinement compares both surfaces after the same
+//! low-pass filter, at positions scattered within the cells, which removes both effects. Errors are
+//! measured on the unsmoothed surfaces.
 //!
-//! A shift counts only when it keeps at least three quarters of the largest number of cells valid in both: otherwise
-//! an incomplete surface would do best where it hardly overlaps. Samples are stratified and depend on nothing but the grids.
-//! Flat ground has no translation: then the NMAD hardly changes over the searched shifts, which [`SearchSummary::contrast`] shows.
+//! A shift counts only if it keeps at least three quarters of the largest number of cells valid in
+//! both. Otherwise an incomplete surface would do best where it hardly overlaps. The samples are
+//! stratified and depend on the grids alone. Flat ground has no unique translation: the NMAD then
+//! hardly changes over the searched shifts, which [`SearchSummary::contrast`] shows.
 
 use crate::align::MetresFromCells;
 use crate::cell_map::CellMap;
@@ -24,44 +27,50 @@ use raster::Grid;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Fewest common cells of a search.
+/// Lowest number of cells valid in both surfaces.
 const LEAST_CELLS: usize = 100;
 /// Share of the largest common cell count that a shift must keep.
 const LEAST_OVERLAP: f64 = 0.75;
-/// Most whole-cell shifts that are tried.
+/// Highest number of whole-cell shifts.
 const MOST_CANDIDATES: usize = 50_000;
-/// Whole-cell shifts within this many cells are tried even if the radius is shorter.
+/// Shortest search radius, cells.
 const LEAST_RADIUS_CELLS: f64 = 2.0;
-/// How many winners of the small sample are compared on the large one.
+/// Number of winners on the small sample that are compared on the large one.
 const FINALISTS: usize = 5;
-/// Sizes of the samples, in cells.
+/// Number of cells of the small sample.
 const SMALL_SAMPLE: std::ops::RangeInclusive<usize> = 10_000..=60_000;
+/// Number of heights read from the small sample over all shifts. It bounds the time of a wide
+/// search.
 const SMALL_SAMPLE_READS: usize = 30_000_000;
+/// Number of positions of the large sample.
 const LARGE_SAMPLE: usize = 250_000;
+/// Highest number of positions of the large sample within one cell.
 const MOST_PER_CELL: usize = 4;
-/// The compass search ends at this step, in cells.
+/// Step at which the compass search ends, cells.
 const LAST_STEP_CELLS: f64 = 1.0 / 64.0;
-/// Distance of the 5 by 5 shifts to which the last paraboloid is fitted.
+/// Distance of the 5 × 5 shifts to which the last paraboloid is fitted, cells.
 const FIT_STEP_CELLS: f64 = 0.25;
-/// The vertex is refused when its NMAD is above that of the minimum by more than this factor.
+/// Highest ratio of the NMAD at the vertex to that of the minimum for which the vertex is accepted.
 const CLEARLY_BETTER: f64 = 1.02;
-/// How far the refinement may leave the best whole-cell shift.
+/// Largest distance of the refined shift from the best whole-cell shift, cells.
 const MOST_REFINEMENT_CELLS: f64 = 1.5;
 
-/// What a search of the shift found.
+/// Summary of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SearchSummary {
-    /// Radius searched, metres.
+    /// Search radius, metres.
     pub radius_m: f64,
-    /// Whole-cell shifts tried.
+    /// Number of whole-cell shifts tried.
     pub candidates: usize,
-    /// Median NMAD of all whole-cell shifts over the least of them: near 1 the ground is too flat for a shift to be found.
+    /// Median NMAD of all whole-cell shifts divided by the lowest. Near 1 the ground is too flat to
+    /// find a shift.
     pub contrast: f64,
-    /// Whether the best whole-cell shift lies at the edge of the searched disc: the true one may lie outside.
+    /// Whether the best whole-cell shift lies at the edge of the searched disc. The true shift may
+    /// then lie outside.
     pub at_edge: bool,
 }
 
-/// The two surfaces of a search.
+/// Input of a search.
 pub(crate) struct Search<'a> {
     pub(crate) reference: &'a Grid<f32>,
     pub(crate) test: &'a Grid<f32>,
@@ -69,7 +78,7 @@ pub(crate) struct Search<'a> {
     pub(crate) metres_from_cells: MetresFromCells,
 }
 
-/// A place on the reference (in its cells) and the height there.
+/// Position on the reference, in cells, and the height there.
 #[derive(Clone, Copy)]
 struct Sample {
     column: f64,
@@ -77,7 +86,7 @@ struct Sample {
     height: f64,
 }
 
-/// A shift in reference cells and how well it does.
+/// Shift in reference cells and its score.
 #[derive(Clone, Copy)]
 struct Candidate {
     columns: f64,
@@ -87,7 +96,7 @@ struct Candidate {
 }
 
 impl Search<'_> {
-    /// The shift in reference cells that is added to the test surface.
+    /// Returns the shift, in reference cells, that is added to the test surface.
     pub(crate) fn run(&self, radius_m: f64) -> Result<((f64, f64), SearchSummary), EvalError> {
         let steps = self.steps(radius_m)?;
         let small_count = (SMALL_SAMPLE_READS / steps.len()).clamp(*SMALL_SAMPLE.start(), *SMALL_SAMPLE.end());
@@ -121,7 +130,7 @@ impl Search<'_> {
         radius_m.max(LEAST_RADIUS_CELLS * along_columns.max(along_rows))
     }
 
-    /// All whole-cell shifts within the radius, nearest first.
+    /// Returns all whole-cell shifts within the radius, nearest first.
     fn steps(&self, radius_m: f64) -> Result<Vec<(i32, i32)>, EvalError> {
         let radius_m = self.radius_m(radius_m);
         let (along_columns, along_rows) = self.metres_from_cells.cell_size_m();
@@ -130,7 +139,7 @@ impl Search<'_> {
         if candidates.is_nan() || candidates > MOST_CANDIDATES as f64 {
             return Err(EvalError::SearchTooWide { radius_m, candidates: candidates as usize, most: MOST_CANDIDATES });
         }
-        // Sheared cells reach a little further than their sides say.
+        // The side lengths underestimate the reach of sheared cells, hence the factor of two.
         let (columns, rows) = (2 * columns as i32 + 1, 2 * rows as i32 + 1);
         let length = |&(c, r): &(i32, i32)| {
             let (dx, dy) = self.metres_from_cells.apply(f64::from(c), f64::from(r));
@@ -142,7 +151,7 @@ impl Search<'_> {
         Ok(steps)
     }
 
-    /// Indices of the valid reference cells that some shift brings over the test grid.
+    /// Returns the indices of the valid reference cells that some shift brings over the test grid.
     fn cells_near_test(&self, steps: &[(i32, i32)]) -> Vec<usize> {
         let (width, height) = (self.test.width() as f64, self.test.height() as f64);
         let reach = steps.iter().map(|&(c, r)| c.abs().max(r.abs())).max().unwrap_or(0);
@@ -164,7 +173,7 @@ impl Search<'_> {
             .collect()
     }
 
-    /// The centres of at most `count` of the cells.
+    /// Samples the centres of at most `count` of the cells.
     fn at_centres(&self, cells: &[usize], count: usize) -> Vec<Sample> {
         let (columns, heights) = (self.reference.width().max(1), self.reference.data());
         let sample = |i: usize| Sample {
@@ -175,7 +184,8 @@ impl Search<'_> {
         stratified(cells, count).map(sample).collect()
     }
 
-    /// Places anywhere within at most `count` of the cells; several per cell where there are few cells.
+    /// Samples positions anywhere within at most `count` of the cells, several per cell if there
+    /// are few cells.
     fn scattered(&self, cells: &[usize], count: usize) -> Vec<Sample> {
         let columns = self.reference.width().max(1);
         let per_cell = (count / cells.len().max(1)).clamp(1, MOST_PER_CELL);
@@ -199,7 +209,8 @@ impl Search<'_> {
         Candidate { columns, rows, n, nmad: upper_nmad(&mut differences).unwrap_or(f64::INFINITY) }
     }
 
-    /// Compass search: to the best of eight neighbours while it is better, then with half the step.
+    /// Refines a shift by compass search: it moves to the best of eight neighbours while that
+    /// improves, then halves the step.
     fn refined(&self, samples: &[Sample], start: Candidate) -> Candidate {
         let least = (LEAST_OVERLAP * start.n as f64) as usize;
         let mut best = start;
@@ -219,8 +230,9 @@ impl Search<'_> {
         best
     }
 
-    /// The vertex of the paraboloid through NMAD² around a minimum, which averages the roughness that noise gives to the
-    /// criterion; the minimum itself where that is clearly better (surfaces without noise), or where there is no vertex.
+    /// Returns the vertex of the paraboloid through NMAD² around a minimum. It averages the
+    /// roughness that noise gives to the criterion. Returns the minimum itself if it is clearly
+    /// better (surfaces without noise), or if there is no vertex.
     fn levelled(&self, samples: &[Sample], minimum: Candidate) -> Candidate {
         let stencil: Vec<(f64, f64)> =
             (0..25).map(|i| (f64::from(i % 5 - 2) * FIT_STEP_CELLS, f64::from(i / 5 - 2) * FIT_STEP_CELLS)).collect();
@@ -238,7 +250,8 @@ impl Search<'_> {
 const COMPASS: [(f64, f64); 8] =
     [(0.0, -1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
 
-/// Where the paraboloid fitted to values at places has its minimum, if that is one and lies within the outermost places.
+/// Returns the minimum of the paraboloid fitted to values at shifts, or `None` if it has no minimum
+/// within the outermost shifts.
 fn vertex(places: &[(f64, f64)], values: &[f64]) -> Option<(f64, f64)> {
     let mut normal = nalgebra::Matrix6::<f64>::zeros();
     let mut right = nalgebra::Vector6::<f64>::zeros();
@@ -256,12 +269,13 @@ fn vertex(places: &[(f64, f64)], values: &[f64]) -> Option<(f64, f64)> {
     (columns.abs().max(rows.abs()) <= 2.0 * FIT_STEP_CELLS).then_some((columns, rows))
 }
 
-/// The first of two unless the second is truly better.
+/// Returns the second of two candidates if it is strictly better, the first otherwise.
 fn better(a: Candidate, b: Candidate) -> Candidate {
     if b.nmad < a.nmad { b } else { a }
 }
 
-/// The candidates that overlap enough, best first; equals stay in their order (shortest shift first).
+/// Returns the candidates that overlap enough, best first. Equal ones keep their order (shortest
+/// shift first).
 fn ranked(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
     let most = candidates.iter().map(|c| c.n).max().unwrap_or(0);
     candidates.retain(|c| c.n > 0 && c.n as f64 >= LEAST_OVERLAP * most as f64);
@@ -269,7 +283,7 @@ fn ranked(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
     candidates
 }
 
-/// Middle over first of ranked candidates; 1 when every shift fits equally.
+/// Returns the NMAD of the middle candidate divided by the first; 1 if every shift fits equally.
 fn contrast(ranked: &[Candidate]) -> f64 {
     match (ranked.first(), ranked.get(ranked.len() / 2)) {
         (Some(first), Some(middle)) if first.nmad > 0.0 => middle.nmad / first.nmad,
@@ -278,14 +292,14 @@ fn contrast(ranked: &[Candidate]) -> f64 {
     }
 }
 
-/// Whether a neighbour of the whole-cell shift was not searched.
+/// Returns whether a neighbour of the whole-cell shift was not searched.
 fn at_edge(steps: &[(i32, i32)], start: Candidate) -> bool {
     let (column, row) = (start.columns as i32, start.rows as i32);
     [(0, -1), (-1, 0), (1, 0), (0, 1)].iter().any(|(c, r)| !steps.contains(&(column + c, row + r)))
 }
 
-/// At most `count` of the cells: one from each of `count` equal runs, at a place that a hash of its number chooses, so that
-/// no stride falls in step with the columns.
+/// Picks at most `count` of the cells: one from each of `count` equal runs. A hash chooses the
+/// place within the run, so that no stride falls in step with the columns.
 fn stratified(cells: &[usize], count: usize) -> impl Iterator<Item = usize> {
     let count = count.min(cells.len());
     let bound = move |k: usize| (k as u128 * cells.len() as u128 / count as u128) as usize;

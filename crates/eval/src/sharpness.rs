@@ -1,11 +1,14 @@
-//! How far a surface's roofs reach beyond the true ones.
+//! Overreach of roofs: how far the roofs of the test reach beyond those of the reference.
 //!
-//! A roof edge is a jump of the reference (see [`crate::EdgeRule`]) with level ground or roof on both sides: beyond the two cells of the
-//! jump, three cells each that stay within a quarter of it. Across it, along the row or column that is closer to the edge's normal, the test's profile falls
-//! through the height half-way between the two levels somewhere; the reference's own falls between its two cells. The
-//! distance between the two places, outwards positive and turned onto the normal, is the overreach in metres: positive
-//! where roofs are too large (the fattening of matching windows), negative where they are too small. An edge is not measured
-//! where the test does not fall through that height within [`REACH_M`], or is void there.
+//! A roof edge is a jump of the reference (see [`crate::EdgeRule`]) with level ground or roof on
+//! both sides: beyond the two cells of the jump, three cells on either side stay within a quarter
+//! of the jump. The profile across the edge runs along the row or column that is closer to the
+//! edge's normal. The test's profile falls through the height half-way between the two levels at
+//! some position; the reference's own profile falls between its two cells. The overreach is the
+//! distance between the two positions, projected onto the normal, in metres. It is positive where
+//! roofs are too large (the fattening of matching windows) and negative where they are too small.
+//! An edge is not measured if the test is void there, or does not fall through that height within
+//! [`REACH_M`].
 
 use crate::align::MetresFromCells;
 use crate::edges::{Cell, EdgeRule, jumps};
@@ -14,29 +17,33 @@ use crate::statistics::ErrorStatistics;
 use raster::Grid;
 use serde::Serialize;
 
-/// How far from an edge the test's is looked for, metres; at least four cells.
+/// Distance from an edge within which the edge of the test is searched, metres. At least four cells
+/// are searched.
 pub const REACH_M: f64 = 5.0;
+/// Lowest number of cells on either side in which the edge of the test is searched.
 const LEAST_REACH_CELLS: isize = 4;
+/// Highest number of cells on either side in which the edge of the test is searched.
 const MOST_REACH_CELLS: isize = 64;
-/// Cells on either side that must be level.
+/// Number of cells on either side that must be level.
 const LEVEL_CELLS: isize = 3;
-/// How level: the share of the jump that they may differ by.
+/// Highest deviation from level, as a share of the jump.
 const LEVEL_SHARE: f64 = 0.25;
-/// Least cosine between the profile and the edge's normal.
+/// Lowest cosine between the profile and the edge's normal.
 const LEAST_COSINE: f64 = 0.7;
 
-/// The overreach of a surface at the reference's roof edges.
+/// Overreach of a surface at the reference's roof edges.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Sharpness {
-    /// Places on roof edges of the reference.
+    /// Number of positions on roof edges of the reference.
     pub edges: usize,
-    /// Those where the test has an edge too.
+    /// Number of these positions where the test has an edge too.
     pub measured: usize,
-    /// Overreach in metres, outwards positive.
+    /// Overreach in metres, positive outwards. `None` if no position was measured.
     pub overreach_m: Option<ErrorStatistics>,
 }
 
-/// Measures the overreach of `test` (aligned, on the reference grid). `roof` limits the edges by their higher cell.
+/// Measures the overreach of `test`, which is aligned and on the reference grid. `roof` selects the
+/// edges by their higher cell.
 pub(crate) fn sharpness(
     reference: &Grid<f32>,
     test: &Grid<f32>,
@@ -64,7 +71,8 @@ fn offset(from: usize, to: usize) -> isize {
     to as isize - from as isize
 }
 
-/// Cells in a row or column: number 0 is the edge's higher cell, 1 its lower one.
+/// Profile across an edge, in a row or column. Cell 0 is the edge's higher cell, cell 1 its lower
+/// one.
 struct Profile {
     high: Cell,
     step: (isize, isize),
@@ -77,8 +85,9 @@ impl Profile {
         grid.get(column, row).map(|&h| f64::from(h)).filter(|h| h.is_finite())
     }
 
-    /// The height half-way down the jump, and where the reference falls through it; `None` unless both sides are level, or when the
-    /// fall lies between two other cells of a jump that takes several.
+    /// Returns the height half-way down the jump, and the position where the reference falls
+    /// through it. Returns `None` if a side is not level, or if a jump over several cells falls
+    /// through it between two other cells.
     fn edge(&self, reference: &Grid<f32>) -> Option<(f64, f64)> {
         let (inside, outside) = (self.height(reference, -1)?, self.height(reference, 2)?);
         let slack = LEVEL_SHARE * (inside - outside);
@@ -95,7 +104,8 @@ impl Profile {
         (high >= level && low < level).then(|| (level, (high - level) / (high - low)))
     }
 
-    /// The cosine between the profile and the edge's normal, and the distance of the profile's cells in metres.
+    /// Returns the cosine between the profile and the edge's normal, and the distance of the
+    /// profile's cells in metres.
     fn metres(&self, metres_from_cells: MetresFromCells, gradients: [[f32; 2]; 2]) -> Option<(f64, f64)> {
         let (x, y) = metres_from_cells.apply(self.step.0 as f64, self.step.1 as f64);
         let sum = [gradients[0][0] + gradients[1][0], gradients[0][1] + gradients[1][1]];
@@ -104,7 +114,8 @@ impl Profile {
         (cosine >= LEAST_COSINE).then_some((cosine, side_m))
     }
 
-    /// Where the heights fall through `level` outwards, nearest to `at`, in cells.
+    /// Returns the position nearest to `at` where the heights fall through `level` outwards, in
+    /// cells.
     fn crossing(&self, test: &Grid<f32>, level: f64, at: f64, reach: isize) -> Option<f64> {
         let fall = |number: isize| {
             let (inner, outer) = (self.height(test, number)?, self.height(test, number + 1)?);
@@ -121,7 +132,8 @@ mod tests {
 
     const CELL: f64 = 0.5;
 
-    /// A roof of 30 x 24 m, `grown` outwards, turned by an angle; its rim falls over two cells as a sensor blurs it.
+    /// Returns a roof of 30 × 24 m that is `grown` outwards and turned by an angle. Its rim falls
+    /// over two cells, like a rim that a sensor blurs.
     fn roof(grown: f64, turn_deg: f64) -> Grid<f32> {
         let (sin, cos) = turn_deg.to_radians().sin_cos();
         let height = |i: usize| {

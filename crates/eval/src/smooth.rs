@@ -1,5 +1,6 @@
-//! Low-pass filter for surfaces with voids: normalised convolution (Knutsson and Westin 1993, CVPR) with the binomial of
-//! nine taps along columns and rows (standard deviation 1.41 cells). Voids stay void and enter no mean.
+//! Low-pass filter for surfaces with voids: normalised convolution (Knutsson and Westin 1993, CVPR)
+//! with the binomial of nine taps along columns and rows (standard deviation 1.41 cells). Voids
+//! stay void and enter no mean.
 
 use raster::Grid;
 use rayon::prelude::*;
@@ -7,10 +8,10 @@ use rayon::prelude::*;
 const TAPS: [f32; 9] = [1.0, 8.0, 28.0, 56.0, 70.0, 56.0, 28.0, 8.0, 1.0];
 const REACH: usize = TAPS.len() / 2;
 
-/// The surface smoothed where it is valid.
+/// Smooths the surface where it is valid.
 pub(crate) fn smoothed(grid: &Grid<f32>) -> Grid<f32> {
     let width = grid.width().max(1);
-    // Relative to some height of the surface, so that single precision is enough for the sums.
+    // The sums are relative to some height of the surface, so that single precision is enough.
     let origin = grid.data().iter().copied().find(|h| h.is_finite()).unwrap_or(0.0);
     let mut sums = vec![[0.0f32; 2]; grid.data().len()];
     sums.par_chunks_mut(width)
@@ -35,7 +36,8 @@ pub(crate) fn smoothed(grid: &Grid<f32>) -> Grid<f32> {
     result
 }
 
-/// Weighted sums of the valid heights (less `origin`) and of their weights, around each cell of a row.
+/// Computes the weighted sums of the valid heights (less `origin`) and of their weights, around
+/// each cell of a row.
 fn along_row(heights: &[f32], origin: f32, sums: &mut [[f32; 2]]) {
     for (column, height) in heights.iter().enumerate().filter(|(_, h)| h.is_finite()) {
         let first = column.saturating_sub(REACH);

@@ -1,37 +1,39 @@
-//! What stands above the terrain: how much of it was found, by footprint and by volume (the measures of core3d-metrics).
+//! Completeness of the objects above the terrain, by footprint and by volume (the measures of
+//! core3d-metrics).
 //!
-//! A cell stands when its surface is more than a threshold above the terrain, in the reference and in the test alike; a void of
-//! the test does not stand. Footprints are areas, volumes the heights above the terrain over the standing cells;
-//! what two volumes share is the lower of both heights where both stand. recall = shared / reference, precision = shared /
-//! test, IoU = shared / (reference + test − shared).
+//! A cell stands if its surface is more than a threshold above the terrain, in the reference and in
+//! the test alike. A void of the test does not stand. Footprints are areas. Volumes are the heights
+//! above the terrain over the standing cells. The shared volume uses the lower of both heights
+//! where both stand. recall = shared / reference, precision = shared / test, IoU = shared /
+//! (reference + test − shared).
 
 use crate::terrain::TerrainSource;
 use raster::Grid;
 use serde::Serialize;
 
-/// Two sets and what they share: square metres or cubic metres.
+/// Sizes of two sets and of their intersection, in square metres or cubic metres.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Overlap {
-    /// Of the reference.
+    /// Size in the reference.
     pub reference: f64,
-    /// Of the test.
+    /// Size in the test.
     pub test: f64,
-    /// Of both.
+    /// Size of the intersection.
     pub shared: f64,
 }
 
 impl Overlap {
-    /// Share of the reference that is found; `None` when there is nothing to find.
+    /// Returns the share of the reference that is found, or `None` if there is nothing to find.
     pub fn recall(&self) -> Option<f64> {
         share(self.shared, self.reference)
     }
 
-    /// Share of the test that is right; `None` when it has nothing.
+    /// Returns the share of the test that is right, or `None` if the test has nothing.
     pub fn precision(&self) -> Option<f64> {
         share(self.shared, self.test)
     }
 
-    /// Intersection over union; `None` when neither has anything.
+    /// Returns the intersection over union, or `None` if neither has anything.
     pub fn iou(&self) -> Option<f64> {
         share(self.shared, self.reference + self.test - self.shared)
     }
@@ -41,20 +43,21 @@ fn share(part: f64, whole: f64) -> Option<f64> {
     (whole > 0.0).then(|| part / whole)
 }
 
-/// Completeness of what stands above the terrain.
+/// Completeness of the objects above the terrain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Standing {
-    /// Least height above the terrain, metres.
+    /// Lowest height above the terrain of a standing cell, metres.
     pub threshold_m: f64,
-    /// The terrain.
+    /// Source of the terrain.
     pub terrain: TerrainSource,
-    /// Areas, m².
+    /// Footprints, m².
     pub footprint: Overlap,
     /// Volumes, m³.
     pub volume: Overlap,
 }
 
-/// Compares what stands at the cells that `counts` and that have a terrain and a reference.
+/// Compares the standing objects at the cells for which `counts` is true and that have a terrain
+/// and a reference.
 pub(crate) fn standing(
     (reference, test): (&Grid<f32>, &Grid<f32>),
     (terrain, source): (&Grid<f32>, TerrainSource),
@@ -70,7 +73,7 @@ pub(crate) fn standing(
             continue;
         }
         let stands = |height: f64| if height > threshold_m { height } else { 0.0 };
-        // The comparison is false for a void.
+        // The comparison in `stands` is false for a void.
         let (of_reference, of_test) = (stands(above), stands(f64::from(test) - f64::from(ground)));
         for (overlap, of_reference, of_test) in [
             (&mut footprint, f64::from(of_reference > 0.0), f64::from(of_test > 0.0)),

@@ -1,33 +1,33 @@
 //! Statistics of a set of height errors, in metres.
 //!
-//! Percentiles are NumPy's `linear` ones: the p-th of n sorted values stands at the index p/100 · (n − 1), and values between
-//! two indices are interpolated. The standard deviation is that of the population (divided by n). NMAD = 1.4826 · median of
-//! |e − median(e)| (Höhle and Höhle 2009, ISPRS J. 64, 398-406) equals the standard deviation for normal errors. LE*p* is the
-//! p-th percentile of |e|, without any assumption about the distribution.
+//! Percentiles are NumPy's `linear` ones ([`numeric::percentile`]). The standard deviation is that
+//! of the population (divided by n). NMAD = 1.4826 · median of |e − median(e)| (Höhle and Höhle
+//! 2009, ISPRS J. 64, 398-406) equals the standard deviation for normal errors. LE*p* is the p-th
+//! percentile of |e|, without any assumption about the distribution.
 //!
-//! The robust counterparts leave out what is farther than [`OUTLIER_NMADS`] NMADs from the median: the three-sigma rule of Höhle
-//! and Höhle with both of its parameters estimated robustly.
+//! The robust statistics leave out errors farther than [`OUTLIER_NMADS`] NMADs from the median.
+//! This is the three-sigma rule of Höhle and Höhle with robust estimates of both parameters.
 
 use numeric::{NMAD_FACTOR, percentile};
 use serde::Serialize;
 
-/// An error is an outlier when it is farther than this many NMADs from the median.
+/// Distance from the median, in NMADs, beyond which an error is an outlier.
 pub const OUTLIER_NMADS: f64 = 3.0;
 
-/// Errors in metres (test − reference), summarised.
+/// Summary of errors (test − reference), in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ErrorStatistics {
-    /// Bias.
+    /// Mean error, the bias.
     pub mean: f64,
-    /// Median.
+    /// Median error.
     pub median: f64,
-    /// Mean of |e|.
+    /// Mean absolute error.
     pub mae: f64,
-    /// Root of the mean of e².
+    /// Root mean square error.
     pub rmse: f64,
     /// Standard deviation of the population.
     pub std: f64,
-    /// 1.4826 times the median of |e − median|.
+    /// Normalised median absolute deviation: 1.4826 times the median of |e − median|.
     pub nmad: f64,
     /// 68th percentile of |e|.
     pub le68: f64,
@@ -42,7 +42,13 @@ pub struct ErrorStatistics {
 }
 
 impl ErrorStatistics {
-    /// The summary of finite errors, whose order is lost; `None` when there are none.
+    /// Computes the summary of finite errors, or `None` if there are none. The order of the errors
+    /// is lost.
+    ///
+    /// ```
+    /// let found = eval::ErrorStatistics::of(&mut [0.5, -0.5, 1.5]).unwrap();
+    /// assert_eq!((found.mean, found.median, found.max), (0.5, 0.5, 1.5));
+    /// ```
     pub fn of(errors: &mut [f64]) -> Option<Self> {
         if errors.is_empty() {
             return None;
@@ -61,34 +67,35 @@ impl ErrorStatistics {
         Some(Self { mean, median, mae, rmse, std, nmad, le68: le(68.0)?, le90: le(90.0)?, le95: le(95.0)?, min, max })
     }
 
-    /// The names of the statistics, in the order of [`values`](Self::values).
+    /// Names of the statistics, in the order of [`values`](Self::values).
     pub const NAMES: [&'static str; 11] =
         ["mean", "median", "mae", "rmse", "std", "nmad", "le68", "le90", "le95", "min", "max"];
 
-    /// The statistics in the order of [`NAMES`](Self::NAMES).
+    /// Returns the statistics in the order of [`NAMES`](Self::NAMES).
     pub fn values(&self) -> [f64; 11] {
         let s = self;
         [s.mean, s.median, s.mae, s.rmse, s.std, s.nmad, s.le68, s.le90, s.le95, s.min, s.max]
     }
 }
 
-/// Errors in metres without the outliers.
+/// Summary of errors without the outliers, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RobustStatistics {
-    /// Errors farther than [`OUTLIER_NMADS`] NMADs from the median.
+    /// Number of errors farther than [`OUTLIER_NMADS`] NMADs from the median.
     pub outliers: usize,
-    /// Mean of the others.
+    /// Mean of the other errors.
     pub mean: f64,
-    /// Mean of |e| of the others.
+    /// Mean absolute error of the others.
     pub mae: f64,
-    /// Root of the mean of e² of the others.
+    /// Root mean square of the others.
     pub rmse: f64,
-    /// Standard deviation of the others, that of the population.
+    /// Standard deviation of the others, as a population.
     pub std: f64,
 }
 
 impl RobustStatistics {
-    /// The summary of `errors` without their outliers; `all` are the statistics of the same errors.
+    /// Computes the summary of `errors` without their outliers. `all` holds the statistics of the
+    /// same errors.
     pub fn of(errors: &[f64], all: &ErrorStatistics) -> Self {
         let kept = || errors.iter().filter(|&e| (e - all.median).abs() <= OUTLIER_NMADS * all.nmad);
         let (mut count, mut sum, mut absolute, mut square) = (0usize, 0.0, 0.0, 0.0);
@@ -98,17 +105,17 @@ impl RobustStatistics {
             absolute += e.abs();
             square += e * e;
         }
-        // At least half of the errors are within one MAD of the median, so some are kept.
+        // At least half of the errors lie within one MAD of the median, so some are kept.
         let n = count.max(1) as f64;
         let mean = sum / n;
         let std = (kept().map(|e| (e - mean).powi(2)).sum::<f64>() / n).sqrt();
         Self { outliers: errors.len() - count, mean, mae: absolute / n, rmse: (square / n).sqrt(), std }
     }
 
-    /// The names of the statistics, in the order of [`values`](Self::values).
+    /// Names of the statistics, in the order of [`values`](Self::values).
     pub const NAMES: [&'static str; 5] = ["outliers", "robust_mean", "robust_mae", "robust_rmse", "robust_std"];
 
-    /// The statistics in the order of [`NAMES`](Self::NAMES).
+    /// Returns the statistics in the order of [`NAMES`](Self::NAMES).
     pub fn values(&self) -> [f64; 5] {
         [self.outliers as f64, self.mean, self.mae, self.rmse, self.std]
     }

@@ -1,11 +1,15 @@
-//! The bare ground under a surface model, for measuring what stands on it.
+//! Bare ground under a surface model, used to measure the objects on it.
 //!
-//! From cells known to be ground, the rest is filled: each coarser level of a pyramid holds the mean of the ground cells below it,
-//! and what is open takes the bilinear value of the next coarser level (the pull-push scheme of Gortler et al. 1996,
-//! SIGGRAPH). Without a classification ground is found by a progressive morphological filter (Zhang et al. 2003, IEEE TGRS 41,
-//! 872-882): the surface is opened with windows that double up to [`WINDOW_M`] or a quarter of the area's shorter side; a cell
-//! that an opening lowers by more than `0.5 m + slope · growth of the window` is none. The slope is the scene's own: the upper
-//! quartile of the slopes of the lowest heights of blocks half as wide, between 2 and 100 %. It is an estimate: give a terrain model where one is known.
+//! From cells known to be ground, the rest is filled by the pull-push scheme of Gortler et al.
+//! (1996, SIGGRAPH): each coarser level of a pyramid holds the mean of the ground cells below it,
+//! and open cells take the bilinear value of the next coarser level.
+//!
+//! Without a classification, ground is found by a progressive morphological filter (Zhang et al.
+//! 2003, IEEE TGRS 41, 872-882). The surface is opened with windows that double up to [`WINDOW_M`]
+//! or a quarter of the area's shorter side. A cell is not ground if an opening lowers it by more
+//! than `0.5 m + slope · growth of the window`. The slope is estimated from the scene: the upper
+//! quartile of the slopes of the lowest heights of blocks half as wide as the largest window,
+//! limited to 2 to 100 %. The result is an estimate; a terrain model is better.
 
 use crate::align::MetresFromCells;
 use crate::gradient::{gradients, steepness};
@@ -15,42 +19,43 @@ use numeric::percentile;
 use raster::Grid;
 use serde::Serialize;
 
-/// Width of the largest window, metres: what is wider is ground.
+/// Width of the largest window, metres. Wider structures count as ground.
 pub const WINDOW_M: f64 = 80.0;
-/// What an opening may lower ground by at no slope, metres.
+/// Amount by which an opening may lower level ground, metres.
 const TOLERANCE_M: f64 = 0.5;
 /// Bounds of the scene's slope, metres per metre.
 const SLOPES: std::ops::RangeInclusive<f64> = 0.02..=1.0;
 
-/// Where the terrain comes from.
+/// Source of the terrain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "source")]
 #[non_exhaustive]
 pub enum TerrainSource {
-    /// A terrain model was given.
+    /// Terrain model that was given.
     Given,
-    /// The reference's heights at cells of the ground class, the rest filled between them.
+    /// Heights of the reference at cells of the ground class, interpolated elsewhere.
     GroundClass {
-        /// How many cells are ground.
+        /// Number of ground cells.
         cells: usize,
     },
-    /// A morphological estimate from the reference.
+    /// Morphological estimate from the reference.
     Estimated {
-        /// The largest window, metres.
+        /// Width of the largest window, metres.
         window_m: f64,
-        /// The slope allowed for, metres per metre.
+        /// Slope of the ground that the filter allows, metres per metre.
         slope: f64,
     },
 }
 
-/// The terrain through the heights of ground cells, filled between and beyond them; void everywhere without any.
+/// Returns the terrain through the heights of ground cells, filled between and beyond them. It is
+/// void everywhere if there are none.
 pub fn terrain_from_ground(heights: &Grid<f32>, is_ground: impl Fn(usize) -> bool) -> Grid<f32> {
     let cells = heights.data().iter().enumerate();
     let ground = cells.map(|(i, &h)| if is_ground(i) { h } else { f32::NAN }).collect();
     Grid::from_vec(heights.width(), heights.height(), ground).map_or_else(|| Grid::filled(0, 0, 0.0), filled)
 }
 
-/// The terrain estimated from a surface alone.
+/// Estimates the terrain from a surface alone.
 pub fn estimated_terrain(heights: &Grid<f32>, metres_from_cells: MetresFromCells) -> (Grid<f32>, TerrainSource) {
     let (along_columns, along_rows) = metres_from_cells.cell_size_m();
     let cell_m = along_columns.max(along_rows);
@@ -73,7 +78,8 @@ pub fn estimated_terrain(heights: &Grid<f32>, metres_from_cells: MetresFromCells
     (terrain_from_ground(heights, |i| ground.get(i).copied().unwrap_or(false)), source)
 }
 
-/// The upper quartile of the slopes of the lowest heights of blocks as wide as half the largest window.
+/// Returns the upper quartile of the slopes of the lowest heights of blocks, which are half as wide
+/// as the largest window.
 fn scene_slope(heights: &Grid<f32>, metres_from_cells: MetresFromCells, block: usize) -> f64 {
     let (columns, rows) = (heights.width().div_ceil(block), heights.height().div_ceil(block));
     let mut lowest = Grid::filled(columns, rows, f32::NAN);
@@ -92,7 +98,7 @@ fn scene_slope(heights: &Grid<f32>, metres_from_cells: MetresFromCells, block: u
     percentile(&mut slopes, 75.0).unwrap_or(0.0).clamp(*SLOPES.start(), *SLOPES.end())
 }
 
-/// The grid with every void filled from its surroundings; unchanged when all is void.
+/// Fills every void from its surroundings. Returns the grid unchanged if all is void.
 fn filled(fine: Grid<f32>) -> Grid<f32> {
     if fine.data().iter().all(|h| h.is_finite()) || fine.width().max(fine.height()) < 2 {
         return fine;
@@ -111,7 +117,7 @@ fn filled(fine: Grid<f32>) -> Grid<f32> {
     full
 }
 
-/// The mean of the valid ones among four cells.
+/// Reduces the grid by two: each cell is the mean of the valid ones among four.
 fn halved(fine: &Grid<f32>) -> Grid<f32> {
     let mut coarse = Grid::filled(fine.width().div_ceil(2), fine.height().div_ceil(2), f32::NAN);
     for row in 0..coarse.height() {
@@ -133,12 +139,12 @@ mod tests {
         MetresFromCells::new(&GeoTransform::north_up(0.0, 0.0, 1.0), (1.0, 1.0))
     }
 
-    /// Hills on a slope.
+    /// Returns hills on a slope.
     fn ground(column: usize, row: usize, slope: f64) -> f64 {
         50.0 + slope * column as f64 + 2.0 * (row as f64 / 40.0).sin() + 3.0 * (column as f64 / 55.0).cos()
     }
 
-    /// Buildings of 12 x 20 m with 7 m walls, 30 m apart, on a slope.
+    /// Returns buildings of 12 × 20 m with 7 m walls, 30 m apart, on a slope.
     fn hillside_town(slope: f64) -> Grid<f32> {
         let cell = |i: usize| {
             let (column, row) = (i % 240, i / 240);

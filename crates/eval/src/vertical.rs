@@ -1,8 +1,9 @@
-//! Heights of a grid moved from one vertical datum to another.
+//! Conversion of a grid of heights from one vertical datum to another.
 //!
-//! The difference of two datums at a place does not depend on the height there to any digit that counts, and changes slowly:
-//! it is evaluated on a lattice of cells and interpolated bilinearly (geoid grids are 15′ and more apart). For grids of coarse
-//! cells the lattice is finer, down to every cell.
+//! The difference of two datums at a position hardly depends on the height there and changes
+//! slowly. It is evaluated on a lattice of cells and interpolated bilinearly (geoid grids have 15′
+//! and more between their nodes). For grids of coarse cells the lattice is finer, down to every
+//! cell.
 
 use crs::{CrsError, HeightConverter, MapProjection};
 use raster::{GeoTransform, Grid};
@@ -12,13 +13,13 @@ const SPACING_M: f64 = 500.0;
 /// Largest distance of the lattice's nodes, cells.
 const SPACING_CELLS: f64 = 64.0;
 
-/// Converts the heights of a grid in place, from heights above the datum of `from` to heights above that of `to`.
+/// Converts the heights of a grid in place, from the datum of `from` to the datum of `to`.
 ///
-/// `projection` is that of the grid's map coordinates; `cell_m` is the longer side of a cell in metres. A cell becomes void
-/// where a geoid grid has no value.
+/// `projection` belongs to the grid's map coordinates. `cell_m` is the longer side of a cell in
+/// metres. A cell becomes void where a geoid grid has no value.
 ///
 /// # Errors
-/// What PROJ reports when it cannot make a transformation.
+/// [`CrsError`] if PROJ cannot make a transformation.
 pub fn convert_heights(
     heights: &mut Grid<f32>,
     geotransform: &GeoTransform,
@@ -41,7 +42,8 @@ pub fn convert_heights(
     Ok(())
 }
 
-/// What is added to a height, at every `spacing`-th cell and one node past the last.
+/// Returns the height difference between the datums at every `spacing`-th cell, and at one node
+/// past the last.
 fn lattice(
     width: usize,
     height: usize,

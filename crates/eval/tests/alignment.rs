@@ -1,13 +1,13 @@
 //! The shift between two surfaces is found, and what it must not depend on it does not depend on.
 
-use eval::{Alignment, CellMap, EvalConfig, EvalError, EvalInput, Evaluation, MetresFromCells, evaluate};
+use eval::{AlignmentMethod, CellMap, EvalConfig, EvalError, EvalInput, Evaluation, MetresFromCells, evaluate};
 use proptest::prelude::*;
 use raster::{GeoTransform, Grid};
 
 const CELL_M: f64 = 0.5;
 
-/// A town: rolling ground, and a block house with a pitched roof on every square of 17 m, askew to the axes: edges along the
-/// cells would all be sampled at the same phase.
+/// A town: rolling ground, and a block house with a pitched roof on every square of 17 m, askew to
+/// the axes: edges along the cells would all be sampled at the same phase.
 fn town(x: f64, y: f64) -> f64 {
     let ground = 20.0 + 3.0 * (x / 31.0).sin() + 2.0 * (y / 23.0).cos();
     let (x, y) = (0.956 * x + 0.292 * y, 0.956 * y - 0.292 * x);
@@ -36,14 +36,15 @@ fn sampled(width: usize, height: usize, geotransform: &GeoTransform, f: impl Fn(
 fn run(
     reference: (&Grid<f32>, &GeoTransform),
     test: (&Grid<f32>, &GeoTransform),
-    alignment: Alignment,
+    alignment: AlignmentMethod,
 ) -> Result<Evaluation, EvalError> {
     let map = CellMap::affine(reference.1, test.1)?;
     let input = EvalInput::new(test.0, reference.0, &map, MetresFromCells::new(reference.1, (1.0, 1.0)));
     evaluate(&input, &EvalConfig { alignment, ..EvalConfig::default() })
 }
 
-/// The town as a test surface that (3.3, −2.7, 4.1) m must be added to, with noise, gross errors and holes.
+/// The town as a test surface that (3.3, −2.7, 4.1) m must be added to, with noise, gross errors
+/// and holes.
 fn displaced_test(geotransform: &GeoTransform, size: (usize, usize), noise_m: f64, hole_share: f64) -> Grid<f32> {
     sampled(size.0, size.1, geotransform, |x, y, i| {
         let gross = if noise(i, 2) > 0.9 { 12.0 * noise(i, 3) } else { 0.0 };
@@ -64,7 +65,7 @@ fn a_planted_shift_is_found_on_one_grid() {
     let reference = sampled(400, 320, &grid, |x, y, _| town(x, y));
     for (noise_m, holes) in [(0.0, 0.0), (0.1, 0.0), (0.3, 0.3), (0.6, 0.2)] {
         let test = displaced_test(&grid, (400, 320), noise_m, holes);
-        let found = run((&reference, &grid), (&test, &grid), Alignment::Xyz).unwrap();
+        let found = run((&reference, &grid), (&test, &grid), AlignmentMethod::Xyz).unwrap();
         assert_planted(&found, 0.05);
         assert!(!found.search.unwrap().at_edge);
     }
@@ -76,7 +77,7 @@ fn a_planted_shift_is_found_on_another_grid() {
     let other = GeoTransform::north_up(-9.13, 12.71, 0.61);
     let reference = sampled(400, 320, &grid, |x, y, _| town(x, y));
     let test = displaced_test(&other, (370, 320), 0.2, 0.2);
-    let found = run((&reference, &grid), (&test, &other), Alignment::Xyz).unwrap();
+    let found = run((&reference, &grid), (&test, &other), AlignmentMethod::Xyz).unwrap();
     assert_planted(&found, 0.05);
 }
 
@@ -86,7 +87,7 @@ fn a_test_surface_much_smaller_than_the_reference_is_found_too() {
     let small = GeoTransform::north_up(100.0, -80.0, CELL_M);
     let reference = sampled(600, 500, &grid, |x, y, _| town(x, y));
     let test = displaced_test(&small, (110, 100), 0.1, 0.1);
-    assert_planted(&run((&reference, &grid), (&test, &small), Alignment::Xyz).unwrap(), 0.05);
+    assert_planted(&run((&reference, &grid), (&test, &small), AlignmentMethod::Xyz).unwrap(), 0.05);
 }
 
 #[test]
@@ -95,7 +96,7 @@ fn nuth_and_kaab_find_the_planted_shift_too() {
     let reference = sampled(400, 360, &geotransform, |x, y, _| town(x, y));
     for (noise_m, hole_share) in [(0.0, 0.0), (0.2, 0.1)] {
         let test = displaced_test(&geotransform, (400, 360), noise_m, hole_share);
-        let found = run((&reference, &geotransform), (&test, &geotransform), Alignment::NuthKaab).unwrap();
+        let found = run((&reference, &geotransform), (&test, &geotransform), AlignmentMethod::NuthKaab).unwrap();
         assert_planted(&found, 0.05);
         assert!(found.nuth_kaab.unwrap().converged, "{:?}", found.nuth_kaab);
     }
@@ -116,7 +117,7 @@ fn nuth_and_kaab_agree_with_xdem() {
         let test = sampled(240, 200, &geotransform, |x, y, _| {
             hills(x + n[0], y + n[1]) - n[2] + n[3] * (x / 17.0 + 1.0).sin() * (y / 13.0).cos()
         });
-        let found = run((&reference, &geotransform), (&test, &geotransform), Alignment::NuthKaab).unwrap().shift;
+        let found = run((&reference, &geotransform), (&test, &geotransform), AlignmentMethod::NuthKaab).unwrap().shift;
         for (value, xdem) in [(found.dx_m, n[4]), (found.dy_m, n[5]), (found.dz_m, n[6])] {
             assert!((value - xdem).abs() < 0.03, "{line}: {found:?}");
         }
@@ -128,11 +129,11 @@ fn flat_ground_is_refused_by_nuth_and_kaab_whatever_its_noise() {
     let geotransform = GeoTransform::north_up(0.0, 0.0, CELL_M);
     let plain = |salt| sampled(300, 300, &geotransform, |x, _, i| 10.0 + 0.01 * x + 0.2 * noise(i, salt));
     let (reference, test) = (plain(1), plain(2));
-    let refused = run((&reference, &geotransform), (&test, &geotransform), Alignment::NuthKaab).unwrap_err();
+    let refused = run((&reference, &geotransform), (&test, &geotransform), AlignmentMethod::NuthKaab).unwrap_err();
     assert!(matches!(refused, EvalError::TooFlat { .. }), "{refused}");
     assert!(refused.to_string().contains("too flat"), "{refused}");
     let ramp = sampled(300, 300, &geotransform, |x, _, _| 10.0 + 0.3 * x);
-    let refused = run((&ramp, &geotransform), (&ramp, &geotransform), Alignment::NuthKaab).unwrap_err();
+    let refused = run((&ramp, &geotransform), (&ramp, &geotransform), AlignmentMethod::NuthKaab).unwrap_err();
     assert!(matches!(refused, EvalError::OneWaySlopes), "{refused}");
 }
 
@@ -141,7 +142,7 @@ fn a_shift_beyond_the_radius_is_reported_at_the_edge() {
     let grid = GeoTransform::north_up(0.0, 0.0, CELL_M);
     let reference = sampled(300, 300, &grid, |x, y, _| town(x, y));
     let test = sampled(300, 300, &grid, |x, y, _| town(x + 6.0, y));
-    let found = run((&reference, &grid), (&test, &grid), Alignment::Xyz).unwrap();
+    let found = run((&reference, &grid), (&test, &grid), AlignmentMethod::Xyz).unwrap();
     assert!(found.search.unwrap().at_edge, "{:?}", found.shift);
 }
 
@@ -150,7 +151,7 @@ fn flat_ground_has_no_shift_and_no_contrast() {
     let grid = GeoTransform::north_up(0.0, 0.0, CELL_M);
     let reference = Grid::filled(100, 100, 3.0f32);
     let test = Grid::filled(100, 100, 5.0f32);
-    let found = run((&reference, &grid), (&test, &grid), Alignment::Xyz).unwrap();
+    let found = run((&reference, &grid), (&test, &grid), AlignmentMethod::Xyz).unwrap();
     assert_eq!((found.shift.dx_m, found.shift.dy_m, found.shift.dz_m), (0.0, 0.0, -2.0));
     assert_eq!(found.search.unwrap().contrast, 1.0);
 }
@@ -161,20 +162,20 @@ fn unusable_input_is_refused_with_a_reason() {
     let flat = Grid::filled(20, 20, 3.0f32);
     let void = Grid::filled(20, 20, f32::NAN);
     let far = GeoTransform::north_up(1e5, 0.0, CELL_M);
-    for alignment in [Alignment::None, Alignment::Z, Alignment::Xyz, Alignment::NuthKaab] {
+    for alignment in [AlignmentMethod::None, AlignmentMethod::Z, AlignmentMethod::Xyz, AlignmentMethod::NuthKaab] {
         let empty = run((&void, &grid), (&flat, &grid), alignment).unwrap_err();
         assert!(matches!(empty, EvalError::EmptyReference { skipped: 0 }), "{empty}");
         assert!(run((&flat, &grid), (&void, &grid), alignment).is_err());
         assert!(run((&flat, &grid), (&flat, &far), alignment).is_err());
     }
     let tiny = Grid::filled(5, 5, 1.0f32);
-    let error = run((&tiny, &grid), (&tiny, &grid), Alignment::Xyz).unwrap_err();
+    let error = run((&tiny, &grid), (&tiny, &grid), AlignmentMethod::Xyz).unwrap_err();
     assert!(matches!(error, EvalError::TooFewCells { .. }), "{error}");
-    let error = run((&tiny, &grid), (&tiny, &grid), Alignment::NuthKaab).unwrap_err();
+    let error = run((&tiny, &grid), (&tiny, &grid), AlignmentMethod::NuthKaab).unwrap_err();
     assert!(matches!(error, EvalError::TooFlat { .. }), "{error}");
     let nothing = Grid::filled(0, 0, 0.0f32);
-    assert!(run((&nothing, &grid), (&flat, &grid), Alignment::Xyz).is_err());
-    assert!(run((&flat, &grid), (&nothing, &grid), Alignment::Xyz).is_err());
+    assert!(run((&nothing, &grid), (&flat, &grid), AlignmentMethod::Xyz).is_err());
+    assert!(run((&flat, &grid), (&nothing, &grid), AlignmentMethod::Xyz).is_err());
 }
 
 proptest! {
@@ -189,10 +190,10 @@ proptest! {
         let errors = |test: &Grid<f32>, alignment| {
             run((&reference, &grid), (test, &grid), alignment).unwrap().overall.errors.unwrap()
         };
-        let (a, b) = (errors(&test, Alignment::None), errors(&moved, Alignment::None));
+        let (a, b) = (errors(&test, AlignmentMethod::None), errors(&moved, AlignmentMethod::None));
         prop_assert!((b.mean - a.mean - f64::from(constant)).abs() < 1e-4);
         prop_assert!((b.nmad - a.nmad).abs() < 1e-4);
-        let (a, b) = (errors(&test, Alignment::Z), errors(&moved, Alignment::Z));
+        let (a, b) = (errors(&test, AlignmentMethod::Z), errors(&moved, AlignmentMethod::Z));
         for (a, b) in a.values().into_iter().zip(b.values()) {
             prop_assert!((a - b).abs() < 1e-4, "{} {}", a, b);
         }
@@ -204,7 +205,7 @@ proptest! {
         let (dx, dy) = (f64::from(columns) * CELL_M, f64::from(-rows) * CELL_M);
         let reference = sampled(160, 150, &grid, |x, y, _| town(x, y));
         let test = sampled(160, 150, &grid, |x, y, _| town(x + dx, y + dy));
-        let found = run((&reference, &grid), (&test, &grid), Alignment::Xyz).unwrap();
+        let found = run((&reference, &grid), (&test, &grid), AlignmentMethod::Xyz).unwrap();
         prop_assert_eq!((found.shift.dx_m, found.shift.dy_m), (dx, dy));
         prop_assert!(found.overall.errors.unwrap().mae < 1e-4);
     }
@@ -223,7 +224,7 @@ fn what_is_believed_most_has_the_errors_of_those_cells() {
         confidence: Some(&confidence),
         ..EvalInput::new(&test, &reference, &map, MetresFromCells::new(&geotransform, (1.0, 1.0)))
     };
-    let config = EvalConfig { alignment: Alignment::None, ..EvalConfig::default() };
+    let config = EvalConfig { alignment: AlignmentMethod::None, ..EvalConfig::default() };
     let kept = evaluate(&input, &config).unwrap().coverages;
     assert_eq!(kept.iter().map(|c| c.coverage).collect::<Vec<_>>(), eval::COVERAGES);
     for c in &kept {

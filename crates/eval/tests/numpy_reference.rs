@@ -1,6 +1,7 @@
-//! Metrics against NumPy: `reference/eval_numpy.txt`, written by `reference/eval_numpy.py`, to 1e-6.
+//! Metrics against NumPy: `reference/eval_numpy.txt`, written by `reference/eval_numpy.py`, to
+//! 1e-6.
 
-use eval::{Alignment, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, Metrics, Overlap, evaluate};
+use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, Metrics, Overlap, evaluate};
 use raster::{GeoTransform, Grid};
 use std::collections::HashMap;
 
@@ -11,7 +12,7 @@ const TERRAIN_M: f32 = 29.0;
 
 struct Case {
     name: String,
-    alignment: Alignment,
+    alignment: AlignmentMethod,
     skip: Vec<i32>,
     dz_m: f64,
     reference: (Grid<f32>, GeoTransform),
@@ -34,7 +35,7 @@ fn surface(lines: &mut std::str::Lines<'_>, label: &str) -> (Grid<f32>, GeoTrans
 fn next_case(lines: &mut std::str::Lines<'_>) -> Option<Case> {
     let name = lines.by_ref().find_map(|line| line.strip_prefix("case "))?.to_owned();
     let mut value = |key: &str| lines.next().unwrap().strip_prefix(key).expect("the key").trim().to_owned();
-    let alignment = if value("align") == "z" { Alignment::Z } else { Alignment::None };
+    let alignment = if value("align") == "z" { AlignmentMethod::Z } else { AlignmentMethod::None };
     let skip = value("skip").split_whitespace().map(|c| c.parse().unwrap()).collect();
     let dz_m = value("dz").parse().unwrap();
     let (reference, test) = (surface(lines, "reference "), surface(lines, "test "));

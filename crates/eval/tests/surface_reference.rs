@@ -1,8 +1,11 @@
-//! Surfaces and maps against SciPy, trimesh and NumPy: `reference/surface_scipy.txt`, written by `reference/surface_scipy.py`.
+//! Surfaces and maps against SciPy, trimesh and NumPy: `reference/surface_scipy.txt`, written by
+//! `reference/surface_scipy.py`.
 
 use std::collections::BTreeMap;
 
-use eval::{Surface, SurfaceComparison, SurfaceConfig, compare_depths, compare_normals, compare_surfaces};
+use eval::{
+    LocalSurface, SurfaceComparison, SurfaceComparisonConfig, compare_depths, compare_normals, compare_surfaces,
+};
 
 const REFERENCE: &str = include_str!("reference/surface_scipy.txt");
 const TOLERANCE: f64 = 1e-6;
@@ -67,26 +70,28 @@ fn named(found: &SurfaceComparison) -> Vec<(String, f64)> {
     values
 }
 
-fn clouds(reader: &mut Reader, case: &str, config: &SurfaceConfig) {
+fn clouds(reader: &mut Reader, case: &str, config: &SurfaceComparisonConfig) {
     let (test, reference) = (reader.rows::<3>("test "), reader.rows::<3>("reference "));
     let expected = reader.values("values ");
-    let found = compare_surfaces(&Surface::Points(test.clone()), &Surface::Points(reference.clone()), config).unwrap();
+    let found = compare_surfaces(&LocalSurface::Points(test.clone()), &LocalSurface::Points(reference.clone()), config)
+        .unwrap();
     let values = named(&found);
     check(case, &values.iter().map(|(name, v)| (name.as_str(), *v)).collect::<Vec<_>>(), &expected);
     // Whole voxels and whole metres away, all is the same but for what f64 keeps of it.
     let moved = |points: Vec<[f64; 3]>| points.into_iter().map(|[x, y, z]| [x + 2000.0, y - 4000.0, z]).collect();
-    let far = compare_surfaces(&Surface::Points(moved(test)), &Surface::Points(moved(reference)), config).unwrap();
+    let far =
+        compare_surfaces(&LocalSurface::Points(moved(test)), &LocalSurface::Points(moved(reference)), config).unwrap();
     for ((name, here), (_, there)) in values.iter().zip(named(&far)) {
         assert!((here - there).abs() < 1e-6, "{case}, {name}: {here} and {there}");
     }
 }
 
-fn mesh(reader: &mut Reader, case: &str, config: &SurfaceConfig) {
-    let points = Surface::Points(reader.rows::<3>("points "));
+fn mesh(reader: &mut Reader, case: &str, config: &SurfaceComparisonConfig) {
+    let points = LocalSurface::Points(reader.rows::<3>("points "));
     let positions = reader.rows::<3>("positions ");
     let triangles = reader.rows::<3>("triangles ").into_iter().map(|t| t.map(|corner| corner as u32)).collect();
     let expected = reader.values("values ");
-    let house = Surface::Mesh { positions, triangles };
+    let house = LocalSurface::Mesh { positions, triangles };
     let forth = compare_surfaces(&points, &house, config).unwrap();
     let back = compare_surfaces(&house, &points, config).unwrap();
     for (statistics, share) in [
@@ -135,14 +140,14 @@ fn all_surface_metrics_agree_with_scipy() {
     assert!(reader.line("#").contains("surface_scipy.py"));
     let thresholds_m = reader.line("thresholds ").split_whitespace().map(|t| t.parse().unwrap()).collect();
     let stated = reader.values("config ");
-    let config = SurfaceConfig {
+    let config = SurfaceComparisonConfig {
         thresholds_m,
         normal_scale_m: stated["normal_scale"],
         cylinder_m: stated["cylinder"],
         cylinder_reach_m: stated["reach"],
         registration_m: stated["registration"],
         voxel_m: stated["voxel"],
-        ..SurfaceConfig::default()
+        ..SurfaceComparisonConfig::default()
     };
     let mut cases = Vec::new();
     while let Some(line) = reader.lines.next() {

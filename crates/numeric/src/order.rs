@@ -1,10 +1,11 @@
 //! Order statistics: medians, quantiles and the normalised median absolute deviation (NMAD).
 //!
-//! Values are compared by `total_cmp`, so the results do not depend on their order. NaN sorts above +∞ (below −∞ with a
-//! negative sign): remove it first. Functions that take `&mut [T]` work in linear time and reorder the values.
+//! Values are compared by `total_cmp`, so the results do not depend on their order. NaN sorts above
+//! +∞ (below −∞ with a negative sign): remove it first. Functions that take `&mut [T]` work in
+//! linear time and reorder the values.
 //!
-//! There are several definitions of a median and of a quantile for a finite sample. They differ when the wanted place
-//! falls between two values, so each function here names its own:
+//! There are several definitions of a median and of a quantile for a finite sample. They differ
+//! when the wanted place falls between two values, so each function here names its own:
 //!
 //! | function | quantile q of n sorted values |
 //! |---|---|
@@ -19,23 +20,18 @@
 use std::cmp::Ordering;
 use std::ops::Sub;
 
-/// Factor that makes the median absolute deviation an estimate of the standard deviation of a normal distribution
-/// (Höhle and Höhle 2009, ISPRS J. 64, 398-406): one over the 75th percentile of the standard normal distribution.
+/// Factor that makes the median absolute deviation an estimate of the standard deviation of a
+/// normal distribution (Höhle and Höhle 2009, ISPRS J. 64, 398-406): one over the 75th percentile
+/// of the standard normal distribution.
 pub const NMAD_FACTOR: f64 = 1.4826;
 
 /// A floating-point number that order statistics can be taken of: `f32` or `f64`.
-pub trait Float: Copy + Sub<Output = Self> + Into<f64> + private::Sealed {
+pub trait Float: Copy + Sub<Output = Self> + Into<f64> {
     /// Compares by the total order of IEEE 754.
     fn order(&self, other: &Self) -> Ordering;
 
     /// Returns the absolute value.
     fn magnitude(self) -> Self;
-}
-
-mod private {
-    pub trait Sealed {}
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
 }
 
 impl Float for f32 {
@@ -72,7 +68,8 @@ pub fn order_statistic<T: Float>(values: &mut [T], rank: usize) -> Option<T> {
     (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, T::order).1)
 }
 
-/// Returns the median, for an even count the greater of the two middle values. Returns `None` without values.
+/// Returns the median, for an even count the greater of the two middle values. Returns `None`
+/// without values.
 ///
 /// ```
 /// assert_eq!(numeric::upper_median(&mut [4.0, 1.0, 3.0, 2.0]), Some(3.0));
@@ -82,7 +79,8 @@ pub fn upper_median<T: Float>(values: &mut [T]) -> Option<T> {
     order_statistic(values, values.len() / 2)
 }
 
-/// Returns the two middle values of a sorted slice, for an odd count the same one twice. Returns `None` without values.
+/// Returns the two middle values of a sorted slice, for an odd count the same one twice. Returns
+/// `None` without values.
 ///
 /// ```
 /// assert_eq!(numeric::middle_values(&[1.0, 2.0, 3.0, 4.0]), Some((&2.0, &3.0)));
@@ -93,7 +91,8 @@ pub fn middle_values<T>(sorted: &[T]) -> Option<(&T, &T)> {
     Some((sorted.get(n.saturating_sub(1) / 2)?, sorted.get(n / 2)?))
 }
 
-/// Returns the value whose rank is nearest to `share` · (n − 1), with `share` from 0 to 1. Returns `None` without values.
+/// Returns the value whose rank is nearest to `share` · (n − 1), with `share` from 0 to 1. Returns
+/// `None` without values.
 ///
 /// ```
 /// assert_eq!(numeric::nearest_quantile(&mut [10.0, 30.0, 20.0, 40.0], 0.6), Some(30.0));
@@ -104,8 +103,8 @@ pub fn nearest_quantile<T: Float>(values: &mut [T], share: f64) -> Option<T> {
     order_statistic(values, ((share * last as f64).round() as usize).min(last))
 }
 
-/// Returns the percentile `p` (0 to 100) by linear interpolation between two values, like `numpy.percentile`.
-/// Returns `None` without values.
+/// Returns the percentile `p` (0 to 100) by linear interpolation between two values, like
+/// `numpy.percentile`. Returns `None` without values.
 ///
 /// ```
 /// assert_eq!(numeric::percentile(&mut [4.0, 1.0, 3.0, 2.0], 50.0), Some(2.5));
@@ -119,8 +118,8 @@ pub fn percentile(values: &mut [f64], p: f64) -> Option<f64> {
     Some(below + (at - low as f64) * (next - below))
 }
 
-/// Returns [`NMAD_FACTOR`] times the median distance from the median, both by [`upper_median`]. Returns `None` without values.
-/// The values are replaced by their distances from the median.
+/// Returns [`NMAD_FACTOR`] times the median distance from the median, both by [`upper_median`].
+/// Returns `None` without values. The values are replaced by their distances from the median.
 ///
 /// ```
 /// let nmad = numeric::upper_nmad(&mut [1.0, 2.0, 3.0, 4.0, 100.0]).unwrap();

@@ -1,10 +1,10 @@
 //! Progress and cancellation of long jobs.
 //!
-//! A job takes a `&dyn Progress`. It reports its stages, its steps, its choices and its warnings to it, and asks it
-//! between two steps whether it should stop. Use [`Silent`] to watch nothing.
+//! A job takes a `&dyn Progress`. It reports its stages, its steps, its choices and its warnings to
+//! it, and asks it between two steps whether it should stop. Use [`Silent`] to watch nothing.
 //!
-//! A job calls [`Progress::check_cancelled`] between steps and turns [`Cancelled`] into its own error. It must then leave
-//! no half-written file behind.
+//! A job calls [`Progress::check_cancelled`] between steps and turns [`Cancelled`] into its own
+//! error. It must then leave no half-written file behind.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -27,7 +27,8 @@ pub trait Progress: Sync {
         false
     }
 
-    /// Returns an error if the job should stop, so that a job can write `progress.check_cancelled()?`.
+    /// Returns an error if the job should stop, so that a job can write
+    /// `progress.check_cancelled()?`.
     ///
     /// # Errors
     /// [`Cancelled`] if [`is_cancelled`](Self::is_cancelled) is true.

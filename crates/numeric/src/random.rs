@@ -1,19 +1,20 @@
-//! Seeded random numbers that are the same on every machine: SplitMix64 (Steele, Lea and Flood 2014, "Fast splittable
-//! pseudorandom number generators", OOPSLA).
+//! Seeded random numbers that are the same on every machine: SplitMix64 (Steele, Lea and Flood
+//! 2014, "Fast splittable pseudorandom number generators", OOPSLA).
 //!
-//! Output number `i` of seed `s` is `mix64(s + (i + 1) · γ)` modulo 2⁶⁴ with the golden gamma `γ` = [`GOLDEN_GAMMA`]. So
-//! there are two forms:
+//! Output number `i` of seed `s` is `mix64(s + (i + 1) · γ)` modulo 2⁶⁴ with the golden gamma `γ` =
+//! [`GOLDEN_GAMMA`]. So there are two forms:
 //!
 //! * [`SplitMix64`] draws one number after another.
-//! * [`splitmix64_at`] and [`RandomByIndex`] compute any number of a sequence directly. The result does not depend on the
-//!   order of the calls, so threads may share the work in any way.
+//! * [`splitmix64_at`] and [`RandomByIndex`] compute any number of a sequence directly. The result
+//!   does not depend on the order of the calls, so threads may share the work in any way.
 //!
 //! The generator is not cryptographic.
 
 /// Increment of the state of SplitMix64: 2⁶⁴ divided by the golden ratio, made odd.
 pub const GOLDEN_GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Mixes 64 bits with the finaliser of SplitMix64, a bijection. Each output bit depends on all input bits. It maps 0 to 0.
+/// Mixes 64 bits with the finaliser of SplitMix64, a bijection. Each output bit depends on all
+/// input bits. It maps 0 to 0.
 ///
 /// ```
 /// assert_eq!(numeric::random::mix64(0), 0);
@@ -40,7 +41,8 @@ pub const fn splitmix64_at(seed: u64, index: u64) -> u64 {
     mix64(seed.wrapping_add(index.wrapping_add(1).wrapping_mul(GOLDEN_GAMMA)))
 }
 
-/// Hashes a number: neighbouring numbers get unrelated hashes. It is the first output of the sequence with this seed.
+/// Hashes a number: neighbouring numbers get unrelated hashes. It is the first output of the
+/// sequence with this seed.
 ///
 /// ```
 /// assert_eq!(numeric::random::hash64(0), 0xe220_a839_7b1d_cdaf);
@@ -111,8 +113,8 @@ impl SplitMix64 {
         self.uniform() < probability
     }
 
-    /// Draws a number from the normal distribution with mean 0 and standard deviation 1 (Box and Muller 1958). It takes two
-    /// uniform numbers and drops the second normal number of the pair.
+    /// Draws a number from the normal distribution with mean 0 and standard deviation 1 (Box and
+    /// Muller 1958). It takes two uniform numbers and drops the second normal number of the pair.
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
@@ -135,7 +137,8 @@ pub struct RandomByIndex {
 }
 
 impl RandomByIndex {
-    /// Returns the numbers that belong to `seed` and `purpose`. Different purposes of one seed give unrelated numbers.
+    /// Returns the numbers that belong to `seed` and `purpose`. Different purposes of one seed give
+    /// unrelated numbers.
     pub const fn new(seed: u64, purpose: u64) -> Self {
         Self { seed: splitmix64_at(hash64(seed), purpose) }
     }

@@ -1,6 +1,7 @@
 //! Vectors of three numbers: the few operations that geometry needs.
 //!
-//! The order of the floating-point operations is part of the contract: results have the same bits everywhere.
+//! The order of the floating-point operations is part of the contract: results have the same bits
+//! everywhere.
 
 /// Three coordinates, or three components.
 pub type Vector = [f64; 3];
@@ -49,7 +50,8 @@ pub fn norm(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Returns the vector of length 1 in the same direction, or `None` if the length is zero or not finite.
+/// Returns the vector of length 1 in the same direction, or `None` if the length is zero or not
+/// finite.
 ///
 /// ```
 /// assert_eq!(numeric::vector::unit([0.0, 3.0, 4.0]), Some([0.0, 0.6, 0.8]));
@@ -61,7 +63,8 @@ pub fn unit(a: Vector) -> Option<Vector> {
     (length > 0.0 && length.is_finite()).then(|| a.map(|c| c / length))
 }
 
-/// Returns the vector of length 1 in the same direction. The components are NaN if the length is zero.
+/// Returns the vector of length 1 in the same direction. The components are NaN if the length is
+/// zero.
 #[inline]
 pub fn normalized(a: Vector) -> Vector {
     let length = norm(a);

@@ -1,6 +1,6 @@
 //! What was compared and how: published numbers differ more by protocol than by method, so no result goes without it.
 
-use eval::{Alignment, EvalConfig, Evaluation, OUTLIER_NMADS, TerrainSource};
+use eval::{AlignmentMethod, EvalConfig, Evaluation, OUTLIER_NMADS, TerrainSource};
 use serde_json::{Value, json};
 
 /// The protocol of an evaluation.
@@ -79,7 +79,7 @@ impl Protocol {
                 nk.iterations,
                 self.cell_m.0.max(self.cell_m.1) * (nk.levels as f64).exp2()
             ),
-            (Alignment::Z, ..) => "z: the median".into(),
+            (AlignmentMethod::Z, ..) => "z: the median".into(),
             _ => "none".into(),
         }
     }

@@ -1,6 +1,6 @@
 //! An evaluation's page, text and JSON hold what they should and nothing that they should not.
 
-use eval::{Alignment, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, evaluate};
+use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, evaluate};
 use raster::{GeoTransform, Grid};
 use report::{EvaluationReport, Protocol};
 
@@ -23,7 +23,7 @@ fn with_report(change: impl Fn(&mut Protocol), check: impl Fn(&EvaluationReport<
     let map = CellMap::identity();
     let classes = reference.map(|&h| Some(if h > 15.0 { 6 } else { 2 }));
     let input = EvalInput { classes: Some(&classes), ..EvalInput::new(&test, &reference, &map, metres) };
-    let config = EvalConfig { alignment: Alignment::None, ..EvalConfig::default() };
+    let config = EvalConfig { alignment: AlignmentMethod::None, ..EvalConfig::default() };
     let found = evaluate(&input, &config).unwrap();
     let mut protocol = Protocol {
         test: "run/dsm/dsm.tif".into(),

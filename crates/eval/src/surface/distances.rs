@@ -7,7 +7,7 @@ use numeric::percentile;
 /// Distances from samples of one surface to the other, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceStatistics {
-    /// Samples.
+    /// Number of samples.
     pub n: usize,
     /// Mean.
     pub mean_m: f64,
@@ -15,42 +15,43 @@ pub struct DistanceStatistics {
     pub median_m: f64,
     /// Root of the mean square.
     pub rmse_m: f64,
-    /// 90 % are below this.
+    /// 90th percentile.
     pub le90_m: f64,
-    /// 95 % are below this.
+    /// 95th percentile.
     pub le95_m: f64,
-    /// The largest.
+    /// Largest distance.
     pub max_m: f64,
 }
 
 /// Shares of distances below a threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ThresholdScore {
-    /// The threshold.
+    /// Threshold, metres.
     pub threshold_m: f64,
     /// Share of the test that is nearer than this to the reference.
     pub precision: f64,
     /// Share of the reference that is nearer than this to the test.
     pub recall: f64,
-    /// Harmonic mean of the two; 0 where both are 0.
+    /// Harmonic mean of precision and recall; 0 if both are 0.
     pub f_score: f64,
 }
 
-/// Angles between normals of the test and of what is nearest in the reference, degrees from 0 to 90.
+/// Angles between normals of the test and of the nearest place of the reference, degrees from 0 to
+/// 90.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NormalAngle {
-    /// Samples where both have a normal.
+    /// Number of samples where both have a normal.
     pub n: usize,
     /// Mean.
     pub mean_deg: f64,
     /// Median.
     pub median_deg: f64,
-    /// 90 % are below this.
+    /// 90th percentile.
     pub p90_deg: f64,
 }
 
 impl DistanceStatistics {
-    /// Of distances, which must not be empty; their order is lost.
+    /// Computes the statistics of distances, which must not be empty. Their order is lost.
     pub(super) fn of(distances: &mut [f64]) -> Self {
         let n = distances.len();
         let count = n.max(1) as f64;
@@ -76,7 +77,7 @@ impl ThresholdScore {
 }
 
 impl NormalAngle {
-    /// `None` where there are no angles; their order is lost.
+    /// Computes the statistics of angles, or `None` if there are none. Their order is lost.
     pub(super) fn of(angles_deg: &mut [f64]) -> Option<Self> {
         let n = angles_deg.len();
         let mean_deg = angles_deg.iter().sum::<f64>() / n as f64;

@@ -1,31 +1,31 @@
-//! Nearest points and triangles, through R-trees (`rstar`).
+//! Search for nearest points and triangles, by R-trees (`rstar`).
 
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
-use super::Surface;
+use super::model::LocalSurface;
 use numeric::vector::{cross, dot, norm, sub, unit};
 
-/// A point with its index.
+/// Point with its index.
 pub(super) type Indexed = GeomWithData<[f64; 3], u32>;
 
-/// Points, found by place.
+/// Spatial index of points.
 pub(super) struct PointIndex(RTree<Indexed>);
 
-/// A surface, found by place.
+/// Spatial index of a surface.
 pub(super) enum SurfaceIndex {
     Points(PointIndex),
     Triangles(RTree<Triangle>),
 }
 
-/// A triangle with an area.
+/// Triangle with an area.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Triangle {
     corners: [[f64; 3]; 3],
     pub(super) normal: [f64; 3],
 }
 
-/// What is nearest.
+/// Nearest place of a surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nearest {
     pub(super) distance_m: f64,
@@ -41,12 +41,12 @@ impl PointIndex {
         Self(RTree::bulk_load(indexed.collect()))
     }
 
-    /// The points within a distance, in no order that may be relied on.
+    /// Returns the points within a distance, in an unspecified order.
     pub(super) fn within(&self, centre: [f64; 3], radius_m: f64) -> impl Iterator<Item = ([f64; 3], u32)> {
         self.0.locate_within_distance(centre, radius_m * radius_m).map(|found| (*found.geom(), found.data))
     }
 
-    /// The points in a box.
+    /// Returns the points in a box, in an unspecified order.
     pub(super) fn in_box(&self, low: [f64; 3], high: [f64; 3]) -> impl Iterator<Item = ([f64; 3], u32)> {
         let envelope = AABB::from_corners(low, high);
         self.0.locate_in_envelope(&envelope).map(|found| (*found.geom(), found.data))
@@ -54,14 +54,14 @@ impl PointIndex {
 }
 
 impl SurfaceIndex {
-    pub(super) fn new(surface: &Surface) -> Self {
+    pub(super) fn new(surface: &LocalSurface) -> Self {
         match surface {
-            Surface::Points(points) => Self::Points(PointIndex::new(points)),
-            Surface::Mesh { .. } => Self::Triangles(RTree::bulk_load(triangles(surface))),
+            LocalSurface::Points(points) => Self::Points(PointIndex::new(points)),
+            LocalSurface::Mesh { .. } => Self::Triangles(RTree::bulk_load(triangles(surface))),
         }
     }
 
-    /// The nearest point of the surface; `None` only for an empty one.
+    /// Returns the nearest place of the surface, or `None` if the surface is empty.
     pub(super) fn nearest(&self, from: [f64; 3]) -> Option<Nearest> {
         match self {
             Self::Points(PointIndex(tree)) => tree.nearest_neighbor(&from).map(|found| {
@@ -77,9 +77,9 @@ impl SurfaceIndex {
     }
 }
 
-/// The triangles of a mesh that have an area.
-pub(super) fn triangles(surface: &Surface) -> Vec<Triangle> {
-    let Surface::Mesh { positions, triangles } = surface else { return Vec::new() };
+/// Returns the triangles of a mesh that have an area.
+pub(super) fn triangles(surface: &LocalSurface) -> Vec<Triangle> {
+    let LocalSurface::Mesh { positions, triangles } = surface else { return Vec::new() };
     triangles.iter().filter_map(|corners| Triangle::new(corners.map(|corner| positions[corner as usize]))).collect()
 }
 
@@ -94,13 +94,14 @@ impl Triangle {
         0.5 * norm(cross(sub(b, a), sub(c, a)))
     }
 
-    /// The point with these weights of the second and third corner.
+    /// Returns the point with these weights of the second and third corner.
     pub(super) fn point(&self, u: f64, v: f64) -> [f64; 3] {
         let [a, b, c] = self.corners;
         [0, 1, 2].map(|i| a[i] + u * (b[i] - a[i]) + v * (c[i] - a[i]))
     }
 
-    /// The nearest point of the triangle, by the regions of its corners, edges and inside (Ericson 2005, 5.1.5).
+    /// Returns the nearest point of the triangle, by the regions of its corners, edges and inside
+    /// (Ericson 2005, 5.1.5).
     fn closest(&self, p: [f64; 3]) -> [f64; 3] {
         let [a, b, c] = self.corners;
         let (ab, ac) = (sub(b, a), sub(c, a));
@@ -180,7 +181,7 @@ mod tests {
         ) {
             let positions: Vec<[f64; 3]> = soup.iter().flatten().copied().collect();
             let triangles = (0..soup.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-            let surface = Surface::Mesh { positions, triangles };
+            let surface = LocalSurface::Mesh { positions, triangles };
             let least = super::triangles(&surface).iter().map(|t| t.distance_2(&p)).fold(f64::INFINITY, f64::min);
             let found = SurfaceIndex::new(&surface).nearest(p).unwrap();
             prop_assert!((found.distance_m - least.sqrt()).abs() < 1e-12);

@@ -1,56 +1,61 @@
-//! M3C2: distances along local normals, with a level of detection (Lague, Brodu, Leroux 2013, sections 3.2 to 3.4).
+//! M3C2: distances along local normals, with a level of detection (Lague, Brodu, Leroux 2013,
+//! sections 3.2 to 3.4).
 //!
-//! At a core point of the reference the normal is that of its points in a ball of diameter D (turned outwards where the
-//! reference is a mesh, upwards elsewhere). In a cylinder of diameter d along it, the mean position of the test minus that of
-//! the reference is the distance. Level of detection at 95 %: 1.96 · (√(σ₁²/n₁ + σ₂²/n₂) + registration), with the
-//! standard deviations σ of the n − 1 kind; it needs two points on each side.
+//! At a core point of the reference, the normal is estimated from the reference's points in a ball
+//! of diameter D. It is turned outwards if the reference is a mesh, upwards otherwise. The distance
+//! is the mean position of the test minus that of the reference along the normal, in a cylinder of
+//! diameter d. The level of detection at 95 % is 1.96 · (√(σ₁²/n₁ + σ₂²/n₂) + registration), where
+//! σ are sample standard deviations (divided by n − 1). It needs two points on each side.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::SurfaceConfig;
+use super::config::SurfaceComparisonConfig;
 use super::index::PointIndex;
 use super::normals::{normal, towards};
 use super::sample::Samples;
 use numeric::percentile;
 use numeric::vector::{dot, sub};
 
-/// Normal quantile of a two-sided 95 %.
+/// Quantile of the normal distribution for a two-sided probability of 95 %.
 const Z95: f64 = 1.96;
 
-/// M3C2 distances over the core points, metres; positive where the test lies outside or above.
+/// M3C2 distances over the core points, metres. They are positive where the test lies outside or
+/// above.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct M3c2 {
-    /// Core points.
+    /// Number of core points.
     pub core_points: usize,
-    /// Core points with a normal and both surfaces in the cylinder: what follows is of these.
+    /// Number of core points with a normal and both surfaces in the cylinder. The fields below
+    /// refer to these.
     pub n: usize,
     /// Mean.
     pub mean_m: f64,
     /// Median.
     pub median_m: f64,
-    /// Mean without the sign.
+    /// Mean absolute distance.
     pub mean_abs_m: f64,
     /// Root of the mean square.
     pub rmse_m: f64,
     /// Standard deviation.
     pub std_m: f64,
-    /// Distances with a level of detection.
+    /// Number of distances with a level of detection.
     pub with_lod: usize,
     /// Median level of detection.
     pub median_lod_m: Option<f64>,
-    /// Share of the distances with a level of detection that are above it: changes that are real.
+    /// Share of the distances with a level of detection that exceed it, which are significant
+    /// changes.
     pub significant: Option<f64>,
 }
 
-/// What one core point gives.
+/// Result of one core point.
 #[derive(Debug, Clone, Copy)]
 struct Core {
     distance_m: f64,
     lod_m: Option<f64>,
 }
 
-/// Mean and variance (of the n − 1 kind) of positions along an axis.
+/// Mean and sample variance (divided by n − 1) of positions along an axis.
 struct Along {
     count: usize,
     mean: f64,
@@ -61,7 +66,7 @@ pub(super) fn m3c2(
     reference: &Samples,
     in_reference: &PointIndex,
     in_test: &PointIndex,
-    config: &SurfaceConfig,
+    config: &SurfaceComparisonConfig,
 ) -> M3c2 {
     let step = reference.points.len().div_ceil(config.max_core_points.max(1)).max(1);
     let core = |i: usize| {
@@ -80,8 +85,8 @@ pub(super) fn m3c2(
     summary(chosen.len(), &found)
 }
 
-/// `None` where no point is in the cylinder.
-fn along(index: &PointIndex, core: [f64; 3], axis: [f64; 3], config: &SurfaceConfig) -> Option<Along> {
+/// Returns the positions of the points in the cylinder along its axis, or `None` if there are none.
+fn along(index: &PointIndex, core: [f64; 3], axis: [f64; 3], config: &SurfaceComparisonConfig) -> Option<Along> {
     let (radius, reach) = (0.5 * config.cylinder_m, config.cylinder_reach_m);
     let half = axis.map(|n| reach * n.abs() + radius * (1.0 - n * n).max(0.0).sqrt());
     let low = [0, 1, 2].map(|i| core[i] - half[i]);

@@ -1,4 +1,4 @@
-//! Normals of a cloud: the direction of least variance of the points in a ball.
+//! Normals of a point cloud: the direction of least variance of the points in a ball.
 
 use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
@@ -6,16 +6,17 @@ use rayon::prelude::*;
 use super::index::PointIndex;
 use numeric::vector::{dot, sub, unit};
 
-/// Fewer points than this have no plane.
+/// Lowest number of points that have a plane.
 const LEAST_POINTS: usize = 3;
 
-/// The normal of the points within `radius_m`, upwards; `None` where they are fewer than three or on one line.
+/// Returns the upward normal of the points within `radius_m`, or `None` if they are fewer than
+/// three or on one line.
 pub(super) fn normal(index: &PointIndex, at: [f64; 3], radius_m: f64) -> Option<[f64; 3]> {
     let mut near: Vec<([f64; 3], u32)> = index.within(at, radius_m).collect();
     if near.len() < LEAST_POINTS {
         return None;
     }
-    // The sums must not depend on the order in which the tree is searched.
+    // Sorting makes the sums independent of the order in which the tree is searched.
     near.sort_unstable_by_key(|(_, index)| *index);
     let count = near.len() as f64;
     let mut mean = [0.0; 3];
@@ -36,18 +37,19 @@ pub(super) fn normal(index: &PointIndex, at: [f64; 3], radius_m: f64) -> Option<
     unit([column[0], column[1], column[2]]).map(upwards)
 }
 
-/// The normals of many points.
+/// Returns the normals at many points.
 pub(super) fn normals(index: &PointIndex, points: &[[f64; 3]], radius_m: f64) -> Vec<Option<[f64; 3]>> {
     points.par_iter().map(|&point| normal(index, point, radius_m)).collect()
 }
 
-/// The one of a direction and its opposite whose first of z, y, x that is not zero is positive.
+/// Returns the direction or its opposite, such that the first of z, y, x that is not zero is
+/// positive.
 fn upwards(n: [f64; 3]) -> [f64; 3] {
     let first = [n[2], n[1], n[0]].into_iter().find(|c| *c != 0.0).unwrap_or(1.0);
     if first < 0.0 { n.map(|c| -c) } else { n }
 }
 
-/// The one of a direction and its opposite that is on the side of another.
+/// Returns the direction or its opposite, whichever is on the side of `side`.
 pub(super) fn towards(n: [f64; 3], side: [f64; 3]) -> [f64; 3] {
     if dot(n, side) < 0.0 { n.map(|c| -c) } else { n }
 }

@@ -1,16 +1,19 @@
-//! Points on a surface: those of a cloud, or seeded ones on a mesh.
+//! Samples of a surface: the points of a cloud, or seeded points on a mesh.
 //!
-//! Of n samples on a mesh the i-th lies in the i-th of n equal shares of the area, so that the density is even; inside its
-//! triangle it is uniform. Its random numbers depend on the seed and on i alone.
+//! Of n samples on a mesh, the i-th lies in the i-th of n equal shares of the area, so that the
+//! density is even. Inside its triangle it is uniform. Its random numbers depend on the seed and on
+//! i alone.
 
 use numeric::SplitMix64;
 use numeric::random::{GOLDEN_GAMMA, mix64};
 use rayon::prelude::*;
 
+use super::config::SurfaceComparisonConfig;
+use super::error::SurfaceError;
 use super::index::{Triangle, triangles};
-use super::{Surface, SurfaceConfig, SurfaceError};
+use super::model::LocalSurface;
 
-/// Points on a surface, and the normals of a mesh there.
+/// Points on a surface, with the normals of a mesh.
 pub(super) struct Samples {
     pub(super) points: Vec<[f64; 3]>,
     pub(super) normals: Option<Vec<[f64; 3]>>,
@@ -19,16 +22,20 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    pub(super) fn of(surface: &Surface, config: &SurfaceConfig, which: &'static str) -> Result<Self, SurfaceError> {
+    pub(super) fn of(
+        surface: &LocalSurface,
+        config: &SurfaceComparisonConfig,
+        which: &'static str,
+    ) -> Result<Self, SurfaceError> {
         match surface {
-            Surface::Points(points) => Ok(Self { points: points.clone(), normals: None, per_m2: None }),
-            Surface::Mesh { .. } => on_mesh(&triangles(surface), config)
+            LocalSurface::Points(points) => Ok(Self { points: points.clone(), normals: None, per_m2: None }),
+            LocalSurface::Mesh { .. } => on_mesh(&triangles(surface), config)
                 .ok_or(SurfaceError::Empty { which, found: "no triangle with an area" }),
         }
     }
 }
 
-fn on_mesh(triangles: &[Triangle], config: &SurfaceConfig) -> Option<Samples> {
+fn on_mesh(triangles: &[Triangle], config: &SurfaceComparisonConfig) -> Option<Samples> {
     let ends: Vec<f64> = triangles
         .iter()
         .scan(0.0, |sum, triangle| {
@@ -42,7 +49,7 @@ fn on_mesh(triangles: &[Triangle], config: &SurfaceConfig) -> Option<Samples> {
         let [place, u, v] = random(config.seed, i as u64);
         let at = (i as f64 + place) / count as f64 * area;
         let triangle = &triangles[ends.partition_point(|&end| end <= at).min(triangles.len() - 1)];
-        // The square root makes the corner opposite to the edge as likely as its share of the area.
+        // The square root makes the samples uniform over the triangle.
         let root = u.sqrt();
         (triangle.point(root * (1.0 - v), root * v), triangle.normal)
     };
@@ -50,7 +57,7 @@ fn on_mesh(triangles: &[Triangle], config: &SurfaceConfig) -> Option<Samples> {
     Some(Samples { points, normals: Some(normals), per_m2: Some(count as f64 / area) })
 }
 
-/// Three numbers in [0, 1) that depend on a seed and an index.
+/// Returns three numbers in [0, 1) that depend on the seed and the index alone.
 fn random(seed: u64, index: u64) -> [f64; 3] {
     let mut random = SplitMix64::new(mix64(seed ^ GOLDEN_GAMMA) ^ mix64(index.wrapping_add(1)));
     [0; 3].map(|_: i32| random.uniform())
@@ -60,8 +67,8 @@ fn random(seed: u64, index: u64) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    fn square() -> Surface {
-        Surface::Mesh {
+    fn square() -> LocalSurface {
+        LocalSurface::Mesh {
             positions: vec![[0.0, 0.0, 2.0], [10.0, 0.0, 2.0], [10.0, 10.0, 2.0], [0.0, 10.0, 2.0]],
             triangles: vec![[0, 1, 2], [0, 2, 3], [0, 0, 1]],
         }
@@ -69,7 +76,7 @@ mod tests {
 
     #[test]
     fn samples_are_even_on_the_mesh_and_follow_the_seed() {
-        let config = SurfaceConfig { samples_per_m2: 100.0, ..SurfaceConfig::default() };
+        let config = SurfaceComparisonConfig { samples_per_m2: 100.0, ..SurfaceComparisonConfig::default() };
         let found = Samples::of(&square(), &config, "test").unwrap();
         assert_eq!((found.points.len(), found.per_m2), (10_000, Some(100.0)));
         assert!(
@@ -79,14 +86,14 @@ mod tests {
         for quarter in 0..4 {
             let inside = |p: &&[f64; 3]| (p[0] >= 5.0) as usize + 2 * (p[1] >= 5.0) as usize == quarter;
             let count = found.points.iter().filter(inside).count();
-            // Six standard deviations of a binomial count.
+            // The limits are six standard deviations of a binomial count.
             assert!((2240..2760).contains(&count), "{quarter}: {count}");
         }
         let again = Samples::of(&square(), &config, "test").unwrap();
-        let other = Samples::of(&square(), &SurfaceConfig { seed: 1, ..config.clone() }, "test").unwrap();
+        let other = Samples::of(&square(), &SurfaceComparisonConfig { seed: 1, ..config.clone() }, "test").unwrap();
         assert_eq!(again.points, found.points);
         assert_ne!(other.points, found.points);
-        let few = SurfaceConfig { max_samples: 50, ..config };
+        let few = SurfaceComparisonConfig { max_samples: 50, ..config };
         assert_eq!(Samples::of(&square(), &few, "test").unwrap().per_m2, Some(0.5));
     }
 }

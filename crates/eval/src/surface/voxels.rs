@@ -1,23 +1,24 @@
-//! VOC, the volumetric overlap: which voxels both surfaces are in.
+//! VOC, the volumetric overlap: the voxels that both surfaces occupy.
 
 use serde::Serialize;
 
-/// Voxels that hold samples; their corners are at whole multiples of the edge from the local origin.
+/// Overlap of occupied voxels. Corners of voxels are at whole multiples of the edge length from the
+/// local origin.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct VoxelOverlap {
-    /// Edge of a voxel, metres.
+    /// Edge length of a voxel, metres.
     pub voxel_m: f64,
-    /// Voxels with the test.
+    /// Number of voxels with samples of the test.
     pub test: usize,
-    /// Voxels with the reference.
+    /// Number of voxels with samples of the reference.
     pub reference: usize,
-    /// Voxels with both.
+    /// Number of voxels with samples of both.
     pub shared: usize,
-    /// Shared voxels over those of either: the volumetric overlap.
+    /// Number of shared voxels divided by the number occupied by either: the volumetric overlap.
     pub voc: f64,
-    /// Shared voxels over those of the reference.
+    /// Number of shared voxels divided by the number of the reference.
     pub completeness: f64,
-    /// Shared voxels over those of the test.
+    /// Number of shared voxels divided by the number of the test.
     pub correctness: f64,
 }
 
@@ -36,7 +37,7 @@ pub(super) fn overlap(test: &[[f64; 3]], reference: &[[f64; 3]], voxel_m: f64) -
     }
 }
 
-/// The voxels of points, in order.
+/// Returns the voxels of points, in order.
 fn occupied(points: &[[f64; 3]], voxel_m: f64) -> Vec<[i64; 3]> {
     let mut voxels: Vec<[i64; 3]> = points.iter().map(|p| p.map(|c| (c / voxel_m).floor() as i64)).collect();
     voxels.sort_unstable();

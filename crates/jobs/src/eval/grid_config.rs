@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crs::VerticalDatum;
-use eval::{Alignment, EvalConfig};
+use eval::{AlignmentMethod, EvalConfig};
 use serde::{Deserialize, Serialize};
 
 use super::error::EvalJobError;
@@ -34,7 +34,7 @@ pub struct GridEvalConfig {
     /// Surface model that is believed, or a LAS or LAZ cloud. Errors are measured at its cells.
     pub reference: PathBuf,
     /// What is removed before the comparison.
-    pub alignment: Alignment,
+    pub alignment: AlignmentMethod,
     /// Radius of the horizontal search, metres.
     pub search_m: f64,
     /// Thresholds of completeness and accuracy, metres.

@@ -49,7 +49,7 @@ pub struct GridEvalReport {
 ///
 /// let town = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town");
 /// let mut config = GridEvalConfig::new(format!("{town}/truth/dsm.tif").into(), format!("{town}/truth/dsm.tif").into());
-/// config.alignment = eval::Alignment::Z;
+/// config.alignment = eval::AlignmentMethod::Z;
 /// config.target = EvalTarget::Nowhere;
 /// let report = compare_grids(&config, &Silent)?;
 /// assert_eq!(report.evaluation.overall.errors.map(|errors| errors.mae), Some(0.0));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use city::Lod;
 use crs::VerticalDatum;
-use eval::SurfaceConfig;
+use eval::SurfaceComparisonConfig;
 use serde::{Deserialize, Serialize};
 
 use super::error::EvalJobError;
@@ -57,7 +57,7 @@ pub struct SurfaceEvalConfig {
 impl SurfaceEvalConfig {
     /// A comparison with default settings that writes no file.
     pub fn new(test: PathBuf, reference: PathBuf) -> Self {
-        let defaults = SurfaceConfig::default();
+        let defaults = SurfaceComparisonConfig::default();
         Self {
             test,
             reference,
@@ -89,8 +89,8 @@ impl SurfaceEvalConfig {
     }
 
     /// Returns the settings of the comparison itself.
-    pub(super) fn surface_config(&self) -> SurfaceConfig {
-        SurfaceConfig {
+    pub(super) fn surface_config(&self) -> SurfaceComparisonConfig {
+        SurfaceComparisonConfig {
             thresholds_m: self.requirements.with_thresholds(self.thresholds_m.clone()),
             samples_per_m2: self.samples_per_m2,
             seed: self.sample_seed,
@@ -99,7 +99,7 @@ impl SurfaceEvalConfig {
             cylinder_reach_m: self.cylinder_reach_m,
             registration_m: self.registration_m,
             voxel_m: self.voxel_m,
-            ..SurfaceConfig::default()
+            ..SurfaceComparisonConfig::default()
         }
     }
 }

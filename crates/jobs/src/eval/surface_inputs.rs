@@ -2,7 +2,7 @@
 
 use city::{MeshConfig, Scope};
 use crs::{HeightConverter, MapProjection, VerticalDatum};
-use eval::Surface;
+use eval::LocalSurface;
 use io::surfaces::SurfaceFile;
 
 use super::error::EvalJobError;
@@ -10,8 +10,8 @@ use super::surface_config::SurfaceEvalConfig;
 
 /// Two surfaces that can be compared.
 pub(super) struct SurfaceInputs {
-    pub(super) test: Surface,
-    pub(super) reference: Surface,
+    pub(super) test: LocalSurface,
+    pub(super) reference: LocalSurface,
     /// Formats and sizes of test and reference, in words.
     pub(super) formats: [String; 2],
     /// Position of the local origin in the coordinate reference system, whole metres.
@@ -65,13 +65,13 @@ fn middle(positions: &[[f64; 3]]) -> [f64; 3] {
     })
 }
 
-fn local(file: SurfaceFile, origin: [f64; 3]) -> Surface {
+fn local(file: SurfaceFile, origin: [f64; 3]) -> LocalSurface {
     let mut positions = file.positions;
     positions.iter_mut().for_each(|p| (0..3).for_each(|i| p[i] -= origin[i]));
     if file.triangles.is_empty() {
-        Surface::Points(positions)
+        LocalSurface::Points(positions)
     } else {
-        Surface::Mesh { positions, triangles: file.triangles }
+        LocalSurface::Mesh { positions, triangles: file.triangles }
     }
 }
 

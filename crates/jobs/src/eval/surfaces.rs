@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use eval::{SurfaceComparison, SurfaceConfig, compare_surfaces};
+use eval::{SurfaceComparison, SurfaceComparisonConfig, compare_surfaces};
 use numeric::Progress;
 use serde::Serialize;
 
@@ -49,7 +49,7 @@ pub struct SurfaceProtocol {
     /// Always `none`.
     pub alignment: &'static str,
     /// Settings of the comparison.
-    pub config: SurfaceConfig,
+    pub config: SurfaceComparisonConfig,
     /// Choices and doubts that a reader must know.
     pub notes: Vec<String>,
     /// Requirements that are not met.

@@ -6,7 +6,7 @@
 //! not: a geoid taken for the ellipsoid would be an error of tens of metres.
 
 use crs::{HeightConverter, VerticalDatum};
-use eval::{Alignment, MetresFromCells, convert_heights};
+use eval::{AlignmentMethod, MetresFromCells, convert_heights};
 use io::raster::Dem;
 
 use super::error::EvalJobError;
@@ -23,11 +23,11 @@ impl StatedDatums {
     pub(super) fn reconcile(
         &self,
         test: &mut Dem,
-        alignment: Alignment,
+        alignment: AlignmentMethod,
         notes: &mut Vec<String>,
     ) -> Result<Option<VerticalDatum>, EvalJobError> {
         let unstated = |unknown: &'static str, known: &'static str, datum: VerticalDatum| {
-            if datum != VerticalDatum::Ellipsoid || alignment == Alignment::None {
+            if datum != VerticalDatum::Ellipsoid || alignment == AlignmentMethod::None {
                 return Err(EvalJobError::DatumUnknown { known, unknown, datum });
             }
             Ok(format!(

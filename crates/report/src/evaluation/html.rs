@@ -1,6 +1,6 @@
 //! The page: headline numbers, protocol, pictures, plots, tables.
 
-use eval::Alignment;
+use eval::AlignmentMethod;
 
 use super::EvaluationReport;
 use super::numbers::{grouped, percent};
@@ -55,8 +55,8 @@ impl EvaluationReport<'_> {
     fn brief_protocol(&self) -> String {
         let shift = self.found.shift;
         let moved = match self.protocol.config.alignment {
-            Alignment::None => "Compared as they are, without alignment".to_owned(),
-            Alignment::Z => format!("Aligned by the median: {:+.2} m up", shift.dz_m),
+            AlignmentMethod::None => "Compared as they are, without alignment".to_owned(),
+            AlignmentMethod::Z => format!("Aligned by the median: {:+.2} m up", shift.dz_m),
             _ => format!("Aligned: {:+.2} m east, {:+.2} m north, {:+.2} m up", shift.dx_m, shift.dy_m, shift.dz_m),
         };
         let left_out = match self.found.skipped_cells {
