@@ -5,7 +5,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::{CameraError, ImageCorrection, ImagePoint, Rpc};
 
-/// An RPC with an image-space correction behind it: what the pipeline projects with.
+/// An RPC followed by an image-space correction. All jobs project with this camera.
+///
+/// ```
+/// use camera::{ImageCorrection, ImagePoint, Rpc, RpcCamera};
+/// # use geodesy::LonLatHeight;
+/// # fn corrected(rpc: Rpc, ground: LonLatHeight) -> Result<(), camera::CameraError> {
+/// let raw = RpcCamera::new(rpc.clone());
+/// let shifted = RpcCamera { rpc, correction: ImageCorrection::translation(1.5, -0.5) };
+/// let (a, b) = (raw.project(ground)?, shifted.project(ground)?);
+/// assert_eq!((b.sample - a.sample, b.line - a.line), (1.5, -0.5));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RpcCamera {
     /// The provider's model.
@@ -15,35 +27,35 @@ pub struct RpcCamera {
 }
 
 impl RpcCamera {
-    /// A camera without correction.
+    /// Makes a camera without correction.
     pub const fn new(rpc: Rpc) -> Self {
         Self { rpc, correction: ImageCorrection::IDENTITY }
     }
 
-    /// The image position of a ground point, corrected.
+    /// Returns the corrected image position of a ground point.
     ///
     /// # Errors
-    /// As [`Rpc::project`].
+    /// The same as for [`Rpc::project`].
     pub fn project(&self, ground: LonLatHeight) -> Result<ImagePoint, CameraError> {
         self.rpc.project(ground).map(|p| self.correction.apply(p))
     }
 
-    /// The ground point at `height_m` seen at a position of the image.
+    /// Returns the ground point at `height_m` that is seen at an image position.
     ///
     /// # Errors
-    /// As [`Rpc::localize`]; a correction that cannot be inverted is [`CameraError::Singular`].
+    /// The same as for [`Rpc::localize`], and [`CameraError::Singular`] if the correction cannot be inverted.
     pub fn localize(&self, image: ImagePoint, height_m: f64) -> Result<LonLatHeight, CameraError> {
         let p = self.correction.invert(image).ok_or(CameraError::Singular)?;
         self.rpc.localize(p, height_m)
     }
 
-    /// The camera of the image cut at `origin`, the crop's upper-left pixel.
+    /// Returns the camera of a crop whose upper-left pixel is `origin`.
     #[must_use]
     pub fn cropped(&self, origin: ImagePoint) -> Self {
         Self { rpc: self.rpc.cropped(origin), correction: self.correction.cropped(origin) }
     }
 
-    /// The camera of the image resampled by `factor`; see [`Rpc::rescaled`].
+    /// Returns the camera of the image resampled by `factor`. See [`Rpc::rescaled`].
     #[must_use]
     pub fn rescaled(&self, factor: f64) -> Self {
         Self { rpc: self.rpc.rescaled(factor), correction: self.correction.rescaled(factor) }

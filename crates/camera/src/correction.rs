@@ -1,4 +1,4 @@
-//! Image-space correction of an RPC's pointing.
+//! Image-space correction of the pointing of an RPC.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,8 +6,17 @@ use crate::ImagePoint;
 
 /// An affine map in image space, applied after the RPC: `corrected = p + t + D (p − centre)`.
 ///
-/// The translation is given at `centre`, so that a small linear part does not turn into a huge translation
-/// for crops far from the origin of their coordinates.
+/// The translation holds at `centre`. Otherwise a small linear part would become a huge translation for crops far
+/// from the origin of their coordinates.
+///
+/// ```
+/// use camera::{ImageCorrection, ImagePoint};
+///
+/// let correction = ImageCorrection::translation(2.0, -1.0);
+/// let corrected = correction.apply(ImagePoint::new(10.0, 10.0));
+/// assert_eq!(corrected, ImagePoint::new(12.0, 9.0));
+/// assert_eq!(correction.invert(corrected), Some(ImagePoint::new(10.0, 10.0)));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ImageCorrection {
     /// Shift at `centre`, pixels (sample, line).
@@ -19,16 +28,16 @@ pub struct ImageCorrection {
 }
 
 impl ImageCorrection {
-    /// No correction.
+    /// The correction that changes nothing.
     pub const IDENTITY: Self =
         Self { translation_px: [0.0; 2], linear: [[0.0; 2]; 2], centre: ImagePoint::new(0.0, 0.0) };
 
-    /// A shift of `sample` columns and `line` rows.
+    /// Makes a shift of `sample` columns and `line` rows.
     pub const fn translation(sample: f64, line: f64) -> Self {
         Self { translation_px: [sample, line], ..Self::IDENTITY }
     }
 
-    /// The corrected position of a point that the RPC projected.
+    /// Returns the corrected position of a point that the RPC projected.
     pub fn apply(&self, p: ImagePoint) -> ImagePoint {
         let (ds, dl) = (p.sample - self.centre.sample, p.line - self.centre.line);
         let t = self.translation_px;
@@ -38,7 +47,7 @@ impl ImageCorrection {
         }
     }
 
-    /// The RPC's own position for a point observed in the image; `None` when the linear part is singular.
+    /// Returns the uncorrected position of a point observed in the image. `None` if the linear part is singular.
     pub fn invert(&self, q: ImagePoint) -> Option<ImagePoint> {
         let [[a, b], [c, d]] = self.linear;
         let (m00, m11) = (1.0 + a, 1.0 + d);
@@ -54,7 +63,7 @@ impl ImageCorrection {
         })
     }
 
-    /// This correction followed by `next`, as one correction about this one's centre.
+    /// Combines this correction and the following one, `next`, about the centre of this one.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
         let ([[a, b], [c, d]], [[e, f], [g, h]]) = (self.linear, next.linear);
@@ -66,14 +75,14 @@ impl ImageCorrection {
         }
     }
 
-    /// The same correction in the coordinates of the image cut at `origin`.
+    /// Returns the same correction in the coordinates of the image cut at `origin`.
     #[must_use]
     pub fn cropped(&self, origin: ImagePoint) -> Self {
         let centre = ImagePoint::new(self.centre.sample - origin.sample, self.centre.line - origin.line);
         Self { centre, ..*self }
     }
 
-    /// The same correction in the coordinates of the image resampled by `factor`.
+    /// Returns the same correction in the coordinates of the image resampled by `factor`.
     #[must_use]
     pub fn rescaled(&self, factor: f64) -> Self {
         let at = |x: f64| (x + 0.5) * factor - 0.5;

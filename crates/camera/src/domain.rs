@@ -19,15 +19,15 @@ pub struct ValidityDomain {
 }
 
 impl ValidityDomain {
-    /// Whether a point lies in the box, its faces included.
+    /// Returns whether a point lies in the box, faces included.
     pub fn contains(&self, g: LonLatHeight) -> bool {
         short_way(g.lon_deg - self.centre.lon_deg).abs() <= self.half_lon_deg
             && (g.lat_deg - self.centre.lat_deg).abs() <= self.half_lat_deg
             && (g.height_m - self.centre.height_m).abs() <= self.half_height_m
     }
 
-    /// The point at fractions of the half-extents, each in [−1, 1] inside the box: longitude, latitude, height. The
-    /// longitude is not brought back into ±180°.
+    /// Returns the point at fractions of the half-extents: longitude, latitude, height. Fractions in [−1, 1] are inside
+    /// the box. The longitude is not brought back into ±180°.
     pub fn at(&self, [l, p, h]: [f64; 3]) -> LonLatHeight {
         LonLatHeight::new(
             self.centre.lon_deg + l * self.half_lon_deg,
@@ -36,14 +36,14 @@ impl ValidityDomain {
         )
     }
 
-    /// Lowest and highest height, metres.
+    /// Returns the lowest and highest height, metres.
     pub fn height_range_m(&self) -> (f64, f64) {
         (self.centre.height_m - self.half_height_m, self.centre.height_m + self.half_height_m)
     }
 }
 
 impl Rpc {
-    /// The box on which the coefficients were fitted: offsets ± scales.
+    /// Returns the box on which the coefficients were fitted: offsets ± scales.
     pub fn domain(&self) -> ValidityDomain {
         ValidityDomain {
             centre: LonLatHeight::new(self.long_off, self.lat_off, self.height_off),

@@ -1,6 +1,6 @@
-//! Why a camera could not answer, and why a set of coefficients is no camera.
+//! Errors of projection and localisation, and of coefficients that do not form a camera.
 
-/// Why a point has no image or no ground position.
+/// A point that cannot be projected or localised.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraError {
@@ -16,9 +16,9 @@ pub enum CameraError {
     /// Newton's method did not reach the tolerance.
     #[error("localisation did not converge: {residual_px:.3} px left after {iterations} iterations")]
     NotConverged {
-        /// What was left, pixels.
+        /// Remaining distance in the image, pixels.
         residual_px: f64,
-        /// Iterations done.
+        /// Number of iterations.
         iterations: u32,
     },
     /// The ground point is so far from the RPC's validity domain that its polynomials mean nothing.
@@ -27,26 +27,26 @@ pub enum CameraError {
          accepted: is this image of that place?"
     )]
     OutsideDomain {
-        /// The larger of the normalised longitude's and latitude's sizes.
+        /// The larger absolute value of the normalised longitude and latitude.
         normalised: f64,
-        /// What is accepted.
+        /// Largest accepted value.
         limit: f64,
     },
-    /// The image does not change in one direction on the ground, so that the inverse does not exist.
+    /// The image position does not change in one direction on the ground, so that no inverse exists.
     #[error("the camera's Jacobian is singular at this point")]
     Singular,
 }
 
-/// Why coefficients are no usable RPC.
+/// Coefficients that do not form a camera.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RpcError {
     /// An entry is NaN or infinite.
     #[error("{key} is {value}, expected a finite number")]
     NotFinite {
-        /// RPC00B name of the entry, with the coefficient's number from 1 where there is one.
+        /// RPC00B name of the entry.
         key: Key,
-        /// What was found.
+        /// Value found.
         value: f64,
     },
     /// A scale is zero.
@@ -55,14 +55,14 @@ pub enum RpcError {
         /// RPC00B name of the entry.
         key: Key,
     },
-    /// An offset is no angle of its kind.
-    #[error("{key} is {value}°, expected at most {limit}° in size")]
+    /// An offset is not a valid longitude or latitude.
+    #[error("{key} is {value}°, expected an angle between −{limit}° and {limit}°")]
     Angle {
         /// RPC00B name of the entry.
         key: Key,
-        /// What was found, degrees.
+        /// Value found, degrees.
         value: f64,
-        /// What is possible, degrees.
+        /// Largest absolute value, degrees.
         limit: f64,
     },
     /// The first denominator coefficient is zero: a pole at the centre of the domain.
@@ -72,16 +72,18 @@ pub enum RpcError {
         key: Key,
     },
     /// The image does not depend on both longitude and latitude at the centre.
-    #[error("the image does not depend on both longitude and latitude at the centre: the coefficients are no camera")]
+    #[error(
+        "the image does not depend on both longitude and latitude at the centre: the coefficients do not form a camera"
+    )]
     Degenerate,
 }
 
 /// The RPC00B name of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Key {
-    /// Such as `LINE_OFF` or `SAMP_NUM_COEFF`.
+    /// Name of the entry, such as `LINE_OFF` or `SAMP_NUM_COEFF`.
     pub name: &'static str,
-    /// Number of the coefficient, from 1.
+    /// Number of the coefficient, from 1. `None` for entries that are not lists.
     pub number: Option<usize>,
 }
 

@@ -1,10 +1,10 @@
 //! Fitting an RPC to ground ↔ image correspondences.
 //!
-//! Per image coordinate, with r the normalised coordinate and D's first coefficient fixed at 1, the residual
-//! N(x) − r D(x) is linear in the other 39 coefficients. It is divided by the D of the round before, so that the sum
-//! of squares becomes that of the image residual (Tao & Hu, Photogrammetric Engineering & Remote Sensing 67, 2001), and
-//! regularised by a small ridge, since real geometry leaves several coefficients undetermined. Each round is a least
-//! squares problem solved by QR, which keeps the digits that normal equations would lose.
+//! Each image coordinate is fitted on its own. Let r be the normalised coordinate, and fix the first coefficient of D
+//! at 1. Then the residual N(x) − r D(x) is linear in the other 39 coefficients. Dividing it by D of the previous round
+//! makes the sum of squares the one of the image residuals (Tao & Hu, Photogrammetric Engineering & Remote Sensing 67,
+//! 2001). A small ridge regularises the problem, because real geometry leaves several coefficients undetermined. Each
+//! round is a least-squares problem solved by QR, which is more accurate than normal equations.
 //!
 //! Offsets and scales are the middle and half the range of the correspondences: these become the validity domain.
 
@@ -19,24 +19,24 @@ use crate::{CameraError, ImagePoint, Rpc, RpcCamera, ValidityDomain};
 const UNKNOWNS: usize = 39;
 /// Weight of the ridge relative to one correspondence.
 const RIDGE: f64 = 1e-9;
-/// Rounds of reweighting; denominators stay within a few percent of 1, so that the second changes little.
+/// Rounds of reweighting. Denominators stay within a few percent of 1, so the second round already changes little.
 const ROUNDS: usize = 4;
-/// Positions along longitude, latitude and height of a lattice that determines all coefficients well.
+/// Numbers of lattice positions along longitude, latitude and height. They determine all coefficients well.
 const LATTICE: [usize; 3] = [13, 13, 7];
 
 /// A ground point and its image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Correspondence {
-    /// Where it is.
+    /// Ground position.
     pub ground: LonLatHeight,
-    /// Where it is seen.
+    /// Image position.
     pub image: ImagePoint,
 }
 
 /// A fitted model with its residuals at the correspondences.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RpcFit {
-    /// The model.
+    /// The fitted model.
     pub rpc: Rpc,
     /// Root mean square distance in the image, pixels.
     pub rms_px: f64,
@@ -44,30 +44,32 @@ pub struct RpcFit {
     pub max_px: f64,
 }
 
-/// Why no model could be fitted.
+/// Correspondences to which no RPC can be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitError {
     /// Too few correspondences to determine the coefficients.
     #[error("{found} correspondences found; an RPC needs at least {UNKNOWNS}, spread over its domain")]
     TooFew {
-        /// How many were given.
+        /// Number of correspondences.
         found: usize,
     },
     /// A coordinate is NaN or infinite.
     #[error("correspondence {index} has a coordinate that is not a finite number")]
     NotFinite {
-        /// Which, from 0.
+        /// Index of the correspondence.
         index: usize,
     },
     /// All correspondences have the same longitude, latitude, sample or line.
     #[error("all correspondences have the same {coordinate}: expected points spread over the image and the ground")]
     Degenerate {
-        /// Which coordinate.
+        /// Name of the coordinate.
         coordinate: &'static str,
     },
     /// The least squares problem has no solution, or the fitted model fails at its own points.
-    #[error("the fitted model is no camera: are ground and image coordinates of the same points?")]
+    #[error(
+        "the fitted model does not form a camera: check that ground and image coordinates belong to the same points"
+    )]
     Unsolvable,
     /// The camera to be fitted fails inside its domain.
     #[error("the camera to be fitted fails inside its domain: {0}")]
@@ -107,7 +109,7 @@ impl RpcFit {
         Self::to_correspondences(&points?)
     }
 
-    /// The residuals of a model at correspondences.
+    /// Measures the residuals of a model at correspondences.
     ///
     /// # Errors
     /// [`FitError::Unsolvable`] when the model has no image for one of them.
@@ -124,12 +126,13 @@ impl RpcFit {
 }
 
 impl RpcCamera {
-    /// One RPC that includes the correction, for formats that know no correction. Translations and changes of scale go
-    /// into offsets and scales, shears between equal denominators into the numerators, exactly (residuals 0); any
-    /// other correction is fitted over the validity domain.
+    /// Returns one RPC that includes the correction, for formats without corrections.
+    ///
+    /// Translations and changes of scale go into offsets and scales. Shears between equal denominators go into the
+    /// numerators. Both are exact, with residuals of 0. Any other correction is fitted over the validity domain.
     ///
     /// # Errors
-    /// Those of the fit.
+    /// The same as for [`RpcFit::to_camera`].
     pub fn folded(&self) -> Result<RpcFit, FitError> {
         let rpc = &self.rpc;
         let [[a, b], [c, d]] = self.correction.linear;
@@ -154,14 +157,14 @@ impl RpcCamera {
         Ok(RpcFit { rpc: folded, rms_px: 0.0, max_px: 0.0 })
     }
 
-    /// The fit knows nothing of the provider's error estimates.
+    /// Copies the provider's error estimates, which a fit does not know.
     fn with_errors_of(rpc: &Rpc, fit: RpcFit) -> RpcFit {
         let refitted = Rpc { err_bias_m: rpc.err_bias_m, err_rand_m: rpc.err_rand_m, ..fit.rpc };
         RpcFit { rpc: refitted, ..fit }
     }
 }
 
-/// A model that has offsets and scales and no coefficients yet.
+/// Returns a model with offsets and scales but without coefficients.
 fn normalisation(points: &[Correspondence]) -> Result<Rpc, FitError> {
     let first = match points {
         [first, ..] if points.len() >= UNKNOWNS => first.ground.lon_deg,
@@ -183,7 +186,7 @@ fn normalisation(points: &[Correspondence]) -> Result<Rpc, FitError> {
     }
     let off: [f64; 5] = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
     let mut scale: [f64; 5] = std::array::from_fn(|i| 0.5 * (high[i] - low[i]));
-    // A single height is a legitimate model of one plane.
+    // Points at a single height are allowed: they give a model of one plane.
     if scale[2] == 0.0 {
         scale[2] = 1.0;
     }
@@ -212,7 +215,7 @@ fn normalisation(points: &[Correspondence]) -> Result<Rpc, FitError> {
     })
 }
 
-/// Numerator and denominator that give the values `r` at the points whose terms are given.
+/// Returns the numerator and denominator whose quotient fits the values `r` at points with the given terms.
 fn ratio(points: &[[f64; 20]], r: &[f64]) -> Result<([f64; 20], [f64; 20]), FitError> {
     let mut den = [0.0; 20];
     den[0] = 1.0;
@@ -226,7 +229,7 @@ fn ratio(points: &[[f64; 20]], r: &[f64]) -> Result<([f64; 20], [f64; 20]), FitE
     Ok((num, den))
 }
 
-/// The ridge-regularised least squares solution of w (N − r (D − 1)) = w r.
+/// Returns the ridge-regularised least-squares solution of w (N − r (D − 1)) = w r.
 fn weighted_solution(points: &[[f64; 20]], r: &[f64], weights: &[f64]) -> Result<DVector<f64>, FitError> {
     let n = points.len();
     let ridge = RIDGE * (n as f64).sqrt();

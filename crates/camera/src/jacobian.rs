@@ -9,14 +9,14 @@ use crate::{CameraError, Rpc, RpcCamera};
 /// Derivatives of sample and line: pixels per degree of longitude, per degree of latitude, per metre of height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageFromGroundJacobian {
-    /// Of the sample: by longitude, latitude, height.
+    /// Derivatives of the sample by longitude, latitude and height.
     pub sample: [f64; 3],
-    /// Of the line: by longitude, latitude, height.
+    /// Derivatives of the line by longitude, latitude and height.
     pub line: [f64; 3],
 }
 
 impl Rpc {
-    /// The Jacobian of [`Rpc::project`].
+    /// Returns the Jacobian of [`Rpc::project`].
     ///
     /// # Errors
     /// As [`Rpc::project`].
@@ -40,7 +40,7 @@ impl Rpc {
 }
 
 impl RpcCamera {
-    /// The Jacobian of [`RpcCamera::project`].
+    /// Returns the Jacobian of [`RpcCamera::project`].
     ///
     /// # Errors
     /// As [`Rpc::project`].

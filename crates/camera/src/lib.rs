@@ -5,7 +5,7 @@
 //!
 //! - [`Rpc`] projects and localises, [`RpcPlane`] does so at one height, [`RpcCamera`] adds an [`ImageCorrection`].
 //! - [`RpcFit`] fits an RPC to correspondences or to any camera.
-//! - [`Rpc::validate`] tells coefficients that can be a camera from those that cannot, [`Rpc::domain`] where they hold.
+//! - [`Rpc::validate`] checks that coefficients form a camera. [`Rpc::domain`] is the box in which they hold.
 
 mod camera;
 mod correction;

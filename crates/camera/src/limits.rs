@@ -1,4 +1,4 @@
-//! What the RPC model is trusted with: how far from its domain, and how close to a pole.
+//! Limits within which an RPC is evaluated: the distance from its domain, and the distance from a pole.
 
 use crate::CameraError;
 

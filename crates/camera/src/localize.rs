@@ -1,11 +1,11 @@
 //! Localisation: the ground point of a height plane that is seen at an image position.
 //!
-//! Newton's method on normalised (L, P) with the analytic Jacobian, each step shortened until the residual falls and
-//! the path crosses no pole and no fold of the model. The start is the domain's centre, from where real sensors
-//! converge in three or four steps whatever their image offsets (the step is affine-invariant in the image); where
-//! that fails (a pole or a fold inside the domain), the best positions of a lattice over the domain are tried.
+//! Newton's method works on normalised (L, P) with the analytic Jacobian. Each step is shortened until the residual
+//! falls and the path crosses no pole and no fold of the model. The search starts at the centre of the domain, from where
+//! real sensors converge in three or four steps, whatever their image offsets: the step is affine-invariant in the
+//! image. If that fails because of a pole or a fold inside the domain, the best positions of a lattice are tried.
 //!
-//! A result is accepted when it lies within [`EXTRAPOLATION_MAX`] half-widths of the centre on the centre's side of
+//! A result is accepted if it lies within [`EXTRAPOLATION_MAX`] half-widths of the centre on the centre's side of
 //! every pole and fold, or else inside the validity domain itself. Everything else is an error.
 
 use geodesy::LonLatHeight;
@@ -14,32 +14,32 @@ use crate::limits::EXTRAPOLATION_MAX;
 use crate::plane::{PlaneSample, RpcPlane};
 use crate::{CameraError, ImagePoint, Rpc};
 
-/// Localisation stops when the image residual is below this, well under any use of it.
+/// Residual at which localisation stops, pixels: far below any practical need.
 const TOLERANCE_PX: f64 = 1e-9;
-/// Where rounding keeps the residual above the tolerance (huge pixel coordinates), this is still accepted.
+/// Residual that is still accepted, pixels. Rounding of huge pixel coordinates can keep it above the tolerance.
 const STALLED_PX: f64 = 1e-7;
-/// Steps from one start; quadratic convergence needs far fewer.
+/// Largest number of steps from one start. Quadratic convergence needs far fewer.
 const STEPS: u32 = 40;
-/// Halvings of one step before the start is given up.
+/// Largest number of halvings of one step.
 const HALVINGS: u32 = 12;
 /// Positions along each axis of the lattice of starts over [−1, 1]².
 const LATTICE: usize = 9;
-/// How many of them are followed.
+/// Number of starts that are followed.
 const STARTS: usize = 8;
 
-/// Where Newton's method ended.
+/// The end of a Newton search.
 struct End {
     l: f64,
     p: f64,
     at: PlaneSample,
     residual_px: f64,
     steps: u32,
-    /// The shortened step was held back by the edge of what is accepted.
+    /// Whether the last step was shortened because it left the accepted region.
     at_edge: bool,
 }
 
 impl Rpc {
-    /// The ground point at `height_m` (ellipsoidal) that is seen at an image position.
+    /// Returns the ground point at `height_m` (ellipsoidal) that is seen at an image position.
     ///
     /// # Errors
     /// A coordinate that is not finite, a point far outside the domain, a pole at the centre, or no convergence.
@@ -49,10 +49,10 @@ impl Rpc {
 }
 
 impl RpcPlane {
-    /// The ground point of this plane that is seen at an image position.
+    /// Returns the ground point of this plane that is seen at an image position.
     ///
     /// # Errors
-    /// As [`Rpc::localize`].
+    /// The same as for [`Rpc::localize`].
     pub fn localize(&self, image: ImagePoint) -> Result<LonLatHeight, CameraError> {
         if !(image.sample.is_finite() && image.line.is_finite() && self.height_m.is_finite()) {
             return Err(CameraError::NotFinite);
@@ -66,7 +66,7 @@ impl RpcPlane {
         }
     }
 
-    /// The first acceptable end among the starts with the smallest residuals.
+    /// Returns the first acceptable end among the starts with the smallest residuals.
     fn localize_from_lattice(&self, image: ImagePoint, side: Option<[bool; 3]>) -> Option<LonLatHeight> {
         let at = |i: usize| 2.0 * i as f64 / (LATTICE - 1) as f64 - 1.0;
         let mut starts: Vec<(f64, f64, f64, PlaneSample)> = (0..LATTICE * LATTICE)
@@ -106,8 +106,7 @@ impl RpcPlane {
         Ok(end)
     }
 
-    /// Takes the longest of the step, its half, its quarter, … that brings the image closer on the same side of every
-    /// pole and fold; `false` when none does.
+    /// Halves the step until it brings the image closer without crossing a pole or fold. Returns false if none does.
     fn shortened_step(&self, image: ImagePoint, step: [f64; 2], end: &mut End) -> bool {
         let mut t = 1.0;
         end.at_edge = false;
@@ -139,7 +138,7 @@ fn residual(a: ImagePoint, b: ImagePoint) -> f64 {
     (a.sample - b.sample).hypot(a.line - b.line)
 }
 
-/// What to report when no start led anywhere: the story of the first.
+/// Returns the error of the first start, for the case that no start succeeded.
 fn failure(first: Result<End, CameraError>) -> CameraError {
     match first {
         Err(e) => e,

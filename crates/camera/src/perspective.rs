@@ -1,18 +1,18 @@
 //! Central perspective cameras: a pose, and a lens with or without distortion.
 //!
-//! The lens models are COLMAP's, with its names and order of parameters, after Brown (1971) for the radial and tangential
-//! ones and Kannala and Brandt (2006) for the fisheyes. Pixels follow this toolkit (the centre of the upper-left pixel is
-//! (0, 0); COLMAP has it at (0.5, 0.5), which its readers convert). Camera axes: x right, y down, z forward.
+//! The lens models have COLMAP's names and order of parameters. The radial and tangential ones follow Brown (1971), the
+//! fisheyes Kannala and Brandt (2006). The centre of the upper-left pixel is (0, 0). COLMAP has it at (0.5, 0.5), and
+//! the readers convert it. Camera axes: x right, y down, z forward.
 
 use crate::ImagePoint;
 
-/// A direction is found when it projects back to its pixel within this, in units of the image plane at distance 1.
+/// Tolerance when a distortion is inverted, in units of the image plane at distance 1.
 const TOLERANCE: f64 = 1e-12;
 const MAX_ITERATIONS: usize = 50;
-/// Fisheye angles must stay below a right angle: what is beside the camera has no place in its image plane.
+/// Largest angle of a fisheye, radians. Directions at a right angle have no place in the image plane.
 const MAX_THETA: f64 = 1.55;
 
-/// A lens model by COLMAP's name.
+/// A lens model, with its parameters in COLMAP's order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LensModel {
     /// f, cx, cy.
@@ -55,37 +55,37 @@ const MODELS: [(LensModel, &str, usize); 11] = [
 ];
 
 impl LensModel {
-    /// The model of a name.
+    /// Returns the model with a COLMAP name.
     pub fn from_name(name: &str) -> Option<Self> {
         MODELS.iter().find(|(_, known, _)| *known == name).map(|&(model, ..)| model)
     }
 
-    /// The model of COLMAP's number.
+    /// Returns the model with a COLMAP number.
     pub fn from_number(number: u32) -> Option<Self> {
         MODELS.get(usize::try_from(number).ok()?).map(|&(model, ..)| model)
     }
 
-    /// COLMAP's number.
+    /// Returns COLMAP's number.
     pub fn number(self) -> u32 {
         self as u32
     }
 
-    /// COLMAP's name.
+    /// Returns COLMAP's name.
     pub fn name(self) -> &'static str {
         MODELS[self as usize].1
     }
 
-    /// How many parameters it has.
+    /// Returns the number of parameters.
     pub fn parameter_count(self) -> usize {
         MODELS[self as usize].2
     }
 
-    /// Whether rays are straight lines through the pixel.
+    /// Returns whether the lens has no distortion.
     pub fn is_pinhole(self) -> bool {
         matches!(self, Self::SimplePinhole | Self::Pinhole)
     }
 
-    /// Whether one focal length serves both axes.
+    /// Returns whether both axes share one focal length.
     fn has_one_focal_length(self) -> bool {
         matches!(
             self,
@@ -94,7 +94,7 @@ impl LensModel {
     }
 }
 
-/// Numbers that make no lens.
+/// Parameters that do not form a lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LensError {
@@ -103,13 +103,15 @@ pub enum LensError {
     Count {
         /// The model.
         model: &'static str,
-        /// How many it has.
+        /// Number of parameters of the model.
         expected: usize,
-        /// How many there are.
+        /// Number of parameters found.
         found: usize,
     },
     /// A parameter that is not finite, or a focal length that is not positive.
-    #[error("parameter {index} of the lens model {model} is {value}: focal lengths are positive, all are finite")]
+    #[error(
+        "parameter {index} of the lens model {model} is {value}: expected finite numbers, and positive focal lengths"
+    )]
     Parameter {
         /// The model.
         model: &'static str,
@@ -119,7 +121,7 @@ pub enum LensError {
         value: f64,
     },
     /// An image without pixels.
-    #[error("the image of the camera has {width} × {height} pixels")]
+    #[error("the image of the camera has {width} × {height} pixels, expected 1 to 16777216 along each side")]
     Size {
         /// Columns.
         width: u64,
@@ -128,7 +130,7 @@ pub enum LensError {
     },
 }
 
-/// The inside of a perspective camera.
+/// The lens of a perspective camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lens {
     width: usize,
@@ -137,11 +139,11 @@ pub struct Lens {
     /// Focal lengths and the principal point, pixels.
     focal: [f64; 2],
     centre: ImagePoint,
-    /// What follows the focal lengths and the principal point.
+    /// Distortion parameters, which follow the focal lengths and the principal point.
     distortion: Vec<f64>,
 }
 
-/// Where a camera is and looks.
+/// Position and orientation of a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Rotation from the world to the camera, row by row: the camera's axes in the world.
@@ -151,7 +153,7 @@ pub struct Pose {
 }
 
 impl Lens {
-    /// A lens from COLMAP's parameters, with the principal point in this toolkit's pixels.
+    /// Makes a lens from COLMAP's parameters, with the principal point in this toolkit's pixels.
     ///
     /// # Errors
     /// A wrong number of parameters, one that is not finite, a focal length that is not positive, an empty image.
@@ -179,54 +181,54 @@ impl Lens {
         })
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The lens model.
+    /// Returns the lens model.
     pub fn model(&self) -> LensModel {
         self.model
     }
 
-    /// Focal lengths along rows and columns, pixels.
+    /// Returns the focal lengths along rows and columns, pixels.
     pub fn focal_px(&self) -> [f64; 2] {
         self.focal
     }
 
-    /// The principal point.
+    /// Returns the principal point.
     pub fn principal_point(&self) -> ImagePoint {
         self.centre
     }
 
-    /// COLMAP's parameters, with the principal point in this toolkit's pixels: what [`Lens::new`] takes.
+    /// Returns the parameters as [`Lens::new`] takes them.
     pub fn parameters(&self) -> Vec<f64> {
         let focal_count = if self.model.has_one_focal_length() { 1 } else { 2 };
         let focal = self.focal[..focal_count].iter().copied();
         focal.chain([self.centre.sample, self.centre.line]).chain(self.distortion.iter().copied()).collect()
     }
 
-    /// The pixel of a point (x, y) of the image plane at distance 1; `None` where a fisheye has none.
+    /// Returns the pixel of a point (x, y) of the image plane at distance 1. `None` where a fisheye has none.
     pub fn project(&self, x: f64, y: f64) -> Option<ImagePoint> {
         let [x, y] = self.distort(x, y)?;
         Some(ImagePoint { sample: self.focal[0] * x + self.centre.sample, line: self.focal[1] * y + self.centre.line })
     }
 
-    /// The point (x, y) of the image plane at distance 1 that a pixel's ray goes through.
+    /// Returns the point (x, y) of the image plane at distance 1 through which the ray of a pixel goes.
     ///
-    /// `None` where the lens model sees no such ray: beyond the fold of a distortion, or beside a fisheye.
+    /// `None` if the pixel has no ray: beyond the fold of a distortion, or outside the circle of a fisheye.
     pub fn direction(&self, pixel: ImagePoint) -> Option<[f64; 2]> {
         let distorted =
             [(pixel.sample - self.centre.sample) / self.focal[0], (pixel.line - self.centre.line) / self.focal[1]];
         if self.model.is_pinhole() { Some(distorted) } else { self.undistort(distorted) }
     }
 
-    /// Newton's iterations from the distorted point, with a numerical Jacobian.
+    /// Inverts the distortion by Newton's method with a numerical Jacobian.
     fn undistort(&self, target: [f64; 2]) -> Option<[f64; 2]> {
         let mut at = self.first_guess(target);
         for _ in 0..MAX_ITERATIONS {
@@ -251,7 +253,7 @@ impl Lens {
         None
     }
 
-    /// The distorted point itself, for fisheyes with the angle taken for its tangent.
+    /// Returns the start of the inversion: the distorted point, for fisheyes with the angle replaced by its tangent.
     fn first_guess(&self, target: [f64; 2]) -> [f64; 2] {
         let theta = target[0].hypot(target[1]);
         let fisheye = matches!(
@@ -305,13 +307,13 @@ impl Lens {
     }
 }
 
-/// Radial factor and Brown's tangential terms.
+/// Applies a radial factor and Brown's tangential terms.
 fn tangential(x: f64, y: f64, factor: f64, p1: f64, p2: f64) -> [f64; 2] {
     let r2 = x * x + y * y;
     [x * factor + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x), y * factor + 2.0 * p2 * x * y + p1 * (r2 + 2.0 * y * y)]
 }
 
-/// θ(1 + k₁θ² + k₂θ⁴ + …) / tan θ for r = tan θ.
+/// Returns θ(1 + k₁θ² + k₂θ⁴ + …) / tan θ for r = tan θ.
 fn fisheye(r: f64, k: [f64; 4]) -> Option<f64> {
     let theta = r.atan();
     if theta > MAX_THETA {
@@ -323,9 +325,9 @@ fn fisheye(r: f64, k: [f64; 4]) -> Option<f64> {
 }
 
 impl Pose {
-    /// A pose from a unit quaternion (w, x, y, z) and a translation, both from the world to the camera, as in COLMAP.
+    /// Makes a pose from a unit quaternion (w, x, y, z) and a translation, both from the world to the camera, as in COLMAP.
     ///
-    /// The quaternion is brought to length 1; `None` where it has none, or where a number is not finite.
+    /// The quaternion is normalised. `None` if its length is zero or a number is not finite.
     pub fn from_quaternion(quaternion: [f64; 4], translation: [f64; 3]) -> Option<Self> {
         let length = quaternion.iter().map(|c| c * c).sum::<f64>().sqrt();
         if !(length > 1e-9 && length.is_finite() && translation.iter().all(|c| c.is_finite())) {
@@ -341,24 +343,25 @@ impl Pose {
         Some(Self { rotation, centre })
     }
 
-    /// The unit quaternion (w, x, y, z) of the rotation from the world to the camera, with w ≥ 0.
+    /// Returns the unit quaternion (w, x, y, z) of the rotation from the world to the camera, with w ≥ 0.
     pub fn quaternion(&self) -> [f64; 4] {
         quaternion_from_rotation(&self.rotation)
     }
 
-    /// The translation from the world to the camera: where the world's origin is in the camera.
+    /// Returns the translation from the world to the camera: the position of the world's origin in the camera.
     pub fn translation(&self) -> [f64; 3] {
         self.rotation.map(|row| -(0..3).map(|i| row[i] * self.centre[i]).sum::<f64>())
     }
 
-    /// A position of the world in the camera.
+    /// Returns a position of the world in the camera.
     pub fn camera_from_world(&self, position: [f64; 3]) -> [f64; 3] {
         self.rotation.map(|row| (0..3).map(|i| row[i] * (position[i] - self.centre[i])).sum())
     }
 }
 
-/// The unit quaternion (w, x, y, z), w ≥ 0, of a rotation matrix: from its largest component, which is where no digits
-/// are lost (Shepperd 1978).
+/// Returns the unit quaternion (w, x, y, z), w ≥ 0, of a rotation matrix.
+///
+/// The largest component is computed first, which avoids a loss of digits (Shepperd 1978).
 pub(crate) fn quaternion_from_rotation(r: &[[f64; 3]; 3]) -> [f64; 4] {
     let trace = r[0][0] + r[1][1] + r[2][2];
     let squares = [trace, r[0][0], r[1][1], r[2][2]];

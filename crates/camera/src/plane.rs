@@ -1,8 +1,8 @@
 //! An RPC at one height: each cubic loses its height terms (20 → 10), exactly.
 //!
-//! A sweep asks for many points on one height plane, and localisation searches on one: both use this form.
-//! Heights are metres above the ellipsoid; points whose normalised longitude or latitude exceeds
-//! [`EXTRAPOLATION_MAX`](crate::EXTRAPOLATION_MAX) and points at a pole are errors.
+//! The sweep projects many points of one height plane, and localisation searches on one. Both use this form. Heights
+//! are metres above the ellipsoid. Points at a pole are errors, and so are points whose normalised longitude or latitude
+//! exceeds [`EXTRAPOLATION_MAX`](crate::EXTRAPOLATION_MAX).
 
 use geodesy::LonLatHeight;
 
@@ -31,7 +31,7 @@ pub(crate) struct PlaneRatio {
     pub(crate) den: PlaneCubic,
 }
 
-/// Image position with its derivatives by normalised (L, P), and which way the denominators and the Jacobian point.
+/// Image position with its derivatives by normalised (L, P), and the signs of denominators and determinant.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlaneSample {
     pub(crate) image: ImagePoint,
@@ -45,7 +45,7 @@ pub(crate) struct PlaneSample {
 }
 
 impl Rpc {
-    /// The model at one height, metres above the ellipsoid.
+    /// Returns the model at one height, metres above the ellipsoid.
     pub fn plane(&self, height_m: f64) -> RpcPlane {
         let h = (height_m - self.height_off) / self.height_scale;
         let ratio = |off, scale, num, den| PlaneRatio { off, scale, num: at_height(num, h), den: at_height(den, h) };
@@ -62,12 +62,12 @@ impl Rpc {
 }
 
 impl RpcPlane {
-    /// The plane's height, metres above the ellipsoid.
+    /// Returns the height of the plane, metres above the ellipsoid.
     pub fn height_m(&self) -> f64 {
         self.height_m
     }
 
-    /// The image position of the point of the plane at a longitude and latitude, degrees.
+    /// Returns the image position of the point of the plane at a longitude and latitude, degrees.
     ///
     /// # Errors
     /// A coordinate that is not finite, a point far outside the domain, or one at a pole of the model.
@@ -77,17 +77,17 @@ impl RpcPlane {
         Ok(ImagePoint { sample: self.samp.value(l, p)?, line: self.line.value(l, p)? })
     }
 
-    /// Normalised longitude and latitude; the longitude difference is taken the short way round.
+    /// Returns normalised longitude and latitude. The longitude difference is brought into ±180°.
     pub(crate) fn normalised(&self, lon_deg: f64, lat_deg: f64) -> [f64; 2] {
         [short_way(lon_deg - self.long_off) / self.long_scale, (lat_deg - self.lat_off) / self.lat_scale]
     }
 
-    /// The ground point at a normalised position.
+    /// Returns the ground point at a normalised position.
     pub(crate) fn ground(&self, l: f64, p: f64) -> LonLatHeight {
         LonLatHeight::new(self.long_off + self.long_scale * l, self.lat_off + self.lat_scale * p, self.height_m)
     }
 
-    /// Image position and derivatives at a normalised position.
+    /// Returns image position and derivatives at a normalised position.
     pub(crate) fn sample(&self, l: f64, p: f64) -> Result<PlaneSample, CameraError> {
         let (sample, row_s, den_s) = self.samp.gradient(l, p)?;
         let (line, row_l, den_l) = self.line.gradient(l, p)?;
@@ -102,7 +102,7 @@ impl RpcPlane {
 }
 
 impl PlaneSample {
-    /// Whether the Jacobian can be inverted: its rows are neither zero nor parallel, up to rounding.
+    /// Returns whether the Jacobian can be inverted: its rows are neither zero nor parallel, up to rounding.
     pub(crate) fn is_regular(&self) -> bool {
         let [s, l] = self.jacobian;
         self.determinant.abs() > 1e-9 * s[0].hypot(s[1]) * l[0].hypot(l[1])
@@ -117,7 +117,7 @@ impl PlaneRatio {
         Ok(self.off + self.scale * (n / d))
     }
 
-    /// Value, derivatives by L and P, denominator.
+    /// Returns the value, its derivatives by L and P, and the denominator.
     fn gradient(&self, l: f64, p: f64) -> Result<(f64, [f64; 2], f64), CameraError> {
         let [n, n_l, n_p] = plane_gradient(&self.num, l, p);
         let [d, d_l, d_p] = plane_gradient(&self.den, l, p);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A position in an image; the centre of the upper-left pixel is (0, 0).
+/// A position in an image. The centre of the upper-left pixel is (0, 0).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImagePoint {
     /// Column, pixels.
@@ -12,7 +12,7 @@ pub struct ImagePoint {
 }
 
 impl ImagePoint {
-    /// A point from its column and row.
+    /// Makes a point from its column and row.
     pub const fn new(sample: f64, line: f64) -> Self {
         Self { sample, line }
     }

@@ -29,17 +29,17 @@ pub(crate) fn at_height(c: &[f64; 20], h: f64) -> PlaneCubic {
     ]
 }
 
-/// Value of a cubic whose height has been fixed.
+/// Returns the value of a cubic at a fixed height.
 #[inline(always)]
 pub(crate) fn plane_value(q: &PlaneCubic, l: f64, p: f64) -> f64 {
-    // Nested in P, each coefficient a polynomial of L.
+    // A polynomial in P whose coefficients are polynomials in L.
     let q0 = mul_add(l, mul_add(l, mul_add(l, q[6], q[4]), q[1]), q[0]);
     let q1 = mul_add(l, mul_add(l, q[8], q[3]), q[2]);
     let q2 = mul_add(l, q[7], q[5]);
     mul_add(p, mul_add(p, mul_add(p, q[9], q2), q1), q0)
 }
 
-/// Value of a cubic whose height has been fixed, and its derivatives by L and P.
+/// Returns the value of a cubic at a fixed height, and its derivatives by L and P.
 #[inline(always)]
 pub(crate) fn plane_gradient(q: &PlaneCubic, l: f64, p: f64) -> [f64; 3] {
     let q0 = mul_add(l, mul_add(l, mul_add(l, q[6], q[4]), q[1]), q[0]);
@@ -53,14 +53,14 @@ pub(crate) fn plane_gradient(q: &PlaneCubic, l: f64, p: f64) -> [f64; 3] {
     [value, d_l, d_p]
 }
 
-/// Derivative of a cubic by H.
+/// Returns the derivative of a cubic by H.
 pub(crate) fn derivative_by_height(c: &[f64; 20], l: f64, p: f64, h: f64) -> f64 {
     c[3] + l * (c[5] + l * c[17] + p * c[10])
         + p * (c[6] + p * c[18])
         + h * (2.0 * (c[9] + l * c[13] + p * c[16]) + 3.0 * h * c[19])
 }
 
-/// The twenty terms themselves, in RPC00B order.
+/// Returns the twenty terms in RPC00B order.
 pub(crate) fn terms(l: f64, p: f64, h: f64) -> [f64; 20] {
     [
         1.0,

@@ -3,7 +3,7 @@
 //! With normalised longitude L, latitude P and height H,
 //! `line = LINE_OFF + LINE_SCALE · Num_l(P, L, H) / Den_l(P, L, H)`, likewise for the sample, each polynomial with
 //! the terms 1, L, P, H, LP, LH, PH, L², P², H², PLH, L³, LP², LH², L²P, P³, PH², L²H, P²H, H³.
-//! Longitudes may be given within ±360°; the difference to LONG_OFF is taken the short way round.
+//! Longitudes may be given within ±360°. The difference to LONG_OFF is brought into ±180°.
 
 use geodesy::LonLatHeight;
 use serde::{Deserialize, Serialize};
@@ -53,7 +53,7 @@ const LATITUDE_MAX_DEG: f64 = 90.0;
 const LONGITUDE_MAX_DEG: f64 = 360.0;
 
 impl Rpc {
-    /// The image position of a ground point.
+    /// Returns the image position of a ground point.
     ///
     /// # Errors
     /// A coordinate that is not finite, a point far outside the domain (see [`crate::EXTRAPOLATION_MAX`]), or one at a
@@ -62,11 +62,13 @@ impl Rpc {
         self.plane(ground.height_m).project(ground.lon_deg, ground.lat_deg)
     }
 
-    /// Checks that the coefficients can be a camera: finite entries, scales that are not zero, angles that are
-    /// angles, no pole at the centre, and an image that depends on longitude and latitude there.
+    /// Checks that the coefficients form a camera.
+    ///
+    /// All entries must be finite, scales not zero, and angles valid. At the centre the model must have no pole, and
+    /// the image must depend on longitude and latitude.
     ///
     /// # Errors
-    /// The first of these that fails.
+    /// The first check that fails.
     pub fn validate(&self) -> Result<(), RpcError> {
         let key = |name| Key { name, number: None };
         for (name, value) in self.offsets().into_iter().chain(self.scales()) {
@@ -100,13 +102,13 @@ impl Rpc {
         }
     }
 
-    /// The model of the image cut at `origin`, the crop's upper-left pixel.
+    /// Returns the model of a crop whose upper-left pixel is `origin`.
     #[must_use]
     pub fn cropped(&self, origin: ImagePoint) -> Self {
         Self { samp_off: self.samp_off - origin.sample, line_off: self.line_off - origin.line, ..self.clone() }
     }
 
-    /// The model of the image resampled by `factor` (0.5 halves it): an offset o becomes (o + 0.5) · factor − 0.5.
+    /// Returns the model of the image resampled by `factor` (0.5 halves it). An offset o becomes (o + 0.5) · factor − 0.5.
     #[must_use]
     pub fn rescaled(&self, factor: f64) -> Self {
         Self {
@@ -118,7 +120,7 @@ impl Rpc {
         }
     }
 
-    /// Normalised longitude, latitude and height; the longitude difference is taken the short way round.
+    /// Returns normalised longitude, latitude and height. The longitude difference is brought into ±180°.
     pub(crate) fn normalised(&self, g: LonLatHeight) -> [f64; 3] {
         [
             short_way(g.lon_deg - self.long_off) / self.long_scale,

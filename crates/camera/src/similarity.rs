@@ -1,12 +1,12 @@
 //! Similarities between two frames in space: target = s · R · source + t.
 //!
-//! They carry a city model's frame (a map projection with heights) to the frame of cameras that were oriented on their own.
-//! R has determinant 1, s is positive; what a file gives is checked and refused with a [`SimilarityError`].
+//! A similarity takes the frame of a city model (a map projection with heights) to the frame of cameras that were
+//! oriented without it. R has determinant 1, and s is positive. Invalid numbers are a [`SimilarityError`].
 
 use crate::Pose;
 use crate::perspective::quaternion_from_rotation;
 
-/// Rotations may be off by this (rounding in text files) before they are brought to length 1.
+/// Largest deviation of R·Rᵀ from the identity, as rounding in text files causes it.
 const ORTHOGONAL: f64 = 1e-4;
 
 /// A rotation, a scale and a translation from a source frame to a target frame.
@@ -17,20 +17,20 @@ pub struct Similarity {
     translation: [f64; 3],
 }
 
-/// Numbers that make no similarity.
+/// Numbers that do not form a similarity.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimilarityError {
-    /// A number that is NaN or infinite.
+    /// A number is NaN or infinite.
     #[error("a number of the similarity is not finite")]
     NotFinite,
-    /// A scale of zero, below it, or beyond use.
-    #[error("the scale is {scale}, expected 1e-9 to 1e9")]
+    /// The scale is not between 1e-9 and 1e9.
+    #[error("the scale is {scale}, expected a value from 1e-9 to 1e9")]
     Scale {
-        /// What was found.
+        /// Scale found.
         scale: f64,
     },
-    /// A matrix that does more than turn.
+    /// The matrix is not a rotation.
     #[error(
         "the matrix is no rotation (its axes are {off:e} from right angles and length 1): expected one without shear"
     )]
@@ -38,20 +38,21 @@ pub enum SimilarityError {
         /// Largest deviation of R·Rᵀ from the identity.
         off: f64,
     },
-    /// A matrix with determinant −1.
+    /// The matrix has determinant −1.
     #[error("the matrix mirrors: expected a rotation, whose determinant is 1")]
     Mirror,
 }
 
 impl Similarity {
-    /// What changes nothing.
+    /// The similarity that changes nothing.
     pub const IDENTITY: Self =
         Self { scale: 1.0, rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
-    /// A similarity of its parts; the rotation, row by row, is brought to exact length.
+    /// Makes a similarity. The rotation is given row by row, and its rows are normalised.
     ///
     /// # Errors
-    /// Numbers that are not finite, a scale outside 1e-9 … 1e9, a matrix that mirrors or is off a rotation by more than 1e-4.
+    /// A number is not finite, the scale is outside 1e-9 to 1e9, or the matrix mirrors or deviates from a rotation by more
+    /// than 1e-4.
     pub fn new(scale: f64, rotation: [[f64; 3]; 3], translation: [f64; 3]) -> Result<Self, SimilarityError> {
         if !scale.is_finite() || !rotation.as_flattened().iter().chain(&translation).all(|c| c.is_finite()) {
             return Err(SimilarityError::NotFinite);
@@ -63,10 +64,10 @@ impl Similarity {
         Ok(Self { scale, rotation, translation })
     }
 
-    /// A similarity of the upper three rows of a 4 × 4 matrix: s · R beside t.
+    /// Makes a similarity from the upper three rows of a 4 × 4 matrix: s · R beside t.
     ///
     /// # Errors
-    /// As [`Similarity::new`].
+    /// The same as for [`Similarity::new`].
     pub fn from_matrix(rows: [[f64; 4]; 3]) -> Result<Self, SimilarityError> {
         if !rows.as_flattened().iter().all(|c| c.is_finite()) {
             return Err(SimilarityError::NotFinite);
@@ -80,33 +81,33 @@ impl Similarity {
         Self::new(scale, linear.map(|row| row.map(|c| c / scale)), rows.map(|row| row[3]))
     }
 
-    /// Lengths in the target frame per length in the source frame.
+    /// Returns the length in the target frame per length in the source frame.
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
-    /// The rotation, row by row.
+    /// Returns the rotation, row by row.
     pub fn rotation(&self) -> [[f64; 3]; 3] {
         self.rotation
     }
 
-    /// Where the source's origin is in the target frame.
+    /// Returns the position of the source's origin in the target frame.
     pub fn translation(&self) -> [f64; 3] {
         self.translation
     }
 
-    /// A position of the source in the target.
+    /// Returns a position of the source in the target frame.
     pub fn apply(&self, p: [f64; 3]) -> [f64; 3] {
         let turned = self.turn(p);
         [0, 1, 2].map(|i| self.scale * turned[i] + self.translation[i])
     }
 
-    /// A direction of the source in the target, its length kept.
+    /// Returns a direction of the source in the target frame, with the same length.
     pub fn turn(&self, d: [f64; 3]) -> [f64; 3] {
         self.rotation.map(|row| row[0] * d[0] + row[1] * d[1] + row[2] * d[2])
     }
 
-    /// From the target to the source.
+    /// Returns the similarity from the target to the source.
     pub fn inverse(&self) -> Self {
         let r = &self.rotation;
         let rotation = [0, 1, 2].map(|i| [r[0][i], r[1][i], r[2][i]]);
@@ -114,7 +115,7 @@ impl Similarity {
         Self { translation: back.apply(self.translation).map(|c| -c), ..back }
     }
 
-    /// `self` after `first`.
+    /// Returns the similarity that applies `first` and then `self`.
     pub fn after(&self, first: &Self) -> Self {
         let columns = [0, 1, 2].map(|j| self.turn([first.rotation[0][j], first.rotation[1][j], first.rotation[2][j]]));
         Self {
@@ -124,14 +125,15 @@ impl Similarity {
         }
     }
 
-    /// A camera of the source frame in the target frame: it sees the moved scene in the same pixels. Its depths are those of
-    /// the source times [`Self::scale`].
+    /// Returns a camera of the source frame in the target frame.
+    ///
+    /// It sees the moved scene in the same pixels. Its depths are the depths in the source times [`Self::scale`].
     pub fn move_pose(&self, pose: &Pose) -> Pose {
         Pose { rotation: pose.rotation.map(|axis| self.turn(axis)), centre: self.apply(pose.centre) }
     }
 }
 
-/// The rotation nearest to a matrix that is one but for rounding.
+/// Returns the rotation nearest to a matrix that is a rotation up to rounding.
 fn proper_rotation(r: &[[f64; 3]; 3]) -> Result<[[f64; 3]; 3], SimilarityError> {
     let dot = |i: usize, j: usize| (0..3).map(|k| r[i][k] * r[j][k]).sum::<f64>();
     let off = (0..9).map(|n| (dot(n / 3, n % 3) - if n / 3 == n % 3 { 1.0 } else { 0.0 }).abs()).fold(0.0, f64::max);
@@ -142,7 +144,7 @@ fn proper_rotation(r: &[[f64; 3]; 3]) -> Result<[[f64; 3]; 3], SimilarityError> 
     if determinant(r) < 0.0 {
         return Err(SimilarityError::Mirror);
     }
-    // What is exact already stays bit for bit.
+    // A matrix that is exact already keeps its bits.
     if off < 4.0 * f64::EPSILON {
         return Ok(*r);
     }

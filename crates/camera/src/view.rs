@@ -1,11 +1,12 @@
-//! How a camera looks at a ground point: view direction, incidence, azimuth, intersection angle, GSD.
+//! The view of a ground point: direction, incidence, azimuth, intersection angle and GSD.
 //!
-//! The direction is the tangent of the curve of ground points with the same image: dλ, dφ for a step dh follow from
-//! the Jacobian, and become metres east and north with the radii of curvature: dE = (N + h) cos φ dλ, dN = (M + h) dφ.
-//! It is exact for the model and differs from the direction to the satellite by what the RPC's fit leaves.
+//! The direction is the tangent of the curve of ground points with the same image position. The steps dλ and dφ for a
+//! step dh follow from the Jacobian. They become metres east and north with the radii of curvature:
+//! dE = (N + h) cos φ dλ, dN = (M + h) dφ. The direction is exact for the RPC. It differs from the direction to the
+//! satellite by the residual of the RPC's fit.
 //!
-//! Vectors are unit vectors (east, north, up) at the ground point, from the ground towards the sensor; angles are
-//! degrees. Nothing is defined at the poles, where there is no east, and where the Jacobian is singular.
+//! Vectors are unit vectors (east, north, up) at the ground point, from the ground towards the sensor. Angles are
+//! degrees. Directions are undefined at the poles, where there is no east, and where the Jacobian is singular.
 
 use geodesy::{LonLatHeight, meridian_radius_m, prime_vertical_radius_m};
 
@@ -32,40 +33,40 @@ pub struct GroundSamplingDistance {
 }
 
 impl ViewDirection {
-    /// Angle between the direction and the vertical at the ground point.
+    /// Returns the angle between the direction and the vertical at the ground point.
     pub fn incidence_deg(&self) -> f64 {
         self.east.hypot(self.north).atan2(self.up).to_degrees()
     }
 
-    /// Azimuth of the sensor as seen from the ground: clockwise from north, in [0, 360); 0 for a sensor overhead.
+    /// Returns the azimuth of the sensor as seen from the ground: clockwise from north, in [0, 360), 0 for a sensor overhead.
     pub fn azimuth_deg(&self) -> f64 {
         let a = self.east.atan2(self.north).to_degrees();
         // A tiny negative angle would round up to 360 itself.
         if a < 0.0 { (a + 360.0) % 360.0 } else { a }
     }
 
-    /// Angle between two views of the same ground point, in [0, 180].
+    /// Returns the angle between two views of the same ground point, in [0, 180].
     pub fn intersection_angle_deg(&self, other: &Self) -> f64 {
         let (a, b) = ([self.east, self.north, self.up], [other.east, other.north, other.up]);
         let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
         let dot: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
-        // The arc tangent keeps its digits for the small angles of narrow baselines, unlike the arc cosine.
+        // The arc tangent is accurate for the small angles of narrow baselines, unlike the arc cosine.
         cross.iter().map(|c| c * c).sum::<f64>().sqrt().atan2(dot).to_degrees()
     }
 }
 
 impl GroundSamplingDistance {
-    /// The geometric mean of both directions, metres.
+    /// Returns the geometric mean of both distances, metres.
     pub fn mean_m(&self) -> f64 {
         (self.sample_m * self.line_m).sqrt()
     }
 }
 
 impl RpcCamera {
-    /// The direction from a ground point towards the sensor.
+    /// Returns the direction from a ground point towards the sensor.
     ///
     /// # Errors
-    /// As [`crate::Rpc::project`]; [`CameraError::Singular`] where the direction is not defined.
+    /// The same as for [`crate::Rpc::project`], and [`CameraError::Singular`] where the direction is not defined.
     pub fn view_direction(&self, ground: LonLatHeight) -> Result<ViewDirection, CameraError> {
         let local = self.metric_jacobian(ground)?;
         let [east, north] = local.solve([-local.up[0], -local.up[1]]).ok_or(CameraError::Singular)?;
@@ -73,20 +74,20 @@ impl RpcCamera {
         Ok(ViewDirection { east: east / size, north: north / size, up: 1.0 / size })
     }
 
-    /// The ground sampling distances at a ground point, on its horizontal plane.
+    /// Returns the ground sampling distances at a ground point, on its horizontal plane.
     ///
     /// # Errors
-    /// As [`RpcCamera::view_direction`].
+    /// The same as for [`RpcCamera::view_direction`].
     pub fn gsd(&self, ground: LonLatHeight) -> Result<GroundSamplingDistance, CameraError> {
         let local = self.metric_jacobian(ground)?;
         let step = |pixels| local.solve(pixels).map(|[e, n]| e.hypot(n)).ok_or(CameraError::Singular);
         Ok(GroundSamplingDistance { sample_m: step([1.0, 0.0])?, line_m: step([0.0, 1.0])? })
     }
 
-    /// The ground sampling distances at an image position, at a height in metres.
+    /// Returns the ground sampling distances at an image position, at a height in metres.
     ///
     /// # Errors
-    /// As [`RpcCamera::localize`] and [`RpcCamera::view_direction`].
+    /// The same as for [`RpcCamera::localize`] and [`RpcCamera::view_direction`].
     pub fn gsd_at(&self, image: ImagePoint, height_m: f64) -> Result<GroundSamplingDistance, CameraError> {
         self.gsd(self.localize(image, height_m)?)
     }
@@ -115,7 +116,7 @@ struct MetricJacobian {
 }
 
 impl MetricJacobian {
-    /// Metres east and north that move the image by `pixels`; `None` where the Jacobian cannot be inverted.
+    /// Returns the metres east and north that move the image by `pixels`. `None` if the Jacobian cannot be inverted.
     fn solve(&self, pixels: [f64; 2]) -> Option<[f64; 2]> {
         let (e, n) = (self.east, self.north);
         let det = e[0] * n[1] - n[0] * e[1];
