@@ -1,9 +1,9 @@
 //! The WGS 84 ellipsoid: radii of curvature, and geodetic ↔ Earth-centred coordinates.
 //!
 //! X = (N + h) cos φ cos λ, Y = (N + h) cos φ sin λ, Z = (N (1 − e²) + h) sin φ with N = a / √(1 − e² sin² φ).
-//! The inverse iterates Bowring's formula (Survey Review 23, 1976) on the parametric latitude; three rounds leave
-//! less than a nanometre from 10 km below the surface to 10,000 km above it. At the Earth's centre, where no latitude
-//! exists, the result is a pole and is not meaningful.
+//! The inverse iterates Bowring's formula (Survey Review 23, 1976) on the parametric latitude. Three rounds leave an
+//! error below a nanometre from 10 km below the surface to 10,000 km above it. At the Earth's centre no latitude exists,
+//! and the result is a pole.
 
 use crate::LonLatHeight;
 
@@ -30,20 +30,28 @@ pub struct EcefPoint {
     pub z: f64,
 }
 
-/// Radius of curvature of the meridian at a latitude in degrees, metres (M).
+/// Returns the radius of curvature of the meridian at a latitude in degrees, metres (M).
 pub fn meridian_radius_m(lat_deg: f64) -> f64 {
     let s = lat_deg.to_radians().sin();
     let w2 = 1.0 - WGS84_E2 * s * s;
     WGS84_A * (1.0 - WGS84_E2) / (w2 * w2.sqrt())
 }
 
-/// Radius of curvature in the prime vertical at a latitude in degrees, metres (N).
+/// Returns the radius of curvature in the prime vertical at a latitude in degrees, metres (N).
 pub fn prime_vertical_radius_m(lat_deg: f64) -> f64 {
     let s = lat_deg.to_radians().sin();
     WGS84_A / (1.0 - WGS84_E2 * s * s).sqrt()
 }
 
-/// Earth-centred position of a geodetic one.
+/// Returns the Earth-centred position of a geodetic position.
+///
+/// ```
+/// use geodesy::{LonLatHeight, ecef_from_ground, ground_from_ecef};
+///
+/// let ground = LonLatHeight::new(7.4, 43.7, 120.0);
+/// let back = ground_from_ecef(ecef_from_ground(ground));
+/// assert!((back.height_m - ground.height_m).abs() < 1e-6);
+/// ```
 pub fn ecef_from_ground(ground: LonLatHeight) -> EcefPoint {
     let (sin_lat, cos_lat) = ground.lat_deg.to_radians().sin_cos();
     let (sin_lon, cos_lon) = ground.lon_deg.to_radians().sin_cos();
@@ -52,7 +60,7 @@ pub fn ecef_from_ground(ground: LonLatHeight) -> EcefPoint {
     EcefPoint { x: across * cos_lon, y: across * sin_lon, z: (n * (1.0 - WGS84_E2) + ground.height_m) * sin_lat }
 }
 
-/// Geodetic position of an Earth-centred one; longitude in (−180, 180].
+/// Returns the geodetic position of an Earth-centred position, with the longitude in (−180, 180].
 pub fn ground_from_ecef(ecef: EcefPoint) -> LonLatHeight {
     let p = ecef.x.hypot(ecef.y);
     let mut beta = (ecef.z * WGS84_A).atan2(p * WGS84_B);
@@ -67,7 +75,7 @@ pub fn ground_from_ecef(ecef: EcefPoint) -> LonLatHeight {
     LonLatHeight { lon_deg: wrap_lon(ecef.y.atan2(ecef.x).to_degrees()), lat_deg: lat.to_degrees(), height_m }
 }
 
-/// The same meridian as `lon_deg`, in (−180, 180].
+/// Returns the longitude of the same meridian in (−180, 180].
 pub fn wrap_lon(lon_deg: f64) -> f64 {
     if lon_deg > -180.0 && lon_deg <= 180.0 {
         return lon_deg;
@@ -76,7 +84,8 @@ pub fn wrap_lon(lon_deg: f64) -> f64 {
     if wrapped <= -180.0 { 180.0 } else { wrapped }
 }
 
-/// The same meridian as `lon_deg`, within 180° of `reference_deg`: differences across the antimeridian stay small.
+/// Returns the longitude of the same meridian within 180° of `reference_deg`, so that differences across the
+/// antimeridian stay small.
 pub fn lon_near(lon_deg: f64, reference_deg: f64) -> f64 {
     let turns = ((lon_deg - reference_deg) / 360.0).round();
     if turns == 0.0 { lon_deg } else { lon_deg - 360.0 * turns }
@@ -87,7 +96,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Metres between two geodetic positions, straight through.
+    /// Returns the length of the straight line between two geodetic positions, metres.
     fn distance_m(a: LonLatHeight, b: LonLatHeight) -> f64 {
         let (p, q) = (ecef_from_ground(a), ecef_from_ground(b));
         (p.x - q.x).hypot(p.y - q.y).hypot(p.z - q.z)

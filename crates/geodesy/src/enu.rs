@@ -1,8 +1,8 @@
 //! A local east-north-up frame, metres.
 //!
-//! The frame is the tangent frame of the ellipsoid's normal at its origin, reached through Earth-centred coordinates,
-//! so nothing happens at the antimeridian or the poles. East and north are those of the origin: `up` departs from
-//! the height by d² / 2R (8 cm at 1 km), which [`EnuFrame::ground_from_enu`] undoes exactly.
+//! The frame is tangent to the ellipsoid at its origin. Conversions go through Earth-centred coordinates, so that the
+//! antimeridian and the poles need no special care. East and north are the directions at the origin. `up` differs from
+//! the height by d² / 2R (8 cm at 1 km), and [`EnuFrame::ground_from_enu`] converts it back exactly.
 
 use crate::LonLatHeight;
 use crate::ellipsoid::{EcefPoint, ecef_from_ground, ground_from_ecef};
@@ -10,11 +10,11 @@ use crate::ellipsoid::{EcefPoint, ecef_from_ground, ground_from_ecef};
 /// A position in an [`EnuFrame`], metres from its origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EnuPoint {
-    /// Towards the east of the origin.
+    /// Coordinate towards the east at the origin.
     pub east: f64,
-    /// Towards the north of the origin.
+    /// Coordinate towards the north at the origin.
     pub north: f64,
-    /// Along the ellipsoid's normal at the origin.
+    /// Coordinate along the ellipsoid's normal at the origin.
     pub up: f64,
 }
 
@@ -30,19 +30,27 @@ pub struct EnuFrame {
 }
 
 impl EnuFrame {
-    /// The frame at `origin`.
+    /// Makes the frame at `origin`.
+    ///
+    /// ```
+    /// use geodesy::{EnuFrame, LonLatHeight};
+    ///
+    /// let frame = EnuFrame::new(LonLatHeight::new(5.4, 43.53, 180.0));
+    /// let above = frame.enu_from_ground(LonLatHeight::new(5.4, 43.53, 190.0));
+    /// assert!((above.up - 10.0).abs() < 1e-6);
+    /// ```
     pub fn new(origin: LonLatHeight) -> Self {
         let (sin_lon, cos_lon) = origin.lon_deg.to_radians().sin_cos();
         let (sin_lat, cos_lat) = origin.lat_deg.to_radians().sin_cos();
         Self { origin, origin_ecef: ecef_from_ground(origin), sin_lon, cos_lon, sin_lat, cos_lat }
     }
 
-    /// The ground point at (0, 0, 0).
+    /// Returns the ground point at (0, 0, 0).
     pub fn origin(&self) -> LonLatHeight {
         self.origin
     }
 
-    /// Local coordinates of a ground point.
+    /// Returns the local coordinates of a ground point.
     pub fn enu_from_ground(&self, ground: LonLatHeight) -> EnuPoint {
         let p = ecef_from_ground(ground);
         let (dx, dy, dz) = (p.x - self.origin_ecef.x, p.y - self.origin_ecef.y, p.z - self.origin_ecef.z);
@@ -54,7 +62,7 @@ impl EnuFrame {
         }
     }
 
-    /// Ground point of local coordinates; longitude in (−180, 180].
+    /// Returns the ground point of local coordinates, with the longitude in (−180, 180].
     pub fn ground_from_enu(&self, enu: EnuPoint) -> LonLatHeight {
         let outward = self.cos_lat * enu.up - self.sin_lat * enu.north;
         ground_from_ecef(EcefPoint {

@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum GeodesyError {
     /// Longitude or latitude is not a position on the Earth.
-    #[error("longitude {lon_deg}, latitude {lat_deg} is no position: expected finite degrees with |latitude| <= 90")]
+    #[error("longitude {lon_deg}, latitude {lat_deg} is not a position: expected finite degrees with |latitude| <= 90")]
     InvalidPosition {
         /// Longitude, degrees.
         lon_deg: f64,

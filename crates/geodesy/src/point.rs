@@ -14,7 +14,7 @@ pub struct LonLatHeight {
 }
 
 impl LonLatHeight {
-    /// A point from longitude and latitude in degrees and an ellipsoidal height in metres.
+    /// Makes a point from longitude and latitude in degrees and an ellipsoidal height in metres.
     pub const fn new(lon_deg: f64, lat_deg: f64, height_m: f64) -> Self {
         Self { lon_deg, lat_deg, height_m }
     }

@@ -1,20 +1,21 @@
-//! A transverse Mercator map of one's own place: metres east and north of a point, true to scale at its height.
+//! A local transverse Mercator map: metres east and north of a point, true to scale at the height of that point.
 //!
-//! Krüger's series to the sixth order in the third flattening (Karney, J. Geodesy 85, 2011, eqs. 7–36), exact to
-//! nanometres within some thousand kilometres of the central meridian. The origin is the point itself: its meridian is grid north,
-//! so there is no convergence there, and the scale is that of the ground at its height, k = 1 + h / √(M N), so that a metre
-//! of the map is a metre on the ground (a *low-distortion projection*): within 1 km of the origin to 1.3e-8. No PROJ
-//! object is made, so that thousands of such maps cost nothing; any software reads [`TransverseMercator::wkt`].
+//! The map uses Krüger's series to the sixth order in the third flattening (Karney, J. Geodesy 85, 2011, eqs. 7–36).
+//! It is exact to nanometres within some thousand kilometres of the central meridian. The origin is the point itself.
+//! Its meridian is grid north, so the convergence there is zero. The scale is k = 1 + h / √(M N), so that a metre on
+//! the map is a metre on the ground at height h (a *low-distortion projection*), to 1.3e-8 within 1 km of the origin.
+//! No PROJ object is needed, so that thousands of such maps are cheap. GIS software reads
+//! [`TransverseMercator::wkt`].
 
 use crate::ellipsoid::{WGS84_A, WGS84_E2, WGS84_F, meridian_radius_m, prime_vertical_radius_m, wrap_lon};
 use crate::{GeodesyError, LonLatHeight, MapPoint};
 
 /// Orders of the series.
 const ORDER: usize = 6;
-/// Newton's steps towards a latitude; three are enough for full precision.
+/// Newton steps towards a latitude. Three are enough for full precision.
 const STEPS: usize = 5;
 
-/// A map on a transverse cylinder with its origin at a point.
+/// A transverse Mercator map with its origin at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TransverseMercator {
     lon_deg: f64,
@@ -29,10 +30,19 @@ pub struct TransverseMercator {
 }
 
 impl TransverseMercator {
-    /// The map whose origin is a point and whose metres are those of the ground at its height.
+    /// Makes the map with its origin at a point, true to scale at the height of that point.
+    ///
+    /// ```
+    /// use geodesy::{LonLatHeight, TransverseMercator};
+    ///
+    /// let map = TransverseMercator::local(LonLatHeight::new(5.4, 43.53, 180.0))?;
+    /// let here = map.map_from_lonlat(5.4, 43.53)?;
+    /// assert!(here.x.abs() < 1e-6 && here.y.abs() < 1e-6);
+    /// # Ok::<(), geodesy::GeodesyError>(())
+    /// ```
     ///
     /// # Errors
-    /// [`GeodesyError::InvalidPosition`] for numbers that are no position, or a height beyond ±100 km.
+    /// [`GeodesyError::InvalidPosition`] for an invalid position or a height beyond ±100 km.
     pub fn local(origin: LonLatHeight) -> Result<Self, GeodesyError> {
         let LonLatHeight { lon_deg, lat_deg, height_m } = origin;
         let radius_m = (meridian_radius_m(lat_deg) * prime_vertical_radius_m(lat_deg)).sqrt();
@@ -40,10 +50,10 @@ impl TransverseMercator {
         Self::new(lon_deg, lat_deg, scale)
     }
 
-    /// The map with its origin at a longitude and latitude in degrees and a scale on its central meridian.
+    /// Makes the map with its origin at a longitude and latitude in degrees and a scale on its central meridian.
     ///
     /// # Errors
-    /// [`GeodesyError::InvalidPosition`] for numbers that are no position, or no positive scale.
+    /// [`GeodesyError::InvalidPosition`] for an invalid position or a scale that is not positive.
     pub fn new(lon_deg: f64, lat_deg: f64, scale: f64) -> Result<Self, GeodesyError> {
         let position = lon_deg.is_finite() && lon_deg.abs() <= 360.0 && lat_deg.abs() <= 90.0;
         if !(position && scale > 0.0 && scale.is_finite()) {
@@ -64,22 +74,22 @@ impl TransverseMercator {
         Ok(map)
     }
 
-    /// Longitude of the origin, degrees.
+    /// Returns the longitude of the origin, degrees.
     pub fn lon_deg(&self) -> f64 {
         self.lon_deg
     }
 
-    /// Latitude of the origin, degrees.
+    /// Returns the latitude of the origin, degrees.
     pub fn lat_deg(&self) -> f64 {
         self.lat_deg
     }
 
-    /// Scale on the central meridian.
+    /// Returns the scale on the central meridian.
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
-    /// Metres east and north of the origin of a longitude and latitude in degrees.
+    /// Returns the metres east and north of the origin for a longitude and latitude in degrees.
     ///
     /// # Errors
     /// [`GeodesyError::OutsideDomain`] 80° and more from the central meridian.
@@ -92,7 +102,7 @@ impl TransverseMercator {
         Ok(MapPoint { x: self.radius_m * eta, y: self.radius_m * (xi - self.xi) })
     }
 
-    /// Longitude in (−180, 180] and latitude in degrees of metres east and north of the origin.
+    /// Returns the longitude in (−180, 180] and latitude, degrees, for metres east and north of the origin.
     ///
     /// # Errors
     /// [`GeodesyError::OutsideDomain`] for numbers beyond 5,000 km.
@@ -113,7 +123,7 @@ impl TransverseMercator {
         Ok((wrap_lon(self.lon_deg + east.to_degrees()), lat_deg))
     }
 
-    /// WKT that GDAL, PROJ and GIS software read.
+    /// Returns WKT that GDAL, PROJ and GIS software read.
     pub fn wkt(&self) -> String {
         format!(
             "PROJCS[\"{self}\",GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563,\
@@ -126,7 +136,7 @@ impl TransverseMercator {
         )
     }
 
-    /// Position on the rectifying sphere: northing and easting as angles.
+    /// Returns the position on the rectifying sphere: northing and easting as angles.
     fn sphere_from_lonlat(&self, east: f64, lat_deg: f64) -> (f64, f64) {
         let conformal = conformal_tangent(lat_deg.to_radians().tan());
         let xi1 = conformal.atan2(east.cos());
@@ -147,7 +157,7 @@ impl std::fmt::Display for TransverseMercator {
     }
 }
 
-/// Tangent of the conformal latitude from that of the geographic one.
+/// Returns the tangent of the conformal latitude from the tangent of the geographic latitude.
 fn conformal_tangent(tangent: f64) -> f64 {
     let e = WGS84_E2.sqrt();
     let root = tangent.hypot(1.0);
@@ -155,7 +165,7 @@ fn conformal_tangent(tangent: f64) -> f64 {
     tangent * sigma.hypot(1.0) - sigma * root
 }
 
-/// Tangent of the geographic latitude from that of the conformal one, by Newton's method (Karney's eqs. 19–21).
+/// Returns the tangent of the geographic latitude from the tangent of the conformal latitude, by Newton's method (Karney's eqs. 19–21).
 fn geographic_tangent(conformal: f64) -> f64 {
     let mut tangent = conformal;
     for _ in 0..STEPS {
@@ -171,7 +181,7 @@ fn geographic_tangent(conformal: f64) -> f64 {
     tangent
 }
 
-/// Sums of powers n^(j + k) of the rows of a table, k from 0.
+/// Evaluates the rows of a table as polynomials in n. Row j begins with the power n^j.
 fn series(n: f64, table: &[&[f64]; ORDER]) -> [f64; ORDER] {
     std::array::from_fn(|j| {
         let powers = (j as i32 + 1..).map(|power| n.powi(power));
@@ -232,7 +242,7 @@ mod tests {
         fn the_way_back_is_the_way(lon in -180.0..180.0f64, lat in -89.9..89.9f64, x in -3e5..3e5f64, y in -3e5..3e5f64) {
             let map = TransverseMercator::new(lon, lat, 1.0001).unwrap();
             let (l, p) = map.lonlat_from_map(x, y).unwrap();
-            // Beyond a pole the way leads down another meridian, more than a quarter of the globe away.
+            // Beyond a pole the position lies on another meridian, more than a quarter of the globe away.
             if let Ok(back) = map.map_from_lonlat(l, p) {
                 prop_assert!((back.x - x).abs() < 1e-6 && (back.y - y).abs() < 1e-6);
             } else {
