@@ -1,5 +1,5 @@
-//! The pages fit together: every link leads to a file and a heading, every page is in the book, the README is short, and the
-//! minimum version of Rust is the one in Cargo.toml.
+//! The pages fit together: every link leads to a file and a heading, every page is in the book, the
+//! README is short, and the minimum version of Rust is the one in Cargo.toml.
 
 use std::path::Path;
 

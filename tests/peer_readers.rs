@@ -1,7 +1,8 @@
 //! What is written for trainers loads in other people's readers: pycolmap, Open3D, trimesh, NumPy.
 //!
-//! `benches/peers/check_priors.py` does the checks. It runs with the Python that `SKYSWEEP_PEERS_PYTHON` names, else with
-//! `python3`. Packages that are not installed are skipped with a line each.
+//! `benches/peers/check_priors.py` does the checks. It runs with the Python that
+//! `SKYSWEEP_PEERS_PYTHON` names, else with `python3`. Packages that are not installed are skipped
+//! with a line each.
 
 use std::path::Path;
 use std::process::Command;

@@ -83,7 +83,8 @@ impl Kinds {
         }
     }
 
-    /// The kind of a point of the surface that at least `views` have to see; `None` for water and outside.
+    /// The kind of a point of the surface that at least `views` have to see; `None` for water and
+    /// outside.
     fn kind(&self, simulation: &Simulation, point: Vector3<f64>, views: u8, sun: &Sun) -> Option<usize> {
         let (column, row) = ((point.x + self.half_m) / self.cell_m, (self.half_m - point.y) / self.cell_m);
         if column < 0.0 || row < 0.0 {

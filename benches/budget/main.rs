@@ -1,9 +1,11 @@
-//! Where the error comes from: `cargo bench --bench budget [-- SCENE…]` writes `benches/results/budget.md`.
+//! Where the error comes from: `cargo bench --bench budget [-- SCENE…]` writes
+//! `benches/results/budget.md`.
 //!
-//! Simulated scenes go through the stages of `skysweep dsm` with what a stage is to find put in its place: the true pointing, the
-//! true heights as the range of the search, no regularisation, and at last the true heights themselves into the fusion. The
-//! heights of the views are compared pixel by pixel with what the pixels see, those of the surface cell by cell with the true
-//! surface; nothing is aligned. Speckle removal and filling come after what is measured here.
+//! Simulated scenes go through the stages of `skysweep dsm` with what a stage is to find put in its
+//! place: the true pointing, the true heights as the range of the search, no regularisation, and at
+//! last the true heights themselves into the fusion. The heights of the views are compared pixel by
+//! pixel with what the pixels see, those of the surface cell by cell with the true surface; nothing
+//! is aligned. Speckle removal and filling come after what is measured here.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 

@@ -123,7 +123,8 @@ impl<'a> Scene<'a> {
         self.simulation.views.iter().map(map).collect()
     }
 
-    /// The surface of all heights, or of those that another view confirms, on the cells of the truth; metres above the ellipsoid.
+    /// The surface of all heights, or of those that another view confirms, on the cells of the
+    /// truth; metres above the ellipsoid.
     pub(crate) fn fused(&self, maps: &[HeightMap], checked: bool) -> anyhow::Result<Grid<f32>> {
         let truth = &self.simulation.truth;
         let all: Vec<Heights<'_>> =

@@ -1,4 +1,5 @@
-//! What comes out, against the stored results of Open3D and against rays that are tested against every triangle.
+//! What comes out, against the stored results of Open3D and against rays that are tested against
+//! every triangle.
 
 use numeric::vector::{cross, dot, sub};
 use std::path::Path;
@@ -112,7 +113,8 @@ fn brute_force(scene: &Scene, out: &Path) -> anyhow::Result<Value> {
     Ok(json!({ "rays": rows.len() / 4, "hits": errors.len(), "hit_by_one_only": other, "mean_m": mean, "max_m": most }))
 }
 
-/// The z-depth of the nearest triangle (Möller and Trumbore 1997, f64); infinite where there is none.
+/// The z-depth of the nearest triangle (Möller and Trumbore 1997, f64); infinite where there is
+/// none.
 fn nearest(model: &PriorModel, view: &View, rays: &Rays, pixel: usize) -> f64 {
     let Some([x, y]) = rays.direction(pixel % rays.width(), pixel / rays.width()) else { return f64::INFINITY };
     let axes = view.pose.rotation;

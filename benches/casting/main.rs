@@ -1,9 +1,11 @@
-//! Rays at a real city model, for a run side by side with Open3D: `cargo bench --bench casting -- CITY time THREADS` and
-//! `cargo bench --bench casting -- CITY check RAYS.npy`. `benches/peers/priors.py` calls both, and says what came out.
+//! Rays at a real city model, for a run side by side with Open3D: `cargo bench --bench casting --
+//! CITY time THREADS` and `cargo bench --bench casting -- CITY check RAYS.npy`.
+//! `benches/peers/priors.py` calls both, and says what came out.
 //!
-//! CITY is `../shared/data/city`. `time` makes the maps of the hundred cameras of `peer_reference`, and looks for its million
-//! points in them, on the triangles that the reference was computed with; `check` compares our triangles of the tile with the
-//! stored results, and both with rays that were tested against every triangle in f64. A line of JSON is printed.
+//! CITY is `../shared/data/city`. `time` makes the maps of the hundred cameras of `peer_reference`,
+//! and looks for its million points in them, on the triangles that the reference was computed with;
+//! `check` compares our triangles of the tile with the stored results, and both with rays that were
+//! tested against every triangle in f64. A line of JSON is printed.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
@@ -82,7 +84,8 @@ fn maps(scene: &Scene) -> anyhow::Result<Value> {
     Ok(told)
 }
 
-/// The points in all cameras: the rays alone, and everything from the points to the list of observations.
+/// The points in all cameras: the rays alone, and everything from the points to the list of
+/// observations.
 fn visibility(scene: &Scene) -> anyhow::Result<Value> {
     let mut cast = Clock::default();
     let mut rays = 0;
@@ -147,7 +150,8 @@ impl Clock {
     }
 }
 
-/// Time that the threads of the process have been running, seconds (Linux: nanoseconds in `schedstat`).
+/// Time that the threads of the process have been running, seconds (Linux: nanoseconds in
+/// `schedstat`).
 fn cpu_s() -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let running = |task: std::fs::DirEntry| {

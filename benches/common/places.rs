@@ -1,7 +1,8 @@
 //! Where a bench finds the command and the shared data.
 //!
-//! The environment variable `SKYSWEEP_BIN` names another command than the one that Cargo built with the bench, for example a
-//! reference binary. `SKYSWEEP_DATA` names the folder of the shared data; without it that is `../shared/data` beside the checkout.
+//! The environment variable `SKYSWEEP_BIN` names another command than the one that Cargo built with
+//! the bench, for example a reference binary. `SKYSWEEP_DATA` names the folder of the shared data;
+//! without it that is `../shared/data` beside the checkout.
 
 #![allow(dead_code, reason = "not every bench reads shared data")]
 

@@ -1,11 +1,14 @@
-//! A thousand height maps from one surface model: `cargo bench --bench heightmaps [-- --tiles N --runs N --folder DIR --out DIR]`.
+//! A thousand height maps from one surface model: `cargo bench --bench heightmaps [-- --tiles N
+//! --runs N --folder DIR --out DIR]`.
 //!
-//! The surface is a formula (gentle hills with gabled houses, see `town`), so its height is known at every pixel of every
-//! tile; the surface model is the formula at the centres of 4096 × 4096 cells of half a metre. The release binary makes tiles
-//! of 518 × 518 pixels at 2 per metre around random places with random headings, on two threads, once for each way of
-//! reading between cells and in turn. Seconds, tiles per second and errors against the formula (every 13th pixel of every 20th
-//! tile; on houses' walls, which no interpolation of cells can place, and away from them) go to
-//! `benches/results/heightmaps.json` and `.md`; with other options than the default ones only with --out.
+//! The surface is a formula (gentle hills with gabled houses, see `town`), so its height is known
+//! at every pixel of every tile; the surface model is the formula at the centres of 4096 × 4096
+//! cells of half a metre. The release binary makes tiles of 518 × 518 pixels at 2 per metre around
+//! random places with random headings, on two threads, once for each way of reading between cells
+//! and in turn. Seconds, tiles per second and errors against the formula (every 13th pixel of every
+//! 20th tile; on houses' walls, which no interpolation of cells can place, and away from them) go
+//! to `benches/results/heightmaps.json` and `.md`; with other options than the default ones only
+//! with --out.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
@@ -36,7 +39,8 @@ const BORDER_M: f64 = 190.0;
 const READINGS: [&str; 3] = ["nearest", "bilinear", "cubic"];
 /// Every how many tiles, and pixels, errors are looked at.
 const EVERY: (usize, usize) = (20, 13);
-/// Places with a jump of the surface this near are on walls, metres: the reach of the cubic, and half a diagonal of a cell.
+/// Places with a jump of the surface this near are on walls, metres: the reach of the cubic, and
+/// half a diagonal of a cell.
 const WALL_M: f64 = 1.5;
 
 fn main() -> anyhow::Result<()> {

@@ -1,4 +1,5 @@
-//! A surface by formula: gentle hills, and on a lattice of 40 m houses with gabled roofs, each turned its own way.
+//! A surface by formula: gentle hills, and on a lattice of 40 m houses with gabled roofs, each
+//! turned its own way.
 //!
 //! Metres east and north of the upper left corner; heights above the ellipsoid.
 

@@ -1,12 +1,15 @@
-//! Cost and memory of large scenes: `cargo bench --bench scale [-- SIDE… --memory MB --preset NAME --folder DIR --out DIR]`.
+//! Cost and memory of large scenes: `cargo bench --bench scale [-- SIDE… --memory MB --preset NAME
+//! --folder DIR --out DIR]`.
 //!
-//! Pairs of SIDE × SIDE pixels (4096, 8192, 12288 and 20000 when none is named) show a town that repeats itself every
-//! 2048 pixels (see `town`), as a GDAL mosaic (VRT) of one rendered tile per view: pixels are decoded window by window as from
-//! any file, and a pair of 800 megapixels takes 30 MB of disk. The release binary runs as a user would run it with `--memory`.
-//! Processor seconds, wall seconds and the largest resident memory of the command go to `benches/results/scale.md`, with the
-//! error against the town's own heights; nothing is aligned. A side that is named several times is run as often, and has its mean:
-//! machines are slower at times, and `4096 20000 4096` tells that from cost that grows. Results of runs with named sides are
-//! written only with --out.
+//! Pairs of SIDE × SIDE pixels (4096, 8192, 12288 and 20000 when none is named) show a town that
+//! repeats itself every 2048 pixels (see `town`), as a GDAL mosaic (VRT) of one rendered tile per
+//! view: pixels are decoded window by window as from any file, and a pair of 800 megapixels takes
+//! 30 MB of disk. The release binary runs as a user would run it with `--memory`. Processor
+//! seconds, wall seconds and the largest resident memory of the command go to
+//! `benches/results/scale.md`, with the error against the town's own heights; nothing is aligned. A
+//! side that is named several times is run as often, and has its mean: machines are slower at
+//! times, and `4096 20000 4096` tells that from cost that grows. Results of runs with named sides
+//! are written only with --out.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
@@ -186,7 +189,8 @@ fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments
     Ok(Row { side, chunks, user_s, system_s, wall_s, peak_mb, mae_m, right })
 }
 
-/// Mean absolute error of the cells with a height, metres, and the share of all that are right to a metre, percent.
+/// Mean absolute error of the cells with a height, metres, and the share of all that are right to a
+/// metre, percent.
 fn errors_of(dsm: &Path, side: usize) -> anyhow::Result<(f64, f64)> {
     let info = ImageSource::open(dsm)?.info().clone();
     let (mut sum, mut known, mut right, mut all) = (0.0, 0u64, 0u64, 0u64);
@@ -214,7 +218,8 @@ fn errors_of(dsm: &Path, side: usize) -> anyhow::Result<(f64, f64)> {
     Ok((sum / known as f64, 100.0 * right as f64 / all as f64))
 }
 
-/// One row for each side, the smallest first, with the mean of its times and the greatest peak; all else is the same in all runs.
+/// One row for each side, the smallest first, with the mean of its times and the greatest peak; all
+/// else is the same in all runs.
 fn means(mut rows: Vec<Row>) -> anyhow::Result<Vec<Row>> {
     rows.sort_by_key(|r| r.side);
     let mut out: Vec<Row> = Vec::new();

@@ -1,8 +1,10 @@
-//! A town that repeats itself every kilometre, in x and in y, and two cameras that see it repeat in whole pixels.
+//! A town that repeats itself every kilometre, in x and in y, and two cameras that see it repeat in
+//! whole pixels.
 //!
-//! Frame: x east, y north in metres, each proportional to longitude and latitude; z metres above the scene's ground height.
-//! The cameras are affine, `sample = (x + a z) / g`, `line = (b z − y) / g`, which an RPC holds exactly: a step of one period on
-//! the ground is a step of [`PERIOD`] pixels in both images, so one rendered tile per view makes images of any size.
+//! Frame: x east, y north in metres, each proportional to longitude and latitude; z metres above
+//! the scene's ground height. The cameras are affine, `sample = (x + a z) / g`, `line = (b z − y) /
+//! g`, which an RPC holds exactly: a step of one period on the ground is a step of [`PERIOD`]
+//! pixels in both images, so one rendered tile per view makes images of any size.
 
 use camera::{ImagePoint, Rpc};
 use numeric::random::{hash64, unit_interval};

@@ -1,11 +1,14 @@
-//! Speed against error of every preset on every scene: `cargo bench --bench scenes [-- NAME… --runs N --out DIR]`.
+//! Speed against error of every preset on every scene: `cargo bench --bench scenes [-- NAME… --runs
+//! N --out DIR]`.
 //!
-//! Simulated scenes are made first (`skysweep simulate`). Real scenes are read from `../shared/data/stereo`, or from the folder
-//! that `SKYSWEEP_DATA` names. The release binary runs with default options except for the preset; scenes with a measured truth
-//! also run without filled voids and with all voids filled, so that other programs' surfaces are compared like with like. All
-//! scenes and presets run once, then all run again, so that a machine that slows down slows them all. `skysweep eval` measures the
-//! accuracy. Medians go to `benches/results/scenes.json`, tables to `scenes.md`, plots to `scenes.svg`. When names choose only
-//! some scenes, nothing is written without `--out`. Results of other programs come from `benches/results/peers.json` and
+//! Simulated scenes are made first (`skysweep simulate`). Real scenes are read from
+//! `../shared/data/stereo`, or from the folder that `SKYSWEEP_DATA` names. The release binary runs
+//! with default options except for the preset; scenes with a measured truth also run without filled
+//! voids and with all voids filled, so that other programs' surfaces are compared like with like.
+//! All scenes and presets run once, then all run again, so that a machine that slows down slows
+//! them all. `skysweep eval` measures the accuracy. Medians go to `benches/results/scenes.json`,
+//! tables to `scenes.md`, plots to `scenes.svg`. When names choose only some scenes, nothing is
+//! written without `--out`. Results of other programs come from `benches/results/peers.json` and
 //! `cars.json`. `make readme` then brings the numbers into the README and the guide.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]

@@ -13,10 +13,11 @@ pub(crate) const PRESETS: [&str; 3] = ["fast", "balanced", "accurate"];
 /// The preset that goals are for.
 pub(crate) const DEFAULT: &str = "balanced";
 
-/// The presets without filled voids, in the order of [`PRESETS`]: what other programs' unfilled surfaces compare with. They run
-/// on measured scenes.
+/// The presets without filled voids, in the order of [`PRESETS`]: what other programs' unfilled
+/// surfaces compare with. They run on measured scenes.
 pub(crate) const UNFILLED: [&str; 3] = ["fast --fill none", "balanced --fill none", "accurate --fill none"];
-/// The default preset with every void filled: what other programs' filled surfaces compare with. It runs on measured scenes.
+/// The default preset with every void filled: what other programs' filled surfaces compare with. It
+/// runs on measured scenes.
 pub(crate) const FILLED: &str = "balanced --fill all";
 
 /// Share by which the median times of equal work differ.
@@ -48,7 +49,8 @@ pub(crate) struct Row {
     /// User seconds of S2P on the same scene, where the shared data know them.
     pub(crate) s2p_cpu_s: Option<f64>,
     pub(crate) goals: Vec<Reached>,
-    /// Another preset is at least as fast and as good in MAE and completeness, and better in one of the three.
+    /// Another preset is at least as fast and as good in MAE and completeness, and better in one of
+    /// the three.
     pub(crate) dominated: bool,
     /// Every run.
     pub(crate) runs: Vec<Cost>,
@@ -101,7 +103,8 @@ impl Row {
         Ok(row)
     }
 
-    /// Whether another row of the same scene makes this one useless. Times that differ by less than [`NOISE`] are equal.
+    /// Whether another row of the same scene makes this one useless. Times that differ by less than
+    /// [`NOISE`] are equal.
     fn is_dominated_by(&self, other: &Self) -> bool {
         let errors = |row: &Self| [row.metric("mae"), 1.0 - row.metric("completeness_1")];
         let pairs = || errors(other).into_iter().zip(errors(self));

@@ -1,7 +1,7 @@
 //! What other programs make of the same images.
 //!
-//! `benches/results/peers.json` is written by `benches/peers/peers.sh` and names its sources; `benches/results/cars.json` is
-//! written by `benches/peers/cars/run.sh`.
+//! `benches/results/peers.json` is written by `benches/peers/peers.sh` and names its sources;
+//! `benches/results/cars.json` is written by `benches/peers/cars/run.sh`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,7 +18,8 @@ pub(crate) struct Peer {
     pub(crate) scene: String,
     /// What it was given, in words.
     pub(crate) input: String,
-    /// Numbers of the views used in `jax_068`. Empty for a simulated scene, of which all views are used.
+    /// Numbers of the views used in `jax_068`. Empty for a simulated scene, of which all views are
+    /// used.
     #[serde(default)]
     pub(crate) views: Vec<usize>,
     /// Whether voids were filled afterwards.

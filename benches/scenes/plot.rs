@@ -1,8 +1,9 @@
 //! Processor seconds per megapixel against error and against incompleteness, with the Pareto front.
 //!
-//! The left plots show the error (MAE), the right plots the incompleteness (the share of the reference's cells without an error
-//! below 1 m). The upper plots show the real scene with LiDAR truth: skysweep's surfaces without filled voids beside other
-//! programs' unfilled surfaces. The lower plots show the simulated scenes with the default fill. There the line joins the presets'
+//! The left plots show the error (MAE), the right plots the incompleteness (the share of the
+//! reference's cells without an error below 1 m). The upper plots show the real scene with LiDAR
+//! truth: skysweep's surfaces without filled voids beside other programs' unfilled surfaces. The
+//! lower plots show the simulated scenes with the default fill. There the line joins the presets'
 //! means over all scenes instead of a Pareto front, because scenes do not compete.
 
 use report::{Axis, Chart};

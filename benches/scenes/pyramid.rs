@@ -1,8 +1,10 @@
-//! The pyramid of Khufu as truth: the slope of three faces, and the height of their common apex over the base.
+//! The pyramid of Khufu as truth: the slope of three faces, and the height of their common apex
+//! over the base.
 //!
-//! Faces look to the cardinal directions. Cells between 25 and 95 m from the axis on a face's side, not near its edges,
-//! are fitted with a plane (robustly); the three planes meet in the apex. The base is the pavement just outside the
-//! east and west sides (118 to 125 m from the axis; the base's half width is 115.15 m): the boat museum stands south.
+//! Faces look to the cardinal directions. Cells between 25 and 95 m from the axis on a face's side,
+//! not near its edges, are fitted with a plane (robustly); the three planes meet in the apex. The
+//! base is the pavement just outside the east and west sides (118 to 125 m from the axis; the
+//! base's half width is 115.15 m): the boat museum stands south.
 
 use std::path::Path;
 
@@ -49,7 +51,8 @@ pub(crate) fn measure(dsm: &Path) -> anyhow::Result<Vec<(String, f64)>> {
     ])
 }
 
-/// The plane of the face that looks to (`east`, `north`): least squares, cells beyond three robust deviations left out.
+/// The plane of the face that looks to (`east`, `north`): least squares, cells beyond three robust
+/// deviations left out.
 fn fit_face(points: &[[f64; 3]], east: f64, north: f64) -> Plane {
     let on_face = |p: &&[f64; 3]| {
         let out = p[0] * east + p[1] * north;

@@ -57,8 +57,9 @@ pub(crate) fn dsm(images: &[PathBuf], preset: &str, out: &Path) -> anyhow::Resul
 /// Metrics by name.
 pub(crate) type Metrics = Vec<(String, f64)>;
 
-/// Runs `skysweep eval --align xyz` and returns the metrics over all cells, `median_abs` (the median of |error|), `volume_iou` and
-/// `overreach`. In simulated scenes water does not count, and the true terrain is used.
+/// Runs `skysweep eval --align xyz` and returns the metrics over all cells, `median_abs` (the
+/// median of |error|), `volume_iou` and `overreach`. In simulated scenes water does not count, and
+/// the true terrain is used.
 pub(crate) fn evaluate(dsm: &Path, truth: &Truth, folder: &Path) -> anyhow::Result<Metrics> {
     let mut command = Command::new(skysweep());
     command.arg("eval").arg(dsm);

@@ -13,8 +13,8 @@ pub(crate) enum Truth {
     Measured { path: PathBuf, vertical: &'static str },
     /// Another program's surface: a comparison, no truth.
     Peer { path: PathBuf, vertical: &'static str },
-    /// The pyramid of Khufu. `peers` are other programs' surface models of it (prefix of the metric, file), measured in the
-    /// same way.
+    /// The pyramid of Khufu. `peers` are other programs' surface models of it (prefix of the
+    /// metric, file), measured in the same way.
     Pyramid { peers: [(&'static str, PathBuf); 2] },
 }
 

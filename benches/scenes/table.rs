@@ -99,7 +99,8 @@ impl Results {
         text
     }
 
-    /// The default preset without its least believed cells, beside unfilled surfaces of other programs.
+    /// The default preset without its least believed cells, beside unfilled surfaces of other
+    /// programs.
     fn coverage_table(&self) -> String {
         let mut text = String::from(
             "\nAt equal coverage: the cells that skysweep's default preset believes most (`dsm/confidence.tif`), filled cells among them, \

@@ -1,4 +1,5 @@
-//! What tests of the command share: the binary, the sample town, towns simulated once for all tests of a file, bands of rasters.
+//! What tests of the command share: the binary, the sample town, towns simulated once for all tests
+//! of a file, bands of rasters.
 
 #![allow(dead_code, reason = "no test file uses all of it")]
 
@@ -19,7 +20,8 @@ pub(crate) fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
 }
 
-/// Simulates the sample town with some of its parameters changed (from, to); `name` is a folder of the test file's own.
+/// Simulates the sample town with some of its parameters changed (from, to); `name` is a folder of
+/// the test file's own.
 pub(crate) fn simulated(name: &str, changes: &[(&str, &str)]) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::create_dir_all(&folder).unwrap();

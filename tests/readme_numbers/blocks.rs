@@ -1,4 +1,5 @@
-//! The texts with numbers: each is made from the results files and stands between markers on the pages.
+//! The texts with numbers: each is made from the results files and stands between markers on the
+//! pages.
 
 use crate::results::{Results, median, number};
 

@@ -1,8 +1,9 @@
 //! Every measured number on the pages comes from a results file.
 //!
-//! A block between `<!-- numbers NAME -->` and `<!-- end -->` is made from `benches/results`. With `SKYSWEEP_WRITE_NUMBERS=1`
-//! (`make readme`) the blocks on the pages are written anew; otherwise the test fails when a block on a page differs. Outside of
-//! blocks, no page may hold a number that looks like a measurement.
+//! A block between `<!-- numbers NAME -->` and `<!-- end -->` is made from `benches/results`. With
+//! `SKYSWEEP_WRITE_NUMBERS=1` (`make readme`) the blocks on the pages are written anew; otherwise
+//! the test fails when a block on a page differs. Outside of blocks, no page may hold a number that
+//! looks like a measurement.
 
 mod blocks;
 mod pages;

@@ -1,11 +1,12 @@
 //! What a test does when an input or a tool is absent: it prints one line and passes.
 //!
-//! Large inputs are not part of the repository. They lie in `../shared/data` beside the checkout, or in the folder that the
-//! environment variable `SKYSWEEP_DATA` names. Tests that need them call [`shared_data`]; tests that need an installed program
-//! call [`skip`] when they do not find it. The line goes to standard error directly, so the test harness shows it even for
-//! tests that pass.
+//! Large inputs are not part of the repository. They lie in `../shared/data` beside the checkout,
+//! or in the folder that the environment variable `SKYSWEEP_DATA` names. Tests that need them call
+//! [`shared_data`]; tests that need an installed program call [`skip`] when they do not find it.
+//! The line goes to standard error directly, so the test harness shows it even for tests that pass.
 //!
-//! With `SKYSWEEP_REQUIRE_DATA=1`, which CI sets, absent shared data fail the test. Absent programs are still skipped.
+//! With `SKYSWEEP_REQUIRE_DATA=1`, which CI sets, absent shared data fail the test. Absent programs
+//! are still skipped.
 //!
 //! This crate is a dev-dependency only; no product crate uses it.
 
