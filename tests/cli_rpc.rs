@@ -7,7 +7,8 @@ use tempfile::TempDir;
 /// An RPC that can be worked by hand: line = 1000 − 1000 P, sample = 2000 + 2000 L, without height.
 fn plain_rpc() -> String {
     let mut text = String::from(
-        "LINE_OFF: 1000 pixels\nSAMP_OFF: 2000 pixels\nLAT_OFF: 45 degrees\nLONG_OFF: 7 degrees\nHEIGHT_OFF: 300 meters\n\
+        "LINE_OFF: 1000 pixels\nSAMP_OFF: 2000 pixels\nLAT_OFF: 45 degrees\nLONG_OFF: 7 degrees\nHEIGHT_OFF: 300 \
+         meters\n\
          LINE_SCALE: 1000 pixels\nSAMP_SCALE: 2000 pixels\nLAT_SCALE: 0.01 degrees\nLONG_SCALE: 0.02 degrees\n\
          HEIGHT_SCALE: 500 meters\n",
     );

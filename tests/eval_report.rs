@@ -164,8 +164,10 @@ fn a_browser_shows_the_page_with_its_pictures_and_without_complaint() {
     // The page allows no script: a copy that does counts what the browser made of it.
     let text = fs::read_to_string(&page).unwrap();
     let policy = text.lines().find(|line| line.contains("Content-Security-Policy")).unwrap();
-    let probe = "<script>document.title = 'widths ' + [...document.images].map(i => i.naturalWidth).join(' ') + ' charts ' + \
-                 [...document.querySelectorAll('svg.chart')].filter(s => s.getBoundingClientRect().height > 50).length + ' over ' + \
+    let probe = "<script>document.title = 'widths ' + [...document.images].map(i => i.naturalWidth).join(' ') + ' \
+    charts ' + \
+                 [...document.querySelectorAll('svg.chart')].filter(s => s.getBoundingClientRect().height > \
+                 50).length + ' over ' + \
                  (document.documentElement.scrollWidth - document.documentElement.clientWidth);</script></body>";
     let probed = folder.path().join("probed.html");
     fs::write(&probed, text.replace(policy, "").replace("</body>", probe)).unwrap();

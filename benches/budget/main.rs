@@ -46,11 +46,16 @@ fn main() -> anyhow::Result<()> {
 
 fn introduction() -> String {
     format!(
-        "Made by `cargo bench --bench budget`: {VIEWS} views of {SIZE_M} m with pointing errors of {} px, default preset. Shares \
-         of pixels or cells, in percent, that are off by more than a metre or have no height; in brackets the mean absolute \
-         error of those that have one, metres. Each pixel counts once, in the first class of the row that holds: occluded (no \
-         other view sees it; for cells, fewer than two views do), edge (within a metre of a jump of two), vegetation, shadow, \
-         roof, ground. Water does not count. What a line loses to the one below is what perfecting its stage could gain.\n\n",
+        "Made by `cargo bench --bench budget`: {VIEWS} views of {SIZE_M} m with pointing errors of {} px, default \
+         preset. Shares \
+         of pixels or cells, in percent, that are off by more than a metre or have no height; in brackets the mean \
+         absolute \
+         error of those that have one, metres. Each pixel counts once, in the first class of the row that holds: \
+         occluded (no \
+         other view sees it; for cells, fewer than two views do), edge (within a metre of a jump of two), \
+         vegetation, shadow, \
+         roof, ground. Water does not count. What a line loses to the one below is what perfecting its stage could \
+         gain.\n\n",
         POINTING_PX[0]
     )
 }

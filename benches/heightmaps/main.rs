@@ -67,7 +67,9 @@ fn main() -> anyhow::Result<()> {
     }
     let rows: Vec<Value> =
         READINGS.iter().zip(&mut seconds).zip(&errors).map(|((r, s), e)| row(r, s, e, &arguments)).collect();
-    let result = json!({ "machine": machine::machine(), "tiles": arguments.tiles, "runs": arguments.runs, "threads": 2, "readings": rows });
+    let (tiles, runs) = (arguments.tiles, arguments.runs);
+    let machine = machine::machine();
+    let result = json!({ "machine": machine, "tiles": tiles, "runs": runs, "threads": 2, "readings": rows });
     let text = markdown(&result);
     println!("{text}");
     if let Some(out) = &arguments.out {
@@ -178,6 +180,10 @@ fn row(reading: &str, seconds: &mut [[f64; 2]], errors: &Errors, arguments: &Arg
     seconds.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let rmse = |e: &[f64]| (e.iter().map(|e| e * e).sum::<f64>() / e.len().max(1) as f64).sqrt();
     let share = |e: &[f64], share: f64| e.get((share * (e.len().max(1) - 1) as f64) as usize).copied();
+    let of = |errors: &[f64]| {
+        let (median_m, p99_m) = (share(errors, 0.5), share(errors, 0.99));
+        json!({ "pixels": errors.len(), "rmse_m": rmse(errors), "median_m": median_m, "p99_m": p99_m })
+    };
     let [middle, processors] = seconds[seconds.len() / 2];
     json!({
         "interpolation": reading,
@@ -185,17 +191,21 @@ fn row(reading: &str, seconds: &mut [[f64; 2]], errors: &Errors, arguments: &Arg
         "seconds_least_and_most": [seconds[0][0], seconds[seconds.len() - 1][0]],
         "processor_seconds": processors,
         "tiles_per_second": arguments.tiles as f64 / middle,
-        "open": { "pixels": errors.open.len(), "rmse_m": rmse(&errors.open), "median_m": share(&errors.open, 0.5), "p99_m": share(&errors.open, 0.99) },
-        "walls": { "pixels": errors.wall.len(), "rmse_m": rmse(&errors.wall), "median_m": share(&errors.wall, 0.5), "p99_m": share(&errors.wall, 0.99) },
+        "open": of(&errors.open),
+        "walls": of(&errors.wall),
     })
 }
 
 fn markdown(result: &Value) -> String {
     let mut text = format!(
-        "# Height maps: speed against interpolation error\n\n{} tiles of 518 × 518 pixels at 2 px/m, random headings, from one surface \
-         model of {CELLS} × {CELLS} cells of {CELL_M} m; whole command, files included, 2 threads; {}; median of {} runs.\n\
-         Errors are against the formula that the surface model was sampled from, away from walls and within {WALL_M} m of them.\n\n\
-         | interpolation | seconds | CPU s | tiles/s | RMSE m | median m | 99 % m | at walls: RMSE m | median m |\n|---|---|---|---|---|---|---|---|---|\n",
+        "# Height maps: speed against interpolation error\n\n{} tiles of 518 × 518 pixels at 2 px/m, random \
+         headings, from one surface \
+         model of {CELLS} × {CELLS} cells of {CELL_M} m; whole command, files included, 2 threads; {}; median of {} \
+         runs.\n\
+         Errors are against the formula that the surface model was sampled from, away from walls and within {WALL_M} \
+         m of them.\n\n\
+         | interpolation | seconds | CPU s | tiles/s | RMSE m | median m | 99 % m | at walls: RMSE m | median m \
+         |\n|---|---|---|---|---|---|---|---|---|\n",
         result["tiles"],
         result["machine"].as_str().unwrap_or_default(),
         result["runs"]

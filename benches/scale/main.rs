@@ -259,11 +259,13 @@ fn markdown(rows: &[Row], arguments: &Arguments) -> String {
     let mut out = format!(
         "# Large scenes\n\n\
          Written by `cargo bench --bench scale -- {}` on {}. A pair of SIDE × SIDE pixels at {} m, preset \
-         {}, `--memory {}`; the images are mosaics of one rendered tile per view (a town that repeats itself every {PERIOD} \
+         {}, `--memory {}`; the images are mosaics of one rendered tile per view (a town that repeats itself every \
+         {PERIOD} \
          pixels; see `benches/scale/town.rs`), the truth is the town's own height function, nothing is aligned. \
          CPU is user and system time of the command, megapixels are those of both images, peak is the largest \
          resident memory; sides that were run several times have the means of their times.\n\n\
-         | side px | Mpx | chunks | user s | system s | CPU s/Mpx | wall s | peak MB | MAE m | < 1 m % |\n|--:|--:|:--|--:|--:|--:|--:|--:|--:|--:|\n",
+         | side px | Mpx | chunks | user s | system s | CPU s/Mpx | wall s | peak MB | MAE m | < 1 m % \
+         |\n|--:|--:|:--|--:|--:|--:|--:|--:|--:|--:|\n",
         arguments.asked,
         machine::machine(),
         town::GSD_M,
@@ -280,7 +282,8 @@ fn markdown(rows: &[Row], arguments: &Arguments) -> String {
     if costs.len() > 1 {
         let _ = writeln!(
             out,
-            "\nOver the runs by chunks the greatest cost per megapixel is {:.0} % above the least, the greatest peak {:.0} %.",
+            "\nOver the runs by chunks the greatest cost per megapixel is {:.0} % above the least, the greatest peak \
+             {:.0} %.",
             spread(&costs),
             spread(&peaks)
         );

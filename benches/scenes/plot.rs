@@ -67,7 +67,8 @@ pub(crate) fn sheet(rows: &[Row], peers: &[Peer]) -> String {
         ("dot2", "accurate"),
         (
             "whisker",
-            "(square) other programs. Dashed: the presets of one scene. Line: Pareto front; below, the mean over scenes",
+            "(square) other programs. Dashed: the presets of one scene. Line: Pareto front; below, the mean over \
+             scenes",
         ),
     ];
     Chart::sheet(&charts, 2, &key)

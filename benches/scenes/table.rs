@@ -34,11 +34,15 @@ impl Results {
     pub(crate) fn markdown(&self) -> String {
         let Self { date, machine, runs, minutes, .. } = self;
         let mut text = format!(
-            "Made by `make bench` ({date}, {machine}, {runs} runs, {minutes:.0} minutes): the release binary, default options, medians. \
-             CPU is user time of the whole command, Mpx are those of all images. Errors in metres after an xyz alignment; shares \
-             are of all cells of the reference, so voids count as failures. ◦ marks a preset that another one beats in all of \
+            "Made by `make bench` ({date}, {machine}, {runs} runs, {minutes:.0} minutes): the release binary, \
+             default options, medians. \
+             CPU is user time of the whole command, Mpx are those of all images. Errors in metres after an xyz \
+             alignment; shares \
+             are of all cells of the reference, so voids count as failures. ◦ marks a preset that another one beats \
+             in all of \
              CPU, MAE and completeness.\n\n\
-             | scene | preset | CPU s | CPU s/Mpx | wall s | peak MB | MAE | RMSE | NMAD | < 1 m % | coverage % | volume IoU % | overreach m |\n\
+             | scene | preset | CPU s | CPU s/Mpx | wall s | peak MB | MAE | RMSE | NMAD | < 1 m % | coverage % | \
+             volume IoU % | overreach m |\n\
              |---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
         );
         for row in self.rows.iter().filter(|row| row.has_truth()) {
@@ -76,7 +80,8 @@ impl Results {
     fn peer_table(&self) -> String {
         let mut text = String::from(
             "\nOther programs on the same images (`benches/peers/`):\n\n\
-             | program | scene | input | CPU s | CPU s/Mpx | MAE | RMSE | NMAD | < 1 m % | coverage % |\n|---|---|---|---|---|---|---|---|---|---|\n",
+             | program | scene | input | CPU s | CPU s/Mpx | MAE | RMSE | NMAD | < 1 m % | coverage % \
+             |\n|---|---|---|---|---|---|---|---|---|---|\n",
         );
         for peer in &self.peers {
             let known = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
@@ -103,10 +108,13 @@ impl Results {
     /// programs.
     fn coverage_table(&self) -> String {
         let mut text = String::from(
-            "\nAt equal coverage: the cells that skysweep's default preset believes most (`dsm/confidence.tif`), filled cells among them, \
-             beside unfilled surfaces of other programs. Their share of the reference is the other program's coverage, rounded up to \
+            "\nAt equal coverage: the cells that skysweep's default preset believes most (`dsm/confidence.tif`), \
+             filled cells among them, \
+             beside unfilled surfaces of other programs. Their share of the reference is the other program's \
+             coverage, rounded up to \
              the next twentieth.\n\n\
-             | program | input | coverage % | MAE | < 1 m % | skysweep coverage % | MAE | < 1 m % |\n|---|---|---|---|---|---|---|---|\n",
+             | program | input | coverage % | MAE | < 1 m % | skysweep coverage % | MAE | < 1 m % \
+             |\n|---|---|---|---|---|---|---|---|\n",
         );
         for peer in self.peers.iter().filter(|peer| !peer.filled) {
             let names: Vec<String> = peer.views.iter().map(|v| format!("{v:03}")).collect();

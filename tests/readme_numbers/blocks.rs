@@ -102,8 +102,10 @@ fn simulated(results: &Results) -> String {
     let town = results.row("town", "balanced");
     let right = |scene: &str| results.row(scene, "balanced").percent("completeness_1");
     format!(
-        "On the sample town, whose surface is known exactly, the NMAD is {:.0} cm, the MAE {:.2} m, and {:.1} % of all cells are \
-         right to a metre, trees, vehicles and walls included. Forests of separate crowns are the hardest: of the simulated hills \
+        "On the sample town, whose surface is known exactly, the NMAD is {:.0} cm, the MAE {:.2} m, and {:.1} % of \
+         all cells are \
+         right to a metre, trees, vehicles and walls included. Forests of separate crowns are the hardest: of the \
+         simulated hills \
          {:.0} % of the cells are right to a metre, of a quarry {:.0} %.",
         100.0 * town.metric("nmad"),
         town.metric("mae"),
@@ -121,7 +123,8 @@ fn large(results: &Results) -> String {
     let spread = results.scale.split("the greatest cost per megapixel is ").nth(1).expect("the spread");
     let spread = spread.split(" % above").next().expect("a number");
     format!(
-        "A simulated pair of {side} × {side} pixels takes {:.0} minutes and {:.1} GB: {:.1} CPU seconds per megapixel, which \
+        "A simulated pair of {side} × {side} pixels takes {:.0} minutes and {:.1} GB: {:.1} CPU seconds per \
+         megapixel, which \
          differ by {spread} % between the sizes measured.",
         value(7) / 60.0,
         value(8) / 1000.0,
@@ -135,7 +138,8 @@ fn heightmaps(results: &Results) -> String {
     let mut readings = all["readings"].as_array().expect("readings").iter();
     let bilinear = readings.find(|reading| reading["interpolation"] == "bilinear").expect("the default interpolation");
     format!(
-        "{} height maps of 518 × 518 pixels from one surface model take {:.0} s on {} threads. Away from walls they are {:.0} mm \
+        "{} height maps of 518 × 518 pixels from one surface model take {:.0} s on {} threads. Away from walls they \
+         are {:.0} mm \
          (RMSE) from the true surface.",
         all["tiles"],
         number(&bilinear["seconds"]),
@@ -148,7 +152,8 @@ fn priors(results: &Results) -> String {
     let of = |tool: &str, path: &str| median(&results.priors["runs"]["1"][tool], path);
     let maps = "/maps/wall_s";
     format!(
-        "On one thread, 100 depth and normal maps of a real tile take {:.1} s; Open3D (Embree) takes {:.1} s. The tile is loaded and \
+        "On one thread, 100 depth and normal maps of a real tile take {:.1} s; Open3D (Embree) takes {:.1} s. The \
+         tile is loaded and \
          triangulated in {:.2} s, and depths are within {:.3} mm of brute force.",
         of("skysweep", maps),
         of("open3d", maps),
