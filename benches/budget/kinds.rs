@@ -1,4 +1,4 @@
-//! What a pixel or cell shows, and how often each kind is wrong.
+//! Classifies pixels and cells by what they show, and counts errors per class.
 
 use camera::ImagePoint;
 use nalgebra::Vector3;
@@ -9,16 +9,18 @@ use sweep::HeightMap;
 
 /// Names, in the order of the columns.
 pub(crate) const KINDS: [&str; 6] = ["occluded", "edge", "vegetation", "shadow", "roof", "ground"];
-/// Jumps of this much within [`EDGE_REACH_M`] make an edge, metres.
+/// Least jump within [`EDGE_REACH_M`] that makes an edge, metres.
 const EDGE_M: f32 = 2.0;
 const EDGE_REACH_M: f64 = 1.0;
-/// A shadow's caster is looked for up to here, metres, from this far above the surface.
+/// Distance up to which something that casts a shadow is searched, and the start of the search
+/// above the surface, metres.
 const CASTER_M: f64 = 300.0;
 const ABOVE_M: f64 = 0.2;
-/// An error that counts, metres.
+/// Errors above this count as wrong, metres.
 const OFF_M: f32 = 1.0;
 
-/// Number, number of wrong ones, number with a height and the sum of their errors, per kind.
+/// Per kind: the number of pixels or cells, the number of wrong ones, the number with a height, and
+/// the sum of their absolute errors.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Tally([(usize, usize, usize, f64); KINDS.len()]);
 
@@ -41,7 +43,8 @@ impl Tally {
         }))
     }
 
-    /// Texts of the columns: of each kind its wrong ones among all pixels, then the sum.
+    /// Returns the texts of the columns: for each kind the share of wrong ones among all pixels,
+    /// then the sum over all kinds.
     pub(crate) fn cells(&self) -> Vec<String> {
         let all = self.0.iter().fold((0, 0, 0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3));
         let text = |(count, off, known, sum): (usize, usize, usize, f64)| match count {
@@ -52,10 +55,10 @@ impl Tally {
     }
 }
 
-/// The cells of the truth by what they hold.
+/// The cells of the truth with their kinds.
 pub(crate) struct Kinds {
     edge: Grid<bool>,
-    /// How many views see a cell.
+    /// Number of views that see each cell.
     seen: Grid<u8>,
     cell_m: f64,
     half_m: f64,
@@ -83,8 +86,8 @@ impl Kinds {
         }
     }
 
-    /// The kind of a point of the surface that at least `views` have to see; `None` for water and
-    /// outside.
+    /// Returns the kind of a surface point. A point that fewer than `views` views see is occluded.
+    /// Returns `None` for water and outside.
     fn kind(&self, simulation: &Simulation, point: Vector3<f64>, views: u8, sun: &Sun) -> Option<usize> {
         let (column, row) = ((point.x + self.half_m) / self.cell_m, (self.half_m - point.y) / self.cell_m);
         if column < 0.0 || row < 0.0 {
@@ -115,7 +118,7 @@ impl Kinds {
         })
     }
 
-    /// The heights of the views against what their pixels see.
+    /// Compares the heights of the views with the true heights of their pixels.
     pub(crate) fn of_pixels(&self, simulation: &Simulation, heights: &[HeightMap]) -> Tally {
         let of_view = |(view, map): (&SimulatedView, &HeightMap)| {
             let (w, h) = (map.height_m.width(), map.height_m.height());
@@ -136,7 +139,7 @@ impl Kinds {
         simulation.views.iter().zip(heights).map(of_view).fold(Tally::default(), Tally::join)
     }
 
-    /// The heights of a surface on the cells of the truth, metres above the ellipsoid.
+    /// Compares a surface on the cells of the truth, metres above the ellipsoid.
     pub(crate) fn of_cells(&self, simulation: &Simulation, height_m: &Grid<f32>) -> Tally {
         let truth = &simulation.truth.dsm;
         let error = |i: usize| {

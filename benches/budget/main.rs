@@ -1,11 +1,11 @@
 //! Where the error comes from: `cargo bench --bench budget [-- SCENE…]` writes
 //! `benches/results/budget.md`.
 //!
-//! Simulated scenes go through the stages of `skysweep dsm` with what a stage is to find put in its
-//! place: the true pointing, the true heights as the range of the search, no regularisation, and at
-//! last the true heights themselves into the fusion. The heights of the views are compared pixel by
-//! pixel with what the pixels see, those of the surface cell by cell with the true surface; nothing
-//! is aligned. Speckle removal and filling come after what is measured here.
+//! Simulated scenes go through the stages of `skysweep dsm`. Step by step, the result of a stage is
+//! replaced by the truth: the true pointing, the true heights as the range of the search, and the
+//! true heights as input of the fusion; one step leaves out the regularisation. The heights of the
+//! views are compared pixel by pixel with the truth, those of the surface cell by cell, without
+//! alignment. Speckle removal and filling come after the stages that are measured here.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
@@ -21,9 +21,9 @@ use simulate::{Simulation, SimulationConfig};
 use kinds::{KINDS, Kinds, Tally};
 use stages::{Known, Scene};
 
-/// Scenes when none is named: preset and number of dates.
+/// Scenes that run when none is named: preset and number of dates.
 const SCENES: [(&str, usize); 5] = [("town", 1), ("town", 3), ("high-rise", 1), ("hills", 1), ("dense-city", 1)];
-/// Side of the scenes, metres: some hundred thousand pixels a view.
+/// Side of the scenes, metres. It gives some hundred thousand pixels per view.
 const SIZE_M: f64 = 240.0;
 const VIEWS: usize = 3;
 /// Planted pointing errors, pixels.
@@ -60,7 +60,7 @@ fn introduction() -> String {
     )
 }
 
-/// The table of a scene.
+/// Measures a scene and returns its table.
 fn budget(preset: &str, dates: usize) -> anyhow::Result<String> {
     let mut config = SimulationConfig::preset(preset)?;
     (config.size_m, config.views) = (SIZE_M, VIEWS);

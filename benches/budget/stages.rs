@@ -1,4 +1,4 @@
-//! The stages of a run, each with what it is to find given or not.
+//! The stages of a run, in which the result of a stage may be replaced by the truth.
 
 use camera::{ImagePoint, RpcCamera};
 use geodesy::MapPoint;
@@ -12,25 +12,25 @@ use sweep::fusion::{FusionConfig, GridFrame, fuse_views, place_view};
 use sweep::ranges::{EDGE_REACH, Ranges};
 use sweep::{HeightMap, LevelConfig, Reference, SweepView, ViewLevel, source_from_reference, sweep_level};
 
-/// That of the default preset.
+/// Value of the default preset.
 const STEP_PX: f64 = 0.5;
-/// Steps around the true heights that are searched where these are given.
+/// Half width of the search around the true heights, steps.
 const AROUND: f64 = 4.0;
-/// Heights around those of the scene that are searched, metres.
+/// Margin of the search below and above the heights of the scene, metres.
 const MARGIN_M: f64 = 20.0;
 
-/// What is given.
+/// The part of the truth that is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Known {
-    /// The pointing.
+    /// The true pointing.
     Pointing,
-    /// That, and the heights to a few steps.
+    /// The true pointing, and the true heights as a range of a few steps.
     Range,
-    /// That, and each pixel stands for itself.
+    /// The same as `Range`, without regularisation.
     RangeAlone,
 }
 
-/// A simulation as the sweep sees it.
+/// A simulated scene as input of the sweep.
 pub(crate) struct Scene<'a> {
     simulation: &'a Simulation,
     views: Vec<SweepView>,
@@ -39,7 +39,7 @@ pub(crate) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// With the true RPCs, or those that a user gets.
+    /// Makes the views with the true RPCs or with the RPCs that a user gets.
     pub(crate) fn new(simulation: &'a Simulation, is_true: bool) -> anyhow::Result<Self> {
         let view = |v: &simulate::SimulatedView| {
             let rpc = if is_true { &v.true_rpc } else { &v.rpc };
@@ -61,7 +61,7 @@ impl<'a> Scene<'a> {
         Ok(Self { simulation, views, step_m: STEP_PX / parallax, origin_m })
     }
 
-    /// Heights of all views.
+    /// Computes the heights of all views.
     pub(crate) fn heights(&self, known: Known) -> anyhow::Result<Vec<HeightMap>> {
         (0..self.views.len()).into_par_iter().map(|i| self.view_heights(i, known)).collect()
     }
@@ -88,7 +88,7 @@ impl<'a> Scene<'a> {
         found.ok_or_else(|| anyhow::anyhow!("an image without a level"))
     }
 
-    /// A few steps around heights above the origin.
+    /// Returns search ranges of a few steps around heights above the origin.
     fn around(&self, height_m: &Grid<f32>) -> Ranges {
         let mut out = Ranges::uniform(height_m.width(), height_m.height(), self.step_m, (0.0, 0.0));
         for (i, h) in height_m.data().iter().enumerate().filter(|(_, h)| !h.is_nan()) {
@@ -110,7 +110,7 @@ impl<'a> Scene<'a> {
         Ok(sweep_level(reference, &sources, self.origin_m, &config)?)
     }
 
-    /// The true heights of all pixels.
+    /// Returns the true heights of all pixels.
     pub(crate) fn true_heights(&self) -> Vec<HeightMap> {
         let map = |v: &simulate::SimulatedView| {
             let mut out = HeightMap::empty(v.heights.width(), v.heights.height(), self.origin_m);
@@ -123,8 +123,8 @@ impl<'a> Scene<'a> {
         self.simulation.views.iter().map(map).collect()
     }
 
-    /// The surface of all heights, or of those that another view confirms, on the cells of the
-    /// truth; metres above the ellipsoid.
+    /// Fuses all heights, or only those that another view confirms, on the cells of the truth.
+    /// Returns metres above the ellipsoid.
     pub(crate) fn fused(&self, maps: &[HeightMap], checked: bool) -> anyhow::Result<Grid<f32>> {
         let truth = &self.simulation.truth;
         let all: Vec<Heights<'_>> =

@@ -1,5 +1,4 @@
-//! What comes out, against the stored results of Open3D and against rays that are tested against
-//! every triangle.
+//! Compares our results with the stored results of Open3D and with brute force over all triangles.
 
 use numeric::vector::{cross, dot, sub};
 use std::path::Path;
@@ -13,12 +12,12 @@ use serde_json::{Value, json};
 use super::VISIBILITY;
 use super::scene::Scene;
 
-/// Every how many pixels of an image a ray is tested against every triangle.
+/// A ray is tested by brute force at every n-th pixel of an image.
 const EVERY: usize = 4_001;
-/// Depths of the stored maps agree within this.
+/// Largest difference at which depths count as equal to the stored ones, metres.
 const SAME_DEPTH_M: f32 = 1e-3;
 
-/// All checks; the rays with their exact depths (camera, column, row, z) go to a file.
+/// Runs all checks. The rays with their exact depths (camera, column, row, z) go to a file.
 pub(crate) fn all(city: &Path, rays: &Path) -> anyhow::Result<Value> {
     let reference = Scene::of_reference(city)?;
     Ok(json!({
@@ -28,7 +27,7 @@ pub(crate) fn all(city: &Path, rays: &Path) -> anyhow::Result<Value> {
     }))
 }
 
-/// Counts and sums of a scene beside those that are stored.
+/// Compares counts and sums of a scene with the stored ones.
 fn yardsticks(scene: &Scene) -> anyhow::Result<Value> {
     let stats = scene.json("depth_o3d_100_stats.json")?;
     let rays = Rays::new(scene.lens())?;
@@ -65,7 +64,7 @@ fn yardsticks(scene: &Scene) -> anyhow::Result<Value> {
     }))
 }
 
-/// How many pixels of a stored map differ by more than a millimetre; misses are stored as 0.
+/// Counts the pixels of a stored map that differ by more than a millimetre. Misses are stored as 0.
 fn stored_map(scene: &Scene, rays: &Rays, name: &str) -> anyhow::Result<usize> {
     let index = scene.cameras.views.iter().position(|v| v.name.starts_with(name)).context("no such camera")?;
     let view = scene.views().nth(index).context("no such camera")?;
@@ -79,7 +78,7 @@ fn stored_map(scene: &Scene, rays: &Rays, name: &str) -> anyhow::Result<usize> {
     Ok(maps.depth_m.data().iter().zip(&stored).filter(|&pair| differs(pair)).count())
 }
 
-/// Pairs, points in one view, points in two.
+/// Returns the number of pairs, of points in at least one view and of points in at least two views.
 fn visible(scene: &Scene, cameras: &[usize]) -> anyhow::Result<[u64; 3]> {
     let mut visibility = Visibility::new(&scene.model, &scene.points, VISIBILITY)?;
     let views: Vec<View> = scene.views().collect();
@@ -90,7 +89,7 @@ fn visible(scene: &Scene, cameras: &[usize]) -> anyhow::Result<[u64; 3]> {
     Ok([found.pairs, (scene.points.len() - found.histogram[0]) as u64, found.points.len() as u64])
 }
 
-/// Some rays of every camera against every triangle.
+/// Compares some rays of every camera with brute force over all triangles.
 fn brute_force(scene: &Scene, out: &Path) -> anyhow::Result<Value> {
     let rays = Rays::new(scene.lens())?;
     let (mut rows, mut errors, mut other) = (Vec::new(), Vec::new(), 0);
@@ -113,8 +112,8 @@ fn brute_force(scene: &Scene, out: &Path) -> anyhow::Result<Value> {
     Ok(json!({ "rays": rows.len() / 4, "hits": errors.len(), "hit_by_one_only": other, "mean_m": mean, "max_m": most }))
 }
 
-/// The z-depth of the nearest triangle (Möller and Trumbore 1997, f64); infinite where there is
-/// none.
+/// Returns the z-depth of the nearest triangle (Möller and Trumbore 1997, f64), or infinity when
+/// the ray meets none.
 fn nearest(model: &PriorModel, view: &View, rays: &Rays, pixel: usize) -> f64 {
     let Some([x, y]) = rays.direction(pixel % rays.width(), pixel / rays.width()) else { return f64::INFINITY };
     let axes = view.pose.rotation;

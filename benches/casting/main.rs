@@ -1,6 +1,6 @@
-//! Rays at a real city model, for a run side by side with Open3D: `cargo bench --bench casting --
+//! Ray casting on a real city model, for a comparison with Open3D: `cargo bench --bench casting --
 //! CITY time THREADS` and `cargo bench --bench casting -- CITY check RAYS.npy`.
-//! `benches/peers/priors.py` calls both, and says what came out.
+//! `benches/peers/priors.py` calls both and writes the results.
 //!
 //! CITY is `../shared/data/city`. `time` makes the maps of the hundred cameras of `peer_reference`,
 //! and looks for its million points in them, on the triangles that the reference was computed with;
@@ -22,7 +22,7 @@ use priors::{MapConfig, PriorMaps, PriorModel, Rays, View, Visibility, Visibilit
 use scene::Scene;
 use serde_json::{Value, json};
 
-/// What the reference was computed with: from border to border of the images.
+/// Parameters that the reference was computed with. They use the images up to their borders.
 const VISIBILITY: VisibilityConfig = VisibilityConfig {
     margin_px: 0.0,
     near_m: 0.0,
@@ -33,7 +33,7 @@ const VISIBILITY: VisibilityConfig = VisibilityConfig {
 };
 
 fn main() -> anyhow::Result<()> {
-    // Cargo adds --bench.
+    // Cargo passes `--bench` to every bench.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let found = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [city, "time", threads] => {
@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
             time(Path::new(city))?
         }
         [city, "check", rays] => check::all(Path::new(city), Path::new(rays))?,
-        // Where benches are only run to see whether they run.
+        // Without arguments there is nothing to compare, for example in a run of all benches.
         [] => return Ok(()),
         _ => bail!("expected CITY time THREADS, or CITY check RAYS.npy"),
     };
@@ -67,7 +67,7 @@ fn time(city: &Path) -> anyhow::Result<Value> {
     }))
 }
 
-/// Depth, normals, class and object of every pixel of every camera.
+/// Makes depth, normals, class and object of every pixel of every camera.
 fn maps(scene: &Scene) -> anyhow::Result<Value> {
     let rays = Rays::new(scene.lens())?;
     let mut clock = Clock::default();
@@ -84,8 +84,8 @@ fn maps(scene: &Scene) -> anyhow::Result<Value> {
     Ok(told)
 }
 
-/// The points in all cameras: the rays alone, and everything from the points to the list of
-/// observations.
+/// Finds the points in all cameras. Measures the rays alone, and everything from the points to the
+/// list of observations.
 fn visibility(scene: &Scene) -> anyhow::Result<Value> {
     let mut cast = Clock::default();
     let mut rays = 0;
@@ -122,14 +122,14 @@ fn targets(scene: &Scene, view: &View) -> Vec<Target> {
     scene.points.iter().filter_map(target).collect()
 }
 
-/// A model whose objects are all buildings.
+/// Makes a model whose objects are all buildings.
 fn arranged(path: &Path) -> anyhow::Result<PriorModel> {
     let model = io::citymodel::read(path)?.model;
     let meshed = TriangleMesh::from_model(&model, &MeshConfig::default())?;
     Ok(PriorModel::new(meshed.mesh, &vec![true; model.objects.len()])?)
 }
 
-/// Wall and CPU time of parts of the program.
+/// Measures wall and CPU time of parts of the program.
 #[derive(Default)]
 struct Clock {
     wall: Duration,
@@ -150,8 +150,8 @@ impl Clock {
     }
 }
 
-/// Time that the threads of the process have been running, seconds (Linux: nanoseconds in
-/// `schedstat`).
+/// Returns the time that the threads of the process have been running, seconds. Linux counts it in
+/// nanoseconds in `schedstat`.
 fn cpu_s() -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let running = |task: std::fs::DirEntry| {
@@ -161,7 +161,7 @@ fn cpu_s() -> f64 {
     tasks.filter_map(running).sum::<f64>() * 1e-9
 }
 
-/// Largest resident memory of the process, MiB.
+/// Returns the largest resident memory of the process, MiB.
 fn peak_mib() -> anyhow::Result<f64> {
     let status = std::fs::read_to_string("/proc/self/status").context("the peak memory is read from /proc")?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:")).context("no VmHWM in /proc/self/status")?;

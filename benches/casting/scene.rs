@@ -1,4 +1,4 @@
-//! The tile with the points and cameras of the reference.
+//! Reads the tile with the points and cameras of the reference.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::arranged;
 
-/// The reference's offset from the tile's coordinates.
+/// Offset of the reference from the tile's coordinates, metres.
 const OFFSET: ModelPoint = ModelPoint::new(85_320.0, 446_656.0, 0.0);
 
 /// A model, and points and cameras in its frame.
@@ -25,12 +25,12 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// With the triangles that the reference was computed with.
+    /// Reads the triangles that the reference was computed with.
     pub(crate) fn of_reference(city: &Path) -> anyhow::Result<Self> {
         Self::of(city, "peer_reference/mesh_local.ply", ModelPoint::default())
     }
 
-    /// With our triangles of the tile.
+    /// Triangulates the tile ourselves.
     pub(crate) fn of_tile(city: &Path) -> anyhow::Result<Self> {
         Self::of(city, "3dbag_5910.city.json", OFFSET)
     }
@@ -54,12 +54,12 @@ impl Scene {
         Ok(Self { folder, model, points, cameras, shift })
     }
 
-    /// The lens that all cameras have.
+    /// Reads the lens that all cameras share.
     pub(crate) fn lens(&self) -> &Lens {
         &self.cameras.lenses[0]
     }
 
-    /// The cameras in the frame of the model.
+    /// Reads the cameras, in the frame of the model.
     pub(crate) fn views(&self) -> impl Iterator<Item = View> + '_ {
         self.cameras.views.iter().map(|view| {
             let centre = [0, 1, 2].map(|i| view.pose.centre[i] + self.shift[i]);
@@ -67,7 +67,7 @@ impl Scene {
         })
     }
 
-    /// A file of the reference.
+    /// Returns the path of a file of the reference.
     pub(crate) fn json(&self, name: &str) -> anyhow::Result<Value> {
         let path = self.folder.join(name);
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;

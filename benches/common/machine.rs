@@ -1,6 +1,7 @@
-//! What a bench ran on.
+//! Describes the machine that a bench ran on.
 
-/// Cores and processor, with the numbers that tell generations of one name apart.
+/// Returns the number of cores and the processor, with family and model, which differ between
+/// generations of one name.
 pub(crate) fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Where a bench finds the command and the shared data.
+//! Finds the command and the shared data for a bench.
 //!
 //! The environment variable `SKYSWEEP_BIN` names another command than the one that Cargo built with
 //! the bench, for example a reference binary. `SKYSWEEP_DATA` names the folder of the shared data;
@@ -10,12 +10,12 @@ use std::env;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// The command that is measured.
+/// Returns the command that is measured.
 pub(crate) fn skysweep() -> OsString {
     env::var_os("SKYSWEEP_BIN").unwrap_or_else(|| env!("CARGO_BIN_EXE_skysweep").into())
 }
 
-/// The folder of the shared data, which may be absent.
+/// Returns the folder of the shared data. It may not exist.
 pub(crate) fn shared_data() -> PathBuf {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     env::var_os("SKYSWEEP_DATA").map_or_else(beside, PathBuf::from)

@@ -3,12 +3,12 @@
 //!
 //! The surface is a formula (gentle hills with gabled houses, see `town`), so its height is known
 //! at every pixel of every tile; the surface model is the formula at the centres of 4096 × 4096
-//! cells of half a metre. The release binary makes tiles of 518 × 518 pixels at 2 per metre around
-//! random places with random headings, on two threads, once for each way of reading between cells
-//! and in turn. Seconds, tiles per second and errors against the formula (every 13th pixel of every
-//! 20th tile; on houses' walls, which no interpolation of cells can place, and away from them) go
-//! to `benches/results/heightmaps.json` and `.md`; with other options than the default ones only
-//! with --out.
+//! cells of half a metre. The release binary makes tiles of 518 × 518 pixels at 2 pixels per metre
+//! around random places with random headings, on two threads, with each interpolation in turn.
+//! Errors against the formula are measured at every 13th pixel of every 20th tile, separately on
+//! the walls of houses, which no interpolation can place, and away from them. Seconds, tiles per
+//! second and errors go to `benches/results/heightmaps.json` and `.md`; runs with other numbers of
+//! tiles or runs are written only with `--out`. `make readme` brings the numbers into the pages.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
@@ -31,16 +31,16 @@ use serde_json::{Value, json};
 /// Cells along each side of the surface model.
 const CELLS: usize = 4096;
 const CELL_M: f64 = 0.5;
-/// UTM 31N: the upper left of the surface model.
+/// UTM 31N. The corner is the upper left of the surface model, metres.
 const EPSG: u32 = 32631;
 const CORNER: (f64, f64) = (693_000.0, 4_824_000.0);
-/// No tile reaches over the border, metres: half a diagonal of 259 m.
+/// Distance of the cameras from the border, metres: more than half the diagonal of a tile of 259 m.
 const BORDER_M: f64 = 190.0;
 const READINGS: [&str; 3] = ["nearest", "bilinear", "cubic"];
-/// Every how many tiles, and pixels, errors are looked at.
+/// Errors are measured at every n-th tile and every n-th pixel of it.
 const EVERY: (usize, usize) = (20, 13);
-/// Places with a jump of the surface this near are on walls, metres: the reach of the cubic, and
-/// half a diagonal of a cell.
+/// A pixel is on a wall when the surface jumps within this distance, metres: the reach of the cubic
+/// and half the diagonal of a cell.
 const WALL_M: f64 = 1.5;
 
 fn main() -> anyhow::Result<()> {
@@ -89,7 +89,7 @@ struct Arguments {
 fn arguments() -> anyhow::Result<Arguments> {
     let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/results");
     let mut found = Arguments { tiles: 1000, runs: 3, folder: None, out: Some(results) };
-    // Cargo adds --bench.
+    // Cargo passes `--bench` to every bench.
     let mut given = std::env::args().skip(1).filter(|argument| argument != "--bench");
     let mut out = None;
     while let Some(argument) = given.next() {
@@ -128,7 +128,7 @@ fn write_positions(path: &Path, tiles: usize, projection: &MapProjection) -> any
     Ok(std::fs::write(path, text)?)
 }
 
-/// Makes all tiles, and returns the seconds that a user waits and those of all processors.
+/// Makes all tiles. Returns wall seconds and processor seconds.
 fn make(dsm: &Path, list: &Path, out: &Path, reading: &str, tiles: usize) -> anyhow::Result<[f64; 2]> {
     let (begun, used) = (std::time::Instant::now(), children_seconds()?);
     let mut command = Command::new(places::skysweep());
@@ -141,7 +141,7 @@ fn make(dsm: &Path, list: &Path, out: &Path, reading: &str, tiles: usize) -> any
     Ok(seconds)
 }
 
-/// Processor seconds of all commands that have ended: Linux counts them in hundredths.
+/// Returns the processor seconds of all finished child processes. Linux counts them in hundredths.
 fn children_seconds() -> anyhow::Result<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat")?;
     let (_, fields) = stat.rsplit_once(')').context("no name in /proc/self/stat")?;

@@ -5,17 +5,18 @@
 
 use numeric::random::{hash64, unit_interval};
 
-/// Spacing of the houses.
+/// Spacing of the houses, metres.
 const BLOCK_M: f64 = 40.0;
-/// Height of the hills' middle.
+/// Mean height of the hills, metres.
 const GROUND_M: f64 = 200.0;
 
-/// The height at a place.
+/// Returns the height at a place, metres.
 pub(crate) fn height(x: f64, y: f64) -> f64 {
     ground(x, y) + house(x, y).unwrap_or(0.0)
 }
 
-/// Whether the surface jumps within a distance: a house on one side only.
+/// Returns whether the surface jumps within a distance, that is, whether only some places are in a
+/// house.
 pub(crate) fn jumps(x: f64, y: f64, within_m: f64) -> bool {
     let inside = house(x, y).is_some();
     let around = (0..16).map(|k| std::f64::consts::TAU * f64::from(k) / 16.0);
@@ -29,7 +30,7 @@ fn ground(x: f64, y: f64) -> f64 {
     GROUND_M + 6.0 * wave(410.0, x + 0.3 * y) + 4.0 * wave(290.0, y - 0.2 * x) + 0.3 * wave(23.0, x) * wave(19.0, y)
 }
 
-/// The height of the roof above the ground; `None` beside houses.
+/// Returns the height of the roof above the ground, or `None` outside of houses.
 fn house(x: f64, y: f64) -> Option<f64> {
     let (i, j) = ((x / BLOCK_M).floor(), (y / BLOCK_M).floor());
     let key = |k: u64| uniform([k, i as i64 as u64, j as i64 as u64]);

@@ -1,8 +1,8 @@
-"""Checks with other people's readers that a dataset of `skysweep priors` loads.
+"""Checks that readers of other projects load a dataset of `skysweep priors`.
 
     python benches/peers/check_priors.py DATASET
 
-DATASET holds what is there of `sparse/0` (COLMAP, bin and txt), `*.ply` and maps as `.npy`. pycolmap reads the model, Open3D and
+DATASET may hold `sparse/0` (COLMAP, bin and txt), `*.ply` and maps as `.npy`. pycolmap reads the model, Open3D and
 trimesh read the points, NumPy the maps. A package that cannot be imported is named on a line that begins with `skip`; a
 check that fails exits with 1. Beyond loading: every observation lies on the projection of its point within a pixel, text and
 binary are the same model, points have unit normals and colours, maps have the size of their camera.

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# A Python environment with the tools that skysweep priors is compared with, in FOLDER (default target/peers).
+# Makes a Python environment in FOLDER (default target/peers) with the tools that skysweep priors is compared with.
 #   benches/peers/environment.sh [FOLDER]
-# Prints the path of its python. Nothing of the build or the tests needs it.
+# Prints the path of its python. Neither the build nor the tests need it.
 set -euo pipefail
 folder=${1:-$(dirname "$0")/../../target/peers}
 [ -x "$folder/bin/python" ] || python3 -m venv "$folder"

@@ -1,9 +1,9 @@
-"""`skysweep priors`' rays, visibility and loading side by side with Open3D and cjio; writes benches/results/priors.{json,md}.
+"""Compares rays, visibility and loading of `skysweep priors` with Open3D and cjio; writes benches/results/priors.{json,md}.
 
     PYTHON benches/peers/priors.py [RUNS]
 
-PYTHON is that of `environment.sh`. From the project's root, with `../shared/data/city` there. Tools alternate, every run in a
-process of its own; numbers are medians. Needs no other load on the machine; CPU seconds suffer less from one.
+PYTHON is what `environment.sh` prints. Run it from the project's root; it needs `../shared/data/city`. The tools alternate, and every
+run is a process of its own. Numbers are medians. Run it without other load on the machine; CPU seconds suffer less from load.
 """
 
 import json

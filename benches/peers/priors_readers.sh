@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Whether other people's readers load what `skysweep priors` writes; benches/results/priors_readers.txt has what they said.
+# Checks that readers of other projects load what `skysweep priors` writes; writes benches/results/priors_readers.txt.
 #   benches/peers/priors_readers.sh [SKYSWEEP]
-# The sample town becomes a dataset for its flight, and pycolmap, Open3D, trimesh and NumPy read it (`check_priors.py`).
+# It makes a dataset of the sample town, which pycolmap, Open3D, trimesh and NumPy read (`check_priors.py`).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 skysweep=${1:-target/release/skysweep}

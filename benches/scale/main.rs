@@ -6,10 +6,10 @@
 //! view: pixels are decoded window by window as from any file, and a pair of 800 megapixels takes
 //! 30 MB of disk. The release binary runs as a user would run it with `--memory`. Processor
 //! seconds, wall seconds and the largest resident memory of the command go to
-//! `benches/results/scale.md`, with the error against the town's own heights; nothing is aligned. A
-//! side that is named several times is run as often, and has its mean: machines are slower at
-//! times, and `4096 20000 4096` tells that from cost that grows. Results of runs with named sides
-//! are written only with --out.
+//! `benches/results/scale.md`, with the error against the heights of the town, without alignment. A
+//! side that is named several times runs as often, and its means are reported: `4096 20000 4096`
+//! separates a machine that slows down from a cost that grows. Results of runs with named sides are
+//! written only with `--out`.
 
 #![allow(clippy::print_stdout, reason = "a bench tells its results")]
 
@@ -29,7 +29,7 @@ use raster::Window;
 use serde_json::Value;
 use town::{LOOKS, PERIOD};
 
-/// Every how many cells of a row, and rows, the error is looked at.
+/// The error is measured at every n-th cell of every n-th row.
 const EVERY: usize = 3;
 
 fn main() -> anyhow::Result<()> {
@@ -90,12 +90,12 @@ fn arguments() -> anyhow::Result<Arguments> {
     Ok(found)
 }
 
-/// The tile of each view.
+/// Renders the tile of each view. Returns the paths.
 fn render(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut out = Vec::new();
     for (view, look) in (0..).zip(LOOKS) {
         let rpc = town::rpc(look, PERIOD);
-        // A point's place in the tile is where the formula that rendered it has it.
+        // The RPC must give the position that the rendering formula gives.
         let [x, y, z] = [100.0, -200.0, 30.0];
         let p = town::project(&rpc, [x, y, z])?;
         let expected = [(x + look[0] * z) / town::GSD_M, (look[1] * z - y) / town::GSD_M];
@@ -109,7 +109,7 @@ fn render(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(out)
 }
 
-/// Images of a side made of the tiles, each with its RPC beside it.
+/// Writes the images of a side as mosaics of the tiles, each with its RPC beside it.
 fn mosaics(folder: &Path, tiles: &[PathBuf], side: usize) -> anyhow::Result<Vec<PathBuf>> {
     let mut out = Vec::new();
     for ((view, tile), look) in (0..).zip(tiles).zip(LOOKS) {
@@ -136,7 +136,7 @@ fn mosaics(folder: &Path, tiles: &[PathBuf], side: usize) -> anyhow::Result<Vec<
     Ok(out)
 }
 
-/// What a run took and gave.
+/// Cost and accuracy of one run.
 struct Row {
     side: usize,
     chunks: String,
@@ -150,7 +150,7 @@ struct Row {
 }
 
 impl Row {
-    /// Both images.
+    /// Megapixels of both images together.
     fn megapixels(&self) -> f64 {
         LOOKS.len() as f64 * (self.side * self.side) as f64 / 1e6
     }
@@ -163,7 +163,7 @@ impl Row {
 
 fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments) -> anyhow::Result<Row> {
     let out = folder.join("out");
-    // bash times the command and its threads; nothing in std does.
+    // The standard library cannot measure the processor time of a child; bash can.
     let output = Command::new("bash")
         .args(["-c", "TIMEFORMAT='times %U %S %R'; time \"$@\"", "bash"])
         .arg(places::skysweep())
@@ -189,8 +189,8 @@ fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments
     Ok(Row { side, chunks, user_s, system_s, wall_s, peak_mb, mae_m, right })
 }
 
-/// Mean absolute error of the cells with a height, metres, and the share of all that are right to a
-/// metre, percent.
+/// Returns the mean absolute error of the cells with a height, metres, and the share of all cells
+/// that are right to a metre, percent.
 fn errors_of(dsm: &Path, side: usize) -> anyhow::Result<(f64, f64)> {
     let info = ImageSource::open(dsm)?.info().clone();
     let (mut sum, mut known, mut right, mut all) = (0.0, 0u64, 0u64, 0u64);
@@ -218,8 +218,8 @@ fn errors_of(dsm: &Path, side: usize) -> anyhow::Result<(f64, f64)> {
     Ok((sum / known as f64, 100.0 * right as f64 / all as f64))
 }
 
-/// One row for each side, the smallest first, with the mean of its times and the greatest peak; all
-/// else is the same in all runs.
+/// Returns one row for each side, the smallest first, with mean times and the greatest peak.
+/// Everything else must be the same in all runs.
 fn means(mut rows: Vec<Row>) -> anyhow::Result<Vec<Row>> {
     rows.sort_by_key(|r| r.side);
     let mut out: Vec<Row> = Vec::new();

@@ -17,20 +17,21 @@ pub(crate) const PERIOD: usize = 2048;
 pub(crate) const GSD_M: f64 = 0.5;
 /// Height of z = 0 above the ellipsoid, metres.
 const GROUND_M: f64 = 180.0;
-/// Least and greatest z of the surface.
+/// Least and greatest z of the surface, metres.
 const SPAN_M: (f64, f64) = (-6.0, 62.0);
-/// Where x = y = 0 lies: the upper left of the images.
+/// Longitude and latitude of x = y = 0, the upper left of the images, degrees.
 const ORIGIN: (f64, f64) = (5.4, 43.55);
-/// Metres per degree of longitude and latitude there, rounded: the frame is whatever these make it.
+/// Metres per degree of longitude and latitude, rounded. They define the frame.
 const METRES_PER_DEGREE: [f64; 2] = [80_800.0, 111_110.0];
-/// (a, b) of the two views: they look 27° apart, as a forward and a backward view of one pass may.
+/// (a, b) of the two views. Their directions differ by 27°, as in a forward and a backward view of
+/// one pass.
 pub(crate) const LOOKS: [[f64; 2]; 2] = [[0.12, 0.22], [0.05, -0.26]];
 /// Buildings stand on a lattice of this spacing, metres.
 const BLOCK_M: f64 = 64.0;
 
 const PERIOD_M: f64 = PERIOD as f64 * GSD_M;
 
-/// Height of the surface above the ground height.
+/// Returns the height of the surface above the ground height, metres.
 pub(crate) fn height(x: f64, y: f64) -> f64 {
     let (i, j) = ((x / BLOCK_M).floor(), (y / BLOCK_M).floor());
     let blocks = (PERIOD_M / BLOCK_M) as i64;
@@ -51,7 +52,7 @@ fn rolling(x: f64, y: f64) -> f64 {
     2.5 * wave(2.0, x) + 2.0 * wave(3.0, y) + wave(5.0, x + y)
 }
 
-/// Reflectance, 0 to 1: detail from a metre to a block on every surface, walls too.
+/// Returns the reflectance, 0 to 1, with detail from a metre to a block on every surface and wall.
 fn paint([x, y, z]: [f64; 3]) -> f64 {
     const OCTAVES: [(f64, f64); 4] = [(1.0, 0.34), (4.0, 0.28), (8.0, 0.22), (32.0, 0.16)];
     let sum: f64 =
@@ -59,7 +60,7 @@ fn paint([x, y, z]: [f64; 3]) -> f64 {
     (0.45 + 0.75 * sum).clamp(0.0, 1.0)
 }
 
-/// Uniform in [−1, 1] at lattice points that repeat with the town, smooth between them.
+/// Returns smooth noise in [−1, 1] whose lattice repeats with the town.
 fn noise(seed: u64, p: [f64; 3], cell: f64) -> f64 {
     let period = (PERIOD_M / cell) as i64;
     let floor = p.map(f64::floor);
@@ -81,7 +82,7 @@ fn uniform(key: [u64; 4]) -> f64 {
     unit_interval(key.into_iter().fold(0, |state, part| hash64(state ^ part)))
 }
 
-/// The tile that a view's image is made of, with noise of four digital numbers.
+/// Renders the tile of a view, with noise of four digital numbers.
 pub(crate) fn tile([a, b]: [f64; 2], view: u64) -> Grid<u16> {
     let mut tile = Grid::filled(PERIOD, PERIOD, 0);
     tile.data_mut().par_chunks_mut(PERIOD).enumerate().for_each(|(line, row)| {
@@ -95,7 +96,7 @@ pub(crate) fn tile([a, b]: [f64; 2], view: u64) -> Grid<u16> {
     tile
 }
 
-/// z at which a ray from above first meets the surface: marched, then bisected.
+/// Returns the z at which a ray from above first meets the surface, by marching and bisection.
 fn hit(at: impl Fn(f64) -> [f64; 3]) -> f64 {
     const STEP_M: f64 = 0.5;
     let is_above = |z: f64| {
@@ -114,7 +115,7 @@ fn hit(at: impl Fn(f64) -> [f64; 3]) -> f64 {
     above
 }
 
-/// The RPC of an image of `size` × `size` pixels.
+/// Returns the RPC of an image of `size` × `size` pixels.
 pub(crate) fn rpc([a, b]: [f64; 2], size: usize) -> Rpc {
     const HEIGHT_SCALE_M: f64 = 200.0;
     let half_px = size as f64 / 2.0;
@@ -142,7 +143,8 @@ pub(crate) fn rpc([a, b]: [f64; 2], size: usize) -> Rpc {
     }
 }
 
-/// Height above the ellipsoid of a place, and whether images of `size` pixels surely see it.
+/// Returns the height of a place above the ellipsoid, or `None` where images of `size` pixels may
+/// not see it.
 pub(crate) fn truth(lon_deg: f64, lat_deg: f64, size: usize) -> Option<f64> {
     let x = (lon_deg - ORIGIN.0) * METRES_PER_DEGREE[0];
     let y = (lat_deg - ORIGIN.1) * METRES_PER_DEGREE[1];
@@ -150,7 +152,7 @@ pub(crate) fn truth(lon_deg: f64, lat_deg: f64, size: usize) -> Option<f64> {
     (inside(x) && inside(-y)).then(|| GROUND_M + height(x, y))
 }
 
-/// Where a view has a ground point, pixels: the RPC's own answer, to hold the tile against.
+/// Returns the image position of a ground point by the RPC, to check the tile.
 pub(crate) fn project(rpc: &Rpc, [x, y, z]: [f64; 3]) -> anyhow::Result<ImagePoint> {
     let (lon, lat) = (ORIGIN.0 + x / METRES_PER_DEGREE[0], ORIGIN.1 + y / METRES_PER_DEGREE[1]);
     Ok(camera::RpcCamera::new(rpc.clone()).project(geodesy::LonLatHeight::new(lon, lat, GROUND_M + z))?)

@@ -30,7 +30,8 @@ use std::time::Instant;
 
 use anyhow::Context;
 
-/// Runs per scene and preset: the machine is noisy, the median of three is not.
+/// Runs per scene and preset. Single times vary with the load of the machine; the median of three
+/// hardly does.
 const RUNS: usize = 3;
 
 fn main() -> anyhow::Result<()> {
@@ -60,9 +61,9 @@ fn main() -> anyhow::Result<()> {
     }
 }
 
-/// What the command line asks for.
+/// The options of the command line.
 struct Arguments {
-    /// Names that scenes must contain; all scenes without any.
+    /// Parts of scene names. Scenes that contain none are left out; an empty list keeps all scenes.
     wanted: Vec<String>,
     runs: usize,
     out: Option<PathBuf>,
@@ -75,7 +76,7 @@ fn arguments() -> anyhow::Result<Arguments> {
         match argument.as_str() {
             "--runs" => found.runs = arguments.next().context("--runs needs a number")?.parse::<usize>()?.max(1),
             "--out" => found.out = Some(arguments.next().context("--out needs a folder")?.into()),
-            // What cargo passes on to every bench.
+            // Cargo passes this option to every bench.
             "--bench" => {}
             name => found.wanted.push(name.to_owned()),
         }

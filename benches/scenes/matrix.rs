@@ -1,4 +1,4 @@
-//! Presets × scenes, alternating.
+//! Runs every preset on every scene and collects cost and accuracy.
 
 use std::path::Path;
 
@@ -10,20 +10,20 @@ use crate::scenes::{Scene, Truth};
 
 /// The presets, fastest first.
 pub(crate) const PRESETS: [&str; 3] = ["fast", "balanced", "accurate"];
-/// The preset that goals are for.
+/// The preset that the goals apply to.
 pub(crate) const DEFAULT: &str = "balanced";
 
-/// The presets without filled voids, in the order of [`PRESETS`]: what other programs' unfilled
-/// surfaces compare with. They run on measured scenes.
+/// The presets without filled voids, in the order of [`PRESETS`], for comparison with other
+/// programs' unfilled surfaces. They run on measured scenes.
 pub(crate) const UNFILLED: [&str; 3] = ["fast --fill none", "balanced --fill none", "accurate --fill none"];
-/// The default preset with every void filled: what other programs' filled surfaces compare with. It
-/// runs on measured scenes.
+/// The default preset with every void filled, for comparison with other programs' filled surfaces.
+/// It runs on measured scenes.
 pub(crate) const FILLED: &str = "balanced --fill all";
 
-/// Share by which the median times of equal work differ.
+/// Relative difference of two median times that is taken as noise.
 const NOISE: f64 = 0.05;
 
-/// One goal with what was reached.
+/// One goal, and the value that was reached.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Reached {
     pub(crate) metric: &'static str,
@@ -33,7 +33,7 @@ pub(crate) struct Reached {
     pub(crate) met: bool,
 }
 
-/// One scene with one preset.
+/// Results of one scene with one preset.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Row {
     pub(crate) scene: &'static str,
@@ -52,12 +52,12 @@ pub(crate) struct Row {
     /// Another preset is at least as fast and as good in MAE and completeness, and better in one of
     /// the three.
     pub(crate) dominated: bool,
-    /// Every run.
+    /// Cost of each run.
     pub(crate) runs: Vec<Cost>,
 }
 
 impl Row {
-    /// A metric by name; NaN where the scene has none.
+    /// Returns a metric by name, or NaN where the scene has no such metric.
     pub(crate) fn metric(&self, name: &str) -> f64 {
         self.metrics.iter().find(|(known, _)| known == name).map_or(f64::NAN, |(_, value)| *value)
     }
@@ -103,8 +103,8 @@ impl Row {
         Ok(row)
     }
 
-    /// Whether another row of the same scene makes this one useless. Times that differ by less than
-    /// [`NOISE`] are equal.
+    /// Returns whether another row of the same scene and fill is at least as good in everything and
+    /// better in something. Times that differ by less than [`NOISE`] count as equal.
     fn is_dominated_by(&self, other: &Self) -> bool {
         let errors = |row: &Self| [row.metric("mae"), 1.0 - row.metric("completeness_1")];
         let pairs = || errors(other).into_iter().zip(errors(self));
@@ -117,7 +117,7 @@ impl Row {
     }
 }
 
-/// Runs everything `runs` times, all scenes and presets before any comes again.
+/// Runs all scenes and presets once, then all of them again, `runs` times.
 pub(crate) fn measure(scenes: &[Scene], folder: &Path, runs: usize) -> anyhow::Result<Vec<Row>> {
     let mut cells: Vec<(&Scene, &'static str, Vec<Cost>, Metrics)> =
         scenes.iter().flat_map(|scene| presets(scene).map(move |p| (scene, p, Vec::new(), Metrics::new()))).collect();

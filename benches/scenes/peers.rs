@@ -1,4 +1,4 @@
-//! What other programs make of the same images.
+//! Results of other programs on the same images.
 //!
 //! `benches/results/peers.json` is written by `benches/peers/peers.sh` and names its sources;
 //! `benches/results/cars.json` is written by `benches/peers/cars/run.sh`.
@@ -16,7 +16,7 @@ pub(crate) struct Peer {
     pub(crate) tool: String,
     /// `jax_068`, or a simulated scene's name.
     pub(crate) scene: String,
-    /// What it was given, in words.
+    /// Description of its input.
     pub(crate) input: String,
     /// Numbers of the views used in `jax_068`. Empty for a simulated scene, of which all views are
     /// used.
@@ -27,15 +27,16 @@ pub(crate) struct Peer {
     pub(crate) filled: bool,
     /// User seconds; none where the source gives none.
     pub(crate) cpu_s: Option<f64>,
-    /// A restriction of the processor time, in words.
+    /// Restriction that applies to the processor time, such as a range.
     #[serde(default)]
     pub(crate) cpu_note: String,
-    /// Of all images together; from the images where the file does not say.
+    /// Megapixels of all images together. Computed from the images where the file does not give
+    /// them.
     pub(crate) megapixels: Option<f64>,
     pub(crate) mae: f64,
     pub(crate) rmse: f64,
     pub(crate) nmad: f64,
-    /// Shares of the reference's cells.
+    /// Shares of all reference cells, 0 to 1.
     pub(crate) completeness_1: f64,
     pub(crate) valid_ratio: f64,
 }

@@ -14,7 +14,7 @@ use crate::peers::Peer;
 /// Mark of each preset, in the order of [`PRESETS`].
 const MARKS: [&str; 3] = ["dot3", "dot", "dot2"];
 
-/// A place in a plot.
+/// One mark of a plot.
 #[derive(Clone)]
 struct Point {
     cost: f64,
@@ -119,7 +119,7 @@ fn plot(title: &str, label: &str, all: &[Series], line: &[(f64, f64)]) -> Chart 
     chart
 }
 
-/// The mean of every preset over the scenes.
+/// Returns the mean of each preset over the scenes.
 fn means(all: &[Series]) -> Vec<(f64, f64)> {
     let mean = |preset: usize| {
         let points: Vec<&Point> = all.iter().filter_map(|series| series.get(preset)).collect();
@@ -129,7 +129,7 @@ fn means(all: &[Series]) -> Vec<(f64, f64)> {
     if all.is_empty() { Vec::new() } else { (0..PRESETS.len()).map(mean).collect() }
 }
 
-/// The points that no other beats in both, as steps.
+/// Returns the Pareto front as a step line: the points that no other point beats in both values.
 fn front<'a>(points: impl Iterator<Item = &'a Point>) -> Vec<(f64, f64)> {
     let mut sorted: Vec<(f64, f64)> =
         points.map(|p| (p.cost, p.error)).filter(|(cost, error)| cost.is_finite() && error.is_finite()).collect();

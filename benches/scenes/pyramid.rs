@@ -15,7 +15,7 @@ const APEX: (f64, f64) = (31.134_2, 29.979_2);
 /// `z = p₀ + p₁ east + p₂ north`, metres from the apex's map position.
 type Plane = Vector3<f64>;
 
-/// Fits the faces of a DSM.
+/// Measures the slopes of three faces and the height of the pyramid in a DSM.
 pub(crate) fn measure(dsm: &Path) -> anyhow::Result<Vec<(String, f64)>> {
     let dem = io::raster::read_dem(dsm)?;
     let epsg = dem.horizontal_epsg.unwrap_or(32636);

@@ -1,4 +1,4 @@
-//! Running the command and reading what it says.
+//! Runs the command and reads its report.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::places::skysweep;
 use crate::scenes::Truth;
 
-/// What one run took.
+/// Cost of one run.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct Cost {
     /// Processor seconds in user mode.
@@ -33,9 +33,9 @@ pub(crate) fn simulate(arguments: &[&str], folder: &Path) -> anyhow::Result<()> 
     checked(made).map(|_| ()).with_context(|| format!("skysweep simulate {}", arguments.join(" ")))
 }
 
-/// Runs `skysweep dsm` with a preset, any options that follow it, and else its defaults.
+/// Runs `skysweep dsm` with a preset. `preset` may hold further options after the preset's name.
 pub(crate) fn dsm(images: &[PathBuf], preset: &str, out: &Path) -> anyhow::Result<Cost> {
-    // bash times the command and its threads; nothing in std does.
+    // The standard library cannot measure the processor time of a child; bash can.
     let output = Command::new("bash")
         .args(["-c", "TIMEFORMAT='times %U %R'; time \"$@\"", "bash"])
         .arg(skysweep())
@@ -54,7 +54,7 @@ pub(crate) fn dsm(images: &[PathBuf], preset: &str, out: &Path) -> anyhow::Resul
     Ok(Cost { cpu_s: next()?, wall_s: next()?, peak_mb: report["peak_memory_mb"].as_f64().unwrap_or(f64::NAN) })
 }
 
-/// Metrics by name.
+/// Names and values of metrics.
 pub(crate) type Metrics = Vec<(String, f64)>;
 
 /// Runs `skysweep eval --align xyz` and returns the metrics over all cells, `median_abs` (the
@@ -93,7 +93,8 @@ pub(crate) fn evaluate(dsm: &Path, truth: &Truth, folder: &Path) -> anyhow::Resu
     Ok(out)
 }
 
-/// The name of a metric of the most believed cells, when they are a share of the reference's.
+/// Returns the name of a metric over the most believed cells, where `share` is their share of all
+/// reference cells.
 pub(crate) fn at_coverage(metric: &str, share: f64) -> String {
     format!("{metric}_at_{:.0}", 100.0 * share)
 }

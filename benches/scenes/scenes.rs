@@ -1,24 +1,24 @@
-//! The scenes, their references, and what was promised of each.
+//! The scenes, their references and the goals.
 
 use std::path::{Path, PathBuf};
 
 use crate::run;
 
-/// What a scene's DSM is compared with.
+/// The surface that a scene's DSM is compared with.
 #[derive(Clone)]
 pub(crate) enum Truth {
     /// The exact surface of a simulated scene, with its terrain and classes.
     Simulated,
     /// A measured surface; `vertical` names the datum of a reference that does not say its own.
     Measured { path: PathBuf, vertical: &'static str },
-    /// Another program's surface: a comparison, no truth.
+    /// Another program's surface. It is no truth; differences show only how far two programs agree.
     Peer { path: PathBuf, vertical: &'static str },
     /// The pyramid of Khufu. `peers` are other programs' surface models of it (prefix of the
     /// metric, file), measured in the same way.
     Pyramid { peers: [(&'static str, PathBuf); 2] },
 }
 
-/// A promise for the default preset: name, least, greatest.
+/// A goal for the default preset: name of the metric, least and greatest value.
 pub(crate) type Goal = (&'static str, f64, f64);
 
 /// One scene of the bench.
@@ -29,7 +29,7 @@ pub(crate) struct Scene {
     pub(crate) goals: &'static [Goal],
     /// Arguments of `skysweep simulate` for a simulated scene.
     simulation: &'static [&'static str],
-    /// Where it is made.
+    /// Folder of a simulated scene.
     pub(crate) folder: PathBuf,
 }
 
@@ -56,7 +56,7 @@ const S2P: [Goal; 2] = [("median_abs", 0.0, 0.35), ("valid_ratio", 0.90, 1.0)];
 const KHUFU: [Goal; 4] =
     [("east_deg", 50.84, 52.84), ("south_deg", 50.84, 52.84), ("west_deg", 50.84, 52.84), ("height_m", 144.0, 148.0)];
 
-/// The simulated scenes, not made yet.
+/// Returns the simulated scenes. Their images do not exist before [`Scene::make`].
 pub(crate) fn simulated() -> Vec<Scene> {
     let scene = |(name, simulation)| Scene {
         name,
@@ -69,7 +69,7 @@ pub(crate) fn simulated() -> Vec<Scene> {
     SIMULATED.into_iter().map(scene).collect()
 }
 
-/// The images of Jacksonville with these numbers.
+/// Returns the paths of the images of Jacksonville with these numbers.
 pub(crate) fn jax_images(data: &Path, views: &[usize]) -> Vec<PathBuf> {
     views.iter().map(|v| data.join(format!("jax_068/images/JAX_068_{v:03}_RGB.tif"))).collect()
 }

@@ -1,4 +1,4 @@
-//! The results as JSON for programs, Markdown and plots for people.
+//! Writes the results as JSON, as Markdown tables and as plots.
 
 use std::fmt::Write;
 use std::fs;
@@ -14,7 +14,7 @@ use crate::peers::Peer;
 use crate::plot;
 use crate::run::at_coverage;
 
-/// All that was measured, and where and when.
+/// All results, with the machine and the date.
 #[derive(Serialize)]
 pub(crate) struct Results {
     date: String,
@@ -30,7 +30,7 @@ impl Results {
         Self { date: date(), machine: machine(), runs, minutes: took.as_secs_f64() / 60.0, rows, peers }
     }
 
-    /// The tables.
+    /// Returns the tables.
     pub(crate) fn markdown(&self) -> String {
         let Self { date, machine, runs, minutes, .. } = self;
         let mut text = format!(
@@ -54,7 +54,7 @@ impl Results {
         text
     }
 
-    /// Scenes without a truth of their own, and what was promised.
+    /// Returns the table of goals, with S2P's time on the same scene.
     fn goal_table(&self) -> String {
         let mut text = String::from(
             "\nWhat was promised of the default preset, and S2P's time on the same scene:\n\n\

@@ -1,5 +1,7 @@
-//! What tests of the command share: the binary, the sample town, towns simulated once for all tests
-//! of a file, bands of rasters.
+//! Helpers that tests of the command share: the binary, the sample town, simulated towns, bands of
+//! rasters and reports.
+//!
+//! Tests that need shared data or an installed program use the crate `testing`, which prints skips.
 
 #![allow(dead_code, reason = "no test file uses all of it")]
 
@@ -10,18 +12,18 @@ use io::raster::ImageSource;
 use raster::Grid;
 use serde_json::Value;
 
-/// The command.
+/// Returns the command.
 pub(crate) fn skysweep() -> Command {
     Command::cargo_bin("skysweep").expect("the binary is built with the tests")
 }
 
-/// A file of the sample town.
+/// Returns the path of a file of the sample town.
 pub(crate) fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
 }
 
-/// Simulates the sample town with some of its parameters changed (from, to); `name` is a folder of
-/// the test file's own.
+/// Simulates the sample town with changed parameters (from, to). `name` is a folder that belongs to
+/// the test file.
 pub(crate) fn simulated(name: &str, changes: &[(&str, &str)]) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::create_dir_all(&folder).unwrap();
@@ -38,13 +40,13 @@ pub(crate) fn simulated(name: &str, changes: &[(&str, &str)]) -> PathBuf {
     scene
 }
 
-/// A band (from 1) of a raster.
+/// Reads a band of a raster. Bands are counted from 1.
 pub(crate) fn band(path: &Path, number: usize) -> Grid<f32> {
     let source = ImageSource::open(path).unwrap();
     source.read_samples(number, source.window()).unwrap()
 }
 
-/// What a command that ends well says in JSON.
+/// Checks that a command succeeded, and parses its JSON output.
 pub(crate) fn json(output: std::process::Output) -> Value {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
