@@ -1,12 +1,13 @@
 //! The pages fit together: every link leads to a file and a heading, every page is in the book, the
-//! README is short, and the minimum version of Rust is the one in Cargo.toml.
+//! README is short, and the minimum version of Rust is the one in Cargo.toml. Tests find shared data
+//! only through the crate `testing`.
 
 use std::path::Path;
 
 #[path = "readme_numbers/pages.rs"]
 mod pages;
 
-use pages::{anchors, links, pages, root, text};
+use pages::{anchors, below, links, pages, root, text};
 
 /// What is wrong with a link on a page, if anything.
 fn broken(page: &Path, link: &str) -> Option<String> {
@@ -71,5 +72,41 @@ fn the_minimum_version_of_rust_is_that_of_cargo() {
     for page in ["README.md", "CONTRIBUTING.md"] {
         let words = format!("Rust {version} or newer");
         assert!(text(&root().join(page)).contains(&words), "{page} does not say \"{words}\"");
+    }
+}
+
+/// One helper prints skips and fails where `SKYSWEEP_REQUIRE_DATA` says so; a test that looks for data by itself would
+/// do neither.
+#[test]
+fn tests_find_shared_data_through_one_helper() {
+    let mut all = Vec::new();
+    ["crates", "tests"].iter().for_each(|folder| below(&root().join(folder), "rs", &mut all));
+    assert!(all.len() > 100, "only {} sources found", all.len());
+    let needle = concat!("shared", "/data");
+    let looks = |line: &str| !line.trim_start().starts_with("//") && line.contains(needle);
+    let strayed: Vec<String> = all
+        .iter()
+        .filter(|path| !path.starts_with(root().join("crates/testing")))
+        .filter(|path| text(path).lines().any(looks))
+        .map(|path| format!("{}: call testing::shared_data", path.display()))
+        .collect();
+    assert!(strayed.is_empty(), "{}", strayed.join("\n"));
+}
+
+#[test]
+fn the_constants_of_the_guide_are_in_the_code() {
+    let page = text(&root().join("docs/constants.md"));
+    let is_name = |word: &&str| word.len() > 4 && word.chars().all(|c| c.is_ascii_uppercase() || c == '_');
+    let names: Vec<&str> = page.split('`').skip(1).step_by(2).filter(is_name).collect();
+    assert!(names.len() > 3, "{names:?}");
+    let mut all = Vec::new();
+    below(&root().join("crates"), "rs", &mut all);
+    let code: Vec<String> = all.iter().map(|path| text(path)).collect();
+    for name in names {
+        let declared = format!("const {name}:");
+        assert!(
+            code.iter().any(|text| text.contains(&declared)),
+            "docs/constants.md names {name}, which no crate declares"
+        );
     }
 }

@@ -14,17 +14,18 @@ pub(crate) fn root() -> &'static Path {
 pub(crate) fn pages() -> Vec<PathBuf> {
     let fixed = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "crates/README.md", "data-samples/README.md"];
     let mut found: Vec<PathBuf> = fixed.iter().map(|name| root().join(name)).collect();
-    below(&root().join("docs"), &mut found);
+    below(&root().join("docs"), "md", &mut found);
     found.sort();
     assert!(found.len() > 15, "only {} pages found", found.len());
     found
 }
 
-fn below(folder: &Path, found: &mut Vec<PathBuf>) {
+/// Adds the files below a folder whose names end with an extension.
+pub(crate) fn below(folder: &Path, extension: &str, found: &mut Vec<PathBuf>) {
     for path in fs::read_dir(folder).expect("the folder is readable").map(|entry| entry.expect("an entry").path()) {
-        if path.is_dir() && !path.ends_with("docs/book") {
-            below(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "md") {
+        if path.is_dir() {
+            below(&path, extension, found);
+        } else if path.extension().is_some_and(|found| found == extension) {
             found.push(path);
         }
     }
