@@ -12,7 +12,7 @@ use clap::ValueEnum;
 use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
 use jobs::rpc::{
-    RpcConvertConfig, RpcDirection, RpcError, RpcInfoConfig, RpcInfoReport, RpcLineAnswer, RpcLinesConfig, RpcPoint,
+    RpcConvertConfig, RpcDirection, RpcInfoConfig, RpcInfoReport, RpcJobError, RpcLineAnswer, RpcLinesConfig, RpcPoint,
     RpcPointsConfig, RpcQuery,
 };
 use serde_json::{Value, json};
@@ -147,7 +147,7 @@ fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
     });
     let report = jobs::rpc::convert(&config, &Log).map_err(|error| {
         let hint = match &error {
-            RpcError::UnknownEnding { .. } => Some("give --format text, rpb or json"),
+            RpcJobError::UnknownEnding { .. } => Some("give --format text, rpb or json"),
             _ => None,
         };
         with_hint(error, hint)

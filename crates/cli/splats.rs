@@ -1,23 +1,17 @@
 //! `skysweep splats`: Gaussian splats of a surface model and its images, as the PLY that 3DGS viewers and trainers read.
 //! `skysweep splats render` looks at them again, through images and perspective cameras.
 
-mod render;
-
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
-use camera::RpcCamera;
+use anyhow::bail;
 use crs::VerticalDatum;
-use io::raster::{ImageSource, read_dem, write_png_rgb};
-use io::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
-use raster::Grid;
-use serde_json::Value;
-use splats::{ColourFit, DivisionConfig, RpcSplatCamera, SplatConfig, SplatReport, SplatView, Surface, make_splats};
+use jobs::files::FileError;
+use jobs::splats::{SplatRenderConfig, SplatRenderReport, SplatsConfig, SplatsJobError, SplatsReport};
+use splats::DivisionConfig;
 
-use crate::progress::Log;
-use crate::{Global, Outcome, print};
-use jobs::corrections::Corrections;
-use jobs::map_surface;
+use crate::error::{OVERWRITE, with_hint};
+use crate::progress::{Log, ProgressStyle, Watcher};
+use crate::{Global, Outcome, corrections_of, print};
 
 /// Arguments of `skysweep splats`.
 #[derive(Debug, clap::Args)]
@@ -37,10 +31,10 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     /// Render splats through images with RPCs and through perspective cameras.
-    Render(render::Args),
+    Render(RenderArgs),
 }
 
-/// What splats are made of, and how.
+/// Inputs and options of new splats.
 #[derive(Debug, clap::Args)]
 struct MakeArgs {
     /// The surface model, in a projected CRS in metres.
@@ -64,11 +58,11 @@ struct MakeArgs {
     /// Confidence of the cells, 0 to 1, on the grid of the DSM; it becomes opacity [default: full].
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
-    /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default: those of the run that made the
-    /// surface model, for the images that it used].
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default: the corrections of the
+    /// run that made the surface model, for the images that it used].
     #[arg(long, value_name = "report.json|none")]
     corrections: Option<PathBuf>,
-    /// What the DSM's heights are above, where the file does not say: ellipsoid, egm96, egm2008 or an EPSG code.
+    /// Vertical datum of the DSM, where the file does not state it: ellipsoid, egm96, egm2008 or an EPSG code.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
     /// Three scales per splat (3DGS) or two (2DGS).
@@ -102,131 +96,120 @@ enum Form {
     TwoD,
 }
 
-/// An image that has been read.
-struct Image {
-    camera: RpcCamera,
-    pixels: Grid<[f32; 3]>,
+/// Arguments of `skysweep splats render`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples: skysweep splats render splats.ply view_*.tif -o seen; \
+                  skysweep splats render splats.ply --cameras views/sparse/0 --pictures views/images -o seen")]
+struct RenderArgs {
+    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them.
+    splats: PathBuf,
+    /// Images with RPCs to look through.
+    #[arg(value_name = "IMAGE")]
+    images: Vec<PathBuf>,
+    /// Perspective cameras to look through: a COLMAP model on the splats' map, with origin.json beside.
+    #[arg(long, value_name = "FOLDER")]
+    cameras: Option<PathBuf>,
+    /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered and not compared.
+    #[arg(long, value_name = "FOLDER", requires = "cameras")]
+    pictures: Option<PathBuf>,
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm.
+    #[arg(long, value_name = "report.json")]
+    corrections: Option<PathBuf>,
+    /// Folder to write.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Replace files that exist.
+    #[arg(long)]
+    overwrite: bool,
+    /// How progress is shown on stderr.
+    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
+    progress: ProgressStyle,
+    /// Print the report as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Runs `skysweep splats`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     match (&args.command, &args.make.dsm, &args.make.output) {
-        (Some(Command::Render(args)), ..) => render::run(args, global),
+        (Some(Command::Render(args)), ..) => render(args, global),
         (None, Some(dsm), Some(output)) => make(&args.make, dsm, output, global),
         _ => bail!("expected DSM, IMAGE and -o OUT.ply"),
     }
 }
 
 fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
-    for path in [Some(output), args.report.as_deref()].into_iter().flatten() {
-        ensure!(
-            args.overwrite || !path.exists(),
-            "the output exists: give --overwrite to replace it: {}",
-            path.display()
-        );
+    let mut config = SplatsConfig::new(dsm.to_owned(), args.images.clone(), output.to_owned());
+    config.error_m = args.error;
+    config.colour_error = args.colour_error;
+    config.uniform_side = args.uniform;
+    config.confidence.clone_from(&args.confidence);
+    config.corrections = corrections_of(args.corrections.as_deref());
+    config.vertical = args.vertical;
+    config.discs = args.form == Form::TwoD;
+    config.sh_degree = args.sh_degree;
+    config.compare = args.compare;
+    config.report.clone_from(&args.report);
+    config.renderings.clone_from(&args.render);
+    config.overwrite = args.overwrite;
+    let report = jobs::splats::make(&config, &Log).map_err(hinted)?;
+    if args.json {
+        print::json(&report.to_json()?)?;
+    } else if !global.is_quiet() {
+        print::text(&summary(&report))?;
     }
-    let read = map_surface::read(dsm, args.vertical, &Log)?;
-    let dem = &read.dem;
-    let origin = Surface::middle(&dem.heights, dem.geotransform)
-        .with_context(|| format!("the surface model has no height: {}", dsm.display()))?;
-    let surface = Surface::new(&dem.heights, dem.geotransform, origin);
-    let confidence = args.confidence.as_deref().map(confidence).transpose()?;
-    let corrections = Corrections::for_surface(dsm, &crate::corrections_of(args.corrections.as_deref()))?;
-    let images = args.images.iter().map(|path| image(path, &corrections)).collect::<anyhow::Result<Vec<_>>>()?;
-    let mut views = Vec::with_capacity(images.len());
-    for (path, image) in args.images.iter().zip(&images) {
-        let size = (image.pixels.width(), image.pixels.height());
-        let camera = RpcSplatCamera::new(&image.camera, &read.projection, origin, size)?
-            .with_context(|| format!("the image does not see the surface model: {}", path.display()))?;
-        views.push(SplatView { camera, image: &image.pixels });
-    }
-    let config = SplatConfig {
-        division: DivisionConfig { error_m: args.error, colour_error: args.colour_error, ..DivisionConfig::default() },
-        colour: ColourFit::default(),
-        uniform_side: args.uniform,
-        compare: args.compare,
-        ..SplatConfig::default()
-    };
-    let scene = make_splats(&surface, confidence.as_ref(), &views, &config)?;
-    let layout = SplatLayout {
-        form: if args.form == Form::TwoD { SplatForm::Discs } else { SplatForm::Ellipsoids },
-        sh_degree: args.sh_degree,
-    };
-    let local = LocalOrigin::new(read.projection.definition(), "ellipsoid", origin);
-    io::splat_ply::write(output, &scene.splats, &local, layout, args.overwrite)?;
-    write_renderings(args, &scene.renderings)?;
-    tell(args, output, global, &scene.report)?;
     Ok(Outcome::Complete)
 }
 
-fn write_renderings(args: &MakeArgs, renderings: &[Grid<[f32; 3]>]) -> anyhow::Result<()> {
-    let Some(folder) = &args.render else { return Ok(()) };
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder: {}", folder.display()))?;
-    for (path, rendering) in args.images.iter().zip(renderings) {
-        let name = path.file_stem().unwrap_or_default();
-        let picture = rendering.map(|p| p.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8));
-        write_png_rgb(folder.join(name).with_extension("png"), &picture, args.overwrite)?;
-    }
-    Ok(())
-}
-
-fn confidence(path: &Path) -> anyhow::Result<Grid<f32>> {
-    Ok(read_dem(path).context("the confidence")?.heights)
-}
-
-fn image(path: &Path, corrections: &Corrections) -> anyhow::Result<Image> {
-    let rpc = io::rpc::read_for_image(path)?;
-    let source = ImageSource::open(path)?;
-    let pixels = source.read_colour(source.window())?;
-    let correction = corrections.for_image(path, &Log);
-    Ok(Image { camera: RpcCamera { rpc: rpc.rpc, correction }, pixels })
-}
-
-fn tell(args: &MakeArgs, output: &Path, global: Global, report: &SplatReport) -> anyhow::Result<()> {
-    let images = args.images.iter().zip(&report.views).map(|(path, view)| {
-        let mut value = serde_json::to_value(view)?;
-        value["image"] = path.display().to_string().into();
-        Ok(value)
-    });
-    let images: Vec<Value> = images.collect::<anyhow::Result<_>>()?;
-    let mut value = serde_json::to_value(report)?;
-    value["views"] = images.into();
-    value["output"] = output.display().to_string().into();
-    value["error_bound_m"] = args.error.into();
-    value["colour_bound"] = serde_json::to_value(args.colour_error)?;
-    if let Some(path) = &args.report {
-        let text = serde_json::to_string_pretty(&value)? + "\n";
-        io::write_bytes(path, text.as_bytes(), args.overwrite)?;
-    }
+fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
+    let mut config = SplatRenderConfig::new(args.splats.clone(), args.output.clone());
+    config.images.clone_from(&args.images);
+    config.cameras.clone_from(&args.cameras);
+    config.pictures.clone_from(&args.pictures);
+    config.corrections.clone_from(&args.corrections);
+    config.overwrite = args.overwrite;
+    let watcher = Watcher::new(args.progress, global);
+    let made = jobs::splats::render(&config, &watcher);
+    watcher.finish();
+    let report = made.map_err(hinted)?;
     if args.json {
-        print::json(&value)?;
+        print::json(&report)?;
     } else if !global.is_quiet() {
-        print::text(&summary(args, output, report))?;
+        print::text(&render_summary(&report, &args.output))?;
     }
-    Ok(())
+    Ok(Outcome::Complete)
 }
 
-fn summary(args: &MakeArgs, output: &Path, report: &SplatReport) -> String {
+fn hinted(error: SplatsJobError) -> anyhow::Error {
+    let hint = match &error {
+        SplatsJobError::File(FileError::Exists { .. }) => Some(OVERWRITE),
+        SplatsJobError::NoCamera => Some("give IMAGE or --cameras FOLDER"),
+        _ => None,
+    };
+    with_hint(error, hint)
+}
+
+fn summary(report: &SplatsReport) -> String {
     let share = 100.0 * report.splats as f64 / report.cells.max(1) as f64;
     let mut text = format!(
         "splats     {} for {} cells ({share:.1} %)\nplanes     within {:.3} m\n",
         report.splats, report.cells, report.plane_error_max_m
     );
-    if let Some(heights) = report.mean_height {
+    if let Some(heights) = &report.mean_height {
         text += &format!(
             "heights    RMSE {:.3} m, MAE {:.3} m, median {:.3} m\n",
             heights.rmse_m, heights.mae_m, heights.median_m
         );
     }
-    for (path, view) in args.images.iter().zip(&report.views) {
-        let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2}"));
+    for image in &report.views {
+        let view = &image.view;
         text += &format!(
             "image      PSNR {} dB, SSIM {}, {:.1} % covered, sees {:.1} % of the cells: {}\n",
             number(view.psnr_db),
             number(view.ssim),
             100.0 * view.coverage,
             100.0 * view.seen,
-            path.display()
+            image.image
         );
     }
     for point in &report.uniform {
@@ -236,5 +219,18 @@ fn summary(args: &MakeArgs, output: &Path, report: &SplatReport) -> String {
         text +=
             &format!("equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n", count / report.splats as f64);
     }
-    text + &format!("written    {}\n", output.display())
+    text + &format!("written    {}\n", report.output)
+}
+
+fn render_summary(report: &SplatRenderReport, folder: &Path) -> String {
+    let mut text = format!("splats     {}\n", report.splats);
+    for view in &report.views {
+        let (psnr, ssim) = (number(view.psnr_db), number(view.ssim));
+        text += &format!("{:20} {:.1} % covered, PSNR {psnr} dB, SSIM {ssim}\n", view.name, 100.0 * view.coverage);
+    }
+    text + &format!("written    {}\n", folder.display())
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |v| format!("{v:.2}"))
 }

@@ -14,5 +14,6 @@ pub mod ortho;
 pub mod placed_model;
 pub mod rpc;
 pub mod simulate;
+pub mod splats;
 pub mod split;
 pub mod threads;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use io::rpc::RpcFormat;
 use serde::{Deserialize, Serialize};
 
-use super::error::RpcError;
+use super::error::RpcJobError;
 use super::input;
 use numeric::Progress;
 
@@ -47,8 +47,8 @@ impl RpcConvertConfig {
     /// Checks that a format is known.
     ///
     /// # Errors
-    /// [`RpcError::UnknownEnding`] when neither `format` nor the ending of `output` names one.
-    pub fn validate(&self) -> Result<(), RpcError> {
+    /// [`RpcJobError::UnknownEnding`] when neither `format` nor the ending of `output` names one.
+    pub fn validate(&self) -> Result<(), RpcJobError> {
         self.format.map_or_else(|| format_of(&self.output).map(drop), |_| Ok(()))
     }
 }
@@ -56,7 +56,7 @@ impl RpcConvertConfig {
 /// Writes the RPC of a file as text, RPB or JSON.
 ///
 /// # Errors
-/// [`RpcError::UnknownEnding`], [`RpcError::Read`], and [`RpcError::Write`], among it an output that exists.
+/// [`RpcJobError::UnknownEnding`], [`RpcJobError::Read`], and [`RpcJobError::Write`], among it an output that exists.
 ///
 /// ```
 /// use jobs::rpc::{RpcConvertConfig, convert};
@@ -67,7 +67,7 @@ impl RpcConvertConfig {
 /// assert_eq!(io::rpc::read(&report.output)?.rpc, io::rpc::read(image.as_ref())?.rpc);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn convert(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<RpcConvertReport, RpcError> {
+pub fn convert(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<RpcConvertReport, RpcJobError> {
     config.validate()?;
     let format = config.format.map_or_else(|| format_of(&config.output), Ok)?;
     let file = input::read(&config.file, progress)?;
@@ -75,12 +75,12 @@ pub fn convert(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<Rpc
     Ok(RpcConvertReport { source: file.source, source_format: file.format, output: config.output.clone(), format })
 }
 
-fn format_of(output: &Path) -> Result<RpcFormat, RpcError> {
+fn format_of(output: &Path) -> Result<RpcFormat, RpcJobError> {
     let ending = output.extension().map(|e| e.to_string_lossy().to_lowercase());
     match ending.as_deref() {
         Some("txt" | "rpc") => Ok(RpcFormat::Text),
         Some("rpb") => Ok(RpcFormat::Rpb),
         Some("json") => Ok(RpcFormat::Json),
-        _ => Err(RpcError::UnknownEnding { path: output.to_owned() }),
+        _ => Err(RpcJobError::UnknownEnding { path: output.to_owned() }),
     }
 }

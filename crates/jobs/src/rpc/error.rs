@@ -8,7 +8,7 @@ use io::rpc::{RpcReadError, RpcWriteError};
 /// An RPC job that could not be done.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum RpcError {
+pub enum RpcJobError {
     /// The file holds no RPC that can be used.
     #[error(transparent)]
     Read(Box<RpcReadError>),
@@ -56,7 +56,7 @@ pub enum RpcError {
     Cancelled(#[from] numeric::Cancelled),
 }
 
-impl From<RpcReadError> for RpcError {
+impl From<RpcReadError> for RpcJobError {
     fn from(error: RpcReadError) -> Self {
         Self::Read(Box::new(error))
     }

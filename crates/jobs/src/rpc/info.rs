@@ -11,7 +11,7 @@ use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
 use serde::{Deserialize, Serialize};
 
-use super::error::RpcError;
+use super::error::RpcJobError;
 use super::input;
 use numeric::Progress;
 
@@ -82,16 +82,16 @@ impl RpcInfoConfig {
 /// Describes the RPC of a file.
 ///
 /// # Errors
-/// [`RpcError::Read`] when the file holds no usable RPC.
+/// [`RpcJobError::Read`] when the file holds no usable RPC.
 ///
 /// ```
 /// use jobs::rpc::{RpcInfoConfig, info};
 /// let image = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/view_1.tif");
 /// let report = info(&RpcInfoConfig::new(image.into()), &numeric::Silent)?;
 /// assert!(report.centre.is_some_and(|centre| centre.gsd_line_m > 0.1));
-/// # Ok::<(), jobs::rpc::RpcError>(())
+/// # Ok::<(), jobs::rpc::RpcJobError>(())
 /// ```
-pub fn info(config: &RpcInfoConfig, progress: &dyn Progress) -> Result<RpcInfoReport, RpcError> {
+pub fn info(config: &RpcInfoConfig, progress: &dyn Progress) -> Result<RpcInfoReport, RpcJobError> {
     let file = input::read(&config.file, progress)?;
     let centre = centre(&file.rpc);
     if let Err(e) = &centre {

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use io::rpc::RpcFile;
 
-use super::error::RpcError;
+use super::error::RpcJobError;
 use numeric::Progress;
 
 /// Reads the RPC of a file and passes the reader's warnings on.
-pub(super) fn read(path: &Path, progress: &dyn Progress) -> Result<RpcFile, RpcError> {
+pub(super) fn read(path: &Path, progress: &dyn Progress) -> Result<RpcFile, RpcJobError> {
     let file = io::rpc::read(path)?;
     for warning in &file.warnings {
         progress.warn(&format!("{}: {warning}", file.source.display()));

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use camera::CameraError;
 use serde::{Deserialize, Serialize};
 
-use super::error::{LineFault, RpcError};
+use super::error::{LineFault, RpcJobError};
 use super::input;
 use super::points::{RpcDirection, RpcPoint, RpcQuery};
 use numeric::Progress;
@@ -59,17 +59,17 @@ impl RpcLinesConfig {
 /// Opens a file of points for [`answer_lines`].
 ///
 /// # Errors
-/// [`RpcError::Points`].
-pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, RpcError> {
-    let file = File::open(path).map_err(|source| RpcError::Points { path: path.to_owned(), source })?;
+/// [`RpcJobError::Points`].
+pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, RpcJobError> {
+    let file = File::open(path).map_err(|source| RpcJobError::Points { path: path.to_owned(), source })?;
     Ok(Box::new(BufReader::new(file)))
 }
 
 /// Answers every line of `input`, in order, through `receive`.
 ///
 /// # Errors
-/// [`RpcError::Read`], [`RpcError::Line`] at the first line without three numbers, [`RpcError::Output`] when `receive` fails,
-/// [`RpcError::Cancelled`].
+/// [`RpcJobError::Read`], [`RpcJobError::Line`] at the first line without three numbers, [`RpcJobError::Output`] when `receive` fails,
+/// [`RpcJobError::Cancelled`].
 ///
 /// ```
 /// use jobs::rpc::{RpcDirection, RpcLinesConfig, answer_lines};
@@ -78,19 +78,19 @@ pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, RpcError> {
 /// let mut lines = &b"# sample line height\n100 50 60\n120, 50, 60\n"[..];
 /// let report = answer_lines(&config, &mut lines, &mut |_| Ok(()), &numeric::Silent)?;
 /// assert_eq!((report.answered, report.failed), (2, 0));
-/// # Ok::<(), jobs::rpc::RpcError>(())
+/// # Ok::<(), jobs::rpc::RpcJobError>(())
 /// ```
 pub fn answer_lines(
     config: &RpcLinesConfig,
     input: &mut dyn BufRead,
     receive: &mut dyn FnMut(RpcLineAnswer) -> std::io::Result<()>,
     progress: &dyn Progress,
-) -> Result<RpcLinesReport, RpcError> {
+) -> Result<RpcLinesReport, RpcJobError> {
     let rpc = input::read(&config.file, progress)?.rpc;
     let mut report = RpcLinesReport::default();
     for line in 1.. {
         progress.check_cancelled()?;
-        let at_line = |source| RpcError::Line { line, source };
+        let at_line = |source| RpcJobError::Line { line, source };
         let Some(text) = next_line(input).map_err(at_line)? else { break };
         let Some(numbers) = parse(&text).map_err(at_line)? else { continue };
         let point = RpcQuery::from_numbers(config.direction, numbers).answer(&rpc);
@@ -98,7 +98,7 @@ pub fn answer_lines(
             Ok(_) => report.answered += 1,
             Err(_) => report.failed += 1,
         }
-        receive(RpcLineAnswer { line, point }).map_err(RpcError::Output)?;
+        receive(RpcLineAnswer { line, point }).map_err(RpcJobError::Output)?;
     }
     Ok(report)
 }

@@ -11,7 +11,7 @@ mod lines;
 mod points;
 
 pub use convert::{RpcConvertConfig, RpcConvertReport, convert};
-pub use error::RpcError;
+pub use error::RpcJobError;
 pub use info::{RpcCentre, RpcInfoConfig, RpcInfoReport, RpcValidity, info};
 pub use lines::{RpcLineAnswer, RpcLinesConfig, RpcLinesReport, answer_lines, open_lines};
 pub use points::{RpcDirection, RpcPoint, RpcPointsConfig, RpcPointsReport, RpcQuery, points};

@@ -6,7 +6,7 @@ use camera::{CameraError, ImagePoint, Rpc};
 use geodesy::LonLatHeight;
 use serde::{Deserialize, Serialize};
 
-use super::error::RpcError;
+use super::error::RpcJobError;
 use super::input;
 use numeric::Progress;
 
@@ -97,7 +97,7 @@ impl RpcQuery {
 /// Projects and localizes points.
 ///
 /// # Errors
-/// [`RpcError::Read`], [`RpcError::NoAnswer`] at the first point without an answer, [`RpcError::Cancelled`].
+/// [`RpcJobError::Read`], [`RpcJobError::NoAnswer`] at the first point without an answer, [`RpcJobError::Cancelled`].
 ///
 /// ```
 /// use camera::ImagePoint;
@@ -108,11 +108,12 @@ impl RpcQuery {
 /// let back = RpcQuery::Project(answer.ground);
 /// let back = points(&RpcPointsConfig::new(image.into(), vec![back]), &numeric::Silent)?.points[0];
 /// assert!((back.image.sample - 100.0).abs() < 1e-4);
-/// # Ok::<(), jobs::rpc::RpcError>(())
+/// # Ok::<(), jobs::rpc::RpcJobError>(())
 /// ```
-pub fn points(config: &RpcPointsConfig, progress: &dyn Progress) -> Result<RpcPointsReport, RpcError> {
+pub fn points(config: &RpcPointsConfig, progress: &dyn Progress) -> Result<RpcPointsReport, RpcJobError> {
     let rpc = input::read(&config.file, progress)?.rpc;
-    let answer =
-        |query: &RpcQuery| query.answer(&rpc).map_err(|source| RpcError::NoAnswer { point: query.numbers(), source });
+    let answer = |query: &RpcQuery| {
+        query.answer(&rpc).map_err(|source| RpcJobError::NoAnswer { point: query.numbers(), source })
+    };
     Ok(RpcPointsReport { points: config.queries.iter().map(answer).collect::<Result<_, _>>()? })
 }

@@ -1,0 +1,13 @@
+//! The splat jobs: Gaussian splats of a surface model and its images, and views of splats through cameras.
+//!
+//! [`make()`] writes the PLY that 3DGS viewers and trainers read, with its origin beside it. [`render()`] looks at such a
+//! file through satellite images and perspective cameras.
+
+mod error;
+mod image;
+mod make;
+mod render;
+
+pub use error::SplatsJobError;
+pub use make::{SplatsConfig, SplatsImageReport, SplatsReport, make};
+pub use render::{SplatRenderConfig, SplatRenderReport, SplatRenderView, render};

@@ -1,0 +1,286 @@
+//! Rendering splats through satellite images and perspective cameras, and comparing them with the pictures.
+//!
+//! The folder holds `colour/NAME.png` (over black), `alpha/NAME.png` (accumulated opacity), `height/NAME.npy` (metres above
+//! the datum of the origin where half of the light is stopped, NaN elsewhere) and `report.json`. Pictures are compared
+//! over the pixels that splats cover by more than half. Satellite images have units of their own, so they are compared
+//! after a gain and an offset per channel.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use ::splats::{LensSplatCamera, Rendering, RpcSplatCamera, SplatCamera, psnr_db, ssim};
+use crs::MapProjection;
+use io::colmap::{ColmapModel, ColmapView};
+use io::npy;
+use io::raster::{write_png_gray, write_png_rgb};
+use io::splat_ply::{LocalOrigin, SplatFile};
+use numeric::Progress;
+use raster::Grid;
+use serde::{Deserialize, Serialize};
+
+use super::error::SplatsJobError;
+use super::image;
+use crate::corrections::Corrections;
+use crate::files::{self, FileError};
+use crate::placed_model;
+use crate::threads::install;
+
+const REPORT: &str = "report.json";
+/// Least accumulated opacity of the pixels that are compared.
+const COVERED: f32 = 0.5;
+
+/// Splats and the cameras to look at them through.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct SplatRenderConfig {
+    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them.
+    pub splats: PathBuf,
+    /// Images with RPCs to look through.
+    pub images: Vec<PathBuf>,
+    /// Perspective cameras to look through: folder of a COLMAP model on the map of the splats, with `origin.json`.
+    pub cameras: Option<PathBuf>,
+    /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered and not compared.
+    pub pictures: Option<PathBuf>,
+    /// Report of a DSM run with the pointing corrections of the images; RPCs as they are when `None`.
+    pub corrections: Option<PathBuf>,
+    /// Folder to write.
+    pub output: PathBuf,
+    /// Worker threads; one per core when `None`.
+    pub threads: Option<usize>,
+    /// Whether existing files may be replaced.
+    pub overwrite: bool,
+}
+
+/// What the cameras saw.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct SplatRenderReport {
+    /// Number of splats.
+    pub splats: usize,
+    /// One entry per camera.
+    pub views: Vec<SplatRenderView>,
+}
+
+/// What one camera saw.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SplatRenderView {
+    /// Name of the view's files.
+    pub name: String,
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Mean accumulated opacity.
+    pub coverage: f64,
+    /// Peak signal-to-noise ratio against the picture, decibels, where there is a picture.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity with the picture, where there is a picture.
+    pub ssim: Option<f64>,
+}
+
+impl SplatRenderConfig {
+    /// Views of `splats` in `output`; at least images or cameras must be added.
+    pub fn new(splats: PathBuf, output: PathBuf) -> Self {
+        Self {
+            splats,
+            images: Vec::new(),
+            cameras: None,
+            pictures: None,
+            corrections: None,
+            output,
+            threads: None,
+            overwrite: false,
+        }
+    }
+
+    /// Checks that there is a camera.
+    ///
+    /// # Errors
+    /// [`SplatsJobError::NoCamera`].
+    pub fn validate(&self) -> Result<(), SplatsJobError> {
+        if self.images.is_empty() && self.cameras.is_none() {
+            return Err(SplatsJobError::NoCamera);
+        }
+        Ok(())
+    }
+}
+
+/// Renders splats through all cameras, compares them with the pictures and writes the folder.
+///
+/// # Errors
+/// [`SplatsJobError`]: splats without an origin, cameras on another map, two views of one name, an output that exists.
+///
+/// ```
+/// use jobs::splats::{SplatRenderConfig, SplatsConfig, make, render};
+/// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
+/// let folder = tempfile::tempdir()?;
+/// let images = vec![town.join("view_1.tif")];
+/// let ply = folder.path().join("town.ply");
+/// make(&SplatsConfig::new(town.join("truth/dsm.tif"), images.clone(), ply.clone()), &numeric::Silent)?;
+/// let mut config = SplatRenderConfig::new(ply, folder.path().join("seen"));
+/// config.images = images;
+/// let report = render(&config, &numeric::Silent)?;
+/// assert!(report.views[0].psnr_db.is_some_and(|psnr| psnr > 15.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<SplatRenderReport, SplatsJobError> {
+    let report_path = config.output.join(REPORT);
+    files::refuse_existing(&report_path, config.overwrite)?;
+    config.validate()?;
+    let file = io::splat_ply::read(&config.splats)?;
+    let origin = file
+        .origin
+        .clone()
+        .ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?;
+    let session = RenderSession { config, file: &file, origin, taken: HashSet::new(), views: Vec::new() };
+    let views = install(config.threads, || session.run(progress))??;
+    let report = SplatRenderReport { splats: file.splats.len(), views };
+    files::write_json(&report_path, &report, config.overwrite)?;
+    Ok(report)
+}
+
+/// Views rendered so far.
+struct RenderSession<'a> {
+    config: &'a SplatRenderConfig,
+    file: &'a SplatFile,
+    origin: LocalOrigin,
+    /// Names of the views that were written.
+    taken: HashSet<String>,
+    views: Vec<SplatRenderView>,
+}
+
+/// The picture that a view is compared with.
+enum Reference {
+    None,
+    /// Values in the display range.
+    Display(Grid<[f32; 3]>),
+    /// Values in units of the image, to be brought to the display range.
+    OwnUnits(Grid<[f32; 3]>),
+}
+
+impl RenderSession<'_> {
+    fn run(mut self, progress: &dyn Progress) -> Result<Vec<SplatRenderView>, SplatsJobError> {
+        let placed = |folder: &PathBuf| placed_model::read(folder, &self.origin);
+        let model = self.config.cameras.as_ref().map(placed).transpose()?;
+        let corrections = self.config.corrections.as_deref().map(Corrections::read).transpose()?.unwrap_or_default();
+        let cameras = model.as_ref().map_or(0, |model| model.views.len());
+        progress.begin("views", self.config.images.len() + cameras);
+        for path in &self.config.images {
+            progress.check_cancelled()?;
+            self.render_image(path, &corrections, progress)?;
+            progress.step();
+        }
+        for view in model.iter().flat_map(|model| &model.views) {
+            progress.check_cancelled()?;
+            self.render_perspective(view, model.as_ref())?;
+            progress.step();
+        }
+        Ok(self.views)
+    }
+
+    fn render_image(
+        &mut self,
+        path: &Path,
+        corrections: &Corrections,
+        progress: &dyn Progress,
+    ) -> Result<(), SplatsJobError> {
+        if self.origin.vertical != "ellipsoid" {
+            return Err(SplatsJobError::NotEllipsoidal {
+                vertical: self.origin.vertical.clone(),
+                path: self.config.splats.clone(),
+            });
+        }
+        let projection = MapProjection::from_definition(&self.origin.crs)?;
+        let image = image::read(path, corrections, progress)?;
+        let size = (image.pixels.width(), image.pixels.height());
+        let camera = RpcSplatCamera::new(&image.camera, &projection, self.origin.origin, size)?
+            .ok_or_else(|| SplatsJobError::NotSeen { target: "the splats", path: path.to_owned() })?;
+        self.look(Path::new(path.file_name().unwrap_or_default()), &camera, Reference::OwnUnits(image.pixels))
+    }
+
+    fn render_perspective(&mut self, view: &ColmapView, model: Option<&ColmapModel>) -> Result<(), SplatsJobError> {
+        let lens = model
+            .and_then(|model| model.lenses.get(view.lens))
+            .ok_or_else(|| SplatsJobError::NoLens { name: view.name.clone() })?;
+        let picture = self.config.pictures.as_deref().map(|folder| folder.join(&view.name)).filter(|p| p.is_file());
+        let reference = match picture {
+            Some(path) => Reference::Display(image::read_pixels(&path)?.map(|p| p.map(|c| c / 255.0))),
+            None => Reference::None,
+        };
+        self.look(Path::new(&view.name), &LensSplatCamera { lens, pose: &view.pose }, reference)
+    }
+
+    /// Renders, writes and compares one view.
+    fn look(&mut self, name: &Path, camera: &impl SplatCamera, reference: Reference) -> Result<(), SplatsJobError> {
+        let name = name.with_extension("").to_string_lossy().replace(['/', '\\'], "_");
+        if !self.taken.insert(name.clone()) {
+            return Err(SplatsJobError::SameName { name });
+        }
+        let rendering = ::splats::render(&self.file.splats, camera)?;
+        self.write(&name, &rendering)?;
+        let size = [rendering.colour.width(), rendering.colour.height()];
+        let covered = rendering.coverage.map(|c| *c > COVERED);
+        let picture = reference.against(&name, &rendering, &covered)?;
+        let pixels = rendering.coverage.data().len().max(1) as f64;
+        self.views.push(SplatRenderView {
+            name,
+            size,
+            coverage: rendering.coverage.data().iter().map(|c| f64::from(*c)).sum::<f64>() / pixels,
+            psnr_db: picture.as_ref().and_then(|picture| psnr_db(&rendering.colour, picture, &covered)),
+            ssim: picture.as_ref().and_then(|picture| ssim(&rendering.colour, picture, &covered)),
+        });
+        Ok(())
+    }
+
+    fn write(&self, name: &str, rendering: &Rendering) -> Result<(), FileError> {
+        let path = |kind: &str, ending: &str| {
+            let folder = self.config.output.join(kind);
+            files::create_folder(&folder)?;
+            Ok::<_, FileError>(folder.join(format!("{name}.{ending}")))
+        };
+        let byte = |share: f32| (255.0 * share.clamp(0.0, 1.0)).round() as u8;
+        let (overwrite, heights) = (self.config.overwrite, &rendering.median_height_m);
+        write_png_rgb(path("colour", "png")?, &rendering.colour.map(|p| p.map(byte)), overwrite)?;
+        write_png_gray(path("alpha", "png")?, &rendering.coverage.map(|c| byte(*c)), overwrite)?;
+        let absolute = heights.map(|&h| (f64::from(h) + self.origin.origin[2]) as f32);
+        let shape = [heights.height(), heights.width()];
+        npy::write(path("height", "npy")?, &shape, absolute.data(), overwrite).map_err(FileError::write)
+    }
+}
+
+impl Reference {
+    /// Returns the picture in the display range of a rendering of the same size.
+    fn against(
+        self,
+        name: &str,
+        rendering: &Rendering,
+        covered: &Grid<bool>,
+    ) -> Result<Option<Grid<[f32; 3]>>, SplatsJobError> {
+        let size = |grid: &Grid<[f32; 3]>| [grid.width(), grid.height()];
+        let (picture, own_units) = match self {
+            Self::None => return Ok(None),
+            Self::Display(picture) => (picture, false),
+            Self::OwnUnits(picture) => (picture, true),
+        };
+        let (found, expected) = (size(&picture), size(&rendering.colour));
+        if found != expected {
+            return Err(SplatsJobError::PictureSize { name: name.to_owned(), found, expected });
+        }
+        Ok(Some(if own_units { fitted(&picture, &rendering.colour, covered) } else { picture }))
+    }
+}
+
+/// Applies to each channel of a picture the gain and offset that bring it closest to a rendering (least squares).
+fn fitted(picture: &Grid<[f32; 3]>, rendered: &Grid<[f32; 3]>, counts: &Grid<bool>) -> Grid<[f32; 3]> {
+    let lines = [0, 1, 2].map(|channel| {
+        let pairs = picture.data().iter().zip(rendered.data()).zip(counts.data()).filter(|(_, counts)| **counts);
+        let pairs = pairs.map(|((p, r), _)| (f64::from(p[channel]), f64::from(r[channel])));
+        let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (p, r) in pairs.filter(|(p, _)| p.is_finite()) {
+            (n, x, y, xx, xy) = (n + 1.0, x + p, y + r, xx + p * p, xy + p * r);
+        }
+        let variance = n * xx - x * x;
+        let gain = if variance > 0.0 { (n * xy - x * y) / variance } else { 0.0 };
+        (gain, if n > 0.0 { (y - gain * x) / n } else { 0.0 })
+    });
+    picture.map(|p| [0, 1, 2].map(|i| (lines[i].0 * f64::from(p[i]) + lines[i].1) as f32))
+}
