@@ -1,177 +1,334 @@
 //! `skysweep priors`: a city model and cameras in, a dataset for Gaussian splatting trainers out.
 //!
-//! The folder holds the points that enough cameras see (COLMAP's `sparse/0` as text and binary, `points3D.ply`), per image
-//! the depth, the normals, the mask, the surface class and the object, flat Gaussians to begin with, and a report. It is made
-//! beside its place and moved there when it is complete. Everything stays in the frame of the cameras; `origin.json` says how
-//! the model lies in it. Of satellite images there are maps only ([`satellite`]). Exit code 1 when objects of the model could not be used.
-
-mod cameras;
-mod content;
-mod folder;
-mod frame;
-mod maps;
-mod options;
-mod satellite;
-mod trainer;
+//! Satellite images give maps only. Exit code 1 when objects of the model could not be used.
 
 use std::path::PathBuf;
 
-use ::priors::{PriorModel, Samples, View, Visibility, Visible, buildings_of, sample};
-use anyhow::{Context, bail};
-use city::{LodChoice, MeshConfig, MeshedModel, ObjectStatus, Scope, TriangleMesh};
-use io::citymodel::CityFile;
-use numeric::Progress as _;
-use report::PriorsReport;
+use ::priors::{Amount, DepthKind, NormalFrame, Spacing as Placement, VisibilityConfig};
+use anyhow::bail;
+use city::{Lod, SurfaceClass};
+use clap::ValueEnum;
+use crs::{CrsRequest, VerticalDatum};
+use jobs::files::FileError;
+use jobs::priors::{
+    LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, PriorsMode, PriorsProduct, PriorsTrainer,
+};
 
-use crate::progress::Watcher;
+use crate::error::with_hint;
+use crate::progress::{ProgressStyle, Watcher};
 use crate::{Global, Outcome, print};
-use cameras::Cameras;
-use content::Dataset;
-use folder::Folder;
-use frame::Frame;
-pub(crate) use options::Args;
+
+/// Make depth, normal and mask priors of a city model for the cameras of a Gaussian splatting scene.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples: skysweep priors town.city.json --cameras scene/sparse/0 --offset 690000 5336000 0 -o scene_priors; \
+                  skysweep priors town.city.json --cameras view_*.tif -o satellite_priors"
+)]
+pub(crate) struct Args {
+    /// City model: CityJSON, CityJSONSeq, CityGML, OBJ or PLY.
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// Cameras: the folder of a COLMAP model (or one with sparse/0 in it), a transforms.json, or satellite images with RPCs.
+    ///
+    /// Of satellite images (files, or a folder of them) the maps are made, in the pixels of each image and with its RPC: heights
+    /// above the ellipsoid, distances along the line of sight, normals in east, north and up, mask, class and object.
+    #[arg(long, value_name = "DIR|FILE", required = true, num_args = 1..)]
+    cameras: Vec<PathBuf>,
+    /// Folder for the dataset.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Origin of the cameras' frame in the model's coordinates.
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, conflicts_with = "transform")]
+    offset: Option<Vec<f64>>,
+    /// Similarity from the model's coordinates to the cameras' frame (JSON: scale, rotation, translation, or a matrix).
+    #[arg(long, value_name = "FILE")]
+    transform: Option<PathBuf>,
+    /// Columns and rows of the images, for a transforms.json that does not state them.
+    #[arg(long, num_args = 2, value_names = ["COLUMNS", "ROWS"])]
+    image_size: Option<Vec<usize>>,
+
+    /// The model's map, where its file does not state it (satellite images): EPSG:n or EPSG:n+m with the code of the heights.
+    #[arg(long, value_name = "EPSG", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
+    crs: Option<CrsRequest>,
+    /// Vertical datum of the model, where its file does not state it: ellipsoid, egm96, egm2008 or an EPSG code.
+    #[arg(long, value_name = "DATUM", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
+    vertical: Option<VerticalDatum>,
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm [default: RPCs as they are].
+    #[arg(long, value_name = "report.json", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
+    corrections: Option<PathBuf>,
+
+    /// What is to be trained: only the buildings, or the whole scene with priors on them.
+    #[arg(long, value_enum, default_value_t = Mode::BuildingOnly)]
+    mode: Mode,
+    /// The trainer that the dataset is for; 2DGS ignores the principal point, gsplat uses it.
+    #[arg(long, value_enum, default_value_t = Trainer::TwoDgs)]
+    trainer: Trainer,
+    /// Crop cameras whose principal point is not in the middle; crops.json says how to crop the images.
+    #[arg(long)]
+    recrop: bool,
+    /// Make the maps only, for lenses of any kind, in the pixels of the images as they are.
+    #[arg(long, conflicts_with = "recrop")]
+    maps_only: bool,
+
+    /// Level of detail, such as 2.2 [default: the highest of each object up to 2.x].
+    #[arg(long, value_name = "LOD")]
+    lod: Option<Lod>,
+    /// Let everything in the model hide what is behind it, not only buildings.
+    #[arg(long)]
+    all_objects: bool,
+
+    /// Number of points on the model [default: 1000000].
+    #[arg(long, value_name = "N", group = "amount")]
+    points: Option<usize>,
+    /// Points per square metre.
+    #[arg(long, value_name = "PER_M2", group = "amount")]
+    density: Option<f64>,
+    /// As many points as this geometric error needs, metres: few on large planes, more at edges and on small parts.
+    #[arg(long, value_name = "METRES", group = "amount")]
+    geometric_error: Option<f64>,
+    /// The largest spacing with --geometric-error, metres.
+    #[arg(long, value_name = "METRES", default_value_t = 2.0)]
+    max_spacing: f64,
+    /// How points keep a distance from each other.
+    #[arg(long, value_enum, default_value_t = Spacing::Stratified)]
+    spacing: Spacing,
+    /// Weight of a class of surfaces, such as RoofSurface=2; 0 leaves it out.
+    #[arg(long, value_name = "CLASS=WEIGHT", value_parser = parse_weight)]
+    class_weight: Vec<(SurfaceClass, f64)>,
+    /// Seed of the random numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+
+    /// Views that must see a point.
+    #[arg(long, value_name = "K", default_value_t = VisibilityConfig::default().min_views)]
+    min_views: u32,
+    /// How far inside the image a point must lie, pixels.
+    #[arg(long, value_name = "PX", default_value_t = VisibilityConfig::default().margin_px, allow_negative_numbers = true)]
+    margin: f64,
+    /// Length of the end of a ray that is not tested for occlusion, metres.
+    #[arg(long, value_name = "METRES", default_value_t = VisibilityConfig::default().epsilon_m)]
+    epsilon: f64,
+    /// Least depth at which something is seen, metres.
+    #[arg(long, value_name = "METRES", default_value_t = VisibilityConfig::default().near_m)]
+    near: f64,
+    /// The largest angle between ray and normal, degrees [default: none].
+    #[arg(long, value_name = "DEGREES")]
+    max_incidence: Option<f64>,
+    /// Largest number of observations kept per point (the best).
+    #[arg(long, value_name = "M", default_value_t = VisibilityConfig::default().max_observations)]
+    max_observations: usize,
+
+    /// What depth means.
+    #[arg(long, value_enum, default_value_t = Depth::Z)]
+    depth: Depth,
+    /// The axes of normals.
+    #[arg(long, value_enum, default_value_t = Normals::World)]
+    normals: Normals,
+    /// Write the maps as GeoTIFF too.
+    #[arg(long)]
+    geotiff: bool,
+    /// Number of views with preview pictures.
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    previews: usize,
+
+    /// Worker threads [default: all cores].
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Replace an earlier dataset.
+    #[arg(long)]
+    overwrite: bool,
+    /// How progress is shown on stderr.
+    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
+    progress: ProgressStyle,
+    /// Print the report as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is to be trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Mode {
+    /// Everything masked to buildings.
+    BuildingOnly,
+    /// The whole scene, with priors on buildings.
+    BuildingEnhanced,
+}
+
+/// The program that reads the dataset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Trainer {
+    /// 2DGS and the trainers made from it.
+    #[value(name = "2dgs")]
+    TwoDgs,
+    /// gsplat, nerfstudio.
+    Gsplat,
+}
+
+/// How points keep a distance from each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Spacing {
+    /// Independent points.
+    Random,
+    /// Even shares, low discrepancy.
+    Stratified,
+    /// A least distance.
+    Poisson,
+}
+
+/// What depth means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Depth {
+    /// Along the axis of the camera.
+    Z,
+    /// Along the ray.
+    Ray,
+}
+
+/// The axes of normals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Normals {
+    /// The axes of the cameras' frame.
+    World,
+    /// The axes of each camera.
+    Camera,
+}
 
 /// Runs `skysweep priors`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let mut pool = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = args.threads {
-        pool = pool.num_threads(threads.max(1));
-    }
+    let config = args.config()?;
     let watcher = Watcher::new(args.progress, global);
-    let pool = pool.build().context("the threads could not be started")?;
-    let made = pool.install(|| match cameras::satellite_images(&args.cameras)? {
-        Some(images) => of_satellite_images(args, &images, &watcher),
-        None => of_cameras(args, &watcher),
-    });
+    let made = jobs::priors::run(&config, &watcher);
     watcher.finish();
-    let Made { report, summary, unusable } = made?;
+    let report = made.map_err(hinted)?;
     if args.json {
-        print::json(&report)?;
+        print::json(&report.product.json()?)?;
     } else if !global.is_quiet() {
-        print::text(&summary)?;
+        print::text(&summary(args, &report.product))?;
     }
-    Ok(if unusable > 0 { Outcome::Partial } else { Outcome::Complete })
+    Ok(if report.unusable_objects > 0 { Outcome::Partial } else { Outcome::Complete })
 }
 
-/// What a run tells.
-struct Made {
-    report: serde_json::Value,
-    summary: String,
-    /// Objects of the model that could not be used.
-    unusable: usize,
-}
-
-fn of_satellite_images(args: &Args, images: &[PathBuf], watcher: &Watcher) -> anyhow::Result<Made> {
-    let (report, unusable) = satellite::make(args, images, watcher)?;
-    Ok(Made { summary: satellite::summary(args, &report), report, unusable })
-}
-
-fn of_cameras(args: &Args, watcher: &Watcher) -> anyhow::Result<Made> {
-    let (report, unusable) = make(args, watcher)?;
-    Ok(Made { report: report.json()?, summary: summary(args, &report), unusable })
-}
-
-fn make(args: &Args, watcher: &Watcher) -> anyhow::Result<(PriorsReport, usize)> {
-    if args.crs.is_some() || args.vertical.is_some() || args.corrections.is_some() {
-        bail!("--crs, --vertical and --corrections are for satellite images: the cameras are none");
-    }
-    let folder = Folder::new(&args.output, args.overwrite)?;
-    let sampling = args.sampling()?;
-    let cameras = Cameras::read(args)?;
-    let (file, meshed) = read_model(args)?;
-    let unusable = unusable(&meshed);
-    let frame = Frame::new(args, meshed.mesh.origin, &cameras)?;
-    let model = PriorModel::new(meshed.mesh, &buildings_of(&file.model))?;
-    let views = cameras.views(&frame);
-    let samples = sample(&model, &sampling)?;
-    let visible = look(args, &model, &samples, &views, watcher)?;
-    let dataset = Dataset {
-        args,
-        file: &file,
-        model: &model,
-        cameras: &cameras,
-        frame: &frame,
-        views: &views,
-        sampling: &sampling,
-        samples: &samples,
-        visible: &visible,
+/// Names the options that mend an error.
+fn hinted(error: PriorsJobError) -> anyhow::Error {
+    let hint = match &error {
+        PriorsJobError::File(FileError::Exists { .. }) => Some("choose another folder or pass --overwrite"),
+        PriorsJobError::NothingInSight { .. } => Some("state it with --offset or --transform"),
+        PriorsJobError::NotSatellite => Some("leave out --crs, --vertical and --corrections"),
+        PriorsJobError::NotPerspective => Some("leave out --offset and --transform"),
+        PriorsJobError::MapUnknown { .. } => Some("give --crs EPSG:n"),
+        PriorsJobError::NoObject { .. } => Some("skysweep city info names the reasons"),
+        PriorsJobError::Offset(_) => Some("it is given by --offset"),
+        PriorsJobError::Lens { source, .. } => match source {
+            LensFault::Distorted { .. } => Some("--maps-only makes the maps for any lens"),
+            LensFault::OffMiddle { .. } => Some(
+                "--recrop crops the camera (and writes how to crop the images), --trainer gsplat keeps the principal point",
+            ),
+            _ => None,
+        },
+        _ => None,
     };
-    let place = folder.begin()?;
-    let report = dataset.write(place.path(), unusable, watcher)?;
-    place.publish()?;
-    Ok((report, unusable))
+    with_hint(error, hint)
 }
 
-/// How many objects could not be used.
-fn unusable(meshed: &MeshedModel) -> usize {
-    meshed.objects.iter().filter(|object| object.status == ObjectStatus::Unusable).count()
+fn summary(args: &Args, product: &PriorsProduct) -> String {
+    let page = args.output.join("report.html").display().to_string();
+    match product {
+        PriorsProduct::Dataset(report) => format!(
+            "points     {} of {} are seen by {} or more of {} views\ndataset    {}\nreport     {page}\n",
+            report.kept,
+            report.samples,
+            report.min_views,
+            report.views.len(),
+            args.output.display(),
+        ),
+        PriorsProduct::SatelliteMaps(report) => {
+            let line = |row: &report::SatelliteRow| {
+                format!("image      {} pixels see a building: {}\n", row.hit_pixels, args.output.display())
+            };
+            report.images.iter().map(line).collect::<String>() + &format!("report     {page}\n")
+        }
+        _ => format!("report     {page}\n"),
+    }
 }
 
-fn read_model(args: &Args) -> anyhow::Result<(CityFile, MeshedModel)> {
-    let file = io::citymodel::read(&args.model)?;
-    let config = MeshConfig {
-        lod: args.lod.map_or_else(LodChoice::default, LodChoice::Only),
-        scope: if args.all_objects { Scope::Everything } else { Scope::Buildings },
+impl Args {
+    fn config(&self) -> anyhow::Result<PriorsConfig> {
+        let mut config = PriorsConfig::new(self.model.clone(), self.cameras.clone(), self.output.clone());
+        config.offset = self.offset.as_deref().and_then(|offset| offset.try_into().ok());
+        config.transform.clone_from(&self.transform);
+        config.image_size = self.image_size.as_deref().and_then(|size| size.try_into().ok());
+        let (map_epsg, datum) = match self.crs {
+            Some(CrsRequest::Epsg { horizontal, vertical }) => (Some(horizontal), vertical),
+            Some(CrsRequest::Auto) => bail!("--crs must name a code: EPSG:n"),
+            None => (None, None),
+        };
+        config.map_epsg = map_epsg;
+        config.vertical = self.vertical.or(datum);
+        config.corrections.clone_from(&self.corrections);
+        config.mode = match self.mode {
+            Mode::BuildingOnly => PriorsMode::BuildingOnly,
+            Mode::BuildingEnhanced => PriorsMode::BuildingEnhanced,
+        };
+        config.trainer = match self.trainer {
+            Trainer::TwoDgs => PriorsTrainer::TwoDgs,
+            Trainer::Gsplat => PriorsTrainer::Gsplat,
+        };
+        config.recrop = self.recrop;
+        config.maps_only = self.maps_only;
+        config.lod = self.lod;
+        config.all_objects = self.all_objects;
+        self.set_sampling(&mut config);
+        config.visibility = VisibilityConfig {
+            margin_px: self.margin,
+            near_m: self.near,
+            epsilon_m: self.epsilon,
+            max_incidence_deg: self.max_incidence,
+            min_views: self.min_views,
+            max_observations: self.max_observations,
+        };
+        config.maps.depth = match self.depth {
+            Depth::Z => DepthKind::ZDepth,
+            Depth::Ray => DepthKind::RayLength,
+        };
+        config.maps.normals = match self.normals {
+            Normals::World => NormalFrame::World,
+            Normals::Camera => NormalFrame::Camera,
+        };
+        config.geotiff = self.geotiff;
+        config.previews = self.previews;
+        config.threads = self.threads.map(|threads| threads.max(1));
+        config.overwrite = self.overwrite;
+        Ok(config)
+    }
+
+    fn set_sampling(&self, config: &mut PriorsConfig) {
+        config.amount = match (self.points, self.density, self.geometric_error) {
+            (_, Some(density), _) => Amount::PerSquareMetre(density),
+            (_, _, Some(error_m)) => Amount::Adaptive { error_m, max_spacing_m: self.max_spacing },
+            (points, None, None) => points.map_or(config.amount, Amount::Count),
+        };
+        config.spacing = match self.spacing {
+            Spacing::Random => Placement::Random,
+            Spacing::Stratified => Placement::Stratified,
+            Spacing::Poisson => Placement::PoissonDisk,
+        };
+        let weight = |&(class, weight): &(SurfaceClass, f64)| PriorsClassWeight { class, weight };
+        config.class_weights = self.class_weight.iter().map(weight).collect();
+        config.seed = self.seed;
+    }
+}
+
+/// `RoofSurface=2`, also `roof=2`.
+fn parse_weight(text: &str) -> Result<(SurfaceClass, f64), String> {
+    let names = || SurfaceClass::all().map(SurfaceClass::name).collect::<Vec<_>>().join(", ");
+    let (name, weight) = text.split_once('=').ok_or_else(|| format!("expected CLASS=WEIGHT, found {text:?}"))?;
+    let wanted = name.trim().to_lowercase();
+    let fits = |class: &SurfaceClass| {
+        let known = class.name().to_lowercase();
+        known == wanted || known.strip_suffix("surface") == Some(wanted.as_str())
     };
-    let meshed = TriangleMesh::from_model(&file.model, &config)?;
-    if meshed.mesh.triangles.is_empty() {
-        bail!(
-            "no object of the model could be used ({} objects; skysweep city info says why): {}",
-            file.model.objects.len(),
-            args.model.display()
-        );
-    }
-    Ok((file, meshed))
-}
-
-fn look(
-    args: &Args,
-    model: &PriorModel,
-    samples: &Samples,
-    views: &[View],
-    watcher: &Watcher,
-) -> anyhow::Result<Visible> {
-    let mut visibility = Visibility::new(model, &samples.points, args.visibility())?;
-    watcher.begin("visibility", views.len());
-    let mut candidates = 0;
-    for view in views {
-        candidates += visibility.add(view).candidates;
-        watcher.step();
-    }
-    if candidates == 0 {
-        bail!("{}", nothing_in_sight(model, views));
-    }
-    Ok(visibility.finish())
-}
-
-/// What to say where no camera has the model in its image.
-fn nothing_in_sight(model: &PriorModel, views: &[View]) -> String {
-    let origin = model.mesh().origin;
-    let to_model = |p: [f64; 3]| [p[0] + origin.x, p[1] + origin.y, p[2] + origin.z];
-    let bounds = |points: &mut dyn Iterator<Item = [f64; 3]>| {
-        let limits = points.fold(([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]), |(low, high), p| {
-            ([0, 1, 2].map(|i| low[i].min(p[i])), [0, 1, 2].map(|i| high[i].max(p[i])))
-        });
-        let text = |p: [f64; 3]| format!("({:.0}, {:.0}, {:.0})", p[0], p[1], p[2]);
-        format!("{} to {}", text(limits.0), text(limits.1))
-    };
-    let of_model = bounds(&mut model.mesh().positions.iter().map(|p| to_model(*p)));
-    let of_cameras = bounds(&mut views.iter().map(|v| to_model(v.pose.centre)));
-    format!(
-        "no camera has a building in its image: in the frame of the model the cameras are at {of_cameras}, and the model reaches from \
-         {of_model}; say how they lie to one another with --offset or --transform"
-    )
-}
-
-fn summary(args: &Args, report: &PriorsReport) -> String {
-    let at = |name: &str| args.output.join(name).display().to_string();
-    format!(
-        "points     {} of {} are seen by {} or more of {} views\ndataset    {}\nreport     {}\n",
-        report.kept,
-        report.samples,
-        report.min_views,
-        report.views.len(),
-        args.output.display(),
-        at("report.html"),
-    )
+    let class =
+        SurfaceClass::all().find(fits).ok_or_else(|| format!("no class {name:?}, expected one of {}", names()))?;
+    let weight = weight.trim().parse().map_err(|_| format!("expected a number after the class, found {weight:?}"))?;
+    Ok((class, weight))
 }

@@ -12,6 +12,7 @@ pub mod files;
 pub mod map_surface;
 pub mod ortho;
 pub mod placed_model;
+pub mod priors;
 pub mod rpc;
 pub mod simulate;
 pub mod splats;

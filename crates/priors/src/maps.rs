@@ -7,12 +7,13 @@
 use bvh::{DepthImage, MISS};
 use raster::Grid;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::{PriorModel, Rays, View};
 use numeric::vector::dot;
 
 /// What depth means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum DepthKind {
     /// Along the axis of the camera.
     #[default]
@@ -22,7 +23,7 @@ pub enum DepthKind {
 }
 
 /// The axes that normals are given in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum NormalFrame {
     /// Those of the mesh.
     #[default]
@@ -32,7 +33,7 @@ pub enum NormalFrame {
 }
 
 /// What the maps hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct MapConfig {
     /// What depth means.
     pub depth: DepthKind,

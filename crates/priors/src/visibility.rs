@@ -9,12 +9,13 @@
 use bvh::Target;
 use camera::ImagePoint;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::{PriorModel, PriorsError, Sample, View};
 use numeric::vector::{dot, norm, sub};
 
 /// What it takes to be seen, and to be kept.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct VisibilityConfig {
     /// How far inside the borders of the image a point must lie, pixels.
     pub margin_px: f64,

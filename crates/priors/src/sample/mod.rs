@@ -11,6 +11,7 @@ mod weights;
 
 use city::SurfaceClass;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::{PriorModel, PriorsError};
 use numeric::RandomByIndex;
@@ -37,7 +38,7 @@ pub struct Sample {
 }
 
 /// How many points.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Amount {
     /// This many on the whole model.
     Count(usize),
@@ -55,7 +56,7 @@ pub enum Amount {
 }
 
 /// How points keep away from one another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Spacing {
     /// Not at all: independent points, as in the paper.
     Random,

@@ -1,14 +1,15 @@
 //! The output folder: made in a hidden folder inside it, moved to its names when everything is written.
 //!
-//! The old report goes first and the new one comes last, so a folder with a report is complete. Files of others in the folder
-//! (images, say) are left alone.
+//! The old report is removed first and the new one is moved last, so a folder with a report is complete. Other files in
+//! the folder (images, for example) are left alone.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use super::error::PriorsJobError;
+use crate::files::FileError;
 
-/// What a dataset consists of, the report last.
+/// Entries of a dataset; the report is moved after them.
 const ENTRIES: [&str; 20] = [
     "sparse",
     "points3D.ply",
@@ -34,79 +35,79 @@ const ENTRIES: [&str; 20] = [
 const REPORT: [&str; 2] = ["report.html", "report.json"];
 const PARTIAL: &str = ".skysweep-partial";
 
-/// Where a dataset is to go.
+/// The folder that a dataset goes to.
 #[derive(Debug)]
-pub(super) struct Folder {
+pub(super) struct OutputFolder {
     path: PathBuf,
 }
 
-/// Where a dataset is being made; what is not published is removed again.
+/// The hidden folder in which a dataset is made. It is removed again unless it is published.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct PartialFolder {
     folder: PathBuf,
     partial: PathBuf,
     created: bool,
     published: bool,
 }
 
-impl Folder {
+impl OutputFolder {
     /// Refuses early what would fail at the end.
-    pub(super) fn new(path: &Path, overwrite: bool) -> anyhow::Result<Self> {
+    pub(super) fn new(path: &Path, overwrite: bool) -> Result<Self, PriorsJobError> {
         if path.exists() && !path.is_dir() {
-            bail!("the output is a file, expected a folder: {}", path.display());
+            return Err(PriorsJobError::OutputIsFile { path: path.to_owned() });
         }
         let taken = ENTRIES.iter().chain(&REPORT).map(|name| path.join(name)).find(|p| p.symlink_metadata().is_ok());
-        if let (Some(taken), false) = (taken, overwrite) {
-            bail!("the output exists already: choose another folder or pass --overwrite: {}", taken.display());
+        match taken {
+            Some(path) if !overwrite => Err(FileError::Exists { path }.into()),
+            _ => Ok(Self { path: path.to_owned() }),
         }
-        Ok(Self { path: path.to_owned() })
     }
 
     /// Makes the hidden folder.
-    pub(super) fn begin(&self) -> anyhow::Result<Place> {
-        let failed = || format!("cannot make the output folder: {}", self.path.display());
+    pub(super) fn begin(&self) -> Result<PartialFolder, PriorsJobError> {
+        let failed = |source| PriorsJobError::OutputFolder { path: self.path.clone(), source };
         let created = !self.path.exists();
         let partial = self.path.join(PARTIAL);
         if partial.symlink_metadata().is_ok() {
-            remove(&partial).with_context(failed)?;
+            remove(&partial).map_err(failed)?;
         }
-        let place = Place { folder: self.path.clone(), partial, created, published: false };
-        fs::create_dir_all(&place.partial).with_context(failed)?;
-        Ok(place)
+        let folder = PartialFolder { folder: self.path.clone(), partial, created, published: false };
+        fs::create_dir_all(&folder.partial).map_err(failed)?;
+        Ok(folder)
     }
 }
 
-impl Place {
+impl PartialFolder {
     /// The folder to write to.
     pub(super) fn path(&self) -> &Path {
         &self.partial
     }
 
     /// Moves everything to its name.
-    pub(super) fn publish(mut self) -> anyhow::Result<()> {
+    pub(super) fn publish(mut self) -> Result<(), PriorsJobError> {
         let (folder, partial) = (self.folder.clone(), self.partial.clone());
-        let failed = |path: &Path| format!("cannot write to the output folder: {}", path.display());
+        let failed = |path: &Path, source| PriorsJobError::OutputFolder { path: path.to_owned(), source };
         // Without its report the folder counts as incomplete from here on.
         for name in REPORT.iter().rev().chain(&ENTRIES) {
             let old = folder.join(name);
             if old.symlink_metadata().is_ok() {
-                remove(&old).with_context(|| failed(&old))?;
+                remove(&old).map_err(|source| failed(&old, source))?;
             }
         }
         self.published = true;
         for name in ENTRIES.iter().chain(&REPORT) {
             let (from, to) = (partial.join(name), folder.join(name));
             if from.symlink_metadata().is_ok() {
-                fs::rename(&from, &to).with_context(|| failed(&to))?;
+                fs::rename(&from, &to).map_err(|source| failed(&to, source))?;
             }
         }
         Ok(())
     }
 }
 
-impl Drop for Place {
+impl Drop for PartialFolder {
     fn drop(&mut self) {
-        // Best effort: the error that led here is the one to report.
+        // Errors are ignored: the error that led here is the one to report.
         let _ = fs::remove_dir_all(&self.partial);
         if self.created && !self.published {
             let _ = fs::remove_dir(&self.folder);

@@ -1,35 +1,41 @@
-//! How the model, its mesh, the cameras and the dataset lie to one another.
+//! The frames of a dataset: model, mesh, cameras and dataset.
 //!
-//! Mesh = model minus a recorded origin, metres; cameras = similarity of the model (--offset, --transform); dataset = cameras,
-//! moved to their middle where they are too far from zero for the f32 of trainers.
+//! Mesh = model minus a recorded origin, metres. Cameras = similarity of the model (an offset or a transform). Dataset =
+//! cameras, shifted to their middle where they are too far from zero for the f32 of trainers.
 
-use anyhow::Context;
+use ::priors::View;
 use camera::Similarity;
 use city::ModelPoint;
+use io::colmap::ColmapView;
 use serde_json::{Value, json};
 
-use super::cameras::Cameras;
-use super::options::Args;
+use super::cameras::SceneCameras;
+use super::config::PriorsConfig;
+use super::error::PriorsJobError;
 
-/// Farther from zero than this, f32 has steps of a millimetre.
+/// Distance from zero above which f32 has steps of a millimetre, metres.
 const FAR: f64 = 10_000.0;
 
-/// The frames of a run.
+/// How the frames of a run lie to one another.
 #[derive(Debug)]
-pub(super) struct Frame {
+pub(super) struct DatasetFrame {
     camera_from_model: Similarity,
     camera_from_mesh: Similarity,
     mesh_from_camera: Similarity,
-    /// What is subtracted from positions in the cameras' frame.
+    /// Shift subtracted from positions in the cameras' frame.
     moved_by: [f64; 3],
 }
 
-impl Frame {
-    pub(super) fn new(args: &Args, origin: ModelPoint, cameras: &Cameras) -> anyhow::Result<Self> {
-        let camera_from_model = match (&args.transform, args.offset.as_deref()) {
+impl DatasetFrame {
+    pub(super) fn new(
+        config: &PriorsConfig,
+        origin: ModelPoint,
+        cameras: &SceneCameras,
+    ) -> Result<Self, PriorsJobError> {
+        let camera_from_model = match (&config.transform, config.offset) {
             (Some(path), _) => io::similarity::read(path)?,
-            (None, Some(&[x, y, z])) => shift([-x, -y, -z]).context("--offset")?,
-            (None, _) => Similarity::IDENTITY,
+            (None, Some([x, y, z])) => shift([-x, -y, -z]).map_err(PriorsJobError::Offset)?,
+            (None, None) => Similarity::IDENTITY,
         };
         let camera_from_mesh = camera_from_model.after(&shift([origin.x, origin.y, origin.z])?);
         let centres = || cameras.model.views.iter().map(|view| view.pose.centre);
@@ -40,48 +46,54 @@ impl Frame {
         Ok(Self { camera_from_model, mesh_from_camera: camera_from_mesh.inverse(), camera_from_mesh, moved_by })
     }
 
-    pub(super) fn mesh_from_camera(&self) -> &Similarity {
-        &self.mesh_from_camera
+    /// Returns the cameras in the frame of the mesh.
+    pub(super) fn views(&self, cameras: &SceneCameras) -> Vec<View> {
+        let view = |v: &ColmapView| View {
+            lens: cameras.model.lenses[v.lens].clone(),
+            pose: self.mesh_from_camera.move_pose(&v.pose),
+        };
+        cameras.model.views.iter().map(view).collect()
     }
 
-    /// Lengths in the dataset per metre.
+    /// Length in the dataset per metre.
     pub(super) fn scale(&self) -> f64 {
         self.camera_from_mesh.scale()
     }
 
-    /// A position of the mesh in the dataset.
+    /// Returns the position in the dataset of a position in the mesh.
     pub(super) fn dataset_from_mesh(&self, position: [f64; 3]) -> [f64; 3] {
         self.dataset_from_camera(self.camera_from_mesh.apply(position))
     }
 
-    /// A position of the cameras' frame in the dataset.
+    /// Returns the position in the dataset of a position in the cameras' frame.
     pub(super) fn dataset_from_camera(&self, position: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|i| position[i] - self.moved_by[i])
     }
 
-    /// A direction of the mesh in the dataset.
+    /// Returns the direction in the dataset of a direction in the mesh.
     pub(super) fn turn(&self, direction: [f64; 3]) -> [f64; 3] {
         self.camera_from_mesh.turn(direction)
     }
 
-    /// Whether directions are the same in both.
+    /// Whether directions differ between the mesh and the dataset.
     pub(super) fn turns(&self) -> bool {
         self.camera_from_mesh.rotation() != Similarity::IDENTITY.rotation()
     }
 
-    /// Where the cameras were moved, if they were.
+    /// Shift subtracted from the cameras' positions, where there is one.
     pub(super) fn moved_by(&self) -> Option<[f64; 3]> {
         Some(self.moved_by).filter(|by| *by != [0.0; 3])
     }
 
-    /// The sidecar of the dataset.
+    /// Returns the content of `origin.json`.
     pub(super) fn describe(&self, crs: &city::CrsReference) -> Value {
         let back = self.camera_from_model.inverse();
         let part = |s: &Similarity, translation: [f64; 3]| json!({ "scale": s.scale(), "rotation": s.rotation(), "translation": translation });
+        let translation = self.dataset_from_camera(self.camera_from_model.translation());
         json!({
             "model_crs": crs.to_string(),
             "model_unit": "metre",
-            "dataset_from_model": part(&self.camera_from_model, self.dataset_from_camera(self.camera_from_model.translation())),
+            "dataset_from_model": part(&self.camera_from_model, translation),
             "model_from_dataset": part(&back, back.apply(self.moved_by)),
             "cameras_moved_by": self.moved_by,
             "meaning": "target = scale * rotation * source + translation; the dataset is the cameras' frame minus cameras_moved_by",
@@ -89,6 +101,6 @@ impl Frame {
     }
 }
 
-fn shift(by: [f64; 3]) -> anyhow::Result<Similarity> {
-    Ok(Similarity::new(1.0, Similarity::IDENTITY.rotation(), by)?)
+fn shift(by: [f64; 3]) -> Result<Similarity, camera::SimilarityError> {
+    Similarity::new(1.0, Similarity::IDENTITY.rotation(), by)
 }
