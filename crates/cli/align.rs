@@ -1,4 +1,5 @@
-//! `skysweep align`: a COLMAP model brought to the world by GPS positions of its images or by points known in both.
+//! `skysweep align`: a COLMAP model brought to the world by GPS positions of its images or by
+//! points known in both.
 
 use std::path::PathBuf;
 
@@ -76,7 +77,8 @@ impl From<Encoding> for ColmapEncoding {
 #[derive(Debug, clap::Args)]
 #[group(id = "noise options")]
 struct NoiseArgs {
-    /// Repeat the alignment with noise and report what changes: mean and standard deviation over seeds.
+    /// Repeat the alignment with noise and report what changes: mean and standard deviation over
+    /// seeds.
     #[arg(long)]
     noise: bool,
     /// Standard deviations of the positions, metres along each axis.

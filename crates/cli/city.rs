@@ -1,7 +1,8 @@
 //! `skysweep city`: what is in a city model, and its triangles or footprints in another format.
 //!
-//! Exit code 1 when parts of the model were lost: objects none of whose surfaces could be used, or surfaces that the reader
-//! had to leave out. The report names every object of the file, used or not, with the reason.
+//! Exit code 1 when parts of the model were lost: objects none of whose surfaces could be used, or
+//! surfaces that the reader had to leave out. The report names every object of the file, used or
+//! not, with the reason.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -25,9 +26,11 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Show what is in a city model: format, reference system, levels of detail, objects, triangles, defects.
+    /// Show what is in a city model: format, reference system, levels of detail, objects,
+    /// triangles, defects.
     Info(InfoArgs),
-    /// Write the triangles (OBJ, PLY, glTF), the footprints with heights (GeoJSON) or the model (CityJSON 2.0).
+    /// Write the triangles (OBJ, PLY, glTF), the footprints with heights (GeoJSON) or the model
+    /// (CityJSON 2.0).
     Convert(ConvertArgs),
 }
 
@@ -43,8 +46,9 @@ struct Input {
     /// Use every object with surfaces, not only buildings.
     #[arg(long)]
     all_objects: bool,
-    /// Write what became of every object, with all defects, to this file (JSON). Only with it solids are checked for
-    /// shells that meet themselves, cavities outside of their solid, and parts that overlap (codes 306, 4xx, 5xx, 601).
+    /// Write what became of every object, with all defects, to this file (JSON). Only with it
+    /// solids are checked for shells that meet themselves, cavities outside of their solid, and
+    /// parts that overlap (codes 306, 4xx, 5xx, 601).
     #[arg(long, value_name = "REPORT.json")]
     report: Option<PathBuf>,
     /// Replace files that exist.

@@ -1,4 +1,5 @@
-//! How an error reaches the user: `error: what happened`, one indented line per cause, and a hint that names an option.
+//! How an error reaches the user: `error: what happened`, one indented line per cause, and a hint
+//! that names an option.
 
 use std::fmt;
 use std::io::{ErrorKind, Write};

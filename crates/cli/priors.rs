@@ -18,7 +18,8 @@ use crate::error::with_hint;
 use crate::progress::{ProgressStyle, Watcher};
 use crate::{Global, Outcome, print};
 
-/// Make depth, normal and mask priors of a city model for the cameras of a Gaussian splatting scene.
+/// Make depth, normal and mask priors of a city model for the cameras of a Gaussian splatting
+/// scene.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples: skysweep priors town.city.json --cameras scene/sparse/0 --offset 690000 5336000 0 -o scene_priors; \
@@ -28,10 +29,12 @@ pub(crate) struct Args {
     /// City model: CityJSON, CityJSONSeq, CityGML, OBJ or PLY.
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// Cameras: the folder of a COLMAP model (or one with sparse/0 in it), a transforms.json, or satellite images with RPCs.
+    /// Cameras: the folder of a COLMAP model (or one with sparse/0 in it), a transforms.json, or
+    /// satellite images with RPCs.
     ///
-    /// Of satellite images (files, or a folder of them) the maps are made, in the pixels of each image and with its RPC: heights
-    /// above the ellipsoid, distances along the line of sight, normals in east, north and up, mask, class and object.
+    /// Of satellite images (files, or a folder of them) the maps are made, in the pixels of each
+    /// image and with its RPC: heights above the ellipsoid, distances along the line of sight,
+    /// normals in east, north and up, mask, class and object.
     #[arg(long, value_name = "DIR|FILE", required = true, num_args = 1..)]
     cameras: Vec<PathBuf>,
     /// Folder for the dataset.
@@ -40,20 +43,24 @@ pub(crate) struct Args {
     /// Origin of the cameras' frame in the model's coordinates.
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, conflicts_with = "transform")]
     offset: Option<Vec<f64>>,
-    /// Similarity from the model's coordinates to the cameras' frame (JSON: scale, rotation, translation, or a matrix).
+    /// Similarity from the model's coordinates to the cameras' frame (JSON: scale, rotation,
+    /// translation, or a matrix).
     #[arg(long, value_name = "FILE")]
     transform: Option<PathBuf>,
     /// Columns and rows of the images, for a transforms.json that does not state them.
     #[arg(long, num_args = 2, value_names = ["COLUMNS", "ROWS"])]
     image_size: Option<Vec<usize>>,
 
-    /// The model's map, where its file does not state it (satellite images): EPSG:n or EPSG:n+m with the code of the heights.
+    /// The model's map, where its file does not state it (satellite images): EPSG:n or EPSG:n+m
+    /// with the code of the heights.
     #[arg(long, value_name = "EPSG", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
     crs: Option<CrsRequest>,
-    /// Vertical datum of the model, where its file does not state it: ellipsoid, egm96, egm2008 or an EPSG code.
+    /// Vertical datum of the model, where its file does not state it: ellipsoid, egm96, egm2008 or
+    /// an EPSG code.
     #[arg(long, value_name = "DATUM", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
     vertical: Option<VerticalDatum>,
-    /// Corrections of the images' pointing: the report of a run of skysweep dsm [default: RPCs as they are].
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm [default: RPCs as
+    /// they are].
     #[arg(long, value_name = "report.json", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
     corrections: Option<PathBuf>,
 
@@ -63,7 +70,8 @@ pub(crate) struct Args {
     /// The trainer that the dataset is for; 2DGS ignores the principal point, gsplat uses it.
     #[arg(long, value_enum, default_value_t = Trainer::TwoDgs)]
     trainer: Trainer,
-    /// Crop cameras whose principal point is not in the middle; crops.json says how to crop the images.
+    /// Crop cameras whose principal point is not in the middle; crops.json says how to crop the
+    /// images.
     #[arg(long)]
     recrop: bool,
     /// Make the maps only, for lenses of any kind, in the pixels of the images as they are.
@@ -83,7 +91,8 @@ pub(crate) struct Args {
     /// Points per square metre.
     #[arg(long, value_name = "PER_M2", group = "amount")]
     density: Option<f64>,
-    /// As many points as this geometric error needs, metres: few on large planes, more at edges and on small parts.
+    /// As many points as this geometric error needs, metres: few on large planes, more at edges and
+    /// on small parts.
     #[arg(long, value_name = "METRES", group = "amount")]
     geometric_error: Option<f64>,
     /// The largest spacing with --geometric-error, metres.

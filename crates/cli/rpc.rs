@@ -1,7 +1,8 @@
 //! `skysweep rpc`: show, use and convert RPC camera models.
 //!
-//! `project` and `localize` take one point from the options, or many from a file or standard input. A point without an
-//! answer gives `nan nan` (in JSON an `error`), a line on standard error, and exit code 1 at the end.
+//! `project` and `localize` take one point from the options, or many from a file or standard input.
+//! A point without an answer gives `nan nan` (in JSON an `error`), a line on standard error, and
+//! exit code 1 at the end.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, Write};
@@ -30,7 +31,8 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Show the RPC of a file: format, offsets and scales, validity box, ground sampling distance, viewing angles.
+    /// Show the RPC of a file: format, offsets and scales, validity box, ground sampling distance,
+    /// viewing angles.
     Info(InfoArgs),
     /// Project ground points into the image.
     Project(ProjectArgs),

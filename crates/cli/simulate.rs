@@ -1,8 +1,8 @@
 //! `skysweep simulate`: a seeded scene seen through RPC cameras, with its exact surface beside.
 //!
-//! Writes `view_1.tif` … (RPC in the file), the record `scene.json`, the parameters `scene.toml`, and in `truth/` the
-//! rasters, the heights of every image and the buildings at LoD2. With `--flight` also perspective cameras, in
-//! `cameras/sparse/0`.
+//! Writes `view_1.tif` … (RPC in the file), the record `scene.json`, the parameters `scene.toml`,
+//! and in `truth/` the rasters, the heights of every image and the buildings at LoD2. With
+//! `--flight` also perspective cameras, in `cameras/sparse/0`.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,8 @@ use crate::{Global, Outcome, print};
 /// Arguments of `skysweep simulate`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Preset or parameter file (TOML): `--list` names the presets, `--template` prints one as a file.
+    /// Preset or parameter file (TOML): `--list` names the presets, `--template` prints one as a
+    /// file.
     #[arg(value_name = "PRESET|FILE.toml", default_value = "town")]
     scene: String,
     /// Everything random follows from this number.
@@ -31,11 +32,12 @@ pub(crate) struct Args {
     /// Number of views.
     #[arg(long, value_name = "N")]
     views: Option<usize>,
-    /// Number of dates that the views are shared out over: another sun, other vehicles, other radiometry on each.
+    /// Number of dates that the views are shared out over: another sun, other vehicles, other
+    /// radiometry on each.
     #[arg(long, value_name = "N")]
     dates: Option<usize>,
-    /// Also write N perspective cameras around the scene (a COLMAP model in cameras/sparse/0, in map coordinates), for skysweep
-    /// priors and the trainers that it prepares.
+    /// Also write N perspective cameras around the scene (a COLMAP model in cameras/sparse/0, in
+    /// map coordinates), for skysweep priors and the trainers that it prepares.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     flight: u32,
     /// Folder for the images and the truth.

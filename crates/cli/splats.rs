@@ -1,5 +1,6 @@
-//! `skysweep splats`: Gaussian splats of a surface model and its images, as the PLY that 3DGS viewers and trainers read.
-//! `skysweep splats render` looks at them again, through images and perspective cameras.
+//! `skysweep splats`: Gaussian splats of a surface model and its images, as the PLY that 3DGS
+//! viewers and trainers read. `skysweep splats render` looks at them again, through images and
+//! perspective cameras.
 
 use std::path::{Path, PathBuf};
 
@@ -49,7 +50,8 @@ struct MakeArgs {
     /// Largest distance of a height from its splat's plane, metres.
     #[arg(long, value_name = "METRES", default_value_t = DivisionConfig::default().error_m)]
     error: f64,
-    /// Largest standard deviation of the colours under one splat, in parts of the display range (inf: geometry alone).
+    /// Largest standard deviation of the colours under one splat, in parts of the display range
+    /// (inf: geometry alone).
     #[arg(long, value_name = "SHARE", default_value_t = DivisionConfig::default().colour_error)]
     colour_error: f64,
     /// Squares of N cells instead of splats as large as the bounds allow.
@@ -58,17 +60,19 @@ struct MakeArgs {
     /// Confidence of the cells, 0 to 1, on the grid of the DSM; it becomes opacity [default: full].
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
-    /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default: the corrections of the
-    /// run that made the surface model, for the images that it used].
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default:
+    /// the corrections of the run that made the surface model, for the images that it used].
     #[arg(long, value_name = "report.json|none")]
     corrections: Option<PathBuf>,
-    /// Vertical datum of the DSM, where the file does not state it: ellipsoid, egm96, egm2008 or an EPSG code.
+    /// Vertical datum of the DSM, where the file does not state it: ellipsoid, egm96, egm2008 or an
+    /// EPSG code.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
     /// Three scales per splat (3DGS) or two (2DGS).
     #[arg(long, value_enum, default_value_t = Form::ThreeD)]
     form: Form,
-    /// Degree of the harmonics in the file, 0 to 3; the loaders of the original 3DGS and 2DGS code want 3.
+    /// Degree of the harmonics in the file, 0 to 3; the loaders of the original 3DGS and 2DGS code
+    /// want 3.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: u8,
     /// Also measure uniform splats of several sizes, and how many of them the same error takes.
@@ -106,10 +110,12 @@ struct RenderArgs {
     /// Images with RPCs to look through.
     #[arg(value_name = "IMAGE")]
     images: Vec<PathBuf>,
-    /// Perspective cameras to look through: a COLMAP model on the splats' map, with origin.json beside.
+    /// Perspective cameras to look through: a COLMAP model on the splats' map, with origin.json
+    /// beside.
     #[arg(long, value_name = "FOLDER")]
     cameras: Option<PathBuf>,
-    /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered and not compared.
+    /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered
+    /// and not compared.
     #[arg(long, value_name = "FOLDER", requires = "cameras")]
     pictures: Option<PathBuf>,
     /// Corrections of the images' pointing: the report of a run of skysweep dsm.

@@ -22,7 +22,8 @@ pub(crate) struct Args {
     /// File to write (JSON) [default: print only].
     #[arg(short, long, value_name = "OUT.json")]
     output: Option<PathBuf>,
-    /// The paper's overlaps: contexts 0.15 and targets 0.02 to 0.1 (narrow), or contexts 0.25 and targets 0.03 to 0.15 (wide).
+    /// The paper's overlaps: contexts 0.15 and targets 0.02 to 0.1 (narrow), or contexts 0.25 and
+    /// targets 0.03 to 0.15 (wide).
     #[arg(long, value_enum, default_value_t = Preset::Narrow)]
     preset: Preset,
     /// Number of contexts.

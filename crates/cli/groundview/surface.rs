@@ -52,7 +52,7 @@ impl Surface {
 
     fn raster(path: &Path, vertical: Option<VerticalDatum>) -> anyhow::Result<Self> {
         let map_surface::MapSurface { dem, projection } = map_surface::read(path, vertical, &Log)?;
-        let origin = splats::Surface::middle(&dem.heights, dem.geotransform)
+        let origin = splats::SplatSurface::middle(&dem.heights, dem.geotransform)
             .with_context(|| format!("the surface has no height: {}", path.display()))?;
         let heights = dem.heights.map(|&h| (f64::from(h) - origin[2]) as f32);
         let field = HeightField::new(heights, dem.geotransform, origin)

@@ -13,7 +13,7 @@ use io::raster::{ImageSource, SampleType};
 use io::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
 use raster::{GeoTransform, Grid};
 use serde_json::json;
-use splats::{DivisionConfig, Surface, picture_splats, stretched};
+use splats::{DivisionConfig, SplatSurface, picture_splats, stretched};
 
 use super::tags::Tags;
 use crate::{Global, Outcome, print};
@@ -167,7 +167,7 @@ impl Map {
         let camera = self.projection.map_from_lonlat(camera_lon_deg, camera_lat_deg)?;
         let heights = self.values.map(|&h| (f64::from(h) * self.scale()) as f32);
         // The heights stay relative to the camera: its own height is the origin's.
-        let surface = Surface::new(&heights, self.geotransform, [camera.x, camera.y, 0.0]);
+        let surface = SplatSurface::new(&heights, self.geotransform, [camera.x, camera.y, 0.0]);
         let picture = args.picture.as_deref().map(picture).transpose()?;
         let merged = args.merge.map(|error_m| DivisionConfig { error_m, ..DivisionConfig::default() });
         let splats = picture_splats(&surface, picture.as_ref(), self.confidence.as_ref(), merged)?;

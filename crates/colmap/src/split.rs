@@ -1,36 +1,37 @@
-//! Context and target views of a camera model, by what they see in common.
+//! Context and target views of a camera model, chosen by what they see in common.
 //!
-//! The overlap of two views is the intersection over union of the model's points that they see. Views are chosen greedily: from a
-//! first view, each further context is the unused view whose overlap with the contexts so far is closest to the wanted one;
-//! then, for each wanted target overlap in turn, the unused view closest to it. A view's overlap with several contexts is its
-//! largest with any of them. Ties go to the view that comes first. Without a first view every view is tried, and the split with the
-//! least sum of deviations is taken.
+//! The overlap of two views is the intersection over union of the points of the model that they
+//! see. Views are chosen greedily. From a first view, each further context is the unused view whose
+//! overlap with the contexts so far is closest to the wanted one. Then, for each wanted target
+//! overlap in turn, the unused view closest to it is chosen. The overlap of a view with several
+//! contexts is its largest with any of them. Ties go to the view that comes first. Without a first
+//! view every view is tried, and the split with the least sum of deviations is taken.
 //!
-//! The presets are those of Cross-View Splatter (Turkulainen et al. 2026): contexts 0.15 with targets 0.02, 0.05, 0.07, 0.1, and
-//! contexts 0.25 with targets 0.03, 0.07, 0.1, 0.15.
+//! The presets are those of Cross-View Splatter (Turkulainen et al. 2026): contexts 0.15 with
+//! targets 0.02, 0.05, 0.07, 0.1, and contexts 0.25 with targets 0.03, 0.07, 0.1, 0.15.
 
 use serde::Serialize;
 
-/// What is wanted.
+/// The overlaps that are wanted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplitConfig {
     /// Number of context views.
     pub contexts: usize,
-    /// Overlap of each context with those before it.
+    /// Overlap of each context with the contexts before it.
     pub context_iou: f64,
     /// Overlap of each target with the contexts.
     pub target_ious: Vec<f64>,
-    /// The first context; found where not given.
+    /// Index of the first context; the one with the best split when `None`.
     pub first: Option<usize>,
 }
 
 impl SplitConfig {
-    /// The paper's contexts of overlap 0.15.
+    /// The paper's preset with contexts of overlap 0.15.
     pub fn narrow() -> Self {
         Self { contexts: 2, context_iou: 0.15, target_ious: vec![0.02, 0.05, 0.07, 0.1], first: None }
     }
 
-    /// The paper's contexts of overlap 0.25.
+    /// The paper's preset with contexts of overlap 0.25.
     pub fn wide() -> Self {
         Self { contexts: 2, context_iou: 0.25, target_ious: vec![0.03, 0.07, 0.1, 0.15], first: None }
     }
@@ -38,45 +39,45 @@ impl SplitConfig {
 
 /// A chosen view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Choice {
+pub struct ChosenView {
     /// Index of the view.
     pub view: usize,
-    /// The overlap that was wanted; none for the first context.
+    /// Overlap that was wanted; `None` for the first context.
     pub wanted_iou: Option<f64>,
-    /// Its largest overlap with a context that was chosen before it; none for the first context.
+    /// Largest overlap with a context chosen before it; `None` for the first context.
     pub iou: Option<f64>,
 }
 
-/// Contexts and targets.
+/// The chosen contexts and targets.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Split {
     /// Views to reconstruct from, in the order of choice.
-    pub contexts: Vec<Choice>,
+    pub contexts: Vec<ChosenView>,
     /// Views to predict, in the order of the wanted overlaps.
-    pub targets: Vec<Choice>,
-    /// Σ |overlap − wanted|.
+    pub targets: Vec<ChosenView>,
+    /// Σ |overlap − wanted overlap|.
     pub deviation: f64,
 }
 
-/// Why there is no split.
+/// Overlaps that cannot be served.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SplitError {
-    /// Fewer views that see points than are to be chosen.
+    /// Fewer views see points than are to be chosen.
     #[error("{found} views see points of the model, {needed} are to be chosen")]
     TooFew {
-        /// How many there are.
+        /// Number of views that see points.
         found: usize,
-        /// How many are needed.
+        /// Number of views to choose.
         needed: usize,
     },
-    /// A first view that is not there or sees nothing.
+    /// The first view is not in the model or sees nothing.
     #[error("view {view} cannot be the first: it is not in the model or sees no point of it")]
     First {
         /// Its index.
         view: usize,
     },
-    /// No contexts, or an overlap that is none.
+    /// No contexts, or an overlap outside of 0 to 1.
     #[error("{what}: expected at least one context and overlaps from 0 to 1")]
     Wanted {
         /// What was asked for.
@@ -84,7 +85,8 @@ pub enum SplitError {
     },
 }
 
-/// Per view the points that it sees, in rising order without repetitions, from the views of each point.
+/// Returns the points that each view sees, in rising order without repetitions, from the views of
+/// each point.
 pub fn points_of_views<'a>(view_count: usize, tracks: impl Iterator<Item = &'a [u32]>) -> Vec<Vec<u32>> {
     let mut points = vec![Vec::new(); view_count];
     for (point, track) in (0u32..).zip(tracks) {
@@ -97,7 +99,11 @@ pub fn points_of_views<'a>(view_count: usize, tracks: impl Iterator<Item = &'a [
     points
 }
 
-/// Intersection over union of two rising sequences; 0 where both are empty.
+/// Returns the intersection over union of two rising sequences; 0 where both are empty.
+///
+/// ```
+/// assert_eq!(colmap::split::iou(&[1, 2, 3], &[2, 3, 4]), 0.5);
+/// ```
 pub fn iou(a: &[u32], b: &[u32]) -> f64 {
     let (mut i, mut j, mut both) = (0, 0, 0usize);
     while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
@@ -109,10 +115,11 @@ pub fn iou(a: &[u32], b: &[u32]) -> f64 {
     if union > 0 { both as f64 / union as f64 } else { 0.0 }
 }
 
-/// Chooses contexts and targets; `points` are those of [`points_of_views`].
+/// Chooses contexts and targets; `points` is the result of [`points_of_views`].
 ///
 /// # Errors
-/// Overlaps outside 0 to 1, fewer views than are to be chosen, a first view that cannot be one.
+/// [`SplitError::Wanted`] for no contexts and overlaps outside of 0 to 1, [`SplitError::TooFew`],
+/// [`SplitError::First`].
 pub fn split(points: &[Vec<u32>], config: &SplitConfig) -> Result<Split, SplitError> {
     let wanted = std::iter::once(config.context_iou).chain(config.target_ious.iter().copied());
     if let Some(bad) = wanted.into_iter().find(|iou| !(0.0..=1.0).contains(iou)) {
@@ -159,14 +166,14 @@ impl Overlaps {
     }
 
     /// The largest overlap of a view with some others.
-    fn with(&self, view: usize, others: &[Choice]) -> f64 {
+    fn with(&self, view: usize, others: &[ChosenView]) -> f64 {
         others.iter().map(|other| self.iou[view * self.count + other.view]).fold(0.0, f64::max)
     }
 }
 
 fn from_first(overlaps: &Overlaps, usable: &[usize], first: usize, config: &SplitConfig) -> Split {
     let mut unused: Vec<usize> = usable.iter().copied().filter(|&view| view != first).collect();
-    let mut contexts = vec![Choice { view: first, wanted_iou: None, iou: None }];
+    let mut contexts = vec![ChosenView { view: first, wanted_iou: None, iou: None }];
     for _ in 1..config.contexts {
         let next = closest(overlaps, &mut unused, &contexts, config.context_iou);
         contexts.extend(next);
@@ -175,13 +182,13 @@ fn from_first(overlaps: &Overlaps, usable: &[usize], first: usize, config: &Spli
     for &wanted in &config.target_ious {
         targets.extend(closest(overlaps, &mut unused, &contexts, wanted));
     }
-    let off = |choice: &Choice| choice.iou.zip(choice.wanted_iou).map_or(0.0, |(iou, wanted)| (iou - wanted).abs());
+    let off = |choice: &ChosenView| choice.iou.zip(choice.wanted_iou).map_or(0.0, |(iou, wanted)| (iou - wanted).abs());
     let deviation = contexts.iter().chain(&targets).map(off).sum();
     Split { contexts, targets, deviation }
 }
 
 /// Takes the unused view whose overlap with the contexts is closest to what is wanted.
-fn closest(overlaps: &Overlaps, unused: &mut Vec<usize>, contexts: &[Choice], wanted: f64) -> Option<Choice> {
+fn closest(overlaps: &Overlaps, unused: &mut Vec<usize>, contexts: &[ChosenView], wanted: f64) -> Option<ChosenView> {
     let off = |view: usize| (overlaps.with(view, contexts) - wanted).abs();
     let mut best: Option<(usize, f64)> = None;
     for (place, &view) in unused.iter().enumerate() {
@@ -191,7 +198,7 @@ fn closest(overlaps: &Overlaps, unused: &mut Vec<usize>, contexts: &[Choice], wa
     }
     let (place, _) = best?;
     let view = unused.remove(place);
-    Some(Choice { view, wanted_iou: Some(wanted), iou: Some(overlaps.with(view, contexts)) })
+    Some(ChosenView { view, wanted_iou: Some(wanted), iou: Some(overlaps.with(view, contexts)) })
 }
 
 #[cfg(test)]

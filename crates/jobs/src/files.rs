@@ -1,4 +1,5 @@
-//! What all jobs do with files in the same way: refuse to replace, make folders, read text, write JSON.
+//! What all jobs do with files in the same way: refuse to replace, make folders, read text, write
+//! JSON.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -81,7 +82,8 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
     fs::read_to_string(path).map_err(|source| FileError::Read { path: path.to_owned(), source })
 }
 
-/// Writes a value as indented JSON with a newline at the end. The file appears complete or not at all.
+/// Writes a value as indented JSON with a newline at the end. The file appears complete or not at
+/// all.
 pub(crate) fn write_json(path: &Path, value: &impl Serialize, overwrite: bool) -> Result<(), FileError> {
     let text = serde_json::to_string_pretty(value)? + "\n";
     Ok(io::write_bytes(path, text.as_bytes(), overwrite)?)

@@ -1,8 +1,8 @@
 //! The simulation job: a seeded scene seen through RPC cameras, with its exact surface.
 //!
-//! Writes `view_1.tif` … (with the RPC in the file), the record `scene.json`, the parameters `scene.toml`, and in `truth/`
-//! the rasters, the heights of every image and the buildings at LoD2. A flight adds perspective cameras in
-//! `cameras/sparse/0`, in map coordinates.
+//! Writes `view_1.tif` … (with the RPC in the file), the record `scene.json`, the parameters
+//! `scene.toml`, and in `truth/` the rasters, the heights of every image and the buildings at LoD2.
+//! A flight adds perspective cameras in `cameras/sparse/0`, in map coordinates.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -112,7 +112,8 @@ pub fn read_scene(path: &Path) -> Result<SimulationConfig, SimulateJobError> {
 /// Simulates a scene and writes its images and its truth.
 ///
 /// # Errors
-/// [`SimulateJobError`]: parameters out of range, a folder that is not empty, a file that cannot be written.
+/// [`SimulateJobError`]: parameters out of range, a folder that is not empty, a file that cannot be
+/// written.
 ///
 /// ```
 /// use jobs::simulate::{SimulateConfig, run};
@@ -170,7 +171,8 @@ impl SceneWriter<'_> {
         if flight > 0 {
             self.write_flight(flight)?;
         }
-        // The parameters and the record of an earlier simulation are replaced: the folder was checked at the start.
+        // The parameters and the record of an earlier simulation are replaced: the folder was
+        // checked at the start.
         let parameters = self.simulation.config.to_toml()?;
         io::write_bytes(self.folder.join("scene.toml"), parameters.as_bytes(), true).map_err(FileError::write)?;
         Ok(files::write_json(&self.folder.join("scene.json"), &self.simulation.record(), true)?)
@@ -180,7 +182,8 @@ impl SceneWriter<'_> {
         let image = [Band { description: "panchromatic", data: BandData::U16(&view.image) }];
         let path = self.folder.join(format!("view_{number}.tif"));
         write_image_with_rpc(path, &image, &view.rpc, Some(0.0), self.overwrite)?;
-        // Truth in the grid of the image keeps the true RPC, which turns a pixel and its height into a place.
+        // Truth in the grid of the image keeps the true RPC, which turns a pixel and its height
+        // into a place.
         let path = |what: &str| self.folder.join("truth").join(format!("{what}_{number}.tif"));
         let heights = [Band { description: "height_m", data: BandData::F32(&view.heights) }];
         let no_data = Some(f64::from(raster::NO_DATA));

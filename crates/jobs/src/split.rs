@@ -1,8 +1,9 @@
-//! The split job: chooses context and target views of a COLMAP model by the overlap of what they see.
+//! The split job: chooses context and target views of a COLMAP model by the overlap of what they
+//! see.
 
 use std::path::PathBuf;
 
-use colmap::split::{Choice, SplitConfig, SplitError, points_of_views, split};
+use colmap::split::{ChosenView, SplitConfig, SplitError, points_of_views, split};
 use io::colmap::{ColmapError, ColmapModel, ColmapPoint};
 use serde::{Deserialize, Serialize};
 
@@ -88,12 +89,14 @@ pub enum SplitJobError {
 }
 
 impl SplitJobConfig {
-    /// Two contexts of overlap 0.15 and targets of 0.02 to 0.1: the narrow preset of Cross-View Splatter.
+    /// Two contexts of overlap 0.15 and targets of 0.02 to 0.1: the narrow preset of Cross-View
+    /// Splatter.
     pub fn narrow(model: PathBuf) -> Self {
         Self::preset(model, SplitConfig::narrow())
     }
 
-    /// Two contexts of overlap 0.25 and targets of 0.03 to 0.15: the wide preset of Cross-View Splatter.
+    /// Two contexts of overlap 0.25 and targets of 0.03 to 0.15: the wide preset of Cross-View
+    /// Splatter.
     pub fn wide(model: PathBuf) -> Self {
         Self::preset(model, SplitConfig::wide())
     }
@@ -107,7 +110,8 @@ impl SplitJobConfig {
 /// Chooses context and target views.
 ///
 /// # Errors
-/// [`SplitJobError`]: a model without points, an unknown first image, overlaps that cannot be served, an output that exists.
+/// [`SplitJobError`]: a model without points, an unknown first image, overlaps that cannot be
+/// served, an output that exists.
 ///
 /// ```
 /// use jobs::split::{SplitJobConfig, SplitJobError, run};
@@ -120,7 +124,7 @@ pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobR
     let (model, points) = io::colmap::read_with_points(&config.model)?;
     progress.check_cancelled()?;
     let found = split(&points_by_view(&model, &points), &goal(config, &model)?)?;
-    let image = |choice: &Choice| SplitImage {
+    let image = |choice: &ChosenView| SplitImage {
         image: model.views[choice.view].name.clone(),
         wanted_iou: choice.wanted_iou,
         iou: choice.iou,

@@ -1,12 +1,14 @@
-//! Rectangular blocks of cells with their plane, and sums over rectangles that make them cheap to fit.
+//! Rectangular blocks of cells with their plane, and sums over rectangles that make them cheap to
+//! fit.
 //!
-//! On a whole rectangle, columns and rows are uncorrelated, so the least-squares plane is z̄ + a (u − ū) + b (v − v̄) with
-//! a = Σ (u − ū) z / Σ (u − ū)², and the sums come from tables of prefix sums (Crow 1984) in four reads each. Heights are
-//! counted from the table's mean, so that squares keep their digits.
+//! On a whole rectangle, columns and rows are uncorrelated, so the least-squares plane is z̄ + a (u
+//! − ū) + b (v − v̄) with a = Σ (u − ū) z / Σ (u − ū)², and the sums come from tables of prefix
+//! sums (Crow 1984) in four reads each. Heights are relative to the mean of the table, so that
+//! squares keep their digits.
 
 use raster::Grid;
 
-use super::Surface;
+use super::SplatSurface;
 
 /// The plane of a block: local height at its middle, rise per column and per row, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -21,7 +23,7 @@ pub struct Plane {
 
 /// A rectangle of cells on one plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Block {
+pub struct SplatBlock {
     /// First column.
     pub column: usize,
     /// First row.
@@ -34,7 +36,7 @@ pub struct Block {
     pub plane: Plane,
 }
 
-impl Block {
+impl SplatBlock {
     /// The middle of the block in cells.
     pub fn middle(&self) -> [f64; 2] {
         let half = |n: usize| (n as f64 - 1.0) / 2.0;
@@ -67,7 +69,7 @@ impl Rectangle {
         self.width * self.height
     }
 
-    /// Both sides of a cut before column or row `at` of the rectangle.
+    /// Returns both sides of a cut before column or row `at` of the rectangle.
     pub(super) fn cut(&self, along_columns: bool, at: usize) -> [Self; 2] {
         if along_columns {
             [Self { width: at, ..*self }, Self { column: self.column + at, width: self.width - at, ..*self }]
@@ -77,7 +79,8 @@ impl Rectangle {
     }
 }
 
-/// What is summed: cells with a height, z, z u, z v, z², slopes by column and row; cells with a colour, red, green, blue, their squares.
+/// Number of sums: cells with a height, z, z u, z v, z², slopes by column and row; cells with a
+/// colour, red, green, blue, and the squares of the colours.
 const CHANNELS: usize = 12;
 
 /// Sums over a rectangle.
@@ -89,12 +92,12 @@ pub(super) struct Tables {
     column: usize,
     row: usize,
     stride: usize,
-    /// What heights are counted from.
+    /// Height that the others are relative to, metres.
     mean: f64,
     sums: Vec<[f64; CHANNELS]>,
 }
 
-/// A fitted rectangle.
+/// A plane fitted to a rectangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fit {
     pub(super) plane: Plane,
@@ -103,8 +106,8 @@ pub(super) struct Fit {
 }
 
 impl Tables {
-    /// The tables of a rectangle of the surface.
-    pub(super) fn new(surface: &Surface<'_>, colours: Option<&Grid<[f32; 3]>>, part: Rectangle) -> Self {
+    /// Computes the tables of a rectangle of the surface.
+    pub(super) fn new(surface: &SplatSurface<'_>, colours: Option<&Grid<[f32; 3]>>, part: Rectangle) -> Self {
         let height = |column: usize, row: usize| surface.local_height(column as i64, row as i64);
         let cells = || {
             (part.row..part.row + part.height)
@@ -141,14 +144,14 @@ impl Tables {
         &self.sums[v * self.stride + u]
     }
 
-    /// The sums over a rectangle whose corner is relative to the table's.
+    /// Returns the sums over a rectangle whose corner is relative to the corner of the table.
     pub(super) fn over(&self, part: Rectangle) -> Sums {
         let (left, right, top, bottom) = (part.column, part.column + part.width, part.row, part.row + part.height);
         let (a, b, c, d) = (self.at(left, top), self.at(right, top), self.at(left, bottom), self.at(right, bottom));
         Sums(std::array::from_fn(|i| d[i] - b[i] - c[i] + a[i]))
     }
 
-    /// The least-squares plane over a rectangle all of whose cells have heights.
+    /// Fits the least-squares plane to a rectangle without voids.
     pub(super) fn fit(&self, part: Rectangle, sums: &Sums) -> Fit {
         let s = &sums.0;
         let count = part.cells() as f64;
@@ -156,7 +159,8 @@ impl Tables {
         let spread = |size: usize| (size * size) as f64 - 1.0;
         let (suu, svv) = (count * spread(part.width) / 12.0, count * spread(part.height) / 12.0);
         let z = s[1] / count;
-        // Across a single column or row the cells' own slopes are all that is known.
+        // A single column or row determines no slope across it: the mean of the cells' own slopes
+        // is used.
         let along = |moment: f64, spread: f64, slope: f64| if spread > 0.0 { moment / spread } else { slope / count };
         let a = along(s[2] - middle(part.column, part.width) * s[1], suu, s[5]);
         let b = along(s[3] - middle(part.row, part.height) * s[1], svv, s[6]);
@@ -164,10 +168,10 @@ impl Tables {
         Fit { plane: Plane { middle_m: z + self.mean, by_column_m: a, by_row_m: b }, squares }
     }
 
-    /// The block of a rectangle.
-    pub(super) fn block(&self, part: Rectangle, plane: Plane) -> Block {
+    /// Returns the block of a rectangle.
+    pub(super) fn block(&self, part: Rectangle, plane: Plane) -> SplatBlock {
         let Rectangle { column, row, width, height } = part;
-        Block { column: self.column + column, row: self.row + row, width, height, plane }
+        SplatBlock { column: self.column + column, row: self.row + row, width, height, plane }
     }
 }
 
@@ -176,7 +180,7 @@ fn cell_values(z: f64, [u, v]: [f64; 2], slope: [f64; 2]) -> [f64; 7] {
 }
 
 impl Sums {
-    /// Cells that have a height.
+    /// Number of cells with a height.
     pub(super) fn with_height(&self) -> f64 {
         self.0[0]
     }
@@ -187,14 +191,14 @@ impl Sums {
         (s[4] - s[1] * s[1] / s[0].max(1.0)).max(0.0)
     }
 
-    /// Sum of the squared distances of the colours from their mean, mean of the channels.
+    /// Sum of the squared distances of the colours from their mean, averaged over the channels.
     pub(super) fn colour_squares(&self) -> f64 {
         let s = &self.0;
         let sums = s[8] * s[8] + s[9] * s[9] + s[10] * s[10];
         (s[11] - sums / s[7].max(1.0)).max(0.0) / 3.0
     }
 
-    /// Cells that have a colour.
+    /// Number of cells with a colour.
     pub(super) fn with_colour(&self) -> f64 {
         self.0[7]
     }
@@ -211,7 +215,7 @@ mod tests {
         #[test]
         fn planes_are_those_of_least_squares(values in prop::collection::vec(-20.0..60.0f32, 63), w in 1..9usize, h in 1..7usize) {
             let heights = Grid::from_vec(9, 7, values).unwrap();
-            let surface = Surface::new(&heights, GeoTransform::north_up(0.0, 0.0, 1.0), [0.0, 0.0, 10.0]);
+            let surface = SplatSurface::new(&heights, GeoTransform::north_up(0.0, 0.0, 1.0), [0.0, 0.0, 10.0]);
             let whole = Rectangle { column: 0, row: 0, width: 9, height: 7 };
             let tables = Tables::new(&surface, None, whole);
             let part = Rectangle { column: 9 - w, row: 7 - h, width: w, height: h };

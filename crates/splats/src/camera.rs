@@ -1,27 +1,31 @@
-//! Cameras that splats are seen through: the pixel of a local position, its depth, and the Jacobian that turns a covariance of
-//! the ground into one of the image (EWA splatting, Zwicker et al. 2001).
+//! Cameras that splats are rendered through: the pixel of a local position, its depth, and the
+//! Jacobian that maps a covariance on the ground to one in the image (EWA splatting, Zwicker et al.
+//! 2001).
 //!
-//! Local positions are metres along the axes of the map. Depth is only compared: the distance along the viewing direction for
-//! satellites, along the optical axis for perspective cameras, and minus the height from above.
+//! Local positions are metres along the axes of the map. Depths are only compared with each other.
+//! They are the distance along the viewing direction for satellites, along the optical axis for
+//! perspective cameras, and minus the height from above.
 
 use camera::{ImagePoint, Lens, Pose, RpcCamera};
 use crs::{CrsError, MapProjection};
 use geodesy::LonLatHeight;
 
-use super::Surface;
+use super::SplatSurface;
 
-/// Step of the numerical derivatives of a satellite's projection, metres: an RPC is linear over it to 1e-6 px.
+/// Step of the numerical derivatives of a satellite's projection, metres: an RPC is linear over it
+/// to 1e-6 px.
 const RPC_STEP_M: f64 = 1.0;
-/// Nothing nearer to a perspective camera is drawn, metres.
+/// Depth below which a perspective camera draws nothing, metres.
 const NEAR_M: f64 = 0.1;
 /// Step of the numerical derivatives of a lens, in its image plane at distance 1.
 const LENS_STEP: f64 = 1e-5;
 
-/// Beyond so many times the image's own half width and height, a lens is continued as if it were flat: a splat beside the camera has
-/// a derivative without bounds there, and would be smeared over the image (the original 3DGS code has the same 1.3).
+/// Multiple of the image's half width and height beyond which a lens is continued as if it were
+/// flat. The derivative of a splat beside the camera is unbounded there and would smear it over the
+/// image. The original 3DGS code has the same 1.3.
 const BESIDE: f64 = 1.3;
 
-/// The low-pass of the original 3DGS code, px².
+/// Low-pass of the original 3DGS code, px².
 const LOW_PASS_PX2: f64 = 0.3;
 
 /// A position seen by a camera.
@@ -29,26 +33,28 @@ const LOW_PASS_PX2: f64 = 0.3;
 pub struct Projection {
     /// Column and row.
     pub pixel: [f64; 2],
-    /// Smaller is in front.
+    /// Depth; the smaller one is in front.
     pub depth: f64,
-    /// Rows: of the column and of the row, by easting, northing and height; pixels per metre.
+    /// Derivatives of column (first) and row (second) by easting, northing and height, pixels per
+    /// metre.
     pub jacobian: [[f64; 3]; 2],
 }
 
-/// What splats can be rendered through.
+/// A camera that splats can be rendered through.
 pub trait SplatCamera: Sync {
     /// Columns and rows of the image.
     fn size(&self) -> (usize, usize);
 
-    /// Variance that a pixel adds to what it sees, px²: what viewers of 3DGS add.
+    /// Variance that a pixel adds to the covariance of a splat, px². The default is that of 3DGS
+    /// viewers.
     fn low_pass_px2(&self) -> f64 {
         LOW_PASS_PX2
     }
 
-    /// Where local positions are in the image; `None` for what the camera cannot see.
+    /// Projects local positions into the image; `None` for positions that the camera cannot see.
     ///
     /// # Errors
-    /// PROJ that cannot be set up.
+    /// [`CrsError`] when PROJ cannot be set up.
     fn project(&self, positions: &[[f64; 3]]) -> Result<Vec<Option<Projection>>, CrsError>;
 }
 
@@ -63,13 +69,15 @@ pub struct RpcSplatCamera<'a> {
 }
 
 impl<'a> RpcSplatCamera<'a> {
-    /// The camera of an image of a size; the origin of local positions is on the map of `projection`, its height above the
-    /// ellipsoid. The line of sight is taken at the origin: over a scene it turns by less than orders in depth notice.
+    /// Creates the camera of an image. The origin of local positions is on the map of `projection`,
+    /// with its height above the ellipsoid. The line of sight at the origin orders splats by depth:
+    /// it hardly turns over a scene.
     ///
-    /// Returns `None` where the camera has no line of sight at the origin: the image is of another place.
+    /// Returns `None` where the camera has no line of sight at the origin, because the image shows
+    /// another place.
     ///
     /// # Errors
-    /// An origin outside the projection.
+    /// [`CrsError`] for an origin outside of the projection.
     pub fn new(
         camera: &'a RpcCamera,
         projection: &'a MapProjection,
@@ -79,7 +87,7 @@ impl<'a> RpcSplatCamera<'a> {
         let mut made = Self { camera, projection, origin, size, towards_sensor: [0.0, 0.0, 1.0] };
         let Some(Some(here)) = made.project(&[[0.0; 3]])?.pop() else { return Ok(None) };
         let [[a, b, c], [d, e, f]] = here.jacobian;
-        // The direction that does not move the image.
+        // The direction along which the position in the image does not change.
         let across = [b * f - c * e, c * d - a * f, a * e - b * d];
         let length = across.iter().map(|x| x * x).sum::<f64>().sqrt();
         if !(across[2].abs() > 1e-6 * length && length.is_finite()) {
@@ -94,10 +102,10 @@ impl<'a> RpcSplatCamera<'a> {
         self.towards_sensor
     }
 
-    /// Pixels of local positions; NaN where there is none.
+    /// Returns the pixels of local positions; NaN for positions without a pixel.
     ///
     /// # Errors
-    /// PROJ that cannot be set up.
+    /// [`CrsError`] when PROJ cannot be set up.
     pub fn pixels(&self, positions: impl Iterator<Item = [f64; 3]>) -> Result<Vec<[f64; 2]>, CrsError> {
         let (mut x, mut y, mut h) = (Vec::new(), Vec::new(), Vec::new());
         for p in positions {
@@ -144,14 +152,15 @@ impl SplatCamera for RpcSplatCamera<'_> {
 /// A perspective camera whose world is the local frame.
 #[derive(Debug, Clone, Copy)]
 pub struct LensSplatCamera<'a> {
-    /// Its inside.
+    /// Inner geometry of the camera.
     pub lens: &'a Lens,
-    /// Where it is, in local metres.
+    /// Pose of the camera in the local frame, metres.
     pub pose: &'a Pose,
 }
 
 impl LensSplatCamera<'_> {
-    /// Least and greatest column and row of the image plane at distance 1 where the lens is taken at its word.
+    /// Least and greatest coordinates in the image plane at distance 1 between which the lens is
+    /// used as it is.
     fn word(&self) -> [[f64; 2]; 2] {
         let (width, height) = (self.lens.width() as f64 - 1.0, self.lens.height() as f64 - 1.0);
         let rim = [0.0, 0.5, 1.0].map(|t| [[t, 0.0], [t, 1.0], [0.0, t], [1.0, t]]).into_iter().flatten();
@@ -160,7 +169,7 @@ impl LensSplatCamera<'_> {
         let [u, v] = seen.fold(none, |range, at| [0, 1].map(|i| [range[i][0].min(at[i]), range[i][1].max(at[i])]));
         [u, v].map(|[low, high]| {
             let (middle, half) = (low + (high - low) / 2.0, BESIDE * (high - low) / 2.0);
-            // Without a rim that the lens knows there is no bound.
+            // A lens that cannot be inverted at the rim has no bound.
             if half >= 0.0 { [middle - half, middle + half] } else { [f64::NEG_INFINITY, f64::INFINITY] }
         })
     }
@@ -194,16 +203,16 @@ impl SplatCamera for LensSplatCamera<'_> {
     }
 }
 
-/// The map itself: straight from above, one pixel per cell of a surface.
+/// A view from straight above, with one pixel per cell of a surface.
 #[derive(Debug, Clone, Copy)]
 pub struct MapSplatCamera<'a> {
-    surface: Surface<'a>,
+    surface: SplatSurface<'a>,
     jacobian: [[f64; 3]; 2],
 }
 
 impl<'a> MapSplatCamera<'a> {
-    /// The camera over a surface; `None` where the geotransform has no inverse.
-    pub fn new(surface: &Surface<'a>) -> Option<Self> {
+    /// Creates the camera over a surface; `None` where the geotransform has no inverse.
+    pub fn new(surface: &SplatSurface<'a>) -> Option<Self> {
         let transform = surface.geotransform();
         let origin = surface.origin();
         let at = |x: f64, y: f64| transform.cell_from_map(origin[0] + x, origin[1] + y);
@@ -218,7 +227,7 @@ impl SplatCamera for MapSplatCamera<'_> {
         (self.surface.heights().width(), self.surface.heights().height())
     }
 
-    /// None: heights are read at the middles of cells.
+    /// Returns 0, because heights are read at the middles of cells.
     fn low_pass_px2(&self) -> f64 {
         0.0
     }

@@ -1,9 +1,10 @@
 //! Colours that render back to the images.
 //!
-//! A rendered pixel is linear in the colours, C = W c, with the weights of the front-to-back pass. The colours with the least
-//! squared residuals over the pixels of all views are approached by simultaneous iterations, c ← c + Wᵀ r / Wᵀ 1 (SIRT,
-//! Gilbert 1972; rows of W sum to 1 at most, so it converges). Residuals are clipped, so that a car or a glint in
-//! one view pulls no further than the clip, and pixels that show no splat's surface (walls, hidden ground) are left out.
+//! A rendered pixel is linear in the colours, C = W c, with the weights of the front-to-back pass.
+//! The colours with the least squared residuals over the pixels of all views are approached by
+//! simultaneous iterations, c ← c + Wᵀ r / Wᵀ 1 (SIRT, Gilbert 1972; rows of W sum to 1 at most, so
+//! it converges). Residuals are clipped, so that a car or a glint in one view pulls no further than
+//! the clip. Pixels that show no surface of a splat (walls, hidden ground) are left out.
 
 use crs::CrsError;
 use gaussian::Splat;
@@ -13,17 +14,17 @@ use super::SplatCamera;
 use super::pass::{Arrangement, TILE_PIXELS, Tile};
 use super::render::{Rendering, render_arranged};
 
-/// How colours are fitted.
+/// Settings of the colour fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColourFit {
-    /// Rounds of the iteration.
+    /// Number of iterations.
     pub rounds: usize,
-    /// Residuals are clipped here, in parts of the display range.
+    /// Largest residual, as a share of the display range; larger ones are clipped.
     pub clip: f32,
 }
 
 impl Default for ColourFit {
-    /// Sixteen rounds, a tenth of the range.
+    /// Sixteen iterations, a clip at a tenth of the range.
     fn default() -> Self {
         Self { rounds: 16, clip: 0.1 }
     }
@@ -37,11 +38,11 @@ pub struct FitView<'a> {
 }
 
 impl<'a> FitView<'a> {
-    /// The view of splats through a camera. `image` is in the display range and as large as the camera's image, `use_pixel` says
-    /// which pixels count.
+    /// Creates the view of splats through a camera. `image` is in the display range and as large as
+    /// the image of the camera; `use_pixel` selects the pixels that count.
     ///
     /// # Errors
-    /// PROJ that cannot be set up.
+    /// [`CrsError`] when PROJ cannot be set up.
     pub fn new(
         splats: &[Splat],
         camera: &impl SplatCamera,
@@ -51,13 +52,14 @@ impl<'a> FitView<'a> {
         Ok(Self { arrangement: Arrangement::new(splats, camera)?, image, use_pixel })
     }
 
-    /// The splats as this view sees them.
+    /// Renders the splats as this view sees them.
     pub fn render(&self, splats: &[Splat]) -> Rendering {
         render_arranged(splats, &self.arrangement)
     }
 }
 
-/// Fits the colours of splats to views of them; their geometry stays as it was when the views were made.
+/// Fits the colours of splats to views of them. Their geometry must be the one that the views were
+/// created with.
 pub fn fit_colours(splats: &mut [Splat], views: &[FitView<'_>], fit: &ColourFit) {
     let mut change = vec![Change::default(); splats.len()];
     for _ in 0..fit.rounds {

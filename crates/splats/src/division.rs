@@ -1,22 +1,25 @@
-//! A surface cut into blocks, as large as bounds on height, colour and overhang allow.
+//! Division of a surface into blocks as large as bounds on height, colour and overhang allow.
 //!
-//! From squares of cells downwards, a rectangle that breaks a bound is cut in two where the squares of both parts (heights to
-//! their planes over the bound's square, colours to their means over theirs) are least; one that only hangs over lower ground is
-//! cut near the side that does, so that strips run along the edges of roofs. Single cells always pass. The result does not
-//! depend on the number of threads.
+//! The division begins with squares of cells. A rectangle that breaks the bound on heights or
+//! colours is cut in two where the sum of squares of both parts is least: squared distances of
+//! heights to their planes and of colours to their means, each over the square of its bound. A
+//! rectangle that only hangs over lower ground is cut near the side that does, so that strips run
+//! along the edges of roofs. Single cells always pass. The result does not depend on the number of
+//! threads.
 
 use raster::Grid;
 use rayon::prelude::*;
 
-use super::block::{Block, Fit, Plane, Rectangle, Sums, Tables};
+use super::block::{Fit, Plane, Rectangle, SplatBlock, Sums, Tables};
 use super::overhang::{self, Overhang};
 use super::surface::SLOPE_MAX;
-use super::{GaussianConfig, Surface};
+use super::{GaussianConfig, SplatSurface};
 
-/// Part of a block's cells' own overhang that the block may have, and part of its bound on heights.
+/// Overhang that a block may have: a share of the overhang of its cells taken alone, and a share of
+/// the bound on heights.
 const OVERHANG_OF_CELLS: f64 = 1.0;
 const OVERHANG_OF_BOUND: f64 = 0.5;
-/// What a void costs beside heights in one rectangle, in squares of the bound.
+/// Cost of a void in a rectangle that has heights too, in squares of the bound.
 const VOID_COST: f64 = 4.0;
 
 /// Bounds of the blocks.
@@ -24,7 +27,8 @@ const VOID_COST: f64 = 4.0;
 pub struct DivisionConfig {
     /// Largest distance of a height from the plane of its block, metres.
     pub error_m: f64,
-    /// Largest standard deviation of the colours of a block, in parts of the display range; infinite for geometry alone.
+    /// Largest standard deviation of the colours of a block, as a share of the display range;
+    /// infinite for geometry alone.
     pub colour_error: f64,
     /// Longest side of a block, cells.
     pub side_max: usize,
@@ -37,8 +41,19 @@ impl Default for DivisionConfig {
     }
 }
 
-/// Blocks of one size: squares of `side` cells with the plane of their heights, smaller where voids or the border cut them.
-pub fn uniform(surface: &Surface<'_>, side: usize) -> Vec<Block> {
+/// Divides a surface into squares of `side` cells on the plane of their heights, smaller at voids
+/// and at the border.
+///
+/// ```
+/// use raster::{GeoTransform, Grid};
+/// use splats::{SplatSurface, uniform};
+/// let heights = Grid::filled(6, 4, 12.5_f32);
+/// let geotransform = GeoTransform::north_up(500_000.0, 5_000_000.0, 1.0);
+/// let surface = SplatSurface::new(&heights, geotransform, [500_000.0, 5_000_000.0, 0.0]);
+/// let blocks = uniform(&surface, 2);
+/// assert_eq!((blocks.len(), blocks[0].cells()), (6, 4));
+/// ```
+pub fn uniform(surface: &SplatSurface<'_>, side: usize) -> Vec<SplatBlock> {
     let tiles = tiles(surface, side.max(1));
     let parts = tiles.par_iter().map(|&tile| {
         let tables = Tables::new(surface, None, tile);
@@ -50,8 +65,8 @@ pub fn uniform(surface: &Surface<'_>, side: usize) -> Vec<Block> {
     parts.collect::<Vec<_>>().concat()
 }
 
-/// A rectangle when all of it has heights, else its halves likewise.
-fn whole_parts(surface: &Surface<'_>, tables: &Tables, part: Rectangle, blocks: &mut Vec<Block>) {
+/// Adds a rectangle without voids as a block, and divides other rectangles into halves.
+fn whole_parts(surface: &SplatSurface<'_>, tables: &Tables, part: Rectangle, blocks: &mut Vec<SplatBlock>) {
     let sums = tables.over(part);
     if sums.with_height() == 0.0 {
         return;
@@ -65,8 +80,9 @@ fn whole_parts(surface: &Surface<'_>, tables: &Tables, part: Rectangle, blocks: 
     part.cut(along_columns, at).into_iter().for_each(|half| whole_parts(surface, tables, half, blocks));
 }
 
-/// A plane across a wall leans no more than a slope may: a block of a given size has no other choice.
-fn gentle(surface: &Surface<'_>, plane: Plane) -> Plane {
+/// Limits a plane across a wall to the steepest slope, because a block of a given size cannot avoid
+/// the wall.
+fn gentle(surface: &SplatSurface<'_>, plane: Plane) -> Plane {
     let (width, height) = surface.geotransform().cell_size();
     Plane {
         by_column_m: plane.by_column_m.clamp(-SLOPE_MAX * width, SLOPE_MAX * width),
@@ -75,13 +91,13 @@ fn gentle(surface: &Surface<'_>, plane: Plane) -> Plane {
     }
 }
 
-/// Cuts a surface into blocks within the bounds. `colours` are per cell, NaN where unknown.
+/// Divides a surface into blocks within the bounds. `colours` are per cell, NaN where unknown.
 pub fn divide(
-    surface: &Surface<'_>,
+    surface: &SplatSurface<'_>,
     colours: Option<&Grid<[f32; 3]>>,
     config: &DivisionConfig,
     gaussian: &GaussianConfig,
-) -> Vec<Block> {
+) -> Vec<SplatBlock> {
     let alone = overhang::of_cells(surface, gaussian, config.error_m);
     let tiles = tiles(surface, config.side_max.max(1));
     let parts = tiles.par_iter().map(|&tile| {
@@ -94,8 +110,8 @@ pub fn divide(
     parts.collect::<Vec<_>>().concat()
 }
 
-/// The grid in squares, row after row.
-fn tiles(surface: &Surface<'_>, side: usize) -> Vec<Rectangle> {
+/// Returns the squares of the grid, row after row.
+fn tiles(surface: &SplatSurface<'_>, side: usize) -> Vec<Rectangle> {
     let (width, height) = (surface.heights().width(), surface.heights().height());
     let rows = (0..height).step_by(side);
     let tile = |column: usize, row: usize| Rectangle {
@@ -108,7 +124,7 @@ fn tiles(surface: &Surface<'_>, side: usize) -> Vec<Rectangle> {
 }
 
 struct Division<'a> {
-    surface: &'a Surface<'a>,
+    surface: &'a SplatSurface<'a>,
     tables: Tables,
     config: &'a DivisionConfig,
     gaussian: &'a GaussianConfig,
@@ -116,7 +132,7 @@ struct Division<'a> {
 }
 
 impl Division<'_> {
-    fn take(&self, part: Rectangle, blocks: &mut Vec<Block>) {
+    fn take(&self, part: Rectangle, blocks: &mut Vec<SplatBlock>) {
         let sums = self.tables.over(part);
         if sums.with_height() == 0.0 {
             return;
@@ -145,8 +161,8 @@ impl Division<'_> {
         part.cut(along_columns, at).into_iter().for_each(|half| self.take(half, blocks));
     }
 
-    /// Whether heights and colours keep their bounds.
-    fn is_within(&self, part: Rectangle, sums: &Sums, fit: &Fit, block: &Block) -> bool {
+    /// Returns whether heights and colours keep their bounds.
+    fn is_within(&self, part: Rectangle, sums: &Sums, fit: &Fit, block: &SplatBlock) -> bool {
         let count = part.cells() as f64;
         let error = self.config.error_m;
         let (width, height) = self.surface.geotransform().cell_size();
@@ -163,8 +179,9 @@ impl Division<'_> {
         })
     }
 
-    /// Where to cut a block that hangs over lower ground; `None` when it hardly does.
-    fn cut_for_overhang(&self, block: &Block) -> Option<(bool, usize)> {
+    /// Returns where to cut a block that hangs over lower ground; `None` when the overhang is
+    /// within its bound.
+    fn cut_for_overhang(&self, block: &SplatBlock) -> Option<(bool, usize)> {
         let overhang = Overhang::of(self.surface, block, self.gaussian, self.config.error_m);
         let rows = block.row..block.row + block.height;
         let alone: f64 = rows
@@ -179,7 +196,7 @@ impl Division<'_> {
         let worst = overhang.worst();
         let side = if worst < 2 { block.width } else { block.height };
         if side == 1 {
-            // The strip is as narrow as it can be: it is too long for what lies beside it.
+            // The strip is one cell wide already, so it is cut across.
             let along_columns = block.width > 1;
             return Some((along_columns, if along_columns { block.width } else { block.height } / 2));
         }
@@ -187,7 +204,8 @@ impl Division<'_> {
         Some((worst < 2, if worst.is_multiple_of(2) { near } else { side - near }))
     }
 
-    /// The cut with the least squares in both parts, the one nearest to the middle where several are alike.
+    /// Returns the cut with the least squares in both parts, in a tie the cut nearest to the
+    /// middle.
     fn best_cut(&self, part: Rectangle) -> (bool, usize) {
         let mut best = (f64::INFINITY, false, 1);
         for (along_columns, side) in [(true, part.width), (false, part.height)] {
@@ -203,7 +221,7 @@ impl Division<'_> {
         (best.1 || part.height == 1, best.2)
     }
 
-    /// Squares in units of the bounds.
+    /// Returns the sum of squares of a part in units of the squared bounds.
     fn cost(&self, part: Rectangle) -> f64 {
         let sums = self.tables.over(part);
         let (heights, cells) = (sums.with_height(), part.cells() as f64);
@@ -229,8 +247,8 @@ mod tests {
     const NORTH_UP: GeoTransform = GeoTransform::north_up(0.0, 0.0, 0.5);
 
     /// Every cell with a height is in exactly one block, and within the bound of its plane.
-    fn check(heights: &Grid<f32>, colours: Option<&Grid<[f32; 3]>>, config: &DivisionConfig) -> Vec<Block> {
-        let surface = Surface::new(heights, NORTH_UP, [0.0; 3]);
+    fn check(heights: &Grid<f32>, colours: Option<&Grid<[f32; 3]>>, config: &DivisionConfig) -> Vec<SplatBlock> {
+        let surface = SplatSurface::new(heights, NORTH_UP, [0.0; 3]);
         let blocks = divide(&surface, colours, config, &GaussianConfig::default());
         let mut covered = heights.map(|_| 0);
         for block in &blocks {
@@ -287,9 +305,9 @@ mod tests {
     fn uniform_blocks_cover_what_has_heights() {
         let mut heights = house();
         heights[(3, 3)] = f32::NAN;
-        let surface = Surface::new(&heights, NORTH_UP, [0.0; 3]);
+        let surface = SplatSurface::new(&heights, NORTH_UP, [0.0; 3]);
         for side in [1, 2, 3, 5] {
-            let cells: usize = uniform(&surface, side).iter().map(Block::cells).sum();
+            let cells: usize = uniform(&surface, side).iter().map(SplatBlock::cells).sum();
             assert_eq!(cells, 4095, "{side}");
         }
         assert_eq!(uniform(&surface, 1).len(), 4095);

@@ -1,15 +1,17 @@
 //! The Gaussian of a block.
 //!
-//! The block's sides become tangents T₁, T₂ on its plane, and the covariance is k² (T₁ T₁ᵀ + T₂ T₂ᵀ) with k the spread; from above, its
-//! footprint is k sides along columns and rows whatever the slope. Tangents of a plane that slopes both ways are not at right
-//! angles, so the own axes are the eigenvectors within the plane. The third is the normal, with a small thickness.
+//! The sides of the block become tangents T₁, T₂ on its plane, and the covariance is k² (T₁ T₁ᵀ +
+//! T₂ T₂ᵀ) with k the spread. Seen from above, its standard deviations are k sides along columns
+//! and rows whatever the slope. Tangents of a plane that slopes both ways are not at right angles,
+//! so the axes of the Gaussian are the eigenvectors within the plane. The third axis is the normal,
+//! with a small thickness.
 
 use gaussian::{Splat, quaternion_of_axes};
 use numeric::vector::{cross, dot, norm};
 
-use super::{Block, Surface};
+use super::{SplatBlock, SplatSurface};
 
-/// How blocks become Gaussians.
+/// Shape and opacity of the Gaussians of blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussianConfig {
     /// Standard deviation in sides of the block.
@@ -18,29 +20,30 @@ pub struct GaussianConfig {
     pub thickness_m: f64,
     /// Opacity of a splat with full confidence.
     pub opacity_max: f64,
-    /// Opacity of a splat without any.
+    /// Opacity of a splat with zero confidence.
     pub opacity_min: f64,
 }
 
 impl Default for GaussianConfig {
-    /// Half a side: neighbours cross at 0.6 of their peak, and the corners between four are covered to 84 %.
+    /// A spread of half a side: neighbours cross at 0.6 of their peak, and the corners between four
+    /// are covered to 84 %.
     fn default() -> Self {
         Self { spread: 0.5, thickness_m: 0.02, opacity_max: 0.99, opacity_min: 0.3 }
     }
 }
 
 impl GaussianConfig {
-    /// The opacity of a confidence in 0 to 1; full where it is not known.
+    /// Returns the opacity of a confidence in 0 to 1; full opacity for NaN.
     pub fn opacity(&self, confidence: f64) -> f64 {
         let share = if confidence.is_finite() { confidence.clamp(0.0, 1.0) } else { 1.0 };
         self.opacity_min + (self.opacity_max - self.opacity_min) * share
     }
 }
 
-/// The splat of a block.
+/// Returns the splat of a block.
 pub fn splat_of_block(
-    surface: &Surface<'_>,
-    block: &Block,
+    surface: &SplatSurface<'_>,
+    block: &SplatBlock,
     colour: [f32; 3],
     confidence: f64,
     config: &GaussianConfig,
@@ -62,7 +65,8 @@ pub fn splat_of_block(
     }
 }
 
-/// Own axes (the normal upwards) and standard deviations along the first two, from two tangents.
+/// Returns the axes of a Gaussian (the third is the upward normal) and the standard deviations
+/// along the first two, from two tangents.
 fn own_axes(first: [f64; 3], second: [f64; 3]) -> ([[f64; 3]; 3], [f64; 2]) {
     let unit = |a: [f64; 3]| {
         let length = norm(a).max(f64::MIN_POSITIVE);
@@ -95,7 +99,8 @@ mod tests {
     use raster::{GeoTransform, Grid};
 
     proptest! {
-        /// The covariance from above is that of the block, and the normal that of the plane, for turned grids too.
+        /// The covariance from above is that of the block, and the normal that of the plane, for
+        /// turned grids too.
         #[test]
         fn the_gaussian_lies_on_its_block(
             slope in prop::array::uniform2(-1.0..1.0f64), width in 1..20usize, height in 1..20usize, turn in 0.0..6.3f64,
@@ -103,9 +108,9 @@ mod tests {
             let heights = Grid::filled(32, 32, 0.0f32);
             let (s, c) = turn.sin_cos();
             let transform = GeoTransform([10.0, 0.5 * c, 0.5 * s, 20.0, 0.5 * s, -0.5 * c]);
-            let surface = Surface::new(&heights, transform, [10.0, 20.0, 0.0]);
+            let surface = SplatSurface::new(&heights, transform, [10.0, 20.0, 0.0]);
             let plane = Plane { middle_m: 3.0, by_column_m: 0.5 * slope[0], by_row_m: 0.5 * slope[1] };
-            let block = Block { column: 2, row: 3, width, height, plane };
+            let block = SplatBlock { column: 2, row: 3, width, height, plane };
             let config = GaussianConfig::default();
             let splat = splat_of_block(&surface, &block, [0.5; 3], 1.0, &config);
             prop_assert!(splat.validate().is_ok());

@@ -1,14 +1,20 @@
-//! Satellite splats: the Gaussians G = {μ, S, R, C, α} of a surface model and its images (SkySplat), as few as an error bound
-//! allows.
+//! Satellite splats: the Gaussians G = {μ, S, R, C, α} of a surface model and its images
+//! (SkySplat), as few as an error bound allows.
 //!
-//! - [`Surface`] gives cells of a surface model positions in metres from a local origin (map axes: easting, northing, height).
-//! - [`divide`] cuts the surface into rectangular blocks of cells. A block becomes one splat when every height in it is
-//!   within a bound of its plane, its colours are within a bound of their mean, and its Gaussian does not hang over lower
-//!   ground beside it. A flat roof is a few dozen blocks, a tree keeps its many.
-//! - [`splat_of_block`] makes the Gaussian: centre on the plane, tangents along the block, normal of the plane.
-//! - [`render`] composites splats front to back through any [`SplatCamera`]: RPC, perspective, or straight from above.
-//! - [`fit_colours`] finds the colours that render back to the images, robustly and over all views that see a splat.
-//! - [`make_splats`] does all of it and measures the result; [`picture_splats`] does with a picture on the surface's own grid.
+//! - [`SplatSurface`] gives the cells of a surface model positions in metres from a local origin
+//!   (map axes: easting, northing, height).
+//! - [`divide`] cuts the surface into rectangular blocks of cells. A block becomes one splat when
+//!   every height in it is within a bound of its plane, its colours are within a bound of their
+//!   mean, and its Gaussian does not hang over lower ground beside it. A flat roof becomes a few
+//!   dozen blocks, a tree many.
+//! - [`splat_of_block`] makes the Gaussian: centre on the plane, tangents along the block, normal
+//!   of the plane.
+//! - [`render`] composites splats front to back through any [`SplatCamera`]: RPC, perspective, or
+//!   straight from above.
+//! - [`fit_colours`] finds the colours that render back to the images, robustly and over all views
+//!   that see a splat.
+//! - [`make_splats`] does all of this and measures the result. [`picture_splats`] does it for a
+//!   picture on the grid of the surface.
 
 mod block;
 mod camera;
@@ -24,7 +30,7 @@ mod scene;
 mod sight;
 mod surface;
 
-pub use block::{Block, Plane};
+pub use block::{Plane, SplatBlock};
 pub use camera::{LensSplatCamera, MapSplatCamera, Projection, RpcSplatCamera, SplatCamera};
 pub use colour::{ColourFit, FitView, fit_colours};
 pub use division::{DivisionConfig, divide, uniform};
@@ -34,4 +40,4 @@ pub use quality::{HeightErrors, height_errors, psnr_db, ssim};
 pub use render::{Rendering, render};
 pub use scene::{CurvePoint, SplatConfig, SplatError, SplatReport, SplatScene, SplatView, ViewReport, make_splats};
 pub use sight::{visible_cells, visible_pixels};
-pub use surface::Surface;
+pub use surface::SplatSurface;

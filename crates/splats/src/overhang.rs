@@ -1,21 +1,24 @@
-//! What a block's Gaussian covers beside the block: where the surface there is lower, the splat hangs over it and is seen instead.
+//! The overhang of a block: its Gaussian reaches beyond the block, and where the surface there is
+//! lower, it hides it.
 //!
-//! The harm is Σ α² d² over the cells outside the block, with α the Gaussian's opacity there and d how far its plane is above
-//! the surface: the squared height error that the overhang would make if nothing else were in front. Single cells have it too,
-//! so a block is measured against its own cells taken one by one. Higher surfaces beside the block hide it and do not count.
+//! The harm is Σ α² d² over the cells outside the block, with α the opacity of the Gaussian there
+//! and d the height of its plane above the surface. This is the squared height error of the
+//! overhang if nothing else were in front. Single cells overhang too, so a block is compared with
+//! its own cells taken one by one. Higher surfaces beside the block hide the overhang and do not
+//! count.
 
 use raster::Grid;
 use rayon::prelude::*;
 
-use super::block::{Block, Plane};
-use super::{GaussianConfig, Surface};
+use super::block::{Plane, SplatBlock};
+use super::{GaussianConfig, SplatSurface};
 
-/// Opacity is looked at up to this many standard deviations.
+/// Distance up to which opacity counts, standard deviations.
 const REACH: f64 = 3.0;
 /// Samples per standard deviation along an axis of a large block.
 const SAMPLES: f64 = 4.0;
 
-/// Harm beyond each side of a block, m² cells.
+/// Harm beyond each side of a block, m² · cells.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Overhang {
     /// Beyond the first column, the last column, the first row, the last row.
@@ -32,8 +35,13 @@ impl Overhang {
         (1..4).fold(0, |worst, side| if self.sides[side] > self.sides[worst] { side } else { worst })
     }
 
-    /// The overhang of a block. Depths below `tolerance_m` are no harm.
-    pub(super) fn of(surface: &Surface<'_>, block: &Block, gaussian: &GaussianConfig, tolerance_m: f64) -> Self {
+    /// Measures the overhang of a block. Depths below `tolerance_m` do no harm.
+    pub(super) fn of(
+        surface: &SplatSurface<'_>,
+        block: &SplatBlock,
+        gaussian: &GaussianConfig,
+        tolerance_m: f64,
+    ) -> Self {
         let [column, row] = block.middle();
         let sigma = [block.width, block.height].map(|side| gaussian.spread * side as f64);
         let step = sigma.map(|s| (s / SAMPLES).floor().max(1.0));
@@ -45,7 +53,7 @@ impl Overhang {
         let mut overhang = Self::default();
         for r in range(row, sigma[1], step[1]) {
             for c in range(column, sigma[0], step[0]) {
-                // Middles of even blocks lie between cells: the nearer cell stands for the place.
+                // Middles of even blocks lie between cells: the nearer cell is used.
                 let cell = [c.floor() as i64, r.floor() as i64];
                 let Some(side) = side_of(block, cell) else { continue };
                 let d = [cell[0] as f64 - column, cell[1] as f64 - row];
@@ -60,8 +68,8 @@ impl Overhang {
     }
 }
 
-/// Which side of the block a cell is beyond; `None` inside.
-fn side_of(block: &Block, [column, row]: [i64; 2]) -> Option<usize> {
+/// Returns the side of the block that a cell is beyond; `None` inside the block.
+fn side_of(block: &SplatBlock, [column, row]: [i64; 2]) -> Option<usize> {
     let beyond = [
         block.column as i64 - column,
         column - (block.column + block.width) as i64 + 1,
@@ -73,8 +81,8 @@ fn side_of(block: &Block, [column, row]: [i64; 2]) -> Option<usize> {
     (beyond[side] > 0).then_some(side)
 }
 
-/// The overhang of every cell taken alone.
-pub(super) fn of_cells(surface: &Surface<'_>, gaussian: &GaussianConfig, tolerance_m: f64) -> Grid<f32> {
+/// Measures the overhang of every cell taken alone.
+pub(super) fn of_cells(surface: &SplatSurface<'_>, gaussian: &GaussianConfig, tolerance_m: f64) -> Grid<f32> {
     let heights = surface.heights();
     let mut harm = Grid::filled(heights.width(), heights.height(), 0.0);
     if heights.width() > 0 {
@@ -84,7 +92,7 @@ pub(super) fn of_cells(surface: &Surface<'_>, gaussian: &GaussianConfig, toleran
                 if middle_m.is_finite() {
                     let [by_column_m, by_row_m] = surface.slope(column, row);
                     let plane = Plane { middle_m, by_column_m, by_row_m };
-                    let block = Block { column, row, width: 1, height: 1, plane };
+                    let block = SplatBlock { column, row, width: 1, height: 1, plane };
                     *cell = Overhang::of(surface, &block, gaussian, tolerance_m).total() as f32;
                 }
             }
@@ -102,9 +110,9 @@ mod tests {
     fn a_roof_hangs_over_the_street_and_the_street_over_nothing() {
         // A roof of 4 columns beside a street of 4.
         let heights = Grid::from_vec(8, 4, (0..32).map(|i| if i % 8 < 4 { 10.0 } else { 0.0 }).collect()).unwrap();
-        let surface = Surface::new(&heights, GeoTransform::north_up(0.0, 0.0, 1.0), [0.0; 3]);
+        let surface = SplatSurface::new(&heights, GeoTransform::north_up(0.0, 0.0, 1.0), [0.0; 3]);
         let gaussian = GaussianConfig::default();
-        let block = |column, middle_m| Block {
+        let block = |column, middle_m| SplatBlock {
             column,
             row: 0,
             width: 4,

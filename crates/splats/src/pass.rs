@@ -1,9 +1,10 @@
-//! The front-to-back pass over the tiles of an image: which splat has which weight in which pixel.
+//! The front-to-back pass over the tiles of an image: the weight of each splat in each pixel.
 //!
-//! A splat's opacity at a pixel is α e^(−q/2) with q the squared distance in its image covariance J Σ Jᵀ + 0.3 px² (the low-pass
-//! of Kerbl et al. 2023, whose constants are kept: nothing below 1/255, at most 0.99, an end below a transmittance of
-//! 10⁻⁴). Its weight is the opacity times what the splats in front let through. Splats are ordered by depth, then by
-//! index; tiles are independent, so the result does not depend on the number of threads.
+//! A splat's opacity at a pixel is α e^(−q/2) with q the squared distance in its image covariance J
+//! Σ Jᵀ + 0.3 px² (the low-pass of Kerbl et al. 2023, whose constants are kept: nothing below
+//! 1/255, at most 0.99, an end below a transmittance of 10⁻⁴). Its weight is the opacity times the
+//! transmittance of the splats in front. Splats are ordered by depth, then by index. Tiles are
+//! independent, so the result does not depend on the number of threads.
 
 use crs::CrsError;
 use gaussian::Splat;
@@ -14,17 +15,17 @@ use super::camera::Projection;
 
 /// Side of a tile, pixels.
 pub(super) const TILE: usize = 16;
-/// Pixels of a tile.
+/// Number of pixels of a tile.
 pub(super) const TILE_PIXELS: usize = TILE * TILE;
 
-/// Least variance in the image, px²: a splat much smaller than a pixel is still found by one.
+/// Least variance in the image, px², so that a splat much smaller than a pixel still falls on one.
 const VARIANCE_MIN: f64 = 1e-3;
 const ALPHA_MIN: f32 = 1.0 / 255.0;
 const ALPHA_MAX: f32 = 0.99;
 const TRANSMITTANCE_MIN: f32 = 1e-4;
-/// A splat is seen edge-on when its tangents are this close to parallel in the image (sine of the angle).
+/// Sine of the angle between the tangents in the image below which a splat counts as seen edge-on.
 const EDGE_ON: f64 = 0.02;
-/// Splats projected at a time.
+/// Number of splats projected at a time.
 const CHUNK: usize = 4096;
 
 /// A splat in the image.
@@ -35,10 +36,11 @@ pub(super) struct Footprint {
     centre: [f32; 2],
     /// Inverse covariance: xx, xy, yy.
     conic: [f32; 3],
-    /// Half of its box, pixels.
+    /// Half of the size of its bounding box, pixels.
     half: [f32; 2],
     opacity: f32,
-    /// Local height of the centre, and its change per column and row on the plane of the splat, metres.
+    /// Local height of the centre, and its change per column and row on the plane of the splat,
+    /// metres.
     height: f32,
     slope: [f32; 2],
     depth: f64,
@@ -49,11 +51,11 @@ pub(super) struct Arrangement {
     width: usize,
     height: usize,
     footprints: Vec<Footprint>,
-    /// Per tile the footprints that touch it, front to back.
+    /// Footprints that touch each tile, front to back.
     tiles: Vec<Vec<u32>>,
 }
 
-/// One splat's part in one pixel.
+/// The part of one splat in one pixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Part {
     /// Pixel within the tile.
@@ -66,7 +68,7 @@ pub(super) struct Part {
 }
 
 impl Arrangement {
-    /// Projects splats, and sorts them into tiles.
+    /// Projects splats and sorts them into tiles.
     pub(super) fn new(splats: &[Splat], camera: &impl SplatCamera) -> Result<Self, CrsError> {
         let (width, height) = camera.size();
         let low_pass = camera.low_pass_px2().max(VARIANCE_MIN);
@@ -101,7 +103,7 @@ impl Arrangement {
         (self.width, self.height)
     }
 
-    /// Runs over all tiles in parallel; results in the order of the tiles.
+    /// Runs over all tiles in parallel and returns the results in the order of the tiles.
     pub(super) fn map_tiles<T: Send>(&self, run: impl Fn(&Tile<'_>) -> T + Sync) -> Vec<T> {
         let across = self.width.div_ceil(TILE);
         let tile = |(index, list): (usize, &Vec<u32>)| {
@@ -124,7 +126,7 @@ pub(super) struct Tile<'a> {
 }
 
 impl Tile<'_> {
-    /// The splats of the tile's list.
+    /// Splats of the tile's list.
     pub(super) fn splats(&self) -> impl Iterator<Item = u32> + '_ {
         self.list.iter().map(|&f| self.arrangement.footprints[f as usize].splat)
     }
@@ -134,12 +136,12 @@ impl Tile<'_> {
         self.list.len()
     }
 
-    /// The tile's pixels that are in the image: index within the tile, column, row.
+    /// Returns the pixels of the tile that are in the image: index within the tile, column, row.
     pub(super) fn pixels(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
         (0..self.rows).flat_map(move |r| (0..self.columns).map(move |c| (r * TILE + c, self.left + c, self.top + r)))
     }
 
-    /// All parts of splats in pixels, front to back in every pixel.
+    /// Returns all parts of splats in pixels, front to back in every pixel.
     pub(super) fn parts(&self, parts: &mut Vec<Part>) {
         parts.clear();
         let mut transmittance = [1.0f32; TILE_PIXELS];
@@ -191,11 +193,11 @@ impl Footprint {
     }
 }
 
-/// A splat in the image; `None` when it has no extent there.
+/// Returns the footprint of a splat in the image; `None` when it has no extent there.
 fn footprint(index: u32, splat: &Splat, seen: &Projection, low_pass: f64) -> Option<Footprint> {
     let axes = splat.axes();
     let j = &seen.jacobian;
-    // The own axes in the image, each as long as its standard deviation.
+    // The axes of the splat in the image, each as long as its standard deviation.
     let image = [0, 1, 2].map(|k| {
         let scale = f64::from(splat.scale_m[k]);
         [0, 1].map(|i| scale * (0..3).map(|a| j[i][a] * axes[k][a]).sum::<f64>())
@@ -206,7 +208,7 @@ fn footprint(index: u32, splat: &Splat, seen: &Projection, low_pass: f64) -> Opt
     if !(det > 0.0 && det.is_finite()) {
         return None;
     }
-    // Where the opacity falls below what counts.
+    // The distance at which the opacity falls below the least one that counts.
     let reach = (2.0 * (f64::from(splat.opacity) / f64::from(ALPHA_MIN)).ln()).max(0.0).sqrt();
     Some(Footprint {
         splat: index,
@@ -220,7 +222,8 @@ fn footprint(index: u32, splat: &Splat, seen: &Projection, low_pass: f64) -> Opt
     })
 }
 
-/// How the height of the splat's plane changes per column and row; none where it is seen edge-on.
+/// Returns the change of the height of the splat's plane per column and row; zero where the splat
+/// is seen edge-on.
 fn height_slope(splat: &Splat, axes: &[[f64; 3]; 3], image: &[[f64; 2]; 3]) -> [f64; 2] {
     let ([a, c], [b, d]) = (image[0], image[1]);
     let det = a * d - b * c;

@@ -1,19 +1,22 @@
-//! Splats of a surface and a picture on its own grid: one for each cell, as cross-view models predict them, or as few as bounds
-//! allow. A bird's-eye height map and the satellite tile over it are such a pair.
+//! Splats of a surface and a picture on its grid: one splat per cell, as cross-view models predict
+//! them, or as few as bounds allow. A bird's-eye height map and the satellite tile over it are such
+//! a pair.
 
 use gaussian::Splat;
 use raster::Grid;
 
 use super::scene::{check, display_range, displayed, first_splat};
-use super::{DivisionConfig, GaussianConfig, SplatConfig, SplatError, Surface, divide, uniform};
+use super::{DivisionConfig, GaussianConfig, SplatConfig, SplatError, SplatSurface, divide, uniform};
 
-/// Makes splats of a surface. `picture` (red, green, blue in 0 to 1, NaN where there is none) and `confidence` (0 to 1) are per
-/// cell; without a colour splats are middle grey. One splat for each cell, or as few as `merged` allows.
+/// Makes splats of a surface: one per cell, or as few as `merged` allows. `picture` (red, green,
+/// blue in 0 to 1, NaN where unknown) and `confidence` (0 to 1) are per cell. Splats without a
+/// colour are middle grey.
 ///
 /// # Errors
-/// A surface without heights, a bound that is not positive, a picture or a confidence of another size.
+/// [`SplatError::NoHeights`], [`SplatError::Bound`], and [`SplatError::Size`] for a picture or
+/// confidence of another size.
 pub fn picture_splats(
-    surface: &Surface<'_>,
+    surface: &SplatSurface<'_>,
     picture: Option<&Grid<[f32; 3]>>,
     confidence: Option<&Grid<f32>>,
     merged: Option<DivisionConfig>,
@@ -34,7 +37,8 @@ pub fn picture_splats(
     Ok(blocks.iter().map(|block| first_splat(surface, block, &colours, confidence, &gaussian)).collect())
 }
 
-/// A picture in units of its own brought to 0 to 1: without the extreme quarter of a percent of its values on either side.
+/// Brings a picture in units of its own to 0 to 1, with the extreme quarter of a percent of its
+/// values clipped on each side.
 pub fn stretched(picture: &Grid<[f32; 3]>) -> Grid<[f32; 3]> {
     let range = display_range(picture);
     picture.map(|colour| displayed(*colour, &range).map(|c| c.clamp(0.0, 1.0)))
@@ -49,7 +53,7 @@ mod tests {
     fn cells_become_splats_with_their_own_colours() {
         let mut heights = Grid::filled(8, 8, 5.0_f32);
         heights[(3, 4)] = f32::NAN;
-        let surface = Surface::new(&heights, GeoTransform::north_up(100.0, 200.0, 0.5), [100.0, 200.0, 1.0]);
+        let surface = SplatSurface::new(&heights, GeoTransform::north_up(100.0, 200.0, 0.5), [100.0, 200.0, 1.0]);
         let picture = Grid::from_vec(8, 8, (0..64).map(|i| [i as f32 / 64.0, 0.5, 1.0]).collect()).unwrap();
         let splats = picture_splats(&surface, Some(&picture), None, None).unwrap();
         assert_eq!(splats.len(), 63);
@@ -63,7 +67,7 @@ mod tests {
     #[test]
     fn level_ground_of_one_colour_takes_few() {
         let heights = Grid::filled(64, 64, 5.0_f32);
-        let surface = Surface::new(&heights, GeoTransform::north_up(100.0, 200.0, 0.5), [100.0, 200.0, 1.0]);
+        let surface = SplatSurface::new(&heights, GeoTransform::north_up(100.0, 200.0, 0.5), [100.0, 200.0, 1.0]);
         let picture = Grid::filled(64, 64, [0.2; 3]);
         let merged = picture_splats(&surface, Some(&picture), None, Some(DivisionConfig::default())).unwrap();
         assert!(merged.len() * 10 < 64 * 64, "{}", merged.len());

@@ -1,7 +1,8 @@
-//! How well splats show what they were made of: PSNR and SSIM against an image, height errors against a surface.
+//! Quality of splats: PSNR and SSIM against an image, height errors against a surface.
 //!
-//! PSNR = −10 log₁₀ (mean squared error) for images in [0, 1]. SSIM (Wang et al. 2004) uses Gaussian windows of 11 px, σ 1.5 px, and
-//! the constants 0.01² and 0.03², on the mean of the channels; pixels that do not count have no weight in any window.
+//! PSNR = −10 log₁₀ (mean squared error) for images in [0, 1]. SSIM (Wang et al. 2004) uses
+//! Gaussian windows of 11 px, σ 1.5 px, and the constants 0.01² and 0.03², on the mean of the
+//! channels. Pixels that do not count have no weight in any window.
 
 use numeric::upper_median;
 use raster::Grid;
@@ -15,19 +16,20 @@ const C2: f64 = 9e-4;
 /// Errors of rendered heights, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeightErrors {
-    /// Cells compared.
+    /// Number of cells compared.
     pub cells: usize,
-    /// Root mean square.
+    /// Root mean square error.
     pub rmse_m: f64,
-    /// Mean size.
+    /// Mean absolute error.
     pub mae_m: f64,
-    /// Median size.
+    /// Median absolute error.
     pub median_m: f64,
     /// Share of the surface's cells that have a rendered height.
     pub share: f64,
 }
 
-/// Errors of heights against those of a surface, both with NaN where there are none; `None` without a common cell.
+/// Compares rendered heights with the heights of a surface, both with NaN for voids. Returns `None`
+/// without a common cell.
 pub fn height_errors(found: &Grid<f32>, truth: &Grid<f32>, truth_minus_found_m: f64) -> Option<HeightErrors> {
     let there = truth.data().iter().filter(|z| z.is_finite()).count();
     let pairs = found.data().iter().zip(truth.data());
@@ -42,7 +44,15 @@ pub fn height_errors(found: &Grid<f32>, truth: &Grid<f32>, truth_minus_found_m: 
     Some(HeightErrors { cells: sizes.len(), rmse_m, mae_m, median_m, share: count / there as f64 })
 }
 
-/// Peak signal-to-noise ratio of two images in [0, 1] over the pixels that count, decibels; `None` when none does.
+/// Returns the peak signal-to-noise ratio of two images in [0, 1] over the pixels that count,
+/// decibels; `None` when no pixel counts.
+///
+/// ```
+/// use raster::Grid;
+/// let (a, b) = (Grid::filled(4, 4, [0.5_f32; 3]), Grid::filled(4, 4, [0.6_f32; 3]));
+/// let psnr = splats::psnr_db(&a, &b, &Grid::filled(4, 4, true)).expect("all pixels count");
+/// assert!((psnr - 20.0).abs() < 1e-4);
+/// ```
 pub fn psnr_db(a: &Grid<[f32; 3]>, b: &Grid<[f32; 3]>, counts: &Grid<bool>) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0usize);
     for ((a, b), _) in a.data().iter().zip(b.data()).zip(counts.data()).filter(|(_, counts)| **counts) {
@@ -51,11 +61,12 @@ pub fn psnr_db(a: &Grid<[f32; 3]>, b: &Grid<[f32; 3]>, counts: &Grid<bool>) -> O
             count += 1;
         }
     }
-    // Equal images have no noise at all: what f32 can tell is reported.
+    // Equal images have no noise, so the error is limited to the resolution of f32.
     (count > 0).then(|| -10.0 * (sum / count as f64).max(1e-14).log10())
 }
 
-/// Structural similarity of two images in [0, 1], mean over the pixels that count; `None` when none does.
+/// Returns the structural similarity of two images in [0, 1], averaged over the pixels that count;
+/// `None` when none counts.
 pub fn ssim(a: &Grid<[f32; 3]>, b: &Grid<[f32; 3]>, counts: &Grid<bool>) -> Option<f64> {
     let grey = |p: &[f32; 3]| p.iter().map(|c| f64::from(c.clamp(0.0, 1.0))).sum::<f64>() / 3.0;
     let zip = a.data().iter().zip(b.data()).zip(counts.data());

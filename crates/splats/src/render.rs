@@ -1,7 +1,8 @@
-//! Splats as an image: C = Σ cᵢ wᵢ with wᵢ = αᵢ Πⱼ₍ᵢ₎ (1 − αⱼ), front to back.
+//! Rendering of splats: C = Σ cᵢ wᵢ with wᵢ = αᵢ Πⱼ₍ᵢ₎ (1 − αⱼ), front to back.
 //!
-//! Heights are those of the splats' planes on the pixel's ray: the mean by weight, and the median, where the accumulated weight
-//! passes one half (as surfaces are read out of 2DGS).
+//! The heights of a pixel are the heights of the splats' planes on its ray: their mean by weight,
+//! and their median, where the accumulated weight passes one half (as surfaces are read out of
+//! 2DGS).
 
 use crs::CrsError;
 use gaussian::Splat;
@@ -15,7 +16,7 @@ use super::pass::{Arrangement, TILE_PIXELS, Tile};
 pub struct Rendering {
     /// Colours over black.
     pub colour: Grid<[f32; 3]>,
-    /// Accumulated weight Σ wᵢ: 1 where nothing behind the splats is seen.
+    /// Accumulated weight Σ wᵢ, 1 where the splats hide everything behind them.
     pub coverage: Grid<f32>,
     /// Mean local height by weight, metres; NaN where there is no splat.
     pub mean_height_m: Grid<f32>,
@@ -26,7 +27,7 @@ pub struct Rendering {
 /// Renders splats through a camera.
 ///
 /// # Errors
-/// PROJ that cannot be set up.
+/// [`CrsError`] when PROJ cannot be set up.
 pub fn render(splats: &[Splat], camera: &impl SplatCamera) -> Result<Rendering, CrsError> {
     Ok(render_arranged(splats, &Arrangement::new(splats, camera)?))
 }
@@ -81,7 +82,7 @@ fn render_tile(splats: &[Splat], tile: &Tile<'_>) -> Vec<(usize, usize, Pixel)> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LensSplatCamera, MapSplatCamera, Surface};
+    use crate::{LensSplatCamera, MapSplatCamera, SplatSurface};
     use camera::{Lens, LensModel, Pose};
     use raster::GeoTransform;
 
@@ -93,7 +94,7 @@ mod tests {
     #[test]
     fn the_upper_splat_covers_the_lower_one() {
         let heights = Grid::filled(21, 21, 0.0f32);
-        let surface = Surface::new(&heights, GeoTransform::north_up(0.0, 21.0, 1.0), [0.0; 3]);
+        let surface = SplatSurface::new(&heights, GeoTransform::north_up(0.0, 21.0, 1.0), [0.0; 3]);
         let camera = MapSplatCamera::new(&surface).unwrap();
         let splats =
             [disc([10.5, 10.5, 2.0], 2.0, [0.0, 1.0, 0.0], 0.9), disc([12.5, 10.5, 5.0], 3.0, [1.0, 0.0, 0.0], 0.6)];
@@ -116,7 +117,7 @@ mod tests {
     #[test]
     fn a_leaning_disc_has_the_heights_of_its_plane() {
         let heights = Grid::filled(21, 21, 0.0f32);
-        let surface = Surface::new(&heights, GeoTransform::north_up(0.0, 21.0, 1.0), [0.0; 3]);
+        let surface = SplatSurface::new(&heights, GeoTransform::north_up(0.0, 21.0, 1.0), [0.0; 3]);
         let half = (0.5f32 * 0.5f32.atan()).sin_cos();
         // Turned about north so that east rises by one half.
         let splat = Splat { rotation: [half.1, 0.0, -half.0, 0.0], ..disc([10.5, 10.5, 4.0], 3.0, [1.0; 3], 0.9) };
@@ -145,7 +146,7 @@ mod tests {
     #[test]
     fn threads_do_not_change_a_bit() {
         let heights = Grid::filled(70, 50, 0.0f32);
-        let surface = Surface::new(&heights, GeoTransform::north_up(0.0, 50.0, 1.0), [0.0; 3]);
+        let surface = SplatSurface::new(&heights, GeoTransform::north_up(0.0, 50.0, 1.0), [0.0; 3]);
         let camera = MapSplatCamera::new(&surface).unwrap();
         let random = |i: usize, k: usize| ((i * 7919 + k * 104_729) % 997) as f32 / 997.0;
         let splats: Vec<Splat> = (0..3000)

@@ -1,9 +1,10 @@
-//! From a surface and its images to splats, with a report of count against error.
+//! Splats of a surface and its images, with a report of count against error.
 //!
-//! Cells that a view sees take its image's values; views are brought to the gain and offset of the view that sees most (median
-//! and interquartile range over the cells both see), and a cell's colour is the median of its views. The display range is
-//! that of the cells' colours without their extreme 0.25 %. Blocks are cut by heights and these colours, and the splats' colours
-//! are then fitted to the images themselves.
+//! Cells that a view sees take the values of its image. Views are brought to the gain and offset of
+//! the view that sees most (by median and interquartile range over the cells that both see), and
+//! the colour of a cell is the median of its views. The display range is the range of the cells'
+//! colours without their extreme 0.25 %. Blocks are divided by heights and these colours. The
+//! colours of the splats are then fitted to the images themselves.
 
 use crs::CrsError;
 use gaussian::Splat;
@@ -13,27 +14,28 @@ use serde::Serialize;
 
 use super::colour::FitView;
 use super::{
-    Block, ColourFit, DivisionConfig, GaussianConfig, HeightErrors, MapSplatCamera, Rendering, RpcSplatCamera, Surface,
-    divide, fit_colours, height_errors, psnr_db, render, splat_of_block, ssim, uniform, visible_cells, visible_pixels,
+    ColourFit, DivisionConfig, GaussianConfig, HeightErrors, MapSplatCamera, Rendering, RpcSplatCamera, SplatBlock,
+    SplatSurface, divide, fit_colours, height_errors, psnr_db, render, splat_of_block, ssim, uniform, visible_cells,
+    visible_pixels,
 };
 
-/// Share of the cells' colours that is left out at each end of the display range.
+/// Share of the cells' colours that is clipped at each end of the display range.
 const TAIL: f64 = 0.0025;
-/// Sides of the uniform splats that the count is compared with, cells.
+/// Sides of the uniform splats for comparison, cells.
 const CURVE_SIDES: [usize; 6] = [1, 2, 3, 4, 6, 8];
 
-/// How splats are made.
+/// Settings of the splats.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SplatConfig {
     /// Bounds of the blocks.
     pub division: DivisionConfig,
-    /// From blocks to Gaussians.
+    /// Shape and opacity of the Gaussians.
     pub gaussian: GaussianConfig,
-    /// From images to colours.
+    /// Settings of the colour fit.
     pub colour: ColourFit,
-    /// Squares of this many cells instead of blocks under bounds.
+    /// Side of square splats, cells, instead of blocks under bounds.
     pub uniform_side: Option<usize>,
-    /// Also measure uniform splats of several sizes.
+    /// Whether uniform splats of several sizes are measured for comparison.
     pub compare: bool,
 }
 
@@ -42,55 +44,55 @@ pub struct SplatConfig {
 pub struct SplatView<'a> {
     /// Its camera.
     pub camera: RpcSplatCamera<'a>,
-    /// Red, green, blue in the image's own units, NaN where there is no value.
+    /// Red, green, blue in the image's own units, NaN where unknown.
     pub image: &'a Grid<[f32; 3]>,
 }
 
-/// Splats and what is known of them.
+/// Splats with their blocks, renderings and report.
 #[derive(Debug, Clone)]
 pub struct SplatScene {
     /// The splats, metres from the surface's origin.
     pub splats: Vec<Splat>,
     /// The block of each splat.
-    pub blocks: Vec<Block>,
-    /// Per image the splats as it sees them, in the display range.
+    pub blocks: Vec<SplatBlock>,
+    /// The splats as each image sees them, in the display range.
     pub renderings: Vec<Grid<[f32; 3]>>,
-    /// Numbers.
+    /// Count and errors.
     pub report: SplatReport,
 }
 
-/// Count against error.
+/// Count and errors of splats.
 #[derive(Debug, Clone, Serialize)]
 pub struct SplatReport {
-    /// Cells with a height: as many as one splat per cell would be.
+    /// Number of cells with a height.
     pub cells: usize,
-    /// Splats made.
+    /// Number of splats.
     pub splats: usize,
     /// Largest distance of a height from the plane of its splat, metres.
     pub plane_error_max_m: f64,
-    /// Heights rendered straight from above against the surface: mean by weight.
+    /// Errors of the heights rendered from above, as the mean by weight.
     pub mean_height: Option<HeightErrors>,
-    /// … and at half of the weight.
+    /// Errors of the heights rendered from above, at half of the weight.
     pub median_height: Option<HeightErrors>,
-    /// What 0 and 1 of the display range are in the reference image's units, per channel.
+    /// Values of the reference image at 0 and 1 of the display range, per channel.
     pub display_range: [[f32; 2]; 3],
-    /// Per image how well the splats render back into it.
+    /// How well the splats render back into each image.
     pub views: Vec<ViewReport>,
     /// Uniform splats of several sizes, when asked for.
     pub uniform: Vec<CurvePoint>,
-    /// Uniform splats needed for the same root mean square error of mean heights, when asked for: interpolated in the logarithms, at
-    /// most one per cell.
+    /// Number of uniform splats with the same root mean square error of mean heights, when asked
+    /// for: interpolated in the logarithms, at most one per cell.
     pub uniform_at_equal_rmse: Option<f64>,
 }
 
-/// One image.
+/// How well the splats render back into one image.
 #[derive(Debug, Clone, Serialize)]
 pub struct ViewReport {
     /// Share of the cells with a height that the view sees.
     pub seen: f64,
-    /// Pixels that show seen cells; the numbers below are over these.
+    /// Number of pixels that show seen cells; the numbers below are over these.
     pub pixels: usize,
-    /// Peak signal-to-noise ratio, decibels, peak 1 of the display range.
+    /// Peak signal-to-noise ratio, decibels; the peak is 1 of the display range.
     pub psnr_db: Option<f64>,
     /// Structural similarity.
     pub ssim: Option<f64>,
@@ -98,7 +100,7 @@ pub struct ViewReport {
     pub coverage: f64,
     /// Factor from this image's units to the reference's, per channel.
     pub gain: [f32; 3],
-    /// Offset, likewise.
+    /// Offset from this image's units to the reference's, per channel.
     pub offset: [f32; 3],
 }
 
@@ -107,47 +109,47 @@ pub struct ViewReport {
 pub struct CurvePoint {
     /// Side of the squares, cells.
     pub side: usize,
-    /// How many.
+    /// Number of splats.
     pub splats: usize,
     /// Root mean square error of mean heights, metres.
     pub rmse_m: f64,
 }
 
-/// Why no splats were made.
+/// Inputs that no splats can be made of.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SplatError {
-    /// Nothing to make splats of.
+    /// No cell of the surface has a height.
     #[error("the surface has no height: no splats can be made")]
     NoHeights,
-    /// A bound that bounds nothing.
+    /// A bound is not positive.
     #[error("{name} is {value}, expected a positive number")]
     Bound {
-        /// Which.
+        /// Name of the value.
         name: &'static str,
         /// Its value.
         value: f64,
     },
-    /// A grid beside the surface that is not on it.
+    /// A grid is not as large as the surface.
     #[error("{what} has {found:?} cells, the surface {expected:?}: both must lie on one grid")]
     Size {
-        /// Which.
+        /// Name of the value.
         what: &'static str,
-        /// Its columns and rows.
+        /// Columns and rows of the grid.
         found: (usize, usize),
-        /// The surface's.
+        /// Columns and rows of the surface.
         expected: (usize, usize),
     },
-    /// An image that shows nothing of the surface.
+    /// An image shows nothing of the surface.
     #[error("image {number} shows no cell of the surface: is it of another place?")]
     Elsewhere {
-        /// Its position in the list, from 1.
+        /// Position of the image in the list, from 1.
         number: usize,
     },
-    /// A geotransform without an inverse.
+    /// The geotransform has no inverse.
     #[error("the geotransform of the surface is singular")]
     Singular,
-    /// PROJ's words.
+    /// A coordinate conversion failed.
     #[error(transparent)]
     Geodesy(#[from] CrsError),
 }
@@ -155,9 +157,10 @@ pub enum SplatError {
 /// Makes splats of a surface and its images. `confidence` is per cell in 0 to 1, NaN where unknown.
 ///
 /// # Errors
-/// A surface without heights, a bound that is not positive, a confidence of another size, an image of another place.
+/// [`SplatError::NoHeights`], [`SplatError::Bound`], [`SplatError::Size`],
+/// [`SplatError::Elsewhere`].
 pub fn make_splats(
-    surface: &Surface<'_>,
+    surface: &SplatSurface<'_>,
     confidence: Option<&Grid<f32>>,
     views: &[SplatView<'_>],
     config: &SplatConfig,
@@ -206,7 +209,7 @@ pub fn make_splats(
 }
 
 pub(super) fn check(
-    surface: &Surface<'_>,
+    surface: &SplatSurface<'_>,
     confidence: Option<&Grid<f32>>,
     config: &SplatConfig,
 ) -> Result<(), SplatError> {
@@ -226,17 +229,17 @@ pub(super) fn check(
     }
 }
 
-/// What a view sees.
+/// Cells and pixels that a view sees.
 struct Seen {
     /// Values of the seen cells in the image's units, NaN elsewhere.
     values: Grid<[f32; 3]>,
     cells: usize,
-    /// Pixels that show them.
+    /// Pixels that show seen cells.
     shows: Grid<bool>,
 }
 
 impl Seen {
-    fn new(surface: &Surface<'_>, view: &SplatView<'_>) -> Result<Self, SplatError> {
+    fn new(surface: &SplatSurface<'_>, view: &SplatView<'_>) -> Result<Self, SplatError> {
         let visible = visible_cells(surface, view.camera.towards_sensor());
         let channels = [0, 1, 2].map(|i| view.image.map(|p| p[i]));
         let (width, height) = (visible.width(), visible.height());
@@ -263,7 +266,7 @@ impl Seen {
 
 type Balance = ([f32; 3], [f32; 3]);
 
-/// Gain and offset of every view that bring it to the one that sees most.
+/// Returns the gain and offset that bring every view to the view that sees most.
 fn balance(seen: &[Seen]) -> Vec<Balance> {
     let Some(reference) = seen.iter().enumerate().rev().max_by_key(|(_, s)| s.cells).map(|(i, _)| i) else {
         return Vec::new();
@@ -288,8 +291,9 @@ fn quartiles(values: &mut [f32]) -> Option<[f32; 3]> {
     (values.len() >= 8).then(|| [0.25, 0.5, 0.75].map(|share| nearest_quantile(values, share).unwrap_or(f32::NAN)))
 }
 
-/// The median over the views that see a cell, in the reference's units; NaN where none does.
-fn cell_colours(surface: &Surface<'_>, seen: &[Seen], balance: &[Balance]) -> Grid<[f32; 3]> {
+/// Returns the median over the views that see a cell, in the reference's units; NaN where no view
+/// sees it.
+fn cell_colours(surface: &SplatSurface<'_>, seen: &[Seen], balance: &[Balance]) -> Grid<[f32; 3]> {
     let (width, height) = (surface.heights().width(), surface.heights().height());
     let mut colours = Grid::filled(width, height, [f32::NAN; 3]);
     let mut values = Vec::with_capacity(seen.len());
@@ -322,10 +326,11 @@ pub(super) fn displayed(colour: [f32; 3], range: &[[f32; 2]; 3]) -> [f32; 3] {
     [0, 1, 2].map(|i| (colour[i] - range[i][0]) / (range[i][1] - range[i][0]))
 }
 
-/// The splat of a block with the mean of its cells' colours and confidences; middle grey where no view sees any.
+/// Returns the splat of a block with the mean of its cells' colours and confidences; middle grey
+/// where no view sees a cell.
 pub(super) fn first_splat(
-    surface: &Surface<'_>,
-    block: &Block,
+    surface: &SplatSurface<'_>,
+    block: &SplatBlock,
     colours: &Grid<[f32; 3]>,
     confidence: Option<&Grid<f32>>,
     config: &GaussianConfig,
@@ -350,8 +355,8 @@ pub(super) fn first_splat(
 }
 
 fn heights_report(
-    surface: &Surface<'_>,
-    blocks: &[Block],
+    surface: &SplatSurface<'_>,
+    blocks: &[SplatBlock],
     splats: &[Splat],
     config: &SplatConfig,
 ) -> Result<SplatReport, SplatError> {
@@ -382,7 +387,7 @@ fn heights_report(
     })
 }
 
-fn plane_error(surface: &Surface<'_>, block: &Block) -> f64 {
+fn plane_error(surface: &SplatSurface<'_>, block: &SplatBlock) -> f64 {
     let rows = block.row..block.row + block.height;
     let cells = rows.flat_map(|row| (block.column..block.column + block.width).map(move |column| (column, row)));
     let error = |(column, row): (usize, usize)| {
@@ -391,7 +396,7 @@ fn plane_error(surface: &Surface<'_>, block: &Block) -> f64 {
     cells.map(|cell| error(cell).abs()).fold(0.0, f64::max)
 }
 
-/// The number of uniform splats at an error, between the points of the curve.
+/// Returns the number of uniform splats at an error, interpolated between the points of the curve.
 fn count_at(curve: &[CurvePoint], rmse_m: f64) -> Option<f64> {
     let (first, last) = (curve.first()?, curve.last()?);
     if rmse_m <= first.rmse_m {

@@ -1,21 +1,24 @@
-//! Which cells of a surface a satellite sees, and which pixels show them.
+//! Cells of a surface that a satellite sees, and pixels that show them.
 //!
-//! A cell is seen when nothing of the surface ([`occlusion::Surface`]) stands in its line of sight. A pixel shows the surface when a seen cell, or a quarter of one, falls
-//! on it; walls and hidden ground have no such cell.
+//! A cell is seen when nothing of the surface stands in its line of sight (crate `occlusion`). A
+//! pixel shows the surface when a seen cell, or a quarter of one, falls on it. Pixels of walls and
+//! hidden ground have no such cell.
 
 use crs::CrsError;
 use raster::Grid;
 use rayon::prelude::*;
 
-use super::{RpcSplatCamera, SplatCamera, Surface};
+use super::{RpcSplatCamera, SplatCamera, SplatSurface};
 
-/// Surfaces up to this far above the line of sight do not hide: half a step of a rough surface.
+/// Height above the line of sight up to which a surface does not hide, metres: half a step of a
+/// rough surface.
 const TOLERANCE_M: f64 = 0.3;
-/// Positions along each side of a cell that are looked up in the image.
+/// Number of positions along each side of a cell that are projected into the image.
 const SUBCELLS: usize = 2;
 
-/// Which cells are seen from a direction (unit vector towards the sensor). Voids hide nothing and are not seen.
-pub fn visible_cells(surface: &Surface<'_>, towards_sensor: [f64; 3]) -> Grid<bool> {
+/// Returns the cells that are seen from a direction (unit vector towards the sensor). Voids hide
+/// nothing and are not seen.
+pub fn visible_cells(surface: &SplatSurface<'_>, towards_sensor: [f64; 3]) -> Grid<bool> {
     let heights = surface.heights();
     let mut seen = Grid::filled(heights.width(), heights.height(), false);
     let Some(per_metre) = cells_per_metre(surface, towards_sensor) else { return seen };
@@ -33,20 +36,21 @@ pub fn visible_cells(surface: &Surface<'_>, towards_sensor: [f64; 3]) -> Grid<bo
     seen
 }
 
-/// Columns and rows that the line of sight moves by for each metre that it rises; `None` when it does not.
-fn cells_per_metre(surface: &Surface<'_>, towards: [f64; 3]) -> Option<[f64; 2]> {
+/// Returns the columns and rows that the line of sight moves by per metre that it rises; `None`
+/// when it does not rise.
+fn cells_per_metre(surface: &SplatSurface<'_>, towards: [f64; 3]) -> Option<[f64; 2]> {
     let transform = surface.geotransform();
     let (x, y) = transform.map_from_cell(0.0, 0.0);
     let (column, row) = transform.cell_from_map(x + towards[0], y + towards[1])?;
     (towards[2] > 1e-6).then(|| [column / towards[2], row / towards[2]])
 }
 
-/// The pixels of an image that show seen cells.
+/// Returns the pixels of an image that show seen cells.
 ///
 /// # Errors
-/// PROJ that cannot be set up.
+/// [`CrsError`] when PROJ cannot be set up.
 pub fn visible_pixels(
-    surface: &Surface<'_>,
+    surface: &SplatSurface<'_>,
     seen: &Grid<bool>,
     camera: &RpcSplatCamera<'_>,
 ) -> Result<Grid<bool>, CrsError> {
@@ -84,7 +88,7 @@ mod tests {
         let mut heights = Grid::filled(40, 7, 0.0f32);
         (6..=10).for_each(|x| (2..=4).for_each(|y| heights[(x, y)] = 8.0));
         heights[(30, 3)] = f32::NAN;
-        let surface = Surface::new(&heights, GeoTransform::north_up(0.0, 0.0, 1.0), [0.0; 3]);
+        let surface = SplatSurface::new(&heights, GeoTransform::north_up(0.0, 0.0, 1.0), [0.0; 3]);
         // The sensor stands in the west at 45°: eight cells east of the tower are hidden.
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let seen = visible_cells(&surface, [-half, 0.0, half]);

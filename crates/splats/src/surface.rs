@@ -1,28 +1,31 @@
 //! A surface model as local positions: metres from an origin along the axes of its map.
 //!
-//! Slopes are differences to the neighbours, of the smaller size where both sides agree in sign and zero where they do not
-//! (minmod): a cell beside a wall belongs to the roof or to the street and does not lean on the wall.
+//! Slopes are differences to the neighbours: the smaller one where both sides agree in sign, zero
+//! where they do not (minmod). So a cell beside a wall belongs to the roof or to the street and
+//! does not lean on the wall.
 
 use raster::{GeoTransform, Grid};
 
-/// Steeper than this (metres per metre) is a wall between cells, not a slope.
+/// Slope above which a height difference is a wall between cells, metres per metre.
 pub(super) const SLOPE_MAX: f64 = 2.0;
 
-/// Heights on a map grid with the origin that local positions are counted from.
+/// Heights on a map grid, with the origin of local positions.
 #[derive(Debug, Clone, Copy)]
-pub struct Surface<'a> {
+pub struct SplatSurface<'a> {
     heights: &'a Grid<f32>,
     geotransform: GeoTransform,
     origin: [f64; 3],
 }
 
-impl<'a> Surface<'a> {
-    /// A surface on a map whose unit is the metre; NaN is no height. The origin is easting, northing and height.
+impl<'a> SplatSurface<'a> {
+    /// Creates a surface on a map whose unit is the metre. NaN marks a void. The origin is easting,
+    /// northing and height.
     pub fn new(heights: &'a Grid<f32>, geotransform: GeoTransform, origin: [f64; 3]) -> Self {
         Self { heights, geotransform, origin }
     }
 
-    /// A round origin in the middle of the grid, at its lowest height; `None` where there is no height.
+    /// Returns a rounded origin in the middle of the grid, at its lowest height; `None` for a grid
+    /// of voids.
     pub fn middle(heights: &Grid<f32>, geotransform: GeoTransform) -> Option<[f64; 3]> {
         let lowest = heights.data().iter().copied().filter(|h| h.is_finite()).reduce(f32::min)?;
         let middle = |cells: usize| (cells as f64 - 1.0) / 2.0;
@@ -30,7 +33,7 @@ impl<'a> Surface<'a> {
         Some([x.round(), y.round(), f64::from(lowest).floor()])
     }
 
-    /// The heights, as on the map.
+    /// Heights on the map, metres.
     pub fn heights(&self) -> &'a Grid<f32> {
         self.heights
     }
@@ -40,18 +43,18 @@ impl<'a> Surface<'a> {
         self.geotransform
     }
 
-    /// What local positions are counted from.
+    /// Origin of local positions: easting, northing, height.
     pub fn origin(&self) -> [f64; 3] {
         self.origin
     }
 
-    /// The local position of a (fractional) cell at a local height.
+    /// Returns the local position of a (fractional) cell at a local height.
     pub fn position(&self, column: f64, row: f64, local_height_m: f64) -> [f64; 3] {
         let (x, y) = self.geotransform.map_from_cell(column, row);
         [x - self.origin[0], y - self.origin[1], local_height_m]
     }
 
-    /// The local height of a cell; NaN outside the grid and where there is none.
+    /// Returns the local height of a cell; NaN outside the grid and in voids.
     pub fn local_height(&self, column: i64, row: i64) -> f64 {
         let at = usize::try_from(column).ok().zip(usize::try_from(row).ok());
         let height = at.and_then(|(column, row)| self.heights.get(column, row));
@@ -64,7 +67,7 @@ impl<'a> Surface<'a> {
         [[c[1], c[4]], [c[2], c[5]]]
     }
 
-    /// Rise per column and per row at a cell, metres, never steeper than a slope can be.
+    /// Rise per column and per row at a cell, metres, limited to the steepest slope.
     pub(super) fn slope(&self, column: usize, row: usize) -> [f64; 2] {
         let (c, r) = (column as i64, row as i64);
         let here = self.local_height(c, r);
@@ -101,12 +104,12 @@ mod tests {
     fn a_slope_is_kept_and_a_wall_is_not_leant_on() {
         // Columns rise by half a metre, then jump by ten.
         let heights = Grid::from_vec(6, 1, vec![0.0, 0.5, 1.0, 11.0, 11.5, f32::NAN]).unwrap();
-        let surface = Surface::new(&heights, GeoTransform::north_up(100.0, 50.0, 0.5), [100.0, 50.0, 0.0]);
+        let surface = SplatSurface::new(&heights, GeoTransform::north_up(100.0, 50.0, 0.5), [100.0, 50.0, 0.0]);
         let slopes: Vec<f64> = (0..5).map(|c| surface.slope(c, 0)[0]).collect();
         assert_eq!(slopes, [0.0, 0.5, 0.5, 0.5, 0.0]);
         assert_eq!(surface.position(0.0, 0.0, 3.0), [0.25, -0.25, 3.0]);
-        assert_eq!(Surface::middle(&heights, surface.geotransform()), Some([102.0, 50.0, 0.0]));
+        assert_eq!(SplatSurface::middle(&heights, surface.geotransform()), Some([102.0, 50.0, 0.0]));
         let void = Grid::filled(2, 2, f32::NAN);
-        assert_eq!(Surface::middle(&void, surface.geotransform()), None);
+        assert_eq!(SplatSurface::middle(&void, surface.geotransform()), None);
     }
 }

@@ -1,17 +1,20 @@
-//! What noise in GPS positions and headings does to an alignment.
+//! Sensitivity of an alignment to noise in GPS positions and headings.
 //!
-//! Translation noise of σ metres moves every world position by an independent normal deviate of σ along each axis, and the model is
-//! aligned anew; rotation noise of σ degrees turns the aligned model about the vertical through the middle of its cameras by
-//! one normal deviate, as a wrong heading does. The harness of Cross-View Splatter (Turkulainen et al. 2026): 1, 3, 5 m and
-//! 5, 10, 15°, five seeds, mean and standard deviation.
+//! Translation noise of σ metres moves every world position by an independent normal deviate of σ
+//! along each axis, and the model is aligned again. Rotation noise of σ degrees turns the aligned
+//! model about the vertical through the middle of its cameras by one normal deviate, as a wrong
+//! heading does. The protocol is that of Cross-View Splatter (Turkulainen et al. 2026): 1, 3, 5 m
+//! and 5, 10, 15°, five seeds, mean and standard deviation.
 
 use camera::Similarity;
 use serde::{Deserialize, Serialize};
 
-use super::{AlignConfig, AlignError, Alignment, PointPair, align};
+use super::error::AlignError;
+use super::robust::{AlignConfig, ModelAlignment, align};
+use super::umeyama::PointPair;
 use numeric::SplitMix64;
 
-/// Which noise, and how much.
+/// Kinds and amounts of noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseConfig {
@@ -19,12 +22,12 @@ pub struct NoiseConfig {
     pub translation_m: Vec<f64>,
     /// Standard deviations of the heading, degrees.
     pub rotation_deg: Vec<f64>,
-    /// Repetitions of each.
+    /// Repetitions of each level.
     pub seeds: u64,
 }
 
 impl Default for NoiseConfig {
-    /// The paper's.
+    /// The levels of the paper.
     fn default() -> Self {
         Self { translation_m: vec![1.0, 3.0, 5.0], rotation_deg: vec![5.0, 10.0, 15.0], seeds: 5 }
     }
@@ -34,9 +37,9 @@ impl Default for NoiseConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Disturbance {
-    /// Of every position, metres along each axis.
+    /// Standard deviation of every position, metres along each axis.
     TranslationM(f64),
-    /// Of the heading, degrees.
+    /// Standard deviation of the heading, degrees.
     RotationDeg(f64),
 }
 
@@ -49,40 +52,40 @@ pub struct MeanStd {
     pub std: f64,
 }
 
-/// How far alignments under one noise are from the one without.
+/// Differences between alignments under one noise and the alignment without noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseLevel {
     /// The noise.
     pub disturbance: Disturbance,
     /// Root mean square distance of the cameras, metres.
     pub position_m: MeanStd,
-    /// Angle of the rotation between the two, degrees.
+    /// Angle of the rotation between both, degrees.
     pub rotation_deg: MeanStd,
-    /// Size of the change of scale, percent.
+    /// Absolute change of scale, percent.
     pub scale_percent: MeanStd,
-    /// Seeds under which no alignment was found.
+    /// Number of seeds without an alignment.
     pub failed: usize,
 }
 
-/// The alignment under a noise.
+/// Returns the similarity found under a noise.
 ///
 /// # Errors
-/// As [`align`], for translations.
+/// As [`align`], for noise in the positions.
 pub fn disturbed(
     pairs: &[PointPair],
-    alignment: &Alignment,
+    alignment: &ModelAlignment,
     disturbance: Disturbance,
     seed: u64,
     config: &AlignConfig,
 ) -> Result<Similarity, AlignError> {
-    // Apart from the numbers that the search for inliers draws.
+    // A sequence of its own, so that it is independent of the random triples of the search.
     let mut random = SplitMix64::new(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
     match disturbance {
         Disturbance::TranslationM(sigma) => {
             let mut move_pair =
                 |p: &PointPair| PointPair { target: p.target.map(|c| c + sigma * random.normal()), ..*p };
             let moved: Vec<PointPair> = pairs.iter().map(&mut move_pair).collect();
-            // A threshold for clean positions would take noisy ones for outliers.
+            // With a threshold for clean positions, noisy positions would be outliers.
             let threshold_m = config.threshold_m.map(|t| t.hypot(3.4 * sigma));
             Ok(align(&moved, &AlignConfig { threshold_m, ..*config })?.world_from_model)
         }
@@ -103,10 +106,10 @@ fn middle(pairs: &[PointPair], similarity: &Similarity) -> [f64; 3] {
     pairs.iter().map(|p| similarity.apply(p.source)).fold([0.0; 3], |sum, p| [0, 1, 2].map(|i| sum[i] + p[i] / count))
 }
 
-/// Repeats an alignment under noise and compares.
+/// Repeats an alignment under noise and compares the results with the alignment without noise.
 pub fn sensitivity(
     pairs: &[PointPair],
-    alignment: &Alignment,
+    alignment: &ModelAlignment,
     noise: &NoiseConfig,
     config: &AlignConfig,
 ) -> Vec<NoiseLevel> {
@@ -136,10 +139,10 @@ fn distance(pairs: &[PointPair], a: &Similarity, b: &Similarity) -> f64 {
     (pairs.iter().map(square).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
 }
 
-/// The angle of the rotation from one to the other.
+/// Returns the angle of the rotation from one similarity to the other, degrees.
 fn angle_deg(a: &Similarity, b: &Similarity) -> f64 {
     let (a, b) = (a.rotation(), b.rotation());
-    // From the chord, which keeps its digits for small angles: |A − B|² = 8 sin² (θ / 2).
+    // The chord keeps its digits for small angles: |A − B|² = 8 sin² (θ / 2).
     let chord: f64 = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| (a - b).powi(2)).sum();
     2.0 * (chord / 8.0).sqrt().min(1.0).asin().to_degrees()
 }

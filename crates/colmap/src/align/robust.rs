@@ -1,58 +1,62 @@
-//! The similarity among outliers.
+//! A similarity among outliers.
 //!
-//! Triples of pairs (all of them where there are few, else a fixed sequence of random ones) propose similarities. With a threshold given,
-//! the proposal with the least Σ min(r², threshold²) wins (MSAC, Torr and Zisserman 2000), without one that with the
-//! least median of r² (Rousseeuw 1984), which takes up to half of outliers. The least-squares fit to the pairs within the
-//! threshold is repeated until the set does not change. Without a threshold it follows the residuals: 2.19 times their median,
-//! the 99th percentile of the length of an isotropic normal vector, estimated anew in every round.
+//! Triples of pairs propose similarities: all triples of few pairs, a fixed sequence of random
+//! triples of many. With a threshold, the proposal with the least Σ min(r², threshold²) wins (MSAC,
+//! Torr and Zisserman 2000). Without one, the proposal with the least median of r² wins (Rousseeuw
+//! 1984), which tolerates up to half of outliers. The least-squares fit to the pairs within the
+//! threshold is repeated until the set of inliers does not change. Where no threshold is given, it
+//! is 2.19 times the median of the residuals, estimated again in every round: the 99th percentile
+//! of the length of an isotropic normal vector.
 
 use camera::Similarity;
 
-use super::{AlignError, PointPair, fit_similarity};
+use super::error::AlignError;
+use super::umeyama::{PointPair, fit_similarity};
 use numeric::{SplitMix64, order_statistic, upper_median};
 
-/// Up to this many pairs every triple is tried.
+/// Number of pairs up to which every triple is tried.
 const ALL_TRIPLES: usize = 20;
-/// Refinements at most; sets settle within a few.
+/// Largest number of refinements; sets of inliers settle within a few.
 const ROUNDS: usize = 50;
-/// The 99th percentile of |e| over its median for a normal vector of three equal components: 3.368 / 1.538.
+/// Ratio of the 99th percentile of |e| to its median for a normal vector of three equal components:
+/// 3.368 / 1.538.
 const PERCENTILE_99: f64 = 2.19;
-/// Residuals below this part of the extent of the world's positions are rounding.
+/// Share of the extent of the world's positions below which residuals are rounding errors.
 const ROUNDING: f64 = 1e-10;
 
-/// How the alignment is searched.
+/// Settings of the search for an alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlignConfig {
-    /// Largest residual of a pair that is believed, metres; found from the residuals where not given.
+    /// Largest residual of an inlier, metres; estimated from the residuals when `None`.
     pub threshold_m: Option<f64>,
-    /// Random triples.
+    /// Number of random triples.
     pub samples: usize,
-    /// Of the random numbers.
+    /// Seed of the random triples.
     pub seed: u64,
 }
 
 impl Default for AlignConfig {
-    /// 2000 triples: with half of the pairs wrong, a right triple is missed once in 10¹¹⁵.
+    /// 2000 triples: with half of the pairs wrong, the probability of no right triple is 10⁻¹¹⁵.
     fn default() -> Self {
         Self { threshold_m: None, samples: 2000, seed: 1 }
     }
 }
 
-/// A similarity with what speaks for it.
+/// A similarity with its residuals and inliers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Alignment {
-    /// From the model to the world.
+pub struct ModelAlignment {
+    /// Similarity from the model to the world.
     pub world_from_model: Similarity,
     /// |target − similarity(source)| of every pair, metres.
     pub residuals_m: Vec<f64>,
-    /// Which pairs the fit is made of.
+    /// Whether each pair is an inlier, that is, part of the fit.
     pub inliers: Vec<bool>,
-    /// Largest residual that was believed, metres.
+    /// Largest residual of an inlier, metres.
     pub threshold_m: f64,
 }
 
-impl Alignment {
-    /// Number of pairs that the fit is made of.
+impl ModelAlignment {
+    /// Number of inliers.
     pub fn inlier_count(&self) -> usize {
         self.inliers.iter().filter(|i| **i).count()
     }
@@ -64,12 +68,26 @@ impl Alignment {
     }
 }
 
-/// Aligns a model to the world by pairs some of which may be wrong.
+/// Aligns a model to the world by pairs of positions, some of which may be wrong.
 ///
 /// # Errors
-/// Fewer than three pairs, positions that are not finite or lie on a line, no agreement among more than three pairs (or more than a third).
-pub fn align(pairs: &[PointPair], config: &AlignConfig) -> Result<Alignment, AlignError> {
-    // Refuses too few pairs and positions that are no numbers; a line may still turn up through outliers.
+/// [`AlignError::TooFew`] below three pairs, [`AlignError::NotFinite`], [`AlignError::Degenerate`]
+/// for positions on a line, [`AlignError::NoConsensus`] where fewer than three pairs or fewer than
+/// a third of them agree.
+///
+/// ```
+/// use colmap::align::{AlignConfig, PointPair, align};
+/// let place = |t: f64| [10.0 * t, (7.0 * t).sin(), (3.0 * t).cos()];
+/// let sources = (0..12).map(|i| place(f64::from(i) / 12.0));
+/// let mut pairs: Vec<PointPair> = sources.map(|p| PointPair { source: p, target: p.map(|c| 3.0 * c) }).collect();
+/// pairs[4].target = [500.0, 0.0, 0.0];
+/// let found = align(&pairs, &AlignConfig::default())?;
+/// assert!((found.world_from_model.scale() - 3.0).abs() < 1e-9 && !found.inliers[4]);
+/// # Ok::<(), colmap::align::AlignError>(())
+/// ```
+pub fn align(pairs: &[PointPair], config: &AlignConfig) -> Result<ModelAlignment, AlignError> {
+    // This refuses too few pairs and positions that are not finite. A line may still be hidden by
+    // outliers.
     let plain = match fit_similarity(pairs) {
         Err(error @ (AlignError::TooFew { .. } | AlignError::NotFinite { .. })) => return Err(error),
         plain => plain,
@@ -111,7 +129,7 @@ fn extent(pairs: &[PointPair]) -> f64 {
     let range = |axis: usize| {
         let values = pairs.iter().map(|p| p.target[axis]);
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-        // Far from the origin, rounding is that of the coordinates themselves.
+        // Far from the origin, the rounding error follows the size of the coordinates.
         (high - low) + 1e-3 * low.abs().max(high.abs())
     };
     (0..3).map(range).fold(0.0, f64::max)
@@ -144,7 +162,7 @@ fn refine(
     first: Similarity,
     threshold_m: Option<f64>,
     floor: f64,
-) -> Result<Alignment, AlignError> {
+) -> Result<ModelAlignment, AlignError> {
     let mut similarity = first;
     let mut inliers = Vec::new();
     for round in 0.. {
@@ -158,7 +176,7 @@ fn refine(
             return Err(AlignError::NoConsensus { inliers: chosen.len(), pairs: pairs.len() });
         }
         if now == inliers || round == ROUNDS {
-            return Ok(Alignment {
+            return Ok(ModelAlignment {
                 world_from_model: similarity,
                 residuals_m: residuals,
                 inliers: now,
@@ -187,7 +205,8 @@ mod tests {
         Similarity::new(7.25, rotation, [412.5, -87.25, 31.0]).unwrap()
     }
 
-    /// Cameras along a bent street, with noise (metres) and every third-or-so position wrong by tens of metres.
+    /// Cameras along a bent street, with noise (metres) and every third-or-so position wrong by
+    /// tens of metres.
     fn pairs(count: usize, noise_m: f64, outliers: f64, seed: u64) -> Vec<PointPair> {
         let mut random = SplitMix64::new(seed);
         let truth = planted();
@@ -229,7 +248,8 @@ mod tests {
             let pairs = pairs(count, 0.5, 0.3, seed);
             for threshold_m in [None, Some(2.0)] {
                 let found = align(&pairs, &AlignConfig { threshold_m, ..AlignConfig::default() }).unwrap();
-                // Seven parameters over 0.7 n positions of three coordinates, with room for bad luck.
+                // Seven parameters over 0.7 n positions of three coordinates, with room for bad
+                // luck.
                 let expected = 0.5 * (7.0 / (0.7 * count as f64)).sqrt();
                 prop_assert!(off(&found.world_from_model, &pairs) < 3.0 * expected, "{} {expected}", off(&found.world_from_model, &pairs));
             }

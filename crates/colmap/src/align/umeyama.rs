@@ -1,29 +1,39 @@
 //! The least-squares similarity of point pairs (Umeyama, IEEE PAMI 13, 1991).
 //!
-//! With Σ = 1/n Σ (y − ȳ)(x − x̄)ᵀ = U D Vᵀ and S = diag(1, 1, det U det V): R = U S Vᵀ, s = tr(D S) / σ²ₓ, t = ȳ − s R x̄. It fails
-//! for fewer than three pairs and for points on a line.
+//! With Σ = 1/n Σ (y − ȳ)(x − x̄)ᵀ = U D Vᵀ and S = diag(1, 1, det U det V): R = U S Vᵀ, s = tr(D
+//! S) / σ²ₓ, t = ȳ − s R x̄. The fit fails for fewer than three pairs and for points on a line.
 
 use camera::Similarity;
 use nalgebra::{Matrix3, Vector3};
 
-use super::AlignError;
+use super::error::AlignError;
 
-/// Positions with less spread across their line than this part of that along it determine no turn about it.
+/// Ratio of spread across a line to spread along it below which positions do not determine the
+/// rotation about the line.
 const SPREAD_MIN: f64 = 1e-6;
 
 /// One position in both frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointPair {
-    /// In the model.
+    /// Position in the model.
     pub source: [f64; 3],
-    /// In the world.
+    /// Position in the world.
     pub target: [f64; 3],
 }
 
-/// The similarity with the least Σ |target − s R source − t|².
+/// Returns the similarity with the least Σ |target − s R source − t|².
 ///
 /// # Errors
-/// Fewer than three pairs, positions that are not finite, positions on a line.
+/// [`AlignError::TooFew`], [`AlignError::NotFinite`], [`AlignError::Degenerate`].
+///
+/// ```
+/// use colmap::align::{PointPair, fit_similarity};
+/// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let pairs = corners.map(|source| PointPair { source, target: source.map(|c| 2.0 * c + 5.0) });
+/// let world_from_model = fit_similarity(&pairs)?;
+/// assert!((world_from_model.scale() - 2.0).abs() < 1e-12);
+/// # Ok::<(), colmap::align::AlignError>(())
+/// ```
 pub fn fit_similarity(pairs: &[PointPair]) -> Result<Similarity, AlignError> {
     if pairs.len() < 3 {
         return Err(AlignError::TooFew { found: pairs.len(), needed: 3 });
@@ -60,7 +70,8 @@ pub fn fit_similarity(pairs: &[PointPair]) -> Result<Similarity, AlignError> {
     Similarity::new(scale, rows, translation.into()).map_err(|_| degenerate(ratio))
 }
 
-/// Spread of points across their main line over that along it: near 0 a turn about the line is badly determined.
+/// Returns the spread of points across their main line over the spread along it. Near 0, the
+/// rotation about the line is badly determined.
 pub fn spread_ratio(points: impl Iterator<Item = [f64; 3]> + Clone) -> f64 {
     let count = points.clone().count().max(1) as f64;
     let mean = points.clone().map(Vector3::from).sum::<Vector3<f64>>() / count;

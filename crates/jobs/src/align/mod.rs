@@ -1,4 +1,5 @@
-//! The alignment job: moves a COLMAP model to the world by GPS positions of its images or by points known in both.
+//! The alignment job: moves a COLMAP model to the world by GPS positions of its images or by points
+//! known in both.
 //!
 //! The moved model is in metres along the axes of a map, relative to the origin in `origin.json`.
 
@@ -9,7 +10,9 @@ mod world;
 
 use std::path::{Path, PathBuf};
 
-use colmap::align::{AlignConfig, Alignment, Disturbance, NoiseLevel, align, disturbed, sensitivity, spread_ratio};
+use colmap::align::{
+    AlignConfig, Disturbance, ModelAlignment, NoiseLevel, align, disturbed, sensitivity, spread_ratio,
+};
 use io::splat_ply::LocalOrigin;
 use serde::Serialize;
 
@@ -69,7 +72,8 @@ pub struct AlignResidual {
 /// Aligns a COLMAP model and writes the moved model with a report.
 ///
 /// # Errors
-/// [`AlignJobError`]: an input that cannot be read, positions that determine no similarity, an output that exists.
+/// [`AlignJobError`]: an input that cannot be read, positions that determine no similarity, an
+/// output that exists.
 ///
 /// ```
 /// use jobs::align::{AlignJobConfig, run};
@@ -126,7 +130,7 @@ fn report(
     config: &AlignJobConfig,
     world: &World,
     known: &KnownPositions,
-    alignment: &Alignment,
+    alignment: &ModelAlignment,
     noise: Vec<NoiseLevel>,
 ) -> AlignJobReport {
     let residuals = known.names.iter().zip(&alignment.residuals_m).zip(&alignment.inliers);
@@ -151,11 +155,12 @@ fn report(
     }
 }
 
-/// Writes the models under noise to folders such as `translation_3m_seed_2` and `rotation_10deg_seed_1`.
+/// Writes the models under noise to folders such as `translation_3m_seed_2` and
+/// `rotation_10deg_seed_1`.
 fn write_under_noise(
     config: &AlignJobConfig,
     known: &KnownPositions,
-    alignment: &Alignment,
+    alignment: &ModelAlignment,
     search: &AlignConfig,
     writer: &ModelWriter<'_>,
     progress: &dyn Progress,

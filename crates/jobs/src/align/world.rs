@@ -1,4 +1,5 @@
-//! The world of an alignment: a map, an origin on it, and the pairs of positions known in the model and on the map.
+//! The world of an alignment: a map, an origin on it, and the pairs of positions known in the model
+//! and on the map.
 
 use std::collections::HashMap;
 
@@ -29,7 +30,8 @@ pub(super) struct KnownPositions {
 }
 
 impl World {
-    /// Places the positions on the map `epsg`, or on the UTM zone of the first position, with an origin amid them.
+    /// Places the positions on the map `epsg`, or on the UTM zone of the first position, with an
+    /// origin amid them.
     pub(super) fn of(
         positions: &[ControlPosition],
         epsg: Option<u32>,
@@ -53,7 +55,8 @@ impl World {
         Ok(Self { origin, places })
     }
 
-    /// Pairs the positions with the model: images by name, or by the last part of the name where that is unique.
+    /// Pairs the positions with the model: images by name, or by the last part of the name where
+    /// that is unique.
     pub(super) fn known(
         &self,
         positions: &[ControlPosition],

@@ -1,4 +1,5 @@
-//! The account of a city model: numbers about the whole, and every object with its status and defects.
+//! The account of a city model: numbers about the whole, and every object with its status and
+//! defects.
 
 use std::collections::BTreeMap;
 

@@ -19,8 +19,9 @@ pub struct CityInput {
     pub lod: Option<Lod>,
     /// Whether every object with surfaces is used, and not only buildings.
     pub all_objects: bool,
-    /// File for the account of every object with its defects (JSON). Only when it is given, solids are checked for
-    /// shells that meet themselves, cavities outside of their solid, and parts that overlap (codes 306, 4xx, 5xx, 601).
+    /// File for the account of every object with its defects (JSON). Only when it is given, solids
+    /// are checked for shells that meet themselves, cavities outside of their solid, and parts that
+    /// overlap (codes 306, 4xx, 5xx, 601).
     pub account: Option<PathBuf>,
     /// Whether existing files may be replaced.
     pub overwrite: bool,

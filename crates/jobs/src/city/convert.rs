@@ -17,15 +17,17 @@ pub struct CityConvertReport {
     pub summary: CitySummary,
     /// Format that was written.
     pub format: CityOutputFormat,
-    /// Used objects that have no surface that looks down, and therefore no footprint; 0 for other formats.
+    /// Used objects that have no surface that looks down, and therefore no footprint; 0 for other
+    /// formats.
     pub without_footprint: usize,
 }
 
-/// Writes the triangles (OBJ, PLY, glTF), the footprints with heights (GeoJSON) or the objects (CityJSON 2.0) of a model.
+/// Writes the triangles (OBJ, PLY, glTF), the footprints with heights (GeoJSON) or the objects
+/// (CityJSON 2.0) of a model.
 ///
 /// # Errors
-/// [`CityJobError::UnknownEnding`], [`CityJobError::Read`], [`CityJobError::Model`], and [`CityJobError::File`] when an
-/// output exists or cannot be written.
+/// [`CityJobError::UnknownEnding`], [`CityJobError::Read`], [`CityJobError::Model`], and
+/// [`CityJobError::File`] when an output exists or cannot be written.
 ///
 /// ```
 /// use jobs::city::{CityConvertConfig, convert};

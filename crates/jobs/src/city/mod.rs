@@ -1,7 +1,9 @@
-//! The city model jobs: an account of a model, and its triangles, footprints or objects in another format.
+//! The city model jobs: an account of a model, and its triangles, footprints or objects in another
+//! format.
 //!
-//! A model is incomplete when objects have no usable surface, or when the reader had to drop surfaces. That is a result
-//! and not an error: the account names every object, used or not, with the reason.
+//! A model is incomplete when objects have no usable surface, or when the reader had to drop
+//! surfaces. That is a result and not an error: the account names every object, used or not, with
+//! the reason.
 
 mod account;
 mod config;
@@ -16,10 +18,12 @@ pub use error::CityJobError;
 
 use numeric::Progress;
 
-/// Describes a city model and writes the account of every object where the configuration names a file for it.
+/// Describes a city model and writes the account of every object where the configuration names a
+/// file for it.
 ///
 /// # Errors
-/// [`CityJobError::Read`], [`CityJobError::Model`], [`CityJobError::File`] when the account exists or cannot be written.
+/// [`CityJobError::Read`], [`CityJobError::Model`], [`CityJobError::File`] when the account exists
+/// or cannot be written.
 ///
 /// ```
 /// use jobs::city::{CityInfoConfig, info};

@@ -1,7 +1,8 @@
 //! The cameras of a scene, checked for what pairs images with maps: one file stem per image.
 //!
-//! Trainers find the map of an image by the part of its name before the first dot, without folders. A name with more than
-//! one dot, or two images with one stem, would be paired wrongly and are refused.
+//! Trainers find the map of an image by the part of its name before the first dot, without folders.
+//! A name with more than one dot, or two images with one stem, would be paired wrongly and are
+//! refused.
 
 use std::collections::HashMap;
 use std::fs;
@@ -45,7 +46,8 @@ impl SceneCameras {
     }
 }
 
-/// Returns the folder of a COLMAP model or the file of a transforms.json, from a path that may be above either.
+/// Returns the folder of a COLMAP model or the file of a transforms.json, from a path that may be
+/// above either.
 fn find(path: &Path) -> Result<PathBuf, PriorsJobError> {
     if path.is_file() {
         return Ok(path.to_owned());
@@ -62,7 +64,8 @@ fn find(path: &Path) -> Result<PathBuf, PriorsJobError> {
     Err(PriorsJobError::NoCameras { path: path.to_owned() })
 }
 
-/// Returns the satellite images among the cameras: image files, or the images of a folder without other cameras.
+/// Returns the satellite images among the cameras: image files, or the images of a folder without
+/// other cameras.
 pub(super) fn satellite_images(paths: &[PathBuf]) -> Result<Option<Vec<PathBuf>>, PriorsJobError> {
     if let [folder] = paths
         && folder.is_dir()

@@ -16,15 +16,15 @@ use super::error::PriorsJobError;
 pub struct PriorsConfig {
     /// City model: CityJSON, CityJSONSeq, CityGML, OBJ or PLY.
     pub model: PathBuf,
-    /// One COLMAP folder (or a folder with `sparse/0` in it), one `transforms.json`, or satellite images with RPCs (files,
-    /// or a folder of them).
+    /// One COLMAP folder (or a folder with `sparse/0` in it), one `transforms.json`, or satellite
+    /// images with RPCs (files, or a folder of them).
     pub cameras: Vec<PathBuf>,
     /// Folder for the dataset.
     pub output: PathBuf,
     /// Origin of the cameras' frame in the model's coordinates. Perspective cameras only.
     pub offset: Option<[f64; 3]>,
-    /// File with the similarity from the model's coordinates to the cameras' frame; excludes `offset`. Perspective cameras
-    /// only.
+    /// File with the similarity from the model's coordinates to the cameras' frame; excludes
+    /// `offset`. Perspective cameras only.
     pub transform: Option<PathBuf>,
     /// Columns and rows of the images, for a `transforms.json` that does not state them.
     pub image_size: Option<[usize; 2]>,
@@ -32,7 +32,8 @@ pub struct PriorsConfig {
     pub map_epsg: Option<u32>,
     /// Vertical datum of the model, where its file does not state it. Satellite images only.
     pub vertical: Option<VerticalDatum>,
-    /// Report of a DSM run with the pointing corrections of the images; RPCs as they are when `None`. Satellite images only.
+    /// Report of a DSM run with the pointing corrections of the images; RPCs as they are when
+    /// `None`. Satellite images only.
     pub corrections: Option<PathBuf>,
     /// What is to be trained.
     pub mode: PriorsMode,
@@ -137,7 +138,8 @@ impl PriorsConfig {
     /// Checks that the values go together.
     ///
     /// # Errors
-    /// [`PriorsJobError::TwoFrames`] for an offset beside a transform, [`PriorsJobError::Priors`] for a bad weight.
+    /// [`PriorsJobError::TwoFrames`] for an offset beside a transform, [`PriorsJobError::Priors`]
+    /// for a bad weight.
     pub fn validate(&self) -> Result<(), PriorsJobError> {
         if self.offset.is_some() && self.transform.is_some() {
             return Err(PriorsJobError::TwoFrames);
@@ -147,7 +149,8 @@ impl PriorsConfig {
 
     /// How points are sampled.
     pub(super) fn sampling(&self) -> Result<SampleConfig, PriorsJobError> {
-        // The bottom of a building is left out where only buildings are trained: almost none of it is ever seen.
+        // The bottom of a building is left out where only buildings are trained: almost none of it
+        // is ever seen.
         let weights = match self.mode {
             PriorsMode::BuildingOnly => ClassWeights::visible(),
             PriorsMode::BuildingEnhanced => ClassWeights::visible().with(SurfaceClass::Ground, 1.0)?,

@@ -1,7 +1,8 @@
-//! The output folder: made in a hidden folder inside it, moved to its names when everything is written.
+//! The output folder: made in a hidden folder inside it, moved to its names when everything is
+//! written.
 //!
-//! The old report is removed first and the new one is moved last, so a folder with a report is complete. Other files in
-//! the folder (images, for example) are left alone.
+//! The old report is removed first and the new one is moved last, so a folder with a report is
+//! complete. Other files in the folder (images, for example) are left alone.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,8 @@
 //! The frames of a dataset: model, mesh, cameras and dataset.
 //!
-//! Mesh = model minus a recorded origin, metres. Cameras = similarity of the model (an offset or a transform). Dataset =
-//! cameras, shifted to their middle where they are too far from zero for the f32 of trainers.
+//! Mesh = model minus a recorded origin, metres. Cameras = similarity of the model (an offset or a
+//! transform). Dataset = cameras, shifted to their middle where they are too far from zero for the
+//! f32 of trainers.
 
 use ::priors::View;
 use camera::Similarity;

@@ -23,7 +23,8 @@ pub(super) fn labels(model: &CityModel, mesh: &TriangleMesh) -> Value {
     })
 }
 
-/// Returns the first colour of the points of a class (red, green, blue), so that roofs differ from walls before training.
+/// Returns the first colour of the points of a class (red, green, blue), so that roofs differ from
+/// walls before training.
 pub(super) fn colour(class: SurfaceClass) -> [u8; 3] {
     match class {
         SurfaceClass::Roof => [178, 84, 66],

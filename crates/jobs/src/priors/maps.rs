@@ -51,7 +51,8 @@ pub(super) fn write(
     Ok(WrittenMaps { rows, pictures, depth_png_step })
 }
 
-/// Writes 16-bit depth maps of one step for all views, so that their values can be compared, and returns the step.
+/// Writes 16-bit depth maps of one step for all views, so that their values can be compared, and
+/// returns the step.
 fn write_depth_pngs(
     dataset: &Dataset<'_>,
     folder: &Path,
@@ -70,7 +71,8 @@ fn write_depth_pngs(
     Ok(step)
 }
 
-/// Reads the depths of a view back from its file, because those of all views together may not fit into memory.
+/// Reads the depths of a view back from its file, because those of all views together may not fit
+/// into memory.
 fn read_depth(folder: &Path, stem: &str) -> Result<Grid<f32>, PriorsJobError> {
     let path = folder.join("raw_depth").join(format!("{stem}.npy"));
     let grid = match npy::read(&path)? {
@@ -108,7 +110,8 @@ fn row(dataset: &Dataset<'_>, view: usize, maps: &PriorMaps) -> ViewRow {
     }
 }
 
-/// Writes the preview pictures of a view that has some, and returns the pictures for the page of the report.
+/// Writes the preview pictures of a view that has some, and returns the pictures for the page of
+/// the report.
 fn write_previews(
     dataset: &Dataset<'_>,
     folder: &Path,

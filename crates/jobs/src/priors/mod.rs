@@ -1,9 +1,10 @@
 //! The priors job: depth, normal and mask priors of a city model for the cameras of a scene.
 //!
-//! Perspective cameras give a dataset for Gaussian splatting trainers: the points that enough cameras see (COLMAP's
-//! `sparse/0` as text and binary, `points3D.ply`), per image the depth, the normals, the mask, the surface class and the
-//! object, flat Gaussians to begin with, and a report. Everything stays in the frame of the cameras; `origin.json`
-//! describes how the model lies in it. Satellite images give maps in the pixels of each image.
+//! Perspective cameras give a dataset for Gaussian splatting trainers: the points that enough
+//! cameras see (COLMAP's `sparse/0` as text and binary, `points3D.ply`), per image the depth, the
+//! normals, the mask, the surface class and the object, flat Gaussians to begin with, and a report.
+//! Everything stays in the frame of the cameras; `origin.json` describes how the model lies in it.
+//! Satellite images give maps in the pixels of each image.
 //!
 //! The folder is made beside its place and moved there when it is complete.
 
@@ -36,7 +37,8 @@ use crate::threads::install;
 /// Makes the priors of a city model for perspective cameras or satellite images.
 ///
 /// # Errors
-/// [`PriorsJobError`]: an input that cannot be used, no building in any image, an output that exists.
+/// [`PriorsJobError`]: an input that cannot be used, no building in any image, an output that
+/// exists.
 ///
 /// ```
 /// use jobs::priors::{PriorsConfig, run};

@@ -99,7 +99,8 @@ fn colmap_points(dataset: &Dataset<'_>, kept: &[Sample]) -> Vec<ColmapPoint> {
     own.chain(scene).collect()
 }
 
-/// Moves an observation of the structure from motion into the kept part of its image; `None` outside of it.
+/// Moves an observation of the structure from motion into the kept part of its image; `None`
+/// outside of it.
 fn cropped(dataset: &Dataset<'_>, mut seen: ColmapObservation) -> Option<ColmapObservation> {
     let cameras = dataset.cameras;
     let Some(crop) = cameras.crops[cameras.model.views[seen.view as usize].lens] else {

@@ -1,8 +1,9 @@
 //! Lenses that trainers can use.
 //!
-//! The COLMAP readers of 3DGS and 2DGS take PINHOLE and SIMPLE_PINHOLE. 2DGS puts the principal point into the middle of
-//! the image whatever the file states, so an image with another principal point would be learned shifted. Cropping the
-//! image moves the middle to the principal point, within a quarter of a pixel.
+//! The COLMAP readers of 3DGS and 2DGS take PINHOLE and SIMPLE_PINHOLE. 2DGS puts the principal
+//! point into the middle of the image whatever the file states, so an image with another principal
+//! point would be learned shifted. Cropping the image moves the middle to the principal point,
+//! within a quarter of a pixel.
 
 use camera::{Lens, LensModel};
 use serde::Serialize;

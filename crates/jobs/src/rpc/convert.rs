@@ -56,7 +56,8 @@ impl RpcConvertConfig {
 /// Writes the RPC of a file as text, RPB or JSON.
 ///
 /// # Errors
-/// [`RpcJobError::UnknownEnding`], [`RpcJobError::Read`], and [`RpcJobError::Write`], among it an output that exists.
+/// [`RpcJobError::UnknownEnding`], [`RpcJobError::Read`], and [`RpcJobError::Write`], among it an
+/// output that exists.
 ///
 /// ```
 /// use jobs::rpc::{RpcConvertConfig, convert};

@@ -1,8 +1,8 @@
 //! Describing an RPC: offsets, validity box, ground sampling distance and viewing direction.
 //!
-//! The ground sampling distance and the viewing direction hold at the centre of the RPC's domain, at the height offset.
-//! The incidence is the angle at the ground between the vertical and the sensor. The azimuth is the direction to the
-//! sensor, clockwise from north.
+//! The ground sampling distance and the viewing direction hold at the centre of the RPC's domain,
+//! at the height offset. The incidence is the angle at the ground between the vertical and the
+//! sensor. The azimuth is the direction to the sensor, clockwise from north.
 
 use std::path::PathBuf;
 

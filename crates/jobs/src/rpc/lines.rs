@@ -1,8 +1,9 @@
 //! Answering points line by line from a stream.
 //!
-//! A line holds three numbers separated by blanks or commas: longitude, latitude, height to project, or sample, line,
-//! height to localize. Empty lines and lines that start with `#` are skipped. Every other line gets one answer, in order;
-//! a point that the model has no answer for is an answer with an error.
+//! A line holds three numbers separated by blanks or commas: longitude, latitude, height to
+//! project, or sample, line, height to localize. Empty lines and lines that start with `#` are
+//! skipped. Every other line gets one answer, in order; a point that the model has no answer for is
+//! an answer with an error.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -68,8 +69,8 @@ pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, RpcJobError> {
 /// Answers every line of `input`, in order, through `receive`.
 ///
 /// # Errors
-/// [`RpcJobError::Read`], [`RpcJobError::Line`] at the first line without three numbers, [`RpcJobError::Output`] when `receive` fails,
-/// [`RpcJobError::Cancelled`].
+/// [`RpcJobError::Read`], [`RpcJobError::Line`] at the first line without three numbers,
+/// [`RpcJobError::Output`] when `receive` fails, [`RpcJobError::Cancelled`].
 ///
 /// ```
 /// use jobs::rpc::{RpcDirection, RpcLinesConfig, answer_lines};

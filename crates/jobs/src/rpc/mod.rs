@@ -1,7 +1,9 @@
-//! The RPC jobs: describe the RPC of a file, project and localize points with it, and write it in another format.
+//! The RPC jobs: describe the RPC of a file, project and localize points with it, and write it in
+//! another format.
 //!
-//! Image coordinates are sample (column) and line (row); the centre of the upper-left pixel is (0, 0). Ground coordinates
-//! are WGS 84 longitude and latitude in degrees, and metres above the ellipsoid.
+//! Image coordinates are sample (column) and line (row); the centre of the upper-left pixel is (0,
+//! 0). Ground coordinates are WGS 84 longitude and latitude in degrees, and metres above the
+//! ellipsoid.
 
 mod convert;
 mod error;

@@ -97,7 +97,8 @@ impl RpcQuery {
 /// Projects and localizes points.
 ///
 /// # Errors
-/// [`RpcJobError::Read`], [`RpcJobError::NoAnswer`] at the first point without an answer, [`RpcJobError::Cancelled`].
+/// [`RpcJobError::Read`], [`RpcJobError::NoAnswer`] at the first point without an answer,
+/// [`RpcJobError::Cancelled`].
 ///
 /// ```
 /// use camera::ImagePoint;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ::splats::{
     ColourFit, CurvePoint, DivisionConfig, HeightErrors, RpcSplatCamera, SplatConfig, SplatReport, SplatScene,
-    SplatView, Surface, ViewReport, make_splats,
+    SplatSurface, SplatView, ViewReport, make_splats,
 };
 use crs::VerticalDatum;
 use io::raster::{read_dem, write_png_rgb};
@@ -34,12 +34,13 @@ pub struct SplatsConfig {
     pub output: PathBuf,
     /// Largest distance of a height from the plane of its splat, metres.
     pub error_m: f64,
-    /// Largest standard deviation of the colours under one splat, as a share of the display range. Infinity leaves the
-    /// division to the geometry.
+    /// Largest standard deviation of the colours under one splat, as a share of the display range.
+    /// Infinity leaves the division to the geometry.
     pub colour_error: f64,
     /// Side of square splats, cells; splats as large as the bounds allow when `None`.
     pub uniform_side: Option<usize>,
-    /// Confidence of the cells, 0 to 1, on the grid of the surface model; it becomes opacity. Full when `None`.
+    /// Confidence of the cells, 0 to 1, on the grid of the surface model; it becomes opacity. Full
+    /// when `None`.
     pub confidence: Option<PathBuf>,
     /// Source of the pointing corrections of the images.
     pub corrections: CorrectionSource,
@@ -47,7 +48,8 @@ pub struct SplatsConfig {
     pub vertical: Option<VerticalDatum>,
     /// Whether splats have two scales (2DGS) instead of three (3DGS).
     pub discs: bool,
-    /// Degree of the spherical harmonics in the file, 0 to 3. The original 3DGS and 2DGS loaders expect 3.
+    /// Degree of the spherical harmonics in the file, 0 to 3. The original 3DGS and 2DGS loaders
+    /// expect 3.
     pub sh_degree: u8,
     /// Whether uniform splats of several sizes are measured for comparison.
     pub compare: bool,
@@ -102,7 +104,8 @@ pub struct SplatsImageReport {
 }
 
 impl SplatsConfig {
-    /// Splats under the default bounds, with the corrections of the run that made the surface model.
+    /// Splats under the default bounds, with the corrections of the run that made the surface
+    /// model.
     pub fn new(dsm: PathBuf, images: Vec<PathBuf>, output: PathBuf) -> Self {
         let division = DivisionConfig::default();
         Self {
@@ -172,7 +175,8 @@ impl SplatsReport {
 /// Makes splats of a surface model and its images and writes them.
 ///
 /// # Errors
-/// [`SplatsJobError`]: an input that cannot be used, bounds that are not positive, an output that exists.
+/// [`SplatsJobError`]: an input that cannot be used, bounds that are not positive, an output that
+/// exists.
 ///
 /// ```
 /// use jobs::splats::{SplatsConfig, make};
@@ -198,7 +202,7 @@ pub fn make(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsRepo
 
 fn make_and_write(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, SplatsJobError> {
     let map = map_surface::read(&config.dsm, config.vertical, progress)?;
-    let origin = Surface::middle(&map.dem.heights, map.dem.geotransform)
+    let origin = SplatSurface::middle(&map.dem.heights, map.dem.geotransform)
         .ok_or_else(|| SplatsJobError::NoHeight { path: config.dsm.clone() })?;
     progress.check_cancelled()?;
     let scene = splat_scene(config, &map, origin, progress)?;
@@ -217,7 +221,7 @@ fn splat_scene(
     origin: [f64; 3],
     progress: &dyn Progress,
 ) -> Result<SplatScene, SplatsJobError> {
-    let surface = Surface::new(&map.dem.heights, map.dem.geotransform, origin);
+    let surface = SplatSurface::new(&map.dem.heights, map.dem.geotransform, origin);
     let confidence = config.confidence.as_deref().map(read_confidence).transpose()?;
     let corrections = Corrections::for_surface(&config.dsm, &config.corrections)?;
     let read = |path: &PathBuf| image::read(path, &corrections, progress);

@@ -1,7 +1,8 @@
-//! The splat jobs: Gaussian splats of a surface model and its images, and views of splats through cameras.
+//! The splat jobs: Gaussian splats of a surface model and its images, and views of splats through
+//! cameras.
 //!
-//! [`make()`] writes the PLY that 3DGS viewers and trainers read, with its origin beside it. [`render()`] looks at such a
-//! file through satellite images and perspective cameras.
+//! [`make()`] writes the PLY that 3DGS viewers and trainers read, with its origin beside it.
+//! [`render()`] looks at such a file through satellite images and perspective cameras.
 
 mod error;
 mod image;

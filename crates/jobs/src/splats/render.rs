@@ -1,9 +1,11 @@
-//! Rendering splats through satellite images and perspective cameras, and comparing them with the pictures.
+//! Rendering splats through satellite images and perspective cameras, and comparing them with the
+//! pictures.
 //!
-//! The folder holds `colour/NAME.png` (over black), `alpha/NAME.png` (accumulated opacity), `height/NAME.npy` (metres above
-//! the datum of the origin where half of the light is stopped, NaN elsewhere) and `report.json`. Pictures are compared
-//! over the pixels that splats cover by more than half. Satellite images have units of their own, so they are compared
-//! after a gain and an offset per channel.
+//! The folder holds `colour/NAME.png` (over black), `alpha/NAME.png` (accumulated opacity),
+//! `height/NAME.npy` (metres above the datum of the origin where half of the light is stopped, NaN
+//! elsewhere) and `report.json`. Pictures are compared over the pixels that splats cover by more
+//! than half. Satellite images have units of their own, so they are compared after a gain and an
+//! offset per channel.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -38,11 +40,14 @@ pub struct SplatRenderConfig {
     pub splats: PathBuf,
     /// Images with RPCs to look through.
     pub images: Vec<PathBuf>,
-    /// Perspective cameras to look through: folder of a COLMAP model on the map of the splats, with `origin.json`.
+    /// Perspective cameras to look through: folder of a COLMAP model on the map of the splats, with
+    /// `origin.json`.
     pub cameras: Option<PathBuf>,
-    /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered and not compared.
+    /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered
+    /// and not compared.
     pub pictures: Option<PathBuf>,
-    /// Report of a DSM run with the pointing corrections of the images; RPCs as they are when `None`.
+    /// Report of a DSM run with the pointing corrections of the images; RPCs as they are when
+    /// `None`.
     pub corrections: Option<PathBuf>,
     /// Folder to write.
     pub output: PathBuf,
@@ -107,7 +112,8 @@ impl SplatRenderConfig {
 /// Renders splats through all cameras, compares them with the pictures and writes the folder.
 ///
 /// # Errors
-/// [`SplatsJobError`]: splats without an origin, cameras on another map, two views of one name, an output that exists.
+/// [`SplatsJobError`]: splats without an origin, cameras on another map, two views of one name, an
+/// output that exists.
 ///
 /// ```
 /// use jobs::splats::{SplatRenderConfig, SplatsConfig, make, render};
@@ -269,7 +275,8 @@ impl Reference {
     }
 }
 
-/// Applies to each channel of a picture the gain and offset that bring it closest to a rendering (least squares).
+/// Applies to each channel of a picture the gain and offset that bring it closest to a rendering
+/// (least squares).
 fn fitted(picture: &Grid<[f32; 3]>, rendered: &Grid<[f32; 3]>, counts: &Grid<bool>) -> Grid<[f32; 3]> {
     let lines = [0, 1, 2].map(|channel| {
         let pairs = picture.data().iter().zip(rendered.data()).zip(counts.data()).filter(|(_, counts)| **counts);
