@@ -1,6 +1,6 @@
 //! `skysweep city info` and `convert`, from the command line: exit codes, reports, and what the written files hold.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use assert_cmd::Command;
 use serde_json::Value;
