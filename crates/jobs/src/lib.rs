@@ -5,7 +5,6 @@ mod as_text;
 pub mod city;
 pub mod corrections;
 pub mod dsm;
-mod error;
 mod error_text;
 pub mod eval;
 pub mod files;

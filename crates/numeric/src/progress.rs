@@ -38,7 +38,7 @@ pub trait Progress: Sync {
 }
 
 /// A value that a job chose, or was given, and the reason for it.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Choice {
     /// Name of what was chosen: `gsd`, `crs`, `height range`, …
     pub name: String,

@@ -1,87 +1,119 @@
-//! What a DSM run is asked for.
+//! The configuration of a DSM run and its validation.
 
 use std::path::PathBuf;
 
 use crs::VerticalDatum;
 use serde::{Deserialize, Serialize};
-use sweep::LevelConfig;
-use sweep::ranges::EDGE_REACH;
 
-/// Speed against accuracy.
+use crate::dsm::error::{DsmError, DsmSetting};
+use crate::dsm::values::{HeightRange, ImagePair, MapBounds};
+
+/// Heights of the Earth's surface above the ellipsoid: the shore of the Dead Sea and Everest, rounded outward.
+pub(crate) const EARTH_RANGE: HeightRange = HeightRange::new(-500.0, 9000.0);
+/// Smaller output tiles and chunks cost more to manage than to fill, cells.
+const SIDE_MIN: usize = 64;
+/// Side of the output tiles where none is given, cells.
+const TILE_DEFAULT: usize = 1024;
+
+/// Trade-off of speed and accuracy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// Half the images' resolution, in matching and in the DSM; two sources per view.
+    /// Half the resolution of the images in matching and in the DSM, and two sources per view.
     Fast,
-    /// The default.
+    /// Full resolution and up to four sources per view.
     #[default]
     Balanced,
-    /// Every useful source.
+    /// Full resolution and up to eight sources per view.
     Accurate,
 }
 
-/// Which voids are closed from what is known around them; closed cells are marked in any case.
+/// Choice of the voids that are closed from the heights around them. Closed cells are always marked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fill {
-    /// None: what is written was observed.
+    /// No void: every written height was observed.
     None,
-    /// Narrow ones, those that a surface beside them hides, and those between known heights where the images show something.
+    /// Narrow voids, voids that a surface beside them hides, and voids between known heights where the images have texture.
     #[default]
     Justified,
-    /// All within reach of known heights, whatever made them: water, saturated roofs, the border of what two views see.
+    /// All voids within reach of known heights, whatever caused them: water, saturated roofs, the border of the area
+    /// that two views see.
     All,
 }
 
-/// A rectangle on the map: x_min, y_min, x_max, y_max.
-pub type Bounds = [f64; 4];
-
-/// A DSM run. Everything that is `None` is chosen from the scene.
+/// Configuration of a DSM run. A field that is `None` is chosen from the scene.
+///
+/// ```
+/// use jobs::dsm::{DsmConfig, DsmError, DsmSetting};
+///
+/// let mut config = DsmConfig::new(vec!["left.tif".into(), "right.tif".into()], "out".into());
+/// assert!(config.validate().is_ok());
+/// config.gsd_m = Some(-0.5);
+/// let refused = config.validate().unwrap_err();
+/// assert!(matches!(refused, DsmError::Value { setting: DsmSetting::CellSize, .. }));
+/// assert_eq!(refused.to_string(), "the cell size is -0.5, expected a positive cell size in metres");
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct DsmConfig {
-    /// The images, two or more.
+    /// Image files, two or more, each with its RPC inside or beside it.
     pub images: Vec<PathBuf>,
-    /// The folder for the results.
+    /// Folder for the results.
     pub output: PathBuf,
     /// Cell size of the DSM, metres.
     pub gsd_m: Option<f64>,
     /// EPSG code of the horizontal CRS.
     pub crs_epsg: Option<u32>,
-    /// The area, in the DSM's CRS.
-    pub bounds: Option<Bounds>,
-    /// Least and greatest height to search, metres above the ellipsoid.
-    pub height_range_m: Option<(f64, f64)>,
-    /// A coarse elevation model that tells the height range.
+    /// Area of the DSM, in its CRS.
+    pub bounds: Option<MapBounds>,
+    /// Heights to search, metres above the ellipsoid.
+    pub height_range_m: Option<HeightRange>,
+    /// Coarse elevation model from which the height range is taken.
     pub dem: Option<PathBuf>,
-    /// A city model that tells where roofs are expected.
+    /// City model whose roofs are expected.
     pub prior: Option<PathBuf>,
-    /// What the DSM's heights are measured from.
+    /// Datum of the heights of the DSM.
+    #[serde(default)]
     pub vertical: VerticalDatum,
-    /// Speed against accuracy.
+    /// Trade-off of speed and accuracy.
+    #[serde(default)]
     pub preset: Preset,
-    /// Which voids are closed.
+    /// Choice of the voids that are closed.
+    #[serde(default)]
     pub fill: Fill,
-    /// The pairs of images to match, by position in `images`; all useful ones when `None`.
-    pub pairs: Option<Vec<(usize, usize)>>,
-    /// The images to compute heights for, by position; all when `None`.
+    /// Pairs of images to match; all useful ones when `None`.
+    pub pairs: Option<Vec<ImagePair>>,
+    /// Positions of the images to compute heights for, counted from 0; all when `None`.
     pub references: Option<Vec<usize>>,
-    /// Whether the RPCs' pointing is corrected.
+    /// Whether the pointing of the RPCs is corrected.
+    #[serde(default = "yes")]
     pub pointing: bool,
-    /// Worker threads; all cores when `None`.
+    /// Number of worker threads; all cores when `None`.
     pub threads: Option<usize>,
-    /// Memory to stay under, megabytes; 4000 when `None`. A scene that takes more is computed by chunks.
+    /// Memory limit, megabytes; 4000 when `None`. A scene that takes more is computed by chunks.
     pub memory_mb: Option<u64>,
-    /// Side of the chunks that a scene is computed by, cells; as large as the memory allows when `None`.
+    /// Side of the chunks of a large scene, cells; as large as the memory allows when `None`.
     pub chunk: Option<usize>,
-    /// Side of the output tiles that are fused at a time, cells.
+    /// Side of the output tiles that are fused at a time, cells. It changes the memory needed, never the result.
+    #[serde(default = "default_tile")]
     pub tile: usize,
     /// Whether existing results may be replaced.
+    #[serde(default)]
     pub overwrite: bool,
 }
 
+const fn yes() -> bool {
+    true
+}
+
+const fn default_tile() -> usize {
+    TILE_DEFAULT
+}
+
 impl DsmConfig {
-    /// A run with every choice left to the program.
+    /// Makes the configuration of a run that chooses everything but the images and the output folder by itself.
     pub fn new(images: Vec<PathBuf>, output: PathBuf) -> Self {
         Self {
             images,
@@ -101,39 +133,79 @@ impl DsmConfig {
             threads: None,
             memory_mb: None,
             chunk: None,
-            tile: 1024,
+            tile: TILE_DEFAULT,
             overwrite: false,
         }
     }
-}
 
-/// The parameters that a preset stands for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Tuning {
-    /// Parallax between neighbouring hypotheses in the pair that sees most of it, pixels.
-    pub(crate) step_px: f64,
-    /// The finest pyramid level whose heights are computed.
-    pub(crate) finest_level: usize,
-    /// Sources per view, at most.
-    pub(crate) sources: usize,
-    /// How far around a coarse pixel the next level takes over heights to search, coarse pixels.
-    pub(crate) reach: usize,
-    /// Cost, penalties and read-out.
-    pub(crate) level: LevelConfig,
-}
-
-impl Preset {
-    /// Side of a cell that is not asked for, in pixels of the coarsest image: that of the pixels that are matched.
-    pub(crate) fn pixels_per_cell(self) -> f64 {
-        f64::from(1u32 << self.tuning().finest_level)
+    /// Checks everything that can be wrong before a file is opened.
+    ///
+    /// # Errors
+    /// [`DsmError::TooFewImages`], [`DsmError::SameImage`], and [`DsmError::Value`] with the setting that is wrong.
+    pub fn validate(&self) -> Result<(), DsmError> {
+        if self.images.len() < 2 {
+            return Err(DsmError::TooFewImages { found: self.images.len() });
+        }
+        for (i, path) in self.images.iter().enumerate() {
+            if self.images[..i].contains(path) {
+                return Err(DsmError::SameImage { path: path.clone() });
+            }
+        }
+        self.validate_ground()?;
+        self.validate_division()?;
+        self.validate_positions()
     }
 
-    pub(crate) fn tuning(self) -> Tuning {
-        let (finest_level, sources, reach) = match self {
-            Self::Fast => (1, 2, EDGE_REACH),
-            Self::Balanced => (0, 4, EDGE_REACH),
-            Self::Accurate => (0, 8, 2 * EDGE_REACH),
+    fn validate_ground(&self) -> Result<(), DsmError> {
+        if let Some(gsd) = self.gsd_m.filter(|gsd| !(gsd.is_finite() && *gsd > 0.0)) {
+            return Err(DsmError::value(DsmSetting::CellSize, gsd.to_string(), "a positive cell size in metres"));
+        }
+        let is_on_earth = |r: &HeightRange| {
+            EARTH_RANGE.low_m <= r.low_m && r.low_m < r.high_m && r.high_m <= EARTH_RANGE.high_m
         };
-        Tuning { step_px: 0.5, finest_level, sources, reach, level: LevelConfig::default() }
+        if let Some(range) = self.height_range_m.filter(|range| !is_on_earth(range)) {
+            return Err(DsmError::value(
+                DsmSetting::HeightRange,
+                format!("{} {}", range.low_m, range.high_m),
+                "two heights of the Earth's surface in metres above the ellipsoid, the lower first",
+            ));
+        }
+        let is_area =
+            |b: &MapBounds| b.to_array().iter().all(|v| v.is_finite()) && b.x_min < b.x_max && b.y_min < b.y_max;
+        if let Some(bounds) = self.bounds.filter(|bounds| !is_area(bounds)) {
+            return Err(DsmError::value(
+                DsmSetting::Bounds,
+                format!("{:?}", bounds.to_array()),
+                "x_min y_min x_max y_max in the DSM's CRS",
+            ));
+        }
+        Ok(())
+    }
+
+    fn validate_division(&self) -> Result<(), DsmError> {
+        let at_least = format!("{SIDE_MIN} or more cells");
+        if self.tile < SIDE_MIN {
+            return Err(DsmError::value(DsmSetting::TileSide, self.tile.to_string(), at_least));
+        }
+        if let Some(side) = self.chunk.filter(|side| *side < SIDE_MIN) {
+            return Err(DsmError::value(DsmSetting::ChunkSide, side.to_string(), at_least));
+        }
+        if self.threads == Some(0) {
+            return Err(DsmError::value(DsmSetting::Threads, "0", "1 or more"));
+        }
+        Ok(())
+    }
+
+    fn validate_positions(&self) -> Result<(), DsmError> {
+        let n = self.images.len();
+        let paired = self.pairs.iter().flatten().flat_map(|pair| [pair.first, pair.second]);
+        let paired = paired.map(|position| (DsmSetting::Pairs, position));
+        let references = self.references.iter().flatten().map(|&position| (DsmSetting::References, position));
+        match paired.chain(references).find(|(_, position)| *position >= n) {
+            None => Ok(()),
+            Some((setting, bad)) => {
+                Err(DsmError::value(setting, (bad + 1).to_string(), format!("positions of images, 1 to {n}")))
+            }
+        }
     }
 }

@@ -1,41 +1,49 @@
-//! What a run needs of memory, and what it took.
+//! The memory that a run needs, and the memory that it took.
 //!
-//! The estimate is the greatest of the stages' needs: while a view is swept all images and heights are there, while the
-//! views are placed on the grid all their vertices too, and at the end only vertices and the grid. `benches/results/scale.md`
-//! holds it against measured peaks.
+//! The estimate is the largest need of three stages. While the views are swept, all images and heights are in memory. While
+//! they are placed on the grid, all their vertices are too. At the end only the vertices and the grid are left.
+//! `benches/results/scale.md` compares the estimate with measured peaks.
+
+use raster::Window;
 
 use crate::dsm::config::DsmConfig;
-use crate::error::PipelineError;
+use crate::dsm::error::DsmError;
 
-/// Memory to stay under where none is given, megabytes: what any machine of today has.
+/// Memory limit where none is given, megabytes: what any machine of today has.
 const DEFAULT_MB: u64 = 4000;
-/// What the libraries take before anything is done, GDAL's blocks and the program's buffers among it, bytes.
+/// Memory of libraries and buffers before anything is done, among it the block cache of GDAL, bytes.
 const BASE: u64 = 200_000_000;
-/// Bytes per pixel of all views while one is swept: the image with its pyramid (16/3), the heights of two levels with
-/// deviation, confidence and support (16 + 4), the hypotheses' ranges and steep surfaces (10) with what they are found from (4).
+/// Bytes per pixel of all views while they are swept: the image with its pyramid (16/3), the heights of two levels with
+/// deviation, confidence and support (16 + 4), the ranges of hypotheses and steep surfaces (10) with their inputs (4).
 const SWEPT_BYTES_PER_PIXEL: u64 = 40;
-/// … while they are placed on the grid: the image, the heights (16), the vertices (20), and what says which pixels count (5).
+/// Bytes per pixel while the views are placed on the grid: the image, the heights (16), the vertices (20), and the masks of
+/// pixels that count (5).
 const PLACED_BYTES_PER_PIXEL: u64 = 47;
-/// … and when only the vertices are left.
+/// Bytes per pixel when only the vertices are left.
 const VERTEX_BYTES_PER_PIXEL: u64 = 20;
-/// Bytes per cell while views are placed: what no view can see.
+/// Bytes per cell while the views are placed: the mask of cells that no view can see.
 const PLACED_BYTES_PER_CELL: u64 = 2;
-/// Bytes per cell at the end: four results twice, before and after the clean-up (26), with a void's surroundings in up to
-/// half of the cells (48).
+/// Bytes per cell at the end: four results twice, before and after the clean-up (26), with the surroundings of voids in up
+/// to half of the cells (48).
 const FUSED_BYTES_PER_CELL: u64 = 74;
-/// Bytes per pixel of one block in work: about 24 hypotheses, half as many again where a scene is rich in heights, with a byte of
-/// cost each and one of what the first four directions add; and first heights, steep surfaces and offsets (12), edges and the
-/// best costs (2).
+/// Bytes per pixel of one block in work: about 24 hypotheses, half as many again where a scene is rich in heights, with one byte
+/// of cost each and one for the first four directions; first heights, steep surfaces and offsets (12); edges and the best
+/// costs (2).
 const BYTES_PER_BLOCK_PIXEL: u64 = 36 * 2 + 14;
 /// Pixels of a whole block with its margins.
 const BLOCK_PIXELS: u64 = 1120 * 1120;
 
-/// The limit of a run, megabytes.
+/// Returns the memory limit of a run, megabytes.
 pub(crate) fn limit_mb(config: &DsmConfig) -> u64 {
     config.memory_mb.unwrap_or(DEFAULT_MB)
 }
 
-/// What it takes to sweep views of so many pixels onto so many cells at once, megabytes.
+/// Returns the number of pixels or cells of a window.
+pub(crate) fn area(w: &Window) -> u64 {
+    (w.width as u64).saturating_mul(w.height as u64)
+}
+
+/// Returns the memory needed to sweep views of `pixels` pixels each onto `cells` cells at once, megabytes.
 pub(crate) fn needed_mb(pixels: &[u64], cells: u64) -> u64 {
     let all = pixels.iter().fold(0, |sum: u64, p| sum.saturating_add(*p));
     let largest = pixels.iter().copied().max().unwrap_or(0);
@@ -50,16 +58,17 @@ pub(crate) fn needed_mb(pixels: &[u64], cells: u64) -> u64 {
     BASE.saturating_add(stages.into_iter().fold(0, u64::max)) / 1_000_000
 }
 
-/// Refuses what does not fit the limit.
+/// Refuses work that does not fit the limit.
 ///
 /// # Errors
-/// [`PipelineError::Memory`].
-pub(crate) fn check(config: &DsmConfig, needed_mb: u64) -> Result<(), PipelineError> {
+/// [`DsmError::Memory`].
+pub(crate) fn check(config: &DsmConfig, needed_mb: u64) -> Result<(), DsmError> {
     let limit_mb = limit_mb(config);
-    if needed_mb > limit_mb { Err(PipelineError::Memory { needed_mb, limit_mb }) } else { Ok(()) }
+    if needed_mb > limit_mb { Err(DsmError::Memory { needed_mb, limit_mb }) } else { Ok(()) }
 }
 
-/// The largest resident size of the process so far, megabytes, where the system tells (Linux).
+/// Returns the largest resident size of the process so far, megabytes; `None` where the system does not report it (Linux
+/// does).
 pub(crate) fn peak_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;

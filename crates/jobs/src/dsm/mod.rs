@@ -1,25 +1,111 @@
-//! The DSM job: from satellite images to a georeferenced surface model.
+//! The DSM job: from satellite images with RPCs to a georeferenced surface model.
+//!
+//! [`run`] does everything. It is a chain of stages, each of which is a function from plain values to a plain value that can be
+//! written and read back:
+//!
+//! | stage | value | holds |
+//! |---|---|---|
+//! | [`open`] | [`Opened`] | images, RPCs, sizes |
+//! | [`point()`](point()) | [`Pointed`] | corrected cameras, tie points, residuals, noise and contrast of the images |
+//! | [`plan()`](plan()) | [`Plan`] | grid, chunks with windows, sources, height ranges and levels, choices with reasons |
+//! | [`run_chunk`] | [`ChunkResult`] | rasters and counts of one chunk |
+//! | [`merge()`](merge()) | [`Product`] | files and report |
+//!
+//! A scene that fits the memory is a plan of one chunk. A [`Session`] goes along beside the values and keeps what was read, so
+//! that a whole run in one process reads each pixel once. The stages use the current rayon thread pool; [`run`] makes one
+//! with the configured number of threads.
+//!
+//! A plan, and the result of a chunk, may go to another process:
+//!
+//! ```
+//! use jobs::dsm::{ChunkResult, DsmConfig, HeightRange, Plan, Preset, Session, merge, open, plan, point, run_chunk};
+//! use numeric::Silent;
+//!
+//! let town = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town");
+//! let folder = tempfile::tempdir()?;
+//! let images = ["view_1.tif", "view_3.tif"].map(|name| format!("{town}/{name}").into());
+//! let mut config = DsmConfig::new(images.into(), folder.path().join("out"));
+//! (config.preset, config.gsd_m) = (Preset::Fast, Some(2.0));
+//! config.height_range_m = Some(HeightRange::new(170.0, 280.0));
+//!
+//! // One process plans.
+//! let mut session = Session::new(&Silent);
+//! let pointed = point(&config, &open(&config)?, &mut session)?;
+//! let json = serde_json::to_string(&plan(&config, &pointed, &mut session)?)?;
+//!
+//! // Another one computes the chunks.
+//! let plan: Plan = serde_json::from_str(&json)?;
+//! let chunk = folder.path().join("chunk_0");
+//! run_chunk(&plan, 0, &mut Session::new(&Silent))?.write(&chunk)?;
+//!
+//! // A third one merges them.
+//! let product = merge(&plan, [ChunkResult::read(&chunk)], &Silent)?;
+//! assert!(product.report.surface.observed > 0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
-mod chunks;
-pub mod config;
+mod character;
+mod chunk;
+mod chunk_files;
+mod chunk_plan;
+mod chunk_side;
+mod city_prior;
+mod clean_up;
+mod config;
 mod dem;
-mod first_look;
-pub mod geometry;
-mod heights;
+mod error;
+mod footprints;
+mod grid;
+mod height_choice;
+mod image_checks;
+mod image_windows;
+mod images;
+mod levels;
+mod look;
 mod memory;
+mod merge;
+mod notes;
 mod output;
-mod pictures;
-mod pointing;
-mod prior;
+mod plan;
+mod point;
+mod prior_findings;
+mod prior_view;
 mod probe;
-pub mod report;
+mod rasters;
+mod report;
 mod run;
-mod scene;
-mod setup;
+mod scene_sweep;
+mod session;
+mod shared_heights;
+mod sources;
 mod surface;
 mod tie_windows;
+mod ties;
+mod tuning;
+mod values;
+mod view_geometry;
 
-pub use crate::error::PipelineError;
+pub use character::ImageCharacter;
+pub use chunk::{ChunkContent, ChunkResult, ChunkSurface, run_chunk};
+pub use chunk_plan::{ChunkPlan, ChunkSweep, ChunkWork};
 pub use config::{DsmConfig, Fill, Preset};
-pub use report::DsmReport;
-pub use run::run_dsm;
+pub use error::{DsmError, DsmSetting};
+pub use grid::DsmGrid;
+pub use images::{ImagePart, Opened, SceneImage, open};
+pub use levels::SweepLevels;
+pub use merge::{Product, merge};
+pub use plan::{Plan, PlanReport, plan};
+pub use point::{Pointed, point};
+pub use prior_findings::{BuildingFinding, PriorFindings, ViewVotes};
+pub use rasters::ChunkRasters;
+pub use report::{
+    ChunksReport, CorrectionOrder, DsmReport, FailedChunk, ImageReport, LeftOut, PairReport, PointingReport,
+    PriorReport, StageTime, SurfaceReport,
+};
+pub use run::run;
+pub use session::Session;
+pub use surface::{KeptPixels, SurfaceCounts};
+pub use ties::PairTies;
+pub use tuning::SweepTuning;
+pub use values::{HeightRange, ImagePair, MapBounds};
+pub use view_geometry::PairGeometry;

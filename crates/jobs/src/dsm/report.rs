@@ -1,192 +1,223 @@
-//! What a run did, for people and programs.
+//! The report of a run.
 
 use std::path::PathBuf;
 
 use camera::ImageCorrection;
-use serde::Serialize;
+use numeric::Choice;
+use serde::{Deserialize, Serialize};
 use sweep::pointing::{Adjustment, ModelOrder};
 
-use crate::dsm::geometry::PairGeometry;
-use numeric::Choice;
+use crate::dsm::values::{HeightRange, MapBounds, null_is_nan};
+use crate::dsm::view_geometry::PairGeometry;
 
-/// The JSON report of a DSM run.
-#[derive(Debug, Clone, Serialize)]
+/// The report of a DSM run, written as JSON.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct DsmReport {
     /// Version of the program.
     pub version: String,
-    /// The images.
+    /// Images in the order of the configuration.
     pub images: Vec<ImageReport>,
-    /// The pairs matched.
+    /// Pairs that were matched.
     pub pairs: Vec<PairReport>,
-    /// The correction of the RPCs.
+    /// Correction of the pointing.
     pub pointing: PointingReport,
     /// Heights searched, metres above the ellipsoid.
-    pub height_range_m: (f64, f64),
-    /// Pixel × hypothesis pairs evaluated.
+    pub height_range_m: HeightRange,
+    /// Number of pixel-hypothesis pairs evaluated.
     pub hypotheses: u64,
-    /// The surface.
+    /// Cells of the DSM.
     pub surface: SurfaceReport,
-    /// How the scene was divided; absent when it was computed at once.
+    /// Division of the scene into chunks; absent when it was computed at once.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chunks: Option<ChunksReport>,
-    /// What became of the city model; absent without one.
+    /// Use of the city model; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorReport>,
     /// All choices with their reasons.
     pub choices: Vec<Choice>,
-    /// What the user should know.
+    /// Warnings.
     pub warnings: Vec<String>,
-    /// Wall time per stage.
+    /// Wall times of the stages.
     pub stages: Vec<StageTime>,
-    /// Largest resident memory, megabytes.
+    /// Largest resident memory, megabytes; absent where the system does not report it.
     pub peak_memory_mb: Option<f64>,
 }
 
-/// One image.
-#[derive(Debug, Clone, Serialize)]
+/// An image in the report.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ImageReport {
-    /// Its file.
+    /// File of the image.
     pub path: PathBuf,
-    /// Where its RPC was found.
+    /// Format in which the RPC was found.
     pub rpc: String,
     /// Columns and rows.
     pub size: (usize, usize),
-    /// Side of a pixel on the ground, metres.
+    /// Side of a pixel on the ground at the centre of the scene, metres.
     pub gsd_m: Option<f64>,
     /// Angle of the line of sight to the vertical, degrees.
     pub incidence_deg: Option<f64>,
-    /// The correction found, in the frame of the part that was read.
+    /// Correction found, in the frame of the part that was read.
     pub correction: Option<ImageCorrection>,
-    /// The correction that was applied, in the frame of the whole image.
+    /// Correction applied, in the frame of the whole image.
     pub applied_correction: ImageCorrection,
 }
 
-/// One pair of images.
-#[derive(Debug, Clone, Serialize)]
+/// A pair of images in the report.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct PairReport {
-    /// Positions of the images, from 1.
+    /// Positions of the images, counted from 1.
     pub images: (usize, usize),
-    /// Angle, overlap, parallax.
+    /// Angle, overlap and parallax.
     #[serde(flatten)]
     pub geometry: PairGeometry,
-    /// Tie points found.
+    /// Number of tie points found.
     pub ties: usize,
 }
 
-/// The pointing correction.
-#[derive(Debug, Clone, Serialize)]
+/// The correction of the pointing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct PointingReport {
     /// Whether it was applied.
     pub applied: bool,
-    /// `none`, `translation` or `affine`.
-    pub order: &'static str,
-    /// Ground points seen in two or more images.
+    /// Kind of the correction.
+    pub order: CorrectionOrder,
+    /// Number of ground points seen in two or more images.
     pub tracks: usize,
-    /// Those of them that fit.
+    /// Number of tracks that are no outliers.
     pub inliers: usize,
-    /// Robust deviation of the residuals before, pixels.
+    /// Robust standard deviation of the residuals before the correction, pixels.
+    #[serde(with = "null_is_nan")]
     pub residual_before_px: f64,
-    /// … and after.
+    /// Robust standard deviation of the residuals after the correction, pixels.
+    #[serde(with = "null_is_nan")]
     pub residual_after_px: f64,
-    /// Root mean square of the inliers after, pixels.
+    /// Root mean square of the inliers' residuals after the correction, pixels.
+    #[serde(with = "null_is_nan")]
     pub rms_px: f64,
 }
 
-impl PointingReport {
-    pub(crate) fn new(a: &Adjustment, tracks: usize, applied: bool) -> Self {
-        let order = match a.order {
-            ModelOrder::None => "none",
-            ModelOrder::Translation => "translation",
-            ModelOrder::Affine => "affine",
-        };
-        Self {
-            applied,
-            order,
-            tracks,
-            inliers: a.ground.iter().flatten().count(),
-            residual_before_px: a.residual_px.0,
-            residual_after_px: a.residual_px.1,
-            rms_px: a.rms_px,
+/// The kind of a correction of the pointing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CorrectionOrder {
+    /// The RPCs are used as they are.
+    None,
+    /// One shift per image.
+    Translation,
+    /// One affine map per image.
+    Affine,
+}
+
+impl From<ModelOrder> for CorrectionOrder {
+    fn from(order: ModelOrder) -> Self {
+        match order {
+            ModelOrder::None => Self::None,
+            ModelOrder::Translation => Self::Translation,
+            ModelOrder::Affine => Self::Affine,
         }
     }
 }
 
-/// What the grid holds.
-#[derive(Debug, Clone, Serialize)]
+impl PointingReport {
+    pub(crate) fn new(found: &Adjustment, tracks: usize, applied: bool) -> Self {
+        Self {
+            applied,
+            order: found.order.into(),
+            tracks,
+            inliers: found.ground.iter().flatten().count(),
+            residual_before_px: found.residual_px.0,
+            residual_after_px: found.residual_px.1,
+            rms_px: found.rms_px,
+        }
+    }
+}
+
+/// The cells of a DSM.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SurfaceReport {
-    /// All cells.
+    /// Number of cells.
     pub cells: usize,
-    /// Cells with an observed height.
+    /// Number of cells with an observed height.
     pub observed: usize,
-    /// Cells filled from their surroundings.
+    /// Number of cells filled from their surroundings.
     pub filled: usize,
-    /// Cells without a height.
+    /// Number of cells without a height.
     pub void: usize,
-    /// Cells removed as speckle.
+    /// Number of cells removed as speckle.
     pub speckle_removed: usize,
-    /// Share of each view's pixels that another view agrees with.
+    /// Share of each view's pixels with which another view agrees.
     pub kept_by_view: Vec<f64>,
 }
 
-/// A city model held against the heights that a coarser level found.
-#[derive(Debug, Clone, Serialize)]
+/// A city model compared with the heights that a coarser level found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct PriorReport {
-    /// Its file.
+    /// File of the model.
     pub model: PathBuf,
-    /// Buildings that at least one view sees.
+    /// Number of buildings that at least one view sees.
     pub buildings_seen: usize,
-    /// Views (of chunks, each counts) that see the model and agree with hardly any of it: they do without.
+    /// Number of views that see the model, agree with hardly any of it, and do without it. A view counts once per chunk.
     pub disagreeing_views: usize,
-    /// A building is left out in a view where a smaller share of its pixels agrees.
+    /// Share of a building's pixels below which a view leaves it out.
     pub least_agreeing: f64,
-    /// Pixels agree whose heights differ by at most this, metres.
+    /// Largest difference of heights that agree, metres.
     pub tolerance_m: f64,
-    /// Buildings that are taken to be gone.
+    /// Buildings that some view leaves out.
     pub left_out: Vec<LeftOut>,
 }
 
-/// A building that is not where the model has it.
-#[derive(Debug, Clone, Serialize)]
+/// A building that is not where the model places it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct LeftOut {
-    /// Its identifier in the model.
+    /// Identifier in the model.
     pub id: String,
-    /// Views that leave it out.
+    /// Number of views that leave it out.
     pub views: usize,
-    /// Views that see it.
+    /// Number of views that see it.
     pub of_views: usize,
-    /// Its pixels in the views that leave it out whose heights agree.
+    /// Pixels with agreeing heights, in the views that leave it out.
     pub agreeing_pixels: u64,
-    /// Its pixels there that have a height to be compared with.
+    /// Pixels with a height to compare with, in the views that leave it out.
     pub compared_pixels: u64,
 }
 
-/// How a large scene was divided.
-#[derive(Debug, Clone, Default, Serialize)]
+/// The division of a large scene into chunks.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ChunksReport {
     /// Side of the largest chunk, cells.
     pub side: usize,
-    /// Chunks with a surface.
+    /// Number of chunks with a surface.
     pub done: usize,
-    /// Chunks that no two images see.
+    /// Number of chunks that no two images see.
     pub unseen: usize,
     /// Chunks that could not be computed; their cells are void.
     pub failed: Vec<FailedChunk>,
 }
 
 /// A chunk without a result.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FailedChunk {
-    /// x_min, y_min, x_max, y_max in the DSM's CRS.
-    pub bounds: [f64; 4],
-    /// Why.
+    /// Area of the chunk in the CRS of the DSM.
+    pub bounds: MapBounds,
+    /// Cause.
     pub reason: String,
 }
 
-/// Wall time of one stage.
-#[derive(Debug, Clone, Serialize)]
+/// The wall time of one stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct StageTime {
-    /// Its name.
+    /// Name of the stage.
     pub stage: String,
-    /// Seconds.
+    /// Wall time, seconds.
     pub seconds: f64,
 }

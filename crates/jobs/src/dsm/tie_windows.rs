@@ -1,154 +1,130 @@
-//! Tie points of a scene too large to be read at once: they are looked for in windows of its ground, spread evenly, each
-//! read at full resolution and let go. What the windows show also tells each image's noise and contrast, which all its
-//! chunks then share.
+//! Tie points and image characters of a scene that is too large to be read at once.
 //!
-//! Ties are given in pixels of the whole images. The heights seen in the first window with ties narrow the search of the rest.
+//! Ties are searched for in windows of the ground, spread evenly over the scene. Each window is read at full resolution and
+//! dropped. The windows also give the noise and contrast of each image, which all its chunks then share.
+//!
+//! Ties are in pixels of the whole images. The heights seen in the first window with ties narrow the search in the others.
 
 use camera::ImagePoint;
-use numeric::upper_median;
+use crs::MapProjection;
+use numeric::Progress;
 use raster::Window;
 use rayon::prelude::*;
-use sweep::SweepView;
-use sweep::pointing::TieConfig;
+use sweep::View;
+use sweep::pointing::{Tie, TieConfig};
 
-use crate::dsm::pictures;
-use crate::dsm::pointing::{PairTies, heights_seen, match_pairs};
-use crate::dsm::scene::{Opened, read_view};
-use crate::dsm::setup::{OutputGrid, image_span, image_window};
-use crate::error::PipelineError;
-use numeric::Progress;
+use crate::dsm::character::ImageCharacter;
+use crate::dsm::error::DsmError;
+use crate::dsm::grid::DsmGrid;
+use crate::dsm::image_windows::GroundBox;
+use crate::dsm::images::{SceneImage, read_view};
+use crate::dsm::ties::{PairTies, heights_seen, match_pairs};
+use crate::dsm::values::{HeightRange, ImagePair};
 
 /// Side of a window on the ground, cells of the grid.
 const SIDE: usize = 1024;
-/// Places looked at, and how many of them some pair must see; denser ones are tried where footprints fill little of
-/// the grid. A dozen windows tell a shift and an affine map over an image many times over.
+/// Number of places looked at. Denser ones are tried where footprints fill little of the grid. A dozen windows determine
+/// a shift and an affine map over an image many times over.
 const PLACES: [f64; 3] = [12.0, 24.0, 48.0];
+/// Number of places that some pair must see, or the next denser places are tried.
 const SEEN_MIN: usize = 8;
-/// Windows looked at, at most.
+/// Largest number of windows read.
 const WINDOWS_MAX: usize = 16;
-/// Pixels read around a window: the wide search for a gross pointing error needs these.
+/// Pixels read around a window, for the wide search after a gross pointing error.
 const MARGIN: usize = 256;
-/// Corners tried per pair and window: as many in all as in a scene of several times the size that is read at once.
+/// Corners tried per pair and window, at least. All windows together try as many as a scene of several times the size that
+/// is read at once.
 const POINTS: usize = 240;
 /// A part of an image less wide or high than this holds nothing to match, pixels.
 const PART_MIN: usize = 128;
-/// Heights may lie as far outside what the first window shows as three times its own span and this, metres.
+/// Heights may lie outside those of the first window with ties by three times their span and this, metres.
 const FAR_M: f64 = 1500.0;
 
-/// What an image's windows tell of it.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Character {
-    /// Standard deviation of the noise at full resolution, one of each window.
-    noise: Vec<f32>,
-    /// Typical difference of neighbouring pixels on each level, one of each window.
-    contrast: Vec<Vec<f32>>,
-    /// Whether some window has contrast.
-    has_picture: bool,
-}
-
-impl Character {
-    fn learn(&mut self, view: &SweepView) {
-        self.has_picture |= !pictures::is_blank(view);
-        self.noise.push(view.noise);
-        self.contrast.resize(self.contrast.len().max(view.contrast.len()), Vec::new());
-        self.contrast.iter_mut().zip(&view.contrast).for_each(|(all, c)| all.push(*c));
-    }
-
-    /// Whether windows were seen and none has contrast.
-    pub(crate) fn is_blank(&self) -> bool {
-        !self.noise.is_empty() && !self.has_picture
-    }
-
-    /// Gives a view of a part of the image the noise and contrast of the whole.
-    pub(crate) fn lend(&self, view: &mut SweepView) {
-        if let Some(noise) = median(&self.noise) {
-            view.noise = noise;
-        }
-        for (own, all) in view.contrast.iter_mut().zip(&self.contrast) {
-            *own = median(all).unwrap_or(*own);
-        }
-    }
-}
-
-fn median(values: &[f32]) -> Option<f32> {
-    upper_median(&mut values.to_vec())
-}
-
-/// Ties of the pairs, best pair first, over heights in `search`, and the images' characters.
+/// Returns the ties of the pairs, given best first, over heights in `search`, and the characters of the images.
 ///
 /// # Errors
-/// An image that cannot be read, a camera that fails.
+/// [`DsmError::Image`] for an image that cannot be read, [`DsmError::Camera`], [`DsmError::Crs`], [`DsmError::Cancelled`].
 pub(crate) fn match_in_windows(
-    images: &[Opened],
-    grid: &OutputGrid,
-    pairs: &[(usize, usize)],
-    search: (f64, f64),
+    images: &[SceneImage],
+    grid: &DsmGrid,
+    pairs: &[ImagePair],
+    search: HeightRange,
     progress: &dyn Progress,
-) -> Result<(Vec<PairTies>, Vec<Character>), PipelineError> {
-    let places = places(images, grid, pairs, search)?;
+) -> Result<(Vec<PairTies>, Vec<ImageCharacter>), DsmError> {
+    let projection = grid.projection()?;
+    let places = places(images, grid, &projection, pairs, search)?;
     let all = TieConfig::default();
     let config = TieConfig { points: POINTS.max(all.points / places.len().max(1)), ..all };
-    let mut characters = vec![Character::default(); images.len()];
-    let mut out: Vec<PairTies> =
-        pairs.iter().map(|&(reference, source)| PairTies { reference, source, ties: Vec::new() }).collect();
+    let mut characters = vec![ImageCharacter::default(); images.len()];
+    let mut out: Vec<PairTies> = pairs.iter().map(|&pair| PairTies { pair, ties: Vec::new() }).collect();
     let mut range = search;
     progress.begin("matching tie points", places.len());
     for place in places {
-        let windows = windows(images, &grid.part(place)?, range)?;
-        let views: Vec<SweepView> = images
-            .par_iter()
-            .zip(&windows)
-            .map(|(o, w)| w.map_or_else(|| Ok(SweepView::absent(o.camera.clone())), |w| read_view(o, Some(w))))
-            .collect::<Result<_, PipelineError>>()?;
+        progress.check_cancelled()?;
+        let windows = windows(images, &GroundBox::new(&grid.part(place), &projection, range)?)?;
+        let views = read_parts(images, &windows)?;
         let is_there = |i: usize| windows[i].is_some();
         (0..images.len()).filter(|&i| is_there(i)).for_each(|i| characters[i].learn(&views[i]));
-        let here: Vec<(usize, usize)> = pairs.iter().copied().filter(|p| is_there(p.0) && is_there(p.1)).collect();
+        let here: Vec<ImagePair> = pairs.iter().copied().filter(|p| is_there(p.first) && is_there(p.second)).collect();
         let found = match_pairs(&views, &here, range, &config, &|| ());
         if range == search
             && let Some(seen) = found.iter().find_map(|f| heights_seen(&views, f))
         {
-            let far = 3.0 * (seen.1 - seen.0) + FAR_M;
-            range = ((seen.0 - far).max(search.0), (seen.1 + far).min(search.1));
+            let far = 3.0 * seen.span_m() + FAR_M;
+            range = seen.grown(far, far).cut_to(search);
         }
-        for pair in found {
-            let own = out.iter_mut().find(|p| (p.reference, p.source) == (pair.reference, pair.source));
-            let origin =
-                |i: usize| windows[i].map_or(ImagePoint::default(), |w| ImagePoint::new(w.x as f64, w.y as f64));
-            let (a, b) = (origin(pair.reference), origin(pair.source));
-            let moved = pair.ties.iter().map(|t| sweep::pointing::Tie {
-                reference: ImagePoint::new(t.reference.sample + a.sample, t.reference.line + a.line),
-                source: ImagePoint::new(t.source.sample + b.sample, t.source.line + b.line),
-                ..*t
-            });
-            own.into_iter().for_each(|p| p.ties.extend(moved.clone()));
+        for pair in &found {
+            let own = out.iter_mut().find(|p| p.pair == pair.pair);
+            own.into_iter().for_each(|p| p.ties.extend(in_whole_images(pair, &windows)));
         }
         progress.step();
     }
     Ok((out, characters))
 }
 
-/// The parts of the images that may show a place.
-fn windows(images: &[Opened], place: &OutputGrid, range: (f64, f64)) -> Result<Vec<Option<Window>>, PipelineError> {
-    let one = |o: &Opened| {
-        let window = image_window(o, place, range, MARGIN)?;
+/// Reads one window per image. An image without a window gives an absent view.
+fn read_parts(images: &[SceneImage], windows: &[Option<Window>]) -> Result<Vec<View>, DsmError> {
+    let one = |(image, window): (&SceneImage, &Option<Window>)| match window {
+        Some(window) => read_view(image, *window),
+        None => Ok(View::absent(image.camera.clone())),
+    };
+    images.par_iter().zip(windows).map(one).collect()
+}
+
+/// Returns ties found in windows in the frames of the whole images.
+fn in_whole_images(found: &PairTies, windows: &[Option<Window>]) -> impl Iterator<Item = Tie> {
+    let origin = |i: usize| windows[i].map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(w.x as f64, w.y as f64));
+    let (a, b) = (origin(found.pair.first), origin(found.pair.second));
+    found.ties.iter().map(move |t| Tie {
+        reference: [t.reference[0] + a.sample, t.reference[1] + a.line],
+        source: [t.source[0] + b.sample, t.source[1] + b.line],
+        ..*t
+    })
+}
+
+/// Returns the parts of the images that may show a place.
+fn windows(images: &[SceneImage], place: &GroundBox) -> Result<Vec<Option<Window>>, DsmError> {
+    let one = |image: &SceneImage| {
+        let window = place.window_in(image, MARGIN)?;
         Ok(window.filter(|w| w.width.min(w.height) >= PART_MIN))
     };
     images.iter().map(one).collect()
 }
 
-/// Windows of the grid, evenly spread over the ground that some pair sees.
+/// Returns windows of the grid, evenly spread over the ground that some pair sees.
 fn places(
-    images: &[Opened],
-    grid: &OutputGrid,
-    pairs: &[(usize, usize)],
-    search: (f64, f64),
-) -> Result<Vec<Window>, PipelineError> {
-    let middle = 0.5 * (search.0 + search.1);
+    images: &[SceneImage],
+    grid: &DsmGrid,
+    projection: &MapProjection,
+    pairs: &[ImagePair],
+    search: HeightRange,
+) -> Result<Vec<Window>, DsmError> {
+    let middle = HeightRange::at(search.middle_m());
     let mut seen = Vec::new();
     for wanted in PLACES {
         seen.clear();
         for place in lattice(grid.size, wanted) {
-            if is_seen(images, &grid.part(place)?, pairs, middle)? {
+            if is_seen(images, &GroundBox::new(&grid.part(place), projection, middle)?, pairs)? {
                 seen.push(place);
             }
         }
@@ -160,7 +136,8 @@ fn places(
     Ok(seen.into_iter().step_by(every).collect())
 }
 
-/// About `wanted` windows in the middles of the fields of a lattice over the grid, which overlap as little as they can.
+/// Returns about `wanted` windows in the middles of the fields of a lattice over the grid. They overlap as little as they
+/// can.
 fn lattice((width, height): (usize, usize), wanted: f64) -> Vec<Window> {
     let fields = |along: usize, across: usize| {
         let n = (wanted * along as f64 / across as f64).sqrt().round().clamp(1.0, wanted) as usize;
@@ -176,20 +153,15 @@ fn lattice((width, height): (usize, usize), wanted: f64) -> Vec<Window> {
     (0..rows).flat_map(|r| (0..columns).map(move |c| (c, r))).map(|(c, r)| window(c, r)).collect()
 }
 
-/// Whether both images of a pair see most of a place.
-fn is_seen(
-    images: &[Opened],
-    place: &OutputGrid,
-    pairs: &[(usize, usize)],
-    height_m: f64,
-) -> Result<bool, PipelineError> {
-    let sees = |o: &Opened| {
-        let span = image_span(o, place, (height_m, height_m), 0)?;
-        let inside = span.intersection(&Window::whole(o.size.0, o.size.1));
-        Ok::<bool, PipelineError>(inside.is_some_and(|i| 2 * i.width * i.height >= span.width * span.height))
+/// Returns whether both images of a pair see most of a place, whose box has a single height.
+fn is_seen(images: &[SceneImage], place: &GroundBox, pairs: &[ImagePair]) -> Result<bool, DsmError> {
+    let sees = |image: &SceneImage| {
+        let span = place.span_in(image, 0)?;
+        let inside = span.intersection(&image.whole());
+        Ok::<bool, DsmError>(inside.is_some_and(|i| 2 * i.width * i.height >= span.width * span.height))
     };
     let seeing: Vec<bool> = images.iter().map(sees).collect::<Result<_, _>>()?;
-    Ok(pairs.iter().any(|p| seeing[p.0] && seeing[p.1]))
+    Ok(pairs.iter().any(|p| seeing[p.first] && seeing[p.second]))
 }
 
 #[cfg(test)]
@@ -205,12 +177,5 @@ mod tests {
             assert!(all.iter().all(|w| w.intersection(&whole) == Some(*w)), "{size:?}");
             assert!((1..all.len()).all(|i| all[..i].iter().all(|o| o != &all[i])), "{size:?}");
         }
-    }
-
-    #[test]
-    fn an_image_is_blank_when_windows_were_seen_and_none_has_contrast() {
-        let seen = |noise: &[f32], has_picture| Character { noise: noise.to_vec(), has_picture, ..Default::default() };
-        assert!(!seen(&[], false).is_blank() && seen(&[0.0, 0.0], false).is_blank() && !seen(&[0.0], true).is_blank());
-        assert_eq!((median(&[9.0, 1.0, 2.0]), median(&[])), (Some(2.0), None));
     }
 }

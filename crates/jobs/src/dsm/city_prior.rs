@@ -1,0 +1,76 @@
+//! A city model as the prior of the height sweep.
+
+use std::path::{Path, PathBuf};
+
+use city::{MeshConfig, TriangleMesh};
+use priors::{LinesOfSight, ModelPlace, PriorModel, SatelliteMaps, buildings_of};
+use sweep::View;
+
+use crate::dsm::error::DsmError;
+use crate::dsm::notes::Notes;
+use crate::dsm::prior_view::ViewPrior;
+
+type Cause = Box<dyn std::error::Error + Send + Sync>;
+
+/// A city model in its map, with heights above the ellipsoid.
+#[derive(Debug)]
+pub(crate) struct CityPrior {
+    path: PathBuf,
+    model: PriorModel,
+    place: ModelPlace,
+    /// Identifiers of all objects, in the order of their numbers.
+    pub(crate) ids: Vec<String>,
+    /// Number of surfaces of buildings.
+    surfaces: usize,
+}
+
+impl CityPrior {
+    /// Reads a model, which must name its CRS.
+    ///
+    /// # Errors
+    /// [`DsmError::Prior`].
+    pub(crate) fn read(path: &Path) -> Result<Self, DsmError> {
+        Self::open(path).map_err(|source| DsmError::Prior { path: path.to_owned(), source })
+    }
+
+    fn open(path: &Path) -> Result<Self, Cause> {
+        let file = io::citymodel::read(path)?;
+        let mut mesh = TriangleMesh::from_model(&file.model, &MeshConfig::default())?.mesh;
+        if mesh.triangles.is_empty() {
+            return Err("no building of the model has a usable surface".into());
+        }
+        let place = ModelPlace::of(&file.model.crs, None, None)?;
+        place.to_ellipsoid(&mut mesh)?;
+        let surfaces = mesh.surfaces.len();
+        let ids = file.model.objects.iter().map(|object| object.id.clone()).collect();
+        let model = PriorModel::new(mesh, &buildings_of(&file.model))?;
+        Ok(Self { path: path.to_owned(), model, place, ids, surfaces })
+    }
+
+    /// Notes the use of the model.
+    pub(crate) fn note(&self, notes: &mut Notes<'_>) {
+        let path = self.path.display();
+        if self.place.datum.is_none() {
+            notes.warn(format!("the model does not say what its heights are above, taken as the ellipsoid: {path}"));
+        }
+        notes.choose("prior", format!("{} buildings' surfaces", self.surfaces), path.to_string());
+    }
+
+    /// Renders the model into every view; `None` for a view that does not see it. `gsd_m` is a pixel on the ground.
+    ///
+    /// # Errors
+    /// [`DsmError::Prior`] for an image that is too large for maps.
+    pub(crate) fn seen_from(&self, views: &[View], gsd_m: f64) -> Result<Vec<Option<ViewPrior>>, DsmError> {
+        let seen = |view: &View| {
+            let size = view.levels.first().map_or((0, 0), |image| (image.width(), image.height()));
+            if size.0 == 0 || size.1 == 0 {
+                return Ok(None);
+            }
+            let lines = LinesOfSight::new(&view.camera, size, &self.model, &self.place.projection)?;
+            let maps = SatelliteMaps::render(&self.model, &lines)?;
+            Ok((maps.hits() > 0).then_some(ViewPrior { height_m: maps.height_m, object: maps.object, gsd_m }))
+        };
+        let all: Result<_, priors::PriorsError> = views.iter().map(seen).collect();
+        all.map_err(|source| DsmError::Prior { path: self.path.clone(), source: source.into() })
+    }
+}

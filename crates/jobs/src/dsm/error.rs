@@ -1,0 +1,272 @@
+//! The errors of the DSM job.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use crate::dsm::values::{HeightRange, MapBounds};
+
+/// A setting of [`DsmConfig`](crate::dsm::DsmConfig) that an error names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DsmSetting {
+    /// `gsd_m`.
+    CellSize,
+    /// `crs_epsg`.
+    Crs,
+    /// `bounds`.
+    Bounds,
+    /// `height_range_m`.
+    HeightRange,
+    /// `dem`.
+    Dem,
+    /// `pairs`.
+    Pairs,
+    /// `references`.
+    References,
+    /// `threads`.
+    Threads,
+    /// `chunk`.
+    ChunkSide,
+    /// `tile`.
+    TileSide,
+}
+
+impl fmt::Display for DsmSetting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::CellSize => "the cell size",
+            Self::Crs => "the coordinate reference system",
+            Self::Bounds => "the bounds",
+            Self::HeightRange => "the height range",
+            Self::Dem => "the elevation model",
+            Self::Pairs => "the list of image pairs",
+            Self::References => "the list of reference images",
+            Self::Threads => "the number of threads",
+            Self::ChunkSide => "the side of the chunks",
+            Self::TileSide => "the side of the tiles",
+        })
+    }
+}
+
+/// The reason why a DSM run ended without a result. No result file was written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DsmError {
+    /// There are fewer than two images.
+    #[error("found {found} image(s), expected at least 2: heights come from the parallax between views")]
+    TooFewImages {
+        /// Number of images given.
+        found: usize,
+    },
+    /// One image is given twice.
+    #[error("the same image is given twice; remove one: {}", path.display())]
+    SameImage {
+        /// File of the image.
+        path: PathBuf,
+    },
+    /// The city model cannot serve as prior.
+    #[error("cannot use the city model as prior: {}", path.display())]
+    Prior {
+        /// File of the model.
+        path: PathBuf,
+        /// Cause.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// An image cannot be read, or a raster cannot be written.
+    #[error("cannot read the image")]
+    Image(#[from] io::raster::RasterError),
+    /// An image has no usable RPC.
+    #[error("no usable RPC for an image")]
+    Rpc(#[source] Box<io::rpc::RpcReadError>),
+    /// An RPC has no ground under its image.
+    #[error("the RPC has no ground under the image; is it the RPC of this image? {}: {source}", path.display())]
+    Camera {
+        /// File of the image.
+        path: PathBuf,
+        /// Failure of the camera model.
+        source: camera::CameraError,
+    },
+    /// No two images share ground.
+    #[error(
+        "the images share no ground (largest overlap {share_percent:.1} % of an image); check that the RPCs belong to the images"
+    )]
+    NoOverlap {
+        /// Largest overlap found, percent of the smaller footprint.
+        share_percent: f64,
+    },
+    /// No two overlapping images look from different directions.
+    #[error(
+        "no parallax: the overlapping images look along the same line (largest angle {angle_deg:.2}°, needed {needed_deg}°); \
+         add an image from another direction"
+    )]
+    NoParallax {
+        /// Largest intersection angle found, degrees.
+        angle_deg: f64,
+        /// Least angle that gives heights, degrees.
+        needed_deg: f64,
+    },
+    /// All pixels of an image have one value.
+    #[error("an image has no contrast: all its pixels have one value or none; give another one: {}", path.display())]
+    Blank {
+        /// File of the image.
+        path: PathBuf,
+    },
+    /// Two images have the same pixels and different RPCs.
+    #[error(
+        "no parallax: two images have the same pixels; remove one, or give the image that its RPC belongs to: {} and {}",
+        first.display(), second.display()
+    )]
+    SamePixels {
+        /// File of the first image.
+        first: PathBuf,
+        /// File of the second image.
+        second: PathBuf,
+    },
+    /// There are too few tie points to find the height range.
+    #[error(
+        "found {ties} tie points, expected at least {needed}: the height range cannot be found automatically; \
+         give a height range or an elevation model, and check that the images show the same ground"
+    )]
+    NoTies {
+        /// Number of tie points found.
+        ties: usize,
+        /// Least number that is enough.
+        needed: usize,
+    },
+    /// The given height range misses the scene.
+    #[error(
+        "the height range {} to {} m misses the scene, whose tie points lie between {:.0} and {:.0} m above the ellipsoid; \
+         leave the height range out, or give heights above the ellipsoid",
+        asked.low_m, asked.high_m, seen.low_m, seen.high_m
+    )]
+    RangeMissesScene {
+        /// Height range that was asked for.
+        asked: HeightRange,
+        /// Heights of the tie points.
+        seen: HeightRange,
+    },
+    /// A setting has a value that cannot be used.
+    #[error("{setting} is {found}, expected {expected}")]
+    Value {
+        /// Setting with the wrong value.
+        setting: DsmSetting,
+        /// Value that was given.
+        found: String,
+        /// Description of the values that can be used.
+        expected: String,
+    },
+    /// The requested area is not covered by the images.
+    #[error(
+        "the bounds {:?} share no ground with the images, which cover {:?} in EPSG:{epsg}",
+        bounds.to_array(), covered.to_array()
+    )]
+    BoundsMissScene {
+        /// Requested area.
+        bounds: MapBounds,
+        /// Area that the images cover.
+        covered: MapBounds,
+        /// EPSG code of the CRS of both areas.
+        epsg: u32,
+    },
+    /// No height survived.
+    #[error(
+        "no two views agree on any height between {:.0} and {:.0} m: the images may not show the same ground, \
+         or its heights lie outside", range.low_m, range.high_m
+    )]
+    NoSurface {
+        /// Heights that were searched.
+        range: HeightRange,
+    },
+    /// The smallest piece of work needs more memory than the limit.
+    #[error(
+        "the run needs about {needed_mb} MB and the limit is {limit_mb} MB; raise the memory limit or give smaller bounds"
+    )]
+    Memory {
+        /// Estimated need, megabytes.
+        needed_mb: u64,
+        /// Limit, megabytes.
+        limit_mb: u64,
+    },
+    /// Results exist and may not be replaced.
+    #[error("results exist and would be replaced; choose another folder or allow replacing them: {}", path.display())]
+    Exists {
+        /// First file found.
+        path: PathBuf,
+    },
+    /// The output cannot be written.
+    #[error("cannot write the output; check the folder's permissions and space: {}: {source}", path.display())]
+    Output {
+        /// File or folder that failed.
+        path: PathBuf,
+        /// Answer of the system.
+        source: std::io::Error,
+    },
+    /// A stored result of a chunk cannot be read.
+    #[error("cannot read the result of a chunk ({reason}): {}", path.display())]
+    ChunkFile {
+        /// File or folder that failed.
+        path: PathBuf,
+        /// Cause.
+        reason: String,
+    },
+    /// The plan has no chunk of a number.
+    #[error("the plan has {count} chunks and none with number {index}")]
+    NoSuchChunk {
+        /// Number that was asked for, counted from 0.
+        index: usize,
+        /// Number of chunks.
+        count: usize,
+    },
+    /// Results of chunks are missing, or there is more than one for a chunk.
+    #[error("{found} of the {count} chunks of the plan have a result; compute each chunk once before merging")]
+    ChunksMissing {
+        /// Number of results given.
+        found: usize,
+        /// Number of chunks in the plan.
+        count: usize,
+    },
+    /// The coordinate reference system or the vertical datum cannot be used.
+    #[error("cannot use the coordinate reference system")]
+    Crs(#[from] crs::CrsError),
+    /// The height sweep failed.
+    #[error("the height sweep failed")]
+    Sweep(#[from] sweep::SweepError),
+    /// The thread pool cannot be made.
+    #[error("cannot start {threads} threads: {reason}")]
+    Threads {
+        /// Number of threads.
+        threads: usize,
+        /// Answer of the thread pool.
+        reason: String,
+    },
+    /// The caller asked the run to stop.
+    #[error("the run was cancelled")]
+    Cancelled,
+}
+
+impl DsmError {
+    /// Makes the error of a setting with a wrong value.
+    pub(crate) fn value(setting: DsmSetting, found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self::Value { setting, found: found.into(), expected: expected.into() }
+    }
+
+    /// Returns the message with those of all causes, on one line.
+    pub(crate) fn with_causes(&self) -> String {
+        let first = std::error::Error::source(self);
+        let causes = std::iter::successors(first, |cause| cause.source());
+        causes.fold(self.to_string(), |text, cause| format!("{text}: {cause}"))
+    }
+}
+
+impl From<io::rpc::RpcReadError> for DsmError {
+    fn from(e: io::rpc::RpcReadError) -> Self {
+        // Boxed because it is several times larger than the other variants.
+        Self::Rpc(Box::new(e))
+    }
+}
+
+impl From<numeric::Cancelled> for DsmError {
+    fn from(_: numeric::Cancelled) -> Self {
+        Self::Cancelled
+    }
+}

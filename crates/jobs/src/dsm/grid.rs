@@ -1,0 +1,144 @@
+//! The grid of the DSM: CRS, cell size and extent.
+
+use crs::{CrsError, MapProjection};
+use geodesy::utm_epsg;
+use raster::{GeoTransform, Window};
+use serde::{Deserialize, Serialize};
+
+use crate::dsm::config::{DsmConfig, Preset};
+use crate::dsm::error::{DsmError, DsmSetting};
+use crate::dsm::footprints::shared_ground;
+use crate::dsm::notes::Notes;
+use crate::dsm::values::MapBounds;
+use crate::dsm::view_geometry::ViewGeometry;
+
+/// Grids of more cells than this come from a cell size or bounds in wrong units.
+const CELLS_MAX: f64 = 4e9;
+
+/// The grid of a DSM.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct DsmGrid {
+    /// EPSG code of the horizontal CRS, whose units are metres.
+    pub epsg: u32,
+    /// Placement of the cells on the map.
+    pub geotransform: GeoTransform,
+    /// Columns and rows.
+    pub size: (usize, usize),
+    /// Side of a cell, metres.
+    pub gsd_m: f64,
+}
+
+impl DsmGrid {
+    /// Returns the window of all cells.
+    pub(crate) const fn whole(&self) -> Window {
+        Window::whole(self.size.0, self.size.1)
+    }
+
+    /// Returns the grid of a window of cells.
+    #[must_use]
+    pub(crate) fn part(&self, cells: Window) -> Self {
+        Self {
+            epsg: self.epsg,
+            geotransform: self.geotransform.shifted(cells.x as f64, cells.y as f64),
+            size: (cells.width, cells.height),
+            gsd_m: self.gsd_m,
+        }
+    }
+
+    /// Returns the rectangle that the cells cover.
+    pub(crate) fn bounds(&self) -> MapBounds {
+        let (x_min, y_max) = self.geotransform.map_from_cell(-0.5, -0.5);
+        let (x_max, y_min) = self.geotransform.map_from_cell(self.size.0 as f64 - 0.5, self.size.1 as f64 - 0.5);
+        MapBounds { x_min, y_min, x_max, y_max }
+    }
+
+    /// Makes the projection of the CRS.
+    ///
+    /// # Errors
+    /// [`CrsError::NoTransformation`] for a CRS that PROJ does not know.
+    pub(crate) fn projection(&self) -> Result<MapProjection, CrsError> {
+        MapProjection::from_epsg(self.epsg)
+    }
+}
+
+/// Chooses CRS, cell size and extent where they are not given. `coarsest_gsd_m` is the pixel of the coarsest image.
+///
+/// # Errors
+/// [`DsmError::Value`] for a CRS that is not in metres and for a grid of too many cells, [`DsmError::BoundsMissScene`],
+/// [`DsmError::Crs`].
+pub(crate) fn choose_grid(
+    config: &DsmConfig,
+    geometry: &ViewGeometry,
+    coarsest_gsd_m: f64,
+) -> Result<DsmGrid, DsmError> {
+    let centre = geometry.centre;
+    let epsg = match config.crs_epsg {
+        Some(code) => code,
+        None => utm_epsg(centre.lon_deg, centre.lat_deg).map_err(CrsError::from)?,
+    };
+    let projection = MapProjection::from_epsg(epsg)?;
+    if projection.metres_per_unit() != Some(1.0) {
+        let found = format!("EPSG:{epsg}, whose units are not metres");
+        return Err(DsmError::value(DsmSetting::Crs, found, "a projected CRS in metres; a cell has one size"));
+    }
+    let gsd_m = config.gsd_m.unwrap_or_else(|| rounded_gsd_m(coarsest_gsd_m * config.preset.pixels_per_cell()));
+    let covered = covered_bounds(geometry, &projection)?;
+    let bounds = config.bounds.unwrap_or(covered);
+    if !bounds.meets(covered) {
+        return Err(DsmError::BoundsMissScene { bounds, covered, epsg });
+    }
+    let (geotransform, size) = snapped(bounds, gsd_m)?;
+    Ok(DsmGrid { epsg, geotransform, size, gsd_m })
+}
+
+/// Notes the choices of [`choose_grid`].
+pub(crate) fn note_grid(config: &DsmConfig, grid: &DsmGrid, coarsest_gsd_m: f64, notes: &mut Notes<'_>) {
+    let given = |is_given: bool, else_why: String| if is_given { "given".to_owned() } else { else_why };
+    let zone = given(config.crs_epsg.is_some(), "the UTM (or polar) zone of the scene's centre".to_owned());
+    notes.choose("crs", format!("EPSG:{}, heights above {}", grid.epsg, config.vertical), zone);
+    let matched = match config.preset {
+        Preset::Fast => "twice the coarsest image's",
+        Preset::Balanced | Preset::Accurate => "the coarsest image's",
+    };
+    let coarsest = format!("{matched} {coarsest_gsd_m:.3} m, rounded to 5 cm");
+    notes.choose("gsd", format!("{} m", grid.gsd_m), given(config.gsd_m.is_some(), coarsest));
+    let seen = given(config.bounds.is_some(), "the ground that at least two images see".to_owned());
+    let bounds = grid.bounds().to_array();
+    notes.choose("bounds", format!("{bounds:.1?}, {} × {} cells", grid.size.0, grid.size.1), seen);
+}
+
+/// Rounds to whole multiples of 5 cm: a tidy number costs no detail.
+fn rounded_gsd_m(gsd_m: f64) -> f64 {
+    ((gsd_m * 20.0).round() / 20.0).max(0.05)
+}
+
+/// Returns the map rectangle of the ground that at least two images see.
+fn covered_bounds(geometry: &ViewGeometry, projection: &MapProjection) -> Result<MapBounds, DsmError> {
+    let hull = shared_ground(&geometry.outlines).ok_or(DsmError::NoOverlap { share_percent: 0.0 })?;
+    let mut bounds = MapBounds::EMPTY;
+    for p in hull.exterior().points() {
+        let g = geometry.frame.ground_from_enu(geodesy::EnuPoint { east: p.x(), north: p.y(), up: 0.0 });
+        let m = projection.map_from_lonlat(g.lon_deg, g.lat_deg)?;
+        bounds = bounds.including(m.x, m.y);
+    }
+    Ok(bounds)
+}
+
+/// Returns a north-up grid on whole multiples of the cell size that holds the bounds: its geotransform, columns and rows.
+fn snapped(b: MapBounds, gsd_m: f64) -> Result<(GeoTransform, (usize, usize)), DsmError> {
+    let down = |v: f64| (v / gsd_m).floor() * gsd_m;
+    // Slightly inside, so that bounds on the lattice do not gain a cell by rounding.
+    let up = |v: f64| ((v / gsd_m) - 1e-6).ceil() * gsd_m;
+    let (x0, y1) = (down(b.x_min + 1e-6 * gsd_m), up(b.y_max));
+    let (columns, rows) = (((up(b.x_max) - x0) / gsd_m).round(), ((y1 - down(b.y_min + 1e-6 * gsd_m)) / gsd_m).round());
+    if !(columns >= 1.0 && rows >= 1.0 && columns * rows <= CELLS_MAX) {
+        return Err(DsmError::value(
+            DsmSetting::Bounds,
+            format!("a grid of {columns:.0} × {rows:.0} cells of {gsd_m} m"),
+            format!("1 to {CELLS_MAX:.0} cells; bounds are x_min y_min x_max y_max in the DSM's CRS"),
+        ));
+    }
+    Ok((GeoTransform::north_up(x0, y1, gsd_m), (columns as usize, rows as usize)))
+}

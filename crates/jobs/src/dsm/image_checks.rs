@@ -1,0 +1,90 @@
+//! What the tie points show about the images themselves: an image that does not belong to the others, two images that are
+//! one picture, an image whose pointing is grossly off.
+
+use camera::{ImageCorrection, ImagePoint};
+use sweep::pointing::Tie;
+
+use crate::dsm::ties::{PairTies, TIES_MIN};
+use crate::dsm::values::ImagePair;
+
+/// Two different pictures of ground with any relief do not agree to this at all tie points, pixels.
+const SAME_PX: f64 = 0.1;
+/// A pointing error larger than this is gross, pixels: twice the deviation that the adjustment expects.
+const GROSS_PX: f64 = 20.0;
+
+/// Returns the views that tie points do not connect with most of the others; none when all are connected. The pointing of
+/// such a view is not known. [`TIES_MIN`] ties make a connection.
+pub(crate) fn unconnected(views: usize, ties: &[PairTies]) -> Vec<usize> {
+    let mut group: Vec<usize> = (0..views).collect();
+    for t in ties.iter().filter(|t| t.ties.len() >= TIES_MIN) {
+        let (a, b) = (group[t.pair.first], group[t.pair.second]);
+        group.iter_mut().filter(|g| **g == a.max(b)).for_each(|g| *g = a.min(b));
+    }
+    let size = |g: usize| group.iter().filter(|x| **x == g).count();
+    let count = |g: usize| ties.iter().filter(|t| group[t.pair.first] == g).map(|t| t.ties.len()).sum::<usize>();
+    let largest = (0..views).max_by_key(|&g| (size(g), count(g), views - g)).unwrap_or(0);
+    if size(largest) < 2 { Vec::new() } else { (0..views).filter(|&v| group[v] != largest).collect() }
+}
+
+/// Finds a pair whose ties lie at the same pixel of both images: one picture with two RPCs. `origins` are the first pixels
+/// of the parts of the images in which the ties were found.
+pub(crate) fn same_picture(ties: &[PairTies], origins: &[ImagePoint]) -> Option<ImagePair> {
+    let same = |t: &PairTies| {
+        let (a, b) = (origins[t.pair.first], origins[t.pair.second]);
+        let apart = |tie: &Tie| {
+            let samples = tie.source[0] + b.sample - tie.reference[0] - a.sample;
+            let lines = tie.source[1] + b.line - tie.reference[1] - a.line;
+            samples.hypot(lines)
+        };
+        let close = t.ties.iter().filter(|t| apart(t) < SAME_PX).count();
+        t.ties.len() >= TIES_MIN && 10 * close >= 9 * t.ties.len()
+    };
+    ties.iter().find(|t| same(t)).map(|t| t.pair)
+}
+
+/// Returns the views whose corrections are further from those of every other view than pointing errors go, with the
+/// distance to the nearest one in pixels.
+pub(crate) fn grossly_off(corrections: &[ImageCorrection]) -> Vec<(usize, f64)> {
+    let shift = |i: usize| corrections[i].translation_px;
+    let apart = |i: usize, j: usize| (shift(i)[0] - shift(j)[0]).hypot(shift(i)[1] - shift(j)[1]);
+    let n = corrections.len();
+    let nearest = |i: usize| (0..n).filter(|&j| j != i).map(|j| apart(i, j)).fold(f64::INFINITY, f64::min);
+    (0..n).map(|i| (i, nearest(i))).filter(|(_, d)| d.is_finite() && *d > GROSS_PX).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ties(first: usize, second: usize, apart_px: f64) -> PairTies {
+        let tie = |i: usize| {
+            let at = [i as f64 * 7.0, i as f64 * 3.0];
+            Tie { reference: at, source: [at[0] + apart_px, at[1]], correlation: 0.9 }
+        };
+        PairTies { pair: ImagePair { first, second }, ties: (0..20).map(tie).collect() }
+    }
+
+    #[test]
+    fn the_largest_group_stays() {
+        assert_eq!(unconnected(4, &[ties(0, 1, 5.0), ties(1, 3, 5.0)]), [2]);
+        assert_eq!(unconnected(5, &[ties(0, 1, 5.0), ties(2, 3, 5.0), ties(3, 4, 5.0)]), [0, 1]);
+        assert_eq!(unconnected(3, &[]), Vec::<usize>::new());
+    }
+
+    #[test]
+    fn the_odd_one_is_named_or_both_of_two() {
+        let off = |x: f64| ImageCorrection::translation(x, 1.0);
+        assert_eq!(grossly_off(&[off(2.0), off(-38.0), off(0.0)]), [(1, 38.0)]);
+        assert_eq!(grossly_off(&[off(15.0), off(-15.0)]).len(), 2);
+        assert!(grossly_off(&[off(5.0), off(-5.0), off(0.0)]).is_empty());
+    }
+
+    #[test]
+    fn equal_places_are_one_picture_and_a_shift_is_not() {
+        let origin = ImagePoint::new(0.0, 0.0);
+        let pair = Some(ImagePair::new(0, 1));
+        assert_eq!(same_picture(&[ties(0, 1, 0.02)], &[origin; 2]), pair);
+        assert_eq!(same_picture(&[ties(0, 1, 3.0)], &[origin; 2]), None);
+        assert_eq!(same_picture(&[ties(0, 1, 3.0)], &[ImagePoint::new(3.0, 0.0), origin]), pair);
+    }
+}

@@ -1,0 +1,184 @@
+//! The first look at a scene of which only the RPCs are known: the pixels, when they fit the memory, and tie points.
+//!
+//! The search begins at the heights for which the RPCs state that they are made. Where that gives no ties, it is repeated at all
+//! heights at which the images share ground, see [`SharedHeights`].
+
+use camera::RpcCamera;
+use raster::Window;
+use sweep::pointing::TieConfig;
+
+use crate::dsm::character::ImageCharacter;
+use crate::dsm::chunk_side::choose_side;
+use crate::dsm::config::DsmConfig;
+use crate::dsm::error::{DsmError, DsmSetting};
+use crate::dsm::grid::{DsmGrid, choose_grid};
+use crate::dsm::height_choice::validity_range;
+use crate::dsm::image_windows::GroundBox;
+use crate::dsm::images::{SceneImage, read_views};
+use crate::dsm::memory;
+use crate::dsm::session::Session;
+use crate::dsm::shared_heights::SharedHeights;
+use crate::dsm::tie_windows::match_in_windows;
+use crate::dsm::ties::{PairTies, TIES_MIN, match_pairs};
+use crate::dsm::values::{HeightRange, ImagePair};
+use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
+
+/// Pixels read around what the bounds show, at full resolution: patches, aggregation and pointing errors reach out.
+const WINDOW_MARGIN: usize = 96;
+
+/// What is known before the pointing is corrected.
+pub(crate) struct FirstLook {
+    /// Geometry at the height where ties were searched for, with the cameras of the providers.
+    pub(crate) geometry: ViewGeometry,
+    /// Pairs that can give heights, the best angles first.
+    pub(crate) useful: Vec<ImagePair>,
+    /// Ties of the pairs to match, in the frames of `windows`.
+    pub(crate) ties: Vec<PairTies>,
+    /// Part of each image that is used; `None` is the whole image.
+    pub(crate) windows: Vec<Option<Window>>,
+    /// Cameras in the frames of the windows.
+    pub(crate) cameras: Vec<RpcCamera>,
+    /// Columns and rows of the windows.
+    pub(crate) sizes: Vec<(usize, usize)>,
+    pub(crate) characters: Vec<ImageCharacter>,
+    /// Whether the scene is computed at once. The session then holds the views of the windows.
+    pub(crate) is_whole: bool,
+}
+
+impl FirstLook {
+    fn has_ties(&self) -> bool {
+        self.ties.iter().any(|t| t.ties.len() >= TIES_MIN)
+    }
+}
+
+/// Reads the images and matches them.
+///
+/// # Errors
+/// Those of the geometry ([`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Camera`]), of the request
+/// ([`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`]), [`DsmError::Image`], [`DsmError::Cancelled`].
+pub(crate) fn look(
+    config: &DsmConfig,
+    images: &[SceneImage],
+    session: &mut Session<'_>,
+) -> Result<FirstLook, DsmError> {
+    let guess = images.iter().map(|o| o.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
+    let valid = validity_range(images, config.height_range_m);
+    let expected = ViewGeometry::at(images, guess.clamp(valid.low_m, valid.high_m));
+    let looked = expected.and_then(|geometry| look_at(config, images, geometry, valid, session));
+    let has_ties = |l: &Result<FirstLook, DsmError>| l.as_ref().is_ok_and(FirstLook::has_ties);
+    let is_final = |e: &DsmError| matches!(e, DsmError::Image(_) | DsmError::Memory { .. } | DsmError::Cancelled);
+    if has_ties(&looked) || looked.as_ref().is_err_and(is_final) {
+        return looked;
+    }
+    let is_wider = |s: &SharedHeights| s.range.low_m < valid.low_m || s.range.high_m > valid.high_m;
+    let Some(shared) = SharedHeights::of(images).filter(is_wider) else { return looked };
+    let views = session.views.take();
+    let again = ViewGeometry::at(images, shared.best_m)
+        .and_then(|geometry| look_at(config, images, geometry, shared.range, session));
+    if has_ties(&again) || matches!(again, Err(DsmError::Cancelled)) {
+        return again;
+    }
+    // The first error is the better explanation, because the scene should be where the RPCs are valid.
+    session.views = views;
+    looked
+}
+
+fn look_at(
+    config: &DsmConfig,
+    images: &[SceneImage],
+    geometry: ViewGeometry,
+    search: HeightRange,
+    session: &mut Session<'_>,
+) -> Result<FirstLook, DsmError> {
+    let useful = geometry.useful_pairs()?;
+    let pairs = asked_pairs(config, &useful)?;
+    let gsd = images.iter().filter_map(|o| ground_sampling_m(o, geometry.centre)).fold(0.0, f64::max);
+    let grid = choose_grid(config, &geometry, gsd)?;
+    let windows = windows(config, images, &grid, search)?;
+    let progress = session.progress;
+    if !fits(config, images, &windows, &grid) {
+        // A limit too small for the smallest chunk is refused before anything is read.
+        choose_side(config, images, &grid, HeightRange::at(geometry.centre.height_m))?;
+        let (ties, characters) = match_in_windows(images, &grid, &pairs, search, progress)?;
+        return Ok(FirstLook {
+            geometry,
+            useful,
+            ties,
+            windows: vec![None; images.len()],
+            cameras: images.iter().map(|o| o.camera.clone()).collect(),
+            sizes: images.iter().map(|o| o.size).collect(),
+            characters,
+            is_whole: false,
+        });
+    }
+    progress.begin("reading images", images.len());
+    let views = read_views(images, &windows, &|| progress.step())?;
+    session.lap("read");
+    progress.check_cancelled()?;
+    progress.begin("matching tie points", pairs.len());
+    let ties = match_pairs(&views, &pairs, search, &TieConfig::default(), &|| progress.step());
+    let mut characters = vec![ImageCharacter::default(); images.len()];
+    characters.iter_mut().zip(&views).for_each(|(character, view)| character.learn(view));
+    let looked = FirstLook {
+        geometry,
+        useful,
+        ties,
+        windows,
+        cameras: views.iter().map(|v| v.camera.clone()).collect(),
+        sizes: views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect(),
+        characters,
+        is_whole: true,
+    };
+    session.views = Some(views);
+    Ok(looked)
+}
+
+/// Returns whether the scene may be computed at once: it fits the memory, and smaller chunks are not asked for.
+fn fits(config: &DsmConfig, images: &[SceneImage], windows: &[Option<Window>], grid: &DsmGrid) -> bool {
+    let pixels = images.iter().zip(windows).map(|(image, window)| memory::area(&window.unwrap_or(image.whole())));
+    let pixels: Vec<u64> = pixels.collect();
+    let is_one_chunk = config.chunk.is_none_or(|side| side >= grid.size.0.max(grid.size.1));
+    is_one_chunk && memory::needed_mb(&pixels, memory::area(&grid.whole())) <= memory::limit_mb(config)
+}
+
+/// Returns the useful pairs, or those of them that are asked for.
+///
+/// # Errors
+/// [`DsmError::Value`] when no useful pair is asked for.
+pub(crate) fn asked_pairs(config: &DsmConfig, useful: &[ImagePair]) -> Result<Vec<ImagePair>, DsmError> {
+    let pairs: Vec<ImagePair> = match &config.pairs {
+        None => useful.to_vec(),
+        Some(asked) => useful.iter().copied().filter(|p| asked.iter().any(|a| a.ordered() == *p)).collect(),
+    };
+    if pairs.is_empty() {
+        let found = "without a pair that shares ground under a useful angle";
+        return Err(DsmError::value(DsmSetting::Pairs, found, format!("some of {}", pair_names(useful))));
+    }
+    Ok(pairs)
+}
+
+/// Returns the names of pairs, with the positions of the images counted from 1: `1-2 1-3`.
+pub(crate) fn pair_names(pairs: &[ImagePair]) -> String {
+    pairs.iter().map(ImagePair::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the part of each image to read: what the bounds may need, or the whole image (`None`) without bounds.
+fn windows(
+    config: &DsmConfig,
+    images: &[SceneImage],
+    grid: &DsmGrid,
+    search: HeightRange,
+) -> Result<Vec<Option<Window>>, DsmError> {
+    if config.bounds.is_none() {
+        return Ok(vec![None; images.len()]);
+    }
+    let ground = GroundBox::new(grid, &grid.projection()?, config.height_range_m.unwrap_or(search))?;
+    let window = |image: &SceneImage| {
+        ground.window_in(image, WINDOW_MARGIN)?.map(Some).ok_or_else(|| {
+            let found = format!("an area that an image does not see: {}", image.path.display());
+            let expected = "an area that every image sees, or only the images that see it";
+            DsmError::value(DsmSetting::Bounds, found, expected)
+        })
+    };
+    images.iter().map(window).collect()
+}

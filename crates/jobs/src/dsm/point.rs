@@ -1,0 +1,209 @@
+//! Second stage of a run: tie points, and the correction of the cameras' pointing.
+
+use camera::{ImageCorrection, ImagePoint};
+use numeric::{Choice, Progress};
+use serde::{Deserialize, Serialize};
+use sweep::pointing::{AdjustConfig, Adjustment};
+
+use crate::dsm::character::ImageCharacter;
+use crate::dsm::config::DsmConfig;
+use crate::dsm::dem::dem_heights;
+use crate::dsm::error::DsmError;
+use crate::dsm::image_checks::{grossly_off, same_picture, unconnected};
+use crate::dsm::images::{ImagePart, Opened, SceneImage};
+use crate::dsm::look::{FirstLook, asked_pairs, look, pair_names};
+use crate::dsm::notes::Notes;
+use crate::dsm::report::{CorrectionOrder, PointingReport};
+use crate::dsm::session::Session;
+use crate::dsm::ties::{PairTies, TIES_MIN, adjust_cameras, tie_heights};
+use crate::dsm::values::{HeightRange, ImagePair};
+use crate::dsm::view_geometry::ViewGeometry;
+
+/// Where no two views are further apart than this, heights are ten times less precise than positions, and a warning is
+/// given.
+const ANGLE_WEAK_DEG: f64 = 3.0;
+
+/// Second stage of a run: the images with corrected cameras, and what the tie points show.
+///
+/// It can be written as JSON and read back without a change of the result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Pointed {
+    /// Images with corrected cameras.
+    pub images: Vec<SceneImage>,
+    /// Noise and contrast of the images.
+    pub characters: Vec<ImageCharacter>,
+    /// Whether the scene fits the memory and is computed at once.
+    pub is_whole: bool,
+    /// Pairs that see the same ground from different directions, the best angles first.
+    pub useful: Vec<ImagePair>,
+    /// Pairs to match: the useful ones that are asked for.
+    pub pairs: Vec<ImagePair>,
+    /// Tie points by pair, in the frames of the parts of the images that were read.
+    pub ties: Vec<PairTies>,
+    /// Corrections found, one per image, in the same frames. They are in the cameras only if `pointing.applied`.
+    pub corrections: Vec<ImageCorrection>,
+    /// Size of the correction and residuals.
+    pub pointing: PointingReport,
+    /// Heights of the tie points without outliers; `None` when there are too few.
+    pub tie_heights: Option<HeightRange>,
+    /// Heights of the given elevation model over the scene.
+    pub dem_heights: Option<HeightRange>,
+    /// Choices made so far.
+    pub choices: Vec<Choice>,
+    /// Warnings given so far.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the images, or windows of them when they do not fit the memory, finds tie points, and corrects the cameras.
+///
+/// # Errors
+/// [`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Blank`], [`DsmError::SamePixels`] for images that give no
+/// heights; [`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`] for a request that cannot be served;
+/// [`DsmError::Image`], [`DsmError::Camera`], [`DsmError::Crs`], [`DsmError::Cancelled`].
+pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> Result<Pointed, DsmError> {
+    session.progress.check_cancelled()?;
+    let mut images = opened.images.clone();
+    let looked = look(config, &images, session)?;
+    check_pictures(&images, &looked)?;
+    let (found, tracks) = adjust_cameras(&looked.cameras, &looked.sizes, &looked.ties, &AdjustConfig::default());
+    let mut notes = Notes::new(session.progress);
+    let is_applied = is_applied(config, &found, &mut notes);
+    set_cameras(&mut images, session, &looked, is_applied.then_some(&found));
+    let FirstLook { geometry, mut useful, ties, characters, is_whole, .. } = looked;
+    if is_applied {
+        drop_unconnected(config, &mut useful, &ties, &mut notes);
+    }
+    let pairs = choose_pairs(config, &useful, &geometry, &mut notes)?;
+    session.lap("pointing");
+    let dem_heights = config.dem.as_deref().map(|path| dem_heights(path, &geometry)).transpose()?;
+    Ok(Pointed {
+        images,
+        characters,
+        is_whole,
+        useful,
+        pairs,
+        ties,
+        pointing: PointingReport::new(&found, tracks.len(), is_applied),
+        tie_heights: tie_heights(&found),
+        corrections: found.corrections,
+        dem_heights,
+        choices: notes.choices,
+        warnings: notes.warnings,
+    })
+}
+
+/// Refuses images without contrast, and one picture under two RPCs.
+fn check_pictures(images: &[SceneImage], looked: &FirstLook) -> Result<(), DsmError> {
+    let path = |i: usize| images[i].path.clone();
+    let blank = looked.characters.iter().position(ImageCharacter::is_blank);
+    let pictures = looked.characters.iter().filter(|c| !c.is_blank()).count();
+    if let (Some(first), true) = (blank, pictures < 2) {
+        return Err(DsmError::Blank { path: path(first) });
+    }
+    let origin = |w: &raster::Window| ImagePoint::new(w.x as f64, w.y as f64);
+    let origins: Vec<ImagePoint> =
+        looked.windows.iter().map(|w| w.as_ref().map_or(ImagePoint::new(0.0, 0.0), origin)).collect();
+    match same_picture(&looked.ties, &origins) {
+        Some(pair) => Err(DsmError::SamePixels { first: path(pair.first), second: path(pair.second) }),
+        None => Ok(()),
+    }
+}
+
+/// Returns whether corrections are to be put into the cameras: unless that is switched off or the ties are too few.
+fn is_applied(config: &DsmConfig, found: &Adjustment, notes: &mut Notes<'_>) -> bool {
+    let ties = found.ground.iter().flatten().count();
+    if !config.pointing {
+        notes.choose("pointing", "as given".to_owned(), "the correction is switched off");
+        return false;
+    }
+    if ties < TIES_MIN {
+        notes.warn(format!("the pointing of the RPCs is not corrected: {ties} tie points found, {TIES_MIN} needed"));
+        return false;
+    }
+    for (view, apart_px) in grossly_off(&found.corrections) {
+        notes.warn(format!(
+            "the pointing of an image is {apart_px:.0} px off that of the others, far more than providers state; it is \
+             corrected, but check that the RPC belongs to the image: {}",
+            config.images[view].display()
+        ));
+    }
+    let order = match CorrectionOrder::from(found.order) {
+        CorrectionOrder::None => "none needed",
+        CorrectionOrder::Translation => "a shift per image",
+        CorrectionOrder::Affine => "an affine map per image",
+    };
+    let (before, after) = found.residual_px;
+    notes.choose(
+        "pointing",
+        order.to_owned(),
+        format!("{ties} tie points, residual {before:.2} px before and {after:.2} px after, by BIC"),
+    );
+    true
+}
+
+/// Puts the corrections, if any, into the cameras of images, parts and views.
+fn set_cameras(
+    images: &mut [SceneImage],
+    session: &mut Session<'_>,
+    looked: &FirstLook,
+    found: Option<&Adjustment>,
+) {
+    for (i, (image, camera)) in images.iter_mut().zip(&looked.cameras).enumerate() {
+        let mut camera = camera.clone();
+        if let Some(found) = found {
+            camera.correction = found.corrections[i];
+            let origin = looked.windows[i]
+                .map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(-w.x as f64, -w.y as f64));
+            image.camera = camera.cropped(origin);
+        }
+        if let Some(views) = &mut session.views {
+            views[i].camera = camera.clone();
+        }
+        image.part = looked.windows[i].map(|window| ImagePart { window, camera });
+    }
+}
+
+/// Leaves out the pairs of views that no tie points connect with the others, and names these views.
+fn drop_unconnected(config: &DsmConfig, useful: &mut Vec<ImagePair>, ties: &[PairTies], notes: &mut Notes<'_>) {
+    let aside = unconnected(config.images.len(), ties);
+    for view in &aside {
+        notes.warn(format!(
+            "an image is set aside: fewer than {TIES_MIN} tie points connect it with the others, so its pointing is not \
+             known; without the pointing correction it is used as it is: {}",
+            config.images[*view].display()
+        ));
+    }
+    useful.retain(|pair| !aside.iter().any(|view| pair.has(*view)));
+}
+
+/// Chooses the pairs to sweep.
+fn choose_pairs(
+    config: &DsmConfig,
+    useful: &[ImagePair],
+    geometry: &ViewGeometry,
+    notes: &mut Notes<'_>,
+) -> Result<Vec<ImagePair>, DsmError> {
+    let pairs = asked_pairs(config, useful)?;
+    let widest = pairs.iter().filter_map(|p| geometry.pair(*p)).max_by(|a, b| a.angle_deg.total_cmp(&b.angle_deg));
+    if let Some(pair) = widest.filter(|p| p.angle_deg < ANGLE_WEAK_DEG) {
+        notes.warn(format!(
+            "the views look along nearly the same line, {:.1}° apart at most: a pixel of parallax is {:.1} m of height; \
+             add an image from another direction",
+            pair.angle_deg,
+            1.0 / pair.parallax_px_per_m.max(f64::MIN_POSITIVE)
+        ));
+    }
+    for pair in config.pairs.iter().flatten().filter(|p| !useful.contains(&p.ordered())) {
+        notes.warn(format!(
+            "the pair {pair} is left out: it shares too little ground, looks along the same line or has no tie points"
+        ));
+    }
+    let reason = match config.pairs {
+        Some(_) => "given".to_owned(),
+        None => "all that share ground at a useful angle, best angle first".to_owned(),
+    };
+    notes.choose("pairs", pair_names(&pairs), reason);
+    Ok(pairs)
+}

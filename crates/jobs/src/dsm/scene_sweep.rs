@@ -1,0 +1,166 @@
+//! The heights of all views of a scene or chunk, from the coarsest pyramid level to the finest.
+//!
+//! The coarsest level covers the whole height range. Each finer level searches, per pixel, around the heights that the
+//! coarser level found at this pixel and next to it.
+
+use numeric::Progress;
+use rayon::prelude::*;
+use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
+use sweep::cost::{Aggregation, Reference, SourceLevel};
+use sweep::ranges::Ranges;
+use sweep::{HeightMap, LevelConfig, Prior, SweepError, View, sweep_level};
+
+use crate::dsm::error::DsmError;
+use crate::dsm::levels::SweepLevels;
+use crate::dsm::prior_findings::PriorFindings;
+use crate::dsm::prior_view::{DEVIATION_M, ViewPrior};
+use crate::dsm::values::HeightRange;
+
+/// Tolerance of the consistency check on coarse levels, pixels. Coarse heights are rough, and a wrong deletion costs more
+/// than a wide range.
+const COARSE_TOLERANCE_PX: f64 = 2.0;
+
+/// Parameters of a sweep of all views.
+#[derive(Debug, Clone)]
+pub(crate) struct SceneSweep {
+    /// Heights to search.
+    pub(crate) range: HeightRange,
+    /// Distance of two hypotheses at full resolution, metres; each coarser level doubles it.
+    pub(crate) step_m: f64,
+    pub(crate) levels: SweepLevels,
+    /// For each view, the views it is compared with.
+    pub(crate) sources: Vec<Vec<usize>>,
+    /// Distance around a coarse pixel from which heights are taken over, coarse pixels.
+    pub(crate) reach: usize,
+    /// For each view, what it sees of a city model; empty without a model.
+    pub(crate) priors: Vec<Option<ViewPrior>>,
+}
+
+impl SceneSweep {
+    /// Returns the distance of two hypotheses of a level, metres.
+    pub(crate) fn step_at(&self, level: usize) -> f64 {
+        self.step_m * f64::from(1u32 << level)
+    }
+}
+
+/// Heights of all views on the finest level.
+#[derive(Debug, Clone)]
+pub(crate) struct SceneHeights {
+    /// One map per view.
+    pub(crate) maps: Vec<HeightMap>,
+    /// Number of pixel-hypothesis pairs evaluated over all views and levels.
+    pub(crate) hypotheses: u64,
+    /// Agreement of the heights of the last coarse level with the city model.
+    pub(crate) findings: PriorFindings,
+}
+
+/// Sweeps all views from the coarsest level to the finest. Each view and level is a step of `progress`.
+///
+/// # Errors
+/// [`DsmError::Sweep`] as [`sweep_level`], [`DsmError::Cancelled`] between two levels.
+pub(crate) fn sweep_scene(
+    views: &[View],
+    sweep: &SceneSweep,
+    progress: &dyn Progress,
+) -> Result<SceneHeights, DsmError> {
+    let SweepLevels { finest, coarsest } = sweep.levels;
+    let mut maps: Vec<HeightMap> = Vec::new();
+    let mut hypotheses = 0;
+    // Where there are coarser levels, the place of the model is first found from their heights.
+    let is_single = finest == coarsest;
+    let mut priors: Vec<Option<ViewPrior>> = if is_single { sweep.priors.clone() } else { Vec::new() };
+    priors.resize(views.len(), None);
+    let mut findings = PriorFindings::default();
+    for level in (finest..=coarsest).rev() {
+        progress.check_cancelled()?;
+        let swept: Vec<(HeightMap, u64)> = (0..views.len())
+            .into_par_iter()
+            .map(|i| {
+                let out = sweep_view(views, sweep, i, level, maps.get(i), priors[i].as_ref());
+                progress.step();
+                out
+            })
+            .collect::<Result<_, SweepError>>()?;
+        hypotheses += swept.iter().map(|(_, n)| n).sum::<u64>();
+        maps = swept.into_iter().map(|(m, _)| m).collect();
+        if level > finest {
+            maps = drop_lone_heights(views, sweep, &maps, level as u32)?;
+            findings = PriorFindings::default();
+            let mut checked = |(prior, map): (&Option<ViewPrior>, &HeightMap)| {
+                let held = prior.as_ref()?.checked(map, level, sweep.step_at(level));
+                findings.add(held.as_ref().map(|(_, evidence)| evidence));
+                Some(held?.0)
+            };
+            priors = sweep.priors.iter().zip(&maps).map(&mut checked).collect();
+            priors.resize(views.len(), None);
+        }
+    }
+    Ok(SceneHeights { maps, hypotheses, findings })
+}
+
+/// Sweeps one view on one level; returns its heights and the number of hypotheses.
+fn sweep_view(
+    views: &[View],
+    sweep: &SceneSweep,
+    index: usize,
+    level: usize,
+    coarser: Option<&HeightMap>,
+    known: Option<&ViewPrior>,
+) -> Result<(HeightMap, u64), SweepError> {
+    let origin_m = sweep.range.middle_m();
+    let reference = views[index].on_level(index, level);
+    let (w, h) = (reference.image.width(), reference.image.height());
+    if sweep.sources[index].is_empty() {
+        return Ok((HeightMap::empty(w, h, origin_m), 0));
+    }
+    let step = sweep.step_at(level);
+    let range = (sweep.range.low_m, sweep.range.high_m);
+    let ranges = match coarser {
+        None => Ranges::uniform(w, h, step, range),
+        Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, range, sweep.reach),
+    }
+    .without_voids(reference.image);
+    let prior_m = known.map(|prior| prior.at_level(level, (w, h)));
+    let prior = prior_m.as_ref().map(|height_m| Prior { height_m, deviation_m: DEVIATION_M });
+    let ranges = match prior {
+        Some(prior) => prior.widened(ranges),
+        None => ranges,
+    };
+    let sources: Vec<SourceLevel<'_>> = sweep.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
+    let mut config = LevelConfig::default();
+    config.cost.aggregation = Aggregation::of_sources(sources.len());
+    let reference = Reference { view: reference, level: level as u32, ranges: &ranges, prior };
+    let map = sweep_level(reference, &sources, origin_m, &config)?;
+    Ok((map, ranges.evaluations()))
+}
+
+/// Sets coarse heights to NaN that no source shares. A view whose sources have no heights keeps its own.
+fn drop_lone_heights(
+    views: &[View],
+    sweep: &SceneSweep,
+    maps: &[HeightMap],
+    level: u32,
+) -> Result<Vec<HeightMap>, SweepError> {
+    let config = ConsistencyConfig { tolerance_px: COARSE_TOLERANCE_PX, ..ConsistencyConfig::default() };
+    let heights: Vec<Heights<'_>> =
+        maps.iter().enumerate().map(|(index, map)| Heights { index, view: &views[index], map }).collect();
+    heights
+        .par_iter()
+        .map(|h| {
+            let own_heights = |s: &&usize| !sweep.sources[**s].is_empty();
+            let others: Vec<Heights<'_>> =
+                sweep.sources[h.index].iter().filter(own_heights).map(|&s| heights[s]).collect();
+            if others.is_empty() {
+                return Ok(h.map.clone());
+            }
+            let counts = count_agreeing(*h, &others, level, &config)?;
+            let mut out = h.map.clone();
+            for (height, n) in out.height_m.data_mut().iter_mut().zip(counts.data()) {
+                if *n == 0 {
+                    *height = f32::NAN;
+                }
+            }
+            Ok(out)
+        })
+        .collect()
+}

@@ -1,0 +1,165 @@
+//! Tie points over the pairs of views and the joint correction of all cameras.
+
+use std::collections::BTreeMap;
+
+use camera::{ImagePoint, RpcCamera};
+use serde::{Deserialize, Serialize};
+use sweep::View;
+use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Tie, TieConfig, Track, adjust, match_pair};
+
+use crate::dsm::values::{HeightRange, ImagePair};
+
+/// Fewer tie points than this do not determine the heights of a scene.
+pub(crate) const TIES_MIN: usize = 12;
+
+/// Ties of a wide search do not belong together when one shift per view leaves larger residuals than this, pixels.
+const WIDE_RESIDUAL_PX: f64 = 1.0;
+/// One of this many points is tried over all heights, before the others are tried near the heights that it shows.
+const FEW: usize = 5;
+/// Heights may lie outside those of the first ties by the ties' own span and this, metres.
+const NARROWED_MARGIN_M: f64 = 100.0;
+/// One tie in this many may still be wrong at each end of the heights.
+const WRONG_AT_ENDS: usize = 100;
+
+/// Tie points of one pair of views.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct PairTies {
+    /// The pair: its first view is the reference, whose corners were searched for in the second.
+    pub pair: ImagePair,
+    /// Tie points found, each written as `[sample, line, sample, line, correlation]`.
+    #[serde(with = "tie_rows")]
+    pub ties: Vec<Tie>,
+}
+
+/// Matches pairs of views, given best first, over the heights in `range`. `done` is called after each pair.
+///
+/// A few points of the first pair with enough ties narrow the height range of the others, and all its points that of the
+/// other pairs. A pair with too few ties is searched again for a gross pointing error.
+pub(crate) fn match_pairs(
+    views: &[View],
+    pairs: &[ImagePair],
+    range: HeightRange,
+    config: &TieConfig,
+    done: &(dyn Fn() + Sync),
+) -> Vec<PairTies> {
+    let mut near = range;
+    let mut out = Vec::with_capacity(pairs.len());
+    let narrowed = |found: &PairTies| {
+        let seen = heights_seen(views, found)?;
+        let margin = seen.span_m() + NARROWED_MARGIN_M;
+        Some(seen.grown(margin, margin).cut_to(range))
+    };
+    for &pair in pairs {
+        let ties_of = |heights: HeightRange, config: &TieConfig| {
+            let heights = (heights.low_m, heights.high_m);
+            PairTies { pair, ties: match_pair(&views[pair.first], &views[pair.second], heights, config) }
+        };
+        let is_wide = near == range;
+        if is_wide {
+            let few = TieConfig { points: config.points / FEW, ..*config };
+            near = narrowed(&ties_of(range, &few)).unwrap_or(range);
+        }
+        let mut found = ties_of(near, config);
+        if found.ties.len() < TIES_MIN {
+            found = verified(views, ties_of(near, &wide_search(config)));
+        }
+        if is_wide {
+            near = narrowed(&found).unwrap_or(range);
+        }
+        out.push(found);
+        done();
+    }
+    out
+}
+
+/// Keeps the ties of a pair that one correction brings together: a wide search finds more chance likenesses.
+fn verified(views: &[View], found: PairTies) -> PairTies {
+    let (adjustment, tracks) = adjust_views(views, std::slice::from_ref(&found), &shifts());
+    if adjustment.residual_px.1 > WIDE_RESIDUAL_PX {
+        return PairTies { ties: Vec::new(), ..found };
+    }
+    let fits = |t: &&Tie| {
+        let at = |track: &Track| track.first().is_some_and(|(_, p)| [p.sample, p.line] == t.reference);
+        tracks.iter().zip(&adjustment.ground).any(|(track, ground)| ground.is_some() && at(track))
+    };
+    PairTies { ties: found.ties.iter().filter(fits).copied().collect(), ..found }
+}
+
+/// Returns the heights of one pair's ties without outliers; `None` when there are too few ties.
+pub(crate) fn heights_seen(views: &[View], found: &PairTies) -> Option<HeightRange> {
+    if found.ties.len() < TIES_MIN {
+        return None;
+    }
+    tie_heights(&adjust_views(views, std::slice::from_ref(found), &shifts()).0)
+}
+
+/// Returns the adjustment of a single pair, from which only heights and the residual are used: shifts are enough.
+fn shifts() -> AdjustConfig {
+    AdjustConfig { max_order: ModelOrder::Translation, ..AdjustConfig::default() }
+}
+
+/// Returns the least and greatest height of the inliers of an adjustment; `None` when there are fewer than [`TIES_MIN`].
+pub(crate) fn tie_heights(adjustment: &Adjustment) -> Option<HeightRange> {
+    let mut heights: Vec<f64> = adjustment.ground.iter().flatten().map(|g| g.height_m).collect();
+    if heights.len() < TIES_MIN {
+        return None;
+    }
+    heights.sort_by(f64::total_cmp);
+    let cut = heights.len() / WRONG_AT_ENDS;
+    Some(HeightRange::new(heights[cut], heights[heights.len() - 1 - cut]))
+}
+
+/// Adjusts the cameras of views, see [`adjust_cameras`].
+fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
+    let cameras: Vec<_> = views.iter().map(|v| v.camera.clone()).collect();
+    let sizes: Vec<_> = views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect();
+    adjust_cameras(&cameras, &sizes, pairs, config)
+}
+
+/// Joins the ties of all pairs to tracks and adjusts all cameras. A track is one corner of a reference with its places in
+/// all sources. `sizes` are the columns and rows of the cameras' images.
+pub(crate) fn adjust_cameras(
+    cameras: &[RpcCamera],
+    sizes: &[(usize, usize)],
+    pairs: &[PairTies],
+    config: &AdjustConfig,
+) -> (Adjustment, Vec<Track>) {
+    let mut by_corner: BTreeMap<(usize, u64, u64), Track> = BTreeMap::new();
+    for found in pairs {
+        let ImagePair { first: reference, second: source } = found.pair;
+        for tie in &found.ties {
+            let [s, l] = tie.reference;
+            let track = by_corner
+                .entry((reference, s.to_bits(), l.to_bits()))
+                .or_insert_with(|| vec![(reference, ImagePoint::new(s, l))]);
+            track.push((source, ImagePoint::new(tie.source[0], tie.source[1])));
+        }
+    }
+    let tracks: Vec<Track> = by_corner.into_values().collect();
+    (adjust(cameras, sizes, &tracks, config), tracks)
+}
+
+/// Returns the search for pairs in which the ordinary one finds nothing: ten times its pointing error, from a coarser level.
+fn wide_search(config: &TieConfig) -> TieConfig {
+    TieConfig { band_px: 10.0 * config.band_px, coarse_side: config.coarse_side * 2 / 5, ..*config }
+}
+
+/// Serde adapter for tie points: one row of five numbers for each.
+mod tie_rows {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use sweep::pointing::Tie;
+
+    type Row = (f64, f64, f64, f64, f32);
+
+    pub(super) fn serialize<S: Serializer>(ties: &[Tie], out: S) -> Result<S::Ok, S::Error> {
+        let row = |t: &Tie| -> Row { (t.reference[0], t.reference[1], t.source[0], t.source[1], t.correlation) };
+        ties.iter().map(row).collect::<Vec<Row>>().serialize(out)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<Tie>, D::Error> {
+        let tie = |(a, b, c, d, correlation): Row| Tie { reference: [a, b], source: [c, d], correlation };
+        Ok(Vec::<Row>::deserialize(input)?.into_iter().map(tie).collect())
+    }
+}

@@ -1,0 +1,205 @@
+//! Small values that the stages share: height ranges, pairs of images, map rectangles.
+//!
+//! Each is written to JSON and TOML as an array of numbers, the form that configurations and reports have.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// A range of heights, metres above the ellipsoid. It is written as `[low, high]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "[f64; 2]", into = "[f64; 2]")]
+pub struct HeightRange {
+    /// Least height, metres.
+    pub low_m: f64,
+    /// Greatest height, metres.
+    pub high_m: f64,
+}
+
+impl HeightRange {
+    /// Makes a range from its ends.
+    pub const fn new(low_m: f64, high_m: f64) -> Self {
+        Self { low_m, high_m }
+    }
+
+    /// Returns the range that holds one height only.
+    pub const fn at(height_m: f64) -> Self {
+        Self::new(height_m, height_m)
+    }
+
+    /// Returns the difference of the ends, metres.
+    pub fn span_m(self) -> f64 {
+        self.high_m - self.low_m
+    }
+
+    /// Returns the middle of the range.
+    pub fn middle_m(self) -> f64 {
+        0.5 * (self.low_m + self.high_m)
+    }
+
+    /// Returns whether a height lies in the range, ends included.
+    pub fn contains(self, height_m: f64) -> bool {
+        (self.low_m..=self.high_m).contains(&height_m)
+    }
+
+    /// Returns the smallest range that holds both.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self::new(self.low_m.min(other.low_m), self.high_m.max(other.high_m))
+    }
+
+    /// Returns the range cut to `limits`. The ends are in the wrong order when the two ranges are apart.
+    #[must_use]
+    pub fn cut_to(self, limits: Self) -> Self {
+        Self::new(self.low_m.max(limits.low_m), self.high_m.min(limits.high_m))
+    }
+
+    /// Returns the range with `below_m` more at its lower end and `above_m` more at its upper end.
+    #[must_use]
+    pub fn grown(self, below_m: f64, above_m: f64) -> Self {
+        Self::new(self.low_m - below_m, self.high_m + above_m)
+    }
+}
+
+impl From<[f64; 2]> for HeightRange {
+    fn from([low_m, high_m]: [f64; 2]) -> Self {
+        Self { low_m, high_m }
+    }
+}
+
+impl From<HeightRange> for [f64; 2] {
+    fn from(range: HeightRange) -> Self {
+        [range.low_m, range.high_m]
+    }
+}
+
+/// A pair of images by their positions in the list of images, counted from 0. It is written as `[first, second]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(from = "[usize; 2]", into = "[usize; 2]")]
+pub struct ImagePair {
+    /// Position of the first image.
+    pub first: usize,
+    /// Position of the second image.
+    pub second: usize,
+}
+
+impl ImagePair {
+    /// Makes a pair of two positions.
+    pub const fn new(first: usize, second: usize) -> Self {
+        Self { first, second }
+    }
+
+    /// Returns the pair with the lower position first.
+    #[must_use]
+    pub fn ordered(self) -> Self {
+        Self::new(self.first.min(self.second), self.first.max(self.second))
+    }
+
+    /// Returns whether an image is one of the pair.
+    pub const fn has(self, image: usize) -> bool {
+        self.first == image || self.second == image
+    }
+}
+
+impl From<[usize; 2]> for ImagePair {
+    fn from([first, second]: [usize; 2]) -> Self {
+        Self { first, second }
+    }
+}
+
+impl From<ImagePair> for [usize; 2] {
+    fn from(pair: ImagePair) -> Self {
+        [pair.first, pair.second]
+    }
+}
+
+impl fmt::Display for ImagePair {
+    /// Writes the positions as people count them, from 1: `1-2`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.first + 1, self.second + 1)
+    }
+}
+
+/// A rectangle on the map, in the units of its CRS. It is written as `[x_min, y_min, x_max, y_max]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "[f64; 4]", into = "[f64; 4]")]
+pub struct MapBounds {
+    /// Western edge.
+    pub x_min: f64,
+    /// Southern edge.
+    pub y_min: f64,
+    /// Eastern edge.
+    pub x_max: f64,
+    /// Northern edge.
+    pub y_max: f64,
+}
+
+impl MapBounds {
+    /// The rectangle that holds nothing, to be grown by [`MapBounds::including`].
+    pub(crate) const EMPTY: Self = Self {
+        x_min: f64::INFINITY,
+        y_min: f64::INFINITY,
+        x_max: f64::NEG_INFINITY,
+        y_max: f64::NEG_INFINITY,
+    };
+
+    /// Returns the smallest rectangle that holds this one and a point.
+    #[must_use]
+    pub(crate) fn including(self, x: f64, y: f64) -> Self {
+        Self {
+            x_min: self.x_min.min(x),
+            y_min: self.y_min.min(y),
+            x_max: self.x_max.max(x),
+            y_max: self.y_max.max(y),
+        }
+    }
+
+    /// Returns whether the interiors of two rectangles meet.
+    pub(crate) fn meets(self, other: Self) -> bool {
+        self.x_min < other.x_max && self.x_max > other.x_min && self.y_min < other.y_max && self.y_max > other.y_min
+    }
+
+    /// Returns `[x_min, y_min, x_max, y_max]`.
+    pub fn to_array(self) -> [f64; 4] {
+        [self.x_min, self.y_min, self.x_max, self.y_max]
+    }
+}
+
+impl From<[f64; 4]> for MapBounds {
+    fn from([x_min, y_min, x_max, y_max]: [f64; 4]) -> Self {
+        Self { x_min, y_min, x_max, y_max }
+    }
+}
+
+impl From<MapBounds> for [f64; 4] {
+    fn from(bounds: MapBounds) -> Self {
+        bounds.to_array()
+    }
+}
+
+/// Serde adapter for a number that may be NaN, which JSON writes as `null`.
+pub(crate) mod null_is_nan {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(crate) fn serialize<S: Serializer>(value: &f64, out: S) -> Result<S::Ok, S::Error> {
+        value.serialize(out)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
+        Ok(Option::<f64>::deserialize(input)?.unwrap_or(f64::NAN))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_written_as_arrays() {
+        assert_eq!(serde_json::to_string(&HeightRange::new(-1.5, 20.0)).unwrap(), "[-1.5,20.0]");
+        assert_eq!(serde_json::to_string(&ImagePair::new(0, 2)).unwrap(), "[0,2]");
+        assert_eq!(serde_json::to_string(&MapBounds::from([1.0, 2.0, 3.0, 4.0])).unwrap(), "[1.0,2.0,3.0,4.0]");
+        assert_eq!(serde_json::from_str::<HeightRange>("[3,4]").unwrap(), HeightRange::new(3.0, 4.0));
+        assert_eq!(ImagePair::new(2, 0).ordered().to_string(), "1-3");
+    }
+}
