@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use crs::{CrsRequest, VerticalDatum};
-use jobs::dsm::{DsmConfig, DsmReport, Fill, Preset};
+use jobs::dsm::{
+    DsmConfig, DsmError, DsmReport, DsmSetting, Fill, HeightRange, ImagePair, MapBounds, Preset, SweepError,
+};
 
+use crate::error::{OVERWRITE, with_hint};
 use crate::progress::{ProgressStyle, Watcher};
 use crate::{Global, Outcome};
 
@@ -34,10 +36,10 @@ pub(crate) struct Args {
     /// Heights to search, metres above the ellipsoid [default: from tie points].
     #[arg(long, num_args = 2, value_names = ["LO", "HI"], allow_negative_numbers = true, conflicts_with = "dem")]
     height_range: Option<Vec<f64>>,
-    /// A coarse elevation model that tells the heights to search.
+    /// Coarse elevation model from which the heights to search are taken.
     #[arg(long, value_name = "FILE")]
     dem: Option<PathBuf>,
-    /// City model (CityJSON, CityGML) whose roofs are expected: searched and favoured, never believed against the images.
+    /// City model (CityJSON, CityGML) whose roofs are expected: they are searched and favoured, but the images decide.
     #[arg(long, value_name = "MODEL")]
     prior: Option<PathBuf>,
     /// What the DSM's heights are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
@@ -46,29 +48,29 @@ pub(crate) struct Args {
     /// Speed against accuracy.
     #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
     preset: PresetName,
-    /// Voids to close from their surroundings, marked in filled.tif: none, justified (narrow ones, those behind buildings, those
-    /// between known heights where the images show something) or all within reach of known heights.
+    /// Voids to close from the heights around them, marked in filled.tif: none, justified (narrow voids, voids behind buildings,
+    /// voids between known heights where the images have texture) or all within reach of known heights.
     #[arg(long, value_enum, default_value_t = FillName::Justified)]
     fill: FillName,
     /// Pairs of images to match, by position: 1-2,1-3 [default: all that are useful].
     #[arg(long, value_name = "I-J,…", value_delimiter = ',', value_parser = parse_pair)]
-    pairs: Option<Vec<(usize, usize)>>,
+    pairs: Option<Vec<ImagePair>>,
     /// Images to compute heights for, by position: 1,3 [default: all].
     #[arg(long, value_name = "I,…", value_delimiter = ',', value_parser = parse_position)]
     reference: Option<Vec<usize>>,
-    /// Use the RPCs as they are.
+    /// Use the RPCs as they are, without a correction of their pointing.
     #[arg(long)]
     no_pointing: bool,
     /// Worker threads [default: all cores].
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Memory to stay under, megabytes; a scene that takes more is computed by chunks [default: 4000].
+    /// Memory limit, megabytes; a scene that takes more is computed by chunks [default: 4000].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
-    /// Side of the chunks that a scene is computed by, cells [default: as large as the memory allows].
+    /// Side of the chunks of a large scene, cells [default: as large as the memory allows].
     #[arg(long, value_name = "CELLS")]
     chunk: Option<usize>,
-    /// Side of the tiles that are fused at a time, cells; it changes memory, never the result.
+    /// Side of the tiles that are fused at a time, cells; it changes the memory needed, never the result.
     #[arg(long, value_name = "CELLS", default_value_t = 1024)]
     tile: usize,
     /// Replace existing results.
@@ -96,13 +98,17 @@ enum FillName {
     All,
 }
 
-/// `2-3` → (1, 2): positions count from 1 for people.
-fn parse_pair(text: &str) -> Result<(usize, usize), String> {
+/// Parses `2-3` into the pair (1, 2): people count positions from 1.
+fn parse_pair(text: &str) -> Result<ImagePair, String> {
     let (i, j) = text.split_once('-').ok_or_else(|| format!("expected two positions like 1-2, found {text:?}"))?;
-    let (i, j) = (parse_position(i)?, parse_position(j)?);
-    if i == j { Err(format!("a pair needs two different images, found {text:?}")) } else { Ok((i, j)) }
+    let pair = ImagePair::new(parse_position(i)?, parse_position(j)?);
+    if pair.first == pair.second {
+        return Err(format!("a pair needs two different images, found {text:?}"));
+    }
+    Ok(pair)
 }
 
+/// Parses a position, which people count from 1, into one counted from 0.
 fn parse_position(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(n) if n > 0 => Ok(n - 1),
@@ -116,43 +122,47 @@ impl Args {
             CrsRequest::Auto => (None, None),
             CrsRequest::Epsg { horizontal, vertical } => (Some(horizontal), vertical),
         };
-        let two = |v: &Vec<f64>| Some((*v.first()?, *v.get(1)?));
-        DsmConfig {
-            gsd_m: self.gsd,
-            crs_epsg,
-            bounds: self.bounds.as_ref().and_then(|b| b.as_slice().try_into().ok()),
-            height_range_m: self.height_range.as_ref().and_then(two),
-            dem: self.dem.clone(),
-            prior: self.prior.clone(),
-            vertical: self.vertical.or(datum).unwrap_or_default(),
-            preset: match self.preset {
-                PresetName::Fast => Preset::Fast,
-                PresetName::Balanced => Preset::Balanced,
-                PresetName::Accurate => Preset::Accurate,
-            },
-            fill: match self.fill {
-                FillName::None => Fill::None,
-                FillName::Justified => Fill::Justified,
-                FillName::All => Fill::All,
-            },
-            pairs: self.pairs.clone(),
-            references: self.reference.clone(),
-            pointing: !self.no_pointing,
-            threads: self.threads,
-            memory_mb: self.memory,
-            chunk: self.chunk,
-            tile: self.tile,
-            overwrite: self.overwrite,
-            ..DsmConfig::new(self.images.clone(), self.output.clone())
-        }
+        let range = |v: &Vec<f64>| Some(HeightRange::new(*v.first()?, *v.get(1)?));
+        let bounds = |b: &Vec<f64>| <[f64; 4]>::try_from(b.as_slice()).ok().map(MapBounds::from);
+        let mut config = DsmConfig::new(self.images.clone(), self.output.clone());
+        config.gsd_m = self.gsd;
+        config.crs_epsg = crs_epsg;
+        config.bounds = self.bounds.as_ref().and_then(bounds);
+        config.height_range_m = self.height_range.as_ref().and_then(range);
+        config.dem = self.dem.clone();
+        config.prior = self.prior.clone();
+        config.vertical = self.vertical.or(datum).unwrap_or_default();
+        config.preset = match self.preset {
+            PresetName::Fast => Preset::Fast,
+            PresetName::Balanced => Preset::Balanced,
+            PresetName::Accurate => Preset::Accurate,
+        };
+        config.fill = match self.fill {
+            FillName::None => Fill::None,
+            FillName::Justified => Fill::Justified,
+            FillName::All => Fill::All,
+        };
+        config.pairs = self.pairs.clone();
+        config.references = self.reference.clone();
+        config.pointing = !self.no_pointing;
+        config.threads = self.threads;
+        config.memory_mb = self.memory;
+        config.chunk = self.chunk;
+        config.tile = self.tile;
+        config.overwrite = self.overwrite;
+        config
     }
 }
 
+/// Runs the command.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let watcher = Watcher::new(args.progress, global);
-    let outcome = jobs::dsm::run_dsm(&args.config(), &watcher);
+    let outcome = jobs::dsm::run(&args.config(), &watcher);
     watcher.finish();
-    let report = outcome.context("no DSM was made")?;
+    let report = outcome.map_err(|error| {
+        let hint = hint(&error);
+        with_hint(error, hint)
+    })?;
     if args.json {
         crate::print::json(&report)?;
     } else if !global.is_quiet() {
@@ -160,6 +170,35 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     }
     let is_whole = report.chunks.as_ref().is_none_or(|c| c.failed.is_empty());
     Ok(if is_whole { Outcome::Complete } else { Outcome::Partial })
+}
+
+/// Returns the options that help against an error.
+fn hint(error: &DsmError) -> Option<&'static str> {
+    Some(match error {
+        DsmError::Exists { .. } => OVERWRITE,
+        DsmError::NoTies { .. } => "--height-range LO HI gives the heights to search, and --dem takes them from a file",
+        DsmError::RangeMissesScene { .. } => "without --height-range the heights are found from tie points",
+        DsmError::Memory { .. } => "--memory MB raises the limit, and --bounds makes the area smaller",
+        DsmError::BoundsMissScene { .. } => "without --bounds the DSM covers all the ground that two images see",
+        DsmError::Prior { .. } => "`skysweep city info MODEL` checks a city model",
+        DsmError::Value { setting, .. } => match setting {
+            DsmSetting::CellSize => "the cell size is set by --gsd",
+            DsmSetting::Crs => "the CRS is set by --crs",
+            DsmSetting::Bounds => "the grid is set by --bounds and --gsd",
+            DsmSetting::HeightRange => "the heights are set by --height-range",
+            DsmSetting::Dem => "the elevation model is set by --dem",
+            DsmSetting::Pairs => "the pairs are set by --pairs",
+            DsmSetting::References => "the images to compute heights for are set by --reference",
+            DsmSetting::Threads => "the number of threads is set by --threads",
+            DsmSetting::ChunkSide => "the chunks are set by --chunk",
+            DsmSetting::TileSide => "the tiles are set by --tile",
+            _ => return None,
+        },
+        DsmError::Sweep(SweepError::TooManyHypotheses { .. } | SweepError::HeightsTooFar { .. }) => {
+            "--height-range LO HI gives the heights to search"
+        }
+        _ => return None,
+    })
 }
 
 fn summary(args: &Args, report: &DsmReport) -> String {

@@ -1,7 +1,7 @@
 //! RPCs that are extreme as numbers: the same cameras, written in other ways, and cameras that fail somewhere.
 
 use camera::Rpc;
-use jobs::dsm::PipelineError;
+use jobs::dsm::DsmError;
 
 use crate::stage::{EASY, Look, Shot, Stage, triplet};
 
@@ -112,7 +112,7 @@ fn offsets_far_outside_a_crop_with_small_scales_change_nothing() {
 fn ground_far_outside_the_domain_is_found_where_the_model_holds_and_refused_beyond() {
     expect_the_same("|L|, |P| up to 4", |rpc| with_small_domain(rpc, 7.0));
     let refused = EASY.stage.run(&rewritten(|rpc| with_small_domain(rpc, 60.0)), |_| {}).err();
-    let Some(PipelineError::Camera { source, .. }) = refused else { panic!("{refused:?}") };
+    let Some(DsmError::Camera { source, .. }) = refused else { panic!("{refused:?}") };
     assert!(source.to_string().contains("half-widths"), "{source}");
 }
 

@@ -1,6 +1,6 @@
 //! Baselines, overlaps, places and cameras.
 
-use jobs::dsm::PipelineError;
+use jobs::dsm::{CorrectionOrder, DsmError};
 
 use crate::stage::{EASY, Shot, Stage, look, median, triplet};
 
@@ -15,7 +15,7 @@ fn an_easy_village_is_found_where_it_is() {
 fn views_from_one_direction_have_no_parallax() {
     let stage = Stage::default();
     let refused = stage.run(&stage.shots(&[look(10.0, 12.0, 0.5), look(10.2, 12.0, 0.5)]), |_| {}).err();
-    let Some(PipelineError::NoParallax { angle_deg, .. }) = refused else { panic!("{refused:?}") };
+    let Some(DsmError::NoParallax { angle_deg, .. }) = refused else { panic!("{refused:?}") };
     assert!((angle_deg - 0.2).abs() < 0.05, "{angle_deg}");
 }
 
@@ -40,7 +40,7 @@ fn one_picture_under_two_rpcs_has_no_parallax() {
     shots[2].image = shots[0].image.clone();
     shots.remove(1);
     let refused = EASY.stage.run(&shots, |_| {}).err();
-    assert!(matches!(refused, Some(PipelineError::SamePixels { .. })), "{refused:?}");
+    assert!(matches!(refused, Some(DsmError::SamePixels { .. })), "{refused:?}");
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn a_sliver_of_overlap_has_heights_and_less_is_refused() {
     score.expect("a fifth of the images", 0.85, 0.06);
     let (stage, shots, _) = strip(0.03);
     let refused = stage.run(&shots, |_| {}).err();
-    let Some(PipelineError::NoOverlap { share_percent }) = refused else { panic!("{refused:?}") };
+    let Some(DsmError::NoOverlap { share_percent }) = refused else { panic!("{refused:?}") };
     assert!((1.0..5.0).contains(&share_percent), "{share_percent}");
 }
 
@@ -99,7 +99,7 @@ fn shifted(shots: &[Shot], by_px: &[[f64; 2]]) -> Vec<Shot> {
 fn pointing_errors_of_five_pixels_are_taken_out() {
     let shots = shifted(&EASY.shots, &[[3.5, -3.5], [-5.0, 0.5], [1.0, 4.9]]);
     let outcome = EASY.stage.run(&shots, |_| {}).unwrap();
-    assert_eq!(outcome.report.pointing.order, "translation");
+    assert_eq!(outcome.report.pointing.order, CorrectionOrder::Translation);
     assert!(outcome.report.pointing.rms_px < 0.2, "{:?}", outcome.report.pointing);
     EASY.stage.aligned_score(&outcome).expect("5 px", 0.95, 0.04);
 }

@@ -1,7 +1,7 @@
 //! Pixels that say little, nothing, or something else in every view.
 
 use eval::AlignmentMethod;
-use jobs::dsm::{Fill, PipelineError};
+use jobs::dsm::{DsmError, Fill};
 use raster::Grid;
 
 use crate::stage::{EASY, Shot, Stage, look, noise_3d, rolling, triplet, uniform, village, weathered};
@@ -15,7 +15,7 @@ fn blank_images_are_refused() {
     for value in [300, u16::MAX] {
         let shots: Vec<Shot> = EASY.shots.iter().map(|s| blank(s, value)).collect();
         let refused = EASY.stage.run(&shots, |_| {}).err();
-        assert!(matches!(refused, Some(PipelineError::Blank { .. })), "{value}: {refused:?}");
+        assert!(matches!(refused, Some(DsmError::Blank { .. })), "{value}: {refused:?}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! Surfaces that rise fast, and ranges of heights that do not hold them.
 
 use eval::AlignmentMethod;
-use jobs::dsm::PipelineError;
+use jobs::dsm::{DsmError, HeightRange};
 
 use crate::stage::{EASY, Stage, rolling, triplet, village};
 
@@ -41,15 +41,15 @@ fn steep_slopes_are_smooth_and_right() {
 
 #[test]
 fn a_range_far_above_the_scene_is_refused_with_the_heights_seen() {
-    let refused = EASY.stage.run(&EASY.shots, |c| c.height_range_m = Some((480.0, 700.0))).err();
-    let Some(PipelineError::RangeMissesScene { seen, .. }) = refused else { panic!("{refused:?}") };
-    assert!(seen.0 > 170.0 && seen.1 < 210.0, "{seen:?}");
+    let refused = EASY.stage.run(&EASY.shots, |c| c.height_range_m = Some(HeightRange::new(480.0, 700.0))).err();
+    let Some(DsmError::RangeMissesScene { seen, .. }) = refused else { panic!("{refused:?}") };
+    assert!(seen.low_m > 170.0 && seen.high_m < 210.0, "{seen:?}");
 }
 
 /// The range ends at 8 m: the roofs at 9 to 20 m are outside. They are void, and the user is told.
 #[test]
 fn a_range_that_cuts_the_roofs_off_is_told_and_gives_no_false_roofs() {
-    let outcome = EASY.stage.run(&EASY.shots, |c| c.height_range_m = Some((170.0, 188.0))).unwrap();
+    let outcome = EASY.stage.run(&EASY.shots, |c| c.height_range_m = Some(HeightRange::new(170.0, 188.0))).unwrap();
     let errors = EASY.stage.errors(&outcome, 50.0, AlignmentMethod::None);
     let (above, ground) = (errors.over(|x, y| village(x, y) > 12.0), errors.over(|x, y| village(x, y) < 3.0));
     ground.expect("the ground", 0.9, 0.06);
@@ -59,7 +59,7 @@ fn a_range_that_cuts_the_roofs_off_is_told_and_gives_no_false_roofs() {
 
 #[test]
 fn a_range_of_kilometres_gives_the_same_surface() {
-    let outcome = EASY.stage.run(&EASY.shots, |c| c.height_range_m = Some((-400.0, 5000.0))).unwrap();
+    let outcome = EASY.stage.run(&EASY.shots, |c| c.height_range_m = Some(HeightRange::new(-400.0, 5000.0))).unwrap();
     let share = EASY.outcome.agreement(&outcome, 0.1);
     assert!(share > 0.97, "only {share} of the cells are the same");
 }

@@ -14,7 +14,7 @@ use crs::MapProjection;
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use geodesy::{meridian_radius_m, prime_vertical_radius_m};
 use io::raster::{Band, BandData, Dem, read_dem, write_image_with_rpc};
-use jobs::dsm::{DsmConfig, DsmReport, PipelineError, run_dsm};
+use jobs::dsm::{DsmConfig, DsmError, DsmReport};
 use nalgebra::Vector3;
 use numeric::Silent;
 use raster::Grid;
@@ -297,7 +297,7 @@ impl Stage {
     }
 
     /// Runs the pipeline on shots.
-    pub(crate) fn run(&self, shots: &[Shot], set: impl FnOnce(&mut DsmConfig)) -> Result<Outcome, PipelineError> {
+    pub(crate) fn run(&self, shots: &[Shot], set: impl FnOnce(&mut DsmConfig)) -> Result<Outcome, DsmError> {
         let folder = TempDir::new().expect("a folder");
         let paths: Vec<PathBuf> = (1..=shots.len()).map(|i| folder.path().join(format!("view_{i}.tif"))).collect();
         for (shot, path) in shots.iter().zip(&paths) {
@@ -305,9 +305,10 @@ impl Stage {
             write_image_with_rpc(path, &bands, &shot.rpc, shot.no_data, false).expect("an image");
         }
         let out = folder.path().join("out");
-        let mut config = DsmConfig { threads: Some(1), ..DsmConfig::new(paths, out.clone()) };
+        let mut config = DsmConfig::new(paths, out.clone());
+        config.threads = Some(1);
         set(&mut config);
-        let report = run_dsm(&config, &Silent)?;
+        let report = jobs::dsm::run(&config, &Silent)?;
         let read = |name: &str| read_dem(out.join("dsm").join(name)).expect("a result");
         Ok(Outcome { dem: read("dsm.tif"), sigma: read("sigma.tif"), report })
     }

@@ -160,9 +160,8 @@ impl DsmConfig {
         if let Some(gsd) = self.gsd_m.filter(|gsd| !(gsd.is_finite() && *gsd > 0.0)) {
             return Err(DsmError::value(DsmSetting::CellSize, gsd.to_string(), "a positive cell size in metres"));
         }
-        let is_on_earth = |r: &HeightRange| {
-            EARTH_RANGE.low_m <= r.low_m && r.low_m < r.high_m && r.high_m <= EARTH_RANGE.high_m
-        };
+        let is_on_earth =
+            |r: &HeightRange| EARTH_RANGE.low_m <= r.low_m && r.low_m < r.high_m && r.high_m <= EARTH_RANGE.high_m;
         if let Some(range) = self.height_range_m.filter(|range| !is_on_earth(range)) {
             return Err(DsmError::value(
                 DsmSetting::HeightRange,

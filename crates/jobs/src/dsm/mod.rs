@@ -109,3 +109,5 @@ pub use ties::PairTies;
 pub use tuning::SweepTuning;
 pub use values::{HeightRange, ImagePair, MapBounds};
 pub use view_geometry::PairGeometry;
+
+pub use sweep::SweepError;

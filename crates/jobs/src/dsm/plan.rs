@@ -1,7 +1,7 @@
 //! Third stage of a run: the plan, with everything that is needed to compute a chunk.
 
 use camera::ImageCorrection;
-use numeric::{Choice, Progress};
+use numeric::Choice;
 use serde::{Deserialize, Serialize};
 
 use crate::dsm::character::ImageCharacter;

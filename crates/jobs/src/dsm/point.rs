@@ -1,7 +1,7 @@
 //! Second stage of a run: tie points, and the correction of the cameras' pointing.
 
 use camera::{ImageCorrection, ImagePoint};
-use numeric::{Choice, Progress};
+use numeric::Choice;
 use serde::{Deserialize, Serialize};
 use sweep::pointing::{AdjustConfig, Adjustment};
 
@@ -144,18 +144,13 @@ fn is_applied(config: &DsmConfig, found: &Adjustment, notes: &mut Notes<'_>) -> 
 }
 
 /// Puts the corrections, if any, into the cameras of images, parts and views.
-fn set_cameras(
-    images: &mut [SceneImage],
-    session: &mut Session<'_>,
-    looked: &FirstLook,
-    found: Option<&Adjustment>,
-) {
+fn set_cameras(images: &mut [SceneImage], session: &mut Session<'_>, looked: &FirstLook, found: Option<&Adjustment>) {
     for (i, (image, camera)) in images.iter_mut().zip(&looked.cameras).enumerate() {
         let mut camera = camera.clone();
         if let Some(found) = found {
             camera.correction = found.corrections[i];
-            let origin = looked.windows[i]
-                .map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(-w.x as f64, -w.y as f64));
+            let origin =
+                looked.windows[i].map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(-w.x as f64, -w.y as f64));
             image.camera = camera.cropped(origin);
         }
         if let Some(views) = &mut session.views {

@@ -163,13 +163,7 @@ fn found_at(map: &HeightMap, x: i64, y: i64) -> Option<f32> {
 
 /// Rates a shift by `(dx, dy)` coarse pixels: the share of samples that agree with the heights found once the median
 /// difference is added to all. Returns `None` when no sample has a height to compare with, or the difference is too large.
-fn score(
-    map: &HeightMap,
-    samples: &[Sample],
-    side: i64,
-    (dx, dy): (i64, i64),
-    tolerance_m: f32,
-) -> Option<Shift> {
+fn score(map: &HeightMap, samples: &[Sample], side: i64, (dx, dy): (i64, i64), tolerance_m: f32) -> Option<Shift> {
     let difference =
         |s: &Sample| Some(found_at(map, s.x.div_euclid(side) + dx, s.y.div_euclid(side) + dy)? - s.height_m);
     let mut off: Vec<f32> = samples.iter().filter_map(difference).collect();

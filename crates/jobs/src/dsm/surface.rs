@@ -121,8 +121,7 @@ pub(crate) fn make_surface(
             drop_outside(&mut keep, own.map, asked);
         }
         let data = keep.data();
-        kept[own.index] =
-            KeptPixels { kept: data.iter().filter(|k| **k).count() as u64, all: data.len() as u64 };
+        kept[own.index] = KeptPixels { kept: data.iter().filter(|k| **k).count() as u64, all: data.len() as u64 };
         placed.push(place_view(*own, level, &keep, jump_m, &frame)?);
         progress.step();
     }
@@ -174,12 +173,7 @@ fn same_surface_m(sweep: &SceneSweep, grid: &DsmGrid) -> f32 {
 /// Marks the pixels with which enough other views agree: a third of the views that see the ground from another direction,
 /// and at least one. With a third, a chance agreement of two views among many does not put a height on the map. A single
 /// reference view has no other view to agree with, and keeps all its heights.
-fn agreeing(
-    own: Heights<'_>,
-    all: &[Heights<'_>],
-    useful: &[ImagePair],
-    level: u32,
-) -> Result<Grid<bool>, DsmError> {
+fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[ImagePair], level: u32) -> Result<Grid<bool>, DsmError> {
     let partner = |h: &Heights<'_>| useful.contains(&ImagePair::new(own.index, h.index).ordered());
     let others: Vec<Heights<'_>> = all.iter().copied().filter(partner).collect();
     if others.is_empty() {

@@ -136,22 +136,13 @@ pub struct MapBounds {
 
 impl MapBounds {
     /// The rectangle that holds nothing, to be grown by [`MapBounds::including`].
-    pub(crate) const EMPTY: Self = Self {
-        x_min: f64::INFINITY,
-        y_min: f64::INFINITY,
-        x_max: f64::NEG_INFINITY,
-        y_max: f64::NEG_INFINITY,
-    };
+    pub(crate) const EMPTY: Self =
+        Self { x_min: f64::INFINITY, y_min: f64::INFINITY, x_max: f64::NEG_INFINITY, y_max: f64::NEG_INFINITY };
 
     /// Returns the smallest rectangle that holds this one and a point.
     #[must_use]
     pub(crate) fn including(self, x: f64, y: f64) -> Self {
-        Self {
-            x_min: self.x_min.min(x),
-            y_min: self.y_min.min(y),
-            x_max: self.x_max.max(x),
-            y_max: self.y_max.max(y),
-        }
+        Self { x_min: self.x_min.min(x), y_min: self.y_min.min(y), x_max: self.x_max.max(x), y_max: self.y_max.max(y) }
     }
 
     /// Returns whether the interiors of two rectangles meet.
