@@ -2,7 +2,6 @@
 
 use crate::dsm::config::{DsmConfig, EARTH_RANGE};
 use crate::dsm::error::{DsmError, DsmSetting};
-use crate::dsm::images::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::point::Pointed;
 use crate::dsm::ties::TIES_MIN;
@@ -17,18 +16,6 @@ const FAR_BELOW_M: f64 = 100.0;
 /// A given range is searched above the highest tie point by no more than this and the span of the tie points, metres. No
 /// building is taller than twice this.
 const FAR_ABOVE_M: f64 = 500.0;
-
-/// Returns the heights that are possible before anything is known of the scene: those for which the RPCs are valid,
-/// and the given range.
-pub(crate) fn validity_range(images: &[SceneImage], asked: Option<HeightRange>) -> HeightRange {
-    let ranges = images.iter().map(|image| {
-        let r = &image.camera.rpc;
-        HeightRange::new(r.height_off - r.height_scale.abs(), r.height_off + r.height_scale.abs())
-    });
-    let nothing = HeightRange::new(f64::INFINITY, f64::NEG_INFINITY);
-    let range = ranges.chain(asked).fold(nothing, HeightRange::union).cut_to(EARTH_RANGE);
-    if range.low_m < range.high_m { range } else { EARTH_RANGE }
-}
 
 /// Chooses the heights to search.
 ///

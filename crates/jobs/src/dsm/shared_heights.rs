@@ -1,4 +1,5 @@
-//! The heights of the Earth at which images share ground, whatever their RPCs state.
+//! The heights that are possible before anything is known of a scene: those for which the RPCs are valid, and those at which
+//! the images share ground, whatever their RPCs state.
 //!
 //! HEIGHT_OFF and HEIGHT_SCALE of an RPC usually hold the heights of the scene, and sometimes do not (crops, fits to flat
 //! ground, coefficients of another block). Two images from different directions share ground only within some heights, which
@@ -32,6 +33,18 @@ impl SharedHeights {
         let best_m = shared.iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
         Some(Self { best_m, range: HeightRange::new(first, last).grown(STEP_M, STEP_M).cut_to(EARTH_RANGE) })
     }
+}
+
+/// Returns the heights that are possible before anything is known of the scene: those for which the RPCs are valid,
+/// and the given range.
+pub(crate) fn validity_range(images: &[SceneImage], asked: Option<HeightRange>) -> HeightRange {
+    let ranges = images.iter().map(|image| {
+        let r = &image.camera.rpc;
+        HeightRange::new(r.height_off - r.height_scale.abs(), r.height_off + r.height_scale.abs())
+    });
+    let nothing = HeightRange::new(f64::INFINITY, f64::NEG_INFINITY);
+    let range = ranges.chain(asked).fold(nothing, HeightRange::union).cut_to(EARTH_RANGE);
+    if range.low_m < range.high_m { range } else { EARTH_RANGE }
 }
 
 /// Returns the largest share of ground that two of the images have in common at a height; 0 where cameras fail.
