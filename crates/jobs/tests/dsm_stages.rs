@@ -65,7 +65,7 @@ fn run_apart(config: &DsmConfig, folder: &Path) {
 
 #[test]
 fn stages_apart_give_the_same_bytes_as_one_run() {
-    for chunk in [None, Some(100)] {
+    for chunk in [None, Some(150)] {
         let folder = tempfile::tempdir().unwrap();
         let (once, apart) = (folder.path().join("once"), folder.path().join("apart"));
         let mut config = config(&once);
@@ -95,7 +95,7 @@ fn bounds_are_planned_with_the_cameras_that_were_pointed() {
 fn chunks_are_merged_once_each() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = config(&folder.path().join("out"));
-    (config.prior, config.chunk) = (None, Some(100));
+    (config.prior, config.chunk) = (None, Some(150));
     let mut session = Session::new(&Silent);
     let pointed = point(&config, &open(&config).unwrap(), &mut session).unwrap();
     let plan = plan(&config, &pointed, &mut session).unwrap();
@@ -130,7 +130,7 @@ impl Progress for StopAfter {
 #[test]
 fn a_cancelled_run_leaves_nothing() {
     // While images are read, while they are swept or planned, and when chunks are done.
-    for (chunk, steps) in [(None, 0), (None, 2), (None, 8), (None, 13), (Some(100), 3), (Some(100), 9)] {
+    for (chunk, steps) in [(None, 0), (None, 2), (None, 8), (None, 13), (Some(150), 3), (Some(150), 9)] {
         let folder = tempfile::tempdir().unwrap();
         let mut config = config(&folder.path().join("out"));
         (config.prior, config.chunk) = (None, chunk);

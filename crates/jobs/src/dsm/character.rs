@@ -1,7 +1,8 @@
 //! The noise and contrast of an image, which all parts of it share.
 
+use numeric::upper_median;
 use serde::{Deserialize, Serialize};
-use sweep::View;
+use sweep::SweepView;
 
 /// Noise and contrast of one image, as measured in the windows of it that were read.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -18,7 +19,7 @@ pub struct ImageCharacter {
 
 impl ImageCharacter {
     /// Adds the measures of a window.
-    pub(crate) fn learn(&mut self, view: &View) {
+    pub(crate) fn learn(&mut self, view: &SweepView) {
         self.has_contrast |= !is_blank(view);
         self.noise.push(view.noise);
         self.contrast.resize(self.contrast.len().max(view.contrast.len()), Vec::new());
@@ -31,7 +32,7 @@ impl ImageCharacter {
     }
 
     /// Gives a view of a part of the image the noise and contrast of the whole: the medians over the windows.
-    pub(crate) fn lend(&self, view: &mut View) {
+    pub(crate) fn lend(&self, view: &mut SweepView) {
         if let Some(noise) = median(&self.noise) {
             view.noise = noise;
         }
@@ -42,16 +43,14 @@ impl ImageCharacter {
 }
 
 /// Returns whether all valid pixels of a view have one value.
-fn is_blank(view: &View) -> bool {
+fn is_blank(view: &SweepView) -> bool {
     let mut values = view.levels[0].data().iter().filter(|v| v.is_finite());
     let first = values.next();
     values.all(|v| Some(v) == first)
 }
 
 fn median(values: &[f32]) -> Option<f32> {
-    let mut values = values.to_vec();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
+    upper_median(&mut values.to_vec())
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use numeric::Progress;
 use raster::Window;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sweep::View;
+use sweep::SweepView;
 
 use crate::dsm::character::ImageCharacter;
 use crate::dsm::chunk_side::{ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
@@ -29,6 +29,7 @@ use crate::dsm::scene_sweep::SceneSweep;
 use crate::dsm::session::Muted;
 use crate::dsm::tuning::SweepTuning;
 use crate::dsm::values::HeightRange;
+use crate::error_text::with_causes;
 
 /// A part of an image less wide or high than this holds nothing to match, pixels.
 const PART_MIN: usize = 64;
@@ -132,7 +133,7 @@ impl ChunkPlanner<'_> {
                 Ok(Planned::Work(work)) => work,
                 Err(DsmError::Cancelled) => return Err(DsmError::Cancelled),
                 Err(error) => {
-                    let reason = error.with_causes();
+                    let reason = with_causes(&error);
                     first_error.get_or_insert(error);
                     ChunkWork::Failed { reason }
                 }
@@ -249,10 +250,10 @@ pub(crate) fn read_chunk_views(
     images: &[SceneImage],
     characters: &[ImageCharacter],
     windows: &[Option<Window>],
-    read: impl Fn(&SceneImage, Window) -> Result<View, DsmError> + Sync,
-) -> Result<Vec<View>, DsmError> {
+    read: impl Fn(&SceneImage, Window) -> Result<SweepView, DsmError> + Sync,
+) -> Result<Vec<SweepView>, DsmError> {
     let one = |((image, window), character): ((&SceneImage, &Option<Window>), &ImageCharacter)| {
-        let Some(window) = window else { return Ok(View::absent(image.camera.clone())) };
+        let Some(window) = window else { return Ok(SweepView::absent(image.camera.clone())) };
         let mut view = read(image, *window)?;
         character.lend(&mut view);
         Ok(view)

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use city::{MeshConfig, TriangleMesh};
 use priors::{LinesOfSight, ModelPlace, PriorModel, SatelliteMaps, buildings_of};
-use sweep::View;
+use sweep::SweepView;
 
 use crate::dsm::error::DsmError;
 use crate::dsm::notes::Notes;
@@ -60,8 +60,8 @@ impl CityPrior {
     ///
     /// # Errors
     /// [`DsmError::Prior`] for an image that is too large for maps.
-    pub(crate) fn seen_from(&self, views: &[View], gsd_m: f64) -> Result<Vec<Option<ViewPrior>>, DsmError> {
-        let seen = |view: &View| {
+    pub(crate) fn seen_from(&self, views: &[SweepView], gsd_m: f64) -> Result<Vec<Option<ViewPrior>>, DsmError> {
+        let seen = |view: &SweepView| {
             let size = view.levels.first().map_or((0, 0), |image| (image.width(), image.height()));
             if size.0 == 0 || size.1 == 0 {
                 return Ok(None);

@@ -3,7 +3,7 @@
 //! Lengths are in metres, so that a result does not depend on the cell size more than it must.
 
 use raster::{Grid, Window};
-use sweep::fusion::{FillConfig, Surface, fill_voids, reliability, remove_speckle};
+use sweep::fusion::{FillConfig, FusedSurface, fill_voids, reliability, remove_speckle};
 
 use crate::dsm::config::Fill;
 
@@ -51,7 +51,7 @@ fn fill_reach_m(fill: Fill) -> Option<f64> {
 ///
 /// `step_m` is the distance of two hypotheses. `blind` marks the cells where the images have no texture.
 pub(crate) fn clean_up(
-    fused: &mut Surface,
+    fused: &mut FusedSurface,
     blind: &Grid<bool>,
     fill: Fill,
     step_m: f64,

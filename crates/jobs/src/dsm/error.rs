@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use crate::dsm::values::{HeightRange, MapBounds};
+use crate::threads::ThreadsError;
 
 /// A setting of [`DsmConfig`](crate::dsm::DsmConfig) that an error names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -231,14 +232,9 @@ pub enum DsmError {
     /// The height sweep failed.
     #[error("the height sweep failed")]
     Sweep(#[from] sweep::SweepError),
-    /// The thread pool cannot be made.
-    #[error("cannot start {threads} threads: {reason}")]
-    Threads {
-        /// Number of threads.
-        threads: usize,
-        /// Answer of the thread pool.
-        reason: String,
-    },
+    /// The worker threads cannot be started.
+    #[error(transparent)]
+    Threads(#[from] ThreadsError),
     /// The caller asked the run to stop.
     #[error("the run was cancelled")]
     Cancelled,
@@ -248,13 +244,6 @@ impl DsmError {
     /// Makes the error of a setting with a wrong value.
     pub(crate) fn value(setting: DsmSetting, found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self::Value { setting, found: found.into(), expected: expected.into() }
-    }
-
-    /// Returns the message with those of all causes, on one line.
-    pub(crate) fn with_causes(&self) -> String {
-        let first = std::error::Error::source(self);
-        let causes = std::iter::successors(first, |cause| cause.source());
-        causes.fold(self.to_string(), |text, cause| format!("{text}: {cause}"))
     }
 }
 

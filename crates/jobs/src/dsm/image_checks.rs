@@ -32,8 +32,8 @@ pub(crate) fn same_picture(ties: &[PairTies], origins: &[ImagePoint]) -> Option<
     let same = |t: &PairTies| {
         let (a, b) = (origins[t.pair.first], origins[t.pair.second]);
         let apart = |tie: &Tie| {
-            let samples = tie.source[0] + b.sample - tie.reference[0] - a.sample;
-            let lines = tie.source[1] + b.line - tie.reference[1] - a.line;
+            let samples = tie.source.sample + b.sample - tie.reference.sample - a.sample;
+            let lines = tie.source.line + b.line - tie.reference.line - a.line;
             samples.hypot(lines)
         };
         let close = t.ties.iter().filter(|t| apart(t) < SAME_PX).count();
@@ -58,8 +58,8 @@ mod tests {
 
     fn ties(first: usize, second: usize, apart_px: f64) -> PairTies {
         let tie = |i: usize| {
-            let at = [i as f64 * 7.0, i as f64 * 3.0];
-            Tie { reference: at, source: [at[0] + apart_px, at[1]], correlation: 0.9 }
+            let at = ImagePoint::new(i as f64 * 7.0, i as f64 * 3.0);
+            Tie { reference: at, source: ImagePoint::new(at.sample + apart_px, at.line), correlation: 0.9 }
         };
         PairTies { pair: ImagePair { first, second }, ties: (0..20).map(tie).collect() }
     }

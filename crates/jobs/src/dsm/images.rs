@@ -6,7 +6,7 @@ use camera::{ImagePoint, RpcCamera};
 use raster::{Grid, Window};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sweep::View;
+use sweep::SweepView;
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
@@ -91,23 +91,23 @@ fn open_one(path: &Path) -> Result<SceneImage, DsmError> {
 }
 
 /// Reads a window of an image with its pyramid. The camera of the view is that of the window.
-pub(crate) fn read_view(image: &SceneImage, window: Window) -> Result<View, DsmError> {
+pub(crate) fn read_view(image: &SceneImage, window: Window) -> Result<SweepView, DsmError> {
     let source = io::raster::ImageSource::open(&image.path)?;
     let mut pixels = source.read_luma(window)?.luma;
     mask_black(&mut pixels);
-    Ok(View::new(image.camera_of(window), pixels))
+    Ok(SweepView::new(image.camera_of(window), pixels))
 }
 
 /// Reads one pyramid level of a window, whose first pixel must be the corner of a pixel of that level. The camera of the
 /// view is that of the window at full resolution.
-pub(crate) fn read_coarse_view(image: &SceneImage, window: Window, level: usize) -> Result<View, DsmError> {
+pub(crate) fn read_coarse_view(image: &SceneImage, window: Window, level: usize) -> Result<SweepView, DsmError> {
     let source = io::raster::ImageSource::open(&image.path)?;
     let mut pixels = source.read_luma(window)?.luma;
     mask_black(&mut pixels);
     for _ in 0..level {
         pixels = raster::reduce(&pixels);
     }
-    Ok(View::from_level(image.camera_of(window), level, pixels))
+    Ok(SweepView::from_level(image.camera_of(window), level, pixels))
 }
 
 /// Reads one window per image (`None` is the whole image), in parallel. `done` is called after each image.
@@ -115,7 +115,7 @@ pub(crate) fn read_views(
     images: &[SceneImage],
     windows: &[Option<Window>],
     done: &(dyn Fn() + Sync),
-) -> Result<Vec<View>, DsmError> {
+) -> Result<Vec<SweepView>, DsmError> {
     let read = |(image, window): (&SceneImage, &Option<Window>)| {
         let view = read_view(image, window.unwrap_or(image.whole()));
         done();

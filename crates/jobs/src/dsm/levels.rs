@@ -12,7 +12,7 @@ use crate::dsm::values::HeightRange;
 const TOP_HYPOTHESES: f64 = 64.0;
 /// The coarsest level keeps at least this many pixels on a side, or its aggregation has nothing to work with.
 const TOP_SIDE_MIN: usize = 48;
-/// The pyramid of a view stops before a side falls below this, pixels; see [`sweep::View::new`].
+/// The pyramid of a view stops before a side falls below this, pixels; see [`sweep::SweepView::new`].
 const PYRAMID_SIDE_MIN: usize = 32;
 /// Number of levels at which the pyramid of a view stops.
 const PYRAMID_LEVELS_MAX: usize = 16;
@@ -92,7 +92,7 @@ mod tests {
         )));
         let camera = camera::RpcCamera::new(rpc.unwrap().rpc);
         for (width, height) in [(300, 201), (64, 65), (63, 900), (10, 12)] {
-            let view = sweep::View::new(camera.clone(), raster::Grid::filled(width, height, 1.0));
+            let view = sweep::SweepView::new(camera.clone(), raster::Grid::filled(width, height, 1.0));
             let expected: Vec<usize> = view.levels.iter().map(|l| l.width().min(l.height())).collect();
             assert_eq!(smallest_sides(&[Window::whole(width, height)]), expected, "{width} × {height}");
         }

@@ -15,6 +15,7 @@ use crate::dsm::prior_findings::PriorFindings;
 use crate::dsm::report::{ChunksReport, DsmReport, FailedChunk, StageTime, SurfaceReport};
 use crate::dsm::surface::SurfaceCounts;
 use crate::dsm::values::HeightRange;
+use crate::error_text::with_causes;
 
 /// Last stage of a run: the files that were written, and the report.
 #[derive(Debug, Clone)]
@@ -104,7 +105,7 @@ impl<'a> Merger<'a> {
 
     /// Leaves a chunk void that could not be computed.
     pub(crate) fn add_error(&mut self, core: Window, error: DsmError) {
-        self.add_failed(core, error.with_causes());
+        self.add_failed(core, with_causes(&error));
         self.error.get_or_insert(error);
     }
 

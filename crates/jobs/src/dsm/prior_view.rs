@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use numeric::upper_median;
 use priors::NO_OBJECT;
 use raster::Grid;
 use rayon::prelude::*;
@@ -167,11 +168,7 @@ fn score(map: &HeightMap, samples: &[Sample], side: i64, (dx, dy): (i64, i64), t
     let difference =
         |s: &Sample| Some(found_at(map, s.x.div_euclid(side) + dx, s.y.div_euclid(side) + dy)? - s.height_m);
     let mut off: Vec<f32> = samples.iter().filter_map(difference).collect();
-    if off.is_empty() {
-        return None;
-    }
-    let middle = off.len() / 2;
-    let height_m = *off.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let height_m = upper_median(&mut off)?;
     if f64::from(height_m.abs()) > SEARCH_M {
         return None;
     }

@@ -9,7 +9,7 @@
 use camera::ImagePoint;
 use numeric::Progress;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::{HeightMap, View, source_from_reference};
+use sweep::{HeightMap, SweepView, source_from_reference};
 
 use crate::dsm::error::DsmError;
 use crate::dsm::levels::SweepLevels;
@@ -59,7 +59,7 @@ struct ViewHeight {
 /// # Errors
 /// [`DsmError::Sweep`] from the consistency check, [`DsmError::Cancelled`].
 pub(crate) fn extended_range(
-    views: &[View],
+    views: &[SweepView],
     sweep: &SceneSweep,
     gsd_m: f64,
     sides: &[usize],
@@ -90,7 +90,7 @@ pub(crate) fn level_of(gsd_m: f64, sides: &[usize]) -> usize {
 /// # Errors
 /// [`DsmError::Sweep`] from the consistency check, [`DsmError::Cancelled`].
 pub(crate) fn seen_range(
-    views: &[View],
+    views: &[SweepView],
     sweep: &SceneSweep,
     usual: HeightRange,
     progress: &dyn Progress,
@@ -109,7 +109,7 @@ fn extremes(heights: &[f64]) -> HeightRange {
 /// A height outside `usual` does not count where another view does not show what the pixel would be at a usual height. The
 /// best match is then only the best of what the view shows.
 fn sure_heights(
-    views: &[View],
+    views: &[SweepView],
     sweep: &SceneSweep,
     usual: HeightRange,
     is_asked: impl Fn(f64) -> bool,
@@ -146,11 +146,12 @@ fn sure_heights(
 }
 
 /// Returns whether another view shows what a pixel of a level sees, at both ends of a height range.
-fn shows(view: &View, other: &Heights<'_>, level: usize, pixel: ImagePoint, range: HeightRange) -> bool {
-    let size = [other.map.height_m.width(), other.map.height_m.height()];
+fn shows(view: &SweepView, other: &Heights<'_>, level: usize, pixel: ImagePoint, range: HeightRange) -> bool {
+    let (width, height) = (other.map.height_m.width(), other.map.height_m.height());
+    let is_within = |at: f64, size: usize| (0.0..=size as f64 - 1.0).contains(&at);
     let is_inside = |h: f64| {
-        source_from_reference(&view.camera, &other.view.camera, level as u32, [pixel.sample, pixel.line], h)
-            .is_ok_and(|q| (0..2).all(|axis| (0.0..=size[axis] as f64 - 1.0).contains(&q[axis])))
+        source_from_reference(&view.camera, &other.view.camera, level as u32, pixel, h)
+            .is_ok_and(|q| is_within(q.sample, width) && is_within(q.line, height))
     };
     is_inside(range.low_m) && is_inside(range.high_m)
 }

@@ -1,7 +1,7 @@
 //! The rasters of a chunk.
 
 use raster::{Grid, Window};
-use sweep::fusion::Surface;
+use sweep::fusion::FusedSurface;
 
 /// Value of `filled` in a cell that was filled.
 pub(crate) const FILLED: u8 = 1;
@@ -28,9 +28,9 @@ pub struct ChunkRasters {
 
 impl ChunkRasters {
     /// Makes the rasters of a surface after its clean-up. `filled` marks the filled cells.
-    pub(crate) fn new(fused: Surface, filled: Grid<bool>, origin_m: f64) -> Self {
+    pub(crate) fn new(fused: FusedSurface, filled: Grid<bool>, origin_m: f64) -> Self {
         let mut marks = filled.map(|f| if *f { FILLED } else { 0 });
-        let Surface { height_m, mut sigma_m, mut views, mut confidence } = fused;
+        let FusedSurface { height_m, mut sigma_m, mut views, mut confidence } = fused;
         for (i, h) in height_m.data().iter().enumerate() {
             if h.is_nan() {
                 marks.data_mut()[i] = VOID;

@@ -12,6 +12,7 @@ use crate::dsm::plan::{Plan, plan};
 use crate::dsm::point::point;
 use crate::dsm::report::DsmReport;
 use crate::dsm::session::Session;
+use crate::threads;
 
 /// Makes a DSM and writes its files into the output folder.
 ///
@@ -40,19 +41,14 @@ use crate::dsm::session::Session;
 pub fn run(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, DsmError> {
     config.validate()?;
     output::check_target(config)?;
-    let threads = config.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| DsmError::Threads { threads, reason: e.to_string() })?;
-    pool.install(|| {
+    threads::install(config.threads, || {
         let mut session = Session::new(progress);
         let opened = open(config)?;
         let pointed = point(config, &opened, &mut session)?;
         let plan = plan(config, &pointed, &mut session)?;
         drop((opened, pointed));
         Ok(sweep_and_merge(&plan, &mut session)?.report)
-    })
+    })?
 }
 
 /// Computes all chunks of a plan and merges them.

@@ -6,9 +6,9 @@
 use numeric::Progress;
 use rayon::prelude::*;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::cost::{Aggregation, Reference, SourceLevel};
+use sweep::cost::Aggregation;
 use sweep::ranges::Ranges;
-use sweep::{HeightMap, LevelConfig, Prior, SweepError, View, sweep_level};
+use sweep::{HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, ViewLevel, sweep_level};
 
 use crate::dsm::error::DsmError;
 use crate::dsm::levels::SweepLevels;
@@ -59,7 +59,7 @@ pub(crate) struct SceneHeights {
 /// # Errors
 /// [`DsmError::Sweep`] as [`sweep_level`], [`DsmError::Cancelled`] between two levels.
 pub(crate) fn sweep_scene(
-    views: &[View],
+    views: &[SweepView],
     sweep: &SceneSweep,
     progress: &dyn Progress,
 ) -> Result<SceneHeights, DsmError> {
@@ -100,7 +100,7 @@ pub(crate) fn sweep_scene(
 
 /// Sweeps one view on one level; returns its heights and the number of hypotheses.
 fn sweep_view(
-    views: &[View],
+    views: &[SweepView],
     sweep: &SceneSweep,
     index: usize,
     level: usize,
@@ -126,7 +126,7 @@ fn sweep_view(
         Some(prior) => prior.widened(ranges),
         None => ranges,
     };
-    let sources: Vec<SourceLevel<'_>> = sweep.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
+    let sources: Vec<ViewLevel<'_>> = sweep.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
     let mut config = LevelConfig::default();
     config.cost.aggregation = Aggregation::of_sources(sources.len());
     let reference = Reference { view: reference, level: level as u32, ranges: &ranges, prior };
@@ -136,7 +136,7 @@ fn sweep_view(
 
 /// Sets coarse heights to NaN that no source shares. A view whose sources have no heights keeps its own.
 fn drop_lone_heights(
-    views: &[View],
+    views: &[SweepView],
     sweep: &SceneSweep,
     maps: &[HeightMap],
     level: u32,

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use numeric::{Choice, Progress};
-use sweep::View;
+use sweep::SweepView;
 
 use crate::dsm::city_prior::CityPrior;
 use crate::dsm::error::DsmError;
@@ -17,7 +17,7 @@ use crate::dsm::report::StageTime;
 pub struct Session<'a> {
     pub(crate) progress: &'a dyn Progress,
     /// Views of all images with the cameras of the latest stage, when the scene fits the memory.
-    pub(crate) views: Option<Vec<View>>,
+    pub(crate) views: Option<Vec<SweepView>>,
     prior: Option<CityPrior>,
     times: Vec<StageTime>,
     since: Instant,

@@ -8,7 +8,7 @@ use raster::{Grid, Window};
 use serde::{Deserialize, Serialize};
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::fusion::{FusionConfig, GridFrame, PlacedView, fuse_views, mark_cells, place_view};
-use sweep::{HeightMap, View};
+use sweep::{HeightMap, SweepView};
 
 use crate::dsm::clean_up::clean_up;
 use crate::dsm::config::DsmConfig;
@@ -92,7 +92,7 @@ impl SurfaceCounts {
 /// [`DsmError::Sweep`] for a camera that fails inside the scene, [`DsmError::Crs`], [`DsmError::Cancelled`].
 pub(crate) fn make_surface(
     input: SurfaceInput<'_>,
-    views: Vec<View>,
+    views: Vec<SweepView>,
     heights: SceneHeights,
     progress: &dyn Progress,
 ) -> Result<(ChunkRasters, SurfaceCounts), DsmError> {
@@ -105,8 +105,8 @@ pub(crate) fn make_surface(
         .map(|(index, map)| Heights { index, view: &views[index], map })
         .collect();
     let projection = grid.projection()?;
-    let lonlat = |g: geodesy::LonLatHeight| projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok().map(|p| [p.x, p.y]);
-    let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &lonlat };
+    let map_from_ground = |g: geodesy::LonLatHeight| projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok();
+    let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &map_from_ground };
     let level = sweep.levels.finest as u32;
     let jump_m = same_surface_m(sweep, grid);
     let mut placed = Vec::with_capacity(all.len());

@@ -10,7 +10,7 @@ use crs::MapProjection;
 use numeric::Progress;
 use raster::Window;
 use rayon::prelude::*;
-use sweep::View;
+use sweep::SweepView;
 use sweep::pointing::{Tie, TieConfig};
 
 use crate::dsm::character::ImageCharacter;
@@ -83,10 +83,10 @@ pub(crate) fn match_in_windows(
 }
 
 /// Reads one window per image. An image without a window gives an absent view.
-fn read_parts(images: &[SceneImage], windows: &[Option<Window>]) -> Result<Vec<View>, DsmError> {
+fn read_parts(images: &[SceneImage], windows: &[Option<Window>]) -> Result<Vec<SweepView>, DsmError> {
     let one = |(image, window): (&SceneImage, &Option<Window>)| match window {
         Some(window) => read_view(image, *window),
-        None => Ok(View::absent(image.camera.clone())),
+        None => Ok(SweepView::absent(image.camera.clone())),
     };
     images.par_iter().zip(windows).map(one).collect()
 }
@@ -96,8 +96,8 @@ fn in_whole_images(found: &PairTies, windows: &[Option<Window>]) -> impl Iterato
     let origin = |i: usize| windows[i].map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(w.x as f64, w.y as f64));
     let (a, b) = (origin(found.pair.first), origin(found.pair.second));
     found.ties.iter().map(move |t| Tie {
-        reference: [t.reference[0] + a.sample, t.reference[1] + a.line],
-        source: [t.source[0] + b.sample, t.source[1] + b.line],
+        reference: ImagePoint::new(t.reference.sample + a.sample, t.reference.line + a.line),
+        source: ImagePoint::new(t.source.sample + b.sample, t.source.line + b.line),
         ..*t
     })
 }

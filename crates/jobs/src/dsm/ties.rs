@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use camera::{ImagePoint, RpcCamera};
+use camera::RpcCamera;
 use serde::{Deserialize, Serialize};
-use sweep::View;
+use sweep::SweepView;
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Tie, TieConfig, Track, adjust, match_pair};
 
 use crate::dsm::values::{HeightRange, ImagePair};
@@ -38,7 +38,7 @@ pub struct PairTies {
 /// A few points of the first pair with enough ties narrow the height range of the others, and all its points that of the
 /// other pairs. A pair with too few ties is searched again for a gross pointing error.
 pub(crate) fn match_pairs(
-    views: &[View],
+    views: &[SweepView],
     pairs: &[ImagePair],
     range: HeightRange,
     config: &TieConfig,
@@ -75,20 +75,20 @@ pub(crate) fn match_pairs(
 }
 
 /// Keeps the ties of a pair that one correction brings together: a wide search finds more chance likenesses.
-fn verified(views: &[View], found: PairTies) -> PairTies {
+fn verified(views: &[SweepView], found: PairTies) -> PairTies {
     let (adjustment, tracks) = adjust_views(views, std::slice::from_ref(&found), &shifts());
     if adjustment.residual_px.1 > WIDE_RESIDUAL_PX {
         return PairTies { ties: Vec::new(), ..found };
     }
     let fits = |t: &&Tie| {
-        let at = |track: &Track| track.first().is_some_and(|(_, p)| [p.sample, p.line] == t.reference);
+        let at = |track: &Track| track.first().is_some_and(|(_, p)| *p == t.reference);
         tracks.iter().zip(&adjustment.ground).any(|(track, ground)| ground.is_some() && at(track))
     };
     PairTies { ties: found.ties.iter().filter(fits).copied().collect(), ..found }
 }
 
 /// Returns the heights of one pair's ties without outliers; `None` when there are too few ties.
-pub(crate) fn heights_seen(views: &[View], found: &PairTies) -> Option<HeightRange> {
+pub(crate) fn heights_seen(views: &[SweepView], found: &PairTies) -> Option<HeightRange> {
     if found.ties.len() < TIES_MIN {
         return None;
     }
@@ -112,7 +112,7 @@ pub(crate) fn tie_heights(adjustment: &Adjustment) -> Option<HeightRange> {
 }
 
 /// Adjusts the cameras of views, see [`adjust_cameras`].
-fn adjust_views(views: &[View], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
+fn adjust_views(views: &[SweepView], pairs: &[PairTies], config: &AdjustConfig) -> (Adjustment, Vec<Track>) {
     let cameras: Vec<_> = views.iter().map(|v| v.camera.clone()).collect();
     let sizes: Vec<_> = views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect();
     adjust_cameras(&cameras, &sizes, pairs, config)
@@ -130,11 +130,11 @@ pub(crate) fn adjust_cameras(
     for found in pairs {
         let ImagePair { first: reference, second: source } = found.pair;
         for tie in &found.ties {
-            let [s, l] = tie.reference;
+            let corner = tie.reference;
             let track = by_corner
-                .entry((reference, s.to_bits(), l.to_bits()))
-                .or_insert_with(|| vec![(reference, ImagePoint::new(s, l))]);
-            track.push((source, ImagePoint::new(tie.source[0], tie.source[1])));
+                .entry((reference, corner.sample.to_bits(), corner.line.to_bits()))
+                .or_insert_with(|| vec![(reference, corner)]);
+            track.push((source, tie.source));
         }
     }
     let tracks: Vec<Track> = by_corner.into_values().collect();
@@ -148,18 +148,23 @@ fn wide_search(config: &TieConfig) -> TieConfig {
 
 /// Serde adapter for tie points: one row of five numbers for each.
 mod tie_rows {
+    use camera::ImagePoint;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
     use sweep::pointing::Tie;
 
     type Row = (f64, f64, f64, f64, f32);
 
     pub(super) fn serialize<S: Serializer>(ties: &[Tie], out: S) -> Result<S::Ok, S::Error> {
-        let row = |t: &Tie| -> Row { (t.reference[0], t.reference[1], t.source[0], t.source[1], t.correlation) };
+        let row = |t: &Tie| -> Row { (t.reference.sample, t.reference.line, t.source.sample, t.source.line, t.correlation) };
         ties.iter().map(row).collect::<Vec<Row>>().serialize(out)
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<Tie>, D::Error> {
-        let tie = |(a, b, c, d, correlation): Row| Tie { reference: [a, b], source: [c, d], correlation };
+        let tie = |(a, b, c, d, correlation): Row| Tie {
+            reference: ImagePoint::new(a, b),
+            source: ImagePoint::new(c, d),
+            correlation,
+        };
         Ok(Vec::<Row>::deserialize(input)?.into_iter().map(tie).collect())
     }
 }

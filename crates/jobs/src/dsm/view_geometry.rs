@@ -137,9 +137,9 @@ fn pair_geometry(
     let angle_deg = a.view_direction(centre)?.intersection_angle_deg(&b.view_direction(centre)?);
     let (low, high) = (centre.height_m - 5.0, centre.height_m + 5.0);
     let move_px = |r: &RpcCamera, s: &RpcCamera, at: ImagePoint| {
-        let place = |h| source_from_reference(r, s, 0, [at.sample, at.line], h);
+        let place = |h| source_from_reference(r, s, 0, at, h);
         let (from, to) = (place(low)?, place(high)?);
-        Ok::<f64, CameraError>((to[0] - from[0]).hypot(to[1] - from[1]) / (high - low))
+        Ok::<f64, CameraError>((to.sample - from.sample).hypot(to.line - from.line) / (high - low))
     };
     let parallax_px_per_m = move_px(a, b, p)?.max(move_px(b, a, q)?);
     Ok(PairGeometry { angle_deg, overlap, parallax_px_per_m })
