@@ -155,7 +155,8 @@ mod tie_rows {
     type Row = (f64, f64, f64, f64, f32);
 
     pub(super) fn serialize<S: Serializer>(ties: &[Tie], out: S) -> Result<S::Ok, S::Error> {
-        let row = |t: &Tie| -> Row { (t.reference.sample, t.reference.line, t.source.sample, t.source.line, t.correlation) };
+        let row =
+            |t: &Tie| -> Row { (t.reference.sample, t.reference.line, t.source.sample, t.source.line, t.correlation) };
         ties.iter().map(row).collect::<Vec<Row>>().serialize(out)
     }
 
