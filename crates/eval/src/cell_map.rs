@@ -217,7 +217,8 @@ mod tests {
     proptest! {
         #[test]
         fn the_lattice_agrees_with_the_affine_map(
-            x in -50.0..50.0f64, y in -50.0..50.0f64, cell in 0.2..3.0f64, column in -10.0..70.0f64, row in -10.0..60.0f64,
+            x in -50.0..50.0f64, y in -50.0..50.0f64, cell in 0.2..3.0f64,
+            column in -10.0..70.0f64, row in -10.0..60.0f64,
         ) {
             let (a, b) = (GeoTransform::north_up(0.0, 0.0, 0.5), GeoTransform::north_up(x, y, cell));
             let affine = CellMap::affine(&a, &b).unwrap().position(column, row);

@@ -5,14 +5,16 @@
 #[non_exhaustive]
 pub enum EvalError {
     /// The reference has no valid cell left.
-    #[error("the reference has no valid cell{}: check its no-data value, the mask and the skipped classes", skipped_text(*.skipped))]
+    #[error("the reference has no valid cell{}: check its no-data value, the mask and the skipped \
+      classes", skipped_text(*.skipped))]
     EmptyReference {
         /// Number of valid cells that the class or the mask excludes.
         skipped: usize,
     },
     /// No cell is valid in both surfaces.
     #[error(
-        "the surfaces share no valid cell (the reference has {reference_cells}): check that they cover the same ground and \
+        "the surfaces share no valid cell (the reference has {reference_cells}): check that they cover the same \
+          ground and \
          that each names its coordinate system"
     )]
     NoOverlap {
@@ -62,7 +64,8 @@ pub enum EvalError {
     },
     /// The ground has too little slope for the method of Nuth and Kääb.
     #[error(
-        "the ground is too flat for the alignment nuth-kaab: {:.2} % of it is steeper than {slope_deg}° at cells of {cell_m:.1} m, \
+        "the ground is too flat for the alignment nuth-kaab: {:.2} % of it is steeper than {slope_deg}° at \
+          cells of {cell_m:.1} m, \
          needed are {:.0} %: use the alignment xyz, z or none", 100.0 * share, 100.0 * needed
     )]
     TooFlat {

@@ -86,7 +86,9 @@ mod tests {
         }
 
         #[test]
-        fn a_value_exists_where_the_nearest_cell_has_one(column in -2.0..10.0f64, row in -2.0..8.0f64, hole in 0usize..48) {
+        fn a_value_exists_where_the_nearest_cell_has_one(
+            column in -2.0..10.0f64, row in -2.0..8.0f64, hole in 0usize..48,
+        ) {
             let mut grid = plane(8, 6);
             grid.data_mut()[hole] = f32::NAN;
             let by_nearest = nearest(&grid, column, row).is_some_and(f32::is_finite);

@@ -167,7 +167,9 @@ mod tests {
         }
 
         #[test]
-        fn the_upper_nmad_is_the_nmad_for_odd_counts(half in prop::collection::vec(-50.0..50.0f32, 0..100), one in -1.0..1.0f32) {
+        fn the_upper_nmad_is_the_nmad_for_odd_counts(
+            half in prop::collection::vec(-50.0..50.0f32, 0..100), one in -1.0..1.0f32,
+        ) {
             let mut values: Vec<f32> = half.iter().chain(&half).copied().chain([one]).collect();
             let mut wide: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
             let expected = ErrorStatistics::of(&mut wide).unwrap().nmad;

@@ -1,4 +1,4 @@
-//! The shift between two surfaces is found, and what it must not depend on it does not depend on.
+//! The shift between two surfaces is found, whatever their noise, gross errors and voids.
 
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalError, EvalInput, Evaluation, MetresFromCells, evaluate};
 use proptest::prelude::*;
@@ -6,8 +6,9 @@ use raster::{GeoTransform, Grid};
 
 const CELL_M: f64 = 0.5;
 
-/// A town: rolling ground, and a block house with a pitched roof on every square of 17 m, askew to
-/// the axes: edges along the cells would all be sampled at the same phase.
+/// Returns the height of a town: rolling ground, and a house with a pitched roof on every square of
+/// 17 m. The town is askew to the axes, because edges along the cells would all be sampled at the
+/// same phase.
 fn town(x: f64, y: f64) -> f64 {
     let ground = 20.0 + 3.0 * (x / 31.0).sin() + 2.0 * (y / 23.0).cos();
     let (x, y) = (0.956 * x + 0.292 * y, 0.956 * y - 0.292 * x);
@@ -18,7 +19,7 @@ fn town(x: f64, y: f64) -> f64 {
     ground + if inside { 4.0 + 2.0 * kind + 0.3 * (u - 3.0) } else { 0.0 }
 }
 
-/// Deterministic noise in (-1, 1) for a cell.
+/// Returns deterministic noise in (−1, 1) for a cell.
 fn noise(i: usize, salt: u64) -> f64 {
     let z = (i as u64 ^ (salt << 40)).wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -43,8 +44,8 @@ fn run(
     evaluate(&input, &EvalConfig { alignment, ..EvalConfig::default() })
 }
 
-/// The town as a test surface that (3.3, −2.7, 4.1) m must be added to, with noise, gross errors
-/// and holes.
+/// Returns the town as a test surface to which (3.3, −2.7, 4.1) m must be added, with noise, gross
+/// errors and holes.
 fn displaced_test(geotransform: &GeoTransform, size: (usize, usize), noise_m: f64, hole_share: f64) -> Grid<f32> {
     sampled(size.0, size.1, geotransform, |x, y, i| {
         let gross = if noise(i, 2) > 0.9 { 12.0 * noise(i, 3) } else { 0.0 };
@@ -102,7 +103,7 @@ fn nuth_and_kaab_find_the_planted_shift_too() {
     }
 }
 
-/// The surfaces of `reference/nuth_kaab_xdem.py`.
+/// Returns the surfaces of `reference/nuth_kaab_xdem.py`.
 fn hills(x: f64, y: f64) -> f64 {
     300.0 + 25.0 * (x / 61.0).sin() * (y / 47.0).cos() + 9.0 * (x / 23.0 + y / 31.0).sin() + 0.05 * x
 }
@@ -215,7 +216,7 @@ proptest! {
 fn what_is_believed_most_has_the_errors_of_those_cells() {
     let geotransform = GeoTransform::north_up(0.0, 0.0, 1.0);
     let reference = Grid::filled(20, 10, 5.0f32);
-    // Errors of 0.1 m per column; the confidence falls with them, and one column is void.
+    // The error is 0.1 m per column. The confidence falls with it, and one column is void.
     let cell = |i: usize| if i % 20 == 19 { f32::NAN } else { 5.0 + 0.1 * (i % 20) as f32 };
     let test = Grid::from_vec(20, 10, (0..200).map(cell).collect()).unwrap();
     let confidence = Grid::from_vec(20, 10, (0..200).map(|i| 1.0 - 0.01 * (i % 20) as f32).collect()).unwrap();
@@ -228,7 +229,7 @@ fn what_is_believed_most_has_the_errors_of_those_cells() {
     let kept = evaluate(&input, &config).unwrap().coverages;
     assert_eq!(kept.iter().map(|c| c.coverage).collect::<Vec<_>>(), eval::COVERAGES);
     for c in &kept {
-        // The columns that are kept have errors of 0, 0.1, …
+        // The kept columns have errors of 0, 0.1, …
         let columns = (20.0 * c.coverage).round();
         let mae = c.metrics.errors.unwrap().mae;
         assert!((mae - 0.05 * (columns - 1.0)).abs() < 1e-6, "{c:?}");

@@ -1,5 +1,5 @@
-//! Metrics against NumPy: `reference/eval_numpy.txt`, written by `reference/eval_numpy.py`, to
-//! 1e-6.
+//! Metrics agree with NumPy to 1e-6. The reference is `reference/eval_numpy.txt`, written by
+//! `reference/eval_numpy.py`.
 
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, Metrics, Overlap, evaluate};
 use raster::{GeoTransform, Grid};
@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 const REFERENCE: &str = include_str!("reference/eval_numpy.txt");
 const TOLERANCE: f64 = 1e-6;
-/// The generator's terrain is level.
+/// Height of the generator's level terrain.
 const TERRAIN_M: f32 = 29.0;
 
 struct Case {
@@ -60,7 +60,8 @@ fn check(context: &str, found: &Metrics, expected: &HashMap<String, f64>) {
     }
 }
 
-/// Areas and volumes to 1e-6 of their size: the aligned surface is kept in single precision.
+/// Checks areas and volumes to 1e-6 of their size, because the aligned surface has single
+/// precision.
 fn check_overlap(context: &str, found: &Overlap, expected: &HashMap<String, f64>) {
     for (name, value) in [("reference", found.reference), ("test", found.test), ("shared", found.shared)] {
         let expected = expected[name];
@@ -68,7 +69,8 @@ fn check_overlap(context: &str, found: &Overlap, expected: &HashMap<String, f64>
     }
 }
 
-/// The metrics with the generator's label: `all`, a class, `slope_<lower bound>`, `edge` or `rest`.
+/// Returns the metrics with the generator's label: `all`, a class, `slope_<lower bound>`, `edge` or
+/// `rest`.
 fn metrics_of<'a>(found: &'a Evaluation, label: &str) -> &'a Metrics {
     let slope = || found.slopes.iter().find(|bin| label == format!("slope_{}", bin.from_deg)).map(|bin| &bin.metrics);
     let class = || found.classes.iter().find(|c| c.class.to_string() == label).map(|c| &c.metrics);
@@ -80,7 +82,7 @@ fn metrics_of<'a>(found: &'a Evaluation, label: &str) -> &'a Metrics {
     }
 }
 
-/// How many sets of cells have errors.
+/// Returns the number of sets of cells that have errors.
 fn sets_with_values(found: &Evaluation) -> usize {
     let classes = found.classes.iter().map(|c| &c.metrics);
     let slopes = found.slopes.iter().map(|bin| &bin.metrics);

@@ -1,5 +1,5 @@
-//! Surfaces and maps against SciPy, trimesh and NumPy: `reference/surface_scipy.txt`, written by
-//! `reference/surface_scipy.py`.
+//! Metrics of surfaces and maps agree with SciPy, trimesh and NumPy. The reference is
+//! `reference/surface_scipy.txt`, written by `reference/surface_scipy.py`.
 
 use std::collections::BTreeMap;
 
@@ -47,7 +47,7 @@ fn check(case: &str, found: &[(&str, f64)], expected: &Values) {
     }
 }
 
-/// Every number of a comparison under its path: `accuracy.mean_m`, `precision_0.1`.
+/// Returns every number of a comparison with its path: `accuracy.mean_m`, `precision_0.1`.
 fn named(found: &SurfaceComparison) -> Vec<(String, f64)> {
     let json = serde_json::to_value(found).unwrap();
     let mut values = Vec::new();
@@ -77,7 +77,7 @@ fn clouds(reader: &mut Reader, case: &str, config: &SurfaceComparisonConfig) {
         .unwrap();
     let values = named(&found);
     check(case, &values.iter().map(|(name, v)| (name.as_str(), *v)).collect::<Vec<_>>(), &expected);
-    // Whole voxels and whole metres away, all is the same but for what f64 keeps of it.
+    // A shift by whole voxels and whole metres changes nothing except rounding.
     let moved = |points: Vec<[f64; 3]>| points.into_iter().map(|[x, y, z]| [x + 2000.0, y - 4000.0, z]).collect();
     let far =
         compare_surfaces(&LocalSurface::Points(moved(test)), &LocalSurface::Points(moved(reference)), config).unwrap();

@@ -92,7 +92,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_vector_product_is_perpendicular_to_both(a in prop::array::uniform3(-9.0..9.0f64), b in prop::array::uniform3(-9.0..9.0f64)) {
+        fn the_vector_product_is_perpendicular_to_both(
+            a in prop::array::uniform3(-9.0..9.0f64), b in prop::array::uniform3(-9.0..9.0f64),
+        ) {
             let product = cross(a, b);
             prop_assert!(dot(product, a).abs() < 1e-10 && dot(product, b).abs() < 1e-10);
             // Lagrange's identity.

@@ -1,13 +1,14 @@
-//! Gaussian smoothing that respects no-data.
+//! Gaussian smoothing of grids with no-data.
 //!
-//! Separable convolution truncated at 3 σ and normalised by the weight of the valid pixels, so that neither no-data
-//! nor the image's edge darkens its surroundings. No-data stays no-data.
+//! The convolution is separable, truncated at 3 σ, and normalised by the weight of the valid
+//! pixels. So neither no-data nor the image's edge darkens its surroundings. No-data stays no-data.
 
 use rayon::prelude::*;
 
 use crate::Grid;
 
-/// Smooths with a standard deviation in pixels; a σ that is not positive (or not finite) returns the grid unchanged.
+/// Smooths with a standard deviation in pixels. Returns the grid unchanged if σ is not positive or
+/// not finite.
 pub fn gaussian(grid: &Grid<f32>, sigma_px: f32) -> Grid<f32> {
     let width = grid.width();
     if sigma_px.is_nan() || sigma_px <= 0.0 || !sigma_px.is_finite() || width == 0 {
@@ -35,13 +36,13 @@ pub fn gaussian(grid: &Grid<f32>, sigma_px: f32) -> Grid<f32> {
     smooth
 }
 
-/// Weights at distances 0, 1, … ; never longer than the grid.
+/// Returns the weights at distances 0, 1, … They never reach beyond the grid.
 fn taps(sigma_px: f32, longest: usize) -> Vec<f32> {
     let reach = ((3.0 * sigma_px).ceil() as usize).min(longest);
     (0..=reach).map(|d| (-0.5 * (d as f32 / sigma_px).powi(2)).exp()).collect()
 }
 
-/// Weighted sum of pairs around `centre` in `0..length`.
+/// Returns the weighted sum of the pairs around `centre` in `0..length`.
 fn accumulate(taps: &[f32], centre: usize, length: usize, pair: impl Fn(usize) -> [f32; 2]) -> [f32; 2] {
     let reach = taps.len() - 1;
     let (first, last) = (centre.saturating_sub(reach), (centre + reach).min(length - 1));
@@ -76,7 +77,7 @@ mod tests {
         let row: f32 = (0..41).map(|c| smooth[(c, 20)]).sum();
         let variance: f32 = (0..41).map(|c| smooth[(c, 20)] * (c as f32 - 20.0).powi(2)).sum::<f32>() / row;
         let total: f32 = smooth.data().iter().sum();
-        // Truncation at 3 sigma takes about 3 % of the variance.
+        // Truncation at 3 σ removes about 3 % of the variance.
         assert!((variance - 4.0).abs() < 0.15 && (total - 1.0).abs() < 1e-4, "{variance} {total}");
     }
 }

@@ -2,7 +2,17 @@
 
 use crate::Window;
 
-/// A `width × height` raster in row-major order; `(column, row)` = (0, 0) is the upper-left pixel.
+/// Raster of `width × height` cells in row-major order. `(column, row)` = (0, 0) is the upper-left
+/// pixel.
+///
+/// ```
+/// use raster::Grid;
+///
+/// let mut grid = Grid::filled(3, 2, 0.0);
+/// grid[(2, 1)] = 7.5;
+/// assert_eq!(grid.row(1), [0.0, 0.0, 7.5]);
+/// assert_eq!(grid.get(3, 0), None);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid<T> {
     width: usize,
@@ -11,12 +21,12 @@ pub struct Grid<T> {
 }
 
 impl<T: Copy> Grid<T> {
-    /// A grid with every cell set to `value`.
+    /// Returns a grid with every cell set to `value`.
     pub fn filled(width: usize, height: usize, value: T) -> Self {
         Self { width, height, data: vec![value; width * height] }
     }
 
-    /// A copy of a window, which may reach outside: cells there are `padding`.
+    /// Copies a window, which may reach outside the grid. Cells there are set to `padding`.
     pub fn window(&self, window: Window, padding: T) -> Self {
         let mut part = Self::filled(window.width, window.height, padding);
         if let Some(shared) = Window::whole(self.width, self.height).intersection(&window) {
@@ -31,52 +41,52 @@ impl<T: Copy> Grid<T> {
 }
 
 impl<T> Grid<T> {
-    /// A grid over existing row-major data; `None` when the length is not `width · height`.
+    /// Returns a grid over row-major data, or `None` if the length is not `width · height`.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
         (data.len() == width.checked_mul(height)?).then_some(Self { width, height, data })
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// All cells, row after row.
+    /// Returns all cells, row after row.
     pub fn data(&self) -> &[T] {
         &self.data
     }
 
-    /// All cells, row after row, to change.
+    /// Returns all cells for writing, row after row.
     pub fn data_mut(&mut self) -> &mut [T] {
         &mut self.data
     }
 
-    /// One row.
+    /// Returns one row.
     pub fn row(&self, row: usize) -> &[T] {
         &self.data[row * self.width..(row + 1) * self.width]
     }
 
-    /// One row, to change.
+    /// Returns one row for writing.
     pub fn row_mut(&mut self, row: usize) -> &mut [T] {
         &mut self.data[row * self.width..(row + 1) * self.width]
     }
 
-    /// The cells by themselves.
+    /// Returns the cells, row after row, and drops the grid.
     pub fn into_vec(self) -> Vec<T> {
         self.data
     }
 
-    /// A cell, or `None` outside the grid.
+    /// Returns a cell, or `None` outside the grid.
     pub fn get(&self, column: usize, row: usize) -> Option<&T> {
         (column < self.width && row < self.height).then(|| &self.data[row * self.width + column])
     }
 
-    /// A grid of the same shape with `f` applied to every cell.
+    /// Returns a grid of the same shape with `f` applied to every cell.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Grid<U> {
         Grid { width: self.width, height: self.height, data: self.data.iter().map(f).collect() }
     }
@@ -85,7 +95,7 @@ impl<T> Grid<T> {
 impl<T> std::ops::Index<(usize, usize)> for Grid<T> {
     type Output = T;
 
-    /// The cell at (column, row).
+    /// Returns the cell at (column, row).
     fn index(&self, (column, row): (usize, usize)) -> &T {
         debug_assert!(column < self.width);
         &self.data[row * self.width + column]

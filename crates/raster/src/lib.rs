@@ -1,7 +1,7 @@
 //! Rasters in memory: grids, geotransforms, windows, masks, pyramids and resampling.
 //!
-//! One pixel convention everywhere: the centre of the upper-left pixel is at (0, 0). GDAL's corner convention
-//! (centre at 0.5, 0.5) is met in [`GeoTransform`] and in the readers, and nowhere else.
+//! All functions use one pixel convention: the centre of the upper-left pixel is at (0, 0). GDAL's
+//! corner convention (centre at 0.5, 0.5) appears in [`GeoTransform`] and in the readers only.
 
 mod gaussian;
 mod geotransform;
@@ -21,5 +21,5 @@ pub use relief::{Light, coloured_relief, height_percentiles, hillshade};
 pub use resample::{Interpolation, bicubic, bicubic_along, bilinear, cubic_weights, resample, sample};
 pub use window::Window;
 
-/// The no-data value of every float raster that the toolkit writes, unless told otherwise.
+/// No-data value of every float raster that the toolkit writes, unless the user sets another.
 pub const NO_DATA: f32 = -32768.0;

@@ -1,9 +1,10 @@
 //! Image pyramids by factors of two, with an explicit geometry.
 //!
-//! A pixel p of level l is centred at `(p + 0.5) · 2^l − 0.5` of level 0. One reduction convolves with the binomial
-//! (1, 3, 3, 1) / 8 along rows and columns, which is centred between the two pixels that become one and suppresses
-//! what the coarser grid cannot carry. Averages are taken over valid pixels only (normalised convolution); a pixel
-//! is valid when at least half of the filter's weight falls on valid pixels inside the image. Odd sizes round up.
+//! A pixel p of level l is centred at `(p + 0.5) · 2^l − 0.5` of level 0. One reduction convolves
+//! with the binomial (1, 3, 3, 1) / 8 along rows and columns. It is centred between the two pixels
+//! that become one, and suppresses frequencies that the coarser grid cannot represent. Averages are
+//! taken over valid pixels only (normalised convolution). A pixel is valid if at least half of the
+//! filter's weight falls on valid pixels inside the image. Odd sizes round up.
 
 use rayon::prelude::*;
 
@@ -14,15 +15,15 @@ const TAPS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
 /// Share of the filter's weight that must fall on valid pixels.
 const VALID_WEIGHT: f32 = 0.5;
 
-/// A grid and its reductions, finest first.
+/// Grid and its reductions, finest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pyramid {
     levels: Vec<Grid<f32>>,
 }
 
 impl Pyramid {
-    /// Reduces until `levels` are there or a level's shorter side would fall below `min_side` pixels. Level 0 is
-    /// always there.
+    /// Reduces the grid until there are `levels` levels, or until the shorter side of the next
+    /// level would fall below `min_side` pixels. Level 0 always exists.
     pub fn new(level0: Grid<f32>, levels: usize, min_side: usize) -> Self {
         let mut all = vec![level0];
         while all.len() < levels {
@@ -36,28 +37,33 @@ impl Pyramid {
         Self { levels: all }
     }
 
-    /// All levels, finest first.
+    /// Returns all levels, finest first.
     pub fn levels(&self) -> &[Grid<f32>] {
         &self.levels
     }
 
-    /// The levels by themselves, finest first.
+    /// Returns the levels, finest first, and drops the pyramid.
     pub fn into_levels(self) -> Vec<Grid<f32>> {
         self.levels
     }
 
-    /// A level by number, 0 the finest.
+    /// Returns a level by number; 0 is the finest.
     pub fn level(&self, level: usize) -> Option<&Grid<f32>> {
         self.levels.get(level)
     }
 }
 
-/// Position in level 0 of a position (column or row) in a level.
+/// Converts a position (column or row) in a level to level 0.
 pub fn level0_from_level(position: f64, level: u32) -> f64 {
     (position + 0.5) * scale(level) - 0.5
 }
 
-/// Position in a level of a position (column or row) in level 0.
+/// Converts a position (column or row) in level 0 to a level.
+///
+/// ```
+/// assert_eq!(raster::level_from_level0(0.5, 1), 0.0);
+/// assert_eq!(raster::level0_from_level(0.0, 1), 0.5);
+/// ```
 pub fn level_from_level0(position: f64, level: u32) -> f64 {
     (position + 0.5) / scale(level) - 0.5
 }
@@ -66,7 +72,7 @@ fn scale(level: u32) -> f64 {
     f64::from(level).exp2()
 }
 
-/// One reduction by two; NaN is no-data. Rows in parallel, the same result for any number of threads.
+/// Reduces a grid by two. NaN is no-data. The result is the same for any number of threads.
 pub fn reduce(grid: &Grid<f32>) -> Grid<f32> {
     let (width, height) = (grid.width().div_ceil(2), grid.height().div_ceil(2));
     let mut sums = Grid::filled(width, grid.height(), [0.0_f32; 2]);
@@ -79,7 +85,7 @@ pub fn reduce(grid: &Grid<f32>) -> Grid<f32> {
     reduced
 }
 
-/// Weighted sum and weight of the valid pixels along one row.
+/// Computes the weighted sum and the weight of the valid pixels along one row.
 fn reduce_along(pixels: &[f32], out: &mut [[f32; 2]]) {
     let term = |value: f32, tap: f32| if value.is_finite() { [tap * value, tap] } else { [0.0; 2] };
     let n = pixels.len();
@@ -99,7 +105,7 @@ fn reduce_along(pixels: &[f32], out: &mut [[f32; 2]]) {
     }
 }
 
-/// The values of one reduced row from the sums along the four rows under it.
+/// Computes the values of one reduced row from the sums along the four rows under it.
 fn reduce_across(sums: &Grid<[f32; 2]>, row: usize, out: &mut [f32]) {
     let nothing = vec![[0.0_f32; 2]; if row == 0 || 2 * row + 2 >= sums.height() { out.len() } else { 0 }];
     let at = |k: usize| match (2 * row + k).checked_sub(1) {

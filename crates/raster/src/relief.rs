@@ -1,22 +1,23 @@
 //! Pictures of heights: hillshade and coloured relief.
 //!
-//! Hillshade after Horn (Proc. IEEE 69, 1981): slopes from the eight neighbours with weights 1, 2, 1, shade
-//! `cos(angle between the surface's normal and the sun)`, scaled to 1–255 as gdaldem does; 0 is no-data. A neighbour
-//! without height takes the centre's, so that pictures have no gaps wider than the data's.
+//! The hillshade follows Horn (Proc. IEEE 69, 1981): slopes come from the eight neighbours with
+//! weights 1, 2, 1. The shade is `cos(angle between the surface's normal and the sun)`, scaled to
+//! 1–255 as in gdaldem; 0 is no-data. A neighbour without a height takes the height of the centre,
+//! so that gaps in pictures are no wider than those in the data.
 
 use numeric::nearest_quantile;
 use rayon::prelude::*;
 
 use crate::Grid;
 
-/// Where the light comes from and how steep the relief looks.
+/// Direction of the light, and exaggeration of the relief.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Light {
-    /// Degrees clockwise from north (from the top of the picture).
+    /// Azimuth of the light, degrees clockwise from north (from the top of the picture).
     pub azimuth_deg: f32,
-    /// Degrees above the horizon.
+    /// Altitude of the light, degrees above the horizon.
     pub altitude_deg: f32,
-    /// Exaggeration of heights.
+    /// Factor by which heights are exaggerated.
     pub z_factor: f32,
 }
 
@@ -35,12 +36,13 @@ const RAMP: [[f32; 3]; 6] = [
     [150.0, 107.0, 93.0],
     [236.0, 232.0, 228.0],
 ];
-/// Share of the shade in the blend: flat ground keeps its colour at this brightness.
+/// Share of the shade in the blend of colour and shade.
 const SHADE_SHARE: f32 = 0.75;
 /// Colour of cells without height.
 const VOID: [u8; 3] = [255, 255, 255];
 
-/// Shade of every cell; rows run from north to south and cells are `cell_size_m` wide and high, metres.
+/// Computes the shade of every cell. Rows run from north to south. Cells are `cell_size_m` metres
+/// wide and high.
 pub fn hillshade(heights: &Grid<f32>, cell_size_m: (f64, f64), light: Light) -> Grid<u8> {
     let (width, height) = (heights.width(), heights.height());
     let mut shade = Grid::filled(width, height, 0_u8);
@@ -55,7 +57,8 @@ pub fn hillshade(heights: &Grid<f32>, cell_size_m: (f64, f64), light: Light) -> 
         let rows = [heights.row(row.saturating_sub(1)), heights.row(row), heights.row((row + 1).min(height - 1))];
         for (column, cell) in out.iter_mut().enumerate() {
             let Some((dx, dy)) = horn(rows, column) else { continue };
-            // Towards east and north; the sun's horizontal direction is (sin azimuth, cos azimuth).
+            // Slopes towards east and north. The sun's horizontal direction is (sin azimuth, cos
+            // azimuth).
             let (east, north) = (dx * scale_x, -dy * scale_y);
             let facing = sin_altitude - cos_altitude * (east * sin_azimuth + north * cos_azimuth);
             let cosine = facing / (1.0 + east * east + north * north).sqrt();
@@ -65,7 +68,8 @@ pub fn hillshade(heights: &Grid<f32>, cell_size_m: (f64, f64), light: Light) -> 
     shade
 }
 
-/// Horn's sums of differences towards larger columns and rows; `None` where the centre has no height.
+/// Returns Horn's sums of differences towards larger columns and rows, or `None` if the centre has
+/// no height.
 fn horn(rows: [&[f32]; 3], column: usize) -> Option<(f32, f32)> {
     let centre = rows[1][column];
     if !centre.is_finite() {
@@ -81,10 +85,11 @@ fn horn(rows: [&[f32]; 3], column: usize) -> Option<(f32, f32)> {
     Some((dx, dy))
 }
 
-/// Heights coloured from `low_m` to `high_m` and shaded; cells without height are white.
+/// Colours heights from `low_m` to `high_m` and shades them. Cells without a height are white.
 pub fn coloured_relief(heights: &Grid<f32>, shade: &Grid<u8>, low_m: f32, high_m: f32) -> Grid<[u8; 3]> {
     let span = if high_m > low_m { high_m - low_m } else { 1.0 };
-    // Flat ground has the shade of the sun's altitude, sin 45° by default, which should leave its colour alone.
+    // Flat ground has the shade of the sun's altitude (sin 45° by default). It should keep its
+    // colour.
     let flat = 255.0 * std::f32::consts::FRAC_1_SQRT_2;
     let mut picture = Grid::filled(heights.width(), heights.height(), VOID);
     let cells = heights.data().iter().zip(shade.data());
@@ -97,15 +102,20 @@ pub fn coloured_relief(heights: &Grid<f32>, shade: &Grid<u8>, low_m: f32, high_m
     picture
 }
 
-/// Heights at two percentiles (0–100) of the valid cells: a range for [`coloured_relief`] that outliers do not stretch.
-/// `None` without valid cells.
+/// Returns the heights at two percentiles (0–100) of the valid cells, or `None` without valid
+/// cells. As a range for [`coloured_relief`], they keep outliers from stretching the colours.
+///
+/// ```
+/// let heights = raster::Grid::from_vec(5, 1, vec![1.0, 2.0, 3.0, 4.0, f32::NAN]).unwrap();
+/// assert_eq!(raster::height_percentiles(&heights, 0.0, 100.0), Some((1.0, 4.0)));
+/// ```
 pub fn height_percentiles(heights: &Grid<f32>, low: f64, high: f64) -> Option<(f32, f32)> {
     let mut valid: Vec<f32> = heights.data().iter().copied().filter(|h| h.is_finite()).collect();
     let mut at = |percent: f64| nearest_quantile(&mut valid, percent.clamp(0.0, 100.0) / 100.0);
     Some((at(low)?, at(high)?))
 }
 
-/// The ramp's colour at a fraction, clamped to [0, 1].
+/// Returns the ramp's colour at a fraction, clamped to [0, 1].
 fn colour(fraction: f32) -> [f32; 3] {
     let position = fraction.clamp(0.0, 1.0) * (RAMP.len() - 1) as f32;
     let below = (position as usize).min(RAMP.len() - 2);
@@ -129,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_slope_towards_the_sun_is_bright_and_away_is_dark() {
-        // Rising to the lower right, the ground faces north-west, where the sun is.
+        // The ground rises to the lower right, so it faces north-west, where the sun is.
         let facing = hillshade(&slope(0.5, 0.5), (0.5, 0.5), Light::default())[(4, 4)];
         let averted = hillshade(&slope(-0.5, -0.5), (0.5, 0.5), Light::default())[(4, 4)];
         let flat = hillshade(&slope(0.0, 0.0), (0.5, 0.5), Light::default())[(4, 4)];

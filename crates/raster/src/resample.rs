@@ -1,9 +1,10 @@
-//! Values between pixel centres: bilinear and bicubic.
+//! Interpolation between pixel centres: bilinear and bicubic.
 //!
-//! Bicubic is Keys' convolution with a = −1/2 (IEEE Trans. ASSP 29, 1981; Catmull–Rom), exact for quadratics. No-data
-//! (NaN) never bleeds: a bilinear value exists where every pixel with a non-zero weight does, and is NaN elsewhere;
-//! bicubic falls back to bilinear where its 4 × 4 neighbourhood is not complete. Positions outside
-//! [0, width − 1] × [0, height − 1] have no value: nothing is extrapolated.
+//! Bicubic is Keys' convolution with a = −1/2 (IEEE Trans. ASSP 29, 1981; Catmull–Rom), which is
+//! exact for quadratics. No-data (NaN) never spreads: a bilinear value exists if every pixel with a
+//! non-zero weight has a value, and is NaN otherwise. Bicubic falls back to bilinear where its 4 ×
+//! 4 neighbourhood is not complete. Positions outside [0, width − 1] × [0, height − 1] have no
+//! value: nothing is extrapolated.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -13,14 +14,14 @@ use crate::Grid;
 /// Interpolation between pixel centres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Interpolation {
-    /// Four pixels.
+    /// Bilinear, from four pixels.
     Bilinear,
-    /// Sixteen pixels, four where they are not all there.
+    /// Bicubic, from sixteen pixels. Bilinear if one of them is missing.
     #[default]
     Bicubic,
 }
 
-/// The value at a position, or NaN where there is none.
+/// Returns the value at a position, or NaN if there is none.
 pub fn sample(grid: &Grid<f32>, column: f64, row: f64, interpolation: Interpolation) -> f32 {
     match interpolation {
         Interpolation::Bilinear => bilinear(grid, column, row),
@@ -28,7 +29,7 @@ pub fn sample(grid: &Grid<f32>, column: f64, row: f64, interpolation: Interpolat
     }
 }
 
-/// The bilinear value at a position, or NaN where there is none.
+/// Returns the bilinear value at a position, or NaN if there is none.
 pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
     let (Some((c, u)), Some((r, v))) = (split(column, grid.width()), split(row, grid.height())) else {
         return f32::NAN;
@@ -37,7 +38,8 @@ pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
     if v == 0.0 { top } else { mix(top, along(grid.row(r + 1), c, u), v) }
 }
 
-/// The bicubic value at a position, the bilinear one where the 4 × 4 pixels around it are not all there, or NaN.
+/// Returns the bicubic value at a position, the bilinear one if a pixel of the 4 × 4 around it is
+/// missing, or NaN if there is neither.
 pub fn bicubic(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
     let (Some((c, u)), Some((r, v))) = (split(column, grid.width()), split(row, grid.height())) else {
         return f32::NAN;
@@ -54,17 +56,18 @@ pub fn bicubic(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
     if value.is_finite() { value } else { bilinear(grid, column, row) }
 }
 
-/// Positions that are worked on together.
+/// Number of positions that are processed together.
 const LANES: usize = 8;
 
-/// [`bicubic`] at `from`, `from + step`, … (column, row), but for the order of the sums.
+/// Computes [`bicubic`] at `from`, `from + step`, … (column, row), with another order of the sums.
 #[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
 pub fn bicubic_along(grid: &Grid<f32>, from: [f64; 2], step: [f64; 2], out: &mut [f32]) {
     for (k, values) in out.chunks_mut(LANES).enumerate() {
         let first = (k * LANES) as f64;
         let at = |axis: usize| std::array::from_fn(|i| from[axis] + step[axis] * (first + i as f64));
         let (columns, rows): ([f64; LANES], [f64; LANES]) = (at(0), at(1));
-        // Positions between two that have all their pixels have them too; those between two beyond one side have no value.
+        // If the first and the last position have all their pixels, so have those between them. If
+        // both lie beyond the same side, none of the positions has a value.
         if [0, LANES - 1].into_iter().all(|i| has_all_pixels(grid, [columns[i], rows[i]])) {
             let inside = bicubic_inside(grid, columns, rows);
             match <&mut [f32; LANES]>::try_from(&mut *values) {
@@ -86,7 +89,8 @@ pub fn bicubic_along(grid: &Grid<f32>, from: [f64; 2], step: [f64; 2], out: &mut
     }
 }
 
-/// Whether positions along a line all lie before the first pixel, or all behind the last one.
+/// Returns whether positions along a line all lie before the first pixel, or all behind the last
+/// one.
 #[inline(always)]
 fn are_beyond(positions: &[f64; LANES], length: usize) -> bool {
     let [first, .., last] = positions;
@@ -98,18 +102,21 @@ fn has_all_pixels(grid: &Grid<f32>, [column, row]: [f64; 2]) -> bool {
     column >= 1.0 && row >= 1.0 && column < grid.width() as f64 - 3.0 && row < grid.height() as f64 - 3.0
 }
 
-/// Four values by the weights of the `i`th position.
+/// Returns the sum of four values with the weights of position `i`.
 #[inline(always)]
 fn weigh(weights: &[[f32; LANES]; 4], i: usize, [p, q, r, s]: [f32; 4]) -> f32 {
     weights[0][i] * p + weights[1][i] * q + weights[2][i] * r + weights[3][i] * s
 }
 
-/// The bicubic values where all sixteen pixels of each are there; whatever comes of it where some are not finite.
+/// Returns bicubic values at positions whose sixteen pixels all exist. The values are unspecified
+/// where pixels are not finite.
 #[inline(always)]
 fn bicubic_inside(grid: &Grid<f32>, columns: [f64; LANES], rows: [f64; LANES]) -> [f32; LANES] {
-    /// Added to a whole number it leaves that in the lowest bits of the sum, which vectorises; a cast does not.
+    /// Added to a whole number, it leaves that number in the lowest bits of the sum. This
+    /// vectorises; a cast does not.
     const TWO_52: f64 = 4_503_599_627_370_496.0;
-    // A width of 32 bits shows the compiler that three of them do not overflow, and so one check of bounds does for a pixel.
+    // With a width of 32 bits the compiler sees that three rows do not overflow, so one check of
+    // bounds per pixel is enough.
     let Ok(width) = u32::try_from(grid.width()) else { return [f32::NAN; LANES] };
     let (c, r) = (columns.map(f64::floor), rows.map(f64::floor));
     let first: [u64; LANES] =
@@ -122,7 +129,8 @@ fn bicubic_inside(grid: &Grid<f32>, columns: [f64; LANES], rows: [f64; LANES]) -
         }
     }
     let width = width as usize;
-    // Rows first. Neighbouring positions mostly lie between neighbouring pixels: eight of these are one vector then, else four.
+    // Rows first. Neighbouring positions mostly lie between neighbouring pixels. Then eight pixels
+    // are one vector; otherwise four are.
     if (1..LANES).fold(true, |all, i| all & (r[i] == r[0]) & (c[i] == c[0] + i as f64)) {
         let pixels = &grid.data()[(first[0] - TWO_52.to_bits()) as usize..][..3 * width + LANES + 3];
         let mut sums = [[0.0f32; LANES]; 4];
@@ -151,9 +159,10 @@ fn bicubic_inside(grid: &Grid<f32>, columns: [f64; LANES], rows: [f64; LANES]) -
     std::array::from_fn(|i| weigh(&wu, i, sums[i]))
 }
 
-/// A grid filled from another through a map of positions, rows in parallel.
+/// Fills a grid from another through a map of positions, rows in parallel.
 ///
-/// `source_from_target` gives the (column, row) in `source` of a target cell; cells without a value become NaN.
+/// `source_from_target` returns the (column, row) in `source` of a target cell. Cells without a
+/// value become NaN.
 pub fn resample(
     source: &Grid<f32>,
     width: usize,
@@ -173,7 +182,8 @@ pub fn resample(
     target
 }
 
-/// Whole and fractional part of a position in `[0, length − 1]`.
+/// Splits a position in `[0, length − 1]` into its whole and fractional parts. Returns `None`
+/// outside.
 fn split(position: f64, length: usize) -> Option<(usize, f32)> {
     if length == 0 || !(position >= 0.0 && position <= (length - 1) as f64) {
         return None;
@@ -192,7 +202,7 @@ fn mix(a: f32, b: f32, fraction: f32) -> f32 {
     a + (b - a) * fraction
 }
 
-/// Weights of the pixels at −1, 0, 1, 2 for a fraction in [0, 1).
+/// Returns the weights of the pixels at −1, 0, 1 and 2 for a fraction in [0, 1).
 pub fn cubic_weights(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [0.5 * (-t3 + 2.0 * t2 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (-3.0 * t3 + 4.0 * t2 + t), 0.5 * (t3 - t2)]
@@ -238,7 +248,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn values_follow_a_gain_and_an_offset(x in 0.0..=11.0f64, y in 0.0..=8.0f64, gain in -8.0..8.0f32, offset in -500.0..500.0f32) {
+        fn values_follow_a_gain_and_an_offset(
+            x in 0.0..=11.0f64, y in 0.0..=8.0f64, gain in -8.0..8.0f32, offset in -500.0..500.0f32,
+        ) {
             let grid = field(|x, y| 40.0 * (1.3 * x).sin() + 25.0 * (0.7 * x - 1.9 * y).cos());
             let changed = grid.map(|v| gain * v + offset);
             for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
@@ -247,32 +259,39 @@ mod tests {
             }
         }
 
-        /// Sixteenths of a pixel, which a shift by whole pixels leaves exact.
+        /// Positions are sixteenths of a pixel, which a shift by whole pixels leaves exact.
         #[test]
-        fn a_shift_by_whole_pixels_moves_the_values_and_nothing_else(x in 16..80u32, y in 16..64u32, dx in 0..5usize, dy in 0..4usize) {
+        fn a_shift_by_whole_pixels_moves_the_values_and_nothing_else(
+            x in 16..80u32, y in 16..64u32, dx in 0..5usize, dy in 0..4usize,
+        ) {
             let f = |x: f64, y: f64| 40.0 * (1.3 * x).sin() + 25.0 * (0.7 * x - 1.9 * y).cos();
             let (grid, moved) = (field(f), field(|x, y| f(x + dx as f64, y + dy as f64)));
             let at = (f64::from(x) / 16.0, f64::from(y) / 16.0);
             let (there, inside) = ((at.0 + dx as f64, at.1 + dy as f64), |(x, y): (f64, f64)| x < 9.0 && y < 6.0);
             if inside(at) && inside(there) {
                 for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
-                    let (a, b) = (sample(&moved, at.0, at.1, interpolation), sample(&grid, there.0, there.1, interpolation));
+                    let a = sample(&moved, at.0, at.1, interpolation);
+                    let b = sample(&grid, there.0, there.1, interpolation);
                     prop_assert_eq!(a.to_bits(), b.to_bits());
                 }
             }
         }
 
         #[test]
-        fn a_value_lies_within_its_neighbours_or_overshoots_by_an_eighth(values in prop::collection::vec(0.0..1.0f32, 108), x in 0.0..=11.0f64, y in 0.0..=8.0f64) {
+        fn a_value_lies_within_its_neighbours_or_overshoots_by_an_eighth(
+            values in prop::collection::vec(0.0..1.0f32, 108), x in 0.0..=11.0f64, y in 0.0..=8.0f64,
+        ) {
             let grid = Grid::from_vec(12, 9, values).unwrap();
             prop_assert!((0.0..=1.0).contains(&bilinear(&grid, x, y)));
-            // The negative weights of Catmull and Rom's cubic sum to an eighth at most, along each axis.
+            // The negative weights of the Catmull–Rom cubic sum to at most an eighth along each
+            // axis.
             prop_assert!((-0.3..=1.3).contains(&bicubic(&grid, x, y)));
         }
     }
 
     proptest! {
-        /// Into the grid and out of it, past a hole, with and without a rest that fills no register.
+        /// The lines run into the grid and out of it, past a hole, with and without a remainder
+        /// that fills no register.
         #[test]
         fn values_along_a_line_are_those_of_its_positions(
             from in (-3.0..9.0f64, -3.0..9.0f64), step in (-0.9..0.9f64, -0.9..0.9f64), count in 0..30usize,
@@ -288,7 +307,8 @@ mod tests {
         }
     }
 
-    /// As when a picture is laid over another of the same scale: eight pixels side by side, or with one left out or taken twice.
+    /// As when an image is resampled to another of the same scale: eight pixels side by side, or
+    /// with one left out or taken twice.
     #[test]
     fn values_along_a_row_are_those_of_its_positions() {
         let f = |i: usize| (40.0 * (1.3 * (i % 60) as f64).sin() + 25.0 * (0.9 * i as f64).cos()) as f32;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A rectangle of whole pixels: `[x, x + width) × [y, y + height)`. It may reach outside an image.
+/// Rectangle of whole pixels: `[x, x + width) × [y, y + height)`. It may reach outside an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Window {
     /// First column.
@@ -16,12 +16,12 @@ pub struct Window {
 }
 
 impl Window {
-    /// The window of a whole image.
+    /// Returns the window of a whole image.
     pub const fn whole(width: usize, height: usize) -> Self {
         Self { x: 0, y: 0, width, height }
     }
 
-    /// The common part of two windows, or `None` when they do not overlap.
+    /// Returns the common part of two windows, or `None` if they do not overlap.
     pub fn intersection(&self, other: &Self) -> Option<Self> {
         let x0 = self.x.max(other.x);
         let y0 = self.y.max(other.y);
@@ -30,7 +30,7 @@ impl Window {
         (x1 > x0 && y1 > y0).then(|| Self { x: x0, y: y0, width: (x1 - x0) as usize, height: (y1 - y0) as usize })
     }
 
-    /// The window grown by `margin` pixels on every side.
+    /// Returns the window grown by `margin` pixels on every side.
     pub fn grown(&self, margin: usize) -> Self {
         let m = margin as i64;
         let grown = |side: usize| side.saturating_add(margin.saturating_mul(2));
@@ -43,7 +43,7 @@ impl Window {
     }
 }
 
-/// One past the last pixel; windows at the edge of the number range stay there.
+/// Returns one past the last pixel, saturated at the end of the number range.
 fn end(start: i64, length: usize) -> i64 {
     start.saturating_add(i64::try_from(length).unwrap_or(i64::MAX))
 }

@@ -2,7 +2,7 @@
 
 use raster::{Grid, Light, hillshade};
 
-/// An ESRI ASCII grid: header lines begin with a letter.
+/// Reads an ESRI ASCII grid. Header lines begin with a letter.
 fn ascii_grid(text: &str) -> Grid<f32> {
     let rows: Vec<Vec<f32>> = text
         .lines()

@@ -1,6 +1,10 @@
 //! Names of classes in the LAS specification.
 
-/// The class with its name, where that is common.
+/// Returns the class number, with its name if it is a common class.
+///
+/// ```
+/// assert_eq!(report::class_title(6), "6 building");
+/// ```
 pub fn class_title(class: i32) -> String {
     let name = match class {
         2 => " ground",

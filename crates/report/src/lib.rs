@@ -1,12 +1,17 @@
 //! Results for people and programs: pictures, plots, pages and JSON.
 //!
-//! An [`EvaluationReport`] tells one evaluation three times, always with its protocol: as text for the terminal, as JSON, and as
-//! one HTML file that needs no network, no script and no other file. [`Chart`] draws plots as SVG, inside a page or on their own.
-//! A [`PriorsReport`] does the same for the priors of a city model, a [`SatellitePriorsReport`] for those of satellite images; [`depth_preview`] and [`normal_preview`] are its pictures.
-//! Nothing here touches a file: everything comes back as text or bytes, the same for the same input.
+//! An [`EvaluationReport`] presents one evaluation in three forms, each with its protocol: text for
+//! the terminal, JSON, and one HTML file that needs no network, no script and no other file.
+//! [`Chart`] draws plots as SVG, inside a page or as files of their own. A [`PriorsReport`]
+//! presents the priors of a city model, a [`SatellitePriorsReport`] those of satellite images.
+//! [`depth_preview`] and [`normal_preview`] are their pictures.
+//!
+//! This crate touches no file. Everything is returned as text or bytes, the same for the same
+//! input.
 
 mod base64;
 mod class;
+mod escape;
 mod evaluation;
 mod page;
 mod palette;
@@ -19,8 +24,8 @@ mod satellite;
 mod svg;
 
 pub use class::class_title;
+pub use escape::escape;
 pub use evaluation::EvaluationReport;
-pub use page::escape;
 pub use palette::{MISSING, OUTSIDE, diverging};
 pub use parts::ViewPictures;
 pub use picture::{PictureError, error_picture, png};

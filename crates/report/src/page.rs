@@ -1,65 +1,63 @@
-//! The frame of a page: one HTML file, no network, no script, light and dark, fit to print.
+//! Frame of a page: one HTML file without network or script, light and dark, fit to print.
 
+use crate::escape::escape;
 use crate::svg;
 
 const STYLE: &str = "\
-:root{color-scheme:light dark;--paper:#fff;--panel:#f6f8fa;--ink:#1d2530;--soft:#5d6773;--line:#dfe4e9;--a:#2667a8;--b:#c8551b}\
-@media(prefers-color-scheme:dark){:root{--paper:#14181d;--panel:#1c2229;--ink:#e4e8ec;--soft:#98a2ad;--line:#2f363f;--a:#6fb1ee;--b:#f29a63}}\
-*{box-sizing:border-box}body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,-apple-system,'Segoe UI',sans-serif}\
-main{max-width:1180px;margin:0 auto;padding:2.5rem 1.5rem 4rem}h1{font-size:1.75rem;line-height:1.25;margin:0 0 .35rem;font-weight:650}\
-h2{font-size:1.15rem;margin:2.6rem 0 .8rem;font-weight:650}p{margin:.4rem 0;max-width:75ch}.lead{font-size:1.06rem;color:var(--soft)}\
+:root{color-scheme:light dark;--paper:#fff;--panel:#f6f8fa;--ink:#1d2530;--soft:#5d6773;--line:#dfe4e9;\
+--a:#2667a8;--b:#c8551b}\
+@media(prefers-color-scheme:dark){:root{--paper:#14181d;--panel:#1c2229;--ink:#e4e8ec;--soft:#98a2ad;\
+--line:#2f363f;--a:#6fb1ee;--b:#f29a63}}\
+*{box-sizing:border-box}body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 \
+system-ui,-apple-system,'Segoe UI',sans-serif}\
+main{max-width:1180px;margin:0 auto;padding:2.5rem 1.5rem 4rem}h1{font-size:1.75rem;line-height:1.25;margin:0 0 \
+.35rem;font-weight:650}\
+h2{font-size:1.15rem;margin:2.6rem 0 .8rem;font-weight:650}p{margin:.4rem 0;max-width:75ch}\
+.lead{font-size:1.06rem;color:var(--soft)}\
 code{font:0.92em ui-monospace,Menlo,Consolas,monospace;overflow-wrap:anywhere}\
 .cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(140px,1fr));gap:.8rem;margin:1.6rem 0 0}\
 .card{background:var(--panel);border:1px solid var(--line);border-radius:10px;padding:.8rem 1rem}\
-.card b{display:block;font-size:1.6rem;line-height:1.2;font-weight:650;font-variant-numeric:tabular-nums}.card b small{font-size:.95rem;font-weight:500}\
+.card b{display:block;font-size:1.6rem;line-height:1.2;font-weight:650;font-variant-numeric:tabular-nums}.card \
+b small{font-size:.95rem;font-weight:500}\
 .card span{color:var(--soft);font-size:.86rem}\
-dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem;margin:0}dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}\
+dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem;margin:0}dt{color:var(--soft)}\
+dd{margin:0;overflow-wrap:anywhere}\
 .pictures{display:grid;grid-template-columns:repeat(auto-fit,minmax(300px,1fr));gap:1.2rem}\
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:1.2rem}\
-figure{margin:0;break-inside:avoid}figure img{display:block;width:100%;height:auto;border:1px solid var(--line);border-radius:6px;image-rendering:auto}\
+figure{margin:0;break-inside:avoid}figure img{display:block;width:100%;height:auto;border:1px solid var(--line);\
+border-radius:6px;image-rendering:auto}\
 figure svg.chart{display:block;width:100%;height:auto}figcaption{color:var(--soft);font-size:.88rem;margin-top:.4rem}\
-.scale{display:block;width:100%;height:34px;margin-top:.5rem}.scale text{font:11px system-ui,sans-serif;fill:var(--soft)}\
+.scale{display:block;width:100%;height:34px;margin-top:.5rem}.scale text{font:11px system-ui,sans-serif;\
+fill:var(--soft)}\
 .key{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.3em;border:1px solid var(--line)}\
-.wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem;min-width:min(100%,420px)}\
-th,td{text-align:right;padding:.28rem .8rem;border-bottom:1px solid var(--line);white-space:nowrap}th:first-child{text-align:left;font-weight:500}\
+.wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem;\
+min-width:min(100%,420px)}\
+th,td{text-align:right;padding:.28rem .8rem;border-bottom:1px solid var(--line);white-space:nowrap}\
+th:first-child{text-align:left;font-weight:500}\
 thead th{color:var(--soft);font-weight:600;border-bottom:2px solid var(--line)}tbody tr:hover{background:var(--panel)}\
-.notes{background:var(--panel);border-left:4px solid var(--b);border-radius:0 8px 8px 0;padding:.6rem 1.1rem;margin-top:1.4rem}.notes ul{margin:.2rem 0;padding-left:1.1rem}\
+.notes{background:var(--panel);border-left:4px solid var(--b);border-radius:0 8px 8px 0;padding:.6rem 1.1rem;\
+margin-top:1.4rem}.notes ul{margin:.2rem 0;padding-left:1.1rem}\
 footer{margin-top:3rem;color:var(--soft);font-size:.88rem;border-top:1px solid var(--line);padding-top:.8rem}\
 @media(max-width:520px){.plots{grid-template-columns:1fr}dl{grid-template-columns:1fr}}\
 @media print{:root{--paper:#fff;--panel:#fff;--ink:#000;--soft:#444;--line:#bbb;--a:#2667a8;--b:#c8551b}\
-main{max-width:none;padding:0}h2{break-after:avoid}.pictures{grid-template-columns:repeat(3,1fr)}.plots{grid-template-columns:1fr 1fr}\
+main{max-width:none;padding:0}h2{break-after:avoid}.pictures{grid-template-columns:repeat(3,1fr)}\
+.plots{grid-template-columns:1fr 1fr}\
 .wide{overflow:visible}table{font-size:.78rem}th,td{padding:.15rem .4rem}body{font-size:12px}}";
 
-/// A whole page around a body that is HTML already; the title is plain text.
+/// Returns a whole page around a body of HTML. The title is plain text.
 pub(crate) fn page(title: &str, body: &str) -> String {
     let (title, version) = (escape(title), env!("CARGO_PKG_VERSION"));
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src \
+         'unsafe-inline'\">\n\
          <meta name=\"generator\" content=\"skysweep {version}\">\n\
          <title>{title}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>{STYLE}{}</style>\n</head>\n\
-         <body>\n<main>\n{body}\n<footer>skysweep {version}. One file: nothing is fetched, nothing runs.</footer>\n</main>\n</body>\n</html>\n",
+         <body>\n<main>\n{body}\n<footer>skysweep {version}. One file: nothing is fetched, nothing \
+         runs.</footer>\n</main>\n</body>\n</html>\n",
         svg::STYLE
     )
-}
-
-/// Text as it may stand in HTML and SVG, also inside quotes.
-pub fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&#39;"),
-            // No other control character is allowed in a document.
-            c if c.is_control() && c != '\n' && c != '\t' => safe.push('\u{fffd}'),
-            c => safe.push(c),
-        }
-    }
-    safe
 }
 
 #[cfg(test)]

@@ -1,16 +1,23 @@
-//! Colours for errors: blue where the surface is too low, red where it is too high, near white at zero.
+//! Colours of errors: blue where the surface is too low, red where it is too high, near white at
+//! zero.
 //!
-//! Both arms darken evenly, so that the sign is read by hue and the size by lightness, also by readers who see no red or green.
+//! Both arms darken evenly. So the sign is read by hue and the size by lightness, also by readers
+//! who cannot tell red from green.
 
 /// Colours at −1, −½, 0, ½ and 1 of the range.
 const STOPS: [[f64; 3]; 5] =
     [[24.0, 62.0, 120.0], [109.0, 165.0, 212.0], [247.0, 246.0, 242.0], [236.0, 148.0, 104.0], [140.0, 20.0, 38.0]];
-/// A cell that the test leaves void.
+/// Colour of a cell that is void in the test.
 pub const MISSING: [u8; 3] = [72, 72, 76];
-/// A cell that is not evaluated: void in the reference, masked or skipped.
+/// Colour of a cell that is not evaluated: void in the reference, masked or skipped.
 pub const OUTSIDE: [u8; 3] = [222, 222, 222];
 
-/// The colour of an error relative to the range: −1 and below to 1 and above.
+/// Returns the colour of an error relative to the range, clamped to −1 … 1.
+///
+/// ```
+/// let [red, _, blue] = report::diverging(0.5);
+/// assert!(red > blue);
+/// ```
 pub fn diverging(relative: f64) -> [u8; 3] {
     let position = (relative.clamp(-1.0, 1.0) + 1.0) / 2.0 * (STOPS.len() - 1) as f64;
     let below = (position as usize).min(STOPS.len() - 2);
@@ -18,7 +25,7 @@ pub fn diverging(relative: f64) -> [u8; 3] {
     std::array::from_fn(|i| (STOPS[below][i] + t * (STOPS[below + 1][i] - STOPS[below][i])).round() as u8)
 }
 
-/// A colour for CSS.
+/// Returns a colour for CSS.
 pub(crate) fn css([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }

@@ -1,22 +1,22 @@
-//! What pages about priors are made of: cards, notes, pictures of views, tables.
+//! Parts of the pages about priors: cards, notes, pictures of views, tables.
 
 use raster::Grid;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::page::escape;
+use crate::escape::escape;
 use crate::picture::{PictureError, data_uri};
 
-/// What the page shows of one view.
+/// Pictures of one view.
 #[derive(Debug, Clone)]
 pub struct ViewPictures {
-    /// The image.
+    /// Name of the image.
     pub name: String,
-    /// Its maps in colours, with what they show.
+    /// Maps of the view as pictures, each with its name.
     pub maps: Vec<(&'static str, Grid<[u8; 3]>)>,
 }
 
-/// Numbers with what they count; the numbers are HTML already.
+/// Returns cards with numbers and their labels. The numbers are HTML already.
 pub(crate) fn cards_of(cards: &[(String, &str)]) -> String {
     let cards: String = cards
         .iter()
@@ -25,20 +25,21 @@ pub(crate) fn cards_of(cards: &[(String, &str)]) -> String {
     format!("<div class=\"cards\">{cards}</div>")
 }
 
-/// The notes as a list; nothing without any.
+/// Returns the notes as a list, or an empty text without notes.
 pub(crate) fn notes(notes: &[String]) -> String {
     let items: String = notes.iter().map(|note| format!("<li>{}</li>", escape(note))).collect();
     if items.is_empty() { items } else { format!("<div class=\"notes\"><ul>{items}</ul></div>") }
 }
 
-/// The pictures of views under a heading; nothing without any.
+/// Returns the pictures of views under a heading, or an empty text without pictures.
 pub(crate) fn figures(pictures: &[ViewPictures]) -> Result<String, PictureError> {
     let mut figures = String::new();
     for ViewPictures { name, maps } in pictures {
         for (what, picture) in maps {
             let (uri, name) = (data_uri(picture)?, escape(name));
             figures += &format!(
-                "<figure><img src=\"{uri}\" alt=\"{what} of {name}\"><figcaption><b>{name}</b> {what}</figcaption></figure>"
+                "<figure><img src=\"{uri}\" alt=\"{what} of {name}\"><figcaption><b>{name}</b> \
+                  {what}</figcaption></figure>"
             );
         }
     }
@@ -64,10 +65,10 @@ pub(crate) fn last_part(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// Every number of a report of priors, by name, and who made it.
+/// Returns every number of a report of priors by name, and the generator.
 ///
 /// # Errors
-/// None that a report of finite numbers can cause.
+/// [`serde_json::Error`] if the report cannot be serialised. A report of finite numbers always can.
 pub(crate) fn with_generator(report: &impl Serialize) -> Result<Value, serde_json::Error> {
     let mut value = json!({ "generator": concat!("skysweep priors ", env!("CARGO_PKG_VERSION")) });
     if let (Some(all), Value::Object(own)) = (value.as_object_mut(), serde_json::to_value(report)?) {

@@ -1,6 +1,7 @@
 //! Grids as pictures: reliefs, error maps, PNG.
 //!
-//! A grid that is larger than a page needs is reduced by halves first (means over valid cells).
+//! A grid that is larger than a page needs is first reduced by factors of two (means over valid
+//! cells).
 
 use std::io::Cursor;
 
@@ -13,23 +14,29 @@ use crate::palette::{MISSING, OUTSIDE, diverging};
 /// Longest side of a picture in a page, pixels.
 const LONGEST_SIDE: usize = 1000;
 
-/// A picture that cannot be made.
+/// A picture cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[error("cannot make a picture of {width} x {height} pixels ({reason}): leave the pictures out")]
 pub struct PictureError {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// The encoder's words.
+    /// Message of the encoder.
     pub reason: String,
 }
 
-/// The bytes of a PNG; pixels are red, green, blue.
+/// Encodes a picture (red, green, blue) as PNG.
+///
+/// ```
+/// let bytes = report::png(&raster::Grid::filled(4, 3, [255, 0, 0]))?;
+/// assert_eq!(&bytes[1..4], b"PNG");
+/// # Ok::<(), report::PictureError>(())
+/// ```
 ///
 /// # Errors
-/// For pictures without pixels, or larger than PNG allows.
+/// [`PictureError`] if the picture has no pixels or is larger than PNG allows.
 pub fn png(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, PictureError> {
     let (width, height) = (picture.width(), picture.height());
     let failed = |reason: String| PictureError { width, height, reason };
@@ -42,13 +49,13 @@ pub fn png(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, PictureError> {
     Ok(bytes.into_inner())
 }
 
-/// A picture as an address that holds it.
+/// Returns a picture as a data URI.
 pub(crate) fn data_uri(picture: &Grid<[u8; 3]>) -> Result<String, PictureError> {
     Ok(format!("data:image/png;base64,{}", base64::encode(&png(picture)?)))
 }
 
-/// The errors in diverging colours over ±`range_m`. Cells where `reference` has a height and there is no error are voids of the
-/// test; where it has none the cell is outside.
+/// Colours the errors with a diverging palette over ±`range_m`. Cells without an error are voids of
+/// the test if `reference` has a height there, and outside otherwise.
 pub fn error_picture(errors: &Grid<f32>, reference: &Grid<f32>, range_m: f64) -> Grid<[u8; 3]> {
     let colours = errors.data().iter().zip(reference.data()).map(|(&error, &height)| {
         if error.is_finite() {
@@ -62,7 +69,7 @@ pub fn error_picture(errors: &Grid<f32>, reference: &Grid<f32>, range_m: f64) ->
     Grid::from_vec(errors.width(), errors.height(), colours.collect()).unwrap_or_else(|| Grid::filled(0, 0, OUTSIDE))
 }
 
-/// The grid reduced until it fits a page.
+/// Reduces the grid until it fits a page.
 pub(crate) fn fitted(grid: &Grid<f32>) -> Grid<f32> {
     let mut fitted = grid.clone();
     while fitted.width().max(fitted.height()) > LONGEST_SIDE {
@@ -71,7 +78,8 @@ pub(crate) fn fitted(grid: &Grid<f32>) -> Grid<f32> {
     fitted
 }
 
-/// Coloured relief over the heights from `low` to `high`; `cell_m` is the size of the cells before `fitted` reduced them.
+/// Returns a coloured relief over the heights from `low` to `high`. `cell_m` is the size of the
+/// cells before `fitted` reduced them.
 pub(crate) fn relief(
     heights: &Grid<f32>,
     full_width: usize,

@@ -1,6 +1,8 @@
-//! Depth and normal maps as pictures for people: colours from near to far with a bar that has the depths written on it; normals
-//! as the usual colours, (n + 1) / 2 as red, green, blue. Pixels without a value are grey. Large maps are thinned first, by
-//! whole numbers of pixels, without mixing depths across edges.
+//! Depth and normal maps as pictures for people.
+//!
+//! Depths have colours from near to far, and a bar with the depths written beside it. Normals have
+//! the usual colours, (n + 1) / 2 as red, green, blue. Pixels without a value are grey. Large maps
+//! are first thinned by a whole number of pixels, without mixing depths across edges.
 
 use raster::Grid;
 
@@ -8,7 +10,7 @@ use crate::palette::OUTSIDE;
 
 /// Longest side of a preview without its bar, pixels.
 const LONGEST_SIDE: usize = 640;
-/// Colours from near to far, dark at the far end: light means close, also in print.
+/// Colours from near to far. The far end is dark, so that lightness means nearness, also in print.
 const NEAR_TO_FAR: [[f64; 3]; 6] = [
     [252.0, 246.0, 190.0],
     [251.0, 178.0, 96.0],
@@ -19,12 +21,12 @@ const NEAR_TO_FAR: [[f64; 3]; 6] = [
 ];
 const PAPER: [u8; 3] = [255; 3];
 const INK: [u8; 3] = [30; 3];
-/// Width of the bar, of the gap before it, and of the room for its numbers.
+/// Widths of the bar, of the gap before it, and of the space for its numbers, pixels.
 const BAR: [usize; 3] = [14, 10, 52];
-/// Numbers at the bar.
+/// Number of labels at the bar.
 const MARKS: usize = 5;
 
-/// Depths from near (light) to far (dark), with a bar; what is not finite is grey.
+/// Colours depths from near (light) to far (dark), with a bar. Values that are not finite are grey.
 pub fn depth_preview(depth_m: &Grid<f32>) -> Grid<[u8; 3]> {
     let depth = thinned(depth_m);
     let range = raster::height_percentiles(&depth, 1.0, 99.0);
@@ -51,7 +53,7 @@ pub fn depth_preview(depth_m: &Grid<f32>) -> Grid<[u8; 3]> {
     picture
 }
 
-/// Normals as colours; pixels with a normal of zero are grey.
+/// Colours normals. Pixels with a normal of zero are grey.
 pub fn normal_preview(normals: &Grid<[f32; 3]>) -> Grid<[u8; 3]> {
     let colour = |n: &[f32; 3]| {
         if *n == [0.0; 3] { OUTSIDE } else { n.map(|c| (127.5 * (c + 1.0)).round().clamp(0.0, 255.0) as u8) }
@@ -59,7 +61,7 @@ pub fn normal_preview(normals: &Grid<[f32; 3]>) -> Grid<[u8; 3]> {
     thinned(normals).map(colour)
 }
 
-/// Pictures side by side on white, a strip of 8 pixels between them.
+/// Puts pictures side by side on white, with a strip of 8 pixels between them.
 pub fn side_by_side(pictures: &[&Grid<[u8; 3]>]) -> Grid<[u8; 3]> {
     const GAP: usize = 8;
     let width = pictures.iter().map(|p| p.width() + GAP).sum::<usize>().saturating_sub(GAP);
@@ -75,18 +77,18 @@ pub fn side_by_side(pictures: &[&Grid<[u8; 3]>]) -> Grid<[u8; 3]> {
     sheet
 }
 
-/// A mask, white where it is set.
+/// Draws a mask: white where it is set, dark elsewhere.
 pub fn mask_preview(mask: &Grid<bool>) -> Grid<[u8; 3]> {
     thinned(mask).map(|set| if *set { PAPER } else { INK })
 }
 
-/// Every n-th pixel of every n-th row, so that the longest side fits.
+/// Keeps every n-th pixel of every n-th row, so that the longest side fits.
 fn thinned<T: Copy>(map: &Grid<T>) -> Grid<T> {
     let step = map.width().max(map.height()).div_ceil(LONGEST_SIDE).max(1);
     let (width, height) = (map.width().div_ceil(step), map.height().div_ceil(step));
     let rows = (0..map.height()).step_by(step);
     let data = rows.flat_map(|row| map.row(row).iter().step_by(step).copied()).collect();
-    // The count is that of the two divisions by construction.
+    // The number of values follows from the two divisions above.
     Grid::from_vec(width, height, data).unwrap_or_else(|| map.clone())
 }
 
@@ -99,13 +101,13 @@ fn near_to_far(part: f64) -> [u8; 3] {
     })
 }
 
-/// A depth in at most five characters, and its unit.
+/// Writes a depth in at most five characters, and its unit.
 fn short(value_m: f64) -> String {
     let digits = if value_m < 9.995 { 2 } else { usize::from(value_m < 999.95) };
     if value_m < 99_999.5 { format!("{value_m:.digits$}m") } else { format!("{:.0}km", value_m / 1e3) }
 }
 
-/// Letters of 5 × 7 pixels, a row per number, the leftmost pixel in the highest of five bits.
+/// Letters of 5 × 7 pixels, one number per row. The highest of five bits is the leftmost pixel.
 const LETTERS: [(char, [u8; 7]); 13] = [
     ('0', [0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e]),
     ('1', [0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e]),
@@ -159,7 +161,7 @@ mod tests {
         let light = |x: usize| picture[(x, 30)].iter().map(|&c| u32::from(c)).sum::<u32>();
         assert_eq!(picture[(5, 30)], OUTSIDE);
         assert!(light(12) > light(50) && light(50) > light(95));
-        // The bar has the colours of its ends, and something is written beside it.
+        // The bar ends in the colours of the range, and there are labels beside it.
         assert_eq!([picture[(112, 0)], picture[(112, 59)]], [near_to_far(0.0), near_to_far(1.0)]);
         assert!((127..176).any(|x| picture[(x, 2)] == INK));
     }

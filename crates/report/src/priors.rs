@@ -1,94 +1,97 @@
-//! The account of a set of priors: what went in, what came out, and what it may be used for; as JSON and as one page.
+//! Report of a set of priors, as JSON and as one page: its inputs, its results, and their limits.
 
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::page::{escape, page};
+use crate::escape::escape;
+use crate::page::page;
 use crate::parts::{ViewPictures, cards_of, figures, last_part, notes, table, with_generator};
 use crate::picture::PictureError;
 
-/// What became of a city model and its cameras.
+/// Report of the priors of a city model for a set of cameras.
 #[derive(Debug, Clone, Serialize)]
 pub struct PriorsReport {
-    /// The city model's file.
+    /// File of the city model.
     pub model: String,
-    /// Where the cameras were read.
+    /// Source of the cameras.
     pub cameras: String,
     /// `building-only` or `building-enhanced`.
     pub mode: String,
-    /// What is to be known: choices with their reasons, what was left out.
+    /// Notes: choices with their reasons, and what was left out.
     pub notes: Vec<String>,
-    /// Triangles of the model in use.
+    /// Number of triangles of the model in use.
     pub triangles: usize,
-    /// Area that was sampled, m².
+    /// Sampled area, m².
     pub sampled_area_m2: f64,
-    /// Area by class that was not sampled, m².
+    /// Area that was not sampled, by class, m².
     pub skipped_area_m2: Vec<(String, f64)>,
-    /// Points on the model.
+    /// Number of points on the model.
     pub samples: usize,
-    /// Points that enough views see.
+    /// Number of points that enough views see.
     pub kept: usize,
-    /// How many views a point needs.
+    /// Lowest number of views that must see a point.
     pub min_views: u32,
-    /// Pairs of a view and a point that it sees.
+    /// Number of pairs of a view and a point that it sees.
     pub pairs: u64,
-    /// Points by the number of views that see them; the last counts that many and more.
+    /// Number of points by the number of views that see them. The last entry counts that many views
+    /// and more.
     pub views_histogram: Vec<usize>,
-    /// Kept points by class.
+    /// Number of kept points, by class.
     pub kept_by_class: Vec<(String, usize)>,
-    /// Points of the structure from motion that were taken along.
+    /// Number of points taken from the structure from motion.
     pub scene_points: usize,
     /// Number of points against geometric error.
     pub error_curve: Vec<ErrorRow>,
-    /// Metres per step of the 16-bit depth maps; `None` where there are none.
+    /// Metres per step of the 16-bit depth maps. `None` if there are none.
     pub depth_png_step: Option<f64>,
-    /// The views.
+    /// One row per view.
     pub views: Vec<ViewRow>,
-    /// How it was made, as values by name.
+    /// Settings, by name.
     pub settings: Value,
 }
 
-/// How many points keep an error.
+/// Number of points that keep within a geometric error.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct ErrorRow {
-    /// The geometric error, metres.
+    /// Geometric error, metres.
     pub error_m: f64,
-    /// Points of varying spacing.
+    /// Number of points with varying spacing.
     pub points: f64,
-    /// Points of one spacing.
+    /// Number of points with one spacing.
     pub even_points: f64,
 }
 
-/// One view.
+/// Report of one view.
 #[derive(Debug, Clone, Serialize)]
 pub struct ViewRow {
-    /// The image.
+    /// Name of the image.
     pub name: String,
-    /// Columns and rows of its maps.
+    /// Numbers of columns and rows of its maps.
     pub size: [usize; 2],
-    /// Pixels that see a building.
+    /// Number of pixels that see a building.
     pub hit_pixels: usize,
-    /// The smallest and the largest depth; `None` where no building is seen.
+    /// Smallest and largest depth. `None` if no building is seen.
     pub depth_range: Option<[f32; 2]>,
-    /// Points in the image.
+    /// Number of points in the image.
     pub candidates: usize,
-    /// Those that nothing hides.
+    /// Number of these points that nothing hides.
     pub visible: usize,
 }
 
 impl PriorsReport {
-    /// Every number, by name.
+    /// Returns every number by name.
     ///
     /// # Errors
-    /// None that a report of finite numbers can cause.
+    /// [`serde_json::Error`] if the report cannot be serialised. A report of finite numbers always
+    /// can.
     pub fn json(&self) -> Result<Value, serde_json::Error> {
         with_generator(self)
     }
 
-    /// The page, with pictures of some views.
+    /// Returns the page, with pictures of some views.
     ///
     /// # Errors
-    /// [`PictureError`] for a picture without pixels.
+    /// [`PictureError`] if a picture has no pixels.
     pub fn html(&self, pictures: &[ViewPictures]) -> Result<String, PictureError> {
         let title = format!("Priors of {}", last_part(&self.model));
         let mut body = vec![

@@ -1,41 +1,42 @@
-//! What was compared and how: published numbers differ more by protocol than by method, so no result goes without it.
+//! Protocol of an evaluation. Published numbers differ more by protocol than by method, so every
+//! result includes it.
 
 use eval::{AlignmentMethod, EvalConfig, Evaluation, OUTLIER_NMADS, TerrainSource};
 use serde_json::{Value, json};
 
-/// The protocol of an evaluation.
+/// Protocol of an evaluation: inputs and conventions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Protocol {
-    /// The evaluated surface, by name.
+    /// Name of the evaluated surface.
     pub test: String,
-    /// The reference, by name.
+    /// Name of the reference.
     pub reference: String,
-    /// Columns and rows of the reference grid.
+    /// Numbers of columns and rows of the reference grid.
     pub size: (usize, usize),
-    /// Sides of its cells, metres.
+    /// Side lengths of its cells, metres.
     pub cell_m: (f64, f64),
-    /// Its coordinate system in words.
+    /// Coordinate system of the grid, in words.
     pub crs: String,
-    /// … and by EPSG code.
+    /// EPSG code of the coordinate system.
     pub horizontal_epsg: Option<u32>,
-    /// What the heights of both are above.
+    /// Vertical datum of both surfaces, in words.
     pub vertical: String,
-    /// Alignment, thresholds, skipped classes, least height of what stands.
+    /// Settings: alignment, thresholds, skipped classes, lowest height of a standing object.
     pub config: EvalConfig,
-    /// Where the classes come from.
+    /// Source of the classes.
     pub classes: Option<String>,
-    /// Where the mask comes from.
+    /// Source of the mask.
     pub mask: Option<String>,
-    /// Where a terrain model comes from.
+    /// Source of the terrain model.
     pub terrain: Option<String>,
     /// Decisions and doubts that a reader must know.
     pub notes: Vec<String>,
-    /// Requirements that are not met.
+    /// Requirements that were not met.
     pub missed: Vec<String>,
 }
 
 impl Protocol {
-    /// The protocol as labels and texts.
+    /// Returns the protocol as labels and texts.
     pub(crate) fn lines(&self, found: &Evaluation) -> Vec<(&'static str, String)> {
         let shift = found.shift;
         let ((columns, rows), (cell_x, cell_y)) = (self.size, self.cell_m);

@@ -1,67 +1,70 @@
-//! The account of priors for satellite images: what each image sees of a city model, as JSON and as one page.
+//! Report of priors for satellite images, as JSON and as one page: what each image sees of a city
+//! model.
 
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::page::{escape, page};
+use crate::escape::escape;
+use crate::page::page;
 use crate::parts::{ViewPictures, cards_of, figures, last_part, notes, table, with_generator};
 use crate::picture::PictureError;
 
-/// What became of a city model in satellite images.
+/// Report of the priors of a city model for satellite images.
 #[derive(Debug, Clone, Serialize)]
 pub struct SatellitePriorsReport {
-    /// The city model's file.
+    /// File of the city model.
     pub model: String,
-    /// Its reference system, as it says.
+    /// Reference system that the model states.
     pub model_crs: String,
-    /// The map that it was taken to be in.
+    /// Map projection in which its coordinates were read.
     pub map: String,
-    /// What its heights were taken to be above.
+    /// Vertical datum of its heights, in words.
     pub model_heights_above: String,
-    /// Triangles of the model in use.
+    /// Number of triangles of the model in use.
     pub triangles: usize,
-    /// What is to be known.
+    /// Notes for the reader.
     pub notes: Vec<String>,
-    /// The images.
+    /// One row per image.
     pub images: Vec<SatelliteRow>,
-    /// What the maps hold, by name.
+    /// Description of the maps, by name.
     pub maps: Value,
 }
 
-/// One image.
+/// Report of one image.
 #[derive(Debug, Clone, Serialize)]
 pub struct SatelliteRow {
-    /// Its file.
+    /// File of the image.
     pub image: String,
-    /// The name that its maps have.
+    /// Name of its maps.
     pub name: String,
-    /// Columns and rows.
+    /// Numbers of columns and rows.
     pub size: [usize; 2],
-    /// Pixels that see a building.
+    /// Number of pixels that see a building.
     pub hit_pixels: usize,
-    /// The lowest and the highest place seen, metres above the ellipsoid; `None` where no building is seen.
+    /// Lowest and highest place seen, metres above the ellipsoid. `None` if no building is seen.
     pub height_range_m: Option<[f32; 2]>,
-    /// Distances are counted from this height, metres above the ellipsoid.
+    /// Height from which distances are measured, metres above the ellipsoid.
     pub distance_from_height_m: f64,
-    /// How far the lines of sight are from those of the RPC at most, metres.
+    /// Largest distance between the approximated lines of sight and those of the RPC, metres.
     pub line_of_sight_error_m: f64,
     /// Whether a correction was applied to the RPC.
     pub corrected: bool,
 }
 
 impl SatellitePriorsReport {
-    /// Every number, by name.
+    /// Returns every number by name.
     ///
     /// # Errors
-    /// None that a report of finite numbers can cause.
+    /// [`serde_json::Error`] if the report cannot be serialised. A report of finite numbers always
+    /// can.
     pub fn json(&self) -> Result<Value, serde_json::Error> {
         with_generator(self)
     }
 
-    /// The page, with pictures of some images.
+    /// Returns the page, with pictures of some images.
     ///
     /// # Errors
-    /// [`PictureError`] for a picture without pixels.
+    /// [`PictureError`] if a picture has no pixels.
     pub fn html(&self, pictures: &[ViewPictures]) -> Result<String, PictureError> {
         let title = format!("Priors of {} in satellite images", last_part(&self.model));
         let lead = format!(

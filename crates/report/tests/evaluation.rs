@@ -1,10 +1,11 @@
-//! An evaluation's page, text and JSON hold what they should and nothing that they should not.
+//! The page, the text and the JSON of an evaluation hold what they should, and nothing else.
 
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, evaluate};
 use raster::{GeoTransform, Grid};
 use report::{EvaluationReport, Protocol};
 
-/// Ground with a house; the test is half a metre too high, lacks a corner, and its house is a cell wider.
+/// Returns ground with a house. The test is half a metre too high, lacks a corner, and its house is
+/// one cell wider.
 fn surfaces() -> (Grid<f32>, Grid<f32>) {
     let house = |i: usize, grown: usize| {
         let (column, row) = (i % 80, i / 80);

@@ -6,19 +6,19 @@ use eval::{ErrorStatistics, Metrics, cumulative, histogram};
 
 use raster::Grid;
 
-use super::EvaluationReport;
 use super::numbers::{grouped, percent};
+use super::report::EvaluationReport;
 use crate::class::class_title;
-use crate::page::escape;
+use crate::escape::escape;
 use crate::palette::{MISSING, OUTSIDE, css, diverging};
 use crate::picture::{PictureError, data_uri, error_picture, fitted, relief};
 use crate::svg::{Axis, Chart};
 
-/// Cells that a category needs to be drawn.
+/// Lowest number of cells of a category that is drawn.
 const LEAST_CELLS: usize = 30;
 
 impl EvaluationReport<'_> {
-    /// Both surfaces and the error map.
+    /// Returns pictures of both surfaces and of the errors.
     pub(super) fn pictures(&self) -> Result<String, PictureError> {
         let (reference, errors) = (fitted(self.reference), fitted(&self.found.errors));
         let (range, (low, high)) = (self.error_range_m(), self.height_range());
@@ -35,13 +35,14 @@ impl EvaluationReport<'_> {
             key(OUTSIDE, "not evaluated")
         );
         let error = format!(
-            "<figure><img src=\"{map}\" alt=\"map of the errors\">{}<figcaption><b>Error.</b> {caption}</figcaption></figure>",
+            "<figure><img src=\"{map}\" alt=\"map of the errors\">{}<figcaption><b>Error.</b> \
+              {caption}</figcaption></figure>",
             scale(range)
         );
         Ok(format!("<div class=\"pictures\">{test}{truth}{error}</div>"))
     }
 
-    /// The plots of the distribution and of the breakdowns.
+    /// Returns the plots of the distribution and of the breakdowns.
     pub(super) fn plots(&self) -> String {
         let mut plots = vec![self.histogram_plot(), self.cumulative_plot()];
         let slopes =
@@ -109,7 +110,8 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// MAE, NMAD and LE90 of categories; nothing when none has enough cells. Logarithmic: edges err a hundred times as much as plains.
+/// Plots MAE, NMAD and LE90 of categories, or returns `None` if no category has enough cells. The
+/// scale is logarithmic, because errors at edges are a hundred times those on plains.
 fn categories<'a>(title: &str, label: &str, all: impl Iterator<Item = (String, &'a Metrics)>) -> Option<String> {
     let usable = |(name, m): (String, &Metrics)| Some((name, m.n, m.errors.filter(|_| m.n >= LEAST_CELLS)?));
     let drawn: Vec<(String, usize, ErrorStatistics)> = all.filter_map(usable).collect();
@@ -144,10 +146,11 @@ fn figure(uri: &str, alt: &str, title: &str, caption: &str) -> String {
     format!("<figure><img src=\"{uri}\" alt=\"{alt}\"><figcaption><b>{title}.</b> {caption}</figcaption></figure>")
 }
 
-/// The colours of the error map with their values.
+/// Returns the colour bar of the error map.
 fn scale(range_m: f64) -> String {
     let mut bar = String::from(
-        "<svg class=\"scale\" viewBox=\"0 0 320 34\" shape-rendering=\"crispEdges\" role=\"img\" aria-label=\"colours of the error map\">",
+        "<svg class=\"scale\" viewBox=\"0 0 320 34\" shape-rendering=\"crispEdges\" role=\"img\" \
+          aria-label=\"colours of the error map\">",
     );
     const STEPS: i32 = 64;
     for i in 0..STEPS {

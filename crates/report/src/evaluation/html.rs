@@ -2,16 +2,17 @@
 
 use eval::AlignmentMethod;
 
-use super::EvaluationReport;
 use super::numbers::{grouped, percent};
-use crate::page::{escape, page};
+use super::report::EvaluationReport;
+use crate::escape::escape;
+use crate::page::page;
 use crate::picture::PictureError;
 
 impl EvaluationReport<'_> {
-    /// The whole page.
+    /// Returns the whole page.
     ///
     /// # Errors
-    /// [`PictureError`] for a grid without cells.
+    /// [`PictureError`] if a grid has no cells.
     pub fn html(&self) -> Result<String, PictureError> {
         let title = format!("{} against {}", short(&self.protocol.test), short(&self.protocol.reference));
         let body = [
@@ -38,7 +39,7 @@ impl EvaluationReport<'_> {
         Ok(page(&title, &body.join("\n")))
     }
 
-    /// The result in a sentence.
+    /// Returns the result in a sentence.
     fn lead(&self) -> String {
         let overall = &self.found.overall;
         let cell = self.protocol.cell_m.0;
@@ -46,12 +47,13 @@ impl EvaluationReport<'_> {
         let Some(errors) = overall.errors else { return format!("Of {cells}, none has a height to compare.") };
         let coverage = percent(overall.valid_ratio());
         format!(
-            "Of {cells}, {coverage} % have a height. Two thirds of these are within {:.2} m (LE68), nine in ten within {:.2} m (LE90).",
+            "Of {cells}, {coverage} % have a height. Two thirds of these are within {:.2} m (LE68), nine in ten \
+              within {:.2} m (LE90).",
             errors.le68, errors.le90
         )
     }
 
-    /// What the numbers hold under, in a sentence.
+    /// Returns the most important conventions in a sentence.
     fn brief_protocol(&self) -> String {
         let shift = self.found.shift;
         let moved = match self.protocol.config.alignment {
@@ -105,7 +107,8 @@ impl EvaluationReport<'_> {
         let places = format!("{} of {} places", grouped(sharpness.measured), grouped(sharpness.edges));
         match sharpness.overreach_m {
             Some(e) => format!(
-                "Roof edges reach out by {:+.2} m (median; NMAD {:.2} m, LE90 {:.2} m), measured at {places} where the reference \
+                "Roof edges reach out by {:+.2} m (median; NMAD {:.2} m, LE90 {:.2} m), measured at {places} \
+                  where the reference \
                  is level on both sides of a jump. Positive is too large.",
                 e.median, e.nmad, e.le90
             ),
@@ -121,7 +124,7 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// The last three parts of a path: enough to know it by.
+/// Returns the last three parts of a path, which are enough to recognise it.
 fn short(path: &str) -> String {
     let parts: Vec<&str> = path.split(['/', '\\']).filter(|part| !part.is_empty() && *part != ".").collect();
     parts[parts.len().saturating_sub(3)..].join("/")

@@ -1,16 +1,16 @@
-//! The same for programs.
+//! Report of an evaluation for programs.
 
 use eval::{Metrics, Overlap, cumulative, histogram};
 use serde_json::{Map, Value, json};
 
-use super::EvaluationReport;
 use super::numbers::is_count;
+use super::report::EvaluationReport;
 
-/// What marks a file as ours.
+/// Generator that identifies our files.
 const GENERATOR: &str = concat!("skysweep eval ", env!("CARGO_PKG_VERSION"));
 
 impl EvaluationReport<'_> {
-    /// Every number, by name.
+    /// Returns every number by name.
     pub fn json(&self) -> Value {
         let (found, protocol) = (self.found, self.protocol);
         let classes: Map<String, Value> =
@@ -45,7 +45,7 @@ impl EvaluationReport<'_> {
         })
     }
 
-    /// Whether a JSON text was written by an evaluation.
+    /// Returns whether a JSON text was written by an evaluation.
     pub fn is_ours(json: &str) -> bool {
         let generator = serde_json::from_str::<Value>(json).ok();
         let generator = generator.as_ref().and_then(|value| value.get("generator")?.as_str());
@@ -53,7 +53,8 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// Metrics by name; numbers of cells are whole, what cannot be computed is null.
+/// Returns metrics by name. Numbers of cells are integers. Metrics that cannot be computed are
+/// null.
 fn metrics_json(metrics: &Metrics) -> Value {
     let value = |name: &str, value: Option<f64>| match value {
         Some(count) if is_count(name) => json!(count as u64),

@@ -1,6 +1,6 @@
-//! How a metric is written: metres, shares in percent, counts.
+//! Format of metrics: metres, shares in percent, counts.
 
-/// Whether a metric counts cells.
+/// Returns whether a metric counts cells.
 pub(super) fn is_count(name: &str) -> bool {
     matches!(name, "n" | "reference_cells" | "outliers")
 }
@@ -9,7 +9,7 @@ fn is_share(name: &str) -> bool {
     name == "valid_ratio" || name.starts_with("completeness_") || name.starts_with("pag_")
 }
 
-/// The name with its unit.
+/// Returns the name with its unit.
 pub(super) fn label(name: &str) -> String {
     let unit = match name {
         _ if is_count(name) => "",
@@ -19,7 +19,7 @@ pub(super) fn label(name: &str) -> String {
     format!("{name}{unit}")
 }
 
-/// The value in that unit; a dash where there is none.
+/// Formats the value in that unit, or as a dash if there is none.
 pub(super) fn cell(name: &str, value: Option<f64>) -> String {
     match value {
         None => "-".into(),
@@ -29,12 +29,12 @@ pub(super) fn cell(name: &str, value: Option<f64>) -> String {
     }
 }
 
-/// A share in percent, or a dash.
+/// Formats a share in percent, or as a dash if there is none.
 pub(super) fn percent(share: Option<f64>) -> String {
     share.map_or("-".into(), |share| format!("{:.1}", 100.0 * share))
 }
 
-/// A whole number in groups of three.
+/// Formats an integer in groups of three digits.
 pub(super) fn grouped(count: usize) -> String {
     let digits = count.to_string();
     let mut text = String::new();

@@ -1,11 +1,11 @@
 //! Tables of a page.
 
-use super::EvaluationReport;
 use super::numbers::{cell, grouped, is_count, label, percent};
-use crate::page::escape;
+use super::report::EvaluationReport;
+use crate::escape::escape;
 
 impl EvaluationReport<'_> {
-    /// Every metric for every set of cells.
+    /// Returns a table of every metric for every set of cells.
     pub(super) fn metric_table(&self) -> String {
         let columns: Vec<_> = self.sets().into_iter().map(|(title, metrics)| (title, metrics.named())).collect();
         let rows = self.found.overall.named().into_iter().enumerate().map(|(i, (name, _))| {
@@ -16,7 +16,7 @@ impl EvaluationReport<'_> {
         table("metric", columns.iter().map(|(title, _)| title.as_str()), rows)
     }
 
-    /// Slopes, one row each.
+    /// Returns a table with one row per slope.
     pub(super) fn slope_table(&self) -> String {
         let heads = ["cells", "bias m", "median m", "MAE m", "RMSE m", "NMAD m", "LE90 m"];
         let rows = self.found.slopes.iter().filter(|bin| bin.metrics.reference_cells > 0).map(|bin| {
@@ -28,7 +28,8 @@ impl EvaluationReport<'_> {
         table("slope of the reference", heads.into_iter(), rows)
     }
 
-    /// What remains when the least believed cells are dropped, one row per coverage; nothing without a confidence.
+    /// Returns a table of the most confident cells, one row per coverage, or an empty text without
+    /// a confidence.
     pub(super) fn coverage_table(&self) -> String {
         if self.found.coverages.is_empty() {
             return String::new();
@@ -44,7 +45,7 @@ impl EvaluationReport<'_> {
         table("most believed cells", heads.into_iter(), rows)
     }
 
-    /// What stands above the terrain.
+    /// Returns a table of the objects above the terrain.
     pub(super) fn standing_table(&self) -> String {
         let standing = &self.found.standing;
         let rows = [("footprint", "m²", standing.footprint), ("volume", "m³", standing.volume)];
@@ -59,7 +60,7 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// As [`cell`], with counts in groups of three.
+/// Formats a value like [`cell`], with counts in groups of three digits.
 fn pretty(name: &str, value: Option<f64>) -> String {
     match value {
         Some(count) if is_count(name) => grouped(count as usize),
@@ -80,7 +81,8 @@ fn table<'a>(
         })
         .collect();
     format!(
-        "<div class=\"wide\"><table><thead><tr><th scope=\"col\">{}</th>{heads}</tr></thead><tbody>{rows}</tbody></table></div>",
+        "<div class=\"wide\"><table><thead><tr><th scope=\"col\">{}</th>{heads}</tr></thead><tbody>\
+          {rows}</tbody></table></div>",
         escape(corner)
     )
 }

@@ -1,12 +1,12 @@
-//! The table for the terminal: the protocol, then one row per metric with one column per set of cells.
+//! Table for the terminal: the protocol, then one row per metric with one column per set of cells.
 
 use std::fmt::Write;
 
-use super::EvaluationReport;
 use super::numbers::{cell, label, percent};
+use super::report::EvaluationReport;
 
 impl EvaluationReport<'_> {
-    /// The whole as text, ending in a line break.
+    /// Returns the report as text that ends in a line break.
     pub fn table(&self) -> String {
         let mut lines: Vec<String> =
             self.protocol.lines(self.found).iter().map(|(name, text)| format!("{name:<10} {text}")).collect();

@@ -1,25 +1,25 @@
-//! An axis: its range, its ticks, and where a value lies on it.
+//! Axis of a plot: its range, its ticks, and the positions of values.
 
-/// A linear or logarithmic axis.
+/// Linear or logarithmic axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     label: String,
     low: f64,
     high: f64,
     logarithmic: bool,
-    /// Ticks with their texts; computed where there are none.
+    /// Ticks with their texts. They are computed if there are none.
     names: Vec<(f64, String)>,
 }
 
 impl Axis {
-    /// An axis from `low` to `high`; a range that is no range is widened to one.
+    /// Returns an axis from `low` to `high`. An empty or invalid range becomes 0 to 1.
     pub fn linear(label: &str, low: f64, high: f64) -> Self {
         let usable = low.is_finite() && high.is_finite() && high > low;
         let (low, high) = if usable { (low, high) } else { (0.0, 1.0) };
         Self { label: label.to_owned(), low, high, logarithmic: false, names: Vec::new() }
     }
 
-    /// A logarithmic axis that holds all positive values with some room.
+    /// Returns a logarithmic axis that holds all positive values, with some margin.
     pub fn logarithmic(label: &str, values: impl Iterator<Item = f64>) -> Self {
         let positive = values.filter(|v| v.is_finite() && *v > 0.0);
         let (low, high) = positive.fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
@@ -27,7 +27,7 @@ impl Axis {
         Self { logarithmic: true, ..Self::linear(label, low, high) }
     }
 
-    /// An axis of names: the i-th stands at i + ½.
+    /// Returns an axis of names. The i-th name stands at i + ½.
     pub fn names(label: &str, names: impl Iterator<Item = String>) -> Self {
         let names: Vec<(f64, String)> = names.enumerate().map(|(i, name)| (i as f64 + 0.5, name)).collect();
         Self { names: names.clone(), ..Self::linear(label, 0.0, names.len().max(1) as f64) }
@@ -37,7 +37,7 @@ impl Axis {
         &self.label
     }
 
-    /// Where a value lies between 0 and 1; outside values are moved to the ends.
+    /// Returns the position of a value from 0 to 1. Values outside the range are moved to its ends.
     pub(super) fn fraction(&self, value: f64) -> f64 {
         let place = if self.logarithmic {
             (value.max(self.low) / self.low).ln() / (self.high / self.low).ln()
@@ -47,7 +47,7 @@ impl Axis {
         if place.is_nan() { 0.0 } else { place.clamp(0.0, 1.0) }
     }
 
-    /// Ticks with their texts, rising.
+    /// Returns the ticks with their texts, in rising order.
     pub(super) fn ticks(&self) -> Vec<(f64, String)> {
         if !self.names.is_empty() {
             return self.names.clone();
@@ -72,7 +72,7 @@ impl Axis {
     }
 }
 
-/// A number without the rounding noise of its computation.
+/// Formats a number without the rounding noise of its computation.
 fn text(value: f64) -> String {
     let rounded = format!("{value:.4}");
     let short = rounded.trim_end_matches('0').trim_end_matches('.');

@@ -1,31 +1,44 @@
-//! The frame of a plot and its marks.
+//! Frame of a plot and its marks.
 
 use std::fmt::Write;
 
-use super::Axis;
-use crate::page::escape;
+use super::axis::Axis;
+use crate::escape::escape;
 
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 320.0;
-/// Room for ticks and labels: left, right, top, bottom.
+/// Margins for ticks and labels: left, right, top, bottom.
 const MARGINS: [f64; 4] = [58.0, 16.0, 16.0, 48.0];
-/// Room above a plot for its heading.
+/// Height of the heading above a plot.
 const HEADING: f64 = 26.0;
 
-/// How marks look; colours are variables that a page or a plot on its own sets.
+/// Style of the marks. Colours are variables that a page, or a plot in a file of its own, sets.
 pub(crate) const STYLE: &str = "\
 .chart text{font:12px system-ui,sans-serif;fill:var(--ink)}.chart .soft{fill:var(--soft)}\
 .chart .grid{stroke:var(--line);stroke-width:1}.chart .bar{fill:var(--a)}.chart .bar2{fill:var(--b)}\
 .chart .line{fill:none;stroke:var(--a);stroke-width:2}.chart .line2{fill:none;stroke:var(--b);stroke-width:2}\
-.chart .rule{fill:none;stroke:var(--soft);stroke-width:1;stroke-dasharray:4 3}.chart .whisker{fill:none;stroke:var(--ink);stroke-width:1.2}\
-.chart .dot{fill:var(--a);stroke:var(--paper);stroke-width:1}.chart .dot2{fill:var(--b);stroke:var(--paper);stroke-width:1}\
+.chart .rule{fill:none;stroke:var(--soft);stroke-width:1;stroke-dasharray:4 3}.chart .whisker{fill:none;\
+stroke:var(--ink);stroke-width:1.2}\
+.chart .dot{fill:var(--a);stroke:var(--paper);stroke-width:1}.chart .dot2{fill:var(--b);stroke:var(--paper);\
+stroke-width:1}\
 .chart .dot3{fill:var(--soft);stroke:var(--paper);stroke-width:1}";
 
-/// The colours of a plot on its own.
-const COLOURS: &str = ":root{--paper:#fff;--ink:#1d2530;--soft:#66707c;--line:#e2e6ea;--a:#2667a8;--b:#c8551b;background:#fff}\
-@media(prefers-color-scheme:dark){:root{--paper:#14181d;--ink:#e4e8ec;--soft:#98a2ad;--line:#2b323a;--a:#6fb1ee;--b:#f29a63;background:#14181d}}";
+/// Colours of a plot in a file of its own.
+const COLOURS: &str = ":root{--paper:#fff;--ink:#1d2530;--soft:#66707c;--line:#e2e6ea;--a:#2667a8;--b:#c8551b;\
+background:#fff}\
+@media(prefers-color-scheme:dark){:root{--paper:#14181d;--ink:#e4e8ec;--soft:#98a2ad;--line:#2b323a;--a:#6fb1ee;\
+--b:#f29a63;background:#14181d}}";
 
-/// A plot under construction. Marks are drawn in the order in which they are added.
+/// Plot under construction. Marks are drawn in the order in which they are added.
+///
+/// ```
+/// use report::{Axis, Chart};
+///
+/// let (x, y) = (Axis::linear("cell", 0.0, 10.0), Axis::linear("m", 0.0, 1.0));
+/// let mut chart = Chart::new("Errors", x, y);
+/// chart.dot("dot", 3.0, 0.4);
+/// assert!(chart.inline().starts_with("<svg"));
+/// ```
 #[derive(Debug, Clone)]
 pub struct Chart {
     title: String,
@@ -35,12 +48,12 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// A plot with nothing in it; the title is what a screen reader says.
+    /// Returns a plot without marks. The title is read by screen readers.
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {
         Self { title: title.to_owned(), x, y, marks: String::new() }
     }
 
-    /// A line through points; `class` is `line`, `line2` or `rule`.
+    /// Draws a line through points. `class` is `line`, `line2` or `rule`.
     pub fn line(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)>) {
         let places: Vec<String> = points
             .map(|(x, y)| {
@@ -51,7 +64,7 @@ impl Chart {
         self.add(format_args!("<polyline class=\"{class}\" points=\"{}\"/>", places.join(" ")));
     }
 
-    /// A bar from the foot of the plot; `class` is `bar` or `bar2`.
+    /// Draws a bar from the foot of the plot. `class` is `bar` or `bar2`.
     pub fn bar(&mut self, class: &str, (from, to): (f64, f64), value: f64) {
         let ((left, top), (right, foot)) = (self.place(from, value), self.place(to, f64::NEG_INFINITY));
         let (width, height) = ((right - left).max(0.0), (foot - top).max(0.0));
@@ -60,7 +73,7 @@ impl Chart {
         ));
     }
 
-    /// A vertical line between two values with a cap at the second.
+    /// Draws a vertical line between two values with a cap at the second.
     pub fn whisker(&mut self, x: f64, from: f64, to: f64) {
         let ((x, foot), (_, top)) = (self.place(x, from), self.place(x, to));
         let (left, right) = (x - 5.0, x + 5.0);
@@ -69,20 +82,20 @@ impl Chart {
         ));
     }
 
-    /// A dot; `class` is `dot`, `dot2` or `dot3`.
+    /// Draws a dot. `class` is `dot`, `dot2` or `dot3`.
     pub fn dot(&mut self, class: &str, x: f64, y: f64) {
         let (x, y) = self.place(x, y);
         self.add(format_args!("<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4.5\"/>"));
     }
 
-    /// A square; `class` as for dots.
+    /// Draws a square. `class` is `dot`, `dot2` or `dot3`.
     pub fn square(&mut self, class: &str, x: f64, y: f64) {
         let (x, y) = self.place(x, y);
         let (left, top) = (x - 4.0, y - 4.0);
         self.add(format_args!("<rect class=\"{class}\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"8\" height=\"8\"/>"));
     }
 
-    /// Text beside a place, left of it where it would not fit to the right.
+    /// Draws text beside a position: to its right, or to its left if it would not fit there.
     pub fn note(&mut self, x: f64, y: f64, text: &str) {
         let (x, y) = self.place(x, y);
         let fits = x + 8.0 + 6.2 * text.chars().count() as f64 <= WIDTH;
@@ -91,13 +104,13 @@ impl Chart {
         self.add(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>", escape(text)));
     }
 
-    /// The plot for a page whose style has the colours.
+    /// Returns the plot for a page whose style sets the colours.
     pub fn inline(&self) -> String {
         self.svg("")
     }
 
-    /// Plots as a file of their own, side by side in `columns`, each under its title; `key` explains the marks below them: classes
-    /// of dots with texts.
+    /// Returns plots as a file of their own, in `columns` columns, each under its title. `key`
+    /// explains the marks below them: classes of dots with texts.
     pub fn sheet(charts: &[Self], columns: usize, key: &[(&str, &str)]) -> String {
         let columns = columns.clamp(1, charts.len().max(1));
         let pitch = HEIGHT + HEADING;
@@ -169,7 +182,7 @@ impl Chart {
         frame
     }
 
-    /// The place of a pair of values in the picture.
+    /// Returns the position of a pair of values in the picture.
     fn place(&self, x: f64, y: f64) -> (f64, f64) {
         let [left, right, top, bottom] = MARGINS;
         let (width, height) = (WIDTH - left - right, HEIGHT - top - bottom);

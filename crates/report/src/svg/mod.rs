@@ -1,7 +1,8 @@
 //! Plots as SVG: two axes, and marks between them.
 //!
-//! Inside a page the marks take their colours from the page's style (classes `bar`, `line`, `dot`, …); on their own
-//! ([`Chart::sheet`]) plots carry their style, for light and dark surroundings. Sizes are in user units of a 560 × 320 picture.
+//! Inside a page the marks take their colours from the page's style (classes `bar`, `line`, `dot`,
+//! …). In a file of their own ([`Chart::sheet`]) plots carry their style, for light and dark
+//! surroundings. Sizes are in user units of a 560 × 320 picture.
 
 mod axis;
 mod chart;
