@@ -1,8 +1,8 @@
 //! Links the system's PROJ, 9.1 or newer.
 //!
-//! The build script of `proj-sys` asks for PROJ 9.6 and otherwise compiles a copy of its own. That would take
-//! minutes and put a second PROJ beside the one that GDAL uses into the same process. Its feature `nobuild`
-//! leaves only the declarations, and this script finds the library.
+//! The build script of `proj-sys` requires PROJ 9.6 and otherwise compiles its own copy. That takes
+//! minutes and puts a second PROJ beside GDAL's into the same process. The feature `nobuild` leaves
+//! only the declarations, so this script finds the library.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

@@ -1,6 +1,6 @@
-//! The identity of a coordinate reference system: an EPSG code on the ground and a vertical datum.
+//! The identity of a coordinate reference system: a horizontal EPSG code and a vertical datum.
 //!
-//! The automatic choice is [`geodesy::utm_epsg`].
+//! The automatic choice of the horizontal code is [`geodesy::utm_epsg`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,13 +9,14 @@ use serde::{Deserialize, Serialize};
 
 use geodesy::utm_epsg;
 
-use crate::{CrsError, proj_handle};
+use crate::error::CrsError;
+use crate::proj_handle;
 
-/// What heights are measured from.
+/// The surface that heights are measured from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum VerticalDatum {
-    /// The WGS 84 ellipsoid, as inside the program.
+    /// The WGS 84 ellipsoid, which all computations use.
     #[default]
     Ellipsoid,
     /// The EGM96 geoid (EPSG:5773).
@@ -27,7 +28,8 @@ pub enum VerticalDatum {
 }
 
 impl VerticalDatum {
-    /// EPSG code of the vertical CRS; `None` for ellipsoidal heights, which have none of their own.
+    /// Returns the EPSG code of the vertical CRS; `None` for ellipsoidal heights, which have no
+    /// vertical CRS.
     pub fn epsg(&self) -> Option<u32> {
         match *self {
             Self::Ellipsoid => None,
@@ -37,7 +39,7 @@ impl VerticalDatum {
         }
     }
 
-    /// The datum of a vertical CRS's EPSG code.
+    /// Returns the datum of the vertical CRS with this EPSG code.
     pub fn from_epsg(code: u32) -> Self {
         match code {
             5773 => Self::Egm96,
@@ -88,7 +90,7 @@ impl TryFrom<String> for VerticalDatum {
     }
 }
 
-/// A horizontal CRS and what heights in it are measured from.
+/// A horizontal CRS and a vertical datum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Crs {
     /// EPSG code of the projected or geographic horizontal CRS.
@@ -98,12 +100,13 @@ pub struct Crs {
 }
 
 impl Crs {
-    /// A CRS with heights above the ellipsoid.
+    /// Makes a CRS with heights above the ellipsoid.
     pub const fn ellipsoidal(horizontal: u32) -> Self {
         Self { horizontal, vertical: VerticalDatum::Ellipsoid }
     }
 
-    /// WKT2:2019 of the whole: a compound CRS, or for ellipsoidal heights the horizontal CRS with a height axis.
+    /// Returns the WKT2:2019 of a compound CRS, or for ellipsoidal heights of the horizontal CRS
+    /// with a height axis.
     ///
     /// # Errors
     /// [`CrsError::NoTransformation`] when PROJ does not know a code.
@@ -112,14 +115,14 @@ impl Crs {
             .map_err(|reason| unknown(self, reason))
     }
 
-    /// PROJ's and GDAL's name for the horizontal part, `EPSG:32617`.
+    /// Returns the name of the horizontal part for PROJ and GDAL, such as `EPSG:32617`.
     pub fn horizontal_definition(&self) -> String {
         format!("EPSG:{}", self.horizontal)
     }
 }
 
 impl fmt::Display for Crs {
-    /// `EPSG:32617` for ellipsoidal heights, else the compound `EPSG:32617+5773`.
+    /// Writes `EPSG:32617` for ellipsoidal heights, else the compound `EPSG:32617+5773`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.vertical.epsg() {
             None => write!(f, "EPSG:{}", self.horizontal),
@@ -128,22 +131,33 @@ impl fmt::Display for Crs {
     }
 }
 
-/// What a definition met in a file (WKT, `EPSG:n`, PROJJSON) is in terms of EPSG codes.
+/// The EPSG codes of a definition from a file (WKT, `EPSG:n`, PROJJSON).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CrsIdentity {
     /// Name in the definition.
     pub name: String,
-    /// EPSG code of the horizontal part, if it carries one or PROJ is sure of one.
+    /// EPSG code of the horizontal part, if it has one or PROJ recognises it with at least 90 %
+    /// confidence.
     pub horizontal: Option<u32>,
-    /// Datum of the heights; `None` when the definition does not say.
+    /// Vertical datum; `None` when the definition has none.
     pub vertical: Option<VerticalDatum>,
 }
 
 impl CrsIdentity {
-    /// Takes a definition apart.
+    /// Finds the codes of a definition.
+    ///
+    /// ```
+    /// use crs::{Crs, CrsIdentity, VerticalDatum};
+    ///
+    /// let crs = Crs { horizontal: 32617, vertical: VerticalDatum::Egm96 };
+    /// let identity = CrsIdentity::of(&crs.wkt()?)?;
+    /// assert_eq!(identity.horizontal, Some(32617));
+    /// assert_eq!(identity.vertical, Some(VerticalDatum::Egm96));
+    /// # Ok::<(), crs::CrsError>(())
+    /// ```
     ///
     /// # Errors
-    /// [`CrsError::NoTransformation`] when PROJ does not read the definition as a CRS.
+    /// [`CrsError::NoTransformation`] when PROJ cannot read the definition as a CRS.
     pub fn of(definition: &str) -> Result<Self, CrsError> {
         let codes = proj_handle::codes(definition).map_err(|reason| unknown(&"the definition in the file", reason))?;
         let ellipsoidal = codes.three_dimensional.then_some(VerticalDatum::Ellipsoid);
@@ -156,13 +170,13 @@ fn unknown(what: &dyn fmt::Display, reason: String) -> CrsError {
     CrsError::NoTransformation { source_crs: "EPSG:4979".to_owned(), target_crs: what.to_string(), reason }
 }
 
-/// A CRS as the user asks for it.
+/// A CRS as the user requests it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CrsRequest {
     /// The UTM or polar zone of the scene (`auto` or `utm`).
     #[default]
     Auto,
-    /// A code, and a vertical datum where the text names one (`EPSG:32617+5773`).
+    /// A code, and optionally a vertical datum (`EPSG:32617+5773`).
     Epsg {
         /// EPSG code of the horizontal CRS.
         horizontal: u32,
@@ -172,10 +186,10 @@ pub enum CrsRequest {
 }
 
 impl CrsRequest {
-    /// EPSG code of the horizontal CRS for a scene centred at a position in degrees.
+    /// Returns the EPSG code of the horizontal CRS for a scene centred at a position in degrees.
     ///
     /// # Errors
-    /// [`geodesy::GeodesyError::InvalidPosition`] when the choice is automatic and the position is none.
+    /// [`CrsError::Position`] when the choice is automatic and the position is not on the Earth.
     pub fn horizontal_at(&self, lon_deg: f64, lat_deg: f64) -> Result<u32, CrsError> {
         match *self {
             Self::Auto => Ok(utm_epsg(lon_deg, lat_deg)?),
@@ -204,7 +218,7 @@ impl FromStr for CrsRequest {
     }
 }
 
-/// The code in `epsg:1234` or `1234` (lower case).
+/// Parses the code in `epsg:1234` or `1234` (lower case).
 fn epsg_code(text: &str) -> Option<u32> {
     let digits = text.strip_prefix("epsg:").unwrap_or(text);
     let plain = !digits.is_empty() && digits.len() <= 7 && digits.bytes().all(|b| b.is_ascii_digit());

@@ -1,8 +1,8 @@
 //! Coordinate reference systems: their identity, map projections and vertical datums.
 //!
-//! Angles are degrees and heights metres above the WGS 84 ellipsoid unless a name says otherwise.
-//! PROJ is called in this crate and nowhere else, and its C interface in one private module. PROJ's network access
-//! is switched off: a grid is read from the local disk or reported as missing.
+//! Angles are degrees, and heights are metres above the WGS 84 ellipsoid unless a name says
+//! otherwise. No other crate uses PROJ, and one private module calls its C interface. PROJ's
+//! network access is switched off: a grid is read from the local disk or reported as missing.
 
 mod error;
 mod identity;

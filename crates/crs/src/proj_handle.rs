@@ -1,8 +1,9 @@
-//! The one place where PROJ's C interface is called.
+//! The calls of PROJ's C interface.
 //!
-//! A [`Transformation`] owns its PROJ context, so it may move between threads but not be shared; a [`Pool`] hands
-//! transformations out to any number of threads and makes more as needed. Network access is off and PROJ's log is
-//! silent: what it has to say is in the error. Axis order is longitude, latitude and east, north.
+//! A [`Transformation`] owns its PROJ context, so it may move between threads but not be shared. A
+//! [`Pool`] gives a transformation to each thread and makes more as needed. Network access is off.
+//! PROJ's log is silent: its messages are in the errors. The axis order is longitude, latitude and
+//! east, north.
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
@@ -21,18 +22,18 @@ use proj_sys::{
     proj_normalize_for_visualization, proj_trans_generic,
 };
 
-/// How to make a transformation.
+/// The definition of a transformation.
 #[derive(Debug, Clone)]
 pub(crate) enum Recipe {
     /// Between the horizontal parts of two CRSs.
     Horizontal { source: String, target: String },
     /// Between two CRSs with heights.
     Spatial { source: String, target: String },
-    /// A pipeline in PROJ's own words.
+    /// A pipeline in PROJ's syntax.
     Pipeline(String),
 }
 
-/// Which way through a transformation.
+/// The direction of a transformation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Direction {
     Forward,
@@ -48,10 +49,10 @@ impl Direction {
     }
 }
 
-/// Where PROJ's log goes: some messages are printed whatever the level.
+/// Ignores a message of PROJ's log, which prints some messages at every log level.
 unsafe extern "C" fn ignore(_data: *mut c_void, _level: c_int, _message: *const c_char) {}
 
-/// A PROJ context; destroyed last.
+/// A PROJ context. It must be destroyed after the objects made in it.
 struct Context(*mut PJ_CONTEXT);
 
 impl Context {
@@ -66,7 +67,7 @@ impl Context {
         }
     }
 
-    /// PROJ's words for the last failure.
+    /// Returns PROJ's message for the last failure.
     fn reason(&self) -> String {
         // SAFETY: the context is alive; the returned text belongs to it and is copied at once.
         unsafe {
@@ -75,24 +76,25 @@ impl Context {
                 code => proj_context_errno_string(self.0, code),
             };
             if text.is_null() {
-                return "PROJ knows no such system, or no operation with the grids that are installed".to_owned();
+                return "PROJ does not know the system, or has no operation with the installed grids".to_owned();
             }
             CStr::from_ptr(text).to_string_lossy().into_owned()
         }
     }
 
-    /// Takes a PROJ object made in this context, or says why there is none.
+    /// Takes ownership of a PROJ object made in this context. A null pointer becomes PROJ's
+    /// message.
     fn own(&self, raw: *mut PJ) -> Result<Object, String> {
         if raw.is_null() { Err(self.reason()) } else { Ok(Object(raw)) }
     }
 
     fn create(&self, definition: &str) -> Result<Object, String> {
-        let text = CString::new(definition).map_err(|_| "the definition holds a zero byte".to_owned())?;
+        let text = CString::new(definition).map_err(|_| "the definition has a NUL character".to_owned())?;
         // SAFETY: context and text are alive during the call; the result is owned by `Object`.
         self.own(unsafe { proj_create(self.0, text.as_ptr()) })
     }
 
-    /// The two-dimensional horizontal part of a CRS.
+    /// Returns the two-dimensional horizontal part of a CRS.
     fn horizontal(&self, definition: &str) -> Result<Object, String> {
         let mut crs = self.create(definition)?;
         // SAFETY: all objects belong to this context and are alive; results are owned by `Object`.
@@ -104,9 +106,11 @@ impl Context {
         }
     }
 
-    /// EPSG code of a CRS: the one it carries, else the one that PROJ recognises with at least 90 % confidence.
+    /// Returns the EPSG code of a CRS: its own, else the code that PROJ recognises with at least 90
+    /// % confidence.
     fn epsg(&self, crs: &Object) -> Option<u32> {
-        // SAFETY: the object belongs to this context; texts are copied at once, lists are released below.
+        // SAFETY: the object belongs to this context; texts are copied at once, lists are released
+        // below.
         unsafe {
             if text_of(proj_get_id_auth_name(crs.0, 0)).as_deref() == Some("EPSG") {
                 return text_of(proj_get_id_code(crs.0, 0))?.parse().ok();
@@ -135,7 +139,8 @@ impl Context {
         }
     }
 
-    /// The transformation between two CRSs, best first; never a ballpark one, which would be silently wrong.
+    /// Makes the best transformation between two CRSs. Ballpark transformations are refused,
+    /// because their error is unknown.
     fn between(&self, source: &Object, target: &Object) -> Result<Object, String> {
         let options: [*const c_char; 2] = [c"ALLOW_BALLPARK=NO".as_ptr(), ptr::null()];
         // SAFETY: objects and options are alive; the option list ends with a null pointer.
@@ -164,18 +169,20 @@ impl Drop for Object {
     }
 }
 
-/// A coordinate transformation with its own context. Fields drop in order: the object before its context.
+/// A coordinate transformation with its own context. Fields drop in order: the object before its
+/// context.
 pub(crate) struct Transformation {
     operation: Object,
     _context: Context,
 }
 
-// SAFETY: PROJ contexts and objects are bound to no thread, only barred from simultaneous use; this value owns
-// both, lends neither, and needs `&mut self` to transform.
+// SAFETY: PROJ contexts and objects are not bound to a thread; they must only not be used by two
+// threads at once. This value owns both, gives no reference to either, and needs `&mut self` to
+// transform.
 unsafe impl Send for Transformation {}
 
 impl Transformation {
-    /// Makes the transformation, or says in PROJ's words why there is none.
+    /// Makes the transformation. The error is PROJ's message.
     pub(crate) fn new(recipe: &Recipe) -> Result<Self, String> {
         let context = Context::new();
         let operation = match recipe {
@@ -190,16 +197,17 @@ impl Transformation {
         Ok(Self { operation, _context: context })
     }
 
-    /// Transforms in place and returns how many points failed; all coordinates of those become NaN.
+    /// Transforms in place and returns the number of points that failed. All their coordinates
+    /// become NaN.
     ///
-    /// The slices have equal lengths (checked by the callers); `z` may be empty.
+    /// The callers check that the slices have equal lengths. `z` may be empty.
     pub(crate) fn apply(&mut self, direction: Direction, x: &mut [f64], y: &mut [f64], z: &mut [f64]) -> usize {
         let n = x.len().min(y.len());
         let step = size_of::<f64>();
         let nz = if z.is_empty() { 0 } else { z.len().min(n) };
         let z_pointer = if nz == 0 { ptr::null_mut() } else { z.as_mut_ptr() };
-        // SAFETY: each pointer is valid for its count of f64 at the stride of one f64; absent coordinates are null
-        // with count 0, which PROJ takes as "none".
+        // SAFETY: each pointer is valid for its count of f64 with a stride of one f64. Absent
+        // coordinates are null with count 0, which PROJ ignores.
         unsafe {
             proj_trans_generic(
                 self.operation.0,
@@ -246,18 +254,19 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
-    /// A pool with one transformation made, so that a recipe that cannot work fails here.
+    /// Makes a pool with one transformation, so that a recipe that cannot work fails here.
     pub(crate) fn new(recipe: Recipe) -> Result<Self, String> {
         let first = Transformation::new(&recipe)?;
         Ok(Self { recipe, idle: Mutex::new(vec![first]) })
     }
 
-    /// Another pool of the same recipe.
+    /// Makes another pool of the same recipe.
     pub(crate) fn duplicate(&self) -> Self {
         Self { recipe: self.recipe.clone(), idle: Mutex::new(Vec::new()) }
     }
 
-    /// Transforms in place with a transformation of this thread's own; see [`Transformation::apply`].
+    /// Transforms in place with a transformation that no other thread uses; see
+    /// [`Transformation::apply`].
     pub(crate) fn apply(
         &self,
         direction: Direction,
@@ -285,11 +294,11 @@ pub(crate) struct Codes {
     pub(crate) name: String,
     pub(crate) horizontal: Option<u32>,
     pub(crate) vertical: Option<u32>,
-    /// Heights are an axis of the CRS itself, above its ellipsoid.
+    /// Whether the CRS has a height axis, above its ellipsoid.
     pub(crate) three_dimensional: bool,
 }
 
-/// Takes a CRS apart into its codes.
+/// Finds the codes of a CRS.
 pub(crate) fn codes(definition: &str) -> Result<Codes, String> {
     let context = Context::new();
     let mut crs = context.create(definition)?;
@@ -315,11 +324,12 @@ pub(crate) fn codes(definition: &str) -> Result<Codes, String> {
     }
 }
 
-/// WKT2:2019 of a CRS, with an ellipsoidal height axis added when `promote` is set.
+/// Returns the WKT2:2019 of a CRS. With `promote`, an ellipsoidal height axis is added.
 pub(crate) fn wkt(definition: &str, promote: bool) -> Result<String, String> {
     let context = Context::new();
     let mut crs = context.create(definition)?;
-    // SAFETY: all objects belong to this context and are alive; the text belongs to `crs` and is copied at once.
+    // SAFETY: all objects belong to this context and are alive; the text belongs to `crs` and is
+    // copied at once.
     unsafe {
         if promote {
             crs = context.own(proj_crs_promote_to_3D(context.0, ptr::null(), crs.0))?;
@@ -329,21 +339,23 @@ pub(crate) fn wkt(definition: &str, promote: bool) -> Result<String, String> {
     }
 }
 
-/// Copies a text of PROJ's.
+/// Copies a string of PROJ's.
 ///
 /// # Safety
-/// `text` is null or a zero-terminated string that is alive.
+/// `text` must be null or a valid NUL-terminated string.
 unsafe fn text_of(text: *const c_char) -> Option<String> {
-    // SAFETY: promised by the caller.
+    // SAFETY: the caller guarantees that a pointer other than null is a valid NUL-terminated
+    // string.
     (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())
 }
 
-/// Metres per map unit of a CRS's horizontal axes; `None` when they are angles.
+/// Returns the metres per unit of a CRS's horizontal axes; `None` when the units are angles.
 pub(crate) fn metres_per_unit(definition: &str) -> Result<Option<f64>, String> {
     let context = Context::new();
     let crs = context.horizontal(definition)?;
     let mut factor = 0.0;
-    // SAFETY: objects belong to the context and are alive; the one output pointer is valid, the others may be null.
+    // SAFETY: objects belong to the context and are alive; the one output pointer is valid, the
+    // others may be null.
     let (kind, found) = unsafe {
         let axes = context.own(proj_crs_get_coordinate_system(context.0, crs.0))?;
         let null = ptr::null_mut();

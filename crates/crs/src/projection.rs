@@ -1,16 +1,17 @@
-//! Map coordinates from longitude and latitude, and back, through PROJ.
+//! Conversion between longitude and latitude and map coordinates, through PROJ.
 //!
-//! Degrees of WGS 84 on one side; on the other the CRS's own units with axes easting, northing (or longitude,
-//! latitude: the traditional GIS order, whatever the authority says). Heights are not touched; see
-//! [`crate::HeightConverter`]. A [`MapProjection`] is `Send` and `Sync`; its batch calls take an exclusive PROJ handle
-//! once per call, so threads work side by side when they pass slices.
+//! Longitude and latitude are degrees of WGS 84. Map coordinates are in the units of the CRS, in
+//! the order easting, northing (or longitude, latitude: the traditional GIS order, not the order of
+//! the authority). Heights are not converted; see [`crate::HeightConverter`]. A [`MapProjection`]
+//! is `Send` and `Sync`. Each call takes one exclusive PROJ handle, so threads run in parallel when
+//! they pass slices.
 
 use geodesy::{GeodesyError, MapPoint};
 
-use crate::CrsError;
+use crate::error::CrsError;
 use crate::proj_handle::{Direction, Pool, Recipe, metres_per_unit};
 
-/// The way between WGS 84 longitude, latitude and a map CRS.
+/// The conversion between WGS 84 longitude and latitude and a map CRS.
 #[derive(Debug)]
 pub struct MapProjection {
     definition: String,
@@ -19,19 +20,29 @@ pub struct MapProjection {
 }
 
 impl MapProjection {
-    /// The projection of an EPSG code.
+    /// Makes the projection of an EPSG code.
+    ///
+    /// ```
+    /// let utm = crs::MapProjection::from_epsg(32617)?;
+    /// let map = utm.map_from_lonlat(-81.66, 30.34)?;
+    /// let (lon_deg, lat_deg) = utm.lonlat_from_map(map.x, map.y)?;
+    /// assert!((lon_deg + 81.66).abs() < 1e-9 && (lat_deg - 30.34).abs() < 1e-9);
+    /// # Ok::<(), crs::CrsError>(())
+    /// ```
     ///
     /// # Errors
-    /// [`CrsError::NoTransformation`] when PROJ does not know the code or a way to it from WGS 84.
+    /// [`CrsError::NoTransformation`] when PROJ does not know the code or has no transformation to
+    /// it from WGS 84.
     pub fn from_epsg(code: u32) -> Result<Self, CrsError> {
         Self::from_definition(&format!("EPSG:{code}"))
     }
 
-    /// The projection of any CRS that PROJ reads: `EPSG:n`, WKT, PROJJSON. The vertical part of a compound CRS is
-    /// set aside. Transformations of unknown accuracy ("ballpark") are refused.
+    /// Makes the projection of any CRS that PROJ reads: `EPSG:n`, WKT, PROJJSON. The vertical part
+    /// of a compound CRS is ignored. Transformations of unknown accuracy ("ballpark") are refused.
     ///
     /// # Errors
-    /// [`CrsError::NoTransformation`] when PROJ does not know the CRS or a way to it from WGS 84.
+    /// [`CrsError::NoTransformation`] when PROJ does not know the CRS or has no transformation to
+    /// it from WGS 84.
     pub fn from_definition(definition: &str) -> Result<Self, CrsError> {
         let fails = |reason| CrsError::NoTransformation {
             source_crs: "EPSG:4326".to_owned(),
@@ -54,34 +65,37 @@ impl MapProjection {
         self.metres_per_unit
     }
 
-    /// Map position of a longitude and latitude in degrees.
+    /// Returns the map position of a longitude and latitude in degrees.
     ///
     /// # Errors
-    /// [`GeodesyError::OutsideDomain`] where the projection is not defined.
+    /// [`CrsError::Position`] with [`GeodesyError::OutsideDomain`] where the projection is not
+    /// defined.
     pub fn map_from_lonlat(&self, lon_deg: f64, lat_deg: f64) -> Result<MapPoint, CrsError> {
         let (x, y) = self.one(Direction::Forward, lon_deg, lat_deg)?;
         Ok(MapPoint { x, y })
     }
 
-    /// Longitude and latitude in degrees of a map position.
+    /// Returns the longitude and latitude in degrees of a map position.
     ///
     /// # Errors
-    /// [`GeodesyError::OutsideDomain`] where the projection is not defined.
+    /// [`CrsError::Position`] with [`GeodesyError::OutsideDomain`] where the projection is not
+    /// defined.
     pub fn lonlat_from_map(&self, x: f64, y: f64) -> Result<(f64, f64), CrsError> {
         self.one(Direction::Inverse, x, y)
     }
 
-    /// Turns longitudes into x and latitudes into y, in place. Returns how many points lie outside the domain: those
-    /// become NaN.
+    /// Converts longitudes to x and latitudes to y, in place. Points outside the domain become NaN,
+    /// and their number is returned.
     ///
     /// # Errors
-    /// [`CrsError::LengthMismatch`]; [`CrsError::NoTransformation`] when a further PROJ handle cannot be made.
+    /// [`CrsError::LengthMismatch`]; [`CrsError::NoTransformation`] when PROJ cannot make a further
+    /// handle.
     pub fn map_from_lonlat_slices(&self, lon_to_x: &mut [f64], lat_to_y: &mut [f64]) -> Result<usize, CrsError> {
         self.many(Direction::Forward, lon_to_x, lat_to_y)
     }
 
-    /// Turns x into longitudes and y into latitudes, in place. Returns how many points lie outside the domain: those
-    /// become NaN.
+    /// Converts x to longitudes and y to latitudes, in place. Points outside the domain become NaN,
+    /// and their number is returned.
     ///
     /// # Errors
     /// As [`Self::map_from_lonlat_slices`].
@@ -110,13 +124,13 @@ impl MapProjection {
 }
 
 impl Clone for MapProjection {
-    /// A projection with PROJ handles of its own, made on first use.
+    /// Makes a projection with separate PROJ handles, which are created on first use.
     fn clone(&self) -> Self {
         Self { definition: self.definition.clone(), metres_per_unit: self.metres_per_unit, pool: self.pool.duplicate() }
     }
 }
 
-/// Enough of a definition to recognise it: WKT runs over many lines.
+/// Returns the start of a definition, for messages: WKT has many lines.
 fn first_line(definition: &str) -> String {
     let line = definition.lines().next().unwrap_or_default();
     line.chars().take(80).collect()
@@ -144,9 +158,15 @@ mod tests {
     }
 
     proptest! {
-        /// In the zone that is chosen for a place, at any latitude and on both sides of the antimeridian.
+        /// A round trip in the zone of the position, at any latitude and on both sides of the
+        /// antimeridian.
         #[test]
-        fn any_place_survives_its_own_zone(lon in -180.0..180.0f64, lat in -89.9..89.9f64, dx in -2e4..2e4f64, dy in -2e4..2e4f64) {
+        fn any_place_survives_its_own_zone(
+            lon in -180.0..180.0f64,
+            lat in -89.9..89.9f64,
+            dx in -2e4..2e4f64,
+            dy in -2e4..2e4f64,
+        ) {
             let projection = MapProjection::from_epsg(geodesy::utm_epsg(lon, lat).unwrap()).unwrap();
             let at = projection.map_from_lonlat(lon, lat).unwrap();
             let (lon_back, lat_back) = projection.lonlat_from_map(at.x + dx, at.y + dy).unwrap();

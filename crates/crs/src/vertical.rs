@@ -1,36 +1,49 @@
-//! Heights above the ellipsoid ↔ heights above a geoid or another vertical CRS.
+//! Conversion between heights above the ellipsoid and heights above a geoid or another vertical
+//! CRS.
 //!
-//! H = h − N(λ, φ): the orthometric height is the ellipsoidal one minus the geoid's undulation. EGM96 and EGM2008 are
-//! read from PROJ's grids by bilinear interpolation (`vgridshift`); other vertical CRSs go through PROJ's database with
-//! ballpark transformations forbidden. A grid that is not there is an error when the converter is made, never a height
-//! passed through; a point outside the grid is an error (single) or NaN with a count (batch).
+//! H = h − N(λ, φ): the orthometric height is the ellipsoidal height minus the geoid's undulation.
+//! EGM96 and EGM2008 are interpolated bilinearly in PROJ's grids (`vgridshift`). Other vertical
+//! CRSs use PROJ's database without ballpark transformations. A missing grid is an error when the
+//! converter is made; a height is never returned unchanged instead. A point outside the grid is an
+//! error for a single point, and NaN with a count for slices.
 
 use std::path::Path;
 
-use crate::proj_handle::{Direction, Pool, Recipe};
 use geodesy::GeodesyError;
 
-use crate::{CrsError, VerticalDatum};
+use crate::error::CrsError;
+use crate::identity::VerticalDatum;
+use crate::proj_handle::{Direction, Pool, Recipe};
 
-/// File names of the EGM96 grid, as PROJ and older distributions have it.
+/// File names of the EGM96 grid in current and older distributions of PROJ.
 const EGM96_GRIDS: [&str; 2] = ["us_nga_egm96_15.tif", "egm96_15.gtx"];
-/// File names of the EGM2008 grid.
+/// File names of the EGM2008 grid in current and older distributions of PROJ.
 const EGM2008_GRIDS: [&str; 2] = ["us_nga_egm08_25.tif", "egm08_25.gtx"];
 
 /// Converts heights between the WGS 84 ellipsoid and one vertical datum. `Send` and `Sync`.
 #[derive(Debug)]
 pub struct HeightConverter {
     datum: VerticalDatum,
-    /// Forward subtracts the undulation; `None` for the ellipsoid itself.
+    /// The forward direction subtracts the undulation. `None` for the ellipsoid.
     pool: Option<Pool>,
 }
 
 impl HeightConverter {
-    /// The converter to and from a datum, with the grids that PROJ finds (its own folder, `PROJ_DATA`, `PROJ_LIB`).
+    /// Makes the converter of a datum, with the grids that PROJ finds (its folder, `PROJ_DATA`,
+    /// `PROJ_LIB`).
+    ///
+    /// ```
+    /// use crs::{HeightConverter, VerticalDatum};
+    ///
+    /// let ellipsoid = HeightConverter::new(VerticalDatum::Ellipsoid)?;
+    /// assert_eq!(ellipsoid.datum_from_ellipsoid(-81.66, 30.34, 12.5)?, 12.5);
+    /// # Ok::<(), crs::CrsError>(())
+    /// ```
     ///
     /// # Errors
-    /// [`CrsError::MissingGrid`] when the geoid's grid is not installed, [`CrsError::NoTransformation`] when PROJ
-    /// knows no way from the ellipsoid to an EPSG code.
+    /// [`CrsError::MissingGrid`] when the geoid's grid is not installed;
+    /// [`CrsError::NoTransformation`] when PROJ has no transformation from the ellipsoid to the
+    /// EPSG code.
     pub fn new(datum: VerticalDatum) -> Result<Self, CrsError> {
         let pool = match datum {
             VerticalDatum::Ellipsoid => None,
@@ -41,46 +54,51 @@ impl HeightConverter {
         Ok(Self { datum, pool })
     }
 
-    /// The converter for a datum whose geoid grid is a file of the user's (GTX or GeoTIFF).
+    /// Makes the converter of a datum with a given geoid grid (GTX or GeoTIFF).
     ///
     /// # Errors
-    /// [`CrsError::UnusableGrid`] when PROJ cannot read the file.
+    /// [`CrsError::UnusableGrid`] when PROJ cannot read the file, or cannot be given its path.
     pub fn with_grid(datum: VerticalDatum, grid: &Path) -> Result<Self, CrsError> {
         let unusable = |reason: String| CrsError::UnusableGrid { path: grid.to_owned(), reason };
         let name = grid.to_str().ok_or_else(|| unusable("the path is not UTF-8".to_owned()))?;
         if name.contains(['"', ',', '+']) {
-            return Err(unusable("PROJ takes no path with a quote, a comma or a plus sign".to_owned()));
+            return Err(unusable(
+                "the path has a quote, a comma or a plus sign, which PROJ does not accept".to_owned(),
+            ));
         }
         let pool = Pool::new(Recipe::Pipeline(grid_pipeline(name))).map_err(unusable)?;
         Ok(Self { datum, pool: Some(pool) })
     }
 
-    /// The datum at the far end.
+    /// The vertical datum of the converter.
     pub fn datum(&self) -> VerticalDatum {
         self.datum
     }
 
-    /// Height above the datum of a height above the ellipsoid, metres, at a position in degrees.
+    /// Converts a height above the ellipsoid to a height above the datum, metres, at a position in
+    /// degrees.
     ///
     /// # Errors
-    /// [`GeodesyError::OutsideDomain`] where the grid has no value.
+    /// [`CrsError::Position`] with [`GeodesyError::OutsideDomain`] where the grid has no value.
     pub fn datum_from_ellipsoid(&self, lon_deg: f64, lat_deg: f64, height_m: f64) -> Result<f64, CrsError> {
         self.one(Direction::Forward, lon_deg, lat_deg, height_m)
     }
 
-    /// Height above the ellipsoid of a height above the datum, metres, at a position in degrees.
+    /// Converts a height above the datum to a height above the ellipsoid, metres, at a position in
+    /// degrees.
     ///
     /// # Errors
-    /// [`GeodesyError::OutsideDomain`] where the grid has no value.
+    /// [`CrsError::Position`] with [`GeodesyError::OutsideDomain`] where the grid has no value.
     pub fn ellipsoid_from_datum(&self, lon_deg: f64, lat_deg: f64, height_m: f64) -> Result<f64, CrsError> {
         self.one(Direction::Inverse, lon_deg, lat_deg, height_m)
     }
 
-    /// [`Self::datum_from_ellipsoid`] over slices, in place. Returns how many heights became NaN; those that were NaN
-    /// before are counted too.
+    /// Converts slices in place, as [`Self::datum_from_ellipsoid`] does. Returns the number of NaN
+    /// heights, including those that were NaN before.
     ///
     /// # Errors
-    /// [`CrsError::LengthMismatch`]; [`CrsError::NoTransformation`] when a further PROJ handle cannot be made.
+    /// [`CrsError::LengthMismatch`]; [`CrsError::NoTransformation`] when PROJ cannot make a further
+    /// handle.
     pub fn datum_from_ellipsoid_slices(
         &self,
         lon_deg: &[f64],
@@ -90,7 +108,8 @@ impl HeightConverter {
         self.many(Direction::Forward, lon_deg, lat_deg, height_m)
     }
 
-    /// [`Self::ellipsoid_from_datum`] over slices, in place. Returns how many heights became NaN.
+    /// Converts slices in place, as [`Self::ellipsoid_from_datum`] does. Returns the number of NaN
+    /// heights.
     ///
     /// # Errors
     /// As [`Self::datum_from_ellipsoid_slices`].
@@ -119,11 +138,12 @@ impl HeightConverter {
             return Ok(height.iter().filter(|h| !h.is_finite()).count());
         };
         let (mut x, mut y) = (lon.to_vec(), lat.to_vec());
-        pool.apply(direction, &mut x, &mut y, height).map_err(|reason| no_way(&self.datum.to_string(), reason))
+        pool.apply(direction, &mut x, &mut y, height)
+            .map_err(|reason| no_transformation(&self.datum.to_string(), reason))
     }
 }
 
-/// The first grid of a list that PROJ can open.
+/// Opens the first grid of a list that PROJ can read.
 fn first_grid(datum: VerticalDatum, names: &[&str]) -> Result<Pool, CrsError> {
     names
         .iter()
@@ -131,7 +151,8 @@ fn first_grid(datum: VerticalDatum, names: &[&str]) -> Result<Pool, CrsError> {
         .ok_or_else(|| CrsError::MissingGrid { datum: datum.to_string(), candidates: names.join(", ") })
 }
 
-/// Longitude, latitude in degrees and a height: forward subtracts the grid's value.
+/// Returns the PROJ pipeline that subtracts the grid's value at a longitude and latitude in degrees
+/// from the height.
 fn grid_pipeline(grid: &str) -> String {
     format!(
         "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad \
@@ -140,15 +161,15 @@ fn grid_pipeline(grid: &str) -> String {
     )
 }
 
-/// The way to a vertical CRS by PROJ's database. PROJ makes it even where its grids are missing and fails at the
-/// points, so the caller sees every height as lost and none as unchanged.
+/// Makes the transformation to a vertical CRS in PROJ's database. PROJ makes it even when its grids
+/// are missing, and then fails at every point, so no height is returned unchanged.
 fn through_database(code: u32) -> Result<Pool, CrsError> {
     let target = format!("EPSG:4326+{code}");
     let recipe = Recipe::Spatial { source: "EPSG:4979".to_owned(), target: target.clone() };
-    Pool::new(recipe).map_err(|reason| no_way(&target, reason))
+    Pool::new(recipe).map_err(|reason| no_transformation(&target, reason))
 }
 
-fn no_way(target: &str, reason: String) -> CrsError {
+fn no_transformation(target: &str, reason: String) -> CrsError {
     CrsError::NoTransformation { source_crs: "EPSG:4979".to_owned(), target_crs: target.to_owned(), reason }
 }
 
@@ -169,7 +190,8 @@ mod tests {
         if let Some(error) = error {
             assert!(error.to_string().contains("us_nga_egm08_25.tif"), "{error}");
         }
-        // NAVD 88 needs grids that differ by region: without them the height must be lost, not kept.
+        // NAVD 88 needs grids that differ by region: without them the height must be lost, not
+        // kept.
         if let Ok(converter) = HeightConverter::new(VerticalDatum::Epsg(3855)) {
             let height = converter.datum_from_ellipsoid(-81.66, 30.34, 0.0);
             assert!(height != Ok(0.0), "the height came through unchanged");

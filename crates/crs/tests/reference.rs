@@ -38,7 +38,8 @@ fn egm96_heights_agree_with_the_grid_read_by_hand() {
 #[test]
 fn a_grid_of_the_users_is_read_where_it_has_values_and_nowhere_else() {
     let path = std::env::temp_dir().join(format!("skysweep-geoid-{}.gtx", std::process::id()));
-    // GTX: south, west, steps in degrees, rows, columns, then values from the south-west, all big-endian.
+    // GTX: south, west, steps in degrees, rows, columns, then values from the south-west, all
+    // big-endian.
     let mut bytes: Vec<u8> = [10.0_f64, 20.0, 1.0, 1.0].iter().flat_map(|v| v.to_be_bytes()).collect();
     bytes.extend([2_i32, 3].iter().flat_map(|v| v.to_be_bytes()));
     bytes.extend([1.0_f32, 2.0, 3.0, 1.0, 2.0, 3.0].iter().flat_map(|v| v.to_be_bytes()));

@@ -72,6 +72,15 @@ pub fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), SaveError> {
 
 /// Writes `bytes` to `path`.
 ///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("report.json");
+/// io::write_bytes(&path, b"{}\n", false)?;
+/// assert!(matches!(io::write_bytes(&path, b"", false), Err(io::SaveError::Exists { .. })));
+/// assert_eq!(std::fs::read(&path)?, b"{}\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`].
 pub fn write_bytes(path: impl AsRef<Path>, bytes: &[u8], overwrite: bool) -> Result<(), SaveError> {

@@ -13,7 +13,7 @@
 
 use std::path::{Path, PathBuf};
 
-use geodesy::LonLatHeight;
+use geodesy::{LonLatHeight, MapPoint};
 
 /// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 256 << 20;
@@ -33,8 +33,13 @@ pub enum Place {
     /// A geographic position. The height is above the vertical datum of the table, which the caller
     /// knows.
     Geographic(LonLatHeight),
-    /// Easting, northing and height on a map, metres.
-    Map([f64; 3]),
+    /// A position on a map.
+    Map {
+        /// Easting and northing.
+        point: MapPoint,
+        /// Height above the vertical datum of the table, metres.
+        height_m: f64,
+    },
 }
 
 /// A row of the table.
@@ -187,7 +192,7 @@ impl Columns {
         let place = if self.geographic {
             Place::Geographic(LonLatHeight::new(a, b, height))
         } else {
-            Place::Map([a, b, height])
+            Place::Map { point: MapPoint { x: a, y: b }, height_m: height }
         };
         Ok(ControlPosition { subject, place })
     }
@@ -208,7 +213,7 @@ mod tests {
         assert_eq!(gps[0].place, Place::Geographic(LonLatHeight::new(5.4, 43.5, 180.25)));
         let pairs = parse("x;y;z;easting;northing;height\n1;2;3;400000.5;5e6;-3\n").unwrap();
         assert_eq!(pairs[0].subject, Subject::Model([1.0, 2.0, 3.0]));
-        assert_eq!(pairs[0].place, Place::Map([400_000.5, 5e6, -3.0]));
+        assert_eq!(pairs[0].place, Place::Map { point: MapPoint { x: 400_000.5, y: 5e6 }, height_m: -3.0 });
     }
 
     #[test]

@@ -62,6 +62,18 @@ pub enum PositionsError {
 
 /// Reads a list of positions.
 ///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("cameras.csv");
+/// std::fs::write(&path, "id,lon,lat,heading\ndoor,4.36,52.01,90\nroof,east,52.01,0\n")?;
+///
+/// let rows = io::positions::read_positions(&path)?;
+/// assert_eq!(rows[0].id, "door");
+/// assert_eq!(rows[0].position.as_ref().map(|p| p.heading_deg), Ok(Some(90.0)));
+/// assert!(rows[1].position.is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`PositionsError::Unreadable`] when the system refuses. [`PositionsError::Invalid`] for a file
 /// larger than 1 GiB, without rows or without a required column, for two rows with the same id, and

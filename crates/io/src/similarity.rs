@@ -88,6 +88,16 @@ enum Rotation {
 /// Reads the similarity from the model's frame to the frame of the cameras, including the vertical
 /// offset.
 ///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("camera_from_model.json");
+/// std::fs::write(&path, r#"{ "translation": [-1000.0, -2000.0, 0.0], "vertical_offset_m": 45.5 }"#)?;
+///
+/// let camera_from_model = io::similarity::read(&path)?;
+/// assert_eq!(camera_from_model.apply([1010.0, 2020.0, 1.0]), [10.0, 20.0, 46.5]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// - [`SimilarityFileError::Unreadable`] when the system refuses.
 /// - [`SimilarityFileError::Invalid`] for a file larger than 1 MiB or not of the documented form.

@@ -97,7 +97,7 @@ fn map_of(positions: &[ControlPosition], given: Option<u32>) -> Result<u32, Alig
     }
     let geographic = positions.iter().find_map(|position| match position.place {
         Place::Geographic(ground) => Some(ground),
-        Place::Map(_) => None,
+        Place::Map { .. } => None,
     });
     let ground = geographic.ok_or(AlignJobError::UnknownMap)?;
     Ok(utm_epsg(ground.lon_deg, ground.lat_deg)?)
@@ -110,7 +110,7 @@ fn place_on(
     position: &ControlPosition,
 ) -> Result<[f64; 3], AlignJobError> {
     let ([x, y, height], (lon, lat)) = match position.place {
-        Place::Map(place) => (place, projection.lonlat_from_map(place[0], place[1])?),
+        Place::Map { point, height_m } => ([point.x, point.y, height_m], projection.lonlat_from_map(point.x, point.y)?),
         Place::Geographic(g) => {
             let map = projection.map_from_lonlat(g.lon_deg, g.lat_deg)?;
             ([map.x, map.y, g.height_m], (g.lon_deg, g.lat_deg))
