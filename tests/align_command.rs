@@ -1,5 +1,5 @@
-//! `skysweep align` end to end: a planted similarity among right and wrong positions (made by NumPy and PROJ), the files it writes,
-//! the noise harness, a real model, and what is refused.
+//! `skysweep align` end to end: a planted similarity among right and wrong positions (made by NumPy
+//! and PROJ), the files it writes, the noise harness, a real model, and what is refused.
 
 mod common;
 
@@ -117,7 +117,8 @@ fn a_real_model_is_brought_to_a_map() {
     let Some(model) = testing::shared_data("city/colmap/bartoszek+test_colmap/sparse/0") else { return };
     let folder = tempfile::tempdir().unwrap();
     let (before, points) = read_with_points(&model).unwrap();
-    // Easting, northing, height of the cameras under a similarity of this test's own, one of them far off.
+    // Easting, northing, height of the cameras under a similarity of this test's own, one of them
+    // far off.
     let place = |p: [f64; 3]| [500_000.0 - 4.0 * p[2], 5_000_000.0 - 4.0 * p[0], 80.0 + 4.0 * p[1]];
     let mut table = "name,easting,northing,height\n".to_owned();
     for (index, view) in before.views.iter().enumerate() {

@@ -1,11 +1,13 @@
-//! `skysweep city info` and `convert`, from the command line: exit codes, reports, and what the written files hold.
+//! `skysweep city info` and `convert`, from the command line: exit codes, reports, and what the
+//! written files hold.
 
 use std::path::PathBuf;
 
 use assert_cmd::Command;
 use serde_json::Value;
 
-/// A house with a ridge roof in EPSG:25832, a part without geometry, a road, and a building whose only surface is a line.
+/// A house with a ridge roof in EPSG:25832, a part without geometry, a road, and a building whose
+/// only surface is a line.
 const MODEL: &str = r#"{"type":"CityJSON","version":"2.0",
     "metadata":{"referenceSystem":"https://www.opengis.net/def/crs/EPSG/0/25832"},
     "transform":{"scale":[0.5,0.5,0.5],"translate":[500000.0,5700000.0,30.0]},
@@ -94,7 +96,8 @@ fn the_report_names_every_object() {
 }
 
 /// A part of the house that is inside of it.
-const WING: &str = r#""wing":{"type":"BuildingPart","parents":["house"],"geometry":[{"type":"Solid","lod":"2.2","boundaries":[[
+const WING: &str = r#""wing":{"type":"BuildingPart","parents":["house"],"geometry":[{"type":"Solid","lod":"2.2",
+  "boundaries":[[
     [[0,3,2,1]],[[0,1,5,4]],[[1,2,6,5]],[[2,3,7,6]],[[3,0,4,7]],[[4,5,6,7]]]]}]},"#;
 
 #[test]
@@ -166,7 +169,8 @@ fn footprints_and_cityjson() {
     assert_eq!((&properties["id"], &properties["height_m"]), (&Value::from("house"), &Value::from(5.0)));
     let ring = feature["geometry"]["coordinates"][0][0].as_array().unwrap();
     assert_eq!((ring.len(), &ring[0]), (5, &ring[4]));
-    // Easting 500 000 m is the zone's central meridian, 9 degrees east; gdaltransform gives the latitude 51.451182.
+    // Easting 500 000 m is the zone's central meridian, 9 degrees east; gdaltransform gives the
+    // latitude 51.451182.
     let near = |value: &Value, degrees: f64| (value.as_f64().unwrap() - degrees).abs() < 2e-4;
     assert!(ring.iter().all(|point| near(&point[0], 9.0) && near(&point[1], 51.4512)), "{ring:?}");
     bench.run(&["convert", "model.city.json", "-o", "again.json"]).code(0);

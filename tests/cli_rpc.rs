@@ -55,7 +55,8 @@ fn info_tells_programs_the_same_in_json() {
     assert_eq!(info["format"], "text");
     assert_eq!(info["rpc"]["samp_off"], 2000.0);
     assert_eq!(info["validity"]["height_m"], serde_json::json!([-200.0, 800.0]));
-    // A pixel of the line is 0.01° / 1000 of latitude; a degree at 45° has 111,132 m on the ellipsoid, and 300 m higher more.
+    // A pixel of the line is 0.01° / 1000 of latitude; a degree at 45° has 111,132 m on the
+    // ellipsoid, and 300 m higher more.
     let gsd = info["centre"]["gsd_line_m"].as_f64().expect("a number");
     assert!((gsd - 1.1114).abs() < 1e-3, "{gsd}");
 }

@@ -1,6 +1,6 @@
 //! The pages fit together: every link leads to a file and a heading, every page is in the book, the
-//! README is short, and the minimum version of Rust is the one in Cargo.toml. Tests find shared data
-//! only through the crate `testing`.
+//! README is short, and the minimum version of Rust is the one in Cargo.toml. Tests find shared
+//! data only through the crate `testing`.
 
 use std::path::Path;
 
@@ -75,8 +75,8 @@ fn the_minimum_version_of_rust_is_that_of_cargo() {
     }
 }
 
-/// One helper prints skips and fails where `SKYSWEEP_REQUIRE_DATA` says so; a test that looks for data by itself would
-/// do neither.
+/// One helper prints skips and fails where `SKYSWEEP_REQUIRE_DATA` says so; a test that looks for
+/// data by itself would do neither.
 #[test]
 fn tests_find_shared_data_through_one_helper() {
     let mut all = Vec::new();

@@ -1,5 +1,6 @@
-//! `skysweep dsm` by chunks: the town in one piece and in four has the same accuracy, no seam shows, and threads change
-//! nothing. What large scenes cost is measured by `cargo bench --bench scale`.
+//! `skysweep dsm` by chunks: the town in one piece and in four has the same accuracy, no seam
+//! shows, and threads change nothing. What large scenes cost is measured by `cargo bench --bench
+//! scale`.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -75,7 +76,8 @@ fn four_chunks_are_as_right_as_one() {
     assert!(!BOTH.folder.path().join("four/.skysweep-partial").exists());
 }
 
-/// Steps between neighbouring cells across the seams are those of the same cells computed in one piece.
+/// Steps between neighbouring cells across the seams are those of the same cells computed in one
+/// piece.
 #[test]
 fn no_seam_shows() {
     let (once, four) = (BOTH.dsm("once"), BOTH.dsm("four"));

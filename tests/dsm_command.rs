@@ -1,5 +1,5 @@
-//! `skysweep dsm` end to end on the sample town: its accuracy, its independence of threads and tiles, what it writes,
-//! and what it refuses.
+//! `skysweep dsm` end to end on the sample town: its accuracy, its independence of threads and
+//! tiles, what it writes, and what it refuses.
 
 use std::path::{Path, PathBuf};
 
@@ -119,7 +119,8 @@ fn options_are_obeyed() {
     let projection = crs::MapProjection::from_epsg(dem.horizontal_epsg.unwrap()).unwrap();
     let (lon, lat) = projection.lonlat_from_map(x, y).unwrap();
     let expected = converter.ellipsoid_from_datum(lon, lat, 0.0).unwrap();
-    // Pairs of views leave the common height to the weak prior on pointing; half a metre is its size here.
+    // Pairs of views leave the common height to the weak prior on pointing; half a metre is its
+    // size here.
     assert!((undulation - expected).abs() < 0.5, "{undulation} instead of {expected}");
 }
 

@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 
 /// Roofs in the class raster.
 const ROOF: &str = "6";
-/// Where the wrong building is put: an open place of the town, EPSG:32631, and its ground, metres above the ellipsoid.
+/// Where the wrong building is put: an open place of the town, EPSG:32631, and its ground, metres
+/// above the ellipsoid.
 const OPEN_PLACE: [f64; 3] = [693_830.5, 4_822_578.5, 182.3];
 /// Half of what the wrong building covers and a little more, metres.
 const HALF_M: f64 = 10.0;

@@ -1,4 +1,5 @@
-//! `skysweep eval` from files to exit code: grids, coordinate systems, datums, classes, thresholds and refusals.
+//! `skysweep eval` from files to exit code: grids, coordinate systems, datums, classes, thresholds
+//! and refusals.
 
 use std::path::{Path, PathBuf};
 
@@ -90,7 +91,8 @@ fn another_coordinate_system_and_datum_are_met() {
     let lonlat = |x: f64, y: f64| utm17.lonlat_from_map(x, y).unwrap();
     let (lon, lat) = lonlat(WEST, NORTH);
     let corner = utm16.map_from_lonlat(lon, lat).unwrap();
-    // Larger than the reference by 30 m all around, turned against it by the convergence of the meridians.
+    // Larger than the reference by 30 m all around, turned against it by the convergence of the
+    // meridians.
     let there = GeoTransform::north_up(corner.x - 30.0, corner.y + 30.0, 0.4);
     let heights = sampled((420, 400), &there, |x, y| {
         let (lon, lat) = utm16.lonlat_from_map(x, y).unwrap();
@@ -128,7 +130,8 @@ fn datums_that_may_differ_are_refused_until_they_are_named() {
     let named = json(&["--align", "none", "--test-vertical", "egm96"], &bare, &reference);
     assert_eq!(number(&named, "/metrics/n"), 400.0);
     assert!(named.to_string().contains("no coordinate system"), "{named}");
-    // A geoid taken for the ellipsoid is a constant, which the median removes and nothing else does.
+    // A geoid taken for the ellipsoid is a constant, which the median removes and nothing else
+    // does.
     let assumed = json(&["--align", "z"], &bare, &stated);
     assert!(assumed.to_string().contains("taken as the ellipsoid"), "{assumed}");
     skysweep(&["--align", "none"], &bare, &stated).code(2).stderr(contains("--test-vertical"));
@@ -178,7 +181,8 @@ fn a_mask_leaves_cells_out() {
 fn a_terrain_model_tells_what_stands() {
     let folder = TempDir::new().unwrap();
     let reference = reference(&folder, VerticalDatum::Ellipsoid);
-    // Blocks are found on the east half only; the terrain is coarser, and 1.5 m off where nothing stands.
+    // Blocks are found on the east half only; the terrain is coarser, and 1.5 m off where nothing
+    // stands.
     let ground = |x: f64, y: f64| 20.0 + 3.0 * ((x - WEST) / 31.0).sin() + 2.0 * ((y - NORTH) / 23.0).cos();
     let half = |x: f64, y: f64| if x < WEST + 50.0 { ground(x, y) } else { surface(x, y) };
     let heights = sampled((200, 180), &grid(), half);
@@ -285,7 +289,8 @@ fn bad_input_is_refused_in_one_message() {
     skysweep(&["--min-completeness", "62"], &reference, &reference).code(2).stderr(contains("share"));
 }
 
-/// The LiDAR surface of Jacksonville, moved by its geotransform alone, and its classes, which carry no georeference.
+/// The LiDAR surface of Jacksonville, moved by its geotransform alone, and its classes, which carry
+/// no georeference.
 #[test]
 fn the_lidar_truth_is_brought_back_too() {
     let Some(truth) = testing::shared_data("stereo/jax_068/truth") else { return };

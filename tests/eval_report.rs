@@ -1,4 +1,5 @@
-//! The report of `skysweep eval`: where it goes, what it never replaces, and that a browser shows it.
+//! The report of `skysweep eval`: where it goes, what it never replaces, and that a browser shows
+//! it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -120,7 +121,8 @@ fn what_no_evaluation_wrote_is_never_replaced_unasked() {
     skysweep(&["-o", blocked.to_str().unwrap()], &dsm, &reference).code(2);
 }
 
-/// A Chromium on this machine: the one that the variable CHROMIUM names, else a usual name on the path.
+/// A Chromium on this machine: the one that the variable CHROMIUM names, else a usual name on the
+/// path.
 fn chromium() -> Option<PathBuf> {
     let named = std::env::var_os("CHROMIUM").map(PathBuf::from);
     let folders = std::env::var_os("PATH").unwrap_or_default();

@@ -82,7 +82,8 @@ fn meshes_and_clouds_in_any_combination() {
     for test in [&high, &cloud] {
         let found = json(&[], test, &low);
         assert_eq!(found["kind"], "surfaces");
-        // At the eaves and gables the nearest point is straight below or beside, never nearer than the plane.
+        // At the eaves and gables the nearest point is straight below or beside, never nearer than
+        // the plane.
         near(&found["result"]["accuracy"]["median_m"], apart(), 1e-4);
         let m3c2 = &found["result"]["m3c2"]["median_m"];
         near(m3c2, apart(), 0.01);
@@ -107,7 +108,8 @@ fn the_origin_of_a_ply_is_added_and_systems_are_brought_together() {
         &[
             b"ply\nformat ascii 1.0\ncomment origin 690000 5336000 500\ncomment crs EPSG:25832\n".as_slice(),
             b"element vertex 4\nproperty float x\nproperty float y\nproperty float z\n",
-            b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n10 0 0\n10 6 0\n0 6 0\n4 0 1 2 3\n",
+            b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n10 0 0\n10 6 0\n0 6 0\n4 0 \
+              1 2 3\n",
         ]
         .concat(),
     );
@@ -157,13 +159,15 @@ fn what_cannot_be_compared_is_refused() {
     let hostile = write(
         &folder,
         "hostile.ply",
-        b"ply\nformat ascii 1.0\nelement vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n",
+        b"ply\nformat ascii 1.0\nelement vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty \
+          float z\nend_header\n0 0 0\n",
     );
     skysweep(&[], &hostile, &low).code(2).stderr(contains("901"));
     let degrees = write(
         &folder,
         "degrees.ply",
-        b"ply\nformat ascii 1.0\ncomment origin 0 0 0\ncomment crs EPSG:4326\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n11 48 0\n",
+        b"ply\nformat ascii 1.0\ncomment origin 0 0 0\ncomment crs EPSG:4326\nelement vertex 1\nproperty float \
+          x\nproperty float y\nproperty float z\nend_header\n11 48 0\n",
     );
     skysweep(&[], &degrees, &low).code(2).stderr(contains("not in metres"));
 }

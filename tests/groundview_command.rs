@@ -1,5 +1,5 @@
-//! `skysweep groundview` end to end: depths and normals against the tree of triangles of the same surface, the COLMAP set, masks,
-//! crops and compositions, and what is refused.
+//! `skysweep groundview` end to end: depths and normals against the tree of triangles of the same
+//! surface, the COLMAP set, masks, crops and compositions, and what is refused.
 
 mod common;
 

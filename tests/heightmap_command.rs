@@ -1,5 +1,5 @@
-//! `skysweep heightmap` end to end: where its pixels are and what they hold, against rasterio, pyproj and NumPy
-//! (`reference/heightmap.txt`, written by `heightmap.py`), and what it refuses.
+//! `skysweep heightmap` end to end: where its pixels are and what they hold, against rasterio,
+//! pyproj and NumPy (`reference/heightmap.txt`, written by `heightmap.py`), and what it refuses.
 
 mod common;
 
@@ -80,7 +80,8 @@ fn a_turned_map_is_in_its_place_and_holds_the_surface() {
             let (lon, lat) = projection.lonlat_from_map(x, y).unwrap();
             let off_m = [(lon - row[2]) * row[3].to_radians().cos(), lat - row[3]].map(|d| d.to_radians() * 6.37e6);
             assert!(off_m[0].hypot(off_m[1]) < PLACE_TOLERANCE_M, "{crs} {row:?}: {off_m:?} m off");
-            // On the local map places agree to micrometres, and so do heights; UTM bends by up to a fiftieth of a pixel.
+            // On the local map places agree to micrometres, and so do heights; UTM bends by up to a
+            // fiftieth of a pixel.
             let tolerance = if crs == "local" { 1e-3 } else { 0.05 };
             assert!(agree(at(&dem, row), row[4], tolerance), "{crs} {row:?}: {}", at(&dem, row));
             voids += usize::from(row[4].is_nan());
@@ -225,7 +226,8 @@ fn a_normalised_map_times_its_scale_is_the_metric_map() {
         }
         assert!((number(&tags, "RESOLUTION_PX_PER_SCENE_UNIT") - 2.0 * s).abs() < 1e-9);
         assert_eq!(tags["NORMALIZED"], "yes");
-        // Readers that follow GDAL's scale and offset see heights above the ellipsoid in either map.
+        // Readers that follow GDAL's scale and offset see heights above the ellipsoid in either
+        // map.
         let (a, b) = (read_dem(&path).unwrap(), read_dem(&metric).unwrap());
         assert!(a.heights.data().iter().zip(b.heights.data()).all(|(a, b)| agree((*a).into(), (*b).into(), 1e-4)));
         if asked == "auto" {
@@ -309,7 +311,8 @@ fn unprojected_splats_lie_on_the_surface_in_the_pictures_colours() {
         let (c, r) = dsm.geotransform.cell_from_map(at.x, at.y).unwrap();
         let height = f64::from(raster::bilinear(&dsm.heights, c, r));
         assert!(height.is_nan() || (height - z).abs() < 0.02, "{height} {z}");
-        // The source has every height: confidence 1. A pixel of half a metre: a quarter of a metre of standard deviation.
+        // The source has every height: confidence 1. A pixel of half a metre: a quarter of a metre
+        // of standard deviation.
         assert!((splat.opacity - 0.99).abs() < 1e-4 && splat.scale_m[0] >= 0.2499);
         assert!((splat.colour[1] - 80.0 / 255.0).abs() < 1e-5 && splat.colour[2].abs() < 1e-5);
     }

@@ -1,5 +1,5 @@
-//! `skysweep ortho` end to end on simulated towns: hidden cells against the exact scene, grey values against the simulator's own
-//! picture from above, and what is refused.
+//! `skysweep ortho` end to end on simulated towns: hidden cells against the exact scene, grey
+//! values against the simulator's own picture from above, and what is refused.
 
 mod common;
 
@@ -11,7 +11,8 @@ use raster::Grid;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Vehicles are in no surface model. RPCs point where they say, and pixels are sampled once where grey values do not matter.
+/// Vehicles are in no surface model. RPCs point where they say, and pixels are sampled once where
+/// grey values do not matter.
 const STILL: [(&str, &str); 2] = [
     ("parked_share = 0.35", "parked_share = 0.0"),
     ("pointing_error_px = [1.0, 3.0]", "pointing_error_px = [0.0, 0.0]"),
@@ -40,9 +41,10 @@ fn hidden(scene: &Path, view: u8, least: f64) -> (f64, f64) {
     (right / (right + wrong), right / (right + missed))
 }
 
-/// The town as it is sold: parapets thinner than the cells, chimneys, plant rooms, trees, and its own three views, the middle one only
-/// 6° from the vertical. There what a house hides is two cells wide and what a parapet hides a fifth of a cell, which cells of
-/// half a metre do not tell; those of a quarter do.
+/// The town as it is sold: parapets thinner than the cells, chimneys, plant rooms, trees, and its
+/// own three views, the middle one only 6° from the vertical. There what a house hides is two cells
+/// wide and what a parapet hides a fifth of a cell, which cells of half a metre do not tell; those
+/// of a quarter do.
 #[test]
 fn hidden_cells_are_the_hidden_ones_in_a_town_with_parapets_and_trees() {
     let scene = simulated("ortho_half", &[STILL[0], STILL[1], QUICK]);

@@ -1,4 +1,5 @@
-//! `skysweep priors` from the command line: a whole dataset, what is refused, and that nothing is left behind.
+//! `skysweep priors` from the command line: a whole dataset, what is refused, and that nothing is
+//! left behind.
 
 use std::path::{Path, PathBuf};
 
@@ -161,7 +162,8 @@ fn a_whole_dataset() {
     assert!(top > 4.5, "{top}");
     for ply in ["out/points3D.ply", "out/sparse/0/points3D.ply"] {
         let header = ply_header(&bench.path(ply));
-        let words = "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty uchar red";
+        let words = "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float \
+          ny\nproperty float nz\nproperty uchar red";
         assert!(header.contains(&format!("element vertex {kept}\n{words}")), "{header}");
     }
     assert!(ply_header(&bench.path("out/splats/splats_2dgs.ply")).contains(&format!("element vertex {kept}\n")));
@@ -383,7 +385,8 @@ fn transforms_json_serves_as_well() {
     assert!((25.0..25.4).contains(&nearest), "{nearest}");
 }
 
-/// The two lines of the README: the sample town in the cameras of a flight, and in its satellite images.
+/// The two lines of the README: the sample town in the cameras of a flight, and in its satellite
+/// images.
 #[test]
 fn the_sample_town() {
     let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town");

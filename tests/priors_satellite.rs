@@ -74,7 +74,8 @@ fn heights_are_those_that_the_simulator_saw() {
         errors.sort_unstable_by(f32::total_cmp);
         let at = |share: f64| errors[(share * (errors.len() - 1) as f64) as usize];
         assert!(covered > 10_000 && errors.len() > covered / 2, "{covered} {}", errors.len());
-        // Corners of the model are rounded to a millimetre; at edges the one may see a roof and the other what is below.
+        // Corners of the model are rounded to a millimetre; at edges the one may see a roof and the
+        // other what is below.
         assert!(at(0.5) < 0.002 && at(0.99) < 0.01, "{} {} {}", at(0.5), at(0.99), at(1.0));
     }
     let files = ["height", "distance", "normal", "mask", "class", "object"];

@@ -1,7 +1,8 @@
-//! Priors of a real tile against what Open3D (Embree) made of the same points and cameras, and the same tile at other
-//! coordinates.
+//! Priors of a real tile against what Open3D (Embree) made of the same points and cameras, and the
+//! same tile at other coordinates.
 //!
-//! The reference is `city/peer_reference` of the shared data. Its points are relative to an offset of whole metres.
+//! The reference is `city/peer_reference` of the shared data. Its points are relative to an offset
+//! of whole metres.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -121,7 +122,8 @@ fn visible_points_equal_the_yardsticks() {
     }
 }
 
-/// Hits, depths and normals of every fifth camera (`benches/casting` compares all); counts of hits agree within five.
+/// Hits, depths and normals of every fifth camera (`benches/casting` compares all); counts of hits
+/// agree within five.
 fn check_statistics(scene: &Scene, without: &HashMap<usize, usize>) {
     let rays = Rays::new(&scene.cameras.lenses[0]).unwrap();
     let stats = scene.json("depth_o3d_100_stats.json");
@@ -147,11 +149,13 @@ fn statistics_of_maps_equal_the_yardsticks() {
     check_statistics(&scene, &HashMap::from([FALSE_ROOF_HITS]));
 }
 
-/// A camera that sees, in the reference only, a sliver of roof outside of the roof's ring; and in how many pixels.
+/// A camera that sees, in the reference only, a sliver of roof outside of the roof's ring; and in
+/// how many pixels.
 const FALSE_ROOF_HITS: (usize, usize) = (45, 10);
 
-/// A corner of one roof lies a quarter of a millimetre across another edge of its ring. The ear clipping of the reference
-/// then covers a sliver beside the roof; where it does, the ring does not go around the place that is hit.
+/// A corner of one roof lies a quarter of a millimetre across another edge of its ring. The ear
+/// clipping of the reference then covers a sliver beside the roof; where it does, the ring does not
+/// go around the place that is hit.
 #[test]
 fn the_roof_that_only_the_reference_has_is_outside_of_its_ring() {
     let (Some(ours), Some(theirs), Some(city)) = (Scene::load(), Scene::with_their_triangles(), city()) else { return };

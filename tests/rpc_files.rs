@@ -1,8 +1,9 @@
-//! Every file of the shared RPC collection is read as `reference/rpc_files.txt` says, or refused for the reason it gives;
-//! whatever another reader reads, ours reads; and the same RPC in two containers has the same numbers.
+//! Every file of the shared RPC collection is read as `reference/rpc_files.txt` says, or refused
+//! for the reason it gives; whatever another reader reads, ours reads; and the same RPC in two
+//! containers has the same numbers.
 //!
-//! The reference is written by `reference/rpc_files.py` with rasterio, rpcm and plain text search. The collection is not
-//! part of the repository: without it the tests print a line and end.
+//! The reference is written by `reference/rpc_files.py` with rasterio, rpcm and plain text search.
+//! The collection is not part of the repository: without it the tests print a line and end.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -118,7 +119,8 @@ fn the_same_rpc_in_two_containers_has_the_same_numbers() {
     check_same(&root, "gcore/data/test_rpc.txt", "gcore/data/byte_rpc.tif", 0.0);
     check_same(&root, "gcore/data/alos/RPC-md_alos.txt", "gcore/data/alos/IMG-md_alos.tif", 0.0);
     check_same(&root, "gdrivers/data/envi/envirpc.hdr", "gdrivers/data/envi/envirpc.img", 0.0);
-    // DIMAP against GDAL's reading of it: the same pixel counting for Pléiades (from 1) and Pléiades Neo (from 0).
+    // DIMAP against GDAL's reading of it: the same pixel counting for Pléiades (from 1) and
+    // Pléiades Neo (from 0).
     check_same(&root, "gdrivers/data/jpeg2000/RPC_md_ple.XML", "gdrivers/data/jpeg2000/IMG_md_ple_R1C1.jp2", 0.0);
     check_same(&root, "gdrivers/data/jpeg2000/RPC_md_pneo.XML", "gdrivers/data/jpeg2000/IMG_md_pneo_R1C1.jp2", 0.0);
 }
@@ -131,7 +133,8 @@ fn geom_counts_pixels_from_zero_where_dimap_counts_from_one() {
     check_same(&root, &format!("{image}.geom"), &format!("RPC_{image}.XML"), 1e-14);
 }
 
-/// The originals have a `.geom` of the whole scene and the cut's origin in the geotransform; the other pair has tags.
+/// The originals have a `.geom` of the whole scene and the cut's origin in the geotransform; the
+/// other pair has tags.
 #[test]
 fn a_cut_of_a_geoms_scene_gets_the_rpc_of_the_cut() {
     let Some(root) = testing::shared_data("stereo/phr_gizeh") else { return };

@@ -1,7 +1,8 @@
-//! Every RPC of the shared collection projects as rpcm does, and is inverted over its whole validity cube.
+//! Every RPC of the shared collection projects as rpcm does, and is inverted over its whole
+//! validity cube.
 //!
-//! `reference/rpc_rpcm.txt` holds the projections of rpcm, written by `reference/rpc_rpcm.py`. The collection is part of the
-//! shared data.
+//! `reference/rpc_rpcm.txt` holds the projections of rpcm, written by `reference/rpc_rpcm.py`. The
+//! collection is part of the shared data.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,5 @@
-//! `skysweep simulate` end to end: the files it writes, the loop through `dsm` and `eval`, and what it refuses.
+//! `skysweep simulate` end to end: the files it writes, the loop through `dsm` and `eval`, and what
+//! it refuses.
 
 mod common;
 

@@ -1,5 +1,6 @@
-//! `skysweep splats` end to end: count against error on a simulated town, the image that the splats render back to, the file
-//! as trainers read it, pointing taken over from a run, and what is refused.
+//! `skysweep splats` end to end: count against error on a simulated town, the image that the splats
+//! render back to, the file as trainers read it, pointing taken over from a run, and what is
+//! refused.
 
 mod common;
 
@@ -19,7 +20,8 @@ fn town() -> &'static Path {
     TOWN.get_or_init(|| simulated("splats", &[("size_m = 320.0", "size_m = 120.0"), pointing]))
 }
 
-/// PSNR of a rendering over the pixels whose true height is that of the surface model there: those it shows.
+/// PSNR of a rendering over the pixels whose true height is that of the surface model there: those
+/// it shows.
 fn psnr_by_truth(scene: &Path, rendering: &Path, range: &Value, view: &str) -> (f64, usize) {
     let image = ImageSource::open(scene.join(format!("{view}.tif"))).unwrap();
     let pixels = image.read_colour(image.window()).unwrap();
@@ -128,7 +130,8 @@ fn the_file_is_what_trainers_load_and_lies_on_the_surface() {
         let map = [x + origin.origin[0], y + origin.origin[1]];
         let (c, r) = dsm.geotransform.cell_from_map(map[0], map[1]).unwrap();
         let normal = third_axis([0, 1, 2, 3].map(|i| at(&format!("rot_{i}"))));
-        // The middle of an even block lies between cells of the block; its plane is within the bound of each.
+        // The middle of an even block lies between cells of the block; its plane is within the
+        // bound of each.
         let near = [(c - 0.01).round(), (c + 0.01).round()];
         let near = near.into_iter().flat_map(|c| [(r - 0.01).round(), (r + 0.01).round()].map(|r| [c, r]));
         let off = near.map(|[c, r]| {
@@ -157,11 +160,13 @@ fn discs_uniform_splats_and_threads() {
     assert!(bytes(run("a.ply", "1", &[])) == bytes(run("b.ply", "3", &[])), "threads change the splats");
     let discs = io::splat_ply::read(&run("c.ply", "2", &["--form", "2d", "--uniform", "4"])).unwrap();
     assert_eq!((discs.layout.form, discs.splats.len()), (io::splat_ply::SplatForm::Discs, 60 * 60));
-    // Squares of 4 cells of half a metre: one metre of standard deviation where the ground is level.
+    // Squares of 4 cells of half a metre: one metre of standard deviation where the ground is
+    // level.
     assert!(discs.splats.iter().all(|s| s.scale_m[0] >= 0.999 && s.scale_m[1] >= 0.999));
 }
 
-/// The sample's RPCs are off by pixels, each its own way: a run finds out, and the splats take it over.
+/// The sample's RPCs are off by pixels, each its own way: a run finds out, and the splats take it
+/// over.
 #[test]
 fn pointing_comes_from_the_run_that_made_the_surface() {
     let folder = tempfile::tempdir().unwrap();
@@ -183,13 +188,15 @@ fn pointing_comes_from_the_run_that_made_the_surface() {
     let confidence = read_dem(out.join("dsm/confidence.tif")).unwrap().heights;
     let surest = confidence.data().iter().copied().filter(|c| c.is_finite()).fold(0.0, f32::max);
     let most = opacities.iter().copied().fold(0.0, f32::max);
-    // Opacities go from 0.3 without any confidence to 0.99 with all of it; a splat has the mean confidence of its cells.
+    // Opacities go from 0.3 without any confidence to 0.99 with all of it; a splat has the mean
+    // confidence of its cells.
     let bound = 0.3 + 0.69 * surest;
     assert!(most <= bound + 1e-6 && most > bound - 0.01, "{most} of a confidence of {surest}");
     assert!(opacities.iter().any(|o| *o < 0.7), "confidence becomes opacity");
 }
 
-/// Splats seen from the air and from the ground: the image that they are of, and heights where a ray meets the same surface.
+/// Splats seen from the air and from the ground: the image that they are of, and heights where a
+/// ray meets the same surface.
 #[test]
 fn splats_are_seen_again_through_images_and_perspective_cameras() {
     let folder = tempfile::tempdir().unwrap();

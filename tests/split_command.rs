@@ -1,4 +1,5 @@
-//! `skysweep split` on real COLMAP models against a brute-force choice by Python sets, and what it refuses.
+//! `skysweep split` on real COLMAP models against a brute-force choice by Python sets, and what it
+//! refuses.
 
 mod common;
 

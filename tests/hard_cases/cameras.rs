@@ -1,4 +1,5 @@
-//! RPCs that are extreme as numbers: the same cameras, written in other ways, and cameras that fail somewhere.
+//! RPCs that are extreme as numbers: the same cameras, written in other ways, and cameras that fail
+//! somewhere.
 
 use camera::Rpc;
 use jobs::dsm::DsmError;
@@ -12,8 +13,8 @@ fn polynomials(rpc: &mut Rpc) -> [&mut [f64; 20]; 4] {
     [&mut rpc.line_num, &mut rpc.line_den, &mut rpc.samp_num, &mut rpc.samp_den]
 }
 
-/// Multiplies numerators and denominators by `1 − x / at`, x one of the normalised coordinates L, P, H (1 to 3): the same
-/// camera, whose denominators are zero where `x = at`.
+/// Multiplies numerators and denominators by `1 − x / at`, x one of the normalised coordinates L,
+/// P, H (1 to 3): the same camera, whose denominators are zero where `x = at`.
 fn with_pole(mut rpc: Rpc, x: usize, at: f64) -> Rpc {
     // Where the product of two linear terms stands in the list.
     const PRODUCT: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 7, 4, 5], [2, 4, 8, 6], [3, 5, 6, 9]];
@@ -88,7 +89,8 @@ fn denominators_that_are_zero_above_the_scene_change_nothing() {
     expect_the_same("a pole in the air", |rpc| with_pole(rpc, 3, 0.7));
 }
 
-/// A camera that does fail at a height: its samples run away towards H = 0.9, 450 m above the scene.
+/// A camera that does fail at a height: its samples run away towards H = 0.9, 450 m above the
+/// scene.
 #[test]
 fn a_camera_that_fails_high_above_the_scene_is_good_at_the_scene() {
     let stage = Stage::default();

@@ -19,7 +19,8 @@ fn views_from_one_direction_have_no_parallax() {
     assert!((angle_deg - 0.2).abs() < 0.05, "{angle_deg}");
 }
 
-/// One degree moves the image by 0.035 px per metre: heights are a few metres off, and the user is told so.
+/// One degree moves the image by 0.035 px per metre: heights are a few metres off, and the user is
+/// told so.
 #[test]
 fn a_tiny_baseline_gives_heights_with_an_honest_deviation_and_a_warning() {
     let stage = Stage::default();
@@ -33,7 +34,8 @@ fn a_tiny_baseline_gives_heights_with_an_honest_deviation_and_a_warning() {
     assert!(outcome.warns("1.0°"), "{:?}", outcome.report.warnings);
 }
 
-/// One picture under the RPCs of two: every point lies where both say, and no height follows from it.
+/// One picture under the RPCs of two: every point lies where both say, and no height follows from
+/// it.
 #[test]
 fn one_picture_under_two_rpcs_has_no_parallax() {
     let mut shots = EASY.shots.clone();

@@ -1,4 +1,5 @@
-//! What must not change the heights: the order of the views, their gain and offset, where an image begins.
+//! What must not change the heights: the order of the views, their gain and offset, where an image
+//! begins.
 
 use camera::ImagePoint;
 use raster::Window;
@@ -34,9 +35,9 @@ fn cut(by: [[usize; 2]; 3]) -> Vec<Shot> {
     EASY.shots.iter().zip(by).map(one).collect()
 }
 
-/// By whole pixels of every pyramid level, and by odd numbers. The scene's middle moves with the cut, and with it the
-/// lattice of heights: that is worth what the noise of the heights is. (On one lattice they are the same:
-/// `sweep: level`.)
+/// By whole pixels of every pyramid level, and by odd numbers. The scene's middle moves with the
+/// cut, and with it the lattice of heights: that is worth what the noise of the heights is. (On one
+/// lattice they are the same: `sweep: level`.)
 #[test]
 fn where_an_image_begins_does_not_matter() {
     for by in [[[8, 16], [8, 8], [16, 8]], [[3, 8], [5, 2], [1, 7]]] {

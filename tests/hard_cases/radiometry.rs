@@ -29,7 +29,8 @@ fn one_blank_view_is_named_and_does_not_harm_the_rest() {
     assert!(outcome.warns("view_2.tif"), "{:?}", outcome.report.warnings);
 }
 
-/// The 20 m roof and the ground beside it are white in all views: what has no texture has no height of its own.
+/// The 20 m roof and the ground beside it are white in all views: what has no texture has no height
+/// of its own.
 #[test]
 fn a_saturated_roof_is_right_or_void() {
     let white = |x: f64, y: f64| (x - 35.0).hypot(y + 5.0) < 13.0;
@@ -62,7 +63,8 @@ fn a_saturated_roof_is_right_or_void() {
     }
 }
 
-/// A third of the middle view is void, once as its no-data value says and once as black that nothing declares.
+/// A third of the middle view is void, once as its no-data value says and once as black that
+/// nothing declares.
 #[test]
 fn voids_in_a_view_leave_the_other_views_heights() {
     for no_data in [Some(0.0), None] {
@@ -78,7 +80,8 @@ fn voids_in_a_view_leave_the_other_views_heights() {
     }
 }
 
-/// All views are void west of x = −20 m: there is nothing to see, declared or not, and nothing may be invented.
+/// All views are void west of x = −20 m: there is nothing to see, declared or not, and nothing may
+/// be invented.
 #[test]
 fn where_all_views_are_void_there_is_no_height() {
     for no_data in [Some(0.0), None] {
@@ -97,7 +100,8 @@ fn where_all_views_are_void_there_is_no_height() {
     }
 }
 
-/// A court of tiles that repeat every 3 m, 40 m wide: at 0.6 m of parallax per metre a tile is 5 m of height.
+/// A court of tiles that repeat every 3 m, 40 m wide: at 0.6 m of parallax per metre a tile is 5 m
+/// of height.
 fn tiled() -> Stage {
     let tiles = |x: f64, y: f64| {
         let wave = |v: f64| (std::f64::consts::TAU * v / 3.0).sin();

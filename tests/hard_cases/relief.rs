@@ -5,8 +5,8 @@ use jobs::dsm::{DsmError, HeightRange};
 
 use crate::stage::{EASY, Stage, rolling, triplet, village};
 
-/// A tower of 30 × 30 m and 130 m, whose roof is as far from the ground's heights as its parallax is from the ground's:
-/// 70 px.
+/// A tower of 30 × 30 m and 130 m, whose roof is as far from the ground's heights as its parallax
+/// is from the ground's: 70 px.
 #[test]
 fn a_tower_of_130_m_survives() {
     let tower = |x: f64, y: f64| x.abs() < 15.0 && (y - 5.0).abs() < 15.0;

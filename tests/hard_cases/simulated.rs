@@ -1,5 +1,6 @@
-//! The simulator's presets, small: what a stage with one difficulty does not have, all of them together. Pointing errors
-//! of one to three pixels are in every RPC, so scores are taken after a shift.
+//! The simulator's presets, small: what a stage with one difficulty does not have, all of them
+//! together. Pointing errors of one to three pixels are in every RPC, so scores are taken after a
+//! shift.
 
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use raster::Grid;
@@ -47,7 +48,8 @@ fn compared(config: SimulationConfig) -> Compared {
     Compared { truth: truth.dsm.clone(), classes: truth.classes.clone(), errors: found.errors }
 }
 
-/// A tower of 150 m on 22 × 18 m whose roof holds no tie point: the range of heights has to find it.
+/// A tower of 150 m on 22 × 18 m whose roof holds no tie point: the range of heights has to find
+/// it.
 #[test]
 fn a_slim_tower_of_the_high_rise_town_survives() {
     let c = compared(SimulationConfig { size_m: 110.0, ..preset("high-rise") });

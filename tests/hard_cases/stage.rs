@@ -1,9 +1,10 @@
-//! A stage for hard cases: a height function with paint on it, photographed through exact RPC cameras, and the score of
-//! the DSM that the pipeline makes of the photographs.
+//! A stage for hard cases: a height function with paint on it, photographed through exact RPC
+//! cameras, and the score of the DSM that the pipeline makes of the photographs.
 //!
-//! It is apart from the `simulate` crate on purpose: what both have wrong would cancel, and a case wants to set one thing
-//! to an extreme. Stage frame: x east, y north in metres from the centre, each proportional to longitude and latitude
-//! (so the frame is the same at any latitude and across the antimeridian), z metres above `ground_m`.
+//! It is apart from the `simulate` crate on purpose: what both have wrong would cancel, and a case
+//! wants to set one thing to an extreme. Stage frame: x east, y north in metres from the centre,
+//! each proportional to longitude and latitude (so the frame is the same at any latitude and across
+//! the antimeridian), z metres above `ground_m`.
 
 use numeric::random::{hash64, unit_interval};
 use std::path::PathBuf;
@@ -95,7 +96,8 @@ pub(crate) fn rolling(x: f64, y: f64) -> f64 {
     1.2 * (x / 23.0).sin() + 0.8 * (y / 17.0 + 0.4).cos()
 }
 
-/// Centre, half sizes, and eaves and ridge heights of a building; the ridge runs along its local x axis.
+/// Centre, half sizes, and eaves and ridge heights of a building; the ridge runs along its local x
+/// axis.
 pub(crate) struct Building {
     pub(crate) centre: [f64; 2],
     pub(crate) half: [f64; 2],
@@ -106,7 +108,8 @@ pub(crate) struct Building {
 impl Building {
     /// Height of the building over a place; all stand turned by 17° against the map.
     pub(crate) fn height(&self, x: f64, y: f64) -> Option<f64> {
-        // All of scene construction comes through here: the sine and cosine are not computed each time.
+        // All of scene construction comes through here: the sine and cosine are not computed each
+        // time.
         let (sin, cos) = (0.292_371_704_722_736_77, 0.956_304_755_963_035_4);
         let (dx, dy) = (x - self.centre[0], y - self.centre[1]);
         let (u, v) = (cos * dx + sin * dy, cos * dy - sin * dx);
@@ -115,7 +118,8 @@ impl Building {
     }
 }
 
-/// The village photographed without any difficulty, and its DSM: what the cases with the same pixels are compared with.
+/// The village photographed without any difficulty, and its DSM: what the cases with the same
+/// pixels are compared with.
 pub(crate) struct Easy {
     pub(crate) stage: Stage,
     pub(crate) shots: Vec<Shot>,
@@ -142,7 +146,8 @@ pub(crate) fn village(x: f64, y: f64) -> f64 {
     VILLAGE.iter().find_map(|b| b.height(x, y)).unwrap_or_else(|| rolling(x, y))
 }
 
-/// Detail in three dimensions, at every scale from a metre to a block, so that walls have a picture too.
+/// Detail in three dimensions, at every scale from a metre to a block, so that walls have a picture
+/// too.
 pub(crate) fn weathered([x, y, z]: [f64; 3]) -> f64 {
     const OCTAVES: [(f64, f64); 4] = [(1.1, 0.34), (2.7, 0.28), (7.0, 0.22), (21.0, 0.16)];
     let sum: f64 =
@@ -183,9 +188,10 @@ pub(crate) fn look(incidence_deg: f64, azimuth_deg: f64, gsd_m: f64) -> Look {
 }
 
 impl Look {
-    /// A pushbroom camera, north up, whose image of `size` × `size` pixels has a place of the stage in its middle. With X in
-    /// metres from there, d the direction and u, v the image's axes across it, `sample = u·X / (1 − d·X / range)` and
-    /// `line = −v·X` in pixels, which an RPC holds exactly.
+    /// A pushbroom camera, north up, whose image of `size` × `size` pixels has a place of the stage
+    /// in its middle. With X in metres from there, d the direction and u, v the image's axes across
+    /// it, `sample = u·X / (1 − d·X / range)` and `line = −v·X` in pixels, which an RPC holds
+    /// exactly.
     pub(crate) fn rpc(&self, stage: &Stage, centre: [f64; 2]) -> Rpc {
         const RANGE_M: f64 = 617_000.0;
         const HEIGHT_SCALE_M: f64 = 500.0;
@@ -282,7 +288,8 @@ impl Stage {
             let [x, y, z] = at(t);
             z < (self.surface)(x, y)
         };
-        // A third of a metre of height is a tenth of a metre across: thinner things do not stand on this stage.
+        // A third of a metre of height is a tenth of a metre across: thinner things do not stand on
+        // this stage.
         let step = 0.33 / (from[2] - to[2]);
         let mut t = step;
         while !below(t) && t < 1.0 {
@@ -313,7 +320,8 @@ impl Stage {
         Ok(Outcome { dem: read("dsm.tif"), sigma: read("sigma.tif"), report })
     }
 
-    /// The error of every cell within `half_m` of the centre, after an alignment; NaN in voids and outside.
+    /// The error of every cell within `half_m` of the centre, after an alignment; NaN in voids and
+    /// outside.
     pub(crate) fn errors(&self, outcome: &Outcome, half_m: f64, alignment: AlignmentMethod) -> Errors {
         let (dem, truth) = (&outcome.dem, self.truth(&outcome.dem, half_m));
         let map = CellMap::affine(&dem.geotransform, &dem.geotransform).expect("a grid on itself");
@@ -391,7 +399,8 @@ impl Score {
         }
     }
 
-    /// Fails, with all numbers, unless at least `right` of the cells are right and at most `wrong` wrong.
+    /// Fails, with all numbers, unless at least `right` of the cells are right and at most `wrong`
+    /// wrong.
     pub(crate) fn expect(&self, case: &str, right: f64, wrong: f64) {
         assert!(self.cells > 100, "{case}: the region is empty: {self:?}");
         assert!(
@@ -402,7 +411,8 @@ impl Score {
 }
 
 impl Outcome {
-    /// Share of the inner cells with a height in either DSM whose heights in both are within a tolerance.
+    /// Share of the inner cells with a height in either DSM whose heights in both are within a
+    /// tolerance.
     pub(crate) fn agreement(&self, other: &Self, tolerance_m: f32) -> f64 {
         let (a, b) = (&self.dem, &other.dem);
         let margin = |n: usize| n / 6..n - n / 6;
