@@ -1,26 +1,23 @@
 //! `skysweep groundview`: what cameras and 360° panoramas on the ground see of a surface.
 //!
-//! The folder: `depth/NAME.npy` (metres; z-depth of perspective cameras, ray length of panoramas, NaN for none),
-//! `normal/NAME.npy` (east, north, up of the map), `mask/NAME.png` (255 shows the surface), `sky/NAME.png` (255 is sky) and
-//! `previews/NAME.png` (normals and depths to look at), `visibility.tif` (how many cameras see each cell, for rasters),
-//! `sparse/0` (a COLMAP model of the perspective cameras with points of the surface), `images` (crops of pictures, where
-//! given), `origin.json` (where local positions are counted from, also beside the model) and `report.json`.
-//! A row of a list without a view (no surface under it, no picture of it) does not stop the others: it is named in the report, and
-//! the exit code is 1. `skysweep groundview compose` lays a rendered ground layer over a satellite layer.
+//! A row of a list without a view does not stop the others: it is named in the report, and the exit code is 1.
+//! `skysweep groundview compose` lays a rendered ground layer over a satellite layer.
 
-mod compose;
-mod output;
-mod shots;
-mod surface;
+use std::path::{Path, PathBuf};
 
-use std::path::PathBuf;
-
-use anyhow::{bail, ensure};
+use anyhow::bail;
 use crs::VerticalDatum;
+use jobs::camera_stand::StandError;
+use jobs::files::FileError;
+use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig, GroundViewError};
 
-use crate::progress::{ProgressStyle, Watcher};
+use crate::error::{OVERWRITE, with_hint};
+use crate::progress::{Log, ProgressStyle, Watcher};
 use crate::stand::StandArgs;
-use crate::{Global, Outcome, print, threads};
+use crate::{Global, Outcome, print};
+
+/// Failed views that are printed one by one.
+const SHOWN: usize = 20;
 
 /// Arguments of `skysweep groundview`.
 #[derive(Debug, clap::Args)]
@@ -46,13 +43,33 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     /// Lay a rendered ground layer over a satellite layer.
-    Compose(compose::Args),
+    Compose(ComposeArgs),
 }
 
-/// Which views are made, and how.
+/// Arguments of `skysweep groundview compose`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "C = C_ground + (1 - alpha) C_sat: the ground layer as splat renderers leave it, weighted by its opacity."
+)]
+struct ComposeArgs {
+    /// Colours of the ground layer.
+    ground: PathBuf,
+    /// Its opacity (0 to the largest value of the file's type, or 0 to 1 in floats).
+    alpha: PathBuf,
+    /// Colours of the satellite layer.
+    satellite: PathBuf,
+    /// PNG to write.
+    #[arg(short, long, value_name = "OUT.png")]
+    output: PathBuf,
+    /// Replace a file that exists.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+/// Cameras and outputs of the views.
 #[derive(Debug, clap::Args)]
 struct MakeArgs {
-    /// Cameras of a COLMAP model on the surface's map, with origin.json beside: what skysweep align writes.
+    /// Cameras of a COLMAP model on the surface's map, with origin.json, as skysweep align writes it.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["center", "camera", "positions"])]
     cameras: Option<PathBuf>,
     #[command(flatten)]
@@ -75,7 +92,7 @@ struct MakeArgs {
     /// Points of the surface per perspective camera in the COLMAP model, at most.
     #[arg(long, value_name = "N", default_value_t = 2000)]
     points: usize,
-    /// What SURFACE's heights are above, where the file does not say or is wrong: ellipsoid, egm96, egm2008 or EPSG:n.
+    /// Vertical datum of SURFACE, if the file names none or a wrong one: ellipsoid, egm96, egm2008 or EPSG:n.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
     /// Worker threads [default: all cores].
@@ -94,30 +111,72 @@ struct MakeArgs {
 
 /// Runs `skysweep groundview`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let (surface, output) = match (&args.command, &args.surface, &args.output) {
-        (Some(Command::Compose(args)), ..) => return compose::run(args),
-        (None, Some(surface), Some(output)) => (surface, output),
+    match (&args.command, &args.surface, &args.output) {
+        (Some(Command::Compose(args)), ..) => compose(args),
+        (None, Some(surface), Some(output)) => make(&args.make, surface, output, global),
         _ => bail!("expected SURFACE and -o OUT"),
-    };
-    let make = &args.make;
-    make.stand.check()?;
-    threads::start(make.threads)?;
-    ensure!(
-        make.overwrite || output.join(output::REPORT).symlink_metadata().is_err(),
-        "the folder holds views already: choose another or pass --overwrite: {}",
-        output.display()
-    );
-    let surface = surface::Surface::open(surface, make.vertical)?;
-    let shots = shots::Shots::of(make, &surface)?;
-    let watcher = Watcher::new(make.progress, global);
-    let report = output::write(make, &surface, &shots, output, &watcher);
+    }
+}
+
+fn make(args: &MakeArgs, surface: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
+    let config = config(args, surface, output)?;
+    let watcher = Watcher::new(args.progress, global);
+    let report = jobs::groundview::run(&config, &watcher);
     watcher.finish();
-    let report = report?;
-    report.tell_failures();
-    if make.json {
+    let report = report.map_err(hinted)?;
+    report.failed.iter().take(SHOWN).for_each(|failure| tracing::error!("{}: {}", failure.id, failure.reason));
+    if args.json {
         print::json(&report)?;
     } else if !global.is_quiet() {
-        print::text(&report.text(output))?;
+        print::text(&report.text())?;
     }
     Ok(if report.is_complete() { Outcome::Complete } else { Outcome::Partial })
+}
+
+fn config(args: &MakeArgs, surface: &Path, output: &Path) -> anyhow::Result<GroundViewConfig> {
+    let cameras = match (&args.cameras, args.stand.config()) {
+        (Some(folder), _) => GroundCameras::Model(folder.clone()),
+        (None, Some(stand)) => GroundCameras::Panoramas(stand),
+        _ => bail!("no cameras: give --cameras FOLDER, --center LON LAT, --camera FILE or --positions FILE"),
+    };
+    let mut config = GroundViewConfig::new(surface.to_owned(), output.to_owned(), cameras);
+    config.panorama_width_px = args.width;
+    config.crops = args.crops;
+    config.crop_size_px = args.crop_size;
+    config.crop_fov_deg = args.fov;
+    config.pictures = args.pictures.clone();
+    config.points_per_view = args.points;
+    config.surface_vertical = args.vertical;
+    config.threads = args.threads;
+    config.overwrite = args.overwrite;
+    Ok(config)
+}
+
+fn compose(args: &ComposeArgs) -> anyhow::Result<Outcome> {
+    let (ground, alpha, satellite) = (args.ground.clone(), args.alpha.clone(), args.satellite.clone());
+    let mut config = ComposeConfig::new(ground, alpha, satellite, args.output.clone());
+    config.overwrite = args.overwrite;
+    jobs::groundview::compose(&config, &Log).map_err(hinted)?;
+    Ok(Outcome::Complete)
+}
+
+/// Adds the option that helps with an error.
+fn hinted(error: GroundViewError) -> anyhow::Error {
+    let hint = match &error {
+        GroundViewError::FolderInUse { .. } | GroundViewError::File(FileError::Exists { .. }) => Some(OVERWRITE),
+        GroundViewError::NoGround => Some("give --camera-height"),
+        GroundViewError::NoSurface { .. } => Some("skysweep city info tells why"),
+        GroundViewError::PlacedModel(_) => Some("skysweep align brings cameras to a map, --crs names it"),
+        GroundViewError::Stand(StandError::NotFinite { .. }) => {
+            Some("see --heading, --ground-offset and --camera-height")
+        }
+        GroundViewError::Value { name, .. } => match *name {
+            "the width of a panorama" => Some("see --width"),
+            "the size of a crop" => Some("see --crop-size"),
+            "the field of view" => Some("see --fov"),
+            _ => Some("see --crops"),
+        },
+        _ => None,
+    };
+    with_hint(error, hint)
 }

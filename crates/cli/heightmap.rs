@@ -1,25 +1,28 @@
 //! `skysweep heightmap`: the surface seen from above around a camera, turned to its heading, as a GeoTIFF.
 //!
-//! One map, or one per row of a list. A map that cannot be made does not stop the others of a list: it is named in the
-//! report, and the exit code is 1. `skysweep heightmap unproject` leads back to points
-//! or splats.
+//! The command makes one map, or one per row of a list. A map of a list that cannot be made does not stop the others: it is
+//! named in the report, and the exit code is 1. `skysweep heightmap unproject` turns a map back into points or splats.
 
-mod batch;
-mod settings;
-mod source;
-mod tags;
-mod tile;
-mod unproject;
-
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use city::Lod;
 use crs::{CrsRequest, VerticalDatum};
+use heightmap::{HeightMapError, Reading};
+use jobs::camera_stand::StandError;
+use jobs::files::FileError;
+use jobs::heightmap::{
+    ConfidenceSource, HeightMapConfig, HeightMapFate, HeightMapJobError, HeightMapReport, MapChoice, Normalization,
+    PointAxes, UnprojectConfig,
+};
 
-use crate::progress::ProgressStyle;
+use crate::error::{OVERWRITE, with_hint};
+use crate::progress::{Log, ProgressStyle, Watcher};
 use crate::stand::StandArgs;
-use crate::{Global, Outcome, threads};
+use crate::{Global, Outcome, print};
+
+/// Failed rows that are printed one by one.
+const SHOWN: usize = 20;
 
 /// Arguments of `skysweep heightmap`.
 #[derive(Debug, clap::Args)]
@@ -46,7 +49,55 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     /// Turn a height map back into points or splats.
-    Unproject(unproject::Args),
+    Unproject(UnprojectArgs),
+}
+
+/// Arguments of `skysweep heightmap unproject`.
+#[derive(Debug, clap::Args)]
+struct UnprojectArgs {
+    /// Height map that skysweep made.
+    map: PathBuf,
+    /// File to write: .ply (metres from the camera) or .las (UTM, heights above the ellipsoid).
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Axes of points in a PLY.
+    #[arg(long, value_enum, default_value_t = Frame::World)]
+    frame: Frame,
+    /// Write Gaussian splats as 3DGS viewers and trainers read them (.ply, its origin beside it), one for each pixel.
+    #[arg(long)]
+    splats: bool,
+    /// Picture of the map's own pixels that gives the splats their colours [default: grey].
+    #[arg(long, value_name = "IMAGE", requires = "splats")]
+    picture: Option<PathBuf>,
+    /// Merge splats whose heights are within this distance of one plane, and whose colours are alike.
+    #[arg(long, value_name = "METRES", requires = "splats")]
+    merge: Option<f64>,
+    /// Replace a file that exists.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// `--frame`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Frame {
+    /// East, north, up of the camera.
+    World,
+    /// (u / r, v / r, h): right of the camera, behind it, up.
+    Camera,
+}
+
+/// `--interpolation`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Interpolation {
+    /// The nearest cell.
+    Nearest,
+    /// Between four cells.
+    Bilinear,
+    /// Between sixteen cells.
+    Cubic,
 }
 
 /// How maps are made.
@@ -65,21 +116,21 @@ struct MakeArgs {
     dtm: Option<PathBuf>,
     /// Divide heights by the scale of the scene: auto (mean distance of the map's points), a number of metres, or none.
     #[arg(long, value_name = "auto|S|none", default_value = "none")]
-    normalize: settings::Normalize,
+    normalize: Normalization,
     /// Add a band of confidences (0 to 1): from this raster, or from confidence.tif beside a DSM that skysweep made; for
     /// other sources 1 where SOURCE has a height and 0 where --dtm gave it. "--confidence=FILE" names the raster.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "auto", require_equals = true)]
     confidence: Option<PathBuf>,
     /// Map to write on: local (a transverse Mercator at the camera, whose metres are those of the ground), utm or EPSG:n.
     #[arg(long, value_name = "CRS", default_value = "local")]
-    crs: settings::MapChoice,
-    /// How a raster is read between its cells.
-    #[arg(long, value_enum, default_value_t = settings::Interpolation::Bilinear)]
-    interpolation: settings::Interpolation,
-    /// Coordinate system of SOURCE, where the file does not say or is wrong: EPSG:n.
+    crs: MapChoice,
+    /// Interpolation between the cells of a raster.
+    #[arg(long, value_enum, default_value_t = Interpolation::Bilinear)]
+    interpolation: Interpolation,
+    /// Coordinate system of SOURCE, if the file names none or a wrong one: EPSG:n.
     #[arg(long, value_name = "CRS")]
     source_crs: Option<CrsRequest>,
-    /// What SOURCE's heights are above, likewise: ellipsoid, egm96, egm2008 or EPSG:n.
+    /// Vertical datum of SOURCE, likewise: ellipsoid, egm96, egm2008 or EPSG:n.
     #[arg(long, value_name = "DATUM")]
     source_vertical: Option<VerticalDatum>,
     /// Level of detail of a city model [default: the highest of each object up to 2.x].
@@ -97,7 +148,7 @@ struct MakeArgs {
     /// Worker threads [default: all cores].
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Replace maps that exist; without it a list goes on where it was left.
+    /// Replace maps that exist; without it a list goes on where an earlier run was stopped.
     #[arg(long)]
     overwrite: bool,
     /// How progress is shown on stderr.
@@ -110,15 +161,113 @@ struct MakeArgs {
 
 /// Runs `skysweep heightmap`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let (source, output) = match (&args.command, &args.source, &args.output) {
-        (Some(Command::Unproject(args)), ..) => return unproject::run(args, global),
-        (None, Some(source), Some(output)) => (source, output),
+    match (&args.command, &args.source, &args.output) {
+        (Some(Command::Unproject(args)), ..) => unproject(args, global),
+        (None, Some(source), Some(output)) => make(&args.make, source, output, global),
         _ => bail!("expected SOURCE and -o OUT"),
-    };
-    args.make.stand.check()?;
-    threads::start(args.make.threads)?;
-    match &args.make.stand.positions {
-        Some(positions) => batch::run(&args.make, source, positions, output, global),
-        None => tile::run(&args.make, source, output, global),
     }
+}
+
+fn make(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
+    let config = config(args, source, output)?;
+    let watcher = Watcher::new(args.progress, global);
+    let report = jobs::heightmap::run(&config, &watcher);
+    watcher.finish();
+    let report = report.map_err(hinted)?;
+    let failed = log_failures(&report);
+    if args.json {
+        print::json(&report)?;
+    } else if !global.is_quiet() {
+        print::text(&report.text())?;
+    }
+    Ok(if failed { Outcome::Partial } else { Outcome::Complete })
+}
+
+/// Logs the first rows of a list that failed, and returns whether there are any.
+fn log_failures(report: &HeightMapReport) -> bool {
+    let HeightMapReport::List(list) = report else { return false };
+    let reasons = list.maps.iter().filter_map(|record| match &record.fate {
+        HeightMapFate::Failed { reason } => Some((&record.id, reason)),
+        _ => None,
+    });
+    reasons.take(SHOWN).for_each(|(id, reason)| tracing::error!("{id}: {reason}"));
+    list.failed > 0
+}
+
+fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<HeightMapConfig> {
+    let Some(stand) = args.stand.config() else {
+        bail!("no position: give --center LON LAT, --camera FILE or --positions FILE");
+    };
+    let mut config = HeightMapConfig::new(source.to_owned(), output.to_owned(), stand);
+    config.size_px = args.size;
+    config.resolution_px_per_m = args.resolution;
+    config.terrain = args.dtm.clone();
+    config.normalization = args.normalize;
+    config.confidence = match &args.confidence {
+        None => ConfidenceSource::None,
+        Some(word) if word == Path::new("auto") => ConfidenceSource::Automatic,
+        Some(raster) => ConfidenceSource::Raster(raster.clone()),
+    };
+    config.map = args.crs;
+    config.interpolation = match args.interpolation {
+        Interpolation::Nearest => Reading::Nearest,
+        Interpolation::Bilinear => Reading::Bilinear,
+        Interpolation::Cubic => Reading::Cubic,
+    };
+    config.source_vertical = args.source_vertical;
+    match args.source_crs {
+        Some(CrsRequest::Epsg { horizontal, vertical }) => {
+            config.source_epsg = Some(horizontal);
+            config.source_vertical = args.source_vertical.or(vertical);
+        }
+        Some(CrsRequest::Auto) => bail!("--source-crs must name a code: EPSG:n"),
+        None => {}
+    }
+    config.lod = args.lod;
+    config.all_objects = args.all_objects;
+    config.previews = if args.stand.positions.is_some() { args.previews } else { !args.no_preview };
+    config.threads = args.threads;
+    config.overwrite = args.overwrite;
+    Ok(config)
+}
+
+fn unproject(args: &UnprojectArgs, global: Global) -> anyhow::Result<Outcome> {
+    let mut config = UnprojectConfig::new(args.map.clone(), args.output.clone());
+    config.axes = match args.frame {
+        Frame::World => PointAxes::World,
+        Frame::Camera => PointAxes::Camera,
+    };
+    config.splats = args.splats;
+    config.picture = args.picture.clone();
+    config.merge_m = args.merge;
+    config.overwrite = args.overwrite;
+    let report = jobs::heightmap::unproject(&config, &Log).map_err(hinted)?;
+    if args.json {
+        print::json(&report)?;
+    } else if !global.is_quiet() {
+        print::text(&report.text())?;
+    }
+    Ok(Outcome::Complete)
+}
+
+/// Adds the option that helps with an error.
+fn hinted(error: HeightMapJobError) -> anyhow::Error {
+    let hint = match &error {
+        HeightMapJobError::File(FileError::Exists { .. }) | HeightMapJobError::OtherMap { .. } => Some(OVERWRITE),
+        HeightMapJobError::NoCrs { .. } => Some("give --source-crs"),
+        HeightMapJobError::NoSurface { .. } => Some("skysweep city info tells why"),
+        HeightMapJobError::Stand(StandError::NotFinite { .. }) => {
+            Some("see --heading, --ground-offset and --camera-height")
+        }
+        HeightMapJobError::Tile(error) => match error {
+            HeightMapError::Bent { .. } => Some("give --crs local"),
+            HeightMapError::NotMetric { .. } => Some("give --crs local, utm or another projected EPSG code"),
+            HeightMapError::NoDatum { .. } => Some("--source-vertical ellipsoid takes the heights as they are"),
+            HeightMapError::NoGround { .. } => Some("give --dtm or --camera-height"),
+            _ => None,
+        },
+        HeightMapJobError::MirroredAxes => Some("give --frame world"),
+        _ => None,
+    };
+    with_hint(error, hint)
 }

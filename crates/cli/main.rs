@@ -23,7 +23,6 @@ mod simulate;
 mod splats;
 mod split;
 mod stand;
-mod threads;
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -29,7 +29,7 @@ pub enum HeightMapError {
     },
     /// The map of a CRS bends too much for an affine georeference.
     #[error(
-        "EPSG:{epsg} bends the tile by {off_px:.3} px, at most {limit_px} px can be written as a geotransform: use --crs local"
+        "EPSG:{epsg} bends the tile by {off_px:.3} px, at most {limit_px} px can be written as a geotransform: use the local map"
     )]
     Bent {
         /// The CRS asked for.
@@ -40,7 +40,7 @@ pub enum HeightMapError {
         limit_px: f64,
     },
     /// A CRS that is no map in metres.
-    #[error("EPSG:{epsg} is no map in metres: use --crs local, utm or another projected CRS")]
+    #[error("EPSG:{epsg} is not a map in metres: use the local map, the UTM zone or another projected CRS")]
     NotMetric {
         /// The CRS asked for.
         epsg: u32,
@@ -50,8 +50,8 @@ pub enum HeightMapError {
     OutsideSource,
     /// The datum's grid is not there, or not here.
     #[error(
-        "heights above {datum} cannot be converted here (PROJ has no grid for them): install PROJ's grid, or say \
-         --source-vertical ellipsoid to take them as they are"
+        "heights above {datum} cannot be converted here (PROJ has no grid for them): install PROJ's grid, or \
+         name the ellipsoid as the vertical datum to take them as they are"
     )]
     NoDatum {
         /// What the source's heights are above.
@@ -59,7 +59,7 @@ pub enum HeightMapError {
     },
     /// There is no surface under the camera.
     #[error(
-        "the source has no height within {reach_m} m of the camera at {lon_deg}, {lat_deg}: give --dtm or --camera-height"
+        "the source has no height within {reach_m} m of the camera at {lon_deg}, {lat_deg}: use a terrain model, or give the camera a height"
     )]
     NoGround {
         /// How far was searched, metres.

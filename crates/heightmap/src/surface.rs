@@ -5,10 +5,13 @@
 
 use raster::{Grid, bicubic, bilinear};
 
-use super::TileMap;
+use serde::{Deserialize, Serialize};
+
+use crate::lattice::TileMap;
 
 /// How heights are read between the cells of a grid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Reading {
     /// The nearest cell: steps stay steps.
     Nearest,

@@ -5,7 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use io::SaveError;
+use io::colmap::ColmapError;
+use io::npy::NpyError;
 use io::raster::RasterError;
+use io::splat_ply::SplatPlyError;
 use serde::Serialize;
 
 /// A file or folder that a job could not read or write.
@@ -42,14 +45,21 @@ pub enum FileError {
     Json(#[from] serde_json::Error),
 }
 
-impl From<RasterError> for FileError {
-    fn from(error: RasterError) -> Self {
-        match error {
-            RasterError::NotWritten(error) => error.into(),
-            other => Self::Write(other.into()),
+/// Converts the errors of the writers of `io`, which all have a variant for a file that was not written.
+macro_rules! from_writers {
+    ($($error:ident),*) => {$(
+        impl From<$error> for FileError {
+            fn from(error: $error) -> Self {
+                match error {
+                    $error::NotWritten(error) => error.into(),
+                    other => Self::Write(other.into()),
+                }
+            }
         }
-    }
+    )*};
 }
+
+from_writers!(RasterError, NpyError, ColmapError, SplatPlyError);
 
 impl From<SaveError> for FileError {
     fn from(error: SaveError) -> Self {

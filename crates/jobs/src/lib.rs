@@ -2,12 +2,16 @@
 
 pub mod align;
 mod as_text;
+pub mod camera_stand;
 pub mod city;
+mod city_files;
 pub mod corrections;
 pub mod dsm;
 mod error_text;
 pub mod eval;
 pub mod files;
+pub mod groundview;
+pub mod heightmap;
 pub mod map_surface;
 pub mod ortho;
 pub mod placed_model;

@@ -32,7 +32,6 @@ pub(crate) fn install<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T 
 }
 
 /// Returns the number of workers that encoders may use: the given number, or all cores.
-#[allow(dead_code, reason = "the jobs that use it follow")]
 pub(crate) fn count(threads: Option<usize>) -> usize {
     threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }

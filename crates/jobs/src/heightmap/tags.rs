@@ -1,38 +1,48 @@
-//! What a height map's file says about itself, in GDAL's default metadata domain.
+//! The metadata of a height map's file, in GDAL's default metadata domain.
 
 use std::path::Path;
 
-use anyhow::{Context, bail};
 use io::raster::ImageSource;
 use serde::Serialize;
 
-/// The items of a map.
+use super::error::HeightMapJobError;
+
+/// Metadata of a height map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Tags {
-    pub(super) camera_lon_deg: f64,
-    pub(super) camera_lat_deg: f64,
-    /// Height of the camera above the ellipsoid: the zero of the map's heights.
-    pub(super) camera_height_m: f64,
-    /// Height above the ellipsoid of the ground under it, where it was looked for.
-    pub(super) ground_height_m: Option<f64>,
-    pub(super) heading_deg: f64,
-    pub(super) resolution_px_per_m: f64,
-    /// s: what the heights are divided by in a normalised map, and would be in a metric one.
-    pub(super) scene_scale_m: f64,
-    pub(super) normalized: bool,
-    pub(super) source: String,
-    pub(super) source_kind: String,
-    pub(super) interpolation: String,
-    /// A number for what was asked for, to know the map again.
+#[non_exhaustive]
+pub struct HeightMapTags {
+    /// Longitude of the camera, degrees.
+    pub camera_lon_deg: f64,
+    /// Latitude of the camera, degrees.
+    pub camera_lat_deg: f64,
+    /// Height of the camera above the ellipsoid, metres: the zero of the heights of the map.
+    pub camera_height_m: f64,
+    /// Height of the ground under the camera above the ellipsoid, metres, if it was looked for.
+    pub ground_height_m: Option<f64>,
+    /// Heading, degrees clockwise from true north.
+    pub heading_deg: f64,
+    /// Pixels per metre on the ground.
+    pub resolution_px_per_m: f64,
+    /// Scale of the scene, metres: the divisor of the heights of a normalised map.
+    pub scene_scale_m: f64,
+    /// Whether the heights are divided by the scale of the scene.
+    pub normalized: bool,
+    /// File name of the source.
+    pub source: String,
+    /// `raster`, `city model` or `point cloud`.
+    pub source_kind: String,
+    /// Interpolation between the cells of a raster.
+    pub interpolation: String,
+    /// Number for what was asked for, to recognise the map.
     #[serde(skip)]
     pub(super) request: String,
 }
 
 const PRODUCT: (&str, &str) = ("SKYSWEEP_PRODUCT", "heightmap");
-pub(super) const REQUEST: &str = "HEIGHTMAP_REQUEST";
+const REQUEST: &str = "HEIGHTMAP_REQUEST";
 
-impl Tags {
-    /// As items of metadata; numbers read back to the same bits.
+impl HeightMapTags {
+    /// Returns the items of metadata. Numbers read back to the same bits.
     pub(super) fn items(&self) -> Vec<(&'static str, String)> {
         let units = if self.normalized { "scene (metres / SCENE_SCALE_M)" } else { "metre" };
         let mut items = vec![
@@ -58,19 +68,18 @@ impl Tags {
     }
 
     /// Reads the items of a file.
-    pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
+    pub(super) fn read(path: &Path) -> Result<Self, HeightMapJobError> {
+        let not_one = |found: String| HeightMapJobError::NotAHeightMap { path: path.to_owned(), found };
         let items = ImageSource::open(path)?.metadata("");
         let find = |key: &str| items.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone());
         if find(PRODUCT.0).as_deref() != Some(PRODUCT.1) {
-            bail!("no height map of skysweep (its metadata says no {}={}): {}", PRODUCT.0, PRODUCT.1, path.display());
+            return Err(not_one(format!("its metadata has no {}={}", PRODUCT.0, PRODUCT.1)));
         }
-        let text =
-            |key: &str| find(key).with_context(|| format!("the metadata item {key} is missing: {}", path.display()));
-        let number = |key: &str| -> anyhow::Result<f64> {
+        let text = |key: &str| find(key).ok_or_else(|| not_one(format!("the metadata item {key} is missing")));
+        let number = |key: &str| -> Result<f64, HeightMapJobError> {
             let found = text(key)?;
-            let value: f64 = found.parse().with_context(|| format!("{key} is {found:?}: {}", path.display()))?;
-            anyhow::ensure!(value.is_finite(), "{key} is {found:?}, expected a number: {}", path.display());
-            Ok(value)
+            let value = found.parse().ok().filter(|value: &f64| value.is_finite());
+            value.ok_or_else(|| not_one(format!("{key} is {found:?}, expected a number")))
         };
         Ok(Self {
             camera_lon_deg: number("CAMERA_LON_DEG")?,
