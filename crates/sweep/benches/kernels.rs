@@ -1,7 +1,8 @@
-//! Hypotheses per second of one thread: the cost volume, its aggregation, and the whole chain of a level.
+//! Hypotheses per second on one thread: the cost volume, its aggregation, and the whole chain of a
+//! level.
 //!
-//! Criterion's `elem/s` is pixel × hypothesis per second (Gde/s when divided by 10⁹); the costs are also counted per source,
-//! as each hypothesis is compared with every one of them.
+//! Criterion's `elem/s` is hypotheses of all pixels per second (Gde/s when divided by 10⁹). The
+//! costs are counted per source, as each hypothesis is compared with every source.
 
 use std::hint::black_box;
 
@@ -13,12 +14,12 @@ use sweep::cost::CostConfig;
 use sweep::ranges::Ranges;
 use sweep::{CostVolume, LevelConfig, Reference, SweepView, ViewLevel, sweep_level};
 
-/// Side of the images: a block with its margin is larger than the caches.
+/// Side of the images, pixels. A block of this size is larger than the caches.
 const SIZE: usize = 512;
 /// Hypotheses per pixel, in steps of a metre.
 const HYPOTHESES: usize = 64;
 
-/// A linear camera whose pixels move by `parallax` (samples, lines) per metre of height.
+/// Returns a linear camera whose pixels move by `parallax` (samples, lines) per metre of height.
 fn camera(parallax: [f64; 2]) -> RpcCamera {
     let half = SIZE as f64 / 2.0;
     let polynomial = |terms: [f64; 4]| std::array::from_fn(|i| terms.get(i).copied().unwrap_or(0.0));
@@ -43,7 +44,7 @@ fn camera(parallax: [f64; 2]) -> RpcCamera {
     })
 }
 
-/// Views of a textured plane at height 0, where all cameras agree.
+/// Returns views of a textured plane at height 0, where all cameras agree.
 fn views() -> Vec<SweepView> {
     let texture = |i: usize| {
         let (x, y) = ((i % SIZE) as f32, (i / SIZE) as f32);
@@ -65,11 +66,11 @@ fn kernels(c: &mut Criterion) {
         let sources: Vec<ViewLevel<'_>> = (1..=count).map(|i| views[i].on_level(i, 0)).collect();
         group.throughput(Throughput::Elements(evaluations * count as u64));
         group.bench_function(BenchmarkId::new("cost per source", count), |b| {
-            let mut room = Vec::new();
+            let mut buffer = Vec::new();
             b.iter(|| {
                 let volume =
-                    CostVolume::compute(reference, black_box(&sources), whole, &cost, std::mem::take(&mut room));
-                room = black_box(volume).expect("linear cameras").into_room();
+                    CostVolume::compute(reference, black_box(&sources), whole, &cost, std::mem::take(&mut buffer));
+                buffer = black_box(volume).expect("linear cameras").into_buffer();
             });
         });
     }

@@ -1,32 +1,33 @@
-//! Cross-view consistency: a height is kept when other views' own heights agree with it.
+//! Cross-view consistency: how many other views have heights that agree with a pixel's height.
 //!
-//! A reference pixel at its height goes to the ground and into each source, whose own height there must be the same
-//! within a tolerance. The tolerance is a length: the height by which the parallax between the two views changes by a
-//! stated number of pixels (SkySplat's |Δh|/|h| < 0.2 breaks near and below height 0; SatMVS uses < 1 px and < 2.5 m).
+//! A reference pixel at its height is projected to the ground and into each source. The source's
+//! own height there must be the same within a tolerance. The tolerance is the height difference
+//! that changes the parallax between the two views by a given number of pixels. (SkySplat's
+//! |Δh|/|h| < 0.2 fails near and below height 0; SatMVS uses < 1 px and < 2.5 m.)
 
 use multiversion::multiversion;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
 use crate::error::SweepError;
-use crate::geometry::{LocalMap, source_column_row};
+use crate::geometry::{LocalMap, PixelBox, source_column_row};
 use crate::height_map::{HeightMap, height_span};
 use crate::tiles::{paste, tiles};
 use crate::view::SweepView;
 
-/// Parameters of the check.
+/// Parameters of the consistency check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConsistencyConfig {
     /// Largest disagreement, pixels of parallax between the two views.
     pub tolerance_px: f64,
-    /// Side of the tiles in which the chain is replaced by a local map.
+    /// Side of the tiles in which a local map replaces the exact chain, pixels.
     pub tile: usize,
-    /// Largest error of that map, pixels.
+    /// Largest error of the local map, pixels.
     pub map_tolerance_px: f64,
 }
 
 impl Default for ConsistencyConfig {
-    /// One pixel is the left–right threshold of CARS and S2P.
+    /// Returns a tolerance of one pixel, the left–right threshold of CARS and S2P.
     fn default() -> Self {
         Self { tolerance_px: 1.0, tile: 64, map_tolerance_px: 0.1 }
     }
@@ -35,18 +36,18 @@ impl Default for ConsistencyConfig {
 /// A view and its heights on one level.
 #[derive(Debug, Clone, Copy)]
 pub struct Heights<'a> {
-    /// Its place among the views.
+    /// Index among the views.
     pub index: usize,
     /// The view.
     pub view: &'a SweepView,
-    /// Its heights on the level.
+    /// Heights on the level.
     pub map: &'a HeightMap,
 }
 
-/// How many of `sources` agree with each pixel of the reference.
+/// Counts the sources that agree with the height of each pixel of the reference.
 ///
 /// # Errors
-/// A camera that fails inside the scene.
+/// Returns [`SweepError::Camera`] if a camera fails inside the scene.
 pub fn count_agreeing(
     reference: Heights<'_>,
     sources: &[Heights<'_>],
@@ -82,10 +83,9 @@ fn count_in_tile(
     counts: &mut Grid<u8>,
 ) -> Result<(), SweepError> {
     let Some(range) = height_span(reference.map, w) else { return Ok(()) };
-    let corners = [w.x as f64, w.y as f64, (w.x + w.width as i64 - 1) as f64, (w.y + w.height as i64 - 1) as f64];
     let exact = |p, h| source_column_row(&reference.view.camera, &source.view.camera, level, p, h);
-    // A source whose camera does not reach the tile has nothing to say there.
-    let Ok(map) = LocalMap::fit(corners, range, exact) else { return Ok(()) };
+    // A source whose camera fails over the tile does not see it and agrees with nothing.
+    let Ok(map) = LocalMap::fit(PixelBox::of_window(w), range, exact) else { return Ok(()) };
     let fits = map.max_error_px <= config.map_tolerance_px;
     let parallax = parallax_per_metre(&map);
     let tolerance_m = (config.tolerance_px / parallax.max(f64::MIN_POSITIVE)) as f32;
@@ -112,14 +112,16 @@ fn count_in_tile(
     Ok(())
 }
 
-/// Where the pixels of a row are seen in the source: the pixels to the right and below.
+/// Source positions of the pixels of a row, each as the pixel to its lower right.
 struct Pixels {
+    /// Column right of the position.
     right: Vec<i32>,
+    /// Row below the position.
     below: Vec<i32>,
 }
 
 impl Pixels {
-    /// The row that begins at `first`, at its heights above the origin.
+    /// Maps the row that begins at `first`, at its heights above the origin.
     fn follow(&mut self, map: &LocalMap, first: [f64; 2], height_m: &[f32], origin_m: f64) {
         follow_row(map, first, height_m, origin_m, &mut self.right, &mut self.below);
     }
@@ -137,23 +139,24 @@ fn follow_row(map: &LocalMap, first: [f64; 2], height_m: &[f32], origin_m: f64, 
     }
 }
 
-/// The pixel to the right of a position and below it.
+/// Returns the column right of a position and the row below it.
 #[inline(always)]
 fn behind(q: [f64; 2]) -> (i32, i32) {
     ((q[0] + 1.0).floor() as i32, (q[1] + 1.0).floor() as i32)
 }
 
-/// Source pixels per metre of height.
+/// Returns the parallax, source pixels per metre of height.
 fn parallax_per_metre(map: &LocalMap) -> f64 {
     let h = map.mid_height_m();
     let (a, b) = (map.at([0.0, 0.0], h - 0.5), map.at([0.0, 0.0], h + 0.5));
     (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
-/// Whether one of four pixels, of which the last is named, has a height within the tolerance.
+/// Returns whether one of the four pixels around a position has a height within the tolerance of
+/// `wanted`. `right` and `below` name the last of them.
 #[inline(always)]
 fn agrees(map: &Grid<f32>, (right, below): (&i32, &i32), wanted: f32, tolerance_m: f32) -> bool {
-    // One that is less than 0 becomes more than any.
+    // A negative index becomes a huge one.
     let (right, below) = (*right as u32 as usize, *below as u32 as usize);
     if right > map.width() || below > map.height() {
         return false;

@@ -1,46 +1,47 @@
-//! Why a stage of the sweep could not give a result.
+//! Errors of the stages of the sweep.
 
-/// Why a stage could not give a result.
+/// Reason why a stage has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SweepError {
-    /// The camera model failed inside the scene.
+    /// A camera model failed inside the scene.
     #[error("the camera model of view {view} fails inside the scene: {source}")]
     Camera {
-        /// Which view, by its place in the input.
+        /// Index of the view in the input.
         view: usize,
-        /// What the camera said.
+        /// Error of the camera.
         source: camera::CameraError,
     },
-    /// The range of heights is too wide for the memory of one block.
-    #[error("a block of the image has more than {limit} height hypotheses; give a narrower --height-range")]
+    /// The height range is too wide for the memory of one block.
+    #[error("a block of the image has more than {limit} height hypotheses: give a narrower height range")]
     TooManyHypotheses {
-        /// The most that a block may have.
+        /// Largest number of hypotheses of a block.
         limit: u32,
     },
-    /// Heights that no surface has.
+    /// The height range lies farther from the ellipsoid than any surface.
     #[error(
-        "the height range begins {farthest} hypotheses from the ellipsoid, at most {limit} are expected; give a --height-range on Earth"
+        "the height range begins {farthest} hypotheses from the ellipsoid, at most {limit} are expected: \
+         give a height range on Earth"
     )]
     HeightsTooFar {
-        /// How far, in hypotheses.
+        /// Distance from the ellipsoid, hypotheses.
         farthest: u32,
-        /// The most that it may be.
+        /// Largest distance allowed, hypotheses.
         limit: u32,
     },
-    /// The local map between two images could not be brought under its error bound.
+    /// The local map between two images exceeds its error bound even on the smallest tile.
     #[error(
         "the map from view {reference} to view {source_view} is off by {error_px:.3} px on the smallest tile; \
          expected at most {bound_px} px: the RPC is not smooth here"
     )]
     NotSmooth {
-        /// The reference view.
+        /// Index of the reference view.
         reference: usize,
-        /// The source view.
+        /// Index of the source view.
         source_view: usize,
-        /// The error found, pixels.
+        /// Error of the map, pixels.
         error_px: f64,
-        /// The bound, pixels.
+        /// Error bound, pixels.
         bound_px: f64,
     },
 }

@@ -1,27 +1,32 @@
-//! Heights of one view, with what tells how reliable they are.
+//! Heights of one view on one level, with measures of their reliability.
 
 use raster::{Grid, Window};
 
 use crate::tiles::paste;
 
 /// Heights of one view on one level, with their reliability.
+///
+/// ```
+/// let map = sweep::HeightMap::empty(4, 3, 120.0);
+/// assert!(map.height_m.data().iter().all(|h| h.is_nan()));
+/// ```
 #[derive(Debug, Clone)]
 pub struct HeightMap {
-    /// What `height_m` counts from, metres above the ellipsoid.
+    /// Origin of `height_m`, metres above the ellipsoid.
     pub origin_m: f64,
-    /// Height per pixel minus the origin, metres; NaN where there is none.
+    /// Height above the origin, metres; NaN where there is none.
     pub height_m: Grid<f32>,
-    /// Standard deviation of the height by the spread of its mode, metres.
+    /// Standard deviation of the height, from the sharpness of its mode, metres.
     pub sigma_m: Grid<f32>,
-    /// 0 (a second height is as good) to 1.
+    /// Distinctness of the height: 0 if a second height fits as well, up to 1.
     pub confidence: Grid<f32>,
-    /// Share of the picture's contrast around each pixel that the views agree on at its height, 0 to 1; next to 0 no
-    /// picture stands behind the height, only its surroundings.
+    /// Share of the contrast around the pixel that the views agree on at its height, 0 to 1. Near 0
+    /// the height comes from its surroundings only.
     pub support: Grid<f32>,
 }
 
 impl HeightMap {
-    /// A map without any height.
+    /// Returns a map without heights.
     pub fn empty(width: usize, height: usize, origin_m: f64) -> Self {
         Self {
             origin_m,
@@ -32,7 +37,7 @@ impl HeightMap {
         }
     }
 
-    /// Makes a pixel one without a height.
+    /// Removes the height of a pixel.
     pub(crate) fn clear(&mut self, at: (usize, usize)) {
         self.height_m[at] = f32::NAN;
         self.sigma_m[at] = f32::NAN;
@@ -40,6 +45,7 @@ impl HeightMap {
         self.support[at] = 0.0;
     }
 
+    /// Copies a part of the map to a window.
     pub(crate) fn put(&mut self, at: Window, part: &Self) {
         paste(&mut self.height_m, at, &part.height_m);
         paste(&mut self.sigma_m, at, &part.sigma_m);
@@ -48,7 +54,8 @@ impl HeightMap {
     }
 }
 
-/// Least and greatest height in a window.
+/// Returns the least and the greatest height in a window, metres above the ellipsoid; `None` if it
+/// has no height.
 pub(crate) fn height_span(map: &HeightMap, w: Window) -> Option<(f64, f64)> {
     let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
     for y in 0..w.height {

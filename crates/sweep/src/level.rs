@@ -1,24 +1,22 @@
-//! One view on one pyramid level: costs, aggregation and read-out, block by block.
+//! Heights of one view on one pyramid level: costs, aggregation and read-out, block by block.
 //!
-//! Blocks lie on a fixed lattice of the image and overlap by a margin over which the aggregation settles; they are
-//! part of the method, so the result does not depend on tiles, memory or threads.
+//! Blocks lie on a fixed lattice of the image and overlap by a margin over which the aggregation
+//! settles. They are part of the method, so that the result does not depend on memory or threads.
 
 use std::cell::Cell;
 
-use multiversion::multiversion;
-use multiversion::target::match_target;
 use raster::Window;
 use rayon::prelude::*;
 
-use crate::aggregation::{Penalties, RowSums, Volume};
+use crate::aggregation::{Penalties, RowSums, VolumeBlock};
 use crate::cost::{COST_MAX, CostConfig};
 use crate::error::SweepError;
 use crate::height_map::HeightMap;
-use crate::readout::{Estimates, Modes, Sums, TOGETHER};
+use crate::readout::{Estimates, LeastSum, Modes, TOGETHER};
 use crate::reference::Reference;
-use crate::simd::Anywhere;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::Avx2;
+use crate::simd::{Arrays, Kernel};
 use crate::support::agreed_share;
 use crate::tiles::tiles;
 use crate::view::ViewLevel;
@@ -26,20 +24,22 @@ use crate::volume::CostVolume;
 
 /// Side of a block's core, pixels.
 const BLOCK: usize = 1024;
-/// Overlap of a block on each side: a path forgets its start within a few tens of pixels.
+/// Overlap of a block on each side, pixels. A path forgets its start within a few tens of pixels.
 const BLOCK_MARGIN: usize = 48;
 
-/// Room for more hypotheses than this, four times those of a usual block, is given back.
+/// Largest number of hypotheses whose buffers are kept for the next block: four times a usual
+/// block's.
 const KEPT_MAX: usize = 64 << 20;
 
 /// Parameters of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LevelConfig {
-    /// The cost volume.
+    /// Parameters of the cost volume.
     pub cost: CostConfig,
-    /// The aggregation's penalties.
+    /// Penalties of the aggregation.
     pub penalties: Penalties,
-    /// Deviation of a cost relative to the worst one: turns the sharpness of a mode into the deviation of its height.
+    /// Standard deviation of a cost relative to the worst one. It turns the sharpness of a mode
+    /// into the deviation of its height.
     pub cost_noise: f32,
 }
 
@@ -49,10 +49,13 @@ impl Default for LevelConfig {
     }
 }
 
-/// Sweeps one view against its sources.
+/// Computes the heights of one view from its sources. Heights in the result count from `origin_m`,
+/// metres above the ellipsoid.
 ///
 /// # Errors
-/// A camera that fails inside the scene, or is not smooth at the scale of a tile.
+/// Returns [`SweepError::NotSmooth`] if a camera is not smooth at the scale of a tile,
+/// [`SweepError::TooManyHypotheses`] if a block does not fit into memory, and
+/// [`SweepError::HeightsTooFar`] if the ranges lie absurdly far from the ellipsoid.
 pub fn sweep_level(
     reference: Reference<'_>,
     sources: &[ViewLevel<'_>],
@@ -84,7 +87,7 @@ fn sweep_block(
 ) -> Result<HeightMap, SweepError> {
     let whole = Window::whole(reference.view.image.width(), reference.view.image.height());
     let window = core.grown(BLOCK_MARGIN).intersection(&whole).unwrap_or(core);
-    let Room { costs, mut forward } = ROOM.take();
+    let LevelScratch { costs, mut forward } = SCRATCH.take();
     let volume = CostVolume::compute(reference, sources, window, &config.cost, costs)?;
     let mut reader = Reader {
         reference,
@@ -97,53 +100,72 @@ fn sweep_block(
     let block = volume.as_block();
     volume.aggregate(config.penalties, &mut forward, |y, sums| read_row(&mut reader, &block, y, sums));
     if volume.hypotheses() <= KEPT_MAX {
-        ROOM.set(Room { costs: volume.into_room(), forward });
+        SCRATCH.set(LevelScratch { costs: volume.into_buffer(), forward });
     }
     Ok(reader.finish())
 }
 
-/// Room for a block's costs and sums, two bytes per hypothesis.
+/// Buffers for a block's costs and for the forward pass: two bytes per hypothesis.
 #[derive(Default)]
-struct Room {
+struct LevelScratch {
     costs: Vec<u8>,
     forward: Vec<u8>,
 }
 
 thread_local! {
-    /// Blocks of one level and of the next take the same: fresh pages cost more than what is done with them.
-    static ROOM: Cell<Room> = Cell::default();
+    /// Kept from block to block and from level to level: fresh pages cost more time than the work
+    /// on them.
+    static SCRATCH: Cell<LevelScratch> = Cell::default();
 }
 
-/// Reads the heights of a block out of its sums, row by row.
+/// Reads the heights of a block from its aggregated costs, row by row.
 struct Reader<'a> {
     reference: Reference<'a>,
     window: Window,
     core: Window,
     config: &'a LevelConfig,
-    /// The cost of each pixel of the window at its hypothesis with the least sum.
+    /// Cost of each pixel of the window at its hypothesis with the least sum.
     best: Vec<u8>,
-    /// Of the core.
+    /// Heights of the core.
     out: HeightMap,
 }
 
-#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
-fn read_row(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize, sums: RowSums<'_>) {
-    match_target! {
-        "x86_64+avx512vl" => read_row_with::<Avx2>(reader, volume, y, sums),
-        "x86_64+avx2" => read_row_with::<Avx2>(reader, volume, y, sums),
-        _ => read_row_with::<Anywhere>(reader, volume, y, sums),
-    };
+/// Reading of one row.
+struct ReadRow<'a, 'b> {
+    reader: &'a mut Reader<'b>,
+    block: &'a VolumeBlock<'a>,
+    y: usize,
+    sums: RowSums<'a>,
+}
+
+fn read_row(reader: &mut Reader<'_>, block: &VolumeBlock<'_>, y: usize, sums: RowSums<'_>) {
+    let kernel = ReadRow { reader, block, y, sums };
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx2) = Avx2::detect() {
+        return avx2.run(kernel);
+    }
+    kernel.run(Arrays);
+}
+
+impl<S: LeastSum> Kernel<S> for ReadRow<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, token: S) {
+        read_row_with(token, self);
+    }
 }
 
 #[inline(always)]
-fn read_row_with<S: Sums>(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize, sums: RowSums<'_>) {
+fn read_row_with<S: LeastSum>(token: S, row: ReadRow<'_, '_>) {
+    let ReadRow { reader, block, y, sums } = row;
     let Reader { reference, window, core, config, best, out } = reader;
     let scale = 8.0 * f32::from(COST_MAX);
     let step = reference.ranges.step_m;
     let gy = window.y + y as i64;
     let image = &reference.view.image.row(gy as usize)[window.x as usize..][..window.width];
     let row = y * window.width..(y + 1) * window.width;
-    let (low, offsets, best) = (&volume.low[row.clone()], &volume.offsets[row.clone()], &mut best[row]);
+    let (low, offsets, best) = (&block.low[row.clone()], &block.offsets[row.clone()], &mut best[row]);
     let first = (core.x - window.x) as usize;
     let inner = usize::try_from(gy - core.y).ok().filter(|cy| *cy < core.height);
     let mut modes = Modes::new();
@@ -152,11 +174,11 @@ fn read_row_with<S: Sums>(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize
         let inside = run.start.max(first)..run.end.min(first + core.width);
         let inside = if inner.is_some() { inside } else { 0..0 };
         for (i, x) in run.enumerate() {
-            let own = sums.pixel_and_more(x);
-            let least = S::least(own.0, own.1);
-            best[x] = volume.costs[offsets[x] as usize + least.1];
+            let own = sums.pixel_with_overhang(x);
+            let least = token.least(own.0, own.1);
+            best[x] = block.costs[offsets[x] as usize + least.1];
             if inside.contains(&x) {
-                modes.put::<S>(i, own, least);
+                modes.put(token, i, own, least);
             }
         }
         let Some(cy) = inner.filter(|_| !inside.is_empty()) else { continue };
@@ -165,7 +187,8 @@ fn read_row_with<S: Sums>(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize
         let heights = out.height_m.row_mut(cy)[to.clone()].iter_mut().zip(&index[from.clone()]);
         for ((height, index), (low, grey)) in heights.zip(low[inside.clone()].iter().zip(&image[inside])) {
             let height_m = (f64::from(*low) + f64::from(*index)) * step;
-            // No picture, no height: blank parts agree at every height at which both images see them.
+            // Invalid pixels get no height: voids agree at every height at which both images see
+            // them.
             *height = if grey.is_nan() { f32::NAN } else { (height_m - out.origin_m) as f32 };
         }
         let sigmas = out.sigma_m.row_mut(cy)[to.clone()].iter_mut().zip(&spread[from.clone()]);
@@ -175,7 +198,7 @@ fn read_row_with<S: Sums>(reader: &mut Reader<'_>, volume: &Volume<'_>, y: usize
 }
 
 impl Reader<'_> {
-    /// The heights that a picture stands behind.
+    /// Drops the heights that no texture supports, and returns the map.
     fn finish(self) -> HeightMap {
         let Self { reference, window, core, best, mut out, .. } = self;
         let support = agreed_share(&best, &reference.view, window);
@@ -211,7 +234,7 @@ mod tests {
         Reference { view: views[0].on_level(0, 0), level: 0, ranges, prior: None }
     }
 
-    /// Errors of the inner pixels, in steps, for a plane at a height between two hypotheses.
+    /// Errors of the inner pixels, in steps, for a plane at a given height.
     fn errors(views: &[SweepView], height_m: f64, aggregation: Aggregation) -> Vec<f64> {
         let size = views[0].levels[0].width();
         let ranges = Ranges::uniform(size, size, 1.0, (-10.0, 30.0));
@@ -243,7 +266,7 @@ mod tests {
         sweep_level(reference(views, &ranges), &sources, 0.0, &config(Aggregation::Variance)).unwrap()
     }
 
-    /// Share of pixels with one height, to a hundredth of a step.
+    /// Share of pixels whose heights in two maps differ by less than a hundredth of a step.
     fn same(a: &HeightMap, b: &HeightMap) -> f64 {
         let pairs = a.height_m.data().iter().zip(b.height_m.data());
         let same = pairs.filter(|(a, b)| (*a - *b).abs() < 0.01 || (a.is_nan() && b.is_nan())).count();
@@ -255,7 +278,8 @@ mod tests {
         cameras.map(|c| view_of_plane(c, size, 7.3)).to_vec()
     }
 
-    /// A core that begins between two runs of pixels, and ends in one, has the heights that the whole window has there.
+    /// A core that begins and ends inside a run of pixels has the heights that the whole window has
+    /// there.
     #[test]
     fn a_block_reads_its_core_where_it_is() {
         let views = three_views(130);
@@ -293,7 +317,7 @@ mod tests {
         assert!(same(&swept(&views, &[1, 2]), &swept(&changed, &[1, 2])) > 0.99);
     }
 
-    /// Whole tiles cut off at the upper left of all views: what is left has the heights that it had.
+    /// Whole tiles are cut off at the upper left of all views: the rest keeps its heights.
     #[test]
     fn where_the_images_begin_does_not_matter() {
         let views = three_views(192);

@@ -1,37 +1,50 @@
-//! Heights that something else than the images tells, as a city model seen from a view (GS4Buildings' prior, carried to the
-//! height sweep): where to search, what to favour, where surfaces may end.
+//! Heights known beforehand, such as a city model seen from a view: the prior of GS4Buildings,
+//! carried to the height sweep.
 //!
-//! The prior is a hint. It widens the search, makes its height cheaper by less than what texture tells, and makes jumps cheap
-//! at its edges; where the images show another height well, that one wins.
+//! The prior is a hint. It widens the search, makes its heights a little cheaper, and makes jumps
+//! cheap at its edges. Where the images clearly show another height, that one wins.
 
 use raster::{Grid, Window};
 
 use crate::ranges::Ranges;
 
-/// How much cheaper the prior's height is, of [`crate::cost::COST_MAX`]: a tenth, so that where the picture tells heights apart it still
-/// decides (`tests/dsm_prior.rs`: a building too many does not show).
+/// Reduction of the cost at the prior's height, a tenth of [`crate::cost::COST_MAX`]. Where the
+/// image has texture it still decides: a building in the prior that does not exist leaves no trace
+/// (`tests/dsm_prior.rs`).
 const FAVOUR: f32 = 11.0;
-/// Steps of the search that the prior is off by at least: a step is half a pixel of parallax.
+/// Smallest deviation of the prior, in steps of the search. A step is half a pixel of parallax.
 const STEPS: f64 = 2.0;
-/// Prior heights of neighbours further apart than this many steps belong to two surfaces.
+/// Neighbours whose prior heights differ by more steps than this belong to two surfaces.
 const JUMP_STEPS: f32 = 4.0;
 
 /// Prior heights of a view on one level.
+///
+/// ```
+/// use raster::Grid;
+/// use sweep::Prior;
+/// use sweep::ranges::Ranges;
+///
+/// let roof_m = Grid::filled(8, 8, 30.0f32);
+/// let prior = Prior { height_m: &roof_m, deviation_m: 0.5 };
+/// let ground = Ranges::uniform(8, 8, 1.0, (0.0, 5.0));
+/// let widened = prior.widened(ground);
+/// assert_eq!((widened.low[(3, 3)], widened.count[(3, 3)]), (0, 33));
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Prior<'a> {
-    /// Metres above the ellipsoid for every pixel of the level, NaN where nothing is known.
+    /// Height of every pixel of the level, metres above the ellipsoid; NaN where unknown.
     pub height_m: &'a Grid<f32>,
-    /// How far they may be off, metres.
+    /// Standard deviation of the heights, metres.
     pub deviation_m: f64,
 }
 
 impl Prior<'_> {
-    /// Half the width of what is searched and favoured, metres.
+    /// Returns half the width of the heights that are searched and favoured, metres.
     fn reach_m(&self, step_m: f64) -> f64 {
         (STEPS * step_m).max(2.0 * self.deviation_m)
     }
 
-    /// Adds the heights around the prior to what is searched.
+    /// Widens the ranges of the search to include the heights around the prior.
     #[must_use]
     pub fn widened(&self, mut ranges: Ranges) -> Ranges {
         let reach_m = self.reach_m(ranges.step_m);
@@ -40,7 +53,7 @@ impl Prior<'_> {
             let lattice = |height_m: f64| (height_m / ranges.step_m).round() as i32;
             let first = lattice(f64::from(*prior) - reach_m).min(*low);
             let last = lattice(f64::from(*prior) + reach_m).max(*low + i32::from(*count) - 1);
-            // A prior that is off by thousands of steps is none.
+            // A prior that is off by tens of thousands of steps is ignored.
             if let Ok(all) = u16::try_from(last - first + 1) {
                 (*low, *count) = (first, all);
             }
@@ -48,7 +61,7 @@ impl Prior<'_> {
         ranges
     }
 
-    /// Makes the heights around the prior cheaper.
+    /// Lowers the costs of the heights around the prior.
     pub(crate) fn favour(&self, window: Window, step_m: f64, low: &[i32], offsets: &[u32], costs: &mut [u8]) {
         let reach = (self.reach_m(step_m) / step_m) as f32;
         for (pixel, low) in low.iter().enumerate() {
@@ -64,7 +77,7 @@ impl Prior<'_> {
         }
     }
 
-    /// Marks where the prior's surfaces end.
+    /// Marks the pixels where the prior's surfaces end as image edges.
     pub(crate) fn mark_edges(&self, window: Window, step_m: f64, edges: &mut [u8]) {
         let jump_m = JUMP_STEPS * step_m as f32;
         for (pixel, edge) in edges.iter_mut().enumerate() {
@@ -80,7 +93,7 @@ impl Prior<'_> {
     }
 }
 
-/// Where a window's pixel is in the image.
+/// Returns the column and row in the image of a window's pixel.
 fn place(window: Window, pixel: usize) -> (usize, usize) {
     (window.x as usize + pixel % window.width, window.y as usize + pixel / window.width)
 }

@@ -1,45 +1,60 @@
-//! Which height hypotheses each pixel is given.
+//! The height hypotheses of each pixel.
 //!
-//! Heights live on the lattice `k · step_m`. A pixel searches `[low, low + count)`; its hypotheses are stored one
-//! after the other, so cost and memory follow the scene's content and not its height range.
+//! Heights lie on the lattice `k · step_m` above the ellipsoid. A pixel searches
+//! `low..low + count`. Only these hypotheses are computed and stored, so that time and memory
+//! follow the content of the scene and not its height range.
 
 use raster::Grid;
 
-/// The hypotheses of every pixel of an image level.
+/// Height hypotheses of every pixel of an image level.
+///
+/// ```
+/// use sweep::ranges::Ranges;
+///
+/// let ranges = Ranges::uniform(100, 80, 0.5, (10.0, 14.0));
+/// assert_eq!((ranges.low[(0, 0)], ranges.count[(0, 0)]), (20, 9));
+/// assert_eq!(ranges.evaluations(), 100 * 80 * 9);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Ranges {
-    /// Metres between neighbouring hypotheses.
+    /// Distance of neighbouring hypotheses, metres.
     pub step_m: f64,
     /// First hypothesis of each pixel.
     pub low: Grid<i32>,
     /// Number of hypotheses of each pixel, at least one.
     pub count: Grid<u16>,
-    /// The hypothesis at which the coarser level found a steep surface; [`NOT_STEEP`] elsewhere.
+    /// Hypothesis at which the coarser level found a steep surface; [`NOT_STEEP`] elsewhere.
     pub steep: Grid<i32>,
 }
 
-/// How far around a coarse pixel heights count, coarse pixels: a patch that holds an edge sees the upper surface's height up to
-/// two pixels beside it, and the lower one begins only there. Twice as far gains little more.
+/// Reach around a coarse pixel within which heights enter its range, coarse pixels.
+///
+/// A patch that holds an edge sees the height of the upper surface up to two pixels beside it, and
+/// the lower surface begins only there. Twice the reach gains little more.
 pub const EDGE_REACH: usize = 2;
-/// Squares of unknown heights wider than about four times this take the whole map's heights.
+/// Largest reach of the search for known heights around unknown ones, coarse pixels. Farther inside
+/// a larger void the heights of the whole map count.
 const REACH_MAX: usize = 16;
-/// Steps that a finer level searches beyond what the coarser one found: one coarse step is two fine ones, and the
-/// coarser height is itself off by up to a step.
+/// Steps that a finer level searches beyond the heights of the coarser one. One coarse step is two
+/// fine ones, and the coarser height is itself off by up to a step.
 const MARGIN_STEPS: f64 = 3.0;
 
-/// No steep surface is expected.
+/// Value of [`Ranges::steep`] where no steep surface is expected.
 pub const NOT_STEEP: i32 = i32::MIN;
-/// Surfaces that climb by more hypotheses than this from pixel to pixel are two: three are a slope of 1.5 pixels of parallax per
-/// pixel, at which a view hardly sees the surface that another one sees.
+/// Largest climb of one surface from pixel to pixel, hypotheses.
+///
+/// Three hypotheses are a slope of 1.5 pixels of parallax per pixel. On steeper slopes one view
+/// hardly sees the surface that another one sees.
 pub const CLIMB_MAX: i32 = 3;
-/// Climbs beyond this are steep, hypotheses per pixel: gentler surfaces cost a step every other pixel, less than the noise of a
-/// coarse height handed down would do harm.
+/// Smallest climb of a steep surface, hypotheses per pixel. A gentler one pays for a step every
+/// other pixel at most, which does less harm than the noise of coarse heights would.
 const STEEP: f32 = 0.5;
-/// A climb whose halves differ by this factor is a jump, or noise.
+/// A climb whose halves differ by this factor or more is a jump, or noise.
 const UNEVEN: f32 = 2.0;
 
 impl Ranges {
-    /// The same range of heights for every pixel.
+    /// Gives every pixel the same range of heights, from `lo_m` to `hi_m` metres above the
+    /// ellipsoid.
     pub fn uniform(width: usize, height: usize, step_m: f64, (lo_m, hi_m): (f64, f64)) -> Self {
         let (low, count) = span(lo_m, hi_m, step_m);
         Self {
@@ -50,9 +65,12 @@ impl Ranges {
         }
     }
 
-    /// Ranges of a level from the heights of the next coarser one (metres, NaN where unknown): the least and greatest
-    /// height among the coarse neighbours up to `reach` away, with a margin. Where all of them are unknown, the nearest known
-    /// ones around count; `full` where the whole map is unknown.
+    /// Derives the ranges of a level from the heights of the next coarser one.
+    ///
+    /// `coarse` holds metres above `origin_m`, NaN where unknown. A pixel searches from the least
+    /// to the greatest height among the coarse neighbours up to `reach` pixels away, with a margin,
+    /// inside `full` (metres above the ellipsoid). Where all of them are unknown, the nearest known
+    /// ones count; where the whole map is unknown, all of `full` is searched.
     pub fn from_coarser(
         width: usize,
         height: usize,
@@ -65,7 +83,7 @@ impl Ranges {
         let (least, greatest) = known_extremes(coarse, reach);
         let mut out = Self::uniform(width, height, step_m, full);
         let margin = MARGIN_STEPS * step_m;
-        // All pixels of a coarse one search alike.
+        // The pixels below one coarse pixel share a range.
         let extremes = least.data().iter().zip(greatest.data());
         let spans = extremes.map(|(lo, hi)| {
             let (lo, hi) = (f64::from(*lo), f64::from(*hi));
@@ -85,11 +103,11 @@ impl Ranges {
         out
     }
 
-    /// Takes over the coarser level's surface where it is steep.
+    /// Notes the coarser level's surface where it is steep.
     fn expect_steep(&mut self, coarse: &Grid<f32>, origin_m: f64) {
         let (width, height) = (self.steep.width(), self.steep.height());
         let steps = |height_m: f32| height_m / self.step_m as f32;
-        // Along the map's border no slope has two sides.
+        // At the border of the map slopes lack a side.
         for y in 2..coarse.height().saturating_sub(2) {
             let rows = [y - 2, y - 1, y, y + 1, y + 2].map(|y| coarse.row(y));
             for x in 2..coarse.width().saturating_sub(2) {
@@ -101,7 +119,9 @@ impl Ranges {
                 }
                 for (dy, fine_y) in (0..2).map(|dy| (dy, 2 * y + dy)).filter(|(_, y)| *y < height) {
                     for (dx, fine_x) in (0..2).map(|dx| (dx, 2 * x + dx)).filter(|(_, x)| *x < width) {
-                        // The next coarse pixels in the direction of the fine one; what is across a jump is another surface.
+                        // Bilinear interpolation with the coarse pixels in the direction of the
+                        // fine one. A height across a jump belongs to another surface and is
+                        // replaced.
                         let (row, column) = (rows[1 + 2 * dy], x + 2 * dx - 1);
                         let near = |height_m: f32| {
                             if steps((height_m - own).abs()) <= 2.0 * CLIMB_MAX as f32 { height_m } else { own }
@@ -116,7 +136,7 @@ impl Ranges {
         }
     }
 
-    /// One hypothesis, which is never looked at, for the pixels where the image has no value.
+    /// Gives one hypothesis, whose result is not used, to pixels where the image is NaN.
     #[must_use]
     pub fn without_voids(mut self, image: &Grid<f32>) -> Self {
         for (n, _) in self.count.data_mut().iter_mut().zip(image.data()).filter(|(_, v)| v.is_nan()) {
@@ -125,41 +145,45 @@ impl Ranges {
         self
     }
 
-    /// Number of pixel × hypothesis pairs.
+    /// Returns the number of hypotheses of all pixels.
     pub fn evaluations(&self) -> u64 {
         self.count.data().iter().map(|&n| u64::from(n)).sum()
     }
 }
 
-/// By how many hypotheses a surface climbs from one pixel to the next, by where it is expected at each; by none where it is not
-/// steep, or the one ends and another begins.
+/// Returns by how many hypotheses a steep surface climbs from one pixel to the next, given where it
+/// is expected at each. Returns 0 where no steep surface is expected, or where one ends and another
+/// begins.
 #[inline(always)]
 pub(crate) fn climb_of(from: i32, to: i32) -> i32 {
     let climb = to.wrapping_sub(from);
     if climb.wrapping_add(CLIMB_MAX) as u32 <= 2 * CLIMB_MAX as u32 { climb } else { 0 }
 }
 
-/// A coarse height and those two pixels before and behind it say by how much the surface climbs per fine pixel; 0 where it is
-/// uneven or one is not known.
+/// Returns by how much the surface climbs per fine pixel, from a coarse height and those two pixels
+/// before and behind it; 0 where the climb is uneven or a height is NaN.
 fn slope([before, own, behind]: [f32; 3]) -> f32 {
     let (before, behind) = (own - before, behind - own);
     let (less, more) = (before.abs().min(behind.abs()), before.abs().max(behind.abs()));
     if before * behind > 0.0 && more < UNEVEN * less { (before + behind) / 8.0 } else { 0.0 }
 }
 
-/// Lattice indices that cover a height interval: first, and how many.
+/// Returns the lattice indices that cover a height interval: the first one and their number.
 fn span(lo_m: f64, hi_m: f64, step_m: f64) -> (i32, u16) {
     let low = (lo_m / step_m).floor() as i32;
     let high = (hi_m / step_m).ceil() as i32;
     (low, (high - low + 1).clamp(1, i32::from(u16::MAX)) as u16)
 }
 
-/// Least and greatest known height around every cell: of its neighbours up to `reach` away or, where all are unknown, of the
-/// smallest of a few growing squares that holds a known one, or else of the whole map. (+inf, −inf) when nothing is.
+/// Returns the least and the greatest known height around every cell.
+///
+/// The neighbours up to `reach` away count. Where all are unknown, the smallest of a few growing
+/// squares with a known height counts, or else the whole map. Without any height the result is (+∞,
+/// −∞).
 fn known_extremes(g: &Grid<f32>, reach: usize) -> (Grid<f32>, Grid<f32>) {
     let (mut least, mut greatest) =
         (extremes(g, f32::INFINITY, f32::min, reach), extremes(g, f32::NEG_INFINITY, f32::max, reach));
-    // Each round adds its reach to that of the rounds before it.
+    // The reach of each round adds to that of the rounds before.
     let mut reach = reach + 1;
     let (mut wide_least, mut wide_greatest) = (least.clone(), greatest.clone());
     while reach <= REACH_MAX && least.data().iter().any(|v| v.is_infinite()) {
@@ -180,13 +204,14 @@ fn known_extremes(g: &Grid<f32>, reach: usize) -> (Grid<f32>, Grid<f32>) {
     (least, greatest)
 }
 
-/// `pick` over the square of half width `reach` around every cell, NaN cells left out.
+/// Applies `pick` (minimum or maximum) over the square of half width `reach` around every cell, NaN
+/// cells left out.
 pub(crate) fn extremes(g: &Grid<f32>, start: f32, pick: impl Fn(f32, f32) -> f32, reach: usize) -> Grid<f32> {
     let (w, h) = (g.width(), g.height());
     let mut rows = Grid::filled(w, h, start);
     for y in 0..h {
         let (from, to) = (g.row(y), rows.row_mut(y));
-        // `f32::min` and `max` return the other operand for a NaN.
+        // For a NaN `f32::min` and `f32::max` return the other operand.
         for shift in 0..=reach.min(w.saturating_sub(1)) {
             to.iter_mut().zip(&from[shift..]).for_each(|(to, v)| *to = pick(*to, *v));
             to[shift..].iter_mut().zip(from).for_each(|(to, v)| *to = pick(*to, *v));
@@ -230,12 +255,13 @@ mod tests {
             Grid::from_vec(12, 12, (0..144).map(|i| of((i % 12) as f32, (i / 12) as f32)).collect()).unwrap()
         };
         let steep = |coarse: &Grid<f32>| Ranges::from_coarser(24, 24, 0.5, coarse, 100.125, (0.0, 400.0), 1).steep;
-        // A metre per coarse pixel is a hypothesis per fine one, whose middle lies a quarter of a coarse pixel beside that one's.
+        // A metre per coarse pixel is a hypothesis per fine pixel. The centre of a fine pixel lies
+        // a quarter of a coarse pixel beside that of the coarse one.
         let [right, down] = [steep(&map(&|x, _| x)), steep(&map(&|_, y| y))];
         for (x, y) in (4..20).flat_map(|y| (4..20).map(move |x| (x, y))) {
             assert_eq!((right[(x, y)], down[(x, y)]), (200 + x as i32, 200 + y as i32), "at ({x}, {y})");
         }
-        // The foot of a wall beside a slope is the slope's.
+        // At the foot of a wall beside a slope the slope is expected.
         let beside = steep(&map(&|x, y| if x < 6.0 { y } else { y + 40.0 }));
         assert!((4..20).all(|y| beside[(11, y)] == 200 + y as i32 && beside[(12, y)] == 280 + y as i32));
         assert_eq!(climb_of(beside[(11, 8)], beside[(12, 8)]), 0);

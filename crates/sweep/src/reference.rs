@@ -1,18 +1,18 @@
-//! The view whose heights are sought, on the level being swept.
+//! The view whose heights are computed, on the level being swept.
 
 use crate::prior::Prior;
 use crate::ranges::Ranges;
 use crate::view::ViewLevel;
 
-/// The reference on the level being swept.
+/// View whose heights are computed, on the level being swept.
 #[derive(Debug, Clone, Copy)]
 pub struct Reference<'a> {
-    /// Its image and camera.
+    /// Image and camera.
     pub view: ViewLevel<'a>,
-    /// The level of its pyramid.
+    /// Level of the pyramid; 0 is the full resolution.
     pub level: u32,
-    /// The hypotheses of its pixels.
+    /// Hypotheses of its pixels.
     pub ranges: &'a Ranges,
-    /// What is known of its heights beforehand.
+    /// Heights known beforehand, if any.
     pub prior: Option<Prior<'a>>,
 }

@@ -1,9 +1,11 @@
-//! How much of the picture stands behind a height: the share of its contrast that the views agree on, over a window.
+//! Support of a height by the images: the share of the contrast around a pixel that the views agree
+//! on.
 //!
-//! The aggregation carries heights into places that have no texture (a saturated roof, an undeclared void) or another
-//! one in every view (water). Costs there are no better than chance, which one pixel's cost does not tell and the mean
-//! over a window does. Unrelated pictures differ by as much as one of them holds: `1 − Σ cost / Σ contrast` is then 0, with
-//! contrast the mean of the absolute graded census of the reference.
+//! The aggregation carries heights into places without texture (a saturated roof, an undeclared
+//! void) or with different texture in every view (water). Costs there are no better than chance.
+//! The cost of a single pixel does not show that, but the mean over a window does. Unrelated
+//! pictures differ by as much as the contrast of one of them, so that `1 − Σ cost / Σ contrast` is
+//! 0 there. The contrast is the mean of the absolute graded census of the reference.
 
 use multiversion::multiversion;
 use raster::Window;
@@ -12,16 +14,17 @@ use crate::cost::{COST_MAX, census_scale};
 use crate::view::ViewLevel;
 use crate::window_sums::window_sums;
 
-/// Half width of the window, pixels: 81 patches bring the spread of a mean at chance down to a few percent.
+/// Half width of the window, pixels. Over its 81 pixels the mean cost of unrelated pictures
+/// scatters by a few percent only.
 const REACH: usize = 4;
 
-/// For each pixel of the window the share of contrast agreed on, 0 to 1; `best` are the costs of its pixels at the hypotheses with
-/// the least sums.
+/// Returns the share of contrast that is agreed on for each pixel of the window, 0 to 1. `best` are
+/// the costs of its pixels at the hypotheses with the least aggregated cost.
 pub(crate) fn agreed_share(best: &[u8], view: &ViewLevel<'_>, window: Window) -> Vec<f32> {
     share(best, &census_contrast(view, window), window.width)
 }
 
-/// Mean absolute graded census of every pixel, 0 to 1; NaN where the image is invalid.
+/// Computes the mean absolute graded census of every pixel, 0 to 1; NaN where the image is invalid.
 fn census_contrast(view: &ViewLevel<'_>, window: Window) -> Vec<f32> {
     let scale = census_scale(view);
     let padded = view.image.window(window.grown(1), f32::NAN);
@@ -32,7 +35,7 @@ fn census_contrast(view: &ViewLevel<'_>, window: Window) -> Vec<f32> {
     out
 }
 
-/// The contrast of the middle one of three rows, which have a pixel more at either end.
+/// Computes the contrast of the middle one of three rows, which have one pixel more at either end.
 #[multiversion(targets("x86_64+avx2"))]
 fn contrast_of_row(rows: [&[f32]; 3], scale: f32, out: &mut [f32]) {
     let own = &rows[1][1..][..out.len()];
@@ -46,7 +49,7 @@ fn contrast_of_row(rows: [&[f32]; 3], scale: f32, out: &mut [f32]) {
 }
 
 fn share(best: &[u8], contrast: &[f32], width: usize) -> Vec<f32> {
-    // In units of the cost, so that the sums over the window are exact; 81 costs fit 16 bits.
+    // In integer units of the cost the sums over the window are exact; 81 costs fit 16 bits.
     let cost = |i: usize| if contrast[i].is_nan() { 0 } else { u16::from(best[i]) };
     let held = |i: usize| if contrast[i].is_nan() { 0 } else { (contrast[i] * f32::from(COST_MAX)).round() as u16 };
     let (costs, held) = (window_sums(best.len(), width, REACH, cost), window_sums(best.len(), width, REACH, held));
@@ -63,7 +66,8 @@ mod tests {
 
     #[test]
     fn a_pixel_has_the_share_that_the_best_hypotheses_around_it_agree_on() {
-        // On the right half of the contrast is agreed on, on the left nothing, and the lowest rows hold no picture.
+        // Half of the contrast is agreed on at the right, none at the left; the lower rows have no
+        // contrast.
         let (width, height) = (40, 30);
         let n = width * height;
         let best: Vec<u8> = (0..n).map(|p| if p % width < 20 { 64 } else { 32 }).collect();

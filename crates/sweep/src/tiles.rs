@@ -2,7 +2,8 @@
 
 use raster::{Grid, Window};
 
-/// The windows of side `side` that cover `area`, row after row; the last ones may be smaller.
+/// Returns the windows of side `side` that cover `area`, row after row. The last ones may be
+/// smaller.
 pub(crate) fn tiles(area: Window, side: usize) -> Vec<Window> {
     let mut out = Vec::new();
     for y in (0..area.height).step_by(side) {
@@ -18,7 +19,7 @@ pub(crate) fn tiles(area: Window, side: usize) -> Vec<Window> {
     out
 }
 
-/// Copies `part` into `whole` at the window `at`, which lies inside.
+/// Copies `part` into `whole` at the window `at`, which must lie inside.
 pub(crate) fn paste<T: Copy>(whole: &mut Grid<T>, at: Window, part: &Grid<T>) {
     for y in 0..at.height {
         whole.row_mut(at.y as usize + y)[at.x as usize..][..at.width].copy_from_slice(part.row(y));

@@ -1,33 +1,55 @@
-//! A view: an image pyramid with its camera.
+//! Views: image pyramids with their cameras.
 
 use camera::RpcCamera;
 use numeric::{order_statistic, upper_median};
 use raster::{Grid, Pyramid};
 
-/// Variance that an 8-bit quantisation alone leaves.
+/// Variance of the rounding error of integer grey values.
 pub(crate) const QUANTISATION_VARIANCE: f32 = 1.0 / 12.0;
-/// The pyramid stops when a side would fall below this: a handful of patches.
+/// Smallest side of a pyramid level, pixels: a handful of patches.
 const SIDE_MIN: usize = 32;
-/// From the largest image there is to a pixel.
+/// Largest number of levels: enough to reduce the largest image to a pixel.
 const LEVELS_MAX: usize = 16;
 
-/// One image of the scene. Invalid pixels (no-data, masked) are NaN on every level.
+/// One image of the scene as a pyramid, with its camera. Invalid pixels (no-data, masked) are NaN
+/// on every level.
+///
+/// ```
+/// use camera::{Rpc, RpcCamera};
+/// use raster::Grid;
+/// use sweep::SweepView;
+///
+/// # let one = [1.0, 0.0, 0.0, 0.0];
+/// # let terms = |t: [f64; 4]| std::array::from_fn(|i| t.get(i).copied().unwrap_or(0.0));
+/// # let rpc = Rpc {
+/// #     line_off: 50.0, samp_off: 50.0, lat_off: 0.0, long_off: 0.0, height_off: 0.0,
+/// #     line_scale: 50.0, samp_scale: 50.0, lat_scale: 1e-3, long_scale: 1e-3,
+/// #     height_scale: 100.0,
+/// #     line_num: terms([0.0, 0.0, -1.0, 0.0]), line_den: terms(one),
+/// #     samp_num: terms([0.0, 1.0, 0.0, 0.5]), samp_den: terms(one),
+/// #     err_bias_m: None, err_rand_m: None,
+/// # };
+/// let view = SweepView::new(RpcCamera::new(rpc), Grid::filled(100, 100, 0.0));
+/// assert_eq!(view.levels[1].width(), 50);
+/// ```
 #[derive(Debug, Clone)]
 pub struct SweepView {
-    /// The camera of level 0, corrected.
+    /// Corrected camera of level 0.
     pub camera: RpcCamera,
-    /// Level 0 is the full resolution; each level halves the one before it.
+    /// Images. Level 0 is the full resolution; each level halves the one before it.
     pub levels: Vec<Grid<f32>>,
-    /// Standard deviation of the image noise at level 0, grey values: patches flatter than this carry no information.
+    /// Standard deviation of the image noise at level 0, grey values. Patches flatter than this
+    /// carry no information.
     pub noise: f32,
-    /// Typical difference between neighbouring pixels of each level, grey values: what its texture is measured by.
+    /// Median difference between neighbouring pixels of each level, grey values: the unit of its
+    /// texture.
     pub contrast: Vec<f32>,
 }
 
 impl SweepView {
-    /// A view of an image, NaN where invalid.
+    /// Builds a view from an image that is NaN where invalid.
     pub fn new(camera: RpcCamera, mut image: Grid<f32>) -> Self {
-        // One kind of NaN: the census tells it by its bits.
+        // The quantisation of the census relies on the bits of this NaN.
         image.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = f32::NAN);
         let noise = noise_deviation(&image);
         let levels = Pyramid::new(image, LEVELS_MAX, SIDE_MIN).into_levels();
@@ -35,7 +57,8 @@ impl SweepView {
         Self { camera, levels, noise, contrast }
     }
 
-    /// A view of which only the levels from `level` on are there: `image` is that level, the finer ones are empty.
+    /// Builds a view without its finest levels: `image` is level `level`, and finer levels are
+    /// empty.
     pub fn from_level(camera: RpcCamera, level: usize, image: Grid<f32>) -> Self {
         let noise = noise_deviation(&image) * (1 << level) as f32;
         let mut levels = vec![Grid::filled(0, 0, f32::NAN); level];
@@ -44,13 +67,13 @@ impl SweepView {
         Self { camera, levels, noise, contrast }
     }
 
-    /// A view that does not see the scene: every level is empty.
+    /// Returns a view that does not see the scene: every level is empty.
     pub fn absent(camera: RpcCamera) -> Self {
         let levels = vec![Grid::filled(0, 0, f32::NAN); LEVELS_MAX];
         Self { camera, levels, noise: 0.0, contrast: vec![0.0; LEVELS_MAX] }
     }
 
-    /// What the sweep takes of it on a level; `index` is its place among the views.
+    /// Returns the view on one level; `index` is its index among the views.
     pub fn on_level(&self, index: usize, level: usize) -> ViewLevel<'_> {
         ViewLevel {
             index,
@@ -61,7 +84,8 @@ impl SweepView {
         }
     }
 
-    /// The pixels of a level whose patch holds a single value: saturated, or a void that nothing declares. No height shows there.
+    /// Marks the pixels of a level whose 3 × 3 patch holds a single value: saturated, or a void
+    /// that nothing declares. Images show no height there.
     pub fn blank(&self, level: usize) -> Grid<bool> {
         let image = &self.levels[level];
         let mut out = Grid::filled(image.width(), image.height(), false);
@@ -75,31 +99,32 @@ impl SweepView {
         out
     }
 
-    /// The most noise to expect on a level: each reduction at least halves it.
+    /// Returns the largest noise to expect on a level: each reduction at least halves it.
     pub fn noise_at(&self, level: usize) -> f32 {
         self.noise / (1 << level) as f32
     }
 }
 
-/// A source view on the level being swept.
+/// A view on the level being swept.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewLevel<'a> {
-    /// Its place among the views.
+    /// Index among the views.
     pub index: usize,
-    /// Its image on this level, NaN where invalid.
+    /// Image on this level, NaN where invalid.
     pub image: &'a Grid<f32>,
-    /// Its camera.
+    /// Camera of level 0.
     pub camera: &'a RpcCamera,
-    /// Its noise on this level, grey values.
+    /// Standard deviation of the noise on this level, grey values.
     pub noise: f32,
-    /// Its typical difference between neighbouring pixels on this level, grey values.
+    /// Median difference between neighbouring pixels on this level, grey values.
     pub contrast: f32,
 }
 
-/// Median of the greater of the differences to the left and to the upper neighbour; 0 for an image without any.
+/// Returns the median over the pixels of the greater difference to the left and to the upper
+/// neighbour; 0 for an image without valid differences.
 fn typical_difference(g: &Grid<f32>) -> f32 {
     let (w, h) = (g.width(), g.height());
-    // About a quarter of a million pixels tell the median to a few thousandths.
+    // A quarter of a million pixels give the median to a few thousandths.
     let step = 1.max(((w * h) as f64 / 2.5e5).sqrt() as usize);
     let places = (1..h).step_by(step).flat_map(|y| (1..w).step_by(step).map(move |x| (x, y)));
     let difference = |(x, y): (usize, usize)| {
@@ -110,11 +135,13 @@ fn typical_difference(g: &Grid<f32>) -> f32 {
     upper_median(&mut all).unwrap_or(0.0)
 }
 
-/// Standard deviation of the noise: of the response to Immerkær's mask (1996), which smooth and straight structures do
-/// not excite, the lower quartile, which texture hardly reaches. 0 for an image without valid neighbourhoods.
+/// Estimates the standard deviation of the noise; 0 for an image without valid neighbourhoods.
+///
+/// The estimate is the lower quartile of the responses to Immerkær's mask (1996). Smooth and
+/// straight structures do not excite the mask, and texture hardly reaches the lower quartile.
 fn noise_deviation(g: &Grid<f32>) -> f32 {
     let (w, h) = (g.width(), g.height());
-    // Every ninth pixel of at most a few million: the quartile does not need more.
+    // The quartile needs no more than every ninth pixel, and of large images fewer.
     let step = 3.max(((w * h) as f64 / 4e6).sqrt() as usize);
     let mut responses = Vec::new();
     for y in (1..h.saturating_sub(1)).step_by(step) {
@@ -129,7 +156,7 @@ fn noise_deviation(g: &Grid<f32>) -> f32 {
         }
     }
     let quarter = responses.len() / 4;
-    // A quarter of a normal deviate lies within 0.3186 of its deviation.
+    // A quarter of all normal deviates lie within 0.3186 standard deviations.
     order_statistic(&mut responses, quarter).map_or(0.0, |response| response / 0.3186)
 }
 
@@ -164,7 +191,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 40) as f32 / (1u64 << 24) as f32
         };
-        // The sum of twelve uniform deviates minus six is close to a normal one.
+        // The sum of twelve uniform deviates minus six is nearly normal.
         let values = (0..300 * 300).map(|i| {
             let normal: f32 = (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
             (i % 300) as f32 * 0.5 + 3.0 * normal

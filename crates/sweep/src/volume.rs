@@ -1,11 +1,11 @@
-//! The cost volume of one window of a view: for every pixel its own hypotheses, their costs against the sources, and what
-//! the semi-global aggregation makes of them.
+//! The cost volume of one window of a view: the hypotheses of every pixel with their costs against
+//! the sources, and their aggregation.
 
 use multiversion::multiversion;
 use numeric::upper_median;
 use raster::{Grid, Window};
 
-use crate::aggregation::{FARTHEST, LANES, Penalties, RowSums, Volume, aggregate};
+use crate::aggregation::{FARTHEST, LANES, Penalties, RowSums, VolumeBlock, aggregate};
 use crate::cost::{BlockCosts, CostConfig, TileScratch, sweep_tile};
 use crate::error::SweepError;
 use crate::ranges::{NOT_STEEP, Ranges};
@@ -13,38 +13,47 @@ use crate::reference::Reference;
 use crate::tiles::tiles;
 use crate::view::ViewLevel;
 
-/// A window with more hypotheses than this would take more than 2 GB.
+/// Largest number of hypotheses of a window: more would take over 2 GB.
 const HYPOTHESES_MAX: u32 = 700_000_000;
 
-/// Costs of a window's pixels, row after row; memory follows the hypotheses, a byte each.
+/// Costs of a window's pixels, row after row, one byte per hypothesis.
 #[derive(Debug, Clone)]
 pub struct CostVolume {
     width: usize,
     height: usize,
+    /// First hypothesis of each pixel.
     low: Vec<i32>,
+    /// Hypothesis at which a steep surface is expected at each pixel.
     steep: Vec<i32>,
+    /// Index of each pixel's first cost; one entry more than there are pixels.
     offsets: Vec<u32>,
+    /// The costs, followed by [`LANES`] entries that belong to no pixel.
     costs: Vec<u8>,
+    /// Strength of the image edge at each pixel, 0 to 255.
     edges: Vec<u8>,
 }
 
 impl CostVolume {
-    /// Sweeps a window of the reference through the hypotheses of its pixels. `room` is for the costs ([`Self::into_room`]): fresh
-    /// pages cost as much as what is written to them.
+    /// Computes the costs of all hypotheses of a window of the reference.
+    ///
+    /// `buffer` becomes the memory of the costs, and [`Self::into_buffer`] returns it: fresh pages
+    /// would cost as much time as writing to them.
     ///
     /// # Errors
-    /// A camera that fails inside the scene, or is not smooth at the scale of a tile; more hypotheses than fit into memory.
+    /// Returns [`SweepError::NotSmooth`] if a camera is not smooth at the scale of a tile,
+    /// [`SweepError::TooManyHypotheses`] if the window does not fit into memory, and
+    /// [`SweepError::HeightsTooFar`] if the ranges lie absurdly far from the ellipsoid.
     pub fn compute(
         reference: Reference<'_>,
         sources: &[ViewLevel<'_>],
         window: Window,
         config: &CostConfig,
-        room: Vec<u8>,
+        buffer: Vec<u8>,
     ) -> Result<Self, SweepError> {
         let (low, offsets) = layout(reference.ranges, window)?;
         let steep = reference.ranges.steep.window(window, NOT_STEEP).into_vec();
-        // Every hypothesis gets its cost below, whatever was there.
-        let mut costs = room;
+        // Every hypothesis gets its cost below, whatever the buffer holds.
+        let mut costs = buffer;
         costs.resize(offsets.last().map_or(0, |&n| n as usize) + LANES, 0);
         let mut scratch = TileScratch::default();
         let mut block = BlockCosts { window, offsets: &offsets, costs: &mut costs };
@@ -59,24 +68,26 @@ impl CostVolume {
         Ok(Self { width: window.width, height: window.height, low, steep, offsets, costs, edges })
     }
 
-    /// Number of hypotheses of all pixels.
+    /// Returns the number of hypotheses of all pixels.
     pub fn hypotheses(&self) -> usize {
         self.costs.len() - LANES
     }
 
-    /// The room that the costs took, for the next volume.
-    pub fn into_room(self) -> Vec<u8> {
+    /// Returns the memory of the costs, for the next volume.
+    pub fn into_buffer(self) -> Vec<u8> {
         self.costs
     }
 
-    /// The sums of the path costs over eight directions, one per hypothesis: `read` is given every row's, the last row first.
-    /// `forward` is room for the first half of the directions; one that is used again need not be made anew.
+    /// Sums the path costs over eight directions and hands every row of sums to `read`, the last
+    /// row first. `forward` is a scratch buffer for the first four directions, which may be used
+    /// again.
     pub fn aggregate(&self, penalties: Penalties, forward: &mut Vec<u8>, read: impl FnMut(usize, RowSums<'_>)) {
         aggregate(&self.as_block(), penalties, forward, read);
     }
 
-    pub(crate) fn as_block(&self) -> Volume<'_> {
-        Volume {
+    /// Returns the volume as the aggregation reads it.
+    pub(crate) fn as_block(&self) -> VolumeBlock<'_> {
+        VolumeBlock {
             width: self.width,
             height: self.height,
             low: &self.low,
@@ -88,7 +99,7 @@ impl CostVolume {
     }
 }
 
-/// First hypotheses and cost offsets of a window's pixels.
+/// Returns the first hypothesis of each pixel of a window, and the index of its first cost.
 fn layout(ranges: &Ranges, window: Window) -> Result<(Vec<i32>, Vec<u32>), SweepError> {
     let area = window.width * window.height;
     let (mut low, mut offsets) = (Vec::with_capacity(area), Vec::with_capacity(area + 1));
@@ -113,8 +124,8 @@ fn layout(ranges: &Ranges, window: Window) -> Result<(Vec<i32>, Vec<u32>), Sweep
     Ok((low, offsets))
 }
 
-/// How strong an edge each pixel is, 0 to 255: its gradient against the block's typical one and the noise. Pixels without
-/// a value are no edge, and say nothing of what is typical.
+/// Returns the strength of the edge at each pixel, 0 to 255: its gradient against the block's
+/// median and the noise. Invalid pixels are no edge and do not count in the median.
 fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
     let mut gradient = vec![0.0f32; w.width * w.height];
     for (y, row) in gradient.chunks_exact_mut(w.width).enumerate() {
@@ -122,7 +133,8 @@ fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
         let below = if gy + 1 < image.height() { gy + 1 } else { gy };
         gradients(&image.row(gy)[w.x as usize..], &image.row(below)[w.x as usize..], row);
     }
-    // The median of a fourth of the rows, thousands of pixels even in a small block, is as good as that of all.
+    // A quarter of the rows, thousands of pixels even in a small block, gives the median well
+    // enough.
     let rows = gradient.chunks_exact(w.width).step_by(4);
     let mut known: Vec<f32> = rows.flatten().copied().filter(|g| g.is_finite()).collect();
     let typical = upper_median(&mut known).unwrap_or(0.0);
@@ -131,7 +143,8 @@ fn edge_strength(image: &Grid<f32>, w: Window, noise: f32) -> Vec<u8> {
     edges
 }
 
-/// Gradients up to twice the typical one, the `unit`, are texture; from eight times on they are edges.
+/// Grades gradients from 0 to 255: up to twice the `unit` they are texture, from eight times it
+/// they are full edges.
 #[multiversion(targets("x86_64+avx2"))]
 fn grade_edges(gradient: &[f32], unit: f32, out: &mut [u8]) {
     for (edge, g) in out.iter_mut().zip(gradient) {
@@ -140,7 +153,8 @@ fn grade_edges(gradient: &[f32], unit: f32, out: &mut [u8]) {
     }
 }
 
-/// The greater of the differences to the right and to the lower neighbour; the last column may have no right one.
+/// Computes the greater of the differences to the right and to the lower neighbour. The last column
+/// may lack a right neighbour.
 #[multiversion(targets("x86_64+avx2"))]
 fn gradients(row: &[f32], below: &[f32], out: &mut [f32]) {
     let inner = out.len().min(row.len() - 1);

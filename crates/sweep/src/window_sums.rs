@@ -1,10 +1,12 @@
-//! Sums over the square around every cell.
+//! Sums over the square around every cell, by running sums.
 
 use std::iter::Sum;
 use std::ops::{AddAssign, SubAssign};
 
-/// Sums over the square of half width `reach` around every one of `count` values in rows of `width`, as much of it as there is;
-/// `value` tells the one at an index. Running sums: exact for integers, to rounding for others.
+/// Returns the sums over the square of half width `reach` around each of `count` values in rows of
+/// `width`. `value` returns the value at an index; values outside count as 0.
+///
+/// The running sums are exact for integers, and correct up to rounding for floating-point numbers.
 pub(crate) fn window_sums<T>(count: usize, width: usize, reach: usize, value: impl Fn(usize) -> T) -> Vec<T>
 where
     T: Copy + Default + AddAssign + SubAssign + Sum<T>,
@@ -23,7 +25,7 @@ where
             sum -= x.checked_sub(reach).map_or(T::default(), |left| values[left]);
         }
     };
-    // The rows that a square covers, one after the other in turn: the next one takes the place of the first.
+    // Ring buffer of the rows that a square covers: the next row replaces the first.
     let turns = (2 * reach + 1).min(height);
     let mut rows = vec![T::default(); turns * width];
     let place = |y: usize| (y % turns) * width..(y % turns + 1) * width;
@@ -56,7 +58,7 @@ mod tests {
         assert_eq!((sums[0], sums[5 + 2], sums[2 * 5 + 4]), (12.0, 63.0, 44.0));
         assert_eq!(window_sums(3, 3, 7, |i| i as u16 + 1), [6, 6, 6]);
         assert!(window_sums(0, 3, 7, |i| i as u16).is_empty());
-        // Rows in turn, more of them than a square covers.
+        // More rows than the ring buffer holds.
         let (width, height) = (7i64, 23i64);
         let value = |i: usize| ((i * i * 31) % 101) as i64;
         for (i, sum) in window_sums((width * height) as usize, width as usize, 2, value).iter().enumerate() {

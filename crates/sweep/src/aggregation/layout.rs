@@ -1,66 +1,104 @@
-//! Rows of pixels with the path costs that lead to them: where they lie, and what pixels have to do with those before them.
-//!
-//! Between the path costs of two pixels lie [`GUARD`] entries that are [`FAR`], so that those of pixels that search nearly the
-//! same heights are read in place.
+//! Layout of one row of path costs in memory, and what is known of each of its pixels.
 
-/// The cost of heights that a pixel does not search. Others reach it only where the worst cost and the penalty of a jump do
-/// together, and are cut.
+/// Path cost of heights that a pixel does not search.
+///
+/// A path that comes from such a height is dearer than a jump, so that the jump is taken. A true
+/// path cost is 255 only where the worst cost and the penalty of a jump exceed it together.
 pub(super) const FAR: u8 = u8::MAX;
-/// Most hypotheses that are worked on together, a vector register of bytes; most pixels need half of it.
+
+/// Longest vector, bytes: most hypotheses that are worked on together. Most pixels need half of it.
 pub(crate) const LANES: usize = 32;
-/// Entries between the path costs of two pixels: a neighbour that searches this many heights less one beyond them finds its
-/// own in place.
+
+/// Guard entries between the path costs of two pixels.
+///
+/// A neighbour whose range ends up to `GUARD − 1` hypotheses inside a pixel's range is read in
+/// place.
 pub(super) const GUARD: usize = 8;
-/// Pixels whose links are worked out together.
+
+/// Pixels whose links to their neighbours are worked out together.
 pub(super) const RUN: usize = 64;
-/// How far from 0 a pixel's hypotheses may begin: two pixels' differ by what 32 bits hold.
+
+/// Largest distance of a pixel's first hypothesis from 0. The difference of two such numbers fits
+/// 32 bits, climbs included.
 pub(crate) const FARTHEST: u32 = 1 << 29;
 
-/// The pixels of a row, from left to right.
+/// Input of one row of pixels, from left to right.
 #[derive(Clone, Copy)]
-pub(crate) struct Pixels<'a> {
-    /// First hypothesis of each.
+pub(crate) struct RowPixels<'a> {
+    /// First hypothesis of each pixel.
     pub(crate) low: &'a [i32],
-    /// Where a steep surface is expected at each ([`crate::ranges::Ranges::steep`]).
+    /// Hypothesis at which a steep surface is expected at each pixel
+    /// ([`crate::ranges::Ranges::steep`]).
     pub(crate) steep: &'a [i32],
-    /// Where the costs of each begin, and those of the next row.
+    /// Index of each pixel's first cost, and of the next row's.
     pub(crate) offsets: &'a [u32],
-    /// Strength of the edge at each.
+    /// Strength of the image edge at each pixel, 0 to 255.
     pub(crate) edges: &'a [u8],
 }
 
-/// Path costs of one row along the three directions from the row before, in the order in which they are computed. What is said
-/// of each pixel is in the order of the image, with one entry more at either end, at which nothing has a cost, and room for
-/// whole [`RUN`]s.
+/// Path costs of one row along the three directions that come from the row before.
+///
+/// `paths` holds the directions one after the other, [`PathRow::direction_stride`] bytes each. The
+/// pixels follow each other in the order of computation (left to right forward, right to left
+/// backward), each with one byte per hypothesis:
+///
+/// ```text
+///            start[1]        start[2]                        start[width]
+///            v               v                               v
+/// +-------+--------+-------+----------+-------+-- ... --+-------+--------+-------+-----------+
+/// | guard | pixel  | guard | pixel    | guard |         | guard | pixel  | guard | overhang  |
+/// | 8 FAR | n₁     | 8 FAR | n₂       | 8 FAR |         | 8 FAR | n_w    | 8 FAR | 2 · LANES |
+/// +-------+--------+-------+----------+-------+-- ... --+-------+--------+-------+-----------+
+///  <------------------------------ direction_stride -------------------------------------->
+/// ```
+///
+/// Vectors are written whole. The last one of a pixel overhangs into the guard behind it and into
+/// the next pixel; the guard is written again when the pixel is complete, and the next pixel's
+/// costs come later. Behind the last pixel the overhang takes what is too much.
+///
+/// A pixel reads a neighbour's costs from one height below its own first one to one above its last
+/// one, as whole vectors. If its range exceeds the neighbour's by less than [`GUARD`] hypotheses at
+/// either end, its own heights meet only the neighbour's costs and guards. The lanes behind its
+/// last hypothesis read whatever lies there and do not count. Other neighbours are copied aside
+/// first.
+///
+/// The vectors per pixel (`low`, `high`, …) are in the order of the image. They have one entry more
+/// at either end, which stands for the pixels outside the image: a jump from there costs nothing.
+/// They are filled up to whole [`RUN`]s.
 #[derive(Default)]
-pub(crate) struct Row {
-    /// One direction after the other, as many entries each.
+pub(crate) struct PathRow {
+    /// Path costs, as drawn above.
     pub(super) paths: Vec<u8>,
+    /// Number of pixels.
     pub(super) width: usize,
-    /// All hypotheses, and the most of a pixel.
+    /// Number of hypotheses of all pixels.
     pub(super) count: usize,
+    /// Largest number of hypotheses of a pixel.
     pub(super) most: usize,
-    /// Each pixel's first hypothesis, and the one behind its last.
+    /// First hypothesis of each pixel.
     pub(super) low: Vec<i32>,
+    /// Hypothesis after the last one of each pixel.
     pub(super) high: Vec<i32>,
-    /// Where a steep surface is expected at it.
+    /// Hypothesis at which a steep surface is expected at each pixel.
     pub(super) steep: Vec<i32>,
-    /// Where its path costs are.
-    pub(super) place: Vec<i32>,
-    /// The penalty of a jump at it; between two pixels it is the lower one of theirs.
+    /// Index of each pixel's path costs within a direction.
+    pub(super) start: Vec<i32>,
+    /// Penalty of a jump at each pixel. Between two pixels the lower penalty counts.
     pub(super) jump: Vec<u8>,
-    /// The least path costs: of the path along the row, and of the three from the row before.
+    /// Least path costs of each pixel: along the row, then along the three other directions.
     pub(super) least: Vec<[u8; 4]>,
 }
 
-impl Row {
-    /// Makes room for the pixels, `backward` for the last one first; `jump` is the penalty of a jump by the edge.
+impl PathRow {
+    /// Lays out a row of pixels, the last one first if `backward`. `jump` maps the strength of an
+    /// edge to the penalty of a jump.
     ///
     /// # Panics
-    /// Slices of different lengths, a pixel without hypotheses or with those of absurd heights, or more of them than a row can have.
+    /// Panics if the slices do not fit each other, if a pixel has no hypothesis or one farther than
+    /// [`FARTHEST`], or if the row needs more than 2²⁹ bytes.
     #[inline(always)]
-    pub(crate) fn place(&mut self, pixels: Pixels<'_>, backward: bool, jump: impl Fn(u8) -> u8) {
-        let Pixels { low, steep, offsets, edges } = pixels;
+    pub(crate) fn place(&mut self, pixels: RowPixels<'_>, backward: bool, jump: impl Fn(u8) -> u8) {
+        let RowPixels { low, steep, offsets, edges } = pixels;
         let width = low.len();
         assert!(width > 0 && offsets.len() == width + 1 && edges.len() == width && steep.len() == width);
         self.resize(width);
@@ -76,75 +114,79 @@ impl Row {
             (fewest, most, farthest) = (count.min(fewest), count.max(most), low.unsigned_abs().max(farthest));
             *high = low.wrapping_add(count);
         }
-        assert!(fewest > 0, "a pixel of {fewest} hypotheses");
-        assert!(farthest <= FARTHEST, "hypotheses that begin at {farthest}");
+        assert!(fewest > 0, "a pixel has {fewest} hypotheses");
+        assert!(
+            farthest <= FARTHEST,
+            "a pixel's hypotheses begin at {farthest}, at most {FARTHEST} from 0 are allowed"
+        );
         (self.count, self.most) = (end.wrapping_sub(first) as usize, most as usize);
-        // A register that overhangs and two more; guards reach as far.
         let len = self.count + GUARD * (width + 1) + 2 * LANES;
-        assert!(len < i32::MAX as usize / 4, "{len} entries");
+        assert!(len < i32::MAX as usize / 4, "a row has {len} path costs");
         let guard = GUARD as i32;
-        for ((place, pixel), (from, to)) in self.place[1..=width].iter_mut().zip(0..).zip(from.iter().zip(to)) {
-            *place = if backward {
+        for ((start, pixel), (from, to)) in self.start[1..=width].iter_mut().zip(0..).zip(from.iter().zip(to)) {
+            *start = if backward {
                 end.wrapping_sub(*to) as i32 + guard * (width as i32 - pixel)
             } else {
                 from.wrapping_sub(first) as i32 + guard * (pixel + 1)
             };
         }
-        for of_each in [&mut self.low, &mut self.high, &mut self.steep, &mut self.place] {
-            (of_each[0], of_each[width + 1]) = (of_each[1], of_each[width]);
+        for per_pixel in [&mut self.low, &mut self.high, &mut self.steep, &mut self.start] {
+            (per_pixel[0], per_pixel[width + 1]) = (per_pixel[1], per_pixel[width]);
         }
         (self.jump[0], self.jump[width + 1]) = (0, 0);
         (self.least[0], self.least[width + 1]) = ([0; 4], [0; 4]);
-        if self.apart() < len {
+        if self.direction_stride() < len {
             self.paths.resize(3 * len, FAR);
         }
-        let apart = self.apart();
-        (0..3).for_each(|d| self.paths[d * apart..][..GUARD].fill(FAR));
+        let stride = self.direction_stride();
+        (0..3).for_each(|d| self.paths[d * stride..][..GUARD].fill(FAR));
     }
 
     fn resize(&mut self, width: usize) {
         let entries = width.next_multiple_of(RUN) + 2;
-        for of_each in [&mut self.low, &mut self.high, &mut self.steep, &mut self.place] {
-            of_each.resize(entries, 0);
+        for per_pixel in [&mut self.low, &mut self.high, &mut self.steep, &mut self.start] {
+            per_pixel.resize(entries, 0);
         }
         self.jump.resize(entries, 0);
         self.least.resize(entries, [0; 4]);
         self.width = width;
     }
 
-    /// What the pixel of an entry searches.
+    /// Returns the heights that the pixel of an entry searches.
     #[inline(always)]
-    pub(super) fn range(&self, entry: usize) -> Range {
-        Range { low: self.low[entry], high: self.high[entry] }
+    pub(super) fn range(&self, entry: usize) -> HypothesisRange {
+        HypothesisRange { low: self.low[entry], high: self.high[entry] }
     }
 
-    /// From the path costs of one direction to those of the next.
-    pub(super) fn apart(&self) -> usize {
+    /// Returns the number of bytes from one direction to the next.
+    pub(super) fn direction_stride(&self) -> usize {
         self.paths.len() / 3
     }
 }
 
-/// A pixel's first hypothesis, and the one behind its last.
+/// Hypotheses `low..high` of a pixel.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Range {
+pub(super) struct HypothesisRange {
     pub(super) low: i32,
     pub(super) high: i32,
 }
 
-impl Range {
+impl HypothesisRange {
+    /// Returns the number of hypotheses.
     #[inline(always)]
     pub(super) fn count(self) -> usize {
         self.high.wrapping_sub(self.low) as usize
     }
 
+    /// Returns the range raised by a climb.
     #[inline(always)]
     pub(super) fn climbed(self, by: i32) -> Self {
         Self { low: self.low.wrapping_add(by), high: self.high.wrapping_add(by) }
     }
 
-    /// By how many heights a pixel searches beyond another's.
+    /// Returns by how many hypotheses the range exceeds another one, at the end where that is more.
     #[inline(always)]
-    pub(super) fn beyond(self, other: Self) -> i32 {
+    pub(super) fn excess_over(self, other: Self) -> i32 {
         other.low.wrapping_sub(self.low).max(self.high.wrapping_sub(other.high))
     }
 }

@@ -1,7 +1,7 @@
-//! Four paths extended to the hypotheses of one pixel, and what becomes of their costs.
+//! Four paths extended to the hypotheses of one pixel.
 //!
-//! A path cost is the pixel's cost and what the way there adds, which is no more than the penalty of a jump: two of them fit a
-//! byte, and so does half of four.
+//! A path cost is the pixel's cost plus an increment of at most the penalty of a jump. The sum of
+//! two increments therefore fits a byte, and so does half the sum of four.
 
 #![allow(unsafe_code)]
 
@@ -9,27 +9,45 @@ use super::layout::{FAR, GUARD, LANES};
 use super::store::Store;
 use crate::simd::Bytes;
 
-/// A pixel: what its path costs come from, and where they go. All that is read or written are whole registers.
+/// Inputs and outputs of one pixel. Everything is read and written as whole vectors.
+///
+/// The pointers are valid for the row and the row before as [`super::layout::PathRow`] draws them.
+/// The `unsafe` methods below rely on that.
 pub(super) struct Pixel<'a, S> {
+    /// Number of hypotheses.
     pub(super) count: usize,
+    /// Penalty of a step.
     pub(super) step: u8,
+    /// Costs of the hypotheses.
     pub(super) costs: *const u8,
-    /// The path costs of the three pixels before it in the row before, from the height below its first one on, and two more than
-    /// its registers hold.
+    /// Path costs of the three pixels before it in the row before, from one height below its first
+    /// hypothesis on: readable for its vectors and two bytes more.
     pub(super) upper: [*const u8; 3],
-    /// The least of them.
+    /// Least path cost of each of these three.
     pub(super) least: [&'a u8; 3],
-    /// The penalties of a jump, along the row first.
+    /// Penalties of a jump: along the row, then from the row before.
     pub(super) jumps: [&'a u8; 4],
-    /// For the path costs from the row before, each direction `apart` from the one before; there is room for a guard behind.
+    /// Destination of the path costs from the row before: three directions, `direction_stride`
+    /// apart, each with room for a guard behind.
     pub(super) paths: *mut u8,
-    pub(super) apart: usize,
+    /// Number of bytes from one direction to the next.
+    pub(super) direction_stride: usize,
+    /// Destination of the results.
     pub(super) results: S,
-    /// For the least path costs.
+    /// Destination of the least path costs of the four directions.
     pub(super) leasts: *mut [u8; 4],
 }
 
-/// No bits of twice [`LANES`], and all of as many.
+/// Part of a pixel's hypotheses: `left` of them from hypothesis `at` on.
+#[derive(Clone, Copy)]
+pub(super) struct Span {
+    /// First hypothesis.
+    pub(super) at: usize,
+    /// Number of hypotheses from `at` to the pixel's last one, at most two vectors.
+    pub(super) left: usize,
+}
+
+/// Mask that sets lanes to 255: none in the first two vectors' length, all in the next two.
 static OUTSIDE: [u8; 4 * LANES] = {
     let mut out = [0; 4 * LANES];
     let mut i = 2 * LANES;
@@ -41,72 +59,81 @@ static OUTSIDE: [u8; 4 * LANES] = {
 };
 
 impl<S: Store> Pixel<'_, S> {
-    /// Extends four paths to the hypotheses from `at` on, as many as `N` registers hold; `left` of them are the pixel's, or all.
-    /// `around` are the path costs along the row, and `least` the least of them. Returns its own path costs along the row, and all
-    /// four's least.
+    /// Extends four paths to the hypotheses of a span that fits `N` vectors.
+    ///
+    /// `around` are the path costs along the row one height below, at the same height and one
+    /// above; `least` is the least of them, in all lanes. Returns the pixel's own path costs along
+    /// the row, and the lane-wise minima of all four directions.
     ///
     /// # Safety
-    /// What [`Pixel`] says.
+    /// The pointers are as [`Pixel`] states. The span lies within the pixel's hypotheses, and
+    /// `N` vectors from `span.at` on lie within its vectors.
     #[inline(always)]
     pub(super) unsafe fn extend<V: Bytes, const N: usize>(
         &self,
-        (at, left): (usize, usize),
+        token: V::Token,
+        span: Span,
         around: [[V; 3]; N],
         least: V,
     ) -> ([V; N], [V; 4]) {
-        let step = V::splat(self.step);
-        // SAFETY: the caller's; the table is twice as long as the registers.
+        let Span { at, left } = span;
+        let step = V::splat(token, self.step);
+        // SAFETY: costs, path costs and results can be read and written in whole vectors from `at`
+        // on, as the caller vouches. `left` is at most `2 * LANES`, so the mask begins inside the
+        // table, and `N` vectors, at most `2 * LANES` bytes, end inside it.
         unsafe {
-            // Where the cost has all bits, so has the path cost.
+            // Lanes behind the last hypothesis get a cost of 255, and with it a path cost of 255.
             let outside = OUTSIDE.as_ptr().add(2 * LANES - left);
-            let cost: [V; N] =
-                lanes(|i| V::load(self.costs.add(at + i * V::LANES)).or(V::load(outside.add(i * V::LANES))));
-            let jump = V::splat(*self.jumps[0]);
-            let added: [V; N] = lanes(|i| turn(around[i], step, least, jump));
-            let along: [V; N] = lanes(|i| cost[i].plus(added[i]));
-            let mut leasts = [lesser(along); 4];
+            let cost: [V; N] = registers(|i| {
+                V::load(token, self.costs.add(at + i * V::LANES)).or(V::load(token, outside.add(i * V::LANES)))
+            });
+            let jump = V::splat(token, *self.jumps[0]);
+            let added: [V; N] = registers(|i| increment(around[i], step, least, jump));
+            let along: [V; N] = registers(|i| cost[i].saturating_add(added[i]));
+            let mut leasts = [lane_minima(along); 4];
             let mut sums = [added; 2];
             for d in 0..3 {
-                let (least, jump) = (V::splat(*self.least[d]), V::splat(*self.jumps[d + 1]));
-                let added: [V; N] = lanes(|i| {
+                let (least, jump) = (V::splat(token, *self.least[d]), V::splat(token, *self.jumps[d + 1]));
+                let added: [V; N] = registers(|i| {
                     let from = self.upper[d].add(at + i * V::LANES);
-                    turn([V::load(from), V::load(from.add(1)), V::load(from.add(2))], step, least, jump)
+                    let around = [V::load(token, from), V::load(token, from.add(1)), V::load(token, from.add(2))];
+                    increment(around, step, least, jump)
                 });
-                let own: [V; N] = lanes(|i| cost[i].plus(added[i]));
-                let to = self.paths.add(d * self.apart + at);
+                let own: [V; N] = registers(|i| cost[i].saturating_add(added[i]));
+                let to = self.paths.add(d * self.direction_stride + at);
                 for (i, own) in own.iter().enumerate() {
                     own.store(to.add(i * V::LANES));
                 }
-                leasts[d + 1] = lesser(own);
+                leasts[d + 1] = lane_minima(own);
                 match d {
-                    0 => sums[0] = lanes(|i| sums[0][i].plus(added[i])),
+                    0 => sums[0] = registers(|i| sums[0][i].saturating_add(added[i])),
                     1 => sums[1] = added,
-                    _ => sums[1] = lanes(|i| sums[1][i].plus(added[i])),
+                    _ => sums[1] = registers(|i| sums[1][i].saturating_add(added[i])),
                 }
             }
             for i in 0..N {
-                self.results.store(at + i * V::LANES, [sums[0][i], sums[1][i]], cost[i]);
+                self.results.store(token, at + i * V::LANES, [sums[0][i], sums[1][i]], cost[i]);
             }
             (along, leasts)
         }
     }
 
-    /// Writes the guards behind the path costs, which are those before the next pixel's.
+    /// Writes the guards behind the path costs. They are also the guards before the next pixel.
     ///
     /// # Safety
-    /// What [`Pixel`] says.
+    /// The pointers are as [`Pixel`] states.
     #[inline(always)]
     pub(super) unsafe fn close(&self) {
         for d in 0..3 {
-            // SAFETY: the caller's.
-            unsafe { self.paths.add(d * self.apart + self.count).cast::<[u8; GUARD]>().write([FAR; GUARD]) }
+            // SAFETY: each direction has room for a guard behind the pixel's `count` path costs.
+            unsafe { self.paths.add(d * self.direction_stride + self.count).cast::<[u8; GUARD]>().write([FAR; GUARD]) }
         }
     }
 }
 
-/// A register after the other. (The library's way leaves calls behind.)
+/// Makes `N` registers one after the other. (`std::array::from_fn` leaves function calls behind.)
 #[inline(always)]
-pub(super) fn lanes<V: Copy, const N: usize>(mut register: impl FnMut(usize) -> V) -> [V; N] {
+pub(super) fn registers<V: Copy, const N: usize>(mut register: impl FnMut(usize) -> V) -> [V; N] {
     let mut out = [register(0); N];
     for (i, out) in out.iter_mut().enumerate().skip(1) {
         *out = register(i);
@@ -114,9 +141,9 @@ pub(super) fn lanes<V: Copy, const N: usize>(mut register: impl FnMut(usize) -> 
     out
 }
 
-/// The lesser ones of each lane.
+/// Returns the minima of all registers, lane by lane.
 #[inline(always)]
-fn lesser<V: Bytes, const N: usize>(registers: [V; N]) -> V {
+fn lane_minima<V: Bytes, const N: usize>(registers: [V; N]) -> V {
     let mut least = registers[0];
     for other in &registers[1..] {
         least = least.min(*other);
@@ -124,9 +151,9 @@ fn lesser<V: Bytes, const N: usize>(registers: [V; N]) -> V {
     least
 }
 
-/// What the way from a pixel adds: `min(L, L(± 1) + P1, min L + P2) − min L`, with its path costs L from below, at the same
-/// height and above.
+/// Returns what the way from the pixel before adds: `min(L, L(± 1) + P1, min L + P2) − min L`, with
+/// L its path costs one height below, at the same height and one above.
 #[inline(always)]
-fn turn<V: Bytes>([below, same, above]: [V; 3], step: V, least: V, jump: V) -> V {
-    same.min(below.min(above).plus(step)).minus(least).min(jump)
+fn increment<V: Bytes>([below, same, above]: [V; 3], step: V, least: V, jump: V) -> V {
+    same.min(below.min(above).saturating_add(step)).saturating_sub(least).min(jump)
 }

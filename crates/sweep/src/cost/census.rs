@@ -1,16 +1,15 @@
-//! The graded census of pictures, and how far two of them are apart: the inner loops of the cost.
+//! The graded census of pictures, and the cost of two of them: the inner loops of the cost volume.
 //!
-//! Pictures and all that comes of them are rows one directly after the other, so that registers go on across their ends;
-//! what that gives in the first and last columns and rows, which lack a neighbour, means nothing.
+//! Pictures and everything made from them are rows without gaps, so that a register may run across
+//! the end of a row. The results in the first and last rows and columns, which lack a neighbour,
+//! are meaningless; parts of tiles have a margin for them.
 
 #![allow(unsafe_code)]
 
-use multiversion::multiversion;
-use multiversion::target::match_target;
-#[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::{__m256i, __m512i};
+use crate::simd::wide::Wide;
+use crate::simd::wide_kernel::{WideKernel, run_wide};
 
-/// Bytes that are worked on together: the longest register, or two.
+/// Bytes that are worked on together: one of the longest registers, or two of the shorter ones.
 pub(crate) const CHUNK: usize = 64;
 
 /// Bytes that do not cross cache lines.
@@ -25,99 +24,164 @@ fn fit(chunks: &mut Chunks, count: usize) {
 }
 
 fn bytes(chunks: &[Chunk]) -> &[u8] {
-    // SAFETY: a chunk is nothing but its bytes, as many as it is aligned to.
+    // SAFETY: `Chunk` is `repr(C)` with 64 bytes and an alignment of 64, so it has no padding, and
+    // the slice spans exactly the chunks' bytes for the same lifetime.
     unsafe { std::slice::from_raw_parts(chunks.as_ptr().cast(), chunks.len() * CHUNK) }
 }
 
 fn bytes_mut(chunks: &mut [Chunk]) -> &mut [u8] {
-    // SAFETY: as above.
+    // SAFETY: `Chunk` has no padding and any bytes are valid in it; the slice spans exactly the
+    // chunks' bytes, which are borrowed mutably for its lifetime.
     unsafe { std::slice::from_raw_parts_mut(chunks.as_mut_ptr().cast(), chunks.len() * CHUNK) }
 }
 
-/// Values that a picture of `width` columns must have behind it.
+/// Returns how many values must follow a picture of `width` columns, so that its neighbours can be
+/// read in whole registers.
 pub(crate) fn overhang(width: usize) -> usize {
     width + 1 + CHUNK
 }
 
-/// The graded census of a picture: every pixel's difference to the neighbours to the right, below, below on the right, and
-/// of its right neighbour to the one below; the other four are those of neighbours.
+/// The graded census of a picture: for every pixel four of the differences to its neighbours, as
+/// bytes.
+///
+/// The differences are: right − own, below − own, below right − own, and below − right. The other
+/// four neighbours' differences are those of other pixels.
 #[derive(Default)]
 pub(crate) struct Census {
-    /// 128 for no difference; in the order of the pixels or in what the registers make of it.
+    /// Differences cut at ±128, plus 128. The order of the bytes within 64 is that of the pixels,
+    /// or the one in which registers pack them ([`Wide::in_order`]); it is the same for all
+    /// pictures.
     grades: [Chunks; 4],
 }
 
-/// Room for what two pictures differ by.
+/// Scratch buffers for the cost of two pictures.
 #[derive(Default)]
-pub(crate) struct Room {
+pub(crate) struct CensusScratch {
+    /// Census of a picture that came without one.
     graded: Census,
-    apart: [Chunks; 4],
+    /// Absolute differences of grades, after room for a row and a pixel.
+    differences: [Chunks; 4],
 }
 
 impl Census {
-    /// Grades the first `area` values of a picture of `width` columns; [`overhang`] more lie behind them.
+    /// Grades the first `area` values of a picture of `width` columns. [`overhang`] more must
+    /// follow.
+    ///
+    /// # Panics
+    /// Panics if the picture is shorter.
     pub(crate) fn fill(&mut self, picture: &[i16], width: usize, area: usize) {
         let picture = &picture[..area.next_multiple_of(CHUNK) + width + 1];
-        self.grades.iter_mut().for_each(|g| fit(g, area.div_ceil(CHUNK)));
-        grade(picture, width, &mut self.grades);
+        self.fit(area);
+        run_wide(Grade { picture, width, grades: &mut self.grades });
     }
 
-    /// Bytes of each grade.
+    fn fit(&mut self, area: usize) {
+        self.grades.iter_mut().for_each(|g| fit(g, area.div_ceil(CHUNK)));
+    }
+
+    /// Returns the number of bytes of each grade.
     fn len(&self) -> usize {
         self.grades[0].len() * CHUNK
     }
 }
 
-/// The cost of every pixel of two pictures of `width` columns: the mean absolute difference of their census, cut at 128, as
-/// 0 to 112. Whole chunks are written.
-pub(crate) fn census_cost(a: &Census, b: &Census, width: usize, room: &mut Room, out: &mut [u8]) {
+/// Computes the cost of every pixel of two pictures of `width` columns.
+///
+/// The cost is the mean absolute difference of their census over the eight neighbours, cut at 128
+/// and scaled to 0 to 112. Whole chunks of `out` are written.
+///
+/// # Panics
+/// Panics if the pictures differ in size or `out` is shorter.
+pub(crate) fn census_cost(a: &Census, b: &Census, width: usize, scratch: &mut CensusScratch, out: &mut [u8]) {
     assert!(a.len() == b.len() && out.len() >= a.len(), "{} and {} grades for {} costs", a.len(), b.len(), out.len());
-    let lead = (width + 1).div_ceil(CHUNK);
-    room.apart.iter_mut().for_each(|d| fit(d, lead + b.len() / CHUNK));
-    compare_census(a, b, width, &mut room.apart, out);
+    scratch.fit(width, b);
+    run_wide(CompareCensus { a, b, width, differences: &mut scratch.differences, out });
 }
 
-/// [`census_cost`] of a picture that is not graded yet; [`overhang`] more values lie behind it.
-pub(crate) fn picture_cost(picture: &[i16], b: &Census, width: usize, room: &mut Room, out: &mut [u8]) {
+/// Computes [`census_cost`] of a picture that is not graded yet. [`overhang`] more values must
+/// follow it.
+///
+/// # Panics
+/// Panics if the picture or `out` is shorter than `b`.
+pub(crate) fn picture_cost(picture: &[i16], b: &Census, width: usize, scratch: &mut CensusScratch, out: &mut [u8]) {
     assert!(picture.len() > b.len() + width && out.len() >= b.len(), "{} values of {}", picture.len(), b.len());
-    let lead = (width + 1).div_ceil(CHUNK);
-    room.apart.iter_mut().for_each(|d| fit(d, lead + b.len() / CHUNK));
-    compare_picture(picture, b, width, room, out);
+    scratch.fit(width, b);
+    run_wide(ComparePicture { picture, b, width, scratch, out });
 }
 
-#[multiversion(targets("x86_64+avx512bw", "x86_64+avx2"))]
-fn grade(picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
-    match_target! {
-        "x86_64+avx512bw" => registers::grade::<__m512i>(picture, width, grades),
-        "x86_64+avx2" => registers::grade::<__m256i>(picture, width, grades),
-        _ => plain::grade(picture, width, grades),
+impl CensusScratch {
+    fn fit(&mut self, width: usize, b: &Census) {
+        let lead = (width + 1).div_ceil(CHUNK);
+        self.differences.iter_mut().for_each(|d| fit(d, lead + b.len() / CHUNK));
     }
 }
 
-#[multiversion(targets("x86_64+avx512bw", "x86_64+avx2"))]
-fn compare_census(a: &Census, b: &Census, width: usize, apart: &mut [Chunks; 4], out: &mut [u8]) {
-    match_target! {
-        "x86_64+avx512bw" => registers::compare_census::<__m512i>(a, b, width, apart, out),
-        "x86_64+avx2" => registers::compare_census::<__m256i>(a, b, width, apart, out),
-        _ => plain::compare(a, b, width, apart, out),
+/// Grades a picture, which has a row, a pixel and at least as many values as there are grades.
+struct Grade<'a> {
+    picture: &'a [i16],
+    width: usize,
+    grades: &'a mut [Chunks; 4],
+}
+
+impl WideKernel for Grade<'_> {
+    #[inline(always)]
+    fn run<V: Wide>(self, token: V::Token) {
+        registers::grade::<V>(token, self.picture, self.width, self.grades);
+    }
+
+    fn run_plain(self) {
+        plain::grade(self.picture, self.width, self.grades);
     }
 }
 
-#[multiversion(targets("x86_64+avx512bw", "x86_64+avx2"))]
-fn compare_picture(picture: &[i16], b: &Census, width: usize, room: &mut Room, out: &mut [u8]) {
-    match_target! {
-        "x86_64+avx512bw" => registers::compare_picture::<__m512i>(picture, b, width, &mut room.apart, out),
-        "x86_64+avx2" => registers::compare_picture::<__m256i>(picture, b, width, &mut room.apart, out),
-        _ => plain::compare_picture(picture, b, width, room, out),
+/// Compares two pictures that are graded.
+struct CompareCensus<'a> {
+    a: &'a Census,
+    b: &'a Census,
+    width: usize,
+    differences: &'a mut [Chunks; 4],
+    out: &'a mut [u8],
+}
+
+impl WideKernel for CompareCensus<'_> {
+    #[inline(always)]
+    fn run<V: Wide>(self, token: V::Token) {
+        registers::compare_census::<V>(token, self);
+    }
+
+    fn run_plain(self) {
+        plain::compare(self);
     }
 }
 
-/// For all machines.
-#[cfg_attr(target_arch = "x86_64", allow(dead_code, reason = "for machines without AVX2"))]
+/// Compares a picture with one that is graded.
+struct ComparePicture<'a> {
+    picture: &'a [i16],
+    b: &'a Census,
+    width: usize,
+    scratch: &'a mut CensusScratch,
+    out: &'a mut [u8],
+}
+
+impl WideKernel for ComparePicture<'_> {
+    #[inline(always)]
+    fn run<V: Wide>(self, token: V::Token) {
+        registers::compare_picture::<V>(token, self);
+    }
+
+    fn run_plain(self) {
+        let Self { picture, b, width, scratch, out } = self;
+        let CensusScratch { graded, differences } = scratch;
+        graded.fit(b.len());
+        plain::grade(picture, width, &mut graded.grades);
+        plain::compare(CompareCensus { a: graded, b, width, differences, out });
+    }
+}
+
+/// The kernels without registers.
 mod plain {
     use super::*;
 
-    #[inline(always)]
     pub(super) fn grade(picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
         let [right, below, falling, rising] = grades.each_mut().map(|g| bytes_mut(g));
         codes(&picture[1..], picture, right);
@@ -126,7 +190,7 @@ mod plain {
         codes(&picture[width..], &picture[1..], rising);
     }
 
-    /// The grades of differences.
+    /// Grades differences.
     #[inline(always)]
     fn codes(to: &[i16], from: &[i16], out: &mut [u8]) {
         for ((o, to), from) in out.iter_mut().zip(to).zip(from) {
@@ -134,19 +198,13 @@ mod plain {
         }
     }
 
-    #[inline(always)]
-    pub(super) fn compare_picture(picture: &[i16], b: &Census, width: usize, room: &mut Room, out: &mut [u8]) {
-        room.graded.fill(picture, width, b.len());
-        compare(&room.graded, b, width, &mut room.apart, out);
-    }
-
-    #[inline(always)]
-    pub(super) fn compare(a: &Census, b: &Census, width: usize, apart: &mut [Chunks; 4], out: &mut [u8]) {
-        for ((a, b), d) in a.grades.iter().zip(&b.grades).zip(apart.iter_mut()) {
+    pub(super) fn compare(pair: CompareCensus<'_>) {
+        let CompareCensus { a, b, width, differences, out } = pair;
+        for ((a, b), d) in a.grades.iter().zip(&b.grades).zip(differences.iter_mut()) {
             let differences = bytes_mut(d).iter_mut().zip(bytes(a)).zip(bytes(b));
             differences.for_each(|((d, a), b)| *d = a.abs_diff(*b));
         }
-        let [right, below, falling, rising] = apart.each_ref().map(|d| bytes(d));
+        let [right, below, falling, rising] = differences.each_ref().map(|d| bytes(d));
         let mean = |a: u8, b: u8| (u16::from(a) + u16::from(b)).div_ceil(2) as u8;
         for (i, o) in out[..b.len()].iter_mut().enumerate().skip(width + 1) {
             let beside = mean(mean(right[i], below[i]), mean(right[i - 1], rising[i - 1]));
@@ -157,26 +215,25 @@ mod plain {
     }
 }
 
-/// For functions that are compiled for the instructions of `V`, and nowhere else.
-#[cfg(target_arch = "x86_64")]
+/// The kernels with registers.
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "there are no registers"))]
 mod registers {
     use super::*;
-    use crate::simd::wide::Wide;
 
-    /// Registers of differences that are computed before they are summed: what has just been written cannot be read elsewhere in
-    /// the register at once.
+    /// Registers of differences that are computed before they are summed: a register that has just
+    /// been written cannot be read at another offset without waiting for the memory.
     const BAND: usize = 16;
 
-    // SAFETY of all blocks below: every register that is read or written lies in a slice whose length is checked.
-
     #[inline(always)]
-    pub(super) fn grade<V: Wide>(picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
+    pub(super) fn grade<V: Wide>(token: V::Token, picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
         let len = grades[0].len() * CHUNK;
         assert!(picture.len() > len + width && grades.iter().all(|g| g.len() * CHUNK == len));
         for at in (0..len).step_by(V::BYTES) {
-            // SAFETY: as above.
+            // SAFETY: `at + V::BYTES` is at most `len`, a multiple of `CHUNK` and thus of
+            // `V::BYTES`. The picture has `width + 1` values more than that, as `grades_at` needs;
+            // each grade has `len`.
             unsafe {
-                let own = grades_at::<V>(picture.as_ptr().add(at), width);
+                let own = grades_at::<V>(token, picture.as_ptr().add(at), width);
                 for (to, own) in grades.iter_mut().zip(own) {
                     own.store(start_mut(to).add(at));
                 }
@@ -185,29 +242,25 @@ mod registers {
     }
 
     #[inline(always)]
-    pub(super) fn compare_census<V: Wide>(
-        a: &Census,
-        b: &Census,
-        width: usize,
-        apart: &mut [Chunks; 4],
-        out: &mut [u8],
-    ) {
+    pub(super) fn compare_census<V: Wide>(token: V::Token, pair: CompareCensus<'_>) {
+        let CompareCensus { a, b, width, differences, out } = pair;
         assert!(a.grades.iter().all(|g| g.len() * CHUNK == b.len()));
-        // SAFETY: as above.
-        unsafe { compare::<V>(|at| all_at(&a.grades, at), b, width, apart, out) }
+        // SAFETY: `compare` calls the closure with `at + V::BYTES <= b.len()`, and each grade of
+        // `a` has `b.len()` bytes.
+        unsafe { compare::<V>(token, |at| all_at(token, &a.grades, at), b, width, differences, out) }
     }
 
     #[inline(always)]
-    pub(super) fn compare_picture<V: Wide>(
-        picture: &[i16],
-        b: &Census,
-        width: usize,
-        apart: &mut [Chunks; 4],
-        out: &mut [u8],
-    ) {
+    pub(super) fn compare_picture<V: Wide>(token: V::Token, pair: ComparePicture<'_>) {
+        let ComparePicture { picture, b, width, scratch, out } = pair;
         assert!(picture.len() > b.len() + width);
-        // SAFETY: as above.
-        unsafe { compare::<V>(|at| grades_at(picture.as_ptr().add(at), width), b, width, apart, out) }
+        let own = |at: usize| {
+            // SAFETY: `compare` calls the closure with `at + V::BYTES <= b.len()`, and the picture
+            // has `width + 1` values more than that, as `grades_at` needs.
+            unsafe { grades_at(token, picture.as_ptr().add(at), width) }
+        };
+        // SAFETY: the closure is safe to call with `at + V::BYTES <= b.len()`.
+        unsafe { compare::<V>(token, own, b, width, &mut scratch.differences, out) }
     }
 
     #[inline(always)]
@@ -220,91 +273,121 @@ mod registers {
         chunks.as_mut_ptr().cast()
     }
 
+    /// Reads a register of each grade.
+    ///
+    /// # Safety
+    /// Each grade has `V::BYTES` bytes from `at` on.
     #[inline(always)]
-    unsafe fn all_at<V: Wide>([p, q, r, s]: &[Chunks; 4], at: usize) -> [V; 4] {
-        // SAFETY: as above.
-        unsafe { [p, q, r, s].map(|grades| V::load(start(grades).add(at))) }
+    unsafe fn all_at<V: Wide>(token: V::Token, [p, q, r, s]: &[Chunks; 4], at: usize) -> [V; 4] {
+        // SAFETY: the caller vouches for the bytes of each grade.
+        unsafe { [p, q, r, s].map(|grades| V::load(token, start(grades).add(at))) }
     }
 
-    /// The four grades of the pixels from `at` on, which [`Wide::in_order`] brings into their order.
+    /// Grades the pixels from `at` on, in the order of [`Wide::pack`].
+    ///
+    /// # Safety
+    /// `V::BYTES + width + 1` values can be read from `at` on.
     #[inline(always)]
-    unsafe fn grades_at<V: Wide>(at: *const i16, width: usize) -> [V; 4] {
-        // SAFETY: as above.
+    unsafe fn grades_at<V: Wide>(token: V::Token, at: *const i16, width: usize) -> [V; 4] {
+        // SAFETY: the farthest register begins `width + 1` values behind `at` and has `V::BYTES`
+        // values.
         unsafe {
-            let (own, right) = (values(at), values(at.add(1)));
-            let (below, falling) = (values(at.add(width)), values(at.add(width + 1)));
-            [codes(right, own), codes(below, own), codes(falling, own), codes(below, right)]
+            let (own, right) = (values(token, at), values(token, at.add(1)));
+            let (below, falling) = (values(token, at.add(width)), values(token, at.add(width + 1)));
+            [codes(token, right, own), codes(token, below, own), codes(token, falling, own), codes(token, below, right)]
         }
     }
 
+    /// Reads as many values as a register has bytes.
+    ///
+    /// # Safety
+    /// `V::BYTES` values can be read from `at` on.
     #[inline(always)]
-    unsafe fn values<V: Wide>(at: *const i16) -> [V; 2] {
-        // SAFETY: as above.
-        unsafe { [V::load(at), V::load(at.add(V::BYTES / 2))] }
+    unsafe fn values<V: Wide>(token: V::Token, at: *const i16) -> [V; 2] {
+        // SAFETY: two registers of `V::BYTES / 2` values each are the values that the caller
+        // vouches for.
+        unsafe { [V::load(token, at), V::load(token, at.add(V::BYTES / 2))] }
     }
 
     #[inline(always)]
-    fn codes<V: Wide>(to: [V; 2], from: [V; 2]) -> V {
-        to[0].minus_words_cut(from[0]).pack(to[1].minus_words_cut(from[1])).xor(V::splat(-128))
+    fn codes<V: Wide>(token: V::Token, to: [V; 2], from: [V; 2]) -> V {
+        let difference = |i: usize| to[i].saturating_sub_words(from[i]);
+        difference(0).pack(difference(1)).xor(V::splat(token, -128))
     }
 
+    /// Compares the grades that `own` returns with those of `b`.
+    ///
+    /// # Safety
+    /// `own` can be called with any multiple of `V::BYTES` below `b.len()`.
     #[inline(always)]
     unsafe fn compare<V: Wide>(
+        token: V::Token,
         own: impl Fn(usize) -> [V; 4],
         b: &Census,
         width: usize,
-        apart: &mut [Chunks; 4],
+        differences: &mut [Chunks; 4],
         out: &mut [u8],
     ) {
         let (len, lead) = (b.len(), (width + 1).next_multiple_of(CHUNK));
         assert!(b.grades.iter().all(|g| g.len() * CHUNK == len) && out.len() >= len);
-        assert!(apart.iter().all(|d| d.len() * CHUNK == lead + len));
+        assert!(differences.iter().all(|d| d.len() * CHUNK == lead + len));
         for first in (0..len).step_by(BAND * V::BYTES) {
             let band = (first..len.min(first + BAND * V::BYTES)).step_by(V::BYTES);
             for at in band.clone() {
-                // SAFETY: as above.
-                unsafe { differ(own(at), all_at(&b.grades, at), lead + at, apart) };
+                // SAFETY: `at + V::BYTES` is at most `len`, which is the length of each grade of
+                // `b`, and `lead + len` that of the differences.
+                unsafe { differ(own(at), all_at(token, &b.grades, at), lead + at, differences) };
             }
             for at in band {
-                // SAFETY: as above.
-                unsafe { cost::<V>(apart, lead + at, width).store(out.as_mut_ptr().add(at)) };
+                // SAFETY: `cost` reads from `width + 1`, at most `lead`, bytes before `lead + at`
+                // up to `V::BYTES` behind it, which lie in the differences; `out` has `len` bytes.
+                unsafe { cost::<V>(token, differences, lead + at, width).store(out.as_mut_ptr().add(at)) };
             }
         }
     }
 
-    /// The means of those differences of which a pixel needs two of the same place, and those along the falling diagonal.
+    /// Stores means of those differences that a pixel needs in pairs, and the difference along the
+    /// falling diagonal.
+    ///
+    /// # Safety
+    /// Each buffer has `V::BYTES` bytes from `at` on.
     #[inline(always)]
-    unsafe fn differ<V: Wide>(a: [V; 4], b: [V; 4], at: usize, apart: &mut [Chunks; 4]) {
-        let apart_of = |j: usize| a[j].max(b[j]).minus(a[j].min(b[j]));
-        let (right, below, falling, rising) = (apart_of(0), apart_of(1), apart_of(2), apart_of(3));
+    unsafe fn differ<V: Wide>(a: [V; 4], b: [V; 4], at: usize, differences: &mut [Chunks; 4]) {
+        let difference = |j: usize| a[j].max(b[j]).saturating_sub(a[j].min(b[j]));
+        let (right, below, falling, rising) = (difference(0), difference(1), difference(2), difference(3));
         let all = [right.average(below), right.average(rising), below.average(rising), falling];
-        for (to, d) in apart.iter_mut().zip(all) {
-            // SAFETY: as above.
+        for (to, d) in differences.iter_mut().zip(all) {
+            // SAFETY: the caller vouches for the bytes of each buffer.
             unsafe { d.in_order().store(start_mut(to).add(at)) };
         }
     }
 
-    /// The costs of a register's pixels from the differences to all eight neighbours.
+    /// Computes the costs of a register's pixels from the differences to all eight neighbours.
+    ///
+    /// # Safety
+    /// Each buffer has the bytes from `at − width − 1` to `at + V::BYTES`.
     #[inline(always)]
-    unsafe fn cost<V: Wide>([here, left, above, falling]: &[Chunks; 4], at: usize, width: usize) -> V {
-        // SAFETY: as above; the chunks before the first have room for what lies a row and a pixel before it.
-        let bytes = |of: &Chunks, before: usize| unsafe { V::load(start(of).add(at - before)) };
+    unsafe fn cost<V: Wide>(token: V::Token, [here, left, above, falling]: &[Chunks; 4], at: usize, width: usize) -> V {
+        // SAFETY: `before` is at most `width + 1`, and the caller vouches for the bytes from there
+        // on.
+        let bytes = |of: &Chunks, before: usize| unsafe { V::load(token, start(of).add(at - before)) };
         let beside = bytes(here, 0).average(bytes(left, 1));
         let across = bytes(falling, width + 1).average(bytes(falling, 0));
-        let sum = beside.plus(bytes(above, width).average(across));
-        let half = sum.right(1).and(V::splat(0x7f));
-        let sixteenth = sum.right(4).and(V::splat(0x0f));
-        half.minus(sixteenth)
+        let sum = beside.saturating_add(bytes(above, width).average(across));
+        let half = sum.shift_words_right(1).and(V::splat(token, 0x7f));
+        let sixteenth = sum.shift_words_right(4).and(V::splat(token, 0x0f));
+        half.saturating_sub(sixteenth)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::wide_kernel::run_with_avx2;
 
     #[test]
     fn the_cost_is_the_mean_difference_to_eight_neighbours() {
-        let (width, height) = (37, 61);
+        let (width, height) = if cfg!(miri) { (21, 9) } else { (37, 61) };
         let area = width * height;
         let picture = |factor: usize| -> Vec<i16> {
             (0..area + overhang(width)).map(|i| ((i * factor) % 331) as i16 / 2 - 80).collect()
@@ -313,27 +396,31 @@ mod tests {
         let (mut census, mut other) = (Census::default(), Census::default());
         census.fill(&a, width, area);
         other.fill(&b, width, area);
-        let mut room = Room::default();
+        let mut scratch = CensusScratch::default();
         let mut costs = vec![vec![0; area.next_multiple_of(CHUNK)]; 3];
-        census_cost(&census, &other, width, &mut room, &mut costs[0]);
-        picture_cost(&a, &other, width, &mut room, &mut costs[1]);
+        census_cost(&census, &other, width, &mut scratch, &mut costs[0]);
+        picture_cost(&a, &other, width, &mut scratch, &mut costs[1]);
         let mut plain = [Census::default(), Census::default()];
         for (plain, picture) in plain.iter_mut().zip([&a, &b]) {
-            plain.grades.iter_mut().for_each(|g| fit(g, area.div_ceil(CHUNK)));
-            plain::grade(picture, width, &mut plain.grades);
+            plain.fit(area);
+            Grade { picture, width, grades: &mut plain.grades }.run_plain();
         }
-        plain::compare(&plain[0], &plain[1], width, &mut room.apart, &mut costs[2]);
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx2") {
-            let mut graded = [Census::default(), Census::default()];
-            for (graded, picture) in graded.iter_mut().zip([&a, &b]) {
-                graded.grades.iter_mut().for_each(|g| fit(g, area.div_ceil(CHUNK)));
-                registers::grade::<__m256i>(picture, width, &mut graded.grades);
-            }
+        let [own, other] = &plain;
+        let (differences, out) = (&mut scratch.differences, &mut costs[2][..]);
+        CompareCensus { a: own, b: other, width, differences, out }.run_plain();
+        let mut graded = [Census::default(), Census::default()];
+        let mut has_avx2 = true;
+        for (graded, picture) in graded.iter_mut().zip([&a, &b]) {
+            graded.fit(area);
+            has_avx2 &= run_with_avx2(Grade { picture, width, grades: &mut graded.grades });
+        }
+        if has_avx2 {
             let [own, other] = &graded;
             let mut further = vec![vec![0; area.next_multiple_of(CHUNK)]; 2];
-            registers::compare_census::<__m256i>(own, other, width, &mut room.apart, &mut further[0]);
-            registers::compare_picture::<__m256i>(&a, other, width, &mut room.apart, &mut further[1]);
+            let (differences, out) = (&mut scratch.differences, &mut further[0][..]);
+            run_with_avx2(CompareCensus { a: own, b: other, width, differences, out });
+            let (scratch, out) = (&mut scratch, &mut further[1][..]);
+            run_with_avx2(ComparePicture { picture: &a, b: other, width, scratch, out });
             costs.extend(further);
         }
         for y in 1..height - 1 {
@@ -343,7 +430,7 @@ mod tests {
                 let grade = |p: &[i16], n: usize| f64::from((p[n] - p[i]).clamp(-128, 128));
                 let sum = neighbours.map(|n| (grade(&a, n) - grade(&b, n)).abs()).sum::<f64>();
                 let expected = (sum / 8.0).min(128.0) * 112.0 / 128.0;
-                // Means of two are rounded upwards.
+                // The means of two are rounded up.
                 assert!((-0.7..2.0).contains(&(f64::from(costs[0][i]) - expected)), "{} {expected}", costs[0][i]);
                 assert!(
                     costs.iter().all(|c| c[i] == costs[0][i]),

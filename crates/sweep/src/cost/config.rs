@@ -1,23 +1,34 @@
 //! Parameters of the cost volume.
 
-/// Costs are stored as integers 0 to this: finer than the noise of any correlation, and a path's cost fits a byte: this and the
-/// penalty of a jump, which is a little more.
+/// Largest cost. Costs are integers from 0 to this value.
+///
+/// Its steps are finer than the noise of a comparison. Together with the penalty of a jump, which
+/// is a little larger, it fits a byte, as the cost of a path must.
 pub const COST_MAX: u8 = 112;
 
-/// How the pairs of views are combined into one cost.
+/// How the costs of the pairs of views are combined into one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Aggregation {
-    /// The variance over all views, source–source pairs included.
+    /// Mean over all pairs of views, source–source pairs included: the variance over the views.
     Variance,
-    /// The mean of the best `K` reference–source pairs.
+    /// Mean of the best `K` reference–source pairs.
     BestOf(usize),
 }
 
-/// Two of the sources see even the ground beside a wall, and on dates like the reference's; the third best may not.
+/// Pairs that count by default. Two of the sources see even the ground beside a wall, and on dates
+/// like the reference's; the third best may not.
 const BEST: usize = 2;
 
 impl Aggregation {
-    /// That for so many sources: the best count where there are others.
+    /// Picks the aggregation for `count` sources: best-of-2 for more than two, the full variance
+    /// otherwise.
+    ///
+    /// ```
+    /// use sweep::cost::Aggregation;
+    ///
+    /// assert_eq!(Aggregation::of_sources(2), Aggregation::Variance);
+    /// assert_eq!(Aggregation::of_sources(6), Aggregation::BestOf(2));
+    /// ```
     pub fn of_sources(count: usize) -> Self {
         if count > BEST { Self::BestOf(BEST) } else { Self::Variance }
     }
@@ -26,11 +37,12 @@ impl Aggregation {
 /// Parameters of the cost volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CostConfig {
-    /// How views are combined.
+    /// How the pairs of views are combined.
     pub aggregation: Aggregation,
-    /// Side of the tiles, pixels: large enough that the laid-over pictures pay, small enough for the cache.
+    /// Side of the tiles, pixels: large enough to make up for resampling the sources, small enough
+    /// for the cache.
     pub tile: usize,
-    /// Largest error of the local map against the exact RPC chain, pixels.
+    /// Largest error of a tile's local map against the exact RPC chain, pixels.
     pub map_tolerance_px: f64,
 }
 

@@ -1,4 +1,7 @@
-//! Division of a tile into parts that are swept through their own planes.
+//! Division of a tile into parts that are swept through the height planes of their own pixels only.
+//!
+//! A tile with a wall between two roofs, for example, would otherwise be swept through all planes
+//! between them.
 
 use multiversion::multiversion;
 use raster::Window;
@@ -7,11 +10,12 @@ use super::part::CENSUS_REACH;
 use super::shift::OVERHANG;
 use crate::ranges::Ranges;
 
-/// A tile is not divided below this side: an RPC that is not smooth over eight pixels is broken.
+/// Smallest side of a part, pixels. An RPC that is not smooth over eight pixels is broken.
 pub(super) const TILE_MIN: usize = 8;
-/// What a plane costs beside its pixels, in pixels.
+/// Fixed cost of a plane, in units of a pixel's cost.
 const PLANE_PIXELS: usize = 256;
-/// First plane and one past the last that any pixel of the tile asks for.
+/// Returns the planes that the pixels of a tile have hypotheses on: the first one and the one after
+/// the last.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn plane_span(ranges: &Ranges, tile: Window) -> (i32, i32) {
     let mut span = (i32::MAX, i32::MIN);
@@ -25,15 +29,20 @@ pub(super) fn plane_span(ranges: &Ranges, tile: Window) -> (i32, i32) {
     span
 }
 
-/// A part of a tile, and the planes that it is swept through: all that its pixels ask for, or some of them.
+/// A part of a tile and the planes that it is swept through.
 pub(super) struct SweptPart {
+    /// The part in image coordinates.
     pub(super) window: Window,
+    /// First plane and the one after the last.
     pub(super) planes: (i32, i32),
+    /// Whether its pixels have no hypotheses outside these planes.
     pub(super) is_all: bool,
 }
 
-/// Appends the parts in which a tile is swept at the least cost, each through those of `planes` that its pixels ask for, as
-/// beside a wall between two roofs; returns that cost, in pixels, and what all its pixels ask for.
+/// Appends the parts by which a tile is swept through `planes` at the least cost.
+///
+/// Each part is swept through those of the planes that its pixels have hypotheses on. Returns the
+/// cost, in units of a pixel's cost, and the planes of all pixels of the tile.
 pub(super) fn divide(
     ranges: &Ranges,
     tile: Window,
@@ -51,7 +60,7 @@ pub(super) fn divide(
     if own.0 >= own.1 {
         return (0, asked);
     }
-    // Parts cost their margins again, and registers are filled up.
+    // Every part pays for its own margin and for registers that are filled up.
     let width = tile.width + 2 * CENSUS_REACH;
     let area = (width + width.next_multiple_of(OVERHANG)) / 2 * (tile.height + 2 * CENSUS_REACH);
     let whole = (own.1 - own.0) as usize * (area + PLANE_PIXELS) + area;
@@ -63,7 +72,7 @@ pub(super) fn divide(
     (whole, asked)
 }
 
-/// The two halves of a tile across its longer side.
+/// Returns the two halves of a tile, divided across its longer side.
 pub(super) fn halves(t: Window) -> [Window; 2] {
     if t.width >= t.height {
         let w = t.width / 2;

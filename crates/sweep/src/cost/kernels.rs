@@ -1,39 +1,47 @@
-//! The inner loops: integer arithmetic on rows, compiled for several instruction sets and chosen at run time.
+//! Inner loops of the costs: integer arithmetic on rows, compiled for several instruction sets, of
+//! which the best is chosen at run time.
 //!
-//! Grey values are 16-bit integers in [`FULL`]ths of the difference that counts fully; which of them are valid is told apart.
+//! Grey values are 16-bit integers in which [`FULL`] is the difference that counts fully. Voids are
+//! marked elsewhere ([`super::voids::Voids`]).
 
 use multiversion::multiversion;
 
 use super::config::COST_MAX;
 
-/// The cost of a pair that cannot be compared: more than any that can, so that it comes last.
+/// Cost of a pair that cannot be compared. It exceeds every other cost, so that it is sorted last.
 pub(crate) const INVALID: u8 = 255;
-/// A difference of the census that counts fully; those of −`FULL` to `FULL` − 1 fit a byte.
+/// Difference that counts fully in the census. Differences from −`FULL` to `FULL` − 1 fit a byte.
 pub(crate) const FULL: f32 = 128.0;
-/// Grey values are cut here: the cubic interpolation may overshoot by 1.25 in each direction before a 16-bit integer is full.
+/// Grey values are cut at ± this value. The cubic interpolation may then overshoot by a factor of
+/// 1.25 in each direction before a 16-bit integer overflows.
 const GREY_MAX: f32 = 20_000.0;
-/// 1.5 · 2²³: added to a value it leaves the rounded integer in the lowest bits of the sum, which vectorises; a cast does not.
+/// 1.5 · 2²³. Added to a value it leaves the rounded integer in the lowest bits of the sum. Unlike
+/// a cast, this is vectorised.
 const ROUND: f32 = 12_582_912.0;
-/// One in so many values tells well enough around which grey value integers lie.
+/// One in this many runs of values is enough to find the mean around which the integers lie.
 const MEAN_STEP: usize = 4;
-/// A void says nothing of a height, so that two views suffice where a third has one; but a height that takes fewer views
-/// into account must not win by having fewer that can disagree. Its weight is one part of these.
+/// Weight of a valid cost, against 1 for an invalid one.
+///
+/// A void tells nothing about a height, so that two views suffice where the third has one. But a
+/// height that fewer views see must not win because fewer can disagree, so an invalid cost counts a
+/// little.
 const VALID_WEIGHT: u16 = 4;
 
-/// Turns grey values into integers around the mean, `scale` to one, with some more behind them; NaN becomes 0. Tells whether
-/// there is one.
+/// Converts grey values to integers around their mean, `scale` integers per grey value, with room
+/// for `behind` more. NaN becomes 0. Returns whether there is a NaN.
 pub(crate) fn quantise(values: &[f32], scale: f32, behind: usize, out: &mut Vec<i16>) -> bool {
     let mean = rough_mean(values);
     out.resize(values.len() + behind, 0);
     round(values, mean, scale, out)
 }
 
-/// The mean of a part of the values, or of all where that part has none, NaN left out; 0 where all are.
+/// Returns the mean of a sample of the values, or of all of them if the sample has no valid value.
+/// NaN is left out; the result is 0 if all are NaN.
 fn rough_mean(values: &[f32]) -> f32 {
     [MEAN_STEP, 1].into_iter().map(|step| mean_of(values, step)).find(|mean| mean.is_finite()).unwrap_or(0.0)
 }
 
-/// The mean of every `step`th sixteen values, NaN left out.
+/// Returns the mean of every `step`th run of sixteen values, NaN left out.
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn mean_of(values: &[f32], step: usize) -> f32 {
     const LANES: usize = 16;
@@ -50,24 +58,24 @@ fn mean_of(values: &[f32], step: usize) -> f32 {
     (sum.iter().sum::<f32>() + rest.clone().sum::<f32>()) / (known.iter().sum::<f32>() + rest.count() as f32)
 }
 
-/// Rounds what differs from the mean; tells whether a value is NaN.
+/// Rounds the scaled differences to the mean. Returns whether a value is NaN.
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn round(values: &[f32], mean: f32, scale: f32, out: &mut [i16]) -> bool {
     let mut has_nan = 0;
     for (o, v) in out.iter_mut().zip(values) {
-        // `clamp` passes a NaN on, whose lowest bits are 0: `SweepView` keeps no others.
+        // `clamp` passes a NaN on, and its lowest 16 bits are 0: `SweepView` keeps only such NaNs.
         *o = (((v - mean) * scale).clamp(-GREY_MAX, GREY_MAX) + ROUND).to_bits() as i16;
         has_nan |= i32::from(v.is_nan());
     }
     has_nan != 0
 }
 
-/// A weight of an interpolation, in 2¹⁵ths.
+/// Converts the weight of an interpolation to 2¹⁵ths.
 pub(crate) fn fixed(weight: f32) -> i16 {
     ((weight * 32_768.0).min(32_767.0) + ROUND).to_bits() as i16
 }
 
-/// Keeps the smaller of two rows in `a` and the larger in `b`.
+/// Moves the smaller of each two values to `a` and the larger to `b`.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub(crate) fn sort_pair(a: &mut [u8], b: &mut [u8]) {
     for (p, q) in a.iter_mut().zip(b) {
@@ -77,8 +85,10 @@ pub(crate) fn sort_pair(a: &mut [u8], b: &mut [u8]) {
     }
 }
 
-/// `out`: the weighted mean of each pixel's costs, in which an invalid one counts as chance does, [`COST_MAX`], and a
-/// valid one [`VALID_WEIGHT`] times as much. `is_hidden` tells whether one is invalid.
+/// Writes the weighted mean of each pixel's costs. An invalid cost counts as [`COST_MAX`], the cost
+/// of unrelated pictures, with weight 1; a valid one has weight [`VALID_WEIGHT`].
+///
+/// `is_hidden` tells whether any cost is invalid. `sums` and `weights` are scratch buffers.
 pub(crate) fn mean_cost(costs: &[Vec<u8>], is_hidden: bool, sums: &mut [u16], weights: &mut [u16], out: &mut [u8]) {
     match costs {
         [a, b] if !is_hidden => mean_of_two(a, b, out),
@@ -102,7 +112,7 @@ fn mean_of_two(a: &[u8], b: &[u8], out: &mut [u8]) {
 #[multiversion(targets("x86_64+avx2"))]
 fn mean_of_three([a, b, c]: [&[u8]; 3], out: &mut [u8]) {
     for (((o, a), b), c) in out.iter_mut().zip(a).zip(b).zip(c) {
-        // Rounded; 21,846 is a third of 2¹⁶.
+        // The third is rounded; 21,846 is a third of 2¹⁶.
         let sum = u16::from(*a) + u16::from(*b) + u16::from(*c) + 1;
         *o = ((u32::from(sum) * 21_846) >> 16) as u8;
     }
@@ -119,7 +129,7 @@ fn add_cost(pair: &[u8], sums: &mut [u16], weights: &mut [u16]) {
 
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn divide(sums: &[u16], weights: &[u16], out: &mut [u8]) {
-    /// As in [`round`], for what is not negative.
+    /// 2²³, which does for non-negative values what [`ROUND`] does for all.
     const TWO_23: f32 = 8_388_608.0;
     for ((o, s), n) in out.iter_mut().zip(sums).zip(weights) {
         *o = (f32::from(*s) / f32::from(*n) + TWO_23).to_bits() as u8;
@@ -128,7 +138,7 @@ fn divide(sums: &[u16], weights: &[u16], out: &mut [u8]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::census::{CHUNK, Census, Room, census_cost, overhang};
+    use super::super::census::{CHUNK, Census, CensusScratch, census_cost, overhang};
     use super::super::part::Part;
     use super::super::voids::Voids;
     use super::*;
@@ -136,10 +146,10 @@ mod tests {
 
     const SIDE: usize = 3;
 
-    /// The least difference of two costs.
+    /// Smallest difference of two costs.
     const UNIT: f64 = 1.0 / COST_MAX as f64;
 
-    /// The cost of two tiles of `side` columns each, as the sweep computes it.
+    /// Returns the costs of two tiles of `side` columns each, as the sweep computes them.
     fn tile_cost(a: &[f32], b: &[f32], (scale_a, scale_b): (f32, f32), side: usize) -> Vec<u8> {
         let part = Part { within: [0; 2], width: side, height: side };
         let mut hidden = Vec::new();
@@ -153,14 +163,14 @@ mod tests {
         };
         let (a, b) = (graded(a, scale_a), graded(b, scale_b));
         let mut costs = vec![0; part.area().next_multiple_of(CHUNK)];
-        census_cost(&a, &b, side, &mut Room::default(), &mut costs);
+        census_cost(&a, &b, side, &mut CensusScratch::default(), &mut costs);
         for voids in hidden {
             voids.hide((0, 0), part, INVALID, &mut costs);
         }
         (1..side - 1).flat_map(|y| costs[y * side + 1..(y + 1) * side - 1].to_vec()).collect()
     }
 
-    /// The cost of two tiles of one patch.
+    /// Returns the cost of two tiles of one patch each.
     fn patch_cost(a: &[f32], b: &[f32], scales: (f32, f32)) -> u8 {
         tile_cost(a, b, scales, SIDE)[0]
     }
@@ -169,7 +179,7 @@ mod tests {
         prop::collection::vec(-60.0..60.0f32, SIDE * SIDE)
     }
 
-    /// Patches with a common picture, so that no cost is cut.
+    /// Patches that share most of their picture, so that no cost is cut.
     fn alike(n: usize) -> impl Strategy<Value = Vec<Vec<f32>>> {
         let own = prop::collection::vec(-20.0..20.0f32, SIDE * SIDE);
         (patch(), prop::collection::vec(own, n)).prop_map(|(common, own)| {
@@ -179,7 +189,8 @@ mod tests {
     }
 
     proptest! {
-        /// For bits the mean over pairs of `|s − t|` is `4 N / (N − 1) · mean p (1 − p)`, p the share of views with the bit.
+        /// For bits the mean over pairs of `|s − t|` is `4 N / (N − 1) · mean p (1 − p)`, where p
+        /// is the share of views that have the bit.
         #[test]
         fn the_mean_over_all_pairs_is_the_variance_of_the_census_bits(patches in (2..6usize).prop_flat_map(alike)) {
             const HARD: f32 = 0.95;
@@ -219,7 +230,7 @@ mod tests {
             let mut out = [255];
             mean_cost(&[vec![cost], vec![INVALID]], true, &mut [0], &mut [0], &mut out);
             prop_assert!(out[0] >= cost.min(COST_MAX) && out[0] <= COST_MAX, "{out:?}");
-            prop_assert!(!a.iter().chain(&b).any(|v| v.is_nan()) || cost == INVALID, "{cost} of a patch that is not valid");
+            prop_assert!(!a.iter().chain(&b).any(|v| v.is_nan()) || cost == INVALID, "{cost} of an invalid patch");
         }
     }
 

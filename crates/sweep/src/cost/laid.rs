@@ -1,44 +1,55 @@
-//! A source laid over a tile of the reference, and what its height planes cost.
+//! A source resampled over a tile of the reference, and the costs of its height planes.
 
 use raster::{Window, bicubic_along, cubic_weights};
 
-use super::census::{Census, Room as Apart, census_cost, overhang, picture_cost};
+use super::census::{Census, CensusScratch, census_cost, overhang, picture_cost};
 use super::kernels::{self, FULL};
 use super::part::{CENSUS_REACH, Part};
 use super::scale::census_scale;
-use super::shift::{OVERHANG, Picture, shift_bicubic};
+use super::shift::{BicubicShift, OVERHANG, Picture, shift_bicubic};
 use super::voids::Voids;
 use crate::geometry::LocalMap;
 use crate::view::ViewLevel;
 
-/// Pixels that the cubic interpolation takes in a row.
+/// Pixels per row that the cubic interpolation reads.
 const CUBIC_TAPS: usize = 4;
 
-/// A source laid over the tile, and the census of its shifted form for the current plane.
+/// A source resampled over the tile at the middle height, and its state for the current plane.
 #[derive(Default)]
-pub(super) struct Laid {
+pub(super) struct LaidSource {
+    /// Local map from the tile to the source; `None` if the source does not see the tile.
     map: Option<LocalMap>,
+    /// The resampled picture.
     picture: Vec<i16>,
-    /// Where the census of a pixel that is moved here holds a void.
+    /// Places whose census, after a shift, would read a void.
     voids: Voids,
+    /// Columns of the picture.
     stride: usize,
+    /// Rows of the picture.
     rows: usize,
+    /// Column and row of the picture's first pixel, relative to the tile with its margin.
     origin: [i64; 2],
-    /// Where the part's first padded pixel lies for the current plane; `None` where the source is not seen.
+    /// Place in the picture of the part's first pixel for the current plane; `None` if the source
+    /// does not see the part there.
     at: Option<(usize, usize)>,
+    /// Census of the shifted picture for the current plane.
     census: Census,
 }
 
-/// What a plane is computed with.
+/// Scratch buffers for one plane.
 #[derive(Default)]
-pub(super) struct Room {
-    moved: Vec<i16>,
+pub(super) struct PlaneScratch {
+    /// The shifted picture.
+    shifted: Vec<i16>,
+    /// Rows of the interpolation.
     rows: Vec<i16>,
-    apart: Apart,
+    /// Buffers of the census.
+    census: CensusScratch,
 }
 
-impl Laid {
-    /// Resamples the source over the padded tile at the map's middle height, wide enough for all heights.
+impl LaidSource {
+    /// Resamples the source over the padded tile at the map's middle height, wide enough for shifts
+    /// to all heights in metres from `h_lo` to `h_hi`.
     pub(super) fn lay_over(
         &mut self,
         source: &ViewLevel<'_>,
@@ -61,7 +72,8 @@ impl Laid {
             self.map = None;
             return;
         }
-        // One pixel before and two after for the cubic, one more at each side for the curvature between the heights.
+        // The interpolation reads one pixel before and two behind. One more at each side allows for
+        // the curvature between the three heights.
         let first = [span[0][0].floor() as i64 - 2, span[1][0].floor() as i64 - 2];
         let extent = |i: usize| (span[i][1].ceil() as i64 + 3 - first[i]) as usize;
         self.stride = padded.width + extent(0);
@@ -78,8 +90,8 @@ impl Laid {
         self.voids.mark(grey, self.stride, CUBIC_TAPS + 2 * CENSUS_REACH, has_voids);
     }
 
-    /// Lays the part over the source at a height.
-    pub(super) fn place(&mut self, height_m: f64, part: Part, room: &mut Room) {
+    /// Shifts the picture so that the part lies over it at a height.
+    pub(super) fn place(&mut self, height_m: f64, part: Part, scratch: &mut PlaneScratch) {
         self.at = None;
         let Some([dx, dy]) = self.map.and_then(|m| m.shift_at(height_m)) else { return };
         let (fx, fy) = (dx.floor(), dy.floor());
@@ -94,33 +106,52 @@ impl Laid {
         }
         let at = (x0 as usize, y0 as usize);
         self.at = Some(at);
-        let weights = (cubic_weights((dx - fx) as f32), cubic_weights((dy - fy) as f32));
-        let weights = (weights.0.map(kernels::fixed), weights.1.map(kernels::fixed));
-        let picture = Picture { data: &self.picture, stride: self.stride };
-        room.moved.resize(part.area() + overhang(part.width), 0);
-        shift_bicubic(picture, at, weights, (part.width, part.height), &mut room.rows, &mut room.moved);
+        scratch.shifted.resize(part.area() + overhang(part.width), 0);
+        shift_bicubic(BicubicShift {
+            picture: Picture { data: &self.picture, stride: self.stride },
+            at,
+            column_weights: cubic_weights((dx - fx) as f32).map(kernels::fixed),
+            row_weights: cubic_weights((dy - fy) as f32).map(kernels::fixed),
+            size: (part.width, part.height),
+            rows: &mut scratch.rows,
+            out: &mut scratch.shifted,
+        });
     }
 
-    /// Keeps the census of what was just placed.
-    pub(super) fn grade(&mut self, part: Part, room: &Room) {
+    /// Keeps the census of the picture that was just shifted.
+    pub(super) fn grade(&mut self, part: Part, scratch: &PlaneScratch) {
         if self.at.is_some() {
-            self.census.fill(&room.moved, part.width, part.area());
+            self.census.fill(&scratch.shifted, part.width, part.area());
         }
     }
 
-    /// The costs of what was just placed against the reference, `worst` where this source has voids; tells whether it has any.
-    pub(super) fn cost(&self, reference: &Census, part: Part, worst: u8, room: &mut Room, costs: &mut [u8]) -> bool {
+    /// Computes the costs of the shifted picture against the reference. Where the source has a void
+    /// they are raised to `worst`; returns whether it has one.
+    pub(super) fn cost(
+        &self,
+        reference: &Census,
+        part: Part,
+        worst: u8,
+        scratch: &mut PlaneScratch,
+        costs: &mut [u8],
+    ) -> bool {
         if self.at.is_some() {
-            picture_cost(&room.moved, reference, part.width, &mut room.apart, costs);
+            picture_cost(&scratch.shifted, reference, part.width, &mut scratch.census, costs);
         }
         self.hide(part, worst, costs)
     }
 
-    /// The costs of the current plane between two sources that were graded, invalid where one of them is; tells whether there
-    /// are such.
-    pub(super) fn cost_between(&self, other: &Laid, part: Part, room: &mut Room, costs: &mut [u8]) -> bool {
+    /// Computes the costs of the current plane between two sources that were graded. They are
+    /// invalid where one of the two has a void; returns whether there is one.
+    pub(super) fn cost_between(
+        &self,
+        other: &LaidSource,
+        part: Part,
+        scratch: &mut PlaneScratch,
+        costs: &mut [u8],
+    ) -> bool {
         if self.at.is_some() && other.at.is_some() {
-            census_cost(&other.census, &self.census, part.width, &mut room.apart, costs);
+            census_cost(&other.census, &self.census, part.width, &mut scratch.census, costs);
         }
         let is_hidden = self.hide(part, kernels::INVALID, costs);
         other.hide(part, kernels::INVALID, costs) || is_hidden

@@ -1,19 +1,24 @@
-//! Parts of tiles with the margin that the census needs.
+//! A part of a tile with the margin that the census needs.
 
-/// The census looks at the eight neighbours, as MicMac's patches in cities do: the aggregation brings the support that they
-/// lack, and roofs keep their edges.
+/// Reach of the census, pixels: the eight neighbours.
+///
+/// MicMac uses patches as small in cities. The aggregation brings the support that they lack, and
+/// roofs keep their edges.
 pub(super) const CENSUS_REACH: usize = 1;
 
-/// A part of a tile with its margin.
+/// A part of a tile, with a margin of [`CENSUS_REACH`] pixels on each side.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
-    /// Where it begins in the tile with its margin.
+    /// Column and row of its first pixel in the tile with its margin.
     pub(super) within: [i64; 2],
+    /// Columns, margin included.
     pub(super) width: usize,
+    /// Rows, margin included.
     pub(super) height: usize,
 }
 
 impl Part {
+    /// Returns the number of pixels, margin included.
     pub(super) fn area(self) -> usize {
         self.width * self.height
     }

@@ -1,155 +1,179 @@
-//! A picture shifted by a sub-pixel vector: bicubic, in 16-bit integers.
+//! A picture shifted by a sub-pixel vector: bicubic interpolation in 16-bit integers.
 
 #![allow(unsafe_code)]
 
-use multiversion::multiversion;
-use multiversion::target::match_target;
-#[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::{__m256i, __m512i};
+use crate::simd::wide::Wide;
+use crate::simd::wide_kernel::{WideKernel, run_wide};
 
-/// A picture of `stride` columns per row, with [`OVERHANG`] values behind it.
+/// A picture of `stride` columns, followed by [`OVERHANG`] values.
 #[derive(Clone, Copy)]
 pub(crate) struct Picture<'a> {
+    /// Values, row after row.
     pub(crate) data: &'a [i16],
+    /// Number of columns.
     pub(crate) stride: usize,
 }
 
-/// Values that may be read, and changed, behind what is asked for: whole registers are written.
+/// Values behind a picture and behind the result that may be read and overwritten: whole registers
+/// are read and written.
 pub(crate) const OVERHANG: usize = 16;
 
-/// `out[y][x] = Σ wy[j] wx[i] picture[y0 + y + j][x0 + x + i]`: a whole tile shifted by one sub-pixel vector; weights in 2¹⁵ths,
-/// each product rounded. `out` is for [`OVERHANG`] values more; `rows` is room.
-#[multiversion(targets("x86_64+avx512bw", "x86_64+avx2"))]
-pub(crate) fn shift_bicubic(
-    picture: Picture<'_>,
-    at: (usize, usize),
-    weights: ([i16; 4], [i16; 4]),
-    (width, height): (usize, usize),
-    rows: &mut Vec<i16>,
-    out: &mut [i16],
-) {
-    match_target! {
-        "x86_64+avx512bw" => registers::shift::<__m512i>(picture, at, weights, (width, height), rows, out),
-        "x86_64+avx2" => registers::shift::<__m256i>(picture, at, weights, (width, height), rows, out),
-        _ => shift(picture, at, weights, (width, height), rows, out),
+/// A shift of a window of a picture by one sub-pixel vector.
+///
+/// `out[y][x] = Σ wy[j] wx[i] picture[y0 + y + j][x0 + x + i]` over `i` and `j` from 0 to 3.
+/// Weights are in 2¹⁵ths, and each product is rounded.
+pub(crate) struct BicubicShift<'a> {
+    /// The picture.
+    pub(crate) picture: Picture<'a>,
+    /// First column `x0` and row `y0` of the picture that the result takes.
+    pub(crate) at: (usize, usize),
+    /// Weights `wx` of four columns.
+    pub(crate) column_weights: [i16; 4],
+    /// Weights `wy` of four rows.
+    pub(crate) row_weights: [i16; 4],
+    /// Columns and rows of the result.
+    pub(crate) size: (usize, usize),
+    /// Scratch buffer for rows that are weighted along.
+    pub(crate) rows: &'a mut Vec<i16>,
+    /// The result, row after row, followed by [`OVERHANG`] values.
+    pub(crate) out: &'a mut [i16],
+}
+
+/// Computes a shift.
+///
+/// # Panics
+/// Panics if the picture or the result is too short.
+pub(crate) fn shift_bicubic(shift: BicubicShift<'_>) {
+    run_wide(shift);
+}
+
+impl WideKernel for BicubicShift<'_> {
+    #[inline(always)]
+    fn run<V: Wide>(self, token: V::Token) {
+        registers::shift::<V>(token, self);
+    }
+
+    fn run_plain(self) {
+        let Self { picture, at: (x0, y0), column_weights, row_weights, size: (width, height), rows, out } = self;
+        rows.resize(width * (height + 3), 0);
+        for (y, row) in rows.chunks_exact_mut(width).enumerate() {
+            weigh(&picture.data[(y0 + y) * picture.stride + x0..], 1, column_weights, row);
+        }
+        weigh(rows, width, row_weights, &mut out[..width * height]);
     }
 }
 
-/// Along the rows first, then across them.
-#[cfg_attr(target_arch = "x86_64", allow(dead_code, reason = "for machines without AVX2"))]
+/// Computes the weighted sums of four values, `stride` from one to the next, from each value on.
 #[inline(always)]
-fn shift(
-    picture: Picture<'_>,
-    (x0, y0): (usize, usize),
-    (wx, wy): ([i16; 4], [i16; 4]),
-    (width, height): (usize, usize),
-    rows: &mut Vec<i16>,
-    out: &mut [i16],
-) {
-    rows.resize(width * (height + 3), 0);
-    for (y, row) in rows.chunks_exact_mut(width).enumerate() {
-        weigh(&picture.data[(y0 + y) * picture.stride + x0..], 1, wx, row);
-    }
-    weigh(rows, width, wy, &mut out[..width * height]);
-}
-
-/// The weighted sums of four values `apart`, from each on.
-#[cfg_attr(target_arch = "x86_64", allow(dead_code, reason = "for machines without AVX2"))]
-#[inline(always)]
-fn weigh(from: &[i16], apart: usize, [p, q, r, s]: [i16; 4], out: &mut [i16]) {
+fn weigh(from: &[i16], stride: usize, [p, q, r, s]: [i16; 4], out: &mut [i16]) {
     let product = |v: i16, w: i16| ((((i32::from(v) * i32::from(w)) >> 14) + 1) >> 1) as i16;
-    let (a, b, c, d) = (from, &from[apart..], &from[2 * apart..], &from[3 * apart..]);
+    let (a, b, c, d) = (from, &from[stride..], &from[2 * stride..], &from[3 * stride..]);
     for (x, out) in out.iter_mut().enumerate() {
         let outer = product(a[x], p).wrapping_add(product(d[x], s));
         *out = outer.wrapping_add(product(b[x], q)).saturating_add(product(c[x], r));
     }
 }
 
-/// For functions that are compiled for the instructions of `V`, and nowhere else.
-#[cfg(target_arch = "x86_64")]
+/// The kernel with registers.
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "there are no registers"))]
 mod registers {
-    use super::{OVERHANG, Picture};
+    use super::{BicubicShift, OVERHANG};
     use crate::simd::wide::Wide;
-    use std::arch::x86_64::__m256i;
 
-    /// [`super::shift`] by strips as wide as a register, down the rows: what is summed along a row stays in registers until
-    /// the three rows below are there.
+    /// Shifts by strips as wide as a register, down the rows. Three rows that are weighted along
+    /// stay in registers until the fourth one is there.
+    ///
+    /// The strips go from right to left: the last one overhangs into the next row, where the others
+    /// write later. It is a short register if that holds the columns left over, so that it never
+    /// writes more than [`OVERHANG`] values beyond the result.
     #[inline(always)]
-    pub(super) fn shift<V: Wide>(
-        picture: Picture<'_>,
-        (x0, y0): (usize, usize),
-        weights: ([i16; 4], [i16; 4]),
-        (width, height): (usize, usize),
-        _: &mut Vec<i16>,
-        out: &mut [i16],
-    ) {
+    pub(super) fn shift<V: Wide>(token: V::Token, job: BicubicShift<'_>) {
+        let BicubicShift { picture, at: (x0, y0), column_weights, row_weights, size: (width, height), out, .. } = job;
         let stride = picture.stride;
         let from = &picture.data[y0 * stride + x0..][..(height + 2) * stride + width.next_multiple_of(OVERHANG) + 3];
         let out = &mut out[..(height - 1) * width + width.next_multiple_of(OVERHANG)];
+        let mut strips = Strips { from, stride, column_weights, row_weights, out, width, height };
         let columns = V::BYTES / 2;
         let rest = width % columns;
-        // The last strip's overhang lies where the others write later; it is no wider than it must be.
         let last = width - rest;
-        // SAFETY: no strip reaches beyond whole registers of [`OVERHANG`], for which there is room.
+        // SAFETY: every strip begins at a multiple of its register's length, or of a longer one's,
+        // and holds a column of the result. In the last row it therefore ends before
+        // `width.next_multiple_of(OVERHANG)`: a long register is taken only for more than
+        // `OVERHANG` columns, which round up to its length, and a short one has `OVERHANG` words.
         unsafe {
             if rest > OVERHANG {
-                strip::<V>((from, stride), weights, (out, width), last, height);
+                strips.write::<V>(token, last);
             } else if rest > 0 {
-                strip::<__m256i>((from, stride), weights, (out, width), last, height);
+                strips.write::<V::Short>(V::short_token(token), last);
             }
             for x in (0..last).step_by(columns).rev() {
-                strip::<V>((from, stride), weights, (out, width), x, height);
+                strips.write::<V>(token, x);
             }
         }
     }
 
-    /// The strip from the column `x` on.
+    /// Input and output of all strips.
+    struct Strips<'a> {
+        from: &'a [i16],
+        stride: usize,
+        column_weights: [i16; 4],
+        row_weights: [i16; 4],
+        out: &'a mut [i16],
+        width: usize,
+        height: usize,
+    }
+
+    impl Strips<'_> {
+        /// Writes the strip from column `x` on.
+        ///
+        /// # Safety
+        /// `out` holds the register at column `x` of its last row. `from` holds it too, three rows
+        /// farther down and with three values more.
+        #[inline(always)]
+        unsafe fn write<V: Wide>(&mut self, token: V::Token, x: usize) {
+            let column_weights = self.column_weights.map(|w| V::splat_word(token, w));
+            let row_weights = self.row_weights.map(|w| V::splat_word(token, w));
+            // SAFETY: the caller vouches for the registers of the last row, and those of the other
+            // rows lie before them.
+            unsafe {
+                let (from, out) = (self.from.as_ptr().add(x), self.out.as_mut_ptr().add(x));
+                let row = |y: usize| along(token, from.add(y * self.stride), column_weights);
+                let (mut a, mut b, mut c) = (row(0), row(1), row(2));
+                for y in 0..self.height {
+                    let d = row(y + 3);
+                    weigh([a, b, c, d], row_weights).store(out.add(y * self.width));
+                    (a, b, c) = (b, c, d);
+                }
+            }
+        }
+    }
+
+    /// Computes the weighted sums of four values of a row, from each value on.
     ///
     /// # Safety
-    /// The slices hold the register that begins there in the last row, and `from` three values and three rows more.
+    /// A register and three values more can be read from `from` on.
     #[inline(always)]
-    unsafe fn strip<V: Wide>(
-        (from, stride): (&[i16], usize),
-        (wx, wy): ([i16; 4], [i16; 4]),
-        (out, width): (&mut [i16], usize),
-        x: usize,
-        height: usize,
-    ) {
-        let (wx, wy) = (wx.map(V::splat_word), wy.map(V::splat_word));
-        // SAFETY: the caller's.
-        unsafe {
-            let (from, out) = (from.as_ptr().add(x), out.as_mut_ptr().add(x));
-            let (mut a, mut b) = (along(from, wx), along(from.add(stride), wx));
-            let mut c = along(from.add(2 * stride), wx);
-            for y in 0..height {
-                let d = along(from.add((y + 3) * stride), wx);
-                weigh([a, b, c, d], wy).store(out.add(y * width));
-                (a, b, c) = (b, c, d);
-            }
-        }
-    }
-
-    /// The weighted sums of four values of a row, from each on.
-    #[inline(always)]
-    unsafe fn along<V: Wide>(from: *const i16, weights: [V; 4]) -> V {
-        // SAFETY: as above.
-        unsafe { weigh([V::load(from), V::load(from.add(1)), V::load(from.add(2)), V::load(from.add(3))], weights) }
+    unsafe fn along<V: Wide>(token: V::Token, from: *const i16, weights: [V; 4]) -> V {
+        // SAFETY: the farthest register begins three values behind `from`.
+        let values = unsafe { [0, 1, 2, 3].map(|i| V::load(token, from.add(i))) };
+        weigh(values, weights)
     }
 
     #[inline(always)]
     fn weigh<V: Wide>([a, b, c, d]: [V; 4], [p, q, r, s]: [V; 4]) -> V {
-        let outer = a.times_words(p).add_words(d.times_words(s));
-        outer.add_words(b.times_words(q)).add_words_cut(c.times_words(r))
+        let outer = a.multiply_words(p).wrapping_add_words(d.multiply_words(s));
+        outer.wrapping_add_words(b.multiply_words(q)).saturating_add_words(c.multiply_words(r))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::wide_kernel::run_with_avx2;
 
     #[test]
     fn a_shifted_picture_is_the_weighted_sum_of_sixteen_values() {
-        // Strips of the longest registers with nothing left, with half a register left and less, and with more.
+        // Whole registers of the longest kind, then half a register left over, less, and more.
         [64, 71, 53, 16, 21, 5].into_iter().for_each(shifted);
     }
 
@@ -160,13 +184,21 @@ mod tests {
         let at = |x: usize, y: usize| f64::from(data[y * stride as usize + x]);
         let picture = Picture { data: &data, stride: stride as usize };
         let (mut rows, mut out, mut plain) = (Vec::new(), vec![0; width * height + OVERHANG], vec![0; width * height]);
-        shift_bicubic(picture, (4, 2), (wx, wy), (width, height), &mut rows, &mut out);
-        shift(picture, (4, 2), (wx, wy), (width, height), &mut rows, &mut plain);
+        fn job<'a>(
+            picture: Picture<'a>,
+            weights: ([i16; 4], [i16; 4]),
+            size: (usize, usize),
+            rows: &'a mut Vec<i16>,
+            out: &'a mut [i16],
+        ) -> BicubicShift<'a> {
+            let (column_weights, row_weights) = weights;
+            BicubicShift { picture, at: (4, 2), column_weights, row_weights, size, rows, out }
+        }
+        shift_bicubic(job(picture, (wx, wy), (width, height), &mut rows, &mut out));
+        job(picture, (wx, wy), (width, height), &mut rows, &mut plain).run_plain();
         assert_eq!(out[..plain.len()], plain);
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx2") {
-            out.fill(0);
-            registers::shift::<__m256i>(picture, (4, 2), (wx, wy), (width, height), &mut rows, &mut out);
+        out.fill(0);
+        if run_with_avx2(job(picture, (wx, wy), (width, height), &mut rows, &mut out)) {
             assert_eq!(out[..plain.len()], plain);
         }
         let rounded = |v: f64, w: i16| (v * f64::from(w) / 32_768.0 + 0.5).floor();

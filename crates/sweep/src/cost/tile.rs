@@ -1,4 +1,4 @@
-//! One tile of the reference: all height planes, all sources.
+//! The costs of one tile of the reference: all sources, all height planes.
 
 use raster::{Grid, Window};
 
@@ -6,27 +6,32 @@ use super::census::{CHUNK, Census, overhang};
 use super::config::{Aggregation, COST_MAX, CostConfig};
 use super::division::{SweptPart, TILE_MIN, divide, halves, plane_span};
 use super::kernels::{self, FULL, INVALID};
-use super::laid::{Laid, Room};
+use super::laid::{LaidSource, PlaneScratch};
 use super::part::{CENSUS_REACH, Part};
-use super::planes::{BlockCosts, PLANES_AT_ONCE, Planes, scatter};
+use super::planes::{BlockCosts, PLANES_AT_ONCE, PlaneRun, Planes, scatter};
 use super::scale::census_scale;
 use super::voids::Voids;
 use crate::error::SweepError;
-use crate::geometry::{LocalMap, source_column_row};
+use crate::geometry::{LocalMap, PixelBox, source_column_row};
 use crate::reference::Reference;
 use crate::view::ViewLevel;
 
-/// … nor below this many heights.
+/// A range of this many planes or fewer is not divided further.
 const PLANES_MIN: i32 = 4;
 /// Buffers that a thread reuses from tile to tile.
 #[derive(Default)]
 pub(crate) struct TileScratch {
+    /// Census of the reference over the part.
     reference: Census,
     reference_voids: Voids,
-    sources: Vec<Laid>,
+    /// Sources resampled over the tile.
+    sources: Vec<LaidSource>,
+    /// Grey values before quantisation.
     grey: Vec<f32>,
+    /// Quantised picture of the reference over the part.
     padded: Vec<i16>,
-    room: Room,
+    plane: PlaneScratch,
+    /// Costs of one plane for each pair of views.
     pair_costs: Vec<Vec<u8>>,
     sums: Vec<u16>,
     weights: Vec<u16>,
@@ -34,7 +39,12 @@ pub(crate) struct TileScratch {
     parts: Vec<SweptPart>,
 }
 
-/// Fills the costs of `tile` (a part of the block, in image coordinates) for every pixel's own hypotheses.
+/// Computes the costs of all hypotheses of a tile's pixels. `tile` is a part of the block, in image
+/// coordinates.
+///
+/// # Errors
+/// Returns [`SweepError::NotSmooth`] if the local map to a source exceeds its error bound on the
+/// smallest tile.
 pub(crate) fn sweep_tile(
     reference: Reference<'_>,
     sources: &[ViewLevel<'_>],
@@ -47,7 +57,8 @@ pub(crate) fn sweep_tile(
     sweep_planes(reference, sources, (tile, planes), config, scratch, block)
 }
 
-/// Fills the costs of the tile's pixels for those of their hypotheses that lie among `planes`.
+/// Computes the costs of those hypotheses of the tile's pixels that lie among `planes`. Divides the
+/// tile or the planes where a local map exceeds its error bound.
 fn sweep_planes(
     reference: Reference<'_>,
     sources: &[ViewLevel<'_>],
@@ -83,16 +94,18 @@ fn sweep_planes(
     Ok(())
 }
 
-/// The local maps of a tile to all sources, or in which direction one of them is over the bound.
+/// Result of fitting the local maps of a tile.
 enum Fitted {
+    /// A map for each source; `None` if the source does not see the tile.
     Maps(Vec<Option<LocalMap>>),
-    /// The tile must be divided.
+    /// A map exceeds its error bound across the tile, which must be divided.
     RoughAcross,
-    /// The heights must be divided.
+    /// A map exceeds its error bound over the heights, which must be divided.
     RoughAlong,
 }
 
-/// The local maps to all sources. A source whose camera does not reach the tile has no map: it sees nothing there.
+/// Fits the local maps to all sources. A source whose camera fails over the tile sees nothing there
+/// and has no map.
 fn fit_maps(
     reference: Reference<'_>,
     sources: &[ViewLevel<'_>],
@@ -102,22 +115,16 @@ fn fit_maps(
 ) -> Result<Fitted, SweepError> {
     let step = reference.ranges.step_m;
     let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
-    let corners = [
-        tile.x as f64,
-        tile.y as f64,
-        (tile.x + tile.width as i64 - 1) as f64,
-        (tile.y + tile.height as i64 - 1) as f64,
-    ];
+    let area = PixelBox::of_window(tile);
     let mut maps = Vec::with_capacity(sources.len());
     for s in sources {
         let exact = |p, h| source_column_row(reference.view.camera, s.camera, reference.level, p, h);
-        let Ok(map) = LocalMap::fit(corners, heights, exact) else {
+        let Ok(map) = LocalMap::fit(area, heights, exact) else {
             maps.push(None);
             continue;
         };
         if map.max_error_px > config.map_tolerance_px {
-            let centre = [0.5 * (corners[0] + corners[2]), 0.5 * (corners[1] + corners[3])];
-            let along = LocalMap::fit([centre[0], centre[1], centre[0], centre[1]], heights, exact);
+            let along = LocalMap::fit(PixelBox::of_point(area.centre()), heights, exact);
             let is_along = along.is_ok_and(|m| m.max_error_px > 0.5 * config.map_tolerance_px);
             if is_along && planes.1 - planes.0 > PLANES_MIN {
                 return Ok(Fitted::RoughAlong);
@@ -138,6 +145,7 @@ fn fit_maps(
 }
 
 impl TileScratch {
+    /// Resamples all sources over the tile.
     fn prepare(
         &mut self,
         reference: Reference<'_>,
@@ -148,7 +156,7 @@ impl TileScratch {
         config: &CostConfig,
     ) {
         let padded = tile.grown(CENSUS_REACH);
-        self.sources.resize_with(sources.len(), Laid::default);
+        self.sources.resize_with(sources.len(), LaidSource::default);
         let step = reference.ranges.step_m;
         for ((laid, source), map) in self.sources.iter_mut().zip(sources).zip(maps) {
             let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
@@ -161,7 +169,7 @@ impl TileScratch {
         self.pair_costs.resize_with(pairs, Vec::new);
     }
 
-    /// Fills the costs of a part of the tile for those of its pixels' hypotheses that lie among its planes.
+    /// Computes the costs of a part of the tile, plane by plane, and copies them to its pixels.
     fn sweep_part(
         &mut self,
         reference: Reference<'_>,
@@ -183,11 +191,11 @@ impl TileScratch {
             for i in 0..count {
                 self.sweep_plane(f64::from(first + i as i32) * reference.ranges.step_m, padded, i, config);
             }
-            scatter(reference.ranges, part, (first, count), is_all, &mut self.planes, block);
+            scatter(reference.ranges, part, PlaneRun { first, count, is_all }, &mut self.planes, block);
         }
     }
 
-    /// Takes the reference's picture of a part of the tile, and the room that its planes need.
+    /// Grades the reference over a part of the tile and makes room for its planes.
     fn look_at(&mut self, reference: Reference<'_>, part: Window) {
         let padded = part.grown(CENSUS_REACH);
         let area = padded.width * padded.height;
@@ -204,13 +212,13 @@ impl TileScratch {
         self.reference.fill(&self.padded, padded.width, area);
     }
 
-    /// The cost of a height plane, the `i`th at hand, for every pixel of the part.
+    /// Computes the `i`th plane at hand, at a height, for every pixel of the part.
     fn sweep_plane(&mut self, height_m: f64, part: Part, i: usize, config: &CostConfig) {
-        let Self { reference, reference_voids, sources, room, pair_costs, planes, .. } = self;
+        let Self { reference, reference_voids, sources, plane: scratch, pair_costs, planes, .. } = self;
         let out = planes.plane_mut(i);
         if let [only] = &mut sources[..] {
-            only.place(height_m, part, room);
-            only.cost(reference, part, COST_MAX, room, out);
+            only.place(height_m, part, scratch);
+            only.cost(reference, part, COST_MAX, scratch, out);
             reference_voids.hide((0, 0), part, COST_MAX, out);
             return;
         }
@@ -219,13 +227,13 @@ impl TileScratch {
         for i in 0..sources.len() {
             let (before, rest) = sources.split_at_mut(i);
             let (Some(laid), Some(cost)) = (rest.first_mut(), costs.next()) else { continue };
-            laid.place(height_m, part, room);
-            is_hidden |= laid.cost(reference, part, INVALID, room, cost);
+            laid.place(height_m, part, scratch);
+            is_hidden |= laid.cost(reference, part, INVALID, scratch, cost);
             is_hidden |= reference_voids.hide((0, 0), part, INVALID, cost);
             if config.aggregation == Aggregation::Variance {
-                laid.grade(part, room);
+                laid.grade(part, scratch);
                 for (other, cost) in before.iter().zip(&mut costs) {
-                    is_hidden |= laid.cost_between(other, part, room, cost);
+                    is_hidden |= laid.cost_between(other, part, scratch, cost);
                 }
             }
         }
@@ -238,7 +246,8 @@ impl TileScratch {
     }
 }
 
-/// Moves the `k` smallest costs of every pixel into the first `k` planes; returns how many there are.
+/// Moves the `k` smallest costs of every pixel to the first `k` pairs. Returns their number, at
+/// most that of the pairs.
 fn select_smallest(costs: &mut [Vec<u8>], k: usize) -> usize {
     let k = k.clamp(1, costs.len());
     if k < costs.len() {
@@ -250,7 +259,7 @@ fn select_smallest(costs: &mut [Vec<u8>], k: usize) -> usize {
     k
 }
 
-/// Copies a window that may reach outside the image; NaN there.
+/// Copies a window of an image; outside the image it is NaN.
 fn copy_window(image: &Grid<f32>, w: Window, out: &mut [f32]) {
     out.fill(f32::NAN);
     let Some(i) = Window::whole(image.width(), image.height()).intersection(&w) else { return };

@@ -1,34 +1,66 @@
-//! Rows of bytes turned into columns.
+//! Rows of bytes turned into columns: planes of costs into the costs of each pixel.
 
 #![allow(unsafe_code)]
 
-use multiversion::multiversion;
-use multiversion::target::match_target;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::Avx2;
+use crate::simd::{Arrays, Kernel};
 
 /// Columns that are turned together.
-pub(crate) const COLUMNS: usize = 16;
+pub(super) const COLUMNS: usize = 16;
 /// Rows that are turned together.
-pub(crate) const ROWS: usize = 32;
+pub(super) const ROWS: usize = 32;
 
-/// The first columns of rows that begin `stride` apart: `rows` of them in groups of [`ROWS`], the last of which is filled up
-/// with what follows. There are `columns.len() / depth` columns, in groups of [`COLUMNS`], of `depth` groups each.
+/// Turns the first columns of rows that begin `stride` bytes apart.
+///
+/// `columns` holds `depth` groups of [`ROWS`] bytes for each column, and a multiple of [`COLUMNS`]
+/// columns. The last group of rows is filled up with what follows them in `bytes`.
 ///
 /// # Panics
-/// Fewer bytes, or groups of fewer columns.
-#[multiversion(targets("x86_64+avx2"))]
-pub(crate) fn transpose(bytes: &[u8], stride: usize, rows: usize, depth: usize, columns: &mut [[u8; ROWS]]) {
-    for (x, columns) in columns.chunks_exact_mut(COLUMNS * depth).enumerate() {
-        for group in 0..rows.div_ceil(ROWS).min(depth) {
-            let from = &bytes[group * ROWS * stride + x * COLUMNS..][..(ROWS - 1) * stride + COLUMNS];
-            match_target! {
-                "x86_64+avx2" => registers::turn(from, stride, depth, &mut columns[group..]),
-                _ => turn(from, stride, depth, &mut columns[group..]),
+/// Panics if `bytes` is too short for whole groups.
+pub(super) fn transpose(bytes: &[u8], stride: usize, rows: usize, depth: usize, columns: &mut [[u8; ROWS]]) {
+    let kernel = Transpose { bytes, stride, rows, depth, columns };
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx2) = Avx2::detect() {
+        return avx2.run(kernel);
+    }
+    kernel.run(Arrays);
+}
+
+/// Arguments of [`transpose`].
+struct Transpose<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    rows: usize,
+    depth: usize,
+    columns: &'a mut [[u8; ROWS]],
+}
+
+impl Transpose<'_> {
+    /// Calls `turn` for each group of rows and columns, with the bytes from its corner on and the
+    /// destination of its first column.
+    #[inline(always)]
+    fn for_each_group(self, mut turn: impl FnMut(&[u8], &mut [[u8; ROWS]])) {
+        let Self { bytes, stride, rows, depth, columns } = self;
+        for (x, columns) in columns.chunks_exact_mut(COLUMNS * depth).enumerate() {
+            for group in 0..rows.div_ceil(ROWS).min(depth) {
+                let from = &bytes[group * ROWS * stride + x * COLUMNS..][..(ROWS - 1) * stride + COLUMNS];
+                turn(from, &mut columns[group..]);
             }
         }
     }
 }
 
-#[cfg_attr(target_arch = "x86_64", allow(dead_code, reason = "for machines without AVX2"))]
+impl Kernel<Arrays> for Transpose<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, _: Arrays) {
+        let (stride, depth) = (self.stride, self.depth);
+        self.for_each_group(|from, columns| turn(from, stride, depth, columns));
+    }
+}
+
 #[inline(always)]
 fn turn(from: &[u8], stride: usize, depth: usize, columns: &mut [[u8; ROWS]]) {
     for (y, row) in from.chunks(stride).take(ROWS).enumerate() {
@@ -36,17 +68,29 @@ fn turn(from: &[u8], stride: usize, depth: usize, columns: &mut [[u8; ROWS]]) {
     }
 }
 
-/// For functions that are compiled for AVX2, and nowhere else.
 #[cfg(target_arch = "x86_64")]
 mod registers {
-    use super::{COLUMNS, ROWS};
     use std::arch::x86_64::*;
 
+    use super::{COLUMNS, ROWS, Transpose};
+    use crate::simd::{Avx2, Kernel};
+
+    impl Kernel<Avx2> for Transpose<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run(self, token: Avx2) {
+            let (stride, depth) = (self.stride, self.depth);
+            self.for_each_group(|from, columns| turn(token, from, stride, depth, columns));
+        }
+    }
+
     #[inline(always)]
-    pub(super) fn turn(from: &[u8], stride: usize, depth: usize, columns: &mut [[u8; ROWS]]) {
+    fn turn(_: Avx2, from: &[u8], stride: usize, depth: usize, columns: &mut [[u8; ROWS]]) {
         assert!(from.len() >= (ROWS - 1) * stride + COLUMNS && columns.len() > (COLUMNS - 1) * depth);
-        // SAFETY: the instructions are those of AVX2, for whose functions alone this is; every register that is read or written
-        // lies in the slices, whose lengths are checked.
+        // SAFETY: the token proves that the machine has AVX2. Each of the 32 rows is read for 16
+        // bytes from `y * stride` on, and each of the 16 columns is written whole at `x * depth`;
+        // the lengths of both slices have just been checked.
         unsafe {
             let mut m = [_mm256_setzero_si256(); COLUMNS];
             for (y, m) in m.iter_mut().enumerate() {
@@ -54,7 +98,8 @@ mod registers {
                 let lower = _mm_loadu_si128(from.as_ptr().add((y + ROWS / 2) * stride).cast());
                 *m = _mm256_inserti128_si256::<1>(_mm256_castsi128_si256(upper), lower);
             }
-            // Laying row i beside row i + 8, byte by byte, moves one bit of the row's number into the column's.
+            // Laying row i beside row i + 8, byte by byte, moves one bit of the row's number into
+            // the column's.
             for _ in 0..4 {
                 let before = m;
                 for i in 0..COLUMNS / 2 {

@@ -1,22 +1,24 @@
-//! Where pictures have no value, and which costs that concerns.
+//! Where pictures have no value, and which costs that makes invalid.
 
 use multiversion::multiversion;
 
 use super::kernels::INVALID;
 use super::part::{CENSUS_REACH, Part};
-use super::raise::raise;
 
-/// Marks of what holds a void: [`INVALID`] there, 0 elsewhere; none at all where there is no void.
+/// Marks of the places whose neighbourhood holds a void. There are none if the picture has no void.
 #[derive(Default)]
 pub(super) struct Voids {
+    /// [`INVALID`] at marked places, 0 elsewhere.
     marks: Vec<u8>,
+    /// Columns of the picture.
     stride: usize,
-    /// Rows with a mark.
+    /// Whether each row has a mark.
     rows: Vec<bool>,
 }
 
 impl Voids {
-    /// Marks every place of a picture in rows of `stride` from which a square of `side` to the right and below holds a void.
+    /// Marks every place of a picture of `stride` columns from which a square of `side` pixels to
+    /// the right and below holds a NaN. `has_voids` tells whether there is one.
     pub(super) fn mark(&mut self, values: &[f32], stride: usize, side: usize, has_voids: bool) {
         self.marks.clear();
         self.rows.clear();
@@ -28,18 +30,27 @@ impl Voids {
         }
     }
 
-    /// Raises the costs of a part, whose first pixel's mark is at `(x, y)`, to `worst` where it is marked; tells whether a row is.
+    /// Raises the costs of a part to at least `worst` at marked pixels, where the mark of its first
+    /// inner pixel is at `(x, y)`. Returns whether any row of the part has a mark.
     pub(super) fn hide(&self, (x, y): (usize, usize), part: Part, worst: u8, costs: &mut [u8]) -> bool {
         let (width, height) = (part.width - 2 * CENSUS_REACH, part.height - 2 * CENSUS_REACH);
         let Some(rows) = self.rows.get(y..y + height).filter(|rows| rows.contains(&true)) else { return false };
         let first = CENSUS_REACH * part.width + CENSUS_REACH;
-        let marks = (&self.marks[y * self.stride + x..], self.stride);
-        raise((&mut costs[first..], part.width), marks, rows, width, worst);
+        for (row, _) in rows.iter().enumerate().filter(|(_, is_marked)| **is_marked) {
+            let marks = &self.marks[(y + row) * self.stride + x..][..width];
+            raise(&mut costs[first + row * part.width..][..width], marks, worst);
+        }
         true
     }
 }
 
-/// Marks every place from which a square of `side` to the right and below holds a marked one.
+/// Raises bytes to at least `worst` where `marks` has 255, not 0.
+#[multiversion(targets("x86_64+avx2"))]
+fn raise(bytes: &mut [u8], marks: &[u8], worst: u8) {
+    bytes.iter_mut().zip(marks).for_each(|(byte, mark)| *byte = (*byte).max(mark & worst));
+}
+
+/// Marks every place from which a square of `side` pixels to the right and below holds a mark.
 #[multiversion(targets("x86_64+avx2"))]
 fn spread(voids: &mut [u8], stride: usize, side: usize) {
     for row in voids.chunks_exact_mut(stride) {
@@ -53,5 +64,31 @@ fn spread(voids: &mut [u8], stride: usize, side: usize) {
             row.iter_mut().zip(other).for_each(|(v, other)| *v |= other);
         }
         rest = below;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_marked_pixels_are_raised() {
+        for inner in [5, 32, 47, 64] {
+            let part = Part { within: [0; 2], width: inner + 2 * CENSUS_REACH, height: 3 + 2 * CENSUS_REACH };
+            let stride = inner + 7;
+            let cost = |i: usize| (i * 37 % 256) as u8;
+            let is_void = |i: usize| i / stride != 1 && i % 5 < 2;
+            let values: Vec<f32> = (0..3 * stride).map(|i| if is_void(i) { f32::NAN } else { 1.0 }).collect();
+            let mut voids = Voids::default();
+            voids.mark(&values, stride, 1, true);
+            let mut costs: Vec<u8> = (0..part.area()).map(cost).collect();
+            assert!(voids.hide((0, 0), part, 112, &mut costs));
+            for (i, found) in costs.into_iter().enumerate() {
+                let (x, y) = (i % part.width, i / part.width);
+                let inside = (1..=inner).contains(&x) && (1..=3).contains(&y);
+                let is_raised = inside && is_void((y - 1) * stride + x - 1);
+                assert_eq!(found, if is_raised { cost(i).max(112) } else { cost(i) });
+            }
+        }
     }
 }

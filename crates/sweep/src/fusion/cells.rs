@@ -1,4 +1,4 @@
-//! One height per cell from several views' heights.
+//! One height per cell from the heights of several views.
 
 use numeric::middle_values;
 use raster::{Grid, Window};
@@ -10,15 +10,16 @@ use crate::tiles::{paste, tiles};
 /// Parameters of the fusion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FusionConfig {
-    /// Heights closer than this belong to one surface, metres.
+    /// Largest difference of heights on one surface, metres.
     pub same_surface_m: f32,
-    /// Neighbouring pixels further apart in height than this are not joined, metres.
+    /// Largest difference in height of neighbouring pixels that are joined, metres.
     pub tear_m: f32,
-    /// Side of the tiles that are fused at a time, cells: memory and parallelism, never the result.
+    /// Side of the tiles that are fused at a time, cells. It affects memory and parallelism only,
+    /// never the result.
     pub tile: usize,
 }
 
-/// The fused surface.
+/// Surface fused from several views.
 #[derive(Debug, Clone)]
 pub struct FusedSurface {
     /// Height above the origin, metres; NaN in voids.
@@ -27,8 +28,8 @@ pub struct FusedSurface {
     pub sigma_m: Grid<f32>,
     /// Number of views behind each height.
     pub views: Grid<u8>,
-    /// What speaks for each height against what speaks for others there: `s / (s + o + 1)` with the weights s of the
-    /// views behind it and o of the others; 0 in voids.
+    /// Agreement of the views on each height: `s / (s + o + 1)`, with s the summed weights of the
+    /// views that support it and o those of the others; 0 in voids.
     pub confidence: Grid<f32>,
 }
 
@@ -40,7 +41,7 @@ struct Sample {
     weight: f32,
 }
 
-/// What a cell holds.
+/// Fused height of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Cell {
     height_m: f32,
@@ -50,6 +51,14 @@ struct Cell {
 }
 
 /// Fuses the views on a grid of `size` (columns, rows), tile by tile.
+///
+/// ```
+/// use sweep::fusion::{FusionConfig, fuse_views};
+///
+/// let config = FusionConfig { same_surface_m: 1.5, tear_m: 3.0, tile: 256 };
+/// let surface = fuse_views(&[], (40, 30), &config);
+/// assert!(surface.height_m.data().iter().all(|h| h.is_nan()));
+/// ```
 pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionConfig) -> FusedSurface {
     let windows = tiles(Window::whole(size.0, size.1), config.tile.max(1));
     let parts: Vec<FusedSurface> = windows
@@ -102,7 +111,7 @@ fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> 
     out
 }
 
-/// The best supported surface among the samples.
+/// Finds the best supported surface among the samples; `None` if there are none.
 fn fuse_cell(samples: &mut [Sample], same_surface_m: f32) -> Option<Cell> {
     samples.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
     let (mut best, mut most, mut from) = (0..0, 0.0, 0);
@@ -111,14 +120,15 @@ fn fuse_cell(samples: &mut [Sample], same_surface_m: f32) -> Option<Cell> {
             from += 1;
         }
         let weight: f32 = samples[from..to].iter().map(|s| s.weight).sum();
-        // ≥: in a tie the upper surface wins.
+        // With ≥ the upper surface wins a tie.
         if weight >= most {
             (best, most) = (from..to, weight);
         }
     }
     let mode = &samples[best];
     let all: f32 = samples.iter().map(|s| s.weight).sum();
-    // The median is robust within the mode; the deviation is that of the mean of its members, as they are independent.
+    // The median is robust within the mode. The deviation is that of a weighted mean of its
+    // samples, taken as independent.
     let information: f32 = mode.iter().map(|s| 1.0 / s.sigma_m.max(1e-3).powi(2)).sum();
     Some(Cell {
         height_m: median(mode)?,

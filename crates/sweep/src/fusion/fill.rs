@@ -1,13 +1,21 @@
-//! Closing voids from what is known around them.
+//! Filling of voids from the known heights around them.
 //!
-//! From each void cell the nearest known heights in eight directions are looked up. A void is closed where it is narrow, where
-//! something stands beside it that is high enough to hide it, or between two opposite heights: what changed between the dates, or
-//! has too little texture, is mostly more of what is around. It stays open where the images could not show what stands there
-//! (a saturated roof), and where heights are known on one side alone (water, the scene's border). An island smaller than the
-//! voids that it would close may be chance itself: nothing is drawn from it. Where the heights hold two levels, the void is
-//! ground that a building hides from the views, so only the lower level counts: the heights on one surface with the second
-//! lowest, as one alone may be a pit. Weights are inverse distances: two opposite heights then give the straight line between
-//! them, so that slopes are continued.
+//! For each void cell the nearest known heights in eight directions are found. The cell is filled
+//! if
+//!
+//! - the void is narrow,
+//! - a surface beside it is high enough to hide it from the views, or
+//! - it lies between two opposite heights: what changed between the dates, or has too little
+//!   texture, mostly continues its surroundings.
+//!
+//! It stays open where the images could not show what stands there (a saturated roof), and where
+//! heights are known on one side only (water, the scene's border). Small islands of heights may be
+//! chance, so that nothing is filled from them.
+//!
+//! If the known heights are on two levels, the void is ground that a building hides. Only the lower
+//! level counts then: the heights on one surface with the second lowest one, as the lowest may be a
+//! pit. Weights are inverse distances: two opposite heights give the straight line between them, so
+//! that slopes continue.
 
 use raster::Grid;
 use rayon::prelude::*;
@@ -17,49 +25,51 @@ use super::speckle::remove_speckle;
 /// Parameters of the filling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FillConfig {
-    /// How far known heights are looked for, cells.
+    /// Largest distance of a known height, cells.
     pub reach_cells: usize,
-    /// Voids up to this wide between two opposite heights are closed whatever stands there, cells.
+    /// Largest distance of two opposite known heights between which a void is filled in any case,
+    /// cells.
     pub narrow_cells: f32,
-    /// Heights count where at least this many cells hang together, whatever their heights.
+    /// Smallest number of connected cells with heights from which voids are filled.
     pub island_cells: usize,
-    /// A surface hides what is up to this many cells away per metre that it is higher.
+    /// Distance up to which a surface hides the ground, cells per metre of its height above the
+    /// ground.
     pub hidden_cells_per_m: f32,
-    /// Neighbouring heights further apart than this are two levels, metres …
+    /// Largest difference of neighbouring heights on one level, metres.
     pub same_surface_m: f32,
-    /// … and that much more for every cell between them, metres.
+    /// Increase of that difference for every cell between the heights, metres.
     pub slope_m: f32,
 }
 
-/// Known heights are needed in this many of the eight directions: more than at the outside of a straight edge.
+/// Number of the eight directions that must have a known height: more than outside a straight edge.
 const KNOWN_MIN: usize = 4;
 
-/// Four of the eight directions, in which what lies before a cell comes before it row by row; their opposites are the
-/// other four.
+/// Four of the eight directions: towards cells that come earlier row by row. The other four are
+/// their opposites.
 const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// A known height.
+/// Nearest known height in one direction.
 #[derive(Debug, Clone, Copy)]
 struct Known {
-    /// Above the origin, metres.
+    /// Height above the origin, metres.
     height_m: f32,
-    /// How far away it is, cells.
+    /// Distance, cells.
     apart: f32,
     /// Whether no blind cell lies between.
     in_sight: bool,
 }
 
-/// The nearest known height in each of the four directions before a cell, or behind it.
+/// Nearest known heights in the four directions before a cell, or in the four behind it.
 type Nearest = [Option<Known>; 4];
 
-/// Fills voids of `height_m` in place; returns which cells were filled. `blind` are cells where the images could not show what
-/// stands there.
+/// Fills voids of `height_m` in place and returns which cells were filled. `blind` marks cells
+/// where the images could not show what stands there.
 pub fn fill_voids(height_m: &mut Grid<f32>, blind: &Grid<bool>, config: &FillConfig) -> Grid<bool> {
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut sources = height_m.clone();
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
-    let forward = known_before((&sources, blind), voids.iter().copied(), false, config);
-    let mut backward = known_before((&sources, blind), voids.iter().rev().copied(), true, config);
+    let forward = known_before(&sources, blind, voids.iter().copied(), false, config);
+    let mut backward = known_before(&sources, blind, voids.iter().rev().copied(), true, config);
     backward.reverse();
     let around = voids.par_iter().zip(forward.into_par_iter().zip(backward));
     let value = |(&i, (a, b)): (&usize, (Nearest, Nearest))| Some((i, interpolate(&a, &b, config)?));
@@ -72,10 +82,11 @@ pub fn fill_voids(height_m: &mut Grid<f32>, blind: &Grid<bool>, config: &FillCon
     filled
 }
 
-/// For each of `voids`, in the order of the rows (or all of it reversed), the nearest known heights within reach in the
-/// four directions that come before.
+/// Finds, for each of `voids`, the nearest known heights within reach in the four directions before
+/// it. `voids` are in the order of the rows; with `reversed` everything runs backwards.
 fn known_before(
-    (height_m, blind): (&Grid<f32>, &Grid<bool>),
+    height_m: &Grid<f32>,
+    blind: &Grid<bool>,
     voids: impl Iterator<Item = usize>,
     reversed: bool,
     config: &FillConfig,
@@ -83,7 +94,7 @@ fn known_before(
     let (w, h) = (height_m.width() as isize, height_m.height() as isize);
     let sign = if reversed { -1 } else { 1 };
     let reach = config.reach_cells as f32;
-    // What each cell of the last two rows has before it, per direction.
+    // Nearest known heights before each cell of the last two rows.
     let mut rows = [vec![Nearest::default(); w as usize], vec![Nearest::default(); w as usize]];
     let mut out = Vec::new();
     let mut voids = voids.peekable();
@@ -92,7 +103,7 @@ fn known_before(
         let y = if reversed { h - 1 - row } else { row };
         for column in 0..w {
             let x = if reversed { w - 1 - column } else { column };
-            // What is known ends the search of others and has none of its own.
+            // A known cell ends the search of others and needs none itself.
             if !height_m[(x as usize, y as usize)].is_nan() {
                 continue;
             }
@@ -121,7 +132,8 @@ fn known_before(
     out
 }
 
-/// The height for a cell with the nearest known heights `before` and `behind` it, direction by direction.
+/// Returns the height of a void cell from the nearest known heights before and behind it, or `None`
+/// if it stays open.
 fn interpolate(before: &Nearest, behind: &Nearest, config: &FillConfig) -> Option<f32> {
     let mut known: Vec<Known> = before.iter().chain(behind).copied().flatten().collect();
     if known.len() < KNOWN_MIN {
@@ -158,7 +170,7 @@ mod tests {
         slope_m: 0.1,
     };
 
-    /// With nothing that the images cannot show.
+    /// Fills with no cell blind.
     fn fill(height_m: &mut Grid<f32>) -> Grid<bool> {
         let blind = Grid::filled(height_m.width(), height_m.height(), false);
         fill_voids(height_m, &blind, &CONFIG)

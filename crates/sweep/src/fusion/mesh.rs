@@ -1,4 +1,4 @@
-//! One view's heights on the map grid.
+//! The heights of one view on the map grid.
 
 use geodesy::{LonLatHeight, MapPoint};
 use multiversion::multiversion;
@@ -7,65 +7,71 @@ use rayon::prelude::*;
 
 use crate::consistency::Heights;
 use crate::error::SweepError;
-use crate::geometry::LocalMap;
+use crate::geometry::{LocalMap, PixelBox};
 use crate::height_map::height_span;
 use crate::ranges::extremes;
 use crate::tiles::{paste, tiles};
 
-/// The output grid: its placement and the map projection.
+/// Output grid: its placement and map projection.
 pub struct GridFrame<'a> {
-    /// Placement of the cells.
+    /// Placement of the cells on the map.
     pub geotransform: GeoTransform,
-    /// Map coordinates of a ground point; `None` where the projection has none.
+    /// Projects a ground point to the map; `None` where the projection is undefined.
     pub map_from_ground: &'a (dyn Fn(LonLatHeight) -> Option<MapPoint> + Sync),
 }
 
-/// One view's surface on the grid.
+/// Surface of one view, sampled on the grid.
 #[derive(Debug, Clone)]
 pub struct ViewSurface {
     /// Grid column and row of the first cell.
     origin: [f32; 2],
-    /// Height above the map's origin, metres; NaN where the view has none.
+    /// Height above the origin of the view's height map, metres; NaN where the view has none.
     pub height_m: Grid<f32>,
     /// Standard deviation, metres.
     pub sigma_m: Grid<f32>,
-    /// What each height counts for, 0 to 1.
+    /// Weight of each height, 0 to 1.
     pub weight: Grid<f32>,
 }
 
-/// What a height at a border counts for: four of them outvote one inside a surface.
+/// Weight of a height at a border, against 1 inside a surface.
 const BORDER_WEIGHT: f32 = 0.25;
-/// How far from a jump a height is at the border, pixels: a patch's half width, and half a pixel that the edge is blurred
-/// by on either side.
+/// Reach of a border beside a jump, pixels: half a patch, and the blur of the edge.
 const BORDER_REACH: usize = 2;
-/// Side of the tiles in which image → map is replaced by a local map.
+/// Side of the tiles in which a local map replaces the exact projection to the grid, pixels.
 const TILE: usize = 64;
-/// A pixel on the grid: column, row, height, deviation, weight.
+/// A pixel placed on the grid.
 #[derive(Debug, Clone, Copy)]
 struct Vertex {
+    /// Column of the grid.
     x: f32,
+    /// Row of the grid.
     y: f32,
+    /// Height above the origin, metres; NaN if the pixel is not kept.
     h: f32,
+    /// Standard deviation of the height, metres.
     sigma: f32,
+    /// Weight of the height.
     weight: f32,
 }
 
-/// For a pixel that is not kept.
+/// Vertex of a pixel that is not kept.
 const NO_VERTEX: Vertex = Vertex { x: 0.0, y: 0.0, h: f32::NAN, sigma: f32::NAN, weight: 0.0 };
 
-/// One view's kept pixels in grid coordinates.
+/// Kept pixels of one view in grid coordinates.
 #[derive(Debug, Clone)]
 pub struct PlacedView {
     vertices: Grid<Vertex>,
-    /// Windows of the image, each with the grid cells that its pixels and facets reach: x0, y0, x1, y1.
+    /// Windows of the image, each with the box of grid cells that its facets reach: x0, y0, x1, y1.
     extents: Vec<(Window, [f32; 4])>,
 }
 
-/// Puts one view's heights on the grid. `keep` says which pixels to use. A height with one lower by more than `jump_m`
-/// beside it is at a border, and counts for less: patches that hold a roof's edge see the roof's height outside it too.
+/// Places the kept heights of one view on the grid.
+///
+/// A height with another one lower by more than `jump_m` beside it is at a border and gets a
+/// smaller weight: patches that hold a roof's edge see the roof's height outside it too.
 ///
 /// # Errors
-/// A camera that fails inside the scene.
+/// Returns [`SweepError::Camera`] if the camera or the map projection fails inside the scene.
 pub fn place_view(
     heights: Heights<'_>,
     level: u32,
@@ -81,10 +87,10 @@ pub fn place_view(
     Ok(PlacedView { vertices, extents })
 }
 
-/// Marks the cells of the grid that `pixels` of a view fall into at their heights.
+/// Marks the cells of the grid that the given pixels of a view fall into at their heights.
 ///
 /// # Errors
-/// A camera that fails inside the scene.
+/// Returns [`SweepError::Camera`] if the camera or the map projection fails inside the scene.
 pub fn mark_cells(
     heights: Heights<'_>,
     level: u32,
@@ -104,7 +110,8 @@ pub fn mark_cells(
     Ok(())
 }
 
-/// 1 for a height, or [`BORDER_WEIGHT`] where the least height within [`BORDER_REACH`] is lower by more than `jump_m`.
+/// Returns the weight of each height: [`BORDER_WEIGHT`] where the least height within
+/// [`BORDER_REACH`] is lower by more than `jump_m`, 1 elsewhere.
 fn border_weights(height_m: &Grid<f32>, jump_m: f32) -> Grid<f32> {
     let mut out = extremes(height_m, f32::INFINITY, f32::min, BORDER_REACH);
     for (weight, height) in out.data_mut().iter_mut().zip(height_m.data()) {
@@ -113,10 +120,10 @@ fn border_weights(height_m: &Grid<f32>, jump_m: f32) -> Grid<f32> {
     out
 }
 
-/// The cells that the window's pixels fall into, widened by a cell for the facets to the next window.
+/// Returns the box of cells that the facets of a window reach; `None` if it has no vertex.
 fn extent(vertices: &Grid<Vertex>, w: Window) -> Option<[f32; 4]> {
     let mut e = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
-    // One more row and column: facets belong to the window of their upper-left pixel.
+    // One more row and column, as facets belong to the window of their upper-left pixel.
     let (x1, y1) = (w.x as usize + w.width + 1, w.y as usize + w.height + 1);
     for y in w.y as usize..y1.min(vertices.height()) {
         for v in &vertices.row(y)[w.x as usize..x1.min(vertices.width())] {
@@ -129,8 +136,10 @@ fn extent(vertices: &Grid<Vertex>, w: Window) -> Option<[f32; 4]> {
 }
 
 impl PlacedView {
-    /// Samples the view's surface at the centres of the cells of a window of the grid. Where the surface is torn, at walls and
-    /// beside what the view does not see, a cell whose centre no facet covers holds nothing.
+    /// Samples the view's surface at the centres of the cells of a window of the grid.
+    ///
+    /// Facets with a height difference above `tear` metres are left out. Cells whose centre no
+    /// facet covers, at walls and beside what the view does not see, stay void.
     pub fn rasterise(&self, cells: Window, tear: f32) -> ViewSurface {
         let mut facets = ViewSurface::empty(cells);
         let (x1, y1) = ((cells.x + cells.width as i64) as f32, (cells.y + cells.height as i64) as f32);
@@ -166,7 +175,7 @@ fn rasterise_window(vertices: &Grid<Vertex>, w: Window, tear: f32, facets: &mut 
     }
 }
 
-/// All kept pixels in grid coordinates.
+/// Places all kept pixels on the grid.
 fn place(
     heights: Heights<'_>,
     level: u32,
@@ -185,7 +194,7 @@ fn place(
     Ok(out)
 }
 
-/// The kept pixels of a tile; `None` where there are none.
+/// Places the kept pixels of a tile on the grid; `None` if there are none.
 fn place_tile(
     heights: Heights<'_>,
     level: u32,
@@ -206,10 +215,10 @@ fn place_tile(
         let (column, row) = frame.geotransform.cell_from_map(x, y).ok_or(camera::CameraError::NotFinite)?;
         Ok([column, row])
     };
-    let corners = [w.x as f64, w.y as f64, (w.x + w.width as i64 - 1) as f64, (w.y + w.height as i64 - 1) as f64];
     let failed = |source| SweepError::Camera { view: heights.index, source };
-    let local = LocalMap::fit(corners, range, exact).map_err(failed)?;
-    // A twentieth of a cell is invisible in the result; a tile over it is placed exactly.
+    let local = LocalMap::fit(PixelBox::of_window(w), range, exact).map_err(failed)?;
+    // A twentieth of a cell does not show in the result. A tile with a larger error is placed
+    // exactly.
     let fits = local.max_error_px <= 0.05;
     let mut out = Grid::filled(w.width, w.height, NO_VERTEX);
     for y in 0..w.height {
@@ -237,10 +246,10 @@ impl ViewSurface {
         }
     }
 
-    /// Puts a height into a cell unless a higher one is there.
+    /// Stores a height in a cell unless a higher one is there.
     #[inline(always)]
-    fn put(&mut self, column: f32, row: f32, (h, sigma, weight): (f32, f32, f32)) {
-        let (column, row) = (column - self.origin[0], row - self.origin[1]);
+    fn put(&mut self, sample: Vertex) {
+        let (column, row) = (sample.x - self.origin[0], sample.y - self.origin[1]);
         if column < 0.0 || row < 0.0 {
             return;
         }
@@ -249,14 +258,14 @@ impl ViewSurface {
             return;
         }
         let own = &mut self.height_m[at];
-        if own.is_nan() || *own < h {
-            *own = h;
-            self.sigma_m[at] = sigma;
-            self.weight[at] = weight;
+        if own.is_nan() || *own < sample.h {
+            *own = sample.h;
+            self.sigma_m[at] = sample.sigma;
+            self.weight[at] = sample.weight;
         }
     }
 
-    /// Samples a triangle at the centres of the cells it covers.
+    /// Samples a triangle at the centres of the cells that it covers.
     #[inline(always)]
     fn facet(&mut self, [a, b, c]: [Vertex; 3], tear: f32) {
         let least = a.h.min(b.h).min(c.h);
@@ -281,7 +290,8 @@ impl ViewSurface {
                 if s >= -1e-4 && t >= -1e-4 && s + t <= 1.0 + 1e-4 {
                     let mix = |p: f32, q: f32, r: f32| p + s * (q - p) + t * (r - p);
                     let weight = a.weight.min(b.weight).min(c.weight);
-                    self.put(x, y, (mix(a.h, b.h, c.h), mix(a.sigma, b.sigma, c.sigma), weight));
+                    let (h, sigma) = (mix(a.h, b.h, c.h), mix(a.sigma, b.sigma, c.sigma));
+                    self.put(Vertex { x, y, h, sigma, weight });
                 }
                 x += 1.0;
             }
@@ -300,7 +310,8 @@ mod tests {
     const SIZE: usize = 80;
     const METRES_PER_DEGREE: f64 = 111_320.0;
 
-    /// A view's surface (waves of 3 m) on a map whose coordinates are `false_origin` at (0°, 0°).
+    /// Surface of a view, with waves of 3 m, on a map with the coordinates `false_origin` at (0°,
+    /// 0°).
     fn surface(false_origin: [f64; 2]) -> ViewSurface {
         let view = view_of_plane(leaning_camera(SIZE, [0.3, -0.2]), SIZE, 0.0);
         let mut map = HeightMap::empty(SIZE, SIZE, 40.0);
@@ -318,7 +329,8 @@ mod tests {
         place_view(heights, 0, &keep, 5.0, &frame).unwrap().rasterise(Window::whole(80, 80), 5.0)
     }
 
-    /// At 5 000 km an f32 is half a metre wide: nothing absolute may pass through one.
+    /// At 5,000 km the resolution of an f32 is half a metre: no absolute coordinate may pass
+    /// through one.
     #[test]
     fn heights_at_utm_coordinates_are_those_at_the_origin() {
         let (near, far) = (surface([0.0, 0.0]), surface([499_980.0, 5_000_020.0]));

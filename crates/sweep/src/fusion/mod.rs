@@ -1,9 +1,10 @@
-//! From the views' heights to one surface on a map grid.
+//! Fusion of the views' heights to one surface on a map grid.
 //!
-//! Each view's surviving pixels are joined to a surface and sampled at the cells' centres, so that a height stays where
-//! it was measured. A cell then holds one height per view: the mode with the most support wins, the upper one in a tie,
-//! since averages across a roof's edge are wrong on both sides. Heights at the upper side of a jump support little:
-//! matching makes roofs reach out, and a view that sees the ground beside them knows better.
+//! The kept pixels of each view are joined to a surface that is sampled at the centres of the
+//! cells, so that a height stays where it was measured. A cell then has one height per view. The
+//! mode with the most support wins, the upper one in a tie; an average across a roof's edge would
+//! be wrong on both sides. Heights at the upper side of a jump give little support: matching widens
+//! roofs, and a view that sees the ground beside them is more reliable there.
 
 mod cells;
 mod fill;

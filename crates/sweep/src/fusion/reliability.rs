@@ -1,22 +1,23 @@
-//! How far each height of a fused surface is to be believed, from what is around it.
+//! Reliability of each height of a fused surface, from its surroundings.
 //!
-//! That views agree in a cell says little where they disagree beside it, or where heights tumble as in trees and at walls. The
-//! reliability is the mean agreement of a window, observed or not, divided by one plus the deviation of its heights in units of
-//! what counts as one surface. On JAX_068 the most reliable cells, at no less than S2P's coverage, have less MAE than S2P's pairs
-//! (`benches/results/scenes.md`); chosen by the agreement of the cell alone they have more.
+//! Agreement of the views in a cell means little where they disagree beside it, or where heights
+//! vary as in trees and at walls. The reliability is the mean agreement over a window, with 0 for
+//! unobserved cells, divided by one plus the standard deviation of the window's heights in units of
+//! `same_surface_m`. Chosen by it, the best cells of JAX_068 have a smaller error than chosen by
+//! the agreement of the cell alone (`benches/results/scenes.md`).
 
 use raster::Grid;
 
 use crate::window_sums::window_sums;
 
-/// What a cell without any agreement around it is worth beside one with full agreement: its height was interpolated from
-/// what is around, and that deviates more or less.
+/// Share that is added to the agreement, so that the deviation still ranks cells whose surroundings
+/// were interpolated: without any agreement a cell counts this much of one with full agreement.
 const INTERPOLATED: f64 = 0.1;
 
-/// The reliability of every height, 0 to 1; NaN in voids.
+/// Computes the reliability of every height, 0 to 1; NaN in voids.
 ///
-/// `agreement` is 0 to 1 where a height was observed and 0 elsewhere; the window reaches `reach` cells to each side, and heights
-/// that deviate by `same_surface_m` halve it.
+/// `agreement` is 0 to 1 where a height was observed and 0 elsewhere. The window reaches `reach`
+/// cells to each side. A standard deviation of `same_surface_m` halves the reliability.
 pub fn reliability(height_m: &Grid<f32>, agreement: &Grid<f32>, reach: usize, same_surface_m: f64) -> Grid<f32> {
     let value = |h: f32| if h.is_nan() { 0.0 } else { f64::from(h) };
     let (width, height) = (height_m.width(), height_m.height());
@@ -37,7 +38,7 @@ pub fn reliability(height_m: &Grid<f32>, agreement: &Grid<f32>, reach: usize, sa
     out
 }
 
-/// What a window around `i` covers of `0..n`.
+/// Returns the part of `0..n` within `reach` of `i`.
 fn span(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
     i.saturating_sub(reach)..(i + reach + 1).min(n)
 }

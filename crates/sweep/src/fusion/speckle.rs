@@ -2,8 +2,18 @@
 
 use raster::Grid;
 
-/// Sets to NaN every connected patch (4-neighbours, steps up to `same_surface_m`) of fewer than `min_cells` cells.
-/// Returns how many cells went.
+/// Sets every connected patch of fewer than `min_cells` cells to NaN, and returns the number of
+/// cells removed.
+///
+/// Cells are connected to their four neighbours where heights differ by at most `same_surface_m`.
+///
+/// ```
+/// use raster::Grid;
+///
+/// let mut height_m = Grid::filled(9, 9, 10.0f32);
+/// height_m[(4, 4)] = 50.0;
+/// assert_eq!(sweep::fusion::remove_speckle(&mut height_m, 1.0, 4), 1);
+/// ```
 pub fn remove_speckle(height_m: &mut Grid<f32>, same_surface_m: f32, min_cells: usize) -> usize {
     let (w, h) = (height_m.width(), height_m.height());
     let mut seen = vec![false; w * h];
@@ -34,7 +44,7 @@ pub fn remove_speckle(height_m: &mut Grid<f32>, same_surface_m: f32, min_cells: 
     removed
 }
 
-/// The up to four neighbours of a cell.
+/// Returns the up to four neighbours of a cell.
 fn neighbours(p: usize, w: usize, h: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (p % w, p / w);
     let left = (x > 0).then(|| p - 1);

@@ -1,10 +1,12 @@
-//! Joint adjustment of all views' pointing from tie points.
+//! Joint adjustment of the pointing of all views from tie points.
 //!
-//! Each track gives the residuals of its best ground point, which know nothing of where the ground is: with `J` the
-//! Jacobian of the track's projections, `N` a basis of the null space of `Jᵀ`, and `B` the design of the corrections,
-//! `Nᵀ (r − B x) = 0`. Solved by iteratively reweighted least squares (Cauchy weights on a robust scale). What the ties
-//! cannot see (a common shift of all views) is held by a weak prior, so the corrections stay as small as they can.
-//! The order of the corrections is the least that the Bayesian information criterion justifies.
+//! Each track gives the residuals r of its best ground point. They are made independent of the
+//! ground point: with J the Jacobian of the track's projections, N a basis of the null space of Jᵀ,
+//! and B the design matrix of the corrections x, `Nᵀ (r − B x) = 0`. The system is solved by
+//! iteratively reweighted least squares, with Cauchy weights on a robust scale. A weak prior holds
+//! what ties cannot determine, such as a common shift of all views, so that corrections stay as
+//! small as possible. The order of the corrections is the one with the least Bayesian information
+//! criterion.
 
 use camera::{CameraError, ImageCorrection, ImagePoint, RpcCamera};
 use geodesy::LonLatHeight;
@@ -12,13 +14,14 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use numeric::upper_median;
 use rayon::prelude::*;
 
-/// One ground point seen in two or more views: (view, position in full-resolution pixels).
+/// One ground point seen in two or more views: index of the view, position in full-resolution
+/// pixels.
 pub type Track = Vec<(usize, ImagePoint)>;
 
-/// How much a correction may do.
+/// Order of the image-space corrections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ModelOrder {
-    /// The RPCs are used as they are.
+    /// No correction.
     None,
     /// One shift per view.
     Translation,
@@ -27,6 +30,7 @@ pub enum ModelOrder {
 }
 
 impl ModelOrder {
+    /// Returns the number of parameters per view.
     const fn parameters(self) -> usize {
         match self {
             Self::None => 0,
@@ -39,53 +43,70 @@ impl ModelOrder {
 /// Parameters of the adjustment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdjustConfig {
-    /// The largest order to consider.
+    /// Largest order to consider.
     pub max_order: ModelOrder,
-    /// Standard deviation of the raw pointing, pixels: the weak prior that fixes what the ties cannot see.
+    /// Standard deviation of the raw pointing, pixels: the weak prior on what ties cannot
+    /// determine.
     pub prior_px: f64,
 }
 
 impl Default for AdjustConfig {
-    /// Ten pixels is several metres, what providers state for unadjusted products.
+    /// Returns a prior of ten pixels. These are several metres, which providers state for
+    /// unadjusted products.
     fn default() -> Self {
         Self { max_order: ModelOrder::Affine, prior_px: 10.0 }
     }
 }
 
-/// What an adjustment found.
+/// Result of an adjustment.
 #[derive(Debug, Clone)]
 pub struct Adjustment {
-    /// The order chosen.
+    /// Order chosen.
     pub order: ModelOrder,
-    /// One correction per view.
+    /// Correction of each view.
     pub corrections: Vec<ImageCorrection>,
-    /// Robust standard deviation of the residuals before and after, pixels.
+    /// Robust standard deviation of the residuals before and after the adjustment, pixels.
     pub residual_px: (f64, f64),
-    /// Root mean square of the inliers' residuals after, pixels.
+    /// Root mean square of the inliers' residuals after the adjustment, pixels.
     pub rms_px: f64,
-    /// For each track, its ground point under the corrections, or `None` for an outlier.
+    /// Ground point of each track under the corrections; `None` for an outlier.
     pub ground: Vec<Option<LonLatHeight>>,
 }
 
-/// Rounds of re-triangulation and reweighting, at most; the problem is nearly linear, so the weights settle within these.
+/// Largest number of rounds of triangulation and reweighting. The problem is nearly linear, so that
+/// the weights settle earlier.
 const ROUNDS: usize = 8;
-/// Smaller steps end the rounds, pixels: hundreds of ties do not tell as much.
+/// Step that ends the rounds, pixels: less than hundreds of ties can resolve.
 const SETTLED_PX: f64 = 1e-4;
-/// Residuals beyond this many robust deviations are outliers.
+/// Residuals above this many robust deviations are outliers.
 const OUTLIER: f64 = 4.0;
-/// Ties share the errors of relief and light around them: they weigh no more than this many independent ones. Against
-/// the prior, hundreds of them would read a common shift of all views out of a hundredth of a pixel.
+/// Largest total weight of the ties, in independent ties.
+///
+/// Neighbouring ties share the errors of relief and light. With full weights hundreds of them would
+/// overrule the prior and derive a common shift of all views from a hundredth of a pixel.
 const INDEPENDENT: f64 = 25.0;
-/// Matching is not better than this, pixels: keeps the robust scale from collapsing.
+/// Smallest robust scale, pixels: matching is not more precise.
 const SCALE_MIN_PX: f64 = 0.05;
 
-/// The reduced residuals of one track and their derivatives with respect to all parameters.
+/// Residuals of one track without those that its ground point explains.
 struct Reduced {
+    /// Residuals, pixels.
     residual: DVector<f64>,
+    /// Derivatives with respect to all parameters.
     design: DMatrix<f64>,
 }
 
-/// Adjusts `cameras` so that the tracks meet. `sizes` are the images' (width, height).
+/// Adjusts the pointing of `cameras` so that the rays of each track meet. `sizes` are the images'
+/// columns and rows.
+///
+/// Without tracks the corrections are identities.
+///
+/// ```
+/// use sweep::pointing::{AdjustConfig, ModelOrder, adjust};
+///
+/// let found = adjust(&[], &[], &[], &AdjustConfig::default());
+/// assert_eq!(found.order, ModelOrder::None);
+/// ```
 pub fn adjust(cameras: &[RpcCamera], sizes: &[(usize, usize)], tracks: &[Track], config: &AdjustConfig) -> Adjustment {
     let orders = [ModelOrder::None, ModelOrder::Translation, ModelOrder::Affine];
     let fits = orders.iter().filter(|o| **o <= config.max_order).map(|&o| fit(cameras, sizes, tracks, o, config));
@@ -103,6 +124,7 @@ pub fn adjust(cameras: &[RpcCamera], sizes: &[(usize, usize)], tracks: &[Track],
     best.map(|(_, fit)| fit).unwrap_or_else(|| unadjusted(cameras.len(), tracks.len()))
 }
 
+/// Returns the result without corrections.
 fn unadjusted(views: usize, tracks: usize) -> Adjustment {
     Adjustment {
         order: ModelOrder::None,
@@ -113,7 +135,7 @@ fn unadjusted(views: usize, tracks: usize) -> Adjustment {
     }
 }
 
-/// One order's fit with its information criterion.
+/// Fits the corrections of one order. Returns the information criterion and the fit.
 fn fit(
     cameras: &[RpcCamera],
     sizes: &[(usize, usize)],
@@ -153,26 +175,30 @@ fn fit(
     (information(&norms, scale, n), fit)
 }
 
-/// Bayesian information criterion of a Cauchy likelihood: robust against the outliers that all orders share.
+/// Computes the Bayesian information criterion of a Cauchy likelihood, which is robust against the
+/// outliers that all orders share.
 fn information(residuals: &[f64], scale: f64, parameters: usize) -> f64 {
     let n = residuals.len() as f64;
     let loss: f64 = residuals.iter().map(|r| (1.0 + (r / scale).powi(2)).ln()).sum();
     2.0 * (n * scale.ln() + loss) + parameters as f64 * n.max(1.0).ln()
 }
 
-/// Root mean square of a track's reduced residual: pixels per degree of freedom.
+/// Returns the root mean square of a track's reduced residual per degree of freedom, pixels.
 fn norm_px(r: &DVector<f64>) -> f64 {
     (r.norm_squared() / r.len().max(1) as f64).sqrt()
 }
 
+/// Estimates the standard deviation of residuals from their median.
 fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = residuals.collect();
-    // The median of |r| of a normal deviate is 0.6745 of its deviation.
+    // The median of |r| of a normal deviate is 0.6745 standard deviations.
     upper_median(&mut all).map_or(SCALE_MIN_PX, |median| (median / 0.6745).max(SCALE_MIN_PX))
 }
 
-/// Weights of the prior on every parameter. A view that is shifted by several times the prior's deviation is grossly
-/// off: its shift has a Cauchy weight, so that it is moved to the others, and they are not moved half-way to it.
+/// Returns the weights of the prior on every parameter.
+///
+/// The shift of a view has a Cauchy weight: a view that is off by several times the prior's
+/// deviation is then moved to the others, instead of the others being moved half-way to it.
 fn prior_weights(x: &DVector<f64>, order: ModelOrder, config: &AdjustConfig) -> DVector<f64> {
     let weight = 1.0 / (config.prior_px * config.prior_px);
     let mut out = DVector::repeat(x.len(), weight);
@@ -183,7 +209,7 @@ fn prior_weights(x: &DVector<f64>, order: ModelOrder, config: &AdjustConfig) -> 
     out
 }
 
-/// The step that brings the reweighted reduced residuals to their least, with the prior about zero.
+/// Returns the step that minimises the reweighted reduced residuals and the prior about zero.
 fn solve(reduced: &[Reduced], x: &DVector<f64>, scale: f64, prior: &DVector<f64>) -> DVector<f64> {
     let n = x.len();
     let mut normal = DMatrix::from_diagonal(prior);
@@ -197,8 +223,10 @@ fn solve(reduced: &[Reduced], x: &DVector<f64>, scale: f64, prior: &DVector<f64>
     normal.cholesky().map_or_else(|| DVector::zeros(n), |c| c.solve(&right))
 }
 
-/// The cameras under the parameters. An affine map acts about the image's centre, in units of its half size, so that
-/// every parameter is in pixels and one prior serves all.
+/// Returns the cameras with the corrections of the parameters.
+///
+/// An affine map acts about the image's centre, in units of half its size, so that every parameter
+/// is in pixels and one prior serves all.
 fn corrected(cameras: &[RpcCamera], sizes: &[(usize, usize)], x: &DVector<f64>, order: ModelOrder) -> Vec<RpcCamera> {
     let m = order.parameters();
     let one = |(i, c): (usize, &RpcCamera)| {
@@ -216,12 +244,14 @@ fn corrected(cameras: &[RpcCamera], sizes: &[(usize, usize)], x: &DVector<f64>, 
     cameras.iter().enumerate().map(one).collect()
 }
 
+/// Returns the centre of an image and half its larger side, pixels.
 fn frame((width, height): (usize, usize)) -> (ImagePoint, f64) {
     let centre = ImagePoint::new(0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
     (centre, 0.5 * width.max(height) as f64)
 }
 
-/// Derivatives of a view's corrected position with respect to its own parameters: rows sample, line.
+/// Returns the derivatives of a view's corrected position (sample, line) with respect to each of
+/// its own parameters.
 fn own_design(p: ImagePoint, size: (usize, usize), order: ModelOrder) -> Vec<[f64; 2]> {
     let (centre, half) = frame(size);
     let (s, l) = ((p.sample - centre.sample) / half, (p.line - centre.line) / half);
@@ -229,7 +259,8 @@ fn own_design(p: ImagePoint, size: (usize, usize), order: ModelOrder) -> Vec<[f6
     all[..order.parameters()].to_vec()
 }
 
-/// A track's best ground point, and its residuals with the ground point's freedom taken out.
+/// Finds a track's best ground point, and its residuals without those that the ground point
+/// explains. Returns `None` if the rays do not meet or the track has fewer than two views.
 fn reduce(
     cameras: &[RpcCamera],
     sizes: &[(usize, usize)],
@@ -246,7 +277,7 @@ fn reduce(
             design[(2 * i + 1, view * m + k)] = l;
         }
     }
-    // Turned by Qᵀ of J = QR, all but the first three rows are free of J.
+    // Multiplied by Qᵀ of J = QR, all but the first three rows are independent of the ground point.
     let freedom = rows.checked_sub(3)?;
     let qr = jacobian.qr();
     qr.q_tr_mul(&mut residual);
@@ -255,10 +286,12 @@ fn reduce(
     Some((free, ground))
 }
 
+/// Ground point of a track, residuals and their Jacobian.
 type Triangulated = Option<(LonLatHeight, DVector<f64>, DMatrix<f64>)>;
 
-/// The ground point nearest to all rays in image space, the residuals observed − projected, and their Jacobian with
-/// respect to metres east, north and up; `None` when the rays do not meet.
+/// Finds the ground point with the least squared residuals in the images, observed − projected, and
+/// their Jacobian with respect to metres east, north and up. Returns `None` if the rays do not
+/// meet.
 fn triangulate(cameras: &[RpcCamera], track: &Track) -> Result<Triangulated, CameraError> {
     let Some(&(first, at)) = track.first() else { return Ok(None) };
     let mut ground = cameras[first].localize(at, cameras[first].rpc.height_off)?;
@@ -269,7 +302,7 @@ fn triangulate(cameras: &[RpcCamera], track: &Track) -> Result<Triangulated, Cam
         let right: Vector3<f64> = (jacobian.transpose() * &residual).fixed_rows::<3>(0).into();
         let Some(step) = normal.try_inverse().map(|n| n * right) else { return Ok(None) };
         ground = moved(ground, step);
-        // A tenth of a millimetre: far below any residual.
+        // A tenth of a millimetre is far below any residual.
         if step.norm() < 1e-4 {
             break;
         }
@@ -277,9 +310,11 @@ fn triangulate(cameras: &[RpcCamera], track: &Track) -> Result<Triangulated, Cam
     Ok(ground.height_m.is_finite().then_some((ground, residual, jacobian)))
 }
 
-/// Metres per degree are good enough here: they scale the unknowns, and the iteration takes care of the rest.
+/// Metres per degree of latitude. The value only scales the unknowns, so that its error does not
+/// matter.
 const METRES_PER_DEGREE: f64 = 111_320.0;
 
+/// Returns a ground point moved by metres east, north and up.
 fn moved(g: LonLatHeight, east_north_up: Vector3<f64>) -> LonLatHeight {
     let lon_scale = METRES_PER_DEGREE * g.lat_deg.to_radians().cos().max(1e-3);
     LonLatHeight::new(
@@ -289,6 +324,7 @@ fn moved(g: LonLatHeight, east_north_up: Vector3<f64>) -> LonLatHeight {
     )
 }
 
+/// Returns the residuals of a track at a ground point and their Jacobian.
 fn linearised(
     cameras: &[RpcCamera],
     track: &Track,
@@ -303,7 +339,7 @@ fn linearised(
         residual[2 * i + 1] = observed.line - p.line;
         for axis in 0..3 {
             let mut d = Vector3::zeros();
-            // A metre: the cameras are linear at that scale.
+            // Cameras are linear at the scale of a metre.
             d[axis] = 1.0;
             let q = camera.project(moved(ground, d))?;
             jacobian[(2 * i, axis)] = q.sample - p.sample;
@@ -320,7 +356,7 @@ mod tests {
 
     const SIZE: usize = 400;
 
-    /// Tracks of a lattice of ground points as cameras see them whose pointing is off by `shifts`.
+    /// Tracks of a lattice of ground points, seen by cameras whose pointing is off by `shifts`.
     fn tracks(cameras: &[RpcCamera], shifts: &[[f64; 2]]) -> Vec<Track> {
         let point = |i: usize| {
             let (e, n) = ((i % 12) as f64 / 12.0 - 0.45, (i / 12) as f64 / 12.0 - 0.45);
@@ -356,7 +392,8 @@ mod tests {
 
     #[test]
     fn a_view_that_is_grossly_off_is_moved_and_the_others_stay() {
-        // Along a pass: a common height moves views 1 and 3 apart, and nothing moves view 2 alone.
+        // The views lie along a pass: a common height change moves views 0 and 2 apart, and nothing
+        // moves view 1 alone.
         let cameras = [[0.0, 0.5], [0.05, 0.0], [0.0, -0.5]].map(|p| leaning_camera(SIZE, p));
         let tracks = tracks(&cameras, &[[0.0; 2], [31.0, -27.0], [0.0; 2]]);
         let found = adjust(&cameras, &[(SIZE, SIZE); 3], &tracks, &AdjustConfig::default());

@@ -1,30 +1,32 @@
-//! The search for a patch along its whole height trajectory on a coarse pyramid level.
+//! The search for a patch along its height trajectory on a coarse pyramid level.
 //!
-//! The source is laid over the reference once, so that every height is a shift, and the moments of all its patches are
-//! known before the first is compared.
+//! The source is resampled over the reference once, so that every height is a shift. The moments of
+//! all its patches are computed once too, before the first comparison.
 
-use raster::{Grid, bicubic_along};
+use raster::{Grid, Window, bicubic_along};
 
 use super::moments::{patch_moments, remove_mean};
 use super::pair::{Pair, TieConfig};
 use super::patch::{Patch, padded};
-use crate::geometry::LocalMap;
+use crate::geometry::{LocalMap, PixelBox};
 use crate::view::QUANTISATION_VARIANCE;
 
-/// A source laid over the reference, ready to be searched.
+/// A source resampled over the reference, ready to be searched.
 pub(crate) struct Coarse {
+    /// Map from reference to source positions on the level.
     map: LocalMap,
-    /// Reference position of the laid picture's first pixel.
+    /// Reference column and row of the picture's first pixel.
     origin: [i64; 2],
-    /// As many columns of zeros behind it as a patch reads; 0 where invalid.
+    /// The resampled source, 0 where invalid, with columns of zeros behind it that patches read.
     picture: Grid<f32>,
-    /// `1 / deviation` of the patch centred `radius` pixels further on; NaN where invalid or flat.
+    /// `1 / deviation` of the patch whose first pixel is here; NaN where invalid or flat.
     inverse_deviation: Grid<f32>,
-    /// Heights about a pixel apart, with where a patch may lie from its own place: along the trajectory, and to its sides.
+    /// Heights about a pixel of parallax apart, each with the offsets at which a patch may lie: on
+    /// the trajectory and to its sides.
     places: Vec<(f64, Vec<[i64; 2]>)>,
 }
 
-/// A place tried: its correlation, height, and position in the laid picture's frame.
+/// A place tried, in the frame of the reference.
 struct Candidate {
     correlation: f32,
     height_m: f64,
@@ -32,11 +34,12 @@ struct Candidate {
 }
 
 impl Coarse {
+    /// Prepares the search on a level over a range of heights; `None` if the views do not meet.
     pub(crate) fn prepare(pair: &Pair<'_>, level: usize, range_m: (f64, f64), config: &TieConfig) -> Option<Self> {
         let reference = &pair.reference.levels[level];
         let source = &pair.source.levels[level];
-        let corners = [0.0, 0.0, reference.width() as f64 - 1.0, reference.height() as f64 - 1.0];
-        let map = LocalMap::fit(corners, range_m, |p, h| pair.chain(p, level, h)).ok()?;
+        let area = PixelBox::of_window(Window::whole(reference.width(), reference.height()));
+        let map = LocalMap::fit(area, range_m, |p, h| pair.chain(p, level, h)).ok()?;
         let band = (config.band_px / f64::from(1u32 << level)).ceil() as i32;
         let places = places(&map, range_m, band)?;
         let side = 2 * config.radius as usize + 1;
@@ -47,7 +50,8 @@ impl Coarse {
         Some(Self { map, origin, picture, inverse_deviation, places })
     }
 
-    /// The height and source position of the best match, if it stands out from every other place.
+    /// Returns the height and source position of the best match of a patch around `p`, if it beats
+    /// every other place by the margin.
     pub(crate) fn search(&self, p: [usize; 2], own: &Patch, config: &TieConfig) -> Option<(f64, [f64; 2])> {
         let mut found = Vec::with_capacity(self.places.iter().map(|(_, places)| places.len()).sum());
         for (height_m, places) in &self.places {
@@ -59,7 +63,7 @@ impl Coarse {
             }
         }
         let best = found.iter().max_by(|a, b| a.correlation.total_cmp(&b.correlation))?;
-        // Places within two pixels are the same peak.
+        // Places within two pixels belong to the same peak.
         let apart = |c: &&Candidate| (c.place[0] - best.place[0]).abs().max((c.place[1] - best.place[1]).abs()) > 2;
         let rival = found.iter().filter(apart).map(|c| c.correlation).fold(-1.0f32, f32::max);
         let stands_out = best.correlation >= config.correlation && best.correlation - rival >= config.margin;
@@ -67,7 +71,8 @@ impl Coarse {
         stands_out.then(|| (best.height_m, self.map.at(place, self.map.mid_height_m())))
     }
 
-    /// Correlation of a patch with the laid picture around a place; `None` outside or on invalid pixels.
+    /// Computes the correlation of a patch with the picture around a place; `None` outside the
+    /// picture or on invalid pixels.
     fn correlation(&self, own: &Patch, place: [i64; 2], radius: i32) -> Option<f32> {
         let x = usize::try_from(place[0] - self.origin[0] - i64::from(radius)).ok()?;
         let y = usize::try_from(place[1] - self.origin[1] - i64::from(radius)).ok()?;
@@ -76,7 +81,8 @@ impl Coarse {
     }
 }
 
-/// Where the height trajectory leads, in steps of about a pixel: whole pixels from a patch's own place, up to `band` to its sides.
+/// Returns the offsets along the height trajectory, in steps of about a pixel, with up to `band`
+/// pixels to either side.
 fn places(map: &LocalMap, range_m: (f64, f64), band: i32) -> Option<Vec<(f64, Vec<[i64; 2]>)>> {
     let (from, to) = (map.shift_at(range_m.0)?, map.shift_at(range_m.1)?);
     let along = [to[0] - from[0], to[1] - from[1]];
@@ -92,8 +98,8 @@ fn places(map: &LocalMap, range_m: (f64, f64), band: i32) -> Option<Vec<(f64, Ve
     Some((0..=steps).filter_map(|i| beside(height_m(i))).collect())
 }
 
-/// The source resampled to the reference's frame at the map's middle height and `more` void columns behind it, with the place of
-/// its first pixel.
+/// Resamples the source to the frame of the reference at the map's middle height, with `more` void
+/// columns behind it. Returns the reference position of the first pixel and the picture.
 fn lay_over(source: &Grid<f32>, map: &LocalMap, more: usize) -> Option<([i64; 2], Grid<f32>)> {
     let (w, h) = (source.width() as f64 - 1.0, source.height() as f64 - 1.0);
     let mut span = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
@@ -104,7 +110,7 @@ fn lay_over(source: &Grid<f32>, map: &LocalMap, more: usize) -> Option<([i64; 2]
         }
     }
     let origin = [span[0][0].floor() as i64, span[1][0].floor() as i64];
-    // A map that blows the picture up is not one between two views of the same ground.
+    // A map that enlarges the picture this much does not connect two views of the same ground.
     let area = (span[0][1] - span[0][0] + 2.0) * (span[1][1] - span[1][0] + 2.0);
     if !area.is_finite() || area > 16.0 * (w + 1.0) * (h + 1.0) {
         return None;
@@ -120,7 +126,8 @@ fn lay_over(source: &Grid<f32>, map: &LocalMap, more: usize) -> Option<([i64; 2]
     Some((origin, out))
 }
 
-/// `1 / deviation` of every whole patch of the picture; NaN where it is invalid or no stronger than the noise.
+/// Computes `1 / deviation` of every whole patch of the picture; NaN where it is invalid or no
+/// stronger than the noise.
 fn deviations(picture: &Grid<f32>, side: usize, noise: f32) -> Grid<f32> {
     if picture.width() < side || picture.height() < side {
         return Grid::filled(0, 0, f32::NAN);

@@ -1,12 +1,16 @@
-//! Points worth matching: corners by the smaller eigenvalue of the structure tensor (Shi & Tomasi 1994), spread evenly.
+//! Points worth matching: corners by the smaller eigenvalue of the structure tensor (Shi and Tomasi
+//! 1994), spread evenly over the image.
 
 use raster::Grid;
 
-/// Half width of the window over which gradients are summed.
+/// Half width of the window over which gradients are summed, pixels.
 const WINDOW: usize = 3;
 
-/// The strongest corner of every `cell × cell` square, at least `border` pixels inside, strongest first.
-/// Squares without texture above the noise give none.
+/// Finds the strongest corner of every `cell × cell` square, at least `border` pixels inside the
+/// image.
+///
+/// Corners are (column, row), the strongest first. Squares without texture above the noise have
+/// none.
 pub(crate) fn corners(image: &Grid<f32>, cell: usize, border: usize, noise: f32) -> Vec<[usize; 2]> {
     let (w, h) = (image.width(), image.height());
     let border = border.max(WINDOW + 1);
@@ -22,13 +26,14 @@ pub(crate) fn corners(image: &Grid<f32>, cell: usize, border: usize, noise: f32)
     found.into_iter().map(|(p, _)| p).collect()
 }
 
+/// Finds the strongest corner of a square.
 fn strongest(
     image: &Grid<f32>,
     xs: std::ops::Range<usize>,
     ys: std::ops::Range<usize>,
     noise: f32,
 ) -> Option<([usize; 2], f32)> {
-    // Every second pixel: a corner's response is wider than that.
+    // Every second pixel is enough: the response of a corner is wider than that.
     let candidates = ys.step_by(2).flat_map(|y| xs.clone().step_by(2).map(move |x| [x, y]));
     candidates
         .map(|p| (p, response(image, p)))
@@ -36,7 +41,8 @@ fn strongest(
         .max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The smaller eigenvalue of the mean structure tensor around a pixel; 0 next to invalid pixels.
+/// Computes the smaller eigenvalue of the mean structure tensor around a pixel; 0 next to invalid
+/// pixels.
 fn response(image: &Grid<f32>, [x, y]: [usize; 2]) -> f32 {
     let (mut xx, mut xy, mut yy) = (0.0f32, 0.0, 0.0);
     for v in y - WINDOW..=y + WINDOW {

@@ -1,6 +1,7 @@
 //! Pointing correction: tie points between the views, and one image-space correction per view.
 //!
-//! Raw RPCs are off by pixels; correcting them is the largest single gain published (EOGS++: MAE 1.93 m → 1.33 m).
+//! Raw RPCs are off by pixels. Correcting them is the largest single gain published (EOGS++: MAE
+//! from 1.93 m to 1.33 m).
 
 mod adjust;
 mod coarse;

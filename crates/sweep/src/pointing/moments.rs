@@ -1,8 +1,9 @@
-//! Means and deviations of all patches of a picture. NaN marks invalid pixels and spreads to every patch that touches one.
+//! Means and deviations of all patches of a picture. NaN marks invalid pixels and spreads to every
+//! patch that touches one.
 
 use multiversion::multiversion;
 
-/// Subtracts the mean of the valid samples: keeps f32 sums of squares well conditioned.
+/// Subtracts the mean of the valid values, which keeps f32 sums of squares well conditioned.
 pub(crate) fn remove_mean(v: &mut [f32]) {
     let (mut sum, mut n) = (0.0f64, 0u32);
     for x in v.iter().filter(|x| x.is_finite()) {
@@ -15,7 +16,7 @@ pub(crate) fn remove_mean(v: &mut [f32]) {
     }
 }
 
-/// Sums over windows of `side` columns: `out[x] = Σ_{i < side} v[x + i]`.
+/// Computes sums over windows of `side` columns: `out[x] = Σ_{i < side} v[x + i]`.
 #[inline(always)]
 fn slide(v: &[f32], side: usize, out: &mut [f32]) {
     let n = out.len();
@@ -28,7 +29,8 @@ fn slide(v: &[f32], side: usize, out: &mut [f32]) {
     }
 }
 
-/// Mean and `1 / sqrt(variance + floor)` of every `side × side` patch of a padded tile of `width` columns.
+/// Computes the mean and `1 / sqrt(variance + floor)` of every `side × side` patch of a picture of
+/// `width` columns. `line` is a scratch buffer of two rows.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub(crate) fn patch_moments(
     tile: &[f32],
@@ -63,7 +65,7 @@ pub(crate) fn patch_moments(
         for x in 0..core {
             m[x] *= inv_n;
             let variance = (s[x] * inv_n - m[x] * m[x]).max(0.0) + floor;
-            // `max` drops a NaN; adding 0 · mean brings it back.
+            // `max` drops a NaN; adding 0 · mean restores it.
             s[x] = 1.0 / variance.sqrt() + 0.0 * m[x];
         }
     }

@@ -1,25 +1,28 @@
-//! A patch of one image searched for in another, bent by the local map between them.
+//! A patch of one image compared with parts of another, which is resampled to the frame of the
+//! first.
 
 use multiversion::multiversion;
 use raster::{Grid, bicubic_along};
 
-/// Values that are worked on together; rows of patches are padded to whole ones.
+/// Values that are worked on together. Rows of patches are padded to multiples of it.
 const LANES: usize = 16;
 
 /// A zero-mean, unit-norm patch of `2 · radius + 1` pixels.
 pub(crate) struct Patch {
     side: usize,
-    /// In rows of [`padded`]`(side)`, 0 behind the patch.
+    /// Values in rows of [`padded`]`(side)`; 0 behind the patch.
     values: Vec<f32>,
 }
 
-/// As much as the rows of a patch of `side` pixels take, and what can be read from where it is compared.
+/// Returns the length of a patch's rows in memory, which is also how many columns of a picture a
+/// comparison reads.
 pub(crate) fn padded(side: usize) -> usize {
     side.next_multiple_of(LANES)
 }
 
 impl Patch {
-    /// The patch around a pixel; `None` when it leaves the image, holds invalid pixels, or is flatter than the noise.
+    /// Cuts out the patch around a pixel; `None` if it leaves the image, holds invalid pixels, or
+    /// is flatter than the noise.
     pub(crate) fn around(image: &Grid<f32>, [x, y]: [f64; 2], radius: i32, noise: f32) -> Option<Self> {
         let side = 2 * radius as usize + 1;
         let mut values = vec![0.0; padded(side) * side];
@@ -40,14 +43,15 @@ impl Patch {
         Some(Self { side, values })
     }
 
-    /// The sum of the products with the part of a picture that begins at `(x, y)`, whose values are all numbers; there are as many
-    /// of them as [`padded`] says.
+    /// Returns the sum of products with the part of a picture that begins at `(x, y)`. The picture
+    /// must be free of NaN and have [`padded`] columns from there on.
     pub(crate) fn product_at(&self, picture: &Grid<f32>, at: (usize, usize)) -> f32 {
         product(&self.values, padded(self.side), picture, at)
     }
 
-    /// Zero-mean normalised cross-correlation with the part of a picture (of mean near 0) that begins at `(x, y)`; `None`
-    /// where that holds invalid pixels or is flatter than the noise. The picture has as many columns as [`padded`] says.
+    /// Returns the zero-mean normalised cross-correlation with the part of a picture that begins at
+    /// `(x, y)`; `None` if that part holds invalid pixels or is flatter than the noise. The picture
+    /// must have a mean near 0 and [`padded`] columns from there on.
     pub(crate) fn correlation_at(&self, picture: &Grid<f32>, at: (usize, usize), noise: f32) -> Option<f32> {
         let [sum, square, product] = moments(&self.values, self.side, picture, at);
         let n = (self.side * self.side) as f32;
@@ -67,14 +71,15 @@ fn product(values: &[f32], stride: usize, picture: &Grid<f32>, at: (usize, usize
     sums.iter().sum()
 }
 
-/// Sums of the picture's values, of their squares, and of their products with a patch of `side` columns.
+/// Returns the sums of the picture's values, of their squares, and of their products with a patch
+/// of `side` columns.
 #[multiversion(targets("x86_64+avx2"))]
 fn moments(values: &[f32], side: usize, picture: &Grid<f32>, at: (usize, usize)) -> [f32; 3] {
     let (mut sum, mut square, mut product) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
     for (own, other) in rows(values, padded(side), picture, at) {
         for (k, (a, b)) in own.iter().zip(other).enumerate() {
             for i in 0..LANES {
-                // What lies behind the patch does not count, whatever it is.
+                // Values behind the patch do not count, NaN included.
                 let b = if k * LANES + i < side { b[i] } else { 0.0 };
                 sum[i] += b;
                 square[i] += b * b;
@@ -87,7 +92,7 @@ fn moments(values: &[f32], side: usize, picture: &Grid<f32>, at: (usize, usize))
 
 type Lanes = [f32; LANES];
 
-/// The rows of a patch, each with the part of the picture that it lies over from `(x, y)` on.
+/// Iterates over the rows of a patch, each with the row of the picture below it from `(x, y)` on.
 #[inline(always)]
 fn rows<'a>(
     values: &'a [f32],
@@ -100,7 +105,8 @@ fn rows<'a>(
     values.chunks_exact(stride).zip(under).map(move |(own, other)| (whole(own), whole(other)))
 }
 
-/// Offset in [−0.5, 0.5] of the peak of a parabola through values at −1, 0, 1; 0 where there is no peak.
+/// Returns the offset, in [−0.5, 0.5], of the peak of a parabola through values at −1, 0 and 1; 0
+/// if there is no peak.
 pub(crate) fn parabola_peak(left: f32, middle: f32, right: f32) -> f64 {
     let curvature = f64::from(left) - 2.0 * f64::from(middle) + f64::from(right);
     if curvature >= 0.0 {
@@ -113,7 +119,7 @@ pub(crate) fn parabola_peak(left: f32, middle: f32, right: f32) -> f64 {
 mod tests {
     use super::*;
 
-    /// A picture with a void, and the correlation as it is defined.
+    /// Compares with the definition of the correlation on a picture with a void.
     #[test]
     fn the_correlation_is_that_of_the_definition() {
         let value = |x: usize, y: usize| ((x * x + 3 * y * y + x * y) as f32 * 0.37).sin() * 20.0;

@@ -1,8 +1,10 @@
-//! Tie points of two views: corners of one, searched along the height trajectory in the other.
+//! Tie points of two views: corners of one are searched for along their height trajectory in the
+//! other.
 //!
-//! On a coarse pyramid level every height of the range is tried, with a band across the trajectory for the pointing
-//! error; a match must be better than any other place by a margin. It is then followed down the pyramid, located to a
-//! fraction of a pixel, and kept when the search back from the source returns to where it came from.
+//! On a coarse pyramid level every height of the range is tried, in a band across the trajectory
+//! that allows for the pointing error. A match must be better than every other place by a margin.
+//! It is then followed down the pyramid to a fraction of a pixel, and kept if the search back from
+//! the source returns to the corner.
 
 use camera::{CameraError, ImagePoint, RpcCamera};
 use raster::{Grid, bicubic_along, level_from_level0, level0_from_level};
@@ -16,10 +18,10 @@ use super::patch::{Patch, padded, parabola_peak};
 use crate::geometry::source_column_row;
 use crate::view::SweepView;
 
-/// How far the search back may end from where it started, pixels.
+/// Largest distance of the search back from the corner, pixels.
 const RETURN_PX: f64 = 1.0;
 
-/// Tie points of a pair; heights in `range_m` are considered.
+/// Finds the tie points of a pair at heights in `range_m`, metres above the ellipsoid.
 pub fn match_pair(reference: &SweepView, source: &SweepView, range_m: (f64, f64), config: &TieConfig) -> Vec<Tie> {
     let top = coarse_level(reference, config).min(source.levels.len() - 1);
     let image = &reference.levels[top];
@@ -30,12 +32,14 @@ pub fn match_pair(reference: &SweepView, source: &SweepView, range_m: (f64, f64)
     points.par_iter().filter_map(|&p| pair.follow(p, top, &coarse, config)).collect()
 }
 
+/// Returns the coarsest level that is large enough for the search.
 fn coarse_level(view: &SweepView, config: &TieConfig) -> usize {
     let enough = |g: &&Grid<f32>| g.width().min(g.height()) >= config.coarse_side;
     view.levels.iter().take_while(enough).count().saturating_sub(1)
 }
 
 impl Pair<'_> {
+    /// Follows a corner from the coarse level down to full resolution and back.
     fn follow(&self, p: [usize; 2], top: usize, coarse: &Coarse, config: &TieConfig) -> Option<Tie> {
         let at = [p[0] as f64, p[1] as f64];
         let own = Patch::around(&self.reference.levels[top], at, config.radius, self.reference.noise_at(top))?;
@@ -69,8 +73,12 @@ impl Pair<'_> {
         })
     }
 
-    /// The offset of best correlation within two pixels of `start`, to a fraction of a pixel. The source is sampled once in
-    /// the reference's frame; every place is a part of that picture.
+    /// Finds the offset of best correlation within two pixels of `start`, to a fraction of a pixel,
+    /// and the correlation.
+    ///
+    /// `at` is a position on the level in the reference; offsets are source pixels from its
+    /// projection at `height_m`. The source is resampled once in the frame of the reference, so
+    /// that every place tried is a part of that picture.
     fn refine(
         &self,
         at: [f64; 2],
@@ -105,7 +113,7 @@ impl Pair<'_> {
             }
         }
         let (score, i, j) = best;
-        // A best place on the rim is a slope, not a peak.
+        // A best place at the rim is a slope and not a peak.
         if !(1..SIDE - 1).contains(&i) || !(1..SIDE - 1).contains(&j) {
             return None;
         }
@@ -116,7 +124,7 @@ impl Pair<'_> {
     }
 }
 
-/// How the source's pixels lie to the reference's around a point.
+/// Linear map from reference to source pixels around a point.
 struct LocalFrame([[f64; 2]; 2]);
 
 impl LocalFrame {
@@ -128,23 +136,24 @@ impl LocalFrame {
         height_m: f64,
     ) -> Result<Self, CameraError> {
         let chain = |p| source_column_row(reference, source, level as u32, p, height_m);
-        // Eight pixels: wide enough for differences to be exact, narrow enough to be local.
+        // Eight pixels are wide enough for exact differences and narrow enough to be local.
         let d = 8.0;
         let (l, r, t, b) = (chain([u - d, v])?, chain([u + d, v])?, chain([u, v - d])?, chain([u, v + d])?);
         let row = |i: usize| [(r[i] - l[i]) / (2.0 * d), (b[i] - t[i]) / (2.0 * d)];
         Ok(Self([row(0), row(1)]))
     }
 
+    /// Returns a source position moved by whole reference columns and rows.
     fn place(&self, centre: [f64; 2], i: i32, j: i32) -> [f64; 2] {
         self.moved(centre, f64::from(i), f64::from(j))
     }
 
-    /// The source's step from one reference column to the next.
+    /// Returns the step in the source from one reference column to the next.
     fn column_step(&self) -> [f64; 2] {
         [self.0[0][0], self.0[1][0]]
     }
 
-    /// A source position moved by so many reference columns and rows.
+    /// Returns a source position moved by reference columns `i` and rows `j`.
     fn moved(&self, centre: [f64; 2], i: f64, j: f64) -> [f64; 2] {
         let [[a, b], [c, d]] = self.0;
         [centre[0] + a * i + b * j, centre[1] + c * i + d * j]

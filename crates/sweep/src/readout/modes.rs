@@ -1,61 +1,72 @@
-//! Heights from aggregated costs: windowed soft-argmin with its spread.
+//! Heights from aggregated costs: a soft-argmin over a window, with its spread.
 //!
-//! The weights are `exp(−(S − min S) / T)` inside a window around the best hypothesis, so that a second mode does not pull
-//! the mean; the minimum is subtracted first, so the exponent is never positive whatever the costs are.
+//! The weights are `exp(−(S − min S) / T)` inside a window around the best hypothesis, so that a
+//! second mode does not pull the mean. The minimum is subtracted first, so that the exponent is
+//! never positive.
 //!
-//! The temperature follows the mode: for costs `a (k − k₀)²` the weights are a normal density of deviation `√(T / 2a)`,
-//! and its mean over whole hypotheses is k₀ to a thousandth only if that deviation is near a step. A fixed temperature
-//! is too cold for sharp modes and locks heights to the lattice.
+//! The temperature T follows the mode. For costs `a (k − k₀)²` the weights are a normal density
+//! with the deviation `√(T / 2a)`. Its mean over whole hypotheses equals k₀ to a thousandth only if
+//! the deviation is near one step. A fixed temperature is too cold for sharp modes and locks
+//! heights to the lattice.
 
-use super::least::Sums;
+use super::least::LeastSum;
 
-/// Pixels whose modes are read together: whole registers of any kind.
+/// Pixels whose modes are read together: a multiple of the lanes of every kind of register.
 pub(crate) const TOGETHER: usize = 32;
-/// Hypotheses on each side of the best that belong to its mode.
+/// Hypotheses on each side of the best one that belong to its mode.
 const WINDOW: usize = 3;
-/// Deviation of the weights for a parabolic mode, hypotheses: the least that keeps the mean unbiased, so that the
-/// window holds all of it.
+/// Deviation of the weights for a parabolic mode, hypotheses. It is the smallest one that keeps the
+/// mean unbiased, so that the window holds nearly all of the weight.
 const DEVIATION: f32 = 0.8;
-/// Stands for what is not there; no sum of path costs is as much above another.
+/// Marks a missing sum. No sum of path costs exceeds another one by as much.
 const NONE: u16 = u16::MAX;
 
-/// What the aggregated costs of a run of pixels say around their best hypotheses.
+/// Aggregated costs of a run of pixels around their best hypotheses.
 pub(crate) struct Modes {
-    /// Places of the best hypotheses.
+    /// Index of the best hypothesis.
     best: [u16; TOGETHER],
-    /// How far the sums before and behind the best are above it, the nearest first.
-    above: [[[u16; TOGETHER]; WINDOW]; 2],
-    /// How far the best sum outside of the window is above it.
+    /// Excess of the sums before and behind the best one over it, the nearest first; [`NONE`]
+    /// outside the window.
+    excess: [[[u16; TOGETHER]; WINDOW]; 2],
+    /// Excess of the best sum outside the window; [`NONE`] if there is none.
     outside: [u16; TOGETHER],
 }
 
-/// What they say of the heights.
+/// Heights of a run of pixels.
 pub(crate) struct Estimates {
-    /// Positions of the heights, in hypotheses from the first; NaN where all hypotheses are as good, which says nothing.
+    /// Position of the height, in hypotheses from the first; NaN if all hypotheses are equally
+    /// good.
     pub(crate) index: [f32; TOGETHER],
-    /// Standard deviations of the positions, in hypotheses.
+    /// Standard deviation of the position, in hypotheses.
     pub(crate) spread: [f32; TOGETHER],
-    /// How much worse the best hypothesis outside the window is, relative to the cost scale, 0 to 1.
+    /// Excess of the best hypothesis outside the window, relative to the cost scale, 0 to 1.
     pub(crate) margin: [f32; TOGETHER],
 }
 
 impl Modes {
+    /// Returns modes to be filled.
     pub(crate) fn new() -> Self {
-        Self { best: [0; TOGETHER], above: [[[NONE; TOGETHER]; WINDOW]; 2], outside: [NONE; TOGETHER] }
+        Self { best: [0; TOGETHER], excess: [[[NONE; TOGETHER]; WINDOW]; 2], outside: [NONE; TOGETHER] }
     }
 
-    /// Takes the `count` sums of the pixel at `i`, of which that at `best` is the first of the least, with those of others behind
-    /// them.
+    /// Takes over the sums of pixel `i`: the first `count` of `sums`, of which the one at `best` is
+    /// the first of the least.
     #[inline(always)]
-    pub(crate) fn put<S: Sums>(&mut self, i: usize, (sums, count): (&[u16], usize), (least, best): (u16, usize)) {
-        // A window cut on one side by the range's end would pull the mean inward: both sides are cut alike.
+    pub(crate) fn put<S: LeastSum>(
+        &mut self,
+        token: S,
+        i: usize,
+        (sums, count): (&[u16], usize),
+        (least, best): (u16, usize),
+    ) {
+        // If the range's end cut the window on one side only, it would pull the mean inward.
         let reach = WINDOW.min(best).min(count - 1 - best);
         self.best[i] = best as u16;
-        let outside = S::least_outside(sums, count, best - reach, best + reach + 1);
+        let outside = token.least_outside(sums, count, best - reach, best + reach + 1);
         self.outside[i] = if outside == u16::MAX { NONE } else { outside - least };
-        let [before, behind] = &mut self.above;
+        let [before, behind] = &mut self.excess;
         if reach == WINDOW {
-            // Most are: one check of bounds.
+            // The usual case needs one check of bounds.
             let window = &sums[best - WINDOW..][..2 * WINDOW + 1];
             for k in 0..WINDOW {
                 before[k][i] = window[WINDOW - 1 - k] - least;
@@ -70,22 +81,25 @@ impl Modes {
         }
     }
 
-    /// Reads all pixels of the run. `scale` is the sum that a worst-cost hypothesis would have; `noise` is the deviation of a cost
-    /// relative to it, which turns the mode's curvature into the deviation of its position.
+    /// Estimates the heights of all pixels of the run.
+    ///
+    /// `scale` is the sum of a hypothesis of worst cost. `noise` is the deviation of a cost
+    /// relative to the scale; it turns the curvature of the mode into the deviation of its
+    /// position.
     #[inline(always)]
     pub(crate) fn estimates(&self, scale: f32, noise: f32) -> Estimates {
         let mut out = Estimates { index: [0.0; TOGETHER], spread: [0.0; TOGETHER], margin: [0.0; TOGETHER] };
-        let [before, behind] = &self.above;
+        let [before, behind] = &self.excess;
         for i in 0..TOGETHER {
             let outside = if self.outside[i] == NONE { scale } else { f32::from(self.outside[i]) };
             let margin = (outside / scale).min(1.0);
-            // Both are there or none is.
+            // Either both neighbours are there or none is.
             let slopes = if before[0][i] == NONE { 0.0 } else { f32::from(before[0][i]) + f32::from(behind[0][i]) };
             let curvature = 0.5 * slopes;
             let cold = 1.0 / (2.0 * curvature * DEVIATION * DEVIATION);
             let (mut weight, mut first) = (1.0f32, 0.0f32);
             for k in 0..WINDOW {
-                let weigh = |above: u16| if above == NONE { 0.0 } else { exp(-f32::from(above) * cold) };
+                let weigh = |excess: u16| if excess == NONE { 0.0 } else { exp(-f32::from(excess) * cold) };
                 let (before, behind) = (weigh(before[k][i]), weigh(behind[k][i]));
                 weight += before + behind;
                 first += (k + 1) as f32 * (behind - before);
@@ -101,13 +115,13 @@ impl Modes {
     }
 }
 
-/// `e^x` for x ≤ 0 to a relative 4e-6: a power of two, and a polynomial for what is left of the exponent. The library's
-/// took a third of the read-out's time.
+/// Computes `e^x` for x ≤ 0 to a relative error of 4e-6: a power of two times a polynomial of the
+/// rest of the exponent. Unlike the library's function it is vectorised.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
-    // Below this, weights count nothing, and the exponent would leave its bits.
+    // Smaller weights do not count, and their exponents would leave the bits of an f32.
     let t = (x * std::f32::consts::LOG2_E).max(-100.0);
-    // Adding 1.5 · 2²³ rounds to a whole number, and leaves it in the lowest bits.
+    // Adding 1.5 · 2²³ rounds to an integer and leaves it in the lowest bits.
     const ROUND: f32 = 12_582_912.0;
     let rounded = t + ROUND;
     let u = (t - (rounded - ROUND)) * std::f32::consts::LN_2;
@@ -119,7 +133,7 @@ fn exp(x: f32) -> f32 {
 mod tests {
     use super::super::least::WORDS;
     use super::*;
-    use crate::simd::Anywhere;
+    use crate::simd::Arrays;
     use crate::testing::random::random;
     use proptest::prelude::*;
 
@@ -134,7 +148,7 @@ mod tests {
     fn put(modes: &mut Modes, i: usize, sums: &[u16]) {
         let sums = [sums, &[0; WORDS]].concat();
         let own = (&sums[..], sums.len() - WORDS);
-        modes.put::<Anywhere>(i, own, Anywhere::least(own.0, own.1));
+        modes.put(Arrays, i, own, Arrays.least(own.0, own.1));
     }
 
     fn estimate(modes: &Modes, i: usize, scale: f32, noise: f32) -> Option<Estimate> {
@@ -143,7 +157,7 @@ mod tests {
         (!own.index.is_nan()).then_some(own)
     }
 
-    /// Reads a pixel alone.
+    /// Returns the estimate of a pixel that is alone in its run.
     fn read(sums: &[u16], scale: f32, noise: f32) -> Option<Estimate> {
         let mut modes = Modes::new();
         put(&mut modes, 0, sums);
@@ -170,8 +184,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the costs are, the height lies among the hypotheses, its deviation and margin are numbers, and a
-        /// common addend changes nothing.
+        /// Whatever the costs are, the height lies among the hypotheses, deviation and margin are
+        /// finite, and a common addend changes nothing.
         #[test]
         fn any_costs_give_a_number_or_nothing(
             sums in prop::collection::vec(prop_oneof![0..1016u16, 60_000..=60_100u16, Just(0u16)], 1..40),
@@ -189,7 +203,7 @@ mod tests {
     }
 
     proptest! {
-        /// Hypothesis by hypothesis, with the library's exponential.
+        /// The definition, evaluated hypothesis by hypothesis with the library's exponential.
         #[test]
         fn the_mean_is_that_of_the_definition(sums in prop::collection::vec(0..900u16, 1..30)) {
             let (count, least) = (sums.len(), *sums.iter().min().unwrap());

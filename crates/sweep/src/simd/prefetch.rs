@@ -1,15 +1,19 @@
 //! Hints that memory is wanted soon.
 
-/// Asks for the memory of an element that is wanted soon, which need not be one's own; where machines do not take such hints
-/// that means nothing.
+#![allow(unsafe_code)]
+
+/// Asks the processor for the cache line at an address. The address may lie outside any allocation.
+///
+/// Does nothing on machines other than x86-64.
 #[inline(always)]
-pub(crate) fn fetch<T>(at: *const T) {
-    // SAFETY: a hint reads nothing.
-    #[cfg(target_arch = "x86_64")]
+pub(crate) fn prefetch<T>(at: *const T) {
+    // SAFETY: the instruction is part of SSE, which every x86-64 machine has, and it reads nothing
+    // that the program can observe, whatever the address.
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
     unsafe {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         _mm_prefetch::<_MM_HINT_T0>(at.cast());
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(any(not(target_arch = "x86_64"), miri))]
     let _ = at;
 }

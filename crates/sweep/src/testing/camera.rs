@@ -2,11 +2,11 @@
 
 use camera::{Rpc, RpcCamera};
 
-/// Metres per degree of the small world of the tests, at its equator.
+/// Metres per degree at the equator, where the tests take place.
 pub(crate) const METRES_PER_DEGREE: f64 = 111_320.0;
 
-/// A camera of half-metre pixels around (0°, 0°), leaning so that a metre of height moves the image by
-/// `parallax` = (samples, lines). It is linear, so every distance in it is exact.
+/// Returns a camera with pixels of half a metre around (0°, 0°), in which a metre of height moves
+/// the image by `parallax` (samples, lines). It is linear, so that all distances in it are exact.
 pub(crate) fn leaning_camera(size: usize, parallax: [f64; 2]) -> RpcCamera {
     let half = size as f64 / 2.0;
     let extent_deg = half * 0.5 / METRES_PER_DEGREE;

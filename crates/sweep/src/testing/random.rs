@@ -1,6 +1,7 @@
 //! Repeatable numbers for tests.
 
-/// Numbers below the one asked for, always the same ones (a linear congruential generator; Numerical Recipes, 7.1).
+/// Returns a generator of numbers below its argument, always the same ones: the linear congruential
+/// generator of Numerical Recipes, 7.1.
 pub(crate) fn random() -> impl FnMut(u32) -> u32 {
     let mut state = 12345u32;
     move |n| {
