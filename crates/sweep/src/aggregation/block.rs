@@ -15,7 +15,7 @@ pub(crate) struct VolumeBlock<'a> {
     pub(crate) steep: &'a [i32],
     /// Index of each pixel's first cost; one entry more than there are pixels.
     pub(crate) offsets: &'a [u32],
-    /// The costs, followed by [`super::LANES`] entries that belong to no pixel.
+    /// The costs, followed by [`super::layout::LANES`] entries that belong to no pixel.
     pub(crate) costs: &'a [u8],
     /// Strength of the image gradient at each pixel against noise and contrast, 0 (flat) to 255
     /// (edge).

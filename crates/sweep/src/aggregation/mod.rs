@@ -21,7 +21,7 @@
 //! [`Penalties`] and the block of costs are the input. `layout` draws the memory of one row,
 //! `links` finds the neighbours of its pixels in it, `pixel` extends paths to one pixel, `row` to a
 //! row, and `directions` makes the two passes over the block. The vector code works on
-//! [`crate::simd`]; with arrays instead of registers it runs under Miri, which checks the pointers
+//! `crate::simd`; with arrays instead of registers it runs under Miri, which checks the pointers
 //! of `row` and `pixel`.
 
 mod block;

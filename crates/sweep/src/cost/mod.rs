@@ -14,7 +14,7 @@
 //! not outvote the rest.
 //!
 //! Work goes by tiles of the reference. Each source is resampled over the tile once, through a
-//! local map ([`crate::geometry::LocalMap`]); each height plane is then a sub-pixel shift of that
+//! local map (`geometry::LocalMap`); each height plane is then a sub-pixel shift of that
 //! picture. Pictures are 16-bit integers in which 128 is the difference that counts fully; features
 //! and costs are bytes.
 

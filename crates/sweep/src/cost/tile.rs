@@ -18,6 +18,7 @@ use crate::view::ViewLevel;
 
 /// A range of this many planes or fewer is not divided further.
 const PLANES_MIN: i32 = 4;
+
 /// Buffers that a thread reuses from tile to tile.
 #[derive(Default)]
 pub(crate) struct TileScratch {
