@@ -311,8 +311,8 @@ mod registers {
 
     #[inline(always)]
     fn codes<V: Wide>(token: V::Token, to: [V; 2], from: [V; 2]) -> V {
-        let difference = |i: usize| to[i].saturating_sub_words(from[i]);
-        difference(0).pack(difference(1)).xor(V::splat(token, -128))
+        let (first, second) = (to[0].saturating_sub_words(from[0]), to[1].saturating_sub_words(from[1]));
+        first.pack(second).xor(V::splat(token, -128))
     }
 
     /// Compares the grades that `own` returns with those of `b`.

@@ -131,17 +131,18 @@ mod registers {
         /// farther down and with three values more.
         #[inline(always)]
         unsafe fn write<V: Wide>(&mut self, token: V::Token, x: usize) {
-            let column_weights = self.column_weights.map(|w| V::splat_word(token, w));
-            let row_weights = self.row_weights.map(|w| V::splat_word(token, w));
+            let (column_weights, row_weights) = (splat(token, self.column_weights), splat(token, self.row_weights));
             // SAFETY: the caller vouches for the registers of the last row, and those of the other
             // rows lie before them.
             unsafe {
                 let (from, out) = (self.from.as_ptr().add(x), self.out.as_mut_ptr().add(x));
-                let row = |y: usize| along(token, from.add(y * self.stride), column_weights);
-                let (mut a, mut b, mut c) = (row(0), row(1), row(2));
+                let (stride, width) = (self.stride, self.width);
+                let mut a: V = along(token, from, column_weights);
+                let mut b: V = along(token, from.add(stride), column_weights);
+                let mut c: V = along(token, from.add(2 * stride), column_weights);
                 for y in 0..self.height {
-                    let d = row(y + 3);
-                    weigh([a, b, c, d], row_weights).store(out.add(y * self.width));
+                    let d = along(token, from.add((y + 3) * stride), column_weights);
+                    weigh([a, b, c, d], row_weights).store(out.add(y * width));
                     (a, b, c) = (b, c, d);
                 }
             }
@@ -155,8 +156,16 @@ mod registers {
     #[inline(always)]
     unsafe fn along<V: Wide>(token: V::Token, from: *const i16, weights: [V; 4]) -> V {
         // SAFETY: the farthest register begins three values behind `from`.
-        let values = unsafe { [0, 1, 2, 3].map(|i| V::load(token, from.add(i))) };
-        weigh(values, weights)
+        unsafe {
+            let (a, b) = (V::load(token, from), V::load(token, from.add(1)));
+            let (c, d) = (V::load(token, from.add(2)), V::load(token, from.add(3)));
+            weigh([a, b, c, d], weights)
+        }
+    }
+
+    #[inline(always)]
+    fn splat<V: Wide>(token: V::Token, [p, q, r, s]: [i16; 4]) -> [V; 4] {
+        [V::splat_word(token, p), V::splat_word(token, q), V::splat_word(token, r), V::splat_word(token, s)]
     }
 
     #[inline(always)]
