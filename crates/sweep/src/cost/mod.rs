@@ -25,6 +25,7 @@ mod kernels;
 mod laid;
 mod part;
 mod planes;
+mod raise;
 mod scale;
 mod shift;
 mod tile;

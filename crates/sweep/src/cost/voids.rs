@@ -4,6 +4,7 @@ use multiversion::multiversion;
 
 use super::kernels::INVALID;
 use super::part::{CENSUS_REACH, Part};
+use super::raise::{RaiseMarked, raise_marked};
 
 /// Marks of the places whose neighbourhood holds a void. There are none if the picture has no void.
 #[derive(Default)]
@@ -36,38 +37,16 @@ impl Voids {
         let (width, height) = (part.width - 2 * CENSUS_REACH, part.height - 2 * CENSUS_REACH);
         let Some(rows) = self.rows.get(y..y + height).filter(|rows| rows.contains(&true)) else { return false };
         let first = CENSUS_REACH * part.width + CENSUS_REACH;
-        let marked = MarkedRows { marks: &self.marks[y * self.stride + x..], stride: self.stride, rows, width };
-        raise(&mut costs[first..], part.width, marked, worst);
+        raise_marked(RaiseMarked {
+            costs: &mut costs[first..],
+            stride: part.width,
+            marks: &self.marks[y * self.stride + x..],
+            marks_stride: self.stride,
+            rows,
+            width,
+            worst,
+        });
         true
-    }
-}
-
-/// Rows of marks, of which some have one.
-#[derive(Clone, Copy)]
-struct MarkedRows<'a> {
-    /// Marks from the first pixel on: 255 or 0.
-    marks: &'a [u8],
-    /// Number of marks from one row to the next.
-    stride: usize,
-    /// Whether each row has a mark.
-    rows: &'a [bool],
-    /// Pixels per row.
-    width: usize,
-}
-
-/// Raises costs, in rows of `stride`, to at least `worst` where they are marked.
-#[multiversion(targets("x86_64+avx2"))]
-fn raise(costs: &mut [u8], stride: usize, marked: MarkedRows<'_>, worst: u8) {
-    /// Bytes that the compiler turns into one register.
-    const CHUNK: usize = 32;
-    let MarkedRows { marks, stride: marks_stride, rows, width } = marked;
-    for (y, _) in rows.iter().enumerate().filter(|(_, is_marked)| **is_marked) {
-        let (costs, costs_left) = costs[y * stride..][..width].as_chunks_mut::<CHUNK>();
-        let (marks, marks_left) = marks[y * marks_stride..][..width].as_chunks::<CHUNK>();
-        for (costs, marks) in costs.iter_mut().zip(marks) {
-            (0..CHUNK).for_each(|i| costs[i] = costs[i].max(marks[i] & worst));
-        }
-        costs_left.iter_mut().zip(marks_left).for_each(|(cost, mark)| *cost = (*cost).max(mark & worst));
     }
 }
 
