@@ -33,7 +33,7 @@ pub enum SaveError {
     Unwritable {
         /// The output.
         path: PathBuf,
-        /// The answer of the system or of the library that writes the format.
+        /// The message of the system or of the library that writes the format.
         reason: String,
     },
 }
@@ -43,7 +43,7 @@ impl SaveError {
         Self::Unwritable { path: path.to_owned(), reason: reason.to_string() }
     }
 
-    /// The error of the system, without the temporary name that `tempfile` adds to its text.
+    /// Wraps an error of the system without the temporary name that `tempfile` adds to its text.
     fn system(path: &Path, error: &std::io::Error) -> Self {
         Self::unwritable(path, error.kind())
     }
@@ -52,7 +52,7 @@ impl SaveError {
 /// Whether a stream is flushed to the disk before it gets its final name.
 #[derive(Clone, Copy, PartialEq)]
 enum Durability {
-    /// The system writes the file when it likes; enough for results that can be computed again.
+    /// The system may write the content later, which suits results that can be computed again.
     Cached,
     /// The content is on the disk before the rename.
     Synced,

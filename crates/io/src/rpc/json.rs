@@ -44,7 +44,7 @@ pub(super) fn parse(text: &str) -> Result<Parsed, Fault> {
     let document: Node = serde_json::from_str(text)
         .map_err(|e| Fault::Syntax { what: format!("broken JSON: {e}"), line: Some(e.line()).filter(|l| *l > 0) })?;
     let Node::Object(entries) = document else {
-        return Err(Fault::Syntax { what: "expected a JSON object".to_owned(), line: None });
+        return Err(Fault::Syntax { what: "found a JSON value, expected an object".to_owned(), line: None });
     };
     let nested = entries.iter().find_map(|(key, node)| match node {
         Node::Object(inner) if key == "rpc" => Some(inner),

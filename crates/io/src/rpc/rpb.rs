@@ -91,9 +91,9 @@ fn list<'a>(
         })?;
     }
     list.push_str(piece.split(')').next().unwrap_or_default());
-    let inner = list
-        .trim_start()
-        .strip_prefix('(')
-        .ok_or_else(|| Fault::Syntax { what: format!("the list {key} does not begin with '('"), line: Some(line) })?;
+    let inner = list.trim_start().strip_prefix('(').ok_or_else(|| Fault::Syntax {
+        what: format!("the list {key} does not begin with '(', expected {key} = ( … );"),
+        line: Some(line),
+    })?;
     Ok(inner.to_owned())
 }
