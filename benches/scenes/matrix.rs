@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use numeric::upper_median;
 use serde::Serialize;
 
 use crate::pyramid;
@@ -70,8 +71,7 @@ impl Row {
     fn new(scene: &Scene, preset: &'static str, runs: Vec<Cost>, metrics: Metrics) -> anyhow::Result<Self> {
         let median = |f: fn(&Cost) -> f64| {
             let mut all: Vec<f64> = runs.iter().map(f).collect();
-            all.sort_by(f64::total_cmp);
-            all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+            upper_median(&mut all).unwrap_or(f64::NAN)
         };
         let (megapixels, cpu_s) = (scene.megapixels()?, median(|c| c.cpu_s));
         let truth = match scene.truth {

@@ -9,6 +9,7 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
+use numeric::{NMAD_FACTOR, upper_median};
 
 /// Longitude and latitude of the apex, degrees.
 const APEX: (f64, f64) = (31.134_2, 29.979_2);
@@ -41,8 +42,7 @@ pub(crate) fn measure(dsm: &Path) -> anyhow::Result<Vec<(String, f64)>> {
         .map_or(Vector3::repeat(f64::NAN), |inverse| inverse * Vector3::new(east[0], south[0], west[0]));
     let beside = |p: &&[f64; 3]| (118.0..125.0).contains(&(p[0] - top[0]).abs()) && (p[1] - top[1]).abs() < 60.0;
     let mut pavement: Vec<f64> = points.iter().filter(beside).map(|p| p[2]).collect();
-    pavement.sort_by(f64::total_cmp);
-    let level = pavement.get(pavement.len() / 2).copied().unwrap_or(f64::NAN);
+    let level = upper_median(&mut pavement).unwrap_or(f64::NAN);
     Ok(vec![
         ("east_deg".to_owned(), slope(&east)),
         ("south_deg".to_owned(), slope(&south)),
@@ -65,8 +65,7 @@ fn fit_face(points: &[[f64; 3]], east: f64, north: f64) -> Plane {
         plane = least_squares(&used);
         let error = |p: &[f64; 3]| (p[2] - plane[0] - plane[1] * p[0] - plane[2] * p[1]).abs();
         let mut sizes: Vec<f64> = used.iter().map(error).collect();
-        sizes.sort_by(f64::total_cmp);
-        let limit = 3.0 * 1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(f64::INFINITY);
+        let limit = 3.0 * NMAD_FACTOR * upper_median(&mut sizes).unwrap_or(f64::INFINITY);
         used.retain(|p| error(p) <= limit);
     }
     plane

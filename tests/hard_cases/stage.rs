@@ -6,7 +6,6 @@
 //! each proportional to longitude and latitude (so the frame is the same at any latitude and across
 //! the antimeridian), z metres above `ground_m`.
 
-use numeric::random::{hash64, unit_interval};
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
@@ -17,7 +16,8 @@ use geodesy::{meridian_radius_m, prime_vertical_radius_m};
 use io::raster::{Band, BandData, Dem, read_dem, write_image_with_rpc};
 use jobs::dsm::{DsmConfig, DsmError, DsmReport};
 use nalgebra::Vector3;
-use numeric::Silent;
+use numeric::random::{hash64, unit_interval};
+use numeric::{NMAD_FACTOR, Silent, upper_median};
 use raster::Grid;
 use tempfile::TempDir;
 
@@ -378,8 +378,7 @@ impl Errors {
 }
 
 pub(crate) fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    upper_median(values).unwrap_or(f64::NAN)
 }
 
 impl Score {
@@ -388,7 +387,7 @@ impl Score {
         let share = |f: &dyn Fn(&&f64) -> bool| chosen.iter().filter(f).count() as f64 / chosen.len().max(1) as f64;
         let mut known: Vec<f64> = chosen.iter().copied().filter(|e| e.is_finite()).collect();
         let bias_m = median(&mut known);
-        let nmad_m = 1.4826 * median(&mut known.iter().map(|e| (e - bias_m).abs()).collect::<Vec<_>>());
+        let nmad_m = NMAD_FACTOR * median(&mut known.iter().map(|e| (e - bias_m).abs()).collect::<Vec<_>>());
         Self {
             cells: chosen.len(),
             covered: share(&|e| e.is_finite()),

@@ -2,6 +2,7 @@
 //! Huttenlocher 2012, Theory of Computing 8, 415-428). It is exact, takes linear time and allows
 //! any side lengths.
 
+use crate::transpose::transposed;
 use raster::Grid;
 use rayon::prelude::*;
 
@@ -23,15 +24,6 @@ struct Parabola {
     base: f64,
     /// Position from which it is the lowest, in cells.
     from: f64,
-}
-
-fn transposed(grid: &Grid<f64>) -> Grid<f64> {
-    let mut turned = Grid::filled(grid.height(), grid.width(), 0.0);
-    let rows = turned.width().max(1);
-    turned.data_mut().par_chunks_mut(rows).enumerate().for_each(|(column, out)| {
-        out.iter_mut().enumerate().for_each(|(row, out)| *out = grid[(column, row)]);
-    });
-    turned
 }
 
 /// Replaces every row by the lower envelope of the parabolas that stand on its cells.

@@ -103,7 +103,7 @@ impl Default for EvalConfig {
 /// Result of an evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
-    /// The translation that was added to the test surface.
+    /// Translation that was added to the test surface.
     pub shift: Shift,
     /// Summary of the search of [`AlignmentMethod::Xyz`].
     pub search: Option<SearchSummary>,

@@ -35,6 +35,7 @@ mod standing;
 mod statistics;
 mod surface;
 mod terrain;
+mod transpose;
 mod vertical;
 
 pub use align::{AlignmentMethod, MetresFromCells, Shift};

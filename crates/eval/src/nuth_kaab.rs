@@ -104,7 +104,7 @@ impl NuthKaab<'_> {
         Ok((cells, summary))
     }
 
-    /// The levels, finest first, up to cells of the search radius.
+    /// Returns the levels, finest first, up to cells of the search radius.
     fn levels(&self, search_m: f64) -> Vec<Level> {
         let (along_columns, along_rows) = self.metres_from_cells.cell_size_m();
         let mut heights = self.reference.clone();

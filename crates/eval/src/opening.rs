@@ -4,6 +4,7 @@
 //! Each pass along rows or columns takes three comparisons per cell for any window size (van Herk
 //! 1992, Pattern Recognition Letters 13, 517-521). Voids neither lower nor raise a neighbour.
 
+use crate::transpose::transposed;
 use raster::Grid;
 use rayon::prelude::*;
 
@@ -19,15 +20,6 @@ pub(crate) fn opened(heights: &Grid<f32>, radius: usize) -> Grid<f32> {
 fn both_ways(grid: &Grid<f32>, radius: usize, pick: fn(f32, f32) -> f32) -> Grid<f32> {
     let rows = along_rows(grid, radius, pick);
     transposed(&along_rows(&transposed(&rows), radius, pick))
-}
-
-fn transposed(grid: &Grid<f32>) -> Grid<f32> {
-    let mut turned = Grid::filled(grid.height(), grid.width(), 0.0);
-    let rows = turned.width().max(1);
-    turned.data_mut().par_chunks_mut(rows).enumerate().for_each(|(column, out)| {
-        out.iter_mut().enumerate().for_each(|(row, out)| *out = grid[(column, row)]);
-    });
-    turned
 }
 
 fn along_rows(grid: &Grid<f32>, radius: usize, pick: fn(f32, f32) -> f32) -> Grid<f32> {

@@ -9,6 +9,7 @@ use geodesy::utm_epsg;
 use io::colmap::ColmapModel;
 use io::control::{ControlPosition, Place, Subject};
 use io::splat_ply::LocalOrigin;
+use numeric::upper_median;
 
 use super::error::AlignJobError;
 
@@ -48,8 +49,7 @@ impl World {
         // The median: one wild position must not carry the origin away.
         let middle = |axis: usize| {
             let mut values: Vec<f64> = places.iter().map(|place| place[axis]).collect();
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied().unwrap_or(0.0).round()
+            upper_median(&mut values).unwrap_or(0.0).round()
         };
         let origin = LocalOrigin::new(format!("EPSG:{epsg}"), "ellipsoid", [middle(0), middle(1), middle(2)]);
         Ok(Self { origin, places })
