@@ -37,3 +37,19 @@ fn a_surface_model_is_made_of_two_images() {
 fn a_surface_model_is_evaluated() {
     assert!(output_of("evaluate", &[]).contains("NMAD"));
 }
+
+#[test]
+fn priors_of_a_tile_are_made() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("priors");
+    output_of("priors_of_a_tile", &[out.to_str().expect("UTF-8")]);
+    assert!(out.join("height/view_1.tif").is_file());
+}
+
+#[test]
+fn a_height_map_is_made() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let map = folder.path().join("map.tif");
+    output_of("height_map", &[map.to_str().expect("UTF-8")]);
+    assert!(map.is_file());
+}
