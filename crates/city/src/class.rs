@@ -53,7 +53,8 @@ impl SurfaceClass {
         NAMES.iter().map(|&(class, _)| class)
     }
 
-    /// Returns the class with a CityGML or CityJSON name, or [`SurfaceClass::Other`] for an unknown name.
+    /// Returns the class with a CityGML or CityJSON name, or [`SurfaceClass::Other`] for an unknown
+    /// name.
     pub fn from_name(name: &str) -> Self {
         match name {
             "CeilingSurface" | "FloorSurface" => Self::Interior,

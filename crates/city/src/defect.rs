@@ -1,7 +1,7 @@
 //! The catalogue of the defects of city models, each with a stable number.
 //!
-//! Numbers below 1000 have the same meaning as in val3dity's catalogue (Ledoux 2018, doi:10.1186/s40965-018-0043-x).
-//! Defects that val3dity has no number for start at 1001.
+//! Numbers below 1000 have the same meaning as in val3dity's catalogue (Ledoux 2018,
+//! doi:10.1186/s40965-018-0043-x). Defects that val3dity has no number for start at 1001.
 
 use std::fmt;
 
@@ -38,7 +38,8 @@ pub enum DefectCode {
     TooFewPolygons = 301,
     /// A shell has edges that belong to only one polygon.
     ShellNotClosed = 302,
-    /// An edge belongs to more than two polygons of a shell, or the polygons around a vertex form several fans.
+    /// An edge belongs to more than two polygons of a shell, or the polygons around a vertex form
+    /// several fans.
     NonManifold = 303,
     /// A shell consists of several pieces.
     MultipleComponents = 305,
@@ -118,7 +119,8 @@ pub struct Defect {
     pub code: DefectCode,
     /// Consequence of the defect.
     pub effect: Effect,
-    /// Index in [`CityModel::objects`](crate::CityModel::objects), if the defect belongs to an object.
+    /// Index in [`CityModel::objects`](crate::CityModel::objects), if the defect belongs to an
+    /// object.
     pub object: Option<usize>,
     /// Place within the object (`geometry 0, surface 12`) or within the file.
     pub place: String,

@@ -1,8 +1,10 @@
-//! Triangulation of a ring by ear clipping: a corner whose triangle contains no other corner is cut off, then the next.
+//! Triangulation of a ring by ear clipping: a corner whose triangle contains no other corner is cut
+//! off, then the next.
 //!
-//! A Delaunay triangulation is the better choice for a planar polygon. A polygon that is not planar is a different
-//! surface under every triangulation, and none of them is right. Ear clipping (Meisters 1975), in the order of the
-//! widely used library `earcut`, gives the same surface as other tools.
+//! A Delaunay triangulation is the better choice for a planar polygon. A polygon that is not planar
+//! is a different surface under every triangulation, and none of them is right. Ear clipping
+//! (Meisters 1975), in the order of the widely used library `earcut`, gives the same surface as
+//! other tools.
 
 use std::cmp::Ordering;
 

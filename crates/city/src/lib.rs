@@ -1,13 +1,15 @@
 //! City models: objects with classified surfaces, and the triangles made of them.
 //!
-//! A [`CityModel`] holds the content of a file: objects with an identifier, a kind and a parent, and per level of detail
-//! the polygons of their surfaces, each with a [`SurfaceClass`]. Coordinates are f64 in the reference system of the
-//! model. Everywhere in this toolkit that is metres east, north and up. The crate `io` reads and writes the files.
+//! A [`CityModel`] holds the content of a file: objects with an identifier, a kind and a parent,
+//! and per level of detail the polygons of their surfaces, each with a [`SurfaceClass`].
+//! Coordinates are f64 in the reference system of the model. Everywhere in this toolkit that is
+//! metres east, north and up. The crate `io` reads and writes the files.
 //!
-//! [`TriangleMesh::from_model`] makes triangles: it picks one level of detail per object, cuts polygons with holes by
-//! constrained Delaunay triangulation and checks the solids. Each problem is a [`Defect`] with a number of the
-//! catalogue, and each object has an [`ObjectStatus`] that says whether it was used. [`check_solids`] runs the slow
-//! checks that only a report needs: shells that intersect themselves, cavities, overlapping solids and building parts.
+//! [`TriangleMesh::from_model`] makes triangles: it picks one level of detail per object, cuts
+//! polygons with holes by constrained Delaunay triangulation and checks the solids. Each problem is
+//! a [`Defect`] with a number of the catalogue, and each object has an [`ObjectStatus`] that says
+//! whether it was used. [`check_solids`] runs the slow checks that only a report needs: shells that
+//! intersect themselves, cavities, overlapping solids and building parts.
 
 mod class;
 mod crs;

@@ -1,4 +1,5 @@
-//! Levels of detail, with the decimals of the refined scheme of Biljecki et al. (2016), such as 1.2 and 2.2.
+//! Levels of detail, with the decimals of the refined scheme of Biljecki et al. (2016), such as 1.2
+//! and 2.2.
 
 use std::fmt;
 use std::str::FromStr;
@@ -30,7 +31,8 @@ impl Lod {
         self.minor
     }
 
-    /// Returns whether `chosen` covers this level. A plain `2` covers each of its refinements, `2.2` only itself.
+    /// Returns whether `chosen` covers this level. A plain `2` covers each of its refinements,
+    /// `2.2` only itself.
     pub fn matches(self, chosen: Self) -> bool {
         self.major == chosen.major && (chosen.minor.is_none() || chosen.minor == self.minor)
     }

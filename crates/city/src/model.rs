@@ -1,8 +1,9 @@
-//! The city model: objects, their geometries per level of detail, and the polygons of their surfaces.
+//! The city model: objects, their geometries per level of detail, and the polygons of their
+//! surfaces.
 //!
-//! All surfaces share one list of vertices, and rings are indices into it. A ring is open: it does not repeat its first
-//! vertex at the end. The first ring of a surface is its outer boundary, counter-clockwise seen from outside. The other
-//! rings are holes.
+//! All surfaces share one list of vertices, and rings are indices into it. A ring is open: it does
+//! not repeat its first vertex at the end. The first ring of a surface is its outer boundary,
+//! counter-clockwise seen from outside. The other rings are holes.
 
 use crate::{CrsReference, Lod, ModelError, ModelPoint, ObjectKind, SurfaceClass};
 
@@ -37,7 +38,8 @@ pub struct Geometry {
     pub lod: Option<Lod>,
     /// How the surfaces belong together.
     pub kind: GeometryKind,
-    /// Surfaces; in a solid they are ordered by [`SurfacePolygon::solid`] and [`SurfacePolygon::shell`].
+    /// Surfaces; in a solid they are ordered by [`SurfacePolygon::solid`] and
+    /// [`SurfacePolygon::shell`].
     pub surfaces: Vec<SurfacePolygon>,
 }
 
@@ -95,7 +97,8 @@ impl CityModel {
         self.objects.iter().flat_map(|object| &object.geometries).flat_map(|geometry| &geometry.surfaces)
     }
 
-    /// Returns the index of the topmost ancestor of an object, or `object` itself when it has no parent.
+    /// Returns the index of the topmost ancestor of an object, or `object` itself when it has no
+    /// parent.
     pub fn root(&self, object: usize) -> usize {
         let mut at = object;
         // A longer chain than this is a circle, which `validate` reports.
@@ -108,8 +111,8 @@ impl CityModel {
         object
     }
 
-    /// Checks the invariants of a model: coordinates are finite, indices are in range, each surface has an outer ring,
-    /// and no object is its own ancestor.
+    /// Checks the invariants of a model: coordinates are finite, indices are in range, each surface
+    /// has an outer ring, and no object is its own ancestor.
     ///
     /// # Errors
     /// [`ModelError`] with the first violation.

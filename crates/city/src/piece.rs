@@ -26,7 +26,8 @@ pub(crate) struct PieceDefect {
 }
 
 impl Piece {
-    /// Cuts the surfaces of an object at a level of detail; `position` returns the place of a vertex, metres.
+    /// Cuts the surfaces of an object at a level of detail; `position` returns the place of a
+    /// vertex, metres.
     pub(crate) fn new(model: &CityModel, object: usize, lod: Option<Lod>, position: &impl Fn(u32) -> Vector) -> Self {
         let mut piece = Self::default();
         let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
@@ -53,7 +54,8 @@ impl Piece {
         self.defects.push(PieceDefect { code, effect, place, detail });
     }
 
-    /// Sets the class of a polygon that has none: a polygon may be classified in only one of two geometries.
+    /// Sets the class of a polygon that has none: a polygon may be classified in only one of two
+    /// geometries.
     fn merge_class(&mut self, polygon: usize, class: SurfaceClass) {
         if let Some((known, _)) = self.polygons.get_mut(polygon).filter(|(c, _)| *c == SurfaceClass::Unclassified) {
             *known = class;
@@ -78,7 +80,8 @@ impl Piece {
         self.polygons.push((surface.class, cut));
     }
 
-    /// Returns per surface whether it must be turned around. Only the surfaces of solids have an outside.
+    /// Returns per surface whether it must be turned around. Only the surfaces of solids have an
+    /// outside.
     fn check_shells(&mut self, geometry: &Geometry, number: usize, position: &impl Fn(u32) -> Vector) -> Vec<bool> {
         let mut turn = vec![false; geometry.surfaces.len()];
         if !geometry.kind.is_solid() {
@@ -101,7 +104,8 @@ impl Piece {
     }
 }
 
-/// Returns the corners in ascending order, a key that does not depend on where and which way a ring runs.
+/// Returns the corners in ascending order, a key that does not depend on where and which way a ring
+/// runs.
 fn sorted_corners(surface: &SurfacePolygon) -> Vec<u32> {
     let mut corners: Vec<u32> = surface.rings.iter().flatten().copied().collect();
     corners.sort_unstable();

@@ -1,8 +1,8 @@
 //! A list of vertices that holds each position once.
 //!
-//! Formats without shared vertices (CityGML) repeat a corner in every polygon. Equal coordinates get the same index here,
-//! which makes shared edges visible to the topology checks. Equality is bit for bit, and −0 equals 0. No tolerance is
-//! applied, so no vertex moves.
+//! Formats without shared vertices (CityGML) repeat a corner in every polygon. Equal coordinates
+//! get the same index here, which makes shared edges visible to the topology checks. Equality is
+//! bit for bit, and −0 equals 0. No tolerance is applied, so no vertex moves.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,5 @@
-//! Prepares rings for triangulation: fits a plane by Newell's method, and removes repeated vertices and spikes.
+//! Prepares rings for triangulation: fits a plane by Newell's method, and removes repeated vertices
+//! and spikes.
 
 use numeric::vector::{Vector, cross, dot, norm, scale, sub, unit};
 
@@ -16,8 +17,8 @@ pub(crate) struct Plane {
 impl Plane {
     /// Fits the plane through the mean of the vertices with Newell's normal.
     ///
-    /// Returns `None` when the area of the ring is lost in the rounding of its size: fewer than three vertices, or all of
-    /// them on a line.
+    /// Returns `None` when the area of the ring is lost in the rounding of its size: fewer than
+    /// three vertices, or all of them on a line.
     pub(crate) fn of_ring(ring: &[Vector]) -> Option<Self> {
         let first = *ring.first()?;
         let local = |i: usize| sub(ring[i % ring.len()], first);
@@ -42,7 +43,8 @@ impl Plane {
     /// Returns two unit vectors in the plane that form a right-handed frame with the normal.
     pub(crate) fn axes(&self) -> (Vector, Vector) {
         let n = self.normal;
-        // The coordinate axis with the smallest component of the normal keeps the cross product long.
+        // The coordinate axis with the smallest component of the normal keeps the cross product
+        // long.
         let least = (0..3).min_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs())).unwrap_or(0);
         let mut axis = [0.0; 3];
         axis[least] = 1.0;
@@ -60,7 +62,8 @@ pub(crate) struct Cleaned {
     pub(crate) spikes: usize,
 }
 
-/// Removes vertices that repeat the one before, and the tips b of spikes a → b → a, also across the end of the ring.
+/// Removes vertices that repeat the one before, and the tips b of spikes a → b → a, also across the
+/// end of the ring.
 pub(crate) fn clean(ring: &mut Vec<u32>, same: impl Fn(u32, u32) -> bool) -> Cleaned {
     let mut found = Cleaned::default();
     let mut kept: Vec<u32> = Vec::with_capacity(ring.len());

@@ -1,7 +1,8 @@
 //! Selects the geometries of a model: the objects in scope, and one level of detail for each.
 //!
-//! The default is the highest level up to 2.x of every object of a building. A LoD0 footprint is not a shape and is only
-//! used when it is asked for. A building whose parts are more detailed than itself is replaced by its parts.
+//! The default is the highest level up to 2.x of every object of a building. A LoD0 footprint is
+//! not a shape and is only used when it is asked for. A building whose parts are more detailed than
+//! itself is replaced by its parts.
 
 use crate::{BuildingRole, CityModel, CityObject, Geometry, Lod};
 
@@ -54,7 +55,8 @@ pub enum ObjectStatus {
     Unusable,
 }
 
-/// Level of the geometries that are used, or why none is. `Ok(None)` selects the geometries without a level.
+/// Level of the geometries that are used, or why none is. `Ok(None)` selects the geometries without
+/// a level.
 pub(crate) type Chosen = Result<Option<Lod>, ObjectStatus>;
 
 /// Decides for each object of the model.

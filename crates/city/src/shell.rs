@@ -1,7 +1,8 @@
 //! Checks whether the shells of solids are closed, and turns polygons that face the wrong side.
 //!
-//! Two polygons use every edge of a closed shell, once in each direction. Where only the directions are wrong, polygons
-//! are turned until neighbours agree. The sign of the enclosed volume then tells which side is outside.
+//! Two polygons use every edge of a closed shell, once in each direction. Where only the directions
+//! are wrong, polygons are turned until neighbours agree. The sign of the enclosed volume then
+//! tells which side is outside.
 
 use crate::sets::DisjointSets;
 use crate::{DefectCode, SurfacePolygon};
@@ -126,7 +127,8 @@ fn pieces(count: usize, edges: &[Edge]) -> usize {
     sets.count()
 }
 
-/// Turns polygons until neighbours agree, and returns the connected component of each and the number of components.
+/// Turns polygons until neighbours agree, and returns the connected component of each and the
+/// number of components.
 ///
 /// Returns `None` for a surface with only one side, such as a Möbius strip.
 fn orient(count: usize, pairs: &[Neighbours], turn: &mut [bool]) -> Option<(Vec<usize>, usize)> {
@@ -159,7 +161,8 @@ fn orient(count: usize, pairs: &[Neighbours], turn: &mut [bool]) -> Option<(Vec<
     Some((component, components))
 }
 
-/// Turns each component as a whole so that an outer shell faces away from its volume, and a cavity towards it.
+/// Turns each component as a whole so that an outer shell faces away from its volume, and a cavity
+/// towards it.
 fn turn_outwards(
     surfaces: &[&SurfacePolygon],
     component: &[usize],
@@ -179,7 +182,8 @@ fn turn_outwards(
     }
 }
 
-/// Returns six times the volume of the cone from `reference` to a polygon, positive when the polygon faces away from it.
+/// Returns six times the volume of the cone from `reference` to a polygon, positive when the
+/// polygon faces away from it.
 fn flux(surface: &SurfacePolygon, reference: Vector, position: &impl Fn(u32) -> Vector) -> f64 {
     let of_ring = |ring: &Vec<u32>| {
         let Some(&first) = ring.first() else { return 0.0 };

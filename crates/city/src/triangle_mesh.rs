@@ -1,8 +1,9 @@
 //! The triangles of a city model, each with its surface, class and object.
 //!
-//! Positions are f64 metres from a recorded origin on whole metres, rounded to 1 µm. The same model at other coordinates
-//! (another zone, another offset in whole metres) gives bit for bit the same triangles. Triangles of solids are
-//! counter-clockwise seen from outside. The result does not depend on the number of threads.
+//! Positions are f64 metres from a recorded origin on whole metres, rounded to 1 µm. The same model
+//! at other coordinates (another zone, another offset in whole metres) gives bit for bit the same
+//! triangles. Triangles of solids are counter-clockwise seen from outside. The result does not
+//! depend on the number of threads.
 
 use rayon::prelude::*;
 
@@ -58,7 +59,8 @@ pub struct MeshedModel {
 /// Report on an object.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ObjectReport {
-    /// Level of detail that was used; `None` when the object was not used or the file names no level.
+    /// Level of detail that was used; `None` when the object was not used or the file names no
+    /// level.
     pub lod: Option<Lod>,
     /// Whether it was used.
     pub status: ObjectStatus,
@@ -145,8 +147,8 @@ impl TriangleMesh {
     /// Checks the invariants of a mesh.
     ///
     /// # Errors
-    /// [`ModelError::NotFinite`] for a position that is not finite, [`ModelError::Triangle`] for a triangle without a
-    /// surface, or with an index of a corner or a surface that is out of range.
+    /// [`ModelError::NotFinite`] for a position that is not finite, [`ModelError::Triangle`] for a
+    /// triangle without a surface, or with an index of a corner or a surface that is out of range.
     pub fn validate(&self) -> Result<(), ModelError> {
         if let Some(vertex) = self.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
             return Err(ModelError::NotFinite { vertex });
@@ -163,7 +165,8 @@ impl TriangleMesh {
     }
 }
 
-/// Returns the middle of the geometries that are used, rounded down to whole metres; zero when none is used.
+/// Returns the middle of the geometries that are used, rounded down to whole metres; zero when none
+/// is used.
 fn origin(model: &CityModel, chosen: &[Chosen]) -> ModelPoint {
     let mut bounds: Option<(Vector, Vector)> = None;
     for (object, lod) in model.objects.iter().zip(chosen).filter_map(|(o, c)| Some((o, *c.as_ref().ok()?))) {
@@ -178,7 +181,8 @@ fn origin(model: &CityModel, chosen: &[Chosen]) -> ModelPoint {
         }
     }
     bounds.map_or(ModelPoint::default(), |(low, high)| {
-        // Rounding to a nanometre first keeps the rounding errors of an offset from deciding between two origins.
+        // Rounding to a nanometre first keeps the rounding errors of an offset from deciding
+        // between two origins.
         ModelPoint::from([0, 1, 2].map(|i| ((0.5e9 * (low[i] + high[i])).round() / 1e9).floor()))
     })
 }
@@ -188,7 +192,8 @@ fn positions(model: &CityModel, origin: ModelPoint) -> impl Fn(u32) -> Vector + 
     move |i| micrometres(model.vertices[i as usize].from_origin(origin))
 }
 
-/// Returns the places of the vertices in the frame of the triangles that [`TriangleMesh::from_model`] makes.
+/// Returns the places of the vertices in the frame of the triangles that
+/// [`TriangleMesh::from_model`] makes.
 pub(crate) fn positions_of<'a>(model: &'a CityModel, chosen: &[Chosen]) -> impl Fn(u32) -> Vector + 'a {
     positions(model, origin(model, chosen))
 }
@@ -260,7 +265,8 @@ mod tests {
     use super::*;
     use crate::{CityObject, CrsReference, Geometry, GeometryKind, ObjectKind, SurfacePolygon};
 
-    /// Makes a house with a ridge and a hole in its front wall. One face is turned, another one is repeated.
+    /// Makes a house with a ridge and a hole in its front wall. One face is turned, another one is
+    /// repeated.
     fn house(offset: Vector) -> CityModel {
         let mut model = CityModel::new(CrsReference::default());
         let corners = [

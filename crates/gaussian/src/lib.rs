@@ -1,15 +1,16 @@
 //! A Gaussian on a surface: SkySplat's G = {μ, S, R, C, α}, in plain units.
 //!
-//! Positions are metres from a local origin, which is recorded beside them, so that f32 is precise enough. The covariance
-//! is R S Sᵀ Rᵀ. The third principal axis is the surface normal. The crate `io` converts to the logarithms, logits and
-//! harmonics that trainers store.
+//! Positions are metres from a local origin, which is recorded beside them, so that f32 is precise
+//! enough. The covariance is R S Sᵀ Rᵀ. The third principal axis is the surface normal. The crate
+//! `io` converts to the logarithms, logits and harmonics that trainers store.
 
 /// An oriented Gaussian with a colour and an opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Splat {
     /// Centre μ, metres from the local origin: east, north, up.
     pub position: [f32; 3],
-    /// Standard deviations S along the principal axes, metres, all positive; the third is along the normal.
+    /// Standard deviations S along the principal axes, metres, all positive; the third is along the
+    /// normal.
     pub scale_m: [f32; 3],
     /// Unit quaternion R (w, x, y, z), the rotation from the principal axes to the world.
     pub rotation: [f32; 4],
@@ -91,10 +92,11 @@ impl Splat {
     }
 }
 
-/// Returns the unit quaternion (w, x, y, z) of the rotation whose columns are three orthonormal, right-handed axes.
+/// Returns the unit quaternion (w, x, y, z) of the rotation whose columns are three orthonormal,
+/// right-handed axes.
 ///
-/// The method of Shepperd (J. Guidance and Control 1, 1978) computes the largest component first, which keeps the others
-/// precise. The component w is not negative.
+/// The method of Shepperd (J. Guidance and Control 1, 1978) computes the largest component first,
+/// which keeps the others precise. The component w is not negative.
 ///
 /// # Examples
 /// ```

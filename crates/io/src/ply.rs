@@ -1,8 +1,8 @@
-//! Writes points for Gaussian splatting trainers: binary little-endian PLY with `x y z nx ny nz` as float and
-//! `red green blue` as uchar.
+//! Writes points for Gaussian splatting trainers: binary little-endian PLY with `x y z nx ny nz` as
+//! float and `red green blue` as uchar.
 //!
-//! The readers of 3DGS and 2DGS require these properties in this order, and fail without normals. Positions are f32
-//! relative to an origin in the comments, so that they stay precise on a map.
+//! The readers of 3DGS and 2DGS require these properties in this order, and fail without normals.
+//! Positions are f32 relative to an origin in the comments, so that they stay precise on a map.
 
 use std::path::Path;
 
@@ -28,8 +28,8 @@ const PROPERTIES: &str = "property float x\nproperty float y\nproperty float z\n
 ///
 /// # Errors
 /// - [`SaveError::Exists`] when the file exists and `overwrite` is false.
-/// - [`SaveError::Unwritable`] when the system refuses to write, or the iterator yields another number of points than
-///   its length.
+/// - [`SaveError::Unwritable`] when the system refuses to write, or the iterator yields another
+///   number of points than its length.
 ///
 /// # Examples
 /// ```

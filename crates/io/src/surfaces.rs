@@ -1,7 +1,9 @@
-//! Reads surfaces for comparison: city models and meshes (CityJSON, CityGML, OBJ, PLY) and clouds (PLY, LAS, LAZ).
+//! Reads surfaces for comparison: city models and meshes (CityJSON, CityGML, OBJ, PLY) and clouds
+//! (PLY, LAS, LAZ).
 //!
-//! Positions are f64 in the reference system of the file. A PLY file may hold positions relative to an origin, which is in
-//! a comment `origin x y z` (with `crs …`), or beside it in `NAME.origin.json`. The origin is added to the positions.
+//! Positions are f64 in the reference system of the file. A PLY file may hold positions relative to
+//! an origin, which is in a comment `origin x y z` (with `crs …`), or beside it in
+//! `NAME.origin.json`. The origin is added to the positions.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -262,7 +262,8 @@ fn hostile_xml_is_refused() {
 
 #[test]
 fn links_that_multiply_are_refused() {
-    // Each set links ten times to the set before it, which makes 10^9 surfaces when all links are followed.
+    // Each set links ten times to the set before it, which makes 10^9 surfaces when all links are
+    // followed.
     let set = |i: usize, target: String| {
         let links = format!("<gml:surfaceMember xlink:href=\"#{target}\"/>").repeat(300);
         format!(

@@ -1,7 +1,8 @@
-//! Checks the test files of val3dity, one per code of its catalogue: the code in the name of a file must be found.
+//! Checks the test files of val3dity, one per code of its catalogue: the code in the name of a file
+//! must be found.
 //!
-//! The files are in `city/val3dity` of the shared data. A `.poly` file holds one shell. For a cavity the unit cube is the
-//! outer shell.
+//! The files are in `city/val3dity` of the shared data. A `.poly` file holds one shell. For a
+//! cavity the unit cube is the outer shell.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -26,7 +27,8 @@ fn codes(model: &CityModel) -> Vec<u16> {
     codes
 }
 
-/// Reads a shell from a `.poly` file: vertices, then faces with their number of rings. Points in holes are skipped.
+/// Reads a shell from a `.poly` file: vertices, then faces with their number of rings. Points in
+/// holes are skipped.
 fn shell(path: &Path, number: u32, pool: &mut VertexPool) -> Vec<SurfacePolygon> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines().map(|line| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
@@ -137,7 +139,8 @@ fn solids_and_parts() {
     }
 }
 
-/// 3DBAG publishes the codes that val3dity found in each building before the coordinates were rounded to millimetres.
+/// 3DBAG publishes the codes that val3dity found in each building before the coordinates were
+/// rounded to millimetres.
 #[test]
 fn buildings_of_3dbag_are_valid_where_val3dity_says_so() {
     let Some(city) = folder("..") else { return };
@@ -166,7 +169,8 @@ fn buildings_of_3dbag_are_valid_where_val3dity_says_so() {
     }
     let set = |codes: &[u16]| codes.iter().copied().collect::<BTreeSet<_>>();
     let expected = [
-        // Slivers of a few centimetres. We read a polygon with two different vertices as no polygon.
+        // Slivers of a few centimetres. We read a polygon with two different vertices as no
+        // polygon.
         ("19275", set(&[104]), set(&[306])),
         // The same case; val3dity found no defect before the coordinates were rounded.
         ("25101", set(&[]), set(&[306])),

@@ -1,10 +1,11 @@
-//! Compares depth maps and visible points of a CityJSON tile with the results of Open3D (Embree) for the same input.
+//! Compares depth maps and visible points of a CityJSON tile with the results of Open3D (Embree)
+//! for the same input.
 //!
-//! The reference is in `city/peer_reference` of the shared data. Its points and maps are relative to an offset on whole
-//! metres.
+//! The reference is in `city/peer_reference` of the shared data. Its points and maps are relative
+//! to an offset on whole metres.
 //!
-//! Rays are cast at our triangles of the tile, and at the triangles of the reference (`mesh_local.ply`). Both results must
-//! agree with the reference.
+//! Rays are cast at our triangles of the tile, and at the triangles of the reference
+//! (`mesh_local.ply`). Both results must agree with the reference.
 
 use std::path::{Path, PathBuf};
 
@@ -83,7 +84,8 @@ impl Scene {
         })
     }
 
-    /// Returns the points that a view sees: in the image, in front of the camera, and not occluded by more than ε.
+    /// Returns the points that a view sees: in the image, in front of the camera, and not occluded
+    /// by more than ε.
     fn visible(&self, view: usize, points: &[[f64; 3]]) -> Vec<u32> {
         let (eye, lens) = (self.eye(view), self.lens(view));
         let (mut numbers, mut targets) = (Vec::new(), Vec::new());
@@ -205,7 +207,8 @@ fn national_coordinates_change_nothing() {
     let near = io::citymodel::read(&tile).unwrap().model;
     let config = MeshConfig::default();
     let expected = TriangleMesh::from_model(&near, &config).unwrap();
-    // The tile is moved to Munich in EPSG:25832, and to the same place with the zone number before the easting.
+    // The tile is moved to Munich in EPSG:25832, and to the same place with the zone number before
+    // the easting.
     for shift in [[606_000.0, 4_887_000.0, 500.0], [32_606_000.0, 4_887_000.0, 0.0]] {
         let mut far = near.clone();
         for vertex in &mut far.vertices {

@@ -1,8 +1,9 @@
 //! What a camera would measure of a model: depth, normal, mask, class and object of every pixel.
 //!
-//! Rays go through the centres of the pixels. The depth is the distance along the camera's axis (z-depth), which trainers
-//! render, or along the ray: at the corner of a wide image they differ by a quarter. A pixel that sees no building has depth
-//! +∞, never 0, which a trainer's resizing would mix into depths of its neighbours. Normals are turned to the camera.
+//! Rays go through the centres of the pixels. The depth is the distance along the camera's axis
+//! (z-depth), which trainers render, or along the ray: at the corner of a wide image they differ by
+//! a quarter. A pixel that sees no building has depth +∞, never 0, which a trainer's resizing would
+//! mix into depths of its neighbours. Normals are turned to the camera.
 
 use bvh::{DepthImage, MISS};
 use raster::Grid;
@@ -28,7 +29,8 @@ pub enum NormalFrame {
     /// Those of the mesh.
     #[default]
     World,
-    /// Those of the camera: right, down, forward. Normals turned to it have a negative last component near the middle.
+    /// Those of the camera: right, down, forward. Normals turned to it have a negative last
+    /// component near the middle.
     Camera,
 }
 
@@ -53,7 +55,8 @@ pub struct PriorMaps {
     pub depth_m: Grid<f32>,
     /// Unit normals, turned to the camera; zero where no building is seen.
     pub normal: Grid<[f32; 3]>,
-    /// Number of the surface's class ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no building is seen.
+    /// Number of the surface's class ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no building
+    /// is seen.
     pub class: Grid<u8>,
     /// Index of the object in the model plus one; [`NO_OBJECT`] where no building is seen.
     pub object: Grid<u32>,

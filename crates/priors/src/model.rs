@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use crate::PriorsError;
 use numeric::vector::{Vector, cross, norm, sub, unit};
 
-/// Triangles lower than this take the normal of their surface: their own would be made of the rounding of their corners.
+/// Triangles lower than this take the normal of their surface: their own would be made of the
+/// rounding of their corners.
 const SLIVER_M: f64 = 1e-3;
 
 /// A city model to take priors from.
@@ -21,11 +22,12 @@ pub struct PriorModel {
 }
 
 impl PriorModel {
-    /// Arranges a mesh. `is_building` says of every object of the model whether it is (part of) a building: the others hide
-    /// what is behind them, and give no priors.
+    /// Arranges a mesh. `is_building` says of every object of the model whether it is (part of) a
+    /// building: the others hide what is behind them, and give no priors.
     ///
     /// # Errors
-    /// A mesh that fails [`TriangleMesh::validate`], that rays cannot be cast at, or that names more objects.
+    /// A mesh that fails [`TriangleMesh::validate`], that rays cannot be cast at, or that names
+    /// more objects.
     pub fn new(mesh: TriangleMesh, is_building: &[bool]) -> Result<Self, PriorsError> {
         mesh.validate()?;
         let bvh = Bvh::new(&mesh.positions, &mesh.triangles)?;
@@ -58,8 +60,8 @@ impl PriorModel {
         self.areas[triangle]
     }
 
-    /// Unit normal of a triangle, outwards where the model's solids allow to tell; zero where the triangle and its surface have
-    /// no area.
+    /// Unit normal of a triangle, outwards where the model's solids allow to tell; zero where the
+    /// triangle and its surface have no area.
     ///
     /// # Panics
     /// When there is no such triangle.
@@ -112,7 +114,8 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// A box with its corner at `low`: ground, roof, four walls, two triangles each, looking outwards; object 0.
+    /// A box with its corner at `low`: ground, roof, four walls, two triangles each, looking
+    /// outwards; object 0.
     pub(crate) fn cuboid(low: Vector, size: Vector) -> TriangleMesh {
         let corner = |i: usize| [0, 1, 2].map(|axis| low[axis] + if i >> axis & 1 == 1 { size[axis] } else { 0.0 });
         let faces: [([u32; 4], SurfaceClass); 6] = [

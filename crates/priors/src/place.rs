@@ -12,7 +12,8 @@ use crate::PriorsError;
 pub struct ModelPlace {
     /// The map, in metres.
     pub projection: MapProjection,
-    /// What the heights are above; `None` where no one says, and they are taken to be above the ellipsoid.
+    /// What the heights are above; `None` where no one says, and they are taken to be above the
+    /// ellipsoid.
     pub datum: Option<VerticalDatum>,
 }
 
@@ -41,7 +42,8 @@ impl ModelPlace {
     /// The heights of a mesh in this map become heights above the WGS 84 ellipsoid.
     ///
     /// # Errors
-    /// A datum whose grid cannot be had; [`PriorsError::BeyondDatum`] outside its area, the mesh is then as it was.
+    /// A datum whose grid cannot be had; [`PriorsError::BeyondDatum`] outside its area, the mesh is
+    /// then as it was.
     pub fn to_ellipsoid(&self, mesh: &mut TriangleMesh) -> Result<(), PriorsError> {
         let datum = self.datum();
         if datum == VerticalDatum::Ellipsoid {

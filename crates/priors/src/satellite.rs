@@ -1,9 +1,11 @@
-//! What a satellite image sees of a model: height above the ellipsoid, distance, normal, class and object of every pixel.
+//! What a satellite image sees of a model: height above the ellipsoid, distance, normal, class and
+//! object of every pixel.
 //!
-//! A pixel of an RPC image sees along the line between the ground points that the RPC gives it above and below the model
-//! ([`LinesOfSight`]); the first triangle on it is what it sees. No centre of projection is assumed: scanners have none.
-//! Normals are in the directions of east, north and up at the middle of the model: the map's axes turned by the convergence
-//! of its meridians there (over a scene of 10 km that changes by less than 0.1°).
+//! A pixel of an RPC image sees along the line between the ground points that the RPC gives it
+//! above and below the model ([`LinesOfSight`]); the first triangle on it is what it sees. No
+//! centre of projection is assumed: scanners have none. Normals are in the directions of east,
+//! north and up at the middle of the model: the map's axes turned by the convergence of its
+//! meridians there (over a scene of 10 km that changes by less than 0.1°).
 
 mod lines;
 
@@ -19,13 +21,16 @@ use numeric::vector::{along, dot, norm};
 /// The maps of one image, all of its size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SatelliteMaps {
-    /// Metres above the ellipsoid that the model's heights are above; NaN where no building is seen.
+    /// Metres above the ellipsoid that the model's heights are above; NaN where no building is
+    /// seen.
     pub height_m: Grid<f32>,
-    /// Metres along the line of sight from the height [`LinesOfSight::from_height_m`]; NaN where no building is seen.
+    /// Metres along the line of sight from the height [`LinesOfSight::from_height_m`]; NaN where no
+    /// building is seen.
     pub distance_m: Grid<f32>,
     /// East, north, up; unit normals turned to the sensor, zero where no building is seen.
     pub normal: Grid<[f32; 3]>,
-    /// Number of the surface's class ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no building is seen.
+    /// Number of the surface's class ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no building
+    /// is seen.
     pub class: Grid<u8>,
     /// Index of the object in the model plus one; [`NO_OBJECT`] where no building is seen.
     pub object: Grid<u32>,

@@ -1,8 +1,9 @@
 //! How much the priors weigh in a training, iteration by iteration.
 //!
-//! The values are those of the released code of GS4Buildings: the depth prior comes in between iterations 5,000 and 7,000, the
-//! normal prior fades to a tenth between 7,000 and 9,000; depths of a view are compared after the ratio of their medians,
-//! α = median(prior) / median(rendered), has been applied to the rendered ones.
+//! The values are those of the released code of GS4Buildings: the depth prior comes in between
+//! iterations 5,000 and 7,000, the normal prior fades to a tenth between 7,000 and 9,000; depths of
+//! a view are compared after the ratio of their medians, α = median(prior) / median(rendered), has
+//! been applied to the rendered ones.
 
 use serde::{Deserialize, Serialize};
 

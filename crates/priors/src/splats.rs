@@ -1,8 +1,10 @@
-//! Flat Gaussians to begin a training with: one per point, in its tangent plane, as wide as the spacing of the points.
+//! Flat Gaussians to begin a training with: one per point, in its tangent plane, as wide as the
+//! spacing of the points.
 //!
-//! The standard deviation is half of the spacing: Gaussians on a square lattice then add up to a constant within 3 %, and their
-//! disks of two deviations are those that an adaptive sample keeps within its error. Across the surface it is a hundredth
-//! of that (2DGS has no third scale). The opacity is 0.1, with which 3DGS begins as well: training has to bring it up.
+//! The standard deviation is half of the spacing: Gaussians on a square lattice then add up to a
+//! constant within 3 %, and their disks of two deviations are those that an adaptive sample keeps
+//! within its error. Across the surface it is a hundredth of that (2DGS has no third scale). The
+//! opacity is 0.1, with which 3DGS begins as well: training has to bring it up.
 
 use gaussian::Splat;
 
@@ -16,7 +18,8 @@ const FLATNESS: f32 = 0.01;
 /// The thinnest a splat may be: spacings of zero come from nowhere but hand-made samples.
 const LEAST: f32 = 1e-6;
 
-/// Splats from points and their colours (red, green, blue from 0 to 1), relative to the same origin as the points.
+/// Splats from points and their colours (red, green, blue from 0 to 1), relative to the same origin
+/// as the points.
 pub fn initial_splats<'a>(points: impl IntoIterator<Item = (&'a Sample, [f32; 3])>) -> Vec<Splat> {
     points.into_iter().map(|(point, colour)| splat(point, colour)).collect()
 }

@@ -18,8 +18,9 @@ pub struct View {
     pub pose: Pose,
 }
 
-/// How far the direction of a pixel may be from the point that was projected to it, image plane at distance 1. Beyond, the
-/// point is not the one that the lens sees there: a distortion folds what is far outside back into the image.
+/// How far the direction of a pixel may be from the point that was projected to it, image plane at
+/// distance 1. Beyond, the point is not the one that the lens sees there: a distortion folds what
+/// is far outside back into the image.
 const FOLD: f64 = 1e-6;
 
 impl View {
@@ -28,8 +29,8 @@ impl View {
         Eye::new(self.pose.centre, self.pose.rotation)
     }
 
-    /// The pixel in which the lens sees a point (x, y) of the image plane at distance 1, where it lies at least `margin_px`
-    /// inside the borders of the image (outside for a negative margin).
+    /// The pixel in which the lens sees a point (x, y) of the image plane at distance 1, where it
+    /// lies at least `margin_px` inside the borders of the image (outside for a negative margin).
     pub fn pixel(&self, x: f64, y: f64, margin_px: f64) -> Option<ImagePoint> {
         let lens = &self.lens;
         let pixel = lens.project(x, y)?;
@@ -85,8 +86,8 @@ impl Rays {
         self.lens.height()
     }
 
-    /// The point of the image plane at distance 1 that a pixel's ray goes through; `None` where the lens sees nothing, and
-    /// outside the image.
+    /// The point of the image plane at distance 1 that a pixel's ray goes through; `None` where the
+    /// lens sees nothing, and outside the image.
     pub fn direction(&self, column: usize, row: usize) -> Option<[f64; 2]> {
         if column >= self.width() || row >= self.height() {
             return None;

@@ -1,10 +1,11 @@
 //! Which cameras see which points, and which of them see a point best.
 //!
-//! A view sees a point that lies in its image by a margin, not nearer than the near plane, not at a more grazing angle than
-//! allowed, and with nothing before it: a ray from the camera meets no triangle up to ε before the point (any hit). ε absorbs
-//! the distance between a point and its own triangle, and is a length along the ray. Points are kept that at least k views
-//! see, with the m observations of the highest resolution f cos θ / distance (pixels per metre of the surface), the first of
-//! equals. Views are added one by one, so a caller may show progress.
+//! A view sees a point that lies in its image by a margin, not nearer than the near plane, not at a
+//! more grazing angle than allowed, and with nothing before it: a ray from the camera meets no
+//! triangle up to ε before the point (any hit). ε absorbs the distance between a point and its own
+//! triangle, and is a length along the ray. Points are kept that at least k views see, with the m
+//! observations of the highest resolution f cos θ / distance (pixels per metre of the surface), the
+//! first of equals. Views are added one by one, so a caller may show progress.
 
 use bvh::Target;
 use camera::ImagePoint;
@@ -23,7 +24,8 @@ pub struct VisibilityConfig {
     pub near_m: f64,
     /// The last part of the ray that is not looked at, metres.
     pub epsilon_m: f64,
-    /// The largest angle between the ray and the normal, degrees; `None` sees up to 90°, and surfaces from behind.
+    /// The largest angle between the ray and the normal, degrees; `None` sees up to 90°, and
+    /// surfaces from behind.
     pub max_incidence_deg: Option<f64>,
     /// A point needs this many views to be kept.
     pub min_views: u32,
@@ -201,7 +203,8 @@ impl<'a> Visibility<'a> {
     }
 }
 
-/// Puts an observation among the best, worst last; `count` were seen before. A later one must be better to replace.
+/// Puts an observation among the best, worst last; `count` were seen before. A later one must be
+/// better to replace.
 fn insert(slots: &mut [Slot], count: usize, new: Slot) {
     let used = count.min(slots.len());
     let place = slots[..used].iter().position(|slot| new.score > slot.score).unwrap_or(used);

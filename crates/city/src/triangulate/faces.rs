@@ -1,4 +1,5 @@
-//! Walks from face to face of a constrained triangulation: finds the faces inside, and counts connected pieces.
+//! Walks from face to face of a constrained triangulation: finds the faces inside, and counts
+//! connected pieces.
 
 use spade::Triangulation as _;
 use spade::handles::{FixedFaceHandle, InnerTag};

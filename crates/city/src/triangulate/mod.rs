@@ -1,12 +1,15 @@
-//! Cuts polygons with holes into triangles, by constrained Delaunay triangulation in the fitted plane (`spade`).
+//! Cuts polygons with holes into triangles, by constrained Delaunay triangulation in the fitted
+//! plane (`spade`).
 //!
-//! Most polygons of a city are triangles or strictly convex quadrilaterals, which need no triangulation. Quadrilaterals
-//! are cut from their first corner, so that the rounding of coordinates does not choose between the two diagonals of a
-//! rectangle. The surface of a ring that is not planar depends on the cut; such rings are cut by [`ears`](crate::ears),
-//! as other tools do. Where rings cross or share edges, edges are split at the crossings, and a triangle belongs to the
-//! polygon when its centroid is inside the outer ring and in no hole (even-odd rule).
+//! Most polygons of a city are triangles or strictly convex quadrilaterals, which need no
+//! triangulation. Quadrilaterals are cut from their first corner, so that the rounding of
+//! coordinates does not choose between the two diagonals of a rectangle. The surface of a ring that
+//! is not planar depends on the cut; such rings are cut by [`ears`](crate::ears), as other tools
+//! do. Where rings cross or share edges, edges are split at the crossings, and a triangle belongs
+//! to the polygon when its centroid is inside the outer ring and in no hole (even-odd rule).
 //!
-//! Coordinates are metres relative to any nearby origin. Every defect comes back as a [`PolygonFinding`].
+//! Coordinates are metres relative to any nearby origin. Every defect comes back as a
+//! [`PolygonFinding`].
 
 mod faces;
 mod plane;
@@ -24,15 +27,17 @@ pub use result::{PolygonFinding, Triangulation};
 
 /// A vertex off the plane by more than this is reported, metres (val3dity's default).
 const PLANARITY_M: f64 = 0.01;
-/// Cosine of 20 degrees: a triangle that deviates more from the normal of the polygon is reported (val3dity's default).
+/// Cosine of 20 degrees: a triangle that deviates more from the normal of the polygon is reported
+/// (val3dity's default).
 const NORMAL_COSINE: f64 = 0.939_692_620_785_908_4;
 /// Narrower triangles have no reliable normal when coordinates are rounded to millimetres, metres.
 const NARROW_M: f64 = 2.5e-3;
 
 /// Cuts a polygon into triangles.
 ///
-/// `rings` are vertex indices, the outer ring first. `position` returns the coordinates of a vertex in metres. A polygon
-/// that cannot be used gets no triangles, and a finding that says that it was dropped.
+/// `rings` are vertex indices, the outer ring first. `position` returns the coordinates of a vertex
+/// in metres. A polygon that cannot be used gets no triangles, and a finding that says that it was
+/// dropped.
 ///
 /// # Examples
 /// ```
@@ -60,7 +65,8 @@ pub fn triangulate(rings: &[Vec<u32>], position: impl Fn(u32) -> [f64; 3]) -> Tr
     out
 }
 
-/// Returns the largest distance of a vertex from the plane, and reports it when the polygon is not planar.
+/// Returns the largest distance of a vertex from the plane, and reports it when the polygon is not
+/// planar.
 fn check_planarity(
     rings: &[Vec<u32>],
     plane: &Plane,
@@ -101,7 +107,8 @@ fn convex_shortcut(rings: &[Vec<u32>], plane: &Plane, position: &impl Fn(u32) ->
             let edge = |i: usize| sub(corners[(i + 1) % 4], corners[i % 4]);
             let turn = |i: usize| dot(cross(edge(i), edge(i + 1)), plane.normal);
             let strict = (0..4).all(|i| turn(i) > 1e-6 * plane.area);
-            // A rectangle has two Delaunay triangulations. Cutting from the first corner keeps rounding from choosing.
+            // A rectangle has two Delaunay triangulations. Cutting from the first corner keeps
+            // rounding from choosing.
             strict.then(|| vec![[a, b, c], [a, c, d]])
         }
         _ => None,

@@ -31,8 +31,8 @@ pub(super) fn midpoint(a: Point2<f64>, b: Point2<f64>) -> Point2<f64> {
 
 /// Inserts a ring and its edges as constraints, except for edges that cross another constraint.
 ///
-/// Returns whether no edge was left out, or `None` when `spade` refuses a coordinate. Without `patient` it stops at the
-/// first edge that crosses.
+/// Returns whether no edge was left out, or `None` when `spade` refuses a coordinate. Without
+/// `patient` it stops at the first edge that crosses.
 pub(super) fn constrain_ring(cdt: &mut Cdt, ring: &[Corner], patient: bool) -> Option<bool> {
     let handles: Vec<FixedVertexHandle> = ring.iter().map(|&corner| cdt.insert(corner).ok()).collect::<Option<_>>()?;
     let mut complete = true;
@@ -76,7 +76,8 @@ fn crossing([a, b]: [Point2<f64>; 2], [c, d]: [Point2<f64>; 2]) -> Option<(f64, 
     let (from, to) = (side(c, d, a), side(c, d, b));
     let crosses = from * to < 0.0 && side(a, b, c) * side(a, b, d) < 0.0;
     let t = from / (from - to);
-    // Computing the place along the edge with the lower coordinates gives the same place for both edges.
+    // Computing the place along the edge with the lower coordinates gives the same place for both
+    // edges.
     let along = |p: Point2<f64>, q: Point2<f64>, t: f64| Point2::new(p.x + t * (q.x - p.x), p.y + t * (q.y - p.y));
     crosses.then(|| {
         let key = |p: Point2<f64>, q: Point2<f64>| [p.x, p.y, q.x, q.y];

@@ -10,14 +10,15 @@ use crate::ears;
 use crate::ring::Plane;
 use numeric::vector::{Vector, dot, sub};
 
-/// Deviation from the plane below which the way a polygon is cut does not change its surface visibly, metres.
+/// Deviation from the plane below which the way a polygon is cut does not change its surface
+/// visibly, metres.
 pub(super) const FLAT_M: f64 = 2e-4;
 /// Longest ring that is cut by ears, because the search for ears is quadratic.
 const MAX_EARS: usize = 1000;
 /// Limit of the tests of a point against an edge for one invalid polygon.
 const MAX_EDGE_TESTS: usize = 50_000_000;
-/// Coordinates in the plane below this are taken as zero, metres. `spade` refuses tiny numbers, and no two things of a
-/// city are a picometre apart.
+/// Coordinates in the plane below this are taken as zero, metres. `spade` refuses tiny numbers, and
+/// no two things of a city are a picometre apart.
 const SMALLEST_M: f64 = 1e-12;
 
 /// A polygon in its plane, with the axes `u` and `v`.
@@ -54,7 +55,8 @@ impl Polygon {
         ears::cut(&corners)?.into_iter().map(|[a, b, c]| Some([vertex(a)?, vertex(b)?, vertex(c)?])).collect()
     }
 
-    /// Cuts the polygon into triangles; `off_plane_m` is the largest distance of a vertex from the plane.
+    /// Cuts the polygon into triangles; `off_plane_m` is the largest distance of a vertex from the
+    /// plane.
     pub(super) fn cut(&self, off_plane_m: f64, out: &mut Triangulation) {
         let out_of_range = || PolygonFinding::fatal(DefectCode::NotTriangulated, "the coordinates are out of range");
         let Some((mut cdt, crossing)) = self.constrain() else { return out.findings.push(out_of_range()) };
@@ -90,7 +92,8 @@ impl Polygon {
         self.collect(&cdt, &inside, out);
     }
 
-    /// Triangulates with the edges of all rings as constraints, and returns whether edges were left out because they cross.
+    /// Triangulates with the edges of all rings as constraints, and returns whether edges were left
+    /// out because they cross.
     fn constrain(&self) -> Option<(Cdt, bool)> {
         let mut cdt = Cdt::new();
         let mut crossing = false;
@@ -102,9 +105,11 @@ impl Polygon {
         Some((cdt, crossing))
     }
 
-    /// Triangulates the rings with a vertex at each crossing. Returns `None` when there are too many crossings.
+    /// Triangulates the rings with a vertex at each crossing. Returns `None` when there are too
+    /// many crossings.
     ///
-    /// Crossing points are rounded, so that parts of edges may still cross slightly. Such parts are left out.
+    /// Crossing points are rounded, so that parts of edges may still cross slightly. Such parts are
+    /// left out.
     fn constrain_split(&self) -> Option<Cdt> {
         let edges: Vec<[Point2<f64>; 2]> = self.rings.iter().flat_map(|ring| ring_edges(ring)).collect();
         let mut cdt = Cdt::new();
@@ -135,7 +140,8 @@ impl Polygon {
         PolygonFinding::note(code, if crossing { "edges cross" } else { "a vertex or an edge lies on another edge" })
     }
 
-    /// Reports holes outside the outer ring or inside another hole, and returns whether there are none.
+    /// Reports holes outside the outer ring or inside another hole, and returns whether there are
+    /// none.
     fn check_holes(&self, findings: &mut Vec<PolygonFinding>) -> bool {
         let before = findings.len();
         for (index, hole) in self.rings.iter().enumerate().skip(1) {

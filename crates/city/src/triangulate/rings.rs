@@ -1,14 +1,17 @@
-//! Prepares the rings of a polygon: cleans them, drops those without area, and fits the plane of the outer ring.
+//! Prepares the rings of a polygon: cleans them, drops those without area, and fits the plane of
+//! the outer ring.
 
 use super::result::PolygonFinding;
 use crate::DefectCode;
 use crate::ring::{Plane, clean};
 use numeric::vector::{Vector, dot};
 
-/// Number of rings of one polygon that are compared with each other. Later repetitions show as edges that meet.
+/// Number of rings of one polygon that are compared with each other. Later repetitions show as
+/// edges that meet.
 const MAX_COMPARED: usize = 256;
 
-/// Returns the clean rings that have an area, and the plane of the outer ring; `None` when the outer ring has no area.
+/// Returns the clean rings that have an area, and the plane of the outer ring; `None` when the
+/// outer ring has no area.
 pub(super) fn usable_rings(
     rings: &[Vec<u32>],
     position: &impl Fn(u32) -> Vector,
@@ -88,7 +91,8 @@ fn touches_itself(ring: &[u32], position: &impl Fn(u32) -> Vector) -> bool {
     places.windows(2).any(|pair| pair[0] == pair[1])
 }
 
-/// Returns whether two rings have the same corners in the same or the opposite order, whichever corner is the first.
+/// Returns whether two rings have the same corners in the same or the opposite order, whichever
+/// corner is the first.
 fn same_ring(a: &[u32], b: &[u32], position: &impl Fn(u32) -> Vector) -> bool {
     let n = a.len();
     let same = |i: usize, j: usize| position(a[i % n]) == position(b[j % n]);

@@ -3,7 +3,8 @@
 use super::*;
 use proptest::prelude::*;
 
-/// Cuts rings in a tilted plane away from the origin, and returns the area of the triangles and the defects.
+/// Cuts rings in a tilted plane away from the origin, and returns the area of the triangles and the
+/// defects.
 fn cut(rings: &[&[[f64; 2]]]) -> (f64, Vec<u16>) {
     let (u, v) = ([0.6, 0.0, 0.8], [0.0, 1.0, 0.0]);
     let lift = |p: &[f64; 2]| [0, 1, 2].map(|i| 100.0 + p[0] * u[i] + p[1] * v[i]);
@@ -75,7 +76,8 @@ fn broken_rings() {
     covers(&[&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]], 0.0, &[1003]);
     covers(&[&[[f64::NAN, 0.0], [1.0, 1.0], [2.0, 0.0]]], 0.0, &[1003]);
     covers(&[], 0.0, &[]);
-    // A ring that touches itself at a corner of two squares, and a bow tie with a large and a small wing.
+    // A ring that touches itself at a corner of two squares, and a bow tie with a large and a small
+    // wing.
     let touching = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0], [1.0, 1.0], [0.0, 1.0]];
     covers(&[&touching], 2.0, &[104]);
     let (area, codes) = cut(&[&[[0.0, 0.0], [4.0, 0.0], [3.0, -1.0], [3.0, 3.0]]]);
@@ -125,7 +127,8 @@ proptest! {
 
 #[test]
 fn rings_of_many_crossings_are_given_up() {
-    // A walk that jumps about (a linear congruence), so that almost every edge crosses hundreds of others.
+    // A walk that jumps about (a linear congruence), so that almost every edge crosses hundreds of
+    // others.
     let walk = |count: usize| -> Vec<[f64; 2]> {
         let place = |i: usize| ((i * 7_368_787 + 11) % 1_000_003) as f64 / 1000.0;
         (0..count).map(|i| [place(i), place(3 * i * i + 5)]).collect()

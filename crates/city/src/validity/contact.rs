@@ -1,8 +1,10 @@
-//! The relation of two closed surfaces: apart, touching, sharing faces, or reaching into each other.
+//! The relation of two closed surfaces: apart, touching, sharing faces, or reaching into each
+//! other.
 //!
-//! Each edge of one surface is cut where it passes through a triangle of the other. The pieces are then inside, outside or
-//! on the other surface. Surfaces whose edges lie in each other's faces are distinguished by the faces that they share:
-//! when both face the same way, their interiors are on the same side.
+//! Each edge of one surface is cut where it passes through a triangle of the other. The pieces are
+//! then inside, outside or on the other surface. Surfaces whose edges lie in each other's faces are
+//! distinguished by the faces that they share: when both face the same way, their interiors are on
+//! the same side.
 
 use super::limits::{MAX_COMPARISONS, SHELL_TOLERANCE_M};
 use super::patch::{Bounds, Patch, Side};
@@ -108,7 +110,8 @@ fn pieces(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option
     Some((inside, outside))
 }
 
-/// Returns the fractions along an edge of its ends and of its crossings with the planes of nearby triangles, ascending.
+/// Returns the fractions along an edge of its ends and of its crossings with the planes of nearby
+/// triangles, ascending.
 fn cuts([p, q]: [Vector; 2], b: &Patch) -> Vec<f64> {
     let edge = Bounds::of([p, q]);
     let mut cuts = vec![0.0, 1.0];
@@ -132,7 +135,8 @@ pub(super) fn normal(&[a, b, c]: &[Vector; 3]) -> Option<Vector> {
     (norm(doubled) > SHELL_TOLERANCE_M * longest).then(|| unit(doubled)).flatten()
 }
 
-/// Returns whether two triangles face the same way, when they lie in one plane and share more than their borders.
+/// Returns whether two triangles face the same way, when they lie in one plane and share more than
+/// their borders.
 ///
 /// Returns `None` when they do not overlap.
 pub(super) fn shared_face(s: &[Vector; 3], t: &[Vector; 3], tolerance_m: f64) -> Option<bool> {

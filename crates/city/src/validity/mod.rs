@@ -1,12 +1,13 @@
-//! Checks solids for val3dity's codes 303 (at a vertex), 306, 4xx, 5xx and 601, and composite surfaces for 303 and 305.
+//! Checks solids for val3dity's codes 303 (at a vertex), 306, 4xx, 5xx and 601, and composite
+//! surfaces for 303 and 305.
 //!
-//! The checks compare triangles with triangles, which is slow. They are made for a report, and reading a model does not
-//! run them. They build upon each other as in val3dity (Ledoux 2018): only closed shells are searched for
-//! self-intersections, only valid shells are compared within a solid, and only valid solids with each other. The model is
-//! not changed.
+//! The checks compare triangles with triangles, which is slow. They are made for a report, and
+//! reading a model does not run them. They build upon each other as in val3dity (Ledoux 2018): only
+//! closed shells are searched for self-intersections, only valid shells are compared within a
+//! solid, and only valid solids with each other. The model is not changed.
 //!
-//! Surfaces nearer than [`SHELL_TOLERANCE_M`](limits::SHELL_TOLERANCE_M) touch. Polygons intersect, and solids overlap,
-//! when one reaches into the other by more than [`OVERLAP_M`].
+//! Surfaces nearer than [`SHELL_TOLERANCE_M`](limits::SHELL_TOLERANCE_M) touch. Polygons intersect,
+//! and solids overlap, when one reaches into the other by more than [`OVERLAP_M`].
 
 mod body;
 mod contact;
@@ -30,8 +31,8 @@ use limits::OVERLAP_M;
 use numeric::vector::Vector;
 use patch::Patch;
 
-/// Checks the solids that [`TriangleMesh::from_model`](crate::TriangleMesh::from_model) makes triangles of, and returns
-/// the defects that it does not report itself.
+/// Checks the solids that [`TriangleMesh::from_model`](crate::TriangleMesh::from_model) makes
+/// triangles of, and returns the defects that it does not report itself.
 ///
 /// # Errors
 /// The errors of [`CityModel::validate`].

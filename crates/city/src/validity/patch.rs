@@ -1,5 +1,5 @@
-//! A closed surface as triangles. A point is inside, outside or on it by its winding number (Jacobson et al. 2013) and
-//! its distance.
+//! A closed surface as triangles. A point is inside, outside or on it by its winding number
+//! (Jacobson et al. 2013) and its distance.
 
 use crate::SurfacePolygon;
 use crate::triangulate::triangulate;
@@ -48,7 +48,8 @@ impl Bounds {
 }
 
 impl Patch {
-    /// Cuts polygons into triangles and turns those with `turn`. Returns `None` when edges of a polygon cross.
+    /// Cuts polygons into triangles and turns those with `turn`. Returns `None` when edges of a
+    /// polygon cross.
     pub(super) fn new(surfaces: &[&SurfacePolygon], turn: &[bool], position: &impl Fn(u32) -> Vector) -> Option<Self> {
         let (mut vertices, mut polygon) = (Vec::new(), Vec::new());
         for (number, (surface, &turn)) in surfaces.iter().zip(turn).enumerate() {
@@ -110,7 +111,8 @@ impl Patch {
     }
 }
 
-/// Returns the solid angle of a triangle seen from a point (Van Oosterom and Strackee 1983), positive from its back.
+/// Returns the solid angle of a triangle seen from a point (Van Oosterom and Strackee 1983),
+/// positive from its back.
 fn solid_angle(from: Vector, triangle: &[Vector; 3]) -> f64 {
     let [a, b, c] = triangle.map(|corner| sub(corner, from));
     let (la, lb, lc) = (norm(a), norm(b), norm(c));

@@ -1,7 +1,9 @@
-//! Finds self-intersections of a shell: triangles of different polygons that meet elsewhere than at shared vertices.
+//! Finds self-intersections of a shell: triangles of different polygons that meet elsewhere than at
+//! shared vertices.
 //!
-//! A sweep of bounding boxes along the longest side of the shell finds the candidates. An edge that passes through a
-//! polygon within a millimetre of its border does not count, because rounding of the coordinates can cause that.
+//! A sweep of bounding boxes along the longest side of the shell finds the candidates. An edge that
+//! passes through a polygon within a millimetre of its border does not count, because rounding of
+//! the coordinates can cause that.
 
 use super::contact::{normal, shared_face};
 use super::limits::{MAX_COMPARISONS, OVERLAP_M, SHELL_TOLERANCE_M};
@@ -33,7 +35,8 @@ pub(super) fn meetings(shell: &Patch) -> Option<usize> {
     Some(found)
 }
 
-/// A shell, and per triangle which of its edges are on the border of its polygon. Edge i begins at corner i.
+/// A shell, and per triangle which of its edges are on the border of its polygon. Edge i begins at
+/// corner i.
 struct Shell<'a> {
     patch: &'a Patch,
     borders: Vec<[bool; 3]>,
@@ -58,7 +61,8 @@ fn meet(shell: &Shell<'_>, a: usize, b: usize) -> bool {
     goes_through(shell, a, b) || goes_through(shell, b, a) || shared_face(s, t, OVERLAP_M).is_some()
 }
 
-/// Returns whether a corner of triangle `a` lies on triangle `b`, or an edge of `a` passes through it.
+/// Returns whether a corner of triangle `a` lies on triangle `b`, or an edge of `a` passes through
+/// it.
 ///
 /// Corners that both triangles have do not count.
 fn goes_through(&Shell { patch: shell, ref borders }: &Shell<'_>, a: usize, b: usize) -> bool {

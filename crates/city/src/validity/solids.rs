@@ -32,7 +32,8 @@ pub(super) fn compare_shells(shells: &[Patch]) -> Vec<MemberDefect> {
     found
 }
 
-/// Returns the defect of shell B, a cavity, in relation to shell A, which is the outer shell or another cavity.
+/// Returns the defect of shell B, a cavity, in relation to shell A, which is the outer shell or
+/// another cavity.
 fn wrong_between(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
     if contact.is_same() {
         return Some(DefectCode::DuplicateShells);
@@ -45,7 +46,8 @@ fn wrong_between(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
     (a_is_outer != contact.b_inside || (nested && !a_is_outer)).then_some(DefectCode::InnerShellOutside)
 }
 
-/// Returns whether edges of a cavity that lie on earlier shells close a circle, which cuts off the interior within it.
+/// Returns whether edges of a cavity that lie on earlier shells close a circle, which cuts off the
+/// interior within it.
 fn touches_all_around(shells: &[Patch], index: usize) -> bool {
     let mut number_of: HashMap<u32, usize> = HashMap::new();
     let touching: Vec<[usize; 2]> = shells[index]

@@ -1,11 +1,14 @@
-//! Finds vertices at which a closed shell touches itself: the polygons around a vertex must form one fan.
+//! Finds vertices at which a closed shell touches itself: the polygons around a vertex must form
+//! one fan.
 
 use crate::SurfacePolygon;
 use crate::sets::DisjointSets;
 
-/// Counts the vertices with several fans around them. Every edge of the shell must belong to two polygons.
+/// Counts the vertices with several fans around them. Every edge of the shell must belong to two
+/// polygons.
 pub(super) fn pinched(surfaces: &[&SurfacePolygon]) -> usize {
-    // A spoke is an edge seen from one of its ends. The two corners that share a spoke are neighbours in a fan.
+    // A spoke is an edge seen from one of its ends. The two corners that share a spoke are
+    // neighbours in a fan.
     let mut spokes: Vec<([u32; 2], usize)> = Vec::new();
     let mut vertex_of: Vec<u32> = Vec::new();
     for ring in surfaces.iter().flat_map(|surface| &surface.rings) {

@@ -1,4 +1,5 @@
-//! Builds a city model from the elements of a file: finds objects by identifier, checks vertices and collects defects.
+//! Builds a city model from the elements of a file: finds objects by identifier, checks vertices
+//! and collects defects.
 
 use std::collections::{HashMap, HashSet};
 
@@ -30,7 +31,8 @@ impl Builder {
         self.model.crs = crs;
     }
 
-    /// Adds an object and returns its index. A repeated identifier is noted and stays with the first object.
+    /// Adds an object and returns its index. A repeated identifier is noted and stays with the
+    /// first object.
     pub(super) fn object(&mut self, id: impl Into<String>, kind: ObjectKind) -> usize {
         let (id, index) = (id.into(), self.model.objects.len());
         if self.object_of.contains_key(&id) {

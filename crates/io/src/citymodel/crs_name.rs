@@ -7,7 +7,8 @@
 
 use city::CrsReference;
 
-/// German vertical systems: their names by the working group of the surveys (AdV), and their EPSG codes.
+/// German vertical systems: their names by the working group of the surveys (AdV), and their EPSG
+/// codes.
 const ADV_HEIGHTS: [(&str, u32); 4] =
     [("DE_DHHN2016_NH", 7837), ("DE_DHHN92_NH", 5783), ("DE_DHHN85_NOH", 5784), ("DE_DHHN12_NOH", 7699)];
 
@@ -18,14 +19,16 @@ pub(super) fn crs_reference(name: &str) -> CrsReference {
     CrsReference { name: (!name.is_empty()).then(|| name.chars().take(200).collect()), epsg, vertical_epsg }
 }
 
-/// Returns the horizontal and vertical codes of a German name: UTM or Gauss-Krüger, and a height system.
+/// Returns the horizontal and vertical codes of a German name: UTM or Gauss-Krüger, and a height
+/// system.
 fn adv_codes(name: &str) -> Option<(Option<u32>, Option<u32>)> {
     let rest = strip_prefix_ignoring_case(name, "urn:adv:crs:")?;
     let (plane, height) = rest.split_once('*').unwrap_or((rest, ""));
     let zone = |prefix: &str| plane.strip_prefix(prefix).and_then(|z| z.parse::<u32>().ok());
     let horizontal = match (zone("ETRS89_UTM"), zone("DE_DHDN_3GK")) {
         (Some(zone @ 28..=38), _) => Some(25800 + zone),
-        // The first digit after `3GK` is the strip. A second digit may name the realisation of a survey.
+        // The first digit after `3GK` is the strip. A second digit may name the realisation of a
+        // survey.
         (_, Some(strip)) => leading_digit(strip).filter(|s| (2..=5).contains(s)).map(|s| 31464 + s),
         _ => None,
     };

@@ -1,4 +1,5 @@
-//! Why a city model was not read or written. Each fault of a file has a number of the catalogue and a place.
+//! Why a city model was not read or written. Each fault of a file has a number of the catalogue and
+//! a place.
 
 use std::path::{Path, PathBuf};
 

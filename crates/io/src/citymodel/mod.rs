@@ -1,9 +1,10 @@
 //! City models in files: CityJSON, CityJSONSeq, CityGML, OBJ and PLY.
 //!
-//! [`read`] recognises the format by the content and returns a [`CityModel`](city::CityModel). A surface that cannot be
-//! used is left out and listed among the [`Defect`](city::Defect)s. A file that breaks its format is refused with a
-//! number of the catalogue and a place ([`CityFault`]). Coordinates stay in the reference system of the file. A file that
-//! is named inside another file is never opened.
+//! [`read`] recognises the format by the content and returns a [`CityModel`](city::CityModel). A
+//! surface that cannot be used is left out and listed among the [`Defect`](city::Defect)s. A file
+//! that breaks its format is refused with a number of the catalogue and a place ([`CityFault`]).
+//! Coordinates stay in the reference system of the file. A file that is named inside another file
+//! is never opened.
 
 mod builder;
 mod citygml;

@@ -1,8 +1,8 @@
 //! Reads Wavefront OBJ: vertices and polygons.
 //!
-//! Objects and groups become city objects. Materials with the names of CityGML's surfaces (`usemtl RoofSurface`) become
-//! classes. Material files are not opened, lines and curves are skipped. A comment `# crs EPSG:n` at the top names the
-//! reference system.
+//! Objects and groups become city objects. Materials with the names of CityGML's surfaces (`usemtl
+//! RoofSurface`) become classes. Material files are not opened, lines and curves are skipped. A
+//! comment `# crs EPSG:n` at the top names the reference system.
 
 use std::collections::HashMap;
 
@@ -51,7 +51,8 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
     Ok(Parsed { model, format: CityFormat::Obj, defects })
 }
 
-/// Returns the reference system in a comment `# crs EPSG:n` at the top, as [`write_mesh`](super::write_mesh) writes it.
+/// Returns the reference system in a comment `# crs EPSG:n` at the top, as
+/// [`write_mesh`](super::write_mesh) writes it.
 fn stated_crs(text: &str) -> CrsReference {
     let comments = text.lines().map_while(|line| line.strip_prefix('#'));
     let name = comments.filter_map(|line| line.trim().strip_prefix("crs ")).next().unwrap_or("unknown");
@@ -149,7 +150,8 @@ impl Reader {
     }
 }
 
-/// Returns the index, from 0, of the vertex in `7`, `7/1/2` (counted from 1) or `-1` (counted from the last vertex).
+/// Returns the index, from 0, of the vertex in `7`, `7/1/2` (counted from 1) or `-1` (counted from
+/// the last vertex).
 fn index(word: &str, count: usize) -> Option<u32> {
     let number: i64 = word.split('/').next()?.parse().ok()?;
     let index = if number < 0 { number.checked_add(i64::try_from(count).ok()?)? } else { number - 1 };

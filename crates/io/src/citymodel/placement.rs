@@ -1,4 +1,5 @@
-//! Places shapes with their own coordinates in the model: CityJSON's templates and CityGML's implicit geometries.
+//! Places shapes with their own coordinates in the model: CityJSON's templates and CityGML's
+//! implicit geometries.
 
 use std::collections::HashMap;
 
@@ -7,7 +8,8 @@ use city::ModelPoint;
 use super::CityFault;
 use super::builder::Builder;
 
-/// Limit of the vertices of all instances in a file. A few kilobytes of text can ask for any number of vertices.
+/// Limit of the vertices of all instances in a file. A few kilobytes of text can ask for any number
+/// of vertices.
 const MAX_VERTICES: usize = 20_000_000;
 
 /// Placement of a shape: a 4 × 4 matrix in row order, then a shift by a point of the model.
@@ -36,7 +38,8 @@ pub(super) struct Instances {
 }
 
 impl Instances {
-    /// Adds the vertices of an instance to the model, and returns their indices by their numbers in the shape.
+    /// Adds the vertices of an instance to the model, and returns their indices by their numbers in
+    /// the shape.
     ///
     /// # Errors
     /// A fault at the place `at` when the instances of the file have too many vertices.

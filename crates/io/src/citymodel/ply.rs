@@ -1,7 +1,8 @@
 //! Reads PLY meshes, text and binary: the positions of `vertex` and the polygons of `face`.
 //!
-//! Two comments are read: `origin x y z`, which the positions are relative to, and `crs EPSG:n`. When a file has both, as
-//! the files of this toolkit do, the property `class` of a face is the class of its surface. Everything else is skipped.
+//! Two comments are read: `origin x y z`, which the positions are relative to, and `crs EPSG:n`.
+//! When a file has both, as the files of this toolkit do, the property `class` of a face is the
+//! class of its surface. Everything else is skipped.
 //!
 //! Counts are checked against the size of the file before anything is allocated.
 
@@ -45,7 +46,8 @@ pub(crate) struct PlyPoints {
     pub(crate) has_faces: bool,
 }
 
-/// Reads the vertices of a cloud, without adding an origin. A position that is not finite is a fault.
+/// Reads the vertices of a cloud, without adding an origin. A position that is not finite is a
+/// fault.
 pub(crate) fn points(bytes: &[u8]) -> Result<PlyPoints, CityFault> {
     let header = header(bytes)?;
     let mut body = Body { bytes, at: header.end, encoding: header.encoding };
@@ -289,7 +291,8 @@ impl Body<'_> {
         self.bytes.len() - self.at
     }
 
-    /// Checks that the rest of the file can hold all of an element, and returns per property the axis that it is.
+    /// Checks that the rest of the file can hold all of an element, and returns per property the
+    /// axis that it is.
     fn check(&self, element: &Element) -> Result<Vec<Option<usize>>, CityFault> {
         if element.count == 0 {
             return Ok(Vec::new());

@@ -123,7 +123,8 @@ impl Bytes<'_> {
         self.take().map(f64::from_le_bytes)
     }
 
-    /// Reads a count of records of at least `each` bytes, and refuses more than the rest of the file can hold.
+    /// Reads a count of records of at least `each` bytes, and refuses more than the rest of the
+    /// file can hold.
     fn count(&mut self, what: &str, each: usize) -> Result<u64, Fault> {
         let place = self.place();
         let count = self.u64()?;

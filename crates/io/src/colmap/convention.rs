@@ -25,7 +25,8 @@ pub(super) fn colmap_parameters(lens: &Lens) -> Vec<f64> {
     parameters
 }
 
-/// Returns the index of the principal point among the parameters: it follows one or two focal lengths.
+/// Returns the index of the principal point among the parameters: it follows one or two focal
+/// lengths.
 pub(super) fn principal_point_index(model: LensModel) -> usize {
     use LensModel::{Radial, RadialFisheye, SimplePinhole, SimpleRadial, SimpleRadialFisheye};
     match model {

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::error::{ColmapError, Fault};
 
-/// Largest file that is read, bytes. `images` is the largest one, because it lists every observation.
+/// Largest file that is read, bytes. `images` is the largest one, because it lists every
+/// observation.
 const SIZE_LIMIT: u64 = 4 << 30;
 
 /// Reads `name.bin`, or else `name.txt`, and returns its path and its records.

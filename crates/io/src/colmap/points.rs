@@ -14,8 +14,8 @@ use super::{binary, text};
 /// Reads the model in a folder with its points.
 ///
 /// # Errors
-/// The errors of [`read`](super::read), for `points3D` too; [`ColmapError::Invalid`] when a position is not finite, or
-/// a track names an image or an image point that does not exist.
+/// The errors of [`read`](super::read), for `points3D` too; [`ColmapError::Invalid`] when a
+/// position is not finite, or a track names an image or an image point that does not exist.
 pub fn read_with_points(folder: &Path) -> Result<(ColmapModel, Vec<ColmapPoint>), ColmapError> {
     let (model, pixels) = read_views(folder, ImagePoints::Keep)?;
     let view_of: HashMap<u32, usize> = model.views.iter().enumerate().map(|(index, view)| (view.id, index)).collect();

@@ -1,4 +1,5 @@
-//! The records of COLMAP's files as they stand there: identifiers are not resolved, pixels are COLMAP's.
+//! The records of COLMAP's files as they stand there: identifiers are not resolved, pixels are
+//! COLMAP's.
 
 use camera::LensModel;
 

@@ -17,8 +17,9 @@ use super::{binary, text};
 /// # Errors
 /// - [`ColmapError::Missing`] when `cameras` or `images` is not there.
 /// - [`ColmapError::Unreadable`] when the system cannot read a file.
-/// - [`ColmapError::Invalid`] when a file breaks its format, a lens is impossible, an image has no camera or no finite
-///   pose, an image name leads out of its folder, or an identifier occurs twice.
+/// - [`ColmapError::Invalid`] when a file breaks its format, a lens is impossible, an image has no
+///   camera or no finite pose, an image name leads out of its folder, or an identifier occurs
+///   twice.
 ///
 /// # Examples
 /// ```

@@ -76,7 +76,8 @@ fn the_text_is_what_colmap_reads() {
     };
     assert_eq!(lines("cameras.txt")[0], "1 PINHOLE 640 480 500.1 510.2 320.0 239.75");
     assert_eq!(lines("images.txt")[0], "7 1.0 0.0 0.0 0.0 1.0 2.0 3.0 1 a b.png");
-    // The second line of an image lists its points in the order of the model; tracks give the index in that line.
+    // The second line of an image lists its points in the order of the model; tracks give the index
+    // in that line.
     assert_eq!(lines("images.txt")[1], "0.625 0.75 1 639.9 0.5 3");
     assert_eq!(lines("points3D.txt")[0], "1 0.3333333333333333 -2e-300 690123.456 1 128 255 0.25 9 0 7 0");
     assert_eq!(lines("points3D.txt")[2], "3 1.0 2.0 3.0 1 128 255 0.25 7 1 3 0");
@@ -122,7 +123,8 @@ fn hostile_points_are_refused() {
         std::fs::write(&path, &whole[..end]).unwrap();
         assert!(read_with_points(folder.path()).is_err(), "{end}");
     }
-    // Offsets of the number of points, the length of a track, its image, its point, and a coordinate.
+    // Offsets of the number of points, the length of a track, its image, its point, and a
+    // coordinate.
     let changes: [(usize, &[u8], &str); 5] = [
         (0, &[0xff; 8], "room for"),
         (51, &[0xff; 8], "room for"),

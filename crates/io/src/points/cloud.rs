@@ -71,7 +71,8 @@ impl PointCloud {
     ///
     /// # Errors
     /// - [`PointsError::Unreadable`] when the system cannot read the file.
-    /// - [`PointsError::Damaged`] when the file is not LAS or LAZ, or its header does not fit its length.
+    /// - [`PointsError::Damaged`] when the file is not LAS or LAZ, or its header does not fit its
+    ///   length.
     /// - [`PointsError::Crs`] when PROJ cannot read the reference system.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, PointsError> {
         let path = path.as_ref().to_owned();
@@ -142,7 +143,8 @@ impl PointCloud {
 
     /// Makes a grid with the highest point of every cell.
     ///
-    /// `cell` is the size of a cell (x, y) in map units. The corners of the cells are whole cells away from `anchor` (x, y).
+    /// `cell` is the size of a cell (x, y) in map units. The corners of the cells are whole cells
+    /// away from `anchor` (x, y).
     ///
     /// # Errors
     /// - [`PointsError::TooManyCells`] when the extent has too many cells for the number of points.
@@ -190,7 +192,8 @@ impl PointCloud {
 
     /// Passes each point of the surface to `take`, in the order of the file.
     ///
-    /// Returns the number of points read, and the number of those that were noise, withheld or without a finite height.
+    /// Returns the number of points read, and the number of those that were noise, withheld or
+    /// without a finite height.
     ///
     /// # Errors
     /// [`PointsError::Damaged`] when the points cannot be decoded.
@@ -221,7 +224,8 @@ impl PointCloud {
         }
     }
 
-    /// Returns the geotransform, the width and the height of the grid that covers the extent in the header.
+    /// Returns the geotransform, the width and the height of the grid that covers the extent in the
+    /// header.
     fn grid(&self, cell: (f64, f64), anchor: (f64, f64)) -> Result<(GeoTransform, usize, usize), PointsError> {
         let (bounds, points) = (self.reader.header().bounds(), self.reader.header().number_of_points());
         let extent = [bounds.min.x, bounds.min.y, bounds.max.x, bounds.max.y];
@@ -255,7 +259,8 @@ fn place(geotransform: &GeoTransform, x: f64, y: f64) -> Option<(usize, usize)> 
     Some((whole(column)?, whole(row)?))
 }
 
-/// Runs the decoder. It uses numbers of the file as indices without checks, so a panic means that the file is damaged.
+/// Runs the decoder. It uses numbers of the file as indices without checks, so a panic means that
+/// the file is damaged.
 fn guarded<T, E: ToString>(path: &Path, decode: impl FnOnce() -> Result<T, E>) -> Result<T, PointsError> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(Ok(value)) => Ok(value),

@@ -1,7 +1,8 @@
 //! Writes points as LAS or LAZ.
 //!
-//! The file is LAS 1.4 with point format 6. Coordinates are whole millimetres from an offset on whole metres. The
-//! reference system is written as WKT. No date is written, so that the same points give the same bytes.
+//! The file is LAS 1.4 with point format 6. Coordinates are whole millimetres from an offset on
+//! whole metres. The reference system is written as WKT. No date is written, so that the same
+//! points give the same bytes.
 
 use std::path::Path;
 
@@ -17,11 +18,13 @@ const UNIT_M: f64 = 0.001;
 /// Class of all points: never classified.
 const CLASS: u8 = 0;
 
-/// Writes points (x, y, height in metres) as LAS, or as LAZ when the extension of the path is `laz`.
+/// Writes points (x, y, height in metres) as LAS, or as LAZ when the extension of the path is
+/// `laz`.
 ///
 /// # Errors
-/// - [`RasterError::NotWritten`] when the file exists and `overwrite` is false, the system refuses to write, a point is not
-///   finite, or the points are farther apart than the format can hold (2,147 km).
+/// - [`RasterError::NotWritten`] when the file exists and `overwrite` is false, the system refuses
+///   to write, a point is not finite, or the points are farther apart than the format can hold
+///   (2,147 km).
 /// - [`RasterError::Crs`] when the reference system has no WKT.
 pub fn write_las(path: &Path, points: &[[f64; 3]], crs: Crs, overwrite: bool) -> Result<(), RasterError> {
     let wkt = crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;

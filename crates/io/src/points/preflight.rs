@@ -1,10 +1,11 @@
 //! Checks the numbers of a LAS or LAZ file that decide how much memory the decoder allocates.
 //!
-//! They are compared with the length of the file before the decoder uses them, because an allocation that fails ends the
-//! process without an error.
+//! They are compared with the length of the file before the decoder uses them, because an
+//! allocation that fails ends the process without an error.
 //!
-//! The offsets are from the LAS 1.4 R15 specification: table 3 (public header block) and section 2.7 (extended records).
-//! Compressed points are in LASzip's layout: the offset of the chunk table, the chunks, the chunk table.
+//! The offsets are from the LAS 1.4 R15 specification: table 3 (public header block) and section
+//! 2.7 (extended records). Compressed points are in LASzip's layout: the offset of the chunk table,
+//! the chunks, the chunk table.
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -22,7 +23,8 @@ const POINTS_MAX: u64 = 1 << 40;
 /// LASzip's oldest compressor, point-wise: it has neither chunks nor a chunk table.
 const POINT_WISE: [u8; 2] = 1u16.to_le_bytes();
 
-/// Checks the header of a file of `length` bytes, and returns what is wrong with it. Leaves the reader at the start.
+/// Checks the header of a file of `length` bytes, and returns what is wrong with it. Leaves the
+/// reader at the start.
 pub(super) fn check(read: &mut (impl Read + Seek), length: u64) -> Result<(), String> {
     let mut header = Vec::with_capacity(HEADER);
     let failed = |error: std::io::Error| error.to_string();
@@ -64,10 +66,11 @@ fn check_extended(read: &mut (impl Read + Seek), header: &[u8], length: u64) -> 
     if data > length - start - EXTENDED_RECORD { Err(past_end()) } else { Ok(()) }
 }
 
-/// Checks the chunk table and the chunks of compressed points of a file of `length` bytes, and returns what is wrong.
+/// Checks the chunk table and the chunks of compressed points of a file of `length` bytes, and
+/// returns what is wrong.
 ///
-/// The reader must be at the first byte of the points. The decoder reads the chunk table here, and may panic on damaged
-/// numbers.
+/// The reader must be at the first byte of the points. The decoder reads the chunk table here, and
+/// may panic on damaged numbers.
 pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, length: u64) -> Result<(), String> {
     let record = header.vlrs().iter().find(|record| is_laszip_vlr(record));
     let Some(record) = record.filter(|_| header.point_format().is_compressed) else { return Ok(()) };
@@ -93,7 +96,8 @@ pub(super) fn check_chunks(read: &mut (impl Read + Seek), header: &Header, lengt
     layout.check_layers(read, points_of, header.number_of_points(), length)
 }
 
-/// Checks the number of chunks. Each chunk begins with an uncompressed point, which limits their number.
+/// Checks the number of chunks. Each chunk begins with an uncompressed point, which limits their
+/// number.
 fn check_chunk_count(read: &mut (impl Read + Seek), data: u64, point_bytes: u64, length: u64) -> Result<(), String> {
     let mut place = |from| Some(i64::from_le_bytes(bytes_at(read, from)?)).filter(|&at| at > data as i64);
     // A writer that cannot seek puts the offset of the table at the end of the file.
@@ -143,11 +147,12 @@ impl Layout {
         Ok(out)
     }
 
-    /// Checks that the layers of each chunk fit into the file, and returns what is wrong. `read` is at the first chunk.
+    /// Checks that the layers of each chunk fit into the file, and returns what is wrong. `read` is
+    /// at the first chunk.
     ///
-    /// A chunk in layers (point formats 6 to 10) begins with a point, the number of its points, and the size of each layer
-    /// in bytes. The next chunk follows its last layer. The decoder reads `points_of(chunk)` points from a chunk, whatever
-    /// number the chunk itself holds.
+    /// A chunk in layers (point formats 6 to 10) begins with a point, the number of its points, and
+    /// the size of each layer in bytes. The next chunk follows its last layer. The decoder reads
+    /// `points_of(chunk)` points from a chunk, whatever number the chunk itself holds.
     fn check_layers(
         &self,
         read: &mut (impl Read + Seek),

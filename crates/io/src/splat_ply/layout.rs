@@ -32,8 +32,8 @@ pub struct SplatLayout {
     pub form: SplatForm,
     /// Degree of the spherical harmonics, 0 to [`SH_DEGREE_MAX`].
     ///
-    /// The loaders of the original 3DGS and 2DGS code expect the degree of their model, which is 3 by default. Viewers
-    /// and gsplat accept any degree.
+    /// The loaders of the original 3DGS and 2DGS code expect the degree of their model, which is 3
+    /// by default. Viewers and gsplat accept any degree.
     pub sh_degree: u8,
 }
 

@@ -1,7 +1,8 @@
-//! Gaussian splats as PLY files for viewers and trainers of 3D Gaussian Splatting (Kerbl et al. 2023) and 2DGS (Huang et
-//! al. 2024).
+//! Gaussian splats as PLY files for viewers and trainers of 3D Gaussian Splatting (Kerbl et al.
+//! 2023) and 2DGS (Huang et al. 2024).
 //!
-//! The file is binary little-endian. It has one `vertex` per splat, and all its properties are `float`:
+//! The file is binary little-endian. It has one `vertex` per splat, and all its properties are
+//! `float`:
 //!
 //! - `x y z`: position, metres from a local origin
 //! - `nx ny nz`: surface normal
@@ -11,7 +12,8 @@
 //! - `scale_0..2`: natural logarithm of the standard deviations in metres; 2DGS has only two
 //! - `rot_0..3`: quaternion, w first
 //!
-//! The local origin is in a file of its own, `NAME.origin.json`, because not every loader skips PLY comments.
+//! The local origin is in a file of its own, `NAME.origin.json`, because not every loader skips PLY
+//! comments.
 //!
 //! The number of splats is checked against the length of the file before anything is allocated.
 

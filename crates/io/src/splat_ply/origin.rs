@@ -1,8 +1,8 @@
 //! The origin of local positions, as JSON beside the file with the positions.
 //!
-//! `{"crs": "EPSG:32631", "vertical": "ellipsoid", "origin": [x, y, z], "axes": ["easting", "northing", "height"], "unit":
-//! "metre"}`: the local position p lies at `origin + p` in the CRS. The third coordinate is a height above the vertical
-//! datum.
+//! `{"crs": "EPSG:32631", "vertical": "ellipsoid", "origin": [x, y, z], "axes": ["easting",
+//! "northing", "height"], "unit": "metre"}`: the local position p lies at `origin + p` in the CRS.
+//! The third coordinate is a height above the vertical datum.
 
 use std::path::{Path, PathBuf};
 
@@ -53,8 +53,8 @@ impl LocalOrigin {
     /// Writes the origin to a file.
     ///
     /// # Errors
-    /// [`SplatPlyError::Invalid`] when the origin is not finite, [`SplatPlyError::NotWritten`] when the file exists and
-    /// `overwrite` is false, or cannot be written.
+    /// [`SplatPlyError::Invalid`] when the origin is not finite, [`SplatPlyError::NotWritten`] when
+    /// the file exists and `overwrite` is false, or cannot be written.
     pub fn write(&self, path: &Path, overwrite: bool) -> Result<(), SplatPlyError> {
         if !self.origin.iter().all(|c| c.is_finite()) {
             return Err(invalid(path, "the origin is not finite"));
@@ -66,8 +66,8 @@ impl LocalOrigin {
     /// Reads the origin beside a file, or returns `None` when no such file exists.
     ///
     /// # Errors
-    /// [`SplatPlyError::Unreadable`] when the system cannot read the file, [`SplatPlyError::Invalid`] when it is not an
-    /// origin.
+    /// [`SplatPlyError::Unreadable`] when the system cannot read the file,
+    /// [`SplatPlyError::Invalid`] when it is not an origin.
     pub fn read_beside(file: &Path) -> Result<Option<Self>, SplatPlyError> {
         let path = origin_path(file);
         match std::fs::read_to_string(&path) {

@@ -1,4 +1,5 @@
-//! Reads splats. Properties are found by name, so that files of other programs can be read. Unknown ones are skipped.
+//! Reads splats. Properties are found by name, so that files of other programs can be read. Unknown
+//! ones are skipped.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -50,8 +51,9 @@ struct Column {
 ///
 /// # Errors
 /// - [`SplatPlyError::Unreadable`] when the system cannot read the file or its origin.
-/// - [`SplatPlyError::Invalid`] when the file is not a little-endian binary PLY of Gaussians, is shorter than its header
-///   announces, holds a splat that fails [`Splat::validate`], or the origin beside it is broken.
+/// - [`SplatPlyError::Invalid`] when the file is not a little-endian binary PLY of Gaussians, is
+///   shorter than its header announces, holds a splat that fails [`Splat::validate`], or the origin
+///   beside it is broken.
 ///
 /// # Examples
 /// ```

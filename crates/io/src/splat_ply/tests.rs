@@ -54,7 +54,8 @@ fn every_layout_comes_back() {
     }
 }
 
-/// Compares the first splat with what the loader of the original 3DGS code expects, computed by hand.
+/// Compares the first splat with what the loader of the original 3DGS code expects, computed by
+/// hand.
 #[test]
 fn the_bytes_are_those_that_trainers_expect() {
     let folder = tempfile::tempdir().unwrap();

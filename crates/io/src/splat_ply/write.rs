@@ -13,9 +13,11 @@ use crate::atomic::{refuse_existing, write_stream};
 /// Writes splats, and their origin beside them.
 ///
 /// # Errors
-/// - [`SplatPlyError::Invalid`] when the degree of the harmonics is above [`SH_DEGREE_MAX`] or the origin is not finite.
+/// - [`SplatPlyError::Invalid`] when the degree of the harmonics is above [`SH_DEGREE_MAX`] or the
+///   origin is not finite.
 /// - [`SplatPlyError::Splat`] when a splat fails [`Splat::validate`].
-/// - [`SplatPlyError::NotWritten`] when a file exists and `overwrite` is false, or cannot be written.
+/// - [`SplatPlyError::NotWritten`] when a file exists and `overwrite` is false, or cannot be
+///   written.
 pub fn write(
     path: &Path,
     splats: &[Splat],

@@ -1,18 +1,23 @@
 //! Reads the cameras of nerfstudio, instant-ngp and Blender: `transforms.json`.
 //!
-//! The `transform_matrix` of a frame maps from the camera to the world. Its camera axes are OpenGL's (x right, y up, z
-//! back). The poses that this module returns have COLMAP's axes (x right, y down, z forward). Intrinsics are in the frame,
-//! or else in the file:
+//! The `transform_matrix` of a frame maps from the camera to the world. Its camera axes are
+//! OpenGL's (x right, y up, z back). The poses that this module returns have COLMAP's axes (x
+//! right, y down, z forward). Intrinsics are in the frame, or else in the file:
 //!
-//! - focal length: `fl_x`, `fl_y`, or `camera_angle_x`, `camera_angle_y` with f = w / (2 tan(angle / 2))
-//! - principal point: `cx`, `cy` from the upper-left corner of the image; the middle of the image by default
-//! - distortion: `k1`, `k2`, `p1`, `p2` (OPENCV), also with `k3` (FULL_OPENCV), or `k1` to `k4` of a fisheye lens
+//! - focal length: `fl_x`, `fl_y`, or `camera_angle_x`, `camera_angle_y` with f = w / (2 tan(angle
+//!   / 2))
+//! - principal point: `cx`, `cy` from the upper-left corner of the image; the middle of the image
+//!   by default
+//! - distortion: `k1`, `k2`, `p1`, `p2` (OPENCV), also with `k3` (FULL_OPENCV), or `k1` to `k4` of
+//!   a fisheye lens
 //!
-//! nerfstudio's `applied_transform` and `applied_scale` map the original world to the world of the file
-//! (new = scale · transform · original). They are undone, so that the poses are in the original world.
+//! nerfstudio's `applied_transform` and `applied_scale` map the original world to the world of the
+//! file (new = scale · transform · original). They are undone, so that the poses are in the
+//! original world.
 //!
-//! Matrices that shear, mirror or are singular, numbers that are not finite, names that lead out of the folder, and frames
-//! without a size or a focal length are refused with the number of the frame. A file that is named inside is not opened.
+//! Matrices that shear, mirror or are singular, numbers that are not finite, names that lead out of
+//! the folder, and frames without a size or a focal length are refused with the number of the
+//! frame. A file that is named inside is not opened.
 
 mod lens;
 mod schema;
@@ -53,13 +58,14 @@ pub enum TransformsError {
     },
 }
 
-/// Reads the cameras of a `transforms.json`. Views get the identifiers 1, 2, … in the order of the frames.
+/// Reads the cameras of a `transforms.json`. Views get the identifiers 1, 2, … in the order of the
+/// frames.
 ///
 /// `size` is the number of columns and rows of the images, for files without it, such as Blender's.
 ///
 /// # Errors
-/// [`TransformsError::Unreadable`] when the system cannot read the file, [`TransformsError::Invalid`] when it is too large
-/// or breaks the format.
+/// [`TransformsError::Unreadable`] when the system cannot read the file,
+/// [`TransformsError::Invalid`] when it is too large or breaks the format.
 ///
 /// # Examples
 /// ```
@@ -149,7 +155,8 @@ fn pose(matrix: &Matrix) -> Result<Pose, String> {
         ));
     }
     let r = world_from_gl.rotation();
-    // The columns are the camera axes in the world. From OpenGL to COLMAP, y and z change their sign.
+    // The columns are the camera axes in the world. From OpenGL to COLMAP, y and z change their
+    // sign.
     let axis = |i: usize, sign: f64| [sign * r[0][i], sign * r[1][i], sign * r[2][i]];
     Ok(Pose { rotation: [axis(0, 1.0), axis(1, -1.0), axis(2, -1.0)], centre: world_from_gl.translation() })
 }

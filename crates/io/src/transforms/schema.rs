@@ -72,7 +72,8 @@ impl Intrinsics {
 }
 
 impl Matrix {
-    /// Returns the matrix as similarity, if its rows have the right lengths and the last one is 0 0 0 1.
+    /// Returns the matrix as similarity, if its rows have the right lengths and the last one is 0 0
+    /// 0 1.
     pub(super) fn similarity(&self) -> Result<Similarity, String> {
         let row = |i: usize| <[f64; 4]>::try_from(self.0.get(i)?.as_slice()).ok();
         let last_fits = self.0.get(3).is_none_or(|last| last.as_slice() == [0.0, 0.0, 0.0, 1.0]);

@@ -25,7 +25,8 @@ fn a_roof_from_above() {
     assert_eq!(maps.depth_m[(20, 15)], 20.0);
     assert_eq!(maps.normal[(20, 15)], [0.0, 0.0, 1.0]);
     assert_eq!((maps.class[(20, 15)], maps.object[(20, 15)]), (SurfaceClass::Roof as u8, 1));
-    // 8 m by 6 m at 20 m with a focal length of 20 px: within 4 px and 3 px of the middle. Nothing else is a building.
+    // 8 m by 6 m at 20 m with a focal length of 20 px: within 4 px and 3 px of the middle. Nothing
+    // else is a building.
     assert_eq!(maps.hits(), 9 * 7);
     for (column, row) in [(0, 0), (15, 15), (20, 19)] {
         assert_eq!(maps.depth_m[(column, row)], f32::INFINITY);
@@ -67,7 +68,8 @@ fn a_distorted_lens_sees_along_its_own_rays() {
     assert!(bent.hits() > straight.hits(), "{} {}", bent.hits(), straight.hits());
     let fisheye = Lens::new(40, 40, LensModel::OpenCvFisheye, &[8.0, 8.0, 19.5, 19.5, 0.0, 0.0, 0.0, 0.0]).unwrap();
     let maps = render(&nadir([4.0, 3.0, 2.5], fisheye), MapConfig::default());
-    // A corner lies 27.6 px off the axis, at 3.4 rad: behind the camera, where this lens sees nothing.
+    // A corner lies 27.6 px off the axis, at 3.4 rad: behind the camera, where this lens sees
+    // nothing.
     assert_eq!(maps.depth_m[(0, 0)], f32::INFINITY);
     assert_eq!(maps.depth_m[(19, 19)], 2.5);
 }

@@ -1,9 +1,11 @@
 //! Points as dense as a geometric error needs, and no denser.
 //!
-//! The spacing s at a place comes from the creases around it ([`super::creases`]). Triangles are halved until the spacing
-//! hardly changes over a piece. The spacing grows no faster than one goes away from a crease, so that the parts of a piece look only
-//! at the creases that may bound it somewhere on the piece. A piece of area A stands for w A / s² points, w being the weight of its class. The pieces of a
-//! triangle, laid end to end in the order of the halving, take a point at every whole number past a random start.
+//! The spacing s at a place comes from the creases around it ([`super::creases`]). Triangles are
+//! halved until the spacing hardly changes over a piece. The spacing grows no faster than one goes
+//! away from a crease, so that the parts of a piece look only at the creases that may bound it
+//! somewhere on the piece. A piece of area A stands for w A / s² points, w being the weight of its
+//! class. The pieces of a triangle, laid end to end in the order of the halving, take a point at
+//! every whole number past a random start.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -54,7 +56,8 @@ pub struct ErrorCurve {
     pub even_points: f64,
 }
 
-/// How many points other errors need: the one of the configuration times each of `factors`. Empty where it has none.
+/// How many points other errors need: the one of the configuration times each of `factors`. Empty
+/// where it has none.
 ///
 /// # Errors
 /// As [`super::sample`].
@@ -119,7 +122,8 @@ impl<'a> Work<'a> {
             return Ok(());
         }
         let corners = self.model.mesh().corners(triangle);
-        // The creases of the pieces still to be cut, one list after the other; those of a piece end where its parts' begin.
+        // The creases of the pieces still to be cut, one list after the other; those of a piece end
+        // where its parts' begin.
         let mut near = self.creases.near(&corners, self.model.normal(triangle), self.bound.error_m);
         let mut open = vec![(corners, 0..near.len())];
         while let Some((corners, own)) = open.pop() {
@@ -141,7 +145,8 @@ impl<'a> Work<'a> {
             let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);
             let middle = [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]));
             let radius = corners.iter().map(|&corner| norm(sub(corner, centre))).fold(0.0, f64::max);
-            // At the far side of the piece the bound of a crease may be lower by the radius, and all others' higher.
+            // At the far side of the piece the bound of a crease may be lower by the radius, and
+            // all others' higher.
             let highest = spacing_m + 2.0 * radius + ROUNDING_M;
             for i in own.clone() {
                 let crease = near[i];

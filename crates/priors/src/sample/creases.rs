@@ -1,10 +1,12 @@
 //! The edges at which a surface bends or ends, in a grid of cells.
 //!
-//! A flat disk of radius s around a point p may reach over an edge at distance d. Beyond it the surface leaves the disk's plane
-//! at the angle α between the normals, and the disk is off by up to (s − d) sin α; where the surface ends, or turns by more
-//! than a right angle, by s − d. The spacing that keeps this under half of the error e is s ≤ d + e / (2 sin α). The half makes
-//! surfaces keep the whole of e that bend a little at each of many edges (a tower of radius R in narrow facets): there the
-//! smallest of these bounds is √(2 e R), the radius whose disk is off by e.
+//! A flat disk of radius s around a point p may reach over an edge at distance d. Beyond it the
+//! surface leaves the disk's plane at the angle α between the normals, and the disk is off by up to
+//! (s − d) sin α; where the surface ends, or turns by more than a right angle, by s − d. The
+//! spacing that keeps this under half of the error e is s ≤ d + e / (2 sin α). The half makes
+//! surfaces keep the whole of e that bend a little at each of many edges (a tower of radius R in
+//! narrow facets): there the smallest of these bounds is √(2 e R), the radius whose disk is off by
+//! e.
 
 use std::collections::HashMap;
 
@@ -108,7 +110,8 @@ impl Creases {
 }
 
 impl Crease {
-    /// The sine of the angle by which the surface leaves a plane here; 1 for an end and for more than a right angle.
+    /// The sine of the angle by which the surface leaves a plane here; 1 for an end and for more
+    /// than a right angle.
     fn bend(&self, normal: Vector) -> f64 {
         let Some(faces) = self.faces else { return 1.0 };
         let sine = |face: Vector| if dot(normal, face) <= 0.0 { 1.0 } else { norm(cross(normal, face)) };

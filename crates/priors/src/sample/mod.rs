@@ -1,8 +1,9 @@
 //! Points on the surfaces of a model: how many, where, and of which classes.
 //!
-//! A point's chance to lie on a triangle goes with the triangle's area times the weight of its class; on the triangle all
-//! places are alike. Points carry the local spacing s = 1/√(points per m²), for splats to be made of them. The i-th point
-//! does not depend on the others, or only on those before it, so any number of threads makes the same points.
+//! A point's chance to lie on a triangle goes with the triangle's area times the weight of its
+//! class; on the triangle all places are alike. Points carry the local spacing s = 1/√(points per
+//! m²), for splats to be made of them. The i-th point does not depend on the others, or only on
+//! those before it, so any number of threads makes the same points.
 
 mod adaptive;
 mod creases;
@@ -44,9 +45,9 @@ pub enum Amount {
     Count(usize),
     /// This many per square metre, on classes of weight 1.
     PerSquareMetre(f64),
-    /// As many as a geometric error needs: a flat disk with the radius of its point's spacing stays within the error of the
-    /// surface (convex, and flat or evenly curved). Few points on large planes, many at edges and on small parts. The
-    /// points are stratified.
+    /// As many as a geometric error needs: a flat disk with the radius of its point's spacing stays
+    /// within the error of the surface (convex, and flat or evenly curved). Few points on large
+    /// planes, many at edges and on small parts. The points are stratified.
     Adaptive {
         /// The error, metres.
         error_m: f64,
@@ -60,10 +61,12 @@ pub enum Amount {
 pub enum Spacing {
     /// Not at all: independent points, as in the paper.
     Random,
-    /// Triangles get their share up to one point, and the points of a triangle follow a low-discrepancy sequence.
+    /// Triangles get their share up to one point, and the points of a triangle follow a
+    /// low-discrepancy sequence.
     #[default]
     Stratified,
-    /// No two points on the same side of a wall are closer than a distance that follows from the density.
+    /// No two points on the same side of a wall are closer than a distance that follows from the
+    /// density.
     PoissonDisk,
 }
 
@@ -140,7 +143,8 @@ impl SampleConfig {
 /// Spreads points over a model.
 ///
 /// # Errors
-/// A density, error or spacing that is not a positive number, nothing left to sample, or more than 10⁸ points.
+/// A density, error or spacing that is not a positive number, nothing left to sample, or more than
+/// 10⁸ points.
 pub fn sample(model: &PriorModel, config: &SampleConfig) -> Result<Samples, PriorsError> {
     let share = Share::new(model, config)?;
     let mut disk_m = None;
@@ -263,7 +267,8 @@ impl<'a> Share<'a> {
 }
 
 impl SampleConfig {
-    /// The n-th of evenly spread places in a unit square: Roberts' R2 sequence, begun elsewhere for every triangle.
+    /// The n-th of evenly spread places in a unit square: Roberts' R2 sequence, begun elsewhere for
+    /// every triangle.
     fn even_place(&self, triangle: usize, n: usize) -> [f64; 2] {
         const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
         let start = |axis: u64| self.stream(Purpose::Offset).uniform(2 * triangle as u64 + axis);

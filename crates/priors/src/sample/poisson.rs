@@ -1,8 +1,10 @@
-//! Poisson disks by throwing darts: of independent candidates in their order, each is kept that is not too close to those kept
-//! before. Points whose normals are opposed do not meet: the two sides of a thin wall are sampled each for itself.
+//! Poisson disks by throwing darts: of independent candidates in their order, each is kept that is
+//! not too close to those kept before. Points whose normals are opposed do not meet: the two sides
+//! of a thin wall are sampled each for itself.
 //!
-//! Darts that never stop fill 0.547 of a plane with disks (random sequential adsorption), which gives the distance for a
-//! number of points; it is then shrunk until the candidates that there are give that number.
+//! Darts that never stop fill 0.547 of a plane with disks (random sequential adsorption), which
+//! gives the distance for a number of points; it is then shrunk until the candidates that there are
+//! give that number.
 
 use std::collections::HashMap;
 
@@ -40,7 +42,8 @@ pub(super) fn sample(share: &Share<'_>, count: usize) -> Result<(Vec<Sample>, f6
     Ok((kept.into_iter().map(|i| darts[i]).collect(), distance))
 }
 
-/// Indices of the darts that are no closer to an earlier one than `factor` times the smaller of both spacings.
+/// Indices of the darts that are no closer to an earlier one than `factor` times the smaller of
+/// both spacings.
 fn thrown(darts: &[Sample], factor: f64) -> Vec<usize> {
     let side = factor * darts.iter().map(|d| f64::from(d.spacing_m)).fold(0.0, f64::max);
     let cell = |p: [f64; 3]| p.map(|c| (c / side).floor() as i64);

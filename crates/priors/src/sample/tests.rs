@@ -82,7 +82,8 @@ fn disks_keep_their_distance_and_are_dense() {
         }
     }
     assert!(nearest >= distance * 0.999_999, "{nearest} {distance}");
-    // Independent points of this density come as close as a thirtieth of it; saturated disks have 0.83 of the spacing.
+    // Independent points of this density come as close as a thirtieth of it; saturated disks have
+    // 0.83 of the spacing.
     assert!(distance > 0.6 * (132.0f64 / 1_000.0).sqrt(), "{distance}");
 }
 
@@ -187,7 +188,8 @@ fn adaptive_disks_stay_within_the_error() {
                 worst = worst.max(to_mesh(model.mesh(), rim));
             }
         }
-        // A piece has the spacing of its middle, and its points are up to 0.7 of it nearer to an edge.
+        // A piece has the spacing of its middle, and its points are up to 0.7 of it nearer to an
+        // edge.
         assert!(worst <= 1.5 * error_m, "{worst} for {error_m}");
         let spacings =
             made.points.iter().map(|p| p.spacing_m).fold((f32::INFINITY, 0.0f32), |(l, h), s| (l.min(s), h.max(s)));

@@ -17,8 +17,8 @@ impl ClassWeights {
         Self { weights: SurfaceClass::all().map(|_| 1.0).collect() }
     }
 
-    /// What can be seen from outside: grounds, closures and interiors are left out. Grounds take a quarter of an area-weighted
-    /// sample of an LoD2 model, and almost none of it is ever seen.
+    /// What can be seen from outside: grounds, closures and interiors are left out. Grounds take a
+    /// quarter of an area-weighted sample of an LoD2 model, and almost none of it is ever seen.
     pub fn visible() -> Self {
         [SurfaceClass::Ground, SurfaceClass::Closure, SurfaceClass::Interior]
             .into_iter()

@@ -1,8 +1,9 @@
 //! The lines of sight of a satellite image in the frame of a mesh.
 //!
-//! The RPC is inverted at two heights, just above and just below the model, on a lattice of pixels; in between the ground points
-//! are interpolated bilinearly. The lattice is as wide as leaves less than a millimetre of error, which is measured in the
-//! middles of its cells, also half way between the heights: there the line is straight in the map and the RPC's is not.
+//! The RPC is inverted at two heights, just above and just below the model, on a lattice of pixels;
+//! in between the ground points are interpolated bilinearly. The lattice is as wide as leaves less
+//! than a millimetre of error, which is measured in the middles of its cells, also half way between
+//! the heights: there the line is straight in the map and the RPC's is not.
 
 use bvh::Ray;
 use camera::{ImagePoint, RpcCamera};
@@ -45,11 +46,12 @@ struct Ground<'a> {
 }
 
 impl LinesOfSight {
-    /// The lines of sight of an image of a size; the mesh of the model is in the map of `projection` (metres), its heights are
-    /// above the ellipsoid.
+    /// The lines of sight of an image of a size; the mesh of the model is in the map of
+    /// `projection` (metres), its heights are above the ellipsoid.
     ///
     /// # Errors
-    /// A model without triangles or in a place that the map does not have; PROJ that cannot be set up.
+    /// A model without triangles or in a place that the map does not have; PROJ that cannot be set
+    /// up.
     pub fn new(
         camera: &RpcCamera,
         size: (usize, usize),
@@ -103,7 +105,8 @@ impl LinesOfSight {
         self.error_m
     }
 
-    /// The line of sight of a pixel, from above the model (t = 0) to below it (t = 1); `None` where the RPC has none.
+    /// The line of sight of a pixel, from above the model (t = 0) to below it (t = 1); `None` where
+    /// the RPC has none.
     pub fn ray(&self, column: usize, row: usize) -> Option<Ray> {
         if column >= self.size.0 || row >= self.size.1 {
             return None;

@@ -1,4 +1,5 @@
-//! Assembles the geometries after the walk: follows links, assigns classes, and drops surfaces that a solid repeats.
+//! Assembles the geometries after the walk: follows links, assigns classes, and drops surfaces that
+//! a solid repeats.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -138,7 +139,8 @@ fn resolve(
                 builder.dropped(DefectCode::UnresolvedReference, group.object, format!("line {}", member.line), detail);
             }
         }
-        // A boundary surface also classifies a polygon that belongs to a solid and that it only links to.
+        // A boundary surface also classifies a polygon that belongs to a solid and that it only
+        // links to.
         for member in &found {
             let polygon = &mut polygons[member.polygon];
             if polygon.class == SurfaceClass::Unclassified {
@@ -195,7 +197,8 @@ fn add(builder: &mut Builder, object: usize, geometry: Geometry) {
     }
 }
 
-/// Returns the surface of a member, or `None` for a polygon that cannot be used, which has been reported.
+/// Returns the surface of a member, or `None` for a polygon that cannot be used, which has been
+/// reported.
 fn surface(polygon: &Polygon, member: &Resolved) -> Option<SurfacePolygon> {
     let mut rings = polygon.rings.clone();
     if member.turned {

@@ -4,10 +4,12 @@ use quick_xml::events::BytesStart;
 
 use crate::citymodel::error::CityFault;
 
-/// Limit of the attributes of an element. The root has the most, because it declares the namespaces.
+/// Limit of the attributes of an element. The root has the most, because it declares the
+/// namespaces.
 const ATTRIBUTES_MAX: usize = 256;
 
-/// The attributes of an element by their local names. Declarations of namespaces have the name `xmlns`.
+/// The attributes of an element by their local names. Declarations of namespaces have the name
+/// `xmlns`.
 pub(super) struct Attributes(Vec<(String, String)>);
 
 impl Attributes {

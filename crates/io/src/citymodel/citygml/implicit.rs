@@ -1,6 +1,8 @@
-//! Implicit geometries: shapes with their own coordinates, placed by a 4 × 4 matrix in row order and a reference point.
+//! Implicit geometries: shapes with their own coordinates, placed by a 4 × 4 matrix in row order
+//! and a reference point.
 //!
-//! The shape is inside the element, or elsewhere in the file behind a link. A library in another file is never opened.
+//! The shape is inside the element, or elsewhere in the file behind a link. A library in another
+//! file is never opened.
 
 use city::{DefectCode, ModelPoint};
 

@@ -1,9 +1,10 @@
 //! Reads CityGML 1.0, 2.0 and 3.0: objects, their surfaces, and the geometry of GML 3.
 //!
-//! The text is read in one pass, without a tree. A document with a DTD is refused, and only predefined entities are
-//! expanded. Links (`xlink:href`) are followed only within the file, to a limited depth and number. Boundary surfaces give
-//! polygons their class. A solid that links to them becomes one geometry with classes. Implicit geometries are placed by
-//! their matrix and reference point. Curves, points, appearance and attributes are skipped.
+//! The text is read in one pass, without a tree. A document with a DTD is refused, and only
+//! predefined entities are expanded. Links (`xlink:href`) are followed only within the file, to a
+//! limited depth and number. Boundary surfaces give polygons their class. A solid that links to
+//! them becomes one geometry with classes. Implicit geometries are placed by their matrix and
+//! reference point. Curves, points, appearance and attributes are skipped.
 
 mod assemble;
 mod attributes;

@@ -11,8 +11,8 @@ use crate::citymodel::builder::Builder;
 use crate::citymodel::crs_name::crs_reference;
 use crate::citymodel::error::CityFault;
 
-/// Properties whose child is a city object: properties of the model, and of buildings, bridges and tunnels in CityGML
-/// 1 to 3.
+/// Properties whose child is a city object: properties of the model, and of buildings, bridges and
+/// tunnels in CityGML 1 to 3.
 const OBJECT_PROPERTIES: [&str; 22] = [
     "cityObjectMember",
     "featureMember",
@@ -423,7 +423,8 @@ impl Walker {
     }
 }
 
-/// Returns the level of a property such as `lod2MultiSurface`, or `None` for a property without surfaces.
+/// Returns the level of a property such as `lod2MultiSurface`, or `None` for a property without
+/// surfaces.
 fn lod_of_property(name: &str) -> Option<Lod> {
     let rest = name.strip_prefix("lod")?;
     let digit = rest.bytes().next().filter(u8::is_ascii_digit)?;

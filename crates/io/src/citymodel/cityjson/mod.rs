@@ -1,7 +1,9 @@
-//! Reads CityJSON 1.0, 1.1 and 2.0 and CityJSON text sequences (CityJSONSeq), and writes CityJSON 2.0.
+//! Reads CityJSON 1.0, 1.1 and 2.0 and CityJSON text sequences (CityJSONSeq), and writes CityJSON
+//! 2.0.
 //!
-//! A text that is not JSON, or has members of the wrong type, is refused with its line and column. Any other defect costs
-//! only the surface that has it. Extensions, appearance and attributes are skipped.
+//! A text that is not JSON, or has members of the wrong type, is refused with its line and column.
+//! Any other defect costs only the surface that has it. Extensions, appearance and attributes are
+//! skipped.
 
 mod geometry;
 mod schema;

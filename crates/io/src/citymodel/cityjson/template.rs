@@ -1,4 +1,5 @@
-//! Geometry templates: shapes with their own vertices, placed at a vertex of the model by a 4 × 4 matrix in row order.
+//! Geometry templates: shapes with their own vertices, placed at a vertex of the model by a 4 × 4
+//! matrix in row order.
 
 use std::ops::Range;
 

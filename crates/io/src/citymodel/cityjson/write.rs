@@ -1,7 +1,8 @@
 //! Writes CityJSON 2.0.
 //!
-//! Coordinates are whole multiples of the scale (1 mm by default), counted from a corner of the model. Vertices that get
-//! the same coordinates are merged. Classes that CityJSON has no name for are written without semantics.
+//! Coordinates are whole multiples of the scale (1 mm by default), counted from a corner of the
+//! model. Vertices that get the same coordinates are merged. Classes that CityJSON has no name for
+//! are written without semantics.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -31,9 +32,10 @@ impl Default for CityJsonOptions {
 /// Writes a model as CityJSON 2.0.
 ///
 /// # Errors
-/// - [`CityError::Refused`] when the model fails [`CityModel::validate`], two objects share an identifier, or the scale is
-///   not positive.
-/// - [`CityError::NotWritten`] when the file exists and `overwrite` is false, or the system refuses to write.
+/// - [`CityError::Refused`] when the model fails [`CityModel::validate`], two objects share an
+///   identifier, or the scale is not positive.
+/// - [`CityError::NotWritten`] when the file exists and `overwrite` is false, or the system refuses
+///   to write.
 ///
 /// # Examples
 /// ```
@@ -143,7 +145,8 @@ fn geometry_value(model: &CityModel, geometry: &Geometry, lattice: &mut Lattice)
     value
 }
 
-/// Nests one value per surface in arrays of solids and shells, as the kind of the geometry requires.
+/// Nests one value per surface in arrays of solids and shells, as the kind of the geometry
+/// requires.
 fn nest(geometry: &Geometry, mut each: impl FnMut(&SurfacePolygon) -> Value) -> Value {
     let groups = |surfaces: &[&SurfacePolygon], key: fn(&SurfacePolygon) -> u32| -> Vec<Vec<usize>> {
         let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();

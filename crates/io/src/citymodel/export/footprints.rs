@@ -1,7 +1,8 @@
-//! Writes the footprints of the objects with their heights as GeoJSON (RFC 7946: longitude and latitude, WGS 84).
+//! Writes the footprints of the objects with their heights as GeoJSON (RFC 7946: longitude and
+//! latitude, WGS 84).
 //!
-//! The footprint of an object consists of its ground surfaces, or if it has none, of its surfaces that face down. Polygons
-//! that touch are not merged.
+//! The footprint of an object consists of its ground surfaces, or if it has none, of its surfaces
+//! that face down. Polygons that touch are not merged.
 
 use std::path::Path;
 
@@ -21,15 +22,18 @@ pub struct Footprints {
     pub without: usize,
 }
 
-/// Writes the footprints of the objects that are used according to `reports`, at their level of detail.
+/// Writes the footprints of the objects that are used according to `reports`, at their level of
+/// detail.
 ///
-/// `reports` has one entry per object. The properties of a footprint are `id`, `kind`, `parent`, `lod`, the heights
-/// `ground_m` and `top_m` in metres above the vertical datum of the model, and their difference `height_m`.
+/// `reports` has one entry per object. The properties of a footprint are `id`, `kind`, `parent`,
+/// `lod`, the heights `ground_m` and `top_m` in metres above the vertical datum of the model, and
+/// their difference `height_m`.
 ///
 /// # Errors
-/// - [`CityError::Refused`] when the model has no known reference system (1010, 1011), or coordinates that it cannot
-///   project (1002).
-/// - [`CityError::NotWritten`] when the file exists and `overwrite` is false, or the system refuses to write.
+/// - [`CityError::Refused`] when the model has no known reference system (1010, 1011), or
+///   coordinates that it cannot project (1002).
+/// - [`CityError::NotWritten`] when the file exists and `overwrite` is false, or the system refuses
+///   to write.
 pub fn write_footprints(
     path: &Path,
     model: &CityModel,
@@ -127,7 +131,8 @@ fn looks_down(model: &CityModel, surface: &SurfacePolygon) -> bool {
     -normal[2] > normal[0].hypot(normal[1])
 }
 
-/// Returns the rings as GeoJSON: closed, the outer ring counter-clockwise seen from above, holes clockwise.
+/// Returns the rings as GeoJSON: closed, the outer ring counter-clockwise seen from above, holes
+/// clockwise.
 fn polygon(model: &CityModel, surface: &SurfacePolygon, projection: &MapProjection) -> Result<Value, CityFault> {
     let ring = |(number, ring): (usize, &Vec<u32>)| -> Result<Value, CityFault> {
         let mut points: Vec<[f64; 2]> = Vec::with_capacity(ring.len() + 1);

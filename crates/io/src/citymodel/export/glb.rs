@@ -1,8 +1,10 @@
-//! Writes glTF 2.0 as one binary file: a node and a mesh per city object, a primitive and a colour per class.
+//! Writes glTF 2.0 as one binary file: a node and a mesh per city object, a primitive and a colour
+//! per class.
 //!
-//! The y axis of glTF points up: (x, y, z) of the model becomes (x, z, −y). Positions are f32 metres from the origin, which
-//! the extras of the asset hold together with the reference system. The triangles of an object share their corners. Faces
-//! have no normals, so that viewers shade them flat.
+//! The y axis of glTF points up: (x, y, z) of the model becomes (x, z, −y). Positions are f32
+//! metres from the origin, which the extras of the asset hold together with the reference system.
+//! The triangles of an object share their corners. Faces have no normals, so that viewers shade
+//! them flat.
 
 use std::collections::BTreeMap;
 use std::io::Write;

@@ -1,7 +1,7 @@
 //! Writes the triangles of a city model as OBJ, PLY or glTF, and its footprints as GeoJSON.
 //!
-//! Formats with f32 (PLY, glTF) hold positions relative to the origin of the mesh, which is written into the file. OBJ
-//! holds full coordinates. A file appears under its name when it is complete.
+//! Formats with f32 (PLY, glTF) hold positions relative to the origin of the mesh, which is written
+//! into the file. OBJ holds full coordinates. A file appears under its name when it is complete.
 
 mod footprints;
 mod glb;
@@ -24,7 +24,8 @@ pub use footprints::{Footprints, write_footprints};
 pub enum MeshFormat {
     /// Wavefront OBJ: one object per city object, one material name per class.
     Obj,
-    /// Binary little-endian PLY: faces with `class` (number of the [`city::SurfaceClass`]) and `object` (index).
+    /// Binary little-endian PLY: faces with `class` (number of the [`city::SurfaceClass`]) and
+    /// `object` (index).
     Ply,
     /// Binary glTF 2.0: one node per city object, one primitive per class; y is up.
     Glb,
@@ -33,8 +34,8 @@ pub enum MeshFormat {
 /// Writes the triangles `mesh` of `model`.
 ///
 /// # Errors
-/// [`CityError::NotWritten`] when the file exists and `overwrite` is false, the system refuses to write, or the mesh is too
-/// large for the format.
+/// [`CityError::NotWritten`] when the file exists and `overwrite` is false, the system refuses to
+/// write, or the mesh is too large for the format.
 pub fn write_mesh(
     path: &Path,
     model: &CityModel,

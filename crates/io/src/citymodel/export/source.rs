@@ -11,7 +11,8 @@ pub(super) struct Export<'a> {
 }
 
 impl Export<'_> {
-    /// Iterates over the objects with triangles, and their ranges of triangles, which are in the order of the objects.
+    /// Iterates over the objects with triangles, and their ranges of triangles, which are in the
+    /// order of the objects.
     pub(super) fn objects(&self) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
         let object = |triangle: usize| self.mesh.surface(triangle).object as usize;
         let mut start = 0;

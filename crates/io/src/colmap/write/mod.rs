@@ -1,10 +1,11 @@
 //! Writes a COLMAP model: `cameras`, `images` and `points3D` as text or binary.
 //!
-//! Cameras and points are numbered from 1 in the order of the model. Images keep their identifiers. The tracks are written
-//! on both sides: the points of an image are in the order of the points of the model. Binary files hold the f64 values,
-//! text files the shortest decimals that read back to the same f64. A pose is written as quaternion and translation, which
-//! changes its rotation matrix by rounding only. Each file appears under its name when it is complete. `images` is
-//! written last, so that a folder with `images` is complete.
+//! Cameras and points are numbered from 1 in the order of the model. Images keep their identifiers.
+//! The tracks are written on both sides: the points of an image are in the order of the points of
+//! the model. Binary files hold the f64 values, text files the shortest decimals that read back to
+//! the same f64. A pose is written as quaternion and translation, which changes its rotation matrix
+//! by rounding only. Each file appears under its name when it is complete. `images` is written
+//! last, so that a folder with `images` is complete.
 
 mod binary;
 mod observations;
@@ -35,10 +36,12 @@ pub enum ColmapEncoding {
 /// Writes a model with its points into an existing folder.
 ///
 /// # Errors
-/// - [`ColmapError::NotWritten`] when a file exists and `overwrite` is false, or the system refuses to write.
-/// - [`ColmapError::Inconsistent`] when the folder holds `rigs` or `frames` of another model, a view has no lens, two
-///   views share an identifier, an image name leads out of its folder or has control characters, a pose or a point is
-///   not finite, or a track names a view that does not exist. Nothing is written then.
+/// - [`ColmapError::NotWritten`] when a file exists and `overwrite` is false, or the system refuses
+///   to write.
+/// - [`ColmapError::Inconsistent`] when the folder holds `rigs` or `frames` of another model, a
+///   view has no lens, two views share an identifier, an image name leads out of its folder or has
+///   control characters, a pose or a point is not finite, or a track names a view that does not
+///   exist. Nothing is written then.
 pub fn write(
     folder: &Path,
     model: &ColmapModel,
@@ -117,7 +120,8 @@ fn finite(pixel: ImagePoint) -> bool {
     pixel.sample.is_finite() && pixel.line.is_finite()
 }
 
-/// Refuses a folder with `rigs` or `frames`: COLMAP would read them with the new model, although they belong to another.
+/// Refuses a folder with `rigs` or `frames`: COLMAP would read them with the new model, although
+/// they belong to another.
 fn no_rigs(folder: &Path) -> Result<(), String> {
     let names = ["rigs.bin", "rigs.txt", "frames.bin", "frames.txt"];
     match names.iter().find(|name| folder.join(name).symlink_metadata().is_ok()) {

@@ -39,7 +39,8 @@ impl ImageObservations {
     }
 }
 
-/// Counts the observations of every view in the order of the points, as [`ImageObservations`] lays them out.
+/// Counts the observations of every view in the order of the points, as [`ImageObservations`] lays
+/// them out.
 pub(super) struct Numbering(Vec<u32>);
 
 impl Numbering {
