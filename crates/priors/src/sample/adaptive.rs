@@ -1,32 +1,34 @@
-//! Points as dense as a geometric error needs, and no denser.
+//! Points as dense as a geometric error requires, and no denser.
 //!
-//! The spacing s at a place comes from the creases around it ([`super::creases`]). Triangles are
-//! halved until the spacing hardly changes over a piece. The spacing grows no faster than one goes
-//! away from a crease, so that the parts of a piece look only at the creases that may bound it
-//! somewhere on the piece. A piece of area A stands for w A / s² points, w being the weight of its
-//! class. The pieces of a triangle, laid end to end in the order of the halving, take a point at
-//! every whole number past a random start.
+//! The creases around a place ([`super::creases`]) determine its spacing s. Triangles are halved
+//! until the spacing is nearly constant over a piece. The spacing grows at most as fast as the
+//! distance from a crease, so a part of a piece needs only the creases that may limit the spacing
+//! somewhere on the piece. A piece of area A stands for w A / s² points, where w is the weight of
+//! its class. The pieces of a triangle lie end to end on a line, in the order of the halving. The
+//! piece at each whole number after a random start gets a point.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use super::config::{Amount, Purpose, SampleConfig};
 use super::creases::Creases;
-use super::{Amount, LIMIT, Purpose, Sample, SampleConfig, on_triangle, positive};
+use super::limits::{LIMIT, positive};
+use super::point::{Sample, on_triangle};
 use crate::{PriorModel, PriorsError};
 use numeric::vector::{Vector, cross, norm, sub};
 
-/// A piece is small enough when it is no longer than this many spacings.
+/// Longest edge of a final piece, in spacings.
 const PIECE: f64 = 0.7;
 
-/// Cuts for each point that is made of them, on city models.
+/// Typical number of cuts per point on city models.
 const CUTS_PER_POINT: usize = 30;
-/// Without this a huge plane and a tiny error would never end.
+/// Largest number of cuts, which ends the work on a huge plane with a tiny error.
 const MAX_CUTS: usize = CUTS_PER_POINT * LIMIT;
-/// Creases that are no nearer than this to being of no use are kept, metres.
+/// Margin for rounding in the test whether a crease is still needed, metres.
 const ROUNDING_M: f64 = 1e-9;
 
-/// What the points must keep.
+/// Limits that the points must keep.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bound {
     error_m: f64,
@@ -45,22 +47,24 @@ impl Bound {
     }
 }
 
-/// How many points an error needs.
+/// Number of points that an error requires.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorCurve {
-    /// The error, metres.
+    /// Geometric error, metres.
     pub error_m: f64,
-    /// Points of varying spacing that keep it.
+    /// Number of points with adaptive spacing.
     pub points: f64,
-    /// Points of one spacing that keep it everywhere: half of the error, as at an edge.
+    /// Number of points with constant spacing: half of the error, as at an edge.
     pub even_points: f64,
 }
 
-/// How many points other errors need: the one of the configuration times each of `factors`. Empty
-/// where it has none.
+/// Returns the numbers of points for other errors: the error of the configuration times each of
+/// `factors`.
+///
+/// The result is empty when the amount of the configuration is not [`Amount::Adaptive`].
 ///
 /// # Errors
-/// As [`super::sample`].
+/// The errors of [`sample`](super::sample).
 pub fn error_curve(model: &PriorModel, config: &SampleConfig, factors: &[f64]) -> Result<Vec<ErrorCurve>, PriorsError> {
     let Amount::Adaptive { error_m, max_spacing_m } = config.amount else { return Ok(Vec::new()) };
     let area: f64 = (0..model.mesh().triangles.len()).map(|t| config.weight(model, t) * model.area_m2(t)).sum();
@@ -75,25 +79,29 @@ pub fn error_curve(model: &PriorModel, config: &SampleConfig, factors: &[f64]) -
     factors.iter().map(|factor| of_error((error_m * factor).min(max_spacing_m))).collect()
 }
 
+/// Makes adaptive points, ordered by triangle.
 pub(super) fn sample(model: &PriorModel, config: &SampleConfig, bound: Bound) -> Result<Vec<Sample>, PriorsError> {
     let points =
         Work::new(model, config, bound)?.pieces(|pieces, triangle| on_pieces(model, config, pieces, triangle))?;
     Ok(points.into_iter().flatten().collect())
 }
 
-/// A part of a triangle over which the spacing hardly changes.
+/// A part of a triangle with nearly constant spacing.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     corners: [Vector; 3],
     spacing_m: f64,
+    /// Number of points that the piece stands for.
     share: f64,
 }
 
+/// The division of triangles into pieces.
 struct Work<'a> {
     model: &'a PriorModel,
     config: &'a SampleConfig,
     bound: Bound,
     creases: Creases,
+    /// Number of cuts so far.
     made: AtomicUsize,
 }
 
@@ -103,7 +111,7 @@ impl<'a> Work<'a> {
         Ok(Self { model, config, bound, creases, made: AtomicUsize::new(0) })
     }
 
-    /// What `of_triangle` makes of the pieces of each triangle.
+    /// Divides each triangle into pieces, and returns the results of `of_triangle`.
     fn pieces<T: Send>(&self, of_triangle: impl Fn(&[Piece], usize) -> T + Sync) -> Result<Vec<T>, PriorsError> {
         let triangles = 0..self.model.mesh().triangles.len();
         triangles
@@ -116,14 +124,15 @@ impl<'a> Work<'a> {
             .collect()
     }
 
+    /// Divides a triangle into pieces.
     fn cut(&self, triangle: usize, pieces: &mut Vec<Piece>) -> Result<(), PriorsError> {
         let weight = self.config.weight(self.model, triangle);
         if weight == 0.0 {
             return Ok(());
         }
         let corners = self.model.mesh().corners(triangle);
-        // The creases of the pieces still to be cut, one list after the other; those of a piece end
-        // where its parts' begin.
+        // The lists of creases of the open pieces follow one another. The list of a piece ends where
+        // the list of its parts begins.
         let mut near = self.creases.near(&corners, self.model.normal(triangle), self.bound.error_m);
         let mut open = vec![(corners, 0..near.len())];
         while let Some((corners, own)) = open.pop() {
@@ -145,8 +154,8 @@ impl<'a> Work<'a> {
             let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);
             let middle = [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]));
             let radius = corners.iter().map(|&corner| norm(sub(corner, centre))).fold(0.0, f64::max);
-            // At the far side of the piece the bound of a crease may be lower by the radius, and
-            // all others' higher.
+            // Within the piece the bound of a crease may be lower by the radius, and the bounds of
+            // all other creases may be higher by the radius.
             let highest = spacing_m + 2.0 * radius + ROUNDING_M;
             for i in own.clone() {
                 let crease = near[i];
@@ -161,6 +170,7 @@ impl<'a> Work<'a> {
     }
 }
 
+/// Makes the points of the pieces of a triangle.
 fn on_pieces(model: &PriorModel, config: &SampleConfig, pieces: &[Piece], triangle: usize) -> Vec<Sample> {
     let mut points = Vec::new();
     let mut reached = config.stream(Purpose::Share).uniform(triangle as u64);

@@ -1,66 +1,69 @@
 //! The edges at which a surface bends or ends, in a grid of cells.
 //!
-//! A flat disk of radius s around a point p may reach over an edge at distance d. Beyond it the
-//! surface leaves the disk's plane at the angle α between the normals, and the disk is off by up to
-//! (s − d) sin α; where the surface ends, or turns by more than a right angle, by s − d. The
-//! spacing that keeps this under half of the error e is s ≤ d + e / (2 sin α). The half makes
-//! surfaces keep the whole of e that bend a little at each of many edges (a tower of radius R in
-//! narrow facets): there the smallest of these bounds is √(2 e R), the radius whose disk is off by
-//! e.
+//! A flat disk of radius s around a point may extend beyond an edge at distance d. Beyond the edge
+//! the surface leaves the plane of the disk at the angle α between the normals, and the disk is off
+//! by up to (s − d) sin α. Where the surface ends, or turns by more than a right angle, the disk is
+//! off by up to s − d. The spacing s ≤ d + e / (2 sin α) keeps this below half of the error e.
+//!
+//! The factor one half makes surfaces that bend slightly at many edges (a tower of radius R with
+//! narrow facets) keep the whole error e: the smallest of these bounds is then √(2 e R), the radius
+//! of a disk that is off by e.
 
 use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::LIMIT;
+use super::limits::LIMIT;
 use crate::{PriorModel, PriorsError};
 use numeric::vector::{Vector, along, cross, dot, norm, sub};
 
-/// Normals closer than this belong to one plane (sine of the angle).
+/// Sine of the angle below which two normals belong to one plane.
 const FLAT: f64 = 1e-4;
-/// Faces kept per edge; an edge with more counts as an end of the surface.
+/// Number of faces of an ordinary edge. An edge with another number counts as an end of the surface.
 const FACES: usize = 2;
 
-/// An edge with the faces that meet there.
+/// An edge and the faces that meet there.
 #[derive(Debug, Clone, Copy)]
 struct Crease {
     ends: [Vector; 2],
-    /// Normals of the faces; none where the surface ends.
+    /// Normals of the faces; `None` where the surface ends.
     faces: Option<[Vector; FACES]>,
 }
 
-/// The creases of a model, by cells.
+/// The creases of a model in a grid of cells.
 #[derive(Debug)]
 pub(super) struct Creases {
     creases: Vec<Crease>,
-    /// Pairs of a cell and a crease that may touch it, ascending.
+    /// Pairs of a cell and the index of a crease that may touch it, ascending.
     touching: Vec<([i32; 3], u32)>,
-    /// Where the pairs of a cell begin and end.
+    /// Per cell the range of its pairs.
     cells: HashMap<[i32; 3], (u32, u32)>,
+    /// Side of a cell, metres.
     side_m: f64,
+    /// Largest distance at which a crease is found, metres.
     reach_m: f64,
 }
 
-/// A crease as a triangle meets it.
+/// A crease near a triangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Near {
     ends: [Vector; 2],
-    /// How far a disk may reach over it, metres.
+    /// How far a disk may extend beyond the crease, metres.
     over_m: f64,
 }
 
 impl Near {
-    /// The largest radius of a disk at a point that this crease allows.
+    /// Returns the largest radius of a disk at a point that this crease allows, metres.
     pub(super) fn allows(&self, position: Vector) -> f64 {
         to_segment(position, self.ends) + self.over_m
     }
 }
 
 impl Creases {
-    /// The creases of a model, found from points up to `reach_m` away.
+    /// Collects the creases of a model. They are found from points up to `reach_m` away.
     pub(super) fn new(model: &PriorModel, reach_m: f64) -> Result<Self, PriorsError> {
         let creases = collect(model);
-        // A cell as wide as the reach: most triangles then look into a few dozen cells.
+        // With cells as wide as the reach most triangles look into a few dozen cells.
         let side_m = reach_m;
         let pieces: f64 = creases.iter().map(|c| norm(sub(c.ends[1], c.ends[0])) / side_m + 1.0).sum();
         let extent = model.mesh().positions.iter().flatten().fold(0.0, |most: f64, c| most.max(c.abs()));
@@ -81,12 +84,12 @@ impl Creases {
         Ok(Self { creases, touching, cells, side_m, reach_m })
     }
 
-    /// The largest radius of all, metres.
+    /// Returns the largest radius of any disk, metres.
     pub(super) fn reach_m(&self) -> f64 {
         self.reach_m
     }
 
-    /// The creases that may bound the radius of a disk somewhere on a triangle with a normal.
+    /// Returns the creases that may limit the radius of a disk on a triangle with a normal.
     pub(super) fn near(&self, corners: &[Vector; 3], normal: Vector, error_m: f64) -> Vec<Near> {
         let limit = |axis: usize, pick: fn(f64, f64) -> f64, by: f64| {
             let most = corners.iter().map(|c| c[axis]).reduce(pick).unwrap_or(0.0);
@@ -110,8 +113,8 @@ impl Creases {
 }
 
 impl Crease {
-    /// The sine of the angle by which the surface leaves a plane here; 1 for an end and for more
-    /// than a right angle.
+    /// Returns the sine of the angle between the surface and a plane with a normal; 1 where the
+    /// surface ends or turns by more than a right angle.
     fn bend(&self, normal: Vector) -> f64 {
         let Some(faces) = self.faces else { return 1.0 };
         let sine = |face: Vector| if dot(normal, face) <= 0.0 { 1.0 } else { norm(cross(normal, face)) };
@@ -119,7 +122,7 @@ impl Crease {
     }
 }
 
-/// Every edge that is not inside a plane, in the order of the triangles.
+/// Returns the edges that are not inside a plane, in the order of the triangles.
 fn collect(model: &PriorModel) -> Vec<Crease> {
     let mesh = model.mesh();
     let mut faces_at: HashMap<(u32, u32), Vec<u32>> = HashMap::new();
@@ -144,7 +147,7 @@ fn collect(model: &PriorModel) -> Vec<Crease> {
     order.into_iter().filter_map(crease).collect()
 }
 
-/// The cells that a segment may touch: those around its pieces, each no longer than a cell.
+/// Iterates over the cells that a segment may touch: the cells around pieces no longer than a cell.
 fn touched([start, end]: [Vector; 2], side: f64) -> impl Iterator<Item = [i32; 3]> {
     let span = sub(end, start);
     let pieces = (norm(span) / side).ceil().max(1.0) as usize;
@@ -160,6 +163,7 @@ fn touched([start, end]: [Vector; 2], side: f64) -> impl Iterator<Item = [i32; 3
     })
 }
 
+/// Returns the distance of a point from a segment.
 fn to_segment(position: Vector, [start, end]: [Vector; 2]) -> f64 {
     let (span, from_start) = (sub(end, start), sub(position, start));
     let length_2 = dot(span, span);

@@ -1,26 +1,28 @@
-//! Poisson disks by throwing darts: of independent candidates in their order, each is kept that is
-//! not too close to those kept before. Points whose normals are opposed do not meet: the two sides
-//! of a thin wall are sampled each for itself.
+//! Poisson disks by dart throwing: an independent candidate is kept unless it is too close to a point
+//! that was kept before. Points with opposite normals do not exclude each other, so that the two
+//! sides of a thin wall are sampled independently.
 //!
-//! Darts that never stop fill 0.547 of a plane with disks (random sequential adsorption), which
-//! gives the distance for a number of points; it is then shrunk until the candidates that there are
-//! give that number.
+//! Unlimited dart throwing covers 0.547 of a plane with disks (random sequential adsorption). This
+//! gives the distance for a number of points. The distance is then reduced until the limited number
+//! of candidates gives the number of points.
 
 use std::collections::HashMap;
 
-use super::{LIMIT, Sample, Share};
+use super::limits::LIMIT;
+use super::point::Sample;
+use super::share::Share;
 use crate::PriorsError;
 use numeric::vector::{dot, norm, sub};
 use rayon::prelude::*;
 
-/// Points per r² of area where no further dart fits: 0.547 of the area in disks of radius r/2.
+/// Points per area r² when no further dart fits: disks of radius r/2 cover 0.547 of the area.
 const SATURATED: f64 = 0.696;
-/// Candidates per point.
+/// Number of candidates per point.
 const CANDIDATES: usize = 6;
-/// Rounds of shrinking.
+/// Largest number of reductions of the distance.
 const ROUNDS: usize = 12;
 
-/// Points that keep their distance, and the distance on classes of weight 1.
+/// Returns points with a least distance, and that distance on classes of weight 1, metres.
 pub(super) fn sample(share: &Share<'_>, count: usize) -> Result<(Vec<Sample>, f64), PriorsError> {
     let candidates = count.saturating_mul(CANDIDATES);
     if candidates > LIMIT {
@@ -42,8 +44,8 @@ pub(super) fn sample(share: &Share<'_>, count: usize) -> Result<(Vec<Sample>, f6
     Ok((kept.into_iter().map(|i| darts[i]).collect(), distance))
 }
 
-/// Indices of the darts that are no closer to an earlier one than `factor` times the smaller of
-/// both spacings.
+/// Returns the indices of the darts that are kept: the distance to each dart kept before is at least
+/// `factor` times the smaller one of both spacings.
 fn thrown(darts: &[Sample], factor: f64) -> Vec<usize> {
     let side = factor * darts.iter().map(|d| f64::from(d.spacing_m)).fold(0.0, f64::max);
     let cell = |p: [f64; 3]| p.map(|c| (c / side).floor() as i64);
@@ -61,12 +63,14 @@ fn thrown(darts: &[Sample], factor: f64) -> Vec<usize> {
     kept
 }
 
+/// Returns whether two darts exclude each other.
 fn too_close(a: &Sample, b: &Sample, factor: f64) -> bool {
     let opposed = dot(a.normal.map(f64::from), b.normal.map(f64::from)) < -0.5;
     let limit = factor * f64::from(a.spacing_m.min(b.spacing_m));
     !opposed && norm(sub(a.position, b.position)) < limit
 }
 
+/// Iterates over a cell and the 26 cells around it.
 fn neighbours([x, y, z]: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
     (0..27).map(move |i| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1])
 }

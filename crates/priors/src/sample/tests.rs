@@ -1,4 +1,4 @@
-//! Counts, shares, distances and errors of samples; threads and coordinates change nothing.
+//! Checks counts, shares, distances and errors of samples, and that threads and coordinates do not change them.
 
 use super::*;
 use crate::model::tests::{cuboid, joined};
@@ -55,7 +55,7 @@ fn points_lie_on_their_triangles_and_fill_them() {
             }
         }
         let n = of_class(&made.points, SurfaceClass::Roof) as f64;
-        // The mean of independent points is off by 0.09 m (one standard deviation) along the roof.
+        // The standard deviation of the mean of independent points along the roof is 0.09 m.
         assert!((middle[0] / n - 4.0).abs() < 0.35 && (middle[1] / n - 3.0).abs() < 0.3, "{spacing:?} {middle:?} {n}");
     }
 }
@@ -82,8 +82,8 @@ fn disks_keep_their_distance_and_are_dense() {
         }
     }
     assert!(nearest >= distance * 0.999_999, "{nearest} {distance}");
-    // Independent points of this density come as close as a thirtieth of it; saturated disks have
-    // 0.83 of the spacing.
+    // Independent points of this density come as close as a thirtieth of the spacing. Saturated
+    // disks have 0.83 of the spacing.
     assert!(distance > 0.6 * (132.0f64 / 1_000.0).sqrt(), "{distance}");
 }
 
@@ -132,7 +132,7 @@ fn what_cannot_be_sampled_is_refused() {
     assert!(sample(&model, &amount(Amount::Count(0))).unwrap().points.is_empty());
 }
 
-/// A tower of `sides` walls around the z axis.
+/// Makes a tower of `sides` walls around the z axis.
 fn tower(radius: f64, height: f64, sides: usize) -> TriangleMesh {
     let mut mesh = TriangleMesh { origin: ModelPoint::default(), ..TriangleMesh::default() };
     for i in 0..sides {
@@ -147,7 +147,7 @@ fn tower(radius: f64, height: f64, sides: usize) -> TriangleMesh {
     mesh
 }
 
-/// Distance from a position to the nearest triangle.
+/// Returns the distance from a position to the nearest triangle.
 fn to_mesh(mesh: &TriangleMesh, position: [f64; 3]) -> f64 {
     (0..mesh.triangles.len()).map(|t| to_triangle(position, mesh.corners(t))).fold(f64::INFINITY, f64::min)
 }
@@ -188,8 +188,8 @@ fn adaptive_disks_stay_within_the_error() {
                 worst = worst.max(to_mesh(model.mesh(), rim));
             }
         }
-        // A piece has the spacing of its middle, and its points are up to 0.7 of it nearer to an
-        // edge.
+        // The spacing of a piece is the spacing at its middle. Its points may be nearer to an edge by
+        // up to 0.7 spacings.
         assert!(worst <= 1.5 * error_m, "{worst} for {error_m}");
         let spacings =
             made.points.iter().map(|p| p.spacing_m).fold((f32::INFINITY, 0.0f32), |(l, h), s| (l.min(s), h.max(s)));

@@ -1,34 +1,36 @@
-//! What the classes of surfaces count in a sample.
+//! Weights of the classes of surfaces in a sample.
 
 use city::SurfaceClass;
 
-use super::positive;
+use super::limits::positive;
 use crate::PriorsError;
 
-/// A weight per class: how many points its surfaces get per area, beside a class of weight 1.
+/// A weight per class: the number of points per area, relative to a class of weight 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClassWeights {
     weights: Vec<f64>,
 }
 
 impl ClassWeights {
-    /// Every class alike.
+    /// Returns the weight 1 for every class.
     pub fn equal() -> Self {
         Self { weights: SurfaceClass::all().map(|_| 1.0).collect() }
     }
 
-    /// What can be seen from outside: grounds, closures and interiors are left out. Grounds take a
-    /// quarter of an area-weighted sample of an LoD2 model, and almost none of it is ever seen.
+    /// Returns the weight 1 for classes that are visible from outside, and 0 for grounds, closures
+    /// and interiors.
+    ///
+    /// About a quarter of the area of an LoD2 model is ground, and almost none of it is ever seen.
     pub fn visible() -> Self {
         [SurfaceClass::Ground, SurfaceClass::Closure, SurfaceClass::Interior]
             .into_iter()
             .fold(Self::equal(), |weights, class| weights.replaced(class, 0.0))
     }
 
-    /// Sets the weight of a class; 0 leaves it out.
+    /// Sets the weight of a class; 0 excludes it.
     ///
     /// # Errors
-    /// A weight that is negative or not finite.
+    /// [`PriorsError::Config`] when the weight is negative or not finite.
     pub fn with(self, class: SurfaceClass, weight: f64) -> Result<Self, PriorsError> {
         if weight != 0.0 {
             positive("the weight of a class", weight)?;
@@ -43,7 +45,7 @@ impl ClassWeights {
         self
     }
 
-    /// The weight of a class.
+    /// Returns the weight of a class.
     pub fn get(&self, class: SurfaceClass) -> f64 {
         self.weights.get(class as usize).copied().unwrap_or(0.0)
     }
