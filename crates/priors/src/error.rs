@@ -1,79 +1,79 @@
-//! What stops priors from being made.
+//! Why priors cannot be made.
 
-/// Why no priors can be made.
+/// Why priors cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PriorsError {
-    /// A mesh that contradicts itself.
+    /// The mesh is inconsistent.
     #[error(transparent)]
     Mesh(#[from] city::ModelError),
-    /// A mesh that rays cannot be cast at.
+    /// No index for ray casting can be built for the mesh.
     #[error(transparent)]
     Bvh(#[from] bvh::BvhError),
-    /// A place that the map of the model does not have, or a map that cannot be had.
+    /// A position cannot be projected, or PROJ cannot provide the projection or the datum.
     #[error(transparent)]
     Geodesy(#[from] crs::CrsError),
-    /// A model that does not say in which map it is.
-    #[error("the model does not say in which map it is ({crs}), expected an EPSG code")]
+    /// The model names no map projection.
+    #[error("the reference system of the model is {crs}, expected one with an EPSG code, give the code of its map")]
     MapUnknown {
-        /// What it says of its reference system.
+        /// Reference system of the model.
         crs: String,
     },
-    /// A model in degrees or feet.
-    #[error("the model is in {definition}, expected a projected coordinate system in metres")]
+    /// The coordinates of the model are in degrees or feet.
+    #[error("the reference system of the model is {definition}, expected a projected one in metres")]
     MapNotMetric {
-        /// Its reference system.
+        /// Reference system of the model.
         definition: String,
     },
-    /// A model outside the geoid model that its heights are above.
-    #[error("the model reaches beyond where heights above {datum} are known")]
+    /// The model extends beyond the area of its geoid model.
+    #[error("the model extends beyond the area in which heights above {datum} can be converted")]
     BeyondDatum {
-        /// What the heights are above.
+        /// Vertical datum of the heights.
         datum: crs::VerticalDatum,
     },
-    /// A model without triangles.
-    #[error("the model has no triangle that an image could see")]
+    /// The model has no triangles.
+    #[error("the model has no triangles, so that an image cannot see it")]
     NothingToSee,
-    /// Nothing is left to put samples on.
-    #[error("no surface is left to sample: {total} triangles, and all of them are excluded or without area")]
+    /// No surface is left to sample.
+    #[error("no surface is left to sample, all {total} triangles are excluded or have no area")]
     NothingToSample {
-        /// How many triangles there are.
+        /// Number of triangles.
         total: usize,
     },
-    /// More samples than a run may make.
-    #[error("{asked} samples, at most {limit} are made: lower the density, or allow a larger error")]
+    /// More samples were asked for than the limit allows.
+    #[error("{asked} samples are needed, the limit is {limit}, lower the density or allow a larger error")]
     TooMany {
-        /// How many were asked for, or at least how many.
+        /// Number of samples needed, or a lower bound of it.
         asked: u64,
-        /// The limit.
+        /// Largest number of samples.
         limit: usize,
     },
-    /// A number that means nothing.
+    /// A parameter is out of its range.
     #[error("{name} is {value}, expected {expected}")]
     Config {
-        /// The parameter.
+        /// Name of the parameter.
         name: &'static str,
-        /// Its value.
+        /// Value of the parameter.
         value: f64,
-        /// What it should be.
+        /// Range of valid values.
         expected: &'static str,
     },
-    /// An image with more pixels than maps are made for.
-    #[error("the image of the camera has {width} × {height} pixels, maps are made of up to {limit}")]
+    /// The image has more pixels than the limit allows.
+    #[error("the image of the camera has {width} × {height} pixels, the limit is {limit} pixels")]
     ImageSize {
-        /// Columns.
+        /// Number of columns.
         width: usize,
-        /// Rows.
+        /// Number of rows.
         height: usize,
-        /// The limit.
+        /// Largest number of pixels.
         limit: usize,
     },
     /// The list of building objects does not fit the mesh.
-    #[error("{flags} objects are said to be buildings or not, and a surface names object {object}")]
+    #[error("the list of building objects has {flags} entries, and a surface names object {object}")]
     Objects {
         /// Length of the list.
         flags: usize,
-        /// The object that it leaves out.
+        /// Object that the list does not have.
         object: u32,
     },
 }

@@ -1,18 +1,19 @@
-//! Building priors from LoD2 city models, after GS4Buildings (Zhang et al. 2025, arXiv 2508.07355):
-//! area-weighted samples, the points that at least k cameras see, and depth, normal, mask, class
-//! and object maps per camera.
+//! Building priors from LoD2 city models, after GS4Buildings (Zhang et al. 2025, arXiv 2508.07355).
+//!
+//! Priors are area-weighted samples, the points that at least k cameras see, and depth, normal,
+//! mask, class and object maps per camera.
 //!
 //! Positions are f64 metres from the recorded origin of the mesh. Results do not depend on the
-//! number of threads, and a model at other coordinates (a shift by whole metres) gives the same.
+//! number of threads. A model shifted by whole metres gives the same results.
 //!
-//! - [`PriorModel`] holds the triangles, arranged for rays, [`ModelPlace`] says where on the Earth
-//!   they are; [`View`] is a camera in their frame.
-//! - [`sample`] spreads points over the surfaces, by count, by density or under a geometric error.
-//! - [`Visibility`] counts views per point, and keeps the best of them.
-//! - [`PriorMaps`] are what a camera would measure of the model, [`SatelliteMaps`] what a satellite
-//!   image would.
-//! - [`initial_splats`] are flat Gaussians to begin a training with, [`Schedule`] how much the
-//!   priors weigh in it.
+//! - [`PriorModel`] holds the triangles and an index for ray casting. [`ModelPlace`] is their place
+//!   on the Earth. [`View`] is a camera in their frame.
+//! - [`sample`] distributes points over the surfaces, by count, by density or by geometric error.
+//! - [`Visibility`] counts the views that see each point, and keeps the best of them.
+//! - [`PriorMaps`] are the maps that a camera would measure of the model, [`SatelliteMaps`] the
+//!   maps of a satellite image.
+//! - [`initial_splats`] makes flat Gaussians to start a training with. [`Schedule`] holds the
+//!   weights of the priors during the training.
 
 mod error;
 mod maps;

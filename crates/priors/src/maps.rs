@@ -1,9 +1,10 @@
-//! What a camera would measure of a model: depth, normal, mask, class and object of every pixel.
+//! Maps that a camera would measure of a model: depth, normal, mask, class and object per pixel.
 //!
-//! Rays go through the centres of the pixels. The depth is the distance along the camera's axis
-//! (z-depth), which trainers render, or along the ray: at the corner of a wide image they differ by
-//! a quarter. A pixel that sees no building has depth +∞, never 0, which a trainer's resizing would
-//! mix into depths of its neighbours. Normals are turned to the camera.
+//! Rays pass through the centres of the pixels. The depth is the distance along the optical axis
+//! (z-depth), which trainers render, or the distance along the ray. At the corner of a wide image
+//! the two differ by a quarter. A pixel that sees no building has the depth +∞. The depth 0 would
+//! be wrong, because resizing in a trainer would mix it with the depths of the neighbours. Normals
+//! face the camera.
 
 use bvh::{DepthImage, MISS};
 use raster::Grid;
@@ -13,57 +14,57 @@ use serde::{Deserialize, Serialize};
 use crate::{PriorModel, Rays, View};
 use numeric::vector::dot;
 
-/// What depth means.
+/// Meaning of the depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum DepthKind {
-    /// Along the axis of the camera.
+    /// Distance along the optical axis of the camera.
     #[default]
     ZDepth,
-    /// Along the ray.
+    /// Distance along the ray.
     RayLength,
 }
 
-/// The axes that normals are given in.
+/// Axes of the normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum NormalFrame {
-    /// Those of the mesh.
+    /// Axes of the mesh.
     #[default]
     World,
-    /// Those of the camera: right, down, forward. Normals turned to it have a negative last
-    /// component near the middle.
+    /// Axes of the camera: right, down, forward. Normals that face the camera have a negative last
+    /// component near the middle of the image.
     Camera,
 }
 
-/// What the maps hold.
+/// Options for the maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct MapConfig {
-    /// What depth means.
+    /// Meaning of the depth.
     pub depth: DepthKind,
-    /// The axes of normals.
+    /// Axes of the normals.
     pub normals: NormalFrame,
 }
 
-/// The class of a pixel that sees no building.
+/// Class of a pixel that sees no building.
 pub const MISSING_CLASS: u8 = 255;
-/// The object of a pixel that sees no building; objects are counted from 1.
+/// Object of a pixel that sees no building; objects are numbered from 1.
 pub const NO_OBJECT: u32 = 0;
 
-/// The maps of one view, all of the size of its image.
+/// Maps of a view. All have the size of its image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PriorMaps {
-    /// Metres; +∞ where no building is seen.
+    /// Depth, metres; +∞ where no building is seen.
     pub depth_m: Grid<f32>,
-    /// Unit normals, turned to the camera; zero where no building is seen.
+    /// Unit normal facing the camera; zero where no building is seen.
     pub normal: Grid<[f32; 3]>,
-    /// Number of the surface's class ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no building
-    /// is seen.
+    /// Number of the class of the surface ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no
+    /// building is seen.
     pub class: Grid<u8>,
     /// Index of the object in the model plus one; [`NO_OBJECT`] where no building is seen.
     pub object: Grid<u32>,
 }
 
 impl PriorMaps {
-    /// Casts the rays of a view; `rays` are those of its lens.
+    /// Casts the rays of a view; `rays` must belong to its lens.
     pub fn render(model: &PriorModel, view: &View, rays: &Rays, config: MapConfig) -> Self {
         let (width, height) = (rays.width(), rays.height());
         let image = model.bvh().cast_image(&view.eye(), width, height, |column, row| rays.direction(column, row));
@@ -87,18 +88,18 @@ impl PriorMaps {
         maps
     }
 
-    /// Where a building is seen.
+    /// Returns the pixels that see a building.
     pub fn mask(&self) -> Grid<bool> {
         self.object.map(|object| *object != NO_OBJECT)
     }
 
-    /// How many pixels see a building.
+    /// Returns the number of pixels that see a building.
     pub fn hits(&self) -> usize {
         self.object.data().iter().filter(|object| **object != NO_OBJECT).count()
     }
 }
 
-/// What one pixel sees.
+/// The values of a pixel that sees a building.
 struct Pixel {
     depth_m: f32,
     normal: [f32; 3],
@@ -107,7 +108,7 @@ struct Pixel {
 }
 
 impl Pixel {
-    /// `None` where no building is seen.
+    /// Returns `None` when the pixel sees no building.
     fn new(
         model: &PriorModel,
         view: &View,
@@ -138,7 +139,7 @@ impl Pixel {
         };
         Some(Self {
             depth_m: depth as f32,
-            // Zero has no sign in a file that others compare.
+            // Adding zero turns −0 into 0, so that equal normals have equal bytes.
             normal: normal.map(|c| (turn * c) as f32 + 0.0),
             class: surface.class as u8,
             object: surface.object.saturating_add(1),

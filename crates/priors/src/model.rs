@@ -1,4 +1,4 @@
-//! The triangles of a city model with their areas and normals, arranged for rays.
+//! The triangles of a city model with their areas, normals and an index for ray casting.
 
 use bvh::Bvh;
 use city::{BuildingRole, CityModel, TriangleMesh};
@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use crate::PriorsError;
 use numeric::vector::{Vector, cross, norm, sub, unit};
 
-/// Triangles lower than this take the normal of their surface: their own would be made of the
-/// rounding of their corners.
+/// Height of a triangle over its longest edge below which it takes the normal of its surface,
+/// metres. The rounding of the corners decides the normal of such a triangle.
 const SLIVER_M: f64 = 1e-3;
 
-/// A city model to take priors from.
+/// A city model prepared for priors.
 #[derive(Debug, Clone)]
 pub struct PriorModel {
     mesh: TriangleMesh,
@@ -22,12 +22,13 @@ pub struct PriorModel {
 }
 
 impl PriorModel {
-    /// Arranges a mesh. `is_building` says of every object of the model whether it is (part of) a
-    /// building: the others hide what is behind them, and give no priors.
+    /// Prepares a mesh. `is_building` says per object of the model whether it belongs to a
+    /// building. Other objects occlude what is behind them, and give no priors.
     ///
     /// # Errors
-    /// A mesh that fails [`TriangleMesh::validate`], that rays cannot be cast at, or that names
-    /// more objects.
+    /// - [`PriorsError::Mesh`] when the mesh fails [`TriangleMesh::validate`].
+    /// - [`PriorsError::Bvh`] when no index for ray casting can be built.
+    /// - [`PriorsError::Objects`] when `is_building` is shorter than the list of objects.
     pub fn new(mesh: TriangleMesh, is_building: &[bool]) -> Result<Self, PriorsError> {
         mesh.validate()?;
         let bvh = Bvh::new(&mesh.positions, &mesh.triangles)?;
@@ -42,55 +43,56 @@ impl PriorModel {
         Ok(Self { mesh, bvh, areas, normals, building })
     }
 
-    /// The triangles.
+    /// Returns the triangles.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// The triangles, arranged for rays.
+    /// Returns the index for ray casting.
     pub fn bvh(&self) -> &Bvh {
         &self.bvh
     }
 
-    /// Area of a triangle, m².
+    /// Returns the area of a triangle, m².
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// Panics when the triangle does not exist.
     pub fn area_m2(&self, triangle: usize) -> f64 {
         self.areas[triangle]
     }
 
-    /// Unit normal of a triangle, outwards where the model's solids allow to tell; zero where the
+    /// Returns the unit normal of a triangle, which faces outwards on solids. It is zero when the
     /// triangle and its surface have no area.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// Panics when the triangle does not exist.
     pub fn normal(&self, triangle: usize) -> [f64; 3] {
         self.normals[triangle]
     }
 
-    /// Whether a triangle is a building's.
+    /// Returns whether a triangle belongs to a building.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// Panics when the triangle does not exist.
     pub fn is_building(&self, triangle: usize) -> bool {
         self.building[triangle]
     }
 }
 
-/// Which objects of a model are buildings or belong to one: what [`PriorModel::new`] wants to know.
+/// Returns per object whether it belongs to a building, as [`PriorModel::new`] expects.
 pub fn buildings_of(model: &CityModel) -> Vec<bool> {
     let roles = || model.objects.iter().map(|object| object.kind.role());
-    // OBJ and PLY know no kinds: what stands in them is what priors are wanted of.
+    // OBJ and PLY have no kinds of objects, so all their objects count as buildings.
     let is_named = roles().any(|role| role != BuildingRole::Other);
     roles().map(|role| !is_named || !matches!(role, BuildingRole::Other | BuildingRole::Interior)).collect()
 }
 
-/// A vector along the normal, twice the area long.
+/// Returns a vector along the normal whose length is twice the area.
 fn doubled_area([a, b, c]: [Vector; 3]) -> Vector {
     cross(sub(b, a), sub(c, a))
 }
 
+/// Returns the normal of each triangle; slivers take the normal of their surface.
 fn normals(mesh: &TriangleMesh) -> Vec<Vector> {
     let mut of_surface = vec![[0.0; 3]; mesh.surfaces.len()];
     for (triangle, &surface) in mesh.surface_of.iter().enumerate() {
@@ -114,8 +116,8 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// A box with its corner at `low`: ground, roof, four walls, two triangles each, looking
-    /// outwards; object 0.
+    /// Makes a box with its corner at `low`: ground, roof and four walls of two triangles each,
+    /// facing outwards; object 0.
     pub(crate) fn cuboid(low: Vector, size: Vector) -> TriangleMesh {
         let corner = |i: usize| [0, 1, 2].map(|axis| low[axis] + if i >> axis & 1 == 1 { size[axis] } else { 0.0 });
         let faces: [([u32; 4], SurfaceClass); 6] = [
@@ -136,7 +138,7 @@ pub(crate) mod tests {
         mesh
     }
 
-    /// Both meshes; the objects of the second come after those of the first.
+    /// Joins two meshes. The objects of the second mesh follow those of the first.
     pub(crate) fn joined(mut first: TriangleMesh, second: &TriangleMesh) -> TriangleMesh {
         let (corners, surfaces) = (first.positions.len() as u32, first.surfaces.len() as u32);
         let object = first.surfaces.iter().map(|s| s.object + 1).max().unwrap_or(0);
@@ -164,7 +166,7 @@ pub(crate) mod tests {
     #[test]
     fn a_sliver_takes_the_normal_of_its_surface() {
         let mut mesh = cuboid([0.0; 3], [8.0, 6.0, 3.0]);
-        // A needle along an edge of the roof, tilted by the lattice of its corners.
+        // A sliver along an edge of the roof, tilted by the rounding of its corners.
         let first = mesh.positions.len() as u32;
         mesh.positions.extend([[0.0, 0.0, 3.0], [8.0, 0.0, 3.0], [4.0, 1e-6, 3.000_001]]);
         mesh.triangles.push([first, first + 1, first + 2]);

@@ -1,27 +1,28 @@
-//! Where on the Earth a city model is: the map of its coordinates, and what its heights are above.
+//! The place of a city model on the Earth: the map projection and the vertical datum.
 //!
-//! RPCs count from the WGS 84 ellipsoid, so the heights of the model go there first.
+//! RPCs use heights above the WGS 84 ellipsoid, so the heights of the model are converted first.
 
 use city::{CrsReference, TriangleMesh};
 use crs::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
 
 use crate::PriorsError;
 
-/// The map and the heights of a model.
+/// Map projection and vertical datum of a model.
 #[derive(Debug)]
 pub struct ModelPlace {
-    /// The map, in metres.
+    /// Map projection, in metres.
     pub projection: MapProjection,
-    /// What the heights are above; `None` where no one says, and they are taken to be above the
-    /// ellipsoid.
+    /// Vertical datum of the heights; `None` when it is unknown, which counts as the ellipsoid.
     pub datum: Option<VerticalDatum>,
 }
 
 impl ModelPlace {
-    /// The place that a model names; `map_epsg` and `datum` go before what it says.
+    /// Returns the place that a model names. `map_epsg` and `datum` override the model.
     ///
     /// # Errors
-    /// [`PriorsError::MapUnknown`], [`PriorsError::MapNotMetric`], a code that PROJ does not know.
+    /// - [`PriorsError::MapUnknown`] when there is no EPSG code.
+    /// - [`PriorsError::MapNotMetric`] when the coordinates are not in metres.
+    /// - [`PriorsError::Geodesy`] when PROJ does not know the code.
     pub fn of(crs: &CrsReference, map_epsg: Option<u32>, datum: Option<VerticalDatum>) -> Result<Self, PriorsError> {
         let stated = crs.epsg.map(|code| CrsIdentity::of(&format!("EPSG:{code}"))).transpose()?;
         let code = map_epsg.or(crs.epsg).ok_or_else(|| PriorsError::MapUnknown { crs: crs.to_string() })?;
@@ -34,16 +35,18 @@ impl ModelPlace {
         Ok(Self { projection, datum: datum.or(in_file) })
     }
 
-    /// What the heights are taken to be above.
+    /// Returns the vertical datum, or the ellipsoid when it is unknown.
     pub fn datum(&self) -> VerticalDatum {
         self.datum.unwrap_or_default()
     }
 
-    /// The heights of a mesh in this map become heights above the WGS 84 ellipsoid.
+    /// Converts the heights of a mesh in this map to heights above the WGS 84 ellipsoid.
     ///
     /// # Errors
-    /// A datum whose grid cannot be had; [`PriorsError::BeyondDatum`] outside its area, the mesh is
-    /// then as it was.
+    /// - [`PriorsError::Geodesy`] when a position cannot be projected, or the grid of the datum is
+    ///   missing.
+    /// - [`PriorsError::BeyondDatum`] when the mesh extends beyond the grid. The mesh is unchanged
+    ///   then.
     pub fn to_ellipsoid(&self, mesh: &mut TriangleMesh) -> Result<(), PriorsError> {
         let datum = self.datum();
         if datum == VerticalDatum::Ellipsoid {

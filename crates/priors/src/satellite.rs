@@ -1,11 +1,11 @@
-//! What a satellite image sees of a model: height above the ellipsoid, distance, normal, class and
-//! object of every pixel.
+//! Maps that a satellite image would measure of a model: height above the ellipsoid, distance,
+//! normal, class and object per pixel.
 //!
-//! A pixel of an RPC image sees along the line between the ground points that the RPC gives it
-//! above and below the model ([`LinesOfSight`]); the first triangle on it is what it sees. No
-//! centre of projection is assumed: scanners have none. Normals are in the directions of east,
-//! north and up at the middle of the model: the map's axes turned by the convergence of its
-//! meridians there (over a scene of 10 km that changes by less than 0.1°).
+//! The line of sight of a pixel joins the ground points that the RPC returns above and below the
+//! model ([`LinesOfSight`]). The pixel sees the first triangle on this line. No centre of
+//! projection is assumed, because a pushbroom scanner has none. Normals are in east, north and up
+//! at the middle of the model, which are the axes of the map turned by the meridian convergence
+//! there. Within a scene of 10 km the convergence changes by less than 0.1°.
 
 mod lines;
 
@@ -18,29 +18,28 @@ use crate::maps::{MISSING_CLASS, NO_OBJECT};
 use crate::{PriorModel, PriorsError};
 use numeric::vector::{along, dot, norm};
 
-/// The maps of one image, all of its size.
+/// Maps of a satellite image. All have its size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SatelliteMaps {
-    /// Metres above the ellipsoid that the model's heights are above; NaN where no building is
-    /// seen.
+    /// Height above the ellipsoid of the model's heights, metres; NaN where no building is seen.
     pub height_m: Grid<f32>,
-    /// Metres along the line of sight from the height [`LinesOfSight::from_height_m`]; NaN where no
-    /// building is seen.
+    /// Distance along the line of sight from the height [`LinesOfSight::from_height_m`], metres;
+    /// NaN where no building is seen.
     pub distance_m: Grid<f32>,
-    /// East, north, up; unit normals turned to the sensor, zero where no building is seen.
+    /// Unit normal facing the sensor (east, north, up); zero where no building is seen.
     pub normal: Grid<[f32; 3]>,
-    /// Number of the surface's class ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no building
-    /// is seen.
+    /// Number of the class of the surface ([`city::SurfaceClass`]); [`MISSING_CLASS`] where no
+    /// building is seen.
     pub class: Grid<u8>,
     /// Index of the object in the model plus one; [`NO_OBJECT`] where no building is seen.
     pub object: Grid<u32>,
 }
 
 impl SatelliteMaps {
-    /// Looks along the lines of sight of an image.
+    /// Casts rays along the lines of sight of an image.
     ///
     /// # Errors
-    /// An image of more than [`crate::MAX_PIXELS`] pixels.
+    /// [`PriorsError::ImageSize`] when the image has more than [`crate::MAX_PIXELS`] pixels.
     pub fn render(model: &PriorModel, lines: &LinesOfSight) -> Result<Self, PriorsError> {
         let (width, height) = lines.size();
         if width.saturating_mul(height) > crate::MAX_PIXELS {
@@ -73,18 +72,18 @@ impl SatelliteMaps {
         Ok(maps)
     }
 
-    /// Where a building is seen.
+    /// Returns the pixels that see a building.
     pub fn mask(&self) -> Grid<bool> {
         self.object.map(|object| *object != NO_OBJECT)
     }
 
-    /// How many pixels see a building.
+    /// Returns the number of pixels that see a building.
     pub fn hits(&self) -> usize {
         self.object.data().iter().filter(|object| **object != NO_OBJECT).count()
     }
 }
 
-/// What one pixel sees.
+/// The values of a pixel that sees a building.
 struct Seen {
     height_m: f32,
     distance_m: f32,
@@ -94,7 +93,7 @@ struct Seen {
 }
 
 impl Seen {
-    /// `None` where no building is seen.
+    /// Returns `None` when the pixel sees no building.
     fn new(model: &PriorModel, lines: &LinesOfSight, column: usize, row: usize) -> Option<Self> {
         let ray = lines.ray(column, row)?;
         let hit = model.bvh().closest_hit(&ray)?;
@@ -109,7 +108,7 @@ impl Seen {
         Some(Self {
             height_m: height as f32,
             distance_m: (hit.t * norm(ray.direction)) as f32,
-            // Zero has no sign in a file that others compare.
+            // Adding zero turns −0 into 0, so that equal normals have equal bytes.
             normal: lines.east_north_up(world).map(|c| (turn * c) as f32 + 0.0),
             class: surface.class as u8,
             object: surface.object.saturating_add(1),

@@ -1,38 +1,44 @@
-//! How much the priors weigh in a training, iteration by iteration.
+//! Weights of the priors during a training, by iteration.
 //!
-//! The values are those of the released code of GS4Buildings: the depth prior comes in between
-//! iterations 5,000 and 7,000, the normal prior fades to a tenth between 7,000 and 9,000; depths of
-//! a view are compared after the ratio of their medians, α = median(prior) / median(rendered), has
-//! been applied to the rendered ones.
+//! The values are from the released code of GS4Buildings. The weight of the depth prior grows
+//! between iterations 5,000 and 7,000. The weight of the normal prior falls to a tenth between
+//! iterations 7,000 and 9,000. The rendered depths of a view are multiplied by α = median(prior) /
+//! median(rendered) before they are compared.
 
 use serde::{Deserialize, Serialize};
 
-/// A factor that goes from one value to another.
+/// A factor that changes linearly from one value to another.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ramp {
-    /// Iteration at which it begins to change.
+    /// Iteration at which the change begins.
     pub from_iteration: u32,
-    /// Iteration from which it stays.
+    /// Iteration at which the change ends.
     pub to_iteration: u32,
-    /// Factor up to the first.
+    /// Factor before the change.
     pub from_factor: f64,
-    /// Factor from the second.
+    /// Factor after the change.
     pub to_factor: f64,
 }
 
-/// Factors of the loss terms, to be multiplied with the trainer's own weights.
+/// Factors of the loss terms, to be multiplied with the weights of the trainer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
-    /// Of the depth prior.
+    /// Factor of the depth prior.
     pub depth: Ramp,
-    /// Of the normal prior.
+    /// Factor of the normal prior.
     pub normal: Ramp,
 }
 
 impl Ramp {
-    /// The factor at an iteration, linear between the two.
+    /// Returns the factor at an iteration.
+    ///
+    /// # Examples
+    /// ```
+    /// let schedule = priors::Schedule::default();
+    /// assert_eq!(schedule.depth.at(6_000), 0.5);
+    /// ```
     pub fn at(&self, iteration: u32) -> f64 {
         if iteration <= self.from_iteration {
             return self.from_factor;
@@ -46,7 +52,7 @@ impl Ramp {
 }
 
 impl Default for Schedule {
-    /// The published one.
+    /// Returns the published schedule.
     fn default() -> Self {
         Self {
             depth: Ramp { from_iteration: 5_000, to_iteration: 7_000, from_factor: 0.0, to_factor: 1.0 },

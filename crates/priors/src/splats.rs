@@ -1,25 +1,27 @@
-//! Flat Gaussians to begin a training with: one per point, in its tangent plane, as wide as the
+//! Flat Gaussians to start a training with: one per point, in its tangent plane, as wide as the
 //! spacing of the points.
 //!
-//! The standard deviation is half of the spacing: Gaussians on a square lattice then add up to a
-//! constant within 3 %, and their disks of two deviations are those that an adaptive sample keeps
-//! within its error. Across the surface it is a hundredth of that (2DGS has no third scale). The
-//! opacity is 0.1, with which 3DGS begins as well: training has to bring it up.
+//! The standard deviation is half of the spacing. Gaussians on a square lattice then add up to a
+//! constant within 3 %. The disk of two standard deviations has the spacing as radius, which an
+//! adaptive sample keeps within its error. The thickness is a hundredth of the standard deviation
+//! (2DGS has no third scale). The opacity is 0.1, the initial value of 3DGS, which training raises.
 
 use gaussian::Splat;
 
 use crate::Sample;
 use numeric::vector::{Vector, cross, unit};
 
-/// Opacity of a splat that nothing has been learned about.
+/// Opacity before the training.
 const OPACITY: f32 = 0.1;
-/// Thickness by width.
+/// Ratio of thickness to width.
 const FLATNESS: f32 = 0.01;
-/// The thinnest a splat may be: spacings of zero come from nowhere but hand-made samples.
+/// Smallest standard deviation, metres. Only samples that were not made by
+/// [`sample`](crate::sample) have a spacing of 0.
 const LEAST: f32 = 1e-6;
 
-/// Splats from points and their colours (red, green, blue from 0 to 1), relative to the same origin
-/// as the points.
+/// Makes splats from points and their colours (red, green, blue from 0 to 1).
+///
+/// Their positions are relative to the same origin as the points.
 pub fn initial_splats<'a>(points: impl IntoIterator<Item = (&'a Sample, [f32; 3])>) -> Vec<Splat> {
     points.into_iter().map(|(point, colour)| splat(point, colour)).collect()
 }
@@ -36,10 +38,11 @@ fn splat(point: &Sample, colour: [f32; 3]) -> Splat {
     }
 }
 
-/// The shortest rotation that takes (0, 0, 1) to a unit vector, as a quaternion with w ≥ 0 first.
+/// Returns the shortest rotation from (0, 0, 1) to a unit vector, as a quaternion (w, x, y, z) with
+/// w ≥ 0.
 fn from_up(normal: Vector) -> [f64; 4] {
     const UP: Vector = [0.0, 0.0, 1.0];
-    // Straight down is half a turn about any level axis.
+    // The rotation to straight down is half a turn about any horizontal axis.
     if normal[2] < -1.0 + 1e-12 {
         return [0.0, 1.0, 0.0, 0.0];
     }

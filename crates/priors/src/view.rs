@@ -6,35 +6,39 @@ use rayon::prelude::*;
 
 use crate::PriorsError;
 
-/// Maps are made for images of up to this many pixels.
+/// Largest number of pixels of an image.
 pub const MAX_PIXELS: usize = 1 << 28;
 
-/// A lens, and where it is in the frame of the mesh (metres from its origin).
+/// A perspective camera in the frame of the mesh (metres from its origin).
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// The inside.
+    /// Lens.
     pub lens: Lens,
-    /// Where it is and looks.
+    /// Position and orientation in the frame of the mesh.
     pub pose: Pose,
 }
 
-/// How far the direction of a pixel may be from the point that was projected to it, image plane at
-/// distance 1. Beyond, the point is not the one that the lens sees there: a distortion folds what
-/// is far outside back into the image.
+/// Largest distance between a point of the image plane at distance 1 and the direction of its
+/// pixel.
+///
+/// A larger distance means that the lens does not see the point there: a distortion may fold points
+/// far outside back into the image.
 const FOLD: f64 = 1e-6;
 
 impl View {
-    /// Centre and axes.
+    /// Returns the centre and the axes.
     pub fn eye(&self) -> Eye {
         Eye::new(self.pose.centre, self.pose.rotation)
     }
 
-    /// The pixel in which the lens sees a point (x, y) of the image plane at distance 1, where it
-    /// lies at least `margin_px` inside the borders of the image (outside for a negative margin).
+    /// Returns the pixel in which the lens sees a point (x, y) of the image plane at distance 1.
+    ///
+    /// Returns `None` unless the pixel is at least `margin_px` inside the borders of the image.
+    /// With a negative margin it may be outside by that much.
     pub fn pixel(&self, x: f64, y: f64, margin_px: f64) -> Option<ImagePoint> {
         let lens = &self.lens;
         let pixel = lens.project(x, y)?;
-        // The border of the image is half a pixel before the centre of its first.
+        // The border of the image is half a pixel before the centre of the first pixel.
         let inside = |at: f64, size: usize| (margin_px - 0.5..size as f64 - 0.5 - margin_px).contains(&at);
         if !inside(pixel.sample, lens.width()) || !inside(pixel.line, lens.height()) {
             return None;
@@ -49,19 +53,20 @@ impl View {
     }
 }
 
-/// The directions of a lens's pixels; those of a distorted one are found once and kept.
+/// Directions of the pixels of a lens. They are computed once and stored if the lens has
+/// distortion.
 #[derive(Debug, Clone)]
 pub struct Rays {
     lens: Lens,
-    /// Row by row; NaN where the lens sees nothing. Empty for pinholes.
+    /// Directions in row order; NaN where the lens sees nothing. Empty for a pinhole.
     directions: Vec<[f64; 2]>,
 }
 
 impl Rays {
-    /// The rays of a lens.
+    /// Computes the directions of a lens.
     ///
     /// # Errors
-    /// An image of more than [`MAX_PIXELS`] pixels.
+    /// [`PriorsError::ImageSize`] when the image has more than [`MAX_PIXELS`] pixels.
     pub fn new(lens: &Lens) -> Result<Self, PriorsError> {
         if lens.width().saturating_mul(lens.height()) > MAX_PIXELS {
             return Err(PriorsError::ImageSize { width: lens.width(), height: lens.height(), limit: MAX_PIXELS });
@@ -76,18 +81,19 @@ impl Rays {
         Ok(Self { lens: lens.clone(), directions })
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.lens.width()
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.lens.height()
     }
 
-    /// The point of the image plane at distance 1 that a pixel's ray goes through; `None` where the
-    /// lens sees nothing, and outside the image.
+    /// Returns the point of the image plane at distance 1 on the ray of a pixel.
+    ///
+    /// Returns `None` outside the image and where the lens sees nothing.
     pub fn direction(&self, column: usize, row: usize) -> Option<[f64; 2]> {
         if column >= self.width() || row >= self.height() {
             return None;
@@ -105,7 +111,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// A camera at `centre` that looks straight down, north up.
+    /// Makes a camera at `centre` that faces straight down, with north at the top of the image.
     pub(crate) fn nadir(centre: [f64; 3], lens: Lens) -> View {
         View { lens, pose: Pose { rotation: [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], centre } }
     }
@@ -130,7 +136,7 @@ pub(crate) mod tests {
     fn what_a_distortion_folds_back_is_not_seen() {
         let lens = Lens::new(100, 80, LensModel::SimpleRadial, &[50.0, 49.5, 39.5, -0.25]).unwrap();
         let view = nadir([0.0; 3], lens);
-        // r (1 − r²/4) grows up to r = 1.15 and comes back to 0 at r = 2.
+        // r (1 − r²/4) grows up to r = 1.15 and returns to 0 at r = 2.
         assert!(view.pixel(0.8, 0.0, 0.0).is_some());
         assert!(view.lens.project(1.9, 0.0).is_some() && view.pixel(1.9, 0.0, 0.0).is_none());
     }

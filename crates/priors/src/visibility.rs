@@ -1,11 +1,13 @@
-//! Which cameras see which points, and which of them see a point best.
+//! Counts the cameras that see each point, and keeps the best of them.
 //!
-//! A view sees a point that lies in its image by a margin, not nearer than the near plane, not at a
-//! more grazing angle than allowed, and with nothing before it: a ray from the camera meets no
-//! triangle up to ε before the point (any hit). ε absorbs the distance between a point and its own
-//! triangle, and is a length along the ray. Points are kept that at least k views see, with the m
-//! observations of the highest resolution f cos θ / distance (pixels per metre of the surface), the
-//! first of equals. Views are added one by one, so a caller may show progress.
+//! A view sees a point when its pixel is inside the image by a margin, its depth is beyond the near
+//! plane, the incidence angle is below the limit, and no triangle occludes it. The test for
+//! occlusion casts a ray from the camera that ends ε before the point, measured along the ray. The
+//! length ε absorbs the distance between a point and its own triangle.
+//!
+//! A point is kept when at least k views see it, with the m observations of the highest resolution
+//! f cos θ / distance (pixels per metre of the surface). Of equal observations the first is kept.
+//! Views are added one by one, so that a caller can show progress.
 
 use bvh::Target;
 use camera::ImagePoint;
@@ -15,26 +17,28 @@ use serde::{Deserialize, Serialize};
 use crate::{PriorModel, PriorsError, Sample, View};
 use numeric::vector::{dot, norm, sub};
 
-/// What it takes to be seen, and to be kept.
+/// Conditions for a point to be seen and to be kept.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct VisibilityConfig {
-    /// How far inside the borders of the image a point must lie, pixels.
+    /// Distance from the borders of the image, pixels; a point must be inside by at least this
+    /// much.
     pub margin_px: f64,
-    /// Depth before which nothing is seen, metres.
+    /// Depth of the near plane, metres.
     pub near_m: f64,
-    /// The last part of the ray that is not looked at, metres.
+    /// Length ε of the last part of the ray, which is not tested for occlusion, metres.
     pub epsilon_m: f64,
-    /// The largest angle between the ray and the normal, degrees; `None` sees up to 90°, and
-    /// surfaces from behind.
+    /// Largest angle between the ray and the normal, degrees; `None` allows any angle, also
+    /// surfaces seen from behind.
     pub max_incidence_deg: Option<f64>,
-    /// A point needs this many views to be kept.
+    /// Number of views that a point needs to be kept.
     pub min_views: u32,
-    /// At most this many observations are kept per point, the best.
+    /// Largest number of observations that are kept per point.
     pub max_observations: usize,
 }
 
 impl Default for VisibilityConfig {
-    /// 5 px, near plane at 0.1 m, ε = 0.05 m, no limit of incidence, two views, ten observations.
+    /// Returns a margin of 5 px, a near plane at 0.1 m, ε = 0.05 m, no limit of the incidence
+    /// angle, two views and ten observations.
     fn default() -> Self {
         Self {
             margin_px: 5.0,
@@ -50,14 +54,14 @@ impl Default for VisibilityConfig {
 impl VisibilityConfig {
     fn validate(&self) -> Result<(), PriorsError> {
         let numbers = [
-            ("the margin", self.margin_px, self.margin_px.is_finite(), "a number of pixels"),
-            ("the near plane", self.near_m, self.near_m >= 0.0 && self.near_m.is_finite(), "0 or more metres"),
-            ("ε", self.epsilon_m, self.epsilon_m >= 0.0 && self.epsilon_m.is_finite(), "0 or more metres"),
+            ("the margin", self.margin_px, self.margin_px.is_finite(), "a finite number of pixels"),
+            ("the depth of the near plane", self.near_m, self.near_m >= 0.0 && self.near_m.is_finite(), "at least 0 m"),
+            ("the length ε", self.epsilon_m, self.epsilon_m >= 0.0 && self.epsilon_m.is_finite(), "at least 0 m"),
             (
-                "the largest incidence",
+                "the largest incidence angle",
                 self.max_incidence_deg.unwrap_or(90.0),
                 self.max_incidence_deg.is_none_or(|a| a > 0.0 && a <= 90.0),
-                "an angle up to 90°",
+                "more than 0° and at most 90°",
             ),
             (
                 "the number of observations",
@@ -73,45 +77,46 @@ impl VisibilityConfig {
     }
 }
 
-/// Slots of a point are counted in a byte.
+/// Largest number of observations per point.
 const MAX_OBSERVATIONS: usize = 255;
 
-/// What one view sees.
+/// Counts of the points of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ViewCounts {
-    /// Points in its image, in front of it and not too grazing.
+    /// Number of points in its image, beyond the near plane and below the largest incidence angle.
     pub candidates: usize,
-    /// Those that nothing hides.
+    /// Number of those points that are not occluded.
     pub visible: usize,
 }
 
-/// A point in an image.
+/// Observation of a point in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
-    /// Index of the view, in the order of adding.
+    /// Index of the view, in the order of [`Visibility::add`].
     pub view: u32,
-    /// Where.
+    /// Pixel of the point.
     pub pixel: ImagePoint,
 }
 
-/// The points that were kept.
+/// Points that enough views see.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Visible {
     /// Indices of the samples, ascending.
     pub points: Vec<u32>,
-    /// Per kept point how many views see it.
+    /// Number of views that see each kept point.
     pub views: Vec<u32>,
-    /// Per kept point its best observations, ordered by view.
+    /// Best observations of each kept point, ordered by view.
     pub observations: Vec<Vec<Observation>>,
-    /// Pairs of a view and a point that it sees, over all points.
+    /// Number of pairs of a view and a point that it sees, over all points.
     pub pairs: u64,
-    /// Points by the number of views that see them: 0, 1, …, and the last for that many and more.
+    /// Number of points by the number of views that see them: 0, 1, …; the last entry also counts
+    /// larger numbers.
     pub histogram: Vec<usize>,
-    /// What each view sees.
+    /// Counts of each view.
     pub per_view: Vec<ViewCounts>,
 }
 
-/// A count of views per point that grows view by view.
+/// Counts of the views that see each point, which grow view by view.
 #[derive(Debug, Clone)]
 pub struct Visibility<'a> {
     model: &'a PriorModel,
@@ -119,25 +124,26 @@ pub struct Visibility<'a> {
     config: VisibilityConfig,
     views: Vec<View>,
     counts: Vec<u32>,
-    /// The best observations of each point so far, `max_observations` slots each.
+    /// Best observations of each point so far: `max_observations` slots per point.
     best: Vec<Slot>,
     per_view: Vec<ViewCounts>,
 }
 
+/// An observation of a point: the view, and its resolution.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     view: u32,
     score: f32,
 }
 
-/// The longest histogram.
+/// Last number of views in the histogram, which counts all larger ones too.
 const HISTOGRAM: usize = 32;
 
 impl<'a> Visibility<'a> {
-    /// Begins with no view.
+    /// Starts without views.
     ///
     /// # Errors
-    /// A configuration with numbers that mean nothing.
+    /// [`PriorsError::Config`] when a parameter is out of its range.
     pub fn new(model: &'a PriorModel, samples: &'a [Sample], config: VisibilityConfig) -> Result<Self, PriorsError> {
         config.validate()?;
         let best = vec![Slot { view: u32::MAX, score: 0.0 }; samples.len().saturating_mul(config.max_observations)];
@@ -145,7 +151,7 @@ impl<'a> Visibility<'a> {
         Ok(Self { model, samples, config, views: Vec::new(), counts, best, per_view: Vec::new() })
     }
 
-    /// Adds a view.
+    /// Adds a view, and returns its counts.
     pub fn add(&mut self, view: &View) -> ViewCounts {
         let number = self.views.len() as u32;
         let candidates = candidates(self.samples, view, &self.config);
@@ -166,12 +172,12 @@ impl<'a> Visibility<'a> {
         counts
     }
 
-    /// How many views see each point.
+    /// Returns per point the number of views that see it.
     pub fn counts(&self) -> &[u32] {
         &self.counts
     }
 
-    /// The points that enough views see.
+    /// Returns the points that enough views see.
     pub fn finish(self) -> Visible {
         let slots = self.config.max_observations;
         let mut histogram = vec![0; HISTOGRAM + 1];
@@ -203,8 +209,8 @@ impl<'a> Visibility<'a> {
     }
 }
 
-/// Puts an observation among the best, worst last; `count` were seen before. A later one must be
-/// better to replace.
+/// Inserts an observation into the best ones, which are in descending order; `count` observations
+/// came before. A later observation must be better to replace an earlier one.
 fn insert(slots: &mut [Slot], count: usize, new: Slot) {
     let used = count.min(slots.len());
     let place = slots[..used].iter().position(|slot| new.score > slot.score).unwrap_or(used);
@@ -215,7 +221,7 @@ fn insert(slots: &mut [Slot], count: usize, new: Slot) {
     }
 }
 
-/// A point that may be visible.
+/// A point inside the image of a view, which may be occluded.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     sample: u32,
@@ -223,6 +229,7 @@ struct Candidate {
     score: f32,
 }
 
+/// Returns the points that are inside the image of a view.
 fn candidates(samples: &[Sample], view: &View, config: &VisibilityConfig) -> Vec<Candidate> {
     let eye = view.eye();
     let focal = view.lens.focal_px();

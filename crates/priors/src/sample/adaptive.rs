@@ -131,8 +131,8 @@ impl<'a> Work<'a> {
             return Ok(());
         }
         let corners = self.model.mesh().corners(triangle);
-        // The lists of creases of the open pieces follow one another. The list of a piece ends where
-        // the list of its parts begins.
+        // The lists of creases of the open pieces follow one another. The list of a piece ends
+        // where the list of its parts begins.
         let mut near = self.creases.near(&corners, self.model.normal(triangle), self.bound.error_m);
         let mut open = vec![(corners, 0..near.len())];
         while let Some((corners, own)) = open.pop() {

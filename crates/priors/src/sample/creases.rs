@@ -19,7 +19,8 @@ use numeric::vector::{Vector, along, cross, dot, norm, sub};
 
 /// Sine of the angle below which two normals belong to one plane.
 const FLAT: f64 = 1e-4;
-/// Number of faces of an ordinary edge. An edge with another number counts as an end of the surface.
+/// Number of faces of an ordinary edge. An edge with another number counts as an end of the
+/// surface.
 const FACES: usize = 2;
 
 /// An edge and the faces that meet there.

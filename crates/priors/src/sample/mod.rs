@@ -1,9 +1,9 @@
 //! Samples points on the surfaces of a model.
 //!
-//! The probability of a point to lie on a triangle is proportional to the area of the triangle times
-//! the weight of its class. Within a triangle the distribution is uniform. Each point has the local
-//! spacing s = 1/√(points per m²), from which splats get their size. A point does not depend on the
-//! points after it, so that the result is the same for any number of threads.
+//! The probability of a point to lie on a triangle is proportional to the area of the triangle
+//! times the weight of its class. Within a triangle the distribution is uniform. Each point has the
+//! local spacing s = 1/√(points per m²), from which splats get their size. A point does not depend
+//! on the points after it, so that the result is the same for any number of threads.
 
 mod adaptive;
 mod config;

@@ -1,6 +1,6 @@
-//! Poisson disks by dart throwing: an independent candidate is kept unless it is too close to a point
-//! that was kept before. Points with opposite normals do not exclude each other, so that the two
-//! sides of a thin wall are sampled independently.
+//! Poisson disks by dart throwing: an independent candidate is kept unless it is too close to a
+//! point that was kept before. Points with opposite normals do not exclude each other, so that the
+//! two sides of a thin wall are sampled independently.
 //!
 //! Unlimited dart throwing covers 0.547 of a plane with disks (random sequential adsorption). This
 //! gives the distance for a number of points. The distance is then reduced until the limited number
@@ -44,8 +44,8 @@ pub(super) fn sample(share: &Share<'_>, count: usize) -> Result<(Vec<Sample>, f6
     Ok((kept.into_iter().map(|i| darts[i]).collect(), distance))
 }
 
-/// Returns the indices of the darts that are kept: the distance to each dart kept before is at least
-/// `factor` times the smaller one of both spacings.
+/// Returns the indices of the darts that are kept: the distance to each dart kept before is at
+/// least `factor` times the smaller one of both spacings.
 fn thrown(darts: &[Sample], factor: f64) -> Vec<usize> {
     let side = factor * darts.iter().map(|d| f64::from(d.spacing_m)).fold(0.0, f64::max);
     let cell = |p: [f64; 3]| p.map(|c| (c / side).floor() as i64);

@@ -1,4 +1,5 @@
-//! Shares points among the triangles by area and weight, and makes independent and stratified points.
+//! Shares points among the triangles by area and weight, and makes independent and stratified
+//! points.
 
 use city::SurfaceClass;
 use rayon::prelude::*;

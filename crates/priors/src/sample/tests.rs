@@ -1,4 +1,5 @@
-//! Checks counts, shares, distances and errors of samples, and that threads and coordinates do not change them.
+//! Checks counts, shares, distances and errors of samples, and that threads and coordinates do not
+//! change them.
 
 use super::*;
 use crate::model::tests::{cuboid, joined};
@@ -188,8 +189,8 @@ fn adaptive_disks_stay_within_the_error() {
                 worst = worst.max(to_mesh(model.mesh(), rim));
             }
         }
-        // The spacing of a piece is the spacing at its middle. Its points may be nearer to an edge by
-        // up to 0.7 spacings.
+        // The spacing of a piece is the spacing at its middle. Its points may be nearer to an edge
+        // by up to 0.7 spacings.
         assert!(worst <= 1.5 * error_m, "{worst} for {error_m}");
         let spacings =
             made.points.iter().map(|p| p.spacing_m).fold((f32::INFINITY, 0.0f32), |(l, h), s| (l.min(s), h.max(s)));

@@ -1,9 +1,10 @@
 //! The lines of sight of a satellite image in the frame of a mesh.
 //!
-//! The RPC is inverted at two heights, just above and just below the model, on a lattice of pixels;
-//! in between the ground points are interpolated bilinearly. The lattice is as wide as leaves less
-//! than a millimetre of error, which is measured in the middles of its cells, also half way between
-//! the heights: there the line is straight in the map and the RPC's is not.
+//! The RPC is inverted at two heights, just above and just below the model, on a lattice of pixels.
+//! Between the nodes the ground points are interpolated bilinearly. The widest lattice with an
+//! interpolation error below a millimetre is used. The error is measured in the middles of cells.
+//! Halfway between the heights the deviation of the straight line from the line of the RPC, which
+//! is curved in the map, is measured too.
 
 use bvh::Ray;
 use camera::{ImagePoint, RpcCamera};
@@ -14,31 +15,32 @@ use numeric::vector::{Vector, along, dot, norm, sub, unit};
 
 /// Spacings of the lattice that are tried, pixels.
 const STEPS: [usize; 4] = [64, 16, 4, 1];
-/// What interpolation may add, metres.
+/// Largest interpolation error, metres.
 const TOLERANCE_M: f64 = 1e-3;
-/// Rows and columns of cells that are measured.
+/// Number of rows and columns of cells in which the error is measured.
 const MEASURED: usize = 8;
-/// Lines of sight begin and end this far above and below the model, metres.
+/// Distance of the ends of a line of sight above and below the model, metres.
 const BEYOND_M: f64 = 1.0;
-/// The step north that the convergence is measured with, degrees.
+/// Step in latitude for the meridian convergence, degrees.
 const NORTH_STEP_DEG: f64 = 1e-4;
 
-/// The line of sight of every pixel.
+/// Lines of sight of the pixels of an image.
 #[derive(Debug, Clone)]
 pub struct LinesOfSight {
     size: (usize, usize),
+    /// Spacing of the lattice, pixels.
     step: usize,
-    /// Nodes in a row of the lattice.
+    /// Number of nodes in a row of the lattice.
     columns: usize,
-    /// Ground points of the nodes, at the upper and the lower height; NaN where there is none.
+    /// Ground points of the nodes at the upper and the lower height; NaN where the RPC has none.
     nodes: Vec<[Vector; 2]>,
     from_height_m: f64,
     error_m: f64,
-    /// The direction of north in the map.
+    /// Unit vector to the north in the map.
     north: [f64; 2],
 }
 
-/// A camera, and how its ground points come into the frame of the mesh.
+/// A camera, and the transform of its ground points to the frame of the mesh.
 struct Ground<'a> {
     camera: &'a RpcCamera,
     projection: &'a MapProjection,
@@ -46,12 +48,14 @@ struct Ground<'a> {
 }
 
 impl LinesOfSight {
-    /// The lines of sight of an image of a size; the mesh of the model is in the map of
-    /// `projection` (metres), its heights are above the ellipsoid.
+    /// Computes the lines of sight of an image with `size` (columns, rows).
+    ///
+    /// The mesh of the model must be in the map of `projection` (metres), with heights above the
+    /// ellipsoid.
     ///
     /// # Errors
-    /// A model without triangles or in a place that the map does not have; PROJ that cannot be set
-    /// up.
+    /// [`PriorsError::NothingToSee`] when the model has no triangles, [`PriorsError::Geodesy`] when
+    /// its position cannot be projected.
     pub fn new(
         camera: &RpcCamera,
         size: (usize, usize),
@@ -81,7 +85,8 @@ impl LinesOfSight {
         for step in STEPS {
             made.lay(&ground, step, heights)?;
             let bent = made.measure(&ground, heights)?;
-            // Straightness does not depend on the lattice.
+            // The straightness does not depend on the lattice, so a narrower one would not improve
+            // it.
             if bent.interpolation_m <= TOLERANCE_M || step == 1 {
                 made.error_m = bent.interpolation_m.max(bent.straightness_m);
                 break;
@@ -90,23 +95,24 @@ impl LinesOfSight {
         Ok(made)
     }
 
-    /// Columns and rows of the image.
+    /// Returns the columns and rows of the image.
     pub fn size(&self) -> (usize, usize) {
         self.size
     }
 
-    /// Height above the ellipsoid at which lines of sight begin, metres.
+    /// Returns the height above the ellipsoid at which lines of sight begin, metres.
     pub fn from_height_m(&self) -> f64 {
         self.from_height_m
     }
 
-    /// The largest distance between a line of sight and the RPC's that was found, metres.
+    /// Returns the largest measured distance between a line of sight and the RPC, metres.
     pub fn error_m(&self) -> f64 {
         self.error_m
     }
 
-    /// The line of sight of a pixel, from above the model (t = 0) to below it (t = 1); `None` where
-    /// the RPC has none.
+    /// Returns the line of sight of a pixel, from above the model (t = 0) to below it (t = 1).
+    ///
+    /// Returns `None` outside the image and where the RPC has no ground point.
     pub fn ray(&self, column: usize, row: usize) -> Option<Ray> {
         if column >= self.size.0 || row >= self.size.1 {
             return None;
@@ -116,12 +122,13 @@ impl LinesOfSight {
         direction.iter().all(|c| c.is_finite()).then_some(Ray { origin: top, direction, end: 1.0 })
     }
 
-    /// A direction of the map as east, north, up.
+    /// Converts a direction of the map to east, north, up.
     pub(crate) fn east_north_up(&self, direction: Vector) -> Vector {
         let [x, y] = self.north;
         [dot(direction, [y, -x, 0.0]), dot(direction, [x, y, 0.0]), direction[2]]
     }
 
+    /// Computes the nodes of a lattice.
     fn lay(&mut self, ground: &Ground<'_>, step: usize, heights: [f64; 2]) -> Result<(), PriorsError> {
         let count = |pixels: usize| pixels.saturating_sub(1).div_ceil(step) + 1;
         (self.step, self.columns) = (step, count(self.size.0));
@@ -135,7 +142,7 @@ impl LinesOfSight {
         Ok(())
     }
 
-    /// The two ends of a line of sight.
+    /// Interpolates the two ends of a line of sight.
     fn ends(&self, sample: f64, line: f64) -> [Vector; 2] {
         let step = self.step as f64;
         let rows = self.nodes.len() / self.columns;
@@ -151,7 +158,7 @@ impl LinesOfSight {
         })
     }
 
-    /// How far the lines are from those of the RPC, in the middles of some cells.
+    /// Measures the distance of the lines from the RPC in the middles of some cells.
     fn measure(&self, ground: &Ground<'_>, heights: [f64; 2]) -> Result<Bent, PriorsError> {
         let middles = |pixels: usize| {
             let cells = pixels.saturating_sub(1).div_ceil(self.step).max(1);
@@ -168,7 +175,7 @@ impl LinesOfSight {
         for (i, pixel) in pixels.iter().enumerate() {
             let [top, bottom] = self.ends(pixel.sample, pixel.line);
             let middle = |a: Vector, b: Vector| along(a, 0.5, sub(b, a));
-            // Distances of NaN, where there is no ground point, count for nothing.
+            // `max` ignores NaN, the distance where the RPC has no ground point.
             bent.interpolation_m =
                 bent.interpolation_m.max(norm(sub(top, exact[0][i]))).max(norm(sub(bottom, exact[1][i])));
             let straight = middle(exact[0][i], exact[1][i]);
@@ -178,14 +185,17 @@ impl LinesOfSight {
     }
 }
 
-/// What is lost by a lattice, and by straight lines.
+/// Errors of lines of sight.
 struct Bent {
+    /// Largest error of the interpolation, metres.
     interpolation_m: f64,
+    /// Largest distance of a straight line from the line of the RPC, metres.
     straightness_m: f64,
 }
 
 impl Ground<'_> {
-    /// Where pixels see a height, in the frame of the mesh; NaN where they do not.
+    /// Returns the ground points of pixels at a height, in the frame of the mesh; NaN where the RPC
+    /// has none.
     fn at(&self, pixels: &[ImagePoint], height_m: f64) -> Result<Vec<Vector>, PriorsError> {
         let found = |&pixel: &ImagePoint| match self.camera.localize(pixel, height_m) {
             Ok(ground) => (ground.lon_deg, ground.lat_deg),
@@ -198,10 +208,10 @@ impl Ground<'_> {
     }
 }
 
-/// The direction of north at a position of the map.
+/// Returns the unit vector to the north at a position of the map.
 fn north(projection: &MapProjection, [x, y]: [f64; 2]) -> Result<[f64; 2], PriorsError> {
     let (lon, lat) = projection.lonlat_from_map(x, y)?;
-    // At the poles of the Earth there is no step north left.
+    // At the pole there is no room for a step to the north.
     let (from, to) = (lat.min(90.0 - NORTH_STEP_DEG), lat.min(90.0 - NORTH_STEP_DEG) + NORTH_STEP_DEG);
     let (a, b) = (projection.map_from_lonlat(lon, from)?, projection.map_from_lonlat(lon, to)?);
     let [x, y, _] = unit([b.x - a.x, b.y - a.y, 0.0]).unwrap_or([0.0, 1.0, 0.0]);

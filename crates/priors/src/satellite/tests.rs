@@ -1,4 +1,4 @@
-//! A box in UTM zone 31 under an affine RPC that looks at it from the west.
+//! Checks a box in UTM zone 31 under an affine RPC that views it from the west.
 
 use camera::{ImageCorrection, ImagePoint, Rpc, RpcCamera};
 use city::{ModelPoint, SurfaceClass, TriangleMesh};
@@ -12,11 +12,12 @@ use numeric::vector::sub;
 const PLACE: LonLatHeight = LonLatHeight { lon_deg: 5.4, lat_deg: 43.53, height_m: 200.0 };
 const SIZE: (usize, usize) = (150, 120);
 
-/// Pixels of about half a metre; what is higher moves east in the image by a third of it.
+/// Makes an RPC with pixels of about half a metre. Higher points move east in the image by a third
+/// of their height.
 fn camera() -> RpcCamera {
     let (mut samp_num, mut line_num, mut den) = ([0.0; 20], [0.0; 20], [0.0; 20]);
     (samp_num[1], samp_num[3], line_num[2], den[0]) = (1.0, 0.35, -1.0, 1.0);
-    // Enough of a second order that rays are not parallel.
+    // Second-order terms that are large enough for the rays not to be parallel.
     (samp_num[4], line_num[7]) = (0.02, 0.03);
     let rpc = Rpc {
         line_off: 60.0,
@@ -77,8 +78,8 @@ fn what_is_seen_projects_to_its_pixel() {
                 assert!((height - 207.0).abs() < 1e-3 && up > 0.999_999, "{at:?}");
                 roofs += 1;
             } else {
-                // Meridians converge by sin(43.53°) · 2.4° here, 0.02885 rad; a sliver of the south
-                // wall is seen for that.
+                // The meridian convergence is sin(43.53°) · 2.4° = 0.02885 rad here, so that a narrow
+                // strip of the south wall is visible.
                 let expected = if east.abs() > 0.5 { [-0.99958, 0.02885] } else { [-0.02885, -0.99958] };
                 let off = (f64::from(east) - expected[0]).hypot(f64::from(north) - expected[1]);
                 assert!(off < 1e-4 && up == 0.0, "{:?}", maps.normal[at]);

@@ -1,4 +1,4 @@
-//! Visibility of points on boxes, against a test of every triangle.
+//! Compares the visibility of points on boxes with a test of every triangle.
 
 use bvh::Ray;
 use proptest::prelude::*;
@@ -25,7 +25,7 @@ fn seen(model: &PriorModel, samples: &[Sample], views: &[View], config: Visibili
     visibility.finish()
 }
 
-/// A camera that looks at a point.
+/// Makes a camera that faces a point.
 fn looking_at(centre: [f64; 3], at: [f64; 3]) -> View {
     let forward = numeric::vector::unit(sub(at, centre)).unwrap();
     let right = numeric::vector::unit(numeric::vector::cross(forward, [0.0, 0.0, 1.0])).unwrap();
@@ -54,10 +54,10 @@ fn two_views_are_needed_by_default() {
     let model = two_boxes();
     let samples = points(&model, 3_000);
     let views = [looking_at([-30.0, 3.0, 8.0], [4.0, 3.0, 2.0]), looking_at([14.0, -40.0, 12.0], [8.0, 3.0, 2.0])];
-    // Points that are hidden by less than ε, just behind an edge, are left out by the angle of 90°.
+    // The limit of 90° excludes points just behind an edge that are occluded by less than ε.
     let config = VisibilityConfig { max_incidence_deg: Some(90.0), ..VisibilityConfig::default() };
     let visible = seen(&model, &samples, &views, config);
-    // Only roofs are seen from the west and from the south.
+    // Only roofs are visible from the west and from the south.
     assert!(visible.points.len() > 200);
     for (&point, observations) in visible.points.iter().zip(&visible.observations) {
         let sample = &samples[point as usize];
