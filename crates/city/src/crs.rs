@@ -5,6 +5,14 @@ use std::fmt;
 /// Reference to a coordinate reference system, by EPSG codes and by the name in the file.
 ///
 /// All fields are `None` when the file names no reference system.
+///
+/// # Examples
+/// ```
+/// use city::CrsReference;
+///
+/// assert_eq!(CrsReference::from_epsg(25832, Some(7837)).to_string(), "EPSG:25832+7837");
+/// assert_eq!(CrsReference::default().to_string(), "unknown");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct CrsReference {
     /// Name as it stands in the file.

@@ -200,7 +200,7 @@ impl DefectCode {
             Self::TooFewPolygons => "a shell has fewer than four polygons",
             Self::ShellNotClosed => "a shell is not closed",
             Self::NonManifold => {
-                "an edge belongs to more than two polygons of a shell, or the polygons around a vertex form several fans"
+                "an edge has more than two polygons of a shell, or the polygons around a vertex form several fans"
             }
             Self::MultipleComponents => "a shell consists of several pieces",
             Self::ShellSelfIntersection => "polygons of a shell touch or cross where they do not share an edge",

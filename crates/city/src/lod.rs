@@ -9,6 +9,16 @@ use crate::ModelError;
 /// Level of detail: `2`, or refined as `2.2`.
 ///
 /// The order is that of the numbers, and a plain `2` is coarser than any `2.x`.
+///
+/// # Examples
+/// ```
+/// use city::Lod;
+///
+/// let refined: Lod = "2.2".parse()?;
+/// assert!(refined.matches(Lod::new(2, None)));
+/// assert!(Lod::new(2, None) < refined);
+/// # Ok::<(), city::ModelError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Lod {
     major: u8,

@@ -80,7 +80,8 @@ impl TriangleMesh {
     /// };
     ///
     /// let mut model = CityModel::new(CrsReference::from_epsg(25832, Some(7837)));
-    /// model.vertices = [[0.0, 0.0, 5.0], [4.0, 0.0, 5.0], [4.0, 3.0, 5.0], [0.0, 3.0, 5.0]].map(ModelPoint::from).to_vec();
+    /// let corners = [[0.0, 0.0, 5.0], [4.0, 0.0, 5.0], [4.0, 3.0, 5.0], [0.0, 3.0, 5.0]];
+    /// model.vertices = corners.map(ModelPoint::from).to_vec();
     /// let mut roof = Geometry::new(Some(Lod::new(2, None)), GeometryKind::MultiSurface);
     /// roof.surfaces.push(SurfacePolygon::new(vec![vec![0, 1, 2, 3]], SurfaceClass::Roof));
     /// let mut house = CityObject::new("house", ObjectKind::BUILDING);

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crs::{Crs, VerticalDatum};
-use io::points::{GriddedPoints, PointCloud, PointsError, is_point_cloud};
+use geodesy::MapPoint;
+use io::points::{CellLattice, GriddedPoints, PointCloud, PointsError, is_point_cloud};
 use las::point::{Classification, Format};
 use las::{Builder, Point, Transform, Vector, Version, Writer};
 use proptest::prelude::*;
@@ -51,7 +52,8 @@ fn write_as(format: Format, folder: &TempDir, name: &str, crs: Option<Crs>, poin
 }
 
 fn gridded(path: &Path) -> Result<GriddedPoints, PointsError> {
-    PointCloud::open(path)?.highest((0.5, 0.5), (WEST, NORTH))
+    let anchor = MapPoint { x: WEST, y: NORTH };
+    PointCloud::open(path)?.highest(CellLattice { cell_x: 0.5, cell_y: 0.5, anchor })
 }
 
 #[test]

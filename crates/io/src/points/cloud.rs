@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use crs::VerticalDatum;
+use geodesy::MapPoint;
 use las::{Header, PointDataBuilder, Reader};
 use raster::{GeoTransform, Grid};
 
@@ -53,6 +54,26 @@ pub struct SurfacePoint {
     pub class: u8,
 }
 
+/// Cells of a grid, before its extent is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CellLattice {
+    /// Size of a cell along x, map units.
+    pub cell_x: f64,
+    /// Size of a cell along y, map units.
+    pub cell_y: f64,
+    /// A corner of a cell.
+    pub anchor: MapPoint,
+}
+
+/// Numbers of points that were read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PointCounts {
+    /// Number of points read.
+    pub read: u64,
+    /// Number of those points that were left out: noise, withheld, or without a finite height.
+    pub left_out: u64,
+}
+
 /// A grid made from a cloud.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GriddedPoints {
@@ -95,10 +116,10 @@ impl PointCloud {
         self.stated.definition.as_deref()
     }
 
-    /// Returns the middle of the extent in the header (x, y), map units.
-    pub fn centre(&self) -> (f64, f64) {
+    /// Returns the middle of the extent in the header.
+    pub fn centre(&self) -> MapPoint {
         let bounds = self.reader.header().bounds();
-        (0.5 * (bounds.min.x + bounds.max.x), 0.5 * (bounds.min.y + bounds.max.y))
+        MapPoint { x: 0.5 * (bounds.min.x + bounds.max.x), y: 0.5 * (bounds.min.y + bounds.max.y) }
     }
 
     /// Returns the EPSG code of the horizontal reference system, if the file names it.
@@ -133,7 +154,7 @@ impl PointCloud {
             return Err(PointsError::TooManyPoints { path: self.path, points: announced, most });
         }
         let mut found = Vec::new();
-        let (points, _) = self.each(|point| {
+        let PointCounts { read: points, .. } = self.each(|point| {
             if point.x.is_finite() && point.y.is_finite() {
                 found.push([point.x, point.y, point.height_m]);
             }
@@ -141,21 +162,18 @@ impl PointCloud {
         if found.is_empty() { Err(PointsError::NoPoints { path: self.path, points }) } else { Ok(found) }
     }
 
-    /// Makes a grid with the highest point of every cell.
-    ///
-    /// `cell` is the size of a cell (x, y) in map units. The corners of the cells are whole cells
-    /// away from `anchor` (x, y).
+    /// Makes a grid with the highest point of every cell of a lattice.
     ///
     /// # Errors
     /// - [`PointsError::TooManyCells`] when the extent has too many cells for the number of points.
     /// - [`PointsError::Damaged`] when the extent is invalid or the points cannot be decoded.
     /// - [`PointsError::NoPoints`] when no point is left.
-    pub fn highest(mut self, cell: (f64, f64), anchor: (f64, f64)) -> Result<GriddedPoints, PointsError> {
-        let (geotransform, width, height) = self.grid(cell, anchor)?;
+    pub fn highest(mut self, lattice: CellLattice) -> Result<GriddedPoints, PointsError> {
+        let (geotransform, width, height) = self.grid(lattice)?;
         let mut heights = Grid::filled(width, height, f32::NAN);
         let mut classes = Grid::filled(width, height, None);
         let mut outside = 0u64;
-        let (points, unusable) = self.each(|point| {
+        let PointCounts { read: points, left_out: unusable } = self.each(|point| {
             match place(&geotransform, point.x, point.y).filter(|&(c, r)| c < width && r < height) {
                 Some(cell) => {
                     let z = point.height_m as f32;
@@ -192,30 +210,27 @@ impl PointCloud {
 
     /// Passes each point of the surface to `take`, in the order of the file.
     ///
-    /// Returns the number of points read, and the number of those that were noise, withheld or
-    /// without a finite height.
-    ///
     /// # Errors
     /// [`PointsError::Damaged`] when the points cannot be decoded.
-    pub fn visit(mut self, take: impl FnMut(SurfacePoint)) -> Result<(u64, u64), PointsError> {
+    pub fn visit(mut self, take: impl FnMut(SurfacePoint)) -> Result<PointCounts, PointsError> {
         self.each(take)
     }
 
-    fn each(&mut self, mut take: impl FnMut(SurfacePoint)) -> Result<(u64, u64), PointsError> {
+    fn each(&mut self, mut take: impl FnMut(SurfacePoint)) -> Result<PointCounts, PointsError> {
         let mut batch = PointDataBuilder::new().for_header(self.reader.header()).build();
         let at_once = (BATCH_BYTES / u64::from(self.reader.header().point_format().len().max(1))).min(BATCH);
-        let (mut points, mut left_out) = (0u64, 0u64);
+        let mut counts = PointCounts { read: 0, left_out: 0 };
         loop {
             let read = guarded(&self.path, || self.reader.fill_points(at_once, &mut batch))?;
             if read == 0 {
-                return Ok((points, left_out));
+                return Ok(counts);
             }
             for point in batch.points() {
                 let point = point.map_err(|error| PointsError::damaged(&self.path, error))?;
-                points += 1;
+                counts.read += 1;
                 let class = u8::from(point.classification);
                 if point.is_withheld || NOISE.contains(&class) || !point.z.is_finite() {
-                    left_out += 1;
+                    counts.left_out += 1;
                     continue;
                 }
                 let height_m = point.z * self.stated.height_unit_m;
@@ -226,7 +241,7 @@ impl PointCloud {
 
     /// Returns the geotransform, the width and the height of the grid that covers the extent in the
     /// header.
-    fn grid(&self, cell: (f64, f64), anchor: (f64, f64)) -> Result<(GeoTransform, usize, usize), PointsError> {
+    fn grid(&self, lattice: CellLattice) -> Result<(GeoTransform, usize, usize), PointsError> {
         let (bounds, points) = (self.reader.header().bounds(), self.reader.header().number_of_points());
         let extent = [bounds.min.x, bounds.min.y, bounds.max.x, bounds.max.y];
         let ordered = bounds.min.x <= bounds.max.x && bounds.min.y <= bounds.max.y;
@@ -236,16 +251,16 @@ impl PointCloud {
                 format!("the extent in the header is {extent:?}, expected finite numbers in ascending order"),
             ));
         }
-        let snapped = |value: f64, anchor: f64, cell: f64| anchor + ((value - anchor) / cell).floor() * cell;
-        let left = snapped(bounds.min.x, anchor.0, cell.0);
-        let top = anchor.1 + ((bounds.max.y - anchor.1) / cell.1).ceil() * cell.1;
-        let columns = ((bounds.max.x - left) / cell.0).floor() + 1.0;
-        let rows = ((top - bounds.min.y) / cell.1).floor() + 1.0;
+        let CellLattice { cell_x, cell_y, anchor } = lattice;
+        let left = anchor.x + ((bounds.min.x - anchor.x) / cell_x).floor() * cell_x;
+        let top = anchor.y + ((bounds.max.y - anchor.y) / cell_y).ceil() * cell_y;
+        let columns = ((bounds.max.x - left) / cell_x).floor() + 1.0;
+        let rows = ((top - bounds.min.y) / cell_y).floor() + 1.0;
         let (cells, most) = (columns * rows, points.saturating_mul(CELLS_PER_POINT).clamp(CELLS_ALWAYS, CELLS_MAX));
         if !(cells.is_finite() && cells > 0.0 && cells <= most as f64) {
-            return Err(PointsError::TooManyCells { path: self.path.clone(), cells, cell: cell.0, points, most });
+            return Err(PointsError::TooManyCells { path: self.path.clone(), cells, cell: cell_x, points, most });
         }
-        Ok((GeoTransform([left, cell.0, 0.0, top, 0.0, -cell.1]), columns as usize, rows as usize))
+        Ok((GeoTransform([left, cell_x, 0.0, top, 0.0, -cell_y]), columns as usize, rows as usize))
     }
 }
 

@@ -42,8 +42,8 @@ pub enum PointsError {
     },
     /// The grid would have many more cells than the cloud has points.
     #[error(
-        "the extent of the cloud has {cells:.0} cells of {cell} map units for {points} points, the limit is {most} cells, \
-         use larger cells: {}", path.display()
+        "the extent of the cloud has {cells:.0} cells of {cell} map units for {points} points, \
+         the limit is {most} cells, use larger cells: {}", path.display()
     )]
     TooManyCells {
         /// Path of the file.

@@ -15,6 +15,6 @@ mod error;
 mod export;
 mod preflight;
 
-pub use cloud::{GriddedPoints, PointCloud, SurfacePoint, is_point_cloud};
+pub use cloud::{CellLattice, GriddedPoints, PointCloud, PointCounts, SurfacePoint, is_point_cloud};
 pub use error::PointsError;
 pub use export::write_las;

@@ -5,7 +5,8 @@
 use std::path::Path;
 
 use eval::{CellMap, MetresFromCells};
-use io::points::{PointCloud, is_point_cloud};
+use geodesy::MapPoint;
+use io::points::{CellLattice, PointCloud, is_point_cloud};
 use io::raster::{Dem, read_dem};
 use raster::Grid;
 
@@ -120,10 +121,11 @@ fn reference(
         return Err(EvalJobError::value("the cell size of the reference", cell_m, "a positive number of metres"));
     }
     let cloud = PointCloud::open(&config.reference)?;
-    let metres = metres_per_unit_at(cloud.crs_definition(), cloud.centre().1, &config.reference)?;
+    let metres = metres_per_unit_at(cloud.crs_definition(), cloud.centre().y, &config.reference)?;
     // Anchored at the corner of the test grid: if the cells have the same size, nothing is interpolated.
-    let anchor = (test.geotransform.0[0], test.geotransform.0[3]);
-    let gridded = cloud.highest((cell_m / metres.0, cell_m / metres.1), anchor)?;
+    let anchor = MapPoint { x: test.geotransform.0[0], y: test.geotransform.0[3] };
+    let lattice = CellLattice { cell_x: cell_m / metres.0, cell_y: cell_m / metres.1, anchor };
+    let gridded = cloud.highest(lattice)?;
     let (dem, classes) = (gridded.dem, gridded.classes);
     let filled = dem.heights.data().iter().filter(|h| h.is_finite()).count();
     let share = filled as f64 / dem.heights.data().len().max(1) as f64;
