@@ -22,7 +22,7 @@ pub struct PriorModel {
 }
 
 impl PriorModel {
-    /// Prepares a mesh. `is_building` says per object of the model whether it belongs to a
+    /// Prepares a mesh. `is_building` holds per object of the model whether it belongs to a
     /// building. Other objects occlude what is behind them, and give no priors.
     ///
     /// # Errors

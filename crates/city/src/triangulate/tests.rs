@@ -97,7 +97,7 @@ fn uneven_polygons_are_measured() {
 }
 
 proptest! {
-    /// Star-shaped rings are simple: the triangles cover exactly the ring, whatever its corners.
+    /// A star-shaped ring does not intersect itself, so its triangles cover it exactly.
     #[test]
     fn star_polygons_are_covered(radii in prop::collection::vec(0.5f64..20.0, 3..60)) {
         let step = std::f64::consts::TAU / radii.len() as f64;
@@ -113,7 +113,7 @@ proptest! {
         prop_assert!((area - expected).abs() < 1e-9 * expected.max(1.0));
     }
 
-    /// Any corners whatever: no panic, and no more area than the corners' box.
+    /// Random rings cause no panic, and their triangles do not exceed the bounding box.
     #[test]
     fn any_rings_end(rings in prop::collection::vec(prop::collection::vec((0i32..12, 0i32..12), 0..14), 0..4)) {
         let rings: Vec<Vec<[f64; 2]>> = rings
@@ -127,8 +127,7 @@ proptest! {
 
 #[test]
 fn rings_of_many_crossings_are_given_up() {
-    // A walk that jumps about (a linear congruence), so that almost every edge crosses hundreds of
-    // others.
+    // A linear congruential walk, in which almost every edge crosses hundreds of others.
     let walk = |count: usize| -> Vec<[f64; 2]> {
         let place = |i: usize| ((i * 7_368_787 + 11) % 1_000_003) as f64 / 1000.0;
         (0..count).map(|i| [place(i), place(3 * i * i + 5)]).collect()

@@ -35,7 +35,7 @@ pub(super) fn principal_point_index(model: LensModel) -> usize {
     }
 }
 
-/// Tells whether an image name stays inside the folder of the images.
+/// Returns whether an image name stays inside the folder of the images.
 pub(crate) fn is_inside(name: &str) -> bool {
     let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     !name.is_empty() && inside && !name.contains(['\\', '\0'])

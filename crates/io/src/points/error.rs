@@ -19,7 +19,7 @@ pub enum PointsError {
     Damaged {
         /// Path of the file.
         path: PathBuf,
-        /// What was found.
+        /// What was found, and what was expected.
         reason: String,
     },
     /// No point is left.

@@ -107,18 +107,18 @@ fn position(model: &CityModel, vertex: u32) -> ModelPoint {
     model.vertices[vertex as usize]
 }
 
-/// The ground surfaces, or those that look down.
+/// Returns the ground surfaces, or if there are none, the surfaces that face down.
 fn bottom<'a>(model: &CityModel, surfaces: &[&'a SurfacePolygon]) -> Vec<&'a SurfacePolygon> {
     let ground = |surface: &&&SurfacePolygon| surface.class == SurfaceClass::Ground;
     let classed: Vec<&SurfacePolygon> = surfaces.iter().filter(ground).copied().collect();
     if !classed.is_empty() {
         return classed;
     }
-    surfaces.iter().filter(|surface| looks_down(model, surface)).copied().collect()
+    surfaces.iter().filter(|surface| faces_down(model, surface)).copied().collect()
 }
 
 /// Returns whether the outer ring is clockwise seen from above, and its slope is below 45 degrees.
-fn looks_down(model: &CityModel, surface: &SurfacePolygon) -> bool {
+fn faces_down(model: &CityModel, surface: &SurfacePolygon) -> bool {
     let Some(ring) = surface.rings.first().filter(|ring| ring.len() >= 3) else { return false };
     let origin = position(model, ring[0]);
     let at = |i: usize| position(model, ring[i % ring.len()]).from_origin(origin);
