@@ -39,7 +39,8 @@ pub(crate) struct Args {
     /// Coarse elevation model from which the heights to search are taken.
     #[arg(long, value_name = "FILE")]
     dem: Option<PathBuf>,
-    /// City model (CityJSON, CityGML) whose roofs are expected: they are searched and favoured, but the images decide.
+    /// City model (CityJSON, CityGML) whose roofs are expected: they are searched and favoured, but
+    /// the images decide.
     #[arg(long, value_name = "MODEL")]
     prior: Option<PathBuf>,
     /// What the DSM's heights are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
@@ -48,8 +49,9 @@ pub(crate) struct Args {
     /// Speed against accuracy.
     #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
     preset: PresetName,
-    /// Voids to close from the heights around them, marked in filled.tif: none, justified (narrow voids, voids behind buildings,
-    /// voids between known heights where the images have texture) or all within reach of known heights.
+    /// Voids to close from the heights around them, marked in filled.tif: none, justified (narrow
+    /// voids, voids behind buildings, voids between known heights where the images have texture) or
+    /// all within reach of known heights.
     #[arg(long, value_enum, default_value_t = FillName::Justified)]
     fill: FillName,
     /// Pairs of images to match, by position: 1-2,1-3 [default: all that are useful].
@@ -70,7 +72,8 @@ pub(crate) struct Args {
     /// Side of the chunks of a large scene, cells [default: as large as the memory allows].
     #[arg(long, value_name = "CELLS")]
     chunk: Option<usize>,
-    /// Side of the tiles that are fused at a time, cells; it changes the memory needed, never the result.
+    /// Side of the tiles that are fused at a time, cells; it changes the memory needed, never the
+    /// result.
     #[arg(long, value_name = "CELLS", default_value_t = 1024)]
     tile: usize,
     /// Replace existing results.
@@ -206,7 +209,11 @@ fn summary(args: &Args, report: &DsmReport) -> String {
     let share = |n: usize| 100.0 * n as f64 / s.cells.max(1) as f64;
     let seconds: f64 = report.stages.iter().map(|t| t.seconds).sum();
     format!(
-        "DSM        {}\ncells      {} ({:.1} % observed, {:.1} % filled, {:.1} % void)\npicture    {}\nreport     {}\ntime       {seconds:.1} s\n",
+        "DSM        {}\n\
+         cells      {} ({:.1} % observed, {:.1} % filled, {:.1} % void)\n\
+         picture    {}\n\
+         report     {}\n\
+         time       {seconds:.1} s\n",
         args.output.join("dsm/dsm.tif").display(),
         s.cells,
         share(s.observed),

@@ -1,5 +1,5 @@
-//! The stages of the DSM job are plain values: written, read back and continued in a fresh session they give the same bytes.
-//! A cancelled run leaves nothing.
+//! The stages of the DSM job are plain values: written, read back and continued in a fresh session
+//! they give the same bytes. A cancelled run leaves nothing.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -31,7 +31,8 @@ impl ImageCharacter {
         !self.noise.is_empty() && !self.has_contrast
     }
 
-    /// Gives a view of a part of the image the noise and contrast of the whole: the medians over the windows.
+    /// Gives a view of a part of the image the noise and contrast of the whole: the medians over
+    /// the windows.
     pub(crate) fn lend(&self, view: &mut SweepView) {
         if let Some(noise) = median(&self.noise) {
             view.noise = noise;

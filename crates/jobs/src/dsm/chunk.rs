@@ -14,7 +14,8 @@ use crate::dsm::session::{Muted, Session};
 use crate::dsm::surface::{SurfaceCounts, SurfaceInput, make_surface};
 use crate::dsm::values::HeightRange;
 
-/// Fourth stage of a run: the result of one chunk. [`ChunkResult::write`] and [`ChunkResult::read`] keep it in a folder.
+/// Fourth stage of a run: the result of one chunk. [`ChunkResult::write`] and [`ChunkResult::read`]
+/// keep it in a folder.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ChunkResult {
@@ -58,8 +59,8 @@ pub struct ChunkSurface {
 /// Computes the chunk with number `index` (counted from 0) of a plan.
 ///
 /// # Errors
-/// [`DsmError::NoSuchChunk`], [`DsmError::Image`], [`DsmError::Prior`], [`DsmError::Sweep`], [`DsmError::Crs`],
-/// [`DsmError::Cancelled`].
+/// [`DsmError::NoSuchChunk`], [`DsmError::Image`], [`DsmError::Prior`], [`DsmError::Sweep`],
+/// [`DsmError::Crs`], [`DsmError::Cancelled`].
 pub fn run_chunk(plan: &Plan, index: usize, session: &mut Session<'_>) -> Result<ChunkResult, DsmError> {
     session.progress.check_cancelled()?;
     let count = plan.chunks.len();
@@ -78,7 +79,8 @@ fn sweep_chunk(
     work: &ChunkSweep,
     session: &mut Session<'_>,
 ) -> Result<ChunkSurface, DsmError> {
-    // A scene that is computed at once shows its own stages. A chunk of several is one step of the caller's stage.
+    // A scene that is computed at once shows its own stages. A chunk of several is one step of the
+    // caller's stage.
     let is_whole = plan.chunk_side.is_none();
     let watcher = session.progress;
     let muted = Muted(watcher);

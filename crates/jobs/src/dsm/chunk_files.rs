@@ -1,7 +1,9 @@
-//! The result of a chunk as a folder: `result.json` with the counts, and one NumPy array per raster.
+//! The result of a chunk as a folder: `result.json` with the counts, and one NumPy array per
+//! raster.
 //!
-//! Arrays keep the heights as they are, relative to their origin and with NaN in voids, so that a result that was written and
-//! read back gives the same DSM. The folder is made beside its place and renamed, so that it is complete under its name.
+//! Arrays keep the heights as they are, relative to their origin and with NaN in voids, so that a
+//! result that was written and read back gives the same DSM. The folder is made beside its place
+//! and renamed, so that it is complete under its name.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -86,7 +88,8 @@ impl ChunkResult {
     /// Reads a result that [`ChunkResult::write`] wrote.
     ///
     /// # Errors
-    /// [`DsmError::ChunkFile`] for a folder without a result, and for a result whose parts do not fit together.
+    /// [`DsmError::ChunkFile`] for a folder without a result, and for a result whose parts do not
+    /// fit together.
     pub fn read(folder: &Path) -> Result<Self, DsmError> {
         let path = folder.join(RECORD);
         let failed = |reason: String| DsmError::ChunkFile { path: path.clone(), reason };

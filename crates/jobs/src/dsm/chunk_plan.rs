@@ -1,12 +1,13 @@
 //! The division of a large scene into chunks, each with the pixels that show it.
 //!
-//! Pointing, grid, height step and sources are those of the whole scene, and so are each image's noise and contrast. The
-//! windows of a chunk begin on whole pixels of all the levels used, and its hypotheses lie on the scene's lattice. Neighbouring
-//! chunks therefore have the same heights in their overlap, but for what the paths of the aggregation bring from further away.
+//! Pointing, grid, height step and sources are those of the whole scene, and so are each image's
+//! noise and contrast. The windows of a chunk begin on whole pixels of all the levels used, and its
+//! hypotheses lie on the scene's lattice. Neighbouring chunks therefore have the same heights in
+//! their overlap, but for what the paths of the aggregation bring from further away.
 //!
-//! The heights of a chunk are found by a coarse sweep of it over all heights that the scene may have (see `probe`), towers
-//! included: a chunk in a plain does not pay for the mountains beside it. A chunk that would still take more memory than the
-//! run has is divided into quarters.
+//! The heights of a chunk are found by a coarse sweep of it over all heights that the scene may
+//! have (see `probe`), towers included: a chunk in a plain does not pay for the mountains beside
+//! it. A chunk that would still take more memory than the run has is divided into quarters.
 
 use crs::MapProjection;
 use numeric::Progress;
@@ -35,7 +36,8 @@ use crate::error_text::with_causes;
 const PART_MIN: usize = 64;
 /// Fewer sure pixels than this do not determine the heights of a chunk.
 const SURE_MIN: usize = 200;
-/// Searched beyond the sure heights of the coarse sweep, metres, or a tenth of their span: what the sweep does not resolve.
+/// Searched beyond the sure heights of the coarse sweep, metres, or a tenth of their span: what the
+/// sweep does not resolve.
 const MARGIN_M: f64 = 25.0;
 /// Bytes per pixel while a chunk is read for the coarse sweep: samples, grey values, flags.
 const BYTES_PER_COARSE_PIXEL: u64 = 14;
@@ -113,8 +115,8 @@ enum Planned {
 }
 
 impl ChunkPlanner<'_> {
-    /// Plans the chunks of the given cores, in their order. Cores that take too much memory are divided into quarters. A chunk
-    /// that cannot be planned stays void.
+    /// Plans the chunks of the given cores, in their order. Cores that take too much memory are
+    /// divided into quarters. A chunk that cannot be planned stays void.
     ///
     /// # Errors
     /// The first error when no chunk can be planned, [`DsmError::Cancelled`].
@@ -193,7 +195,8 @@ impl ChunkPlanner<'_> {
         self.images.iter().map(sees).collect()
     }
 
-    /// Returns all heights that something in the scene may have: those given, or those of the tie points with towers and pits.
+    /// Returns all heights that something in the scene may have: those given, or those of the tie
+    /// points with towers and pits.
     fn wide_range(&self) -> HeightRange {
         if self.config.height_range_m.is_some() {
             return self.range;
@@ -215,7 +218,8 @@ impl ChunkPlanner<'_> {
         self.images.iter().zip(seen).map(one).collect()
     }
 
-    /// Returns the heights of a chunk, from a coarse sweep over all heights that the scene may have.
+    /// Returns the heights of a chunk, from a coarse sweep over all heights that the scene may
+    /// have.
     fn heights(&self, windows: &[Option<Window>], sources: &[Vec<usize>]) -> Result<HeightRange, DsmError> {
         let wide = self.wide_range();
         let side = windows.iter().flatten().map(|w| w.width.min(w.height)).min().unwrap_or(0);
@@ -241,8 +245,8 @@ impl ChunkPlanner<'_> {
     }
 }
 
-/// Reads views of windows by `read`, with the noise and contrast of their images. An image without a window gives an absent
-/// view.
+/// Reads views of windows by `read`, with the noise and contrast of their images. An image without
+/// a window gives an absent view.
 ///
 /// # Errors
 /// Those of `read`.

@@ -1,6 +1,7 @@
 //! Side and layout of the chunks of a large scene.
 //!
-//! A chunk has a core, which is kept, and a rim of ground around it, as wide as what decides the content of a cell.
+//! A chunk has a core, which is kept, and a rim of ground around it, as wide as what decides the
+//! content of a cell.
 
 use raster::Window;
 
@@ -17,16 +18,18 @@ use crate::dsm::values::HeightRange;
 const SIDE_MAX: usize = 8192;
 /// Least side of a chunk, cells: smaller ones are mostly rim.
 pub(crate) const SIDE_MIN: usize = 256;
-/// Pixels read around what shows a chunk with its rim. Patches and the aggregation reach out, and what stands beyond the rim
-/// is only looked at from the core.
+/// Pixels read around what shows a chunk with its rim. Patches and the aggregation reach out, and
+/// what stands beyond the rim is only looked at from the core.
 pub(crate) const MARGIN_PX: usize = 32;
 /// Windows begin and end on multiples of this, pixels: whole pixels of seven levels.
 pub(crate) const ALIGNED: i64 = 64;
 
-/// Returns the largest side of a chunk that the memory allows, cells, when its heights lie in `range`.
+/// Returns the largest side of a chunk that the memory allows, cells, when its heights lie in
+/// `range`.
 ///
 /// # Errors
-/// [`DsmError::Memory`] when the memory allows none, [`DsmError::Camera`] and [`DsmError::Crs`] in the middle of the grid.
+/// [`DsmError::Memory`] when the memory allows none, [`DsmError::Camera`] and [`DsmError::Crs`] in
+/// the middle of the grid.
 pub(crate) fn choose_side(
     config: &DsmConfig,
     images: &[SceneImage],
@@ -74,7 +77,8 @@ fn rim(config: &DsmConfig, grid: &DsmGrid) -> usize {
     (surroundings_m(config.fill) / grid.gsd_m).ceil() as usize
 }
 
-/// Returns cores of about equal size that cover the grid, row after row. They are at most `side` cells wide and high.
+/// Returns cores of about equal size that cover the grid, row after row. They are at most `side`
+/// cells wide and high.
 pub(crate) fn cores(size: (usize, usize), side: usize) -> Vec<Window> {
     let cuts = |length: usize| {
         let n = length.div_ceil(side).max(1);

@@ -56,7 +56,8 @@ impl CityPrior {
         notes.choose("prior", format!("{} buildings' surfaces", self.surfaces), path.to_string());
     }
 
-    /// Renders the model into every view; `None` for a view that does not see it. `gsd_m` is a pixel on the ground.
+    /// Renders the model into every view; `None` for a view that does not see it. `gsd_m` is a
+    /// pixel on the ground.
     ///
     /// # Errors
     /// [`DsmError::Prior`] for an image that is too large for maps.

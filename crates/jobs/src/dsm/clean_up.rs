@@ -1,4 +1,5 @@
-//! Clean-up of a fused surface: speckle is removed, voids are filled, and the confidence is computed.
+//! Clean-up of a fused surface: speckle is removed, voids are filled, and the confidence is
+//! computed.
 //!
 //! Lengths are in metres, so that a result does not depend on the cell size more than it must.
 
@@ -7,20 +8,24 @@ use sweep::fusion::{FillConfig, FusedSurface, fill_voids, reliability, remove_sp
 
 use crate::dsm::config::Fill;
 
-/// Isolated patches of less ground than a square of this side are speckle, metres: smaller than a house.
+/// Isolated patches of less ground than a square of this side are speckle, metres: smaller than a
+/// house.
 const SPECKLE_SIDE_M: f64 = 5.0;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
 const SPECKLE_CELLS_MIN: usize = 9;
 /// Distance at which heights around a void are looked for, metres: the shadow side of a tower.
 const FILL_REACH_M: f64 = 40.0;
-/// Distance at which heights around a void are looked for where every void is to be closed, metres: the middle of a pond or
-/// of a hall.
+/// Distance at which heights around a void are looked for where every void is to be closed, metres:
+/// the middle of a pond or of a hall.
 const FILL_REACH_ALL_M: f64 = 60.0;
-/// Voids up to this wide are closed, whatever the images show there, metres: the shadow side of a house.
+/// Voids up to this wide are closed, whatever the images show there, metres: the shadow side of a
+/// house.
 const FILL_NARROW_M: f64 = 10.0;
-/// A surface hides what is this many times its height away: views lean by up to 30°, and shadows reach further.
+/// A surface hides what is this many times its height away: views lean by up to 30°, and shadows
+/// reach further.
 const FILL_HIDDEN: f64 = 1.0;
-/// Heights around a void that differ by more than this per metre between them are two surfaces: steeper than streets.
+/// Heights around a void that differ by more than this per metre between them are two surfaces:
+/// steeper than streets.
 const FILL_SLOPE: f64 = 0.05;
 
 /// Number of cells after each step of the clean-up.
@@ -32,8 +37,8 @@ pub(crate) struct Cleaned {
     pub(crate) speckle_removed: usize,
 }
 
-/// Returns the width of the ground around a cell that decides its content, metres: speckle is judged, then voids are filled
-/// from this far.
+/// Returns the width of the ground around a cell that decides its content, metres: speckle is
+/// judged, then voids are filled from this far.
 pub(crate) fn surroundings_m(fill: Fill) -> f64 {
     fill_reach_m(fill).unwrap_or(0.0) + 2.0 * SPECKLE_SIDE_M
 }
@@ -49,7 +54,8 @@ fn fill_reach_m(fill: Fill) -> Option<f64> {
 
 /// Cleans a surface on cells of `gsd_m`; returns the mask of filled cells and the counts of `core`.
 ///
-/// `step_m` is the distance of two hypotheses. `blind` marks the cells where the images have no texture.
+/// `step_m` is the distance of two hypotheses. `blind` marks the cells where the images have no
+/// texture.
 pub(crate) fn clean_up(
     fused: &mut FusedSurface,
     blind: &Grid<bool>,

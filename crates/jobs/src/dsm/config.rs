@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::values::{HeightRange, ImagePair, MapBounds};
 
-/// Heights of the Earth's surface above the ellipsoid: the shore of the Dead Sea and Everest, rounded outward.
+/// Heights of the Earth's surface above the ellipsoid: the shore of the Dead Sea and Everest,
+/// rounded outward.
 pub(crate) const EARTH_RANGE: HeightRange = HeightRange::new(-500.0, 9000.0);
 /// Smaller output tiles and chunks cost more to manage than to fill, cells.
 const SIDE_MIN: usize = 64;
@@ -28,17 +29,19 @@ pub enum Preset {
     Accurate,
 }
 
-/// Choice of the voids that are closed from the heights around them. Closed cells are always marked.
+/// Choice of the voids that are closed from the heights around them. Closed cells are always
+/// marked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fill {
     /// No void: every written height was observed.
     None,
-    /// Narrow voids, voids that a surface beside them hides, and voids between known heights where the images have texture.
+    /// Narrow voids, voids that a surface beside them hides, and voids between known heights where
+    /// the images have texture.
     #[default]
     Justified,
-    /// All voids within reach of known heights, whatever caused them: water, saturated roofs, the border of the area
-    /// that two views see.
+    /// All voids within reach of known heights, whatever caused them: water, saturated roofs, the
+    /// border of the area that two views see.
     All,
 }
 
@@ -52,7 +55,8 @@ pub enum Fill {
 /// config.gsd_m = Some(-0.5);
 /// let refused = config.validate().unwrap_err();
 /// assert!(matches!(refused, DsmError::Value { setting: DsmSetting::CellSize, .. }));
-/// assert_eq!(refused.to_string(), "the cell size is -0.5, expected a positive cell size in metres");
+/// let text = "the cell size is -0.5, expected a positive cell size in metres";
+/// assert_eq!(refused.to_string(), text);
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -96,7 +100,8 @@ pub struct DsmConfig {
     pub memory_mb: Option<u64>,
     /// Side of the chunks of a large scene, cells; as large as the memory allows when `None`.
     pub chunk: Option<usize>,
-    /// Side of the output tiles that are fused at a time, cells. It changes the memory needed, never the result.
+    /// Side of the output tiles that are fused at a time, cells. It changes the memory needed,
+    /// never the result.
     #[serde(default = "default_tile")]
     pub tile: usize,
     /// Whether existing results may be replaced.
@@ -113,7 +118,8 @@ const fn default_tile() -> usize {
 }
 
 impl DsmConfig {
-    /// Makes the configuration of a run that chooses everything but the images and the output folder by itself.
+    /// Makes the configuration of a run that chooses everything but the images and the output
+    /// folder by itself.
     pub fn new(images: Vec<PathBuf>, output: PathBuf) -> Self {
         Self {
             images,
@@ -141,7 +147,8 @@ impl DsmConfig {
     /// Checks everything that can be wrong before a file is opened.
     ///
     /// # Errors
-    /// [`DsmError::TooFewImages`], [`DsmError::SameImage`], and [`DsmError::Value`] with the setting that is wrong.
+    /// [`DsmError::TooFewImages`], [`DsmError::SameImage`], and [`DsmError::Value`] with the
+    /// setting that is wrong.
     pub fn validate(&self) -> Result<(), DsmError> {
         if self.images.len() < 2 {
             return Err(DsmError::TooFewImages { found: self.images.len() });

@@ -9,12 +9,15 @@ use crate::dsm::footprints::shared_ground;
 use crate::dsm::values::{HeightRange, MapBounds};
 use crate::dsm::view_geometry::ViewGeometry;
 
-/// Returns the least and greatest height of an elevation model over the ground that the images share.
+/// Returns the least and greatest height of an elevation model over the ground that the images
+/// share.
 ///
-/// The vertical datum is that of the file. A file without one is taken as EGM96, as SRTM and most others are.
+/// The vertical datum is that of the file. A file without one is taken as EGM96, as SRTM and most
+/// others are.
 ///
 /// # Errors
-/// [`DsmError::Value`] for a file without CRS or without heights under the scene, [`DsmError::Image`], [`DsmError::Crs`].
+/// [`DsmError::Value`] for a file without CRS or without heights under the scene,
+/// [`DsmError::Image`], [`DsmError::Crs`].
 pub(crate) fn dem_heights(path: &Path, geometry: &ViewGeometry) -> Result<HeightRange, DsmError> {
     let dem = io::raster::read_dem(path)?;
     let no_crs = || {

@@ -89,7 +89,8 @@ pub enum DsmError {
     },
     /// No two images share ground.
     #[error(
-        "the images share no ground (largest overlap {share_percent:.1} % of an image); check that the RPCs belong to the images"
+        "the images share no ground (largest overlap {share_percent:.1} % of an image); \
+         check that the RPCs belong to the images"
     )]
     NoOverlap {
         /// Largest overlap found, percent of the smaller footprint.
@@ -97,8 +98,8 @@ pub enum DsmError {
     },
     /// No two overlapping images look from different directions.
     #[error(
-        "no parallax: the overlapping images look along the same line (largest angle {angle_deg:.2}°, needed {needed_deg}°); \
-         add an image from another direction"
+        "no parallax: the overlapping images look along the same line \
+         (largest angle {angle_deg:.2}°, needed {needed_deg}°); add an image from another direction"
     )]
     NoParallax {
         /// Largest intersection angle found, degrees.
@@ -114,7 +115,8 @@ pub enum DsmError {
     },
     /// Two images have the same pixels and different RPCs.
     #[error(
-        "no parallax: two images have the same pixels; remove one, or give the image that its RPC belongs to: {} and {}",
+        "no parallax: two images have the same pixels; \
+         remove one, or give the image that its RPC belongs to: {} and {}",
         first.display(), second.display()
     )]
     SamePixels {
@@ -136,7 +138,8 @@ pub enum DsmError {
     },
     /// The given height range misses the scene.
     #[error(
-        "the height range {} to {} m misses the scene, whose tie points lie between {:.0} and {:.0} m above the ellipsoid; \
+        "the height range {} to {} m misses the scene, \
+         whose tie points lie between {:.0} and {:.0} m above the ellipsoid; \
          leave the height range out, or give heights above the ellipsoid",
         asked.low_m, asked.high_m, seen.low_m, seen.high_m
     )]
@@ -180,7 +183,8 @@ pub enum DsmError {
     },
     /// The smallest piece of work needs more memory than the limit.
     #[error(
-        "the run needs about {needed_mb} MB and the limit is {limit_mb} MB; raise the memory limit or give smaller bounds"
+        "the run needs about {needed_mb} MB and the limit is {limit_mb} MB; \
+         raise the memory limit or give smaller bounds"
     )]
     Memory {
         /// Estimated need, megabytes.

@@ -37,7 +37,8 @@ pub(crate) fn overlap_share(a: &Polygon<f64>, b: &Polygon<f64>) -> f64 {
     if smaller > 0.0 { a.intersection(b).unsigned_area() / smaller } else { 0.0 }
 }
 
-/// Returns the convex hull of the ground that at least two of the outlines share; `None` where no two meet.
+/// Returns the convex hull of the ground that at least two of the outlines share; `None` where no
+/// two meet.
 pub(crate) fn shared_ground(outlines: &[Polygon<f64>]) -> Option<Polygon<f64>> {
     let mut points: Vec<Point<f64>> = Vec::new();
     for (i, a) in outlines.iter().enumerate() {

@@ -63,11 +63,12 @@ impl DsmGrid {
     }
 }
 
-/// Chooses CRS, cell size and extent where they are not given. `coarsest_gsd_m` is the pixel of the coarsest image.
+/// Chooses CRS, cell size and extent where they are not given. `coarsest_gsd_m` is the pixel of the
+/// coarsest image.
 ///
 /// # Errors
-/// [`DsmError::Value`] for a CRS that is not in metres and for a grid of too many cells, [`DsmError::BoundsMissScene`],
-/// [`DsmError::Crs`].
+/// [`DsmError::Value`] for a CRS that is not in metres and for a grid of too many cells,
+/// [`DsmError::BoundsMissScene`], [`DsmError::Crs`].
 pub(crate) fn choose_grid(
     config: &DsmConfig,
     geometry: &ViewGeometry,
@@ -126,7 +127,8 @@ fn covered_bounds(geometry: &ViewGeometry, projection: &MapProjection) -> Result
     Ok(bounds)
 }
 
-/// Returns a north-up grid on whole multiples of the cell size that holds the bounds: its geotransform, columns and rows.
+/// Returns a north-up grid on whole multiples of the cell size that holds the bounds: its
+/// geotransform, columns and rows.
 fn snapped(b: MapBounds, gsd_m: f64) -> Result<(GeoTransform, (usize, usize)), DsmError> {
     let down = |v: f64| (v / gsd_m).floor() * gsd_m;
     // Slightly inside, so that bounds on the lattice do not gain a cell by rounding.

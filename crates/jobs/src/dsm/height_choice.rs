@@ -7,21 +7,24 @@ use crate::dsm::point::Pointed;
 use crate::dsm::ties::TIES_MIN;
 use crate::dsm::values::HeightRange;
 
-/// Searched below the lowest tie point at least, metres: tie points seldom lie at the bottom of a pit or courtyard.
+/// Searched below the lowest tie point at least, metres: tie points seldom lie at the bottom of a
+/// pit or courtyard.
 const MARGIN_BELOW_M: f64 = 20.0;
-/// Searched above the highest tie point at least, metres: tie points seldom lie on top of a mast or tower.
+/// Searched above the highest tie point at least, metres: tie points seldom lie on top of a mast or
+/// tower.
 const MARGIN_ABOVE_M: f64 = 60.0;
-/// A given range is searched below the lowest tie point by no more than this and the span of the tie points, metres.
+/// A given range is searched below the lowest tie point by no more than this and the span of the
+/// tie points, metres.
 const FAR_BELOW_M: f64 = 100.0;
-/// A given range is searched above the highest tie point by no more than this and the span of the tie points, metres. No
-/// building is taller than twice this.
+/// A given range is searched above the highest tie point by no more than this and the span of the
+/// tie points, metres. No building is taller than twice this.
 const FAR_ABOVE_M: f64 = 500.0;
 
 /// Chooses the heights to search.
 ///
 /// # Errors
-/// [`DsmError::RangeMissesScene`], [`DsmError::NoTies`], and [`DsmError::Value`] for an elevation model with heights that
-/// are not on Earth.
+/// [`DsmError::RangeMissesScene`], [`DsmError::NoTies`], and [`DsmError::Value`] for an elevation
+/// model with heights that are not on Earth.
 pub(crate) fn choose_heights(
     config: &DsmConfig,
     pointed: &Pointed,
@@ -63,8 +66,8 @@ fn given_heights(
     }
     if seen.low_m < given.low_m || seen.high_m > given.high_m {
         notes.warn(format!(
-            "the height range {} to {} m cuts the scene, whose tie points lie between {:.0} and {:.0} m above the ellipsoid: \
-             what is outside stays void",
+            "the height range {} to {} m cuts the scene, \
+             whose tie points lie between {:.0} and {:.0} m above the ellipsoid: what is outside stays void",
             given.low_m, given.high_m, seen.low_m, seen.high_m
         ));
     }
@@ -77,8 +80,9 @@ fn given_heights(
 
 /// Returns the heights to search for a given range when tie points lie in `seen`.
 ///
-/// Heights with tie points outside the given range are searched too. Their pixels are then recognised and left out,
-/// instead of getting a false height inside the range. Heights kilometres from every tie point are not searched.
+/// Heights with tie points outside the given range are searched too. Their pixels are then
+/// recognised and left out, instead of getting a false height inside the range. Heights kilometres
+/// from every tie point are not searched.
 fn searched(given: HeightRange, seen: HeightRange) -> HeightRange {
     let near = with_margins(seen);
     let span = seen.high_m - seen.low_m;
@@ -94,7 +98,8 @@ fn with_margins(seen: HeightRange) -> HeightRange {
     seen.grown(tenth.max(MARGIN_BELOW_M), tenth.max(MARGIN_ABOVE_M))
 }
 
-/// Returns the height at which footprints and angles are taken: the middle of the tie points' heights, or else of the range.
+/// Returns the height at which footprints and angles are taken: the middle of the tie points'
+/// heights, or else of the range.
 pub(crate) fn middle_height_m(tie_heights: Option<HeightRange>, range: HeightRange) -> f64 {
     tie_heights.unwrap_or(range).middle_m().clamp(range.low_m, range.high_m)
 }

@@ -1,5 +1,5 @@
-//! What the tie points show about the images themselves: an image that does not belong to the others, two images that are
-//! one picture, an image whose pointing is grossly off.
+//! What the tie points show about the images themselves: an image that does not belong to the
+//! others, two images that are one picture, an image whose pointing is grossly off.
 
 use camera::{ImageCorrection, ImagePoint};
 use sweep::pointing::Tie;
@@ -9,11 +9,12 @@ use crate::dsm::values::ImagePair;
 
 /// Two different pictures of ground with any relief do not agree to this at all tie points, pixels.
 const SAME_PX: f64 = 0.1;
-/// A pointing error larger than this is gross, pixels: twice the deviation that the adjustment expects.
+/// A pointing error larger than this is gross, pixels: twice the deviation that the adjustment
+/// expects.
 const GROSS_PX: f64 = 20.0;
 
-/// Returns the views that tie points do not connect with most of the others; none when all are connected. The pointing of
-/// such a view is not known. [`TIES_MIN`] ties make a connection.
+/// Returns the views that tie points do not connect with most of the others; none when all are
+/// connected. The pointing of such a view is not known. [`TIES_MIN`] ties make a connection.
 pub(crate) fn unconnected(views: usize, ties: &[PairTies]) -> Vec<usize> {
     let mut group: Vec<usize> = (0..views).collect();
     for t in ties.iter().filter(|t| t.ties.len() >= TIES_MIN) {
@@ -26,8 +27,8 @@ pub(crate) fn unconnected(views: usize, ties: &[PairTies]) -> Vec<usize> {
     if size(largest) < 2 { Vec::new() } else { (0..views).filter(|&v| group[v] != largest).collect() }
 }
 
-/// Finds a pair whose ties lie at the same pixel of both images: one picture with two RPCs. `origins` are the first pixels
-/// of the parts of the images in which the ties were found.
+/// Finds a pair whose ties lie at the same pixel of both images: one picture with two RPCs.
+/// `origins` are the first pixels of the parts of the images in which the ties were found.
 pub(crate) fn same_picture(ties: &[PairTies], origins: &[ImagePoint]) -> Option<ImagePair> {
     let same = |t: &PairTies| {
         let (a, b) = (origins[t.pair.first], origins[t.pair.second]);
@@ -42,8 +43,8 @@ pub(crate) fn same_picture(ties: &[PairTies], origins: &[ImagePoint]) -> Option<
     ties.iter().find(|t| same(t)).map(|t| t.pair)
 }
 
-/// Returns the views whose corrections are further from those of every other view than pointing errors go, with the
-/// distance to the nearest one in pixels.
+/// Returns the views whose corrections are further from those of every other view than pointing
+/// errors go, with the distance to the nearest one in pixels.
 pub(crate) fn grossly_off(corrections: &[ImageCorrection]) -> Vec<(usize, f64)> {
     let shift = |i: usize| corrections[i].translation_px;
     let apart = |i: usize, j: usize| (shift(i)[0] - shift(j)[0]).hypot(shift(i)[1] - shift(j)[1]);

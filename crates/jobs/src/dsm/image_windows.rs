@@ -10,10 +10,12 @@ use crate::dsm::grid::DsmGrid;
 use crate::dsm::images::SceneImage;
 use crate::dsm::values::HeightRange;
 
-/// No image reaches further than this, pixels. Far outside its image a camera may return any position.
+/// No image reaches further than this, pixels. Far outside its image a camera may return any
+/// position.
 const FARTHEST_PX: f64 = 1e9;
 
-/// Part of the grid on the ground: its corners in longitude and latitude, and the heights that it may have.
+/// Part of the grid on the ground: its corners in longitude and latitude, and the heights that it
+/// may have.
 ///
 /// The corners are projected once, because a part is looked at in every image.
 pub(crate) struct GroundBox {
@@ -62,7 +64,8 @@ impl GroundBox {
         Ok(wanted.grown(margin))
     }
 
-    /// Returns the part of [`GroundBox::span_in`] that lies inside the image; `None` when the image does not see the box.
+    /// Returns the part of [`GroundBox::span_in`] that lies inside the image; `None` when the image
+    /// does not see the box.
     ///
     /// # Errors
     /// As [`GroundBox::span_in`].

@@ -42,8 +42,8 @@ pub struct SceneImage {
 
 /// A part of an image with its camera.
 ///
-/// The camera is kept beside that of the whole image because moving a camera from one frame to another and back changes
-/// its last bits.
+/// The camera is kept beside that of the whole image because moving a camera from one frame to
+/// another and back changes its last bits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -72,7 +72,8 @@ impl SceneImage {
 /// Opens the images of a run and finds their RPCs.
 ///
 /// # Errors
-/// [`DsmError::Image`] for a file that is no image, [`DsmError::Rpc`] for an image without a usable RPC.
+/// [`DsmError::Image`] for a file that is no image, [`DsmError::Rpc`] for an image without a usable
+/// RPC.
 pub fn open(config: &DsmConfig) -> Result<Opened, DsmError> {
     let images = config.images.iter().map(|path| open_one(path)).collect::<Result<_, _>>()?;
     Ok(Opened { images })
@@ -98,8 +99,8 @@ pub(crate) fn read_view(image: &SceneImage, window: Window) -> Result<SweepView,
     Ok(SweepView::new(image.camera_of(window), pixels))
 }
 
-/// Reads one pyramid level of a window, whose first pixel must be the corner of a pixel of that level. The camera of the
-/// view is that of the window at full resolution.
+/// Reads one pyramid level of a window, whose first pixel must be the corner of a pixel of that
+/// level. The camera of the view is that of the window at full resolution.
 pub(crate) fn read_coarse_view(image: &SceneImage, window: Window, level: usize) -> Result<SweepView, DsmError> {
     let source = io::raster::ImageSource::open(&image.path)?;
     let mut pixels = source.read_luma(window)?.luma;
@@ -110,7 +111,8 @@ pub(crate) fn read_coarse_view(image: &SceneImage, window: Window, level: usize)
     Ok(SweepView::from_level(image.camera_of(window), level, pixels))
 }
 
-/// Reads one window per image (`None` is the whole image), in parallel. `done` is called after each image.
+/// Reads one window per image (`None` is the whole image), in parallel. `done` is called after each
+/// image.
 pub(crate) fn read_views(
     images: &[SceneImage],
     windows: &[Option<Window>],
@@ -124,8 +126,8 @@ pub(crate) fn read_views(
     images.par_iter().zip(windows).map(read).collect()
 }
 
-/// Sets squares of zeros to NaN. They are voids that the file does not declare, and would be compared with what the other
-/// views see.
+/// Sets squares of zeros to NaN. They are voids that the file does not declare, and would be
+/// compared with what the other views see.
 fn mask_black(image: &mut Grid<f32>) {
     let (w, h) = (image.width(), image.height());
     let mut runs = vec![0usize; w];

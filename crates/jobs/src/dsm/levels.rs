@@ -7,12 +7,14 @@ use crate::dsm::notes::Notes;
 use crate::dsm::tuning::SweepTuning;
 use crate::dsm::values::HeightRange;
 
-/// The coarsest level is chosen so that the height range is at most this many of its steps. The full range is then
-/// searched where that is cheap, and still at several pixels per building.
+/// The coarsest level is chosen so that the height range is at most this many of its steps. The
+/// full range is then searched where that is cheap, and still at several pixels per building.
 const TOP_HYPOTHESES: f64 = 64.0;
-/// The coarsest level keeps at least this many pixels on a side, or its aggregation has nothing to work with.
+/// The coarsest level keeps at least this many pixels on a side, or its aggregation has nothing to
+/// work with.
 const TOP_SIDE_MIN: usize = 48;
-/// The pyramid of a view stops before a side falls below this, pixels; see [`sweep::SweepView::new`].
+/// The pyramid of a view stops before a side falls below this, pixels; see
+/// [`sweep::SweepView::new`].
 const PYRAMID_SIDE_MIN: usize = 32;
 /// Number of levels at which the pyramid of a view stops.
 const PYRAMID_LEVELS_MAX: usize = 16;
@@ -39,7 +41,8 @@ impl SweepLevels {
     }
 }
 
-/// Returns the distance of two hypotheses at full resolution, metres. `widest` is the largest parallax, pixels per metre.
+/// Returns the distance of two hypotheses at full resolution, metres. `widest` is the largest
+/// parallax, pixels per metre.
 pub(crate) fn height_step_m(widest: f64, tuning: &SweepTuning) -> f64 {
     tuning.step_px / widest.max(f64::MIN_POSITIVE)
 }
@@ -53,7 +56,8 @@ pub(crate) fn note_step(widest: f64, tuning: &SweepTuning, notes: &mut Notes<'_>
     );
 }
 
-/// Chooses the levels of a sweep of views. `sides` are the shortest sides of the views' levels, see [`smallest_sides`].
+/// Chooses the levels of a sweep of views. `sides` are the shortest sides of the views' levels, see
+/// [`smallest_sides`].
 pub(crate) fn choose_levels(range: HeightRange, step_m: f64, sides: &[usize], tuning: &SweepTuning) -> SweepLevels {
     let deepest = sides.iter().filter(|s| **s >= TOP_SIDE_MIN).count().saturating_sub(1);
     let too_many = |level: &usize| range.span_m() / (step_m * f64::from(1u32 << *level)) > TOP_HYPOTHESES;
@@ -71,7 +75,8 @@ pub(crate) fn note_levels(levels: SweepLevels, range: HeightRange, step_m: f64, 
     );
 }
 
-/// Returns, for each pyramid level that the views of all windows have, the shortest side of any of them, pixels.
+/// Returns, for each pyramid level that the views of all windows have, the shortest side of any of
+/// them, pixels.
 ///
 /// The sizes follow from those of the windows, so that a plan can be made without the pixels.
 pub(crate) fn smallest_sides<'a>(windows: impl IntoIterator<Item = &'a Window>) -> Vec<usize> {

@@ -1,7 +1,8 @@
-//! The first look at a scene of which only the RPCs are known: the pixels, when they fit the memory, and tie points.
+//! The first look at a scene of which only the RPCs are known: the pixels, when they fit the
+//! memory, and tie points.
 //!
-//! The search begins at the heights for which the RPCs state that they are made. Where that gives no ties, it is repeated at all
-//! heights at which the images share ground, see [`SharedHeights`].
+//! The search begins at the heights for which the RPCs state that they are made. Where that gives
+//! no ties, it is repeated at all heights at which the images share ground, see [`SharedHeights`].
 
 use camera::RpcCamera;
 use raster::Window;
@@ -22,7 +23,8 @@ use crate::dsm::ties::{PairTies, TIES_MIN, match_pairs};
 use crate::dsm::values::{HeightRange, ImagePair};
 use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
 
-/// Pixels read around what the bounds show, at full resolution: patches, aggregation and pointing errors reach out.
+/// Pixels read around what the bounds show, at full resolution: patches, aggregation and pointing
+/// errors reach out.
 const WINDOW_MARGIN: usize = 96;
 
 /// What is known before the pointing is corrected.
@@ -53,8 +55,9 @@ impl FirstLook {
 /// Reads the images and matches them.
 ///
 /// # Errors
-/// Those of the geometry ([`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Camera`]), of the request
-/// ([`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`]), [`DsmError::Image`], [`DsmError::Cancelled`].
+/// Those of the geometry ([`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Camera`]),
+/// of the request ([`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`]),
+/// [`DsmError::Image`], [`DsmError::Cancelled`].
 pub(crate) fn look(
     config: &DsmConfig,
     images: &[SceneImage],
@@ -77,7 +80,8 @@ pub(crate) fn look(
     if has_ties(&again) || matches!(again, Err(DsmError::Cancelled)) {
         return again;
     }
-    // The first error is the better explanation, because the scene should be where the RPCs are valid.
+    // The first error is the better explanation, because the scene should be where the RPCs are
+    // valid.
     session.views = views;
     looked
 }
@@ -132,7 +136,8 @@ fn look_at(
     Ok(looked)
 }
 
-/// Returns whether the scene may be computed at once: it fits the memory, and smaller chunks are not asked for.
+/// Returns whether the scene may be computed at once: it fits the memory, and smaller chunks are
+/// not asked for.
 fn fits(config: &DsmConfig, images: &[SceneImage], windows: &[Option<Window>], grid: &DsmGrid) -> bool {
     let pixels = images.iter().zip(windows).map(|(image, window)| memory::area(&window.unwrap_or(image.whole())));
     let pixels: Vec<u64> = pixels.collect();
@@ -161,7 +166,8 @@ pub(crate) fn pair_names(pairs: &[ImagePair]) -> String {
     pairs.iter().map(ImagePair::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the part of each image to read: what the bounds may need, or the whole image (`None`) without bounds.
+/// Returns the part of each image to read: what the bounds may need, or the whole image (`None`)
+/// without bounds.
 fn windows(
     config: &DsmConfig,
     images: &[SceneImage],

@@ -123,8 +123,9 @@ impl<'a> Merger<'a> {
     /// Writes the files. `times` are the wall times of the stages.
     ///
     /// # Errors
-    /// [`DsmError::NoSurface`], or the error of the first chunk that failed, when no cell has an observed height;
-    /// [`DsmError::Output`], [`DsmError::Image`], [`DsmError::Crs`], [`DsmError::Cancelled`]. Nothing stays behind.
+    /// [`DsmError::NoSurface`], or the error of the first chunk that failed, when no cell has an
+    /// observed height; [`DsmError::Output`], [`DsmError::Image`], [`DsmError::Crs`],
+    /// [`DsmError::Cancelled`]. Nothing stays behind.
     pub(crate) fn finish(mut self, times: &[StageTime]) -> Result<Product, DsmError> {
         self.progress.check_cancelled()?;
         let plan = self.plan;
@@ -164,9 +165,10 @@ impl<'a> Merger<'a> {
 /// Merges the results of all chunks of a plan, in any order, and writes the files of the run.
 ///
 /// # Errors
-/// [`DsmError::ChunksMissing`] when a chunk has no result or more than one, the errors of `results`, [`DsmError::NoSurface`]
-/// when no cell has an observed height, [`DsmError::Exists`], [`DsmError::Output`], [`DsmError::Image`], [`DsmError::Crs`],
-/// [`DsmError::Cancelled`]. Nothing stays behind.
+/// [`DsmError::ChunksMissing`] when a chunk has no result or more than one, the errors of
+/// `results`, [`DsmError::NoSurface`] when no cell has an observed height, [`DsmError::Exists`],
+/// [`DsmError::Output`], [`DsmError::Image`], [`DsmError::Crs`], [`DsmError::Cancelled`]. Nothing
+/// stays behind.
 pub fn merge(
     plan: &Plan,
     results: impl IntoIterator<Item = Result<ChunkResult, DsmError>>,

@@ -1,24 +1,25 @@
 //! The DSM job: from satellite images with RPCs to a georeferenced surface model.
 //!
-//! [`run`] does everything. It is a chain of stages, each of which is a function from plain values to a plain value that can be
-//! written and read back:
+//! [`run`] does everything. It is a chain of stages, each of which is a function from plain values
+//! to a plain value that can be written and read back:
 //!
-//! | stage | value | holds |
-//! |---|---|---|
-//! | [`open`] | [`Opened`] | images, RPCs, sizes |
-//! | [`point()`](point()) | [`Pointed`] | corrected cameras, tie points, residuals, noise and contrast of the images |
-//! | [`plan()`](plan()) | [`Plan`] | grid, chunks with windows, sources, height ranges and levels, choices with reasons |
-//! | [`run_chunk`] | [`ChunkResult`] | rasters and counts of one chunk |
-//! | [`merge()`](merge()) | [`Product`] | files and report |
+//! - [`open`] gives [`Opened`]: images, RPCs, sizes.
+//! - [`point()`](point()) gives [`Pointed`]: corrected cameras, tie points, residuals, noise and
+//!   contrast of the images.
+//! - [`plan()`](plan()) gives [`Plan`]: grid, chunks with their windows, sources, height ranges and
+//!   levels, choices with reasons.
+//! - [`run_chunk`] gives [`ChunkResult`]: rasters and counts of one chunk.
+//! - [`merge()`](merge()) gives [`Product`]: files and report.
 //!
-//! A scene that fits the memory is a plan of one chunk. A [`Session`] goes along beside the values and keeps what was read, so
-//! that a whole run in one process reads each pixel once. The stages use the current rayon thread pool; [`run`] makes one
-//! with the configured number of threads.
+//! A scene that fits the memory is a plan of one chunk. A [`Session`] goes along beside the values
+//! and keeps what was read, so that a whole run in one process reads each pixel once. The stages
+//! use the current rayon thread pool; [`run`] makes one with the configured number of threads.
 //!
 //! A plan, and the result of a chunk, may go to another process:
 //!
 //! ```
-//! use jobs::dsm::{ChunkResult, DsmConfig, HeightRange, Plan, Preset, Session, merge, open, plan, point, run_chunk};
+//! use jobs::dsm::{ChunkResult, DsmConfig, HeightRange, Plan, Preset, Session};
+//! use jobs::dsm::{merge, open, plan, point, run_chunk};
 //! use numeric::Silent;
 //!
 //! let town = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town");

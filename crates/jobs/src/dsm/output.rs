@@ -1,7 +1,8 @@
-//! The files of a run. All are made in a work folder inside the output folder, then each is moved to its final name.
+//! The files of a run. All are made in a work folder inside the output folder, then each is moved
+//! to its final name.
 //!
-//! A scene that was computed at once is written from memory. The chunks of a large scene go into spools on the disk as they
-//! come, and its pictures are reduced to a size that can be looked at.
+//! A scene that was computed at once is written from memory. The chunks of a large scene go into
+//! spools on the disk as they come, and its pictures are reduced to a size that can be looked at.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +17,8 @@ use crate::dsm::grid::DsmGrid;
 use crate::dsm::rasters::{ChunkRasters, VOID};
 use crate::dsm::report::DsmReport;
 
-/// Files of a run, relative to its folder. The report is the last to appear: a folder with a report is complete.
+/// Files of a run, relative to its folder. The report is the last to appear: a folder with a report
+/// is complete.
 pub(crate) const FILES: [&str; 9] = [
     "dsm/dsm.tif",
     "dsm/sigma.tif",
@@ -42,7 +44,8 @@ const BANDS: [(&str, SpoolBand<'static>); 5] = [
     ("filled.tif", SpoolBand { description: "1_filled_0_observed", is_float: false, no_data: VOID as f64 }),
 ];
 
-/// Returns the contents of the rasters in the order of [`BANDS`]; `heights` come from [`absolute_heights`].
+/// Returns the contents of the rasters in the order of [`BANDS`]; `heights` come from
+/// [`absolute_heights`].
 fn bands<'a>(rasters: &'a ChunkRasters, heights: &'a Grid<f32>) -> [BandData<'a>; 5] {
     [
         BandData::F32(heights),
@@ -56,7 +59,8 @@ fn bands<'a>(rasters: &'a ChunkRasters, heights: &'a Grid<f32>) -> [BandData<'a>
 /// Refuses early what would fail at the end.
 ///
 /// # Errors
-/// [`DsmError::Exists`] for results that may not be replaced, [`DsmError::Output`] for a folder that cannot be written.
+/// [`DsmError::Exists`] for results that may not be replaced, [`DsmError::Output`] for a folder
+/// that cannot be written.
 pub(crate) fn check_target(config: &DsmConfig) -> Result<(), DsmError> {
     let existing = FILES.iter().map(|f| config.output.join(f)).find(|p| p.exists());
     if let (Some(path), false) = (existing, config.overwrite) {
@@ -97,8 +101,8 @@ pub(crate) fn write_whole(
     written
 }
 
-/// The rasters of a large scene, which grow on the disk chunk by chunk. Dropping it before [`ChunkedOutput::finish`] removes
-/// what was made.
+/// The rasters of a large scene, which grow on the disk chunk by chunk. Dropping it before
+/// [`ChunkedOutput::finish`] removes what was made.
 pub(crate) struct ChunkedOutput<'a> {
     config: &'a DsmConfig,
     grid: &'a DsmGrid,
@@ -263,8 +267,8 @@ fn absolute_heights(grid: &DsmGrid, vertical: VerticalDatum, rasters: &ChunkRast
     Ok(out)
 }
 
-/// Rounds a height to whole 1024ths of a metre, a hundredth of the precision of any image. The bits behind them are noise
-/// that takes a third of the file and of the time to compress it.
+/// Rounds a height to whole 1024ths of a metre, a hundredth of the precision of any image. The bits
+/// behind them are noise that takes a third of the file and of the time to compress it.
 fn written(height_m: f64) -> f32 {
     const UNIT_M: f64 = 1.0 / 1024.0;
     ((height_m / UNIT_M).round() * UNIT_M) as f32

@@ -28,8 +28,8 @@ use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
 
 /// Third stage of a run: everything that is needed to compute the chunks and to merge them.
 ///
-/// A scene that fits the memory is a plan of one chunk. A plan can be written as JSON and read back without a change of the
-/// result.
+/// A scene that fits the memory is a plan of one chunk. A plan can be written as JSON and read back
+/// without a change of the result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -82,9 +82,10 @@ pub struct PlanReport {
 /// Chooses grid, heights, sources, steps and chunks.
 ///
 /// # Errors
-/// [`DsmError::NoTies`], [`DsmError::RangeMissesScene`], [`DsmError::BoundsMissScene`], [`DsmError::Value`],
-/// [`DsmError::Memory`] for a request that cannot be served; [`DsmError::Prior`], [`DsmError::Image`], [`DsmError::Camera`],
-/// [`DsmError::Crs`], [`DsmError::Sweep`]; [`DsmError::Cancelled`].
+/// [`DsmError::NoTies`], [`DsmError::RangeMissesScene`], [`DsmError::BoundsMissScene`],
+/// [`DsmError::Value`], [`DsmError::Memory`] for a request that cannot be served;
+/// [`DsmError::Prior`], [`DsmError::Image`], [`DsmError::Camera`], [`DsmError::Crs`],
+/// [`DsmError::Sweep`]; [`DsmError::Cancelled`].
 pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) -> Result<Plan, DsmError> {
     session.progress.check_cancelled()?;
     let tuning = config.preset.tuning();

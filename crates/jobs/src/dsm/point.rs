@@ -19,8 +19,8 @@ use crate::dsm::ties::{PairTies, TIES_MIN, adjust_cameras, tie_heights};
 use crate::dsm::values::{HeightRange, ImagePair};
 use crate::dsm::view_geometry::ViewGeometry;
 
-/// Where no two views are further apart than this, heights are ten times less precise than positions, and a warning is
-/// given.
+/// Where no two views are further apart than this, heights are ten times less precise than
+/// positions, and a warning is given.
 const ANGLE_WEAK_DEG: f64 = 3.0;
 
 /// Second stage of a run: the images with corrected cameras, and what the tie points show.
@@ -42,7 +42,8 @@ pub struct Pointed {
     pub pairs: Vec<ImagePair>,
     /// Tie points by pair, in the frames of the parts of the images that were read.
     pub ties: Vec<PairTies>,
-    /// Corrections found, one per image, in the same frames. They are in the cameras only if `pointing.applied`.
+    /// Corrections found, one per image, in the same frames. They are in the cameras only if
+    /// `pointing.applied`.
     pub corrections: Vec<ImageCorrection>,
     /// Size of the correction and residuals.
     pub pointing: PointingReport,
@@ -56,12 +57,14 @@ pub struct Pointed {
     pub warnings: Vec<String>,
 }
 
-/// Reads the images, or windows of them when they do not fit the memory, finds tie points, and corrects the cameras.
+/// Reads the images, or windows of them when they do not fit the memory, finds tie points, and
+/// corrects the cameras.
 ///
 /// # Errors
-/// [`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Blank`], [`DsmError::SamePixels`] for images that give no
-/// heights; [`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`] for a request that cannot be served;
-/// [`DsmError::Image`], [`DsmError::Camera`], [`DsmError::Crs`], [`DsmError::Cancelled`].
+/// [`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Blank`], [`DsmError::SamePixels`]
+/// for images that give no heights; [`DsmError::Value`], [`DsmError::BoundsMissScene`],
+/// [`DsmError::Memory`] for a request that cannot be served; [`DsmError::Image`],
+/// [`DsmError::Camera`], [`DsmError::Crs`], [`DsmError::Cancelled`].
 pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> Result<Pointed, DsmError> {
     session.progress.check_cancelled()?;
     let mut images = opened.images.clone();
@@ -111,7 +114,8 @@ fn check_pictures(images: &[SceneImage], looked: &FirstLook) -> Result<(), DsmEr
     }
 }
 
-/// Returns whether corrections are to be put into the cameras: unless that is switched off or the ties are too few.
+/// Returns whether corrections are to be put into the cameras: unless that is switched off or the
+/// ties are too few.
 fn is_applied(config: &DsmConfig, found: &Adjustment, notes: &mut Notes<'_>) -> bool {
     let ties = found.ground.iter().flatten().count();
     if !config.pointing {
@@ -165,8 +169,8 @@ fn drop_unconnected(config: &DsmConfig, useful: &mut Vec<ImagePair>, ties: &[Pai
     let aside = unconnected(config.images.len(), ties);
     for view in &aside {
         notes.warn(format!(
-            "an image is set aside: fewer than {TIES_MIN} tie points connect it with the others, so its pointing is not \
-             known; without the pointing correction it is used as it is: {}",
+            "an image is set aside: fewer than {TIES_MIN} tie points connect it with the others, \
+             so its pointing is not known; without the pointing correction it is used as it is: {}",
             config.images[*view].display()
         ));
     }
@@ -184,8 +188,8 @@ fn choose_pairs(
     let widest = pairs.iter().filter_map(|p| geometry.pair(*p)).max_by(|a, b| a.angle_deg.total_cmp(&b.angle_deg));
     if let Some(pair) = widest.filter(|p| p.angle_deg < ANGLE_WEAK_DEG) {
         notes.warn(format!(
-            "the views look along nearly the same line, {:.1}° apart at most: a pixel of parallax is {:.1} m of height; \
-             add an image from another direction",
+            "the views look along nearly the same line, {:.1}° apart at most: \
+             a pixel of parallax is {:.1} m of height; add an image from another direction",
             pair.angle_deg,
             1.0 / pair.parallax_px_per_m.max(f64::MIN_POSITIVE)
         ));

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::dsm::notes::Notes;
 use crate::dsm::report::{LeftOut, PriorReport};
 
-/// A building is taken to be gone when a smaller share of its pixels agrees with the heights found. On small buildings the
-/// coarse heights are wrong more often than right.
+/// A building is taken to be gone when a smaller share of its pixels agrees with the heights found.
+/// On small buildings the coarse heights are wrong more often than right.
 const BUILDING_MIN: f64 = 0.1;
 /// Number of buildings that are named in the choice; the report names all.
 const NAMED: usize = 3;

@@ -1,7 +1,8 @@
 //! What one view sees of a city model, held against the heights that a coarse level found.
 //!
-//! The pointing of the images and the place of the model are each off by metres. The prior is therefore moved to where most
-//! of its pixels agree with the heights found. Buildings that still do not agree are left out, because they may be gone.
+//! The pointing of the images and the place of the model are each off by metres. The prior is
+//! therefore moved to where most of its pixels agree with the heights found. Buildings that still
+//! do not agree are left out, because they may be gone.
 
 use std::collections::BTreeMap;
 
@@ -13,10 +14,12 @@ use sweep::HeightMap;
 
 use crate::dsm::prior_findings::{Evidence, Vote};
 
-/// Standard deviation of the heights of city models, metres: roofs of LoD2 models lie within half a metre of laser heights.
+/// Standard deviation of the heights of city models, metres: roofs of LoD2 models lie within half a
+/// metre of laser heights.
 pub(crate) const DEVIATION_M: f64 = 0.5;
 
-/// Largest shift of the model against the images, metres: the pointing of good satellites without ground control.
+/// Largest shift of the model against the images, metres: the pointing of good satellites without
+/// ground control.
 const SEARCH_M: f64 = 10.0;
 /// Largest shift of the model against the images, pixels of the level.
 const REACH_MAX: i64 = 12;
@@ -26,8 +29,8 @@ const SAMPLES_MAX: usize = 4000;
 const AGREEING_STEPS: f64 = 2.0;
 /// A model with a smaller share of agreeing pixels has nothing to do with the scene.
 const AGREEING_MIN: f64 = 0.3;
-/// A shift must raise the share of agreeing pixels by this much. Walls that hide what is behind them draw the model a pixel
-/// to their side.
+/// A shift must raise the share of agreeing pixels by this much. Walls that hide what is behind
+/// them draw the model a pixel to their side.
 const MOVE_GAIN: f64 = 0.05;
 
 /// What one view sees of the model, at its full resolution.
@@ -64,7 +67,8 @@ struct Sample {
 }
 
 impl ViewPrior {
-    /// Returns the heights of a level: those of the pixel in the middle of each coarse pixel, so that edges stay sharp.
+    /// Returns the heights of a level: those of the pixel in the middle of each coarse pixel, so
+    /// that edges stay sharp.
     pub(crate) fn at_level(&self, level: usize, (width, height): (usize, usize)) -> Grid<f32> {
         let side = 1usize << level;
         let place = |i: usize, n: usize| (i * side + side / 2).min(n - 1);
@@ -74,9 +78,11 @@ impl ViewPrior {
         out
     }
 
-    /// Moves the prior to the heights that a level found, and leaves out buildings that do not agree with them.
+    /// Moves the prior to the heights that a level found, and leaves out buildings that do not
+    /// agree with them.
     ///
-    /// Returns `None` when hardly anything agrees, because then the place of the rest is not known either.
+    /// Returns `None` when hardly anything agrees, because then the place of the rest is not known
+    /// either.
     pub(crate) fn checked(&self, map: &HeightMap, level: usize, step_m: f64) -> Option<(Self, Evidence)> {
         let tolerance_m = (AGREEING_STEPS * step_m).max(DEVIATION_M) as f32;
         let side = 1i64 << level;
@@ -162,8 +168,9 @@ fn found_at(map: &HeightMap, x: i64, y: i64) -> Option<f32> {
     (!found.is_nan()).then(|| (map.origin_m + f64::from(*found)) as f32)
 }
 
-/// Rates a shift by `(dx, dy)` coarse pixels: the share of samples that agree with the heights found once the median
-/// difference is added to all. Returns `None` when no sample has a height to compare with, or the difference is too large.
+/// Rates a shift by `(dx, dy)` coarse pixels: the share of samples that agree with the heights
+/// found once the median difference is added to all. Returns `None` when no sample has a height to
+/// compare with, or the difference is too large.
 fn score(map: &HeightMap, samples: &[Sample], side: i64, (dx, dy): (i64, i64), tolerance_m: f32) -> Option<Shift> {
     let difference =
         |s: &Sample| Some(found_at(map, s.x.div_euclid(side) + dx, s.y.div_euclid(side) + dy)? - s.height_m);
@@ -194,7 +201,8 @@ mod tests {
         out
     }
 
-    /// The heights that a level of 2 × 2 pixels finds when the scene lies elsewhere by pixels and metres.
+    /// The heights that a level of 2 × 2 pixels finds when the scene lies elsewhere by pixels and
+    /// metres.
     fn found(by: (i64, i64), up_m: f32, is_there: impl Fn(u32) -> bool) -> HeightMap {
         let moved = boxes().moved(Shift { x: by.0, y: by.1, height_m: 0.0, agreeing: 1.0 });
         let mut map = HeightMap::empty(32, 32, 100.0);

@@ -1,8 +1,10 @@
-//! Towers and pits: heights outside those of the tie points, which seldom lie on the roof of a tower.
+//! Towers and pits: heights outside those of the tie points, which seldom lie on the roof of a
+//! tower.
 //!
-//! One level is swept over a height range that holds the tallest buildings. Where a patch of neighbouring pixels has heights
-//! outside the range of the tie points, confident and shared by another view, the range is extended to hold them. The
-//! sweep costs about two hypotheses per pixel at full resolution.
+//! One level is swept over a height range that holds the tallest buildings. Where a patch of
+//! neighbouring pixels has heights outside the range of the tie points, confident and shared by
+//! another view, the range is extended to hold them. The sweep costs about two hypotheses per pixel
+//! at full resolution.
 //!
 //! For a chunk of a large scene the same sweep determines the whole range, see [`seen_range`].
 
@@ -16,12 +18,13 @@ use crate::dsm::levels::SweepLevels;
 use crate::dsm::scene_sweep::{SceneHeights, SceneSweep, sweep_scene};
 use crate::dsm::values::HeightRange;
 
-/// Searched below the heights of the tie points, metres: the deepest quarries beside ground with tie points.
+/// Searched below the heights of the tie points, metres: the deepest quarries beside ground with
+/// tie points.
 const BELOW_M: f64 = 150.0;
 /// Searched above the heights of the tie points, metres: all but a dozen buildings of the world.
 const ABOVE_M: f64 = 450.0;
-/// Largest pixel of the level that is swept, metres: a slim tower is three of them wide. A little more than four metres,
-/// because pixels of nominally half a metre are sometimes larger.
+/// Largest pixel of the level that is swept, metres: a slim tower is three of them wide. A little
+/// more than four metres, because pixels of nominally half a metre are sometimes larger.
 const PIXEL_M: f64 = 4.2;
 /// The level that is swept keeps at least this many pixels on a side.
 const SIDE_MIN: usize = 48;
@@ -51,10 +54,11 @@ struct ViewHeight {
     height_m: f64,
 }
 
-/// Extends the range of a sweep by the heights outside it that are sure; `None` when there are none.
+/// Extends the range of a sweep by the heights outside it that are sure; `None` when there are
+/// none.
 ///
-/// `gsd_m` is a pixel at full resolution, and `sides` are the shortest sides of the views' levels. The levels of `sweep` are not
-/// used.
+/// `gsd_m` is a pixel at full resolution, and `sides` are the shortest sides of the views' levels.
+/// The levels of `sweep` are not used.
 ///
 /// # Errors
 /// [`DsmError::Sweep`] from the consistency check, [`DsmError::Cancelled`].
@@ -78,14 +82,15 @@ pub(crate) fn widened(range: HeightRange) -> HeightRange {
     range.grown(BELOW_M, ABOVE_M)
 }
 
-/// Returns the level that is swept. `gsd_m` is a pixel at full resolution, and `sides` are the shortest sides of the levels.
+/// Returns the level that is swept. `gsd_m` is a pixel at full resolution, and `sides` are the
+/// shortest sides of the levels.
 pub(crate) fn level_of(gsd_m: f64, sides: &[usize]) -> usize {
     let fits = |(l, side): &(usize, &usize)| **side >= SIDE_MIN && gsd_m * f64::from(1u32 << l) <= PIXEL_M;
     sides.iter().enumerate().take_while(fits).count().saturating_sub(1)
 }
 
-/// Returns the least and greatest height that a sweep of one level finds for sure; `None` where nothing is sure. Most
-/// heights are within `usual`.
+/// Returns the least and greatest height that a sweep of one level finds for sure; `None` where
+/// nothing is sure. Most heights are within `usual`.
 ///
 /// # Errors
 /// [`DsmError::Sweep`] from the consistency check, [`DsmError::Cancelled`].
@@ -106,8 +111,8 @@ fn extremes(heights: &[f64]) -> HeightRange {
 
 /// Sweeps one level and returns the sure heights among those for which `is_asked` holds.
 ///
-/// A height outside `usual` does not count where another view does not show what the pixel would be at a usual height. The
-/// best match is then only the best of what the view shows.
+/// A height outside `usual` does not count where another view does not show what the pixel would be
+/// at a usual height. The best match is then only the best of what the view shows.
 fn sure_heights(
     views: &[SweepView],
     sweep: &SceneSweep,
@@ -156,7 +161,8 @@ fn shows(view: &SweepView, other: &Heights<'_>, level: usize, pixel: ImagePoint,
     is_inside(range.low_m) && is_inside(range.high_m)
 }
 
-/// Returns the heights that pixels of at least two views have, to a tolerance, and enough pixels in all.
+/// Returns the heights that pixels of at least two views have, to a tolerance, and enough pixels in
+/// all.
 fn shared(mut pixels: Vec<ViewHeight>, tolerance_m: f64) -> Vec<f64> {
     pixels.sort_by(|a, b| a.height_m.total_cmp(&b.height_m).then(a.view.cmp(&b.view)));
     let near = |h: f64| {
@@ -171,7 +177,8 @@ fn shared(mut pixels: Vec<ViewHeight>, tolerance_m: f64) -> Vec<f64> {
     pixels.iter().filter(is_shared).map(|p| p.height_m).collect()
 }
 
-/// Returns the heights of the pixels that count and have enough neighbours that count at the same height, to two steps.
+/// Returns the heights of the pixels that count and have enough neighbours that count at the same
+/// height, to two steps.
 fn patches(map: &HeightMap, step_m: f32, counts: impl Fn(f32, (usize, usize)) -> bool) -> Vec<f64> {
     let grid = &map.height_m;
     let mut out = Vec::new();

@@ -64,7 +64,8 @@ impl ChunkRasters {
     }
 }
 
-/// Rounds a value to eight binary digits: the precision of a deviation or a confidence, in half the bits.
+/// Rounds a value to eight binary digits: the precision of a deviation or a confidence, in half the
+/// bits.
 fn shortened(value: f32) -> f32 {
     if value.is_finite() { f32::from_bits(value.to_bits().wrapping_add(0x8000) & 0xFFFF_0000) } else { value }
 }

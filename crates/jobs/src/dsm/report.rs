@@ -162,7 +162,8 @@ pub struct PriorReport {
     pub model: PathBuf,
     /// Number of buildings that at least one view sees.
     pub buildings_seen: usize,
-    /// Number of views that see the model, agree with hardly any of it, and do without it. A view counts once per chunk.
+    /// Number of views that see the model, agree with hardly any of it, and do without it. A view
+    /// counts once per chunk.
     pub disagreeing_views: usize,
     /// Share of a building's pixels below which a view leaves it out.
     pub least_agreeing: f64,

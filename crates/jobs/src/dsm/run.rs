@@ -16,8 +16,8 @@ use crate::threads;
 
 /// Makes a DSM and writes its files into the output folder.
 ///
-/// A scene that does not fit the memory is computed by chunks. A chunk that fails then stays void and is named in the
-/// report, and the others go on.
+/// A scene that does not fit the memory is computed by chunks. A chunk that fails then stays void
+/// and is named in the report, and the others go on.
 ///
 /// # Errors
 /// See [`DsmError`]; nothing is left half-written.

@@ -1,7 +1,7 @@
 //! The heights of all views of a scene or chunk, from the coarsest pyramid level to the finest.
 //!
-//! The coarsest level covers the whole height range. Each finer level searches, per pixel, around the heights that the
-//! coarser level found at this pixel and next to it.
+//! The coarsest level covers the whole height range. Each finer level searches, per pixel, around
+//! the heights that the coarser level found at this pixel and next to it.
 
 use numeric::Progress;
 use rayon::prelude::*;
@@ -16,8 +16,8 @@ use crate::dsm::prior_findings::PriorFindings;
 use crate::dsm::prior_view::{DEVIATION_M, ViewPrior};
 use crate::dsm::values::HeightRange;
 
-/// Tolerance of the consistency check on coarse levels, pixels. Coarse heights are rough, and a wrong deletion costs more
-/// than a wide range.
+/// Tolerance of the consistency check on coarse levels, pixels. Coarse heights are rough, and a
+/// wrong deletion costs more than a wide range.
 const COARSE_TOLERANCE_PX: f64 = 2.0;
 
 /// Parameters of a sweep of all views.
@@ -54,7 +54,8 @@ pub(crate) struct SceneHeights {
     pub(crate) findings: PriorFindings,
 }
 
-/// Sweeps all views from the coarsest level to the finest. Each view and level is a step of `progress`.
+/// Sweeps all views from the coarsest level to the finest. Each view and level is a step of
+/// `progress`.
 ///
 /// # Errors
 /// [`DsmError::Sweep`] as [`sweep_level`], [`DsmError::Cancelled`] between two levels.
@@ -134,7 +135,8 @@ fn sweep_view(
     Ok((map, ranges.evaluations()))
 }
 
-/// Sets coarse heights to NaN that no source shares. A view whose sources have no heights keeps its own.
+/// Sets coarse heights to NaN that no source shares. A view whose sources have no heights keeps its
+/// own.
 fn drop_lone_heights(
     views: &[SweepView],
     sweep: &SceneSweep,

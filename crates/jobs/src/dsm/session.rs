@@ -1,7 +1,8 @@
-//! What a process keeps beside the plain values of the stages: the watcher, pixels that were read, and times.
+//! What a process keeps beside the plain values of the stages: the watcher, pixels that were read,
+//! and times.
 //!
-//! Nothing in a session changes a result. A stage that finds its session empty, because an earlier stage ran in another
-//! process, reads again what it needs.
+//! Nothing in a session changes a result. A stage that finds its session empty, because an earlier
+//! stage ran in another process, reads again what it needs.
 
 use std::path::Path;
 use std::time::Instant;

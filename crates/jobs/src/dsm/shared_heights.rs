@@ -1,9 +1,9 @@
-//! The heights that are possible before anything is known of a scene: those for which the RPCs are valid, and those at which
-//! the images share ground, whatever their RPCs state.
+//! The heights that are possible before anything is known of a scene: those for which the RPCs are
+//! valid, and those at which the images share ground, whatever their RPCs state.
 //!
-//! HEIGHT_OFF and HEIGHT_SCALE of an RPC usually hold the heights of the scene, and sometimes do not (crops, fits to flat
-//! ground, coefficients of another block). Two images from different directions share ground only within some heights, which
-//! bounds the search in any case.
+//! HEIGHT_OFF and HEIGHT_SCALE of an RPC usually hold the heights of the scene, and sometimes do
+//! not (crops, fits to flat ground, coefficients of another block). Two images from different
+//! directions share ground only within some heights, which bounds the search in any case.
 
 use crate::dsm::config::EARTH_RANGE;
 use crate::dsm::footprints::{footprint, local_polygon, overlap_share};
@@ -35,8 +35,8 @@ impl SharedHeights {
     }
 }
 
-/// Returns the heights that are possible before anything is known of the scene: those for which the RPCs are valid,
-/// and the given range.
+/// Returns the heights that are possible before anything is known of the scene: those for which the
+/// RPCs are valid, and the given range.
 pub(crate) fn validity_range(images: &[SceneImage], asked: Option<HeightRange>) -> HeightRange {
     let ranges = images.iter().map(|image| {
         let r = &image.camera.rpc;
@@ -47,7 +47,8 @@ pub(crate) fn validity_range(images: &[SceneImage], asked: Option<HeightRange>) 
     if range.low_m < range.high_m { range } else { EARTH_RANGE }
 }
 
-/// Returns the largest share of ground that two of the images have in common at a height; 0 where cameras fail.
+/// Returns the largest share of ground that two of the images have in common at a height; 0 where
+/// cameras fail.
 fn largest_overlap(images: &[SceneImage], height_m: f64) -> f64 {
     let prints: Vec<_> = images.iter().filter_map(|o| footprint(&o.camera, o.size, height_m).ok()).collect();
     let Some(origin) = prints.first().and_then(|p| p.first()) else { return 0.0 };

@@ -13,8 +13,8 @@ use crate::dsm::view_geometry::{ViewGeometry, angle_merit};
 /// Least rating of an angle, so that tie points decide among pairs with bad angles.
 const MERIT_MIN: f64 = 0.05;
 
-/// Chooses the sources of every view: the views with the most tie points at the best angles. A view that is not asked for
-/// has none.
+/// Chooses the sources of every view: the views with the most tie points at the best angles. A view
+/// that is not asked for has none.
 ///
 /// # Errors
 /// [`DsmError::Value`] when no view that is asked for has a source.

@@ -1,7 +1,8 @@
-//! The surface of a scene or chunk: consistency of the views' heights, fusion on the grid, clean-up.
+//! The surface of a scene or chunk: consistency of the views' heights, fusion on the grid,
+//! clean-up.
 //!
-//! A chunk is computed with a rim around its core, so that what stands at the border of the core is judged with its
-//! surroundings. Only the core is counted and kept.
+//! A chunk is computed with a rim around its core, so that what stands at the border of the core is
+//! judged with its surroundings. Only the core is counted and kept.
 
 use numeric::Progress;
 use raster::{Grid, Window};
@@ -18,14 +19,16 @@ use crate::dsm::rasters::{ChunkRasters, FILLED};
 use crate::dsm::scene_sweep::{SceneHeights, SceneSweep};
 use crate::dsm::values::{HeightRange, ImagePair};
 
-/// A facet steeper than this (rise over run) is a tear and not a surface: about 70°. Two hypotheses apart is not yet a tear.
+/// A facet steeper than this (rise over run) is a tear and not a surface: about 70°. Two hypotheses
+/// apart is not yet a tear.
 const TEAR_SLOPE: f64 = 2.75;
-/// A height around which the views agree on less of the picture's contrast than this has no picture behind it. The best of
-/// several unrelated pictures reaches nearly this.
+/// A height around which the views agree on less of the picture's contrast than this has no picture
+/// behind it. The best of several unrelated pictures reaches nearly this.
 const SUPPORT_MIN: f32 = 0.2;
-/// A height that is better than all others by less than this share of the worst cost may be chance, as on water. The heights
-/// around it are better evidence. Half of this and twice this are alike on simulated towns. Chosen with JAX_068 in view, which
-/// gains in completeness with every set of its views and loses 0.02 m of MAE with one pair.
+/// A height that is better than all others by less than this share of the worst cost may be chance,
+/// as on water. The heights around it are better evidence. Half of this and twice this are alike on
+/// simulated towns. Chosen with JAX_068 in view, which gains in completeness with every set of its
+/// views and loses 0.02 m of MAE with one pair.
 const CONFIDENCE_MIN: f32 = 0.1;
 
 /// Everything but pixels and heights that a surface is made from.
@@ -86,10 +89,12 @@ impl SurfaceCounts {
     }
 }
 
-/// Makes the surface; returns the cells of the core and their counts. Each view, and the fusion, is a step of `progress`.
+/// Makes the surface; returns the cells of the core and their counts. Each view, and the fusion, is
+/// a step of `progress`.
 ///
 /// # Errors
-/// [`DsmError::Sweep`] for a camera that fails inside the scene, [`DsmError::Crs`], [`DsmError::Cancelled`].
+/// [`DsmError::Sweep`] for a camera that fails inside the scene, [`DsmError::Crs`],
+/// [`DsmError::Cancelled`].
 pub(crate) fn make_surface(
     input: SurfaceInput<'_>,
     views: Vec<SweepView>,
@@ -170,9 +175,10 @@ fn same_surface_m(sweep: &SceneSweep, grid: &DsmGrid) -> f32 {
     (2.0 * sweep.step_at(sweep.levels.finest)).max(1.5 * grid.gsd_m) as f32
 }
 
-/// Marks the pixels with which enough other views agree: a third of the views that see the ground from another direction,
-/// and at least one. With a third, a chance agreement of two views among many does not put a height on the map. A single
-/// reference view has no other view to agree with, and keeps all its heights.
+/// Marks the pixels with which enough other views agree: a third of the views that see the ground
+/// from another direction, and at least one. With a third, a chance agreement of two views among
+/// many does not put a height on the map. A single reference view has no other view to agree with,
+/// and keeps all its heights.
 fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[ImagePair], level: u32) -> Result<Grid<bool>, DsmError> {
     let partner = |h: &Heights<'_>| useful.contains(&ImagePair::new(own.index, h.index).ordered());
     let others: Vec<Heights<'_>> = all.iter().copied().filter(partner).collect();
@@ -189,8 +195,8 @@ fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[ImagePair], level: 
     Ok(keep)
 }
 
-/// Marks the pixels that carry no evidence of what they show: blank ones, and those whose best height lies outside the range
-/// that was asked for.
+/// Marks the pixels that carry no evidence of what they show: blank ones, and those whose best
+/// height lies outside the range that was asked for.
 fn unseen(own: Heights<'_>, level: usize, asked: Option<HeightRange>) -> Grid<bool> {
     let mut out = own.view.blank(level);
     if let Some(asked) = asked {

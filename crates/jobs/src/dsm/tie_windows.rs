@@ -1,9 +1,11 @@
 //! Tie points and image characters of a scene that is too large to be read at once.
 //!
-//! Ties are searched for in windows of the ground, spread evenly over the scene. Each window is read at full resolution and
-//! dropped. The windows also give the noise and contrast of each image, which all its chunks then share.
+//! Ties are searched for in windows of the ground, spread evenly over the scene. Each window is
+//! read at full resolution and dropped. The windows also give the noise and contrast of each image,
+//! which all its chunks then share.
 //!
-//! Ties are in pixels of the whole images. The heights seen in the first window with ties narrow the search in the others.
+//! Ties are in pixels of the whole images. The heights seen in the first window with ties narrow
+//! the search in the others.
 
 use camera::ImagePoint;
 use crs::MapProjection;
@@ -23,8 +25,8 @@ use crate::dsm::values::{HeightRange, ImagePair};
 
 /// Side of a window on the ground, cells of the grid.
 const SIDE: usize = 1024;
-/// Number of places looked at. Denser ones are tried where footprints fill little of the grid. A dozen windows determine
-/// a shift and an affine map over an image many times over.
+/// Number of places looked at. Denser ones are tried where footprints fill little of the grid. A
+/// dozen windows determine a shift and an affine map over an image many times over.
 const PLACES: [f64; 3] = [12.0, 24.0, 48.0];
 /// Number of places that some pair must see, or the next denser places are tried.
 const SEEN_MIN: usize = 8;
@@ -32,18 +34,21 @@ const SEEN_MIN: usize = 8;
 const WINDOWS_MAX: usize = 16;
 /// Pixels read around a window, for the wide search after a gross pointing error.
 const MARGIN: usize = 256;
-/// Corners tried per pair and window, at least. All windows together try as many as a scene of several times the size that
-/// is read at once.
+/// Corners tried per pair and window, at least. All windows together try as many as a scene of
+/// several times the size that is read at once.
 const POINTS: usize = 240;
 /// A part of an image less wide or high than this holds nothing to match, pixels.
 const PART_MIN: usize = 128;
-/// Heights may lie outside those of the first window with ties by three times their span and this, metres.
+/// Heights may lie outside those of the first window with ties by three times their span and this,
+/// metres.
 const FAR_M: f64 = 1500.0;
 
-/// Returns the ties of the pairs, given best first, over heights in `search`, and the characters of the images.
+/// Returns the ties of the pairs, given best first, over heights in `search`, and the characters of
+/// the images.
 ///
 /// # Errors
-/// [`DsmError::Image`] for an image that cannot be read, [`DsmError::Camera`], [`DsmError::Crs`], [`DsmError::Cancelled`].
+/// [`DsmError::Image`] for an image that cannot be read, [`DsmError::Camera`], [`DsmError::Crs`],
+/// [`DsmError::Cancelled`].
 pub(crate) fn match_in_windows(
     images: &[SceneImage],
     grid: &DsmGrid,
@@ -136,8 +141,8 @@ fn places(
     Ok(seen.into_iter().step_by(every).collect())
 }
 
-/// Returns about `wanted` windows in the middles of the fields of a lattice over the grid. They overlap as little as they
-/// can.
+/// Returns about `wanted` windows in the middles of the fields of a lattice over the grid. They
+/// overlap as little as they can.
 fn lattice((width, height): (usize, usize), wanted: f64) -> Vec<Window> {
     let fields = |along: usize, across: usize| {
         let n = (wanted * along as f64 / across as f64).sqrt().round().clamp(1.0, wanted) as usize;

@@ -12,9 +12,11 @@ use crate::dsm::values::{HeightRange, ImagePair};
 /// Fewer tie points than this do not determine the heights of a scene.
 pub(crate) const TIES_MIN: usize = 12;
 
-/// Ties of a wide search do not belong together when one shift per view leaves larger residuals than this, pixels.
+/// Ties of a wide search do not belong together when one shift per view leaves larger residuals
+/// than this, pixels.
 const WIDE_RESIDUAL_PX: f64 = 1.0;
-/// One of this many points is tried over all heights, before the others are tried near the heights that it shows.
+/// One of this many points is tried over all heights, before the others are tried near the heights
+/// that it shows.
 const FEW: usize = 5;
 /// Heights may lie outside those of the first ties by the ties' own span and this, metres.
 const NARROWED_MARGIN_M: f64 = 100.0;
@@ -33,10 +35,12 @@ pub struct PairTies {
     pub ties: Vec<Tie>,
 }
 
-/// Matches pairs of views, given best first, over the heights in `range`. `done` is called after each pair.
+/// Matches pairs of views, given best first, over the heights in `range`. `done` is called after
+/// each pair.
 ///
-/// A few points of the first pair with enough ties narrow the height range of the others, and all its points that of the
-/// other pairs. A pair with too few ties is searched again for a gross pointing error.
+/// A few points of the first pair with enough ties narrow the height range of the others, and all
+/// its points that of the other pairs. A pair with too few ties is searched again for a gross
+/// pointing error.
 pub(crate) fn match_pairs(
     views: &[SweepView],
     pairs: &[ImagePair],
@@ -74,7 +78,8 @@ pub(crate) fn match_pairs(
     out
 }
 
-/// Keeps the ties of a pair that one correction brings together: a wide search finds more chance likenesses.
+/// Keeps the ties of a pair that one correction brings together: a wide search finds more chance
+/// likenesses.
 fn verified(views: &[SweepView], found: PairTies) -> PairTies {
     let (adjustment, tracks) = adjust_views(views, std::slice::from_ref(&found), &shifts());
     if adjustment.residual_px.1 > WIDE_RESIDUAL_PX {
@@ -95,12 +100,14 @@ pub(crate) fn heights_seen(views: &[SweepView], found: &PairTies) -> Option<Heig
     tie_heights(&adjust_views(views, std::slice::from_ref(found), &shifts()).0)
 }
 
-/// Returns the adjustment of a single pair, from which only heights and the residual are used: shifts are enough.
+/// Returns the adjustment of a single pair, from which only heights and the residual are used:
+/// shifts are enough.
 fn shifts() -> AdjustConfig {
     AdjustConfig { max_order: ModelOrder::Translation, ..AdjustConfig::default() }
 }
 
-/// Returns the least and greatest height of the inliers of an adjustment; `None` when there are fewer than [`TIES_MIN`].
+/// Returns the least and greatest height of the inliers of an adjustment; `None` when there are
+/// fewer than [`TIES_MIN`].
 pub(crate) fn tie_heights(adjustment: &Adjustment) -> Option<HeightRange> {
     let mut heights: Vec<f64> = adjustment.ground.iter().flatten().map(|g| g.height_m).collect();
     if heights.len() < TIES_MIN {
@@ -118,8 +125,9 @@ fn adjust_views(views: &[SweepView], pairs: &[PairTies], config: &AdjustConfig) 
     adjust_cameras(&cameras, &sizes, pairs, config)
 }
 
-/// Joins the ties of all pairs to tracks and adjusts all cameras. A track is one corner of a reference with its places in
-/// all sources. `sizes` are the columns and rows of the cameras' images.
+/// Joins the ties of all pairs to tracks and adjusts all cameras. A track is one corner of a
+/// reference with its places in all sources. `sizes` are the columns and rows of the cameras'
+/// images.
 pub(crate) fn adjust_cameras(
     cameras: &[RpcCamera],
     sizes: &[(usize, usize)],
@@ -141,7 +149,8 @@ pub(crate) fn adjust_cameras(
     (adjust(cameras, sizes, &tracks, config), tracks)
 }
 
-/// Returns the search for pairs in which the ordinary one finds nothing: ten times its pointing error, from a coarser level.
+/// Returns the search for pairs in which the ordinary one finds nothing: ten times its pointing
+/// error, from a coarser level.
 fn wide_search(config: &TieConfig) -> TieConfig {
     TieConfig { band_px: 10.0 * config.band_px, coarse_side: config.coarse_side * 2 / 5, ..*config }
 }

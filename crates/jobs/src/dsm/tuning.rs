@@ -5,23 +5,27 @@ use sweep::ranges::EDGE_REACH;
 
 use crate::dsm::config::Preset;
 
-/// Parameters of the sweep. The remaining ones are the same for all presets: the defaults of [`sweep::LevelConfig`].
+/// Parameters of the sweep. The remaining ones are the same for all presets: the defaults of
+/// [`sweep::LevelConfig`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct SweepTuning {
-    /// Parallax between neighbouring hypotheses in the pair with the most parallax per metre, pixels.
+    /// Parallax between neighbouring hypotheses in the pair with the most parallax per metre,
+    /// pixels.
     pub step_px: f64,
     /// Finest pyramid level whose heights are computed; 0 is the full resolution.
     pub finest_level: usize,
     /// Largest number of sources per view.
     pub sources: usize,
-    /// Distance around a coarse pixel from which the next finer level takes over heights to search, coarse pixels.
+    /// Distance around a coarse pixel from which the next finer level takes over heights to search,
+    /// coarse pixels.
     pub reach: usize,
 }
 
 impl Preset {
-    /// Returns the side of a cell where none is given, in pixels of the coarsest image: that of the pixels matched.
+    /// Returns the side of a cell where none is given, in pixels of the coarsest image: that of the
+    /// pixels matched.
     pub(crate) fn pixels_per_cell(self) -> f64 {
         f64::from(1u32 << self.tuning().finest_level)
     }

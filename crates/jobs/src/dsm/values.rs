@@ -1,6 +1,7 @@
 //! Small values that the stages share: height ranges, pairs of images, map rectangles.
 //!
-//! Each is written to JSON and TOML as an array of numbers, the form that configurations and reports have.
+//! Each is written to JSON and TOML as an array of numbers, the form that configurations and
+//! reports have.
 
 use std::fmt;
 
@@ -48,7 +49,8 @@ impl HeightRange {
         Self::new(self.low_m.min(other.low_m), self.high_m.max(other.high_m))
     }
 
-    /// Returns the range cut to `limits`. The ends are in the wrong order when the two ranges are apart.
+    /// Returns the range cut to `limits`. The ends are in the wrong order when the two ranges are
+    /// apart.
     #[must_use]
     pub fn cut_to(self, limits: Self) -> Self {
         Self::new(self.low_m.max(limits.low_m), self.high_m.min(limits.high_m))
@@ -73,7 +75,8 @@ impl From<HeightRange> for [f64; 2] {
     }
 }
 
-/// A pair of images by their positions in the list of images, counted from 0. It is written as `[first, second]`.
+/// A pair of images by their positions in the list of images, counted from 0. It is written as
+/// `[first, second]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(from = "[usize; 2]", into = "[usize; 2]")]
 pub struct ImagePair {
@@ -120,7 +123,8 @@ impl fmt::Display for ImagePair {
     }
 }
 
-/// A rectangle on the map, in the units of its CRS. It is written as `[x_min, y_min, x_max, y_max]`.
+/// A rectangle on the map, in the units of its CRS. It is written as `[x_min, y_min, x_max,
+/// y_max]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[f64; 4]", into = "[f64; 4]")]
 pub struct MapBounds {

@@ -1,4 +1,5 @@
-//! How the views see the scene at one height: footprints, overlaps, intersection angles and parallax of all pairs.
+//! How the views see the scene at one height: footprints, overlaps, intersection angles and
+//! parallax of all pairs.
 
 use camera::{CameraError, ImagePoint, RpcCamera};
 use geodesy::{EnuFrame, LonLatHeight};
@@ -11,8 +12,8 @@ use crate::dsm::footprints::{footprint, local_polygon, overlap_share};
 use crate::dsm::images::SceneImage;
 use crate::dsm::values::ImagePair;
 
-/// Least angle between two lines of sight that gives heights, degrees. Matching is off by a fifth of a pixel, which at
-/// this angle is a height of more than 20 pixels' ground.
+/// Least angle between two lines of sight that gives heights, degrees. Matching is off by a fifth
+/// of a pixel, which at this angle is a height of more than 20 pixels' ground.
 pub(crate) const ANGLE_MIN_DEG: f64 = 0.5;
 /// Beyond this angle walls and roofs look too different to be matched, degrees.
 pub(crate) const ANGLE_MAX_DEG: f64 = 50.0;
@@ -46,7 +47,8 @@ impl ViewGeometry {
     /// Computes the geometry at `height_m`, metres above the ellipsoid.
     ///
     /// # Errors
-    /// [`DsmError::Camera`] for an image without a footprint, [`DsmError::NoOverlap`] when no two images share ground.
+    /// [`DsmError::Camera`] for an image without a footprint, [`DsmError::NoOverlap`] when no two
+    /// images share ground.
     pub(crate) fn at(images: &[SceneImage], height_m: f64) -> Result<Self, DsmError> {
         let failed = |i: usize| move |source: CameraError| DsmError::Camera { path: images[i].path.clone(), source };
         let prints: Vec<Vec<LonLatHeight>> = images
@@ -109,13 +111,14 @@ impl ViewGeometry {
     }
 }
 
-/// Rates an intersection angle from 0 to 1. Small angles give imprecise heights, and large ones give pictures that differ
-/// too much. The best published pairs lie between 5° and 25°.
+/// Rates an intersection angle from 0 to 1. Small angles give imprecise heights, and large ones
+/// give pictures that differ too much. The best published pairs lie between 5° and 25°.
 pub(crate) fn angle_merit(angle_deg: f64) -> f64 {
     (-((angle_deg - 15.0) / 15.0).powi(2)).exp()
 }
 
-/// Returns the side of a pixel on the ground, metres; `None` where the camera has no ground at `centre`.
+/// Returns the side of a pixel on the ground, metres; `None` where the camera has no ground at
+/// `centre`.
 pub(crate) fn ground_sampling_m(image: &SceneImage, centre: LonLatHeight) -> Option<f64> {
     image.camera.gsd(centre).ok().map(|g| g.mean_m())
 }
