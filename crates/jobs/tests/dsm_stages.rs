@@ -1,6 +1,8 @@
 //! The stages of the DSM job are plain values: written, read back and continued in a fresh session
 //! they give the same bytes. A cancelled run leaves nothing.
 
+use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -11,16 +13,6 @@ use jobs::dsm::{
 use numeric::{Choice, Progress, Silent};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-
-const RASTERS: [&str; 7] = [
-    "dsm/dsm.tif",
-    "dsm/sigma.tif",
-    "dsm/views.tif",
-    "dsm/filled.tif",
-    "dsm/confidence.tif",
-    "dsm/hillshade.png",
-    "dsm/relief.png",
-];
 
 fn town(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town").join(name)
@@ -43,8 +35,13 @@ fn read_back<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(valu
     back
 }
 
-fn bytes(output: &Path) -> Vec<Vec<u8>> {
-    RASTERS.iter().map(|name| std::fs::read(output.join(name)).unwrap()).collect()
+/// Names and contents of the rasters and pictures.
+fn bytes(output: &Path) -> BTreeMap<OsString, Vec<u8>> {
+    let files = std::fs::read_dir(output.join("dsm")).unwrap().map(Result::unwrap);
+    let read = |file: std::fs::DirEntry| (file.file_name(), std::fs::read(file.path()).unwrap());
+    let all: BTreeMap<_, _> = files.map(read).collect();
+    assert_eq!(all.len(), 7);
+    all
 }
 
 /// Runs every stage in its own session, with each value written and read back between them.
