@@ -1,6 +1,6 @@
 //! `skysweep dsm` by chunks: the town in one piece and in four has the same accuracy, no seam
-//! shows, and threads change nothing. What large scenes cost is measured by `cargo bench --bench
-//! scale`.
+//! shows, and threads change nothing. `cargo bench --bench scale` measures time and memory of large
+//! scenes.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -17,7 +17,7 @@ fn town(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
 }
 
-/// `skysweep dsm` on the town, with further options; returns its report.
+/// Runs `skysweep dsm` on the town with further options; returns its report.
 fn run(out: &Path, options: &[&str]) -> Value {
     let views = ["view_1.tif", "view_2.tif", "view_3.tif"].map(town);
     let mut command = skysweep();
@@ -76,8 +76,7 @@ fn four_chunks_are_as_right_as_one() {
     assert!(!BOTH.folder.path().join("four/.skysweep-partial").exists());
 }
 
-/// Steps between neighbouring cells across the seams are those of the same cells computed in one
-/// piece.
+/// Steps between neighbouring cells across the seams are the same as without seams.
 #[test]
 fn no_seam_shows() {
     let (once, four) = (BOTH.dsm("once"), BOTH.dsm("four"));

@@ -19,7 +19,8 @@ fn views() -> [PathBuf; 3] {
     ["view_1.tif", "view_2.tif", "view_3.tif"].map(town)
 }
 
-/// `skysweep dsm` on two views and a small part of the town, which takes a second.
+/// Returns the command `skysweep dsm` on two views of the town with coarse cells, which takes a
+/// second.
 fn small(output: &Path) -> Command {
     let mut command = skysweep();
     command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(output).args(["-q", "--gsd", "1"]);
@@ -62,7 +63,8 @@ fn the_town_is_found_where_it_is() {
         .unwrap();
     let evaluation: Value = serde_json::from_slice(&evaluation.stdout).unwrap();
     let metric = |name: &str| evaluation["metrics"][name].as_f64().unwrap();
-    // The truth has no vehicles and the images have: some of what is missing is theirs.
+    // The truth has no vehicles and the images have some, which are among the cells that are not
+    // right.
     assert!(metric("completeness_1") > 0.94, "completeness {}", metric("completeness_1"));
     assert!(metric("nmad") < 0.1, "NMAD {}", metric("nmad"));
     assert!(metric("mae") < 0.5, "MAE {}", metric("mae"));
@@ -119,12 +121,12 @@ fn options_are_obeyed() {
     let projection = crs::MapProjection::from_epsg(dem.horizontal_epsg.unwrap()).unwrap();
     let (lon, lat) = projection.lonlat_from_map(x, y).unwrap();
     let expected = converter.ellipsoid_from_datum(lon, lat, 0.0).unwrap();
-    // Pairs of views leave the common height to the weak prior on pointing; half a metre is its
-    // size here.
+    // A pair of views does not determine the common height, which the weak prior on pointing holds
+    // to half a metre here.
     assert!((undulation - expected).abs() < 0.5, "{undulation} instead of {expected}");
 }
 
-/// Runs that must end with exit 2, one clear message, and nothing written.
+/// Runs a command that must end with exit code 2, one clear message, and nothing written.
 fn refused(mut command: Command, output: &Path, message: &str) {
     command.assert().code(2).stdout("").stderr(predicate::str::contains(message));
     assert!(!output.exists(), "{} was left behind", output.display());

@@ -6,12 +6,12 @@ use assert_cmd::Command;
 use predicates::prelude::*;
 use serde_json::{Value, json};
 
-/// Roofs in the class raster.
+/// Class of roofs in the class raster.
 const ROOF: &str = "6";
-/// Where the wrong building is put: an open place of the town, EPSG:32631, and its ground, metres
-/// above the ellipsoid.
+/// Place of the wrong building: an open place of the town, EPSG:32631, and its ground, metres above
+/// the ellipsoid.
 const OPEN_PLACE: [f64; 3] = [693_830.5, 4_822_578.5, 182.3];
-/// Half of what the wrong building covers and a little more, metres.
+/// Half the side of a square around the wrong building, metres.
 const HALF_M: f64 = 10.0;
 
 fn town(name: &str) -> PathBuf {
@@ -22,7 +22,7 @@ fn skysweep() -> Command {
     Command::cargo_bin("skysweep").expect("the binary is built with the tests")
 }
 
-/// The town's surface model with a prior or without.
+/// Makes the town's surface model with a prior or without; returns its file.
 fn surface(folder: &Path, name: &str, prior: Option<&Path>) -> PathBuf {
     let out = folder.join(name);
     let mut command = skysweep();
@@ -45,7 +45,7 @@ fn mae(evaluation: &Value, path: &str) -> f64 {
     evaluation.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} is missing: {evaluation}"))
 }
 
-/// Every vertex index of nested boundaries.
+/// Collects every vertex index of nested boundaries.
 fn indices(boundaries: &Value, found: &mut Vec<usize>) {
     match boundaries {
         Value::Array(parts) => parts.iter().for_each(|part| indices(part, found)),
@@ -60,7 +60,8 @@ fn moved(boundaries: &Value, by: usize) -> Value {
     }
 }
 
-/// The town's model without its largest building and with a copy of another one in an open place.
+/// Writes the town's model without its largest building and with a copy of another one in an open
+/// place.
 fn wrong_model(path: &Path) {
     let mut model: Value = serde_json::from_slice(&std::fs::read(town("truth/buildings.city.json")).unwrap()).unwrap();
     let numbers =

@@ -1,4 +1,4 @@
-//! RPCs that are extreme as numbers: the same cameras, written in other ways, and cameras that fail
+//! RPCs with extreme numbers: the same cameras with other coefficients, and cameras that fail
 //! somewhere.
 
 use camera::Rpc;
@@ -6,7 +6,7 @@ use jobs::dsm::DsmError;
 
 use crate::stage::{EASY, Look, Shot, Stage, triplet};
 
-/// Positions of the linear terms.
+/// Positions of the linear terms in the list of coefficients.
 const LINEAR: [usize; 4] = [0, 1, 2, 3];
 
 fn polynomials(rpc: &mut Rpc) -> [&mut [f64; 20]; 4] {
@@ -16,7 +16,7 @@ fn polynomials(rpc: &mut Rpc) -> [&mut [f64; 20]; 4] {
 /// Multiplies numerators and denominators by `1 − x / at`, x one of the normalised coordinates L,
 /// P, H (1 to 3): the same camera, whose denominators are zero where `x = at`.
 fn with_pole(mut rpc: Rpc, x: usize, at: f64) -> Rpc {
-    // Where the product of two linear terms stands in the list.
+    // Position of the product of two linear terms in the list of coefficients.
     const PRODUCT: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 7, 4, 5], [2, 4, 8, 6], [3, 5, 6, 9]];
     for c in polynomials(&mut rpc) {
         let linear: [f64; 4] = std::array::from_fn(|i| c[i]);
@@ -27,7 +27,7 @@ fn with_pole(mut rpc: Rpc, x: usize, at: f64) -> Rpc {
     rpc
 }
 
-/// The same camera with ground scales that are smaller by a factor.
+/// Makes the ground scales smaller by a factor without a change of the camera.
 fn with_small_domain(mut rpc: Rpc, factor: f64) -> Rpc {
     rpc.long_scale /= factor;
     rpc.lat_scale /= factor;
@@ -38,7 +38,7 @@ fn with_small_domain(mut rpc: Rpc, factor: f64) -> Rpc {
     rpc
 }
 
-/// The same camera with other image offsets and scales.
+/// Sets other image offsets and scales without a change of the camera.
 fn with_far_offsets(mut rpc: Rpc, offset: f64, scale: f64) -> Rpc {
     for i in LINEAR {
         rpc.samp_num[i] = (rpc.samp_den[i] * (rpc.samp_off - offset) + rpc.samp_scale * rpc.samp_num[i]) / scale;
@@ -48,7 +48,7 @@ fn with_far_offsets(mut rpc: Rpc, offset: f64, scale: f64) -> Rpc {
     rpc
 }
 
-/// The same camera with another HEIGHT_OFF and HEIGHT_SCALE.
+/// Sets another HEIGHT_OFF and HEIGHT_SCALE without a change of the camera.
 fn with_heights_about(mut rpc: Rpc, offset_m: f64, scale_m: f64) -> Rpc {
     let (shift, factor) = ((offset_m - rpc.height_off) / rpc.height_scale, scale_m / rpc.height_scale);
     for c in polynomials(&mut rpc) {
@@ -63,7 +63,7 @@ fn rewritten(change: impl Fn(Rpc) -> Rpc) -> Vec<Shot> {
     EASY.shots.iter().map(|s| Shot { rpc: change(s.rpc.clone()), ..s.clone() }).collect()
 }
 
-/// The DSM from RPCs that are written in another way is the DSM.
+/// Other coefficients of the same cameras give the same DSM.
 fn expect_the_same(case: &str, change: impl Fn(Rpc) -> Rpc) {
     expect_near(case, 0.05, change);
 }
@@ -89,7 +89,7 @@ fn denominators_that_are_zero_above_the_scene_change_nothing() {
     expect_the_same("a pole in the air", |rpc| with_pole(rpc, 3, 0.7));
 }
 
-/// A camera that does fail at a height: its samples run away towards H = 0.9, 450 m above the
+/// A camera that fails at a height: its samples go to infinity towards H = 0.9, 450 m above the
 /// scene.
 #[test]
 fn a_camera_that_fails_high_above_the_scene_is_good_at_the_scene() {

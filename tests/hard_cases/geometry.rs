@@ -19,8 +19,8 @@ fn views_from_one_direction_have_no_parallax() {
     assert!((angle_deg - 0.2).abs() < 0.05, "{angle_deg}");
 }
 
-/// One degree moves the image by 0.035 px per metre: heights are a few metres off, and the user is
-/// told so.
+/// One degree moves the image by 0.035 px per metre: heights are a few metres off, and a warning
+/// says so.
 #[test]
 fn a_tiny_baseline_gives_heights_with_an_honest_deviation_and_a_warning() {
     let stage = Stage::default();
@@ -34,8 +34,8 @@ fn a_tiny_baseline_gives_heights_with_an_honest_deviation_and_a_warning() {
     assert!(outcome.warns("1.0°"), "{:?}", outcome.report.warnings);
 }
 
-/// One picture under the RPCs of two: every point lies where both say, and no height follows from
-/// it.
+/// One picture with two RPCs: every point lies at the same pixel of both, so that no height follows
+/// from it.
 #[test]
 fn one_picture_under_two_rpcs_has_no_parallax() {
     let mut shots = EASY.shots.clone();
@@ -61,7 +61,7 @@ fn a_scene_at_85_degrees_north_is_mapped_in_the_polar_zone() {
     stage.score(&outcome).expect("85° N", 0.95, 0.03);
 }
 
-/// Two images that share a strip: the second camera looks beside the first one's ground.
+/// Two images that share a strip: the second camera looks beside the ground of the first one.
 fn strip(share: f64) -> (Stage, Vec<Shot>, f64) {
     let stage = Stage::default();
     let side_m = stage.size_px as f64 * stage.gsd_m;

@@ -1,5 +1,5 @@
-//! What must not change the heights: the order of the views, their gain and offset, where an image
-//! begins.
+//! Heights do not depend on the order of the views, on their gain and offset, nor on the first
+//! pixel of an image.
 
 use camera::ImagePoint;
 use raster::Window;
@@ -25,7 +25,7 @@ fn gain_and_offset_of_a_view_do_not_matter() {
     assert!(share > 0.985, "only {share} of the cells are the same");
 }
 
-/// The shots cut by (columns, rows) at their upper left.
+/// Returns the shots without the given (columns, rows) at their upper left.
 fn cut(by: [[usize; 2]; 3]) -> Vec<Shot> {
     let one = |(shot, [x, y]): (&Shot, [usize; 2])| {
         let (width, height) = (shot.image.width() - x, shot.image.height() - y);
@@ -35,9 +35,9 @@ fn cut(by: [[usize; 2]; 3]) -> Vec<Shot> {
     EASY.shots.iter().zip(by).map(one).collect()
 }
 
-/// By whole pixels of every pyramid level, and by odd numbers. The scene's middle moves with the
-/// cut, and with it the lattice of heights: that is worth what the noise of the heights is. (On one
-/// lattice they are the same: `sweep: level`.)
+/// The cuts are whole pixels of every pyramid level, and odd numbers. The middle of the scene moves
+/// with the cut, and with it the lattice of heights, which changes the heights by about their
+/// noise. (On one lattice they are the same: `sweep: level`.)
 #[test]
 fn where_an_image_begins_does_not_matter() {
     for by in [[[8, 16], [8, 8], [16, 8]], [[3, 8], [5, 2], [1, 7]]] {

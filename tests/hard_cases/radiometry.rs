@@ -1,4 +1,4 @@
-//! Pixels that say little, nothing, or something else in every view.
+//! Pixels with little texture, with none, or with a different one in every view.
 
 use eval::AlignmentMethod;
 use jobs::dsm::{DsmError, Fill};
@@ -29,8 +29,8 @@ fn one_blank_view_is_named_and_does_not_harm_the_rest() {
     assert!(outcome.warns("view_2.tif"), "{:?}", outcome.report.warnings);
 }
 
-/// The 20 m roof and the ground beside it are white in all views: what has no texture has no height
-/// of its own.
+/// The 20 m roof and the ground beside it are white in all views. A surface without texture has no
+/// observed height.
 #[test]
 fn a_saturated_roof_is_right_or_void() {
     let white = |x: f64, y: f64| (x - 35.0).hypot(y + 5.0) < 13.0;
@@ -40,7 +40,7 @@ fn a_saturated_roof_is_right_or_void() {
             ..Stage::default()
         };
         let mut shots = stage.shots(&triplet(0.5));
-        // 2047 is white to an 11-bit sensor, 65535 to the file.
+        // 2047 is the white of an 11-bit sensor, 65535 that of the file.
         for s in &mut shots {
             s.image.data_mut().iter_mut().filter(|v| **v >= 2047).for_each(|v| *v = limit);
         }
@@ -55,7 +55,7 @@ fn a_saturated_roof_is_right_or_void() {
             assert!(
                 inside.covered < 0.5 && stage.errors(&closed, 50.0, AlignmentMethod::None).over(white).covered == 1.0
             );
-            // What is closed on request is told as closed, and nothing else changes.
+            // Voids that are closed on request are counted as filled, and nothing else changes.
             assert!(before.observed == after.observed && before.filled + 1000 < after.filled, "{before:?} {after:?}");
             let open = stage.run(&shots, |config| config.fill = Fill::None).unwrap().report.surface;
             assert!(before.observed == open.observed && before.filled > 0 && open.filled == 0, "{before:?} {open:?}");
@@ -63,8 +63,8 @@ fn a_saturated_roof_is_right_or_void() {
     }
 }
 
-/// A third of the middle view is void, once as its no-data value says and once as black that
-/// nothing declares.
+/// A third of the middle view is void, once by its declared no-data value and once as undeclared
+/// black.
 #[test]
 fn voids_in_a_view_leave_the_other_views_heights() {
     for no_data in [Some(0.0), None] {
@@ -132,7 +132,7 @@ fn repeated_texture_is_not_taken_for_another_height() {
     }
 }
 
-/// South of the shore the water glitters, in every view in another way.
+/// South of the shore the water glitters, differently in every view.
 #[test]
 fn glittering_water_is_void_or_level_and_the_land_is_right() {
     let stage = Stage {

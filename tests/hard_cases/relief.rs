@@ -1,12 +1,11 @@
-//! Surfaces that rise fast, and ranges of heights that do not hold them.
+//! Surfaces that rise fast, and height ranges that do not hold them.
 
 use eval::AlignmentMethod;
 use jobs::dsm::{DsmError, HeightRange};
 
 use crate::stage::{EASY, Stage, rolling, triplet, village};
 
-/// A tower of 30 × 30 m and 130 m, whose roof is as far from the ground's heights as its parallax
-/// is from the ground's: 70 px.
+/// A tower of 30 × 30 m and 130 m. The parallax of its roof against the ground is 70 px.
 #[test]
 fn a_tower_of_130_m_survives() {
     let tower = |x: f64, y: f64| x.abs() < 15.0 && (y - 5.0).abs() < 15.0;
@@ -46,7 +45,7 @@ fn a_range_far_above_the_scene_is_refused_with_the_heights_seen() {
     assert!(seen.low_m > 170.0 && seen.high_m < 210.0, "{seen:?}");
 }
 
-/// The range ends at 8 m: the roofs at 9 to 20 m are outside. They are void, and the user is told.
+/// The range ends at 8 m: the roofs at 9 to 20 m are outside. They are void, and a warning says so.
 #[test]
 fn a_range_that_cuts_the_roofs_off_is_told_and_gives_no_false_roofs() {
     let outcome = EASY.stage.run(&EASY.shots, |c| c.height_range_m = Some(HeightRange::new(170.0, 188.0))).unwrap();

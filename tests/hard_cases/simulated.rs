@@ -1,6 +1,5 @@
-//! The simulator's presets, small: what a stage with one difficulty does not have, all of them
-//! together. Pointing errors of one to three pixels are in every RPC, so scores are taken after a
-//! shift.
+//! Small scenes of the simulator's presets, which have many difficulties at once where a stage has
+//! one. Every RPC has a pointing error of one to three pixels, so scores are taken after a shift.
 
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use raster::Grid;
@@ -8,7 +7,7 @@ use simulate::{Simulation, SimulationConfig, TruthClass};
 
 use crate::stage::{Score, Shot, Stage};
 
-/// Classes of the truth, as LAS numbers them and the simulator goes on.
+/// Classes of the truth: the numbers of LAS, and those that the simulator adds.
 const GROUND: u8 = TruthClass::Ground as u8;
 const BUILDING: u8 = TruthClass::Building as u8;
 const WATER: u8 = TruthClass::Water as u8;
@@ -27,7 +26,7 @@ struct Compared {
 }
 
 impl Compared {
-    /// The score over the cells whose class and true height are chosen.
+    /// Returns the score over the cells whose class and true height are chosen.
     fn over(&self, choose: impl Fn(u8, f32) -> bool) -> Score {
         let cells = self.errors.data().iter().zip(self.classes.data().iter().zip(self.truth.data()));
         Score::of(cells.filter(|(_, (c, t))| choose(**c, **t)).map(|(e, _)| f64::from(*e)).collect())
@@ -48,8 +47,8 @@ fn compared(config: SimulationConfig) -> Compared {
     Compared { truth: truth.dsm.clone(), classes: truth.classes.clone(), errors: found.errors }
 }
 
-/// A tower of 150 m on 22 × 18 m whose roof holds no tie point: the range of heights has to find
-/// it.
+/// A tower of 150 m on 22 × 18 m whose roof holds no tie point: the height range must be extended
+/// to hold it.
 #[test]
 fn a_slim_tower_of_the_high_rise_town_survives() {
     let c = compared(SimulationConfig { size_m: 110.0, ..preset("high-rise") });

@@ -1,10 +1,9 @@
 //! A stage for hard cases: a height function with paint on it, photographed through exact RPC
-//! cameras, and the score of the DSM that the pipeline makes of the photographs.
-//!
-//! It is apart from the `simulate` crate on purpose: what both have wrong would cancel, and a case
-//! wants to set one thing to an extreme. Stage frame: x east, y north in metres from the centre,
-//! each proportional to longitude and latitude (so the frame is the same at any latitude and across
-//! the antimeridian), z metres above `ground_m`.
+//! cameras, and the score of the DSM that `jobs::dsm` makes of the photographs. It does not use the
+//! `simulate` crate on purpose: an error in both would cancel, and a case sets one thing to an
+//! extreme. Stage frame: x east, y north in metres from the centre, each proportional to longitude
+//! and latitude (so the frame is the same at any latitude and across the antimeridian), z metres
+//! above `ground_m`.
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
@@ -50,7 +49,7 @@ pub(crate) struct Shot {
     pub(crate) no_data: Option<f64>,
 }
 
-/// What a run left.
+/// Results of a run.
 pub(crate) struct Outcome {
     pub(crate) dem: Dem,
     pub(crate) sigma: Dem,
@@ -62,11 +61,12 @@ pub(crate) struct Outcome {
 pub(crate) struct Score {
     /// Cells of the region.
     pub(crate) cells: usize,
-    /// Share of them that have a height.
+    /// Share of the cells with a height.
     pub(crate) covered: f64,
-    /// Share of them whose height is right to a metre.
+    /// Share of the cells whose height is right to a metre.
     pub(crate) right: f64,
-    /// Share of them whose height is wrong by more than two metres: worse than none.
+    /// Share of the cells whose height is wrong by more than two metres, which is worse than a
+    /// void.
     pub(crate) wrong: f64,
     /// Median error, metres.
     pub(crate) bias_m: f64,
@@ -106,10 +106,11 @@ pub(crate) struct Building {
 }
 
 impl Building {
-    /// Height of the building over a place; all stand turned by 17° against the map.
+    /// Returns the height of the building over a place. All buildings are turned by 17° against the
+    /// map.
     pub(crate) fn height(&self, x: f64, y: f64) -> Option<f64> {
-        // All of scene construction comes through here: the sine and cosine are not computed each
-        // time.
+        // Sine and cosine are constants because the construction of every scene calls this for
+        // every pixel.
         let (sin, cos) = (0.292_371_704_722_736_77, 0.956_304_755_963_035_4);
         let (dx, dy) = (x - self.centre[0], y - self.centre[1]);
         let (u, v) = (cos * dx + sin * dy, cos * dy - sin * dx);
@@ -118,8 +119,8 @@ impl Building {
     }
 }
 
-/// The village photographed without any difficulty, and its DSM: what the cases with the same
-/// pixels are compared with.
+/// The village photographed without any difficulty, and its DSM. Cases with the same pixels are
+/// compared with it.
 pub(crate) struct Easy {
     pub(crate) stage: Stage,
     pub(crate) shots: Vec<Shot>,
@@ -146,7 +147,7 @@ pub(crate) fn village(x: f64, y: f64) -> f64 {
     VILLAGE.iter().find_map(|b| b.height(x, y)).unwrap_or_else(|| rolling(x, y))
 }
 
-/// Detail in three dimensions, at every scale from a metre to a block, so that walls have a picture
+/// Detail in three dimensions, at every scale from a metre to a block, so that walls have texture
 /// too.
 pub(crate) fn weathered([x, y, z]: [f64; 3]) -> f64 {
     const OCTAVES: [(f64, f64); 4] = [(1.1, 0.34), (2.7, 0.28), (7.0, 0.22), (21.0, 0.16)];
@@ -188,10 +189,10 @@ pub(crate) fn look(incidence_deg: f64, azimuth_deg: f64, gsd_m: f64) -> Look {
 }
 
 impl Look {
-    /// A pushbroom camera, north up, whose image of `size` × `size` pixels has a place of the stage
-    /// in its middle. With X in metres from there, d the direction and u, v the image's axes across
-    /// it, `sample = u·X / (1 − d·X / range)` and `line = −v·X` in pixels, which an RPC holds
-    /// exactly.
+    /// Returns a pushbroom camera, north up, whose image of `size` × `size` pixels has a place of
+    /// the stage in its middle. With X in metres from there, d the direction and u, v the image's
+    /// axes across it, `sample = u·X / (1 − d·X / range)` and `line = −v·X` in pixels, which an RPC
+    /// holds exactly.
     pub(crate) fn rpc(&self, stage: &Stage, centre: [f64; 2]) -> Rpc {
         const RANGE_M: f64 = 617_000.0;
         const HEIGHT_SCALE_M: f64 = 500.0;
@@ -256,7 +257,7 @@ impl Stage {
         looks.iter().enumerate().map(|(view, look)| self.shot(self.rpc(look), view)).collect()
     }
 
-    /// The photograph taken through an RPC.
+    /// Returns the photograph taken through an RPC.
     pub(crate) fn shot(&self, rpc: Rpc, view: usize) -> Shot {
         let n = self.size_px;
         let (top, bottom) =
@@ -281,15 +282,15 @@ impl Stage {
         Shot { image, rpc, no_data: None }
     }
 
-    /// Where the line from above the surface to below it first meets it: marched, then bisected.
+    /// Returns the first point of the surface on a line from above it to below it: marched, then
+    /// bisected.
     fn hit(&self, from: [f64; 3], to: [f64; 3]) -> [f64; 3] {
         let at = |t: f64| -> [f64; 3] { std::array::from_fn(|i| from[i] + t * (to[i] - from[i])) };
         let below = |t: f64| {
             let [x, y, z] = at(t);
             z < (self.surface)(x, y)
         };
-        // A third of a metre of height is a tenth of a metre across: thinner things do not stand on
-        // this stage.
+        // A third of a metre of height is a tenth of a metre across: no stage has thinner things.
         let step = 0.33 / (from[2] - to[2]);
         let mut t = step;
         while !below(t) && t < 1.0 {
@@ -303,7 +304,7 @@ impl Stage {
         at(above)
     }
 
-    /// Runs the pipeline on shots.
+    /// Makes a DSM of shots.
     pub(crate) fn run(&self, shots: &[Shot], set: impl FnOnce(&mut DsmConfig)) -> Result<Outcome, DsmError> {
         let folder = TempDir::new().expect("a folder");
         let paths: Vec<PathBuf> = (1..=shots.len()).map(|i| folder.path().join(format!("view_{i}.tif"))).collect();
@@ -320,8 +321,8 @@ impl Stage {
         Ok(Outcome { dem: read("dsm.tif"), sigma: read("sigma.tif"), report })
     }
 
-    /// The error of every cell within `half_m` of the centre, after an alignment; NaN in voids and
-    /// outside.
+    /// Returns the error of every cell within `half_m` of the centre, after an alignment; NaN in
+    /// voids and outside.
     pub(crate) fn errors(&self, outcome: &Outcome, half_m: f64, alignment: AlignmentMethod) -> Errors {
         let (dem, truth) = (&outcome.dem, self.truth(&outcome.dem, half_m));
         let map = CellMap::affine(&dem.geotransform, &dem.geotransform).expect("a grid on itself");
@@ -331,12 +332,12 @@ impl Stage {
         Errors { errors: found.errors, truth, places: self.places(dem) }
     }
 
-    /// Errors as they are, over 50 m around the centre.
+    /// Returns the score without alignment, over 50 m around the centre.
     pub(crate) fn score(&self, outcome: &Outcome) -> Score {
         self.errors(outcome, 50.0, AlignmentMethod::None).over(|_, _| true)
     }
 
-    /// Errors after the shift that pointing errors common to all views leave.
+    /// Returns the score after the shift that pointing errors common to all views leave.
     pub(crate) fn aligned_score(&self, outcome: &Outcome) -> Score {
         self.errors(outcome, 50.0, AlignmentMethod::Xyz).over(|_, _| true)
     }
@@ -368,7 +369,7 @@ pub(crate) struct Errors {
 }
 
 impl Errors {
-    /// The score over the cells whose place (x, y) belongs to a region.
+    /// Returns the score over the cells whose place (x, y) belongs to a region.
     pub(crate) fn over(&self, region: impl Fn(f64, f64) -> bool) -> Score {
         let inside = self.truth.data().iter().zip(self.places.data()).map(|(t, p)| !t.is_nan() && region(p[0], p[1]));
         let chosen: Vec<f64> =
@@ -382,7 +383,7 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
 }
 
 impl Score {
-    /// The score of cells with these errors, NaN in voids.
+    /// Returns the score of cells with these errors, NaN in voids.
     pub(crate) fn of(chosen: Vec<f64>) -> Self {
         let share = |f: &dyn Fn(&&f64) -> bool| chosen.iter().filter(f).count() as f64 / chosen.len().max(1) as f64;
         let mut known: Vec<f64> = chosen.iter().copied().filter(|e| e.is_finite()).collect();
@@ -410,7 +411,7 @@ impl Score {
 }
 
 impl Outcome {
-    /// Share of the inner cells with a height in either DSM whose heights in both are within a
+    /// Returns the share of the inner cells with a height in either DSM whose heights agree to a
     /// tolerance.
     pub(crate) fn agreement(&self, other: &Self, tolerance_m: f32) -> f64 {
         let (a, b) = (&self.dem, &other.dem);
@@ -433,7 +434,7 @@ impl Outcome {
         f64::from(same as u32) / f64::from(known.max(1) as u32)
     }
 
-    /// Whether a warning of the report holds a text.
+    /// Returns whether a warning of the report contains a text.
     pub(crate) fn warns(&self, text: &str) -> bool {
         self.report.warnings.iter().any(|w| w.contains(text))
     }

@@ -25,7 +25,7 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Begins a session that reports to `progress`.
+    /// Begins the session of one run, which reports to `progress`.
     pub fn new(progress: &'a dyn Progress) -> Self {
         Self { progress, views: None, prior: None, times: Vec::new(), since: Instant::now() }
     }
