@@ -7,6 +7,7 @@
 mod align;
 mod city;
 mod completions;
+mod corrections;
 mod dsm;
 mod error;
 mod eval;
@@ -24,11 +25,9 @@ mod splats;
 mod split;
 mod stand;
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use jobs::corrections::CorrectionSource;
 
 use crate::global::{Global, Outcome};
 
@@ -72,15 +71,6 @@ enum Command {
     Splats(Box<splats::Args>),
     /// Choose context and target views of a COLMAP model by their overlap.
     Split(split::Args),
-}
-
-/// Reads `--corrections`: a report, the word `none`, or nothing (the corrections of the run that made the surface).
-pub(crate) fn corrections_of(option: Option<&Path>) -> CorrectionSource {
-    match option {
-        None => CorrectionSource::SurfaceRun,
-        Some(word) if word.as_os_str() == "none" => CorrectionSource::Uncorrected,
-        Some(report) => CorrectionSource::Report(report.to_owned()),
-    }
 }
 
 fn main() -> ExitCode {

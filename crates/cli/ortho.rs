@@ -6,9 +6,10 @@ use crs::VerticalDatum;
 use jobs::files::FileError;
 use jobs::ortho::{OrthoConfig, OrthoError};
 
+use crate::corrections::corrections_of;
 use crate::error::{OVERWRITE, with_hint};
 use crate::progress::{ProgressStyle, Watcher};
-use crate::{Global, Outcome, corrections_of, print};
+use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep ortho`.
 #[derive(Debug, clap::Args)]

@@ -10,9 +10,10 @@ use jobs::files::FileError;
 use jobs::splats::{SplatRenderConfig, SplatRenderReport, SplatsConfig, SplatsJobError, SplatsReport};
 use splats::DivisionConfig;
 
+use crate::corrections::corrections_of;
 use crate::error::{OVERWRITE, with_hint};
 use crate::progress::{Log, ProgressStyle, Watcher};
-use crate::{Global, Outcome, corrections_of, print};
+use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep splats`.
 #[derive(Debug, clap::Args)]
