@@ -1,7 +1,8 @@
 //! `skysweep eval`: how far a surface model is from a reference.
 //!
-//! The files decide what is compared: height grids (the reference may be a LAS cloud), surfaces (both are meshes, city models
-//! or clouds), or maps in the pixels of a camera (both are `.npy`, or `--maps` names their kind).
+//! The files decide what is compared: height grids (the reference may be a LAS cloud), surfaces
+//! (both are meshes, city models or clouds), or maps in the pixels of a camera (both are `.npy`, or
+//! `--maps` names their kind).
 
 use std::path::PathBuf;
 
@@ -22,13 +23,15 @@ use crate::{Global, Outcome, print};
 /// Arguments of `skysweep eval`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Surface model to evaluate, on any grid; or a mesh, city model or cloud (OBJ, PLY, CityJSON, CityGML, LAS, LAZ) if REF
-    /// is one, too; or a map of depths, normals or a mask (.npy).
+    /// Surface model to evaluate, on any grid; or a mesh, city model or cloud (OBJ, PLY, CityJSON,
+    /// CityGML, LAS, LAZ) if REF is one, too; or a map of depths, normals or a mask (.npy).
     test: PathBuf,
-    /// Reference of the same kind. For a grid it may also be a LAS or LAZ cloud; errors are then measured at its cells.
+    /// Reference of the same kind. For a grid it may also be a LAS or LAZ cloud; errors are then
+    /// measured at its cells.
     #[arg(value_name = "REF")]
     reference: PathBuf,
-    /// What is removed before the comparison [default: xyz for grids; surfaces and maps are compared as they are].
+    /// What is removed before the comparison [default: xyz for grids; surfaces and maps are
+    /// compared as they are].
     #[arg(long, value_enum)]
     align: Option<Align>,
     /// Radius of the horizontal search of --align xyz and nuth-kaab, in metres.
@@ -43,11 +46,12 @@ pub(crate) struct Args {
     /// Raster on any grid: only cells where it is not zero count (read at the nearest cell).
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
-    /// Terrain model, to find what stands above it [default: from the class ground, else estimated from REF].
+    /// Terrain model, to find what stands above it [default: from the class ground, else estimated
+    /// from REF].
     #[arg(long, value_name = "FILE")]
     dtm: Option<PathBuf>,
-    /// Confidence of each cell of TEST, on its grid, more is better (dsm/confidence.tif). Adds rows for the most confident
-    /// 95 to 50 % of REF's cells.
+    /// Confidence of each cell of TEST, on its grid, more is better (dsm/confidence.tif). Adds rows
+    /// for the most confident 95 to 50 % of REF's cells.
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
     /// Least height above the terrain of cells that count as standing, in metres.
@@ -56,18 +60,19 @@ pub(crate) struct Args {
     /// Side of the cells into which a point cloud REF is gridded, in metres [default: TEST's].
     #[arg(long, value_name = "METRES")]
     ref_cell: Option<f64>,
-    /// Thresholds in metres: of completeness_T and pag_T [default: 0.5,1,2.5,7.5], or of precision, recall and F-score of
-    /// surfaces [default: 0.1,0.2,0.5,1].
+    /// Thresholds in metres: of completeness_T and pag_T [default: 0.5,1,2.5,7.5], or of precision,
+    /// recall and F-score of surfaces [default: 0.1,0.2,0.5,1].
     #[arg(long, value_name = "METRES", value_delimiter = ',')]
     thresholds: Vec<f64>,
-    /// Vertical datum of TEST's heights, if the file names none or a wrong one: ellipsoid, egm96, egm2008 or EPSG:n.
+    /// Vertical datum of TEST's heights, if the file names none or a wrong one: ellipsoid, egm96,
+    /// egm2008 or EPSG:n.
     #[arg(long, value_name = "DATUM")]
     test_vertical: Option<VerticalDatum>,
     /// Vertical datum of REF's heights, likewise.
     #[arg(long, value_name = "DATUM")]
     ref_vertical: Option<VerticalDatum>,
-    /// Folder for report.html, report.json and the error map [default: RUN/eval for a surface model RUN/dsm/dsm.tif that
-    /// skysweep made, else none].
+    /// Folder for report.html, report.json and the error map [default: RUN/eval for a surface model
+    /// RUN/dsm/dsm.tif that skysweep made, else none].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Write the page alone to this file.
@@ -87,13 +92,16 @@ pub(crate) struct Args {
     json: bool,
     #[command(flatten)]
     surface: SurfaceArgs,
-    /// The files are maps of this kind in the pixels of one camera [default: found by shape and type of .npy files].
+    /// The files are maps of this kind in the pixels of one camera [default: found by shape and
+    /// type of .npy files].
     #[arg(long, value_enum, value_name = "KIND")]
     maps: Option<MapKind>,
-    /// Exit with 1 if the MAE over all cells is above this, in metres; for surfaces the mean distance of TEST to REF.
+    /// Exit with 1 if the MAE over all cells is above this, in metres; for surfaces the mean
+    /// distance of TEST to REF.
     #[arg(long, value_name = "METRES")]
     max_mae: Option<f64>,
-    /// Exit with 1 if the completeness over all cells is below this share (0 to 1), at 1 m unless T names another threshold.
+    /// Exit with 1 if the completeness over all cells is below this share (0 to 1), at 1 m unless T
+    /// names another threshold.
     #[arg(long, value_name = "[T=]SHARE", value_delimiter = ',')]
     min_completeness: Vec<LeastCompleteness>,
 }
@@ -140,7 +148,8 @@ enum Align {
     Z,
     /// The translation with the least NMAD, then the median of the differences.
     Xyz,
-    /// The translation that follows from slopes and aspects (Nuth and Kääb 2011), then the median of the differences.
+    /// The translation that follows from slopes and aspects (Nuth and Kääb 2011), then the median
+    /// of the differences.
     NuthKaab,
 }
 

@@ -1,7 +1,7 @@
 //! `skysweep groundview`: what cameras and 360° panoramas on the ground see of a surface.
 //!
-//! A row of a list without a view does not stop the others: it is named in the report, and the exit code is 1.
-//! `skysweep groundview compose` lays a rendered ground layer over a satellite layer.
+//! A row of a list without a view does not stop the others: it is named in the report, and the exit
+//! code is 1. `skysweep groundview compose` lays a rendered ground layer over a satellite layer.
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,8 @@ const SHOWN: usize = 20;
 pub(crate) struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Height map or surface model (raster), or city model (CityJSON, CityGML, OBJ, PLY), on a map in metres.
+    /// Height map or surface model (raster), or city model (CityJSON, CityGML, OBJ, PLY), on a map
+    /// in metres.
     #[arg(required = true, value_name = "SURFACE")]
     surface: Option<PathBuf>,
     /// Folder to write.
@@ -69,7 +70,8 @@ struct ComposeArgs {
 /// Cameras and outputs of the views.
 #[derive(Debug, clap::Args)]
 struct MakeArgs {
-    /// Cameras of a COLMAP model on the surface's map, with origin.json, as skysweep align writes it.
+    /// Cameras of a COLMAP model on the surface's map, with origin.json, as skysweep align writes
+    /// it.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["center", "camera", "positions"])]
     cameras: Option<PathBuf>,
     #[command(flatten)]
@@ -86,13 +88,15 @@ struct MakeArgs {
     /// Field of view of a crop, degrees.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0)]
     fov: f64,
-    /// Folder with the pictures of the panoramas (ID.png, ID.jpg or ID.tif; ID is panorama for --center): crops are cut from them.
+    /// Folder with the pictures of the panoramas (ID.png, ID.jpg or ID.tif; ID is panorama for
+    /// --center): crops are cut from them.
     #[arg(long, value_name = "FOLDER")]
     pictures: Option<PathBuf>,
     /// Points of the surface per perspective camera in the COLMAP model, at most.
     #[arg(long, value_name = "N", default_value_t = 2000)]
     points: usize,
-    /// Vertical datum of SURFACE, if the file names none or a wrong one: ellipsoid, egm96, egm2008 or EPSG:n.
+    /// Vertical datum of SURFACE, if the file names none or a wrong one: ellipsoid, egm96, egm2008
+    /// or EPSG:n.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
     /// Worker threads [default: all cores].

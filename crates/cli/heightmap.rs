@@ -1,7 +1,9 @@
-//! `skysweep heightmap`: the surface seen from above around a camera, turned to its heading, as a GeoTIFF.
+//! `skysweep heightmap`: the surface seen from above around a camera, turned to its heading, as a
+//! GeoTIFF.
 //!
-//! The command makes one map, or one per row of a list. A map of a list that cannot be made does not stop the others: it is
-//! named in the report, and the exit code is 1. `skysweep heightmap unproject` turns a map back into points or splats.
+//! The command makes one map, or one per row of a list. A map of a list that cannot be made does
+//! not stop the others: it is named in the report, and the exit code is 1. `skysweep heightmap
+//! unproject` turns a map back into points or splats.
 
 use std::path::{Path, PathBuf};
 
@@ -36,7 +38,8 @@ const SHOWN: usize = 20;
 pub(crate) struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Surface model (raster), city model (CityJSON, CityGML, OBJ, PLY) or point cloud (LAS, LAZ, COPC).
+    /// Surface model (raster), city model (CityJSON, CityGML, OBJ, PLY) or point cloud (LAS, LAZ,
+    /// COPC).
     #[arg(required = true, value_name = "SOURCE")]
     source: Option<PathBuf>,
     /// GeoTIFF to write; with --positions the folder for the maps.
@@ -63,13 +66,15 @@ struct UnprojectArgs {
     /// Axes of points in a PLY.
     #[arg(long, value_enum, default_value_t = Frame::World)]
     frame: Frame,
-    /// Write Gaussian splats as 3DGS viewers and trainers read them (.ply, its origin beside it), one for each pixel.
+    /// Write Gaussian splats as 3DGS viewers and trainers read them (.ply, its origin beside it),
+    /// one for each pixel.
     #[arg(long)]
     splats: bool,
     /// Picture of the map's own pixels that gives the splats their colours [default: grey].
     #[arg(long, value_name = "IMAGE", requires = "splats")]
     picture: Option<PathBuf>,
-    /// Merge splats whose heights are within this distance of one plane, and whose colours are alike.
+    /// Merge splats whose heights are within this distance of one plane, and whose colours are
+    /// alike.
     #[arg(long, value_name = "METRES", requires = "splats")]
     merge: Option<f64>,
     /// Replace a file that exists.
@@ -114,14 +119,17 @@ struct MakeArgs {
     /// Terrain model: the ground under the camera, and the height where SOURCE has none.
     #[arg(long, value_name = "FILE")]
     dtm: Option<PathBuf>,
-    /// Divide heights by the scale of the scene: auto (mean distance of the map's points), a number of metres, or none.
+    /// Divide heights by the scale of the scene: auto (mean distance of the map's points), a number
+    /// of metres, or none.
     #[arg(long, value_name = "auto|S|none", default_value = "none")]
     normalize: Normalization,
-    /// Add a band of confidences (0 to 1): from this raster, or from confidence.tif beside a DSM that skysweep made; for
-    /// other sources 1 where SOURCE has a height and 0 where --dtm gave it. "--confidence=FILE" names the raster.
+    /// Add a band of confidences (0 to 1): from this raster, or from confidence.tif beside a DSM
+    /// that skysweep made; for other sources 1 where SOURCE has a height and 0 where --dtm gave it.
+    /// "--confidence=FILE" names the raster.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "auto", require_equals = true)]
     confidence: Option<PathBuf>,
-    /// Map to write on: local (a transverse Mercator at the camera, whose metres are those of the ground), utm or EPSG:n.
+    /// Map to write on: local (a transverse Mercator at the camera, whose metres are those of the
+    /// ground), utm or EPSG:n.
     #[arg(long, value_name = "CRS", default_value = "local")]
     crs: MapChoice,
     /// Interpolation between the cells of a raster.

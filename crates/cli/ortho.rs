@@ -1,4 +1,5 @@
-//! `skysweep ortho`: images laid on a surface model so that every cell shows its own ground point, hidden cells marked.
+//! `skysweep ortho`: images laid on a surface model so that every cell shows its own ground point,
+//! hidden cells marked.
 
 use std::path::PathBuf;
 
@@ -33,14 +34,15 @@ pub(crate) struct Args {
     /// Area in the surface model's map [default: all of it].
     #[arg(long, num_args = 4, value_names = ["X_MIN", "Y_MIN", "X_MAX", "Y_MAX"], allow_negative_numbers = true)]
     bounds: Option<Vec<f64>>,
-    /// Pointing corrections of the images: the report of a run of skysweep dsm, or none [default: from the run that made the
-    /// surface model, for the images that it used].
+    /// Pointing corrections of the images: the report of a run of skysweep dsm, or none [default:
+    /// from the run that made the surface model, for the images that it used].
     #[arg(long, value_name = "report.json|none")]
     corrections: Option<PathBuf>,
     /// Vertical datum of the surface model, if the file names none or a wrong one.
     #[arg(long, value_name = "DATUM")]
     dsm_vertical: Option<VerticalDatum>,
-    /// Height by which the surface must stand above a line of sight to hide what is behind it, metres.
+    /// Height by which the surface must stand above a line of sight to hide what is behind it,
+    /// metres.
     #[arg(long, value_name = "METRES", default_value_t = 0.05)]
     tolerance: f64,
     /// Leave the images' grey values as they are.

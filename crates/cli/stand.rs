@@ -16,13 +16,15 @@ pub(crate) struct StandArgs {
     /// One camera for each row of a list (CSV or GeoJSON: id, lon, lat, heading, height_m).
     #[arg(long, value_name = "FILE", conflicts_with_all = ["center", "camera"])]
     pub(crate) positions: Option<PathBuf>,
-    /// Heading of the camera, degrees clockwise from true north [default: the camera's or row's, else 0].
+    /// Heading of the camera, degrees clockwise from true north [default: the camera's or row's,
+    /// else 0].
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     heading: Option<f64>,
     /// Height of the camera above the ground under it, metres.
     #[arg(long, value_name = "METRES", default_value_t = 2.0, allow_negative_numbers = true)]
     ground_offset: f64,
-    /// Height of the camera above the ellipsoid, metres [default: the camera's or row's, else the ground's and --ground-offset].
+    /// Height of the camera above the ellipsoid, metres [default: the camera's or row's, else the
+    /// ground's and --ground-offset].
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     camera_height: Option<f64>,
 }

@@ -1,6 +1,7 @@
-//! A rendered ground layer over a satellite layer: C = C_ground + (1 − α_ground) · C_sat (Cross-View Splatter).
+//! Lays a rendered ground layer over a satellite layer: C = C_ground + (1 − α_ground) · C_sat
+//! (Cross-View Splatter).
 //!
-//! The colours of the ground layer are as a splat renderer leaves them, already weighted by their opacity.
+//! A splat renderer leaves the colours of the ground layer weighted by their opacity.
 
 use raster::Grid;
 
@@ -10,16 +11,28 @@ use raster::Grid;
 pub struct SizeError {
     /// Columns and rows of the ground layer.
     pub ground: (usize, usize),
-    /// … of its opacity.
+    /// Columns and rows of its opacity.
     pub alpha: (usize, usize),
-    /// … of the satellite layer.
+    /// Columns and rows of the satellite layer.
     pub satellite: (usize, usize),
 }
 
-/// Composes two layers; opacities are 0 to 1.
+/// Lays the ground layer over the satellite layer; opacities are 0 to 1.
 ///
 /// # Errors
-/// Layers of different sizes.
+/// [`SizeError`] for layers of different sizes.
+///
+/// ```
+/// use raster::Grid;
+///
+/// let both = groundview::compose(
+///     &Grid::filled(1, 1, [0.2, 0.0, 0.0]),
+///     &Grid::filled(1, 1, 0.5),
+///     &Grid::filled(1, 1, [0.0, 0.0, 0.8]),
+/// )?;
+/// assert_eq!(both[(0, 0)], [0.2, 0.0, 0.4]);
+/// # Ok::<(), groundview::SizeError>(())
+/// ```
 pub fn compose(
     ground: &Grid<[f32; 3]>,
     alpha: &Grid<f32>,

@@ -1,8 +1,9 @@
 //! A height field followed exactly by rays.
 //!
-//! Between four neighbouring centres the surface is two triangles: upper left, upper right, lower left; and the rest. A ray goes
-//! from square to square (Amanatides and Woo 1987); in each it is compared with the planes of both triangles, on which
-//! the height is linear along the ray. A triangle with a corner without a height is not there.
+//! Between four neighbouring centres the surface is two triangles: upper left, upper right, lower
+//! left; and the rest. A ray goes from square to square (Amanatides and Woo 1987); in each it is
+//! compared with the planes of both triangles, on which the height is linear along the ray. A
+//! triangle with a corner without a height is not there.
 
 use bvh::Ray;
 use raster::{GeoTransform, Grid};
@@ -10,7 +11,8 @@ use raster::{GeoTransform, Grid};
 use super::{Ground, Met};
 use numeric::vector::{cross, normalized};
 
-/// How far beyond a square its triangles are still met, cells: a ray along an edge must not slip through.
+/// How far beyond a square its triangles are still met, cells: a ray along an edge must not slip
+/// through.
 const EDGE: f64 = 1e-9;
 
 /// Heights on a map grid.
@@ -33,8 +35,8 @@ struct Course {
 }
 
 impl HeightField {
-    /// A field of heights above `origin[2]` on a map in metres; `None` where the geotransform has no inverse or no square of cells
-    /// can be met.
+    /// A field of heights above `origin[2]` on a map in metres; `None` where the geotransform has
+    /// no inverse or no square of cells can be met.
     pub fn new(heights: Grid<f32>, geotransform: GeoTransform, origin: [f64; 3]) -> Option<Self> {
         geotransform.cell_from_map(origin[0], origin[1])?;
         let known = || heights.data().iter().copied().filter(|h| h.is_finite()).map(f64::from);

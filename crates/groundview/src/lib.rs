@@ -1,9 +1,10 @@
 //! Views from the ground: what cameras and 360° panoramas see of a height field or of a mesh.
 //!
-//! Positions are metres from a local origin on a map: easting, northing, height. [`HeightField`] is followed exactly, two triangles to
-//! each square of cells; [`MeshGround`] goes through the tree of the crate `bvh`. [`render`] makes depths, normals and what
-//! each pixel is; [`visible_cells`] is the way back, from a camera to the cells that it sees. [`compose`] lays a
-//! rendered ground layer over a satellite layer.
+//! Positions are metres from a local origin on a map: easting, northing, height. Rays follow a
+//! [`HeightField`] exactly, with two triangles for each square of cells, and a [`MeshGround`]
+//! through the tree of the crate `bvh`. [`render`] makes depths, normals and the kind of each
+//! pixel. [`visible_cells`] finds the cells that a camera sees. [`compose`] lays a rendered ground
+//! layer over a satellite layer.
 
 mod compose;
 mod field;

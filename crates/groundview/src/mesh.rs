@@ -1,11 +1,11 @@
-//! Triangles as ground: rays through the tree of the crate `bvh`.
+//! Triangles as the surface of ground views: rays go through the tree of the crate `bvh`.
 
 use bvh::{Bvh, BvhError, Ray};
 
 use super::{Ground, Met};
 use numeric::vector::{cross, normalized};
 
-/// Triangles in metres from the local origin.
+/// Triangles, metres from the local origin.
 #[derive(Debug)]
 pub struct MeshGround {
     bvh: Bvh,
@@ -13,7 +13,7 @@ pub struct MeshGround {
 }
 
 impl MeshGround {
-    /// Arranges triangles; their normals are those of their corners' order.
+    /// Arranges triangles. Their normals follow from the order of their corners.
     ///
     /// # Errors
     /// As [`Bvh::new`].

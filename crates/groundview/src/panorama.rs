@@ -1,8 +1,9 @@
 //! 360° panoramas in the equirectangular projection, and perspective crops of them.
 //!
-//! The middle column looks along the camera's z axis, columns turn to the right, rows go from straight up to straight down:
-//! azimuth = ((c + ½) / W − ½) · 360°, elevation = (½ − (r + ½) / H) · 180°, pixels counted from the centre of the upper left
-//! one. Camera axes: x right, y down, z forward.
+//! The middle column looks along the camera's z axis, columns turn to the right, rows go from
+//! straight up to straight down: azimuth = ((c + ½) / W − ½) · 360°, elevation = (½ − (r + ½) / H)
+//! · 180°, pixels counted from the centre of the upper left one. Camera axes: x right, y down, z
+//! forward.
 
 use camera::{ImagePoint, Lens, LensError, LensModel, Pose};
 use raster::Grid;
@@ -34,8 +35,8 @@ impl Panorama {
         [(azimuth + 0.5) * self.width as f64 - 0.5, (0.5 - elevation) * self.height as f64 - 0.5]
     }
 
-    /// Cuts the picture that a lens sees, turned to the right by `turn_deg`, out of a panorama's picture: bilinear, and
-    /// closed behind. Pixels that the lens has no ray for are zero.
+    /// Cuts the picture that a lens sees, turned to the right by `turn_deg`, out of a panorama's
+    /// picture: bilinear, and closed behind. Pixels that the lens has no ray for are zero.
     pub fn crop(picture: &Grid<[f32; 3]>, lens: &Lens, turn_deg: f64) -> Grid<[f32; 3]> {
         let panorama = Self { width: picture.width(), height: picture.height() };
         let (sin, cos) = turn_deg.to_radians().sin_cos();

@@ -1,7 +1,9 @@
-//! Depths, normals and kinds of the pixels of a camera on the ground, and the cells of a height field that it sees.
+//! Depths, normals and kinds of the pixels of a camera on the ground, and the cells of a height
+//! field that it sees.
 //!
-//! The depth of a perspective camera is along its z axis, that of a panorama along the ray. Normals are in the axes of the map and
-//! turned to the camera. A pixel that meets nothing is sky where its ray rises, and beyond the surface where it falls.
+//! The depth of a perspective camera is along its z axis, that of a panorama along the ray. Normals
+//! are in the axes of the map and turned to the camera. A pixel that meets nothing is sky where its
+//! ray rises, and beyond the surface where it falls.
 
 use bvh::Ray;
 use camera::{ImagePoint, Lens, Pose};
@@ -17,7 +19,8 @@ pub const SKY: u8 = 1;
 /// The pixel's ray falls beyond the surface, or the lens has no ray for it.
 pub const BEYOND: u8 = 2;
 
-/// A cell is seen when nothing is met before this far above it, metres: its own triangles end in it.
+/// A cell is seen when nothing is met before this far above it, metres: its own triangles end in
+/// it.
 const ABOVE_CELL_M: f64 = 0.02;
 
 /// The inside of a camera.

@@ -1,10 +1,11 @@
-//! The confidence of a tile's heights, from a raster of confidences on the source's grid.
+//! Confidences of the heights of a tile, from a raster of confidences.
 
 use raster::{Grid, bilinear};
 
-use super::TileMap;
+use crate::lattice::TileMap;
 
-/// Confidences (0 to 1) at the pixels of a tile that have a height, NaN elsewhere; where the raster has none it is 0.
+/// Reads confidences (0 to 1) at the pixels of a tile that have a height, NaN elsewhere. Where the
+/// raster has no value, the confidence is 0.
 pub fn confidence_from_grid(grid: &Grid<f32>, map: &TileMap, heights: &Grid<f32>) -> Grid<f32> {
     let mut confidences = Grid::filled(heights.width(), heights.height(), f32::NAN);
     for row in 0..heights.height() {

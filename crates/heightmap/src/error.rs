@@ -1,4 +1,4 @@
-//! What can go wrong with a height map.
+//! Reasons why a height map cannot be made.
 
 use crs::CrsError;
 use geodesy::GeodesyError;
@@ -7,7 +7,7 @@ use geodesy::GeodesyError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HeightMapError {
-    /// The size or the resolution make no tile.
+    /// The size or the resolution is out of range.
     #[error(
         "a tile of {size} x {size} pixels at {resolution_px_per_m} px/m: expected 1 to {most} pixels a side, and up to {widest_m} m"
     )]
@@ -21,10 +21,10 @@ pub enum HeightMapError {
         /// Longest side, metres.
         widest_m: f64,
     },
-    /// The heading is no angle.
+    /// The heading is not finite.
     #[error("the heading is {heading_deg}, expected degrees clockwise from north")]
     Heading {
-        /// As given.
+        /// Heading that was given.
         heading_deg: f64,
     },
     /// The map of a CRS bends too much for an affine georeference.
@@ -34,27 +34,27 @@ pub enum HeightMapError {
     Bent {
         /// The CRS asked for.
         epsg: u32,
-        /// How far a corner is off, pixels.
+        /// Largest error of a corner, pixels.
         off_px: f64,
         /// The limit.
         limit_px: f64,
     },
-    /// A CRS that is no map in metres.
+    /// The CRS is not a map in metres.
     #[error("EPSG:{epsg} is not a map in metres: use the local map, the UTM zone or another projected CRS")]
     NotMetric {
         /// The CRS asked for.
         epsg: u32,
     },
-    /// The way between the tile and the source is not defined somewhere.
+    /// The map between the tile and the source is not defined everywhere.
     #[error("the source's coordinate system is not defined over the whole tile: choose another source or position")]
     OutsideSource,
-    /// The datum's grid is not there, or not here.
+    /// PROJ has no grid for the vertical datum, or none at the tile.
     #[error(
         "heights above {datum} cannot be converted here (PROJ has no grid for them): install PROJ's grid, or \
          name the ellipsoid as the vertical datum to take them as they are"
     )]
     NoDatum {
-        /// What the source's heights are above.
+        /// Vertical datum of the source.
         datum: String,
     },
     /// There is no surface under the camera.
@@ -62,7 +62,7 @@ pub enum HeightMapError {
         "the source has no height within {reach_m} m of the camera at {lon_deg}, {lat_deg}: use a terrain model, or give the camera a height"
     )]
     NoGround {
-        /// How far was searched, metres.
+        /// Radius that was searched, metres.
         reach_m: f64,
         /// Longitude of the camera.
         lon_deg: f64,

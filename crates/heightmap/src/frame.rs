@@ -1,10 +1,11 @@
-//! Where the pixels of a tile are.
+//! The position of a tile and of its pixels.
 //!
-//! The tile lies on a transverse Mercator of its own (origin at the camera, scale that of the ground at its height), in which
-//! the heading is a plain rotation and the pixels are squares of 1 / r metres on the ground. With θ the heading, clockwise from
-//! true north, right of the camera is (cos θ, −sin θ) in (east, north) and forward is (sin θ, cos θ). The map of another CRS (UTM
-//! say) is turned by its convergence and stretched by its scale there: its geotransform is the affine map that fits best,
-//! and is refused where it leaves a corner more than a fiftieth of a pixel off.
+//! The tile lies on a transverse Mercator of its own, with its origin at the camera and true scale
+//! at the height of the ground. In it the heading is a plain rotation, and the pixels are squares
+//! of 1 / r metres on the ground. With θ the heading, clockwise from true north, right of the
+//! camera is (cos θ, −sin θ) in (east, north) and forward is (sin θ, cos θ). The map of another
+//! CRS, such as UTM, is turned by its convergence and stretched by its scale. Its geotransform is
+//! the best affine fit. The fit is refused if a corner is off by more than a fiftieth of a pixel.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use crs::{Crs, MapProjection};
 use geodesy::{LonLatHeight, TransverseMercator};
 use raster::GeoTransform;
 
-use super::HeightMapError;
+use crate::error::HeightMapError;
 
 /// Most pixels along a side.
 const SIZE_MAX: usize = 16_384;
@@ -21,14 +22,14 @@ const SIDE_MAX_M: f64 = 20_000.0;
 /// Largest departure of a CRS from its geotransform, pixels.
 const BEND_MAX_PX: f64 = 0.02;
 
-/// The tile that is asked for.
+/// A tile: position and heading of the camera, size and resolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TileRequest {
     /// Longitude of the camera, degrees.
     pub lon_deg: f64,
     /// Latitude of the camera, degrees.
     pub lat_deg: f64,
-    /// Where the top of the tile points, degrees clockwise from true north.
+    /// Heading: direction of the top of the tile, degrees clockwise from true north.
     pub heading_deg: f64,
     /// Pixels along each side.
     pub size: usize,
@@ -37,13 +38,13 @@ pub struct TileRequest {
 }
 
 impl TileRequest {
-    /// The paper's tile, north up: 518 × 518 pixels, 2 per metre.
+    /// A tile as in the paper, north up: 518 × 518 pixels, 2 per metre.
     pub fn at(lon_deg: f64, lat_deg: f64) -> Self {
         Self { lon_deg, lat_deg, heading_deg: 0.0, size: 518, resolution_px_per_m: 2.0 }
     }
 }
 
-/// The map that a tile is written on.
+/// Map projection that a tile is written in.
 #[derive(Debug, Clone)]
 pub enum MapSystem {
     /// The tile's own transverse Mercator.
@@ -52,12 +53,22 @@ pub enum MapSystem {
     Projected {
         /// Its EPSG code.
         epsg: u32,
-        /// The way to it.
+        /// Its projection.
         projection: Arc<MapProjection>,
     },
 }
 
-/// A tile in its place.
+/// A tile with its position on the Earth.
+///
+/// ```
+/// use heightmap::{MapSystem, TileFrame, TileRequest};
+///
+/// let frame = TileFrame::new(TileRequest::at(4.36, 52.0), 2.0, MapSystem::Local)?;
+/// let centre = frame.centre();
+/// let [lon_deg, lat_deg] = frame.lonlat_from_pixels(&[[centre, centre]])?[0];
+/// assert!((lon_deg - 4.36).abs() < 1e-9 && (lat_deg - 52.0).abs() < 1e-9);
+/// # Ok::<(), heightmap::HeightMapError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct TileFrame {
     request: TileRequest,
@@ -67,11 +78,12 @@ pub struct TileFrame {
 }
 
 impl TileFrame {
-    /// Puts a tile into its place; `height_m` is that of the ground or camera above the ellipsoid, to some metres: it gives the scale
-    /// of the local map.
+    /// Lays out a tile. `height_m` is the height of the ground or camera above the ellipsoid, to
+    /// some metres; it sets the scale of the local map.
     ///
     /// # Errors
-    /// Impossible numbers, a CRS that is not metric or bends the tile.
+    /// [`HeightMapError`] for numbers out of range, and for a CRS that is not in metres or bends
+    /// the tile.
     pub fn new(request: TileRequest, height_m: f64, system: MapSystem) -> Result<Self, HeightMapError> {
         let TileRequest { lon_deg, lat_deg, heading_deg, size, resolution_px_per_m } = request;
         let side_m = size as f64 / resolution_px_per_m;
@@ -92,22 +104,24 @@ impl TileFrame {
         Ok(Self { request, local, system, geotransform })
     }
 
-    /// The request it was made for.
+    /// Returns the tile that was asked for.
     pub fn request(&self) -> &TileRequest {
         &self.request
     }
 
-    /// The tile's own map, whatever it is written on.
+    /// Returns the tile's own transverse Mercator, also if the tile is written in another
+    /// projection.
     pub fn local(&self) -> &TransverseMercator {
         &self.local
     }
 
-    /// From pixels to metres of the map.
+    /// Returns the map from pixels to metres of the projection.
     pub fn geotransform(&self) -> GeoTransform {
         self.geotransform
     }
 
-    /// EPSG code of the map, with heights above the ellipsoid; `None` for the tile's own, see [`Self::wkt`].
+    /// Returns the CRS of the projection, with heights above the ellipsoid; `None` for the tile's
+    /// own map, see [`Self::wkt`].
     pub fn crs(&self) -> Option<Crs> {
         match &self.system {
             MapSystem::Local => None,
@@ -115,20 +129,20 @@ impl TileFrame {
         }
     }
 
-    /// WKT of the tile's own map.
+    /// Returns the WKT of the tile's own map.
     pub fn wkt(&self) -> String {
         self.local.wkt()
     }
 
-    /// Pixels from the left (upper) edge's pixel to the camera.
+    /// Returns the column of the camera, which is also its row.
     pub fn centre(&self) -> f64 {
         (self.request.size as f64 - 1.0) / 2.0
     }
 
-    /// Longitudes and latitudes of pixels (column, row), degrees.
+    /// Converts pixels (column, row) to longitudes and latitudes, degrees.
     ///
     /// # Errors
-    /// A position outside the map.
+    /// [`HeightMapError`] for a position outside of the projection.
     pub fn lonlat_from_pixels(&self, pixels: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, HeightMapError> {
         let on_map = pixels.iter().map(|&[column, row]| self.geotransform.map_from_cell(column, row));
         match &self.system {
@@ -145,10 +159,10 @@ impl TileFrame {
         }
     }
 
-    /// Pixels of longitudes and latitudes; NaN for those that the map does not hold.
+    /// Converts longitudes and latitudes to pixels; NaN for positions outside of the projection.
     ///
     /// # Errors
-    /// A transformation that PROJ cannot make.
+    /// [`HeightMapError::Crs`] for a transformation that PROJ cannot make.
     pub fn pixels_from_lonlat(&self, lonlat: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, HeightMapError> {
         let (mut x, mut y): (Vec<f64>, Vec<f64>) = lonlat.iter().map(|&[lon, lat]| (lon, lat)).unzip();
         match &self.system {
@@ -167,7 +181,7 @@ impl TileFrame {
     }
 }
 
-/// Pixels of `pixel_m` metres around the origin, turned clockwise.
+/// Returns the geotransform of pixels of `pixel_m` metres around the origin, turned clockwise.
 fn turned(heading_deg: f64, size: usize, pixel_m: f64) -> GeoTransform {
     let (sin, cos) = quadrant_sin_cos(heading_deg);
     let half = size as f64 / 2.0 * pixel_m;
@@ -177,7 +191,8 @@ fn turned(heading_deg: f64, size: usize, pixel_m: f64) -> GeoTransform {
     GeoTransform([corner.0, pixel_m * right.0, pixel_m * back.0, corner.1, pixel_m * right.1, pixel_m * back.1])
 }
 
-/// Sine and cosine of degrees, exact at the quarters, so that a heading of 90 makes no rotation of 1e-17.
+/// Computes sine and cosine of degrees, exactly at multiples of 90, so that a heading of 90 has no
+/// rotation terms of 1e-17.
 fn quadrant_sin_cos(degrees: f64) -> (f64, f64) {
     let turn = degrees.rem_euclid(360.0);
     match turn {
@@ -189,7 +204,8 @@ fn quadrant_sin_cos(degrees: f64) -> (f64, f64) {
     }
 }
 
-/// The affine map from pixels to another CRS: exact at the middles of the sides, checked at the corners and the centre.
+/// Fits the affine map from pixels to another CRS: exact at the middles of the sides, checked at
+/// the corners and the centre.
 fn fitted(
     epsg: u32,
     projection: &MapProjection,

@@ -1,15 +1,21 @@
 //! The height of the ground under the camera.
 //!
-//! Where the camera stands is known from the outside, how high is not: by convention it stands 2 m above what is under it. That is
-//! the surface at the middle of the tile, between its pixels; where the surface has a hole there, the lowest of
-//! the nearest pixels within [`GROUND_REACH_M`].
+//! The position of the camera is given, its height often is not: by convention it is 2 m above the
+//! ground. The ground is the surface at the middle of the tile, interpolated between its pixels. If
+//! the surface has a hole there, it is the lowest of the nearest pixels within [`GROUND_REACH_M`].
 
 use raster::{Grid, bilinear};
 
-/// How far from the camera ground is looked for, metres.
+/// Radius around the camera in which ground is searched, metres.
 pub const GROUND_REACH_M: f64 = 5.0;
 
-/// The height at the middle of a tile of `resolution_px_per_m`, in the heights' own measure; `None` where there is none near.
+/// Returns the height at the middle of a tile, in the unit of the heights; `None` if there is none
+/// near.
+///
+/// ```
+/// let heights = raster::Grid::filled(4, 4, 12.5_f32);
+/// assert_eq!(heightmap::ground_height(&heights, 2.0), Some(12.5));
+/// ```
 pub fn ground_height(heights: &Grid<f32>, resolution_px_per_m: f64) -> Option<f64> {
     let middle = |pixels: usize| (pixels as f64 - 1.0) / 2.0;
     let (column, row) = (middle(heights.width()), middle(heights.height()));

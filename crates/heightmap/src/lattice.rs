@@ -1,59 +1,66 @@
-//! From the pixels of a tile to a source of heights, and back.
+//! The map from the pixels of a tile to a source of heights, and back.
 //!
-//! The exact way (geotransform, projection of the tile, longitude and latitude, projection of the source, its geoid) is
-//! evaluated at the nodes of a lattice and interpolated bilinearly. The lattice is refined until the interpolation at the centres
-//! of its meshes is within a thousandth of a pixel and a tenth of a millimetre of height.
+//! The exact map (geotransform, projection of the tile, longitude and latitude, projection of the
+//! source, geoid) is computed at the nodes of a lattice and interpolated bilinearly between them.
+//! The lattice is refined until the interpolation at the centres of its meshes is within a
+//! thousandth of a pixel and a tenth of a millimetre of height.
 
 use crs::{HeightConverter, MapProjection};
 use raster::{GeoTransform, Grid};
 
-use super::{HeightMapError, TileFrame};
+use crate::error::HeightMapError;
+use crate::frame::TileFrame;
 
-/// Meshes along each side at the start and at most.
+/// Meshes along each side of the lattice: at the start, and at most.
 const MESHES: (usize, usize) = (8, 256);
 /// Largest error of a position, pixels of the tile.
 const TOLERANCE_PX: f64 = 1e-3;
 /// Largest error of a height, metres.
 const TOLERANCE_M: f64 = 1e-4;
-/// How far the map from a source reaches beyond the tile, as a share of its extent there.
+/// Margin of a map from a source around the tile, as a share of the extent of the tile.
 const MARGIN: f64 = 0.02;
 
-/// The coordinate system of a source.
+/// Coordinate reference system of a source.
 #[derive(Debug)]
 pub struct SourceMap {
-    /// The way to its map.
+    /// Projection of its map.
     pub projection: MapProjection,
-    /// What its heights are above.
+    /// Conversion of its heights to the ellipsoid.
     pub heights: HeightConverter,
 }
 
-/// Where the pixels of a tile are in a source, or the other way.
+/// The map from the pixels of a tile to a source, or back.
 #[derive(Debug, Clone)]
 pub struct TileMap {
     low: [f64; 2],
     step: [f64; 2],
-    /// Two coordinates, and what must be added to the source's heights to be above the ellipsoid.
+    /// Two coordinates, and the metres to add to heights of the source to get heights above the
+    /// ellipsoid.
     nodes: Grid<[f64; 3]>,
 }
 
 impl TileMap {
-    /// From (column, row) of a tile to the coordinates (x, y) of a source's map.
+    /// Returns the map from (column, row) of a tile to the coordinates (x, y) of the map of a
+    /// source.
     ///
     /// # Errors
-    /// [`HeightMapError::OutsideSource`] where the source's system or geoid is not defined over the whole tile.
+    /// [`HeightMapError::OutsideSource`] if the projection or the geoid of the source is not
+    /// defined over the whole tile.
     pub fn to_map(frame: &TileFrame, source: &SourceMap) -> Result<Self, HeightMapError> {
         Self::from_pixels(frame, source, |x, y| Some([x, y]))
     }
 
-    /// From (column, row) of a tile to (column, row) of a grid on a source's map.
+    /// Returns the map from (column, row) of a tile to (column, row) of a grid on the map of a
+    /// source.
     ///
     /// # Errors
-    /// As [`Self::to_map`]; also for a geotransform that is singular.
+    /// As [`Self::to_map`], and for a singular geotransform.
     pub fn to_grid(frame: &TileFrame, source: &SourceMap, grid: &GeoTransform) -> Result<Self, HeightMapError> {
         Self::from_pixels(frame, source, |x, y| grid.cell_from_map(x, y).map(|(c, r)| [c, r]))
     }
 
-    /// From coordinates (x, y) of a source's map to (column, row) of a tile; it holds over the tile and a little more.
+    /// Returns the map from coordinates (x, y) of the map of a source to (column, row) of a tile.
+    /// It holds over the tile and a small margin.
     ///
     /// # Errors
     /// As [`Self::to_map`].
@@ -127,7 +134,8 @@ impl TileMap {
         }
     }
 
-    /// The two coordinates of a place, and what must be added to the source's heights there.
+    /// Returns the two coordinates of a position, and the metres to add to heights of the source
+    /// there.
     #[inline]
     pub fn at(&self, x: f64, y: f64) -> [f64; 3] {
         let along = |value: f64, i: usize, nodes: usize| {
@@ -147,21 +155,21 @@ impl TileMap {
         out
     }
 
-    /// Whether a place lies where the map holds.
+    /// Returns whether the map holds at a position.
     #[inline]
     pub fn holds(&self, x: f64, y: f64) -> bool {
         let (low, high) = self.domain();
         x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1]
     }
 
-    /// Where the map holds: its least and greatest places.
+    /// Returns the domain of the map: least and greatest coordinates.
     #[inline]
     pub fn domain(&self) -> ([f64; 2], [f64; 2]) {
         let meshes = [self.nodes.width() - 1, self.nodes.height() - 1];
         (self.low, [0, 1].map(|i| self.low[i] + self.step[i] * meshes[i] as f64))
     }
 
-    /// Least and greatest of the two coordinates that it leads to, a little widened.
+    /// Returns the range of the map: least and greatest coordinates, with a small margin.
     pub fn extent(&self) -> ([f64; 2], [f64; 2]) {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for node in self.nodes.data() {
@@ -175,7 +183,7 @@ impl TileMap {
     }
 }
 
-/// What must be added to the source's heights to be above the ellipsoid.
+/// Returns the metres to add to heights of the source to get heights above the ellipsoid.
 fn undulation(source: &SourceMap, lon: &[f64], lat: &[f64]) -> Result<Vec<f64>, HeightMapError> {
     let mut shift = vec![0.0; lon.len()];
     match source.heights.ellipsoid_from_datum_slices(lon, lat, &mut shift)? {
@@ -186,8 +194,8 @@ fn undulation(source: &SourceMap, lon: &[f64], lat: &[f64]) -> Result<Vec<f64>, 
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MapSystem, TileRequest};
     use super::*;
+    use crate::frame::{MapSystem, TileRequest};
     use crs::VerticalDatum;
 
     #[test]

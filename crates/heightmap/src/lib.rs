@@ -1,10 +1,12 @@
-//! Height maps seen from above, as in Cross-View Splatter (Turkulainen et al. 2026, arXiv 2605.19656).
+//! Height maps seen from above, as in Cross-View Splatter (Turkulainen et al. 2026, arXiv
+//! 2605.19656).
 //!
-//! A map is a square tile around the first ground camera. The camera stands at the middle of the square, and the top of the
-//! picture is what lies before it: columns run to its right, rows to its back. A pixel holds the height of the upper surface in
-//! metres relative to the camera, which stands 2 m above the ground by convention. [`TileFrame`] says where the pixels are,
-//! [`TileMap`] leads from them to any source: a grid of heights ([`heights_from_grid`]), triangles
-//! ([`heights_from_triangles`]) or points ([`HighestPoints`]). Where no source has a height the map is NaN.
+//! A map is a square tile around the first ground camera. The camera is at the middle of the
+//! square, and the top of the picture lies before it: columns run to its right, rows to its back. A
+//! pixel holds the height of the upper surface in metres relative to the camera, which is 2 m above
+//! the ground by convention. [`TileFrame`] positions the pixels. [`TileMap`] leads from them to a
+//! source: a grid of heights ([`heights_from_grid`]), triangles ([`heights_from_triangles`]) or
+//! points ([`HighestPoints`]). Where no source has a height, the map is NaN.
 
 mod confidence;
 mod error;

@@ -1,15 +1,16 @@
-//! The heights of triangles at the pixels of a tile: the first that a ray from straight above meets.
+//! Heights of triangles at the pixels of a tile: the first hit of a vertical ray from above.
 
 use bvh::{Bvh, Ray};
 use raster::Grid;
 use rayon::prelude::*;
 
-use super::TileMap;
+use crate::lattice::TileMap;
 
-/// Heights above `zero_m` (itself above the ellipsoid) at the `size × size` pixels of a tile, NaN where no triangle is.
+/// Returns the heights above `zero_m` (metres above the ellipsoid) at the `size × size` pixels of a
+/// tile, NaN where there is no triangle.
 ///
-/// The triangles are in metres from `origin` on the model's map, at which `map` arrives; `z_span` are their lowest and
-/// highest z there.
+/// The triangles are in metres from `origin` on the map of the model; `map` leads from pixels to
+/// that map. `z_span` is the lowest and highest z of the triangles.
 pub fn heights_from_triangles(
     bvh: &Bvh,
     origin: [f64; 3],

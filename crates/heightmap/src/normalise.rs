@@ -1,12 +1,16 @@
-//! The scale of a scene: s = mean ‖μ‖ over the back-projected pixels, μ = (u / r, v / r, h) from the camera.
+//! The scale of a scene: s = mean ‖μ‖ over the back-projected pixels, μ = (u / r, v / r, h) from
+//! the camera.
 //!
-//! Heights divided by s are the network's ĥ, and r̂ = s · r is the resolution that belongs to them.
+//! Heights divided by s are the ĥ of the network, and r̂ = s · r is the resolution that belongs to
+//! them.
 
 use raster::Grid;
 
-/// Mean distance of the pixels that have a height from the camera, metres; `None` where none has one.
+/// Computes the mean distance of the camera to the pixels that have a height, metres; `None` if no
+/// pixel has one.
 ///
-/// Heights are metres relative to the camera; sums are those of the rows in order, so that threads change nothing.
+/// Heights are metres relative to the camera. The rows are summed in order, so that the result does
+/// not depend on threads.
 pub fn mean_distance_m(heights: &Grid<f32>, resolution_px_per_m: f64) -> Option<f64> {
     let middle = |pixels: usize| (pixels as f64 - 1.0) / 2.0;
     let (column, row) = (middle(heights.width()), middle(heights.height()));

@@ -1,12 +1,13 @@
-//! The heights of points at the pixels of a tile: the highest point of each pixel's square.
+//! Heights of points at the pixels of a tile: the highest point in the square of each pixel.
 //!
-//! [`PointTiles`] takes every point to all the tiles that it falls into, so that one pass over a cloud fills them.
+//! [`PointTiles`] adds every point to all tiles that it falls into, so that one pass over a cloud
+//! fills them all.
 
 use std::collections::HashMap;
 
 use raster::Grid;
 
-use super::TileMap;
+use crate::lattice::TileMap;
 
 /// Collects the highest points of a tile.
 #[derive(Debug)]
@@ -18,13 +19,14 @@ pub struct HighestPoints {
 }
 
 impl HighestPoints {
-    /// An empty tile of `size × size` pixels; `map` leads to its pixels from the map of the points ([`TileMap::from_map`]), and
-    /// heights are kept above `zero_m` (itself above the ellipsoid).
+    /// Makes an empty tile of `size × size` pixels. `map` leads from the map of the points to
+    /// pixels ([`TileMap::from_map`]). Heights are kept above `zero_m` (metres above the
+    /// ellipsoid).
     pub fn new(map: TileMap, size: usize, zero_m: f64) -> Self {
         Self { map, zero_m, heights: Grid::filled(size, size, f32::NAN), points: 0 }
     }
 
-    /// Takes a point at (x, y) of its map and a height above its datum, metres.
+    /// Adds a point at (x, y) of its map with a height above its datum, metres.
     #[inline]
     pub fn push(&mut self, x: f64, y: f64, height_m: f64) {
         if !self.map.holds(x, y) {
@@ -43,13 +45,13 @@ impl HighestPoints {
         }
     }
 
-    /// The heights, NaN where no point fell, and how many points fell into the tile.
+    /// Returns the heights, NaN where there is no point, and the number of points in the tile.
     pub fn finish(self) -> (Grid<f32>, u64) {
         (self.heights, self.points)
     }
 }
 
-/// Many tiles over one cloud, found by a grid of squares as wide as the widest tile.
+/// Tiles over one cloud. A grid of squares as wide as the widest tile finds the tiles of a point.
 #[derive(Debug)]
 pub struct PointTiles {
     tiles: Vec<HighestPoints>,
@@ -58,7 +60,7 @@ pub struct PointTiles {
 }
 
 impl PointTiles {
-    /// Tiles to be filled by one pass.
+    /// Arranges tiles that one pass fills.
     pub fn new(tiles: Vec<HighestPoints>) -> Self {
         let domains: Vec<_> = tiles.iter().map(|tile| tile.map.domain()).collect();
         let widest = |(low, high): &([f64; 2], [f64; 2])| (high[0] - low[0]).max(high[1] - low[1]);
@@ -73,7 +75,7 @@ impl PointTiles {
         Self { tiles, side, near }
     }
 
-    /// Takes a point to its tiles; see [`HighestPoints::push`].
+    /// Adds a point to its tiles; see [`HighestPoints::push`].
     #[inline]
     pub fn push(&mut self, x: f64, y: f64, height_m: f64) {
         let Some(near) = self.near.get(&square(self.side, x, y)) else { return };
@@ -82,7 +84,7 @@ impl PointTiles {
         }
     }
 
-    /// The heights of the tiles, as [`HighestPoints::finish`] gives them, in their order.
+    /// Returns the heights of the tiles in their order; see [`HighestPoints::finish`].
     pub fn finish(self) -> Vec<(Grid<f32>, u64)> {
         self.tiles.into_iter().map(HighestPoints::finish).collect()
     }

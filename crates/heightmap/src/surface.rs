@@ -1,7 +1,8 @@
-//! The heights of a grid at the pixels of a tile.
+//! Heights of a grid at the pixels of a tile.
 //!
-//! Nothing is extrapolated and no void is bridged: a pixel has a height where the cells that its interpolation needs all
-//! have one (bicubic falls back to bilinear where its sixteen are not complete).
+//! Nothing is extrapolated and no void is bridged: a pixel has a height only if all cells that its
+//! interpolation needs have one. Bicubic interpolation falls back to bilinear if its sixteen cells
+//! are not complete.
 
 use raster::{Grid, bicubic, bilinear};
 
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::lattice::TileMap;
 
-/// How heights are read between the cells of a grid.
+/// Interpolation of heights between the cells of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Reading {
@@ -23,7 +24,7 @@ pub enum Reading {
 }
 
 impl Reading {
-    /// The height at a (column, row) of a grid; NaN where there is none.
+    /// Returns the height at a (column, row) of a grid; NaN if there is none.
     #[inline]
     pub fn at(self, grid: &Grid<f32>, column: f64, row: f64) -> f32 {
         match self {
@@ -34,7 +35,8 @@ impl Reading {
     }
 }
 
-/// Heights above `zero_m` (itself above the ellipsoid) at the `size × size` pixels of a tile; `map` leads to the cells of `grid`.
+/// Returns the heights above `zero_m` (metres above the ellipsoid) at the `size × size` pixels of a
+/// tile. `map` leads to the cells of `grid`.
 pub fn heights_from_grid(grid: &Grid<f32>, map: &TileMap, size: usize, reading: Reading, zero_m: f64) -> Grid<f32> {
     let mut heights = Grid::filled(size, size, f32::NAN);
     for row in 0..size {
@@ -50,7 +52,7 @@ pub fn heights_from_grid(grid: &Grid<f32>, map: &TileMap, size: usize, reading: 
 #[inline]
 fn nearest(grid: &Grid<f32>, column: f64, row: f64) -> f32 {
     let (column, row) = ((column + 0.5).floor(), (row + 0.5).floor());
-    // Casting saturates, so that what lies beyond the numbers lies outside the grid too.
+    // Casting saturates, so that positions beyond the integers lie outside of the grid too.
     let inside = column >= 0.0 && row >= 0.0;
     inside.then(|| grid.get(column as usize, row as usize)).flatten().copied().unwrap_or(f32::NAN)
 }

@@ -1,13 +1,15 @@
-//! From a height map back to points.
+//! Turns a height map back into points.
 
 use raster::{GeoTransform, Grid};
 
-/// The points of a map: x and y of its coordinate system, and the height as it stands times `scale`.
+/// Returns the points of a map: x and y of its coordinate reference system, and the value of the
+/// pixel times `scale`.
 pub fn map_points(heights: &Grid<f32>, geotransform: &GeoTransform, scale: f64) -> Vec<[f64; 3]> {
     collect(heights, scale, |column, row| geotransform.map_from_cell(column, row))
 }
 
-/// The points in the camera's frame, μ = (u / r, v / r, h): to the right, to the back (down the picture) and up, metres.
+/// Returns the points in the frame of the camera, μ = (u / r, v / r, h): right, back (down the
+/// picture) and up, metres.
 pub fn camera_points(heights: &Grid<f32>, resolution_px_per_m: f64, scale: f64) -> Vec<[f64; 3]> {
     let middle = |pixels: usize| (pixels as f64 - 1.0) / 2.0;
     let (column, row) = (middle(heights.width()), middle(heights.height()));

@@ -1,7 +1,8 @@
 //! Positions and headings of cameras: one position, a camera file, or the rows of a list.
 //!
-//! A camera file is JSON: `{"lon_deg": 4.3571, "lat_deg": 52.0116, "heading_deg": 37.0, "height_m": 45.2}`. The heading is
-//! clockwise from true north and the height is above the ellipsoid; both are optional.
+//! A camera file is JSON: `{"lon_deg": 4.3571, "lat_deg": 52.0116, "heading_deg": 37.0, "height_m":
+//! 45.2}`. The heading is clockwise from true north and the height is above the ellipsoid; both are
+//! optional.
 
 use std::path::{Path, PathBuf};
 
@@ -33,11 +34,13 @@ pub enum StandSource {
 pub struct StandConfig {
     /// Where the positions come from.
     pub source: StandSource,
-    /// Heading in degrees clockwise from true north. It overrides the camera file; the rows of a list override it.
+    /// Heading in degrees clockwise from true north. It overrides the camera file; the rows of a
+    /// list override it.
     pub heading_deg: Option<f64>,
     /// Height of the camera above the ground, metres, where its height is not known otherwise.
     pub ground_offset_m: f64,
-    /// Height of the camera above the ellipsoid, metres. It overrides the camera file; the rows of a list override it.
+    /// Height of the camera above the ellipsoid, metres. It overrides the camera file; the rows of
+    /// a list override it.
     pub height_m: Option<f64>,
 }
 

@@ -12,7 +12,8 @@ use numeric::Progress;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum CorrectionSource {
-    /// From the report of the run that made the surface model, where the model lies in the folder of such a run.
+    /// From the report of the run that made the surface model, where the model lies in the folder
+    /// of such a run.
     #[default]
     SurfaceRun,
     /// From this report of a DSM run.
@@ -75,7 +76,8 @@ impl Corrections {
         Ok(Self { images: images.collect() })
     }
 
-    /// Reads the corrections that belong to a surface model, which is a file or the folder of a DSM run.
+    /// Reads the corrections that belong to a surface model, which is a file or the folder of a DSM
+    /// run.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -89,7 +91,8 @@ impl Corrections {
         }
     }
 
-    /// Returns the correction of an image, or the identity (with a warning) if the run did not use the image.
+    /// Returns the correction of an image, or the identity (with a warning) if the run did not use
+    /// the image.
     pub fn for_image(&self, path: &Path, progress: &dyn Progress) -> ImageCorrection {
         self.find(path).unwrap_or_else(|| {
             if !self.images.is_empty() {

@@ -1,4 +1,5 @@
-//! A COLMAP model placed on a map: the alignment job and the ground views write `origin.json` beside such a model.
+//! A COLMAP model placed on a map: the alignment job and the ground views write `origin.json`
+//! beside such a model.
 
 use std::path::{Path, PathBuf};
 

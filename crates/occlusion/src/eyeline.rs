@@ -1,8 +1,9 @@
 //! Where a sensor stands, seen from the cells of a map grid.
 //!
-//! The line of sight through an image position is localised at two heights; what it moves by between them, in cells per metre of
-//! height, changes slowly over an image. It is computed at the nodes of a lattice over the grid and interpolated bilinearly:
-//! directions of satellite images change by less than a degree over 10 km.
+//! The line of sight through an image position is localised at two heights; what it moves by
+//! between them, in cells per metre of height, changes slowly over an image. It is computed at the
+//! nodes of a lattice over the grid and interpolated bilinearly: directions of satellite images
+//! change by less than a degree over 10 km.
 
 use camera::{CameraError, RpcCamera};
 use crs::{CrsError, MapProjection};
@@ -39,7 +40,8 @@ pub enum EyelineError {
 }
 
 impl Eyeline {
-    /// The directions over a grid of (columns, rows) `size` at `height_m` above the ellipsoid; the map's unit is the metre.
+    /// The directions over a grid of (columns, rows) `size` at `height_m` above the ellipsoid; the
+    /// map's unit is the metre.
     ///
     /// # Errors
     /// A camera that sees none of it, or a map that does not hold it.
@@ -68,7 +70,8 @@ impl Eyeline {
         Ok(Self { step, nodes, cell_m: [along_columns, along_rows] })
     }
 
-    /// Columns and rows that the line of sight moves by towards the sensor for each metre that it rises.
+    /// Columns and rows that the line of sight moves by towards the sensor for each metre that it
+    /// rises.
     #[inline]
     pub fn per_metre(&self, column: f64, row: f64) -> [f64; 2] {
         let along = |value: f64, step: f64| {

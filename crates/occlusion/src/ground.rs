@@ -1,7 +1,7 @@
 //! Longitude and latitude of the cells of a map grid.
 //!
-//! Exact at the nodes of a lattice of 64 cells, bilinear between: on a map in metres the error is about d² tan φ / 8R, hundredths of
-//! a millimetre for cells of 0.5 m.
+//! Exact at the nodes of a lattice of 64 cells, bilinear between: on a map in metres the error is
+//! about d² tan φ / 8R, hundredths of a millimetre for cells of 0.5 m.
 
 use crs::{CrsError, MapProjection};
 use geodesy::{GeodesyError, lon_near};

@@ -1,7 +1,8 @@
-//! What a surface model hides from a satellite.
+//! Finds what a surface model hides from a satellite.
 //!
-//! [`Surface`] answers whether anything stands between a point and the sensor, with upright [walls](wall) between
-//! cells. [`Eyeline`] gives the direction towards the sensor at each cell, [`GridGround`] the position of each cell.
+//! [`Surface`] answers whether anything stands between a point and the sensor, with upright
+//! [walls](wall) between cells. [`Eyeline`] gives the direction towards the sensor at each cell,
+//! [`GridGround`] the position of each cell.
 
 mod eyeline;
 mod ground;

@@ -1,16 +1,19 @@
 //! A surface model as an obstacle: what stands between a point of it and a sensor.
 //!
-//! From the point one goes along the line of sight, an eighth of a cell at a time along the grid's longer axis of motion and a
-//! sixty-fourth where the surface is nearly met, until the line is above everything. The point is hidden where the surface is
-//! above the line. Between cell centres the surface is bilinear, except where neighbours differ by more than a slope of
-//! [`STEP_SLOPE`]: there a wall stands, whose place [`wall`](super::wall) finds from the cells around it. (A ramp in its place would take
-//! half a cell off every roof's edge and let the sensor see behind it.) Where the surface has no height nothing stands in the way.
+//! From the point one goes along the line of sight, an eighth of a cell at a time along the grid's
+//! longer axis of motion and a sixty-fourth where the surface is nearly met, until the line is
+//! above everything. The point is hidden where the surface is above the line. Between cell centres
+//! the surface is bilinear, except where neighbours differ by more than a slope of [`STEP_SLOPE`]:
+//! there a wall stands, whose place [`wall`](super::wall) finds from the cells around it. (A ramp
+//! in its place would take half a cell off every roof's edge and let the sensor see behind it.)
+//! Where the surface has no height nothing stands in the way.
 
 use raster::Grid;
 
 use super::wall::Walls;
 
-/// Slope beyond which neighbours are a wall and not a slope (58°): a parapet of 0.9 m on cells of 0.5 m is a wall.
+/// Slope beyond which neighbours are a wall and not a slope (58°): a parapet of 0.9 m on cells of
+/// 0.5 m is a wall.
 pub const STEP_SLOPE: f32 = 1.6;
 
 /// Side of the blocks whose highest cell is kept.
@@ -48,7 +51,8 @@ impl<'a> Surface<'a> {
         Self { heights, walls: Walls::find(heights, STEP_SLOPE * cell_m as f32), ceilings, highest }
     }
 
-    /// The height at a (column, row): bilinear, with walls kept upright; NaN where the cells that count have none.
+    /// The height at a (column, row): bilinear, with walls kept upright; NaN where the cells that
+    /// count have none.
     #[inline]
     pub fn height_at(&self, column: f64, row: f64) -> f32 {
         self.quad(column, row).map_or(f32::NAN, |quad| self.height_in(&quad))
@@ -97,8 +101,9 @@ impl<'a> Surface<'a> {
         })
     }
 
-    /// Whether anything stands between the point at (column, row), `height_m`, and a sensor towards which the line of sight moves by
-    /// `per_metre` (columns, rows) for each metre that it rises. What is less than `tolerance_m` above the line does not count.
+    /// Whether anything stands between the point at (column, row), `height_m`, and a sensor towards
+    /// which the line of sight moves by `per_metre` (columns, rows) for each metre that it rises.
+    /// What is less than `tolerance_m` above the line does not count.
     pub fn hides(&self, column: f64, row: f64, height_m: f64, per_metre: [f64; 2], tolerance_m: f64) -> bool {
         let fastest = per_metre[0].abs().max(per_metre[1].abs());
         if !(fastest > 0.0 && fastest.is_finite() && height_m.is_finite()) {

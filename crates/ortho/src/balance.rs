@@ -1,10 +1,12 @@
 //! Grey values of several images brought together: a gain and an offset for each.
 //!
-//! Where two images see the same cells, their values are related by v_j = g v_i + o, up to what moved, shadows and glare. Per
-//! pair, median and spread of either side are taken over the cells that fit, which are found by a fit and a cut at three robust
-//! deviations, a few times over. The spreads give log gains, the medians offsets; over all pairs they are solved for in the sense of
-//! least squares, weighted by count and correlation. The image that covers most keeps its values. Moments treat both images
-//! alike, where a regression would draw every gain towards zero by the noise of one of them.
+//! Where two images see the same cells, their values are related by v_j = g v_i + o, up to what
+//! moved, shadows and glare. Per pair, median and spread of either side are taken over the cells
+//! that fit, which are found by a fit and a cut at three robust deviations, a few times over. The
+//! spreads give log gains, the medians offsets; over all pairs they are solved for in the sense of
+//! least squares, weighted by count and correlation. The image that covers most keeps its values.
+//! Moments treat both images alike, where a regression would draw every gain towards zero by the
+//! noise of one of them.
 
 use nalgebra::{DMatrix, DVector};
 use numeric::upper_median;

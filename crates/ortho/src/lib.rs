@@ -1,28 +1,35 @@
-//! True orthos: images laid on a surface model, each cell with what its own point looks like, hidden cells marked.
+//! True orthos: images laid on a surface model, where every cell shows its own ground point.
 //!
-//! [`Eyeline`] says in which direction of the grid an image's sensor stands, [`Surface::hides`] whether something of the surface stands
-//! between a point and the sensor. Of several images that see a cell, [`best_view`] takes the one that looks down most
-//! steeply, and [`balance`] brings their grey values together.
+//! The crate `occlusion` finds the cells that the surface hides from an image. Of several images
+//! that see a cell, [`best_view`] picks the one that looks down most steeply. [`balance`] brings
+//! the grey values of the images together.
 
 mod balance;
 
 pub use balance::{Balance, BalanceError, Pair, balance};
 
-/// What an image has to say about a cell.
+/// How an image sees a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sight {
-    /// Its point is outside the image, or the image has no data there.
+    /// The ground point is outside of the image, or the image has no data there.
     Outside,
-    /// Something stands before its point.
+    /// The surface hides the ground point.
     Hidden,
-    /// Its point is seen, under this angle to the vertical, degrees.
+    /// The image sees the ground point.
     Seen {
-        /// The angle.
+        /// Angle of the line of sight from the vertical, degrees.
         incidence_deg: f64,
     },
 }
 
-/// The view that sees a cell most steeply; of equals the first.
+/// Returns the index of the view that sees a cell most steeply; the first of equal ones.
+///
+/// ```
+/// use ortho::{Sight, best_view};
+///
+/// let seen = |incidence_deg| Sight::Seen { incidence_deg };
+/// assert_eq!(best_view([seen(20.0), Sight::Hidden, seen(8.0)]), Some(2));
+/// ```
 pub fn best_view(sights: impl IntoIterator<Item = Sight>) -> Option<usize> {
     let mut best: Option<(usize, f64)> = None;
     for (view, sight) in sights.into_iter().enumerate() {

@@ -14,8 +14,8 @@ use super::requirements::EvalRequirements;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum EvalTarget {
-    /// `RUN/eval` if the test is the surface model of a DSM run (`RUN/dsm/dsm.tif`), else none. A report that cannot be
-    /// written there is a warning.
+    /// `RUN/eval` if the test is the surface model of a DSM run (`RUN/dsm/dsm.tif`), else none. A
+    /// report that cannot be written there is a warning.
     #[default]
     RunFolder,
     /// This folder. A report that cannot be written is an error.
@@ -45,13 +45,15 @@ pub struct GridEvalConfig {
     pub skip: Vec<i32>,
     /// Raster on any grid, read at the nearest cell. Only cells where it is not zero count.
     pub mask: Option<PathBuf>,
-    /// Terrain model. `None` takes the terrain from the cells of class ground, or else estimates it from the reference.
+    /// Terrain model. `None` takes the terrain from the cells of class ground, or else estimates it
+    /// from the reference.
     pub terrain: Option<PathBuf>,
     /// Confidence of each cell of the test, on its grid; more is better.
     pub confidence: Option<PathBuf>,
     /// Least height above the terrain of cells that count as standing, metres.
     pub standing_m: f64,
-    /// Side of the cells into which a reference cloud is gridded, metres. `None` takes the longer side of the test's cells.
+    /// Side of the cells into which a reference cloud is gridded, metres. `None` takes the longer
+    /// side of the test's cells.
     pub reference_cell_m: Option<f64>,
     /// Vertical datum of the test, where the file names none or a wrong one.
     pub test_vertical: Option<VerticalDatum>,
@@ -72,7 +74,8 @@ pub struct GridEvalConfig {
 }
 
 impl GridEvalConfig {
-    /// A comparison with default settings: alignment in x, y and z, and the report in the folder of the run.
+    /// A comparison with default settings: alignment in x, y and z, and the report in the folder of
+    /// the run.
     pub fn new(test: PathBuf, reference: PathBuf) -> Self {
         let EvalConfig { alignment, search_m, thresholds_m, skip, standing_m, .. } = EvalConfig::default();
         Self {

@@ -1,6 +1,7 @@
 //! The inputs of a comparison of height grids, read and brought to one grid and one vertical datum.
 //!
-//! Where a file leaves something open, a choice is made here. Every choice that could be wrong is noted for the report.
+//! Where a file leaves something open, a choice is made here. Every choice that could be wrong is
+//! noted for the report.
 
 use std::path::Path;
 
@@ -17,7 +18,8 @@ use super::on_reference::{
 };
 use super::vertical::{StatedDatums, bring_terrain};
 
-/// Cells beyond the search radius for which the map between the grids must hold: reach of the interpolation.
+/// Cells beyond the search radius for which the map between the grids must hold: reach of the
+/// interpolation.
 const MARGIN_CELLS: f64 = 4.0;
 /// A reference from points gets a note if a smaller share of its cells holds a point.
 const SPARSE: f64 = 0.7;
@@ -122,7 +124,8 @@ fn reference(
     }
     let cloud = PointCloud::open(&config.reference)?;
     let metres = metres_per_unit_at(cloud.crs_definition(), cloud.centre().y, &config.reference)?;
-    // Anchored at the corner of the test grid: if the cells have the same size, nothing is interpolated.
+    // Anchored at the corner of the test grid: if the cells have the same size, nothing is
+    // interpolated.
     let anchor = MapPoint { x: test.geotransform.0[0], y: test.geotransform.0[3] };
     let lattice = CellLattice { cell_x: cell_m / metres.0, cell_y: cell_m / metres.1, anchor };
     let gridded = cloud.highest(lattice)?;

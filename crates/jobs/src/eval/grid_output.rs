@@ -1,8 +1,9 @@
-//! Writes the outputs of a comparison of height grids: the report folder, the page alone, the error map.
+//! Writes the outputs of a comparison of height grids: the report folder, the page alone, the error
+//! map.
 //!
-//! A surface model inside the folder of a DSM run (`RUN/dsm/dsm.tif`, with `RUN/report/report.json` beside it) can have its
-//! report in `RUN/eval` without being asked. Files of an earlier evaluation are replaced; other files are not, unless the
-//! configuration allows it.
+//! A surface model inside the folder of a DSM run (`RUN/dsm/dsm.tif`, with `RUN/report/report.json`
+//! beside it) can have its report in `RUN/eval` without being asked. Files of an earlier evaluation
+//! are replaced; other files are not, unless the configuration allows it.
 
 use std::path::{Path, PathBuf};
 
@@ -27,7 +28,8 @@ const PAGE: &str = "report.html";
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Target {
     folder: PathBuf,
-    /// Whether the folder follows from the place of the test, and nobody asked for it. Then a failure is a warning.
+    /// Whether the folder follows from the place of the test, and nobody asked for it. Then a
+    /// failure is a warning.
     automatic: bool,
 }
 

@@ -1,4 +1,5 @@
-//! The comparison of two height grids: co-registration, errors, and the report with its page and error map.
+//! The comparison of two height grids: co-registration, errors, and the report with its page and
+//! error map.
 
 use std::path::PathBuf;
 
@@ -15,7 +16,8 @@ use super::grid_output;
 use super::requirements::EvalRequirements;
 use crate::threads;
 
-/// Below this ratio of the NMADs at the edge and at the middle of the search, the NMAD hardly depends on the shift.
+/// Below this ratio of the NMADs at the edge and at the middle of the search, the NMAD hardly
+/// depends on the shift.
 const FLAT: f64 = 1.02;
 
 /// A finished comparison of two height grids. It serializes as the JSON report.
@@ -41,7 +43,8 @@ pub struct GridEvalReport {
 /// Compares two height grids and writes what the configuration asks for.
 ///
 /// # Errors
-/// [`EvalJobError`]: files that cannot be read or compared, unknown vertical datums, outputs that exist.
+/// [`EvalJobError`]: files that cannot be read or compared, unknown vertical datums, outputs that
+/// exist.
 ///
 /// ```
 /// use jobs::eval::{EvalTarget, GridEvalConfig, compare_grids};

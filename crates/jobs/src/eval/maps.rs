@@ -56,7 +56,8 @@ pub struct MapEvalReport {
     pub reference: String,
     /// Columns and rows.
     pub size: [usize; 2],
-    /// All numbers by name: a [`eval::DepthComparison`], [`eval::NormalComparison`] or [`eval::MaskComparison`].
+    /// All numbers by name: a [`eval::DepthComparison`], [`eval::NormalComparison`] or
+    /// [`eval::MaskComparison`].
     pub result: Value,
     /// Requirements that are not met.
     pub missed: Vec<String>,

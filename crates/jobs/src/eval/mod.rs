@@ -2,7 +2,8 @@
 //!
 //! Three kinds of input are compared, each by a job of its own:
 //!
-//! - [`compare_grids`]: two height grids (the reference may be a LAS or LAZ cloud, which is gridded first),
+//! - [`compare_grids`]: two height grids (the reference may be a LAS or LAZ cloud, which is gridded
+//!   first),
 //! - [`evaluate_surfaces`]: meshes, city models and point clouds in any combination,
 //! - [`compare_maps`]: depths, normals or masks in the pixels of one camera.
 //!

@@ -32,8 +32,8 @@ pub(super) fn metres_per_unit(dem: &Dem) -> Result<(f64, f64), EvalJobError> {
 
 /// Returns the metres per unit of a coordinate reference system along x and y.
 ///
-/// The scale of a projected map is the same everywhere; degrees are measured on the ellipsoid at `lat_deg`. Without a
-/// coordinate reference system the unit is taken as the metre.
+/// The scale of a projected map is the same everywhere; degrees are measured on the ellipsoid at
+/// `lat_deg`. Without a coordinate reference system the unit is taken as the metre.
 pub(super) fn metres_per_unit_at(
     definition: Option<&str>,
     lat_deg: f64,
@@ -50,8 +50,8 @@ pub(super) fn metres_per_unit_at(
 
 /// Returns the map from the cells of the reference to the cells of another grid.
 ///
-/// A grid without a coordinate reference system is taken to be in the one of the reference. The map holds for `margin`
-/// cells beyond the reference.
+/// A grid without a coordinate reference system is taken to be in the one of the reference. The map
+/// holds for `margin` cells beyond the reference.
 pub(super) fn cell_map(
     reference: &Dem,
     other: &GeoTransform,
@@ -85,8 +85,8 @@ pub(super) fn surface_on_reference(other: &Dem, reference: &Dem) -> Result<Grid<
     Ok(on_reference)
 }
 
-/// Reads the whole numbers of a raster at the cells of the reference, each from the nearest cell. `what` names the
-/// raster in messages.
+/// Reads the whole numbers of a raster at the cells of the reference, each from the nearest cell.
+/// `what` names the raster in messages.
 pub(super) fn numbers_on_reference(
     path: &Path,
     what: &'static str,

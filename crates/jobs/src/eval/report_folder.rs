@@ -10,7 +10,8 @@ use crate::files;
 /// Name of the JSON report. It marks the folder of an evaluation.
 pub(super) const REPORT_JSON: &str = "report.json";
 
-/// Fails if one of `paths` exists in a folder without the report of an evaluation, unless it may be replaced.
+/// Fails if one of `paths` exists in a folder without the report of an evaluation, unless it may be
+/// replaced.
 pub(super) fn check_ours(folder: &Path, paths: &[PathBuf], overwrite: bool) -> Result<(), EvalJobError> {
     let report = files::read_text(&folder.join(REPORT_JSON));
     let ours = report.is_ok_and(|text| EvaluationReport::is_ours(&text));

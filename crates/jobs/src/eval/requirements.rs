@@ -8,8 +8,8 @@ use super::error::EvalJobError;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EvalRequirements {
-    /// Largest mean absolute error, metres; for surfaces the mean distance of the test to the reference, for normals
-    /// the mean angle in degrees.
+    /// Largest mean absolute error, metres; for surfaces the mean distance of the test to the
+    /// reference, for normals the mean angle in degrees.
     pub max_mae: Option<f64>,
     /// Least completeness at some thresholds.
     pub min_completeness: Vec<MinCompleteness>,
@@ -38,7 +38,8 @@ impl EvalRequirements {
         }
     }
 
-    /// Returns the thresholds together with those that the requirements need, sorted and without repetition.
+    /// Returns the thresholds together with those that the requirements need, sorted and without
+    /// repetition.
     pub(super) fn with_thresholds(&self, mut thresholds_m: Vec<f64>) -> Vec<f64> {
         thresholds_m.extend(self.min_completeness.iter().map(|least| least.threshold_m));
         thresholds_m.sort_by(f64::total_cmp);

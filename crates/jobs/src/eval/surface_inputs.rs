@@ -1,4 +1,5 @@
-//! Reads two surfaces and brings them to one coordinate reference system, one vertical datum and one local origin, in f64.
+//! Reads two surfaces and brings them to one coordinate reference system, one vertical datum and
+//! one local origin, in f64.
 
 use city::{MeshConfig, Scope};
 use crs::{HeightConverter, MapProjection, VerticalDatum};
@@ -110,7 +111,8 @@ struct DatumChange {
     to: VerticalDatum,
 }
 
-/// Returns the conversion of the test's heights; `None` if the datums are the same or one of them is not known.
+/// Returns the conversion of the test's heights; `None` if the datums are the same or one of them
+/// is not known.
 fn datums(test: &SurfaceFile, reference: &SurfaceFile, notes: &mut Vec<String>) -> Option<DatumChange> {
     match (test.vertical, reference.vertical) {
         (Some(from), Some(to)) => (from != to).then_some(DatumChange { from, to }),

@@ -59,7 +59,8 @@ pub struct SurfaceProtocol {
 /// Compares two surfaces and writes the report if the configuration names a folder.
 ///
 /// # Errors
-/// [`EvalJobError`]: files that cannot be read or compared, coordinates that are not in metres, a report that exists.
+/// [`EvalJobError`]: files that cannot be read or compared, coordinates that are not in metres, a
+/// report that exists.
 ///
 /// ```
 /// use jobs::eval::{SurfaceEvalConfig, evaluate_surfaces};

@@ -1,9 +1,10 @@
 //! One vertical datum for all surfaces of an evaluation.
 //!
-//! If both files name a datum, the heights of the test are converted to the datum of the reference. If only one file names
-//! its datum, and this is a geoid, the comparison is refused until the other datum is named. If it is the ellipsoid, both are
-//! taken as above the ellipsoid when the alignment removes a vertical offset, and the comparison is refused when it does
-//! not: a geoid taken for the ellipsoid would be an error of tens of metres.
+//! If both files name a datum, the heights of the test are converted to the datum of the reference.
+//! If only one file names its datum, and this is a geoid, the comparison is refused until the other
+//! datum is named. If it is the ellipsoid, both are taken as above the ellipsoid when the alignment
+//! removes a vertical offset, and the comparison is refused when it does not: a geoid taken for the
+//! ellipsoid would be an error of tens of metres.
 
 use crs::{HeightConverter, VerticalDatum};
 use eval::{AlignmentMethod, MetresFromCells, convert_heights};
@@ -57,7 +58,8 @@ impl StatedDatums {
     }
 }
 
-/// Converts a terrain model to the datum of the reference. A model that names no datum is taken to be in it already.
+/// Converts a terrain model to the datum of the reference. A model that names no datum is taken to
+/// be in it already.
 pub(super) fn bring_terrain(
     terrain: &mut Dem,
     datum: Option<VerticalDatum>,

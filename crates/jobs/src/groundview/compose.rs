@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::error::GroundViewError;
 use crate::files::{self, FileError};
 
-/// A ground layer that is laid over a satellite layer. Splat renderers leave the colours of the ground layer weighted by its
-/// opacity.
+/// A ground layer that is laid over a satellite layer. Splat renderers leave the colours of the
+/// ground layer weighted by its opacity.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]

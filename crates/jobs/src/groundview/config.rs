@@ -18,8 +18,8 @@ const CROPS_MAX: usize = 360;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum GroundCameras {
-    /// Cameras of a COLMAP model on the map of the surface, in a folder with `origin.json`: the alignment job writes such
-    /// a folder.
+    /// Cameras of a COLMAP model on the map of the surface, in a folder with `origin.json`: the
+    /// alignment job writes such a folder.
     Model(PathBuf),
     /// Panoramas, each with perspective crops.
     Panoramas(StandConfig),
@@ -30,7 +30,8 @@ pub enum GroundCameras {
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct GroundViewConfig {
-    /// Height map or surface model (raster), or city model (CityJSON, CityGML, OBJ, PLY), on a map in metres.
+    /// Height map or surface model (raster), or city model (CityJSON, CityGML, OBJ, PLY), on a map
+    /// in metres.
     pub surface: PathBuf,
     /// Folder to write.
     pub output: PathBuf,
@@ -44,8 +45,8 @@ pub struct GroundViewConfig {
     pub crop_size_px: usize,
     /// Field of view of a crop, degrees.
     pub crop_fov_deg: f64,
-    /// Folder with the pictures of the panoramas (`ID.png`, `ID.jpg` or `ID.tif`; a single panorama is called `panorama`).
-    /// Crops are cut from them.
+    /// Folder with the pictures of the panoramas (`ID.png`, `ID.jpg` or `ID.tif`; a single panorama
+    /// is called `panorama`). Crops are cut from them.
     pub pictures: Option<PathBuf>,
     /// Most points of the surface per perspective camera in the COLMAP model.
     pub points_per_view: usize,

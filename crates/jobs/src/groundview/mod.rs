@@ -15,8 +15,8 @@
 //! | `origin.json` | origin of the local positions |
 //! | `report.json` | the report |
 //!
-//! A row of a list without a view does not stop the others: the report names it. [`compose`] lays a rendered ground layer
-//! over a satellite layer.
+//! A row of a list without a view does not stop the others: the report names it. [`compose`] lays a
+//! rendered ground layer over a satellite layer.
 
 mod compose;
 mod config;

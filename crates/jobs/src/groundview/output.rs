@@ -144,7 +144,8 @@ impl Shots {
     }
 }
 
-/// Cuts the crop of a shot from the picture of its panorama. `open` keeps the last picture that was read.
+/// Cuts the crop of a shot from the picture of its panorama. `open` keeps the last picture that was
+/// read.
 fn cut(shots: &Shots, shot: &Shot, open: &mut Option<OpenPicture>) -> Result<Option<Grid<[u8; 3]>>, GroundViewError> {
     let (Some((path, turn)), Some(lens)) = (&shot.picture, shot.lens) else { return Ok(None) };
     if open.as_ref().is_none_or(|(known, _)| known != path) {

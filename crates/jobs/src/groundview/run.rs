@@ -13,8 +13,8 @@ use crate::threads;
 /// Renders what cameras on the ground see, and writes it to a folder.
 ///
 /// # Errors
-/// [`GroundViewError`]: a surface or cameras that cannot be read, a folder that holds views already. For a list, a row
-/// without a view is named in the report.
+/// [`GroundViewError`]: a surface or cameras that cannot be read, a folder that holds views
+/// already. For a list, a row without a view is named in the report.
 ///
 /// ```
 /// use jobs::camera_stand::{StandConfig, StandSource};

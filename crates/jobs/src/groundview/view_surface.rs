@@ -1,4 +1,5 @@
-//! The surface that the cameras look at: a raster of heights or the triangles of a city model, on a map in metres.
+//! The surface that the cameras look at: a raster of heights or the triangles of a city model, on a
+//! map in metres.
 
 use std::path::Path;
 
@@ -99,7 +100,8 @@ impl ViewSurface {
         Ok(Self { kind: SurfaceKind::Mesh(MeshGround::new(&mesh.positions, &mesh.triangles)?), projection, origin })
     }
 
-    /// Returns the height of the surface above the origin at a local position; `None` if there is none.
+    /// Returns the height of the surface above the origin at a local position; `None` if there is
+    /// none.
     pub(super) fn height_at(&self, x: f64, y: f64) -> Option<f64> {
         let down = Ray { origin: [x, y, FROM_ABOVE_M], direction: [0.0, 0.0, -1.0], end: f64::INFINITY };
         self.meet(&down).map(|met| FROM_ABOVE_M - met.t)

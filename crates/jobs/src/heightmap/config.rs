@@ -13,7 +13,8 @@ use crate::camera_stand::StandConfig;
 
 /// Unit of the heights of a map.
 ///
-/// The names of the variants are part of the request number that a map's file holds: see `Settings::fingerprint`.
+/// The names of the variants are part of the request number that a map's file holds: see
+/// `Settings::fingerprint`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Normalization {
@@ -43,7 +44,8 @@ impl FromStr for Normalization {
 
 /// Map projection that a height map is written in.
 ///
-/// The names of the variants are part of the request number that a map's file holds: see `Settings::fingerprint`.
+/// The names of the variants are part of the request number that a map's file holds: see
+/// `Settings::fingerprint`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapChoice {
@@ -80,8 +82,8 @@ pub enum ConfidenceSource {
     /// The map has no band of confidences.
     #[default]
     None,
-    /// From `confidence.tif` beside a surface model that skysweep made; for other sources 1 where the source has a height
-    /// and 0 where the terrain model gave it.
+    /// From `confidence.tif` beside a surface model that skysweep made; for other sources 1 where
+    /// the source has a height and 0 where the terrain model gave it.
     Automatic,
     /// From this raster.
     Raster(PathBuf),
@@ -92,7 +94,8 @@ pub enum ConfidenceSource {
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct HeightMapConfig {
-    /// Surface model (raster), city model (CityJSON, CityGML, OBJ, PLY) or point cloud (LAS, LAZ, COPC).
+    /// Surface model (raster), city model (CityJSON, CityGML, OBJ, PLY) or point cloud (LAS, LAZ,
+    /// COPC).
     pub source: PathBuf,
     /// GeoTIFF to write; for a list the folder of the maps.
     pub output: PathBuf,
@@ -125,7 +128,8 @@ pub struct HeightMapConfig {
     pub previews: bool,
     /// Worker threads. `None` uses all cores.
     pub threads: Option<usize>,
-    /// Whether existing maps are replaced. Otherwise a list goes on where an earlier run was stopped.
+    /// Whether existing maps are replaced. Otherwise a list goes on where an earlier run was
+    /// stopped.
     pub overwrite: bool,
 }
 
@@ -153,7 +157,8 @@ impl HeightMapConfig {
         }
     }
 
-    /// Checks the settings that can be judged without opening a file. Size and resolution are judged with the first tile.
+    /// Checks the settings that can be judged without opening a file. Size and resolution are
+    /// judged with the first tile.
     ///
     /// # Errors
     /// [`HeightMapJobError::Stand`] for a camera whose numbers are not finite.

@@ -1,7 +1,8 @@
 //! Makes height maps for the rows of a list: many tiles in one process.
 //!
-//! A map is written as `ID.tif`, and its metadata holds a number for what was asked for. A run that finds such a map keeps it,
-//! so that a run that was stopped goes on where it was. The fate of each row is in `report.json`, written at the end.
+//! A map is written as `ID.tif`, and its metadata holds a number for what was asked for. A run that
+//! finds such a map keeps it, so that a run that was stopped goes on where it was. The fate of each
+//! row is in `report.json`, written at the end.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -103,7 +104,8 @@ impl Run<'_> {
         self.config.output.join(format!("{}.tif", row.id))
     }
 
-    /// Returns whether the map that is asked for exists. Another file in its place is an error for the whole run.
+    /// Returns whether the map that is asked for exists. Another file in its place is an error for
+    /// the whole run.
     fn is_there(&self, row: &PositionRow, stand: &CameraStand) -> Result<bool, HeightMapJobError> {
         let path = self.path(row);
         if self.config.overwrite || path.symlink_metadata().is_err() {

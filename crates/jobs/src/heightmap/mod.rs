@@ -1,8 +1,8 @@
-//! The height map jobs: the surface seen from above around a camera, turned to its heading, as a GeoTIFF; and the way back
-//! to points or splats.
+//! The height map jobs: the surface seen from above around a camera, turned to its heading, as a
+//! GeoTIFF; and the way back to points or splats.
 //!
-//! [`run`] makes one map, or one per row of a list. A map of a list that cannot be made does not stop the others: the report
-//! names it. [`unproject`] turns a map into points or Gaussian splats.
+//! [`run`] makes one map, or one per row of a list. A map of a list that cannot be made does not
+//! stop the others: the report names it. [`unproject`] turns a map into points or Gaussian splats.
 
 mod config;
 mod error;

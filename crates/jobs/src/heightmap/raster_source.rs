@@ -14,7 +14,8 @@ use super::error::HeightMapJobError;
 use super::source_map::{FilePlace, Laid, source_map};
 use crate::camera_stand::CameraStand;
 
-/// Most cells of a raster that is kept in memory (512 MiB). Of a larger raster, the part under each tile is read.
+/// Most cells of a raster that is kept in memory (512 MiB). Of a larger raster, the part under each
+/// tile is read.
 const WHOLE_CELLS: usize = 1 << 27;
 /// Side of the window that is read around a position, cells.
 const AROUND: usize = 3;
@@ -104,7 +105,8 @@ impl RasterSource {
         }
     }
 
-    /// Returns the height above the ellipsoid of a cell near the camera: a first estimate, to some metres.
+    /// Returns the height above the ellipsoid of a cell near the camera: a first estimate, to some
+    /// metres.
     fn near(&self, stand: &CameraStand) -> Result<Option<f64>, HeightMapJobError> {
         let at = self.map.projection.map_from_lonlat(stand.lon_deg, stand.lat_deg)?;
         let Some((column, row)) = self.geotransform.cell_from_map(at.x, at.y) else { return Ok(None) };

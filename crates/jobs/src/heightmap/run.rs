@@ -13,8 +13,8 @@ use crate::{files, threads};
 /// Makes one height map, or one for each row of a list.
 ///
 /// # Errors
-/// [`HeightMapJobError`]: a source or list that cannot be read, a single map that cannot be made, files in the way. For a
-/// list, a map that cannot be made is a failed row of the report.
+/// [`HeightMapJobError`]: a source or list that cannot be read, a single map that cannot be made,
+/// files in the way. For a list, a map that cannot be made is a failed row of the report.
 ///
 /// ```
 /// use jobs::camera_stand::{StandConfig, StandSource};

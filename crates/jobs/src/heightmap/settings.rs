@@ -65,7 +65,8 @@ impl Settings {
 
     /// Returns all settings that change the content of a map, as text.
     ///
-    /// The text is hashed into the file of the map: a change of the format makes earlier maps unknown.
+    /// The text is hashed into the file of the map: a change of the format makes earlier maps
+    /// unknown.
     pub(super) fn fingerprint(&self) -> String {
         let Self { size, resolution_px_per_m, ground_offset_m, normalize, reading, crs, .. } = self;
         format!(

@@ -1,4 +1,5 @@
-//! What every kind of source shares: its place on the Earth, and the heights that it gives for a tile.
+//! What every kind of source shares: its place on the Earth, and the heights that it gives for a
+//! tile.
 
 use std::path::Path;
 
@@ -26,7 +27,8 @@ pub(super) struct FilePlace {
     pub(super) vertical: Option<VerticalDatum>,
 }
 
-/// Returns the map projection and the vertical datum of a source. What the configuration states overrides the file.
+/// Returns the map projection and the vertical datum of a source. What the configuration states
+/// overrides the file.
 pub(super) fn source_map(
     path: &Path,
     file: FilePlace,

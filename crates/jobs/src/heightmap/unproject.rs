@@ -27,7 +27,8 @@ const GREY: [u8; 3] = [128; 3];
 /// Turns a height map back into points or Gaussian splats.
 ///
 /// # Errors
-/// [`HeightMapJobError`]: a file that is not a height map, an unknown ending of the output, an output that exists.
+/// [`HeightMapJobError`]: a file that is not a height map, an unknown ending of the output, an
+/// output that exists.
 ///
 /// ```
 /// use jobs::camera_stand::{StandConfig, StandSource};
@@ -94,7 +95,8 @@ impl HeightMapFile {
         if self.tags.normalized { self.tags.scene_scale_m } else { 1.0 }
     }
 
-    /// Returns longitude, latitude (degrees) and height relative to the camera (metres) of every point.
+    /// Returns longitude, latitude (degrees) and height relative to the camera (metres) of every
+    /// point.
     fn on_ground(&self) -> Result<Vec<[f64; 3]>, HeightMapJobError> {
         let mut points = map_points(&self.values, &self.geotransform, self.scale());
         let (mut lon, mut lat): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();

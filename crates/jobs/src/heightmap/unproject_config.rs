@@ -25,15 +25,19 @@ pub enum PointAxes {
 pub struct UnprojectConfig {
     /// Height map that skysweep made.
     pub map: PathBuf,
-    /// File to write: `.ply` (metres from the camera), or `.las` or `.laz` (UTM, heights above the ellipsoid).
+    /// File to write: `.ply` (metres from the camera), or `.las` or `.laz` (UTM, heights above the
+    /// ellipsoid).
     pub output: PathBuf,
     /// Axes of the points of a PLY.
     pub axes: PointAxes,
-    /// Whether Gaussian splats are written instead of points (PLY, with its origin beside it), one for each pixel.
+    /// Whether Gaussian splats are written instead of points (PLY, with its origin beside it), one
+    /// for each pixel.
     pub splats: bool,
-    /// Picture of the map's own pixels that gives the splats their colours. Without it they are grey.
+    /// Picture of the map's own pixels that gives the splats their colours. Without it they are
+    /// grey.
     pub picture: Option<PathBuf>,
-    /// Splats whose heights are within this distance of one plane, and whose colours are alike, are merged, metres.
+    /// Splats whose heights are within this distance of one plane, and whose colours are alike, are
+    /// merged, metres.
     pub merge_m: Option<f64>,
     /// Whether an existing file may be replaced.
     pub overwrite: bool,

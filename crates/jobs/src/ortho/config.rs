@@ -30,11 +30,13 @@ pub struct OrthoConfig {
     pub corrections: CorrectionSource,
     /// Vertical datum of the surface model, where the file names none or a wrong one.
     pub surface_vertical: Option<VerticalDatum>,
-    /// Height by which the surface must stand above a line of sight to hide what is behind it, metres.
+    /// Height by which the surface must stand above a line of sight to hide what is behind it,
+    /// metres.
     pub tolerance_m: f64,
     /// Whether the grey values of several images are brought together.
     pub balance: bool,
-    /// Whether cells that are hidden in every image take the value of what hides them. Otherwise they are no-data.
+    /// Whether cells that are hidden in every image take the value of what hides them. Otherwise
+    /// they are no-data.
     pub keep_hidden: bool,
     /// Worker threads. `None` uses all cores.
     pub threads: Option<usize>,

@@ -92,7 +92,8 @@ impl Work<'_> {
         starts(grid.height).flat_map(|top| starts(grid.width).map(move |left| block(left, top))).collect()
     }
 
-    /// Returns every `stride`-th cell of a block along both axes of the ortho; `None` for a cell without a height.
+    /// Returns every `stride`-th cell of a block along both axes of the ortho; `None` for a cell
+    /// without a height.
     fn cells(&self, block: &Block, stride: usize) -> Vec<Option<Cell>> {
         let on = |first: usize, length: usize| (first.next_multiple_of(stride)..first + length).step_by(stride);
         let rows: Vec<usize> = on(block.top, block.height).collect();

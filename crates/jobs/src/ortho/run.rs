@@ -12,7 +12,8 @@ use crate::{files, threads};
 /// Makes an ortho and writes it with its mask.
 ///
 /// # Errors
-/// [`OrthoError`]: files that cannot be read, images that do not see the surface, outputs that exist.
+/// [`OrthoError`]: files that cannot be read, images that do not see the surface, outputs that
+/// exist.
 ///
 /// ```
 /// use jobs::ortho::{OrthoConfig, run};

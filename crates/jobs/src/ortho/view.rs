@@ -1,4 +1,5 @@
-//! Looks at cells through one image: whether the image sees them, and the values of its bands there.
+//! Looks at cells through one image: whether the image sees them, and the values of its bands
+//! there.
 
 use camera::ImagePoint;
 use geodesy::LonLatHeight;
@@ -13,7 +14,8 @@ use super::inputs::OrthoImage;
 
 /// Margin around the needed pixels, for the bicubic interpolation, pixels.
 const MARGIN: usize = 3;
-/// Most pixels of an image that are read at once. An image much finer than the ortho is read for fewer cells at a time.
+/// Most pixels of an image that are read at once. An image much finer than the ortho is read for
+/// fewer cells at a time.
 const PIXELS_MAX: usize = 1 << 27;
 
 /// A cell of the ortho.

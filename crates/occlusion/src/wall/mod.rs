@@ -1,18 +1,22 @@
 //! Where walls stand among the cells of a raster.
 //!
-//! A raster says of a wall only which cell centres are above it and which below. Their pattern says more: along a straight
-//! wall that is not parallel to the grid, the steps of the pattern give its place to a tenth of a cell. So wherever four
-//! neighbouring cells differ by a step, the cells around are parted at the middle of the four heights' widest gap by the line of the
-//! widest margin ([`pattern`]). Where no line parts them, lines found nearby are tried in pairs (a building's corner, from inside or outside),
-//! as one side of a strip (a parapet thinner than the cells), and a circle (a crown); the form that is wrong about the fewest centres is
-//! taken. Four cells of which one side differs by another step are parted twice: ground, roof and the parapet between them.
+//! A raster says of a wall only which cell centres are above it and which below. Their pattern says
+//! more: along a straight wall that is not parallel to the grid, the steps of the pattern give its
+//! place to a tenth of a cell. So wherever four neighbouring cells differ by a step, the cells
+//! around are parted at the middle of the four heights' widest gap by the line of the widest margin
+//! ([`pattern`]). Where no line parts them, lines found nearby are tried in pairs (a building's
+//! corner, from inside or outside), as one side of a strip (a parapet thinner than the cells), and
+//! a circle (a crown); the form that is wrong about the fewest centres is taken. Four cells of
+//! which one side differs by another step are parted twice: ground, roof and the parapet between
+//! them.
 //!
-//! On simulated towns with parapets of 0.4 m and trees (three seeds, cells of 0.5 m, true heights), hidden cells are told with 97 %
-//! precision and 96 to 97 % recall under 16.5°, and 93 % of both under 6°, where a wall hides two cells and a parapet a fifth of
-//! one; on cells of 0.25 m, 97 % of both. A surface that is bilinear throughout has a recall of 82, 62 and 73 %.
+//! On simulated towns with parapets of 0.4 m and trees (three seeds, cells of 0.5 m, true heights),
+//! hidden cells are told with 97 % precision and 96 to 97 % recall under 16.5°, and 93 % of both
+//! under 6°, where a wall hides two cells and a parapet a fifth of one; on cells of 0.25 m, 97 % of
+//! both. A surface that is bilinear throughout has a recall of 82, 62 and 73 %.
 //!
-//! Every centre keeps its own side. On either side the surface is bilinear, and continued in a straight line beyond the side's own
-//! cells: a roof goes on falling to its eaves.
+//! Every centre keeps its own side. On either side the surface is bilinear, and continued in a
+//! straight line beyond the side's own cells: a roof goes on falling to its eaves.
 
 mod outline;
 mod pattern;
@@ -60,7 +64,8 @@ struct Found {
 }
 
 impl Walls {
-    /// Finds the walls of cells (NaN where there is no height): where neighbours differ by more than `step_m`.
+    /// Finds the walls of cells (NaN where there is no height): where neighbours differ by more
+    /// than `step_m`.
     pub(super) fn find(cells: &Grid<f32>, step_m: f32) -> Self {
         let (width, height) = (cells.width(), cells.height());
         let mut walls = Self { first: Grid::filled(width, height, NONE), walls: Vec::new(), step_m };
@@ -91,8 +96,9 @@ impl Walls {
         walls
     }
 
-    /// The height at a place `[u, v]` (0 to 1 along columns and rows) among four cells, of which the first is at `corner` and which
-    /// all have heights: upper left, upper right, lower left, lower right. `None` where no wall is among them.
+    /// The height at a place `[u, v]` (0 to 1 along columns and rows) among four cells, of which
+    /// the first is at `corner` and which all have heights: upper left, upper right, lower left,
+    /// lower right. `None` where no wall is among them.
     #[inline]
     pub(super) fn height(
         &self,
@@ -311,7 +317,8 @@ mod tests {
         walls.height(cells, (c, r), heights, [column - c as f32, row - r as f32]).unwrap_or(heights[0])
     }
 
-    /// Share of places around the middle whose height is another one by more than half a metre, in cells per cell of `length`.
+    /// Share of places around the middle whose height is another one by more than half a metre, in
+    /// cells per cell of `length`.
     fn strip_wrong(height: impl Fn(f32, f32) -> f32, length: f32) -> f32 {
         let cells = cells(&height);
         let walls = Walls::find(&cells, 0.8);
@@ -323,7 +330,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever stands there, centres keep their heights, and nothing is far above or below all.
+        /// Whatever stands there, centres keep their heights, and nothing is far above or below
+        /// all.
         #[test]
         fn centres_keep_their_heights(values in prop::collection::vec(0..6u8, SIZE * SIZE), u in 0.0..1.0f32, v in 0.0..1.0f32) {
             let cells = cells(|c, r| f32::from(values[r as usize * SIZE + c as usize]) * 0.9);

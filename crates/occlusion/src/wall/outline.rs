@@ -1,6 +1,8 @@
-//! Forms that a wall takes among a few cells: where a function of the place is positive, there is the upper side.
+//! Forms that a wall takes among a few cells: where a function of the place is positive, there is
+//! the upper side.
 //!
-//! Places are (columns, rows) from the middle of four cells. The functions are about distances in cells: exactly so for lines.
+//! Places are (columns, rows) from the middle of four cells. The functions are about distances in
+//! cells: exactly so for lines.
 
 use super::pattern::Sample;
 
@@ -60,7 +62,8 @@ impl Outline {
         }
     }
 
-    /// How far the centres on the wrong side are from it, by their weights; anything above `limit` for more than that.
+    /// How far the centres on the wrong side are from it, by their weights; anything above `limit`
+    /// for more than that.
     pub(super) fn loss(&self, samples: &[Sample], limit: f32) -> f32 {
         let mut sum = 0.0;
         for sample in samples {
@@ -72,7 +75,8 @@ impl Outline {
         sum
     }
 
-    /// The strip from a line on that holds the upper centres and no other; `None` where there is none.
+    /// The strip from a line on that holds the upper centres and no other; `None` where there is
+    /// none.
     pub(super) fn strip(side: Curve, samples: &[Sample]) -> Option<Self> {
         /// Wider strips show themselves as two edges, cells.
         const WIDEST: f32 = 3.0;

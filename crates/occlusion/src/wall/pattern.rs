@@ -1,8 +1,10 @@
-//! Which of the cells around are above a level, and the line or circle that parts them from the others.
+//! Which of the cells around are above a level, and the line or circle that parts them from the
+//! others.
 //!
-//! The curve is the one of the widest margin in the sense of Vapnik, found by Newton steps on the squared hinge loss: centres farther
-//! from it than the margin have no say, the others weigh less the farther they are from the middle. Centres that no curve
-//! parts leave one that is wrong about few.
+//! The curve is the one of the widest margin in the sense of Vapnik, found by Newton steps on the
+//! squared hinge loss: centres farther from it than the margin have no say, the others weigh less
+//! the farther they are from the middle. Centres that no curve parts leave one that is wrong about
+//! few.
 
 use nalgebra::{Matrix4, Vector4};
 use raster::Grid;
@@ -15,7 +17,8 @@ const REACH: isize = 3;
 const SIGMA: f32 = 1.3;
 /// Newton steps; most settle after four.
 const STEPS: usize = 8;
-/// What the squares of slope and curvature cost: little, so that margins are those of the centres next to the curve.
+/// What the squares of slope and curvature cost: little, so that margins are those of the centres
+/// next to the curve.
 const SLOPE_COST: f64 = 3e-4;
 const CURVATURE_COST: f64 = 0.03;
 
@@ -48,7 +51,8 @@ pub(super) fn samples(cells: &Grid<f32>, corner: (usize, usize), level: f32) -> 
     found
 }
 
-/// The line of the widest margin, or the circle where `round`; `None` where the centres do not determine it.
+/// The line of the widest margin, or the circle where `round`; `None` where the centres do not
+/// determine it.
 pub(super) fn part(samples: &[Sample], round: bool) -> Option<Curve> {
     let mut curve = Vector4::zeros();
     let mut counted = 0;
@@ -64,7 +68,8 @@ pub(super) fn part(samples: &[Sample], round: bool) -> Option<Curve> {
     (slope > 1e-6).then_some(Curve { a, b, c, k })
 }
 
-/// The normal equations of the centres within the margin of a curve, and which these are, a bit each.
+/// The normal equations of the centres within the margin of a curve, and which these are, a bit
+/// each.
 fn equations(samples: &[Sample], curve: &Vector4<f64>, round: bool) -> (Matrix4<f64>, Vector4<f64>, u64) {
     // In terms of 1, x, y and, for circles, q = x² + y².
     let (mut one, mut x1, mut y1, mut q1) = (1e-6, 0.0, 0.0, 0.0);
