@@ -1,9 +1,9 @@
-//! A height field followed exactly by rays.
+//! A height field that rays follow exactly.
 //!
 //! Between four neighbouring centres the surface is two triangles: upper left, upper right, lower
 //! left; and the rest. A ray goes from square to square (Amanatides and Woo 1987); in each it is
 //! compared with the planes of both triangles, on which the height is linear along the ray. A
-//! triangle with a corner without a height is not there.
+//! triangle that has a corner without a height is left out.
 
 use bvh::Ray;
 use raster::{GeoTransform, Grid};
@@ -11,14 +11,14 @@ use raster::{GeoTransform, Grid};
 use super::{Ground, Met};
 use numeric::vector::{cross, normalized};
 
-/// How far beyond a square its triangles are still met, cells: a ray along an edge must not slip
-/// through.
+/// Tolerance around a square within which its triangles are met, cells: a ray along an edge must
+/// not slip through.
 const EDGE: f64 = 1e-9;
 
 /// Heights on a map grid.
 #[derive(Debug, Clone)]
 pub struct HeightField {
-    /// Above the origin, metres; NaN is none.
+    /// Heights above the origin, metres; NaN is no height.
     heights: Grid<f32>,
     geotransform: GeoTransform,
     origin: [f64; 3],
@@ -35,8 +35,8 @@ struct Course {
 }
 
 impl HeightField {
-    /// A field of heights above `origin[2]` on a map in metres; `None` where the geotransform has
-    /// no inverse or no square of cells can be met.
+    /// Makes a field from heights above `origin[2]` on a map in metres; `None` if the geotransform
+    /// has no inverse or the grid has no square of cells.
     pub fn new(heights: Grid<f32>, geotransform: GeoTransform, origin: [f64; 3]) -> Option<Self> {
         geotransform.cell_from_map(origin[0], origin[1])?;
         let known = || heights.data().iter().copied().filter(|h| h.is_finite()).map(f64::from);
@@ -47,24 +47,24 @@ impl HeightField {
         is_usable.then_some(Self { heights, geotransform, origin, range, steps })
     }
 
-    /// The heights above the origin.
+    /// Returns the heights above the origin, metres.
     pub fn heights(&self) -> &Grid<f32> {
         &self.heights
     }
 
-    /// The local position of a cell, at its height.
+    /// Returns the local position of a cell, at its height.
     pub fn position(&self, column: usize, row: usize) -> [f64; 3] {
         let (x, y) = self.geotransform.map_from_cell(column as f64, row as f64);
         [x - self.origin[0], y - self.origin[1], f64::from(self.heights[(column, row)])]
     }
 
-    /// The height of the triangles at a local position; `None` where there is none.
+    /// Returns the height of the triangles at a local position; `None` if there is none.
     pub fn height_at(&self, x: f64, y: f64) -> Option<f64> {
         let down = Ray { origin: [x, y, self.range[1] + 1.0], direction: [0.0, 0.0, -1.0], end: f64::INFINITY };
         self.meet(&down).map(|met| self.range[1] + 1.0 - met.t)
     }
 
-    /// The triangles as positions and corners, those with a corner without a height left out.
+    /// Returns the triangles as positions and corners, without triangles that lack a height.
     pub fn triangles(&self) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
         let (width, height) = (self.heights.width(), self.heights.height());
         let positions = (0..width * height).map(|k| self.position(k % width, k / width));
@@ -119,7 +119,7 @@ impl HeightField {
         let (top, low) = (self.heights.row(j), self.heights.row(j + 1));
         let [a, b, c, d] = [top[i], top[i + 1], low[i], low[i + 1]].map(f64::from);
         let (z0, z1) = (course.from[2] + first * course.by[2], course.from[2] + until * course.by[2]);
-        // f64::max passes over NaN.
+        // f64::max ignores NaN.
         if z0.min(z1) > a.max(b).max(c.max(d)) + EDGE || z0.max(z1) < a.min(b).min(c.min(d)) - EDGE {
             return None;
         }
@@ -130,7 +130,7 @@ impl HeightField {
             let above = course.from[2] - (base + by_column * u + by_row * v);
             let rate = course.by[2] - by_column * course.by[0] - by_row * course.by[1];
             let t = -above / rate;
-            // Negated, so that heights that are none are not met.
+            // Negated, so that NaN heights are not met.
             if !(t > 0.0 && t >= first - EDGE * (1.0 + first) && t <= until + EDGE * (1.0 + until)) {
                 continue;
             }

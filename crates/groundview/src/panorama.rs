@@ -12,14 +12,20 @@ use rayon::prelude::*;
 /// The pixels of a panorama.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Panorama {
-    /// Columns, all around.
+    /// Columns over 360°.
     pub width: usize,
     /// Rows, from the zenith to the nadir.
     pub height: usize,
 }
 
 impl Panorama {
-    /// The unit vector of a pixel in the camera's axes.
+    /// Returns the unit vector of a pixel in the axes of the camera.
+    ///
+    /// ```
+    /// let panorama = groundview::Panorama { width: 4, height: 2 };
+    /// let [x, _, z] = panorama.direction(1.5, 0.5);
+    /// assert!(x.abs() < 1e-12 && (z - 1.0).abs() < 1e-12);
+    /// ```
     pub fn direction(&self, column: f64, row: f64) -> [f64; 3] {
         let azimuth = ((column + 0.5) / self.width as f64 - 0.5) * std::f64::consts::TAU;
         let elevation = (0.5 - (row + 0.5) / self.height as f64) * std::f64::consts::PI;
@@ -28,7 +34,7 @@ impl Panorama {
         [level * right, -up, level * forward]
     }
 
-    /// The pixel (column, row) of a direction in the camera's axes.
+    /// Returns the pixel (column, row) of a direction in the axes of the camera.
     pub fn pixel(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         let azimuth = x.atan2(z) / std::f64::consts::TAU;
         let elevation = (-y).atan2(x.hypot(z)) / std::f64::consts::PI;
@@ -53,10 +59,10 @@ impl Panorama {
         out
     }
 
-    /// A pinhole of `size` × `size` pixels with a field of view.
+    /// Makes a pinhole lens of `size` × `size` pixels with a field of view.
     ///
     /// # Errors
-    /// A field of view that is not between 0 and 180°, or no pixels.
+    /// [`LensError`] for a field of view that is not between 0 and 180°, or no pixels.
     pub fn crop_lens(size: usize, field_of_view_deg: f64) -> Result<Lens, LensError> {
         let focal = size as f64 / 2.0 / (field_of_view_deg.to_radians() / 2.0).tan();
         let middle = (size as f64 - 1.0) / 2.0;
@@ -64,7 +70,7 @@ impl Panorama {
     }
 }
 
-/// Bilinear, with the last column beside the first.
+/// Interpolates bilinearly, with the last column beside the first.
 fn around(picture: &Grid<[f32; 3]>, column: f64, row: f64) -> [f32; 3] {
     let (width, height) = (picture.width() as i64, picture.height() as i64);
     let (c, r) = (column.floor(), row.floor());
@@ -77,7 +83,8 @@ fn around(picture: &Grid<[f32; 3]>, column: f64, row: f64) -> [f32; 3] {
     [0, 1, 2].map(|i| (a[i] * (1.0 - u) + b[i] * u) * (1.0 - v) + (c[i] * (1.0 - u) + d[i] * u) * v)
 }
 
-/// The pose of a level camera that looks along an azimuth, degrees clockwise from the map's north.
+/// Returns the pose of a level camera that looks along an azimuth, degrees clockwise from grid
+/// north.
 pub fn level_pose(centre: [f64; 3], azimuth_deg: f64) -> Pose {
     let (sin, cos) = azimuth_deg.to_radians().sin_cos();
     Pose { rotation: [[cos, -sin, 0.0], [0.0, 0.0, -1.0], [sin, cos, 0.0]], centre }

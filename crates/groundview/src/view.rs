@@ -19,23 +19,23 @@ pub const SKY: u8 = 1;
 /// The pixel's ray falls beyond the surface, or the lens has no ray for it.
 pub const BEYOND: u8 = 2;
 
-/// A cell is seen when nothing is met before this far above it, metres: its own triangles end in
-/// it.
+/// A cell is seen if its ray meets nothing before this height above the cell, metres: its own
+/// triangles end in it.
 const ABOVE_CELL_M: f64 = 0.02;
 
-/// The inside of a camera.
+/// Pixels of a camera and their rays.
 #[derive(Debug, Clone, Copy)]
 pub enum Viewer<'a> {
     /// A perspective camera.
     Perspective(&'a Lens),
-    /// All around.
+    /// A 360° panorama.
     Panorama(Panorama),
 }
 
 /// What a camera sees.
 #[derive(Debug, Clone)]
 pub struct GroundView {
-    /// Metres; NaN where the surface is not met.
+    /// Depths, metres; NaN where the surface is not met.
     pub depth_m: Grid<f32>,
     /// Unit normals (east, north, up of the map), zero where the surface is not met.
     pub normal: Grid<[f32; 3]>,
@@ -44,7 +44,7 @@ pub struct GroundView {
 }
 
 impl Viewer<'_> {
-    /// Columns and rows.
+    /// Returns columns and rows.
     pub fn size(&self) -> (usize, usize) {
         match self {
             Self::Perspective(lens) => (lens.width(), lens.height()),
@@ -52,7 +52,7 @@ impl Viewer<'_> {
         }
     }
 
-    /// The direction of a pixel in the camera's axes, as long as a depth of 1 m.
+    /// Returns the direction of a pixel in the axes of the camera, scaled to a depth of 1 m.
     pub fn direction(&self, column: usize, row: usize) -> Option<[f64; 3]> {
         let (c, r) = (column as f64, row as f64);
         match self {
@@ -61,7 +61,7 @@ impl Viewer<'_> {
         }
     }
 
-    /// Whether a position in the camera's axes is in the picture.
+    /// Returns whether a position in the axes of the camera is in the picture.
     fn holds(&self, [x, y, z]: [f64; 3]) -> bool {
         match self {
             Self::Panorama(_) => true,
@@ -100,7 +100,7 @@ pub fn render(surface: &impl Ground, viewer: &Viewer<'_>, pose: &Pose) -> Ground
     view
 }
 
-/// Which cells of a height field a camera sees.
+/// Finds the cells of a height field that a camera sees.
 pub fn visible_cells(field: &HeightField, viewer: &Viewer<'_>, pose: &Pose) -> Grid<bool> {
     let (width, height) = (field.heights().width(), field.heights().height());
     let mut seen = Grid::filled(width, height, false);

@@ -1,7 +1,7 @@
-//! Where a sensor stands, seen from the cells of a map grid.
+//! Directions towards a sensor at the cells of a map grid.
 //!
-//! The line of sight through an image position is localised at two heights; what it moves by
-//! between them, in cells per metre of height, changes slowly over an image. It is computed at the
+//! The line of sight through an image position is localised at two heights. Its motion between
+//! them, in cells per metre of height, changes slowly over an image. It is computed at the
 //! nodes of a lattice over the grid and interpolated bilinearly: directions of satellite images
 //! change by less than a degree over 10 km.
 
@@ -12,7 +12,7 @@ use raster::{GeoTransform, Grid};
 
 /// Meshes of the lattice along each side.
 const MESHES: usize = 8;
-/// How far the second height is above the first, metres.
+/// Difference of the two heights, metres.
 const RISE_M: f64 = 100.0;
 
 /// Directions towards the sensor of one image over a grid.
@@ -24,7 +24,7 @@ pub struct Eyeline {
     cell_m: [f64; 2],
 }
 
-/// A direction that cannot be had.
+/// A direction that cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EyelineError {
@@ -40,11 +40,11 @@ pub enum EyelineError {
 }
 
 impl Eyeline {
-    /// The directions over a grid of (columns, rows) `size` at `height_m` above the ellipsoid; the
-    /// map's unit is the metre.
+    /// Computes the directions over a grid of (columns, rows) `size` at `height_m` above the
+    /// ellipsoid. The unit of the map is the metre.
     ///
     /// # Errors
-    /// A camera that sees none of it, or a map that does not hold it.
+    /// [`EyelineError`] if the camera does not see the grid or the projection does not hold it.
     pub fn new(
         camera: &RpcCamera,
         projection: &MapProjection,
@@ -70,8 +70,8 @@ impl Eyeline {
         Ok(Self { step, nodes, cell_m: [along_columns, along_rows] })
     }
 
-    /// Columns and rows that the line of sight moves by towards the sensor for each metre that it
-    /// rises.
+    /// Returns the motion of the line of sight towards the sensor, columns and rows per metre of
+    /// height.
     #[inline]
     pub fn per_metre(&self, column: f64, row: f64) -> [f64; 2] {
         let along = |value: f64, step: f64| {

@@ -1,6 +1,6 @@
 //! Finds what a surface model hides from a satellite.
 //!
-//! [`Surface`] answers whether anything stands between a point and the sensor, with upright
+//! [`OcclusionSurface`] finds whether it hides a point from a sensor, with upright
 //! [walls](wall) between cells. [`Eyeline`] gives the direction towards the sensor at each cell,
 //! [`GridGround`] the position of each cell.
 
@@ -11,4 +11,4 @@ mod wall;
 
 pub use eyeline::{Eyeline, EyelineError};
 pub use ground::GridGround;
-pub use surface::{STEP_SLOPE, Surface};
+pub use surface::{OcclusionSurface, STEP_SLOPE};

@@ -1,18 +1,18 @@
-//! A surface model as an obstacle: what stands between a point of it and a sensor.
+//! A surface model as an obstacle between its points and a sensor.
 //!
-//! From the point one goes along the line of sight, an eighth of a cell at a time along the grid's
-//! longer axis of motion and a sixty-fourth where the surface is nearly met, until the line is
-//! above everything. The point is hidden where the surface is above the line. Between cell centres
-//! the surface is bilinear, except where neighbours differ by more than a slope of [`STEP_SLOPE`]:
-//! there a wall stands, whose place [`wall`](super::wall) finds from the cells around it. (A ramp
-//! in its place would take half a cell off every roof's edge and let the sensor see behind it.)
-//! Where the surface has no height nothing stands in the way.
+//! The search follows the line of sight from the point in steps of an eighth of a cell along the
+//! faster axis, and of a sixty-fourth near the surface, until the line is above everything. The
+//! point is hidden where the surface is above the line. Between cell centres the surface is
+//! bilinear, except where neighbours differ by more than a slope of [`STEP_SLOPE`]: there is a
+//! wall, whose position [`wall`](super::wall) finds from the cells around it. (A ramp in its place
+//! would take half a cell off every roof's edge and let the sensor see behind it.) Cells without a
+//! height hide nothing.
 
 use raster::Grid;
 
 use super::wall::Walls;
 
-/// Slope beyond which neighbours are a wall and not a slope (58°): a parapet of 0.9 m on cells of
+/// Slope between neighbours beyond which they form a wall (58°): a parapet of 0.9 m on cells of
 /// 0.5 m is a wall.
 pub const STEP_SLOPE: f32 = 1.6;
 
@@ -20,12 +20,12 @@ pub const STEP_SLOPE: f32 = 1.6;
 const BLOCK: usize = 16;
 /// Steps of the line of sight per cell.
 const STEPS_PER_CELL: f64 = 8.0;
-/// Parts of a step in which the surface is nearly met.
+/// Substeps of a step near the surface.
 const PARTS: u32 = 8;
 
 /// Heights on a grid, made ready for lines of sight.
 #[derive(Debug, Clone)]
-pub struct Surface<'a> {
+pub struct OcclusionSurface<'a> {
     heights: &'a Grid<f32>,
     walls: Walls,
     /// The highest cell of each block and of one cell around it.
@@ -33,7 +33,7 @@ pub struct Surface<'a> {
     highest: f32,
 }
 
-impl<'a> Surface<'a> {
+impl<'a> OcclusionSurface<'a> {
     /// Prepares heights (metres, NaN where there is none) on cells of `cell_m` metres.
     pub fn new(heights: &'a Grid<f32>, cell_m: f64) -> Self {
         let blocks = |cells: usize| cells.div_ceil(BLOCK).max(1);
@@ -43,7 +43,7 @@ impl<'a> Surface<'a> {
             for i in 0..ceilings.width() {
                 let columns = (i * BLOCK).saturating_sub(1)..(i * BLOCK + BLOCK + 1).min(heights.width());
                 let cells = rows.clone().flat_map(|row| &heights.row(row)[columns.clone()]);
-                // f32::max passes over NaN.
+                // f32::max ignores NaN.
                 ceilings[(i, j)] = cells.fold(f32::NEG_INFINITY, |high, &h| high.max(h));
             }
         }
@@ -51,7 +51,7 @@ impl<'a> Surface<'a> {
         Self { heights, walls: Walls::find(heights, STEP_SLOPE * cell_m as f32), ceilings, highest }
     }
 
-    /// The height at a (column, row): bilinear, with walls kept upright; NaN where the cells that
+    /// Returns the height at a (column, row): bilinear, with upright walls; NaN if the cells that
     /// count have none.
     #[inline]
     pub fn height_at(&self, column: f64, row: f64) -> f32 {
@@ -74,7 +74,7 @@ impl<'a> Surface<'a> {
     #[inline]
     fn quad(&self, column: f64, row: f64) -> Option<Quad> {
         let (last_column, last_row) = (self.heights.width().checked_sub(1)?, self.heights.height().checked_sub(1)?);
-        // Negated, so that numbers that are none are outside.
+        // Negated, so that NaN is outside.
         if !(column >= 0.0 && row >= 0.0 && column <= last_column as f64 && row <= last_row as f64) {
             return None;
         }
@@ -101,9 +101,21 @@ impl<'a> Surface<'a> {
         })
     }
 
-    /// Whether anything stands between the point at (column, row), `height_m`, and a sensor towards
-    /// which the line of sight moves by `per_metre` (columns, rows) for each metre that it rises.
-    /// What is less than `tolerance_m` above the line does not count.
+    /// Returns whether the surface hides the point at (column, row) and `height_m` from a sensor.
+    /// The line of sight moves by `per_metre` (columns, rows) for each metre that it rises. Surface
+    /// less than `tolerance_m` above the line does not count.
+    ///
+    /// ```
+    /// use occlusion::OcclusionSurface;
+    /// use raster::Grid;
+    ///
+    /// // A wall of 10 m in column 5, and a sensor to the right at 45°.
+    /// let cells = (0..18).map(|i| if i % 9 == 5 { 10.0 } else { 0.0 }).collect();
+    /// let heights = Grid::from_vec(9, 2, cells).unwrap();
+    /// let surface = OcclusionOcclusionSurface::new(&heights, 1.0);
+    /// assert!(surface.hides(1.0, 0.5, 0.0, [1.0, 0.0], 0.05));
+    /// assert!(!surface.hides(7.0, 0.5, 0.0, [1.0, 0.0], 0.05));
+    /// ```
     pub fn hides(&self, column: f64, row: f64, height_m: f64, per_metre: [f64; 2], tolerance_m: f64) -> bool {
         let fastest = per_metre[0].abs().max(per_metre[1].abs());
         if !(fastest > 0.0 && fastest.is_finite() && height_m.is_finite()) {
@@ -117,7 +129,7 @@ impl<'a> Surface<'a> {
         loop {
             let line = height_m + k * rise;
             let (c, r) = (column + k * step[0], row + k * step[1]);
-            // Negated, so that numbers that are none end it.
+            // Negated, so that NaN ends the search.
             if !(line - rise < top && c > -0.5 && r > -0.5 && c < width - 0.5 && r < height - 0.5) {
                 return false;
             }
@@ -159,7 +171,7 @@ impl Quad {
     fn range(&self) -> (f32, f32) {
         let [a, b, c, d] = self.heights;
         let low = if (a + b + c + d).is_nan() { f32::NAN } else { a.min(b).min(c.min(d)) };
-        // f32::max passes over NaN.
+        // f32::max ignores NaN.
         (low, a.max(b).max(c.max(d)))
     }
 }
@@ -192,7 +204,7 @@ mod tests {
     #[test]
     fn a_wall_hides_as_far_as_its_height_and_the_angle_say() {
         let heights = block();
-        let surface = Surface::new(&heights, 0.5);
+        let surface = OcclusionSurface::new(&heights, 0.5);
         // The sensor stands towards smaller columns, under 45°: two cells per metre.
         let hidden =
             |column: usize| surface.hides(column as f64, 20.0, f64::from(heights[(column, 20)]), [-2.0, 0.0], 0.01);
@@ -211,7 +223,7 @@ mod tests {
         let slope = |s: f32| Grid::from_vec(40, 3, (0..120).map(|i| -(i % 40) as f32 * 0.5 * s).collect()).unwrap();
         for (s, expected) in [(0.9, false), (1.1, true)] {
             let heights = slope(s);
-            let surface = Surface::new(&heights, 0.5);
+            let surface = OcclusionSurface::new(&heights, 0.5);
             let hidden = surface.hides(20.0, 1.0, f64::from(heights[(20, 1)]), [-2.0, 0.0], 0.0);
             assert_eq!(hidden, expected, "{s}");
         }
@@ -228,7 +240,7 @@ mod tests {
             for (c, r, h) in spikes {
                 heights[(c, r)] = h;
             }
-            let surface = Surface::new(&heights, 0.5);
+            let surface = OcclusionSurface::new(&heights, 0.5);
             let slow = Surface { ceilings: surface.ceilings.map(|_| f32::INFINITY), ..surface.clone() };
             let from = f64::from(heights[(column, row)]);
             let ask = |s: &Surface<'_>| s.hides(column as f64, row as f64, from, [dx, dy], 0.05);

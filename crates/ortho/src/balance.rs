@@ -1,4 +1,4 @@
-//! Grey values of several images brought together: a gain and an offset for each.
+//! Brings the grey values of several images together by a gain and an offset for each.
 //!
 //! Where two images see the same cells, their values are related by v_j = g v_i + o, up to what
 //! moved, shadows and glare. Per pair, median and spread of either side are taken over the cells
@@ -11,33 +11,33 @@
 use nalgebra::{DMatrix, DVector};
 use numeric::upper_median;
 
-/// Cuts of what does not fit.
+/// Rounds of fitting and removing outliers.
 const ROUNDS: usize = 4;
 /// Robust deviations beyond which a cell does not count.
 const CUT: f64 = 3.0;
-/// Fewer cells than this say nothing.
+/// Least number of cells of a pair.
 const LEAST: usize = 50;
-/// Pairs that are less alike than this say nothing about gains.
+/// Least correlation of a pair that counts for the gains.
 const ALIKE: f64 = 0.3;
-/// Pulls images that no pair ties to the rest towards their own values.
+/// Weight that keeps an image without pairs at its own values.
 const RIDGE: f64 = 1e-9;
 /// Standard deviation of a normal distribution in terms of the median absolute deviation.
 const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
 
-/// What turns an image's values into those of the mosaic.
+/// Gain and offset that turn the values of an image into values of the mosaic.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Balance {
-    /// Factor.
+    /// Gain.
     pub gain: f64,
-    /// What is added after it.
+    /// Offset, added after the gain.
     pub offset: f64,
 }
 
 impl Balance {
-    /// Values as they are.
+    /// Leaves the values as they are.
     pub const NONE: Self = Self { gain: 1.0, offset: 0.0 };
 
-    /// The balanced value.
+    /// Returns the balanced value.
     #[inline]
     pub fn apply(&self, value: f32) -> f32 {
         (self.gain * f64::from(value) + self.offset) as f32
@@ -49,7 +49,7 @@ impl Balance {
 pub struct Pair {
     /// The two images.
     pub images: (usize, usize),
-    /// A cell's value in each.
+    /// Values of the same cell in both.
     pub values: Vec<(f32, f32)>,
 }
 
@@ -73,21 +73,30 @@ pub enum BalanceError {
     },
 }
 
-/// What two images have in common.
+/// Statistics of the cells that two images share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Relation {
     images: (usize, usize),
     median: (f64, f64),
     spread: (f64, f64),
     weight: f64,
-    /// Whether the spreads say anything.
+    /// Whether the spreads are similar enough to count for the gains.
     alike: bool,
 }
 
-/// A gain and an offset for each of `images`; `reference` keeps its values.
+/// Computes a gain and an offset for each of `images`; `reference` keeps its values.
 ///
 /// # Errors
-/// Pairs of images that are not there.
+/// [`BalanceError`] for pairs of unknown images and for equations without a solution.
+///
+/// ```
+/// use ortho::{Pair, balance};
+///
+/// let values = (0..2000).map(|i| (i as f32, 2.0 * i as f32)).collect();
+/// let found = balance(2, 0, &[Pair { images: (0, 1), values }])?;
+/// assert!((found[1].apply(100.0) - 50.0).abs() < 0.5);
+/// # Ok::<(), ortho::BalanceError>(())
+/// ```
 pub fn balance(images: usize, reference: usize, pairs: &[Pair]) -> Result<Vec<Balance>, BalanceError> {
     let named = pairs.iter().flat_map(|p| [p.images.0, p.images.1]).chain([reference]);
     if let Some(image) = named.into_iter().find(|&image| image >= images) {

@@ -23,7 +23,7 @@ pub fn visible_cells(surface: &SplatSurface<'_>, towards_sensor: [f64; 3]) -> Gr
     let mut seen = Grid::filled(heights.width(), heights.height(), false);
     let Some(per_metre) = cells_per_metre(surface, towards_sensor) else { return seen };
     let (along_columns, along_rows) = surface.geotransform().cell_size();
-    let obstacle = occlusion::Surface::new(heights, (along_columns * along_rows).sqrt());
+    let obstacle = occlusion::OcclusionSurface::new(heights, (along_columns * along_rows).sqrt());
     if heights.width() > 0 {
         seen.data_mut().par_chunks_mut(heights.width()).enumerate().for_each(|(row, cells)| {
             for (column, cell) in cells.iter_mut().enumerate() {

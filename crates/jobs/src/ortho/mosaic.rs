@@ -3,7 +3,7 @@
 use geodesy::LonLatHeight;
 use io::raster::Dem;
 use numeric::Progress;
-use occlusion::Surface;
+use occlusion::OcclusionSurface;
 use ortho::{Balance, Pair, Sight, balance, best_view};
 use raster::Grid;
 use rayon::prelude::*;
@@ -35,7 +35,7 @@ pub(super) struct Ortho {
 
 /// Makes the ortho.
 pub(super) fn make(inputs: &OrthoInputs, config: &OrthoConfig, progress: &dyn Progress) -> Result<Ortho, OrthoError> {
-    let surface = Surface::new(&inputs.dsm.heights, inputs.cell_m);
+    let surface = OcclusionSurface::new(&inputs.dsm.heights, inputs.cell_m);
     let work = Work { inputs, tolerance_m: config.tolerance_m, surface: &surface };
     let bands = inputs.images[0].source.info().bands;
     let balances = if !config.balance || inputs.images.len() < 2 {
@@ -75,7 +75,7 @@ struct Block {
 struct Work<'a> {
     inputs: &'a OrthoInputs,
     tolerance_m: f64,
-    surface: &'a Surface<'a>,
+    surface: &'a OcclusionSurface<'a>,
 }
 
 impl Work<'_> {
@@ -149,7 +149,7 @@ impl Work<'_> {
 struct Ground<'a> {
     grid: &'a OrthoGrid,
     dsm: &'a Dem,
-    surface: &'a Surface<'a>,
+    surface: &'a OcclusionSurface<'a>,
 }
 
 impl Ground<'_> {

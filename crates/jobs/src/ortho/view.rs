@@ -4,7 +4,7 @@
 use camera::ImagePoint;
 use geodesy::LonLatHeight;
 use io::raster::ImageSource;
-use occlusion::{Eyeline, Surface};
+use occlusion::{Eyeline, OcclusionSurface};
 use ortho::Sight;
 use raster::{Grid, Window, bicubic};
 use rayon::prelude::*;
@@ -35,7 +35,7 @@ pub(super) struct Seen {
 
 /// Looks at cells through an image. Hidden cells get the values of what hides them.
 pub(super) fn look(
-    surface: &Surface<'_>,
+    surface: &OcclusionSurface<'_>,
     image: &OrthoImage,
     cells: &[Option<Cell>],
     tolerance_m: f64,
@@ -64,7 +64,7 @@ pub(super) fn look(
 }
 
 /// Finds out whether the surface hides a cell from the image.
-fn sight(surface: &Surface<'_>, eyeline: &Eyeline, cell: &Cell, tolerance_m: f64) -> Sight {
+fn sight(surface: &OcclusionSurface<'_>, eyeline: &Eyeline, cell: &Cell, tolerance_m: f64) -> Sight {
     let [column, row] = cell.in_dsm;
     let towards = eyeline.per_metre(column, row);
     if surface.hides(column, row, cell.ground.height_m, towards, tolerance_m) {

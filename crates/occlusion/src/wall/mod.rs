@@ -1,14 +1,14 @@
-//! Where walls stand among the cells of a raster.
+//! Finds the walls among the cells of a raster.
 //!
-//! A raster says of a wall only which cell centres are above it and which below. Their pattern says
-//! more: along a straight wall that is not parallel to the grid, the steps of the pattern give its
-//! place to a tenth of a cell. So wherever four neighbouring cells differ by a step, the cells
-//! around are parted at the middle of the four heights' widest gap by the line of the widest margin
-//! ([`pattern`]). Where no line parts them, lines found nearby are tried in pairs (a building's
-//! corner, from inside or outside), as one side of a strip (a parapet thinner than the cells), and
-//! a circle (a crown); the form that is wrong about the fewest centres is taken. Four cells of
-//! which one side differs by another step are parted twice: ground, roof and the parapet between
-//! them.
+//! A single cell centre only shows whether it is above or below a wall. The pattern of the centres
+//! shows more: along a straight wall that is not parallel to the grid, the steps of the pattern
+//! give its place to a tenth of a cell. So wherever four neighbouring cells differ by a step, the
+//! cells around are parted at the middle of the four heights' widest gap by the line of the widest
+//! margin ([`pattern`]). Where no line parts them, lines found nearby are tried in pairs (a
+//! building's corner, from inside or outside), as one side of a strip (a parapet thinner than the
+//! cells), and a circle (a crown); the form that is wrong about the fewest centres is taken. Four
+//! cells of which one side differs by another step are parted twice: ground, roof and the parapet
+//! between them.
 //!
 //! On simulated towns with parapets of 0.4 m and trees (three seeds, cells of 0.5 m, true heights),
 //! hidden cells are told with 97 % precision and 96 to 97 % recall under 16.5°, and 93 % of both
@@ -18,13 +18,16 @@
 //! Every centre keeps its own side. On either side the surface is bilinear, and continued in a
 //! straight line beyond the side's own cells: a roof goes on falling to its eaves.
 
+mod curve;
 mod outline;
 mod pattern;
+mod sample;
 
 use raster::Grid;
 use rayon::prelude::*;
 
-use outline::{Curve, Outline};
+use curve::Curve;
+use outline::Outline;
 
 /// Lines are taken from up to so many cells away, at most [`LINES`] of them.
 const NEAR: isize = 4;

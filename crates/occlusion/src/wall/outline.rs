@@ -1,54 +1,27 @@
-//! Forms that a wall takes among a few cells: where a function of the place is positive, there is
-//! the upper side.
+//! Forms of a wall among a few cells: a function of the position that is positive on the upper
+//! side.
 //!
-//! Places are (columns, rows) from the middle of four cells. The functions are about distances in
-//! cells: exactly so for lines.
+//! Positions are (columns, rows) from the middle of four cells. The functions are distances in
+//! cells: exact for lines, approximate otherwise.
 
-use super::pattern::Sample;
-
-/// A line, or a circle: a x + b y + c + k (x² + y²) with a² + b² = 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Curve {
-    pub(super) a: f32,
-    pub(super) b: f32,
-    pub(super) c: f32,
-    pub(super) k: f32,
-}
-
-impl Curve {
-    #[inline]
-    fn at(&self, [x, y]: [f32; 2]) -> f32 {
-        self.a * x + self.b * y + self.c + self.k * (x * x + y * y)
-    }
-
-    /// A line as it is seen from a place that is (columns, rows) further.
-    pub(super) fn line_from(&self, [columns, rows]: [f32; 2]) -> Self {
-        Self { c: self.c + self.a * columns + self.b * rows, ..*self }
-    }
-
-    /// Whether two lines say nearly the same of the cells around.
-    pub(super) fn is_like(&self, other: &Self) -> bool {
-        (self.a * other.b - self.b * other.a).abs() < 0.02
-            && self.a * other.a + self.b * other.b > 0.0
-            && (self.c - other.c).abs() < 0.04
-    }
-}
+use super::curve::Curve;
+use super::sample::Sample;
 
 /// The form of a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Outline {
     /// Straight or round.
     Edge(Curve),
-    /// The corner of what is within both.
+    /// A corner: the intersection of two upper sides.
     Within(Curve, Curve),
-    /// The corner of what is within one or the other.
+    /// A corner: the union of two upper sides.
     Around(Curve, Curve),
-    /// Thinner than the cells around show: from the curve on, so many cells wide.
+    /// A strip that starts at the curve; its width in cells.
     Strip(Curve, f32),
 }
 
 impl Outline {
-    /// Positive on the upper side.
+    /// Returns the signed distance of a position, positive on the upper side.
     #[inline]
     pub(super) fn at(&self, place: [f32; 2]) -> f32 {
         match self {

@@ -1,35 +1,27 @@
-//! Which of the cells around are above a level, and the line or circle that parts them from the
-//! others.
+//! Finds the cells around that are above a level, and the line or circle that separates them from
+//! the others.
 //!
 //! The curve is the one of the widest margin in the sense of Vapnik, found by Newton steps on the
-//! squared hinge loss: centres farther from it than the margin have no say, the others weigh less
-//! the farther they are from the middle. Centres that no curve parts leave one that is wrong about
-//! few.
+//! squared hinge loss: centres farther from it than the margin do not count, the others count less
+//! the farther they are from the middle. If no curve separates the centres, the result is wrong
+//! about few of them.
 
 use nalgebra::{Matrix4, Vector4};
 use raster::Grid;
 
-use super::outline::Curve;
+use super::curve::Curve;
+use super::sample::Sample;
 
-/// Centres this far to either side of the four cells are looked at.
+/// Reach of the centres on either side of the four cells, cells.
 const REACH: isize = 3;
 /// Standard deviation of the weights, cells.
 const SIGMA: f32 = 1.3;
 /// Newton steps; most settle after four.
 const STEPS: usize = 8;
-/// What the squares of slope and curvature cost: little, so that margins are those of the centres
-/// next to the curve.
+/// Penalties of the squares of slope and curvature: small, so that the centres next to the curve
+/// set the margin.
 const SLOPE_COST: f64 = 3e-4;
 const CURVATURE_COST: f64 = 0.03;
-
-/// A cell's centre.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sample {
-    pub(super) place: [f32; 2],
-    /// 1 above the level, −1 below.
-    pub(super) side: f32,
-    pub(super) weight: f32,
-}
 
 /// The centres around the four cells of which the first is at `corner`.
 pub(super) fn samples(cells: &Grid<f32>, corner: (usize, usize), level: f32) -> Vec<Sample> {
