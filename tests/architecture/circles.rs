@@ -1,8 +1,9 @@
 //! Finds circles of files inside a crate: files that use each other, directly or around a loop.
 //!
-//! Every source is parsed. A name in a `use` item or in a path that begins with `crate`, `self` or `super` is followed,
-//! through re-exports, to the file that defines it, and becomes an arrow to that file. A re-export (`pub use`) is no
-//! arrow of its own: it only hands names on. Test modules do not count.
+//! Every source is parsed. A name in a `use` item or in a path that begins with `crate`, `self` or
+//! `super` is followed, through re-exports, to the file that defines it, and becomes an arrow to
+//! that file. A re-export (`pub use`) is no arrow of its own: it only hands names on. Test modules
+//! do not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -28,7 +29,8 @@ struct Module {
     used: Vec<NamedPath>,
 }
 
-/// Finds the circles of a crate; `root` is its `lib.rs` or `main.rs`. Each circle is a sorted list of files.
+/// Finds the circles of a crate; `root` is its `lib.rs` or `main.rs`. Each circle is a sorted list
+/// of files.
 pub(crate) fn circles(root: &Path) -> Vec<Vec<PathBuf>> {
     let mut modules = BTreeMap::new();
     let folder = root.parent().expect("a crate root lies in a folder");

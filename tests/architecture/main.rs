@@ -1,8 +1,10 @@
-//! Holds the rules of `crates/README.md`: the floors, the homes of GDAL and PROJ, where files are touched, no circles of
-//! files, one name for one public type, a thin command line, and that every source says what it does.
+//! Holds the rules of `crates/README.md`: the floors, the homes of GDAL and PROJ, where files are
+//! touched, no circles of files, one name for one public type, a thin command line, and that every
+//! source says what it does.
 //!
-//! The dependencies are read from `cargo metadata --no-deps`, so no network is needed. Where sources are scanned as text,
-//! comments and what follows the first `#[cfg(test)]` of a file do not count.
+//! The dependencies are read from `cargo metadata --no-deps`, so no network is needed. Where
+//! sources are scanned as text, comments and what follows the first `#[cfg(test)]` of a file do not
+//! count.
 
 mod circles;
 mod names;
@@ -13,7 +15,8 @@ use std::path::{Path, PathBuf};
 
 use cargo_metadata::{Metadata, MetadataCommand, Package};
 
-/// The floor of every crate, those to come included, so that a new crate lands where the design has it.
+/// The floor of every crate, those to come included, so that a new crate lands where the design has
+/// it.
 const FLOORS: [(&str, u8); 24] = [
     ("skysweep-numeric", 0),
     ("skysweep-testing", 0),
@@ -112,7 +115,8 @@ fn product_code(text: &str) -> String {
         .collect()
 }
 
-/// Whether the code of a source (no comments, nothing after the first `#[cfg(test)]`) names `std::fs`.
+/// Whether the code of a source (no comments, nothing after the first `#[cfg(test)]`) names
+/// `std::fs`.
 fn names_std_fs(text: &str) -> bool {
     let code = product_code(text);
     let grouped = code.match_indices("std::{").any(|(start, head)| {

@@ -2,7 +2,8 @@
 //!
 //! Nodes first have two children and are then opened up to eight.
 //!
-//! Boxes are f32, rounded outwards from f64. The tree depends on the triangles alone and not on the number of threads.
+//! Boxes are f32, rounded outwards from f64. The tree depends on the triangles alone and not on the
+//! number of threads.
 
 use crate::node::{Child, LEAF_SIZE, MAX_TRIANGLES, Node, WIDTH};
 use crate::tree::{Bvh, BvhError};
@@ -17,10 +18,12 @@ const PARALLEL_FROM: usize = 4096;
 const EXTENT_LIMIT: f64 = 1e9;
 
 impl Bvh {
-    /// Builds the tree. `positions` are metres from a local origin, and `triangles` holds indices into them.
+    /// Builds the tree. `positions` are metres from a local origin, and `triangles` holds indices
+    /// into them.
     ///
     /// # Errors
-    /// An index out of range, a position that is not finite or beyond 10⁹ m, or more than 2²⁷ triangles.
+    /// An index out of range, a position that is not finite or beyond 10⁹ m, or more than 2²⁷
+    /// triangles.
     pub fn new(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<Self, BvhError> {
         if triangles.len() > MAX_TRIANGLES {
             return Err(BvhError::TooMany { triangles: triangles.len(), limit: MAX_TRIANGLES });
@@ -143,8 +146,8 @@ fn halve(items: &mut [Item], bounds: &Bounds) -> usize {
     middle
 }
 
-/// Splits where the surface-area heuristic is lowest over all bins of all axes. Returns `None` where all centres
-/// coincide.
+/// Splits where the surface-area heuristic is lowest over all bins of all axes. Returns `None`
+/// where all centres coincide.
 fn partition(items: &mut [Item]) -> Option<usize> {
     let (mut best_cost, mut best) = (f32::INFINITY, None);
     for axis in 0..3 {

@@ -30,7 +30,8 @@ pub struct Target {
 impl Eye {
     /// Makes an eye from the rotation of a pinhole camera.
     ///
-    /// `rotation` takes directions of the world to the camera, whose axes are right, down and forward.
+    /// `rotation` takes directions of the world to the camera, whose axes are right, down and
+    /// forward.
     pub fn new(centre: [f64; 3], rotation: [[f64; 3]; 3]) -> Self {
         let [right, down, forward] = rotation;
         Self { centre, right, down, forward }

@@ -1,9 +1,10 @@
 //! Ray casting on triangles: which triangle a ray meets first, and whether it meets any.
 //!
-//! Positions are f64 metres from a local origin. The results are the same as if every triangle were tested in f64.
-//! Vectorised f32 arithmetic decides only what its error bounds make certain, and f64 decides the rest. No ray slips
-//! through an edge that two triangles share. Results do not depend on the number of threads, the instruction set or
-//! the order of the rays. Of several triangles at the same distance the one with the lowest index is hit.
+//! Positions are f64 metres from a local origin. The results are the same as if every triangle were
+//! tested in f64. Vectorised f32 arithmetic decides only what its error bounds make certain, and
+//! f64 decides the rest. No ray slips through an edge that two triangles share. Results do not
+//! depend on the number of threads, the instruction set or the order of the rays. Of several
+//! triangles at the same distance the one with the lowest index is hit.
 //!
 //! - [`Bvh::cast_image`] casts the rays of an image through one centre of projection.
 //! - [`Bvh::occluded`] tests which of many points are hidden from one centre of projection.

@@ -1,7 +1,7 @@
 //! Single rays of any origin and direction: the closest hit and any hit.
 //!
-//! Boxes are tested eight at a time in f32 with error bounds. Triangles are tested in f64 with the edge functions of
-//! [`Facet`].
+//! Boxes are tested eight at a time in f32 with error bounds. Triangles are tested in f64 with the
+//! edge functions of [`Facet`].
 
 use crate::Bvh;
 use crate::eye::Eye;
@@ -58,7 +58,8 @@ struct Search<'a> {
     slabs: [Slab; 3],
 }
 
-/// The ray along one axis: t = (position − start) · inverse. `pad` widens boxes outwards against rounding.
+/// The ray along one axis: t = (position − start) · inverse. `pad` widens boxes outwards against
+/// rounding.
 #[derive(Debug, Clone, Copy)]
 struct Slab {
     start: f32,
@@ -76,7 +77,8 @@ impl<'a> Search<'a> {
         }
         let forward = d.map(|c| c / length);
         let slab = |axis: usize| {
-            // A ray parallel to a face of the box gets a tiny slope, whose effect is smaller than the padding.
+            // A ray parallel to a face of the box gets a tiny slope, whose effect is smaller than
+            // the padding.
             let steep = if forward[axis].abs() < 1e-9 { 1e-9f64.copysign(forward[axis]) } else { forward[axis] };
             let size = ray.origin[axis].abs().max(bvh.extent);
             let pad = (4.0 * f64::from(f32::EPSILON) + 3e-9) * size.max(1.0);
@@ -92,7 +94,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Returns the children whose boxes the ray meets before `end` as a bit mask, and where it enters each, metres.
+    /// Returns the children whose boxes the ray meets before `end` as a bit mask, and where it
+    /// enters each, metres.
     #[inline(always)]
     fn touch<I: InstructionSet>(&self, isa: I, node: &Node, end: f32) -> (u32, [f32; WIDTH]) {
         let (mut enter, mut leave) = (isa.splat(0.0), isa.splat(end));

@@ -2,22 +2,26 @@
 //!
 //! Three of them tell on which side of an edge a ray passes, the fourth is the inverse depth.
 //!
-//! With corners a, b, c in the frame of the eye, the ray (x, y, 1) passes an edge on the inner side where
-//! (x, y, 1) · (b × c) ≥ 0 (2D homogeneous rasterisation, Olano and Greer 1997). The inverse depth is linear too:
-//! 1/t = (x, y, 1) · N / det with N = a × b + b × c + c × a and det = a · (b × c). The neighbour of a triangle runs
-//! along their common edge the other way, so its cross product is exactly the negative one. A ray counts as inside
-//! within the rounding of that product (1e-15 of it), so that none slips through where several triangles meet.
+//! With corners a, b, c in the frame of the eye, the ray (x, y, 1) passes an edge on the inner side
+//! where (x, y, 1) · (b × c) ≥ 0 (2D homogeneous rasterisation, Olano and Greer 1997). The inverse
+//! depth is linear too: 1/t = (x, y, 1) · N / det with N = a × b + b × c + c × a and det = a · (b ×
+//! c). The neighbour of a triangle runs along their common edge the other way, so its cross product
+//! is exactly the negative one. A ray counts as inside within the rounding of that product (1e-15
+//! of it), so that none slips through where several triangles meet.
 
 use crate::eye::Eye;
 use crate::simd::{InstructionSet, Lanes};
 use numeric::vector::cross;
 
-/// Bound on the f32 rounding of a linear function: of both factors, the products and the sums, with a reserve.
+/// Bound on the f32 rounding of a linear function: of both factors, the products and the sums, with
+/// a reserve.
 const ROUNDINGS: f64 = 6.0 * (f32::EPSILON as f64) / 2.0;
-/// A triangle is edge-on if its volume with the eye is a smaller share of its bounding box than this.
+/// A triangle is edge-on if its volume with the eye is a smaller share of its bounding box than
+/// this.
 const EDGE_ON: f64 = 1e-14;
 
-/// Bound on the f64 rounding of an edge function, as a share of the product of its corners' distances.
+/// Bound on the f64 rounding of an edge function, as a share of the product of its corners'
+/// distances.
 const EDGE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Coefficients of a linear function a·x + b·y + c.
@@ -59,7 +63,8 @@ pub(crate) fn value(linear: &Linear, x: f64, y: f64) -> f64 {
 }
 
 impl Facet {
-    /// Returns the triangle as the eye sees it, `None` if it is edge-on and no ray can meet its inside.
+    /// Returns the triangle as the eye sees it, `None` if it is edge-on and no ray can meet its
+    /// inside.
     #[inline(always)]
     pub(crate) fn new(eye: &Eye, corners: &[[f64; 3]; 3]) -> Option<Self> {
         let [a, b, c] = corners.map(|corner| eye.eye_from_world(corner));
@@ -86,7 +91,8 @@ impl Facet {
         (inside && inverse > 0.0).then_some(inverse)
     }
 
-    /// Returns the functions in f32 with error bounds for rays with |x| ≤ `reach[0]` and |y| ≤ `reach[1]`.
+    /// Returns the functions in f32 with error bounds for rays with |x| ≤ `reach[0]` and |y| ≤
+    /// `reach[1]`.
     #[inline(always)]
     pub(crate) fn fast(&self, reach: [f64; 2]) -> FastFacet {
         let error = |l: &Linear, slack: f64| {

@@ -1,9 +1,10 @@
 //! Eight f32 values side by side: AVX2 where the machine has it, plain arrays elsewhere.
 //!
-//! This is the only unsafe module of the crate. A kernel is written once, generic over an [`InstructionSet`]. The value
-//! of that type is a token. The token of AVX2 can only be made by [`dispatch`], after the machine was asked, and lanes can
-//! only be made from a token. So no safe function reaches an instruction that the machine lacks. No fused
-//! multiply-add is used, so that both sets give the same bits.
+//! This is the only unsafe module of the crate. A kernel is written once, generic over an
+//! [`InstructionSet`]. The value of that type is a token. The token of AVX2 can only be made by
+//! [`dispatch`], after the machine was asked, and lanes can only be made from a token. So no safe
+//! function reaches an instruction that the machine lacks. No fused multiply-add is used, so that
+//! both sets give the same bits.
 #![allow(unsafe_code)]
 
 /// Makes lanes. Having a value of such a type proves that the machine has its instructions.
@@ -132,8 +133,8 @@ impl Lanes for PlainLanes {
 
 /// Work that is written once for every instruction set.
 ///
-/// `run` and everything that it calls with lanes must be `#[inline(always)]`, so that the whole becomes one
-/// function compiled for the instruction set.
+/// `run` and everything that it calls with lanes must be `#[inline(always)]`, so that the whole
+/// becomes one function compiled for the instruction set.
 pub(crate) trait Kernel {
     type Output;
 
@@ -173,7 +174,8 @@ mod avx2 {
             fn compiled_for_avx2<K: Kernel>(isa: Avx2, kernel: K) -> K::Output {
                 kernel.run(isa)
             }
-            // SAFETY: `self` proves that the machine has AVX2, which is all that the function needs.
+            // SAFETY: `self` proves that the machine has AVX2, which is all that the function
+            // needs.
             unsafe { compiled_for_avx2(self, kernel) }
         }
     }
@@ -183,13 +185,15 @@ mod avx2 {
 
         #[inline(always)]
         fn load(self, from: &[f32; 8]) -> Wide {
-            // SAFETY: `self` proves AVX2, and 32 bytes are readable behind the reference. The load needs no alignment.
+            // SAFETY: `self` proves AVX2, and 32 bytes are readable behind the reference. The load
+            // needs no alignment.
             Wide(unsafe { _mm256_loadu_ps(from.as_ptr()) })
         }
 
         #[inline(always)]
         fn load_bits(self, from: &[u32; 8]) -> Wide {
-            // SAFETY: `self` proves AVX2, and 32 bytes are readable behind the reference. Every bit pattern is an f32.
+            // SAFETY: `self` proves AVX2, and 32 bytes are readable behind the reference. Every bit
+            // pattern is an f32.
             Wide(unsafe { _mm256_loadu_ps(from.as_ptr().cast()) })
         }
 
@@ -207,67 +211,78 @@ mod avx2 {
     impl Lanes for Wide {
         #[inline(always)]
         fn store(self, to: &mut [f32; 8]) {
-            // SAFETY: `self` was made from an `Avx2`, and 32 bytes are writable behind the reference. No alignment is needed.
+            // SAFETY: `self` was made from an `Avx2`, and 32 bytes are writable behind the
+            // reference. No alignment is needed.
             unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
         }
 
         #[inline(always)]
         fn store_bits(self, to: &mut [u32; 8]) {
-            // SAFETY: `self` was made from an `Avx2`, and 32 bytes are writable behind the reference. Every bit pattern is a u32.
+            // SAFETY: `self` was made from an `Avx2`, and 32 bytes are writable behind the
+            // reference. Every bit pattern is a u32.
             unsafe { _mm256_storeu_ps(to.as_mut_ptr().cast(), self.0) }
         }
 
         #[inline(always)]
         fn add(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             Self(unsafe { _mm256_add_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn sub(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             Self(unsafe { _mm256_sub_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn mul(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             Self(unsafe { _mm256_mul_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn min(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             Self(unsafe { _mm256_min_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn max(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             Self(unsafe { _mm256_max_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn above(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             Self(unsafe { _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0) })
         }
 
         #[inline(always)]
         fn and(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             Self(unsafe { _mm256_and_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn pick(self, yes: Self, no: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             Self(unsafe { _mm256_blendv_ps(no.0, yes.0, self.0) })
         }
 
         #[inline(always)]
         fn bits(self) -> u32 {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic needs.
+            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
+            // needs.
             (unsafe { _mm256_movemask_ps(self.0) }) as u32
         }
     }

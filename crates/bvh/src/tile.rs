@@ -1,8 +1,10 @@
-//! The rays of a tile: up to 1024 rays through one eye, in subtiles of 64, with the nearest triangle of each.
+//! The rays of a tile: up to 1024 rays through one eye, in subtiles of 64, with the nearest
+//! triangle of each.
 //!
-//! Depths are stored as inverse depths, because these are linear over a triangle. A larger value is nearer, and 0 is
-//! a miss. Each has an error bound, and two that differ by less than their errors are compared in f64. When any hit
-//! suffices, the inverse depth starts at the target's and becomes infinite as soon as something lies before it.
+//! Depths are stored as inverse depths, because these are linear over a triangle. A larger value is
+//! nearer, and 0 is a miss. Each has an error bound, and two that differ by less than their errors
+//! are compared in f64. When any hit suffices, the inverse depth starts at the target's and becomes
+//! infinite as soon as something lies before it.
 
 use crate::Bvh;
 use crate::eye::Eye;
@@ -81,7 +83,8 @@ impl Tile {
         })
     }
 
-    /// Loads new rays. `ray` gives (x, y, depth of the end) of a ray by its number, `None` for no ray.
+    /// Loads new rays. `ray` gives (x, y, depth of the end) of a ray by its number, `None` for no
+    /// ray.
     ///
     /// Returns whether there is at least one ray.
     pub(crate) fn load(&mut self, ray: impl Fn(usize) -> Option<[f64; 3]>) -> bool {
@@ -112,7 +115,8 @@ impl Tile {
                     self.error[group][lane] = inverse * f32::EPSILON;
                     farthest = farthest.min(inverse - inverse * f32::EPSILON);
                 }
-                // No triangle is nearer than an infinite inverse depth, so lanes without a ray find nothing.
+                // No triangle is nearer than an infinite inverse depth, so lanes without a ray find
+                // nothing.
                 None => {
                     (self.x[group][lane], self.y[group][lane]) = (0.0, 0.0);
                     self.inverse[group][lane] = f32::INFINITY;

@@ -1,6 +1,7 @@
 //! Traversal of the tree by the rays of a tile.
 //!
-//! Nodes are visited from near to far. Boxes outside the pyramid of the rays, and boxes behind all hits, are skipped.
+//! Nodes are visited from near to far. Boxes outside the pyramid of the rays, and boxes behind all
+//! hits, are skipped.
 
 use crate::Bvh;
 use crate::eye::Eye;
@@ -78,7 +79,8 @@ impl Pyramid {
         }
     }
 
-    /// Returns the children that the pyramid may touch as a bit mask, and a lower bound on the depth of each.
+    /// Returns the children that the pyramid may touch as a bit mask, and a lower bound on the
+    /// depth of each.
     #[inline(always)]
     fn touch<I: InstructionSet>(&self, isa: I, node: &Node) -> (u32, [f32; WIDTH]) {
         let mut inside = self.depth.extreme(isa, node, true).above(isa.splat(-self.depth.error));

@@ -1,7 +1,7 @@
 //! Many rays through one eye: the depth image of a camera, and the visibility of many points.
 //!
-//! Images are cut into tiles of 32 × 32 pixels, and points are sorted into tiles along a Morton curve. The rays of a
-//! tile traverse the tree together. Tiles are independent and run in parallel.
+//! Images are cut into tiles of 32 × 32 pixels, and points are sorted into tiles along a Morton
+//! curve. The rays of a tile traverse the tree together. Tiles are independent and run in parallel.
 
 use rayon::prelude::*;
 
@@ -34,8 +34,8 @@ pub struct DepthImage {
 impl Bvh {
     /// Returns the nearest triangle on every pixel's ray, and its depth.
     ///
-    /// `direction` maps (column, row) to the point (x, y) of the image plane at distance 1 through which the ray goes.
-    /// Pixels for which it is `None` or not finite are misses.
+    /// `direction` maps (column, row) to the point (x, y) of the image plane at distance 1 through
+    /// which the ray goes. Pixels for which it is `None` or not finite are misses.
     pub fn cast_image(
         &self,
         eye: &Eye,
@@ -176,8 +176,8 @@ impl LastFacet {
     }
 }
 
-/// Returns the order of the targets along a Morton curve over their bounds, so that neighbours in the order are
-/// neighbours in the image.
+/// Returns the order of the targets along a Morton curve over their bounds, so that neighbours in
+/// the order are neighbours in the image.
 fn morton_order(targets: &[Target]) -> Vec<u32> {
     let finite = || targets.iter().filter(|t| t.x.abs() < 1e6 && t.y.abs() < 1e6);
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);

@@ -1,10 +1,12 @@
-//! Every way of casting rays against the same rays tested with every triangle, in f64 and by another formula.
+//! Every way of casting rays against the same rays tested with every triangle, in f64 and by
+//! another formula.
 
 use bvh::{Bvh, BvhError, Eye, MISS, Ray, Target};
 use numeric::vector::{Vector, cross, dot, sub};
 use proptest::prelude::*;
 
-/// Where a ray meets a triangle, after Möller and Trumbore (1997), and how far from its border in parts of its size.
+/// Where a ray meets a triangle, after Möller and Trumbore (1997), and how far from its border in
+/// parts of its size.
 fn moller_trumbore(origin: Vector, direction: Vector, [a, b, c]: [Vector; 3]) -> Option<(f64, f64)> {
     let (e1, e2) = (sub(b, a), sub(c, a));
     let p = cross(direction, e2);
@@ -26,7 +28,8 @@ fn brute_force(triangles: &[[Vector; 3]], origin: Vector, direction: Vector) -> 
     ((nearest < f64::INFINITY).then_some(nearest), clear)
 }
 
-/// Triangles of all sizes in a cloud, with shared corners, repeated ones and ones without area among them.
+/// Triangles of all sizes in a cloud, with shared corners, repeated ones and ones without area
+/// among them.
 fn scene() -> impl Strategy<Value = Vec<[Vector; 3]>> {
     let corner = prop::array::uniform3(-50.0f64..50.0);
     let size = prop_oneof![Just(0.01), Just(1.0), Just(20.0), Just(150.0)];

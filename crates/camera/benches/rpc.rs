@@ -1,4 +1,5 @@
-//! Points per second on one core: projection and localisation, point by point and on a plane of one height.
+//! Points per second on one core: projection and localisation, point by point and on a plane of one
+//! height.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

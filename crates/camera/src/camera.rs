@@ -43,7 +43,8 @@ impl RpcCamera {
     /// Returns the ground point at `height_m` that is seen at an image position.
     ///
     /// # Errors
-    /// The same as for [`Rpc::localize`], and [`CameraError::Singular`] if the correction cannot be inverted.
+    /// The same as for [`Rpc::localize`], and [`CameraError::Singular`] if the correction cannot be
+    /// inverted.
     pub fn localize(&self, image: ImagePoint, height_m: f64) -> Result<LonLatHeight, CameraError> {
         let p = self.correction.invert(image).ok_or(CameraError::Singular)?;
         self.rpc.localize(p, height_m)

@@ -6,8 +6,8 @@ use crate::ImagePoint;
 
 /// An affine map in image space, applied after the RPC: `corrected = p + t + D (p − centre)`.
 ///
-/// The translation holds at `centre`. Otherwise a small linear part would become a huge translation for crops far
-/// from the origin of their coordinates.
+/// The translation holds at `centre`. Otherwise a small linear part would become a huge translation
+/// for crops far from the origin of their coordinates.
 ///
 /// ```
 /// use camera::{ImageCorrection, ImagePoint};
@@ -47,7 +47,8 @@ impl ImageCorrection {
         }
     }
 
-    /// Returns the uncorrected position of a point observed in the image. `None` if the linear part is singular.
+    /// Returns the uncorrected position of a point observed in the image. `None` if the linear part
+    /// is singular.
     pub fn invert(&self, q: ImagePoint) -> Option<ImagePoint> {
         let [[a, b], [c, d]] = self.linear;
         let (m00, m11) = (1.0 + a, 1.0 + d);

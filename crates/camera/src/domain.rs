@@ -1,4 +1,5 @@
-//! Where an RPC is valid: the box of longitude, latitude and height that its coefficients were fitted on.
+//! Where an RPC is valid: the box of longitude, latitude and height that its coefficients were
+//! fitted on.
 
 use geodesy::LonLatHeight;
 
@@ -26,8 +27,8 @@ impl ValidityDomain {
             && (g.height_m - self.centre.height_m).abs() <= self.half_height_m
     }
 
-    /// Returns the point at fractions of the half-extents: longitude, latitude, height. Fractions in [−1, 1] are inside
-    /// the box. The longitude is not brought back into ±180°.
+    /// Returns the point at fractions of the half-extents: longitude, latitude, height. Fractions
+    /// in [−1, 1] are inside the box. The longitude is not brought back into ±180°.
     pub fn at(&self, [l, p, h]: [f64; 3]) -> LonLatHeight {
         LonLatHeight::new(
             self.centre.lon_deg + l * self.half_lon_deg,

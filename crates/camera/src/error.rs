@@ -32,7 +32,8 @@ pub enum CameraError {
         /// Largest accepted value.
         limit: f64,
     },
-    /// The image position does not change in one direction on the ground, so that no inverse exists.
+    /// The image position does not change in one direction on the ground, so that no inverse
+    /// exists.
     #[error("the camera's Jacobian is singular at this point")]
     Singular,
 }

@@ -1,12 +1,14 @@
 //! Fitting an RPC to ground ↔ image correspondences.
 //!
-//! Each image coordinate is fitted on its own. Let r be the normalised coordinate, and fix the first coefficient of D
-//! at 1. Then the residual N(x) − r D(x) is linear in the other 39 coefficients. Dividing it by D of the previous round
-//! makes the sum of squares the one of the image residuals (Tao & Hu, Photogrammetric Engineering & Remote Sensing 67,
-//! 2001). A small ridge regularises the problem, because real geometry leaves several coefficients undetermined. Each
+//! Each image coordinate is fitted on its own. Let r be the normalised coordinate, and fix the
+//! first coefficient of D at 1. Then the residual N(x) − r D(x) is linear in the other 39
+//! coefficients. Dividing it by D of the previous round makes the sum of squares the one of the
+//! image residuals (Tao & Hu, Photogrammetric Engineering & Remote Sensing 67, 2001). A small ridge
+//! regularises the problem, because real geometry leaves several coefficients undetermined. Each
 //! round is a least-squares problem solved by QR, which is more accurate than normal equations.
 //!
-//! Offsets and scales are the middle and half the range of the correspondences: these become the validity domain.
+//! Offsets and scales are the middle and half the range of the correspondences: these become the
+//! validity domain.
 
 use geodesy::LonLatHeight;
 use nalgebra::{DMatrix, DVector};
@@ -19,9 +21,11 @@ use crate::{CameraError, ImagePoint, Rpc, RpcCamera, ValidityDomain};
 const UNKNOWNS: usize = 39;
 /// Weight of the ridge relative to one correspondence.
 const RIDGE: f64 = 1e-9;
-/// Rounds of reweighting. Denominators stay within a few percent of 1, so the second round already changes little.
+/// Rounds of reweighting. Denominators stay within a few percent of 1, so the second round already
+/// changes little.
 const ROUNDS: usize = 4;
-/// Numbers of lattice positions along longitude, latitude and height. They determine all coefficients well.
+/// Numbers of lattice positions along longitude, latitude and height. They determine all
+/// coefficients well.
 const LATTICE: [usize; 3] = [13, 13, 7];
 
 /// A ground point and its image.
@@ -128,8 +132,9 @@ impl RpcFit {
 impl RpcCamera {
     /// Returns one RPC that includes the correction, for formats without corrections.
     ///
-    /// Translations and changes of scale go into offsets and scales. Shears between equal denominators go into the
-    /// numerators. Both are exact, with residuals of 0. Any other correction is fitted over the validity domain.
+    /// Translations and changes of scale go into offsets and scales. Shears between equal
+    /// denominators go into the numerators. Both are exact, with residuals of 0. Any other
+    /// correction is fitted over the validity domain.
     ///
     /// # Errors
     /// The same as for [`RpcFit::to_camera`].
@@ -215,7 +220,8 @@ fn normalisation(points: &[Correspondence]) -> Result<Rpc, FitError> {
     })
 }
 
-/// Returns the numerator and denominator whose quotient fits the values `r` at points with the given terms.
+/// Returns the numerator and denominator whose quotient fits the values `r` at points with the
+/// given terms.
 fn ratio(points: &[[f64; 20]], r: &[f64]) -> Result<([f64; 20], [f64; 20]), FitError> {
     let mut den = [0.0; 20];
     den[0] = 1.0;

@@ -6,7 +6,8 @@ use crate::limits::{check_ratio, check_reach};
 use crate::polynomial::{at_height, derivative_by_height, plane_gradient};
 use crate::{CameraError, Rpc, RpcCamera};
 
-/// Derivatives of sample and line: pixels per degree of longitude, per degree of latitude, per metre of height.
+/// Derivatives of sample and line: pixels per degree of longitude, per degree of latitude, per
+/// metre of height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageFromGroundJacobian {
     /// Derivatives of the sample by longitude, latitude and height.

@@ -1,11 +1,15 @@
-//! Cameras: the RPC00B model of satellite images, and central perspective cameras ([`Lens`], [`Pose`]).
+//! Cameras: the RPC00B model of satellite images, and central perspective cameras ([`Lens`],
+//! [`Pose`]).
 //!
-//! Image coordinates are [`ImagePoint`]s: (sample, line) = (column, row), f64, with the centre of the upper-left pixel
-//! at (0, 0). Ground coordinates are [`geodesy::LonLatHeight`]: degrees, and metres above the WGS 84 ellipsoid.
+//! Image coordinates are [`ImagePoint`]s: (sample, line) = (column, row), f64, with the centre of
+//! the upper-left pixel at (0, 0). Ground coordinates are [`geodesy::LonLatHeight`]: degrees, and
+//! metres above the WGS 84 ellipsoid.
 //!
-//! - [`Rpc`] projects and localises, [`RpcPlane`] does so at one height, [`RpcCamera`] adds an [`ImageCorrection`].
+//! - [`Rpc`] projects and localises, [`RpcPlane`] does so at one height, [`RpcCamera`] adds an
+//!   [`ImageCorrection`].
 //! - [`RpcFit`] fits an RPC to correspondences or to any camera.
-//! - [`Rpc::validate`] checks that coefficients form a camera. [`Rpc::domain`] is the box in which they hold.
+//! - [`Rpc::validate`] checks that coefficients form a camera. [`Rpc::domain`] is the box in which
+//!   they hold.
 
 mod camera;
 mod correction;

@@ -1,4 +1,5 @@
-//! Limits within which an RPC is evaluated: the distance from its domain, and the distance from a pole.
+//! Limits within which an RPC is evaluated: the distance from its domain, and the distance from a
+//! pole.
 
 use crate::CameraError;
 
@@ -7,8 +8,8 @@ pub(crate) const DENOMINATOR_MIN: f64 = 1e-6;
 
 /// Largest normalised longitude or latitude that is projected or returned.
 ///
-/// The polynomials are fitted on [−1, 1]. Crops and tall scenes reach somewhat beyond it, and several
-/// half-widths away the polynomials mean nothing.
+/// The polynomials are fitted on [−1, 1]. Crops and tall scenes reach somewhat beyond it, and
+/// several half-widths away the polynomials mean nothing.
 pub const EXTRAPOLATION_MAX: f64 = 8.0;
 
 /// Returns a longitude difference brought into ±180°, for longitudes given within ±360°.

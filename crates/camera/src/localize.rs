@@ -1,12 +1,14 @@
 //! Localisation: the ground point of a height plane that is seen at an image position.
 //!
-//! Newton's method works on normalised (L, P) with the analytic Jacobian. Each step is shortened until the residual
-//! falls and the path crosses no pole and no fold of the model. The search starts at the centre of the domain, from where
-//! real sensors converge in three or four steps, whatever their image offsets: the step is affine-invariant in the
-//! image. If that fails because of a pole or a fold inside the domain, the best positions of a lattice are tried.
+//! Newton's method works on normalised (L, P) with the analytic Jacobian. Each step is shortened
+//! until the residual falls and the path crosses no pole and no fold of the model. The search
+//! starts at the centre of the domain, from where real sensors converge in three or four steps,
+//! whatever their image offsets: the step is affine-invariant in the image. If that fails because
+//! of a pole or a fold inside the domain, the best positions of a lattice are tried.
 //!
-//! A result is accepted if it lies within [`EXTRAPOLATION_MAX`] half-widths of the centre on the centre's side of
-//! every pole and fold, or else inside the validity domain itself. Everything else is an error.
+//! A result is accepted if it lies within [`EXTRAPOLATION_MAX`] half-widths of the centre on the
+//! centre's side of every pole and fold, or else inside the validity domain itself. Everything else
+//! is an error.
 
 use geodesy::LonLatHeight;
 
@@ -16,7 +18,8 @@ use crate::{CameraError, ImagePoint, Rpc};
 
 /// Residual at which localisation stops, pixels: far below any practical need.
 const TOLERANCE_PX: f64 = 1e-9;
-/// Residual that is still accepted, pixels. Rounding of huge pixel coordinates can keep it above the tolerance.
+/// Residual that is still accepted, pixels. Rounding of huge pixel coordinates can keep it above
+/// the tolerance.
 const STALLED_PX: f64 = 1e-7;
 /// Largest number of steps from one start. Quadratic convergence needs far fewer.
 const STEPS: u32 = 40;
@@ -42,7 +45,8 @@ impl Rpc {
     /// Returns the ground point at `height_m` (ellipsoidal) that is seen at an image position.
     ///
     /// # Errors
-    /// A coordinate that is not finite, a point far outside the domain, a pole at the centre, or no convergence.
+    /// A coordinate that is not finite, a point far outside the domain, a pole at the centre, or no
+    /// convergence.
     pub fn localize(&self, image: ImagePoint, height_m: f64) -> Result<LonLatHeight, CameraError> {
         self.plane(height_m).localize(image)
     }
@@ -106,7 +110,8 @@ impl RpcPlane {
         Ok(end)
     }
 
-    /// Halves the step until it brings the image closer without crossing a pole or fold. Returns false if none does.
+    /// Halves the step until it brings the image closer without crossing a pole or fold. Returns
+    /// false if none does.
     fn shortened_step(&self, image: ImagePoint, step: [f64; 2], end: &mut End) -> bool {
         let mut t = 1.0;
         end.at_edge = false;

@@ -1,15 +1,17 @@
 //! Central perspective cameras: a pose, and a lens with or without distortion.
 //!
-//! The lens models have COLMAP's names and order of parameters. The radial and tangential ones follow Brown (1971), the
-//! fisheyes Kannala and Brandt (2006). The centre of the upper-left pixel is (0, 0). COLMAP has it at (0.5, 0.5), and
-//! the readers convert it. Camera axes: x right, y down, z forward.
+//! The lens models have COLMAP's names and order of parameters. The radial and tangential ones
+//! follow Brown (1971), the fisheyes Kannala and Brandt (2006). The centre of the upper-left pixel
+//! is (0, 0). COLMAP has it at (0.5, 0.5), and the readers convert it. Camera axes: x right, y
+//! down, z forward.
 
 use crate::ImagePoint;
 
 /// Tolerance when a distortion is inverted, in units of the image plane at distance 1.
 const TOLERANCE: f64 = 1e-12;
 const MAX_ITERATIONS: usize = 50;
-/// Largest angle of a fisheye, radians. Directions at a right angle have no place in the image plane.
+/// Largest angle of a fisheye, radians. Directions at a right angle have no place in the image
+/// plane.
 const MAX_THETA: f64 = 1.55;
 
 /// A lens model, with its parameters in COLMAP's order.
@@ -156,7 +158,8 @@ impl Lens {
     /// Makes a lens from COLMAP's parameters, with the principal point in this toolkit's pixels.
     ///
     /// # Errors
-    /// A wrong number of parameters, one that is not finite, a focal length that is not positive, an empty image.
+    /// A wrong number of parameters, one that is not finite, a focal length that is not positive,
+    /// an empty image.
     pub fn new(width: usize, height: usize, model: LensModel, parameters: &[f64]) -> Result<Self, LensError> {
         let name = model.name();
         if width == 0 || height == 0 || width > 1 << 24 || height > 1 << 24 {
@@ -213,15 +216,18 @@ impl Lens {
         focal.chain([self.centre.sample, self.centre.line]).chain(self.distortion.iter().copied()).collect()
     }
 
-    /// Returns the pixel of a point (x, y) of the image plane at distance 1. `None` where a fisheye has none.
+    /// Returns the pixel of a point (x, y) of the image plane at distance 1. `None` where a fisheye
+    /// has none.
     pub fn project(&self, x: f64, y: f64) -> Option<ImagePoint> {
         let [x, y] = self.distort(x, y)?;
         Some(ImagePoint { sample: self.focal[0] * x + self.centre.sample, line: self.focal[1] * y + self.centre.line })
     }
 
-    /// Returns the point (x, y) of the image plane at distance 1 through which the ray of a pixel goes.
+    /// Returns the point (x, y) of the image plane at distance 1 through which the ray of a pixel
+    /// goes.
     ///
-    /// `None` if the pixel has no ray: beyond the fold of a distortion, or outside the circle of a fisheye.
+    /// `None` if the pixel has no ray: beyond the fold of a distortion, or outside the circle of a
+    /// fisheye.
     pub fn direction(&self, pixel: ImagePoint) -> Option<[f64; 2]> {
         let distorted =
             [(pixel.sample - self.centre.sample) / self.focal[0], (pixel.line - self.centre.line) / self.focal[1]];
@@ -253,7 +259,8 @@ impl Lens {
         None
     }
 
-    /// Returns the start of the inversion: the distorted point, for fisheyes with the angle replaced by its tangent.
+    /// Returns the start of the inversion: the distorted point, for fisheyes with the angle
+    /// replaced by its tangent.
     fn first_guess(&self, target: [f64; 2]) -> [f64; 2] {
         let theta = target[0].hypot(target[1]);
         let fisheye = matches!(
@@ -325,7 +332,8 @@ fn fisheye(r: f64, k: [f64; 4]) -> Option<f64> {
 }
 
 impl Pose {
-    /// Makes a pose from a unit quaternion (w, x, y, z) and a translation, both from the world to the camera, as in COLMAP.
+    /// Makes a pose from a unit quaternion (w, x, y, z) and a translation, both from the world to
+    /// the camera, as in COLMAP.
     ///
     /// The quaternion is normalised. `None` if its length is zero or a number is not finite.
     pub fn from_quaternion(quaternion: [f64; 4], translation: [f64; 3]) -> Option<Self> {
@@ -343,12 +351,14 @@ impl Pose {
         Some(Self { rotation, centre })
     }
 
-    /// Returns the unit quaternion (w, x, y, z) of the rotation from the world to the camera, with w ≥ 0.
+    /// Returns the unit quaternion (w, x, y, z) of the rotation from the world to the camera, with
+    /// w ≥ 0.
     pub fn quaternion(&self) -> [f64; 4] {
         quaternion_from_rotation(&self.rotation)
     }
 
-    /// Returns the translation from the world to the camera: the position of the world's origin in the camera.
+    /// Returns the translation from the world to the camera: the position of the world's origin in
+    /// the camera.
     pub fn translation(&self) -> [f64; 3] {
         self.rotation.map(|row| -(0..3).map(|i| row[i] * self.centre[i]).sum::<f64>())
     }

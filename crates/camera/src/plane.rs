@@ -1,8 +1,9 @@
 //! An RPC at one height: each cubic loses its height terms (20 → 10), exactly.
 //!
-//! The sweep projects many points of one height plane, and localisation searches on one. Both use this form. Heights
-//! are metres above the ellipsoid. Points at a pole are errors, and so are points whose normalised longitude or latitude
-//! exceeds [`EXTRAPOLATION_MAX`](crate::EXTRAPOLATION_MAX).
+//! The sweep projects many points of one height plane, and localisation searches on one. Both use
+//! this form. Heights are metres above the ellipsoid. Points at a pole are errors, and so are
+//! points whose normalised longitude or latitude exceeds
+//! [`EXTRAPOLATION_MAX`](crate::EXTRAPOLATION_MAX).
 
 use geodesy::LonLatHeight;
 
@@ -31,7 +32,8 @@ pub(crate) struct PlaneRatio {
     pub(crate) den: PlaneCubic,
 }
 
-/// Image position with its derivatives by normalised (L, P), and the signs of denominators and determinant.
+/// Image position with its derivatives by normalised (L, P), and the signs of denominators and
+/// determinant.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlaneSample {
     pub(crate) image: ImagePoint,
@@ -39,8 +41,8 @@ pub(crate) struct PlaneSample {
     pub(crate) jacobian: [[f64; 2]; 2],
     /// Determinant of the Jacobian, pixels².
     pub(crate) determinant: f64,
-    /// Signs of the sample denominator, the line denominator and the determinant. Two points of a plane between which
-    /// one of them changes are separated by a pole or a fold of the model.
+    /// Signs of the sample denominator, the line denominator and the determinant. Two points of a
+    /// plane between which one of them changes are separated by a pole or a fold of the model.
     pub(crate) orientation: [bool; 3],
 }
 
@@ -70,7 +72,8 @@ impl RpcPlane {
     /// Returns the image position of the point of the plane at a longitude and latitude, degrees.
     ///
     /// # Errors
-    /// A coordinate that is not finite, a point far outside the domain, or one at a pole of the model.
+    /// A coordinate that is not finite, a point far outside the domain, or one at a pole of the
+    /// model.
     pub fn project(&self, lon_deg: f64, lat_deg: f64) -> Result<ImagePoint, CameraError> {
         let [l, p] = self.normalised(lon_deg, lat_deg);
         check_reach(l, p)?;
@@ -102,7 +105,8 @@ impl RpcPlane {
 }
 
 impl PlaneSample {
-    /// Returns whether the Jacobian can be inverted: its rows are neither zero nor parallel, up to rounding.
+    /// Returns whether the Jacobian can be inverted: its rows are neither zero nor parallel, up to
+    /// rounding.
     pub(crate) fn is_regular(&self) -> bool {
         let [s, l] = self.jacobian;
         self.determinant.abs() > 1e-9 * s[0].hypot(s[1]) * l[0].hypot(l[1])

@@ -1,9 +1,10 @@
 //! The RPC00B cubic and its derivatives.
 //!
-//! Terms: 1, L, P, H, LP, LH, PH, L², P², H², PLH, L³, LP², LH², L²P, P³, PH², L²H, P²H, H³ of the normalised
-//! longitude, latitude and height.
+//! Terms: 1, L, P, H, LP, LH, PH, L², P², H², PLH, L³, LP², LH², L²P, P³, PH², L²H, P²H, H³ of the
+//! normalised longitude, latitude and height.
 
-/// Returns `a · b + c` with two roundings. A fused multiply-add would give other last bits on processors that have it.
+/// Returns `a · b + c` with two roundings. A fused multiply-add would give other last bits on
+/// processors that have it.
 #[inline(always)]
 fn mul_add(a: f64, b: f64, c: f64) -> f64 {
     a * b + c
@@ -12,7 +13,8 @@ fn mul_add(a: f64, b: f64, c: f64) -> f64 {
 /// A cubic at one normalised height: 1, L, P, LP, L², P², L³, LP², L²P, P³.
 pub(crate) type PlaneCubic = [f64; 10];
 
-/// Returns the ten coefficients that are left when the height of a cubic is fixed. The reduction is exact.
+/// Returns the ten coefficients that are left when the height of a cubic is fixed. The reduction is
+/// exact.
 #[inline(always)]
 pub(crate) fn at_height(c: &[f64; 20], h: f64) -> PlaneCubic {
     [
@@ -90,8 +92,8 @@ pub(crate) fn terms(l: f64, p: f64, h: f64) -> [f64; 20] {
 mod tests {
     use super::*;
 
-    /// Every nesting against the plain sum of terms, and derivatives against central differences (exact for cubics
-    /// up to the third derivative, which Richardson's step removes).
+    /// Every nesting against the plain sum of terms, and derivatives against central differences
+    /// (exact for cubics up to the third derivative, which Richardson's step removes).
     #[test]
     fn nested_forms_agree_with_the_plain_sum_of_terms() {
         let c: [f64; 20] = std::array::from_fn(|i| ((i * 7 + 3) % 11) as f64 - 4.5);

@@ -1,9 +1,9 @@
 //! The RPC00B rational polynomial camera (NIMA STDI-0002, appendix E).
 //!
-//! With normalised longitude L, latitude P and height H,
-//! `line = LINE_OFF + LINE_SCALE · Num_l(P, L, H) / Den_l(P, L, H)`, likewise for the sample, each polynomial with
-//! the terms 1, L, P, H, LP, LH, PH, L², P², H², PLH, L³, LP², LH², L²P, P³, PH², L²H, P²H, H³.
-//! Longitudes may be given within ±360°. The difference to LONG_OFF is brought into ±180°.
+//! With normalised longitude L, latitude P and height H, `line = LINE_OFF + LINE_SCALE · Num_l(P,
+//! L, H) / Den_l(P, L, H)`, likewise for the sample, each polynomial with the terms 1, L, P, H, LP,
+//! LH, PH, L², P², H², PLH, L³, LP², LH², L²P, P³, PH², L²H, P²H, H³. Longitudes may be given
+//! within ±360°. The difference to LONG_OFF is brought into ±180°.
 
 use geodesy::LonLatHeight;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use crate::limits::{DENOMINATOR_MIN, short_way};
 use crate::{CameraError, ImagePoint, Key, RpcError};
 
-/// The RPC00B coefficients of one image, in this toolkit's image coordinates (upper-left pixel centre at 0, 0).
+/// The RPC00B coefficients of one image, in this toolkit's image coordinates (upper-left pixel
+/// centre at 0, 0).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rpc {
     /// LINE_OFF, pixels.
@@ -56,16 +57,16 @@ impl Rpc {
     /// Returns the image position of a ground point.
     ///
     /// # Errors
-    /// A coordinate that is not finite, a point far outside the domain (see [`crate::EXTRAPOLATION_MAX`]), or one at a
-    /// pole of the model.
+    /// A coordinate that is not finite, a point far outside the domain (see
+    /// [`crate::EXTRAPOLATION_MAX`]), or one at a pole of the model.
     pub fn project(&self, ground: LonLatHeight) -> Result<ImagePoint, CameraError> {
         self.plane(ground.height_m).project(ground.lon_deg, ground.lat_deg)
     }
 
     /// Checks that the coefficients form a camera.
     ///
-    /// All entries must be finite, scales not zero, and angles valid. At the centre the model must have no pole, and
-    /// the image must depend on longitude and latitude.
+    /// All entries must be finite, scales not zero, and angles valid. At the centre the model must
+    /// have no pole, and the image must depend on longitude and latitude.
     ///
     /// # Errors
     /// The first check that fails.
@@ -108,7 +109,8 @@ impl Rpc {
         Self { samp_off: self.samp_off - origin.sample, line_off: self.line_off - origin.line, ..self.clone() }
     }
 
-    /// Returns the model of the image resampled by `factor` (0.5 halves it). An offset o becomes (o + 0.5) · factor − 0.5.
+    /// Returns the model of the image resampled by `factor` (0.5 halves it). An offset o becomes (o
+    /// + 0.5) · factor − 0.5.
     #[must_use]
     pub fn rescaled(&self, factor: f64) -> Self {
         Self {
@@ -120,7 +122,8 @@ impl Rpc {
         }
     }
 
-    /// Returns normalised longitude, latitude and height. The longitude difference is brought into ±180°.
+    /// Returns normalised longitude, latitude and height. The longitude difference is brought into
+    /// ±180°.
     pub(crate) fn normalised(&self, g: LonLatHeight) -> [f64; 3] {
         [
             short_way(g.lon_deg - self.long_off) / self.long_scale,

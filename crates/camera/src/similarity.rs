@@ -1,7 +1,8 @@
 //! Similarities between two frames in space: target = s · R · source + t.
 //!
-//! A similarity takes the frame of a city model (a map projection with heights) to the frame of cameras that were
-//! oriented without it. R has determinant 1, and s is positive. Invalid numbers are a [`SimilarityError`].
+//! A similarity takes the frame of a city model (a map projection with heights) to the frame of
+//! cameras that were oriented without it. R has determinant 1, and s is positive. Invalid numbers
+//! are a [`SimilarityError`].
 
 use crate::Pose;
 use crate::perspective::quaternion_from_rotation;
@@ -51,8 +52,8 @@ impl Similarity {
     /// Makes a similarity. The rotation is given row by row, and its rows are normalised.
     ///
     /// # Errors
-    /// A number is not finite, the scale is outside 1e-9 to 1e9, or the matrix mirrors or deviates from a rotation by more
-    /// than 1e-4.
+    /// A number is not finite, the scale is outside 1e-9 to 1e9, or the matrix mirrors or deviates
+    /// from a rotation by more than 1e-4.
     pub fn new(scale: f64, rotation: [[f64; 3]; 3], translation: [f64; 3]) -> Result<Self, SimilarityError> {
         if !scale.is_finite() || !rotation.as_flattened().iter().chain(&translation).all(|c| c.is_finite()) {
             return Err(SimilarityError::NotFinite);
@@ -127,7 +128,8 @@ impl Similarity {
 
     /// Returns a camera of the source frame in the target frame.
     ///
-    /// It sees the moved scene in the same pixels. Its depths are the depths in the source times [`Self::scale`].
+    /// It sees the moved scene in the same pixels. Its depths are the depths in the source times
+    /// [`Self::scale`].
     pub fn move_pose(&self, pose: &Pose) -> Pose {
         Pose { rotation: pose.rotation.map(|axis| self.turn(axis)), centre: self.apply(pose.centre) }
     }

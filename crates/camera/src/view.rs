@@ -1,12 +1,13 @@
 //! The view of a ground point: direction, incidence, azimuth, intersection angle and GSD.
 //!
-//! The direction is the tangent of the curve of ground points with the same image position. The steps dλ and dφ for a
-//! step dh follow from the Jacobian. They become metres east and north with the radii of curvature:
-//! dE = (N + h) cos φ dλ, dN = (M + h) dφ. The direction is exact for the RPC. It differs from the direction to the
-//! satellite by the residual of the RPC's fit.
+//! The direction is the tangent of the curve of ground points with the same image position. The
+//! steps dλ and dφ for a step dh follow from the Jacobian. They become metres east and north with
+//! the radii of curvature: dE = (N + h) cos φ dλ, dN = (M + h) dφ. The direction is exact for the
+//! RPC. It differs from the direction to the satellite by the residual of the RPC's fit.
 //!
-//! Vectors are unit vectors (east, north, up) at the ground point, from the ground towards the sensor. Angles are
-//! degrees. Directions are undefined at the poles, where there is no east, and where the Jacobian is singular.
+//! Vectors are unit vectors (east, north, up) at the ground point, from the ground towards the
+//! sensor. Angles are degrees. Directions are undefined at the poles, where there is no east, and
+//! where the Jacobian is singular.
 
 use geodesy::{LonLatHeight, meridian_radius_m, prime_vertical_radius_m};
 
@@ -38,7 +39,8 @@ impl ViewDirection {
         self.east.hypot(self.north).atan2(self.up).to_degrees()
     }
 
-    /// Returns the azimuth of the sensor as seen from the ground: clockwise from north, in [0, 360), 0 for a sensor overhead.
+    /// Returns the azimuth of the sensor as seen from the ground: clockwise from north, in [0,
+    /// 360), 0 for a sensor overhead.
     pub fn azimuth_deg(&self) -> f64 {
         let a = self.east.atan2(self.north).to_degrees();
         // A tiny negative angle would round up to 360 itself.
@@ -50,7 +52,8 @@ impl ViewDirection {
         let (a, b) = ([self.east, self.north, self.up], [other.east, other.north, other.up]);
         let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
         let dot: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
-        // The arc tangent is accurate for the small angles of narrow baselines, unlike the arc cosine.
+        // The arc tangent is accurate for the small angles of narrow baselines, unlike the arc
+        // cosine.
         cross.iter().map(|c| c * c).sum::<f64>().sqrt().atan2(dot).to_degrees()
     }
 }
@@ -66,7 +69,8 @@ impl RpcCamera {
     /// Returns the direction from a ground point towards the sensor.
     ///
     /// # Errors
-    /// The same as for [`crate::Rpc::project`], and [`CameraError::Singular`] where the direction is not defined.
+    /// The same as for [`crate::Rpc::project`], and [`CameraError::Singular`] where the direction
+    /// is not defined.
     pub fn view_direction(&self, ground: LonLatHeight) -> Result<ViewDirection, CameraError> {
         let local = self.metric_jacobian(ground)?;
         let [east, north] = local.solve([-local.up[0], -local.up[1]]).ok_or(CameraError::Singular)?;
@@ -116,7 +120,8 @@ struct MetricJacobian {
 }
 
 impl MetricJacobian {
-    /// Returns the metres east and north that move the image by `pixels`. `None` if the Jacobian cannot be inverted.
+    /// Returns the metres east and north that move the image by `pixels`. `None` if the Jacobian
+    /// cannot be inverted.
     fn solve(&self, pixels: [f64; 2]) -> Option<[f64; 2]> {
         let (e, n) = (self.east, self.north);
         let det = e[0] * n[1] - n[0] * e[1];

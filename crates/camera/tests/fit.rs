@@ -8,7 +8,8 @@ use camera::{
 use common::{crop_far_from_offset, pushbroom};
 use geodesy::{EnuFrame, LonLatHeight};
 
-/// A pushbroom on a curved track 620 km up whose yaw drifts: no rational function describes it exactly.
+/// A pushbroom on a curved track 620 km up whose yaw drifts: no rational function describes it
+/// exactly.
 struct Orbit {
     frame: EnuFrame,
 }
@@ -23,10 +24,12 @@ impl Orbit {
         let g = self.frame.enu_from_ground(ground);
         let mut line = 0.0;
         let mut sample = 0.0;
-        // The line whose viewing plane holds the point; the drift is slow, so that the iteration contracts quickly.
+        // The line whose viewing plane holds the point; the drift is slow, so that the iteration
+        // contracts quickly.
         for _ in 0..60 {
             let along = METRES_PER_LINE * line;
-            // The track bends down with the Earth; the sensor stands 160 km to the west of the scene.
+            // The track bends down with the Earth; the sensor stands 160 km to the west of the
+            // scene.
             let up = ALTITUDE_M - along * along / (2.0 * 7.0e6);
             let [e, n, u] = [g.east + 160_000.0, g.north - along, g.up - up];
             let yaw = 2e-9 * line * line / 1e4 + 1e-8 * line;
@@ -49,7 +52,8 @@ fn domain(lon_deg: f64, lat_deg: f64) -> ValidityDomain {
     }
 }
 
-/// Largest distance between a model and a camera on a lattice that shares no point with the fit's own.
+/// Largest distance between a model and a camera on a lattice that shares no point with the fit's
+/// own.
 fn largest_difference(rpc: &Rpc, domain: &ValidityDomain, camera: impl Fn(LonLatHeight) -> ImagePoint) -> f64 {
     let at = |i: usize| (i as f64 + 0.5) / 5.0 - 1.0;
     (0..1000)

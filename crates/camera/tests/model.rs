@@ -106,7 +106,8 @@ fn tilted() -> ImageCorrection {
     }
 }
 
-/// On a fold the two ground points of one image point lie on either side: the centre's side is the answer.
+/// On a fold the two ground points of one image point lie on either side: the centre's side is the
+/// answer.
 #[test]
 fn the_centre_s_side_of_a_fold_is_preferred() {
     let rpc = fold_inside();
@@ -170,7 +171,8 @@ fn validation_names_the_entry() {
     }
 }
 
-/// The direction against the chord between two heights of the same image point, in Earth-centred coordinates.
+/// The direction against the chord between two heights of the same image point, in Earth-centred
+/// coordinates.
 #[test]
 fn the_view_direction_is_the_chord_between_heights() {
     let camera = RpcCamera { rpc: moved(pushbroom(), 12.0, 85.0), correction: tilted() };

@@ -1,9 +1,9 @@
 //! The WGS 84 ellipsoid: radii of curvature, and geodetic ↔ Earth-centred coordinates.
 //!
-//! X = (N + h) cos φ cos λ, Y = (N + h) cos φ sin λ, Z = (N (1 − e²) + h) sin φ with N = a / √(1 − e² sin² φ).
-//! The inverse iterates Bowring's formula (Survey Review 23, 1976) on the parametric latitude. Three rounds leave an
-//! error below a nanometre from 10 km below the surface to 10,000 km above it. At the Earth's centre no latitude exists,
-//! and the result is a pole.
+//! X = (N + h) cos φ cos λ, Y = (N + h) cos φ sin λ, Z = (N (1 − e²) + h) sin φ with N = a / √(1 −
+//! e² sin² φ). The inverse iterates Bowring's formula (Survey Review 23, 1976) on the parametric
+//! latitude. Three rounds leave an error below a nanometre from 10 km below the surface to 10,000
+//! km above it. At the Earth's centre no latitude exists, and the result is a pole.
 
 use crate::LonLatHeight;
 
@@ -84,8 +84,8 @@ pub fn wrap_lon(lon_deg: f64) -> f64 {
     if wrapped <= -180.0 { 180.0 } else { wrapped }
 }
 
-/// Returns the longitude of the same meridian within 180° of `reference_deg`, so that differences across the
-/// antimeridian stay small.
+/// Returns the longitude of the same meridian within 180° of `reference_deg`, so that differences
+/// across the antimeridian stay small.
 pub fn lon_near(lon_deg: f64, reference_deg: f64) -> f64 {
     let turns = ((lon_deg - reference_deg) / 360.0).round();
     if turns == 0.0 { lon_deg } else { lon_deg - 360.0 * turns }

@@ -1,8 +1,9 @@
 //! A local east-north-up frame, metres.
 //!
-//! The frame is tangent to the ellipsoid at its origin. Conversions go through Earth-centred coordinates, so that the
-//! antimeridian and the poles need no special care. East and north are the directions at the origin. `up` differs from
-//! the height by d² / 2R (8 cm at 1 km), and [`EnuFrame::ground_from_enu`] converts it back exactly.
+//! The frame is tangent to the ellipsoid at its origin. Conversions go through Earth-centred
+//! coordinates, so that the antimeridian and the poles need no special care. East and north are the
+//! directions at the origin. `up` differs from the height by d² / 2R (8 cm at 1 km), and
+//! [`EnuFrame::ground_from_enu`] converts it back exactly.
 
 use crate::LonLatHeight;
 use crate::ellipsoid::{EcefPoint, ecef_from_ground, ground_from_ecef};

@@ -1,7 +1,8 @@
 //! Positions on and above the WGS 84 ellipsoid, local frames and UTM, in plain Rust.
 //!
-//! Angles are degrees and heights metres above the WGS 84 ellipsoid unless a name says otherwise. Map projections of
-//! other coordinate reference systems, and vertical datums, are in the crate `crs`.
+//! Angles are degrees and heights metres above the WGS 84 ellipsoid unless a name says otherwise.
+//! Map projections of other coordinate reference systems, and vertical datums, are in the crate
+//! `crs`.
 
 mod ellipsoid;
 mod enu;

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A geographic position: WGS 84 longitude and latitude in degrees, height in metres above the ellipsoid.
+/// A geographic position: WGS 84 longitude and latitude in degrees, height in metres above the
+/// ellipsoid.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LonLatHeight {
     /// Longitude, degrees, east positive.

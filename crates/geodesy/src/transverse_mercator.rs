@@ -1,10 +1,12 @@
-//! A local transverse Mercator map: metres east and north of a point, true to scale at the height of that point.
+//! A local transverse Mercator map: metres east and north of a point, true to scale at the height
+//! of that point.
 //!
-//! The map uses Krüger's series to the sixth order in the third flattening (Karney, J. Geodesy 85, 2011, eqs. 7–36).
-//! It is exact to nanometres within some thousand kilometres of the central meridian. The origin is the point itself.
-//! Its meridian is grid north, so the convergence there is zero. The scale is k = 1 + h / √(M N), so that a metre on
-//! the map is a metre on the ground at height h (a *low-distortion projection*), to 1.3e-8 within 1 km of the origin.
-//! No PROJ object is needed, so that thousands of such maps are cheap. GIS software reads
+//! The map uses Krüger's series to the sixth order in the third flattening (Karney, J. Geodesy 85,
+//! 2011, eqs. 7–36). It is exact to nanometres within some thousand kilometres of the central
+//! meridian. The origin is the point itself. Its meridian is grid north, so the convergence there
+//! is zero. The scale is k = 1 + h / √(M N), so that a metre on the map is a metre on the ground at
+//! height h (a *low-distortion projection*), to 1.3e-8 within 1 km of the origin. No PROJ object is
+//! needed, so that thousands of such maps are cheap. GIS software reads
 //! [`TransverseMercator::wkt`].
 
 use crate::ellipsoid::{WGS84_A, WGS84_E2, WGS84_F, meridian_radius_m, prime_vertical_radius_m, wrap_lon};
@@ -50,7 +52,8 @@ impl TransverseMercator {
         Self::new(lon_deg, lat_deg, scale)
     }
 
-    /// Makes the map with its origin at a longitude and latitude in degrees and a scale on its central meridian.
+    /// Makes the map with its origin at a longitude and latitude in degrees and a scale on its
+    /// central meridian.
     ///
     /// # Errors
     /// [`GeodesyError::InvalidPosition`] for an invalid position or a scale that is not positive.
@@ -102,7 +105,8 @@ impl TransverseMercator {
         Ok(MapPoint { x: self.radius_m * eta, y: self.radius_m * (xi - self.xi) })
     }
 
-    /// Returns the longitude in (−180, 180] and latitude, degrees, for metres east and north of the origin.
+    /// Returns the longitude in (−180, 180] and latitude, degrees, for metres east and north of the
+    /// origin.
     ///
     /// # Errors
     /// [`GeodesyError::OutsideDomain`] for numbers beyond 5,000 km.
@@ -165,7 +169,8 @@ fn conformal_tangent(tangent: f64) -> f64 {
     tangent * sigma.hypot(1.0) - sigma * root
 }
 
-/// Returns the tangent of the geographic latitude from the tangent of the conformal latitude, by Newton's method (Karney's eqs. 19–21).
+/// Returns the tangent of the geographic latitude from the tangent of the conformal latitude, by
+/// Newton's method (Karney's eqs. 19–21).
 fn geographic_tangent(conformal: f64) -> f64 {
     let mut tangent = conformal;
     for _ in 0..STEPS {
@@ -242,7 +247,8 @@ mod tests {
         fn the_way_back_is_the_way(lon in -180.0..180.0f64, lat in -89.9..89.9f64, x in -3e5..3e5f64, y in -3e5..3e5f64) {
             let map = TransverseMercator::new(lon, lat, 1.0001).unwrap();
             let (l, p) = map.lonlat_from_map(x, y).unwrap();
-            // Beyond a pole the position lies on another meridian, more than a quarter of the globe away.
+            // Beyond a pole the position lies on another meridian, more than a quarter of the globe
+            // away.
             if let Ok(back) = map.map_from_lonlat(l, p) {
                 prop_assert!((back.x - x).abs() < 1e-6 && (back.y - y).abs() < 1e-6);
             } else {

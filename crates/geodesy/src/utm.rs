@@ -1,12 +1,14 @@
 //! The EPSG code of the map zone of a position.
 //!
-//! Between 80° S and 84° N it is the UTM zone of the longitude (WGS 84, EPSG:326zz north, 327zz south). Beyond, it is
-//! universal polar stereographic (EPSG:5041 north, 5042 south, axes east, north). The exceptions for Norway (32V) and
-//! Svalbard (31X to 37X) are not applied. They serve map sheets, and the regular zone is as accurate.
+//! Between 80° S and 84° N it is the UTM zone of the longitude (WGS 84, EPSG:326zz north, 327zz
+//! south). Beyond, it is universal polar stereographic (EPSG:5041 north, 5042 south, axes east,
+//! north). The exceptions for Norway (32V) and Svalbard (31X to 37X) are not applied. They serve
+//! map sheets, and the regular zone is as accurate.
 
 use crate::{GeodesyError, wrap_lon};
 
-/// Returns the EPSG code of the UTM zone at a position in degrees, or of the polar zone beyond 84° N and 80° S.
+/// Returns the EPSG code of the UTM zone at a position in degrees, or of the polar zone beyond 84°
+/// N and 80° S.
 ///
 /// ```
 /// assert_eq!(geodesy::utm_epsg(5.4, 43.5), Ok(32631));
@@ -27,7 +29,8 @@ pub fn utm_epsg(lon_deg: f64, lat_deg: f64) -> Result<u32, GeodesyError> {
     Ok(if lat_deg >= 0.0 { 32600 + zone } else { 32700 + zone })
 }
 
-/// Returns the EPSG code of the universal polar stereographic zone of a hemisphere (axes east, north).
+/// Returns the EPSG code of the universal polar stereographic zone of a hemisphere (axes east,
+/// north).
 pub fn ups_epsg(lat_deg: f64) -> u32 {
     if lat_deg >= 0.0 { 5041 } else { 5042 }
 }

@@ -21,7 +21,8 @@ pub(crate) fn date(config: &SimulationConfig, index: usize) -> Date {
 
 /// Returns the line of sight of a view.
 ///
-/// It is the configured one, or one of a pass from the forward to the backward view that alternates between both sides.
+/// It is the configured one, or one of a pass from the forward to the backward view that alternates
+/// between both sides.
 pub(crate) fn look(config: &SimulationConfig, index: usize) -> Look {
     let a = &config.acquisition;
     let direction = a.looks.get(index).copied().unwrap_or_else(|| on_pass(config, index));
@@ -38,12 +39,14 @@ fn on_pass(config: &SimulationConfig, index: usize) -> LookAngles {
     let along = a.along_track_deg.to_radians().tan() * (1.0 - 2.0 * index as f64 / (config.views - 1) as f64);
     let across = a.across_track_deg.to_radians().tan() * (std::f64::consts::FRAC_PI_2 * index as f64).sin();
     let incidence_deg = along.hypot(across).atan().to_degrees();
-    // The first view is taken before the sensor has passed, so the sensor looks ahead and stands behind the scene.
+    // The first view is taken before the sensor has passed, so the sensor looks ahead and stands
+    // behind the scene.
     let azimuth_deg = (a.heading_deg + 180.0 + across.atan2(along).to_degrees()).rem_euclid(360.0);
     LookAngles { incidence_deg, azimuth_deg }
 }
 
-/// Returns the camera and the size of an image that holds the whole area at both heights (low, high).
+/// Returns the camera and the size of an image that holds the whole area at both heights (low,
+/// high).
 pub(crate) fn camera(
     config: &SimulationConfig,
     frame: &SceneFrame,
@@ -52,7 +55,8 @@ pub(crate) fn camera(
 ) -> Result<(PhysicalCamera, (usize, usize)), SimulateError> {
     let (half, model) = (config.size_m / 2.0, config.acquisition.camera);
     let centre = frame.ground_from_scene(Vector3::new(0.0, 0.0, config.ground_height_m))?;
-    // The scale does not depend on the size of the image, so any camera that holds the area can measure the corners.
+    // The scale does not depend on the size of the image, so any camera that holds the area can
+    // measure the corners.
     let roughly = (1.5 * config.size_m / config.gsd_m) as usize;
     let measuring =
         PhysicalCamera::new(model, look, centre, (roughly, roughly)).fitted((low_m - 1.0, high_m + 1.0))?.rpc;
@@ -70,7 +74,8 @@ pub(crate) fn camera(
     Ok((PhysicalCamera::new(model, look, centre, size), size))
 }
 
-/// Returns the pointing error of the delivered RPC: a translation at the middle of the image and a drift along its lines.
+/// Returns the pointing error of the delivered RPC: a translation at the middle of the image and a
+/// drift along its lines.
 pub(crate) fn pointing(config: &SimulationConfig, index: usize, (width, height): (usize, usize)) -> ImageCorrection {
     let a = &config.acquisition;
     let mut stream = SplitMix64::new(derived(config.seed, 1000 + index as u64));

@@ -1,6 +1,7 @@
 //! Buildings: blocks that stand on the ground or on each other, and details on their roofs.
 //!
-//! An LoD2 model holds the blocks. Parapets, chimneys and plant rooms are details that it leaves out.
+//! An LoD2 model holds the blocks. Parapets, chimneys and plant rooms are details that it leaves
+//! out.
 
 use serde::{Deserialize, Serialize};
 
@@ -78,7 +79,8 @@ impl<'a> Builder<'a> {
         self.pitched(lot, walls_m, pitch, |eaves_m, ridge_m| Roof::Hipped { eaves_m, ridge_m });
     }
 
-    /// Places flat blocks on top of each other. Each is (lot, height above the ground) and lies inside the one before.
+    /// Places flat blocks on top of each other. Each is (lot, height above the ground) and lies
+    /// inside the one before.
     pub(crate) fn stepped(&mut self, steps: &[(Lot, f64)]) {
         let Some((ground, _)) = steps.first().and_then(|(lot, _)| self.block(lot)) else { return };
         let mut parts: Vec<BuildingBlock> = Vec::new();
@@ -113,7 +115,8 @@ impl<'a> Builder<'a> {
         self.buildings.push(Building { parts, details });
     }
 
-    /// Returns the ground height at the middle of a lot and a block without a roof. `None` if a corner lies in water.
+    /// Returns the ground height at the middle of a lot and a block without a roof. `None` if a
+    /// corner lies in water.
     fn block(&self, lot: &Lot) -> Option<(f64, BuildingBlock)> {
         let centre_m = self.streets.scene_from_street(lot.centre[0], lot.centre[1]);
         let ground = self.terrain.height(centre_m[0], centre_m[1]);

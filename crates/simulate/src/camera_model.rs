@@ -1,14 +1,17 @@
-//! The camera of a satellite over the scene: an agile pushbroom on a circular orbit, or a frame camera.
+//! The camera of a satellite over the scene: an agile pushbroom on a circular orbit, or a frame
+//! camera.
 //!
-//! Geometry is in the tangent frame (east, north, up; metres) of the scene's centre C. At t = 0 the sensor is at
-//! `P(0) = C + r u`, where u is the line of sight at the chosen incidence and azimuth. It moves on a circle about the
-//! Earth's centre with the speed of its orbit relative to the ground, which moves too. The pushbroom is steered so that
-//! its line sweeps the ground at a constant speed along the heading. A pixel of line l and sample s looks along
-//! `b(t) + (s − s₀) k a(t)`, where b points to the target and a points across it. The frame camera looks along
-//! `b(0) + (s − s₀) k a(0) + (l − l₀) k c(0)`.
+//! Geometry is in the tangent frame (east, north, up; metres) of the scene's centre C. At t = 0 the
+//! sensor is at `P(0) = C + r u`, where u is the line of sight at the chosen incidence and azimuth.
+//! It moves on a circle about the Earth's centre with the speed of its orbit relative to the
+//! ground, which moves too. The pushbroom is steered so that its line sweeps the ground at a
+//! constant speed along the heading. A pixel of line l and sample s looks along `b(t) + (s − s₀) k
+//! a(t)`, where b points to the target and a points across it. The frame camera looks along `b(0) +
+//! (s − s₀) k a(0) + (l − l₀) k c(0)`.
 //!
-//! A ray is followed to an ellipsoidal height, so that the camera includes the curvature of the Earth. The RPC is fitted
-//! to this camera (see [`FittedCamera`]). Refraction is left out, because it only shifts an image, as pointing does.
+//! A ray is followed to an ellipsoidal height, so that the camera includes the curvature of the
+//! Earth. The RPC is fitted to this camera (see [`FittedCamera`]). Refraction is left out, because
+//! it only shifts an image, as pointing does.
 
 use camera::{Correspondence, ImagePoint, Rpc, RpcFit};
 use geodesy::{EnuFrame, EnuPoint, LonLatHeight};
@@ -53,7 +56,8 @@ pub struct Look {
 pub(crate) struct PhysicalCamera {
     frame: EnuFrame,
     model: CameraModel,
-    /// Sensor position at t = 0, the Earth's centre, and the sensor's velocity relative to the ground.
+    /// Sensor position at t = 0, the Earth's centre, and the sensor's velocity relative to the
+    /// ground.
     position: Vector3<f64>,
     centre_of_orbit: Vector3<f64>,
     tangent: Vector3<f64>,
@@ -85,7 +89,8 @@ impl Look {
 }
 
 impl PhysicalCamera {
-    /// Makes the camera of an image of `width × height` pixels with the scene's `centre` in its middle.
+    /// Makes the camera of an image of `width × height` pixels with the scene's `centre` in its
+    /// middle.
     pub(crate) fn new(model: CameraModel, look: &Look, centre: LonLatHeight, (width, height): (usize, usize)) -> Self {
         let to_sensor = look.towards_sensor();
         let centre_of_orbit = Vector3::new(0.0, 0.0, -EARTH_M - centre.height_m);
@@ -96,7 +101,8 @@ impl PhysicalCamera {
         let position = to_sensor * range;
         let (east, north) = look.heading_deg.to_radians().sin_cos();
         let track = Vector3::new(east, north, 0.0);
-        // Samples grow to the left of the flight direction. An image flown southwards then has north up and east right.
+        // Samples grow to the left of the flight direction. An image flown southwards then has
+        // north up and east right.
         let left = Vector3::new(-north, east, 0.0);
         let outwards = (position - centre_of_orbit).normalize();
         let tangent = (track - outwards * outwards.dot(&track)).normalize();
@@ -169,7 +175,8 @@ impl PhysicalCamera {
         on_orbit - self.earth_turn.cross(&arm) * t_s
     }
 
-    /// Fits an RPC to this camera over its image and a range of heights (low, high), metres above the ellipsoid.
+    /// Fits an RPC to this camera over its image and a range of heights (low, high), metres above
+    /// the ellipsoid.
     ///
     /// # Errors
     /// The fit fails, which does not happen for usual lines of sight.
@@ -256,12 +263,14 @@ mod tests {
     fn the_orbit_moves_the_pushbroom_while_it_scans() {
         let camera = PhysicalCamera::new(CameraModel::Pushbroom, &look(10.0, 10.0), CENTRE, (701, 701));
         let flown = camera.position_at(700.0 * camera.period_s) - camera.position;
-        // The sensor flies about a tenth farther than the 350 m of ground that it scans, because its circle is wider.
+        // The sensor flies about a tenth farther than the 350 m of ground that it scans, because
+        // its circle is wider.
         assert!((350.0..420.0).contains(&flown.norm()), "{}", flown.norm());
         assert!(flown.y < 0.0);
     }
 
-    /// Compares two derivations of a pushbroom: rays followed to the curved Earth, and the planes of a linear camera.
+    /// Compares two derivations of a pushbroom: rays followed to the curved Earth, and the planes
+    /// of a linear camera.
     #[test]
     fn over_a_small_scene_the_pushbroom_is_the_linear_one() {
         let camera = PhysicalCamera::new(CameraModel::Pushbroom, &look(18.0, 40.0), CENTRE, (601, 601));

@@ -1,4 +1,5 @@
-//! Clouds over an image, with a chosen share and extent. Every view has its own, because clouds move between views.
+//! Clouds over an image, with a chosen share and extent. Every view has its own, because clouds
+//! move between views.
 
 use raster::Grid;
 

@@ -1,7 +1,8 @@
 //! The configuration of a simulation: the types of a parameter file (TOML).
 //!
-//! Lengths are metres, angles degrees, heights above the WGS 84 ellipsoid. All random numbers follow from `seed`.
-//! Unknown keys are errors. A missing key takes the value of the preset that the file names (see [`crate::PRESETS`]).
+//! Lengths are metres, angles degrees, heights above the WGS 84 ellipsoid. All random numbers
+//! follow from `seed`. Unknown keys are errors. A missing key takes the value of the preset that
+//! the file names (see [`crate::PRESETS`]).
 
 use serde::{Deserialize, Serialize};
 
@@ -63,7 +64,8 @@ pub struct TerrainConfig {
     pub quay_height_m: f64,
 }
 
-/// A town along a grid of streets. The kind of each quarter between four streets is drawn by the weights.
+/// A town along a grid of streets. The kind of each quarter between four streets is drawn by the
+/// weights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BuildingsConfig {
@@ -187,7 +189,8 @@ pub struct AcquisitionConfig {
     pub pointing_error_px: [f64; 2],
     /// Change of the pointing error from the first to the last line, pixels.
     pub pointing_drift_px: f64,
-    /// Number of dates. Views are distributed over them in order. Each date has its own light, vehicles and radiometry.
+    /// Number of dates. Views are distributed over them in order. Each date has its own light,
+    /// vehicles and radiometry.
     pub dates: usize,
     /// Direction of the sunlight on the first date.
     pub sun: Sun,
@@ -211,11 +214,13 @@ pub struct SensorConfig {
     pub mtf_at_nyquist: f64,
     /// Number of samples along each side of a pixel.
     pub subpixels: usize,
-    /// Electrons of a white surface under full light. The photon noise is the square root of the signal.
+    /// Electrons of a white surface under full light. The photon noise is the square root of the
+    /// signal.
     pub electrons_at_white: f64,
     /// Standard deviation of the read noise, electrons.
     pub read_noise_electrons: f64,
-    /// Share of the sensor's range that a white surface under full light reaches. Values above 1 saturate.
+    /// Share of the sensor's range that a white surface under full light reaches. Values above 1
+    /// saturate.
     pub white_share: f64,
     /// Value of a black surface as a share of the sensor's range: path radiance and dark current.
     pub offset_share: f64,

@@ -1,7 +1,7 @@
 //! The opaque crown of a tree: half an ellipsoid on an upright cylinder that reaches the ground.
 //!
-//! A crown is a convex solid and a height function at once, so that no ray sees anything under it. A ray meets the
-//! cylinder and the ellipsoid at roots of quadratic equations.
+//! A crown is a convex solid and a height function at once, so that no ray sees anything under it.
+//! A ray meets the cylinder and the ellipsoid at roots of quadratic equations.
 
 use nalgebra::Vector3;
 
@@ -32,7 +32,8 @@ impl Crown {
         (inside >= 0.0).then(|| self.shoulder_m + self.dome_m * inside.sqrt())
     }
 
-    /// Returns where a ray from outside enters, as the first parameter in (0, `t_max`), and the outward unit normal there.
+    /// Returns where a ray from outside enters, as the first parameter in (0, `t_max`), and the
+    /// outward unit normal there.
     pub(crate) fn enter(&self, ray: &SceneRay, t_max: f64) -> Option<(f64, Vector3<f64>)> {
         let (r, h) = (self.radius_m, self.dome_m);
         // Coordinates are scaled so that the cylinder and the ellipsoid have radius 1.

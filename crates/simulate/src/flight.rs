@@ -1,7 +1,9 @@
-//! Perspective cameras around a scene, as a drone would fly them, for priors and splats of its buildings.
+//! Perspective cameras around a scene, as a drone would fly them, for priors and splats of its
+//! buildings.
 //!
-//! Cameras stand on a circle around the middle of the scene and look at it. Every second one is nearer and steeper.
-//! Poses are in the map of the scene: easting, northing, metres above the ellipsoid.
+//! Cameras stand on a circle around the middle of the scene and look at it. Every second one is
+//! nearer and steeper. Poses are in the map of the scene: easting, northing, metres above the
+//! ellipsoid.
 
 use camera::{Lens, LensError, LensModel, Pose};
 
@@ -10,7 +12,8 @@ use crate::Simulation;
 /// Columns and rows of an image.
 const SIZE: [usize; 2] = [640, 480];
 const FOCAL_PX: f64 = 560.0;
-/// Distance from the middle and height above the ground, as shares of the side of the scene. Cameras alternate.
+/// Distance from the middle and height above the ground, as shares of the side of the scene.
+/// Cameras alternate.
 const STANDS: [[f64; 2]; 2] = [[0.75, 0.55], [0.35, 0.75]];
 
 impl Simulation {

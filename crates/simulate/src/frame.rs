@@ -17,8 +17,8 @@ pub struct SceneFrame {
 impl SceneFrame {
     /// Makes the frame around a position.
     ///
-    /// The origin is moved to the nearest multiple of `cell_m` on the map, so that rasters of that cell size align with
-    /// the map grid.
+    /// The origin is moved to the nearest multiple of `cell_m` on the map, so that rasters of that
+    /// cell size align with the map grid.
     ///
     /// # Errors
     /// A position where no map projection is defined.

@@ -1,4 +1,5 @@
-//! An index of solids by square buckets of the plane, which a ray visits in order (Amanatides and Woo 1987).
+//! An index of solids by square buckets of the plane, which a ray visits in order (Amanatides and
+//! Woo 1987).
 //!
 //! Each bucket stores its highest point, so that a ray skips most of them.
 
@@ -34,7 +35,8 @@ pub(crate) struct Buckets {
 }
 
 impl Buckets {
-    /// Makes buckets out to `reach_m` along both axes. `ground_top` gives the highest ground of a rectangle.
+    /// Makes buckets out to `reach_m` along both axes. `ground_top` gives the highest ground of a
+    /// rectangle.
     pub(crate) fn new(reach_m: f64, ground_top: impl Fn([f64; 2], [f64; 2]) -> f64, extents: &[Extent]) -> Self {
         let half = (reach_m / BUCKET_M).ceil();
         let (side, corner_m) = (2 * half as usize, -half * BUCKET_M);
@@ -82,7 +84,8 @@ impl Buckets {
         self.along(y) * self.side + self.along(x)
     }
 
-    /// Visits the buckets in which a ray is low enough to meet something, until `visit` returns a value.
+    /// Visits the buckets in which a ray is low enough to meet something, until `visit` returns a
+    /// value.
     pub(crate) fn walk<T>(&self, ray: &SceneRay, t_max: f64, mut visit: impl FnMut(Stretch) -> Option<T>) -> Option<T> {
         let (mut t, end) = self.clipped(ray, t_max)?;
         let start = ray.at(t);

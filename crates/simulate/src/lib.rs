@@ -1,14 +1,16 @@
 //! Simulated acquisitions: seeded scenes with their exact surface, seen through RPC cameras.
 //!
-//! A [`Scene`] is terrain with buildings, trees and vehicles, and rays meet it analytically. A [`Simulation`] renders it
-//! through physical cameras (pushbroom or frame) to which RPCs are fitted. It adds shadows, clouds, point spread, noise,
-//! quantisation and a pointing error of the RPC. It also samples the truth: surface, terrain, classes, visibility in
-//! each view, the height of every pixel, the scene from above, and the buildings as an LoD2 model.
+//! A [`Scene`] is terrain with buildings, trees and vehicles, and rays meet it analytically. A
+//! [`Simulation`] renders it through physical cameras (pushbroom or frame) to which RPCs are
+//! fitted. It adds shadows, clouds, point spread, noise, quantisation and a pointing error of the
+//! RPC. It also samples the truth: surface, terrain, classes, visibility in each view, the height
+//! of every pixel, the scene from above, and the buildings as an LoD2 model.
 //!
-//! [`SimulationConfig`] is a parameter file with named presets ([`PRESETS`]). The same configuration gives the same bytes
-//! for any number of threads.
+//! [`SimulationConfig`] is a parameter file with named presets ([`PRESETS`]). The same
+//! configuration gives the same bytes for any number of threads.
 //!
-//! Scene frame: x east, y north in metres of the map grid from the scene's centre, z metres above the WGS 84 ellipsoid.
+//! Scene frame: x east, y north in metres of the map grid from the scene's centre, z metres above
+//! the WGS 84 ellipsoid.
 //!
 //! ```
 //! use simulate::{Simulation, SimulationConfig};

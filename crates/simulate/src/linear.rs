@@ -1,10 +1,12 @@
-//! A linear pushbroom camera, written as an RPC without any fit. Tests compare the physical camera with it.
+//! A linear pushbroom camera, written as an RPC without any fit. Tests compare the physical camera
+//! with it.
 //!
-//! A sensor that moves on a straight line at constant speed and attitude has `line = m₁·X`, `sample = m₂·X / m₃·X` for
-//! homogeneous points X (Gupta and Hartley 1997, "Linear pushbroom cameras"): a ratio of polynomials of degree one, which the RPC's
-//! terms 1, L, P, H hold exactly. X is (east, north, up) in metres from the scene's centre, each proportional to the RPC's
-//! normalised longitude, latitude and height. The curvature of the Earth is left out (1 cm over 350 m): the physical
-//! camera has it.
+//! A sensor that moves on a straight line at constant speed and attitude has `line = m₁·X`, `sample
+//! = m₂·X / m₃·X` for homogeneous points X (Gupta and Hartley 1997, "Linear pushbroom cameras"): a
+//! ratio of polynomials of degree one, which the RPC's terms 1, L, P, H hold exactly. X is (east,
+//! north, up) in metres from the scene's centre, each proportional to the RPC's normalised
+//! longitude, latitude and height. The curvature of the Earth is left out (1 cm over 350 m): the
+//! physical camera has it.
 
 use camera::{ImagePoint, Rpc};
 use geodesy::{LonLatHeight, meridian_radius_m, prime_vertical_radius_m};
@@ -18,7 +20,8 @@ const ORBIT_M: f64 = 617_000.0;
 const HEIGHT_SCALE_M: f64 = 500.0;
 
 impl Look {
-    /// The RPC of a linear pushbroom image of `width × height` pixels with the scene's `centre` in its middle.
+    /// The RPC of a linear pushbroom image of `width × height` pixels with the scene's `centre` in
+    /// its middle.
     pub(crate) fn rpc(&self, centre: LonLatHeight, width: usize, height: usize) -> Rpc {
         let (width, height) = (width as f64, height as f64);
         let middle = ImagePoint::new((width - 1.0) / 2.0, (height - 1.0) / 2.0);
@@ -57,12 +60,14 @@ impl Look {
         }
     }
 
-    /// Gradients of the line and of the sample's numerator and denominator (1 at the centre), per metre.
+    /// Gradients of the line and of the sample's numerator and denominator (1 at the centre), per
+    /// metre.
     fn planes(&self) -> (Vector3<f64>, SamplePlanes) {
         let to_sensor = self.towards_sensor();
         let (east, north) = self.heading_deg.to_radians().sin_cos();
         let track = Vector3::new(east, north, 0.0);
-        // Sample numbers grow to the left of the flight, so that an image flown southwards has north up and east right.
+        // Sample numbers grow to the left of the flight, so that an image flown southwards has
+        // north up and east right.
         let left = Vector3::new(-north, east, 0.0);
         let scan_normal = left.cross(&to_sensor).normalize();
         let scan_normal = scan_normal * scan_normal.dot(&track).signum();

@@ -1,9 +1,11 @@
-//! The buildings as an LoD2 city model: one solid per block, with surfaces classed as roof, wall and ground.
+//! The buildings as an LoD2 city model: one solid per block, with surfaces classed as roof, wall
+//! and ground.
 //!
-//! Coordinates are those of the map (east, north) and ellipsoidal heights, rounded to the millimetre that CityJSON will hold, so
-//! that equal corners are equal vertices. Rings run counter-clockwise seen from outside. A building of one block is a
-//! `Building`; of several, a `Building` without geometry whose blocks are its `BuildingPart`s, each on top of the other
-//! or wall to wall. Parapets, chimneys and plant rooms are left out, as LoD2 does.
+//! Coordinates are those of the map (east, north) and ellipsoidal heights, rounded to the
+//! millimetre that CityJSON will hold, so that equal corners are equal vertices. Rings run
+//! counter-clockwise seen from outside. A building of one block is a `Building`; of several, a
+//! `Building` without geometry whose blocks are its `BuildingPart`s, each on top of the other or
+//! wall to wall. Parapets, chimneys and plant rooms are left out, as LoD2 does.
 
 use city::{
     CityModel, CityObject, CrsReference, Geometry, GeometryKind, Lod, ModelPoint, ObjectKind, SurfaceClass,
@@ -47,7 +49,8 @@ fn solid(block: &BuildingBlock, frame: &SceneFrame, pool: &mut VertexPool) -> Ge
             let millimetres = |c: f64| (c * 1e3).round() / 1e3;
             ModelPoint::new(millimetres(x + east), millimetres(y + north), millimetres(z))
         });
-        // A scene is at most 3 km wide, far too small for the millions of blocks that would exceed the indices.
+        // A scene is at most 3 km wide, far too small for the millions of blocks that would exceed
+        // the indices.
         let ring = corners.filter_map(|corner| pool.index(corner)).collect();
         geometry.surfaces.push(SurfacePolygon::new(vec![ring], class));
     }
@@ -76,7 +79,8 @@ fn faces(block: &BuildingBlock) -> Vec<(SurfaceClass, Vec<[f64; 3]>)> {
             let mut planes =
                 vec![vec![at(0, eaves), at(1, eaves), end, start], vec![at(2, eaves), at(3, eaves), start, end]];
             if matches!(block.roof, Roof::Gabled { .. }) {
-                // A gable rises above the eaves: after the wall's second upper corner comes the ridge.
+                // A gable rises above the eaves: after the wall's second upper corner comes the
+                // ridge.
                 walls[1].insert(3, end);
                 walls[3].insert(3, start);
             } else {

@@ -1,7 +1,8 @@
 //! Value noise: smooth functions of the plane with a known bound on their slope.
 //!
-//! Values of a random lattice, interpolated with the quintic `6t⁵ − 15t⁴ + 10t³` (Perlin 2002), so that the function is
-//! twice continuously differentiable: terrain has no creases for a matcher to lock on.
+//! Values of a random lattice, interpolated with the quintic `6t⁵ − 15t⁴ + 10t³` (Perlin 2002), so
+//! that the function is twice continuously differentiable: terrain has no creases for a matcher to
+//! lock on.
 
 use crate::random::lattice;
 
@@ -31,7 +32,8 @@ pub(crate) fn detail(seed: u64, x: f64, y: f64) -> f64 {
     OCTAVES.iter().zip(0u64..).map(|((cell, share), k)| share * value_noise(seed.wrapping_add(k), *cell, x, y)).sum()
 }
 
-/// Returns the largest integer not above a value. `f64::floor` is a library call on baseline x86-64 and was the bottleneck.
+/// Returns the largest integer not above a value. `f64::floor` is a library call on baseline x86-64
+/// and was the bottleneck.
 fn floor(x: f64) -> i64 {
     let towards_zero = x as i64;
     towards_zero - i64::from(x < towards_zero as f64)
@@ -56,7 +58,8 @@ mod tests {
         fn noise_keeps_its_range_and_its_slope(seed in 0u64..1000, x in -500.0..500.0f64, y in -500.0..500.0f64) {
             let (value, [by_x, by_y]) = value_and_slope(seed, 20.0, x, y);
             prop_assert!((-1.0..=1.0).contains(&value));
-            // Each partial derivative is at most 2 (the range) times 15/8 (the quintic's steepest slope) over the cell.
+            // Each partial derivative is at most 2 (the range) times 15/8 (the quintic's steepest
+            // slope) over the cell.
             prop_assert!(by_x.hypot(by_y) <= std::f64::consts::SQRT_2 * 2.0 * 1.875 / 20.0);
             let step = 1e-5;
             let difference = |dx: f64, dy: f64| {

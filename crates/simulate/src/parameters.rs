@@ -1,7 +1,7 @@
 //! Parameter files: TOML in, TOML out, and the range of every number.
 //!
-//! A file may name a `preset`, which supplies every missing key. The default preset is `town`. An unknown key is an error
-//! that lists the known keys.
+//! A file may name a `preset`, which supplies every missing key. The default preset is `town`. An
+//! unknown key is an error that lists the known keys.
 
 use crate::config::SimulationConfig;
 use crate::error::SimulateError;
@@ -18,7 +18,8 @@ impl SimulationConfig {
     /// Reads the text of a parameter file.
     ///
     /// # Errors
-    /// Text that is no TOML, an unknown preset, an unknown key, a value of the wrong type or out of range.
+    /// Text that is no TOML, an unknown preset, an unknown key, a value of the wrong type or out of
+    /// range.
     pub fn from_toml(text: &str) -> Result<Self, SimulateError> {
         let refused = |error: toml::de::Error| SimulateError::Parameters { text: error.to_string().trim().to_owned() };
         let mut given: toml::Table = toml::from_str(text).map_err(refused)?;

@@ -46,7 +46,8 @@ impl Default for TerrainConfig {
 }
 
 impl Default for BuildingsConfig {
-    /// A town whose street grid is rotated against the map grid, so that roof edges do not follow the rows of a raster.
+    /// A town whose street grid is rotated against the map grid, so that roof edges do not follow
+    /// the rows of a raster.
     fn default() -> Self {
         Self {
             turn_deg: 17.0,

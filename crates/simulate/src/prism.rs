@@ -1,7 +1,8 @@
 //! A building block: an upright prism over a rectangle, under a flat, gabled or hipped roof.
 //!
-//! The block is a convex solid. A ray meets it where the slabs of its planes overlap (Cyrus and Beck 1978), without
-//! marching. It extends downwards without end, hidden by the ground. Stepped buildings are several blocks.
+//! The block is a convex solid. A ray meets it where the slabs of its planes overlap (Cyrus and
+//! Beck 1978), without marching. It extends downwards without end, hidden by the ground. Stepped
+//! buildings are several blocks.
 
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -43,7 +44,8 @@ pub struct BuildingBlock {
     pub half_size_m: [f64; 2],
     /// Direction of the long axis, degrees counter-clockwise from east.
     pub direction_deg: f64,
-    /// Height of the base, metres above the ellipsoid: the lowest ground around the block, or the roof below it.
+    /// Height of the base, metres above the ellipsoid: the lowest ground around the block, or the
+    /// roof below it.
     pub base_m: f64,
     /// Form and heights of the roof.
     pub roof: Roof,

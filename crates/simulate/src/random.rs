@@ -1,5 +1,5 @@
-//! Seeds and random numbers of the scene by purpose and by place, so that none depends on the order of evaluation or on
-//! the number of threads.
+//! Seeds and random numbers of the scene by purpose and by place, so that none depends on the order
+//! of evaluation or on the number of threads.
 
 use numeric::random::{GOLDEN_GAMMA, mix64, splitmix64_at, unit_interval};
 

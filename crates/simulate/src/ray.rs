@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-/// A half-line `origin + t · direction` with t ≥ 0, in the scene frame, metres. The direction may have any length.
+/// A half-line `origin + t · direction` with t ≥ 0, in the scene frame, metres. The direction may
+/// have any length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneRay {
     /// Start.

@@ -1,8 +1,10 @@
-//! One view of a scene: rays through the pixels, Lambertian shading with cast shadows, and the point-spread function.
+//! One view of a scene: rays through the pixels, Lambertian shading with cast shadows, and the
+//! point-spread function.
 //!
-//! Radiance = reflectance · (sky + (1 − sky) · max(0, n·s) · lit). It is sampled on a regular lattice finer than the
-//! pixels and weighted by the point-spread function. Bands of rows are independent. The samples at their edges are
-//! computed twice, so that the image is the same for any number of threads.
+//! Radiance = reflectance · (sky + (1 − sky) · max(0, n·s) · lit). It is sampled on a regular
+//! lattice finer than the pixels and weighted by the point-spread function. Bands of rows are
+//! independent. The samples at their edges are computed twice, so that the image is the same for
+//! any number of threads.
 
 use camera::ImagePoint;
 use nalgebra::Vector3;
@@ -36,7 +38,8 @@ impl<'a> LitScene<'a> {
         Self { scene, texture, to_sun: sun.direction() }
     }
 
-    /// Returns the radiance of `width × height` pixels, in units of a white surface under full light.
+    /// Returns the radiance of `width × height` pixels, in units of a white surface under full
+    /// light.
     pub(crate) fn image(
         &self,
         sight: &SightLines,

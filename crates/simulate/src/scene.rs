@@ -1,8 +1,9 @@
-//! The surface of a scene: terrain with buildings, trees and vehicles, as a height function and for ray casting.
+//! The surface of a scene: terrain with buildings, trees and vehicles, as a height function and for
+//! ray casting.
 //!
-//! Scene frame: x east, y north (metres of the map grid, from the scene's centre), z metres above the WGS 84 ellipsoid.
-//! The surface is the upper envelope of all solids and the ground, with nothing below it. Rays meet everything
-//! analytically, so that occlusions and shadows are exact.
+//! Scene frame: x east, y north (metres of the map grid, from the scene's centre), z metres above
+//! the WGS 84 ellipsoid. The surface is the upper envelope of all solids and the ground, with
+//! nothing below it. Rays meet everything analytically, so that occlusions and shadows are exact.
 
 use std::sync::Arc;
 
@@ -33,7 +34,8 @@ pub enum TruthClass {
     Building = 6,
     /// Water.
     Water = 9,
-    /// A raster cell through which a façade goes, at the edge of a footprint. LAS leaves classes from 64 on to users.
+    /// A raster cell through which a façade goes, at the edge of a footprint. LAS leaves classes
+    /// from 64 on to users.
     FootprintEdge = 64,
 }
 
@@ -89,7 +91,8 @@ pub(crate) struct Hit {
     pub(crate) part: Part,
 }
 
-/// The parameter at which a ray meets something. The normal is missing for the ground, where it is computed later.
+/// The parameter at which a ray meets something. The normal is missing for the ground, where it is
+/// computed later.
 #[derive(Debug, Clone, Copy)]
 struct Meeting {
     t: f64,
@@ -99,11 +102,13 @@ struct Meeting {
 
 /// Largest distance by which a building may extend beyond the reach of the scene, metres.
 const OVERHANG_M: f64 = 50.0;
-/// Distance from the surface at which a ray towards the sun starts, metres: above rounding, below any detail.
+/// Distance from the surface at which a ray towards the sun starts, metres: above rounding, below
+/// any detail.
 const LIFT_M: f64 = 1e-3;
 
 impl Scene {
-    /// Makes the permanent scene (without vehicles) of a configuration, out to `reach_m` from its centre.
+    /// Makes the permanent scene (without vehicles) of a configuration, out to `reach_m` from its
+    /// centre.
     pub(crate) fn new(config: &SimulationConfig, reach_m: f64) -> Self {
         let terrain = Terrain::new(config, reach_m + OVERHANG_M);
         let buildings = town::build(config, &terrain, reach_m);
@@ -186,7 +191,8 @@ impl Scene {
         (height, class)
     }
 
-    /// Returns the first point of the surface on a ray that starts above it, with t in (0, `t_max`).
+    /// Returns the first point of the surface on a ray that starts above it, with t in (0,
+    /// `t_max`).
     ///
     /// `None` if the ray does not reach the surface before `t_max`, or leaves the scene.
     pub fn first_point(&self, ray: &SceneRay, t_max: f64) -> Option<Vector3<f64>> {
@@ -290,7 +296,8 @@ mod tests {
         Scene::new(&config, 200.0).on_date(&config, 0)
     }
 
-    /// Returns the first point below the surface on a march with a small step, refined by bisection.
+    /// Returns the first point below the surface on a march with a small step, refined by
+    /// bisection.
     fn marched(scene: &Scene, ray: &SceneRay, t_max: f64) -> Option<Vector3<f64>> {
         let below = |t: f64| {
             let p = ray.at(t);
@@ -368,7 +375,8 @@ mod tests {
                 }
             }
             assert!(counts[0] > 150 && counts[1] > 40, "{preset}: {counts:?}");
-            // Where the sun grazes the ground, the smooth normal and the patch disagree about which side is lit.
+            // Where the sun grazes the ground, the smooth normal and the patch disagree about which
+            // side is lit.
             assert!(wrong * 200 < 900, "{preset}: {wrong} of {counts:?} differ");
         }
     }

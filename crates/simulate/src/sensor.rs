@@ -1,8 +1,10 @@
-//! The sensor: point-spread function, photon and read noise, gain, gamma and offset, quantisation to 8 to 12 bits.
+//! The sensor: point-spread function, photon and read noise, gain, gamma and offset, quantisation
+//! to 8 to 12 bits.
 //!
-//! `DN = offset + gain · (electrons / electrons_at_white)^gamma`, where the electrons have the variance
-//! `signal + read noise²`. The modulation transfer is the one of the pixel's box times a Gaussian. The width of the
-//! Gaussian follows from the transfer at the Nyquist frequency: `m = sinc(1/2) · exp(−π² σ² / 2)`, σ in pixels.
+//! `DN = offset + gain · (electrons / electrons_at_white)^gamma`, where the electrons have the
+//! variance `signal + read noise²`. The modulation transfer is the one of the pixel's box times a
+//! Gaussian. The width of the Gaussian follows from the transfer at the Nyquist frequency: `m =
+//! sinc(1/2) · exp(−π² σ² / 2)`, σ in pixels.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,9 +1,10 @@
 //! The lines of sight of an image's pixels in the scene frame.
 //!
-//! The ray of a pixel runs through its positions at two heights, above and below the whole scene. On the map it is
-//! straight to 2 mm over 300 m of height. The deviation comes from the curvature of the Earth and falls with the square
-//! of the height. Positions are computed on a lattice of pixels and interpolated: over 16 pixels the camera and the map
-//! projection deviate from linear by micrometres.
+//! The ray of a pixel runs through its positions at two heights, above and below the whole scene.
+//! On the map it is straight to 2 mm over 300 m of height. The deviation comes from the curvature
+//! of the Earth and falls with the square of the height. Positions are computed on a lattice of
+//! pixels and interpolated: over 16 pixels the camera and the map projection deviate from linear by
+//! micrometres.
 
 use camera::ImagePoint;
 use nalgebra::{Vector2, Vector3};
@@ -27,7 +28,8 @@ pub struct SightLines {
 }
 
 impl SightLines {
-    /// Makes the rays of an image of `width × height` pixels between two heights (low, high), metres above the ellipsoid.
+    /// Makes the rays of an image of `width × height` pixels between two heights (low, high),
+    /// metres above the ellipsoid.
     ///
     /// # Errors
     /// A position outside the map.
@@ -52,7 +54,8 @@ impl SightLines {
         Ok(Self { columns, rows, high_m, low_m, nodes })
     }
 
-    /// Returns the ray of an image position. It starts at the upper height (t = 0) and reaches the lower one at t = 1.
+    /// Returns the ray of an image position. It starts at the upper height (t = 0) and reaches the
+    /// lower one at t = 1.
     pub fn ray(&self, at: ImagePoint) -> SceneRay {
         let (column, s) = cell(at.sample, self.columns);
         let (row, t) = cell(at.line, self.rows);
@@ -68,7 +71,8 @@ impl SightLines {
     }
 }
 
-/// Returns the lattice cell of a coordinate and the position in it. Beyond the lattice the outermost cell is continued.
+/// Returns the lattice cell of a coordinate and the position in it. Beyond the lattice the
+/// outermost cell is continued.
 fn cell(coordinate: f64, nodes: usize) -> (usize, f64) {
     let u = coordinate / STEP_PX + 0.5;
     let index = (u.floor().max(0.0) as usize).min(nodes - 2);

@@ -1,7 +1,7 @@
 //! A whole simulated acquisition: the scene, its views on one date or several, and the truth.
 //!
-//! Images are rendered through a physical camera. The RPC of each view is fitted to that camera and then given a known
-//! translation and drift, as unadjusted RPCs have.
+//! Images are rendered through a physical camera. The RPC of each view is fitted to that camera and
+//! then given a known translation and drift, as unadjusted RPCs have.
 
 use camera::{ImageCorrection, Rpc, RpcCamera};
 use raster::Grid;
@@ -39,8 +39,8 @@ pub struct SimulatedView {
     pub rpc: Rpc,
     /// The RPC of the camera through which the image was rendered.
     pub true_rpc: Rpc,
-    /// Height of the surface at the centre of each pixel, behind clouds too, metres above the ellipsoid. NaN where the
-    /// pixel sees no surface.
+    /// Height of the surface at the centre of each pixel, behind clouds too, metres above the
+    /// ellipsoid. NaN where the pixel sees no surface.
     pub heights: Grid<f32>,
     /// 1 where clouds hide the scene, else 0. `None` without clouds.
     pub clouds: Option<Grid<u8>>,
@@ -90,7 +90,8 @@ pub struct SceneRecord {
     pub epsg: u32,
     /// Map coordinates of the scene's origin, metres.
     pub origin_m: [f64; 2],
-    /// Lowest and highest point of the permanent scene, its surroundings included, metres above the ellipsoid.
+    /// Lowest and highest point of the permanent scene, its surroundings included, metres above the
+    /// ellipsoid.
     pub height_range_m: [f64; 2],
     /// Number of buildings, surroundings included.
     pub buildings: usize,
@@ -161,8 +162,8 @@ impl<'a> Witness<'a> {
     }
 }
 
-/// Returns the distance from the centre to which the scene is built: the area, its surroundings, and the part beyond
-/// them that slanted views see.
+/// Returns the distance from the centre to which the scene is built: the area, its surroundings,
+/// and the part beyond them that slanted views see.
 fn reach_m(config: &SimulationConfig) -> f64 {
     let steepest = (0..config.views).map(|i| acquisition::look(config, i).incidence_deg).fold(0.0, f64::max);
     let towers = match config.buildings.quarters.high_rise > 0.0 {

@@ -14,7 +14,8 @@ pub struct Sun {
 }
 
 impl Sun {
-    /// Lowest permitted elevation, degrees. Below it shadows are longer than the simulated surroundings are wide.
+    /// Lowest permitted elevation, degrees. Below it shadows are longer than the simulated
+    /// surroundings are wide.
     pub const LOWEST_DEG: f64 = 15.0;
 
     /// Returns the unit vector towards the sun (east, north, up).

@@ -1,10 +1,12 @@
 //! The bare ground: bilinear patches between the posts of a lattice, which rays meet exactly.
 //!
-//! The lattice samples a sum of value noises (undulation), a pit, benches and water. With posts every metre, the creases
-//! between patches are too small for a matcher to see, and steep faces keep their slope. A patch is
-//! `a + bu + cv + duv`, so that a ray meets it at the root of a quadratic equation.
+//! The lattice samples a sum of value noises (undulation), a pit, benches and water. With posts
+//! every metre, the creases between patches are too small for a matcher to see, and steep faces
+//! keep their slope. A patch is `a + bu + cv + duv`, so that a ray meets it at the root of a
+//! quadratic equation.
 //!
-//! Scene frame: x east, y north (grid metres from the scene's centre), z metres above the ellipsoid.
+//! Scene frame: x east, y north (grid metres from the scene's centre), z metres above the
+//! ellipsoid.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -44,12 +46,14 @@ struct Relief<'a> {
 }
 
 impl Terrain {
-    /// Makes the ground of a scene out to `reach_m` from its centre along both axes. Beyond, the height at the edge continues.
+    /// Makes the ground of a scene out to `reach_m` from its centre along both axes. Beyond, the
+    /// height at the edge continues.
     pub(crate) fn new(config: &SimulationConfig, reach_m: f64) -> Self {
         let turn = config.buildings.turn_deg.to_radians().sin_cos();
         let relief =
             Relief { config: &config.terrain, seed: derived(config.seed, 1), half_m: config.size_m / 2.0, turn };
-        // The buckets of the scene end at multiples of their side. The lattice reaches as far, so no ray leaves it earlier.
+        // The buckets of the scene end at multiples of their side. The lattice reaches as far, so
+        // no ray leaves it earlier.
         let half = ((reach_m / BUCKET_M).ceil() * BUCKET_M / POST_M).ceil() + 2.0;
         let (posts, corner_m) = (2 * half as usize + 1, -half * POST_M);
         let at = |k: usize| corner_m + k as f64 * POST_M;
@@ -96,10 +100,12 @@ impl Terrain {
         self.base_m + f64::from(top)
     }
 
-    /// Returns the first parameter in [`t_in`, `t_out`] at which a ray over the lattice goes below the ground.
+    /// Returns the first parameter in [`t_in`, `t_out`] at which a ray over the lattice goes below
+    /// the ground.
     pub(crate) fn intersect(&self, ray: &SceneRay, t_in: f64, t_out: f64) -> Option<f64> {
         let mut t = t_in;
-        // Each step crosses one patch. A ray along an edge may need more steps because of rounding, hence the bound.
+        // Each step crosses one patch. A ray along an edge may need more steps because of rounding,
+        // hence the bound.
         for _ in 0..4 * self.posts {
             let start = ray.at(t);
             let (i, j) = (self.cell(start.x).0, self.cell(start.y).0);
@@ -115,7 +121,8 @@ impl Terrain {
         None
     }
 
-    /// Returns where a ray leaves the patch (i, j) that it is in at `t`, just beyond the edge, so that the next patch is found.
+    /// Returns where a ray leaves the patch (i, j) that it is in at `t`, just beyond the edge, so
+    /// that the next patch is found.
     fn leaves(&self, ray: &SceneRay, i: usize, j: usize, t: f64) -> f64 {
         let along = |index: usize, origin: f64, direction: f64| {
             let edge = self.corner_m + (index + usize::from(direction > 0.0)) as f64 * POST_M;
@@ -168,7 +175,8 @@ fn falls_to_zero(q0: f64, q1: f64, q2: f64, s_max: f64) -> Option<f64> {
     if discriminant < 0.0 {
         return None;
     }
-    // This form of the smaller positive root avoids cancellation: with q0 > 0 it is 2 q0 / (−q1 + √Δ).
+    // This form of the smaller positive root avoids cancellation: with q0 > 0 it is 2 q0 / (−q1 +
+    // √Δ).
     let s = 2.0 * q0 / (discriminant.sqrt() - q1);
     (s >= 0.0 && s <= s_max).then_some(s)
 }

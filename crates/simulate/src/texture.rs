@@ -1,7 +1,8 @@
-//! Diffuse reflectance of the surface, 0 to 1. It is procedural, fixed to the surface, with detail down to half a metre.
+//! Diffuse reflectance of the surface, 0 to 1. It is procedural, fixed to the surface, with detail
+//! down to half a metre.
 //!
-//! Each kind of surface has its own pattern (streets with markings, parcels, strata, tiles, panels, windows, foliage)
-//! times multi-octave noise. Only the waves of water differ between views.
+//! Each kind of surface has its own pattern (streets with markings, parcels, strata, tiles, panels,
+//! windows, foliage) times multi-octave noise. Only the waves of water differ between views.
 
 use nalgebra::Vector3;
 
@@ -73,7 +74,8 @@ impl Texture {
         }
     }
 
-    /// Returns the reflectance of parcels with their own tone and direction of rows, and tracks between them.
+    /// Returns the reflectance of parcels with their own tone and direction of rows, and tracks
+    /// between them.
     fn field(&self, x: f64, y: f64) -> f64 {
         let [u, v] = [x + 0.12 * y, y - 0.09 * x];
         let (i, j) = ((u / PARCEL_M[0]).floor(), (v / PARCEL_M[1]).floor());

@@ -1,8 +1,9 @@
-//! The truth as rasters on the map grid: surface, terrain, classes, visibility in each view, and the view from above.
+//! The truth as rasters on the map grid: surface, terrain, classes, visibility in each view, and
+//! the view from above.
 //!
-//! Values belong to cell centres, and heights are rounded to a millimetre. The scene is the permanent one without
-//! vehicles, like a reference that was measured on another day. A view sees a cell if its ray to the point of the cell
-//! meets nothing before it, vehicles of its date included.
+//! Values belong to cell centres, and heights are rounded to a millimetre. The scene is the
+//! permanent one without vehicles, like a reference that was measured on another day. A view sees a
+//! cell if its ray to the point of the cell meets nothing before it, vehicles of its date included.
 
 use camera::{ImagePoint, Rpc};
 use city::CityModel;
@@ -22,8 +23,8 @@ use crate::texture::Texture;
 
 /// Value of the reflectance 1 in [`Truth::ortho`].
 pub const ORTHO_SCALE: f64 = 10_000.0;
-/// A point is visible if its ray ends within this distance of it, metres. It allows for the RPC's residual of a
-/// thousandth of a pixel on a steep slope.
+/// A point is visible if its ray ends within this distance of it, metres. It allows for the RPC's
+/// residual of a thousandth of a pixel on a steep slope.
 const SEEN_M: f64 = 0.03;
 /// Samples along each side of a cell of the ortho image.
 const ORTHO_SUBCELLS: usize = 2;
@@ -137,7 +138,8 @@ fn stored(height_m: f64) -> f32 {
     ((height_m * 1024.0).round() / 1024.0) as f32
 }
 
-/// Returns the class of a cell: the one of its centre, or the edge of a footprint where a façade goes through the cell.
+/// Returns the class of a cell: the one of its centre, or the edge of a footprint where a façade
+/// goes through the cell.
 fn class(scene: &Scene, [x, y]: [f64; 2], cell_m: f64) -> TruthClass {
     let is_building = |class| class == TruthClass::Building;
     let centre = scene.surface(x, y).1;
@@ -159,7 +161,8 @@ fn reflectance_from_above(scene: &Scene, texture: &Texture, [x, y]: [f64; 2], ce
     (sum / (ORTHO_SUBCELLS * ORTHO_SUBCELLS) as f64 * ORTHO_SCALE).round() as u16
 }
 
-/// Returns the height of the surface at the centre of each pixel, metres above the ellipsoid. NaN where there is none.
+/// Returns the height of the surface at the centre of each pixel, metres above the ellipsoid. NaN
+/// where there is none.
 pub(crate) fn image_heights(scene: &Scene, sight: &SightLines, (width, height): (usize, usize)) -> Grid<f32> {
     let height_at = |k: usize| {
         let at = ImagePoint::new((k % width) as f64, (k / width) as f64);

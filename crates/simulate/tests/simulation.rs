@@ -1,5 +1,5 @@
-//! Whole simulations: the renderer against an independent projection and an independent ray caster, determinism, dates, and
-//! what each preset promises.
+//! Whole simulations: the renderer against an independent projection and an independent ray caster,
+//! determinism, dates, and what each preset promises.
 
 use camera::ImagePoint;
 use nalgebra::Vector3;
@@ -73,7 +73,8 @@ fn what_a_view_does_not_see_is_what_a_brute_force_ray_caster_calls_hidden() {
                 let (x, y) = truth.geotransform.map_from_cell(column as f64, row as f64);
                 let (x, y) = (x - x0, y - y0);
                 let point = Vector3::new(x, y, simulation.scene.surface(x, y).0);
-                // Grid north is not north: the convergence of the meridian turns the direction of the look.
+                // Grid north is not north: the convergence of the meridian turns the direction of
+                // the look.
                 let above = simulation.frame.ground_from_scene(point).unwrap();
                 let at = view.true_rpc.project(above).unwrap();
                 let up = view.true_rpc.localize(at, high + 1.0).unwrap();
@@ -91,7 +92,8 @@ fn what_a_view_does_not_see_is_what_a_brute_force_ray_caster_calls_hidden() {
     }
 }
 
-/// What a patch of ground around a scene point looks like from a view's RPC: the ortho truth, shaded by nothing.
+/// What a patch of ground around a scene point looks like from a view's RPC: the ortho truth,
+/// shaded by nothing.
 fn expected_patch(simulation: &Simulation, centre: (usize, usize), radius: usize) -> Vec<f64> {
     let ortho = &simulation.truth.ortho;
     let mut patch = Vec::new();
@@ -115,7 +117,8 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
     ab / (aa * bb).sqrt().max(1e-12)
 }
 
-/// Where the ortho patch around a cell is found in a view, relative to where the true RPC projects it, pixels.
+/// Where the ortho patch around a cell is found in a view, relative to where the true RPC projects
+/// it, pixels.
 fn found_offset(
     simulation: &Simulation,
     view: &SimulatedView,
@@ -148,7 +151,8 @@ fn found_offset(
             (best, at) = (value, [ds, dl]);
         }
     }
-    // Patches in which a shadow's edge or a lack of texture decides the score say nothing about the geometry.
+    // Patches in which a shadow's edge or a lack of texture decides the score say nothing about the
+    // geometry.
     if best < 0.8 {
         return None;
     }

@@ -3,7 +3,8 @@
 
 use camera::Rpc;
 
-/// A 0.5 m pushbroom on a 20 km scene, 15° off nadir: small cubic terms, denominators within 1 % of 1.
+/// A 0.5 m pushbroom on a 20 km scene, 15° off nadir: small cubic terms, denominators within 1 % of
+/// 1.
 pub(crate) fn pushbroom() -> Rpc {
     let mut line_num = small_terms(1, 3e-4);
     line_num[..4].copy_from_slice(&[-2.1e-3, 0.047, -1.062, 0.018]);
