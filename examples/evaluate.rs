@@ -11,7 +11,8 @@ use skysweep::numeric::Silent;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args_os().skip(1).map(PathBuf::from);
     let truth = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/data-samples/town/truth"));
-    // Without arguments the terrain stands in for a bad surface model: it lacks buildings and trees.
+    // Without arguments the terrain stands in for a bad surface model: it lacks buildings and
+    // trees.
     let dsm = arguments.next().unwrap_or_else(|| truth.join("dtm.tif"));
     let reference = arguments.next().unwrap_or_else(|| truth.join("dsm.tif"));
 

@@ -1,4 +1,5 @@
-//! Makes the building priors of a city model for a satellite image: height, distance, normal and mask maps.
+//! Makes the building priors of a city model for a satellite image: height, distance, normal and
+//! mask maps.
 //!
 //! `cargo run --release --example priors_of_a_tile [OUTPUT [MODEL IMAGE…]]`
 

@@ -1,4 +1,5 @@
-//! Projects a ground point into a satellite image through the image's RPC, and finds the point again.
+//! Projects a ground point into a satellite image through the image's RPC, and finds the point
+//! again.
 //!
 //! `cargo run --example project_a_point [IMAGE]`
 

@@ -1,5 +1,5 @@
-//! `skysweep completions SHELL` and `skysweep man [COMMAND…]`: both are made from the command line's own definition and
-//! printed to standard output.
+//! `skysweep completions SHELL` and `skysweep man [COMMAND…]`: both are made from the command
+//! line's own definition and printed to standard output.
 
 use anyhow::Context;
 use clap::Command;

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use jobs::corrections::CorrectionSource;
 
-/// Reads `--corrections`: a report, the word `none`, or nothing (the corrections of the run that made the surface).
+/// Reads `--corrections`: a report, the word `none`, or nothing (the corrections of the run that
+/// made the surface).
 pub(crate) fn corrections_of(option: Option<&Path>) -> CorrectionSource {
     match option {
         None => CorrectionSource::SurfaceRun,

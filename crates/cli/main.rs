@@ -1,8 +1,8 @@
 //! The `skysweep` command: arguments in, exit code out; all work is in the crates.
 //!
 //! One module per subcommand, each with an `Args` struct and a `run` that returns an [`Outcome`].
-//! Results go to standard output; log lines and errors go to standard error.
-//! Exit codes: 0 complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
+//! Results go to standard output; log lines and errors go to standard error. Exit codes: 0
+//! complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
 
 mod align;
 mod city;

@@ -1,11 +1,11 @@
 //! Satellite surface models from RPC images, and building priors from city models.
 //!
-//! This crate is a facade: it re-exports the crates of the toolkit under one name. Each crate holds one subject and
-//! documents its units, frames and sources.
+//! This crate is a facade: it re-exports the crates of the toolkit under one name. Each crate holds
+//! one subject and documents its units, frames and sources.
 //!
 //! # Jobs
-//! [`jobs`] is what most programs need. Every job is a function from a configuration to a report, and the command
-//! `skysweep` is a thin caller of these functions.
+//! [`jobs`] is what most programs need. Every job is a function from a configuration to a report,
+//! and the command `skysweep` is a thin caller of these functions.
 //!
 //! | module | makes |
 //! |---|---|
@@ -21,11 +21,14 @@
 //! | [`jobs::simulate`] | scenes with exact truth, seen through RPC cameras |
 //!
 //! # Building blocks
-//! - Positions: [`geodesy`] (ellipsoid, local frames, UTM), [`crs`] (map projections and vertical datums through PROJ).
-//! - Cameras: [`camera`] (the RPC00B model and perspective lenses), [`colmap`] (sets of posed cameras).
-//! - Surfaces: [`raster`] (grids), [`city`] (city models), [`gaussian`] (splats), [`bvh`] (ray casting), [`occlusion`].
-//! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`], [`ortho`], [`splats`],
-//!   [`simulate`].
+//! - Positions: [`geodesy`] (ellipsoid, local frames, UTM), [`crs`] (map projections and vertical
+//!   datums through PROJ).
+//! - Cameras: [`camera`] (the RPC00B model and perspective lenses), [`colmap`] (sets of posed
+//!   cameras).
+//! - Surfaces: [`raster`] (grids), [`city`] (city models), [`gaussian`] (splats), [`bvh`] (ray
+//!   casting), [`occlusion`].
+//! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`],
+//!   [`ortho`], [`splats`], [`simulate`].
 //! - Files: [`io`] reads and writes every format, [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
 //!

@@ -1,8 +1,8 @@
 //! Makes cameras in a ring around a city model that look down on it at 45°, as a COLMAP text model.
 //!
-//! Usage: `cargo run -p skysweep-io --example ring_of_cameras -- MODEL OUT [COUNT]`. The origin of the
-//! cameras' frame is on whole metres in the middle of the model. The offset from the model's frame to
-//! it is printed for `skysweep priors --offset`.
+//! Usage: `cargo run -p skysweep-io --example ring_of_cameras -- MODEL OUT [COUNT]`. The origin of
+//! the cameras' frame is on whole metres in the middle of the model. The offset from the model's
+//! frame to it is printed for `skysweep priors --offset`.
 
 #![allow(clippy::print_stdout)]
 
@@ -40,8 +40,8 @@ fn main() {
     println!("--offset {} {} {}", middle[0], middle[1], middle[2]);
 }
 
-/// Returns the pose of a camera at `centre` that looks at the origin with a level horizon. The centre
-/// must not be above the origin.
+/// Returns the pose of a camera at `centre` that looks at the origin with a level horizon. The
+/// centre must not be above the origin.
 fn looking_at_zero(centre: [f64; 3]) -> Pose {
     let unit = |v: [f64; 3]| {
         let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();

@@ -1,5 +1,5 @@
-//! Broken and hostile RPC files are refused with an error that names the entry. None panics or takes
-//! long.
+//! Broken and hostile RPC files are refused with an error that names the entry. None panics or
+//! takes long.
 
 use std::path::PathBuf;
 

@@ -45,7 +45,8 @@ pub enum FileError {
     Json(#[from] serde_json::Error),
 }
 
-/// Converts the errors of the writers of `io`, which all have a variant for a file that was not written.
+/// Converts the errors of the writers of `io`, which all have a variant for a file that was not
+/// written.
 macro_rules! from_writers {
     ($($error:ident),*) => {$(
         impl From<$error> for FileError {

@@ -78,8 +78,8 @@ fn what_is_seen_projects_to_its_pixel() {
                 assert!((height - 207.0).abs() < 1e-3 && up > 0.999_999, "{at:?}");
                 roofs += 1;
             } else {
-                // The meridian convergence is sin(43.53°) · 2.4° = 0.02885 rad here, so that a narrow
-                // strip of the south wall is visible.
+                // The meridian convergence is sin(43.53°) · 2.4° = 0.02885 rad here, so that a
+                // narrow strip of the south wall is visible.
                 let expected = if east.abs() > 0.5 { [-0.99958, 0.02885] } else { [-0.02885, -0.99958] };
                 let off = (f64::from(east) - expected[0]).hypot(f64::from(north) - expected[1]);
                 assert!(off < 1e-4 && up == 0.0, "{:?}", maps.normal[at]);

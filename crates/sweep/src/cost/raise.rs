@@ -87,8 +87,8 @@ mod registers {
         };
         let mut x = 0;
         loop {
-            // SAFETY: the token proves that the machine has AVX2. `x` is at most `last`, from which on both
-            // slices hold `LANES` bytes.
+            // SAFETY: the token proves that the machine has AVX2. `x` is at most `last`, from which
+            // on both slices hold `LANES` bytes.
             unsafe {
                 let mark = _mm_loadu_si128(marks.as_ptr().add(x).cast());
                 let mark = _mm_and_si128(mark, _mm_set1_epi8(worst as i8));
