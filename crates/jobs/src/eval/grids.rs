@@ -51,7 +51,8 @@ pub struct GridEvalReport {
 /// use numeric::Silent;
 ///
 /// let town = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town");
-/// let mut config = GridEvalConfig::new(format!("{town}/truth/dsm.tif").into(), format!("{town}/truth/dsm.tif").into());
+/// let truth = std::path::PathBuf::from(town).join("truth/dsm.tif");
+/// let mut config = GridEvalConfig::new(truth.clone(), truth);
 /// config.alignment = eval::AlignmentMethod::Z;
 /// config.target = EvalTarget::Nowhere;
 /// let report = compare_grids(&config, &Silent)?;
