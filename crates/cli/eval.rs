@@ -103,7 +103,7 @@ pub(crate) struct Args {
     /// Exit with 1 if the completeness over all cells is below this share (0 to 1), at 1 m unless T
     /// names another threshold.
     #[arg(long, value_name = "[T=]SHARE", value_delimiter = ',')]
-    min_completeness: Vec<LeastCompleteness>,
+    min_completeness: Vec<MinCompleteness>,
 }
 
 /// Options for surfaces that are not grids.
@@ -185,24 +185,6 @@ impl From<MapKind> for jobs::eval::MapKind {
     }
 }
 
-/// `--min-completeness`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct LeastCompleteness(MinCompleteness);
-
-impl std::str::FromStr for LeastCompleteness {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (threshold, share) = text.split_once('=').unwrap_or(("1", text));
-        let number = |part: &str| part.trim().parse::<f64>().map_err(|_| format!("\"{part}\" is not a number"));
-        let (threshold_m, share) = (number(threshold)?, number(share)?);
-        if !(0.0..=1.0).contains(&share) {
-            return Err(format!("{share} is not a share: expected 0 to 1"));
-        }
-        Ok(Self(MinCompleteness { threshold_m, share }))
-    }
-}
-
 /// Runs `skysweep eval`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if let Some(max_mae) = args.max_mae {
@@ -241,10 +223,7 @@ fn refuse_grid_options(args: &Args, what: &str) -> anyhow::Result<()> {
 }
 
 fn requirements(args: &Args) -> EvalRequirements {
-    EvalRequirements {
-        max_mae: args.max_mae,
-        min_completeness: args.min_completeness.iter().map(|least| least.0).collect(),
-    }
+    EvalRequirements { max_mae: args.max_mae, min_completeness: args.min_completeness.clone() }
 }
 
 /// Compares height grids and returns the requirements that were missed.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use ::priors::{Amount, DepthKind, NormalFrame, Spacing as Placement, VisibilityConfig};
 use anyhow::bail;
-use city::{Lod, SurfaceClass};
+use city::Lod;
 use clap::ValueEnum;
 use crs::{CrsRequest, VerticalDatum};
 use jobs::files::FileError;
@@ -102,8 +102,8 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t = Spacing::Stratified)]
     spacing: Spacing,
     /// Weight of a class of surfaces, such as RoofSurface=2; 0 leaves it out.
-    #[arg(long, value_name = "CLASS=WEIGHT", value_parser = parse_weight)]
-    class_weight: Vec<(SurfaceClass, f64)>,
+    #[arg(long, value_name = "CLASS=WEIGHT")]
+    class_weight: Vec<PriorsClassWeight>,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -321,23 +321,7 @@ impl Args {
             Spacing::Stratified => Placement::Stratified,
             Spacing::Poisson => Placement::PoissonDisk,
         };
-        let weight = |&(class, weight): &(SurfaceClass, f64)| PriorsClassWeight { class, weight };
-        config.class_weights = self.class_weight.iter().map(weight).collect();
+        config.class_weights.clone_from(&self.class_weight);
         config.seed = self.seed;
     }
-}
-
-/// `RoofSurface=2`, also `roof=2`.
-fn parse_weight(text: &str) -> Result<(SurfaceClass, f64), String> {
-    let names = || SurfaceClass::all().map(SurfaceClass::name).collect::<Vec<_>>().join(", ");
-    let (name, weight) = text.split_once('=').ok_or_else(|| format!("expected CLASS=WEIGHT, found {text:?}"))?;
-    let wanted = name.trim().to_lowercase();
-    let fits = |class: &SurfaceClass| {
-        let known = class.name().to_lowercase();
-        known == wanted || known.strip_suffix("surface") == Some(wanted.as_str())
-    };
-    let class =
-        SurfaceClass::all().find(fits).ok_or_else(|| format!("no class {name:?}, expected one of {}", names()))?;
-    let weight = weight.trim().parse().map_err(|_| format!("expected a number after the class, found {weight:?}"))?;
-    Ok((class, weight))
 }

@@ -1,5 +1,7 @@
 //! Requirements that an evaluation must meet. A missed requirement is reported; it is not an error.
 
+use std::str::FromStr;
+
 use serde::{Deserialize, Serialize};
 
 use super::error::EvalJobError;
@@ -23,6 +25,21 @@ pub struct MinCompleteness {
     pub threshold_m: f64,
     /// Least share of the cells, 0 to 1.
     pub share: f64,
+}
+
+impl FromStr for MinCompleteness {
+    type Err = String;
+
+    /// Reads `THRESHOLD=SHARE`, or `SHARE` for a threshold of 1 m.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (threshold, share) = text.split_once('=').unwrap_or(("1", text));
+        let number = |part: &str| part.trim().parse::<f64>().map_err(|_| format!("\"{part}\" is not a number"));
+        let (threshold_m, share) = (number(threshold)?, number(share)?);
+        if !(0.0..=1.0).contains(&share) {
+            return Err(format!("{share} is not a share: expected 0 to 1"));
+        }
+        Ok(Self { threshold_m, share })
+    }
 }
 
 impl EvalRequirements {

@@ -1,6 +1,7 @@
 //! What priors are made of, and how.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use ::priors::{Amount, ClassWeights, MapConfig, SampleConfig, Spacing, VisibilityConfig};
 use city::{Lod, SurfaceClass};
@@ -100,6 +101,26 @@ pub struct PriorsClassWeight {
     pub class: SurfaceClass,
     /// Points per area relative to a class of weight 1.
     pub weight: f64,
+}
+
+impl FromStr for PriorsClassWeight {
+    type Err = String;
+
+    /// Reads `CLASS=WEIGHT` in any letter case, such as `RoofSurface=2` or `roof=2`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = || SurfaceClass::all().map(SurfaceClass::name).collect::<Vec<_>>().join(", ");
+        let (name, weight) = text.split_once('=').ok_or_else(|| format!("expected CLASS=WEIGHT, found {text:?}"))?;
+        let wanted = name.trim().to_lowercase();
+        let fits = |class: &SurfaceClass| {
+            let known = class.name().to_lowercase();
+            known == wanted || known.strip_suffix("surface") == Some(wanted.as_str())
+        };
+        let class =
+            SurfaceClass::all().find(fits).ok_or_else(|| format!("no class {name:?}, expected one of {}", names()))?;
+        let weight =
+            weight.trim().parse().map_err(|_| format!("expected a number after the class, found {weight:?}"))?;
+        Ok(Self { class, weight })
+    }
 }
 
 impl PriorsConfig {
