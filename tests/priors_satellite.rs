@@ -115,7 +115,7 @@ fn check_options(folder: &Path) {
         |out: &str| band(folder.join(out).join("height/heights_1.tif"), 1).data().iter().copied().fold(0.0, f32::max);
     assert!((45.0..55.0).contains(&(top("geoid") - top("out"))), "{}", top("geoid") - top("out"));
     refused(&["--offset", "1", "2", "3"], "satellite images find the model");
-    refused(&["--crs", "EPSG:4326"], "expected a projected coordinate system");
+    refused(&["--crs", "EPSG:4326"], "expected a projected one in metres");
     refused(&["--crs", "EPSG:32633"], "no image has a building in it");
     refused(&["--cameras", "scene/truth/heights_1.tif", "scene/scene.json"], "something else");
     refused(&["--cameras", "scene/truth/dsm.tif"], "RPC");

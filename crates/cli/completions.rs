@@ -1,5 +1,4 @@
-//! `skysweep completions SHELL` and `skysweep man [COMMAND…]`: both are made from the command
-//! line's own definition and printed to standard output.
+//! Completion scripts and manual pages, made from the definition of the command line.
 
 use anyhow::Context;
 use clap::Command;
