@@ -5,13 +5,10 @@
 //! only the declarations, so this script finds the library.
 
 fn main() {
-    println!("cargo:rerun-if-changed=build.rs");
     if let Err(error) = pkg_config::Config::new().atleast_version("9.1").probe("proj") {
-        println!(
-            "cargo:warning=PROJ 9.1 or newer was not found: install its development package (Debian, Ubuntu: \
-             apt-get install libproj-dev pkg-config)"
+        panic!(
+            "PROJ 9.1 or newer was not found: install its development package (Debian, Ubuntu: \
+             apt-get install libproj-dev pkg-config)\n{error}"
         );
-        eprintln!("{error}");
-        std::process::exit(1);
     }
 }

@@ -61,6 +61,14 @@ pub(crate) struct Tile {
     pub(crate) farthest_of_all: f32,
 }
 
+/// A triangle that is tested against the rays of a tile.
+struct Candidate {
+    /// Number in the order of the leaves.
+    number: usize,
+    facet: Facet,
+    fast: FastFacet,
+}
+
 impl Tile {
     pub(crate) fn new(question: Question) -> Box<Self> {
         Box::new(Self {
@@ -144,13 +152,14 @@ impl Tile {
     pub(crate) fn meet<I: InstructionSet>(&mut self, isa: I, eye: &Eye, bvh: &Bvh, number: usize, reach: [f64; 2]) {
         let Some(facet) = Facet::new(eye, &bvh.corners[number]) else { return };
         let fast = facet.fast(reach);
+        let candidate = Candidate { number, facet, fast };
         let mut changed = false;
         for block in 0..SUBTILES / LANES {
-            let mut open = self.subtiles_in_reach(isa, &fast, block);
+            let mut open = self.subtiles_in_reach(isa, &candidate.fast, block);
             while open != 0 {
                 let lane = open.trailing_zeros() as usize;
                 open &= open - 1;
-                changed |= self.meet_subtile(isa, eye, bvh, number, &facet, &fast, block * LANES + lane);
+                changed |= self.meet_subtile(isa, eye, bvh, &candidate, block * LANES + lane);
             }
         }
         if changed {
@@ -178,11 +187,11 @@ impl Tile {
         isa: I,
         eye: &Eye,
         bvh: &Bvh,
-        number: usize,
-        facet: &Facet,
-        fast: &FastFacet,
+        candidate: &Candidate,
         subtile: usize,
     ) -> bool {
+        let Candidate { number, facet, fast } = candidate;
+        let number = *number;
         let mut changed = false;
         for group in subtile * GROUPS_PER_SUBTILE..(subtile + 1) * GROUPS_PER_SUBTILE {
             let (x, y) = (isa.load(&self.x[group]), isa.load(&self.y[group]));
