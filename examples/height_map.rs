@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release --example height_map [OUTPUT.tif]`
 
+#![allow(clippy::print_stdout, reason = "an example shows its results on the terminal")]
+
 use std::error::Error;
 use std::path::PathBuf;
 

@@ -3,6 +3,8 @@
 //!
 //! `cargo run --release --example priors_of_a_tile [OUTPUT [MODEL IMAGE…]]`
 
+#![allow(clippy::print_stdout, reason = "an example shows its results on the terminal")]
+
 use std::error::Error;
 use std::path::PathBuf;
 

@@ -3,6 +3,8 @@
 //!
 //! `cargo run --example project_a_point [IMAGE]`
 
+#![allow(clippy::print_stdout, reason = "an example shows its results on the terminal")]
+
 use std::error::Error;
 use std::path::PathBuf;
 

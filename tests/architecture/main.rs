@@ -264,7 +264,7 @@ fn the_command_line_parses_and_prints_and_does_nothing_else() {
         "create_dir",
         "fs::rename",
         "fs::remove",
-        "io::atomic",
+        "atomic::write",
     ];
     let broken: Vec<String> = files
         .iter()

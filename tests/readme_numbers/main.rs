@@ -60,10 +60,11 @@ fn measurements(line: &str) -> Vec<String> {
         let is_size = next == "×" && is_number(&after);
         if is_number(&word) && UNITS.contains(&next.as_str()) && !is_size {
             found.push(format!("{word} {next}"));
-        } else if is_number(word.trim_end_matches(['%', '×'])) && word.ends_with(['%', '×']) {
-            found.push(word);
-        } else if has_metric && is_number(&word) && word.contains('.') {
-            found.push(word);
+        } else {
+            let is_share = word.ends_with(['%', '×']) && is_number(word.trim_end_matches(['%', '×']));
+            if is_share || (has_metric && is_number(&word) && word.contains('.')) {
+                found.push(word);
+            }
         }
     }
     found

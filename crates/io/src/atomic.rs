@@ -226,7 +226,11 @@ mod tests {
         std::fs::write(&plain, b"").unwrap();
         write_bytes(&bytes, b"", false).unwrap();
         write_bytes_synced(&synced, b"", false).unwrap();
-        write_path::<SaveError>(&path, false, |made| Ok(std::fs::write(made, b"").unwrap())).unwrap();
+        write_path::<SaveError>(&path, false, |made| {
+            std::fs::write(made, b"").unwrap();
+            Ok(())
+        })
+        .unwrap();
         let mode = |path: &PathBuf| std::fs::metadata(path).unwrap().permissions().mode();
         assert!([&bytes, &synced, &path].into_iter().all(|path| mode(path) == mode(&plain)));
     }

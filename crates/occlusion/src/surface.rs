@@ -112,7 +112,7 @@ impl<'a> OcclusionSurface<'a> {
     /// // A wall of 10 m in column 5, and a sensor to the right at 45°.
     /// let cells = (0..18).map(|i| if i % 9 == 5 { 10.0 } else { 0.0 }).collect();
     /// let heights = Grid::from_vec(9, 2, cells).unwrap();
-    /// let surface = OcclusionOcclusionSurface::new(&heights, 1.0);
+    /// let surface = OcclusionSurface::new(&heights, 1.0);
     /// assert!(surface.hides(1.0, 0.5, 0.0, [1.0, 0.0], 0.05));
     /// assert!(!surface.hides(7.0, 0.5, 0.0, [1.0, 0.0], 0.05));
     /// ```

@@ -37,8 +37,11 @@ pub fn read(folder: &Path) -> Result<ColmapModel, ColmapError> {
     Ok(read_views(folder, ImagePoints::Skip)?.0)
 }
 
-/// Reads the model, and per view the pixels of its points in COLMAP's convention.
-pub(super) fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapModel, Vec<Vec<[f64; 2]>>), ColmapError> {
+/// Pixels of the points of one view, in COLMAP's convention.
+pub(super) type ViewPixels = Vec<[f64; 2]>;
+
+/// Reads the model, and the pixels of the points of each view.
+pub(super) fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapModel, Vec<ViewPixels>), ColmapError> {
     let (cameras_path, cameras) = load(folder, "cameras", binary::cameras, text::cameras)?;
     let images = |bytes: &[u8]| binary::images(bytes, keep);
     let (images_path, images) = load(folder, "images", images, |text| text::images(text, keep))?;

@@ -61,7 +61,7 @@ impl AlignJobConfig {
     /// # Errors
     /// [`AlignJobError::Threshold`] and [`AlignJobError::NoiseLevel`].
     pub fn validate(&self) -> Result<(), AlignJobError> {
-        if let Some(threshold_m) = self.threshold_m.filter(|threshold_m| !(*threshold_m > 0.0)) {
+        if let Some(threshold_m) = self.threshold_m.filter(|threshold_m| threshold_m.is_nan() || *threshold_m <= 0.0) {
             return Err(AlignJobError::Threshold { threshold_m });
         }
         let noise = self.noise.iter();

@@ -33,7 +33,7 @@ pub(super) struct GridInputs {
     pub(super) test_from_reference: CellMap,
     pub(super) metres_from_cells: MetresFromCells,
     /// Classes on the reference grid, with their origin in words.
-    pub(super) classes: Option<(Grid<Option<i32>>, String)>,
+    pub(super) classes: Option<(ClassGrid, String)>,
     /// Cells that count, on the reference grid.
     pub(super) mask: Option<Grid<bool>>,
     /// Terrain heights on the reference grid, above the datum of the reference.
@@ -107,12 +107,15 @@ fn on_test_grid(path: &Path, test: &Dem) -> Result<Grid<f32>, EvalJobError> {
     Ok(found.heights)
 }
 
+/// Classes of the cells, `None` where a cell has none.
+type ClassGrid = Grid<Option<i32>>;
+
 /// Reads the reference, and the classes of its points if it is a classified cloud.
 fn reference(
     config: &GridEvalConfig,
     test: &Dem,
     notes: &mut Vec<String>,
-) -> Result<(Dem, Option<Grid<Option<i32>>>), EvalJobError> {
+) -> Result<(Dem, Option<ClassGrid>), EvalJobError> {
     if !is_point_cloud(&config.reference) {
         return Ok((read_dem(&config.reference)?, None));
     }

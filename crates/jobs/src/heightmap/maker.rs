@@ -44,7 +44,7 @@ enum Confidence {
     /// 1 where the source has a height, 0 where the terrain model gave it.
     Presence,
     /// From a raster.
-    Raster(RasterSource),
+    Raster(Box<RasterSource>),
 }
 
 impl Maker {
@@ -173,7 +173,8 @@ fn confidence(
     progress: &dyn Progress,
 ) -> Result<Confidence, HeightMapJobError> {
     let open = |path: &Path| {
-        RasterSource::open(path, None, Some(crs::VerticalDatum::Ellipsoid), progress).map(Confidence::Raster)
+        RasterSource::open(path, None, Some(crs::VerticalDatum::Ellipsoid), progress)
+            .map(|raster| Confidence::Raster(Box::new(raster)))
     };
     let beside = config.source.with_file_name(CONFIDENCE);
     match (&config.confidence, source) {

@@ -198,7 +198,9 @@ mod tests {
         compare_with_the_recurrence((9, 7), |x, _| (if x == 3 { 1 << 30 } else { 0 }, 7));
     }
 
-    const ROWS: [(&str, fn(RowKernel<'_>)); 2] =
+    type ExtendRow = fn(RowKernel<'_>);
+
+    const ROWS: [(&str, ExtendRow); 2] =
         [("the machine's instructions", extend_row_fast), ("arrays", extend_row_plain)];
 
     /// `range` returns the first hypothesis of a pixel and how many it has.

@@ -52,7 +52,7 @@ impl Kernel<Arrays> for RaiseMarked<'_> {
 
     #[inline(always)]
     fn run(self, _: Arrays) {
-        self.for_each_row(|costs, marks, worst| raise_row(costs, marks, worst));
+        self.for_each_row(raise_row);
     }
 }
 
