@@ -1,7 +1,7 @@
 //! Finds what a surface model hides from a satellite.
 //!
 //! [`OcclusionSurface`] finds whether it hides a point from a sensor, with upright
-//! [walls](wall) between cells. [`Eyeline`] gives the direction towards the sensor at each cell,
+//! walls between cells. [`Eyeline`] gives the direction towards the sensor at each cell,
 //! [`GridGround`] the position of each cell.
 
 mod eyeline;

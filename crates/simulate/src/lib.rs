@@ -15,10 +15,10 @@
 //! ```
 //! use simulate::{Simulation, SimulationConfig};
 //!
-//! let config = SimulationConfig { size_m: 40.0, views: 2, ..SimulationConfig::preset("town")? };
+//! let config = SimulationConfig { size_m: 64.0, views: 2, ..SimulationConfig::preset("town")? };
 //! let scene = Simulation::new(config)?;
 //! assert_eq!(scene.views.len(), 2);
-//! assert_eq!(scene.truth.dsm.width(), 80);
+//! assert_eq!(scene.truth.dsm.width(), 128);
 //! # Ok::<(), simulate::SimulateError>(())
 //! ```
 
