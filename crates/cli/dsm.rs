@@ -8,7 +8,7 @@ use jobs::dsm::{
 };
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{ProgressStyle, Watcher};
+use crate::progress::{ShowOptions, Watcher};
 use crate::{Global, Outcome};
 
 /// Make a surface model from two or more satellite images with RPCs.
@@ -79,12 +79,8 @@ pub(crate) struct Args {
     /// Replace existing results.
     #[arg(long)]
     overwrite: bool,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
-    progress: ProgressStyle,
-    /// Print the report as JSON on stdout.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -159,14 +155,14 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let watcher = Watcher::new(args.progress, global);
+    let watcher = Watcher::new(args.show.progress, global);
     let outcome = jobs::dsm::run(&args.config(), &watcher);
     watcher.finish();
     let report = outcome.map_err(|error| {
         let hint = hint(&error);
         with_hint(error, hint)
     })?;
-    if args.json {
+    if args.show.json {
         crate::print::json(&report)?;
     } else if !global.is_quiet() {
         crate::print::text(&summary(args, &report))?;

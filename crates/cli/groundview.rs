@@ -12,7 +12,7 @@ use jobs::files::FileError;
 use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig, GroundViewError};
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{Log, ProgressStyle, Watcher};
+use crate::progress::{Log, ShowOptions, Watcher};
 use crate::stand::StandArgs;
 use crate::{Global, Outcome, print};
 
@@ -105,12 +105,8 @@ struct MakeArgs {
     /// Replace files that exist.
     #[arg(long)]
     overwrite: bool,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
-    progress: ProgressStyle,
-    /// Print the report as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 /// Runs `skysweep groundview`.
@@ -124,12 +120,12 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 fn make(args: &MakeArgs, surface: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, surface, output)?;
-    let watcher = Watcher::new(args.progress, global);
+    let watcher = Watcher::new(args.show.progress, global);
     let report = jobs::groundview::run(&config, &watcher);
     watcher.finish();
     let report = report.map_err(hinted)?;
     report.failed.iter().take(SHOWN).for_each(|failure| tracing::error!("{}: {}", failure.id, failure.reason));
-    if args.json {
+    if args.show.json {
         print::json(&report)?;
     } else if !global.is_quiet() {
         print::text(&report.text())?;

@@ -19,7 +19,7 @@ use jobs::heightmap::{
 };
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{Log, ProgressStyle, Watcher};
+use crate::progress::{Log, ShowOptions, Watcher};
 use crate::stand::StandArgs;
 use crate::{Global, Outcome, print};
 
@@ -159,12 +159,8 @@ struct MakeArgs {
     /// Replace maps that exist; without it a list goes on where an earlier run was stopped.
     #[arg(long)]
     overwrite: bool,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
-    progress: ProgressStyle,
-    /// Print the report as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 /// Runs `skysweep heightmap`.
@@ -178,12 +174,12 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 fn make(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, source, output)?;
-    let watcher = Watcher::new(args.progress, global);
+    let watcher = Watcher::new(args.show.progress, global);
     let report = jobs::heightmap::run(&config, &watcher);
     watcher.finish();
     let report = report.map_err(hinted)?;
     let failed = log_failures(&report);
-    if args.json {
+    if args.show.json {
         print::json(&report)?;
     } else if !global.is_quiet() {
         print::text(&report.text())?;

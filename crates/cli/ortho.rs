@@ -9,7 +9,7 @@ use jobs::ortho::{OrthoConfig, OrthoError};
 
 use crate::corrections::corrections_of;
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{ProgressStyle, Watcher};
+use crate::progress::{ShowOptions, Watcher};
 use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep ortho`.
@@ -57,21 +57,17 @@ pub(crate) struct Args {
     /// Replace files that exist.
     #[arg(long)]
     overwrite: bool,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
-    progress: ProgressStyle,
-    /// Print the report as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 /// Runs `skysweep ortho`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let watcher = Watcher::new(args.progress, global);
+    let watcher = Watcher::new(args.show.progress, global);
     let report = jobs::ortho::run(&args.config(), &watcher);
     watcher.finish();
     let report = report.map_err(hinted)?;
-    if args.json {
+    if args.show.json {
         print::json(&report)?;
     } else if !global.is_quiet() {
         print::text(&report.text())?;

@@ -15,7 +15,7 @@ use jobs::priors::{
 };
 
 use crate::error::with_hint;
-use crate::progress::{ProgressStyle, Watcher};
+use crate::progress::{ShowOptions, Watcher};
 use crate::{Global, Outcome, print};
 
 /// Make depth, normal and mask priors of a city model for the cameras of a Gaussian splatting
@@ -146,12 +146,8 @@ pub(crate) struct Args {
     /// Replace an earlier dataset.
     #[arg(long)]
     overwrite: bool,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
-    progress: ProgressStyle,
-    /// Print the report as JSON on stdout.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 /// What is to be trained.
@@ -205,11 +201,11 @@ enum Normals {
 /// Runs `skysweep priors`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let config = args.config()?;
-    let watcher = Watcher::new(args.progress, global);
+    let watcher = Watcher::new(args.show.progress, global);
     let made = jobs::priors::run(&config, &watcher);
     watcher.finish();
     let report = made.map_err(hinted)?;
-    if args.json {
+    if args.show.json {
         print::json(&report.product.json()?)?;
     } else if !global.is_quiet() {
         print::text(&summary(args, &report.product))?;

@@ -19,6 +19,17 @@ pub(crate) enum ProgressStyle {
     None,
 }
 
+/// How a command shows what it does and what it found.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(crate) struct ShowOptions {
+    /// How progress is shown on stderr.
+    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
+    pub(crate) progress: ProgressStyle,
+    /// Print the report as JSON on stdout.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// Shows a job's progress.
 pub(crate) struct Watcher {
     style: ProgressStyle,

@@ -12,7 +12,7 @@ use splats::DivisionConfig;
 
 use crate::corrections::corrections_of;
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{Log, ProgressStyle, Watcher};
+use crate::progress::{Log, ShowOptions, Watcher};
 use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep splats`.
@@ -128,12 +128,8 @@ struct RenderArgs {
     /// Replace files that exist.
     #[arg(long)]
     overwrite: bool,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t = ProgressStyle::Bar)]
-    progress: ProgressStyle,
-    /// Print the report as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 /// Runs `skysweep splats`.
@@ -175,11 +171,11 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     config.pictures.clone_from(&args.pictures);
     config.corrections.clone_from(&args.corrections);
     config.overwrite = args.overwrite;
-    let watcher = Watcher::new(args.progress, global);
+    let watcher = Watcher::new(args.show.progress, global);
     let made = jobs::splats::render(&config, &watcher);
     watcher.finish();
     let report = made.map_err(hinted)?;
-    if args.json {
+    if args.show.json {
         print::json(&report)?;
     } else if !global.is_quiet() {
         print::text(&render_summary(&report, &args.output))?;
