@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use camera::Rpc;
 use io::rpc::{RpcReadError, read};
 
 /// The fields of every line of the reference, by path.
@@ -81,27 +80,10 @@ fn what_another_reader_reads_ours_reads() {
     assert!(compared > 0, "no file of the list is there");
 }
 
-fn numbers(rpc: &Rpc) -> Vec<f64> {
-    let scalars = [
-        rpc.line_off,
-        rpc.samp_off,
-        rpc.lat_off,
-        rpc.long_off,
-        rpc.height_off,
-        rpc.line_scale,
-        rpc.samp_scale,
-        rpc.lat_scale,
-        rpc.long_scale,
-        rpc.height_scale,
-    ];
-    let polynomials = [rpc.line_num, rpc.line_den, rpc.samp_num, rpc.samp_den];
-    scalars.into_iter().chain(polynomials.into_iter().flatten()).collect()
-}
-
 /// Compares all ninety numbers of two containers; `relative` is what their digits allow.
 fn check_same(root: &Path, a: &str, b: &str, relative: f64) {
     let rpc = |name: &str| read(&root.join(name)).unwrap_or_else(|e| panic!("{e}")).rpc;
-    for (i, (x, y)) in numbers(&rpc(a)).into_iter().zip(numbers(&rpc(b))).enumerate() {
+    for (i, (x, y)) in rpc(a).numbers().zip(rpc(b).numbers()).enumerate() {
         assert!((x - y).abs() <= relative * x.abs().max(y.abs()), "number {i} of {a} is {x}, of {b} {y}");
     }
 }

@@ -63,18 +63,10 @@ fn paint([x, y, z]: [f64; 3]) -> f64 {
 /// Returns smooth noise in [−1, 1] whose lattice repeats with the town.
 fn noise(seed: u64, p: [f64; 3], cell: f64) -> f64 {
     let period = (PERIOD_M / cell) as i64;
-    let floor = p.map(f64::floor);
-    let t: [f64; 3] = std::array::from_fn(|i| {
-        let f = p[i] - floor[i];
-        f * f * (3.0 - 2.0 * f)
-    });
-    let corner = |k: usize| {
-        let at = |i: usize| floor[i] as i64 + (k >> i & 1) as i64;
-        let weight: f64 = (0..3).map(|i| if k >> i & 1 == 1 { t[i] } else { 1.0 - t[i] }).product();
-        let key = [seed, at(0).rem_euclid(period) as u64, at(1).rem_euclid(period) as u64, at(2) as u64];
-        weight * (2.0 * uniform(key) - 1.0)
-    };
-    (0..8).map(corner).sum()
+    testing::lattice_noise(p, |[x, y, z]| {
+        let key = [seed, x.rem_euclid(period) as u64, y.rem_euclid(period) as u64, z as u64];
+        2.0 * uniform(key) - 1.0
+    })
 }
 
 /// Returns a number in [0, 1) that depends on the key alone.

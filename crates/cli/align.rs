@@ -7,9 +7,8 @@ use colmap::align::{AlignConfig, Disturbance, NoiseConfig, NoiseLevel};
 use crs::VerticalDatum;
 use io::colmap::ColmapEncoding;
 use jobs::align::{AlignJobConfig, AlignJobError, AlignJobReport};
-use jobs::files::FileError;
 
-use crate::error::{OVERWRITE, with_hint};
+use crate::error::with_hint;
 use crate::progress::Log;
 use crate::{Global, Outcome, print};
 
@@ -99,7 +98,6 @@ struct NoiseArgs {
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let report = jobs::align::run(&config(args), &Log).map_err(|error| {
         let hint = match &error {
-            AlignJobError::File(FileError::Exists { .. }) => Some(OVERWRITE),
             AlignJobError::Threshold { .. } => Some("give --threshold a number of metres above 0"),
             AlignJobError::UnknownMap => Some("give the map of the positions with --crs"),
             AlignJobError::NotMetres { .. } => Some("choose another --crs"),

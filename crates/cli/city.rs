@@ -11,21 +11,14 @@ use std::path::PathBuf;
 use city::{CrsReference, Lod};
 use clap::ValueEnum;
 use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityJobError, CityOutputFormat, CitySummary};
-use jobs::files::FileError;
 
-use crate::error::{OVERWRITE, with_hint};
+use crate::error::with_hint;
 use crate::progress::Log;
 use crate::{Outcome, print};
 
-/// Arguments of `skysweep city`.
-#[derive(Debug, clap::Args)]
-pub(crate) struct Args {
-    #[command(subcommand)]
-    command: Command,
-}
-
+/// The commands of `skysweep city`.
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+pub(crate) enum Command {
     /// Show what is in a city model: format, reference system, levels of detail, objects,
     /// triangles, defects.
     Info(InfoArgs),
@@ -57,7 +50,7 @@ struct Input {
 }
 
 #[derive(Debug, clap::Args)]
-struct InfoArgs {
+pub(crate) struct InfoArgs {
     #[command(flatten)]
     input: Input,
     /// Print JSON instead of text.
@@ -66,7 +59,7 @@ struct InfoArgs {
 }
 
 #[derive(Debug, clap::Args)]
-struct ConvertArgs {
+pub(crate) struct ConvertArgs {
     #[command(flatten)]
     input: Input,
     /// File to write.
@@ -92,8 +85,8 @@ enum Format {
 }
 
 /// Runs `skysweep city`.
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    match &args.command {
+pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
         Command::Info(args) => info(args),
         Command::Convert(args) => convert(args),
     }
@@ -138,7 +131,6 @@ impl Input {
 
 fn hinted(error: CityJobError) -> anyhow::Error {
     let hint = match &error {
-        CityJobError::File(FileError::Exists { .. }) => Some(OVERWRITE),
         CityJobError::UnknownEnding { .. } => Some("give --format obj, ply, glb, geojson or cityjson"),
         _ => None,
     };

@@ -8,7 +8,7 @@ use jobs::dsm::{
 };
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{ShowOptions, Watcher};
+use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
 
 /// Make a surface model from two or more satellite images with RPCs.
@@ -155,18 +155,11 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let watcher = Watcher::new(args.show.progress, global);
-    let outcome = jobs::dsm::run(&args.config(), &watcher);
-    watcher.finish();
-    let report = outcome.map_err(|error| {
+    let report = args.show.watch(global, |watcher| jobs::dsm::run(&args.config(), watcher)).map_err(|error| {
         let hint = hint(&error);
         with_hint(error, hint)
     })?;
-    if args.show.json {
-        crate::print::json(&report)?;
-    } else if !global.is_quiet() {
-        crate::print::text(&summary(args, &report))?;
-    }
+    args.show.print(global, &report, || summary(args, &report))?;
     let is_whole = report.chunks.as_ref().is_none_or(|c| c.failed.is_empty());
     Ok(if is_whole { Outcome::Complete } else { Outcome::Partial })
 }

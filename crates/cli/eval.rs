@@ -14,7 +14,6 @@ use jobs::eval::{
     EvalJobError, EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, GridEvalReport, MapEvalConfig,
     MinCompleteness, SurfaceEvalConfig,
 };
-use jobs::files::FileError;
 
 use crate::error::{OVERWRITE, with_hint};
 use crate::progress::Log;
@@ -341,7 +340,7 @@ fn maps(args: &Args) -> anyhow::Result<Vec<String>> {
 /// Adds the option that helps with an error.
 fn hinted(error: EvalJobError) -> anyhow::Error {
     let hint = match &error {
-        EvalJobError::ForeignFile { .. } | EvalJobError::File(FileError::Exists { .. }) => Some(OVERWRITE),
+        EvalJobError::ForeignFile { .. } => Some(OVERWRITE),
         EvalJobError::DatumUnknown { unknown: "test", .. } => Some("give --test-vertical"),
         EvalJobError::DatumUnknown { .. } => Some("give --ref-vertical"),
         EvalJobError::NoEpsgForErrorMap => Some("leave --error-map out"),

@@ -8,13 +8,14 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use crs::VerticalDatum;
 use jobs::camera_stand::StandError;
-use jobs::files::FileError;
+use jobs::city_files::CitySurfaceError;
+use jobs::error::JobError;
 use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig, GroundViewError};
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{Log, ShowOptions, Watcher};
+use crate::progress::{Log, RunOptions};
 use crate::stand::StandArgs;
-use crate::{Global, Outcome, print};
+use crate::{Global, Outcome};
 
 /// Failed views that are printed one by one.
 const SHOWN: usize = 20;
@@ -99,14 +100,8 @@ struct MakeArgs {
     /// or EPSG:n.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
-    /// Worker threads [default: all cores].
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
-    /// Replace files that exist.
-    #[arg(long)]
-    overwrite: bool,
     #[command(flatten)]
-    show: ShowOptions,
+    run: RunOptions,
 }
 
 /// Runs `skysweep groundview`.
@@ -120,16 +115,9 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 fn make(args: &MakeArgs, surface: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, surface, output)?;
-    let watcher = Watcher::new(args.show.progress, global);
-    let report = jobs::groundview::run(&config, &watcher);
-    watcher.finish();
-    let report = report.map_err(hinted)?;
+    let report = args.run.show.watch(global, |watcher| jobs::groundview::run(&config, watcher)).map_err(hinted)?;
     report.failed.iter().take(SHOWN).for_each(|failure| tracing::error!("{}: {}", failure.id, failure.reason));
-    if args.show.json {
-        print::json(&report)?;
-    } else if !global.is_quiet() {
-        print::text(&report.text())?;
-    }
+    args.run.show.print(global, &report, || report.text())?;
     Ok(if report.is_complete() { Outcome::Complete } else { Outcome::Partial })
 }
 
@@ -147,8 +135,8 @@ fn config(args: &MakeArgs, surface: &Path, output: &Path) -> anyhow::Result<Grou
     config.pictures = args.pictures.clone();
     config.points_per_view = args.points;
     config.surface_vertical = args.vertical;
-    config.threads = args.threads;
-    config.overwrite = args.overwrite;
+    config.threads = args.run.threads;
+    config.overwrite = args.run.overwrite;
     Ok(config)
 }
 
@@ -163,14 +151,14 @@ fn compose(args: &ComposeArgs) -> anyhow::Result<Outcome> {
 /// Adds the option that helps with an error.
 fn hinted(error: GroundViewError) -> anyhow::Error {
     let hint = match &error {
-        GroundViewError::FolderInUse { .. } | GroundViewError::File(FileError::Exists { .. }) => Some(OVERWRITE),
+        GroundViewError::FolderInUse { .. } => Some(OVERWRITE),
         GroundViewError::NoGround => Some("give --camera-height"),
-        GroundViewError::NoSurface { .. } => Some("skysweep city info tells why"),
+        GroundViewError::City(CitySurfaceError::NoSurface { .. }) => Some("skysweep city info tells why"),
         GroundViewError::PlacedModel(_) => Some("skysweep align brings cameras to a map, --crs names it"),
         GroundViewError::Stand(StandError::NotFinite { .. }) => {
             Some("see --heading, --ground-offset and --camera-height")
         }
-        GroundViewError::Value { name, .. } => match *name {
+        GroundViewError::Job(JobError::Setting(setting)) => match setting.name {
             "the width of a panorama" => Some("see --width"),
             "the size of a crop" => Some("see --crop-size"),
             "the field of view" => Some("see --fov"),

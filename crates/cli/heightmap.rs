@@ -12,14 +12,14 @@ use city::Lod;
 use crs::{CrsRequest, VerticalDatum};
 use heightmap::{HeightMapError, Reading};
 use jobs::camera_stand::StandError;
-use jobs::files::FileError;
+use jobs::city_files::CitySurfaceError;
 use jobs::heightmap::{
     ConfidenceSource, HeightMapConfig, HeightMapFate, HeightMapJobError, HeightMapReport, MapChoice, Normalization,
     PointAxes, UnprojectConfig,
 };
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{Log, ShowOptions, Watcher};
+use crate::progress::{Log, RunOptions};
 use crate::stand::StandArgs;
 use crate::{Global, Outcome, print};
 
@@ -107,6 +107,9 @@ enum Interpolation {
 
 /// How maps are made.
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("overwrite", |arg| {
+    arg.help("Replace maps that exist; without it a list goes on where an earlier run was stopped")
+}))]
 struct MakeArgs {
     #[command(flatten)]
     stand: StandArgs,
@@ -153,14 +156,8 @@ struct MakeArgs {
     /// Write pictures beside the maps of a list too.
     #[arg(long, conflicts_with = "no_preview")]
     previews: bool,
-    /// Worker threads [default: all cores].
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
-    /// Replace maps that exist; without it a list goes on where an earlier run was stopped.
-    #[arg(long)]
-    overwrite: bool,
     #[command(flatten)]
-    show: ShowOptions,
+    run: RunOptions,
 }
 
 /// Runs `skysweep heightmap`.
@@ -174,16 +171,9 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 fn make(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, source, output)?;
-    let watcher = Watcher::new(args.show.progress, global);
-    let report = jobs::heightmap::run(&config, &watcher);
-    watcher.finish();
-    let report = report.map_err(hinted)?;
+    let report = args.run.show.watch(global, |watcher| jobs::heightmap::run(&config, watcher)).map_err(hinted)?;
     let failed = log_failures(&report);
-    if args.show.json {
-        print::json(&report)?;
-    } else if !global.is_quiet() {
-        print::text(&report.text())?;
-    }
+    args.run.show.print(global, &report, || report.text())?;
     Ok(if failed { Outcome::Partial } else { Outcome::Complete })
 }
 
@@ -230,8 +220,8 @@ fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<Heigh
     config.lod = args.lod;
     config.all_objects = args.all_objects;
     config.previews = if args.stand.positions.is_some() { args.previews } else { !args.no_preview };
-    config.threads = args.threads;
-    config.overwrite = args.overwrite;
+    config.threads = args.run.threads;
+    config.overwrite = args.run.overwrite;
     Ok(config)
 }
 
@@ -257,9 +247,9 @@ fn unproject(args: &UnprojectArgs, global: Global) -> anyhow::Result<Outcome> {
 /// Adds the option that helps with an error.
 fn hinted(error: HeightMapJobError) -> anyhow::Error {
     let hint = match &error {
-        HeightMapJobError::File(FileError::Exists { .. }) | HeightMapJobError::OtherMap { .. } => Some(OVERWRITE),
+        HeightMapJobError::OtherMap { .. } => Some(OVERWRITE),
         HeightMapJobError::NoCrs { .. } => Some("give --source-crs"),
-        HeightMapJobError::NoSurface { .. } => Some("skysweep city info tells why"),
+        HeightMapJobError::City(CitySurfaceError::NoSurface { .. }) => Some("skysweep city info tells why"),
         HeightMapJobError::Stand(StandError::NotFinite { .. }) => {
             Some("see --heading, --ground-offset and --camera-height")
         }

@@ -46,7 +46,8 @@ enum Command {
     /// Bring a COLMAP model to the world by GPS or point pairs.
     Align(Box<align::Args>),
     /// Show and convert city models.
-    City(city::Args),
+    #[command(subcommand)]
+    City(city::Command),
     /// Print a completion script for a shell.
     Completions(completions::CompletionArgs),
     /// Make a surface model from satellite images.
@@ -64,7 +65,8 @@ enum Command {
     /// Make depth, normal and mask priors of a city model for the cameras of a scene.
     Priors(Box<priors::Args>),
     /// Show, use and convert RPC camera models.
-    Rpc(rpc::Args),
+    #[command(subcommand)]
+    Rpc(rpc::Command),
     /// Make a scene seen through RPC cameras, with its exact surface.
     Simulate(simulate::Args),
     /// Make Gaussian splats of a surface model and its images.
@@ -90,7 +92,7 @@ fn main() -> ExitCode {
 fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Align(args) => align::run(args, cli.global),
-        Command::City(args) => city::run(args),
+        Command::City(command) => city::run(command),
         Command::Completions(args) => completions::completions(args, &mut Cli::command()),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
@@ -99,7 +101,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Ortho(args) => ortho::run(args, cli.global),
         Command::Man(args) => completions::man(args, Cli::command()),
         Command::Priors(args) => priors::run(args, cli.global),
-        Command::Rpc(args) => rpc::run(args),
+        Command::Rpc(command) => rpc::run(command),
         Command::Simulate(args) => simulate::run(args, cli.global),
         Command::Splats(args) => splats::run(args, cli.global),
         Command::Split(args) => split::run(args, cli.global),

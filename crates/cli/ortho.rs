@@ -4,13 +4,13 @@
 use std::path::PathBuf;
 
 use crs::VerticalDatum;
-use jobs::files::FileError;
+use jobs::error::JobError;
 use jobs::ortho::{OrthoConfig, OrthoError};
 
 use crate::corrections::corrections_of;
-use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{ShowOptions, Watcher};
-use crate::{Global, Outcome, print};
+use crate::error::with_hint;
+use crate::progress::RunOptions;
+use crate::{Global, Outcome};
 
 /// Arguments of `skysweep ortho`.
 #[derive(Debug, clap::Args)]
@@ -51,27 +51,15 @@ pub(crate) struct Args {
     /// Fill cells that are hidden in every image with what hides them, instead of no-data.
     #[arg(long)]
     keep_hidden: bool,
-    /// Worker threads [default: all cores].
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
-    /// Replace files that exist.
-    #[arg(long)]
-    overwrite: bool,
     #[command(flatten)]
-    show: ShowOptions,
+    run: RunOptions,
 }
 
 /// Runs `skysweep ortho`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let watcher = Watcher::new(args.show.progress, global);
-    let report = jobs::ortho::run(&args.config(), &watcher);
-    watcher.finish();
-    let report = report.map_err(hinted)?;
-    if args.show.json {
-        print::json(&report)?;
-    } else if !global.is_quiet() {
-        print::text(&report.text())?;
-    }
+    let show = args.run.show;
+    let report = show.watch(global, |watcher| jobs::ortho::run(&args.config(), watcher)).map_err(hinted)?;
+    show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 
@@ -85,8 +73,8 @@ impl Args {
         config.tolerance_m = self.tolerance;
         config.balance = !self.no_balance;
         config.keep_hidden = self.keep_hidden;
-        config.threads = self.threads;
-        config.overwrite = self.overwrite;
+        config.threads = self.run.threads;
+        config.overwrite = self.run.overwrite;
         config
     }
 }
@@ -94,11 +82,13 @@ impl Args {
 /// Adds the option that helps with an error.
 fn hinted(error: OrthoError) -> anyhow::Error {
     let hint = match &error {
-        OrthoError::File(FileError::Exists { .. }) => Some(OVERWRITE),
         OrthoError::Balance(_) => Some("give --no-balance"),
         OrthoError::TooLarge { .. } => Some("give --bounds or a larger --gsd"),
-        OrthoError::Value { name: "the cell size", .. } => Some("see --gsd"),
-        OrthoError::Value { name: "the tolerance", .. } => Some("see --tolerance"),
+        OrthoError::Job(JobError::Setting(setting)) => match setting.name {
+            "the cell size" => Some("see --gsd"),
+            "the tolerance" => Some("see --tolerance"),
+            _ => None,
+        },
         _ => None,
     };
     with_hint(error, hint)

@@ -9,19 +9,19 @@ use anyhow::bail;
 use city::Lod;
 use clap::ValueEnum;
 use crs::{CrsRequest, VerticalDatum};
-use jobs::files::FileError;
 use jobs::priors::{
     LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, PriorsMode, PriorsProduct, PriorsTrainer,
 };
 
 use crate::error::with_hint;
-use crate::progress::{ShowOptions, Watcher};
-use crate::{Global, Outcome, print};
+use crate::progress::RunOptions;
+use crate::{Global, Outcome};
 
 /// Make depth, normal and mask priors of a city model for the cameras of a Gaussian splatting
 /// scene.
 #[derive(Debug, clap::Args)]
 #[command(
+    mut_arg("overwrite", |arg| arg.help("Replace an earlier dataset")),
     after_help = "Examples: skysweep priors town.city.json --cameras scene/sparse/0 --offset 690000 5336000 0 -o scene_priors; \
                   skysweep priors town.city.json --cameras view_*.tif -o satellite_priors"
 )]
@@ -140,14 +140,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 12)]
     previews: usize,
 
-    /// Worker threads [default: all cores].
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
-    /// Replace an earlier dataset.
-    #[arg(long)]
-    overwrite: bool,
     #[command(flatten)]
-    show: ShowOptions,
+    run: RunOptions,
 }
 
 /// What is to be trained.
@@ -201,22 +195,16 @@ enum Normals {
 /// Runs `skysweep priors`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let config = args.config()?;
-    let watcher = Watcher::new(args.show.progress, global);
-    let made = jobs::priors::run(&config, &watcher);
-    watcher.finish();
-    let report = made.map_err(hinted)?;
-    if args.show.json {
-        print::json(&report.product.json()?)?;
-    } else if !global.is_quiet() {
-        print::text(&summary(args, &report.product))?;
-    }
+    let show = args.run.show;
+    let report = show.watch(global, |watcher| jobs::priors::run(&config, watcher)).map_err(hinted)?;
+    show.print(global, &report.product, || summary(args, &report.product))?;
     Ok(if report.unusable_objects > 0 { Outcome::Partial } else { Outcome::Complete })
 }
 
 /// Names the options that mend an error.
 fn hinted(error: PriorsJobError) -> anyhow::Error {
     let hint = match &error {
-        PriorsJobError::File(FileError::Exists { .. }) => Some("choose another folder or pass --overwrite"),
+        PriorsJobError::Job(error) if error.is_existing_output() => Some("choose another folder or pass --overwrite"),
         PriorsJobError::NothingInSight { .. } => Some("state it with --offset or --transform"),
         PriorsJobError::NotSatellite => Some("leave out --crs, --vertical and --corrections"),
         PriorsJobError::NotPerspective => Some("leave out --offset and --transform"),
@@ -301,8 +289,8 @@ impl Args {
         };
         config.geotiff = self.geotiff;
         config.previews = self.previews;
-        config.threads = self.threads.map(|threads| threads.max(1));
-        config.overwrite = self.overwrite;
+        config.threads = self.run.threads.map(|threads| threads.max(1));
+        config.overwrite = self.run.overwrite;
         Ok(config)
     }
 

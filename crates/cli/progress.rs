@@ -6,7 +6,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use numeric::{Choice, Progress};
 
-use crate::Global;
+use crate::{Global, print};
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -28,6 +28,45 @@ pub(crate) struct ShowOptions {
     /// Print the report as JSON on stdout.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl ShowOptions {
+    /// Runs a job while its progress is shown.
+    pub(crate) fn watch<T>(self, global: Global, job: impl FnOnce(&Watcher) -> T) -> T {
+        let watcher = Watcher::new(self.progress, global);
+        let result = job(&watcher);
+        watcher.finish();
+        result
+    }
+
+    /// Prints a report as JSON if asked for, or else as text unless only errors are to be printed.
+    pub(crate) fn print(
+        self,
+        global: Global,
+        report: &impl serde::Serialize,
+        text: impl FnOnce() -> String,
+    ) -> anyhow::Result<()> {
+        if self.json {
+            print::json(report)
+        } else if global.is_quiet() {
+            Ok(())
+        } else {
+            print::text(&text())
+        }
+    }
+}
+
+/// How a job runs, what becomes of earlier outputs, and what it shows.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(crate) struct RunOptions {
+    /// Worker threads [default: all cores].
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    /// Replace files that exist.
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    #[command(flatten)]
+    pub(crate) show: ShowOptions,
 }
 
 /// Shows a job's progress.

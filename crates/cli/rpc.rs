@@ -22,15 +22,9 @@ use crate::error::with_hint;
 use crate::progress::Log;
 use crate::{Outcome, print};
 
-/// Arguments of `skysweep rpc`.
-#[derive(Debug, clap::Args)]
-pub(crate) struct Args {
-    #[command(subcommand)]
-    command: Command,
-}
-
+/// The commands of `skysweep rpc`.
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+pub(crate) enum Command {
     /// Show the RPC of a file: format, offsets and scales, validity box, ground sampling distance,
     /// viewing angles.
     Info(InfoArgs),
@@ -43,7 +37,7 @@ enum Command {
 }
 
 #[derive(Debug, clap::Args)]
-struct InfoArgs {
+pub(crate) struct InfoArgs {
     /// RPC file, or image with an RPC.
     file: PathBuf,
     /// Print JSON for programs.
@@ -52,7 +46,7 @@ struct InfoArgs {
 }
 
 #[derive(Debug, clap::Args)]
-struct ProjectArgs {
+pub(crate) struct ProjectArgs {
     /// RPC file, or image with an RPC.
     file: PathBuf,
     /// Longitude, degrees.
@@ -73,7 +67,7 @@ struct ProjectArgs {
 }
 
 #[derive(Debug, clap::Args)]
-struct LocalizeArgs {
+pub(crate) struct LocalizeArgs {
     /// RPC file, or image with an RPC.
     file: PathBuf,
     /// Column; 0 is the centre of the first.
@@ -94,7 +88,7 @@ struct LocalizeArgs {
 }
 
 #[derive(Debug, clap::Args)]
-struct ConvertArgs {
+pub(crate) struct ConvertArgs {
     /// RPC file, or image with an RPC.
     file: PathBuf,
     /// File to write.
@@ -119,8 +113,8 @@ enum OutputFormat {
 }
 
 /// Runs `skysweep rpc`.
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    match &args.command {
+pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
         Command::Info(args) => info(args),
         Command::Project(args) => project(args),
         Command::Localize(args) => localize(args),

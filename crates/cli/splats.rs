@@ -6,13 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use crs::VerticalDatum;
-use jobs::files::FileError;
 use jobs::splats::{SplatRenderConfig, SplatRenderReport, SplatsConfig, SplatsJobError, SplatsReport};
 use splats::DivisionConfig;
 
 use crate::corrections::corrections_of;
-use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{Log, ShowOptions, Watcher};
+use crate::error::with_hint;
+use crate::progress::{Log, ShowOptions};
 use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep splats`.
@@ -171,21 +170,13 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     config.pictures.clone_from(&args.pictures);
     config.corrections.clone_from(&args.corrections);
     config.overwrite = args.overwrite;
-    let watcher = Watcher::new(args.show.progress, global);
-    let made = jobs::splats::render(&config, &watcher);
-    watcher.finish();
-    let report = made.map_err(hinted)?;
-    if args.show.json {
-        print::json(&report)?;
-    } else if !global.is_quiet() {
-        print::text(&render_summary(&report, &args.output))?;
-    }
+    let report = args.show.watch(global, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
+    args.show.print(global, &report, || render_summary(&report, &args.output))?;
     Ok(Outcome::Complete)
 }
 
 fn hinted(error: SplatsJobError) -> anyhow::Error {
     let hint = match &error {
-        SplatsJobError::File(FileError::Exists { .. }) => Some(OVERWRITE),
         SplatsJobError::NoCamera => Some("give IMAGE or --cameras FOLDER"),
         _ => None,
     };
@@ -193,18 +184,19 @@ fn hinted(error: SplatsJobError) -> anyhow::Error {
 }
 
 fn summary(report: &SplatsReport) -> String {
-    let share = 100.0 * report.splats as f64 / report.cells.max(1) as f64;
+    let made = &report.made;
+    let share = 100.0 * made.splats as f64 / made.cells.max(1) as f64;
     let mut text = format!(
         "splats     {} for {} cells ({share:.1} %)\nplanes     within {:.3} m\n",
-        report.splats, report.cells, report.plane_error_max_m
+        made.splats, made.cells, made.plane_error_max_m
     );
-    if let Some(heights) = &report.mean_height {
+    if let Some(heights) = &made.mean_height {
         text += &format!(
             "heights    RMSE {:.3} m, MAE {:.3} m, median {:.3} m\n",
             heights.rmse_m, heights.mae_m, heights.median_m
         );
     }
-    for image in &report.views {
+    for image in &made.views {
         let view = &image.view;
         text += &format!(
             "image      PSNR {} dB, SSIM {}, {:.1} % covered, sees {:.1} % of the cells: {}\n",
@@ -215,12 +207,12 @@ fn summary(report: &SplatsReport) -> String {
             image.image
         );
     }
-    for point in &report.uniform {
+    for point in &made.uniform {
         text += &format!("uniform    {} splats of {} cells: RMSE {:.3} m\n", point.splats, point.side, point.rmse_m);
     }
-    if let Some(count) = report.uniform_at_equal_rmse {
+    if let Some(count) = made.uniform_at_equal_rmse {
         text +=
-            &format!("equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n", count / report.splats as f64);
+            &format!("equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n", count / made.splats as f64);
     }
     text + &format!("written    {}\n", report.output)
 }

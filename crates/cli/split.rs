@@ -2,10 +2,8 @@
 
 use std::path::PathBuf;
 
-use jobs::files::FileError;
-use jobs::split::{SplitImage, SplitJobConfig, SplitJobError, SplitJobReport};
+use jobs::split::{SplitImage, SplitJobConfig, SplitJobReport};
 
-use crate::error::{OVERWRITE, with_hint};
 use crate::progress::Log;
 use crate::{Global, Outcome, print};
 
@@ -54,10 +52,7 @@ enum Preset {
 
 /// Runs `skysweep split`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let report = jobs::split::run(&config(args), &Log).map_err(|error| {
-        let exists = matches!(error, SplitJobError::File(FileError::Exists { .. }));
-        with_hint(error, exists.then_some(OVERWRITE))
-    })?;
+    let report = jobs::split::run(&config(args), &Log)?;
     if args.json {
         print::json(&report)?;
     } else if !global.is_quiet() || args.output.is_none() {

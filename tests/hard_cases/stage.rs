@@ -158,17 +158,7 @@ pub(crate) fn weathered([x, y, z]: [f64; 3]) -> f64 {
 
 /// Uniform in [−1, 1] at lattice points, smooth between them.
 pub(crate) fn noise_3d(seed: u64, p: [f64; 3]) -> f64 {
-    let floor = p.map(f64::floor);
-    let t: [f64; 3] = std::array::from_fn(|i| {
-        let f = p[i] - floor[i];
-        f * f * (3.0 - 2.0 * f)
-    });
-    let corner = |k: usize| {
-        let at = |i: usize| floor[i] as i64 + (k >> i & 1) as i64;
-        let weight: f64 = (0..3).map(|i| if k >> i & 1 == 1 { t[i] } else { 1.0 - t[i] }).product();
-        weight * (2.0 * uniform([seed, at(0) as u64, at(1) as u64, at(2) as u64]) - 1.0)
-    };
-    (0..8).map(corner).sum()
+    testing::lattice_noise(p, |[x, y, z]| 2.0 * uniform([seed, x as u64, y as u64, z as u64]) - 1.0)
 }
 
 /// Returns a number in [0, 1) that depends on the key alone.

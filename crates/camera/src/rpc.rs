@@ -132,6 +132,13 @@ impl Rpc {
         ]
     }
 
+    /// Returns the ninety numbers of the projection in the order of RPC00B: offsets, scales and the
+    /// coefficients of the four polynomials.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let scalars = self.offsets().into_iter().chain(self.scales()).map(|(_, value)| value);
+        scalars.chain(self.polynomials().into_iter().flat_map(|(_, coefficients)| coefficients.iter().copied()))
+    }
+
     fn offsets(&self) -> [(&'static str, f64); 5] {
         [
             ("LINE_OFF", self.line_off),

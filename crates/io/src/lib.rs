@@ -6,6 +6,7 @@
 //! it is complete ([`atomic`]).
 
 pub mod atomic;
+pub mod camera_file;
 pub mod citymodel;
 pub mod colmap;
 pub mod control;

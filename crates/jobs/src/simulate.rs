@@ -13,9 +13,10 @@ use crs::Crs;
 use io::citymodel::{CityJsonOptions, write_cityjson};
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapView};
 use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc};
-use numeric::Progress;
+use numeric::{Cancelled, Progress};
 use serde::{Deserialize, Serialize};
 
+use crate::error::{JobError, from_steps};
 use crate::files::{self, FileError};
 use crate::threads::{ThreadsError, install};
 
@@ -74,16 +75,12 @@ pub enum SimulateJobError {
     /// A perspective camera cannot be made.
     #[error(transparent)]
     Flight(#[from] LensError),
-    /// A file cannot be read or written.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    File(#[from] FileError),
-    /// The threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] ThreadsError),
-    /// The job was cancelled.
-    #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
+
+from_steps!(SimulateJobError: Job(FileError, ThreadsError, Cancelled));
 
 impl SimulateConfig {
     /// A simulation of `scene` without a flight, in a folder that is empty.
@@ -103,7 +100,7 @@ impl SimulateConfig {
 /// Reads the parameters of a scene from a TOML file.
 ///
 /// # Errors
-/// [`SimulateJobError::File`] and [`SimulateJobError::Parameters`].
+/// [`SimulateJobError::Job`] and [`SimulateJobError::Parameters`].
 pub fn read_scene(path: &Path) -> Result<SimulationConfig, SimulateJobError> {
     let text = files::read_text(path)?;
     SimulationConfig::from_toml(&text).map_err(|source| SimulateJobError::Parameters { path: path.to_owned(), source })

@@ -7,8 +7,9 @@ use colmap::split::{ChosenView, SplitConfig, SplitError, points_of_views, split}
 use io::colmap::{ColmapError, ColmapModel, ColmapPoint};
 use serde::{Deserialize, Serialize};
 
+use crate::error::{JobError, from_steps};
 use crate::files::{self, FileError};
-use numeric::Progress;
+use numeric::{Cancelled, Progress};
 
 /// A COLMAP model and the overlaps that are wanted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -63,9 +64,6 @@ pub enum SplitJobError {
     /// The model cannot be read.
     #[error(transparent)]
     Model(#[from] ColmapError),
-    /// The report exists or cannot be written.
-    #[error(transparent)]
-    File(#[from] FileError),
     /// No image has the name of the first context.
     #[error("no image of the model is called {name:?}")]
     UnknownImage {
@@ -83,10 +81,12 @@ pub enum SplitJobError {
     /// The overlaps cannot be served.
     #[error(transparent)]
     Split(#[from] SplitError),
-    /// The job was cancelled.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
+
+from_steps!(SplitJobError: Job(FileError, Cancelled));
 
 impl SplitJobConfig {
     /// Two contexts of overlap 0.15 and targets of 0.02 to 0.1: the narrow preset of Cross-View

@@ -34,29 +34,23 @@ pub trait Float: Copy + Sub<Output = Self> + Into<f64> {
     fn magnitude(self) -> Self;
 }
 
-impl Float for f32 {
-    #[inline]
-    fn order(&self, other: &Self) -> Ordering {
-        self.total_cmp(other)
-    }
+macro_rules! float {
+    ($($number:ty),+) => {$(
+        impl Float for $number {
+            #[inline]
+            fn order(&self, other: &Self) -> Ordering {
+                self.total_cmp(other)
+            }
 
-    #[inline]
-    fn magnitude(self) -> Self {
-        self.abs()
-    }
+            #[inline]
+            fn magnitude(self) -> Self {
+                self.abs()
+            }
+        }
+    )+};
 }
 
-impl Float for f64 {
-    #[inline]
-    fn order(&self, other: &Self) -> Ordering {
-        self.total_cmp(other)
-    }
-
-    #[inline]
-    fn magnitude(self) -> Self {
-        self.abs()
-    }
-}
+float!(f32, f64);
 
 /// Returns the value that sorting would put at `rank`, or `None` if there are not that many values.
 ///

@@ -30,6 +30,8 @@ mod config;
 mod crown;
 mod date;
 mod error;
+#[cfg(test)]
+mod fixtures;
 mod flight;
 mod frame;
 mod index;

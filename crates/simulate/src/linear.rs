@@ -90,12 +90,7 @@ struct SamplePlanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const CENTRE: LonLatHeight = LonLatHeight::new(5.4, 43.5, 200.0);
-
-    fn look(incidence_deg: f64, azimuth_deg: f64) -> Look {
-        Look { incidence_deg, azimuth_deg, heading_deg: 190.0, gsd_m: 0.5 }
-    }
+    use crate::fixtures::{CENTRE, look};
 
     #[test]
     fn the_line_of_sight_has_the_asked_incidence_and_azimuth() {

@@ -61,9 +61,9 @@ pub struct SplatScene {
     pub report: SplatReport,
 }
 
-/// Count and errors of splats.
+/// Count and errors of splats. `V` is what is known of each view.
 #[derive(Debug, Clone, Serialize)]
-pub struct SplatReport {
+pub struct SplatReport<V = ViewReport> {
     /// Number of cells with a height.
     pub cells: usize,
     /// Number of splats.
@@ -77,12 +77,29 @@ pub struct SplatReport {
     /// Values of the reference image at 0 and 1 of the display range, per channel.
     pub display_range: [[f32; 2]; 3],
     /// How well the splats render back into each image.
-    pub views: Vec<ViewReport>,
+    pub views: Vec<V>,
     /// Uniform splats of several sizes, when asked for.
     pub uniform: Vec<CurvePoint>,
     /// Number of uniform splats with the same root mean square error of mean heights, when asked
     /// for: interpolated in the logarithms, at most one per cell.
     pub uniform_at_equal_rmse: Option<f64>,
+}
+
+impl<V> SplatReport<V> {
+    /// Replaces what is known of each view, in the order of the views.
+    pub fn map_views<W>(self, work: impl FnMut(V) -> W) -> SplatReport<W> {
+        SplatReport {
+            cells: self.cells,
+            splats: self.splats,
+            plane_error_max_m: self.plane_error_max_m,
+            mean_height: self.mean_height,
+            median_height: self.median_height,
+            display_range: self.display_range,
+            views: self.views.into_iter().map(work).collect(),
+            uniform: self.uniform,
+            uniform_at_equal_rmse: self.uniform_at_equal_rmse,
+        }
+    }
 }
 
 /// How well the splats render back into one image.

@@ -4,10 +4,13 @@
 //! Criterion's `elem/s` is hypotheses of all pixels per second (Gde/s when divided by 10⁹). The
 //! costs are counted per source, as each hypothesis is compared with every source.
 
+#[path = "../src/testing/camera.rs"]
+mod leaning;
+
 use std::hint::black_box;
 
-use camera::{Rpc, RpcCamera};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use leaning::leaning_camera;
 use raster::{Grid, Window};
 use sweep::aggregation::Penalties;
 use sweep::cost::CostConfig;
@@ -19,31 +22,6 @@ const SIZE: usize = 512;
 /// Hypotheses per pixel, in steps of a metre.
 const HYPOTHESES: usize = 64;
 
-/// Returns a linear camera whose pixels move by `parallax` (samples, lines) per metre of height.
-fn camera(parallax: [f64; 2]) -> RpcCamera {
-    let half = SIZE as f64 / 2.0;
-    let polynomial = |terms: [f64; 4]| std::array::from_fn(|i| terms.get(i).copied().unwrap_or(0.0));
-    let extent_deg = half * 0.5 / 111_320.0;
-    RpcCamera::new(Rpc {
-        line_off: half,
-        samp_off: half,
-        lat_off: 0.0,
-        long_off: 0.0,
-        height_off: 0.0,
-        line_scale: half,
-        samp_scale: half,
-        lat_scale: extent_deg,
-        long_scale: extent_deg,
-        height_scale: 100.0,
-        line_num: polynomial([0.0, 0.0, -1.0, parallax[1] * 100.0 / half]),
-        line_den: polynomial([1.0, 0.0, 0.0, 0.0]),
-        samp_num: polynomial([0.0, 1.0, 0.0, parallax[0] * 100.0 / half]),
-        samp_den: polynomial([1.0, 0.0, 0.0, 0.0]),
-        err_bias_m: None,
-        err_rand_m: None,
-    })
-}
-
 /// Returns views of a textured plane at height 0, where all cameras agree.
 fn views() -> Vec<SweepView> {
     let texture = |i: usize| {
@@ -51,7 +29,7 @@ fn views() -> Vec<SweepView> {
         500.0 + 90.0 * ((0.9 * x).sin() + (1.1 * y + 0.3 * x).sin() + (0.13 * x * y / 40.0).sin())
     };
     let image = Grid::from_vec(SIZE, SIZE, (0..SIZE * SIZE).map(texture).collect()).expect("a square image");
-    [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| SweepView::new(camera(p), image.clone())).into()
+    [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| SweepView::new(leaning_camera(SIZE, p), image.clone())).into()
 }
 
 fn kernels(c: &mut Criterion) {

@@ -1,4 +1,5 @@
-//! What a test does when an input or a tool is absent: it prints one line and passes.
+//! What a test does when an input or a tool is absent: it prints one line and passes. Also the
+//! smooth noise of synthetic scenes.
 //!
 //! Large inputs are not part of the repository. They lie in `../shared/data` beside the checkout,
 //! or in the folder that the environment variable `SKYSWEEP_DATA` names. Tests that need them call
@@ -10,9 +11,13 @@
 //!
 //! This crate is a dev-dependency only; no product crate uses it.
 
+mod noise;
+
 use std::env;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+
+pub use noise::lattice_noise;
 
 /// Returns the path of a file or folder below the shared data.
 ///

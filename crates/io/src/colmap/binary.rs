@@ -2,8 +2,8 @@
 
 use camera::LensModel;
 
-use super::error::Fault;
 use super::raw::{ImagePoints, RawCamera, RawImage, RawObservation, RawPoint};
+use crate::camera_file::Fault;
 
 /// Size of a camera record without its parameters, bytes.
 const CAMERA_BYTES: usize = 24;

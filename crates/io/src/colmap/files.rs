@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::error::{ColmapError, Fault};
+use super::error::ColmapError;
+use crate::camera_file::{Fault, read_bytes};
 
 /// Largest file that is read, bytes. `images` is the largest one, because it lists every
 /// observation.
@@ -18,16 +19,10 @@ pub(super) fn load<T>(
     let [binary, text] = ["bin", "txt"].map(|extension| folder.join(format!("{name}.{extension}")));
     let path = [&binary, &text].into_iter().find(|path| path.is_file());
     let path = path.ok_or_else(|| ColmapError::Missing { folder: folder.to_owned(), name })?.clone();
-    let unreadable = |source| ColmapError::Unreadable { path: path.clone(), source };
-    let size = std::fs::metadata(&path).map_err(unreadable)?.len();
-    if size > SIZE_LIMIT {
-        let what = format!("the file has {size} bytes, at most {SIZE_LIMIT} are read");
-        return Err(Fault { what, place: "size".to_owned() }.at(&path));
-    }
-    let bytes = std::fs::read(&path).map_err(unreadable)?;
+    let bytes = read_bytes(&path, SIZE_LIMIT)?;
     let parsed = if path == binary { from_binary(&bytes) } else { from_text(&String::from_utf8_lossy(&bytes)) };
     match parsed {
         Ok(parsed) => Ok((path, parsed)),
-        Err(fault) => Err(fault.at(&path)),
+        Err(fault) => Err(fault.at(&path).into()),
     }
 }

@@ -6,20 +6,20 @@ use std::path::Path;
 use camera::{Lens, LensError, Pose};
 
 use super::convention::{PIXEL_SHIFT, is_inside, principal_point_index, shorten};
-use super::error::{ColmapError, Fault};
+use super::error::ColmapError;
 use super::files::load;
 use super::model::{ColmapModel, ColmapView};
 use super::raw::{ImagePoints, RawCamera, RawImage};
 use super::{binary, text};
+use crate::camera_file::Fault;
 
 /// Reads the lenses and poses of the model in a folder.
 ///
 /// # Errors
 /// - [`ColmapError::Missing`] when `cameras` or `images` is not there.
-/// - [`ColmapError::Unreadable`] when the system cannot read a file.
-/// - [`ColmapError::Invalid`] when a file breaks its format, a lens is impossible, an image has no
-///   camera or no finite pose, an image name leads out of its folder, or an identifier occurs
-///   twice.
+/// - [`ColmapError::File`] when the system cannot read a file, or a file breaks its format, a lens
+///   is impossible, an image has no camera or no finite pose, an image name leads out of its folder,
+///   or an identifier occurs twice.
 ///
 /// # Examples
 /// ```
@@ -49,7 +49,7 @@ pub(super) fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapMode
     for camera in cameras {
         let fault = |what: String| Fault { what, place: camera.place.clone() }.at(&cameras_path);
         if lens_of.insert(camera.id, lenses.len()).is_some() {
-            return Err(fault(format!("camera {} occurs a second time", camera.id)));
+            return Err(fault(format!("camera {} occurs a second time", camera.id)).into());
         }
         lenses.push(lens(&camera).map_err(|error| fault(error.to_string()))?);
     }
@@ -58,7 +58,7 @@ pub(super) fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapMode
     for mut image in images {
         if !seen.insert(image.id) {
             let what = format!("image {} occurs a second time", image.id);
-            return Err(Fault { what, place: image.place }.at(&images_path));
+            return Err(Fault { what, place: image.place }.at(&images_path).into());
         }
         points.push(std::mem::take(&mut image.points));
         views.push(view(image, &lens_of).map_err(|fault| fault.at(&images_path))?);

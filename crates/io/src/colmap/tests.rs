@@ -1,6 +1,7 @@
 //! Reads valid, broken and hostile COLMAP models in text and binary.
 
 use super::*;
+use crate::camera_file::CameraFileError;
 
 const CAMERAS: &str = "# comment\n7 PINHOLE 640 480 500 510 320 240\n9 SIMPLE_RADIAL 64 48 50 32 24 0.1\n";
 const IMAGES: &str = "# comment\n\n1 1 0 0 0 1 2 3 7 a b.png\n1.0 2.0 -1\n\
@@ -53,7 +54,7 @@ fn read_binary(cameras: &[u8], images: &[u8]) -> Result<ColmapModel, ColmapError
 #[track_caller]
 fn refused(result: Result<ColmapModel, ColmapError>, words: &str, place: &str) {
     match result {
-        Err(ColmapError::Invalid { what, place: found, .. }) => {
+        Err(ColmapError::File(CameraFileError::Invalid { what, place: found, .. })) => {
             assert!(what.contains(words) && found == place, "{what} ({found})");
         }
         other => panic!("{other:?}"),

@@ -5,8 +5,8 @@
 use camera::LensModel;
 
 use super::convention::shorten;
-use super::error::Fault;
 use super::raw::{ImagePoints, RawCamera, RawImage, RawObservation, RawPoint};
+use crate::camera_file::Fault;
 
 pub(super) fn cameras(text: &str) -> Result<Vec<RawCamera>, Fault> {
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));

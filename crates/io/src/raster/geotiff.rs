@@ -179,18 +179,7 @@ pub fn write_image_with_rpc(
     no_data: Option<f64>,
     overwrite: bool,
 ) -> Result<(), RasterError> {
-    let path = path.as_ref();
-    write_path(path, overwrite, |made| {
-        let mut memory = in_memory(path, bands, no_data)?;
-        let options = plain_options(bands);
-        with_gdal(|| {
-            for (key, value) in rpc_items(rpc) {
-                memory.set_metadata_item(key, &value, "RPC")?;
-            }
-            copy(&memory, "GTiff", made, &options)
-        })
-        .map_err(|reason| RasterError::unwritable(path, reason))
-    })
+    write_in_pixels(path.as_ref(), bands, no_data, ItemsOfDomain { domain: "RPC", items: &rpc_items(rpc) }, overwrite)
 }
 
 /// Writes a map in the pixels of an image: tiled, deflate, no georeference. NaN becomes `no_data`.
@@ -204,13 +193,29 @@ pub fn write_map(
     metadata: &[(&str, &str)],
     overwrite: bool,
 ) -> Result<(), RasterError> {
-    let path = path.as_ref();
+    write_in_pixels(path.as_ref(), bands, no_data, ItemsOfDomain { domain: "", items: metadata }, overwrite)
+}
+
+/// Metadata items of one of GDAL's domains.
+struct ItemsOfDomain<'a, T> {
+    domain: &'a str,
+    items: &'a [(&'a str, T)],
+}
+
+/// Writes a file in the pixels of an image: tiled, deflate, no georeference.
+fn write_in_pixels<T: AsRef<str>>(
+    path: &Path,
+    bands: &[Band<'_>],
+    no_data: Option<f64>,
+    metadata: ItemsOfDomain<'_, T>,
+    overwrite: bool,
+) -> Result<(), RasterError> {
     write_path(path, overwrite, |made| {
         let mut memory = in_memory(path, bands, no_data)?;
         let options = plain_options(bands);
         with_gdal(|| {
-            for (key, value) in metadata {
-                memory.set_metadata_item(key, value, "")?;
+            for (key, value) in metadata.items {
+                memory.set_metadata_item(key, value.as_ref(), metadata.domain)?;
             }
             copy(&memory, "GTiff", made, &options)
         })

@@ -78,23 +78,5 @@ fn parse(items: &[String]) -> Result<Parsed, Fault> {
 /// Whether two RPCs have the same numbers up to GDAL's 15 digits.
 fn agree(a: &Rpc, b: &Rpc) -> bool {
     let close = |x: f64, y: f64| (x - y).abs() <= PRINTED_TOLERANCE * x.abs().max(y.abs());
-    numbers(a).zip(numbers(b)).all(|(x, y)| close(x, y))
-}
-
-/// All numbers of the projection, in the order of RPC00B.
-fn numbers(rpc: &Rpc) -> impl Iterator<Item = f64> + '_ {
-    let scalars = [
-        rpc.line_off,
-        rpc.samp_off,
-        rpc.lat_off,
-        rpc.long_off,
-        rpc.height_off,
-        rpc.line_scale,
-        rpc.samp_scale,
-        rpc.lat_scale,
-        rpc.long_scale,
-        rpc.height_scale,
-    ];
-    let polynomials = [&rpc.line_num, &rpc.line_den, &rpc.samp_num, &rpc.samp_den];
-    scalars.into_iter().chain(polynomials.into_iter().flatten().copied())
+    a.numbers().zip(b.numbers()).all(|(x, y)| close(x, y))
 }

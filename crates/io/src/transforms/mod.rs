@@ -22,10 +22,11 @@
 mod lens;
 mod schema;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use camera::{Lens, Pose, Similarity};
 
+use crate::camera_file::{CameraFileError, Fault, read_bytes};
 use crate::colmap::{ColmapModel, ColmapView, is_inside};
 use schema::{File, Frame, Matrix};
 
@@ -34,38 +35,14 @@ const SIZE_LIMIT: u64 = 512 << 20;
 /// Largest number of frames.
 const FRAMES_LIMIT: usize = 1 << 22;
 
-/// Why a `transforms.json` was not read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TransformsError {
-    /// The system cannot read the file.
-    #[error("cannot read the file ({source}): {}", .path.display())]
-    Unreadable {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
-    /// The content of the file is invalid.
-    #[error("{what} ({place}): {}", .path.display())]
-    Invalid {
-        /// Path of the file.
-        path: PathBuf,
-        /// What was found, and what was expected.
-        what: String,
-        /// Place: the frame, counted from 0, or the part of the file.
-        place: String,
-    },
-}
-
 /// Reads the cameras of a `transforms.json`. Views get the identifiers 1, 2, … in the order of the
 /// frames.
 ///
 /// `size` is the number of columns and rows of the images, for files without it, such as Blender's.
 ///
 /// # Errors
-/// [`TransformsError::Unreadable`] when the system cannot read the file,
-/// [`TransformsError::Invalid`] when it is too large or breaks the format.
+/// [`CameraFileError::Unreadable`] when the system cannot read the file,
+/// [`CameraFileError::Invalid`] when it is too large or breaks the format.
 ///
 /// # Examples
 /// ```
@@ -78,23 +55,9 @@ pub enum TransformsError {
 /// assert_eq!(model.views[0].pose.centre, [10.0, 20.0, 30.0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read(path: impl AsRef<Path>, size: Option<[usize; 2]>) -> Result<ColmapModel, TransformsError> {
+pub fn read(path: impl AsRef<Path>, size: Option<[usize; 2]>) -> Result<ColmapModel, CameraFileError> {
     let path = path.as_ref();
-    let unreadable = |source| TransformsError::Unreadable { path: path.to_owned(), source };
-    let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
-    let invalid = |Fault { what, place }| TransformsError::Invalid { path: path.to_owned(), what, place };
-    if bytes > SIZE_LIMIT {
-        let what = format!("the file has {bytes} bytes, at most {SIZE_LIMIT} are read");
-        return Err(invalid(Fault { what, place: "size".to_owned() }));
-    }
-    parse(&std::fs::read(path).map_err(unreadable)?, size).map_err(invalid)
-}
-
-/// A mistake in a file and its place, before the path of the file is known.
-#[derive(Debug)]
-struct Fault {
-    what: String,
-    place: String,
+    parse(&read_bytes(path, SIZE_LIMIT)?, size).map_err(|fault| fault.at(path))
 }
 
 fn parse(bytes: &[u8], size: Option<[usize; 2]>) -> Result<ColmapModel, Fault> {

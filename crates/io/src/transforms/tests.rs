@@ -124,7 +124,7 @@ fn the_file_is_read_from_its_place() {
     let path = folder.path().join("transforms.json");
     std::fs::write(&path, one_frame(SIMPLE, UNIT)).unwrap();
     assert_eq!(read(&path, None).unwrap().views.len(), 1);
-    assert!(matches!(read(folder.path().join("none"), None), Err(TransformsError::Unreadable { .. })));
+    assert!(matches!(read(folder.path().join("none"), None), Err(CameraFileError::Unreadable { .. })));
     std::fs::write(&path, "{").unwrap();
-    assert!(matches!(read(&path, None), Err(TransformsError::Invalid { .. })));
+    assert!(matches!(read(&path, None), Err(CameraFileError::Invalid { .. })));
 }

@@ -5,7 +5,9 @@ use crs::CrsError;
 use geodesy::GeodesyError;
 use io::colmap::ColmapError;
 use io::control::ControlError;
+use numeric::Cancelled;
 
+use crate::error::{JobError, from_steps};
 use crate::files::FileError;
 
 /// An alignment that could not be made.
@@ -30,9 +32,6 @@ pub enum AlignJobError {
     /// The table of positions cannot be read.
     #[error(transparent)]
     Positions(#[from] ControlError),
-    /// A file cannot be written, or exists already.
-    #[error(transparent)]
-    File(#[from] FileError),
     /// The CRS or the vertical datum cannot be used.
     #[error(transparent)]
     Crs(#[from] CrsError),
@@ -65,7 +64,9 @@ pub enum AlignJobError {
         /// Why there is no similarity.
         source: AlignError,
     },
-    /// The job was cancelled.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
+
+from_steps!(AlignJobError: Job(FileError, Cancelled));

@@ -27,7 +27,7 @@ pub struct CityConvertReport {
 ///
 /// # Errors
 /// [`CityJobError::UnknownEnding`], [`CityJobError::Read`], [`CityJobError::Model`], and
-/// [`CityJobError::File`] when an output exists or cannot be written.
+/// [`CityJobError::Job`] when an output exists or cannot be written.
 ///
 /// ```
 /// use jobs::city::{CityConvertConfig, convert};

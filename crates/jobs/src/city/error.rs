@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use city::ModelError;
 use io::citymodel::CityError;
+use numeric::Cancelled;
 
+use crate::error::{JobError, from_steps};
 use crate::files::FileError;
 
 /// A city model job that could not be done.
@@ -17,9 +19,6 @@ pub enum CityJobError {
     /// The model contradicts itself.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The output exists, or the account cannot be written.
-    #[error(transparent)]
-    File(#[from] FileError),
     /// The ending of the output file belongs to no format.
     #[error(
         "no city model format belongs to the ending of {}: expected .obj, .ply, .glb, .geojson or .json, or a stated format",
@@ -29,15 +28,17 @@ pub enum CityJobError {
         /// The output file.
         path: PathBuf,
     },
-    /// The job was cancelled.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
+
+from_steps!(CityJobError: Job(FileError, Cancelled));
 
 impl From<CityError> for CityJobError {
     fn from(error: CityError) -> Self {
         match error {
-            CityError::NotWritten(error) => Self::File(error.into()),
+            CityError::NotWritten(error) => FileError::from(error).into(),
             other => Self::Read(other),
         }
     }

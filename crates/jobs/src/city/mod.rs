@@ -22,7 +22,7 @@ use numeric::Progress;
 /// file for it.
 ///
 /// # Errors
-/// [`CityJobError::Read`], [`CityJobError::Model`], [`CityJobError::File`] when the account exists
+/// [`CityJobError::Read`], [`CityJobError::Model`], [`CityJobError::Job`] when the account exists
 /// or cannot be written.
 ///
 /// ```

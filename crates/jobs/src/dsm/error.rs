@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use crate::dsm::values::{HeightRange, MapBounds};
+use crate::error::from_steps;
 use crate::threads::ThreadsError;
 
 /// A setting of [`DsmConfig`](crate::dsm::DsmConfig) that an error names.
@@ -251,12 +252,7 @@ impl DsmError {
     }
 }
 
-impl From<io::rpc::RpcReadError> for DsmError {
-    fn from(e: io::rpc::RpcReadError) -> Self {
-        // Boxed because it is several times larger than the other variants.
-        Self::Rpc(Box::new(e))
-    }
-}
+from_steps!(DsmError: Rpc(io::rpc::RpcReadError));
 
 impl From<numeric::Cancelled> for DsmError {
     fn from(_: numeric::Cancelled) -> Self {

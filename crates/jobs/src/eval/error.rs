@@ -1,25 +1,18 @@
 //! Reasons why an evaluation cannot be made.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crs::{CrsError, VerticalDatum};
+use numeric::Cancelled;
 
+use crate::error::{FileCrsError, JobError, SettingError, from_steps};
 use crate::files::FileError;
+use crate::threads::ThreadsError;
 
 /// An evaluation that cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvalJobError {
-    /// A setting is outside of its range.
-    #[error("{name} is {found}, expected {expected}")]
-    Value {
-        /// Name of the setting in words.
-        name: &'static str,
-        /// Value that was given.
-        found: String,
-        /// Values that are accepted.
-        expected: String,
-    },
     /// A raster cannot be read.
     #[error(transparent)]
     Raster(#[from] io::raster::RasterError),
@@ -33,13 +26,8 @@ pub enum EvalJobError {
     #[error(transparent)]
     MapFile(#[from] io::maps::MapError),
     /// The coordinate reference system of a file cannot be used.
-    #[error("cannot use the coordinate reference system of the file: {}", path.display())]
-    FileCrs {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: CrsError,
-    },
+    #[error(transparent)]
+    FileCrs(#[from] FileCrsError),
     /// Coordinates or heights cannot be converted.
     #[error(transparent)]
     Crs(#[from] CrsError),
@@ -150,25 +138,9 @@ pub enum EvalJobError {
     /// A picture cannot be made.
     #[error(transparent)]
     Picture(#[from] report::PictureError),
-    /// An output exists or cannot be written.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    File(#[from] FileError),
-    /// The worker threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] crate::threads::ThreadsError),
-    /// The job was cancelled.
-    #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
 
-impl EvalJobError {
-    /// A setting outside of its range.
-    pub(super) fn value(name: &'static str, found: impl ToString, expected: impl Into<String>) -> Self {
-        Self::Value { name, found: found.to_string(), expected: expected.into() }
-    }
-
-    /// A coordinate reference system that cannot be used.
-    pub(super) fn file_crs(path: &Path) -> impl FnOnce(CrsError) -> Self {
-        move |source| Self::FileCrs { path: path.to_owned(), source }
-    }
-}
+from_steps!(EvalJobError: Job(SettingError, FileError, ThreadsError, Cancelled));

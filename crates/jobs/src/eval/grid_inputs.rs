@@ -17,6 +17,7 @@ use super::on_reference::{
     cell_map, definition, metres_per_unit, metres_per_unit_at, numbers_on_reference, surface_on_reference,
 };
 use super::vertical::{StatedDatums, bring_terrain};
+use crate::error::SettingError;
 
 /// Cells beyond the search radius for which the map between the grids must hold: reach of the
 /// interpolation.
@@ -123,7 +124,7 @@ fn reference(
     let (along_columns, along_rows) = MetresFromCells::new(&test.geotransform, test_metres).cell_size_m();
     let cell_m = config.reference_cell_m.unwrap_or(along_columns.max(along_rows));
     if !(cell_m.is_finite() && cell_m > 0.0) {
-        return Err(EvalJobError::value("the cell size of the reference", cell_m, "a positive number of metres"));
+        return Err(SettingError::new("the cell size of the reference", cell_m, "a positive number of metres").into());
     }
     let cloud = PointCloud::open(&config.reference)?;
     let metres = metres_per_unit_at(cloud.crs_definition(), cloud.centre().y, &config.reference)?;

@@ -78,7 +78,7 @@ impl MapEvalConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`EvalJobError::Value`] for a number outside of its range.
+    /// [`EvalJobError::Job`] for a number outside of its range.
     pub fn validate(&self) -> Result<(), EvalJobError> {
         EvalRequirements { max_mae: self.max_mae, ..EvalRequirements::default() }.validate()
     }

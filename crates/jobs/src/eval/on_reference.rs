@@ -9,6 +9,7 @@ use io::raster::{Dem, ImageSource};
 use raster::{GeoTransform, Grid};
 
 use super::error::EvalJobError;
+use crate::error::FileCrsError;
 
 /// Most cells that are read from a class raster or mask.
 const CELLS_MAX: usize = 1 << 30;
@@ -16,11 +17,6 @@ const CELLS_MAX: usize = 1 << 30;
 /// Returns the coordinate reference system of a file as PROJ takes it.
 pub(super) fn definition(dem: &Dem) -> Option<String> {
     dem.horizontal_epsg.map(|code| format!("EPSG:{code}")).or_else(|| dem.crs_wkt.clone())
-}
-
-/// Makes the projection of a file's coordinate reference system.
-pub(super) fn projection(definition: &str, path: &Path) -> Result<MapProjection, EvalJobError> {
-    MapProjection::from_definition(definition).map_err(EvalJobError::file_crs(path))
 }
 
 /// Returns the metres per map unit of a surface along x and y, at its middle.
@@ -40,7 +36,7 @@ pub(super) fn metres_per_unit_at(
     path: &Path,
 ) -> Result<(f64, f64), EvalJobError> {
     let Some(definition) = definition else { return Ok((1.0, 1.0)) };
-    if let Some(metres) = projection(definition, path)?.metres_per_unit() {
+    if let Some(metres) = FileCrsError::projection(path, definition)?.metres_per_unit() {
         return Ok((metres, metres));
     }
     let per_degree = 1.0_f64.to_radians();
@@ -62,7 +58,7 @@ pub(super) fn cell_map(
         (Some(from), Some(to)) if from != to => (from, to),
         _ => return Ok(CellMap::affine(&reference.geotransform, other)?),
     };
-    let (from, to) = (projection(&from, &reference.path)?, MapProjection::from_definition(&to)?);
+    let (from, to) = (FileCrsError::projection(&reference.path, &from)?, MapProjection::from_definition(&to)?);
     let size = (reference.heights.width(), reference.heights.height());
     let project = |x, y| {
         let (lon, lat) = from.lonlat_from_map(x, y).ok()?;

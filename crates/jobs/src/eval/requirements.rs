@@ -5,6 +5,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::error::EvalJobError;
+use crate::error::SettingError;
 
 /// Requirements on the result of an evaluation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -46,11 +47,11 @@ impl EvalRequirements {
     /// Checks that the requirements are numbers in their ranges.
     pub(super) fn validate(&self) -> Result<(), EvalJobError> {
         if let Some(max_mae) = self.max_mae.filter(|mae| mae.is_nan() || *mae < 0.0) {
-            return Err(EvalJobError::value("the largest allowed mean error", max_mae, "a number of metres"));
+            return Err(SettingError::new("the largest allowed mean error", max_mae, "a number of metres").into());
         }
         let outside = |least: &&MinCompleteness| !(0.0..=1.0).contains(&least.share);
         match self.min_completeness.iter().find(outside) {
-            Some(least) => Err(EvalJobError::value("the least completeness", least.share, "a share from 0 to 1")),
+            Some(least) => Err(SettingError::new("the least completeness", least.share, "a share from 0 to 1").into()),
             None => Ok(()),
         }
     }

@@ -83,7 +83,7 @@ impl SurfaceEvalConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`EvalJobError::Value`] for a number outside of its range.
+    /// [`EvalJobError::Job`] for a number outside of its range.
     pub fn validate(&self) -> Result<(), EvalJobError> {
         self.requirements.validate()
     }

@@ -2,12 +2,13 @@
 //! one local origin, in f64.
 
 use city::{MeshConfig, Scope};
-use crs::{HeightConverter, MapProjection, VerticalDatum};
+use crs::{HeightConverter, VerticalDatum};
 use eval::LocalSurface;
 use io::surfaces::SurfaceFile;
 
 use super::error::EvalJobError;
 use super::surface_config::SurfaceEvalConfig;
+use crate::error::FileCrsError;
 
 /// Two surfaces that can be compared.
 pub(super) struct SurfaceInputs {
@@ -92,7 +93,7 @@ fn bring(test: &mut SurfaceFile, reference: &SurfaceFile, notes: &mut Vec<String
     };
     for file in [&*test, reference] {
         let Some(definition) = &file.crs else { continue };
-        let metres = projection(definition, file)?.metres_per_unit();
+        let metres = FileCrsError::projection(&file.path, definition)?.metres_per_unit();
         if metres != Some(1.0) {
             return Err(EvalJobError::NotInMetres { path: file.path.clone(), definition: definition.clone() });
         }
@@ -128,10 +129,6 @@ fn datums(test: &SurfaceFile, reference: &SurfaceFile, notes: &mut Vec<String>) 
     }
 }
 
-fn projection(definition: &str, file: &SurfaceFile) -> Result<MapProjection, EvalJobError> {
-    MapProjection::from_definition(definition).map_err(EvalJobError::file_crs(&file.path))
-}
-
 fn convert(
     test: &mut SurfaceFile,
     from: &str,
@@ -139,7 +136,8 @@ fn convert(
     heights: Option<DatumChange>,
     notes: &mut Vec<String>,
 ) -> Result<(), EvalJobError> {
-    let (from_map, to_map) = (projection(from, test)?, projection(to, test)?);
+    let [from_map, to_map] = [from, to].map(|definition| FileCrsError::projection(&test.path, definition));
+    let (from_map, to_map) = (from_map?, to_map?);
     let axis = |i: usize| test.positions.iter().map(|p| p[i]).collect::<Vec<f64>>();
     let (mut x, mut y, mut z) = (axis(0), axis(1), axis(2));
     let mut lost = from_map.lonlat_from_map_slices(&mut x, &mut y)?;

@@ -11,7 +11,8 @@ use eval::{AlignmentMethod, MetresFromCells, convert_heights};
 use io::raster::Dem;
 
 use super::error::EvalJobError;
-use super::on_reference::{definition, metres_per_unit, projection};
+use super::on_reference::{definition, metres_per_unit};
+use crate::error::FileCrsError;
 
 /// Vertical datums of the two surfaces, where the files or the configuration name them.
 pub(super) struct StatedDatums {
@@ -80,7 +81,7 @@ fn convert(dem: &mut Dem, from: VerticalDatum, to: VerticalDatum) -> Result<(), 
     let definition =
         definition(dem).ok_or_else(|| EvalJobError::NoCrsForHeights { path: dem.path.clone(), from, to })?;
     let (along_columns, along_rows) = MetresFromCells::new(&dem.geotransform, metres_per_unit(dem)?).cell_size_m();
-    let projection = projection(&definition, &dem.path)?;
+    let projection = FileCrsError::projection(&dem.path, &definition)?;
     let (from, to) = (HeightConverter::new(from)?, HeightConverter::new(to)?);
     let cell_m = along_columns.max(along_rows);
     Ok(convert_heights(&mut dem.heights, &dem.geotransform, cell_m, &projection, &from, &to)?)

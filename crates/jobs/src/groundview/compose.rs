@@ -47,7 +47,7 @@ impl ComposeConfig {
     /// Checks that the output may be written.
     ///
     /// # Errors
-    /// [`GroundViewError::File`] if the output exists and may not be replaced.
+    /// [`GroundViewError::Job`] if the output exists and may not be replaced.
     pub fn validate(&self) -> Result<(), GroundViewError> {
         Ok(files::refuse_existing(&self.output, self.overwrite)?)
     }

@@ -3,26 +3,20 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
+use numeric::Cancelled;
 
 use crate::camera_stand::StandError;
+use crate::city_files::CitySurfaceError;
+use crate::error::{JobError, SettingError, from_steps};
 use crate::files::FileError;
 use crate::map_surface::MapSurfaceError;
 use crate::placed_model::PlacedModelError;
+use crate::threads::ThreadsError;
 
 /// Ground views that cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GroundViewError {
-    /// A setting is outside of its range.
-    #[error("{name} is {found}, expected {expected}")]
-    Value {
-        /// Name of the setting in words.
-        name: &'static str,
-        /// Value that was given.
-        found: String,
-        /// Values that are accepted.
-        expected: &'static str,
-    },
     /// A camera cannot be used.
     #[error(transparent)]
     Stand(#[from] StandError),
@@ -50,21 +44,9 @@ pub enum GroundViewError {
         /// The raster.
         path: PathBuf,
     },
-    /// A city model cannot be read.
+    /// The city model cannot serve as surface.
     #[error(transparent)]
-    CityFile(#[from] io::citymodel::CityError),
-    /// The triangles of a city model cannot be made.
-    #[error(transparent)]
-    Model(#[from] city::ModelError),
-    /// The triangles of a city model cannot be searched.
-    #[error(transparent)]
-    Triangles(#[from] bvh::BvhError),
-    /// A city model has no usable surface.
-    #[error("no surface of the model can be used: {}", path.display())]
-    NoSurface {
-        /// The model.
-        path: PathBuf,
-    },
+    City(#[from] CitySurfaceError),
     /// A city model names no coordinate reference system.
     #[error("the model names no coordinate system: {}", path.display())]
     NoCrs {
@@ -121,13 +103,9 @@ pub enum GroundViewError {
     /// The layers of a composition have different sizes.
     #[error(transparent)]
     Layers(#[from] groundview::SizeError),
-    /// An output exists or cannot be written.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    File(#[from] FileError),
-    /// The worker threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] crate::threads::ThreadsError),
-    /// The job was cancelled.
-    #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
+
+from_steps!(GroundViewError: Job(SettingError, FileError, ThreadsError, Cancelled));

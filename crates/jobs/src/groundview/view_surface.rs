@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use bvh::Ray;
-use city::{MeshConfig, TriangleMesh};
+use city::MeshConfig;
 use crs::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
 use groundview::{Ground, HeightField, MeshGround, Met};
 use io::splat_ply::LocalOrigin;
@@ -13,7 +13,7 @@ use raster::GeoTransform;
 use numeric::Progress;
 
 use super::error::GroundViewError;
-use crate::city_files::is_city_model;
+use crate::city_files::{CitySurfaceError, is_city_model, read_triangles};
 use crate::map_surface;
 
 /// Start of rays from above, metres above the origin: higher than any terrain.
@@ -67,12 +67,7 @@ impl ViewSurface {
     }
 
     fn model(path: &Path, vertical: Option<VerticalDatum>, progress: &dyn Progress) -> Result<Self, GroundViewError> {
-        let file = io::citymodel::read(path)?;
-        let mut mesh = TriangleMesh::from_model(&file.model, &MeshConfig::default())?.mesh;
-        if mesh.triangles.is_empty() {
-            return Err(GroundViewError::NoSurface { path: path.to_owned() });
-        }
-        let crs = &file.model.crs;
+        let (mut mesh, crs) = read_triangles(path, &MeshConfig::default())?;
         let Some(epsg) = crs.epsg else { return Err(GroundViewError::NoCrs { path: path.to_owned() }) };
         let definition = format!("EPSG:{epsg}");
         let projection = MapProjection::from_definition(&definition)?;
@@ -97,7 +92,8 @@ impl ViewSurface {
             converter.ellipsoid_from_datum_slices(&x, &y, &mut z)?;
             mesh.positions.iter_mut().zip(z).for_each(|(p, z)| p[2] = z - origin[2]);
         }
-        Ok(Self { kind: SurfaceKind::Mesh(MeshGround::new(&mesh.positions, &mesh.triangles)?), projection, origin })
+        let ground = MeshGround::new(&mesh.positions, &mesh.triangles).map_err(CitySurfaceError::from)?;
+        Ok(Self { kind: SurfaceKind::Mesh(ground), projection, origin })
     }
 
     /// Returns the height of the surface above the origin at a local position; `None` if there is

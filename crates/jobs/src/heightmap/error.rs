@@ -3,9 +3,13 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
+use numeric::Cancelled;
 
 use crate::camera_stand::StandError;
+use crate::city_files::CitySurfaceError;
+use crate::error::{FileCrsError, JobError, from_steps};
 use crate::files::FileError;
+use crate::threads::ThreadsError;
 
 /// A height map that cannot be made or unprojected.
 #[derive(Debug, thiserror::Error)]
@@ -20,21 +24,9 @@ pub enum HeightMapJobError {
     /// A raster cannot be read.
     #[error(transparent)]
     Raster(#[from] io::raster::RasterError),
-    /// A city model cannot be read.
+    /// The city model cannot serve as surface.
     #[error(transparent)]
-    CityFile(#[from] io::citymodel::CityError),
-    /// The triangles of a city model cannot be made.
-    #[error(transparent)]
-    Model(#[from] city::ModelError),
-    /// The triangles of a city model cannot be searched.
-    #[error(transparent)]
-    Triangles(#[from] bvh::BvhError),
-    /// A city model has no usable surface.
-    #[error("no surface of the model can be used: {}", path.display())]
-    NoSurface {
-        /// The model.
-        path: PathBuf,
-    },
+    City(#[from] CitySurfaceError),
     /// A city model is in degrees.
     #[error("the model is in degrees, expected a projected coordinate system: {}", path.display())]
     InDegrees {
@@ -57,13 +49,8 @@ pub enum HeightMapJobError {
         path: PathBuf,
     },
     /// The coordinate reference system of a file cannot be used.
-    #[error("cannot use the coordinate reference system of the file: {}", path.display())]
-    FileCrs {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: CrsError,
-    },
+    #[error(transparent)]
+    FileCrs(#[from] FileCrsError),
     /// Coordinates or heights cannot be converted.
     #[error(transparent)]
     Crs(#[from] CrsError),
@@ -142,13 +129,9 @@ pub enum HeightMapJobError {
     /// The splats cannot be made.
     #[error(transparent)]
     Splats(#[from] splats::SplatError),
-    /// An output exists or cannot be written.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    File(#[from] FileError),
-    /// The worker threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] crate::threads::ThreadsError),
-    /// The job was cancelled.
-    #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
+
+from_steps!(HeightMapJobError: Job(FileError, ThreadsError, Cancelled));

@@ -3,12 +3,13 @@
 
 use std::path::Path;
 
-use crs::{HeightConverter, MapProjection, VerticalDatum};
+use crs::{HeightConverter, VerticalDatum};
 use heightmap::{SourceMap, TileFrame};
 use numeric::Progress;
 use raster::Grid;
 
 use super::error::HeightMapJobError;
+use crate::error::FileCrsError;
 
 /// Heights at the pixels of a tile.
 pub(super) struct Laid {
@@ -40,8 +41,7 @@ pub(super) fn source_map(
         .map(|code| format!("EPSG:{code}"))
         .or(file.crs)
         .ok_or_else(|| HeightMapJobError::NoCrs { path: path.to_owned() })?;
-    let projection = MapProjection::from_definition(&definition)
-        .map_err(|source| HeightMapJobError::FileCrs { path: path.to_owned(), source })?;
+    let projection = FileCrsError::projection(path, &definition)?;
     let datum = vertical.or(file.vertical).unwrap_or_else(|| {
         progress.warn(&format!(
             "the file does not name the vertical datum of its heights, so they are taken as above the ellipsoid: {}",

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bvh::Bvh;
-use city::{LodChoice, MeshConfig, Scope, TriangleMesh};
+use city::{LodChoice, MeshConfig, Scope};
 use crs::{CrsIdentity, VerticalDatum};
 use heightmap::{
     HighestPoints, MapSystem, PointTiles, SourceMap, TileFrame, TileMap, TileRequest, heights_from_triangles,
@@ -16,6 +16,7 @@ use super::error::HeightMapJobError;
 use super::settings::Settings;
 use super::source_map::{FilePlace, Laid, source_map};
 use crate::camera_stand::CameraStand;
+use crate::city_files::{CitySurfaceError, read_triangles};
 
 /// Triangles of a city model.
 pub(super) struct ModelSource {
@@ -30,16 +31,11 @@ impl ModelSource {
     /// Reads a city model and makes its triangles.
     pub(super) fn open(config: &HeightMapConfig, progress: &dyn Progress) -> Result<Self, HeightMapJobError> {
         let path = config.source.as_path();
-        let file = io::citymodel::read(path)?;
         let selection = MeshConfig {
             lod: config.lod.map_or_else(LodChoice::default, LodChoice::Only),
             scope: if config.all_objects { Scope::Everything } else { Scope::Buildings },
         };
-        let mesh = TriangleMesh::from_model(&file.model, &selection)?.mesh;
-        if mesh.triangles.is_empty() {
-            return Err(HeightMapJobError::NoSurface { path: path.to_owned() });
-        }
-        let crs = &file.model.crs;
+        let (mesh, crs) = read_triangles(path, &selection)?;
         let stated = crs.epsg.map(|code| format!("EPSG:{code}"));
         let identity = stated.as_deref().map(CrsIdentity::of).transpose()?;
         let datum = crs.vertical_epsg.map(VerticalDatum::from_epsg).or(identity.and_then(|i| i.vertical));
@@ -48,7 +44,7 @@ impl ModelSource {
         if map.projection.metres_per_unit().is_none() {
             return Err(HeightMapJobError::InDegrees { path: path.to_owned() });
         }
-        let bvh = Bvh::new(&mesh.positions, &mesh.triangles)?;
+        let bvh = Bvh::new(&mesh.positions, &mesh.triangles).map_err(CitySurfaceError::from)?;
         let z = || mesh.positions.iter().map(|p| p[2]);
         let z_span = (z().fold(f64::INFINITY, f64::min), z().fold(f64::NEG_INFINITY, f64::max));
         Ok(Self { map, bvh, origin: [mesh.origin.x, mesh.origin.y, mesh.origin.z], z_span })

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::OrthoError;
 use crate::corrections::CorrectionSource;
+use crate::error::SettingError;
 
 /// Most images of an ortho: the mask holds their numbers as bytes.
 const IMAGES_MAX: usize = 255;
@@ -66,16 +67,16 @@ impl OrthoConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`OrthoError::Value`] for a number outside of its range.
+    /// [`OrthoError::Job`] for a number outside of its range.
     pub fn validate(&self) -> Result<(), OrthoError> {
         if self.images.is_empty() || self.images.len() > IMAGES_MAX {
-            return Err(OrthoError::value("the number of images", self.images.len(), "1 to 255"));
+            return Err(SettingError::new("the number of images", self.images.len(), "1 to 255").into());
         }
         if self.tolerance_m.is_nan() || self.tolerance_m < 0.0 {
-            return Err(OrthoError::value("the tolerance", self.tolerance_m, "metres"));
+            return Err(SettingError::new("the tolerance", self.tolerance_m, "metres").into());
         }
         if let Some(cell) = self.cell_m.filter(|cell| !(*cell > 0.0 && cell.is_finite())) {
-            return Err(OrthoError::value("the cell size", cell, "a positive number of metres"));
+            return Err(SettingError::new("the cell size", cell, "a positive number of metres").into());
         }
         Ok(())
     }

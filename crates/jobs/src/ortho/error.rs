@@ -3,30 +3,24 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
+use io::rpc::RpcReadError;
+use numeric::Cancelled;
 
 use crate::corrections::CorrectionsError;
+use crate::error::{JobError, SettingError, from_steps};
 use crate::files::FileError;
+use crate::threads::ThreadsError;
 
 /// An ortho that cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrthoError {
-    /// A setting is outside of its range.
-    #[error("{name} is {found}, expected {expected}")]
-    Value {
-        /// Name of the setting in words.
-        name: &'static str,
-        /// Value that was given.
-        found: String,
-        /// Values that are accepted.
-        expected: &'static str,
-    },
     /// A raster cannot be read.
     #[error(transparent)]
     Raster(#[from] io::raster::RasterError),
     /// An image has no usable RPC.
     #[error(transparent)]
-    Rpc(Box<io::rpc::RpcReadError>),
+    Rpc(Box<RpcReadError>),
     /// The surface model's coordinate reference system has no EPSG code.
     #[error("the surface model's coordinate system has no EPSG code: {}", path.display())]
     NoEpsg {
@@ -94,27 +88,9 @@ pub enum OrthoError {
     /// The grey values cannot be brought together.
     #[error("the grey values of the images cannot be brought together")]
     Balance(#[from] ortho::BalanceError),
-    /// An output exists or cannot be written.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    File(#[from] FileError),
-    /// The worker threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] crate::threads::ThreadsError),
-    /// The job was cancelled.
-    #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
 
-impl OrthoError {
-    /// A setting outside of its range.
-    pub(super) fn value(name: &'static str, found: impl ToString, expected: &'static str) -> Self {
-        Self::Value { name, found: found.to_string(), expected }
-    }
-}
-
-impl From<io::rpc::RpcReadError> for OrthoError {
-    fn from(error: io::rpc::RpcReadError) -> Self {
-        // Boxed, because it is several times larger than the other variants.
-        Self::Rpc(Box::new(error))
-    }
-}
+from_steps!(OrthoError: Job(SettingError, FileError, ThreadsError, Cancelled), Rpc(RpcReadError));

@@ -13,6 +13,7 @@ use numeric::Progress;
 use super::config::OrthoConfig;
 use super::error::OrthoError;
 use crate::corrections::Corrections;
+use crate::error::SettingError;
 
 /// Most cells of all bands of an ortho: they are held in memory as f32.
 const CELLS_MAX: usize = 1 << 28;
@@ -138,7 +139,7 @@ impl OrthoGrid {
         }
         let cell = config.cell_m.unwrap_or_else(|| dsm.geotransform.cell_size().0);
         if !(cell > 0.0 && cell.is_finite()) {
-            return Err(OrthoError::value("the cell size", cell, "a positive number of metres"));
+            return Err(SettingError::new("the cell size", cell, "a positive number of metres").into());
         }
         let [x_min, y_min, x_max, y_max] = config.bounds.unwrap_or_else(|| extent(&dsm.geotransform, width, height));
         let count = |low: f64, high: f64| {

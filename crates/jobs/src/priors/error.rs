@@ -6,16 +6,18 @@ use ::priors::PriorsError;
 use camera::{FitError, LensError, SimilarityError};
 use city::ModelError;
 use crs::CrsError;
+use io::camera_file::CameraFileError;
 use io::citymodel::CityError;
 use io::colmap::ColmapError;
 use io::npy::NpyError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use io::similarity::SimilarityFileError;
-use io::transforms::TransformsError;
+use numeric::Cancelled;
 use report::PictureError;
 
 use crate::corrections::CorrectionsError;
+use crate::error::{JobError, from_steps};
 use crate::files::FileError;
 use crate::threads::ThreadsError;
 
@@ -215,7 +217,7 @@ pub enum PriorsJobError {
     Colmap(#[from] ColmapError),
     /// The transforms.json cannot be read.
     #[error(transparent)]
-    Transforms(#[from] TransformsError),
+    Transforms(#[from] CameraFileError),
     /// The similarity cannot be read.
     #[error(transparent)]
     Transform(#[from] SimilarityFileError),
@@ -240,22 +242,12 @@ pub enum PriorsJobError {
     /// A picture of the report cannot be made.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// An output exists or cannot be written.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    File(#[from] FileError),
-    /// The threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] ThreadsError),
-    /// The job was cancelled.
-    #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
 
-impl From<RpcReadError> for PriorsJobError {
-    fn from(error: RpcReadError) -> Self {
-        Self::Rpc(Box::new(error))
-    }
-}
+from_steps!(PriorsJobError: Job(FileError, ThreadsError, Cancelled), Rpc(RpcReadError));
 
 /// What a trainer cannot do with a lens.
 #[derive(Debug, thiserror::Error)]

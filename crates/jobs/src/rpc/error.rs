@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use camera::CameraError;
 use io::rpc::{RpcReadError, RpcWriteError};
 
+use crate::error::from_steps;
+
 /// An RPC job that could not be done.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -56,11 +58,7 @@ pub enum RpcJobError {
     Cancelled(#[from] numeric::Cancelled),
 }
 
-impl From<RpcReadError> for RpcJobError {
-    fn from(error: RpcReadError) -> Self {
-        Self::Read(Box::new(error))
-    }
-}
+from_steps!(RpcJobError: Read(RpcReadError));
 
 /// What is wrong with a line of points.
 #[derive(Debug, thiserror::Error)]

@@ -7,8 +7,10 @@ use crs::CrsError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use io::splat_ply::SplatPlyError;
+use numeric::Cancelled;
 
 use crate::corrections::CorrectionsError;
+use crate::error::{JobError, from_steps};
 use crate::files::FileError;
 use crate::map_surface::MapSurfaceError;
 use crate::placed_model::PlacedModelError;
@@ -98,19 +100,9 @@ pub enum SplatsJobError {
         /// Columns and rows of the camera.
         expected: [usize; 2],
     },
-    /// An output exists or cannot be written.
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
-    File(#[from] FileError),
-    /// The threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] ThreadsError),
-    /// The job was cancelled.
-    #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
 
-impl From<RpcReadError> for SplatsJobError {
-    fn from(error: RpcReadError) -> Self {
-        Self::Rpc(Box::new(error))
-    }
-}
+from_steps!(SplatsJobError: Job(FileError, ThreadsError, Cancelled), Rpc(RpcReadError));

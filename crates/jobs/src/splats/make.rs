@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use ::splats::{
-    ColourFit, CurvePoint, DivisionConfig, HeightErrors, RpcSplatCamera, SplatConfig, SplatReport, SplatScene,
-    SplatSurface, SplatView, ViewReport, make_splats,
+    ColourFit, DivisionConfig, RpcSplatCamera, SplatConfig, SplatReport, SplatScene, SplatSurface, SplatView,
+    ViewReport, make_splats,
 };
 use crs::VerticalDatum;
 use io::raster::{read_dem, write_png_rgb};
@@ -67,24 +67,9 @@ pub struct SplatsConfig {
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct SplatsReport {
-    /// Cells with a height.
-    pub cells: usize,
-    /// Number of splats.
-    pub splats: usize,
-    /// Largest distance of a height from the plane of its splat, metres.
-    pub plane_error_max_m: f64,
-    /// Errors of the heights rendered from above, as the mean by weight.
-    pub mean_height: Option<HeightErrors>,
-    /// Errors of the heights rendered from above, at half of the weight.
-    pub median_height: Option<HeightErrors>,
-    /// Values of the reference image at 0 and 1 of the display range, per channel.
-    pub display_range: [[f32; 2]; 3],
-    /// How well the splats render back into each image.
-    pub views: Vec<SplatsImageReport>,
-    /// Uniform splats of several sizes, when asked for.
-    pub uniform: Vec<CurvePoint>,
-    /// Number of uniform splats with the same error, when asked for.
-    pub uniform_at_equal_rmse: Option<f64>,
+    /// Count and errors of the splats.
+    #[serde(flatten)]
+    pub made: SplatReport<SplatsImageReport>,
     /// File that was written.
     pub output: String,
     /// Bound on the heights that was asked for, metres.
@@ -145,18 +130,10 @@ impl SplatsConfig {
 
 impl SplatsReport {
     fn new(config: &SplatsConfig, report: SplatReport) -> Self {
-        let images = config.images.iter().map(|path| path.display().to_string());
-        let views = report.views.into_iter().zip(images).map(|(view, image)| SplatsImageReport { view, image });
+        let mut images = config.images.iter().map(|path| path.display().to_string());
+        let named = |view| SplatsImageReport { view, image: images.next().unwrap_or_default() };
         Self {
-            cells: report.cells,
-            splats: report.splats,
-            plane_error_max_m: report.plane_error_max_m,
-            mean_height: report.mean_height,
-            median_height: report.median_height,
-            display_range: report.display_range,
-            views: views.collect(),
-            uniform: report.uniform,
-            uniform_at_equal_rmse: report.uniform_at_equal_rmse,
+            made: report.map_views(named),
             output: config.output.display().to_string(),
             error_bound_m: config.error_m,
             colour_bound: config.colour_error,
@@ -186,7 +163,7 @@ impl SplatsReport {
 /// let mut config = SplatsConfig::new(town.join("truth/dsm.tif"), images, folder.path().join("town.ply"));
 /// config.error_m = 1.0;
 /// let report = make(&config, &numeric::Silent)?;
-/// assert!(report.splats < report.cells && config.output.is_file());
+/// assert!(report.made.splats < report.made.cells && config.output.is_file());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn make(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, SplatsJobError> {
