@@ -201,6 +201,99 @@ fn a_terrain_model_tells_what_stands() {
     assert_eq!(estimated.pointer("/protocol/terrain/source").and_then(Value::as_str), Some("estimated"));
 }
 
+/// What a surface model says about itself lies beside it. Half of the cells are filled and 3 m too
+/// high; the others are 0.3 m too high with a σ of 0.5 m.
+#[test]
+fn layers_beside_the_test_tell_observed_from_filled_and_judge_the_uncertainty() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    let is_filled = |x: f64| x < WEST + 50.0;
+    let utm = Crs::ellipsoidal(32617);
+    let heights = sampled((200, 180), &grid(), |x, y| surface(x, y) + if is_filled(x) { 3.0 } else { 0.3 });
+    let test = write(&folder, "dsm.tif", BandData::F32(&heights), grid(), utm);
+    let flags = sampled((200, 180), &grid(), |x, _| f64::from(u8::from(is_filled(x)))).map(|&flag| flag as u8);
+    write(&folder, "filled.tif", BandData::U8(&flags), grid(), utm);
+    let alone = json(&["--align", "none"], &test, &reference);
+    assert!(alone["sigma"].is_null() && alone["reliability"].is_null() && alone["objects"].is_null(), "{alone}");
+    let sigma = sampled((200, 180), &grid(), |x, _| if is_filled(x) { 2.0 } else { 0.5 });
+    write(&folder, "sigma.tif", BandData::F32(&sigma), grid(), utm);
+    let confidence = sampled((200, 180), &grid(), |x, _| if is_filled(x) { 0.25 } else { 0.95 });
+    write(&folder, "confidence.tif", BandData::F32(&confidence), grid(), utm);
+    let found = json(&["--align", "none"], &test, &reference);
+    assert_eq!(found["metrics"], alone["metrics"], "layers change no metric");
+    for (name, mae, pag) in [("observed", 0.3, 1.0), ("filled", 3.0, 0.0)] {
+        let of = |member: &str| number(&found, &format!("/origins/{name}/{member}"));
+        assert!((of("metrics/mae") - mae).abs() < 1e-4 && of("metrics/pag_1") == pag, "{found}");
+        assert!((of("metrics/valid_ratio") - 0.5).abs() < 1e-9 && of("edges/edge/n") > 100.0, "{found}");
+    }
+    assert_eq!((number(&found, "/sigma/observed/below_1_sigma"), number(&found, "/sigma/filled/n")), (1.0, 18_000.0));
+    assert_eq!(number(&found, "/sigma/filled/below_2_sigma"), 1.0);
+    // The cells are 0.5 m wide, so a height is right below one metre.
+    assert_eq!(number(&found, "/reliability/right_below_m"), 1.0);
+    assert!((number(&found, "/reliability/tenths/9/promised") - 0.95).abs() < 1e-6);
+    assert_eq!(
+        (number(&found, "/reliability/tenths/9/right"), number(&found, "/reliability/tenths/2/right")),
+        (1.0, 0.0)
+    );
+    let table = skysweep(&["--align", "none"], &test, &reference).success();
+    table.stdout(contains("origin").and(contains("filled %")).and(contains("promised %")).and(contains("sigma")));
+    // `source.tif` is believed before `filled.tif`, and a file on another grid is left out.
+    let codes = sampled((200, 180), &grid(), |x, _| if is_filled(x) { 4.0 } else { 11.0 }).map(|&code| code as u8);
+    write(&folder, "source.tif", BandData::U8(&codes), grid(), utm);
+    std::fs::remove_file(folder.path().join("sigma.tif")).unwrap();
+    write(&folder, "sigma.tif", BandData::F32(&Grid::filled(9, 9, 1.0f32)), grid(), utm);
+    let found = json(&["--align", "none"], &test, &reference);
+    assert_eq!(
+        (number(&found, "/origins/filled/metrics/n"), number(&found, "/origins/unknown_cells")),
+        (18_000.0, 18_000.0)
+    );
+    assert!(found["sigma"].is_null() && found.to_string().contains("sigma.tif"), "{found}");
+}
+
+#[test]
+fn numbered_buildings_are_found_damaged_or_lost() {
+    let folder = TempDir::new().unwrap();
+    let utm = Crs::ellipsoidal(32617);
+    // Three halls of 12 m in a row, 20 m apart, and trees east of them.
+    let hall = |x: f64, y: f64| {
+        let (u, v) = (x - WEST, y - NORTH + 60.0);
+        ((0.0..60.0).contains(&u) && u.rem_euclid(20.0) < 12.0 && (0.0..12.0).contains(&v))
+            .then_some(1.0 + (u / 20.0).floor())
+    };
+    let tree = |x: f64| x > WEST + 90.0;
+    let truth = |x: f64, y: f64| {
+        20.0 + if hall(x, y).is_some() {
+            12.0
+        } else if tree(x) {
+            6.0
+        } else {
+            0.0
+        }
+    };
+    let truths = sampled((200, 180), &grid(), truth);
+    let reference = write(&folder, "reference.tif", BandData::F32(&truths), grid(), utm);
+    let numbers = sampled((200, 180), &grid(), |x, y| hall(x, y).unwrap_or(if tree(x) { -1.0 } else { 0.0 }));
+    let numbers = write(&folder, "numbers.tif", BandData::F32(&numbers), grid(), utm);
+    // The second hall is missing, a third of the third one too, and trees are 3 m too low in the
+    // north.
+    let heights = sampled((200, 180), &grid(), |x, y| match hall(x, y) {
+        Some(2.0) => 20.0,
+        Some(3.0) if x > WEST + 48.0 => 20.0,
+        None if tree(x) && y > NORTH - 45.0 => 23.0,
+        _ => truth(x, y),
+    });
+    let test = write(&folder, "test.tif", BandData::F32(&heights), grid(), utm);
+    let found = json(&["--align", "none", "--buildings", numbers.to_str().unwrap()], &test, &reference);
+    let objects = &found["objects"];
+    let of = |name: &str| number(objects, &format!("/{name}"));
+    assert_eq!((of("buildings"), of("lost"), of("damaged")), (3.0, 1.0, 2.0), "{objects}");
+    assert!((of("trees_right") - 0.5).abs() < 1e-9 && objects["worst"][0]["number"] == 2, "{objects}");
+    // The one whole hall has its outlines where they are.
+    assert!(number(&found, "/outlines/median_cells").abs() < 0.01, "{found}");
+    let table = skysweep(&["--align", "none", "--buildings", numbers.to_str().unwrap()], &test, &reference).success();
+    table.stdout(contains("trees right %").and(contains("building 2")));
+}
+
 /// A classified LAZ cloud of the surface, denser than its cells, above EGM96.
 #[test]
 fn a_point_cloud_is_a_reference() {

@@ -11,12 +11,13 @@ use serde_json::Value;
 
 const SMALL: [&str; 8] = ["simulate", "town", "--size", "60", "--gsd", "1", "--views", "2"];
 
-const FILES: [&str; 12] = [
+const FILES: [&str; 13] = [
     "view_1.tif",
     "view_2.tif",
     "truth/dsm.tif",
     "truth/dtm.tif",
     "truth/classes.tif",
+    "truth/buildings.tif",
     "truth/ortho.tif",
     "truth/visibility.tif",
     "truth/heights_1.tif",
@@ -127,7 +128,7 @@ fn a_template_is_a_parameter_file_and_presets_are_listed() {
     let listed = skysweep().args(["simulate", "--list"]).output().unwrap();
     let listed = String::from_utf8(listed.stdout).unwrap();
     let names: Vec<&str> = listed.lines().filter_map(|line| line.split_whitespace().next()).collect();
-    assert_eq!(names.len(), 9);
+    assert_eq!(names.len(), 12);
     let folder = tempfile::tempdir().unwrap();
     for name in names {
         let template = skysweep().args(["simulate", name, "--template", "--dates", "2"]).output().unwrap();

@@ -2,7 +2,8 @@
 //! N --out DIR]`.
 //!
 //! Simulated scenes are made first (`skysweep simulate`). Real scenes are read from
-//! `../shared/data/stereo`, or from the folder that `SKYSWEEP_DATA` names. The release binary runs
+//! `../shared/data/stereo`, and scenes of another simulator from `../shared/data/sim`, or from the
+//! folder that `SKYSWEEP_DATA` names. The release binary runs
 //! with default options except for the preset; scenes with a measured truth also run without filled
 //! voids and with all voids filled, so that other programs' surfaces are compared like with like.
 //! All scenes and presets run once, then all run again, so that a machine that slows down slows
@@ -21,6 +22,7 @@ mod peers;
 mod places;
 mod plot;
 mod pyramid;
+mod quality;
 mod run;
 mod scenes;
 mod table;
@@ -39,12 +41,19 @@ fn main() -> anyhow::Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let Arguments { wanted, runs, out } = arguments()?;
     let folder = tempfile::tempdir()?;
-    let data = places::shared_data().join("stereo");
+    let (data, sim) = (places::shared_data().join("stereo"), places::shared_data().join("sim"));
     let mut all = scenes::simulated();
+    for scene in scenes::independent(&sim) {
+        if scene.folder.is_dir() {
+            all.push(scene);
+        } else {
+            println!("skipped: scene {}: {} is absent", scene.name, scene.folder.display());
+        }
+    }
     if data.is_dir() {
         all.extend(scenes::real(&data));
     } else {
-        println!("no real scenes: {} is absent", data.display());
+        println!("skipped: real scenes: {} is absent", data.display());
     }
     all.retain(|scene| wanted.is_empty() || wanted.iter().any(|w| scene.name.contains(w.as_str())));
     for scene in &mut all {

@@ -38,7 +38,7 @@ pub(crate) struct Reached {
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Row {
     pub(crate) scene: &'static str,
-    /// `simulated`, `measured`, `peer` or `pyramid`.
+    /// `simulated`, `independent`, `measured`, `peer` or `pyramid`.
     pub(crate) truth: &'static str,
     pub(crate) preset: &'static str,
     pub(crate) megapixels: f64,
@@ -65,7 +65,7 @@ impl Row {
 
     /// Whether the errors are against a truth.
     pub(crate) fn has_truth(&self) -> bool {
-        matches!(self.truth, "simulated" | "measured")
+        matches!(self.truth, "simulated" | "independent" | "measured")
     }
 
     fn new(scene: &Scene, preset: &'static str, runs: Vec<Cost>, metrics: Metrics) -> anyhow::Result<Self> {
@@ -76,6 +76,7 @@ impl Row {
         let (megapixels, cpu_s) = (scene.megapixels()?, median(|c| c.cpu_s));
         let truth = match scene.truth {
             Truth::Simulated => "simulated",
+            Truth::Independent => "independent",
             Truth::Measured { .. } => "measured",
             Truth::Peer { .. } => "peer",
             Truth::Pyramid { .. } => "pyramid",

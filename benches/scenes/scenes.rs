@@ -9,6 +9,8 @@ use crate::run;
 pub(crate) enum Truth {
     /// The exact surface of a simulated scene, with its terrain and classes.
     Simulated,
+    /// The exact surface of a scene of another simulator, with a number for each building.
+    Independent,
     /// A measured surface; `vertical` names the datum of a reference that does not say its own.
     Measured { path: PathBuf, vertical: &'static str },
     /// Another program's surface. It is no truth; differences show only how far two programs agree.
@@ -22,6 +24,7 @@ pub(crate) enum Truth {
 pub(crate) type Goal = (&'static str, f64, f64);
 
 /// One scene of the bench.
+#[derive(Clone)]
 pub(crate) struct Scene {
     pub(crate) name: &'static str,
     pub(crate) images: Vec<PathBuf>,
@@ -29,12 +32,12 @@ pub(crate) struct Scene {
     pub(crate) goals: &'static [Goal],
     /// Arguments of `skysweep simulate` for a simulated scene.
     simulation: &'static [&'static str],
-    /// Folder of a simulated scene.
+    /// Folder of a simulated scene, or of a scene of another simulator.
     pub(crate) folder: PathBuf,
 }
 
 /// Simulated scenes: name and arguments.
-const SIMULATED: [(&str, &[&str]); 9] = [
+const SIMULATED: [(&str, &[&str]); 13] = [
     ("town", &["town"]),
     ("dense-city", &["dense-city"]),
     ("high-rise", &["high-rise"]),
@@ -44,6 +47,10 @@ const SIMULATED: [(&str, &[&str]); 9] = [
     ("repetitive-roofs", &["repetitive-roofs"]),
     ("low-texture", &["low-texture"]),
     ("five-dates", &["town", "--views", "5", "--dates", "5"]),
+    ("five-seasons", &["town", "--views", "5", "--dates", "5", "--seasons"]),
+    ("suburb", &["suburb"]),
+    ("dense-towers", &["dense-towers"]),
+    ("industrial", &["industrial"]),
 ];
 
 /// `jax_068`, all seven views.
@@ -67,6 +74,16 @@ pub(crate) fn simulated() -> Vec<Scene> {
         folder: PathBuf::new(),
     };
     SIMULATED.into_iter().map(scene).collect()
+}
+
+/// Returns the scenes of another simulator under `sim` (`../shared/data/sim`), present or not.
+pub(crate) fn independent(sim: &Path) -> Vec<Scene> {
+    let scene = |(name, folder): (&'static str, &str)| {
+        let folder = sim.join(folder);
+        let images = (1..=3).map(|view| folder.join(format!("view_{view}.tif"))).collect();
+        Scene { name, images, truth: Truth::Independent, goals: &[], simulation: &[], folder }
+    };
+    [("sim/town", "town"), ("sim/suburb", "suburb"), ("sim/highrise", "highrise")].map(scene).to_vec()
 }
 
 /// Returns the paths of the images of Jacksonville with these numbers.

@@ -12,6 +12,7 @@ use crate::machine::machine;
 use crate::matrix::{DEFAULT, Reached, Row};
 use crate::peers::Peer;
 use crate::plot;
+use crate::quality::{quality_table, reliability_table};
 use crate::run::at_coverage;
 
 /// All results, with the machine and the date.
@@ -48,6 +49,8 @@ impl Results {
         for row in self.rows.iter().filter(|row| row.has_truth()) {
             text.push_str(&line(row));
         }
+        text.push_str(&quality_table(&self.rows));
+        text.push_str(&reliability_table(&self.rows));
         text.push_str(&self.goal_table());
         text.push_str(&self.peer_table());
         text.push_str(&self.coverage_table());

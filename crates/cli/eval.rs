@@ -49,10 +49,13 @@ pub(crate) struct Args {
     /// from REF].
     #[arg(long, value_name = "FILE")]
     dtm: Option<PathBuf>,
-    /// Confidence of each cell of TEST, on its grid, more is better (dsm/confidence.tif). Adds rows
-    /// for the most confident 95 to 50 % of REF's cells.
+    /// Confidence of each cell of TEST, on its grid, more is better [default: confidence.tif beside
+    /// TEST]. Adds rows for the most confident 95 to 50 % of REF's cells.
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
+    /// Raster of building numbers (0 ground, −1 tree) on any grid: buildings lost, trees found.
+    #[arg(long, value_name = "FILE")]
+    buildings: Option<PathBuf>,
     /// Least height above the terrain of cells that count as standing, in metres.
     #[arg(long, value_name = "METRES", default_value_t = EvalConfig::default().standing_m)]
     standing_m: f64,
@@ -208,6 +211,7 @@ fn refuse_grid_options(args: &Args, what: &str) -> anyhow::Result<()> {
         ("--align", args.align.is_some_and(|align| !matches!(align, Align::None))),
         ("--classes", args.classes.is_some()),
         ("--confidence", args.confidence.is_some()),
+        ("--buildings", args.buildings.is_some()),
         ("--skip", !args.skip.is_empty()),
         ("--mask", args.mask.is_some()),
         ("--dtm", args.dtm.is_some()),
@@ -251,6 +255,7 @@ fn grid_config(args: &Args) -> GridEvalConfig {
     config.mask = args.mask.clone();
     config.terrain = args.dtm.clone();
     config.confidence = args.confidence.clone();
+    config.objects = args.buildings.clone();
     config.standing_m = args.standing_m;
     config.reference_cell_m = args.ref_cell;
     config.test_vertical = args.test_vertical;

@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ::simulate::{PRESETS, SimulationConfig};
+use ::simulate::{PRESETS, SeasonsConfig, SimulationConfig};
 use jobs::simulate::{SimulateConfig, SimulateJobError};
 
 use crate::error::with_hint;
@@ -36,6 +36,10 @@ pub(crate) struct Args {
     /// radiometry on each.
     #[arg(long, value_name = "N")]
     dates: Option<usize>,
+    /// Change albedo, fine texture and sharpness from date to date; one date per view unless
+    /// --dates says otherwise.
+    #[arg(long)]
+    seasons: bool,
     /// Also write N perspective cameras around the scene (a COLMAP model in cameras/sparse/0, in
     /// map coordinates), for skysweep priors and the trainers that it prepares.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
@@ -84,6 +88,10 @@ fn config(args: &Args) -> anyhow::Result<SimulationConfig> {
     config.gsd_m = args.gsd.unwrap_or(config.gsd_m);
     config.views = args.views.unwrap_or(config.views);
     config.acquisition.dates = args.dates.unwrap_or(config.acquisition.dates);
+    if args.seasons {
+        config.seasons = SeasonsConfig::YEAR;
+        config.acquisition.dates = args.dates.unwrap_or(config.views);
+    }
     config.validate()?;
     Ok(config)
 }

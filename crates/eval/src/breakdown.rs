@@ -76,6 +76,11 @@ impl Cells<'_> {
         cells.into_iter().map(metrics).collect()
     }
 
+    /// Returns the metrics of all cells.
+    pub(crate) fn overall(&self) -> Metrics {
+        self.by(|_| Some(())).remove(&()).unwrap_or_else(|| Metrics::of(&mut [], 0, self.thresholds_m))
+    }
+
     pub(crate) fn per_class(&self, classes: Option<&Grid<Option<i32>>>) -> Vec<ClassMetrics> {
         let by_class = self.by(|i| classes.and_then(|classes| *classes.data().get(i)?));
         by_class.into_iter().map(|(class, metrics)| ClassMetrics { class, metrics }).collect()

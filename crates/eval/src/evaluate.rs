@@ -3,12 +3,15 @@
 
 use crate::align::{AlignmentMethod, MetresFromCells, Shift};
 use crate::breakdown::{Cells, ClassMetrics, CoverageMetrics, EdgeMetrics, SlopeMetrics};
+use crate::calibration::{Reliability, SigmaReport, reliability, sigma_report};
 use crate::cell_map::CellMap;
 use crate::edges::{EdgeRule, edge_zone};
 use crate::error::EvalError;
 use crate::gradient::slope_deg;
 use crate::metrics::Metrics;
 use crate::nuth_kaab::{NuthKaab, NuthKaabSummary};
+use crate::objects::{Objects, ObjectsFound};
+use crate::origin::{CellOrigin, OriginSplit, split};
 use crate::resample::{bilinear, nearest};
 use crate::search::{Search, SearchSummary};
 use crate::sharpness::{Sharpness, sharpness};
@@ -48,8 +51,17 @@ pub struct EvalInput<'a> {
     /// from the ground class or estimated.
     pub terrain: Option<&'a Grid<f32>>,
     /// Confidence of each cell of the test, on the test grid; higher is better. It is used to
-    /// evaluate the most confident cells alone.
+    /// evaluate the most confident cells alone, and for the reliability table.
     pub confidence: Option<&'a Grid<f32>>,
+    /// Standard deviation of each height of the test, on the test grid, metres. Cells that are not
+    /// finite or not positive have none.
+    pub sigma_m: Option<&'a Grid<f32>>,
+    /// Origin of each height of the test, on the test grid. Without it, all heights count as
+    /// observed.
+    pub origins: Option<&'a Grid<CellOrigin>>,
+    /// Object in each reference cell, on the reference grid: 0 or `None` is ground, −1 a tree, and
+    /// a positive number is a building.
+    pub objects: Option<&'a Grid<Option<i32>>>,
 }
 
 impl<'a> EvalInput<'a> {
@@ -69,6 +81,9 @@ impl<'a> EvalInput<'a> {
             mask: None,
             terrain: None,
             confidence: None,
+            sigma_m: None,
+            origins: None,
+            objects: None,
         }
     }
 }
@@ -86,6 +101,8 @@ pub struct EvalConfig {
     pub skip: Vec<i32>,
     /// Lowest height above the terrain of a standing object, metres.
     pub standing_m: f64,
+    /// Absolute error below which a height is right in the reliability table, metres.
+    pub right_below_m: f64,
 }
 
 impl Default for EvalConfig {
@@ -96,6 +113,7 @@ impl Default for EvalConfig {
             thresholds_m: vec![0.5, 1.0, 2.5, 7.5],
             skip: Vec::new(),
             standing_m: 2.0,
+            right_below_m: 1.0,
         }
     }
 }
@@ -126,6 +144,16 @@ pub struct Evaluation {
     pub standing: Standing,
     /// Metrics of the most confident cells. Empty without a confidence.
     pub coverages: Vec<CoverageMetrics>,
+    /// Observed and filled cells apart. `None` without their origins.
+    pub origins: Option<OriginSplit>,
+    /// Calibration of the standard deviations. `None` without them.
+    pub sigma: Option<SigmaReport>,
+    /// Reliability of the confidence. `None` without one.
+    pub reliability: Option<Reliability>,
+    /// Buildings that are lost or damaged, and trees. `None` without the objects.
+    pub objects: Option<ObjectsFound>,
+    /// Overreach along the outlines of the numbered buildings. `None` without the objects.
+    pub outlines: Option<Sharpness>,
     /// Number of valid cells of the reference that the class or the mask excludes.
     pub skipped_cells: usize,
     /// Test − reference after the alignment, metres, on the reference grid. NaN where either is
@@ -179,6 +207,10 @@ pub fn evaluate(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Evaluation
         }
     }
     let aligned = aligned.map(|&h| h as f32);
+    let zone = edge_zone(input.reference, input.metres_from_cells);
+    let confidence = input.confidence.map(|layer| at_reference(input, layer, cells, f32::NAN));
+    let sigma_m = input.sigma_m.map(|layer| at_reference(input, layer, cells, f32::NAN));
+    let origins = input.origins.map(|layer| at_reference(input, layer, cells, CellOrigin::Void));
     let part = Cells { reference: &counted, errors: &errors, thresholds_m: &config.thresholds_m };
     Ok(Evaluation {
         shift,
@@ -188,25 +220,30 @@ pub fn evaluate(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Evaluation
         classes: part.per_class(input.classes),
         slopes: part.per_slope(&slope_deg(input.reference, input.metres_from_cells)),
         edge_rule: EdgeRule::of(input.metres_from_cells),
-        edges: part.at_edges(&edge_zone(input.reference, input.metres_from_cells)),
+        edges: part.at_edges(&zone),
         sharpness: roof_edges(input, &counted, &aligned),
         standing: standing_of(input, config, &counted, &aligned),
-        coverages: input.confidence.map_or_else(Vec::new, |c| part.per_coverage(&confidences(input, c, cells))),
+        coverages: confidence.as_ref().map_or_else(Vec::new, |confidence| part.per_coverage(confidence)),
+        origins: origins.as_ref().map(|origins| split(part, origins, &zone, input.classes)),
+        sigma: sigma_m.map(|sigma_m| sigma_report(&errors, &sigma_m, origins.as_ref())),
+        reliability: confidence.map(|confidence| reliability(&errors, &confidence, config.right_below_m)),
+        objects: input.objects.map(|numbers| objects(input, numbers, &counted, &errors)),
+        outlines: input.objects.map(|numbers| outlines(input, numbers, &counted, &aligned)),
         skipped_cells,
         errors: errors.map(|&e| e as f32),
         aligned,
     })
 }
 
-/// Returns the test's confidence at every reference cell. The test is moved by `shift` reference
-/// cells.
-fn confidences(input: &EvalInput<'_>, confidence: &Grid<f32>, shift: (f64, f64)) -> Grid<f32> {
+/// Returns a layer of the test at every reference cell, each from the nearest cell. The test is
+/// moved by `shift` reference cells. Cells outside of the test get `outside`.
+fn at_reference<T: Copy>(input: &EvalInput<'_>, layer: &Grid<T>, shift: (f64, f64), outside: T) -> Grid<T> {
     let (width, height) = (input.reference.width(), input.reference.height());
-    let mut out = Grid::filled(width, height, f32::NAN);
+    let mut out = Grid::filled(width, height, outside);
     for (i, out) in out.data_mut().iter_mut().enumerate() {
         let (column, row) = ((i % width) as f64, (i / width) as f64);
         let (x, y) = input.test_from_reference.position(column - shift.0, row - shift.1);
-        *out = nearest(confidence, x, y).unwrap_or(f32::NAN);
+        *out = nearest(layer, x, y).unwrap_or(outside);
     }
     out
 }
@@ -218,6 +255,7 @@ fn check(input: &EvalInput<'_>, config: &EvalConfig) -> Result<(), EvalError> {
     config.thresholds_m.iter().try_for_each(|&t| positive("a threshold", t))?;
     positive("the search radius", config.search_m)?;
     positive("the least height of what stands", config.standing_m)?;
+    positive("the error below which a height is right", config.right_below_m)?;
     let (width, height) = (input.reference.width(), input.reference.height());
     let fits = |what, size: Option<(usize, usize)>| match size {
         Some((found_width, found_height)) if (found_width, found_height) != (width, height) => {
@@ -228,11 +266,16 @@ fn check(input: &EvalInput<'_>, config: &EvalConfig) -> Result<(), EvalError> {
     fits("class", input.classes.map(|g| (g.width(), g.height())))?;
     fits("mask", input.mask.map(|g| (g.width(), g.height())))?;
     fits("terrain", input.terrain.map(|g| (g.width(), g.height())))?;
-    if let Some(confidence) = input.confidence {
-        let (width, height) = (input.test.width(), input.test.height());
-        let (found_width, found_height) = (confidence.width(), confidence.height());
-        if (found_width, found_height) != (width, height) {
-            return Err(EvalError::Shape { what: "confidence", found_width, found_height, width, height });
+    fits("building", input.objects.map(|g| (g.width(), g.height())))?;
+    let (width, height) = (input.test.width(), input.test.height());
+    let layers = [
+        ("confidence", input.confidence.map(|g| (g.width(), g.height()))),
+        ("standard deviation", input.sigma_m.map(|g| (g.width(), g.height()))),
+        ("origin", input.origins.map(|g| (g.width(), g.height()))),
+    ];
+    for (what, size) in layers {
+        if let Some((found_width, found_height)) = size.filter(|size| *size != (width, height)) {
+            return Err(EvalError::Shape { what, found_width, found_height, width, height });
         }
     }
     if input.classes.is_none() && !config.skip.is_empty() {
@@ -314,9 +357,29 @@ fn finite(errors: &Grid<f64>) -> Vec<f64> {
 /// otherwise.
 fn roof_edges(input: &EvalInput<'_>, counted: &Grid<f32>, aligned: &Grid<f32>) -> Sharpness {
     let classes = input.classes.filter(|classes| classes.data().contains(&Some(BUILDING)));
-    let counts = |cell: (usize, usize)| {
+    let counts = |cell: (usize, usize), _| {
         counted.get(cell.0, cell.1).is_some_and(|h| h.is_finite())
             && classes.is_none_or(|classes| classes.get(cell.0, cell.1) == Some(&Some(BUILDING)))
+    };
+    sharpness(input.reference, aligned, input.metres_from_cells, counts)
+}
+
+/// Judges the numbered buildings and the trees.
+fn objects(
+    input: &EvalInput<'_>,
+    numbers: &Grid<Option<i32>>,
+    counted: &Grid<f32>,
+    errors: &Grid<f64>,
+) -> ObjectsFound {
+    Objects { reference: counted, errors, numbers, cell_area_m2: input.metres_from_cells.cell_area_m2() }.found()
+}
+
+/// Measures the overreach where a numbered building borders on anything else.
+fn outlines(input: &EvalInput<'_>, numbers: &Grid<Option<i32>>, counted: &Grid<f32>, aligned: &Grid<f32>) -> Sharpness {
+    let number = |(column, row): (usize, usize)| numbers.get(column, row).copied().flatten().unwrap_or(0);
+    let counts = |high: (usize, usize), low| {
+        let is_counted = counted.get(high.0, high.1).is_some_and(|h| h.is_finite());
+        is_counted && number(high) > 0 && number(low) != number(high)
     };
     sharpness(input.reference, aligned, input.metres_from_cells, counts)
 }

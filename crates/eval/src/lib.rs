@@ -4,7 +4,8 @@
 //! *reference*). A [`CellMap`] leads from the cells of the reference to the cells of the test. The
 //! resulting [`Evaluation`] holds the shift that was removed, the errors over all cells, per class,
 //! per slope and at edges, the kinds of completeness, the overreach of roofs, and the error of
-//! every cell.
+//! every cell. With layers that describe the test, it also tells observed from filled cells and
+//! judges the stated uncertainty; with numbered buildings, it names those that are lost.
 //!
 //! [`compare_surfaces`] compares meshes and point clouds. [`compare_depths`], [`compare_normals`]
 //! and [`compare_masks`] compare maps in the pixels of one camera.
@@ -16,6 +17,7 @@
 
 mod align;
 mod breakdown;
+mod calibration;
 mod cell_map;
 mod distance;
 mod distribution;
@@ -26,7 +28,9 @@ mod gradient;
 mod maps;
 mod metrics;
 mod nuth_kaab;
+mod objects;
 mod opening;
+mod origin;
 mod resample;
 mod search;
 mod sharpness;
@@ -40,6 +44,7 @@ mod vertical;
 
 pub use align::{AlignmentMethod, MetresFromCells, Shift};
 pub use breakdown::{COVERAGES, ClassMetrics, CoverageMetrics, EdgeMetrics, SLOPE_BOUNDS_DEG, SlopeMetrics};
+pub use calibration::{Reliability, ReliabilityRow, SigmaCalibration, SigmaReport};
 pub use cell_map::CellMap;
 pub use distribution::{Cumulative, Histogram, cumulative, histogram, round_up};
 pub use edges::{EdgeRule, JUMP_M, JUMP_STEEPNESS, ZONE_CELLS, ZONE_M, edge_zone};
@@ -52,6 +57,8 @@ pub use maps::{
 };
 pub use metrics::Metrics;
 pub use nuth_kaab::NuthKaabSummary;
+pub use objects::{DamagedBuilding, ObjectsFound};
+pub use origin::{CellOrigin, OriginMetrics, OriginSplit};
 pub use resample::{bilinear, nearest};
 pub use search::SearchSummary;
 pub use sharpness::{REACH_M, Sharpness};

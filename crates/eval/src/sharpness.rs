@@ -14,6 +14,7 @@ use crate::align::MetresFromCells;
 use crate::edges::{Cell, EdgeRule, jumps};
 use crate::gradient::{gradients, steepness};
 use crate::statistics::ErrorStatistics;
+use numeric::percentile;
 use raster::Grid;
 use serde::Serialize;
 
@@ -40,21 +41,23 @@ pub struct Sharpness {
     pub measured: usize,
     /// Overreach in metres, positive outwards. `None` if no position was measured.
     pub overreach_m: Option<ErrorStatistics>,
+    /// Median of the overreach in cells. `None` if no position was measured.
+    pub median_cells: Option<f64>,
 }
 
 /// Measures the overreach of `test`, which is aligned and on the reference grid. `roof` selects the
-/// edges by their higher cell.
+/// edges by their higher and their lower cell.
 pub(crate) fn sharpness(
     reference: &Grid<f32>,
     test: &Grid<f32>,
     metres_from_cells: MetresFromCells,
-    roof: impl Fn(Cell) -> bool,
+    roof: impl Fn(Cell, Cell) -> bool,
 ) -> Sharpness {
     let gradients = gradients(reference, metres_from_cells);
     let rule = EdgeRule::of(metres_from_cells);
     let mut edges = 0;
-    let mut overreach = Vec::new();
-    for (high, low) in jumps(reference, rule).filter(|&(high, _)| roof(high)) {
+    let (mut overreach, mut in_cells) = (Vec::new(), Vec::new());
+    for (high, low) in jumps(reference, rule).filter(|&(high, low)| roof(high, low)) {
         let profile = Profile { high, step: (offset(high.0, low.0), offset(high.1, low.1)) };
         let Some((level, at)) = profile.edge(reference) else { continue };
         let Some((cosine, side_m)) = profile.metres(metres_from_cells, [gradients[high], gradients[low]]) else {
@@ -62,9 +65,13 @@ pub(crate) fn sharpness(
         };
         edges += 1;
         let reach = ((REACH_M / side_m).ceil() as isize).clamp(LEAST_REACH_CELLS, MOST_REACH_CELLS);
-        overreach.extend(profile.crossing(test, level, at, reach).map(|found| (found - at) * side_m * cosine));
+        if let Some(found) = profile.crossing(test, level, at, reach) {
+            overreach.push((found - at) * side_m * cosine);
+            in_cells.push((found - at) * cosine);
+        }
     }
-    Sharpness { edges, measured: overreach.len(), overreach_m: ErrorStatistics::of(&mut overreach) }
+    let median_cells = percentile(&mut in_cells, 50.0);
+    Sharpness { edges, measured: overreach.len(), overreach_m: ErrorStatistics::of(&mut overreach), median_cells }
 }
 
 fn offset(from: usize, to: usize) -> isize {
@@ -152,19 +159,20 @@ mod tests {
     #[test]
     fn a_roof_that_is_too_large_reaches_out_by_as_much_in_every_direction() {
         for (grown, turn) in [(0.0, 0.0), (1.25, 0.0), (-0.75, 0.0), (1.25, 23.0), (-0.6, 40.0)] {
-            let found = sharpness(&roof(0.0, turn), &roof(grown, turn), metres(), |_| true);
+            let found = sharpness(&roof(0.0, turn), &roof(grown, turn), metres(), |_, _| true);
             let overreach = found.overreach_m.unwrap();
             assert!((overreach.median - grown).abs() < 0.1, "{grown} m, {turn}°: {found:?}");
+            assert!((found.median_cells.unwrap() * CELL - overreach.median).abs() < 1e-9);
             assert!(found.measured > 150 && found.measured as f64 > 0.9 * found.edges as f64, "{found:?}");
         }
     }
 
     #[test]
     fn a_missing_roof_is_counted_and_not_measured() {
-        let found = sharpness(&roof(0.0, 0.0), &Grid::filled(120, 120, 4.0), metres(), |_| true);
+        let found = sharpness(&roof(0.0, 0.0), &Grid::filled(120, 120, 4.0), metres(), |_, _| true);
         assert!(found.edges > 150 && found.measured == 0 && found.overreach_m.is_none(), "{found:?}");
-        let void = sharpness(&roof(0.0, 0.0), &Grid::filled(120, 120, f32::NAN), metres(), |_| true);
+        let void = sharpness(&roof(0.0, 0.0), &Grid::filled(120, 120, f32::NAN), metres(), |_, _| true);
         assert_eq!(void.measured, 0);
-        assert_eq!(sharpness(&roof(0.0, 0.0), &roof(0.0, 0.0), metres(), |_| false).edges, 0);
+        assert_eq!(sharpness(&roof(0.0, 0.0), &roof(0.0, 0.0), metres(), |_, _| false).edges, 0);
     }
 }

@@ -157,6 +157,10 @@ impl SceneWriter<'_> {
         self.write_map("dsm.tif", &[Band { description: "height_m", data: BandData::F32(&truth.dsm) }])?;
         self.write_map("dtm.tif", &[Band { description: "height_m", data: BandData::F32(&truth.dtm) }])?;
         self.write_map("classes.tif", &[Band { description: "class", data: BandData::U8(&truth.classes) }])?;
+        self.write_map(
+            "buildings.tif",
+            &[Band { description: "building_number", data: BandData::I32(&truth.objects) }],
+        )?;
         self.write_map("ortho.tif", &[Band { description: "reflectance_1e-4", data: BandData::U16(&truth.ortho) }])?;
         let names: Vec<String> = (1..=truth.visibility.len()).map(|view| format!("seen_by_view_{view}")).collect();
         let seen = names.iter().zip(&truth.visibility);

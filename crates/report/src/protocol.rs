@@ -29,6 +29,10 @@ pub struct Protocol {
     pub mask: Option<String>,
     /// Source of the terrain model.
     pub terrain: Option<String>,
+    /// Source of the buildings' numbers.
+    pub objects: Option<String>,
+    /// Sources of the origin, the standard deviation and the confidence of the heights.
+    pub layers: Vec<String>,
     /// Decisions and doubts that a reader must know.
     pub notes: Vec<String>,
     /// Requirements that were not met.
@@ -60,6 +64,12 @@ impl Protocol {
         }
         if let Some(mask) = &self.mask {
             lines.push(("mask", format!("cells that are not zero in {mask}")));
+        }
+        if let Some(objects) = &self.objects {
+            lines.push(("buildings", format!("numbered in {objects}")));
+        }
+        if !self.layers.is_empty() {
+            lines.push(("layers", self.layers.join(", ")));
         }
         if found.skipped_cells > 0 {
             lines.push(("left out", format!("{} valid cells of the reference, by class or mask", found.skipped_cells)));
@@ -127,6 +137,8 @@ impl Protocol {
             "edges": found.edge_rule,
             "terrain": found.standing.terrain,
             "terrain_file": self.terrain,
+            "objects_file": self.objects,
+            "layers": self.layers,
         })
     }
 }

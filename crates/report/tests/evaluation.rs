@@ -38,6 +38,8 @@ fn with_report(change: impl Fn(&mut Protocol), check: impl Fn(&EvaluationReport<
         classes: Some("classes.tif".into()),
         mask: None,
         terrain: None,
+        objects: None,
+        layers: Vec::new(),
         notes: vec!["a note with <tags>".into()],
         missed: Vec::new(),
     };

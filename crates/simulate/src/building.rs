@@ -22,6 +22,8 @@ pub struct Building {
     pub parts: Vec<BuildingBlock>,
     /// Parapets, chimneys, plant rooms.
     pub details: Vec<BuildingBlock>,
+    /// Whether the roof has almost no texture.
+    pub blank_roof: bool,
 }
 
 /// A rectangle to build on, in street coordinates.
@@ -93,6 +95,33 @@ impl<'a> Builder<'a> {
         self.push(parts, details);
     }
 
+    /// Places a building with a flat roof without parapet and plant room, such as a car port.
+    pub(crate) fn plain(&mut self, lot: &Lot, walls_m: f64) {
+        let Some((ground, block)) = self.block(lot) else { return };
+        self.push(vec![BuildingBlock { roof: Roof::Flat { height_m: ground + walls_m }, ..block }], Vec::new());
+    }
+
+    /// Places a hall under a blank roof: flat, or gabled with a small pitch (metres per metre).
+    /// Boxes on the roof are given by their position (shares of the half size) and their height.
+    pub(crate) fn warehouse(&mut self, lot: &Lot, walls_m: f64, pitch: f64, boxes: &[([f64; 2], f64)]) {
+        let Some((ground, block)) = self.block(lot) else { return };
+        let [u, v] = block.half_size_m;
+        let eaves_m = ground + walls_m;
+        let roof = match pitch > 0.0 {
+            true => Roof::Gabled { eaves_m, ridge_m: eaves_m + pitch * v },
+            false => Roof::Flat { height_m: eaves_m },
+        };
+        let block = BuildingBlock { roof, ..block };
+        let device = |([across, along], height): &([f64; 2], f64)| {
+            on_roof(&block, block.position(across * u, along * v), [1.8, 1.2], block.top_m() + height)
+        };
+        let details = boxes.iter().map(device).collect();
+        self.push(vec![block], details);
+        if let Some(building) = self.buildings.last_mut() {
+            building.blank_roof = true;
+        }
+    }
+
     fn pitched(&mut self, lot: &Lot, walls_m: f64, pitch: f64, roof: impl Fn(f64, f64) -> Roof) {
         // The ridge runs along the long axis.
         let [u, v] = lot.half_size;
@@ -112,7 +141,7 @@ impl<'a> Builder<'a> {
 
     fn push(&mut self, parts: Vec<BuildingBlock>, details: Vec<BuildingBlock>) {
         let details = if self.with_details { details } else { Vec::new() };
-        self.buildings.push(Building { parts, details });
+        self.buildings.push(Building { parts, details, blank_roof: false });
     }
 
     /// Returns the ground height at the middle of a lot and a block without a roof. `None` if a

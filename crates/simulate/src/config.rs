@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::seasons::SeasonsConfig;
 use crate::sun::Sun;
 
 /// A scene, its views and its sensor.
@@ -42,6 +43,9 @@ pub struct SimulationConfig {
     pub sensor: SensorConfig,
     /// Clouds.
     pub clouds: CloudsConfig,
+    /// Change of the scene and of the sharpness from date to date.
+    #[serde(default, skip_serializing_if = "SeasonsConfig::is_none")]
+    pub seasons: SeasonsConfig,
 }
 
 /// The shape of the bare ground.
@@ -77,7 +81,7 @@ pub struct BuildingsConfig {
     pub street_width_m: f64,
     /// Height of a stepped tower in the middle of the scene, metres; 0 for none.
     pub landmark_height_m: f64,
-    /// Lowest and highest tower of `high_rise` quarters, metres.
+    /// Lowest and highest tower of `high_rise` and `dense_towers` quarters, metres.
     pub high_rise_height_m: [f64; 2],
     /// Whether roofs have parapets, chimneys and plant rooms.
     pub details: bool,
@@ -105,6 +109,21 @@ pub struct QuarterWeights {
     pub high_rise: f64,
     /// Long low sheds side by side.
     pub sheds: f64,
+    /// Small gabled houses close to one another, with sheds and car ports.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub suburb: f64,
+    /// Towers that fill their block up to the street.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub dense_towers: f64,
+    /// One large hall under an almost blank roof.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub warehouse: f64,
+}
+
+/// Whether a weight is missing from a parameter file that states only what is used.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(weight: &f64) -> bool {
+    *weight == 0.0
 }
 
 /// Trees: opaque crowns on free ground.
@@ -115,6 +134,28 @@ pub struct VegetationConfig {
     pub trees_per_ha: f64,
     /// Lowest and highest tree, metres.
     pub height_m: [f64; 2],
+    /// Shape of the crowns.
+    #[serde(default, skip_serializing_if = "CrownForm::is_dome")]
+    pub crowns: CrownForm,
+}
+
+/// The shape of tree crowns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum CrownForm {
+    /// Smooth domes on upright cylinders that reach the ground.
+    #[default]
+    Dome,
+    /// Rough ellipsoids and cones above the ground.
+    Natural,
+}
+
+impl CrownForm {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    fn is_dome(&self) -> bool {
+        *self == Self::Dome
+    }
 }
 
 /// Vehicles along the streets, different ones on every date.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::SimulationConfig;
 use crate::random::derived;
+use crate::seasons::Season;
 use crate::sun::Sun;
 use numeric::SplitMix64;
 
@@ -22,6 +23,9 @@ pub struct Date {
     pub offset: f64,
     /// Exponent applied to the radiance.
     pub gamma: f64,
+    /// Season, where the scene has seasons and this is not the first date.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub season: Option<Season>,
 }
 
 impl Date {
@@ -29,7 +33,7 @@ impl Date {
     pub(crate) fn new(config: &SimulationConfig, index: usize) -> Self {
         let a = &config.acquisition;
         if index == 0 {
-            return Self { index, sun: a.sun, gain: 1.0, offset: 0.0, gamma: 1.0 };
+            return Self { index, sun: a.sun, gain: 1.0, offset: 0.0, gamma: 1.0, season: None };
         }
         let mut stream = SplitMix64::new(derived(config.seed, 3000 + index as u64));
         let mut differing = |spread: f64| stream.uniform_in(-spread, spread);
@@ -39,6 +43,7 @@ impl Date {
         let sun = Sun { elevation_deg, azimuth_deg };
         let gain = 1.0 + differing(a.gain_spread);
         let offset = differing(a.offset_spread).abs();
-        Self { index, sun, gain, offset, gamma: 1.0 + differing(a.gamma_spread) }
+        let season = Season::of_date(&config.seasons, config.seed, index, config.sensor.mtf_at_nyquist);
+        Self { index, sun, gain, offset, gamma: 1.0 + differing(a.gamma_spread), season }
     }
 }

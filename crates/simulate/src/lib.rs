@@ -4,7 +4,8 @@
 //! [`Simulation`] renders it through physical cameras (pushbroom or frame) to which RPCs are
 //! fitted. It adds shadows, clouds, point spread, noise, quantisation and a pointing error of the
 //! RPC. It also samples the truth: surface, terrain, classes, visibility in each view, the height
-//! of every pixel, the scene from above, and the buildings as an LoD2 model.
+//! of every pixel, the scene from above, the building in each cell, and the buildings as an LoD2
+//! model.
 //!
 //! [`SimulationConfig`] is a parameter file with named presets ([`PRESETS`]). The same
 //! configuration gives the same bytes for any number of threads.
@@ -38,6 +39,7 @@ mod index;
 #[cfg(test)]
 mod linear;
 mod lod2;
+mod natural_crown;
 mod noise;
 mod parameters;
 mod planting;
@@ -48,6 +50,7 @@ mod random;
 mod ray;
 mod render;
 mod scene;
+mod seasons;
 mod sensor;
 mod sight;
 mod simulation;
@@ -56,13 +59,14 @@ mod sun;
 mod terrain;
 mod texture;
 mod town;
+mod tree;
 mod truth;
 
 pub use building::Building;
 pub use camera_model::Look;
 pub use config::{
-    AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, LookAngles,
-    QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
+    AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, CrownForm, GroundCover,
+    LookAngles, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
 };
 pub use date::Date;
 pub use error::SimulateError;
@@ -70,7 +74,8 @@ pub use frame::SceneFrame;
 pub use preset_names::PRESETS;
 pub use prism::{BuildingBlock, Roof};
 pub use ray::SceneRay;
-pub use scene::{Scene, TruthClass};
+pub use scene::{Scene, TREE_NUMBER, TruthClass};
+pub use seasons::{Season, SeasonsConfig};
 pub use sensor::Sensor;
 pub use sight::SightLines;
 pub use simulation::{SceneRecord, SimulatedView, Simulation, ViewRecord};

@@ -63,6 +63,7 @@ impl SimulationConfig {
         within("the height of the ground in metres (ground_height_m)", self.ground_height_m, -400.0, 6000.0)?;
         self.validate_scene()?;
         self.validate_acquisition()?;
+        self.validate_seasons()?;
         self.validate_sensor()
     }
 
@@ -83,7 +84,8 @@ impl SimulationConfig {
         within("the lower of buildings.high_rise_height_m", low, 10.0, 400.0)?;
         within("the upper of buildings.high_rise_height_m", high, low, 400.0)?;
         let q = &buildings.quarters;
-        for weight in [q.park, q.hall, q.rows, q.houses, q.courtyard, q.high_rise, q.sheds] {
+        let usual = [q.park, q.hall, q.rows, q.houses, q.courtyard, q.high_rise, q.sheds];
+        for weight in usual.into_iter().chain([q.suburb, q.dense_towers, q.warehouse]) {
             within("a weight of buildings.quarters", weight, 0.0, 1e6)?;
         }
         within("vegetation.trees_per_ha", self.vegetation.trees_per_ha, 0.0, 600.0)?;
@@ -119,6 +121,15 @@ impl SimulationConfig {
         within("acquisition.gain_spread", a.gain_spread, 0.0, 0.8)?;
         within("acquisition.offset_spread", a.offset_spread, 0.0, 0.3)?;
         within("acquisition.gamma_spread", a.gamma_spread, 0.0, 0.6)
+    }
+
+    fn validate_seasons(&self) -> Result<(), SimulateError> {
+        let s = &self.seasons;
+        within("seasons.ground_spread", s.ground_spread, 0.0, 1.5)?;
+        within("seasons.tree_spread", s.tree_spread, 0.0, 1.5)?;
+        within("seasons.roof_spread", s.roof_spread, 0.0, 1.5)?;
+        within("seasons.texture_share", s.texture_share, 0.0, 1.0)?;
+        within("seasons.sharpness_spread", s.sharpness_spread, 0.0, 1.5)
     }
 
     fn validate_sensor(&self) -> Result<(), SimulateError> {
@@ -178,6 +189,17 @@ mod tests {
     }
 
     #[test]
+    fn what_is_not_used_is_not_written() {
+        let text = SimulationConfig::default().to_toml().unwrap();
+        for key in ["seasons", "crowns", "suburb", "dense_towers", "warehouse"] {
+            assert!(!text.contains(key), "{key}");
+        }
+        let config = SimulationConfig::from_toml("[seasons]\ntexture_share = 0.25\n").unwrap();
+        assert_eq!((config.seasons.texture_share, config.seasons.ground_spread), (0.25, 0.0));
+        assert_eq!(SimulationConfig::from_toml(&config.to_toml().unwrap()).unwrap(), config);
+    }
+
+    #[test]
     fn what_a_file_gets_wrong_is_named() {
         for (text, named) in [
             ("sise_m = 200.0", "sise_m"),
@@ -190,6 +212,9 @@ mod tests {
             ("views = 2\n[[acquisition.looks]]\nincidence_deg = 3.0\nazimuth_deg = 4.0", "looks"),
             ("size_m = ", "line 1"),
             ("[sensor]\nbits = 16", "bits"),
+            ("[seasons]\ntexture_share = 1.5", "texture_share"),
+            ("[seasons]\nsnow = 1", "snow"),
+            ("[vegetation]\ncrowns = \"square\"", "natural"),
         ] {
             let error = SimulationConfig::from_toml(text).unwrap_err().to_string();
             assert!(error.contains(named), "{text}: {error}");

@@ -2,13 +2,15 @@
 //!
 //! Both are placed on lattices, cell by cell, so that a larger scene contains the smaller one.
 
-use crate::config::{SimulationConfig, VehiclesConfig};
+use crate::config::{CrownForm, SimulationConfig, VehiclesConfig};
 use crate::crown::Crown;
+use crate::natural_crown::{CrownProfile, NaturalCrown};
 use crate::noise::value_noise;
 use crate::prism::{BuildingBlock, Roof};
 use crate::random::{derived, lattice};
 use crate::streets::Streets;
 use crate::terrain::Terrain;
+use crate::tree::Tree;
 use numeric::SplitMix64;
 
 /// Width of the clumps in which trees stand, metres.
@@ -28,7 +30,7 @@ pub(crate) fn trees(
     terrain: &Terrain,
     reach_m: f64,
     is_free: impl Fn(f64, f64) -> bool,
-) -> Vec<Crown> {
+) -> Vec<Tree> {
     let density = config.vegetation.trees_per_ha / 1e4;
     if density == 0.0 {
         return Vec::new();
@@ -44,10 +46,36 @@ pub(crate) fn trees(
         let radius_m = height * stream.uniform_in(0.2, 0.32);
         let chance = MEAN_CHANCE * (1.0 + 1.2 * value_noise(seed, CLUMP_M, x, y));
         let stands = stream.chance(chance) && is_free(x, y) && is_clear(x, y, radius_m, &is_free);
-        let shoulder_m = terrain.height(x, y) + 0.35 * height;
-        stands.then_some(Crown { centre_m: [x, y], radius_m, shoulder_m, dome_m: 0.65 * height })
+        stands.then(|| crown(config.vegetation.crowns, [x, y], terrain.height(x, y), [height, radius_m], &mut stream))
     };
     (-count..count).flat_map(|j| (-count..count).map(move |i| (i, j))).filter_map(|(i, j)| tree(i, j)).collect()
+}
+
+/// Probability that a natural crown is conical, and the radius of such a crown relative to that of
+/// a broad one.
+const CONICAL: [f64; 2] = [0.35, 0.75];
+/// Height of the foot of a natural crown as a share of the tree's height: broad, conical.
+const FOOT: [f64; 2] = [0.22, 0.08];
+
+/// Makes the crown of a tree of a height and radius on ground of a height.
+fn crown(
+    form: CrownForm,
+    centre_m: [f64; 2],
+    ground_m: f64,
+    [height, radius_m]: [f64; 2],
+    stream: &mut SplitMix64,
+) -> Tree {
+    if form == CrownForm::Dome {
+        let (shoulder_m, dome_m) = (ground_m + 0.35 * height, 0.65 * height);
+        return Tree::Dome(Crown { centre_m, radius_m, shoulder_m, dome_m });
+    }
+    let (profile, foot, radius_m) = match stream.chance(CONICAL[0]) {
+        true => (CrownProfile::Conical, FOOT[1], CONICAL[1] * radius_m),
+        false => (CrownProfile::Broad, FOOT[0], 1.15 * radius_m),
+    };
+    let seed = (stream.uniform_in(0.0, 1.0) * (1u64 << 53) as f64) as u64;
+    let (foot_m, top_m) = (ground_m + foot * height, ground_m + height);
+    Tree::Natural(NaturalCrown { centre_m, radius_m, foot_m, top_m, profile, seed })
 }
 
 /// Returns whether a crown of a radius stands over free ground only.

@@ -1,10 +1,11 @@
 //! Named scenes. Each is stated as its differences from the preset `town`.
 
 use crate::config::{
-    AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, GroundCover, QuarterWeights,
-    SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
+    AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, CrownForm, GroundCover,
+    QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
 };
 use crate::error::SimulateError;
+use crate::seasons::SeasonsConfig;
 use crate::sun::Sun;
 
 impl Default for SimulationConfig {
@@ -20,12 +21,13 @@ impl Default for SimulationConfig {
             ground_height_m: 180.0,
             terrain: TerrainConfig::default(),
             buildings: BuildingsConfig::default(),
-            vegetation: VegetationConfig { trees_per_ha: 25.0, height_m: [4.0, 11.0] },
+            vegetation: VegetationConfig { trees_per_ha: 25.0, height_m: [4.0, 11.0], crowns: CrownForm::Dome },
             vehicles: VehiclesConfig { parked_share: 0.35 },
             surface: AppearanceConfig { cover: GroundCover::Town, contrast: 1.0 },
             acquisition: AcquisitionConfig::default(),
             sensor: SensorConfig::default(),
             clouds: CloudsConfig { share: 0.0, extent_m: 120.0, masked: true },
+            seasons: SeasonsConfig::default(),
         }
     }
 }
@@ -114,6 +116,9 @@ impl SimulationConfig {
             "fields" => fields(town),
             "harbour" => harbour(town),
             "repetitive-roofs" => repetitive_roofs(town),
+            "suburb" => suburb(town),
+            "dense-towers" => dense_towers(town),
+            "industrial" => industrial(town),
             "low-texture" => Self { surface: AppearanceConfig { contrast: 0.12, ..town.surface }, ..town },
             _ => return Err(SimulateError::UnknownPreset { found: name.to_owned() }),
         })
@@ -143,7 +148,7 @@ fn high_rise(town: SimulationConfig) -> SimulationConfig {
 
 fn hills(town: SimulationConfig) -> SimulationConfig {
     let terrain = TerrainConfig { relief_m: 60.0, wavelength_m: 380.0, roughness: 0.35, ..town.terrain };
-    let vegetation = VegetationConfig { trees_per_ha: 260.0, height_m: [6.0, 22.0] };
+    let vegetation = VegetationConfig { trees_per_ha: 260.0, height_m: [6.0, 22.0], ..town.vegetation };
     let surface = AppearanceConfig { cover: GroundCover::Forest, ..town.surface };
     SimulationConfig {
         ground_height_m: 640.0,
@@ -182,6 +187,42 @@ fn repetitive_roofs(town: SimulationConfig) -> SimulationConfig {
     let buildings = BuildingsConfig { landmark_height_m: 0.0, identical: true, quarters, ..town.buildings };
     let terrain = TerrainConfig { relief_m: 0.5, ..town.terrain };
     let vegetation = VegetationConfig { trees_per_ha: 0.0, ..town.vegetation };
+    SimulationConfig { terrain, buildings, vegetation, ..town }
+}
+
+fn suburb(town: SimulationConfig) -> SimulationConfig {
+    let quarters = QuarterWeights { suburb: 0.94, park: 0.06, ..Default::default() };
+    let buildings = BuildingsConfig {
+        street_spacing_m: 56.0,
+        street_width_m: 7.0,
+        landmark_height_m: 0.0,
+        quarters,
+        ..town.buildings
+    };
+    let vegetation = VegetationConfig { trees_per_ha: 45.0, height_m: [3.5, 14.0], crowns: CrownForm::Natural };
+    SimulationConfig { buildings, vegetation, ..town }
+}
+
+fn dense_towers(town: SimulationConfig) -> SimulationConfig {
+    let quarters = QuarterWeights { dense_towers: 0.92, park: 0.08, ..Default::default() };
+    let buildings = BuildingsConfig {
+        street_spacing_m: 56.0,
+        street_width_m: 11.0,
+        landmark_height_m: 0.0,
+        high_rise_height_m: [20.0, 130.0],
+        quarters,
+        ..town.buildings
+    };
+    let terrain = TerrainConfig { relief_m: 1.0, ..town.terrain };
+    let vegetation = VegetationConfig { trees_per_ha: 12.0, crowns: CrownForm::Natural, ..town.vegetation };
+    SimulationConfig { terrain, buildings, vegetation, ..town }
+}
+
+fn industrial(town: SimulationConfig) -> SimulationConfig {
+    let quarters = QuarterWeights { warehouse: 0.8, sheds: 0.1, park: 0.1, ..Default::default() };
+    let buildings = BuildingsConfig { street_spacing_m: 110.0, landmark_height_m: 0.0, quarters, ..town.buildings };
+    let terrain = TerrainConfig { relief_m: 1.0, ..town.terrain };
+    let vegetation = VegetationConfig { trees_per_ha: 8.0, crowns: CrownForm::Natural, ..town.vegetation };
     SimulationConfig { terrain, buildings, vegetation, ..town }
 }
 

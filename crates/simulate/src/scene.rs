@@ -12,7 +12,6 @@ use nalgebra::Vector3;
 use crate::SceneRay;
 use crate::building::Building;
 use crate::config::SimulationConfig;
-use crate::crown::Crown;
 use crate::index::{Buckets, Extent, Stretch};
 use crate::planting;
 use crate::prism::{BuildingBlock, Face, Prism};
@@ -20,6 +19,7 @@ use crate::random::derived;
 use crate::streets::Streets;
 use crate::terrain::Terrain;
 use crate::town;
+use crate::tree::Tree;
 
 /// The class of a point of the surface. The values are the ASPRS LAS classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +43,8 @@ pub enum TruthClass {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Material {
     Building,
+    /// A building whose roof has almost no texture.
+    BlankRoof,
     Tree,
     Vehicle,
 }
@@ -51,7 +53,7 @@ pub(crate) enum Material {
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
     Prism(Box<Prism>),
-    Crown(Crown),
+    Crown(Tree),
 }
 
 /// An object on the ground.
@@ -61,6 +63,8 @@ pub(crate) struct Solid {
     pub(crate) material: Material,
     /// Seed of its colours.
     pub(crate) paint: u64,
+    /// Number of the building from 1, [`TREE_NUMBER`] for a tree, 0 for a vehicle.
+    number: i32,
 }
 
 /// Terrain with everything on it, known exactly.
@@ -100,6 +104,8 @@ struct Meeting {
     part: Part,
 }
 
+/// Number of a tree among the numbers of buildings.
+pub const TREE_NUMBER: i32 = -1;
 /// Largest distance by which a building may extend beyond the reach of the scene, metres.
 const OVERHANG_M: f64 = 50.0;
 /// Distance from the surface at which a ray towards the sun starts, metres: above rounding, below
@@ -114,11 +120,16 @@ impl Scene {
         let buildings = town::build(config, &terrain, reach_m);
         let paint =
             |index: usize| derived(config.seed, 100 + if config.buildings.identical { 0 } else { index as u64 });
-        let solid = |block: &BuildingBlock, index| Solid::block(*block, Material::Building, paint(index));
+        let solid = |block: &BuildingBlock, index: usize, building: &Building| {
+            let material = if building.blank_roof { Material::BlankRoof } else { Material::Building };
+            // A scene is at most 3 km wide, far too small for the billions of buildings that would
+            // exceed the numbers.
+            Solid { number: index as i32 + 1, ..Solid::block(*block, material, paint(index)) }
+        };
         let solids: Vec<Solid> = buildings
             .iter()
             .enumerate()
-            .flat_map(|(index, b)| b.parts.iter().chain(&b.details).map(move |block| solid(block, index)))
+            .flat_map(|(index, b)| b.parts.iter().chain(&b.details).map(move |block| solid(block, index, b)))
             .collect();
         let mut scene = Self::of(terrain, Streets::new(&config.buildings), buildings, solids, reach_m);
         let is_free =
@@ -128,6 +139,7 @@ impl Scene {
             shape: Shape::Crown(crown),
             material: Material::Tree,
             paint: derived(config.seed ^ 0x7ee, index),
+            number: TREE_NUMBER,
         }));
         scene
     }
@@ -191,6 +203,18 @@ impl Scene {
         (height, class)
     }
 
+    /// Returns the number of the building whose roof is the upper surface at a position: from 1, in
+    /// the order of [`Scene::buildings`]. [`TREE_NUMBER`] stands for a tree, 0 for anything else.
+    pub fn object_number(&self, x: f64, y: f64) -> i32 {
+        let mut top = (self.terrain.height(x, y), 0);
+        for solid in self.buckets.members(self.buckets.at(x, y)).iter().map(|i| &self.solids[*i as usize]) {
+            if let Some(height) = solid.height(x, y).filter(|height| *height > top.0) {
+                top = (height, solid.number);
+            }
+        }
+        top.1
+    }
+
     /// Returns the first point of the surface on a ray that starts above it, with t in (0,
     /// `t_max`).
     ///
@@ -249,12 +273,12 @@ impl Scene {
 
 impl Solid {
     fn block(block: BuildingBlock, material: Material, paint: u64) -> Self {
-        Self { shape: Shape::Prism(Box::new(Prism::new(block))), material, paint }
+        Self { shape: Shape::Prism(Box::new(Prism::new(block))), material, paint, number: 0 }
     }
 
     fn class(&self) -> TruthClass {
         match self.material {
-            Material::Building => TruthClass::Building,
+            Material::Building | Material::BlankRoof => TruthClass::Building,
             Material::Tree => TruthClass::Vegetation,
             Material::Vehicle => TruthClass::Ground,
         }
@@ -270,7 +294,7 @@ impl Solid {
     fn extent(&self) -> Extent {
         let (centre, half, top_m) = match &self.shape {
             Shape::Prism(prism) => (prism.block.centre_m, prism.half_extent(), prism.block.top_m()),
-            Shape::Crown(crown) => (crown.centre_m, [crown.radius_m; 2], crown.top_m()),
+            Shape::Crown(crown) => (crown.centre_m(), [crown.radius_m(); 2], crown.top_m()),
         };
         let [low, high] = [-1.0, 1.0].map(|side| std::array::from_fn(|axis| centre[axis] + side * half[axis]));
         Extent { low, high, top_m }

@@ -10,13 +10,14 @@ use serde::{Deserialize, Serialize};
 use crate::acquisition;
 use crate::camera_model::Look;
 use crate::clouds::{self, CLOUD_RADIANCE};
-use crate::config::SimulationConfig;
+use crate::config::{SensorConfig, SimulationConfig};
 use crate::date::Date;
 use crate::error::SimulateError;
 use crate::frame::SceneFrame;
 use crate::random::derived;
 use crate::render::{BAND, LitScene};
 use crate::scene::Scene;
+use crate::seasons::SeasonLook;
 use crate::sensor::{PointSpread, Sensor};
 use crate::sight::SightLines;
 use crate::texture::Texture;
@@ -166,7 +167,7 @@ impl<'a> Witness<'a> {
 /// and the part beyond them that slanted views see.
 fn reach_m(config: &SimulationConfig) -> f64 {
     let steepest = (0..config.views).map(|i| acquisition::look(config, i).incidence_deg).fold(0.0, f64::max);
-    let towers = match config.buildings.quarters.high_rise > 0.0 {
+    let towers = match config.buildings.quarters.high_rise + config.buildings.quarters.dense_towers > 0.0 {
         true => config.buildings.high_rise_height_m[1],
         false => 0.0,
     };
@@ -189,8 +190,10 @@ fn view(
     let fitted = camera.fitted((low - RPC_HEIGHT_MARGIN_M, high + RPC_HEIGHT_MARGIN_M))?;
     let sight = SightLines::new(&camera, frame, size, (low - 1.0, high + 1.0))?;
     progress.begin(&format!("view {}", index + 1), size.1.div_ceil(BAND));
-    let texture = Texture::new(config.seed, 1 + index as u64, config.surface);
-    let spread = PointSpread::new(&config.sensor);
+    let look_of_date = SeasonLook::new(&config.seasons, config.seed, date.index, date.season);
+    let texture = Texture::new(config.seed, 1 + index as u64, config.surface).on_date(look_of_date);
+    let mtf_at_nyquist = date.season.map_or(config.sensor.mtf_at_nyquist, |season| season.mtf_at_nyquist);
+    let spread = PointSpread::new(&SensorConfig { mtf_at_nyquist, ..config.sensor });
     let radiance = LitScene::new(scene, texture, &date.sun).image(&sight, &spread, size, progress);
     let sensor = Sensor::new(&config.sensor, &date);
     let opacity = clouds::opacity(&config.clouds, derived(config.seed, 4000 + index as u64), config.gsd_m, size);

@@ -2,7 +2,8 @@
 //! down to half a metre.
 //!
 //! Each kind of surface has its own pattern (streets with markings, parcels, strata, tiles, panels,
-//! windows, foliage) times multi-octave noise. Only the waves of water differ between views.
+//! windows, foliage) times multi-octave noise. The waves of water differ between views,
+//! and with seasons the albedo and the fine texture differ between dates.
 
 use nalgebra::Vector3;
 
@@ -11,9 +12,12 @@ use crate::noise::{detail, value_noise};
 use crate::prism::{Face, Prism, Roof};
 use crate::random::{derived, lattice};
 use crate::scene::{Hit, Material, Part, Scene, Shape, Solid};
+use crate::seasons::SeasonLook;
 
 /// Reflectance of a scene without contrast.
 const MEAN: f64 = 0.22;
+/// Contrast of the fine texture of a blank roof.
+const BLANK_CONTRAST: f64 = 0.02;
 /// Length and width of a field, metres.
 const PARCEL_M: [f64; 2] = [110.0, 64.0];
 
@@ -23,13 +27,19 @@ pub(crate) struct Texture {
     seed: u64,
     waves: u64,
     surface: AppearanceConfig,
+    season: Option<SeasonLook>,
 }
 
 impl Texture {
     /// Makes the reflectance of a seed. `view` selects the waves.
     pub(crate) fn new(seed: u64, view: u64, surface: AppearanceConfig) -> Self {
         let seed = derived(seed, 3);
-        Self { seed, waves: derived(seed, view), surface }
+        Self { seed, waves: derived(seed, view), surface, season: None }
+    }
+
+    /// Returns this reflectance in the season of a date.
+    pub(crate) fn on_date(self, season: Option<SeasonLook>) -> Self {
+        Self { season, ..self }
     }
 
     /// Returns the reflectance at a hit.
@@ -51,19 +61,20 @@ impl Texture {
         if scene.terrain().is_water(x, y) {
             return 0.045 * (1.0 + 0.5 * value_noise(self.waves, 3.0, x, y) + 0.3 * value_noise(self.waves, 1.1, y, x));
         }
-        let grain = detail(self.seed, x, y);
+        let grain = self.grain(self.seed, x, y);
+        let paved = self.season.map_or(1.0, |season| season.paved());
         if scene.streets.half_width_m > 0.0 {
             let street = scene.streets.nearest(x, y);
             let distance = street.across_m.abs();
             if distance < scene.streets.half_width_m {
                 let marked = distance < 0.15 && street.along_m.rem_euclid(9.0) < 4.0;
-                return if marked { 0.5 } else { 0.12 * (1.0 + 0.6 * grain) };
+                return paved * if marked { 0.5 } else { 0.12 * (1.0 + 0.6 * grain) };
             }
             if distance < scene.streets.half_width_m + 1.8 {
-                return 0.34 * (1.0 + 0.4 * grain);
+                return paved * 0.34 * (1.0 + 0.4 * grain);
             }
         }
-        match self.surface.cover {
+        let open = match self.surface.cover {
             GroundCover::Town => (0.20 + 0.12 * detail(self.seed ^ 0x50, x * 0.3, y * 0.3)) * (1.0 + 0.9 * grain),
             GroundCover::Fields => self.field(x, y) * (1.0 + 0.35 * grain),
             GroundCover::Rock => {
@@ -71,7 +82,14 @@ impl Texture {
                 (0.34 + 0.06 * strata) * (1.0 + 0.8 * grain)
             }
             GroundCover::Forest => 0.11 * (1.0 + 0.9 * grain),
-        }
+        };
+        self.season.map_or(open, |season| open * season.ground(x, y))
+    }
+
+    /// Returns the fine texture at a place of a surface: the permanent one, or that of the date.
+    fn grain(&self, seed: u64, x: f64, y: f64) -> f64 {
+        let permanent = detail(seed, x, y);
+        self.season.map_or(permanent, |season| season.grain(permanent, seed, x, y))
     }
 
     /// Returns the reflectance of parcels with their own tone and direction of rows, and tracks
@@ -93,7 +111,8 @@ impl Texture {
         let tone = 0.07 + 0.08 * lattice(tree.paint, 0, 0);
         // The pattern of foliage depends on the height as well as on the position.
         let tufts = value_noise(tree.paint, 0.9, point.x + 0.7 * point.z, point.y - 0.6 * point.z);
-        tone * (1.0 + 0.6 * tufts + 0.7 * detail(self.seed, point.x, point.y))
+        let value = tone * (1.0 + 0.6 * tufts + 0.7 * self.grain(self.seed, point.x, point.y));
+        self.season.map_or(value, |season| value * season.tree(tree.paint))
     }
 
     fn block(&self, solid: &Solid, face: Face, point: &Vector3<f64>) -> f64 {
@@ -105,15 +124,23 @@ impl Texture {
         let [u, v] = prism.local(point.x, point.y);
         let above_ground = point.z - prism.block.base_m;
         match face {
-            Face::Roof(along) => roof(prism, solid.paint, tone, if along { [v, u] } else { [u, v] }),
+            Face::Roof(along) => {
+                let at = if along { [v, u] } else { [u, v] };
+                let grain = self.grain(solid.paint, at[0], at[1]);
+                let value = match solid.material {
+                    Material::BlankRoof => (0.22 + 0.3 * tone) * (1.0 + BLANK_CONTRAST * grain),
+                    _ => roof(prism, solid.paint, tone, at, grain),
+                };
+                self.season.map_or(value, |season| value * season.roof(solid.paint))
+            }
             Face::End(end) => wall(solid.paint ^ u64::from(end), tone, v, above_ground),
             Face::Side(left) => wall(solid.paint ^ (2 + u64::from(left)), tone, u, above_ground),
         }
     }
 }
 
-fn roof(prism: &Prism, paint: u64, tone: f64, [u, v]: [f64; 2]) -> f64 {
-    let grain = detail(paint, u, v);
+/// Returns the reflectance of a roof with a fine texture (`grain`).
+fn roof(prism: &Prism, paint: u64, tone: f64, [u, v]: [f64; 2], grain: f64) -> f64 {
     if !matches!(prism.block.roof, Roof::Flat { .. }) {
         let course = if v.rem_euclid(1.3) < 0.45 { 0.85 } else { 1.0 };
         return (0.16 + 0.2 * tone) * course * (1.0 + 0.9 * grain);

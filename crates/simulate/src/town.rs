@@ -1,6 +1,6 @@
 //! A town from a seed: quarters along a grid of streets, and one stepped tower in the middle.
 //!
-//! A quarter has houses, rows, halls, a courtyard, towers or sheds.
+//! A quarter has houses, rows, halls, a courtyard, towers, sheds, a suburb or a warehouse.
 //!
 //! The seed of a quarter follows from its place, so that a larger town contains the smaller one.
 
@@ -19,6 +19,11 @@ const ROW_M: [f64; 2] = [8.0, 14.0];
 const HOUSE_M: [f64; 2] = [4.0, 7.0];
 const COURTYARD_M: [f64; 2] = [15.0, 22.0];
 const SHED_M: f64 = 6.0;
+const SMALL_HOUSE_M: [f64; 2] = [2.8, 5.8];
+const CAR_PORT_M: [f64; 2] = [2.3, 2.9];
+const WAREHOUSE_M: [f64; 2] = [7.0, 15.0];
+/// Width of a plot in a suburb, metres.
+const PLOT_M: f64 = 14.5;
 
 /// The kind of a quarter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +35,9 @@ enum Quarter {
     Courtyard,
     HighRise,
     Sheds,
+    Suburb,
+    DenseTowers,
+    Warehouse,
 }
 
 /// Returns the buildings of a scene out to `reach_m` from its centre.
@@ -68,6 +76,9 @@ fn drawn(config: &BuildingsConfig, at: f64) -> Option<Quarter> {
         (q.courtyard, Quarter::Courtyard),
         (q.high_rise, Quarter::HighRise),
         (q.sheds, Quarter::Sheds),
+        (q.suburb, Quarter::Suburb),
+        (q.dense_towers, Quarter::DenseTowers),
+        (q.warehouse, Quarter::Warehouse),
     ];
     let mut left = at * weights.iter().map(|(w, _)| w).sum::<f64>();
     weights
@@ -99,6 +110,9 @@ impl Town<'_> {
             Quarter::Courtyard => self.courtyard(centre, stream),
             Quarter::HighRise => self.towers(centre, stream),
             Quarter::Sheds => self.sheds(centre),
+            Quarter::Suburb => self.suburb(centre, stream),
+            Quarter::DenseTowers => self.dense_towers(centre, stream),
+            Quarter::Warehouse => self.warehouse(centre, stream),
         }
     }
 
@@ -181,6 +195,83 @@ impl Town<'_> {
         }
     }
 
+    /// Places two rows of plots back to back, each with a small gabled house, and on most of them a
+    /// car port beside the house or a shed in the garden.
+    fn suburb(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
+        let half = self.half_m();
+        let plots = (2.0 * half / PLOT_M).round().max(1.0) as usize;
+        let width = 2.0 * half / plots as f64;
+        for (side, plot) in [-1.0, 1.0].into_iter().flat_map(|side| (0..plots).map(move |plot| (side, plot))) {
+            let middle = u - half + (plot as f64 + 0.5) * width;
+            // Houses of 60 to 120 m² and 3 to 6 m apart, near the street.
+            let length = stream.uniform_in(0.6, 0.78) * width;
+            let area = stream.uniform_in(60.0, 120.0);
+            let depth = (area / length).clamp(6.5, 0.52 * half);
+            let house_u = middle + stream.uniform_in(-0.3, 0.3) * (width - length);
+            let house_v = v + side * (half - stream.uniform_in(1.0, 3.0) - 0.5 * depth);
+            let turn_deg = stream.uniform_in(-3.0, 3.0);
+            let lot = Lot { centre: [house_u, house_v], half_size: [0.5 * length, 0.5 * depth], turn_deg };
+            let (walls, pitch) = (stream.uniform_in(SMALL_HOUSE_M[0], SMALL_HOUSE_M[1]), stream.uniform_in(0.45, 0.95));
+            self.builder.gabled(&lot, walls, pitch);
+            let (kind, low) = (stream.uniform_in(0.0, 1.0), stream.uniform_in(CAR_PORT_M[0], CAR_PORT_M[1]));
+            let garden = v + side * stream.uniform_in(0.14, 0.2) * half;
+            let across = middle + stream.uniform_in(-0.25, 0.25) * width;
+            if kind < 0.4 {
+                // Beside the house, on the border of the plot.
+                let at = [middle + 0.5 * width, house_v - side * 0.5 * depth];
+                self.builder.plain(&Lot { centre: at, half_size: [1.5, 2.8], turn_deg }, low);
+            } else if kind < 0.75 {
+                let shed = Lot { centre: [across, garden], half_size: [2.2, 1.6], turn_deg };
+                self.builder.gabled(&shed, low - 0.3, 0.5);
+            }
+        }
+    }
+
+    /// Places one tower, two slabs or four towers up to the streets. Towers of neighbouring quarters
+    /// are 15 to 25 m apart.
+    fn dense_towers(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
+        let half = self.half_m();
+        let [low, high] = self.config.high_rise_height_m;
+        // More towers are low than high.
+        let height = |stream: &mut SplitMix64| low + (high - low) * stream.uniform_in(0.0, 1.0).powf(1.4);
+        let places: &[[f64; 2]] = match stream.uniform_in(0.0, 1.0) {
+            kind if kind < 0.3 => &[[0.0, 0.0]],
+            kind if kind < 0.65 => &[[-1.0, 0.0], [1.0, 0.0]],
+            _ => &[[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]],
+        };
+        for &[a, b] in places {
+            let mut extent = |place: f64| {
+                let setback = stream.uniform_in(0.0, 2.0);
+                // From the street to the middle of the quarter, less half of an alley.
+                let reach = if place == 0.0 { half - setback } else { 0.5 * (half - setback - 5.0) };
+                (place * (half - setback - reach), reach)
+            };
+            let ((offset_u, half_u), (offset_v, half_v)) = (extent(a), extent(b));
+            let lot = Lot { centre: [u + offset_u, v + offset_v], half_size: [half_u, half_v], turn_deg: 0.0 };
+            let walls = height(stream);
+            if walls > 45.0 && stream.chance(0.35) {
+                let upper = Lot { half_size: lot.half_size.map(|half| 0.72 * half), ..lot };
+                self.builder.stepped(&[(lot, 0.7 * walls), (upper, walls)]);
+            } else {
+                self.builder.flat(&lot, walls, stream);
+            }
+        }
+    }
+
+    /// Places a hall that fills the quarter, with few devices on its roof.
+    fn warehouse(&mut self, centre: [f64; 2], stream: &mut SplitMix64) {
+        let half = self.half_m();
+        let half_size = [stream.uniform_in(0.7, 0.92) * half, stream.uniform_in(0.5, 0.85) * half];
+        let lot = Lot { centre, half_size, turn_deg: stream.uniform_in(-2.0, 2.0) };
+        let walls = stream.uniform_in(WAREHOUSE_M[0], WAREHOUSE_M[1]);
+        let pitch = if stream.chance(0.4) { stream.uniform_in(0.02, 0.08) } else { 0.0 };
+        let count = (stream.uniform_in(0.0, 1.0) * 4.0) as usize;
+        let boxes: Vec<([f64; 2], f64)> = (0..count)
+            .map(|_| ([stream.uniform_in(-0.8, 0.8), stream.uniform_in(-0.8, 0.8)], stream.uniform_in(1.2, 2.2)))
+            .collect();
+        self.builder.warehouse(&lot, walls, pitch, &boxes);
+    }
+
     /// Places three long sheds with the same roof.
     fn sheds(&mut self, [u, v]: [f64; 2]) {
         let half = self.half_m();
@@ -231,6 +322,71 @@ mod tests {
         assert!(tallest(&built("high-rise", 1, 160.0).1) >= 140.0);
         assert!(tallest(&built("dense-city", 1, 160.0).1) >= 15.0);
         assert!(built("hills", 1, 160.0).1.is_empty() && built("fields", 1, 160.0).1.is_empty());
+    }
+
+    fn area(building: &Building) -> f64 {
+        let [u, v] = building.parts[0].half_size_m;
+        4.0 * u * v
+    }
+
+    /// Distance between two blocks, sampled along their outlines.
+    fn gap(a: &Building, b: &Building) -> f64 {
+        let outline = |building: &Building| -> Vec<[f64; 2]> {
+            let corners = building.parts[0].corners();
+            (0..80)
+                .map(|k| {
+                    let ([x0, y0], [x1, y1]) = (corners[k / 20], corners[(k / 20 + 1) % 4]);
+                    let t = (k % 20) as f64 / 20.0;
+                    [x0 + t * (x1 - x0), y0 + t * (y1 - y0)]
+                })
+                .collect()
+        };
+        let (a, b) = (outline(a), outline(b));
+        let distances = a.iter().flat_map(|p| b.iter().map(move |q| (p[0] - q[0]).hypot(p[1] - q[1])));
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn a_suburb_has_small_gabled_houses_close_to_one_another() {
+        for seed in 0..5 {
+            let (_, buildings) = built("suburb", seed, 160.0);
+            let houses: Vec<&Building> = buildings.iter().filter(|b| area(b) > 40.0).collect();
+            assert!(houses.len() > 120 && buildings.len() > houses.len() + 60, "{seed}: {}", houses.len());
+            assert!(houses.iter().all(|b| (55.0..=125.0).contains(&area(b))), "{seed}");
+            assert!(houses.iter().all(|b| matches!(b.parts[0].roof, Roof::Gabled { .. })), "{seed}");
+            let mut gaps: Vec<f64> = houses[..40]
+                .iter()
+                .map(|a| houses.iter().filter(|b| b.parts != a.parts).map(|b| gap(a, b)).fold(f64::INFINITY, f64::min))
+                .collect();
+            gaps.sort_by(f64::total_cmp);
+            assert!(gaps[0] > 0.5 && gaps[20] < 6.0, "{seed}: {gaps:?}");
+        }
+    }
+
+    #[test]
+    fn dense_towers_stand_along_narrow_streets() {
+        let (_, buildings) = built("dense-towers", 2, 160.0);
+        let heights: Vec<f64> = buildings.iter().map(|b| b.parts.last().unwrap().top_m() - b.parts[0].base_m).collect();
+        assert!(heights.iter().all(|h| (19.0..134.0).contains(h)) && heights.iter().any(|h| *h > 90.0));
+        assert!(heights.iter().any(|h| *h < 40.0) && buildings.len() > 40, "{}", buildings.len());
+        // Streets of 15 to 25 m, and alleys of about 10 m inside a quarter.
+        for a in &buildings {
+            for b in buildings.iter().filter(|b| b.parts != a.parts) {
+                assert!(gap(a, b) > 9.0, "{}", gap(a, b));
+            }
+        }
+        let near = buildings.iter().flat_map(|a| buildings.iter().map(move |b| gap(a, b)));
+        let streets = near.filter(|gap| (15.0..=25.0).contains(gap)).count();
+        assert!(streets > buildings.len(), "{streets} of {}", buildings.len());
+    }
+
+    #[test]
+    fn warehouses_are_large_and_blank() {
+        let (_, buildings) = built("industrial", 1, 160.0);
+        let halls: Vec<&Building> = buildings.iter().filter(|b| b.blank_roof).collect();
+        assert!(halls.len() >= 5, "{}", halls.len());
+        assert!(halls.iter().all(|b| area(b) > 2000.0 && b.details.len() < 5));
+        assert!(built("town", 1, 160.0).1.iter().all(|b| !b.blank_roof));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The truth as rasters on the map grid: surface, terrain, classes, visibility in each view, and
+//! The truth as rasters on the map grid: surface, terrain, classes, buildings, visibility in each view, and
 //! the view from above.
 //!
 //! Values belong to cell centres, and heights are rounded to a millimetre. The scene is the
@@ -38,6 +38,8 @@ pub struct Truth {
     pub dtm: Grid<f32>,
     /// Class of the upper surface (see [`TruthClass`]).
     pub classes: Grid<u8>,
+    /// Number of the building in each cell (see [`Scene::object_number`]).
+    pub objects: Grid<i32>,
     /// Per view: 1 where it sees the point of the upper surface at the cell centre, else 0.
     pub visibility: Vec<Grid<u8>>,
     /// Reflectance seen from directly above, mean over the cell, in units of 1 / [`ORTHO_SCALE`].
@@ -113,6 +115,7 @@ impl Truth {
             dsm,
             dtm: cells.grid(|[x, y]| stored(scene.terrain().height(x, y))),
             classes: cells.grid(|at| class(scene, at, cells.cell_m) as u8),
+            objects: cells.grid(|[x, y]| scene.object_number(x, y)),
             visibility: (0..views.len()).map(|k| seen_by.map(|bits| (bits >> k & 1) as u8)).collect(),
             ortho: cells.grid(|at| reflectance_from_above(scene, &texture, at, cells.cell_m)),
             buildings: lod2::model(scene.buildings(), frame),

@@ -23,6 +23,8 @@ pub enum BandData<'a> {
     U16(&'a Grid<u16>),
     /// Object identifiers.
     U32(&'a Grid<u32>),
+    /// Object numbers of which some are negative.
+    I32(&'a Grid<i32>),
 }
 
 /// One band to write.
@@ -52,6 +54,7 @@ pub(super) fn in_memory(path: &Path, bands: &[Band<'_>], no_data: Option<f64>) -
         BandData::U8(_) => fill(path, bands, no_data, as_u8, |v| v),
         BandData::U16(_) => fill(path, bands, no_data, as_u16, |v| v),
         BandData::U32(_) => fill(path, bands, no_data, as_u32, |v| v),
+        BandData::I32(_) => fill(path, bands, no_data, as_i32, |v| v),
     }
 }
 
@@ -69,6 +72,10 @@ fn as_u16<'a>(band: &Band<'a>) -> Option<&'a Grid<u16>> {
 
 fn as_u32<'a>(band: &Band<'a>) -> Option<&'a Grid<u32>> {
     if let BandData::U32(grid) = band.data { Some(grid) } else { None }
+}
+
+fn as_i32<'a>(band: &Band<'a>) -> Option<&'a Grid<i32>> {
+    if let BandData::I32(grid) = band.data { Some(grid) } else { None }
 }
 
 fn fill<'a, T: GdalType + Copy + 'a>(

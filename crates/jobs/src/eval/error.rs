@@ -56,10 +56,10 @@ pub enum EvalJobError {
         /// Datum that is wanted.
         to: VerticalDatum,
     },
-    /// A class raster or mask cannot be used.
+    /// A class raster, a mask or a raster of buildings cannot be used.
     #[error("the {what} raster {found}: {}", path.display())]
     NumberRaster {
-        /// `class` or `mask`.
+        /// `class`, `mask` or `building`.
         what: &'static str,
         /// What is wrong with it.
         found: String,
@@ -67,7 +67,7 @@ pub enum EvalJobError {
         path: PathBuf,
     },
     /// A raster is not on the grid of the test.
-    #[error("the confidence raster has another grid ({found}) than the test ({expected}): {}", path.display())]
+    #[error("the raster has another grid ({found}) than the test ({expected}): {}", path.display())]
     OtherGrid {
         /// The raster.
         path: PathBuf,

@@ -48,8 +48,12 @@ pub struct GridEvalConfig {
     /// Terrain model. `None` takes the terrain from the cells of class ground, or else estimates it
     /// from the reference.
     pub terrain: Option<PathBuf>,
-    /// Confidence of each cell of the test, on its grid; more is better.
+    /// Confidence of each cell of the test, on its grid; more is better. `None` takes
+    /// `confidence.tif` beside the test, if there is one.
     pub confidence: Option<PathBuf>,
+    /// Raster on any grid, read at the nearest cell: 0 is ground, −1 a tree, and a positive number
+    /// is the building that the cell belongs to.
+    pub objects: Option<PathBuf>,
     /// Least height above the terrain of cells that count as standing, metres.
     pub standing_m: f64,
     /// Side of the cells into which a reference cloud is gridded, metres. `None` takes the longer
@@ -89,6 +93,7 @@ impl GridEvalConfig {
             mask: None,
             terrain: None,
             confidence: None,
+            objects: None,
             standing_m,
             reference_cell_m: None,
             test_vertical: None,
@@ -110,14 +115,16 @@ impl GridEvalConfig {
         self.requirements.validate()
     }
 
-    /// Returns the settings of the comparison itself.
-    pub(super) fn eval_config(&self) -> EvalConfig {
+    /// Returns the settings of the comparison itself. A height with an absolute error below
+    /// `right_below_m` is right in the reliability table.
+    pub(super) fn eval_config(&self, right_below_m: f64) -> EvalConfig {
         EvalConfig {
             alignment: self.alignment,
             search_m: self.search_m,
             thresholds_m: self.requirements.with_thresholds(self.thresholds_m.clone()),
             skip: self.skip.clone(),
             standing_m: self.standing_m,
+            right_below_m,
         }
     }
 }

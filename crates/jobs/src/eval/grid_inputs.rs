@@ -3,8 +3,6 @@
 //! Where a file leaves something open, a choice is made here. Every choice that could be wrong is
 //! noted for the report.
 
-use std::path::Path;
-
 use eval::{CellMap, MetresFromCells};
 use geodesy::MapPoint;
 use io::points::{CellLattice, PointCloud, is_point_cloud};
@@ -13,6 +11,7 @@ use raster::Grid;
 
 use super::error::EvalJobError;
 use super::grid_config::GridEvalConfig;
+use super::grid_layers::TestLayers;
 use super::on_reference::{
     cell_map, definition, metres_per_unit, metres_per_unit_at, numbers_on_reference, surface_on_reference,
 };
@@ -39,8 +38,10 @@ pub(super) struct GridInputs {
     pub(super) mask: Option<Grid<bool>>,
     /// Terrain heights on the reference grid, above the datum of the reference.
     pub(super) terrain: Option<Grid<f32>>,
-    /// Confidence on the grid of the test.
-    pub(super) confidence: Option<Grid<f32>>,
+    /// Numbers of the buildings and trees on the reference grid.
+    pub(super) objects: Option<Grid<Option<i32>>>,
+    /// Origin, standard deviation and confidence of the heights, on the grid of the test.
+    pub(super) layers: TestLayers,
     /// Vertical datum of both surfaces, in words.
     pub(super) vertical: String,
     /// Choices and doubts that a reader must know.
@@ -76,7 +77,9 @@ impl GridInputs {
             None => point_classes.map(|classes| (classes, "those of the reference's points".to_owned())),
         };
         let mask = config.mask.as_deref().map(|path| numbers_on_reference(path, "mask", &reference, &mut notes));
-        let confidence = config.confidence.as_deref().map(|path| on_test_grid(path, &test)).transpose()?;
+        let objects = config.objects.as_deref();
+        let objects = objects.map(|path| numbers_on_reference(path, "building", &reference, &mut notes)).transpose()?;
+        let layers = TestLayers::read(config, &test, &mut notes)?;
         let terrain = config.terrain.as_deref().map(|path| -> Result<Grid<f32>, EvalJobError> {
             let mut terrain = read_dem(path)?;
             bring_terrain(&mut terrain, datum, &mut notes)?;
@@ -88,24 +91,14 @@ impl GridInputs {
             classes,
             mask: mask.transpose()?.map(|mask| mask.map(|&value| value.is_some_and(|value| value != 0))),
             terrain: terrain.transpose()?,
-            confidence,
+            objects,
+            layers,
             vertical: datum.map_or_else(|| "not stated".into(), |datum| datum.to_string()),
             test,
             reference,
             notes,
         })
     }
-}
-
-/// Reads a raster that must have the grid of the test.
-fn on_test_grid(path: &Path, test: &Dem) -> Result<Grid<f32>, EvalJobError> {
-    let found = read_dem(path)?;
-    let size = |dem: &Dem| (dem.heights.width(), dem.heights.height());
-    if size(&found) != size(test) || found.geotransform != test.geotransform {
-        let grid = |dem: &Dem| format!("{:?} cells, geotransform {:?}", size(dem), dem.geotransform.0);
-        return Err(EvalJobError::OtherGrid { path: path.to_owned(), found: grid(&found), expected: grid(test) });
-    }
-    Ok(found.heights)
 }
 
 /// Classes of the cells, `None` where a cell has none.

@@ -3,7 +3,8 @@
 
 use std::path::PathBuf;
 
-use eval::{EvalConfig, EvalInput, Evaluation, evaluate};
+use eval::{EvalConfig, EvalInput, Evaluation, MetresFromCells, evaluate};
+use io::raster::Dem;
 use numeric::Progress;
 use raster::Grid;
 use report::{EvaluationReport, Protocol};
@@ -13,12 +14,18 @@ use super::error::EvalJobError;
 use super::grid_config::GridEvalConfig;
 use super::grid_inputs::GridInputs;
 use super::grid_output;
+use super::on_reference::metres_per_unit;
 use super::requirements::EvalRequirements;
 use crate::threads;
 
 /// Below this ratio of the NMADs at the edge and at the middle of the search, the NMAD hardly
 /// depends on the shift.
 const FLAT: f64 = 1.02;
+
+/// Least absolute error that a right height may have, metres.
+const RIGHT_M: f64 = 1.0;
+/// The same in cells of the test.
+const RIGHT_CELLS: f64 = 2.0;
 
 /// A finished comparison of two height grids. It serializes as the JSON report.
 #[derive(Debug, Clone)]
@@ -75,7 +82,10 @@ fn compare(config: &GridEvalConfig, progress: &dyn Progress) -> Result<GridEvalR
         classes: inputs.classes.as_ref().map(|(classes, _)| classes),
         mask: inputs.mask.as_ref(),
         terrain: inputs.terrain.as_ref(),
-        confidence: inputs.confidence.as_ref(),
+        confidence: inputs.layers.confidence.as_ref(),
+        sigma_m: inputs.layers.sigma_m.as_ref(),
+        origins: inputs.layers.origins.as_ref(),
+        objects: inputs.objects.as_ref(),
         ..EvalInput::new(
             &inputs.test.heights,
             &inputs.reference.heights,
@@ -83,7 +93,7 @@ fn compare(config: &GridEvalConfig, progress: &dyn Progress) -> Result<GridEvalR
             inputs.metres_from_cells,
         )
     };
-    let settings = config.eval_config();
+    let settings = config.eval_config(right_below_m(&inputs.test)?);
     let evaluation = evaluate(&input, &settings)?;
     progress.step();
     progress.check_cancelled()?;
@@ -125,6 +135,13 @@ impl Serialize for GridEvalReport {
     }
 }
 
+/// Returns the absolute error below which a height is right: what the confidence of a surface model
+/// promises.
+fn right_below_m(test: &Dem) -> Result<f64, EvalJobError> {
+    let (along_columns, along_rows) = MetresFromCells::new(&test.geotransform, metres_per_unit(test)?).cell_size_m();
+    Ok(RIGHT_M.max(RIGHT_CELLS * along_columns.max(along_rows)))
+}
+
 /// Describes the comparison: inputs, settings, notes, missed requirements.
 fn protocol(config: &GridEvalConfig, settings: EvalConfig, inputs: &GridInputs, found: &Evaluation) -> Protocol {
     let reference = &inputs.reference;
@@ -145,6 +162,8 @@ fn protocol(config: &GridEvalConfig, settings: EvalConfig, inputs: &GridInputs, 
         classes: inputs.classes.as_ref().map(|(_, source)| source.clone()),
         mask: config.mask.as_ref().map(name),
         terrain: config.terrain.as_ref().map(name),
+        objects: config.objects.as_ref().map(name),
+        layers: inputs.layers.names.clone(),
         notes: inputs.notes.iter().cloned().chain(notes(found, &settings)).collect(),
         missed: missed(&config.requirements, found),
         config: settings,

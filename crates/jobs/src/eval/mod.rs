@@ -12,6 +12,7 @@
 mod error;
 mod grid_config;
 mod grid_inputs;
+mod grid_layers;
 mod grid_output;
 mod grids;
 mod maps;

@@ -33,10 +33,20 @@ impl EvaluationReport<'_> {
             "<h2>By slope</h2>".to_owned(),
             self.slope_table(),
             self.coverage_table(),
+            self.judged(),
             "<h2>Protocol</h2>".to_owned(),
             self.protocol_list(),
         ];
         Ok(page(&title, &body.join("\n")))
+    }
+
+    /// Returns the section about the origin of the heights, their stated uncertainty and single
+    /// objects. It is empty without an input for any of them.
+    fn judged(&self) -> String {
+        match self.judged_html() {
+            tables if tables.is_empty() => tables,
+            tables => format!("<h2>Origin, uncertainty, objects</h2>\n{tables}"),
+        }
     }
 
     /// Returns the result in a sentence.

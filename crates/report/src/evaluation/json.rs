@@ -1,6 +1,6 @@
 //! Report of an evaluation for programs.
 
-use eval::{Metrics, Overlap, cumulative, histogram};
+use eval::{Metrics, OriginMetrics, Overlap, cumulative, histogram};
 use serde_json::{Map, Value, json};
 
 use super::numbers::is_count;
@@ -31,6 +31,15 @@ impl EvaluationReport<'_> {
             "classes": classes,
             "slopes": slopes.collect::<Vec<_>>(),
             "coverages": coverages.collect::<Vec<_>>(),
+            "origins": found.origins.as_ref().map(|split| json!({
+                "observed": origin_json(&split.observed),
+                "filled": origin_json(&split.filled),
+                "unknown_cells": split.unknown_cells,
+            })),
+            "sigma": found.sigma,
+            "reliability": found.reliability,
+            "objects": found.objects,
+            "outlines": found.outlines,
             "edges": { "edge": metrics_json(&found.edges.edge), "rest": metrics_json(&found.edges.rest) },
             "sharpness": found.sharpness,
             "standing": {
@@ -61,6 +70,17 @@ fn metrics_json(metrics: &Metrics) -> Value {
         other => json!(other),
     };
     Value::Object(metrics.named().into_iter().map(|(name, v)| (name.clone(), value(&name, v))).collect())
+}
+
+/// Returns the metrics of one origin, over all cells, at edges and per class.
+fn origin_json(origin: &OriginMetrics) -> Value {
+    let classes: Map<String, Value> =
+        origin.classes.iter().map(|c| (c.class.to_string(), metrics_json(&c.metrics))).collect();
+    json!({
+        "metrics": metrics_json(&origin.overall),
+        "edges": { "edge": metrics_json(&origin.edges.edge), "rest": metrics_json(&origin.edges.rest) },
+        "classes": classes,
+    })
 }
 
 fn overlap_json(overlap: &Overlap) -> Value {

@@ -3,6 +3,7 @@
 mod figures;
 mod html;
 mod json;
+mod judged;
 mod numbers;
 mod report;
 mod tables;

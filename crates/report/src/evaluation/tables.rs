@@ -1,5 +1,6 @@
 //! Tables of a page.
 
+use super::judged::JudgedTable;
 use super::numbers::{cell, grouped, is_count, label, percent};
 use super::report::EvaluationReport;
 use crate::escape::escape;
@@ -43,6 +44,18 @@ impl EvaluationReport<'_> {
             (format!("{:.0} %", 100.0 * kept.coverage), first.chain(metres).chain(right).collect())
         });
         table("most believed cells", heads.into_iter(), rows)
+    }
+
+    /// Returns the tables of origins, uncertainty and objects, each for which there is an input.
+    pub(super) fn judged_html(&self) -> String {
+        let of = |judged: JudgedTable| {
+            let rows = judged
+                .rows
+                .into_iter()
+                .map(|(name, cells)| (name, cells.into_iter().map(|cell| cell.replace('-', "\u{2212}")).collect()));
+            table(judged.corner, judged.heads.into_iter(), rows)
+        };
+        self.judged_tables().into_iter().map(of).collect::<Vec<_>>().join("\n")
     }
 
     /// Returns a table of the objects above the terrain.

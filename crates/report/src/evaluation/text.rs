@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::judged::JudgedTable;
 use super::numbers::{cell, label, percent};
 use super::report::EvaluationReport;
 
@@ -17,6 +18,7 @@ impl EvaluationReport<'_> {
         lines.extend(self.coverage_lines());
         lines.push(String::new());
         lines.extend(self.building_lines());
+        lines.extend(self.judged_lines());
         lines.extend(self.protocol.notes.iter().map(|note| format!("note: {note}")));
         lines.join("\n") + "\n"
     }
@@ -56,6 +58,15 @@ impl EvaluationReport<'_> {
             lines.push(row(&format!("{:.0} % of ref.", 100.0 * kept.coverage), cells));
         }
         if self.found.coverages.is_empty() { Vec::new() } else { lines }
+    }
+
+    fn judged_lines(&self) -> Vec<String> {
+        let of = |table: JudgedTable| {
+            let head = row(table.corner, table.heads.iter().map(|head| (*head).to_owned()));
+            let rows = table.rows.into_iter().map(|(label, cells)| row(&label, cells.into_iter()));
+            [String::new(), head].into_iter().chain(rows).collect::<Vec<_>>()
+        };
+        self.judged_tables().into_iter().flat_map(of).collect()
     }
 
     fn building_lines(&self) -> Vec<String> {
