@@ -132,6 +132,13 @@ fn refused(mut command: Command, output: &Path, message: &str) {
     assert!(!output.exists(), "{} was left behind", output.display());
 }
 
+/// Checks that no surface is made of the first view and `other`.
+fn refused_beside_a_view(other: &Path, output: &Path, message: &str) {
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(other).arg("-o").arg(output);
+    refused(command, output, message);
+}
+
 #[test]
 fn too_few_images_and_the_same_image_twice_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -149,9 +156,7 @@ fn copies_of_one_image_have_no_parallax() {
     let folder = tempfile::tempdir().unwrap();
     let (copy, out) = (folder.path().join("copy.tif"), folder.path().join("out"));
     std::fs::copy(town("view_1.tif"), &copy).unwrap();
-    let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(&copy).arg("-o").arg(&out);
-    refused(command, &out, "no parallax");
+    refused_beside_a_view(&copy, &out, "no parallax");
 }
 
 #[test]
@@ -160,18 +165,12 @@ fn images_without_rpc_and_damaged_ones_are_refused() {
     let out = folder.path().join("out");
     let plain = folder.path().join("plain.png");
     io::raster::write_png_gray(&plain, &raster::Grid::filled(64, 64, 7), false).unwrap();
-    let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(&plain).arg("-o").arg(&out);
-    refused(command, &out, "RPC");
+    refused_beside_a_view(&plain, &out, "RPC");
     let damaged = folder.path().join("damaged.tif");
     let bytes = std::fs::read(town("view_2.tif")).unwrap();
     std::fs::write(&damaged, &bytes[..bytes.len() / 2]).unwrap();
-    let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(&damaged).arg("-o").arg(&out);
-    refused(command, &out, "damaged.tif");
-    let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(folder.path().join("missing.tif")).arg("-o").arg(&out);
-    refused(command, &out, "missing.tif");
+    refused_beside_a_view(&damaged, &out, "damaged.tif");
+    refused_beside_a_view(&folder.path().join("missing.tif"), &out, "missing.tif");
 }
 
 #[test]
@@ -183,9 +182,7 @@ fn images_of_different_places_are_refused() {
     let pixels = raster::Grid::filled(722, 752, 100u16);
     let bands = [io::raster::Band { description: "pan", data: io::raster::BandData::U16(&pixels) }];
     io::raster::write_image_with_rpc(&far, &bands, &rpc, None, false).unwrap();
-    let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(&far).arg("-o").arg(&out);
-    refused(command, &out, "share no ground");
+    refused_beside_a_view(&far, &out, "share no ground");
 }
 
 #[test]

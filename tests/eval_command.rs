@@ -139,13 +139,18 @@ fn datums_that_may_differ_are_refused_until_they_are_named() {
     skysweep(&["--test-vertical", "sea"], &bare, &reference).code(2);
 }
 
+/// Writes a surface that is wrong by 5 m on the west half, and by 0.25 m on the east half.
+fn wrong_in_the_west(folder: &TempDir) -> PathBuf {
+    let heights = sampled((200, 180), &grid(), |x, y| surface(x, y) + if x < WEST + 50.0 { 5.0 } else { 0.25 });
+    write(folder, "test.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617))
+}
+
 #[test]
 fn classes_are_counted_apart_and_skipped() {
     let folder = TempDir::new().unwrap();
     let reference = reference(&folder, VerticalDatum::Ellipsoid);
-    // Wrong by 5 m on the west half, which is class 9, on a grid of its own.
-    let heights = sampled((200, 180), &grid(), |x, y| surface(x, y) + if x < WEST + 50.0 { 5.0 } else { 0.25 });
-    let test = write(&folder, "test.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    let test = wrong_in_the_west(&folder);
+    // Class 9 is the west half, on a grid of its own.
     let class_grid = GeoTransform::north_up(WEST, NORTH, 2.0);
     let classes = sampled((50, 45), &class_grid, |x, _| if x < WEST + 50.0 { 9.0 } else { 2.0 }).map(|&c| c as u8);
     let classes = write(&folder, "classes.tif", BandData::U8(&classes), class_grid, Crs::ellipsoidal(32617));
@@ -166,8 +171,7 @@ fn classes_are_counted_apart_and_skipped() {
 fn a_mask_leaves_cells_out() {
     let folder = TempDir::new().unwrap();
     let reference = reference(&folder, VerticalDatum::Ellipsoid);
-    let heights = sampled((200, 180), &grid(), |x, y| surface(x, y) + if x < WEST + 50.0 { 5.0 } else { 0.25 });
-    let test = write(&folder, "test.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    let test = wrong_in_the_west(&folder);
     let mask_grid = GeoTransform::north_up(WEST, NORTH, 1.0);
     let mask = sampled((100, 90), &mask_grid, |x, _| if x < WEST + 50.0 { 0.0 } else { 255.0 }).map(|&m| m as u8);
     let mask = write(&folder, "mask.tif", BandData::U8(&mask), mask_grid, Crs::ellipsoidal(32617));

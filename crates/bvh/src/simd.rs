@@ -204,6 +204,18 @@ mod avx2 {
         }
     }
 
+    /// Methods of [`Wide`] that apply an intrinsic to two registers.
+    macro_rules! lanewise {
+        ($($name:ident: $intrinsic:expr,)+) => {$(
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this
+                // intrinsic needs.
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        )+};
+    }
+
     /// Lanes in a register. They are made from an [`Avx2`] or from other such lanes only.
     #[derive(Debug, Clone, Copy)]
     pub(super) struct Wide(__m256);
@@ -223,53 +235,14 @@ mod avx2 {
             unsafe { _mm256_storeu_ps(to.as_mut_ptr().cast(), self.0) }
         }
 
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
-            // needs.
-            Self(unsafe { _mm256_add_ps(self.0, other.0) })
-        }
-
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
-            // needs.
-            Self(unsafe { _mm256_sub_ps(self.0, other.0) })
-        }
-
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
-            // needs.
-            Self(unsafe { _mm256_mul_ps(self.0, other.0) })
-        }
-
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
-            // needs.
-            Self(unsafe { _mm256_min_ps(self.0, other.0) })
-        }
-
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
-            // needs.
-            Self(unsafe { _mm256_max_ps(self.0, other.0) })
-        }
-
-        #[inline(always)]
-        fn above(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
-            // needs.
-            Self(unsafe { _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0) })
-        }
-
-        #[inline(always)]
-        fn and(self, other: Self) -> Self {
-            // SAFETY: `self` was made from an `Avx2`, so the machine has AVX2, which this intrinsic
-            // needs.
-            Self(unsafe { _mm256_and_ps(self.0, other.0) })
+        lanewise! {
+            add: _mm256_add_ps,
+            sub: _mm256_sub_ps,
+            mul: _mm256_mul_ps,
+            min: _mm256_min_ps,
+            max: _mm256_max_ps,
+            above: _mm256_cmp_ps::<_CMP_GT_OQ>,
+            and: _mm256_and_ps,
         }
 
         #[inline(always)]

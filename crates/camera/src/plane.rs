@@ -15,19 +15,23 @@ use crate::{CameraError, ImagePoint, Rpc};
 #[derive(Debug, Clone, PartialEq)]
 pub struct RpcPlane {
     pub(crate) height_m: f64,
-    pub(crate) long_off: f64,
-    pub(crate) long_scale: f64,
-    pub(crate) lat_off: f64,
-    pub(crate) lat_scale: f64,
+    pub(crate) longitude: AxisScale,
+    pub(crate) latitude: AxisScale,
     pub(crate) samp: PlaneRatio,
     pub(crate) line: PlaneRatio,
 }
 
-/// One image coordinate on a plane: `off + scale · num / den`.
+/// Offset and scale of one coordinate: its value is `off + scale · normalised`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct AxisScale {
+    off: f64,
+    scale: f64,
+}
+
+/// One image coordinate on a plane; its normalised value is `num / den`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlaneRatio {
-    pub(crate) off: f64,
-    pub(crate) scale: f64,
+    pub(crate) axis: AxisScale,
     pub(crate) num: PlaneCubic,
     pub(crate) den: PlaneCubic,
 }
@@ -50,15 +54,14 @@ impl Rpc {
     /// Returns the model at one height, metres above the ellipsoid.
     pub fn plane(&self, height_m: f64) -> RpcPlane {
         let h = (height_m - self.height_off) / self.height_scale;
-        let ratio = |off, scale, num, den| PlaneRatio { off, scale, num: at_height(num, h), den: at_height(den, h) };
+        let ratio = |axis, num, den| PlaneRatio { axis, num: at_height(num, h), den: at_height(den, h) };
+        let axis = |off, scale| AxisScale { off, scale };
         RpcPlane {
             height_m,
-            long_off: self.long_off,
-            long_scale: self.long_scale,
-            lat_off: self.lat_off,
-            lat_scale: self.lat_scale,
-            samp: ratio(self.samp_off, self.samp_scale, &self.samp_num, &self.samp_den),
-            line: ratio(self.line_off, self.line_scale, &self.line_num, &self.line_den),
+            longitude: axis(self.long_off, self.long_scale),
+            latitude: axis(self.lat_off, self.lat_scale),
+            samp: ratio(axis(self.samp_off, self.samp_scale), &self.samp_num, &self.samp_den),
+            line: ratio(axis(self.line_off, self.line_scale), &self.line_num, &self.line_den),
         }
     }
 }
@@ -82,12 +85,13 @@ impl RpcPlane {
 
     /// Returns normalised longitude and latitude. The longitude difference is brought into ±180°.
     pub(crate) fn normalised(&self, lon_deg: f64, lat_deg: f64) -> [f64; 2] {
-        [short_way(lon_deg - self.long_off) / self.long_scale, (lat_deg - self.lat_off) / self.lat_scale]
+        let Self { longitude, latitude, .. } = self;
+        [short_way(lon_deg - longitude.off) / longitude.scale, (lat_deg - latitude.off) / latitude.scale]
     }
 
     /// Returns the ground point at a normalised position.
     pub(crate) fn ground(&self, l: f64, p: f64) -> LonLatHeight {
-        LonLatHeight::new(self.long_off + self.long_scale * l, self.lat_off + self.lat_scale * p, self.height_m)
+        LonLatHeight::new(self.longitude.value(l), self.latitude.value(p), self.height_m)
     }
 
     /// Returns image position and derivatives at a normalised position.
@@ -113,12 +117,19 @@ impl PlaneSample {
     }
 }
 
+impl AxisScale {
+    #[inline]
+    fn value(self, normalised: f64) -> f64 {
+        self.off + self.scale * normalised
+    }
+}
+
 impl PlaneRatio {
     fn value(&self, l: f64, p: f64) -> Result<f64, CameraError> {
         let n = plane_value(&self.num, l, p);
         let d = plane_value(&self.den, l, p);
         check_ratio(n, d)?;
-        Ok(self.off + self.scale * (n / d))
+        Ok(self.axis.value(n / d))
     }
 
     /// Returns the value, its derivatives by L and P, and the denominator.
@@ -127,6 +138,7 @@ impl PlaneRatio {
         let [d, d_l, d_p] = plane_gradient(&self.den, l, p);
         check_ratio(n, d)?;
         let r = n / d;
-        Ok((self.off + self.scale * r, [self.scale * (n_l - r * d_l) / d, self.scale * (n_p - r * d_p) / d], d))
+        let scale = self.axis.scale;
+        Ok((self.axis.value(r), [scale * (n_l - r * d_l) / d, scale * (n_p - r * d_p) / d], d))
     }
 }

@@ -6,30 +6,23 @@ use std::collections::hash_map::Entry;
 use crate::select;
 use crate::shell;
 use crate::triangulate::{Triangulation, triangulate};
-use crate::{CityModel, DefectCode, Effect, Geometry, Lod, SurfaceClass, SurfacePolygon};
+use crate::{CityModel, Defect, DefectCode, Effect, Geometry, Lod, SurfaceClass, SurfacePolygon};
 use numeric::vector::Vector;
 
 /// The triangles of one object. Their corners are vertices of the model.
 #[derive(Debug, Default)]
 pub(crate) struct Piece {
+    /// Index of the object, which its defects name.
+    object: usize,
     pub(crate) polygons: Vec<(SurfaceClass, Triangulation)>,
-    pub(crate) defects: Vec<PieceDefect>,
-}
-
-/// A defect of the object.
-#[derive(Debug)]
-pub(crate) struct PieceDefect {
-    pub(crate) code: DefectCode,
-    pub(crate) effect: Effect,
-    pub(crate) place: String,
-    pub(crate) detail: String,
+    pub(crate) defects: Vec<Defect>,
 }
 
 impl Piece {
     /// Cuts the surfaces of an object at a level of detail; `position` returns the place of a
     /// vertex, metres.
     pub(crate) fn new(model: &CityModel, object: usize, lod: Option<Lod>, position: &impl Fn(u32) -> Vector) -> Self {
-        let mut piece = Self::default();
+        let mut piece = Self { object, ..Self::default() };
         let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
         for (number, geometry) in select::geometries(&model.objects[object], lod) {
             let turn = piece.check_shells(geometry, number, position);
@@ -51,7 +44,7 @@ impl Piece {
     }
 
     fn defect(&mut self, code: DefectCode, effect: Effect, place: String, detail: String) {
-        self.defects.push(PieceDefect { code, effect, place, detail });
+        self.defects.push(Defect { code, effect, object: Some(self.object), place, detail });
     }
 
     /// Sets the class of a polygon that has none: a polygon may be classified in only one of two

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use crate::piece::{Piece, PieceDefect};
+use crate::piece::Piece;
 use crate::select::{self, Chosen, LodChoice, ObjectStatus, Scope};
 use crate::{CityModel, Defect, DefectCode, Effect, Lod, ModelError, ModelPoint, SurfaceClass};
 use numeric::vector::Vector;
@@ -237,13 +237,7 @@ impl Merger {
                 self.mesh.surface_of.push(surface);
             }
         }
-        defects.extend(piece.defects.into_iter().map(|PieceDefect { code, effect, place, detail }| Defect {
-            code,
-            effect,
-            object: Some(object),
-            place,
-            detail,
-        }));
+        defects.extend(piece.defects);
         match self.mesh.triangles.len() - before {
             0 => ObjectStatus::Unusable,
             triangles => ObjectStatus::Used { triangles },

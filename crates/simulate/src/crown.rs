@@ -68,6 +68,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::fixtures::{MARCH_STEP, is_below, march};
 
     proptest! {
         #[test]
@@ -76,18 +77,13 @@ mod tests {
         ) {
             let crown = Crown { centre_m: [1.0, -0.5], radius_m: 3.0, shoulder_m: 4.0, dome_m: 5.0 };
             let ray = SceneRay { origin: Vector3::new(x, y, 12.0), direction: Vector3::new(dx, dy, -1.0) };
-            let inside = |t: f64| {
-                let p = ray.at(t);
-                crown.height(p.x, p.y).is_some_and(|z| p.z < z)
-            };
-            let step = 1e-3;
-            let marched = (0..12_000).map(|i| f64::from(i) * step).find(|t| inside(*t));
-            match (crown.enter(&ray, 12.0), marched) {
+            let inside = |t: f64| is_below(ray.at(t), |x, y| crown.height(x, y));
+            match (crown.enter(&ray, 12.0), march(inside, 12.0)) {
                 (Some((t, normal)), Some(m)) => {
-                    prop_assert!((t - m).abs() <= step + 1e-9, "entered at {t}, marched to {m}");
+                    prop_assert!((t - m).abs() <= MARCH_STEP + 1e-9, "entered at {t}, marched to {m}");
                     prop_assert!(normal.dot(&ray.direction) <= 0.0);
                 }
-                (Some((t, _)), None) => prop_assert!(!inside(t + step)),
+                (Some((t, _)), None) => prop_assert!(!inside(t + MARCH_STEP)),
                 (None, m) => prop_assert!(m.is_none(), "missed what a march meets at {m:?}"),
             }
         }

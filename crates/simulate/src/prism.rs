@@ -204,6 +204,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::fixtures::{MARCH_STEP, is_below, march};
 
     fn house(direction_deg: f64, roof: Roof) -> Prism {
         Prism::new(BuildingBlock { centre_m: [3.0, -2.0], half_size_m: [9.0, 5.0], direction_deg, base_m: 0.0, roof })
@@ -234,19 +235,14 @@ mod tests {
         ) {
             let prism = house(direction, [FLAT, GABLED, HIPPED][roof]);
             let ray = SceneRay { origin: Vector3::new(x, y, 30.0), direction: Vector3::new(dx, dy, -1.0) };
-            let inside = |t: f64| {
-                let p = ray.at(t);
-                prism.roof_height(p.x, p.y).is_some_and(|z| p.z < z)
-            };
-            let step = 1e-3;
-            let marched = (0..30_000).map(|i| f64::from(i) * step).find(|t| inside(*t));
-            match (prism.enter(&ray, 30.0), marched) {
+            let inside = |t: f64| is_below(ray.at(t), |x, y| prism.roof_height(x, y));
+            match (prism.enter(&ray, 30.0), march(inside, 30.0)) {
                 (Some((t, normal, _)), Some(m)) => {
-                    prop_assert!((t - m).abs() <= step + 1e-9, "entered at {t}, marched to {m}");
+                    prop_assert!((t - m).abs() <= MARCH_STEP + 1e-9, "entered at {t}, marched to {m}");
                     prop_assert!(normal.dot(&ray.direction) < 0.0);
                 }
                 // A march misses corners that are cut within one step.
-                (Some((t, _, _)), None) => prop_assert!(!inside(t + step)),
+                (Some((t, _, _)), None) => prop_assert!(!inside(t + MARCH_STEP)),
                 (None, m) => prop_assert!(m.is_none()),
             }
         }

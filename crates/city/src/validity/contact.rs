@@ -28,33 +28,68 @@ impl Budget {
     }
 }
 
+/// On which sides of a surface parts of another one are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Parts {
+    pub(super) inside: bool,
+    pub(super) outside: bool,
+}
+
 /// The relation of surfaces A and B.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Contact {
-    /// Part of A is inside B.
-    pub(super) a_inside: bool,
-    /// Part of A is outside B.
-    pub(super) a_outside: bool,
-    /// Part of B is inside A.
-    pub(super) b_inside: bool,
-    /// Part of B is outside A.
-    pub(super) b_outside: bool,
+    /// Where parts of A are, as seen from B.
+    pub(super) a: Parts,
+    /// Where parts of B are, as seen from A.
+    pub(super) b: Parts,
     /// They share part of a face, and face the same way there.
     pub(super) same_face: bool,
     /// They share part of a face, and face opposite ways there.
     pub(super) opposite_face: bool,
 }
 
+impl Parts {
+    /// Returns where parts of the edges of `a` are, as seen from `b`.
+    fn of(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option<Self> {
+        let mut parts = Self::default();
+        for (_, [p, q]) in a.edges() {
+            if parts.are_on_both_sides() {
+                break;
+            }
+            if !Bounds::of([p, q]).meets(&b.bounds, tolerance_m) {
+                parts.outside = true;
+                continue;
+            }
+            let cuts = cuts([p, q], b);
+            budget.spend(b.corners.len().saturating_mul(cuts.len()))?;
+            for pair in cuts.windows(2) {
+                let middle = 0.5 * (pair[0] + pair[1]);
+                match b.side([0, 1, 2].map(|i| p[i] + middle * (q[i] - p[i])), tolerance_m) {
+                    Side::Inside => parts.inside = true,
+                    Side::Outside => parts.outside = true,
+                    Side::On => {}
+                }
+            }
+        }
+        Some(parts)
+    }
+
+    pub(super) fn are_on_both_sides(self) -> bool {
+        self.inside && self.outside
+    }
+}
+
 impl Contact {
     /// Compares two surfaces, or returns `None` when that exceeds the budget.
     pub(super) fn of(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option<Self> {
         budget.spend(1)?;
-        let mut contact = Self { a_outside: true, b_outside: true, ..Self::default() };
+        let apart = Parts { inside: false, outside: true };
+        let mut contact = Self { a: apart, b: apart, ..Self::default() };
         if !a.bounds.meets(&b.bounds, tolerance_m) {
             return Some(contact);
         }
-        (contact.a_inside, contact.a_outside) = pieces(a, b, tolerance_m, budget)?;
-        (contact.b_inside, contact.b_outside) = pieces(b, a, tolerance_m, budget)?;
+        contact.a = Parts::of(a, b, tolerance_m, budget)?;
+        contact.b = Parts::of(b, a, tolerance_m, budget)?;
         for (i, s) in a.corners.iter().enumerate().filter(|(_, s)| Bounds::of(**s).meets(&b.bounds, tolerance_m)) {
             let bounds = Bounds::of(*s);
             budget.spend(b.corners.len())?;
@@ -71,43 +106,18 @@ impl Contact {
 
     /// Returns whether the interiors of two solids, each facing outwards, overlap.
     pub(super) fn interiors_meet(&self) -> bool {
-        self.a_inside || self.b_inside || self.same_face
+        self.a.inside || self.b.inside || self.same_face
     }
 
     /// Returns whether the surfaces are equal: each lies on the other.
     pub(super) fn is_same(&self) -> bool {
-        !(self.a_inside || self.a_outside || self.b_inside || self.b_outside)
+        self.a == Parts::default() && self.b == Parts::default()
     }
 
     /// Returns whether the surfaces share part of a face.
     pub(super) fn shares_face(&self) -> bool {
         self.same_face || self.opposite_face
     }
-}
-
-/// Returns whether parts of the edges of `a` are inside `b`, and whether parts are outside.
-fn pieces(a: &Patch, b: &Patch, tolerance_m: f64, budget: &mut Budget) -> Option<(bool, bool)> {
-    let (mut inside, mut outside) = (false, false);
-    for (_, [p, q]) in a.edges() {
-        if inside && outside {
-            break;
-        }
-        if !Bounds::of([p, q]).meets(&b.bounds, tolerance_m) {
-            outside = true;
-            continue;
-        }
-        let cuts = cuts([p, q], b);
-        budget.spend(b.corners.len().saturating_mul(cuts.len()))?;
-        for pair in cuts.windows(2) {
-            let middle = 0.5 * (pair[0] + pair[1]);
-            match b.side([0, 1, 2].map(|i| p[i] + middle * (q[i] - p[i])), tolerance_m) {
-                Side::Inside => inside = true,
-                Side::Outside => outside = true,
-                Side::On => {}
-            }
-        }
-    }
-    Some((inside, outside))
 }
 
 /// Returns the fractions along an edge of its ends and of its crossings with the planes of nearby

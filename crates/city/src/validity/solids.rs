@@ -38,12 +38,12 @@ fn wrong_between(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
     if contact.is_same() {
         return Some(DefectCode::DuplicateShells);
     }
-    if contact.shares_face() || (contact.b_inside && contact.b_outside) || (contact.a_inside && contact.a_outside) {
+    if contact.shares_face() || contact.b.are_on_both_sides() || contact.a.are_on_both_sides() {
         return Some(DefectCode::ShellsIntersect);
     }
-    let nested = contact.a_inside || contact.b_inside;
+    let nested = contact.a.inside || contact.b.inside;
     // A cavity must be inside the outer shell and outside the other cavities.
-    (a_is_outer != contact.b_inside || (nested && !a_is_outer)).then_some(DefectCode::InnerShellOutside)
+    (a_is_outer != contact.b.inside || (nested && !a_is_outer)).then_some(DefectCode::InnerShellOutside)
 }
 
 /// Returns whether edges of a cavity that lie on earlier shells close a circle, which cuts off the

@@ -89,7 +89,7 @@ impl Maker {
         path: &Path,
     ) -> Result<HeightMapMade, HeightMapJobError> {
         let Laid { frame, mut heights, zero_m } = laid;
-        let resolution = self.settings.resolution_px_per_m;
+        let resolution = self.settings.config.resolution_px_per_m;
         let measured = heights.clone();
         let ground = match &self.terrain {
             Some(terrain) => {
@@ -102,7 +102,7 @@ impl Maker {
         let ground_height_m = ground.map(|above| above + zero_m);
         let camera_height_m = match (stand.height_m, ground_height_m) {
             (Some(height), _) => height,
-            (None, Some(ground)) => ground + self.settings.ground_offset_m,
+            (None, Some(ground)) => ground + self.settings.config.stand.ground_offset_m,
             (None, None) => {
                 let (lon_deg, lat_deg) = (stand.lon_deg, stand.lat_deg);
                 return Err(HeightMapError::NoGround { reach_m: GROUND_REACH_M, lon_deg, lat_deg }.into());
@@ -111,7 +111,7 @@ impl Maker {
         let lift = zero_m - camera_height_m;
         heights.data_mut().iter_mut().for_each(|h| *h = (f64::from(*h) + lift) as f32);
         let mean = mean_distance_m(&heights, resolution).ok_or(HeightMapJobError::EmptyTile)?;
-        let (scene_scale_m, normalized) = match self.settings.normalize {
+        let (scene_scale_m, normalized) = match self.settings.config.normalization {
             Normalization::None => (mean, false),
             Normalization::Auto => (mean, true),
             Normalization::By(s) => (s, true),
@@ -127,7 +127,7 @@ impl Maker {
             normalized,
             source: self.name.clone(),
             source_kind: self.source.kind().to_owned(),
-            interpolation: format!("{:?}", self.settings.reading).to_lowercase(),
+            interpolation: format!("{:?}", self.settings.config.interpolation).to_lowercase(),
             request: self.request(stand),
         };
         let confidence = match &self.confidence {

@@ -5,36 +5,23 @@ use std::sync::{Arc, Mutex};
 
 use crs::MapProjection;
 use geodesy::utm_epsg;
-use heightmap::{MapSystem, Reading, TileRequest};
+use heightmap::{MapSystem, TileRequest};
 
-use super::config::{HeightMapConfig, MapChoice, Normalization};
+use super::config::{HeightMapConfig, MapChoice};
 use super::error::HeightMapJobError;
 use crate::camera_stand::CameraStand;
 
 /// Settings that all tiles of a run share.
 #[derive(Debug)]
 pub(super) struct Settings {
-    pub(super) size: usize,
-    pub(super) resolution_px_per_m: f64,
-    pub(super) ground_offset_m: f64,
-    pub(super) normalize: Normalization,
-    pub(super) reading: Reading,
-    crs: MapChoice,
+    pub(super) config: HeightMapConfig,
     /// Projections by EPSG code: they are expensive to make, and tiles share them.
     projections: Mutex<HashMap<u32, Arc<MapProjection>>>,
 }
 
 impl Settings {
     pub(super) fn new(config: &HeightMapConfig) -> Self {
-        Self {
-            size: config.size_px,
-            resolution_px_per_m: config.resolution_px_per_m,
-            ground_offset_m: config.stand.ground_offset_m,
-            normalize: config.normalization,
-            reading: config.interpolation,
-            crs: config.map,
-            projections: Mutex::default(),
-        }
+        Self { config: config.clone(), projections: Mutex::default() }
     }
 
     /// Returns the tile of a camera.
@@ -43,14 +30,14 @@ impl Settings {
             lon_deg: stand.lon_deg,
             lat_deg: stand.lat_deg,
             heading_deg: stand.heading_deg,
-            size: self.size,
-            resolution_px_per_m: self.resolution_px_per_m,
+            size: self.config.size_px,
+            resolution_px_per_m: self.config.resolution_px_per_m,
         }
     }
 
     /// Returns the map projection that the tile of a camera is written in.
     pub(super) fn system(&self, stand: &CameraStand) -> Result<MapSystem, HeightMapJobError> {
-        let epsg = match self.crs {
+        let epsg = match self.config.map {
             MapChoice::Local => return Ok(MapSystem::Local),
             MapChoice::Utm => utm_epsg(stand.lon_deg, stand.lat_deg)?,
             MapChoice::Epsg(code) => code,
@@ -68,9 +55,11 @@ impl Settings {
     /// The text is hashed into the file of the map: a change of the format makes earlier maps
     /// unknown.
     pub(super) fn fingerprint(&self) -> String {
-        let Self { size, resolution_px_per_m, ground_offset_m, normalize, reading, crs, .. } = self;
+        let HeightMapConfig { size_px, resolution_px_per_m, stand, normalization, interpolation, map, .. } =
+            &self.config;
         format!(
-            "{size} px, {resolution_px_per_m} px/m, offset {ground_offset_m} m, {normalize:?}, {reading:?}, {crs:?}"
+            "{size_px} px, {resolution_px_per_m} px/m, offset {} m, {normalization:?}, {interpolation:?}, {map:?}",
+            stand.ground_offset_m
         )
     }
 }

@@ -52,7 +52,9 @@ impl HeightSource {
     /// Returns how many tiles are best read at a time.
     pub(super) fn batch(&self, settings: &Settings) -> usize {
         match self {
-            Self::Points(_) => (OPEN_CELLS / settings.size.saturating_mul(settings.size).max(1)).max(1),
+            Self::Points(_) => {
+                (OPEN_CELLS / settings.config.size_px.saturating_mul(settings.config.size_px).max(1)).max(1)
+            }
             _ => 64,
         }
     }
@@ -65,7 +67,7 @@ impl HeightSource {
         };
         match self {
             Self::Raster(raster) => {
-                each(&|stand, request, system| raster.lay(stand, request, system, settings.reading))
+                each(&|stand, request, system| raster.lay(stand, request, system, settings.config.interpolation))
             }
             Self::Model(model) => each(&|_, request, system| model.lay(request, system)),
             Self::Points(points) => points.lay(settings, stands),

@@ -107,6 +107,6 @@ impl PointSource {
     fn begin(&self, settings: &Settings, stand: &CameraStand) -> Result<(TileFrame, HighestPoints), HeightMapJobError> {
         let frame = TileFrame::new(settings.request(stand), self.middle_m, settings.system(stand)?)?;
         let map = TileMap::from_map(&frame, &self.map)?;
-        Ok((frame, HighestPoints::new(map, settings.size, self.middle_m)))
+        Ok((frame, HighestPoints::new(map, settings.config.size_px, self.middle_m)))
     }
 }
