@@ -130,6 +130,8 @@ const PREFIX: &str = ".skysweep-";
 /// Size of the buffer in front of a stream, bytes.
 const BUFFER: usize = 1 << 16;
 
+/// Writes a file through a buffered stream under a temporary name in its folder, and renames it when
+/// `make` succeeds.
 fn stream(
     path: &Path,
     overwrite: bool,

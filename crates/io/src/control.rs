@@ -132,18 +132,25 @@ fn fields(line: &str, separator: char) -> Vec<String> {
 }
 
 /// Indices of the columns.
+/// Which columns of the table hold what.
 struct Columns {
     subject: SubjectColumns,
+    /// Whether places are longitudes and latitudes, and not map coordinates.
     geographic: bool,
+    /// Longitude, latitude and height, or easting, northing and height.
     place: [usize; 3],
 }
 
+/// The columns that say what a row is the position of.
 enum SubjectColumns {
+    /// The name of an image.
     Name(usize),
+    /// Coordinates x, y and z in the model.
     Model([usize; 3]),
 }
 
 impl Columns {
+    /// Finds the columns by their names, in any case. The error says which columns are missing.
     fn of(header: &[String]) -> Result<Self, String> {
         let find = |names: &[&str]| header.iter().position(|h| names.iter().any(|n| h.eq_ignore_ascii_case(n)));
         let all =

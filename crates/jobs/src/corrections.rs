@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use camera::ImageCorrection;
+use camera::{ImageCorrection, RpcCamera};
+use io::rpc::RpcReadError;
 use serde::{Deserialize, Serialize};
 
 use numeric::Progress;
@@ -89,6 +90,15 @@ impl Corrections {
                 report_of_run(surface).map_or_else(|| Ok(Self::default()), |path| Self::read(&path))
             }
         }
+    }
+
+    /// Reads the RPC inside or beside an image, and adds the correction of the image.
+    ///
+    /// # Errors
+    /// [`RpcReadError`] if the image has no usable RPC.
+    pub(crate) fn camera(&self, path: &Path, progress: &dyn Progress) -> Result<RpcCamera, RpcReadError> {
+        let rpc = io::rpc::read_for_image(path)?.rpc;
+        Ok(RpcCamera { rpc, correction: self.for_image(path, progress) })
     }
 
     /// Returns the correction of an image, or the identity (with a warning) if the run did not use

@@ -3,10 +3,28 @@
 use std::path::{Path, PathBuf};
 
 use crs::{CrsError, MapProjection};
+use io::raster::RasterError;
+use io::rpc::RpcReadError;
 use numeric::Cancelled;
 
+use crate::corrections::CorrectionsError;
 use crate::files::FileError;
 use crate::threads::ThreadsError;
+
+/// Implements `From` of the errors of steps for the error of a job. The variant that holds them
+/// takes them through their own `From`: into [`JobError`], or into a box because they are several
+/// times larger than the other variants.
+macro_rules! from_steps {
+    ($error:ident: $($variant:ident($($step:ty),+)),+ $(,)?) => {$($(
+        impl From<$step> for $error {
+            fn from(error: $step) -> Self {
+                Self::$variant(error.into())
+            }
+        }
+    )+)+};
+}
+
+pub(crate) use from_steps;
 
 /// A reason that can end any job.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +64,23 @@ impl SettingError {
     }
 }
 
+/// A satellite image that cannot be read with its camera.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageInputError {
+    /// The image cannot be read.
+    #[error(transparent)]
+    Raster(#[from] RasterError),
+    /// The image has no usable RPC.
+    #[error(transparent)]
+    Rpc(Box<RpcReadError>),
+    /// The pointing corrections cannot be read.
+    #[error(transparent)]
+    Corrections(#[from] CorrectionsError),
+}
+
+from_steps!(ImageInputError: Rpc(RpcReadError));
+
 /// The coordinate reference system of a file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot use the coordinate reference system of the file: {}", path.display())]
@@ -70,18 +105,3 @@ impl JobError {
         matches!(self, Self::File(FileError::Exists { .. }))
     }
 }
-
-/// Implements `From` of the errors of steps for the error of a job. The variant that holds them
-/// takes them through their own `From`: into [`JobError`], or into a box because they are several
-/// times larger than the other variants.
-macro_rules! from_steps {
-    ($error:ident: $($variant:ident($($step:ty),+)),+ $(,)?) => {$($(
-        impl From<$step> for $error {
-            fn from(error: $step) -> Self {
-                Self::$variant(error.into())
-            }
-        }
-    )+)+};
-}
-
-pub(crate) use from_steps;

@@ -20,7 +20,7 @@ pub(super) fn compare_shells(shells: &[Patch]) -> Vec<MemberDefect> {
                 found.push(defect(DefectCode::NotChecked, index, detail));
                 return found;
             };
-            if let Some(code) = wrong_between(&contact, other == 0) {
+            if let Some(code) = cavity_defect(&contact, other == 0) {
                 found.push(defect(code, index, format!("and shell {other}")));
             }
         }
@@ -32,9 +32,9 @@ pub(super) fn compare_shells(shells: &[Patch]) -> Vec<MemberDefect> {
     found
 }
 
-/// Returns the defect of shell B, a cavity, in relation to shell A, which is the outer shell or
-/// another cavity.
-fn wrong_between(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
+/// Returns what is wrong with shell B, a cavity, in relation to shell A, which is the outer shell or
+/// another cavity; `None` if nothing is.
+fn cavity_defect(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
     if contact.is_same() {
         return Some(DefectCode::DuplicateShells);
     }

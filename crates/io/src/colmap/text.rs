@@ -106,6 +106,7 @@ impl<'a> Words<'a> {
         Self { rest: line.trim(), line: number + 1 }
     }
 
+    /// Returns the part of the line that is not read yet.
     fn rest(&self) -> &'a str {
         self.rest
     }

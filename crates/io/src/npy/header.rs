@@ -31,7 +31,8 @@ pub(super) struct Header {
     pub(super) description: String,
 }
 
-/// Returns the bytes before the numbers.
+/// Returns the header of a file: the bytes before the numbers, padded to [`ALIGNMENT`].
+/// `description` is NumPy's name of the number type, such as `<f4`.
 pub(super) fn encode(description: &str, shape: &[usize]) -> Vec<u8> {
     let lengths: Vec<String> = shape.iter().map(usize::to_string).collect();
     // A Python tuple of one item needs a comma.

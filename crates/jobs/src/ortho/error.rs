@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
+use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use numeric::Cancelled;
 
 use crate::corrections::CorrectionsError;
-use crate::error::{JobError, SettingError, from_steps};
+use crate::error::{ImageInputError, JobError, SettingError, from_steps};
 use crate::files::FileError;
 use crate::threads::ThreadsError;
 
@@ -15,12 +16,9 @@ use crate::threads::ThreadsError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrthoError {
-    /// A raster cannot be read.
+    /// A satellite image cannot be read with its camera.
     #[error(transparent)]
-    Raster(#[from] io::raster::RasterError),
-    /// An image has no usable RPC.
-    #[error(transparent)]
-    Rpc(Box<RpcReadError>),
+    Image(#[from] ImageInputError),
     /// The surface model's coordinate reference system has no EPSG code.
     #[error("the surface model's coordinate system has no EPSG code: {}", path.display())]
     NoEpsg {
@@ -42,9 +40,6 @@ pub enum OrthoError {
     /// Coordinates or heights cannot be converted.
     #[error(transparent)]
     Crs(#[from] CrsError),
-    /// The pointing corrections cannot be read.
-    #[error(transparent)]
-    Corrections(#[from] CorrectionsError),
     /// An image does not see the surface.
     #[error("the image does not see the surface model: {}", path.display())]
     NotSeen {
@@ -93,4 +88,4 @@ pub enum OrthoError {
     Job(#[from] JobError),
 }
 
-from_steps!(OrthoError: Job(SettingError, FileError, ThreadsError, Cancelled), Rpc(RpcReadError));
+from_steps!(OrthoError: Job(SettingError, FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));

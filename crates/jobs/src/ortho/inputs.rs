@@ -119,10 +119,8 @@ impl OrthoImage {
     fn open(path: &Path, scene: &Scene<'_>, progress: &dyn Progress) -> Result<Self, OrthoError> {
         let Scene { dsm, projection, middle_m, corrections } = scene;
         let source = ImageSource::open(path)?;
-        let rpc = io::rpc::read_for_image(path)?.rpc;
-        let correction = corrections.for_image(path, progress);
-        let corrected = correction != ImageCorrection::IDENTITY;
-        let camera = RpcCamera { rpc, correction };
+        let camera = corrections.camera(path, progress)?;
+        let corrected = camera.correction != ImageCorrection::IDENTITY;
         let size = (dsm.heights.width(), dsm.heights.height());
         let eyeline = Eyeline::new(&camera, projection, &dsm.geotransform, size, *middle_m)
             .map_err(|source| OrthoError::NotSeen { path: path.to_owned(), source })?;

@@ -17,7 +17,7 @@ use numeric::Cancelled;
 use report::PictureError;
 
 use crate::corrections::CorrectionsError;
-use crate::error::{JobError, from_steps};
+use crate::error::{ImageInputError, JobError, from_steps};
 use crate::files::FileError;
 use crate::threads::ThreadsError;
 
@@ -221,15 +221,9 @@ pub enum PriorsJobError {
     /// The similarity cannot be read.
     #[error(transparent)]
     Transform(#[from] SimilarityFileError),
-    /// A satellite image cannot be read.
+    /// A satellite image cannot be read with its camera.
     #[error(transparent)]
-    Image(#[from] RasterError),
-    /// A satellite image has no usable RPC.
-    #[error(transparent)]
-    Rpc(Box<RpcReadError>),
-    /// The pointing corrections cannot be read.
-    #[error(transparent)]
-    Corrections(#[from] CorrectionsError),
+    Image(#[from] ImageInputError),
     /// The pointing correction cannot be folded into the RPC.
     #[error(transparent)]
     Fold(#[from] FitError),
@@ -247,7 +241,7 @@ pub enum PriorsJobError {
     Job(#[from] JobError),
 }
 
-from_steps!(PriorsJobError: Job(FileError, ThreadsError, Cancelled), Rpc(RpcReadError));
+from_steps!(PriorsJobError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));
 
 /// What a trainer cannot do with a lens.
 #[derive(Debug, thiserror::Error)]

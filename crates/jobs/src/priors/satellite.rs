@@ -84,9 +84,8 @@ fn read_images(
         if let Some(other) = known.insert(stem.to_lowercase(), path) {
             return Err(PriorsJobError::SameName { first: other.to_owned(), second: path.clone() });
         }
-        let rpc = io::rpc::read_for_image(path)?.rpc;
+        let camera = corrections.camera(path, progress)?;
         let window = ImageSource::open(path)?.window();
-        let camera = RpcCamera { rpc, correction: corrections.for_image(path, progress) };
         images.push(PriorsImage { path: path.clone(), stem, camera, size: (window.width, window.height) });
     }
     Ok(images)

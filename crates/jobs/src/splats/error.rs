@@ -10,7 +10,7 @@ use io::splat_ply::SplatPlyError;
 use numeric::Cancelled;
 
 use crate::corrections::CorrectionsError;
-use crate::error::{JobError, from_steps};
+use crate::error::{ImageInputError, JobError, from_steps};
 use crate::files::FileError;
 use crate::map_surface::MapSurfaceError;
 use crate::placed_model::PlacedModelError;
@@ -32,15 +32,9 @@ pub enum SplatsJobError {
     /// The confidence of the cells cannot be read.
     #[error("cannot read the confidence")]
     Confidence(#[source] RasterError),
-    /// The pointing corrections cannot be read.
+    /// A satellite image cannot be read with its camera.
     #[error(transparent)]
-    Corrections(#[from] CorrectionsError),
-    /// An image or a picture cannot be read.
-    #[error(transparent)]
-    Image(#[from] RasterError),
-    /// An image has no usable RPC.
-    #[error(transparent)]
-    Rpc(Box<RpcReadError>),
+    Image(#[from] ImageInputError),
     /// An image shows another place.
     #[error("the image does not see {target}: {}", path.display())]
     NotSeen {
@@ -105,4 +99,4 @@ pub enum SplatsJobError {
     Job(#[from] JobError),
 }
 
-from_steps!(SplatsJobError: Job(FileError, ThreadsError, Cancelled), Rpc(RpcReadError));
+from_steps!(SplatsJobError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));

@@ -23,10 +23,7 @@ pub(super) fn read(
     corrections: &Corrections,
     progress: &dyn Progress,
 ) -> Result<ColourImage, SplatsJobError> {
-    let rpc = io::rpc::read_for_image(path)?.rpc;
-    let pixels = read_pixels(path)?;
-    let correction = corrections.for_image(path, progress);
-    Ok(ColourImage { camera: RpcCamera { rpc, correction }, pixels })
+    Ok(ColourImage { camera: corrections.camera(path, progress)?, pixels: read_pixels(path)? })
 }
 
 /// Reads the colours of a picture in its own units.
