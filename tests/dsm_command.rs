@@ -217,3 +217,54 @@ fn results_are_not_replaced_unasked_and_places_that_cannot_be_written_are_named(
     small(&file.join("out")).assert().code(2).stderr(predicate::str::contains("cannot write the output"));
     assert_eq!(std::fs::read(&file).unwrap(), b"not a folder");
 }
+
+/// Two runs into one folder would mix their files.
+#[test]
+fn a_folder_in_use_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    let other_run = std::fs::File::open(&out).unwrap();
+    other_run.lock().unwrap();
+    let refused = small(&out).assert().code(2);
+    refused.stderr(predicate::str::contains("another run is writing into the folder"));
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 0);
+    drop(other_run);
+    small(&out).assert().code(0);
+    let names: Vec<_> = std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(names.iter().all(|name| !name.to_string_lossy().starts_with('.')), "{names:?}");
+}
+
+/// The link that an attacker could plant under the name of the work folder is not followed.
+#[cfg(unix)]
+#[test]
+fn planted_links_are_not_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, outside) = (folder.path().join("out"), folder.path().join("outside"));
+    std::fs::create_dir_all(outside.join("dsm")).unwrap();
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(outside.join("dsm/dsm.tif"), b"precious").unwrap();
+    std::os::unix::fs::symlink(&outside, out.join(".skysweep-partial")).unwrap();
+    small(&out).assert().code(0);
+    assert_eq!(std::fs::read(outside.join("dsm/dsm.tif")).unwrap(), b"precious");
+    std::fs::remove_dir_all(&out).unwrap();
+    std::fs::create_dir(&out).unwrap();
+    std::os::unix::fs::symlink(outside.join("dsm"), out.join("dsm")).unwrap();
+    small(&out).arg("--overwrite").assert().code(2).stderr(predicate::str::contains("a link is in the place"));
+    assert_eq!(std::fs::read(outside.join("dsm/dsm.tif")).unwrap(), b"precious");
+}
+
+/// An evaluation belongs to the DSM that it measured.
+#[test]
+fn overwriting_removes_the_evaluation_of_the_old_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    small(&out).assert().code(0);
+    let evaluate = || skysweep().arg("eval").arg(out.join("dsm/dsm.tif")).arg(town("truth/dsm.tif")).arg("-q").assert();
+    evaluate().code(0);
+    assert!(out.join("eval/report.html").is_file());
+    std::fs::write(out.join("eval/notes.txt"), b"mine").unwrap();
+    small(&out).args(["--overwrite", "--preset", "fast"]).assert().code(0);
+    let left: Vec<_> = std::fs::read_dir(out.join("eval")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(left, ["notes.txt"]);
+}

@@ -1,18 +1,21 @@
 //! The one atomic writer: a file under its final name is complete.
 //!
-//! A file is made under a temporary name in the folder of its destination and then renamed. On any
-//! failure, and when the process is killed, the destination is as it was before. The new file has
-//! the usual permissions (0666 less the umask), not the private ones of temporary files.
+//! A file is made under a temporary name in the folder of its destination, flushed to the disk and
+//! then renamed. On any failure, and when the process is killed, the destination is as it was
+//! before. A full disk often shows only when the content is flushed, so nothing is renamed before.
+//! The new file has the usual permissions (0666 less the umask), not the private ones of temporary
+//! files.
 //!
 //! [`write_stream`] suits formats that are written from front to back. It never replaces a file
 //! that appears meanwhile, unless overwriting is allowed. [`write_path`] suits libraries that want
-//! a path (GDAL, LAS): it gives them a temporary folder, so that side files vanish with the folder.
+//! a path (GDAL): it gives them a temporary folder, so that side files vanish with the folder.
 //! [`write_bytes`] takes content that is already in memory.
 
+use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::Builder;
+use tempfile::{Builder, TempPath};
 
 /// The first words of [`SaveError::Exists`], by which a caller can recognise it inside other
 /// errors.
@@ -36,6 +39,19 @@ pub enum SaveError {
         /// The message of the system or of the library that writes the format.
         reason: String,
     },
+    /// The disk has too little space for the output.
+    #[error(
+        "the disk has {} MB free and the output takes about {} MB; make space or choose another folder: {}",
+        .free_bytes / 1_000_000, .needed_bytes.div_ceil(1_000_000), .path.display()
+    )]
+    NoSpace {
+        /// Folder of the output.
+        path: PathBuf,
+        /// Estimated size of the output, bytes.
+        needed_bytes: u64,
+        /// Space that is left, bytes.
+        free_bytes: u64,
+    },
 }
 
 impl SaveError {
@@ -47,15 +63,6 @@ impl SaveError {
     fn system(path: &Path, error: &std::io::Error) -> Self {
         Self::unwritable(path, error.kind())
     }
-}
-
-/// Whether a stream is flushed to the disk before it gets its final name.
-#[derive(Clone, Copy, PartialEq)]
-enum Durability {
-    /// The system may write the content later, which suits results that can be computed again.
-    Cached,
-    /// The content is on the disk before the rename.
-    Synced,
 }
 
 /// Checks that a file may be written to `path`: it does not exist, or `overwrite` allows to replace
@@ -84,12 +91,22 @@ pub fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), SaveError> {
 /// # Errors
 /// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`].
 pub fn write_bytes(path: impl AsRef<Path>, bytes: &[u8], overwrite: bool) -> Result<(), SaveError> {
-    stream(path.as_ref(), overwrite, Durability::Cached, |out| out.write_all(bytes))
+    write_stream(path.as_ref(), overwrite, |out| out.write_all(bytes))
 }
 
-/// Writes `bytes` to `path`, and to the disk before the file gets its name.
-pub(crate) fn write_bytes_synced(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), SaveError> {
-    stream(path, overwrite, Durability::Synced, |out| out.write_all(bytes))
+/// Checks that the disk of `folder`, which may not exist yet, has space for `needed_bytes`.
+///
+/// It does not reserve the space: the writers still check what they wrote.
+///
+/// # Errors
+/// [`SaveError::NoSpace`]. A disk that does not say how much is free passes.
+pub fn require_space(folder: &Path, needed_bytes: u64) -> Result<(), SaveError> {
+    match free_bytes(folder) {
+        Some(free_bytes) if free_bytes < needed_bytes => {
+            Err(SaveError::NoSpace { path: folder.to_owned(), needed_bytes, free_bytes })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Writes what `make` puts into the stream to `path`. The stream is buffered.
@@ -102,7 +119,16 @@ pub fn write_stream(
     overwrite: bool,
     make: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), SaveError> {
-    stream(path, overwrite, Durability::Cached, make)
+    let folder = destination_folder(path, overwrite)?;
+    let failed = |error: std::io::Error| SaveError::system(path, &error);
+    let mut builder = Builder::new();
+    set_usual_permissions(&mut builder);
+    let mut file = builder.prefix(PREFIX).tempfile_in(folder).map_err(failed)?;
+    let mut buffered = BufWriter::with_capacity(BUFFER, file.as_file_mut());
+    make(&mut buffered).and_then(|()| buffered.flush()).map_err(failed)?;
+    drop(buffered);
+    file.as_file().sync_all().map_err(failed)?;
+    name_finished(file.into_temp_path(), path, overwrite)
 }
 
 /// Writes the file that `make` creates at the path it is given to `path`.
@@ -122,7 +148,9 @@ pub fn write_path<E: From<SaveError>>(
     let scratch = Builder::new().prefix(PREFIX).tempdir_in(folder).map_err(failed)?;
     let made = scratch.path().join(name);
     make(&made)?;
-    Ok(std::fs::rename(&made, path).map_err(failed)?)
+    File::open(&made).and_then(|file| file.sync_all()).map_err(failed)?;
+    let finished = TempPath::try_from_path(&made).map_err(failed)?;
+    Ok(name_finished(finished, path, overwrite)?)
 }
 
 /// Temporary names begin with this, so that what a killed process leaves is recognised.
@@ -130,32 +158,28 @@ const PREFIX: &str = ".skysweep-";
 /// Size of the buffer in front of a stream, bytes.
 const BUFFER: usize = 1 << 16;
 
-/// Writes a file through a buffered stream under a temporary name in its folder, and renames it when
-/// `make` succeeds.
-fn stream(
-    path: &Path,
-    overwrite: bool,
-    durability: Durability,
-    make: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> Result<(), SaveError> {
-    let folder = destination_folder(path, overwrite)?;
-    let failed = |error: std::io::Error| SaveError::system(path, &error);
-    let mut builder = Builder::new();
-    set_usual_permissions(&mut builder);
-    let mut file = builder.prefix(PREFIX).tempfile_in(folder).map_err(failed)?;
-    let mut buffered = BufWriter::with_capacity(BUFFER, file.as_file_mut());
-    make(&mut buffered).and_then(|()| buffered.flush()).map_err(failed)?;
-    drop(buffered);
-    if durability == Durability::Synced {
-        file.as_file().sync_all().map_err(failed)?;
-    }
-    if overwrite {
-        return file.persist(path).map(drop).map_err(|e| failed(e.error));
-    }
-    file.persist_noclobber(path).map(drop).map_err(|e| match e.error.kind() {
+/// Gives a finished file its name.
+fn name_finished(finished: TempPath, path: &Path, overwrite: bool) -> Result<(), SaveError> {
+    let named = if overwrite { finished.persist(path) } else { finished.persist_noclobber(path) };
+    named.map_err(|e| match e.error.kind() {
         ErrorKind::AlreadyExists => SaveError::Exists { path: path.to_owned() },
-        _ => failed(e.error),
+        _ => SaveError::system(path, &e.error),
     })
+}
+
+/// Returns the space that is free to this user on the disk of a folder, or of the nearest folder
+/// above it that exists.
+#[cfg(unix)]
+fn free_bytes(folder: &Path) -> Option<u64> {
+    let absolute = std::path::absolute(folder).ok()?;
+    let existing = absolute.ancestors().find(|path| path.is_dir())?;
+    let disk = rustix::fs::statvfs(existing).ok()?;
+    Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+}
+
+#[cfg(not(unix))]
+fn free_bytes(_: &Path) -> Option<u64> {
+    None
 }
 
 /// Returns the folder of `path` after the checks that need no file.
@@ -219,21 +243,45 @@ mod tests {
         assert!(matches!(write_bytes(folder.path(), b"", false), Err(SaveError::Exists { .. })));
     }
 
+    #[test]
+    fn a_file_that_appears_meanwhile_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let late = write_path::<SaveError>(&path, false, |made| {
+            std::fs::write(made, b"ours").unwrap();
+            std::fs::write(&path, b"theirs").unwrap();
+            Ok(())
+        });
+        assert!(matches!(late, Err(SaveError::Exists { .. })), "{late:?}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"theirs");
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn space_is_asked_of_the_nearest_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let later = folder.path().join("not/made/yet");
+        assert!(require_space(&later, 1).is_ok());
+        let error = require_space(&later, u64::MAX).unwrap_err();
+        assert!(matches!(error, SaveError::NoSpace { .. }), "{error}");
+        assert!(error.to_string().contains("MB free"), "{error}");
+    }
+
     #[cfg(unix)]
     #[test]
     fn every_writer_gives_the_usual_permissions() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let [plain, bytes, synced, path] = ["plain", "bytes", "synced", "path"].map(|name| folder.path().join(name));
+        let [plain, bytes, path] = ["plain", "bytes", "path"].map(|name| folder.path().join(name));
         std::fs::write(&plain, b"").unwrap();
         write_bytes(&bytes, b"", false).unwrap();
-        write_bytes_synced(&synced, b"", false).unwrap();
         write_path::<SaveError>(&path, false, |made| {
             std::fs::write(made, b"").unwrap();
             Ok(())
         })
         .unwrap();
         let mode = |path: &PathBuf| std::fs::metadata(path).unwrap().permissions().mode();
-        assert!([&bytes, &synced, &path].into_iter().all(|path| mode(path) == mode(&plain)));
+        assert!([&bytes, &path].into_iter().all(|path| mode(path) == mode(&plain)));
     }
 }

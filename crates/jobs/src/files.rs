@@ -37,6 +37,34 @@ pub enum FileError {
         /// Reason given by the operating system.
         source: std::io::Error,
     },
+    /// Another run writes into the folder.
+    #[error("another run is writing into the folder; wait for its end or choose another folder: {}", path.display())]
+    InUse {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A link is in the place of a folder for results. It could lead outside the output folder.
+    #[error("a link is in the place of an output folder; remove it or choose another folder: {}", path.display())]
+    Link {
+        /// The link.
+        path: PathBuf,
+    },
+    /// An old result cannot be removed.
+    #[error("cannot remove an old result: {}", path.display())]
+    Remove {
+        /// The file or folder.
+        path: PathBuf,
+        /// Reason given by the operating system.
+        source: std::io::Error,
+    },
+    /// A finished file cannot be moved to its name.
+    #[error("cannot move a finished file to its name: {}", path.display())]
+    Move {
+        /// The name.
+        path: PathBuf,
+        /// Reason given by the operating system.
+        source: std::io::Error,
+    },
     /// A file cannot be written.
     #[error(transparent)]
     Write(Box<dyn std::error::Error + Send + Sync>),

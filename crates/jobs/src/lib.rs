@@ -15,6 +15,7 @@ pub mod groundview;
 pub mod heightmap;
 pub mod map_surface;
 pub mod ortho;
+mod output_folder;
 pub mod placed_model;
 pub mod priors;
 pub mod rpc;

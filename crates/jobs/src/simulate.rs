@@ -18,7 +18,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{JobError, from_steps};
 use crate::files::{self, FileError};
+use crate::output_folder::OutputFolder;
 use crate::threads::{ThreadsError, install};
+
+/// The record, which is written last.
+const RECORD: &str = "scene.json";
 
 /// A scene to be simulated and the folder for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -125,12 +129,15 @@ pub fn read_scene(path: &Path) -> Result<SimulationConfig, SimulateJobError> {
 pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateReport, SimulateJobError> {
     config.validate()?;
     let output = &config.output;
+    let folder = OutputFolder::take(output)?;
     if !config.overwrite && fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_some()) {
         return Err(SimulateJobError::NotEmpty { path: output.clone() });
     }
-    files::create_folder(&output.join("truth"))?;
     let simulation = install(config.threads, || Simulation::with_progress(config.scene.clone(), progress))??;
     progress.check_cancelled()?;
+    // Without its record the folder counts as incomplete from here on.
+    folder.remove(RECORD)?;
+    folder.subfolder("truth")?;
     let writer = SceneWriter { simulation: &simulation, folder: output, overwrite: config.overwrite };
     install(config.threads, || writer.write(config.flight))??;
     Ok(SimulateReport {
@@ -176,7 +183,7 @@ impl SceneWriter<'_> {
         // checked at the start.
         let parameters = self.simulation.config.to_toml()?;
         io::write_bytes(self.folder.join("scene.toml"), parameters.as_bytes(), true).map_err(FileError::write)?;
-        Ok(files::write_json(&self.folder.join("scene.json"), &self.simulation.record(), true)?)
+        Ok(files::write_json(&self.folder.join(RECORD), &self.simulation.record(), true)?)
     }
 
     fn write_view(&self, number: usize, view: &SimulatedView) -> Result<(), FileError> {

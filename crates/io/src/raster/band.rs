@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use gdal::raster::{Buffer, GdalType};
-use gdal::{Dataset, DriverManager, Metadata};
+use gdal::{Dataset, Metadata};
 use raster::Grid;
 
 use super::error::RasterError;
+use super::gdal_access::memory_driver;
 use super::gdal_setup::with_gdal;
 
 /// Rows converted at a time between a grid and GDAL's memory.
@@ -95,7 +96,7 @@ fn fill<'a, T: GdalType + Copy + 'a>(
         return Err(inconsistent(path, "found no cells, expected at least one column and row"));
     }
     with_gdal(|| {
-        let driver = DriverManager::get_driver_by_name("MEM")?;
+        let driver = memory_driver()?;
         let dataset = driver.create_with_band_type::<T, _>("", width, height, grids.len())?;
         for (index, (grid, band)) in grids.iter().zip(bands).enumerate() {
             let mut target = dataset.rasterband(index + 1)?;

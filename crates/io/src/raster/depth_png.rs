@@ -5,15 +5,13 @@
 //! depth that does not fit into 65,535 steps is refused, not clipped.
 
 use std::fmt;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 
 use png::{BitDepth, ColorType, Encoder, EncodingError};
 use raster::Grid;
 
 use super::error::RasterError;
-use crate::atomic::write_path;
+use crate::atomic::write_bytes;
 
 /// Largest value of a pixel, steps.
 const STEPS: f64 = u16::MAX as f64;
@@ -76,25 +74,28 @@ pub fn write_depth_png(
     let size = size.ok_or_else(|| {
         RasterError::unwritable(path, "the map has no pixels or is too large, expected 1 to 2^32 - 1 columns and rows")
     })?;
-    write_path(path, overwrite, |made| {
-        encode(made, size, step_m, &bytes).map_err(|error| RasterError::unwritable(path, error))
-    })?;
+    let encoded = encode(size, step_m, &bytes).map_err(|error| RasterError::unwritable(path, error))?;
+    write_bytes(path, &encoded, overwrite)?;
     Ok(step_m)
 }
 
-fn encode(path: &Path, (width, height): (u32, u32), step_m: f64, bytes: &[u8]) -> Result<(), EncodingError> {
-    let mut encoder = Encoder::new(BufWriter::new(File::create(path)?), width, height);
+fn encode((width, height): (u32, u32), step_m: f64, bytes: &[u8]) -> Result<Vec<u8>, EncodingError> {
+    let mut file = Vec::new();
+    let mut encoder = Encoder::new(&mut file, width, height);
     encoder.set_color(ColorType::Grayscale);
     encoder.set_depth(BitDepth::Sixteen);
     encoder.add_text_chunk("depth_step_m".to_owned(), step_m.to_string())?;
     encoder.add_text_chunk("depth_no_data".to_owned(), "0".to_owned())?;
     let mut writer = encoder.write_header()?;
     writer.write_image_data(bytes)?;
-    writer.finish()
+    writer.finish()?;
+    Ok(file)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+
     use super::*;
     use crate::atomic::SaveError;
 

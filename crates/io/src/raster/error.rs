@@ -23,6 +23,12 @@ pub enum RasterError {
         /// The name as given.
         path: PathBuf,
     },
+    /// The name is that of a pipe or a device, which cannot be read as a file.
+    #[error("a pipe or a device, expected a file: {}", path.display())]
+    NotAFile {
+        /// The name as given.
+        path: PathBuf,
+    },
     /// GDAL cannot open the file as a raster.
     #[error("not a raster that GDAL can open ({reason}): {}", path.display())]
     NotARaster {

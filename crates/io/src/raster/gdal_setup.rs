@@ -1,9 +1,8 @@
 //! Configuration of GDAL, done once before anything is opened.
 //!
 //! By default GDAL prints errors to stderr and fetches what a file names (a VRT with a `/vsicurl/`
-//! source, a WMS description). Here its messages are collected per thread for our errors, the
-//! drivers that use a network are removed, and the virtual network file systems refuse every file
-//! name.
+//! source, a WMS description). Here its messages are collected per thread for our errors, and
+//! [`super::gdal_access`] leaves it only the drivers and file systems of local files.
 
 use std::cell::RefCell;
 use std::path::Path;
@@ -13,57 +12,10 @@ use gdal::errors::GdalError;
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, config};
 
 use super::error::RasterError;
+use super::gdal_access::{is_local_file_system, restrict};
 
-/// Drivers that reach a network or a database through a description or a connection string. NetCDF
-/// is among them: a VRT may name `NETCDF:"http://…"`, which the NetCDF library fetches.
-const NETWORK_DRIVERS: [&str; 31] = [
-    "WMS",
-    "WMTS",
-    "WCS",
-    "HTTP",
-    "PLMOSAIC",
-    "PLSCENES",
-    "NGW",
-    "DAAS",
-    "EEDA",
-    "EEDAI",
-    "RDA",
-    "OGCAPI",
-    "STACIT",
-    "STACTA",
-    "WFS",
-    "OAPIF",
-    "CSW",
-    "Carto",
-    "Elastic",
-    "AmigoCloud",
-    "GMLAS",
-    "CouchDB",
-    "PostGISRaster",
-    "PostgreSQL",
-    "MySQL",
-    "MongoDBv3",
-    "GeoRaster",
-    "netCDF",
-    "DODS",
-    "ECW",
-    "JPIPKAK",
-];
-
-/// Prefixes of names that lead to a network.
-const NETWORK_PREFIXES: [&str; 11] = [
-    "/vsicurl",
-    "/vsis3",
-    "/vsigs",
-    "/vsiaz",
-    "/vsiadls",
-    "/vsioss",
-    "/vsiswift",
-    "/vsihdfs",
-    "/vsiwebhdfs",
-    "http",
-    "ftp",
-];
+/// Beginnings of names that lead to a network or a service.
+const REMOTE_SCHEMES: [&str; 8] = ["http", "https", "ftp", "ftps", "s3", "gs", "az", "hdfs"];
 
 /// GDAL's cache of decoded blocks, megabytes; GDAL's default is a share of the machine's memory.
 const CACHE_MB: &str = "128";
@@ -99,20 +51,23 @@ pub(crate) fn with_gdal<T>(call: impl FnOnce() -> Result<T, GdalError>) -> Resul
 ///
 /// # Errors
 /// [`RasterError::NotLocal`] for a name on a network; [`RasterError::Unreadable`] for a file that
-/// cannot be opened; [`RasterError::NotARaster`] for a file in no format that GDAL reads.
+/// cannot be opened; [`RasterError::NotAFile`] for a device or a pipe; [`RasterError::NotARaster`]
+/// for a file in no format that GDAL may read.
 pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
     let name = path.to_string_lossy();
-    let inner = name.rsplit("/vsi").next().map(|tail| format!("/vsi{tail}")).unwrap_or_default();
-    let leads_away = |text: &str| NETWORK_PREFIXES.iter().any(|prefix| starts_as_scheme(text, prefix));
-    if leads_away(&name) || (name.contains("/vsi") && leads_away(&inner)) {
-        return Err(RasterError::NotLocal { path: path.to_owned() });
-    }
-    if !name.starts_with("/vsi") {
-        let readable = std::fs::metadata(path).and_then(|meta| {
-            // A folder may be a raster to GDAL (SAFE, Zarr).
-            if meta.is_dir() { Ok(()) } else { std::fs::File::open(path).map(drop) }
-        });
-        readable.map_err(|source| RasterError::Unreadable { path: path.to_owned(), source })?;
+    if !is_local_file_system(&name) {
+        if leads_away(&name) && !path.exists() {
+            return Err(RasterError::NotLocal { path: path.to_owned() });
+        }
+        let unreadable = |source| RasterError::Unreadable { path: path.to_owned(), source };
+        let meta = std::fs::metadata(path).map_err(unreadable)?;
+        // A folder may be a raster to GDAL (SAFE).
+        if !meta.is_dir() {
+            if !meta.is_file() {
+                return Err(RasterError::NotAFile { path: path.to_owned() });
+            }
+            std::fs::File::open(path).map_err(unreadable)?;
+        }
     }
     let open_flags =
         GdalOpenFlags::GDAL_OF_RASTER | GdalOpenFlags::GDAL_OF_READONLY | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR;
@@ -120,13 +75,11 @@ pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
         .map_err(|reason| RasterError::NotARaster { path: path.to_owned(), reason })
 }
 
-/// Whether `text` starts with `prefix` as a scheme: `http:` and `/vsis3/` do, a local folder named
-/// `httpdata` does not.
-fn starts_as_scheme(text: &str, prefix: &str) -> bool {
-    let lower = text.get(..text.len().min(32)).unwrap_or_default().to_ascii_lowercase();
-    lower.strip_prefix(prefix).is_some_and(|rest| {
-        prefix.starts_with('/') || rest.starts_with("://") || rest.starts_with("s://") || rest.starts_with(':')
-    })
+/// Whether a name begins with a scheme or with one of GDAL's file systems that are not local.
+fn leads_away(name: &str) -> bool {
+    let lower = name.to_ascii_lowercase();
+    lower.starts_with("/vsi")
+        || lower.split_once(':').is_some_and(|(scheme, rest)| rest.starts_with('/') && REMOTE_SCHEMES.contains(&scheme))
 }
 
 fn prepare() {
@@ -146,11 +99,13 @@ fn prepare() {
         set("GDAL_CACHEMAX", CACHE_MB);
     }
     DriverManager::register_all();
-    for name in NETWORK_DRIVERS {
-        if let Ok(driver) = DriverManager::get_driver_by_name(name) {
-            DriverManager::deregister_driver(&driver);
-        }
-    }
+    restrict();
+}
+
+/// Returns what GDAL reported in the latest call of [`with_gdal`] on this thread, although it
+/// returned no error. Empty when there is nothing.
+pub(super) fn left_over_messages() -> String {
+    MESSAGES.with_borrow_mut(std::mem::take).join("; ")
 }
 
 /// Returns the message inside an error of the crate `gdal`, without the name of the C function.

@@ -21,7 +21,8 @@ use raster::{GeoTransform, NO_DATA};
 
 use super::band::{Band, in_memory};
 use super::error::RasterError;
-use super::gdal_setup::with_gdal;
+use super::gdal_setup::{left_over_messages, with_gdal};
+use super::verify::verify;
 use crate::atomic::write_path;
 
 /// Metadata item that names the vertical datum.
@@ -163,8 +164,9 @@ pub(super) fn finish_cog(
         for (key, value) in place.metadata {
             dataset.set_metadata_item(key, value, "")?;
         }
-        copy(dataset, "COG", made, &options)
-    })
+        Ok(())
+    })?;
+    copy(dataset, "COG", made, &options)
 }
 
 /// Writes an image with its RPC in TIFF tag 50844 (GDAL's `RPC` metadata): tiled, deflate, no
@@ -217,8 +219,9 @@ fn write_in_pixels<T: AsRef<str>>(
             for (key, value) in metadata.items {
                 memory.set_metadata_item(key, value.as_ref(), metadata.domain)?;
             }
-            copy(&memory, "GTiff", made, &options)
+            Ok(())
         })
+        .and_then(|()| copy(&memory, "GTiff", made, &options))
         .map_err(|reason| RasterError::unwritable(path, reason))
     })
 }
@@ -254,9 +257,17 @@ fn rpc_items(rpc: &Rpc) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Copies a dataset into a file and closes it, because GDAL writes the last bytes on closing.
-pub(super) fn copy(memory: &Dataset, driver: &str, made: &Path, options: &[(&str, &str)]) -> gdal::errors::Result<()> {
-    let options = RasterCreationOptions::from_iter(options.iter().map(|(key, value)| format!("{key}={value}")));
-    let driver = DriverManager::get_driver_by_name(driver)?;
-    memory.create_copy(&driver, made, &options)?.close()
+/// Copies a dataset into a file, closes it, because GDAL writes the last bytes on closing, and
+/// reads it back.
+///
+/// # Errors
+/// The message of GDAL, or the first difference between the file and the dataset.
+pub(super) fn copy(source: &Dataset, driver: &str, made: &Path, options: &[(&str, &str)]) -> Result<(), String> {
+    with_gdal(|| {
+        let options = RasterCreationOptions::from_iter(options.iter().map(|(key, value)| format!("{key}={value}")));
+        let driver = DriverManager::get_driver_by_name(driver)?;
+        source.create_copy(&driver, made, &options)?.close()
+    })?;
+    let reported = left_over_messages();
+    verify(source, made).map_err(|found| if reported.is_empty() { found } else { format!("{found}: {reported}") })
 }

@@ -11,6 +11,7 @@ mod colour;
 mod dem;
 mod depth_png;
 mod error;
+mod gdal_access;
 mod gdal_setup;
 mod geotiff;
 mod luma;
@@ -19,6 +20,7 @@ mod png;
 mod source;
 mod spool;
 mod tile;
+mod verify;
 
 pub use band::{Band, BandData};
 pub use dem::{Dem, read_dem, read_dem_window};

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use image::{ExtendedColorType, ImageFormat};
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
 use raster::Grid;
 
 use super::error::RasterError;
-use crate::atomic::write_path;
+use crate::atomic::write_bytes;
 
 /// Writes a grey picture.
 ///
@@ -41,8 +42,9 @@ fn write(
     if width == 0 || height == 0 {
         return Err(RasterError::unwritable(path, "the picture has no pixels, expected at least one column and row"));
     }
-    write_path(path, overwrite, |made| {
-        image::save_buffer_with_format(made, bytes, width, height, colour, ImageFormat::Png)
-            .map_err(|error| RasterError::unwritable(path, error))
-    })
+    let mut encoded = Vec::new();
+    PngEncoder::new(&mut encoded)
+        .write_image(bytes, width, height, colour)
+        .map_err(|error| RasterError::unwritable(path, error))?;
+    Ok(write_bytes(path, &encoded, overwrite)?)
 }

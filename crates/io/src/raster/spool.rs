@@ -13,7 +13,7 @@ use raster::{Grid, NO_DATA, Window};
 
 use super::band::BandData;
 use super::error::RasterError;
-use super::gdal_setup::with_gdal;
+use super::gdal_setup::{left_over_messages, with_gdal};
 use super::geotiff::{CogPlace, Sampling, finish_cog};
 use super::source::read_as;
 use crate::atomic::write_path;
@@ -108,11 +108,12 @@ impl RasterSpool {
         self.size
     }
 
-    /// Writes a window of cells with its first cell at `at` (column, row).
+    /// Writes a window of cells with its first cell at `at` (column, row) to the disk, and reads it
+    /// back, because GDAL does not report every failure of a write.
     ///
     /// # Errors
     /// [`RasterError::InconsistentBands`] for another cell type or a window that reaches outside;
-    /// [`RasterError::NotWritten`] when GDAL or the system refuses.
+    /// [`RasterError::NotWritten`] when GDAL or the system refuses, or other cells come back.
     pub fn put(&mut self, at: (usize, usize), cells: BandData<'_>) -> Result<(), RasterError> {
         match (cells, self.is_float) {
             (BandData::F32(grid), true) => self.write(at, grid, |v| if v.is_nan() { NO_DATA } else { v }),
@@ -162,7 +163,7 @@ impl RasterSpool {
         Ok(())
     }
 
-    fn write<T: GdalType + Copy>(
+    fn write<T: GdalType + Copy + PartialEq>(
         &mut self,
         at: (usize, usize),
         grid: &Grid<T>,
@@ -173,11 +174,20 @@ impl RasterSpool {
             return Err(self.inconsistent("the window reaches outside the spool"));
         }
         let cells = grid.data().iter().map(|&v| convert(v)).collect();
-        with_gdal(|| {
-            let mut band = self.dataset.rasterband(1)?;
-            band.write((at.0 as isize, at.1 as isize), size, &mut Buffer::new(size, cells))
-        })
-        .map_err(|reason| RasterError::unwritable(&self.path, reason))
+        let mut buffer = Buffer::new(size, cells);
+        with_gdal(|| self.dataset.rasterband(1)?.write((at.0 as isize, at.1 as isize), size, &mut buffer))
+            .map_err(|reason| RasterError::unwritable(&self.path, reason))?;
+        // Flushing drops the blocks from GDAL's cache, so that the file itself is read.
+        self.flush()?;
+        let reported = left_over_messages();
+        let window = Window { x: at.0 as i64, y: at.1 as i64, width: size.0, height: size.1 };
+        let found = read_as::<T>(&self.path, &self.dataset, 1, window)?;
+        if found.data() != buffer.data() {
+            let reason =
+                format!("other cells come back than were written; check that the disk is not full: {reported}");
+            return Err(RasterError::unwritable(&self.path, reason));
+        }
+        Ok(())
     }
 
     fn inconsistent(&self, reason: &str) -> RasterError {

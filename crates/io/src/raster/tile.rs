@@ -78,8 +78,9 @@ pub fn write_map_tile(path: impl AsRef<Path>, tile: &MapTile<'_>, overwrite: boo
                 first.set_scale(scale)?;
                 first.set_offset(offset)?;
             }
-            copy(&memory, "GTiff", made, &options)
+            Ok(())
         })
+        .and_then(|()| copy(&memory, "GTiff", made, &options))
         .map_err(|reason| RasterError::unwritable(path, reason))
     })
 }

@@ -12,7 +12,7 @@ use super::error::RpcWriteError;
 use super::format::RpcFormat;
 use super::names::{POLYS, Poly, REQUIRED, RPC00B};
 use super::{json, rpb};
-use crate::atomic::write_bytes_synced;
+use crate::atomic::write_bytes;
 
 /// Writes `rpc` to `path` as [`RpcFormat::Text`], [`RpcFormat::Rpb`] or [`RpcFormat::Json`].
 ///
@@ -23,7 +23,7 @@ use crate::atomic::write_bytes_synced;
 /// that exists without `overwrite`.
 pub fn write(path: &Path, rpc: &Rpc, format: RpcFormat, overwrite: bool) -> Result<(), RpcWriteError> {
     let text = to_text(rpc, format)?;
-    Ok(write_bytes_synced(path, text.as_bytes(), overwrite)?)
+    Ok(write_bytes(path, text.as_bytes(), overwrite)?)
 }
 
 /// Returns the text of an RPC file.

@@ -21,10 +21,13 @@ pub use error::AlignJobError;
 pub use output::SimilarityParts;
 
 use crate::files;
+use crate::output_folder::OutputFolder;
 use numeric::Progress;
 use output::{ModelWithPoints, ModelWriter};
 use world::{KnownPositions, World};
 
+/// The report, which is written last.
+const REPORT: &str = "align.json";
 /// Ratio of the cameras' spread across their line to that along it, below which the job warns.
 const SPREAD_LOW: f64 = 0.05;
 
@@ -94,7 +97,7 @@ pub struct AlignResidual {
 /// ```
 pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobReport, AlignJobError> {
     config.validate()?;
-    let report_path = config.output.join("align.json");
+    let report_path = config.output.join(REPORT);
     files::refuse_existing(&report_path, config.overwrite)?;
     let model = read_model(&config.model, progress)?;
     let positions = io::control::read(&config.positions)?;
@@ -107,6 +110,8 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     let levels = noise.map(|noise| sensitivity(&known.pairs, &alignment, noise, &search)).unwrap_or_default();
     progress.check_cancelled()?;
     let report = report(config, &world, &known, &alignment, levels);
+    let folder = OutputFolder::take(&config.output)?;
+    folder.remove(REPORT)?;
     let writer =
         ModelWriter { model: &model, origin: &world.origin, encoding: config.encoding, overwrite: config.overwrite };
     writer.write(&config.output, &alignment.world_from_model)?;

@@ -82,7 +82,7 @@ impl ChunkResult {
             }
         };
         let json = serde_json::to_string_pretty(&ChunkRecord { core: self.core, status })?;
-        fs::write(folder.join(RECORD), json + "\n")
+        io::write_bytes(folder.join(RECORD), (json + "\n").as_bytes(), true).map_err(std::io::Error::other)
     }
 
     /// Reads a result that [`ChunkResult::write`] wrote.

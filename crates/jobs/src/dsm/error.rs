@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crate::dsm::values::{HeightRange, MapBounds};
 use crate::error::from_steps;
+use crate::files::FileError;
 use crate::threads::ThreadsError;
 
 /// A setting of [`DsmConfig`](crate::dsm::DsmConfig) that an error names.
@@ -207,6 +208,15 @@ pub enum DsmError {
         /// Answer of the system.
         source: std::io::Error,
     },
+    /// Another run writes into the output folder.
+    #[error("another run is writing into the folder; wait for its end or choose another folder: {}", path.display())]
+    InUse {
+        /// Output folder.
+        path: PathBuf,
+    },
+    /// A file of the output cannot be written.
+    #[error(transparent)]
+    File(FileError),
     /// A stored result of a chunk cannot be read.
     #[error("cannot read the result of a chunk ({reason}): {}", path.display())]
     ChunkFile {
@@ -253,6 +263,17 @@ impl DsmError {
 }
 
 from_steps!(DsmError: Rpc(io::rpc::RpcReadError));
+
+impl From<FileError> for DsmError {
+    fn from(error: FileError) -> Self {
+        match error {
+            FileError::Exists { path } => Self::Exists { path },
+            FileError::InUse { path } => Self::InUse { path },
+            FileError::Folder { path, source } => Self::Output { path, source },
+            other => Self::File(other),
+        }
+    }
+}
 
 impl From<numeric::Cancelled> for DsmError {
     fn from(_: numeric::Cancelled) -> Self {

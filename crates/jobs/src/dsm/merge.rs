@@ -9,7 +9,7 @@ use crate::dsm::chunk::{ChunkContent, ChunkResult, ChunkSurface};
 use crate::dsm::error::DsmError;
 use crate::dsm::memory;
 use crate::dsm::notes::Notes;
-use crate::dsm::output::{self, ChunkedOutput, FILES};
+use crate::dsm::output::{self, ChunkedOutput, DsmFolder, FILES};
 use crate::dsm::plan::Plan;
 use crate::dsm::prior_findings::PriorFindings;
 use crate::dsm::report::{ChunksReport, DsmReport, FailedChunk, StageTime, SurfaceReport};
@@ -46,20 +46,20 @@ pub(crate) struct Merger<'a> {
 /// Place of the cells until the files are made.
 enum Target<'a> {
     /// A scene that was computed at once stays in memory.
-    Whole(Option<Box<ChunkSurface>>),
+    Whole(DsmFolder, Option<Box<ChunkSurface>>),
     /// The chunks of a large scene go to the disk.
     Chunked(ChunkedOutput<'a>),
 }
 
 impl<'a> Merger<'a> {
-    /// Begins the results of a plan. A plan of several chunks makes its work folder.
+    /// Begins the results of a plan, whose files go to `folder`.
     ///
     /// # Errors
     /// [`DsmError::Output`], [`DsmError::Image`].
-    pub(crate) fn begin(plan: &'a Plan, progress: &'a dyn Progress) -> Result<Self, DsmError> {
+    pub(crate) fn begin(plan: &'a Plan, folder: DsmFolder, progress: &'a dyn Progress) -> Result<Self, DsmError> {
         let target = match plan.chunk_side {
-            None => Target::Whole(None),
-            Some(_) => Target::Chunked(ChunkedOutput::begin(&plan.config, &plan.grid)?),
+            None => Target::Whole(folder, None),
+            Some(_) => Target::Chunked(ChunkedOutput::begin(folder, &plan.config, &plan.grid)?),
         };
         Ok(Self {
             plan,
@@ -95,7 +95,7 @@ impl<'a> Merger<'a> {
                 self.findings.extend(&surface.findings);
                 self.chunks.done += 1;
                 match &mut self.target {
-                    Target::Whole(place) => *place = Some(surface),
+                    Target::Whole(_, place) => *place = Some(surface),
                     Target::Chunked(output) => output.put(core, &surface.rasters)?,
                 }
             }
@@ -151,9 +151,9 @@ impl<'a> Merger<'a> {
             peak_memory_mb: memory::peak_mb(),
         };
         match self.target {
-            Target::Whole(surface) => {
+            Target::Whole(folder, surface) => {
                 let surface = surface.ok_or(DsmError::ChunksMissing { found: 0, count: 1 })?;
-                output::write_whole(&plan.config, &plan.grid, &surface.rasters, &report)?;
+                output::write_whole(&folder, &plan.config, &plan.grid, &surface.rasters, &report)?;
             }
             Target::Chunked(output) => output.finish(&report)?,
         }
@@ -174,8 +174,8 @@ pub fn merge(
     results: impl IntoIterator<Item = Result<ChunkResult, DsmError>>,
     progress: &dyn Progress,
 ) -> Result<Product, DsmError> {
-    output::check_target(&plan.config)?;
-    let mut merger = Merger::begin(plan, progress)?;
+    let folder = DsmFolder::take(&plan.config)?;
+    let mut merger = Merger::begin(plan, folder, progress)?;
     let mut missing: Vec<Window> = plan.chunks.iter().map(|chunk| chunk.core).collect();
     let count = missing.len();
     for result in results {

@@ -1,21 +1,25 @@
 //! The files of a run. All are made in a work folder inside the output folder, then each is moved
-//! to its final name.
+//! to its final name. An old report is removed before the first and the new one is moved last, so a
+//! folder with a report holds the files of one run.
 //!
 //! A scene that was computed at once is written from memory. The chunks of a large scene go into
 //! spools on the disk as they come, and its pictures are reduced to a size that can be looked at.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use crs::{Crs, HeightConverter, VerticalDatum};
 use io::raster::{Band, BandData, CogPlace, CogRaster, RasterSpool, SpoolBand, write_cog};
 use raster::{Grid, NO_DATA, Window};
+use tempfile::TempDir;
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::grid::DsmGrid;
 use crate::dsm::rasters::{ChunkRasters, VOID};
 use crate::dsm::report::DsmReport;
+use crate::eval::remove_evaluation;
+use crate::files::{FileError, create_folder, write_json};
+use crate::output_folder::OutputFolder;
 
 /// Files of a run, relative to its folder. The report is the last to appear: a folder with a report
 /// is complete.
@@ -30,8 +34,6 @@ pub(crate) const FILES: [&str; 9] = [
     "used_config.toml",
     "report/report.json",
 ];
-/// Work folder in which files are made before they are moved to their names.
-const PARTIAL: &str = ".skysweep-partial";
 /// Largest width and height of the pictures of a large scene, pixels.
 const PICTURE_SIDE: usize = 4096;
 
@@ -56,29 +58,48 @@ fn bands<'a>(rasters: &'a ChunkRasters, heights: &'a Grid<f32>) -> [BandData<'a>
     ]
 }
 
-/// Refuses early what would fail at the end.
-///
-/// # Errors
-/// [`DsmError::Exists`] for results that may not be replaced, [`DsmError::Output`] for a folder
-/// that cannot be written.
-pub(crate) fn check_target(config: &DsmConfig) -> Result<(), DsmError> {
-    let existing = FILES.iter().map(|f| config.output.join(f)).find(|p| p.exists());
-    if let (Some(path), false) = (existing, config.overwrite) {
-        return Err(DsmError::Exists { path });
-    }
-    let created = !config.output.exists();
-    let partial = config.output.join(PARTIAL);
-    let tried = fs::create_dir_all(&partial).and_then(|()| fs::write(partial.join("probe"), b"skysweep"));
-    clean(config, created);
-    tried.map_err(|source| DsmError::Output { path: config.output.clone(), source })
+/// The output folder of a run, with the work folder in which its files are made. Dropping it before
+/// the files are published removes what was made.
+pub(crate) struct DsmFolder {
+    // Dropped first, so that an empty output folder can be removed after it.
+    work: TempDir,
+    folder: OutputFolder,
 }
 
-/// Removes the work folder, and the output folder when this run made it and it is empty.
-fn clean(config: &DsmConfig, created: bool) {
-    // Best effort: the error that led here is the one to report.
-    let _ = fs::remove_dir_all(config.output.join(PARTIAL));
-    if created {
-        let _ = fs::remove_dir(&config.output);
+impl DsmFolder {
+    /// Takes the output folder for this run, and refuses early what would fail at the end.
+    ///
+    /// # Errors
+    /// [`DsmError::InUse`] when another run writes into the folder, [`DsmError::Exists`] for
+    /// results that may not be replaced, [`DsmError::Output`] for a folder that cannot be written.
+    pub(crate) fn take(config: &DsmConfig) -> Result<Self, DsmError> {
+        let folder = OutputFolder::take(&config.output)?;
+        let existing = FILES.iter().map(|f| config.output.join(f)).find(|p| p.symlink_metadata().is_ok());
+        if let (Some(path), false) = (existing, config.overwrite) {
+            return Err(DsmError::Exists { path });
+        }
+        let work = folder.work_folder()?;
+        for name in ["dsm", "report", "spool"] {
+            create_folder(&work.path().join(name))?;
+        }
+        Ok(Self { work, folder })
+    }
+
+    fn dsm(&self) -> PathBuf {
+        self.work.path().join("dsm")
+    }
+
+    fn spool(&self, name: &str) -> PathBuf {
+        self.work.path().join("spool").join(name)
+    }
+
+    /// Moves every file to its final name. Results about the DSM that is replaced go with it.
+    fn publish(&self) -> Result<(), DsmError> {
+        if let Some(report) = FILES.last() {
+            self.folder.remove(report)?;
+        }
+        remove_evaluation(&self.folder)?;
+        Ok(FILES.iter().try_for_each(|name| self.folder.publish(self.work.path(), name))?)
     }
 }
 
@@ -87,18 +108,15 @@ fn clean(config: &DsmConfig, created: bool) {
 /// # Errors
 /// [`DsmError::Output`], [`DsmError::Image`], [`DsmError::Crs`]. Nothing stays behind.
 pub(crate) fn write_whole(
+    folder: &DsmFolder,
     config: &DsmConfig,
     grid: &DsmGrid,
     rasters: &ChunkRasters,
     report: &DsmReport,
 ) -> Result<(), DsmError> {
-    let created = !config.output.exists();
-    let written = make_folders(config)
-        .and_then(|()| write_rasters(&dsm_folder(config), config.vertical, grid, rasters))
-        .and_then(|()| write_texts(config, report))
-        .and_then(|()| publish(config));
-    clean(config, created && written.is_err());
-    written
+    write_rasters(&folder.dsm(), config.vertical, grid, rasters)?;
+    write_texts(folder, config, report)?;
+    folder.publish()
 }
 
 /// The rasters of a large scene, which grow on the disk chunk by chunk. Dropping it before
@@ -106,22 +124,24 @@ pub(crate) fn write_whole(
 pub(crate) struct ChunkedOutput<'a> {
     config: &'a DsmConfig,
     grid: &'a DsmGrid,
-    created: bool,
     spools: Vec<RasterSpool>,
+    folder: DsmFolder,
 }
 
 impl<'a> ChunkedOutput<'a> {
     /// Makes empty spools in the work folder.
     ///
     /// # Errors
-    /// [`DsmError::Output`], [`DsmError::Image`].
-    pub(crate) fn begin(config: &'a DsmConfig, grid: &'a DsmGrid) -> Result<Self, DsmError> {
-        let mut out = Self { config, grid, created: !config.output.exists(), spools: Vec::new() };
-        make_folders(config)?;
+    /// [`DsmError::Output`] also for a disk with too little space; [`DsmError::Image`].
+    pub(crate) fn begin(folder: DsmFolder, config: &'a DsmConfig, grid: &'a DsmGrid) -> Result<Self, DsmError> {
+        let cell_bytes: u64 = BANDS.iter().map(|(_, band)| if band.is_float { 4 } else { 1 }).sum();
+        let needed_bytes = grid.size.0 as u64 * grid.size.1 as u64 * cell_bytes;
+        io::atomic::require_space(&config.output, needed_bytes).map_err(FileError::from)?;
+        let mut spools = Vec::with_capacity(BANDS.len());
         for (name, band) in BANDS {
-            out.spools.push(RasterSpool::create(spool_path(config, name), grid.size, band)?);
+            spools.push(RasterSpool::create(folder.spool(name), grid.size, band)?);
         }
-        Ok(out)
+        Ok(Self { config, grid, spools, folder })
     }
 
     /// Puts the cells of a chunk into their place.
@@ -132,7 +152,6 @@ impl<'a> ChunkedOutput<'a> {
         let heights = absolute_heights(&self.grid.part(core), self.config.vertical, rasters)?;
         for (spool, cells) in self.spools.iter_mut().zip(bands(rasters, &heights)) {
             spool.put((core.x as usize, core.y as usize), cells)?;
-            spool.flush()?;
         }
         Ok(())
     }
@@ -141,31 +160,21 @@ impl<'a> ChunkedOutput<'a> {
     ///
     /// # Errors
     /// [`DsmError::Output`], [`DsmError::Image`].
-    pub(crate) fn finish(mut self, report: &DsmReport) -> Result<(), DsmError> {
-        let (config, grid) = (self.config, self.grid);
-        let folder = dsm_folder(config);
-        if let Some(heights) = self.spools.first() {
+    pub(crate) fn finish(self, report: &DsmReport) -> Result<(), DsmError> {
+        let Self { config, grid, spools, folder } = self;
+        if let Some(heights) = spools.first() {
             let factor = grid.size.0.max(grid.size.1).div_ceil(PICTURE_SIDE);
             let reduced = reduced(heights, factor)?;
-            write_pictures(&folder, &reduced, grid.gsd_m * factor as f64)?;
+            write_pictures(&folder.dsm(), &reduced, grid.gsd_m * factor as f64)?;
         }
         let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
         let place =
             CogPlace { geotransform: grid.geotransform, crs, metadata: &[], threads: rayon::current_num_threads() };
-        for ((name, _), spool) in BANDS.iter().zip(self.spools.drain(..)) {
-            spool.into_cog(folder.join(name), place, false)?;
+        for ((name, _), spool) in BANDS.iter().zip(spools) {
+            spool.into_cog(folder.dsm().join(name), place, false)?;
         }
-        write_texts(config, report)?;
-        publish(config)?;
-        self.created = false;
-        Ok(())
-    }
-}
-
-impl Drop for ChunkedOutput<'_> {
-    fn drop(&mut self) {
-        self.spools.clear();
-        clean(self.config, self.created);
+        write_texts(&folder, config, report)?;
+        folder.publish()
     }
 }
 
@@ -192,31 +201,13 @@ fn reduced(spool: &RasterSpool, factor: usize) -> Result<Grid<f32>, DsmError> {
     Ok(out)
 }
 
-fn dsm_folder(config: &DsmConfig) -> PathBuf {
-    config.output.join(PARTIAL).join("dsm")
-}
-
-fn spool_path(config: &DsmConfig, name: &str) -> PathBuf {
-    config.output.join(PARTIAL).join("spool").join(name)
-}
-
-fn failed(path: &Path) -> impl Fn(std::io::Error) -> DsmError + use<> {
-    let path = path.to_owned();
-    move |source| DsmError::Output { path: path.clone(), source }
-}
-
-fn make_folders(config: &DsmConfig) -> Result<(), DsmError> {
-    let root = config.output.join(PARTIAL);
-    let made = |folder| fs::create_dir_all(root.join(folder)).map_err(failed(&config.output));
-    ["dsm", "report", "spool"].into_iter().try_for_each(made)
-}
-
-fn write_texts(config: &DsmConfig, report: &DsmReport) -> Result<(), DsmError> {
-    let root = config.output.join(PARTIAL);
-    let json = serde_json::to_string_pretty(report).map_err(|e| failed(&root)(e.into()))?;
-    fs::write(root.join("report/report.json"), json + "\n").map_err(failed(&root))?;
-    let used = toml::to_string_pretty(config).map_err(|e| failed(&root)(std::io::Error::other(e)))?;
-    fs::write(root.join("used_config.toml"), used).map_err(failed(&root))
+fn write_texts(folder: &DsmFolder, config: &DsmConfig, report: &DsmReport) -> Result<(), DsmError> {
+    let root = folder.work.path();
+    write_json(&root.join("report/report.json"), report, false)?;
+    let path = root.join("used_config.toml");
+    let used = toml::to_string_pretty(config)
+        .map_err(|e| DsmError::Output { path: path.clone(), source: std::io::Error::other(e) })?;
+    Ok(io::write_bytes(&path, used.as_bytes(), false).map_err(FileError::from)?)
 }
 
 /// Writes hillshade and coloured relief of heights in cells of `cell_m`.
@@ -274,19 +265,30 @@ fn written(height_m: f64) -> f32 {
     ((height_m / UNIT_M).round() * UNIT_M) as f32
 }
 
-/// Moves every file to its final name.
-fn publish(config: &DsmConfig) -> Result<(), DsmError> {
-    let move_one = |name: &str| {
-        let (from, to): (PathBuf, PathBuf) = (config.output.join(PARTIAL).join(name), config.output.join(name));
-        let made = to.parent().map_or(Ok(()), fs::create_dir_all);
-        made.and_then(|()| fs::rename(&from, &to)).map_err(|source| DsmError::Output { path: to, source })
-    };
-    FILES.iter().try_for_each(|f| move_one(f))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A run that is killed while it publishes leaves no report of an older run beside its files.
+    #[test]
+    fn the_report_goes_first_and_comes_last() {
+        let root = tempfile::tempdir().unwrap();
+        let mut config = DsmConfig::new(Vec::new(), root.path().join("out"));
+        config.overwrite = true;
+        for name in FILES {
+            let path = config.output.join(name);
+            create_folder(path.parent().unwrap()).unwrap();
+            std::fs::write(path, b"old").unwrap();
+        }
+        let folder = DsmFolder::take(&config).unwrap();
+        std::fs::write(folder.dsm().join("dsm.tif"), b"new").unwrap();
+        // The second file is missing, so publishing stops after the first.
+        assert!(folder.publish().is_err());
+        let content = |name: &str| std::fs::read(config.output.join(name)).ok();
+        assert_eq!(content("dsm/dsm.tif").as_deref(), Some(&b"new"[..]));
+        assert_eq!(content("dsm/sigma.tif").as_deref(), Some(&b"old"[..]));
+        assert_eq!(content("report/report.json"), None);
+    }
 
     #[test]
     fn written_heights_are_near() {

@@ -7,7 +7,7 @@ use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::images::open;
 use crate::dsm::merge::{Merger, Product};
-use crate::dsm::output;
+use crate::dsm::output::DsmFolder;
 use crate::dsm::plan::{Plan, plan};
 use crate::dsm::point::point;
 use crate::dsm::report::DsmReport;
@@ -40,22 +40,22 @@ use crate::threads;
 /// ```
 pub fn run(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, DsmError> {
     config.validate()?;
-    output::check_target(config)?;
+    let folder = DsmFolder::take(config)?;
     threads::install(config.threads, || {
         let mut session = Session::new(progress);
         let opened = open(config)?;
         let pointed = point(config, &opened, &mut session)?;
         let plan = plan(config, &pointed, &mut session)?;
         drop((opened, pointed));
-        Ok(sweep_and_merge(&plan, &mut session)?.report)
+        Ok(sweep_and_merge(&plan, folder, &mut session)?.report)
     })?
 }
 
 /// Computes all chunks of a plan and merges them.
-fn sweep_and_merge(plan: &Plan, session: &mut Session<'_>) -> Result<Product, DsmError> {
+fn sweep_and_merge(plan: &Plan, folder: DsmFolder, session: &mut Session<'_>) -> Result<Product, DsmError> {
     let progress = session.progress;
     let is_chunked = plan.chunk_side.is_some();
-    let mut merger = Merger::begin(plan, progress)?;
+    let mut merger = Merger::begin(plan, folder, progress)?;
     if is_chunked {
         progress.begin("sweeping chunks", plan.chunks.len());
     }

@@ -16,13 +16,9 @@ use report::{EvaluationReport, error_picture};
 use super::error::EvalJobError;
 use super::grid_config::{EvalTarget, GridEvalConfig};
 use super::grid_inputs::GridInputs;
-use super::report_folder::{REPORT_JSON, check_ours};
+use super::report_folder::{ERROR_MAP, ERROR_PICTURE, PAGE, REPORT_JSON, RUN_FOLDER, check_ours};
 use crate::files::{self, FileError};
-
-const ERROR_MAP: &str = "error_map.tif";
-const ERROR_PICTURE: &str = "error_map.png";
-/// The page is written last, so that a folder with a page is complete.
-const PAGE: &str = "report.html";
+use crate::output_folder::OutputFolder;
 
 /// Folder that the report is written to.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +48,7 @@ impl Target {
                 let dsm = config.test.parent().filter(|p| p.file_name().is_some_and(|name| name == "dsm"));
                 let run = dsm?.parent()?;
                 let is_run = run.join("report/report.json").is_file() && run.join("used_config.toml").is_file();
-                is_run.then(|| Self { folder: run.join("eval"), automatic: true })
+                is_run.then(|| Self { folder: run.join(RUN_FOLDER), automatic: true })
             }
         }
     }
@@ -107,9 +103,11 @@ fn write_folder(
     overwrite: bool,
 ) -> Result<PathBuf, EvalJobError> {
     target.check(overwrite)?;
-    let folder = &target.folder;
-    files::create_folder(folder)?;
-    // The JSON comes first, so that an interrupted evaluation is recognised as one.
+    let taken = OutputFolder::take(&target.folder)?;
+    let folder = taken.path();
+    // The JSON comes first, so that an interrupted evaluation is recognised as one, and the page of
+    // an earlier one goes before it.
+    taken.remove(PAGE)?;
     files::write_json(&folder.join(REPORT_JSON), &report.json(), true)?;
     if let Some(horizontal) = inputs.reference.horizontal_epsg {
         write_error_map(&folder.join(ERROR_MAP), horizontal, inputs, report, true)?;

@@ -27,6 +27,8 @@ mod vertical;
 
 use std::path::Path;
 
+pub(crate) use report_folder::remove_evaluation;
+
 pub use error::EvalJobError;
 pub use grid_config::{EvalTarget, GridEvalConfig};
 pub use grids::{GridEvalReport, compare_grids};

@@ -5,10 +5,37 @@ use std::path::{Path, PathBuf};
 use report::EvaluationReport;
 
 use super::error::EvalJobError;
-use crate::files;
+use crate::files::{self, FileError};
+use crate::output_folder::OutputFolder;
 
 /// Name of the JSON report. It marks the folder of an evaluation.
 pub(super) const REPORT_JSON: &str = "report.json";
+/// Name of the errors as a GeoTIFF.
+pub(super) const ERROR_MAP: &str = "error_map.tif";
+/// Name of the errors as a picture.
+pub(super) const ERROR_PICTURE: &str = "error_map.png";
+/// Name of the page, which is written last, so that a folder with a page is complete.
+pub(super) const PAGE: &str = "report.html";
+
+/// Folder of the evaluation beside the results of a DSM run.
+pub(super) const RUN_FOLDER: &str = "eval";
+
+/// Removes the evaluation of the DSM in a run's folder, which is about to be replaced. Files that
+/// no evaluation wrote stay.
+pub(crate) fn remove_evaluation(run: &OutputFolder) -> Result<(), FileError> {
+    let folder = run.path().join(RUN_FOLDER);
+    let report = files::read_text(&folder.join(REPORT_JSON));
+    if folder.is_symlink() || !report.is_ok_and(|text| EvaluationReport::is_ours(&text)) {
+        return Ok(());
+    }
+    // The JSON marks the folder, so it goes last.
+    for name in [PAGE, ERROR_PICTURE, ERROR_MAP, REPORT_JSON] {
+        run.remove(&format!("{RUN_FOLDER}/{name}"))?;
+    }
+    // Stays when it holds anything else.
+    let _ = std::fs::remove_dir(&folder);
+    Ok(())
+}
 
 /// Fails if one of `paths` exists in a folder without the report of an evaluation, unless it may be
 /// replaced.

@@ -11,6 +11,7 @@ use super::report_folder::{REPORT_JSON, check_ours};
 use super::requirements::EvalRequirements;
 use super::surface_config::SurfaceEvalConfig;
 use super::surface_inputs::SurfaceInputs;
+use crate::output_folder::OutputFolder;
 use crate::{files, threads};
 
 /// A finished comparison of two surfaces.
@@ -110,7 +111,7 @@ fn evaluate(config: &SurfaceEvalConfig, progress: &dyn Progress) -> Result<Surfa
     let generator = format!("skysweep eval {}", env!("CARGO_PKG_VERSION"));
     let mut report = SurfaceEvalReport { generator, kind: "surfaces", protocol, result, written: None };
     if let Some(folder) = &config.output {
-        files::create_folder(folder)?;
+        let _taken = OutputFolder::take(folder)?;
         let path = folder.join(REPORT_JSON);
         files::write_json(&path, &report, true)?;
         report.written = Some(path);

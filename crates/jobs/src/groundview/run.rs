@@ -8,6 +8,7 @@ use super::output;
 use super::report::{GroundViewReport, REPORT};
 use super::shots::Shots;
 use super::view_surface::ViewSurface;
+use crate::output_folder::OutputFolder;
 use crate::threads;
 
 /// Renders what cameras on the ground see, and writes it to a folder.
@@ -36,9 +37,12 @@ pub fn run(config: &GroundViewConfig, progress: &dyn Progress) -> Result<GroundV
     if !config.overwrite && config.output.join(REPORT).symlink_metadata().is_ok() {
         return Err(GroundViewError::FolderInUse { path: config.output.clone() });
     }
+    let folder = OutputFolder::take(&config.output)?;
     threads::install(config.threads, || {
         let surface = ViewSurface::open(&config.surface, config.surface_vertical, progress)?;
         let shots = Shots::of(config, &surface)?;
+        // Without its report the folder counts as incomplete from here on.
+        folder.remove(REPORT)?;
         output::write(config, &surface, &shots, progress)
     })?
 }

@@ -20,6 +20,7 @@ use super::tags::HeightMapTags;
 use crate::camera_stand::CameraStand;
 use crate::error_text::with_causes;
 use crate::files;
+use crate::output_folder::OutputFolder;
 
 const REPORT: &str = "report.json";
 
@@ -31,7 +32,7 @@ pub(super) fn run(
 ) -> Result<HeightMapList, HeightMapJobError> {
     let rows = read_positions(positions)?;
     let maker = Maker::open(config, progress)?;
-    files::create_folder(&config.output)?;
+    let _taken = OutputFolder::take(&config.output)?;
     let report = Run { config, maker: &maker, begun: Instant::now() }.all(&rows, progress)?;
     files::write_json(&report.written, &report, true)?;
     Ok(report)

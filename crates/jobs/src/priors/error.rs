@@ -195,14 +195,6 @@ pub enum PriorsJobError {
         /// The file.
         path: PathBuf,
     },
-    /// A file or folder of the output cannot be moved, made or removed.
-    #[error("cannot write to the output folder: {}", path.display())]
-    OutputFolder {
-        /// The file or folder.
-        path: PathBuf,
-        /// Reason given by the operating system.
-        source: std::io::Error,
-    },
     /// The priors cannot be computed.
     #[error(transparent)]
     Priors(#[from] PriorsError),

@@ -4,11 +4,13 @@
 //! The old report is removed first and the new one is moved last, so a folder with a report is
 //! complete. Other files in the folder (images, for example) are left alone.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use tempfile::TempDir;
 
 use super::error::PriorsJobError;
 use crate::files::FileError;
+use crate::output_folder::OutputFolder;
 
 /// Entries of a dataset; the report is moved after them.
 const ENTRIES: [&str; 20] = [
@@ -34,89 +36,46 @@ const ENTRIES: [&str; 20] = [
     "crops.json",
 ];
 const REPORT: [&str; 2] = ["report.html", "report.json"];
-const PARTIAL: &str = ".skysweep-partial";
 
-/// The folder that a dataset goes to.
+/// The folder that a dataset goes to, with the hidden folder in which it is made. That one is
+/// removed again unless it is published.
 #[derive(Debug)]
-pub(super) struct OutputFolder {
-    path: PathBuf,
+pub(super) struct PriorsFolder {
+    // Dropped first, so that an empty output folder can be removed after it.
+    work: TempDir,
+    folder: OutputFolder,
 }
 
-/// The hidden folder in which a dataset is made. It is removed again unless it is published.
-#[derive(Debug)]
-pub(super) struct PartialFolder {
-    folder: PathBuf,
-    partial: PathBuf,
-    created: bool,
-    published: bool,
-}
-
-impl OutputFolder {
-    /// Refuses early what would fail at the end.
-    pub(super) fn new(path: &Path, overwrite: bool) -> Result<Self, PriorsJobError> {
+impl PriorsFolder {
+    /// Takes the folder for this run, and refuses early what would fail at the end.
+    pub(super) fn take(path: &Path, overwrite: bool) -> Result<Self, PriorsJobError> {
         if path.exists() && !path.is_dir() {
             return Err(PriorsJobError::OutputIsFile { path: path.to_owned() });
         }
+        let folder = OutputFolder::take(path)?;
         let taken = ENTRIES.iter().chain(&REPORT).map(|name| path.join(name)).find(|p| p.symlink_metadata().is_ok());
         match taken {
             Some(path) if !overwrite => Err(FileError::Exists { path }.into()),
-            _ => Ok(Self { path: path.to_owned() }),
+            _ => Ok(Self { work: folder.work_folder()?, folder }),
         }
     }
 
-    /// Makes the hidden folder.
-    pub(super) fn begin(&self) -> Result<PartialFolder, PriorsJobError> {
-        let failed = |source| PriorsJobError::OutputFolder { path: self.path.clone(), source };
-        let created = !self.path.exists();
-        let partial = self.path.join(PARTIAL);
-        if partial.symlink_metadata().is_ok() {
-            remove(&partial).map_err(failed)?;
-        }
-        let folder = PartialFolder { folder: self.path.clone(), partial, created, published: false };
-        fs::create_dir_all(&folder.partial).map_err(failed)?;
-        Ok(folder)
-    }
-}
-
-impl PartialFolder {
     /// The folder to write to.
     pub(super) fn path(&self) -> &Path {
-        &self.partial
+        self.work.path()
     }
 
     /// Moves everything to its name.
-    pub(super) fn publish(mut self) -> Result<(), PriorsJobError> {
-        let (folder, partial) = (self.folder.clone(), self.partial.clone());
-        let failed = |path: &Path, source| PriorsJobError::OutputFolder { path: path.to_owned(), source };
+    pub(super) fn publish(self) -> Result<(), PriorsJobError> {
         // Without its report the folder counts as incomplete from here on.
         for name in REPORT.iter().rev().chain(&ENTRIES) {
-            let old = folder.join(name);
-            if old.symlink_metadata().is_ok() {
-                remove(&old).map_err(|source| failed(&old, source))?;
-            }
+            self.folder.remove(name)?;
         }
-        self.published = true;
         for name in ENTRIES.iter().chain(&REPORT) {
-            let (from, to) = (partial.join(name), folder.join(name));
-            if from.symlink_metadata().is_ok() {
-                fs::rename(&from, &to).map_err(|source| failed(&to, source))?;
+            if self.path().join(name).symlink_metadata().is_ok() {
+                self.folder.publish(self.path(), name)?;
             }
         }
         Ok(())
     }
-}
-
-impl Drop for PartialFolder {
-    fn drop(&mut self) {
-        // Errors are ignored: the error that led here is the one to report.
-        let _ = fs::remove_dir_all(&self.partial);
-        if self.created && !self.published {
-            let _ = fs::remove_dir(&self.folder);
-        }
-    }
-}
-
-fn remove(path: &Path) -> std::io::Result<()> {
-    let is_folder = path.symlink_metadata()?.is_dir();
-    if is_folder { fs::remove_dir_all(path) } else { fs::remove_file(path) }
 }

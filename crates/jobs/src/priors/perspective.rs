@@ -13,7 +13,7 @@ use super::cameras::SceneCameras;
 use super::config::{PriorsConfig, PriorsMode};
 use super::dataset::Dataset;
 use super::error::PriorsJobError;
-use super::folder::OutputFolder;
+use super::folder::PriorsFolder;
 use super::frame::DatasetFrame;
 use super::labels::labels;
 use super::maps::{self, WrittenMaps};
@@ -31,7 +31,7 @@ pub(super) fn make(config: &PriorsConfig, progress: &dyn Progress) -> Result<Pri
     if config.map_epsg.is_some() || config.vertical.is_some() || config.corrections.is_some() {
         return Err(PriorsJobError::NotSatellite);
     }
-    let folder = OutputFolder::new(&config.output, config.overwrite)?;
+    let partial = PriorsFolder::take(&config.output, config.overwrite)?;
     let sampling = config.sampling()?;
     let cameras = SceneCameras::read(config)?;
     let read = UsableModel::read(config)?;
@@ -53,7 +53,6 @@ pub(super) fn make(config: &PriorsConfig, progress: &dyn Progress) -> Result<Pri
         visible: &visible,
         unusable,
     };
-    let partial = folder.begin()?;
     let report = write(&dataset, partial.path(), progress)?;
     partial.publish()?;
     Ok(PriorsJobReport { product: PriorsProduct::Dataset(Box::new(report)), unusable_objects: unusable })

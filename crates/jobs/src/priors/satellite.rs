@@ -17,7 +17,7 @@ use serde_json::json;
 
 use super::config::PriorsConfig;
 use super::error::PriorsJobError;
-use super::folder::OutputFolder;
+use super::folder::PriorsFolder;
 use super::labels::labels;
 use super::model::UsableModel;
 use super::notes::unusable_note;
@@ -44,7 +44,7 @@ pub(super) fn make(
     paths: &[PathBuf],
     progress: &dyn Progress,
 ) -> Result<PriorsJobReport, PriorsJobError> {
-    let folder = OutputFolder::new(&config.output, config.overwrite)?;
+    let partial = PriorsFolder::take(&config.output, config.overwrite)?;
     let images = read_images(config, paths, progress)?;
     let read = UsableModel::read(config)?;
     let unusable = read.unusable();
@@ -52,7 +52,6 @@ pub(super) fn make(
     let mut mesh = read.meshed.mesh;
     place.to_ellipsoid(&mut mesh)?;
     let model = PriorModel::new(mesh, &buildings_of(&read.file.model))?;
-    let partial = folder.begin()?;
     for name in FOLDERS {
         files::create_folder(&partial.path().join(name))?;
     }

@@ -24,6 +24,7 @@ use super::error::SplatsJobError;
 use super::image;
 use crate::corrections::Corrections;
 use crate::files::{self, FileError};
+use crate::output_folder::OutputFolder;
 use crate::placed_model;
 use crate::threads::install;
 
@@ -137,6 +138,8 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
         .origin
         .clone()
         .ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?;
+    let folder = OutputFolder::take(&config.output)?;
+    folder.remove(REPORT)?;
     let session = RenderSession { config, file: &file, origin, taken: HashSet::new(), views: Vec::new() };
     let views = install(config.threads, || session.run(progress))??;
     let report = SplatRenderReport { splats: file.splats.len(), views };

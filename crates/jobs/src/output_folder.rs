@@ -1,0 +1,196 @@
+//! The output folder of a run: one run at a time, with a work folder of its own.
+//!
+//! A run holds a lock on its folder (an advisory lock of the system on the folder itself, which
+//! ends with the process), so that a second run is refused and not mixed into the first. Files are
+//! made in a hidden work folder with a name that nobody can foresee, which is made new, and moved
+//! to their names at the end. What killed runs left of their work folders is removed by the next
+//! run. Where the file system knows no locks, runs still have work folders of their own.
+
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use crate::files::{FileError, create_folder};
+
+/// Beginning of the names of work folders.
+const WORK: &str = ".skysweep-partial";
+/// Times that a lock is asked for again because the folder was removed meanwhile.
+const ATTEMPTS: usize = 10;
+
+/// An output folder that this run alone writes to. Dropping it ends the lock, and removes the
+/// folder again when the run made it and it is empty.
+#[derive(Debug)]
+pub(crate) struct OutputFolder {
+    path: PathBuf,
+    /// Whether this run made the folder.
+    created: bool,
+    /// The open folder, which holds the lock.
+    _lock: Option<File>,
+}
+
+impl OutputFolder {
+    /// Makes the folder if need be, and takes it for this run.
+    ///
+    /// # Errors
+    /// [`FileError::InUse`] when another run writes into it, [`FileError::Folder`] when it cannot
+    /// be made or is a file.
+    pub(crate) fn take(path: &Path) -> Result<Self, FileError> {
+        for _ in 0..ATTEMPTS {
+            let created = path.symlink_metadata().is_err();
+            create_folder(path)?;
+            let Ok(handle) = File::open(path) else {
+                // A folder that can be written but not listed cannot be locked either.
+                return Ok(Self { path: path.to_owned(), created, _lock: None });
+            };
+            let lock = match handle.try_lock() {
+                Ok(()) => Some(handle),
+                Err(TryLockError::WouldBlock) => return Err(FileError::InUse { path: path.to_owned() }),
+                Err(TryLockError::Error(_)) => None,
+            };
+            if lock.as_ref().is_none_or(|lock| is_same(lock, path)) {
+                let folder = Self { path: path.to_owned(), created, _lock: lock };
+                folder.remove_left_over();
+                return Ok(folder);
+            }
+        }
+        Err(FileError::InUse { path: path.to_owned() })
+    }
+
+    /// The folder.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Makes a new hidden folder inside. It is removed when it is dropped.
+    ///
+    /// # Errors
+    /// [`FileError::Folder`].
+    pub(crate) fn work_folder(&self) -> Result<TempDir, FileError> {
+        tempfile::Builder::new()
+            .prefix(&format!("{WORK}-"))
+            .tempdir_in(&self.path)
+            .map_err(|source| FileError::Folder { path: self.path.clone(), source })
+    }
+
+    /// Makes a folder inside, and refuses a link in its place, which could lead outside.
+    ///
+    /// # Errors
+    /// [`FileError::Link`], [`FileError::Folder`].
+    pub(crate) fn subfolder(&self, name: &str) -> Result<PathBuf, FileError> {
+        let mut path = self.path.clone();
+        for part in name.split('/') {
+            path.push(part);
+            if path.is_symlink() {
+                return Err(FileError::Link { path });
+            }
+            create_folder(&path)?;
+        }
+        Ok(path)
+    }
+
+    /// Removes the file or folder of a name inside, if there is one. A link is removed, and not
+    /// what it leads to.
+    ///
+    /// # Errors
+    /// [`FileError::Remove`].
+    pub(crate) fn remove(&self, name: &str) -> Result<(), FileError> {
+        let path = self.path.join(name);
+        let Ok(found) = path.symlink_metadata() else { return Ok(()) };
+        let removed = if found.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+        removed.map_err(|source| FileError::Remove { path, source })
+    }
+
+    /// Moves a file or folder from a work folder to its name.
+    ///
+    /// # Errors
+    /// [`FileError::Link`], [`FileError::Folder`], [`FileError::Move`].
+    pub(crate) fn publish(&self, work: &Path, name: &str) -> Result<(), FileError> {
+        if let Some((folder, _)) = name.rsplit_once('/') {
+            self.subfolder(folder)?;
+        }
+        let path = self.path.join(name);
+        fs::rename(work.join(name), &path).map_err(|source| FileError::Move { path, source })
+    }
+
+    /// Removes the work folders of runs that were killed. This run has the lock, so they belong to
+    /// nobody.
+    fn remove_left_over(&self) {
+        if self._lock.is_none() {
+            return;
+        }
+        let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
+        for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(WORK)) {
+            // A planted link is not a folder, and stays. What cannot be removed does no harm.
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                let _ = fs::remove_dir_all(entry.path());
+            }
+        }
+    }
+}
+
+impl Drop for OutputFolder {
+    fn drop(&mut self) {
+        if self.created {
+            // Removes nothing that has content.
+            let _ = fs::remove_dir(&self.path);
+        }
+    }
+}
+
+/// Whether an open folder is still the one of this name.
+#[cfg(unix)]
+fn is_same(open: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let key = |found: fs::Metadata| (found.dev(), found.ino());
+    open.metadata().ok().map(key) == fs::metadata(path).ok().map(key)
+}
+
+#[cfg(not(unix))]
+fn is_same(_: &File, path: &Path) -> bool {
+    path.is_dir()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_has_one_run_at_a_time() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("new/out");
+        let first = OutputFolder::take(&path).unwrap();
+        let second = OutputFolder::take(&path).unwrap_err();
+        assert!(matches!(second, FileError::InUse { .. }), "{second}");
+        drop(first);
+        assert!(!path.exists(), "an empty folder is removed again");
+        let third = OutputFolder::take(&path).unwrap();
+        fs::write(path.join("kept"), b"").unwrap();
+        drop(third);
+        assert!(path.exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_lead_nowhere() {
+        let root = tempfile::tempdir().unwrap();
+        let (path, outside) = (root.path().join("out"), root.path().join("outside"));
+        fs::create_dir_all(&path).unwrap();
+        fs::create_dir_all(&outside).unwrap();
+        fs::write(outside.join("precious"), b"old").unwrap();
+        fs::create_dir_all(path.join(".skysweep-partial-left")).unwrap();
+        for name in [".skysweep-partial", "dsm"] {
+            std::os::unix::fs::symlink(&outside, path.join(name)).unwrap();
+        }
+        let folder = OutputFolder::take(&path).unwrap();
+        assert!(!path.join(".skysweep-partial-left").exists());
+        let work = folder.work_folder().unwrap();
+        fs::create_dir_all(work.path().join("dsm")).unwrap();
+        fs::write(work.path().join("dsm/precious"), b"new").unwrap();
+        assert!(matches!(folder.publish(work.path(), "dsm/precious"), Err(FileError::Link { .. })));
+        folder.remove("dsm").unwrap();
+        folder.publish(work.path(), "dsm/precious").unwrap();
+        assert_eq!(fs::read(path.join("dsm/precious")).unwrap(), b"new");
+        assert_eq!(fs::read(outside.join("precious")).unwrap(), b"old");
+    }
+}
