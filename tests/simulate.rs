@@ -115,12 +115,22 @@ fn a_scene_goes_through_dsm_and_eval() {
         .arg("eval")
         .arg(out.join("dsm/dsm.tif"))
         .arg(scene.join("truth/dsm.tif"))
-        .args(["--align", "xyz", "--json"])
+        .args(["--align", "xyz", "--json", "--buildings"])
+        .arg(scene.join("truth/buildings.tif"))
         .output()
         .unwrap();
     let evaluation: Value = serde_json::from_slice(&evaluation.stdout).unwrap();
     let completeness = evaluation["metrics"]["completeness_1"].as_f64().unwrap();
     assert!(completeness > 0.6, "completeness {completeness}");
+    // What the run says about its cells lies beside the surface.
+    let at = |pointer: &str| evaluation.pointer(pointer).and_then(Value::as_f64);
+    assert!(at("/origins/observed/metrics/valid_ratio") > Some(0.5), "{}", evaluation["origins"]);
+    assert!(at("/sigma/observed/n") > Some(1000.0) && at("/reliability/tenths/9/to") == Some(1.0));
+    assert!(
+        at("/objects/buildings") > Some(3.0) && at("/outlines/median_cells").is_some(),
+        "{}",
+        evaluation["objects"]
+    );
 }
 
 #[test]
@@ -137,6 +147,13 @@ fn a_template_is_a_parameter_file_and_presets_are_listed() {
         let again = skysweep().arg("simulate").arg(&file).arg("--template").output().unwrap();
         assert!(!template.stdout.is_empty() && template.stdout == again.stdout, "{name}");
     }
+    let seasons = ["simulate", "suburb", "--template", "--seasons", "--views", "4"];
+    let text = String::from_utf8(skysweep().args(seasons).output().unwrap().stdout).unwrap();
+    for line in ["dates = 4", "[seasons]", "crowns = \"natural\"", "texture_share"] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+    let fewer = skysweep().args(seasons).args(["--dates", "2"]).output().unwrap();
+    assert!(String::from_utf8(fewer.stdout).unwrap().contains("dates = 2"));
 }
 
 #[test]

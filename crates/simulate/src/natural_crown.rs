@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn crowns_fall_from_their_top_and_are_rough() {
-        for (profile, falls_m) in [(CrownProfile::Broad, 0.8), (CrownProfile::Conical, 3.0)] {
+        for (profile, falls_m) in [(CrownProfile::Broad, 0.5), (CrownProfile::Conical, 2.5)] {
             let crown = crown(profile);
             let heights = profile_of(&crown);
             let top = heights[0].unwrap();

@@ -5,7 +5,8 @@ use camera::ImagePoint;
 use nalgebra::Vector3;
 use raster::Grid;
 use simulate::{
-    CameraModel, CloudsConfig, LookAngles, SensorConfig, SimulatedView, Simulation, SimulationConfig, TruthClass,
+    CameraModel, CloudsConfig, CrownForm, LookAngles, SeasonsConfig, SensorConfig, SimulatedView, Simulation,
+    SimulationConfig, TREE_NUMBER, TruthClass, VegetationConfig, VehiclesConfig,
 };
 
 fn small(preset: &str) -> SimulationConfig {
@@ -282,6 +283,137 @@ fn dates_have_another_sun_other_vehicles_and_another_radiometry() {
     assert!(same > 0.99 && other < 0.97, "{same} on a date, {other} between dates");
 }
 
+/// Two scenes of three dates that look alike from above, without and with seasons.
+fn dates_without_and_with(seasons: SeasonsConfig) -> [Simulation; 2] {
+    let mut config = SimulationConfig { views: 3, ..small("town") };
+    config.acquisition.dates = 3;
+    config.acquisition.looks = vec![LookAngles { incidence_deg: 5.0, azimuth_deg: 100.0 }; 3];
+    // Light, radiometry and vehicles stay, so that only the seasons differ.
+    let a = &mut config.acquisition;
+    (a.sun_spread_deg, a.gain_spread, a.offset_spread, a.gamma_spread) = ([0.0; 2], 0.0, 0.0, 0.0);
+    config.vehicles.parked_share = 0.0;
+    [SeasonsConfig::default(), seasons]
+        .map(|seasons| Simulation::new(SimulationConfig { seasons, ..config.clone() }).unwrap())
+}
+
+#[test]
+fn seasons_change_other_dates_and_nothing_of_the_truth() {
+    let [without, with] = dates_without_and_with(SeasonsConfig::YEAR);
+    assert!(without.views[0].image == with.views[0].image, "the first date is as without seasons");
+    assert!(without.truth.dsm == with.truth.dsm && without.truth.ortho == with.truth.ortho);
+    assert!(without.views.iter().all(|view| view.record.date.season.is_none()));
+    let values =
+        |s: &Simulation, k: usize| -> Vec<f64> { s.views[k].image.data().iter().map(|dn| f64::from(*dn)).collect() };
+    let alike = |s: &Simulation, a: usize, b: usize| correlation(&values(s, a), &values(s, b));
+    for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+        let (same, other) = (alike(&without, a, b), alike(&with, a, b));
+        assert!(same > 0.99 && (0.3..0.97).contains(&other), "{a}, {b}: {same} without, {other} with seasons");
+    }
+    let season = with.views[1].record.date.season.unwrap();
+    assert!(season.mtf_at_nyquist != with.config.sensor.mtf_at_nyquist && season.ground != 1.0);
+}
+
+#[test]
+fn a_softer_date_has_less_detail() {
+    let [without, with] = dates_without_and_with(SeasonsConfig { sharpness_spread: 1.2, ..SeasonsConfig::default() });
+    let detail = |s: &Simulation, k: usize| -> f64 {
+        let image = &s.views[k].image;
+        let rows = image.data().chunks_exact(image.width());
+        rows.flat_map(|row| row.windows(2).map(|w| (f64::from(w[0]) - f64::from(w[1])).powi(2))).sum()
+    };
+    let mut is_judged = false;
+    for (k, view) in with.views.iter().enumerate().skip(1) {
+        let mtf = view.record.date.season.unwrap().mtf_at_nyquist / with.config.sensor.mtf_at_nyquist;
+        let ratio = detail(&with, k) / detail(&without, k);
+        if !(0.9..1.1).contains(&mtf) {
+            is_judged = true;
+            assert_eq!(mtf > 1.0, ratio > 1.0, "a transfer of {mtf} gives {ratio}");
+        }
+    }
+    assert!(is_judged);
+}
+
+#[test]
+fn every_cell_has_the_number_of_its_building() {
+    let simulation =
+        Simulation::new(SimulationConfig { vehicles: VehiclesConfig { parked_share: 1.0 }, ..small("suburb") })
+            .unwrap();
+    let truth = &simulation.truth;
+    let mut seen = std::collections::BTreeSet::new();
+    for (i, number) in truth.objects.data().iter().enumerate() {
+        let class = truth.classes.data()[i];
+        if class != TruthClass::FootprintEdge as u8 {
+            assert_eq!(*number > 0, class == TruthClass::Building as u8, "cell {i}");
+        }
+        assert!(*number != TREE_NUMBER || [5, 64].contains(&class), "cell {i}: class {class}");
+        seen.insert(*number);
+    }
+    let numbers = seen.iter().filter(|number| **number > 0).count();
+    assert!(numbers > 25 && seen.contains(&TREE_NUMBER) && seen.contains(&0), "{seen:?}");
+    // The numbers are those of the city model.
+    let [x0, y0] = simulation.frame.origin_m();
+    let building = &simulation.scene.buildings()[usize::try_from(*seen.last().unwrap()).unwrap() - 1];
+    let [x, y] = building.parts[0].centre_m;
+    let (column, row) = truth.geotransform.cell_from_map(x + x0, y + y0).unwrap();
+    let inside = |c: f64| (0.0..119.5).contains(&c);
+    assert!(
+        !inside(column)
+            || !inside(row)
+            || truth.objects[(column.round() as usize, row.round() as usize)] == *seen.last().unwrap()
+    );
+}
+
+#[test]
+fn blank_roofs_have_almost_no_texture() {
+    let mut config = SimulationConfig { size_m: 240.0, views: 2, ..small("industrial") };
+    config.buildings.quarters.sheds = 0.0;
+    let simulation = Simulation::new(config).unwrap();
+    let (ortho, dsm, truth) = (&simulation.truth.ortho, &simulation.truth.dsm, &simulation.truth);
+    // Differences between neighbouring roof cells of the same height, relative to the reflectance.
+    let mut differences: Vec<f64> = Vec::new();
+    for row in 0..ortho.height() {
+        for column in 1..ortho.width() {
+            let (a, b) = ((column - 1, row), (column, row));
+            if truth.objects[a] > 0 && truth.objects[a] == truth.objects[b] && (dsm[a] - dsm[b]).abs() < 0.2 {
+                differences.push((f64::from(ortho[a]) - f64::from(ortho[b])).abs() / f64::from(ortho[a]));
+            }
+        }
+    }
+    differences.sort_by(f64::total_cmp);
+    assert!(differences.len() > 5000 && differences[differences.len() * 9 / 10] < 0.02, "{}", differences.len());
+}
+
+#[test]
+fn views_see_the_ground_under_natural_crowns() {
+    let mut config = SimulationConfig { gsd_m: 0.5, size_m: 80.0, ..small("fields") };
+    config.vegetation = VegetationConfig { trees_per_ha: 80.0, height_m: [8.0, 12.0], crowns: CrownForm::Natural };
+    config.acquisition.looks = vec![LookAngles { incidence_deg: 40.0, azimuth_deg: 120.0 }; 3];
+    let simulation = Simulation::new(config).unwrap();
+    assert!(simulation.scene.tree_count() > 40);
+    let (mut under, mut on) = (0, 0);
+    let view = &simulation.views[0];
+    for row in 20..view.image.height() - 20 {
+        for column in 20..view.image.width() - 20 {
+            let height = f64::from(view.heights[(column, row)]);
+            let at = ImagePoint::new(column as f64, row as f64);
+            let ray = view.sight().ray(at);
+            let p = ray.at((height - ray.origin.z) / ray.direction.z);
+            let (surface, class) = simulation.scene.surface(p.x, p.y);
+            if class == TruthClass::Vegetation {
+                if surface - height > 2.0 { under += 1 } else { on += 1 }
+            }
+        }
+    }
+    assert!(under > 100 && on > 500, "{under} pixels see under a crown, {on} see its top");
+    // Crowns have no upright sides: between the top and the rim lie heights of all kinds.
+    let trees =
+        simulation.truth.objects.data().iter().zip(simulation.truth.dsm.data().iter().zip(simulation.truth.dtm.data()));
+    let heights: Vec<f32> = trees.filter(|(n, _)| **n == TREE_NUMBER).map(|(_, (s, t))| s - t).collect();
+    let share =
+        |low: f32, high: f32| heights.iter().filter(|h| (low..high).contains(*h)).count() as f64 / heights.len() as f64;
+    assert!(share(0.0, 6.0) > 0.1 && share(8.0, 13.0) > 0.1, "{} {}", share(0.0, 6.0), share(8.0, 13.0));
+}
+
 #[test]
 fn clouds_hide_their_share_as_no_data_or_as_white() {
     for masked in [true, false] {
@@ -308,6 +440,9 @@ fn every_preset_makes_its_scene() {
         ("fields", 0.5, 20.0),
         ("harbour", 5.0, 60.0),
         ("repetitive-roofs", 6.0, 20.0),
+        ("suburb", 8.0, 40.0),
+        ("dense-towers", 70.0, 140.0),
+        ("industrial", 9.0, 25.0),
     ] {
         let mut config = small(preset);
         (config.size_m, config.gsd_m, config.views) = (240.0, 2.0, 2);
@@ -323,6 +458,7 @@ fn every_preset_makes_its_scene() {
         match preset {
             "harbour" => assert!((0.2..0.5).contains(&share(TruthClass::Water))),
             "hills" => assert!(share(TruthClass::Vegetation) > 0.3, "{}", share(TruthClass::Vegetation)),
+            "industrial" | "dense-towers" => assert!(share(TruthClass::Building) > 0.25),
             "dense-city" | "repetitive-roofs" => assert!(share(TruthClass::Building) > 0.2),
             _ => {}
         }
