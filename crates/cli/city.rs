@@ -132,6 +132,9 @@ impl Input {
 fn hinted(error: CityJobError) -> anyhow::Error {
     let hint = match &error {
         CityJobError::UnknownEnding { .. } => Some("give --format obj, ply, glb, geojson or cityjson"),
+        CityJobError::NothingSelected { .. } => {
+            Some("--lod chooses a level of detail, such as --lod 3, and --all-objects takes more than buildings")
+        }
         _ => None,
     };
     with_hint(error, hint)

@@ -21,5 +21,7 @@ pub(crate) fn init(global: Global) {
         .with_target(false)
         .without_time()
         .with_ansi(false)
+        // The log would report a broken standard error on standard error, and panic.
+        .log_internal_errors(false)
         .init();
 }

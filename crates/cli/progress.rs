@@ -1,5 +1,6 @@
 //! Progress on stderr: bars for people, JSON lines for programs.
 
+use std::io::Write;
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -99,9 +100,9 @@ impl Watcher {
         }
     }
 
-    #[allow(clippy::print_stderr, reason = "this is the command's own channel to the user")]
+    /// Writes a line to standard error. Where that is closed or full, the work goes on in silence.
     fn say(&self, text: &str) {
-        self.bar.suspend(|| eprintln!("{text}"));
+        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{text}")));
     }
 }
 

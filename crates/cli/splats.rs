@@ -118,8 +118,9 @@ struct RenderArgs {
     /// and not compared.
     #[arg(long, value_name = "FOLDER", requires = "cameras")]
     pictures: Option<PathBuf>,
-    /// Corrections of the images' pointing: the report of a run of skysweep dsm.
-    #[arg(long, value_name = "report.json")]
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default:
+    /// the corrections that the splats were made with].
+    #[arg(long, value_name = "report.json|none")]
     corrections: Option<PathBuf>,
     /// Folder to write.
     #[arg(short, long, value_name = "DIR")]
@@ -168,7 +169,7 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     config.images.clone_from(&args.images);
     config.cameras.clone_from(&args.cameras);
     config.pictures.clone_from(&args.pictures);
-    config.corrections.clone_from(&args.corrections);
+    config.corrections = corrections_of(args.corrections.as_deref());
     config.overwrite = args.overwrite;
     let report = args.show.watch(global, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
     args.show.print(global, &report, || render_summary(&report, &args.output))?;

@@ -66,6 +66,25 @@ pub enum RpcError {
         /// Largest absolute value, degrees.
         limit: f64,
     },
+    /// A scale or an offset is larger than any sensor has.
+    #[error("{key} is {value:e}, expected at most {limit:e} in size: no image has such an RPC")]
+    Implausible {
+        /// RPC00B name of the entry.
+        key: Key,
+        /// Value found.
+        value: f64,
+        /// Largest absolute value.
+        limit: f64,
+    },
+    /// The image lies far outside of its own domain, which a wrong coefficient does.
+    #[error(
+        "the coefficients place a corner of the RPC's own domain {reach_px:e} px from its offset, \
+         expected about the size of the image: a coefficient is wrong"
+    )]
+    Stretched {
+        /// Largest distance along the line or the sample, pixels.
+        reach_px: f64,
+    },
     /// The first denominator coefficient is zero: a pole at the centre of the domain.
     #[error("{key} is zero, expected about 1: the model has a pole at its centre")]
     PoleAtCentre {

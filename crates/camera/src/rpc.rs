@@ -52,6 +52,22 @@ pub struct Rpc {
 /// Validity of an entry that must be an angle, degrees.
 const LATITUDE_MAX_DEG: f64 = 90.0;
 const LONGITUDE_MAX_DEG: f64 = 360.0;
+/// Limits of entries that no sensor exceeds, with which a wrong entry is told before memory is
+/// taken for the ground it would cover: half of the longest strip, pixels; half of the Earth,
+/// degrees; the height of a satellite, metres.
+const PLAUSIBLE: [(&str, f64); 8] = [
+    ("LINE_SCALE", 1e6),
+    ("SAMP_SCALE", 1e6),
+    ("LINE_OFF", 1e7),
+    ("SAMP_OFF", 1e7),
+    ("LAT_SCALE", 90.0),
+    ("LONG_SCALE", 180.0),
+    ("HEIGHT_OFF", 1e6),
+    ("HEIGHT_SCALE", 1e6),
+];
+/// Largest distance of a corner of the domain from the image's offset, pixels. Crops keep the domain
+/// of their scene, so this is the size of the longest strips and more.
+const REACH_MAX_PX: f64 = 1e7;
 
 impl Rpc {
     /// Returns the image position of a ground point.
@@ -65,8 +81,9 @@ impl Rpc {
 
     /// Checks that the coefficients form a camera.
     ///
-    /// All entries must be finite, scales not zero, and angles valid. At the centre the model must
-    /// have no pole, and the image must depend on longitude and latitude.
+    /// All entries must be finite, scales not zero, and angles valid, and scales and offsets such as
+    /// a sensor can have. At the centre the model must have no pole, and the image must depend on
+    /// longitude and latitude. The corners of the domain must not be far outside of the image.
     ///
     /// # Errors
     /// The first check that fails.
@@ -92,15 +109,34 @@ impl Rpc {
                 return Err(RpcError::Angle { key: key(name), value, limit });
             }
         }
+        for (name, value) in self.offsets().into_iter().chain(self.scales()) {
+            if let Some(&(_, limit)) = PLAUSIBLE.iter().find(|(known, limit)| *known == name && value.abs() > *limit) {
+                return Err(RpcError::Implausible { key: key(name), value, limit });
+            }
+        }
         for (name, c) in [("LINE_DEN_COEFF", &self.line_den), ("SAMP_DEN_COEFF", &self.samp_den)] {
             if c[0].abs() < DENOMINATOR_MIN {
                 return Err(RpcError::PoleAtCentre { key: Key { name, number: Some(1) } });
             }
         }
         match self.plane(self.height_off).sample(0.0, 0.0) {
-            Ok(at) if at.is_regular() => Ok(()),
-            _ => Err(RpcError::Degenerate),
+            Ok(at) if at.is_regular() => {}
+            _ => return Err(RpcError::Degenerate),
         }
+        let reach_px = self.reach_px();
+        if reach_px > REACH_MAX_PX { Err(RpcError::Stretched { reach_px }) } else { Ok(()) }
+    }
+
+    /// Returns the largest distance of a corner of the domain from the offsets, along the line or
+    /// the sample, pixels. A corner at a pole does not count.
+    fn reach_px(&self) -> f64 {
+        let corners = (0..8u8).map(|corner| [0, 1, 2].map(|axis| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 }));
+        let at = corners.filter_map(|[l, p, h]| {
+            let height_m = self.height_off + h * self.height_scale;
+            let point = self.plane(height_m).sample(l, p).ok()?.image;
+            Some((point.sample - self.samp_off).abs().max((point.line - self.line_off).abs()))
+        });
+        at.filter(|size| size.is_finite()).fold(0.0, f64::max)
     }
 
     /// Returns the model of a crop whose upper-left pixel is `origin`.

@@ -153,12 +153,16 @@ type Spoiled = (&'static str, fn(&mut Rpc));
 #[test]
 fn validation_names_the_entry() {
     assert_eq!(pushbroom().validate(), Ok(()));
-    let cases: [Spoiled; 6] = [
+    let cases: [Spoiled; 10] = [
         ("SAMP_OFF is NaN", |r| r.samp_off = f64::NAN),
         ("HEIGHT_SCALE is zero", |r| r.height_scale = 0.0),
         ("SAMP_NUM_COEFF_7 is inf", |r| r.samp_num[6] = f64::INFINITY),
         ("LAT_OFF is 91°", |r| r.lat_off = 91.0),
         ("LINE_DEN_COEFF_1 is zero", |r| r.line_den[0] = 0.0),
+        ("SAMP_SCALE is 1e9", |r| r.samp_scale = 1e9),
+        ("LAT_SCALE is 1e308", |r| r.lat_scale = 1e308),
+        ("HEIGHT_OFF is 1e7", |r| r.height_off = 1e7),
+        ("the coefficients place a corner", |r| r.line_num[6] = 1e6),
         ("the image does not depend on both", |r| {
             (r.samp_num, r.samp_den) = (r.line_num, r.line_den);
         }),

@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::regular::read_regular;
+
 /// Why a file of cameras was not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -52,5 +54,5 @@ pub(crate) fn read_bytes(path: &Path, limit: u64) -> Result<Vec<u8>, CameraFileE
         let what = format!("the file has {size} bytes, at most {limit} are read");
         return Err(Fault { what, place: "size".to_owned() }.at(path));
     }
-    std::fs::read(path).map_err(unreadable)
+    read_regular(path, limit).map_err(unreadable)
 }

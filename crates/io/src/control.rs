@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 
 use geodesy::{LonLatHeight, MapPoint};
 
+use crate::regular::read_regular;
+
 /// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 256 << 20;
 
@@ -88,7 +90,7 @@ pub fn read(path: &Path) -> Result<Vec<ControlPosition>, ControlError> {
         let what = format!("the file has {size} bytes, expected at most {SIZE_LIMIT}");
         return Err(ControlError::Invalid { path: path.to_owned(), what, line: 1 });
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let bytes = read_regular(path, SIZE_LIMIT).map_err(unreadable)?;
     parse(&String::from_utf8_lossy(&bytes)).map_err(|(line, what)| ControlError::Invalid {
         path: path.to_owned(),
         what,

@@ -17,6 +17,7 @@ pub mod ply;
 pub mod points;
 pub mod positions;
 pub mod raster;
+mod regular;
 pub mod rpc;
 pub mod similarity;
 pub mod splat_ply;
@@ -24,3 +25,4 @@ pub mod surfaces;
 pub mod transforms;
 
 pub use atomic::{SaveError, write_bytes};
+pub use regular::{read_regular, read_regular_text};

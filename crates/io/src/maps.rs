@@ -10,6 +10,7 @@ use raster::Window;
 
 use crate::npy::{self, NpyData, NpyError};
 use crate::raster::{ImageSource, RasterError, SampleType};
+use crate::regular;
 
 /// Most values of a map.
 const NUMBERS_MAX: usize = 1 << 30;
@@ -56,7 +57,7 @@ pub enum MapError {
 pub fn is_npy(path: impl AsRef<Path>) -> bool {
     use std::io::Read;
     let mut magic = [0u8; 6];
-    std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == *b"\x93NUMPY"
+    regular::open(path.as_ref()).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == *b"\x93NUMPY"
 }
 
 /// Reads a map.

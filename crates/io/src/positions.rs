@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::regular::read_regular;
+
 /// Largest list that is read, bytes.
 const SIZE_LIMIT: u64 = 1 << 30;
 /// Longest id, bytes; the id becomes the name of a file.
@@ -85,7 +87,7 @@ pub fn read_positions(path: impl AsRef<Path>) -> Result<Vec<PositionRow>, Positi
     let rows = if size > SIZE_LIMIT {
         Err(format!("it has {size} bytes, expected at most {SIZE_LIMIT}"))
     } else {
-        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let bytes = read_regular(path, SIZE_LIMIT).map_err(unreadable)?;
         parse(&String::from_utf8_lossy(&bytes))
     };
     rows.map_err(|what| PositionsError::Invalid { path: path.to_owned(), what })

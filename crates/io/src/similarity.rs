@@ -23,6 +23,8 @@ use std::path::{Path, PathBuf};
 use camera::{Pose, Similarity, SimilarityError};
 use serde::Deserialize;
 
+use crate::regular::read_regular;
+
 /// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 1 << 20;
 
@@ -111,7 +113,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Similarity, SimilarityFileError> {
         let what = format!("it has {size} bytes, expected at most {SIZE_LIMIT}");
         return Err(SimilarityFileError::Invalid { path: path.to_owned(), what });
     }
-    parse(&std::fs::read(path).map_err(unreadable)?).map_err(|fault| match fault {
+    parse(&read_regular(path, SIZE_LIMIT).map_err(unreadable)?).map_err(|fault| match fault {
         Fault::Text(what) => SimilarityFileError::Invalid { path: path.to_owned(), what },
         Fault::Numbers(source) => SimilarityFileError::Numbers { path: path.to_owned(), source },
     })

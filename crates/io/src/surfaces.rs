@@ -13,6 +13,7 @@ use crs::{CrsIdentity, VerticalDatum};
 
 use crate::citymodel::{self, CityError};
 use crate::points::{PointCloud, PointsError, is_point_cloud};
+use crate::regular;
 use crate::splat_ply::{LocalOrigin, SplatPlyError};
 
 /// Largest number of points of a cloud.
@@ -71,7 +72,7 @@ pub fn is_surface(path: impl AsRef<Path>) -> bool {
         return true;
     }
     let mut first = [0u8; 16];
-    let read = std::fs::File::open(path).and_then(|mut file| file.read(&mut first)).unwrap_or(0);
+    let read = regular::open(path).and_then(|mut file| file.read(&mut first)).unwrap_or(0);
     let first = first.get(..read).unwrap_or_default();
     let text = first.strip_prefix(b"\xef\xbb\xbf").unwrap_or(first).trim_ascii_start();
     let extension = path.extension().and_then(|name| name.to_str()).unwrap_or_default().to_ascii_lowercase();

@@ -295,7 +295,7 @@ prop_compose! {
         line_num[2] = -3.0;
         camera::Rpc {
             line_off: off[0], samp_off: off[1], lat_off: off[2], long_off: off[3], height_off: off[4],
-            line_scale: scale[0], samp_scale: scale[1], lat_scale: scale[2], long_scale: scale[3],
+            line_scale: scale[0], samp_scale: scale[1], lat_scale: scale[2] * 0.009, long_scale: scale[3] * 0.018,
             height_scale: scale[4],
             line_num, line_den: poly(1, [1.0, 1e-4]), samp_num: poly(2, [0.0, 5.0]), samp_den: poly(3, [1.0, 1e-4]),
             err_bias_m: bias, err_rand_m: bias,

@@ -167,7 +167,7 @@ impl StandConfig {
 }
 
 fn read(path: &Path) -> Result<CameraFile, StandError> {
-    let text =
-        std::fs::read_to_string(path).map_err(|source| StandError::Unreadable { path: path.to_owned(), source })?;
+    let text = io::read_regular_text(path, crate::files::TEXT_LIMIT)
+        .map_err(|source| StandError::Unreadable { path: path.to_owned(), source })?;
     serde_json::from_str(&text).map_err(|source| StandError::NotACamera { path: path.to_owned(), source })
 }

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use numeric::Progress;
 
+use crate::files::{self, FileError};
+
 /// Where the pointing corrections of the images come from.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -52,12 +54,12 @@ pub struct Corrections {
 }
 
 /// The part of a run's report that is read here.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct RunReport {
     images: Vec<RunImage>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct RunImage {
     path: PathBuf,
     applied_correction: Option<ImageCorrection>,
@@ -69,7 +71,7 @@ impl Corrections {
     /// # Errors
     /// [`CorrectionsError`] if the file cannot be read or is not the report of a DSM run.
     pub fn read(path: &Path) -> Result<Self, CorrectionsError> {
-        let text = std::fs::read_to_string(path)
+        let text = io::read_regular_text(path, crate::files::TEXT_LIMIT)
             .map_err(|source| CorrectionsError::Unreadable { path: path.to_owned(), source })?;
         let report: RunReport = serde_json::from_str(&text)
             .map_err(|source| CorrectionsError::NotAReport { path: path.to_owned(), source })?;
@@ -90,6 +92,28 @@ impl Corrections {
                 report_of_run(surface).map_or_else(|| Ok(Self::default()), |path| Self::read(&path))
             }
         }
+    }
+
+    /// Returns the corrections of some images only, which are known by the paths given here.
+    pub(crate) fn of_images(&self, images: &[PathBuf]) -> Self {
+        let one = |path: &PathBuf| Some((path.canonicalize().unwrap_or_else(|_| path.clone()), self.find(path)?));
+        Self { images: images.iter().filter_map(one).collect() }
+    }
+
+    /// Writes the corrections so that [`Self::read`] reads them. Writes nothing and removes an
+    /// older file when there are none.
+    ///
+    /// # Errors
+    /// [`FileError`].
+    pub(crate) fn write(&self, path: &Path, overwrite: bool) -> Result<(), FileError> {
+        if self.images.is_empty() {
+            return if overwrite { files::remove(path) } else { Ok(()) };
+        }
+        let image = |(path, correction): &(PathBuf, ImageCorrection)| RunImage {
+            path: path.clone(),
+            applied_correction: Some(correction.clone()),
+        };
+        files::write_json(path, &RunReport { images: self.images.iter().map(image).collect() }, overwrite)
     }
 
     /// Reads the RPC inside or beside an image, and adds the correction of the image.

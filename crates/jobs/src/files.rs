@@ -11,6 +11,9 @@ use io::raster::RasterError;
 use io::splat_ply::SplatPlyError;
 use serde::Serialize;
 
+/// Largest text that a job reads whole: a report, a configuration, an origin, bytes.
+pub(crate) const TEXT_LIMIT: u64 = 1 << 28;
+
 /// A file or folder that a job could not read or write.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -116,9 +119,19 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), FileError> {
     fs::create_dir_all(path).map_err(|source| FileError::Folder { path: path.to_owned(), source })
 }
 
+/// Removes a file if there is one.
+pub(crate) fn remove(path: &Path) -> Result<(), FileError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(FileError::Remove { path: path.to_owned(), source: error })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Reads a text file.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
-    fs::read_to_string(path).map_err(|source| FileError::Read { path: path.to_owned(), source })
+    io::read_regular_text(path, TEXT_LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })
 }
 
 /// Writes a value as indented JSON with a newline at the end. The file appears complete or not at

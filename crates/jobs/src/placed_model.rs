@@ -49,8 +49,8 @@ pub enum PlacedModelError {
 pub fn read(folder: &Path, origin: &LocalOrigin) -> Result<ColmapModel, PlacedModelError> {
     let mut model = io::colmap::read(folder)?;
     let path = folder.join("origin.json");
-    let text =
-        std::fs::read_to_string(&path).map_err(|source| PlacedModelError::NoOrigin { path: path.clone(), source })?;
+    let text = io::read_regular_text(&path, crate::files::TEXT_LIMIT)
+        .map_err(|source| PlacedModelError::NoOrigin { path: path.clone(), source })?;
     let own: LocalOrigin =
         serde_json::from_str(&text).map_err(|source| PlacedModelError::NotAnOrigin { path, source })?;
     if own.crs != origin.crs || own.vertical != origin.vertical {

@@ -215,7 +215,9 @@ impl SceneWriter<'_> {
 
     fn write_map(&self, name: &str, bands: &[Band<'_>]) -> Result<(), FileError> {
         let truth = &self.simulation.truth;
-        let cog = CogRaster::new(bands, truth.geotransform, Crs::ellipsoidal(truth.epsg));
+        let holds_heights = bands.iter().all(|band| band.description == "height_m");
+        let crs = Crs::ellipsoidal(truth.epsg);
+        let cog = CogRaster { holds_heights, ..CogRaster::new(bands, truth.geotransform, crs) };
         Ok(write_cog(self.folder.join("truth").join(name), &cog, self.overwrite)?)
     }
 }

@@ -1,7 +1,7 @@
 //! The triangles of a city model with their areas, normals and an index for ray casting.
 
 use bvh::Bvh;
-use city::{BuildingRole, CityModel, TriangleMesh};
+use city::{BuildingRole, CityModel, SurfaceClass, TriangleMesh};
 use rayon::prelude::*;
 
 use crate::PriorsError;
@@ -31,7 +31,7 @@ impl PriorModel {
     /// - [`PriorsError::Objects`] when `is_building` is shorter than the list of objects.
     pub fn new(mesh: TriangleMesh, is_building: &[bool]) -> Result<Self, PriorsError> {
         mesh.validate()?;
-        let bvh = Bvh::new(&mesh.positions, &mesh.triangles)?;
+        let bvh = Bvh::new(&mesh.positions, &visible_triangles(&mesh))?;
         let known = |surface: &city::MeshSurface| is_building.get(surface.object as usize).copied();
         if let Some(surface) = mesh.surfaces.iter().find(|surface| known(surface).is_none()) {
             return Err(PriorsError::Objects { flags: is_building.len(), object: surface.object });
@@ -87,6 +87,14 @@ pub fn buildings_of(model: &CityModel) -> Vec<bool> {
     roles().map(|role| !is_named || !matches!(role, BuildingRole::Other | BuildingRole::Interior)).collect()
 }
 
+/// Returns the triangles for ray casting. Closure surfaces close a solid and do not exist in
+/// reality, so nothing sees them and they hide nothing: each becomes a point, which no ray hits.
+fn visible_triangles(mesh: &TriangleMesh) -> Vec<[u32; 3]> {
+    let is_virtual = |triangle: usize| mesh.surface(triangle).class == SurfaceClass::Closure;
+    let one = |(number, &corners): (usize, &[u32; 3])| if is_virtual(number) { [corners[0]; 3] } else { corners };
+    mesh.triangles.iter().enumerate().map(one).collect()
+}
+
 /// Returns a vector along the normal whose length is twice the area.
 fn doubled_area([a, b, c]: [Vector; 3]) -> Vector {
     cross(sub(b, a), sub(c, a))
@@ -112,6 +120,7 @@ fn normals(mesh: &TriangleMesh) -> Vec<Vector> {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use bvh::Ray;
     use city::{MeshSurface, ModelPoint, SurfaceClass};
 
     use super::*;
@@ -161,6 +170,17 @@ pub(crate) mod tests {
         );
         let missing = PriorModel::new(cuboid([0.0; 3], [1.0; 3]), &[]).unwrap_err();
         assert_eq!(missing, PriorsError::Objects { flags: 0, object: 0 });
+    }
+
+    /// A ray from above passes the closure over a box and meets its ground.
+    #[test]
+    fn closure_surfaces_are_not_there() {
+        let mut mesh = cuboid([0.0; 3], [8.0, 6.0, 3.0]);
+        mesh.surfaces[1].class = SurfaceClass::Closure;
+        let model = PriorModel::new(mesh, &[true]).unwrap();
+        let ray = Ray { origin: [1.0, 1.5, 10.0], direction: [0.0, 0.0, -1.0], end: f64::INFINITY };
+        let hit = model.bvh().closest_hit(&ray).unwrap();
+        assert_eq!(model.mesh().surface(hit.triangle as usize).class, SurfaceClass::Ground);
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! 1984), which tolerates up to half of outliers. The least-squares fit to the pairs within the
 //! threshold is repeated until the set of inliers does not change. Where no threshold is given, it
 //! is 2.19 times the median of the residuals, estimated again in every round: the 99th percentile
-//! of the length of an isotropic normal vector.
+//! of the length of an isotropic normal vector. It is never less than a centimetre.
 
 use camera::Similarity;
 
@@ -21,6 +21,9 @@ const ROUNDS: usize = 50;
 /// Ratio of the 99th percentile of |e| to its median for a normal vector of three equal components:
 /// 3.368 / 1.538.
 const PERCENTILE_99: f64 = 2.19;
+/// Least automatic threshold, metres. Positions are written with a few decimals, so the residuals of
+/// exact data are their rounding, and a multiple of its median leaves right positions out.
+const FLOOR_M: f64 = 0.01;
 /// Share of the extent of the world's positions below which residuals are rounding errors.
 const ROUNDING: f64 = 1e-10;
 
@@ -92,7 +95,7 @@ pub fn align(pairs: &[PointPair], config: &AlignConfig) -> Result<ModelAlignment
         Err(error @ (AlignError::TooFew { .. } | AlignError::NotFinite { .. })) => return Err(error),
         plain => plain,
     };
-    let floor = ROUNDING * extent(pairs);
+    let floor = FLOOR_M.max(ROUNDING * extent(pairs));
     let mut best: Option<(f64, Similarity)> = None;
     let mut consider = |triple: [usize; 3]| {
         if let Ok(proposal) = fit_similarity(&triple.map(|i| pairs[i])) {
@@ -169,7 +172,7 @@ fn refine(
         let residuals = residuals(pairs, &similarity);
         // The inliers' median: among all pairs, outliers would widen it.
         let scale = if round == 0 { half(residuals.clone()) } else { median_of(&residuals, &inliers) };
-        let threshold = threshold_m.unwrap_or(PERCENTILE_99 * scale).max(floor);
+        let threshold = threshold_m.unwrap_or((PERCENTILE_99 * scale).max(floor));
         let now: Vec<bool> = residuals.iter().map(|&r| r <= threshold).collect();
         let chosen: Vec<PointPair> = pairs.iter().zip(&now).filter(|(_, inlier)| **inlier).map(|(p, _)| *p).collect();
         if chosen.len() < 3.max(pairs.len().div_ceil(3)) {
@@ -254,6 +257,17 @@ mod tests {
                 prop_assert!(off(&found.world_from_model, &pairs) < 3.0 * expected, "{} {expected}", off(&found.world_from_model, &pairs));
             }
         }
+    }
+
+    /// Positions that are exact but for their rounding to millimetres are all right.
+    #[test]
+    fn rounding_makes_no_outliers() {
+        let mut exact = pairs(12, 0.0, 0.0, 7);
+        for pair in &mut exact {
+            pair.target = pair.target.map(|c| (c * 1e3).round() / 1e3);
+        }
+        let found = align(&exact, &AlignConfig::default()).unwrap();
+        assert_eq!((found.inlier_count(), found.threshold_m), (12, FLOOR_M));
     }
 
     #[test]

@@ -8,9 +8,13 @@ use city::ModelPoint;
 use super::CityFault;
 use super::builder::Builder;
 
-/// Limit of the vertices of all instances in a file. A few kilobytes of text can ask for any number
-/// of vertices.
-const MAX_VERTICES: usize = 20_000_000;
+/// Limit of the size of what references in a file repeat: a few kilobytes of text can ask for any
+/// number of surfaces. The unit is about four bytes of memory.
+const EXPANDED_MAX: usize = 40_000_000;
+/// Size of a surface without its rings, of a ring without its vertices, and of a vertex.
+const SURFACE_SIZE: usize = 16;
+const RING_SIZE: usize = 8;
+const VERTEX_SIZE: usize = 8;
 
 /// Placement of a shape: a 4 × 4 matrix in row order, then a shift by a point of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,11 +34,37 @@ impl Placement {
     }
 }
 
-/// Counter of the instances of a file.
+/// Size of what the references of a file have repeated so far.
+#[derive(Debug, Default)]
+pub(super) struct Expansion {
+    size: usize,
+}
+
+/// Returns the size of a surface with `rings` rings of `corners` corners in all.
+pub(super) fn surface_size(rings: usize, corners: usize) -> usize {
+    SURFACE_SIZE + rings.saturating_mul(RING_SIZE).saturating_add(corners)
+}
+
+impl Expansion {
+    /// Counts the size of what is repeated next, before it is made. A file may repeat `own`, the
+    /// size of what it holds itself, any number of times up to the limit, and once in any case.
+    ///
+    /// # Errors
+    /// A fault at the place `at` when the file repeats too much.
+    pub(super) fn add(&mut self, size: usize, own: usize, at: &str) -> Result<(), CityFault> {
+        self.size = self.size.saturating_add(size);
+        if self.size > own.saturating_add(EXPANDED_MAX) {
+            let what = "the shapes that the file repeats by reference do not fit the memory, cut it into tiles";
+            return Err(CityFault::unsupported(what, at));
+        }
+        Ok(())
+    }
+}
+
+/// Placed shapes of a file.
 #[derive(Debug, Default)]
 pub(super) struct Instances {
-    /// Vertices so far.
-    vertices: usize,
+    pub(super) expansion: Expansion,
 }
 
 impl Instances {
@@ -42,7 +72,7 @@ impl Instances {
     /// the shape.
     ///
     /// # Errors
-    /// A fault at the place `at` when the instances of the file have too many vertices.
+    /// A fault at the place `at` when the instances of the file are too large.
     pub(super) fn place(
         &mut self,
         builder: &mut Builder,
@@ -50,11 +80,7 @@ impl Instances {
         vertices: impl ExactSizeIterator<Item = (u64, [f64; 3])>,
         at: &str,
     ) -> Result<HashMap<u64, u32>, CityFault> {
-        self.vertices += vertices.len();
-        if self.vertices > MAX_VERTICES {
-            let what = format!("the instances of shapes have more than {MAX_VERTICES} vertices, which is the limit");
-            return Err(CityFault::unsupported(what, at));
-        }
+        self.expansion.add(vertices.len().saturating_mul(VERTEX_SIZE), 0, at)?;
         let mut index_of = HashMap::with_capacity(vertices.len());
         for (number, position) in vertices {
             let vertex = builder.vertex(placement.of(position));

@@ -7,6 +7,7 @@ use city::{CityModel, Defect};
 use super::error::{CityError, CityFault};
 use super::format::{CityFormat, Parsed};
 use super::{citygml, cityjson, obj, ply};
+use crate::regular::read_regular;
 
 /// Largest file that is read, bytes.
 pub const SIZE_LIMIT: u64 = 2 << 30;
@@ -85,5 +86,5 @@ pub(crate) fn content(path: &Path) -> Result<Vec<u8>, CityError> {
     if found.len() > SIZE_LIMIT {
         return Err(CityError::TooLarge { path: path.to_owned(), bytes: found.len(), limit: SIZE_LIMIT });
     }
-    std::fs::read(path).map_err(unreadable)
+    read_regular(path, SIZE_LIMIT).map_err(unreadable)
 }

@@ -11,6 +11,7 @@ mod header;
 use std::path::{Path, PathBuf};
 
 use crate::atomic::{SaveError, write_stream};
+use crate::regular::read_regular;
 
 pub use data::{NpyArray, NpyData, NpyNumber};
 
@@ -110,7 +111,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<NpyArray, NpyError> {
     if size > SIZE_LIMIT {
         return Err(invalid(format!("it has {size} bytes, expected at most {SIZE_LIMIT}")));
     }
-    parse(&std::fs::read(path).map_err(unreadable)?).map_err(invalid)
+    parse(&read_regular(path, SIZE_LIMIT).map_err(unreadable)?).map_err(invalid)
 }
 
 fn parse(bytes: &[u8]) -> Result<NpyArray, String> {

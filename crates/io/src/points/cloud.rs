@@ -1,6 +1,5 @@
 //! Reads a cloud, as points or as a grid.
 
-use std::fs::File;
 use std::io::{BufReader, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -13,6 +12,7 @@ use raster::{GeoTransform, Grid};
 use super::crs::{Stated, stated};
 use super::{PointsError, preflight};
 use crate::raster::Dem;
+use crate::regular;
 
 /// Largest number of points in a batch.
 const BATCH: u64 = 1 << 16;
@@ -31,7 +31,7 @@ const CELLS_ALWAYS: u64 = 1 << 20;
 pub fn is_point_cloud(path: impl AsRef<Path>) -> bool {
     use std::io::Read;
     let mut magic = [0u8; 4];
-    File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == *b"LASF"
+    regular::open(path.as_ref()).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == *b"LASF"
 }
 
 /// An open LAS or LAZ file.
@@ -98,7 +98,7 @@ impl PointCloud {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, PointsError> {
         let path = path.as_ref().to_owned();
         let unreadable = |source| PointsError::Unreadable { path: path.clone(), source };
-        let file = File::open(&path).map_err(unreadable)?;
+        let file = regular::open(&path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         let mut file = BufReader::new(file);
         let damaged = |reason| PointsError::damaged(&path, reason);

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use camera::Rpc;
 use crs::Crs;
-use gdal::raster::RasterCreationOptions;
+use gdal::raster::{ColorInterpretation, RasterCreationOptions};
 use gdal::spatial_ref::SpatialRef;
 use gdal::{Dataset, DriverManager, Metadata};
 use raster::{GeoTransform, NO_DATA};
@@ -47,6 +47,9 @@ pub struct CogPlace<'a> {
     pub geotransform: GeoTransform,
     /// Horizontal CRS and vertical datum.
     pub crs: Crs,
+    /// Whether the cells are heights. The vertical datum is written for heights only: it would give
+    /// counts and shares the unit metre.
+    pub holds_heights: bool,
     /// Further items of the default metadata domain, as key and value.
     pub metadata: &'a [(&'a str, &'a str)],
     /// Number of threads that compress.
@@ -62,6 +65,10 @@ pub struct CogRaster<'a> {
     pub geotransform: GeoTransform,
     /// Horizontal CRS and vertical datum.
     pub crs: Crs,
+    /// Whether the cells are heights, as in [`CogPlace`].
+    pub holds_heights: bool,
+    /// Bands that show red, green and blue, counted from 1, where the raster is a colour picture.
+    pub colours: Option<[usize; 3]>,
     /// No-data value, which replaces NaN. `None` declares none, which suits integer bands only.
     pub no_data: Option<f64>,
     /// Resampling of overviews.
@@ -73,13 +80,24 @@ pub struct CogRaster<'a> {
 }
 
 impl<'a> CogRaster<'a> {
-    /// A raster with the defaults: no-data −32768 and averaged overviews for float bands, nearest
-    /// overviews for others, one thread.
+    /// A raster of heights, or of a vertical datum without meaning (ellipsoid), with the defaults:
+    /// no-data −32768 and averaged overviews for float bands, nearest overviews for others, one
+    /// thread.
     pub fn new(bands: &'a [Band<'a>], geotransform: GeoTransform, crs: Crs) -> Self {
         let float = Band::first_is_float(bands);
         let no_data = float.then_some(f64::from(NO_DATA));
         let overviews = if float { Sampling::Average } else { Sampling::Nearest };
-        Self { bands, geotransform, crs, no_data, overviews, metadata: &[], threads: 1 }
+        Self {
+            bands,
+            geotransform,
+            crs,
+            holds_heights: true,
+            colours: None,
+            no_data,
+            overviews,
+            metadata: &[],
+            threads: 1,
+        }
     }
 }
 
@@ -117,9 +135,22 @@ pub fn write_cog(path: impl AsRef<Path>, raster: &CogRaster<'_>, overwrite: bool
         let factors = overview_factors(memory.raster_size());
         with_gdal(|| memory.build_overviews(resampling(raster.overviews), &factors, &[]))
             .map_err(|reason| RasterError::unwritable(path, reason))?;
-        let CogRaster { geotransform, crs, metadata, threads, .. } = *raster;
-        let place = CogPlace { geotransform, crs, metadata, threads };
+        set_colours(&memory, raster.colours).map_err(|reason| RasterError::unwritable(path, reason))?;
+        let CogRaster { geotransform, crs, holds_heights, metadata, threads, .. } = *raster;
+        let place = CogPlace { geotransform, crs, holds_heights, metadata, threads };
         finish_cog(&mut memory, place, raster.overviews, made).map_err(|reason| RasterError::unwritable(path, reason))
+    })
+}
+
+/// Names the colours of the bands, counted from 1, that show red, green and blue.
+fn set_colours(dataset: &Dataset, colours: Option<[usize; 3]>) -> Result<(), String> {
+    let Some(bands) = colours.filter(|bands| bands.iter().all(|band| (1..=dataset.raster_count()).contains(band)))
+    else {
+        return Ok(());
+    };
+    let names = [ColorInterpretation::RedBand, ColorInterpretation::GreenBand, ColorInterpretation::BlueBand];
+    with_gdal(|| {
+        bands.iter().zip(names).try_for_each(|(&band, name)| dataset.rasterband(band)?.set_color_interpretation(name))
     })
 }
 
@@ -158,9 +189,12 @@ pub(super) fn finish_cog(
         ("NUM_THREADS", threads.as_str()),
     ];
     with_gdal(|| {
-        dataset.set_spatial_ref(&SpatialRef::from_definition(&place.crs.to_string())?)?;
+        let crs = if place.holds_heights { place.crs.to_string() } else { place.crs.horizontal_definition() };
+        dataset.set_spatial_ref(&SpatialRef::from_definition(&crs)?)?;
         dataset.set_geo_transform(&place.geotransform.0)?;
-        dataset.set_metadata_item(VERTICAL_DATUM, &place.crs.vertical.to_string(), "")?;
+        if place.holds_heights {
+            dataset.set_metadata_item(VERTICAL_DATUM, &place.crs.vertical.to_string(), "")?;
+        }
         for (key, value) in place.metadata {
             dataset.set_metadata_item(key, value, "")?;
         }

@@ -222,7 +222,9 @@ mod tests {
         assert!(spool.put((0, 0), BandData::U8(&Grid::filled(2, 2, 1))).is_err());
         assert!(spool.put((699, 0), BandData::F32(&Grid::filled(2, 2, 1.0))).is_err());
         let (a, b) = (folder.path().join("a.tif"), folder.path().join("b.tif"));
-        spool.into_cog(&a, CogPlace { geotransform, crs, metadata: &[], threads: 1 }, false).unwrap();
+        spool
+            .into_cog(&a, CogPlace { geotransform, crs, holds_heights: true, metadata: &[], threads: 1 }, false)
+            .unwrap();
         assert!(!folder.path().join("s.tif").exists());
         let bands = [Band { description: "height_m", data: BandData::F32(&whole) }];
         write_cog(&b, &CogRaster::new(&bands, geotransform, crs), false).unwrap();

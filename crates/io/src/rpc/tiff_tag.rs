@@ -3,7 +3,6 @@
 //! The tag has ERR_BIAS and ERR_RAND, then offsets, scales and coefficients in the order of RPC00B.
 //! Read here, the doubles keep all their bits; GDAL reports them as text with 15 digits.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -14,6 +13,7 @@ use super::draft::{Draft, Entry};
 use super::error::{Fault, RpcReadError};
 use super::names::{RPC00B, Scalar};
 use super::rpc_file::Parsed;
+use crate::regular;
 
 const RPC_COEFFICIENT_TAG: u16 = 50844;
 /// Numbers in the tag.
@@ -22,7 +22,7 @@ const COUNT: usize = 92;
 /// Reads the RPC of the tag; `None` when the file is not a TIFF that can be read or does not have
 /// the tag.
 pub(super) fn read(path: &Path) -> Result<Option<Result<Parsed, Fault>>, RpcReadError> {
-    let file = File::open(path).map_err(|source| RpcReadError::Io { path: path.to_owned(), source })?;
+    let file = regular::open(path).map_err(|source| RpcReadError::Io { path: path.to_owned(), source })?;
     let Ok(mut decoder) = Decoder::new(BufReader::new(file)) else { return Ok(None) };
     let Ok(Some(value)) = decoder.find_tag(Tag::Unknown(RPC_COEFFICIENT_TAG)) else { return Ok(None) };
     let wrong_type =

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{SplatPlyError, invalid};
 use crate::atomic::write_bytes;
+use crate::regular::read_regular_text;
 
 /// Point of a map that local positions are relative to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -70,7 +71,7 @@ impl LocalOrigin {
     /// [`SplatPlyError::Invalid`] when it is not an origin.
     pub fn read_beside(file: &Path) -> Result<Option<Self>, SplatPlyError> {
         let path = origin_path(file);
-        match std::fs::read_to_string(&path) {
+        match read_regular_text(&path, 1 << 20) {
             Ok(text) => {
                 let origin: Self = serde_json::from_str(&text).map_err(|error| {
                     invalid(&path, format!("the file is not an origin as skysweep writes it ({error})"))

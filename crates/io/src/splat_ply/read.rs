@@ -9,7 +9,10 @@ use gaussian::Splat;
 use super::error::{SplatPlyError, invalid};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatForm, SplatLayout};
 use super::origin::LocalOrigin;
+use crate::regular::read_regular;
 
+/// Largest file that is read, bytes.
+const SIZE_LIMIT: u64 = 16 << 30;
 /// Longest header that is searched for its end, bytes.
 const HEADER_LIMIT: usize = 1 << 20;
 /// Thickness of a disc as a fraction of its smaller scale.
@@ -78,7 +81,8 @@ struct Column {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
-    let bytes = std::fs::read(path).map_err(|source| SplatPlyError::Unreadable { path: path.to_owned(), source })?;
+    let bytes =
+        read_regular(path, SIZE_LIMIT).map_err(|source| SplatPlyError::Unreadable { path: path.to_owned(), source })?;
     let header = header(&bytes).map_err(|what| invalid(path, what))?;
     let room = (bytes.len() - header.body) / header.row.max(1);
     if header.row == 0 || header.count > room as u64 {

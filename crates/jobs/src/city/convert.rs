@@ -1,5 +1,7 @@
 //! Writing a city model in another format.
 
+use std::collections::BTreeMap;
+
 use io::citymodel::{CityJsonOptions, MeshFormat, write_cityjson, write_footprints, write_mesh};
 use serde::Serialize;
 
@@ -26,7 +28,8 @@ pub struct CityConvertReport {
 /// (CityJSON 2.0) of a model.
 ///
 /// # Errors
-/// [`CityJobError::UnknownEnding`], [`CityJobError::Read`], [`CityJobError::Model`], and
+/// [`CityJobError::UnknownEnding`], [`CityJobError::NothingSelected`] when no object has a surface to
+/// write (CityJSON takes all objects and levels), [`CityJobError::Read`], [`CityJobError::Model`], and
 /// [`CityJobError::Job`] when an output exists or cannot be written.
 ///
 /// ```
@@ -42,13 +45,31 @@ pub fn convert(config: &CityConvertConfig, progress: &dyn Progress) -> Result<Ci
     config.validate()?;
     let format = config.output_format()?;
     let opened = input::open(&config.input, progress)?;
+    let account = CityAccount::of(&opened);
+    if format != CityOutputFormat::Cityjson && account.summary.triangles == 0 {
+        account.write(&config.input)?;
+        return Err(nothing_selected(config, &account.summary));
+    }
     let without_footprint = write(config, format, &opened)?;
     if without_footprint > 0 {
         progress.warn(&format!("{without_footprint} objects have no surface that looks down, and no footprint"));
     }
-    let account = CityAccount::of(&opened);
     account.write(&config.input)?;
     Ok(CityConvertReport { summary: account.summary, format, without_footprint })
+}
+
+/// The error of a model without a triangle to write.
+fn nothing_selected(config: &CityConvertConfig, summary: &CitySummary) -> CityJobError {
+    let listed = |counts: &BTreeMap<String, usize>| {
+        counts.iter().map(|(name, count)| format!("{name}: {count}")).collect::<Vec<_>>().join(", ")
+    };
+    let levels: Vec<&str> = summary.lods.keys().map(String::as_str).collect();
+    CityJobError::NothingSelected {
+        path: config.input.file.clone(),
+        objects: summary.objects,
+        reasons: listed(&summary.statuses),
+        levels: if levels.is_empty() { "none".to_owned() } else { levels.join(", ") },
+    }
 }
 
 /// Writes the output and returns the number of objects without a footprint.

@@ -28,6 +28,21 @@ pub enum CityJobError {
         /// The output file.
         path: PathBuf,
     },
+    /// No object has surfaces at the level of detail that was asked for.
+    #[error(
+        "no surface is selected of {objects} objects ({reasons}); the levels of detail in the file are {levels}: {}",
+        path.display()
+    )]
+    NothingSelected {
+        /// The model.
+        path: PathBuf,
+        /// Number of objects in the file.
+        objects: usize,
+        /// Number of objects per status.
+        reasons: String,
+        /// Levels of detail in the file, most detailed last.
+        levels: String,
+    },
     /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
     Job(#[from] JobError),

@@ -18,6 +18,7 @@ use crate::dsm::prior_findings::PriorFindings;
 use crate::dsm::rasters::ChunkRasters;
 use crate::dsm::surface::SurfaceCounts;
 use crate::dsm::values::HeightRange;
+use crate::files::TEXT_LIMIT;
 
 /// Name of the file with everything but the rasters.
 const RECORD: &str = "result.json";
@@ -93,7 +94,7 @@ impl ChunkResult {
     pub fn read(folder: &Path) -> Result<Self, DsmError> {
         let path = folder.join(RECORD);
         let failed = |reason: String| DsmError::ChunkFile { path: path.clone(), reason };
-        let json = fs::read(&path).map_err(|e| failed(e.to_string()))?;
+        let json = io::read_regular(&path, TEXT_LIMIT).map_err(|e| failed(e.to_string()))?;
         let ChunkRecord { core, status } = serde_json::from_slice(&json).map_err(|e| failed(e.to_string()))?;
         let content = match status {
             Status::Unseen => ChunkContent::Unseen,

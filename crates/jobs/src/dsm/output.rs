@@ -37,9 +37,12 @@ pub(crate) const FILES: [&str; 9] = [
 /// Largest width and height of the pictures of a large scene, pixels.
 const PICTURE_SIDE: usize = 4096;
 
+/// The only raster of heights.
+const HEIGHTS: &str = "dsm.tif";
+
 /// Names and contents of the rasters, in the order of [`bands`].
 const BANDS: [(&str, SpoolBand<'static>); 5] = [
-    ("dsm.tif", SpoolBand { description: "height_m", is_float: true, no_data: NO_DATA as f64 }),
+    (HEIGHTS, SpoolBand { description: "height_m", is_float: true, no_data: NO_DATA as f64 }),
     ("sigma.tif", SpoolBand { description: "height_standard_deviation_m", is_float: true, no_data: NO_DATA as f64 }),
     ("views.tif", SpoolBand { description: "number_of_views", is_float: false, no_data: 0.0 }),
     ("confidence.tif", SpoolBand { description: "confidence_0_to_1", is_float: true, no_data: NO_DATA as f64 }),
@@ -168,9 +171,11 @@ impl<'a> ChunkedOutput<'a> {
             write_pictures(&folder.dsm(), &reduced, grid.gsd_m * factor as f64)?;
         }
         let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
-        let place =
-            CogPlace { geotransform: grid.geotransform, crs, metadata: &[], threads: rayon::current_num_threads() };
+        let geotransform = grid.geotransform;
         for ((name, _), spool) in BANDS.iter().zip(spools) {
+            let holds_heights = *name == HEIGHTS;
+            let place =
+                CogPlace { geotransform, crs, holds_heights, metadata: &[], threads: rayon::current_num_threads() };
             spool.into_cog(folder.dsm().join(name), place, false)?;
         }
         write_texts(&folder, config, report)?;
@@ -231,7 +236,9 @@ fn write_rasters(
     write_pictures(folder, &heights, grid.gsd_m)?;
     for ((name, band), data) in BANDS.iter().zip(bands(rasters, &heights)) {
         let bands = [Band { description: band.description, data }];
-        let raster = CogRaster { no_data: Some(band.no_data), ..CogRaster::new(&bands, grid.geotransform, crs) };
+        let holds_heights = *name == HEIGHTS;
+        let raster =
+            CogRaster { no_data: Some(band.no_data), holds_heights, ..CogRaster::new(&bands, grid.geotransform, crs) };
         write_cog(folder.join(name), &raster, false)?;
     }
     Ok(())

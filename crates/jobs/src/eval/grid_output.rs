@@ -128,6 +128,7 @@ fn write_error_map(
     overwrite: bool,
 ) -> Result<(), EvalJobError> {
     let bands = [Band { description: "error_m", data: BandData::F32(&report.found.errors) }];
-    let raster = CogRaster::new(&bands, inputs.reference.geotransform, Crs::ellipsoidal(horizontal));
+    let place = (inputs.reference.geotransform, Crs::ellipsoidal(horizontal));
+    let raster = CogRaster { holds_heights: false, ..CogRaster::new(&bands, place.0, place.1) };
     Ok(write_cog(path, &raster, overwrite).map_err(FileError::from)?)
 }

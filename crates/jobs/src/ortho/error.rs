@@ -80,6 +80,17 @@ pub enum OrthoError {
         /// Bands.
         bands: usize,
     },
+    /// No image shows any cell of the area.
+    #[error(
+        "no image shows the area: of its {cells} cells {heights} have a height in the surface model; \
+         check that the area is in the coordinates of the surface model"
+    )]
+    NothingSeen {
+        /// Cells of the area.
+        cells: usize,
+        /// Cells with a height.
+        heights: usize,
+    },
     /// The grey values cannot be brought together.
     #[error("the grey values of the images cannot be brought together")]
     Balance(#[from] ortho::BalanceError),

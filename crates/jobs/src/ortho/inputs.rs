@@ -148,6 +148,9 @@ impl OrthoGrid {
             Err(OrthoError::Extent { low, high, cells, cell_m: cell })
         };
         let (columns, rows) = (count(x_min, x_max)?, count(y_min, y_max)?);
+        if columns.saturating_mul(rows) > CELLS_MAX {
+            return Err(OrthoError::TooLarge { width: columns, height: rows, bands: 1 });
+        }
         let geotransform = GeoTransform::north_up(x_min, y_max, cell);
         let ground = GridGround::new(projection, &geotransform, (columns, rows))?;
         Ok(Self { geotransform, width: columns, height: rows, ground, is_dsm: false })

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, SampleType, write_cog};
+use io::raster::{Band, BandData, CogRaster, LumaRule, SampleType, write_cog};
 use ortho::Balance;
 use raster::Grid;
 use serde::Serialize;
@@ -69,7 +69,8 @@ pub(super) fn write(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho) ->
         Band { description: "0_seen_1_hidden_2_outside_255_no_height", data: BandData::U8(&made.state) },
         Band { description: "image_from_1", data: BandData::U8(&made.view) },
     ];
-    let raster = CogRaster { threads, ..CogRaster::new(&mask_bands, inputs.grid.geotransform, crs) };
+    let raster =
+        CogRaster { threads, holds_heights: false, ..CogRaster::new(&mask_bands, inputs.grid.geotransform, crs) };
     write_cog(&mask, &raster, config.overwrite).map_err(FileError::from)?;
     let names: Vec<String> = (1..=made.bands.len()).map(|band| format!("band_{band}")).collect();
     match sample_type(inputs) {
@@ -104,8 +105,19 @@ fn write_ortho(
 ) -> Result<(), OrthoError> {
     let crs = Crs::ellipsoidal(inputs.epsg);
     let overviews = io::raster::Sampling::Average;
-    let raster = CogRaster { no_data, threads, overviews, ..CogRaster::new(bands, inputs.grid.geotransform, crs) };
+    let colours = colours(inputs);
+    let plain = CogRaster::new(bands, inputs.grid.geotransform, crs);
+    let raster = CogRaster { no_data, threads, overviews, holds_heights: false, colours, ..plain };
     Ok(write_cog(&config.output, &raster, config.overwrite).map_err(FileError::from)?)
+}
+
+/// Returns the bands that are red, green and blue, where that is so in all images.
+fn colours(inputs: &OrthoInputs) -> Option<[usize; 3]> {
+    let mut rules = inputs.images.iter().map(|image| &image.source.info().luma);
+    match rules.next() {
+        Some(LumaRule::Rgb(bands)) if rules.all(|rule| *rule == LumaRule::Rgb(*bands)) => Some(*bands),
+        _ => None,
+    }
 }
 
 /// Rounds a sample to the range of an integer type; NaN becomes no-data.

@@ -6,6 +6,7 @@ use super::config::OrthoConfig;
 use super::error::OrthoError;
 use super::inputs::OrthoInputs;
 use super::output::OrthoReport;
+use super::states::{HIDDEN, SEEN, VOID};
 use super::{mosaic, output};
 use crate::{files, threads};
 
@@ -36,6 +37,10 @@ pub fn run(config: &OrthoConfig, progress: &dyn Progress) -> Result<OrthoReport,
     threads::install(config.threads, || {
         let inputs = OrthoInputs::open(config, progress)?;
         let made = mosaic::make(&inputs, config, progress)?;
+        if !made.state.data().iter().any(|state| matches!(*state, SEEN | HIDDEN)) {
+            let heights = made.state.data().iter().filter(|state| **state != VOID).count();
+            return Err(OrthoError::NothingSeen { cells: made.state.data().len(), heights });
+        }
         output::write(config, &inputs, &made)
     })?
 }

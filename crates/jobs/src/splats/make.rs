@@ -187,9 +187,17 @@ fn make_and_write(config: &SplatsConfig, progress: &dyn Progress) -> Result<Spla
     let form = if config.discs { SplatForm::Discs } else { SplatForm::Ellipsoids };
     let layout = SplatLayout { form, sh_degree: config.sh_degree };
     let local = LocalOrigin::new(map.projection.definition(), "ellipsoid", origin);
+    // `render` looks through the same cameras.
+    let corrections = Corrections::for_surface(&config.dsm, &config.corrections)?.of_images(&config.images);
+    corrections.write(&pointing_path(&config.output), config.overwrite)?;
     io::splat_ply::write(&config.output, &scene.splats, &local, layout, config.overwrite).map_err(FileError::write)?;
     write_renderings(config, &scene.renderings)?;
     Ok(SplatsReport::new(config, scene.report))
+}
+
+/// Returns the file beside splats that holds the pointing corrections of their images.
+pub(super) fn pointing_path(splats: &Path) -> PathBuf {
+    splats.with_extension("pointing.json")
 }
 
 fn splat_scene(

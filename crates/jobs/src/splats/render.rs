@@ -22,7 +22,8 @@ use serde::{Deserialize, Serialize};
 
 use super::error::SplatsJobError;
 use super::image;
-use crate::corrections::Corrections;
+use super::make::pointing_path;
+use crate::corrections::{CorrectionSource, Corrections};
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
 use crate::placed_model;
@@ -47,9 +48,9 @@ pub struct SplatRenderConfig {
     /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered
     /// and not compared.
     pub pictures: Option<PathBuf>,
-    /// Report of a DSM run with the pointing corrections of the images; RPCs as they are when
-    /// `None`.
-    pub corrections: Option<PathBuf>,
+    /// Source of the pointing corrections of the images. [`CorrectionSource::SurfaceRun`] takes
+    /// those that the splats were made with, which lie beside them.
+    pub corrections: CorrectionSource,
     /// Folder to write.
     pub output: PathBuf,
     /// Worker threads; one per core when `None`.
@@ -91,7 +92,7 @@ impl SplatRenderConfig {
             images: Vec::new(),
             cameras: None,
             pictures: None,
-            corrections: None,
+            corrections: CorrectionSource::default(),
             output,
             threads: None,
             overwrite: false,
@@ -170,7 +171,14 @@ impl RenderSession<'_> {
     fn run(mut self, progress: &dyn Progress) -> Result<Vec<SplatRenderView>, SplatsJobError> {
         let placed = |folder: &PathBuf| placed_model::read(folder, &self.origin);
         let model = self.config.cameras.as_ref().map(placed).transpose()?;
-        let corrections = self.config.corrections.as_deref().map(Corrections::read).transpose()?.unwrap_or_default();
+        let corrections = match &self.config.corrections {
+            CorrectionSource::Uncorrected => Corrections::default(),
+            CorrectionSource::Report(path) => Corrections::read(path)?,
+            CorrectionSource::SurfaceRun => {
+                let beside = pointing_path(&self.config.splats);
+                if beside.is_file() { Corrections::read(&beside)? } else { Corrections::default() }
+            }
+        };
         let cameras = model.as_ref().map_or(0, |model| model.views.len());
         progress.begin("views", self.config.images.len() + cameras);
         for path in &self.config.images {

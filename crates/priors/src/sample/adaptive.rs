@@ -25,6 +25,8 @@ const PIECE: f64 = 0.7;
 const CUTS_PER_POINT: usize = 30;
 /// Largest number of cuts, which ends the work on a huge plane with a tiny error.
 const MAX_CUTS: usize = CUTS_PER_POINT * LIMIT;
+/// Largest number of pieces of a triangle, which are in memory at a time.
+const PIECES_MAX: usize = 1 << 22;
 /// Margin for rounding in the test whether a crease is still needed, metres.
 const ROUNDING_M: f64 = 1e-9;
 
@@ -114,11 +116,18 @@ impl<'a> Work<'a> {
     /// Divides each triangle into pieces, and returns the results of `of_triangle`.
     fn pieces<T: Send>(&self, of_triangle: impl Fn(&[Piece], usize) -> T + Sync) -> Result<Vec<T>, PriorsError> {
         let triangles = 0..self.model.mesh().triangles.len();
+        // Points so far. Points that are made take memory, so the work ends with the limit.
+        let points = AtomicUsize::new(0);
         triangles
             .into_par_iter()
             .map(|triangle| {
                 let mut pieces = Vec::new();
                 self.cut(triangle, &mut pieces)?;
+                let share: f64 = pieces.iter().map(|piece| piece.share).sum();
+                let asked = points.fetch_add(share.min(LIMIT as f64 + 1.0) as usize, Ordering::Relaxed);
+                if asked > LIMIT {
+                    return Err(PriorsError::TooMany { asked: asked as u64, limit: LIMIT });
+                }
                 Ok(of_triangle(&pieces, triangle))
             })
             .collect()
@@ -148,7 +157,7 @@ impl<'a> Work<'a> {
                 continue;
             }
             let made = self.made.fetch_add(1, Ordering::Relaxed);
-            if made > MAX_CUTS {
+            if made > MAX_CUTS || pieces.len() + open.len() >= PIECES_MAX || near.len() >= PIECES_MAX {
                 return Err(PriorsError::TooMany { asked: (made / CUTS_PER_POINT) as u64, limit: LIMIT });
             }
             let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);

@@ -8,7 +8,7 @@ use city::{DefectCode, Geometry, GeometryKind, Lod, ModelPoint, SurfaceClass, Su
 use super::implicit::Implicit;
 use crate::citymodel::builder::Builder;
 use crate::citymodel::error::CityFault;
-use crate::citymodel::placement::Instances;
+use crate::citymodel::placement::{Expansion, Instances, surface_size};
 
 /// Limit of the depth of links that lead to links.
 const LINK_DEPTH_MAX: usize = 4;
@@ -129,6 +129,11 @@ fn resolve(
     polygons: &mut [Polygon],
     named: &HashMap<String, Named>,
 ) -> Result<Vec<Vec<Resolved>>, CityFault> {
+    let sizes: Vec<usize> =
+        polygons.iter().map(|p| surface_size(p.rings.len(), p.rings.iter().map(Vec::len).sum())).collect();
+    // A polygon that its own element uses and that a solid links to is in the model twice.
+    let own = sizes.iter().sum::<usize>().saturating_mul(4);
+    let mut expansion = Expansion::default();
     let mut links = Links { groups, named, followed: 0 };
     let mut resolved: Vec<Vec<Resolved>> = Vec::with_capacity(groups.len());
     for group in groups {
@@ -139,6 +144,8 @@ fn resolve(
                 builder.dropped(DefectCode::UnresolvedReference, group.object, format!("line {}", member.line), detail);
             }
         }
+        let size = found.iter().map(|member| sizes[member.polygon]).fold(0, usize::saturating_add);
+        expansion.add(size, own, &format!("line {}", group.line))?;
         // A boundary surface also classifies a polygon that belongs to a solid and that it only
         // links to.
         for member in &found {

@@ -9,7 +9,7 @@ use super::geometry::{Place, add};
 use super::schema::{Nested, Shape, Templates};
 use crate::citymodel::builder::Builder;
 use crate::citymodel::error::CityFault;
-use crate::citymodel::placement::{Instances, Placement};
+use crate::citymodel::placement::{Instances, Placement, surface_size};
 
 /// Adds an instance as a geometry. `vertices` is the range of the document's vertices in the model.
 pub(super) fn add_instance(
@@ -41,6 +41,7 @@ pub(super) fn add_instance(
     }
     let placement = Placement { matrix, origin: builder.position(anchor) };
     let used = used_vertices(shape, positions.len());
+    instances.expansion.add(size(&shape.boundaries), 0, &at)?;
     let index_of =
         instances.place(builder, &placement, used.into_iter().map(|index| (index as u64, positions[index])), &at)?;
     add(builder, shape, |index| index_of.get(&index).copied(), place);
@@ -62,6 +63,19 @@ fn template<'a>(instance: &Shape, templates: Option<&'a Templates>) -> Result<Fo
 fn matrix(instance: &Shape) -> Result<[f64; 16], &'static str> {
     let matrix = instance.matrix.as_deref().and_then(|m| <[f64; 16]>::try_from(m).ok());
     matrix.ok_or("a transformationMatrix of 16 numbers")
+}
+
+/// Returns the size of the surfaces of nested boundaries: each list counts as a surface or a ring.
+fn size(boundaries: &Nested) -> usize {
+    let mut total = 0usize;
+    let mut open = vec![boundaries];
+    while let Some(nested) = open.pop() {
+        if let Nested::List(list) = nested {
+            total = total.saturating_add(surface_size(1, list.len()));
+            open.extend(list);
+        }
+    }
+    total
 }
 
 /// Returns the vertices that a shape uses, ascending. [`add`] reports indices that do not exist.
