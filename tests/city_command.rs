@@ -1,6 +1,8 @@
 //! `skysweep city info` and `convert`, from the command line: exit codes, reports, and what the
 //! written files hold.
 
+mod common;
+
 use std::path::PathBuf;
 
 use assert_cmd::Command;
@@ -203,4 +205,28 @@ fn the_tile_of_the_yardsticks() {
     let summary = stdout(&bench.run(&["info", "--json", tile.to_str().unwrap()]).code(0));
     let summary: Value = serde_json::from_str(&summary).unwrap();
     assert_eq!((&summary["objects"], &summary["statuses"]["used"]), (&Value::from(862), &Value::from(430)));
+}
+
+/// A model of another level of detail than the default gives no empty file, but an error that names
+/// its levels.
+#[test]
+fn nothing_selected_is_an_error_that_names_the_levels() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, out) = (folder.path().join("lod3.city.json"), folder.path().join("lod3.obj"));
+    let text = std::fs::read_to_string(common::sample("truth/buildings.city.json")).unwrap();
+    let text = text.replace("\"lod\":\"2.2\"", "\"lod\":\"3\"").replace("\"lod\":\"2\"", "\"lod\":\"3\"");
+    std::fs::write(&model, text).unwrap();
+    let convert = || {
+        let mut command = common::skysweep();
+        command.args(["city", "convert"]).arg(&model).arg("-o").arg(&out);
+        command
+    };
+    let expected = predicates::str::contains("levels of detail in the file are 3");
+    convert()
+        .assert()
+        .code(2)
+        .stderr(predicates::prelude::PredicateBooleanExt::and(expected, predicates::str::contains("--lod 3")));
+    assert!(!out.exists());
+    convert().args(["--lod", "3"]).assert().code(0);
+    assert!(out.metadata().unwrap().len() > 1000);
 }

@@ -218,6 +218,38 @@ fn results_are_not_replaced_unasked_and_places_that_cannot_be_written_are_named(
     assert_eq!(std::fs::read(&file).unwrap(), b"not a folder");
 }
 
+/// The town is near Marseille; Swiss coordinates of it mean little, Floridan ones nothing.
+#[test]
+fn a_crs_far_outside_its_area_of_use_must_be_forced() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let with = |crs: &str| {
+        let mut command = small(&out);
+        command.args(["--crs", crs, "--overwrite"]);
+        command
+    };
+    let refused = with("EPSG:32617").assert().code(2);
+    refused.stderr(predicate::str::contains("EPSG:32617, which is for").and(predicate::str::contains("--force")));
+    with("EPSG:32617").arg("--force").assert().code(0);
+    let report: Value = serde_json::from_slice(&std::fs::read(out.join("report/report.json")).unwrap()).unwrap();
+    assert!(report["warnings"].to_string().contains("outside its area of use"), "{}", report["warnings"]);
+    // Just outside: a warning is enough.
+    with("EPSG:2056").assert().code(0);
+}
+
+/// The vertical datum belongs to heights. Counts and shares are not metres above anything.
+#[test]
+fn only_heights_have_a_vertical_datum() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    small(&out).args(["--vertical", "egm96"]).assert().code(0);
+    let datum = |name: &str| io::raster::read_dem(out.join("dsm").join(name)).unwrap().vertical;
+    assert_eq!(datum("dsm.tif"), Some(crs::VerticalDatum::Egm96));
+    for name in ["sigma.tif", "views.tif", "confidence.tif", "filled.tif"] {
+        assert_eq!(datum(name), None, "{name}");
+    }
+}
+
 /// Two runs into one folder would mix their files.
 #[test]
 fn a_folder_in_use_is_refused() {

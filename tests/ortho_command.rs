@@ -134,3 +134,36 @@ fn what_makes_no_ortho_is_refused() {
     refused(&view, &view, &[], "geotransform");
     refused(Path::new("none.tif"), &dsm, &[], "none.tif");
 }
+
+/// Bounds in other coordinates than the surface model's show nothing, which is an error and no file.
+#[test]
+fn an_area_beside_the_surface_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("ortho.tif");
+    let mut command = skysweep();
+    command.arg("ortho").arg(sample("view_1.tif")).arg("--dsm").arg(sample("truth/dsm.tif")).arg("-o").arg(&out);
+    command.args(["--bounds", "100", "100", "200", "200", "--progress", "none", "-q"]);
+    command.assert().code(2).stderr(predicate::str::contains("no image shows the area"));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// Three bands of a colour image are red, green and blue in the ortho too.
+#[test]
+fn colours_keep_their_names() {
+    use io::raster::{Band, BandData, LumaRule, write_image_with_rpc};
+    let folder = tempfile::tempdir().unwrap();
+    let grey = io::raster::ImageSource::open(sample("view_1.tif")).unwrap();
+    let samples = grey.read_samples(1, grey.window()).unwrap().map(|v| *v as u16);
+    let rpc = io::rpc::read_for_image(&sample("view_1.tif")).unwrap().rpc;
+    let bands = ["red", "green", "blue"].map(|description| Band { description, data: BandData::U16(&samples) });
+    let (image, out) = (folder.path().join("colour.tif"), folder.path().join("ortho.tif"));
+    write_image_with_rpc(&image, &bands, &rpc, Some(0.0), false).unwrap();
+    let mut command = skysweep();
+    command.arg("ortho").arg(&image).arg("--dsm").arg(sample("truth/dsm.tif")).arg("-o").arg(&out);
+    command.args(["--gsd", "2", "--progress", "none", "-q"]).assert().code(0);
+    let written = io::raster::ImageSource::open(&out).unwrap();
+    assert_eq!(written.info().luma, LumaRule::Rgb([1, 2, 3]));
+    // The bytes of a TIFF whose photometric interpretation is RGB (tag 262, value 2).
+    let bytes = std::fs::read(&out).unwrap();
+    assert!(bytes.windows(10).any(|entry| entry == [6, 1, 3, 0, 1, 0, 0, 0, 2, 0]), "no RGB in the TIFF");
+}

@@ -184,6 +184,18 @@ fn pointing_comes_from_the_run_that_made_the_surface() {
     };
     let (with, without) = (psnr(&[]), psnr(&["--corrections", "none"]));
     assert!(with > without + 0.5, "{with:.2} dB with the corrections of the run, {without:.2} dB without");
+    // Looking through the splats again takes the pointing that they were made with.
+    psnr(&[]);
+    let seen = folder.path().join("seen");
+    let rendered = |options: &[&str]| {
+        let mut command = skysweep();
+        command.args(["splats", "render"]).arg(&ply).args(&images).arg("-o").arg(&seen);
+        let report =
+            json(command.args(["--json", "--overwrite", "--progress", "none"]).args(options).output().unwrap());
+        (0..3).map(|i| report["views"][i]["psnr_db"].as_f64().unwrap()).sum::<f64>() / 3.0
+    };
+    let (with, without) = (rendered(&[]), rendered(&["--corrections", "none"]));
+    assert!(with > without + 0.5, "{with:.2} dB rendered with the corrections, {without:.2} dB without");
     let opacities: Vec<f32> = io::splat_ply::read(&ply).unwrap().splats.iter().map(|s| s.opacity).collect();
     let confidence = read_dem(out.join("dsm/confidence.tif")).unwrap().heights;
     let surest = confidence.data().iter().copied().filter(|c| c.is_finite()).fold(0.0, f32::max);

@@ -30,6 +30,9 @@ pub(crate) struct Args {
     /// CRS of the DSM: auto, or a projected EPSG code [default: the scene's UTM zone].
     #[arg(long, value_name = "CRS", default_value = "auto", hide_default_value = true)]
     crs: CrsRequest,
+    /// Use the CRS although the scene lies far outside its area of use.
+    #[arg(long)]
+    force: bool,
     /// Area of the DSM in its CRS [default: the ground that at least two images see].
     #[arg(long, num_args = 4, value_names = ["X_MIN", "Y_MIN", "X_MAX", "Y_MAX"], allow_negative_numbers = true)]
     bounds: Option<Vec<f64>>,
@@ -126,6 +129,7 @@ impl Args {
         let mut config = DsmConfig::new(self.images.clone(), self.output.clone());
         config.gsd_m = self.gsd;
         config.crs_epsg = crs_epsg;
+        config.force_crs = self.force;
         config.bounds = self.bounds.as_ref().and_then(bounds);
         config.height_range_m = self.height_range.as_ref().and_then(range);
         config.dem = self.dem.clone();
@@ -175,7 +179,7 @@ fn hint(error: &DsmError) -> Option<&'static str> {
         DsmError::Prior { .. } => "`skysweep city info MODEL` checks a city model",
         DsmError::Value { setting, .. } => match setting {
             DsmSetting::CellSize => "the cell size is set by --gsd",
-            DsmSetting::Crs => "the CRS is set by --crs",
+            DsmSetting::Crs => "the CRS is set by --crs; --force uses it outside its area of use",
             DsmSetting::Bounds => "the grid is set by --bounds and --gsd",
             DsmSetting::HeightRange => "the heights are set by --height-range",
             DsmSetting::Dem => "the elevation model is set by --dem",

@@ -4,12 +4,14 @@
 //! otherwise. No other crate uses PROJ, and one private module calls its C interface. PROJ's
 //! network access is switched off: a grid is read from the local disk or reported as missing.
 
+mod area;
 mod error;
 mod identity;
 mod proj_handle;
 mod projection;
 mod vertical;
 
+pub use area::AreaOfUse;
 pub use error::CrsError;
 pub use identity::{Crs, CrsIdentity, CrsRequest, VerticalDatum};
 pub use projection::MapProjection;

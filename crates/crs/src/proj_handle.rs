@@ -16,9 +16,9 @@ use proj_sys::{
     PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS, PJ_WKT_TYPE_PJ_WKT2_2019, proj_as_wkt, proj_context_create,
     proj_context_destroy, proj_context_errno, proj_context_errno_string, proj_context_set_enable_network, proj_create,
     proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D, proj_crs_get_coordinate_system, proj_crs_get_sub_crs,
-    proj_crs_promote_to_3D, proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_id_auth_name,
-    proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify, proj_int_list_destroy,
-    proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_func, proj_log_level,
+    proj_crs_promote_to_3D, proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_area_of_use,
+    proj_get_id_auth_name, proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify,
+    proj_int_list_destroy, proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_func, proj_log_level,
     proj_normalize_for_visualization, proj_trans_generic,
 };
 
@@ -347,6 +347,22 @@ unsafe fn text_of(text: *const c_char) -> Option<String> {
     // SAFETY: the caller guarantees that a pointer other than null is a valid NUL-terminated
     // string.
     (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())
+}
+
+/// Returns the bounds of the area of use of a CRS, degrees: west, south, east, north. `None` when the
+/// registry names none.
+pub(crate) fn area_of_use(definition: &str) -> Result<Option<[f64; 4]>, String> {
+    let context = Context::new();
+    let crs = context.create(definition)?;
+    let [mut west, mut south, mut east, mut north] = [0.0; 4];
+    // SAFETY: the object belongs to the context and is alive; the four pointers to numbers are
+    // valid, and the pointer to the name may be null.
+    let found = unsafe {
+        proj_get_area_of_use(context.0, crs.0, &mut west, &mut south, &mut east, &mut north, ptr::null_mut())
+    };
+    // PROJ writes −1000 where a bound is not known.
+    let bounds = [west, south, east, north];
+    Ok((found != 0 && bounds.iter().all(|b| *b > -999.0)).then_some(bounds))
 }
 
 /// Returns the metres per unit of a CRS's horizontal axes; `None` when the units are angles.

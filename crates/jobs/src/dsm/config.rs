@@ -78,6 +78,9 @@ pub struct DsmConfig {
     pub dem: Option<PathBuf>,
     /// City model whose roofs are expected.
     pub prior: Option<PathBuf>,
+    /// Whether a CRS may be used far outside its area of use, where its coordinates mean little.
+    #[serde(default)]
+    pub force_crs: bool,
     /// Datum of the heights of the DSM.
     #[serde(default)]
     pub vertical: VerticalDatum,
@@ -130,6 +133,7 @@ impl DsmConfig {
             height_range_m: None,
             dem: None,
             prior: None,
+            force_crs: false,
             vertical: VerticalDatum::Ellipsoid,
             preset: Preset::default(),
             fill: Fill::default(),

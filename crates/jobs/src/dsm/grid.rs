@@ -1,6 +1,6 @@
 //! The grid of the DSM: CRS, cell size and extent.
 
-use crs::{CrsError, MapProjection};
+use crs::{AreaOfUse, CrsError, MapProjection};
 use geodesy::utm_epsg;
 use raster::{GeoTransform, Window};
 use serde::{Deserialize, Serialize};
@@ -12,6 +12,9 @@ use crate::dsm::notes::Notes;
 use crate::dsm::values::MapBounds;
 use crate::dsm::view_geometry::ViewGeometry;
 
+/// Beyond this distance from its area of use a CRS needs to be forced, degrees. Scenes at the border
+/// of two UTM zones are written in either, and half a zone beyond it distorts by 2 in 1000.
+const FAR_OUTSIDE_DEG: f64 = 3.0;
 /// Grids of more cells than this come from a cell size or bounds in wrong units.
 const CELLS_MAX: f64 = 4e9;
 
@@ -84,6 +87,12 @@ pub(crate) fn choose_grid(
         let found = format!("EPSG:{epsg}, whose units are not metres");
         return Err(DsmError::value(DsmSetting::Crs, found, "a projected CRS in metres; a cell has one size"));
     }
+    if !config.force_crs
+        && let Some(area) =
+            outside_area(epsg, (centre.lon_deg, centre.lat_deg))?.filter(|area| area.distance_deg > FAR_OUTSIDE_DEG)
+    {
+        return Err(DsmError::value(DsmSetting::Crs, area.text, "a CRS for the place of the scene"));
+    }
     let gsd_m = config.gsd_m.unwrap_or_else(|| rounded_gsd_m(coarsest_gsd_m * config.preset.pixels_per_cell()));
     let covered = covered_bounds(geometry, &projection)?;
     let bounds = config.bounds.unwrap_or(covered);
@@ -94,10 +103,41 @@ pub(crate) fn choose_grid(
     Ok(DsmGrid { epsg, geotransform, size, gsd_m })
 }
 
+/// A CRS that is used outside its area of use.
+struct OutsideArea {
+    /// Distance of the scene from the area, degrees.
+    distance_deg: f64,
+    /// Where the CRS and the scene are.
+    text: String,
+}
+
+/// Returns how far the scene lies outside the area of use of the CRS; `None` when it lies inside.
+fn outside_area(epsg: u32, (lon_deg, lat_deg): (f64, f64)) -> Result<Option<OutsideArea>, CrsError> {
+    let Some(area) = AreaOfUse::of_epsg(epsg)? else { return Ok(None) };
+    let distance_deg = area.distance_deg(lon_deg, lat_deg);
+    let AreaOfUse { west_deg, south_deg, east_deg, north_deg } = area;
+    let text = format!(
+        "EPSG:{epsg}, which is for {west_deg:.1}° to {east_deg:.1}° E, {south_deg:.1}° to {north_deg:.1}° N; \
+         the scene is at {lon_deg:.2}° E, {lat_deg:.2}° N"
+    );
+    Ok((distance_deg > 0.0).then_some(OutsideArea { distance_deg, text }))
+}
+
+/// Warns of a CRS that is used outside its area of use. A place that cannot be found is no warning.
+fn warn_of_area(grid: &DsmGrid, notes: &mut Notes<'_>) {
+    let bounds = grid.bounds();
+    let (x, y) = (0.5 * (bounds.x_min + bounds.x_max), 0.5 * (bounds.y_min + bounds.y_max));
+    let place = grid.projection().and_then(|projection| projection.lonlat_from_map(x, y));
+    if let Ok(Some(area)) = place.and_then(|place| outside_area(grid.epsg, place)) {
+        notes.warn(format!("the CRS is used outside its area of use, where it distorts: {}", area.text));
+    }
+}
+
 /// Notes the choices of [`choose_grid`].
 pub(crate) fn note_grid(config: &DsmConfig, grid: &DsmGrid, coarsest_gsd_m: f64, notes: &mut Notes<'_>) {
     let given = |is_given: bool, else_why: String| if is_given { "given".to_owned() } else { else_why };
     let zone = given(config.crs_epsg.is_some(), "the UTM (or polar) zone of the scene's centre".to_owned());
+    warn_of_area(grid, notes);
     notes.choose("crs", format!("EPSG:{}, heights above {}", grid.epsg, config.vertical), zone);
     let matched = match config.preset {
         Preset::Fast => "twice the coarsest image's",
