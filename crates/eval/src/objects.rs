@@ -166,8 +166,8 @@ impl Objects<'_> {
         Some(DamagedBuilding { number, height_m, area_m2, right: right as f64 / inner_errors.len() as f64 })
     }
 
-    /// Returns whether all cells within [`BORDER_STEPS`] steps have the number. Cells outside of the
-    /// grid do not.
+    /// Returns whether all cells within [`BORDER_STEPS`] steps have the number. Cells outside of
+    /// the grid do not.
     fn is_inner(&self, number: i32, column: usize, row: usize) -> bool {
         (-BORDER_STEPS..=BORDER_STEPS).all(|dy| {
             let reach = BORDER_STEPS - dy.abs();

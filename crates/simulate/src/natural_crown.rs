@@ -1,9 +1,10 @@
 //! Rough crowns of single trees: broad ellipsoids and cones that begin above the ground.
 //!
 //! A crown is the solid `|(x, y) − stem| < R(w) · radius · (1 − ROUGH + ROUGH · bumps)`, where w is
-//! the height between the foot of the crown (0) and its top (1). R is the profile: `√(1 − (2w − 1)²)`
-//! for a broad crown, a cone with a rounded foot for a conical one. Bumps of foliage are noise in
-//! [−1, 1] of the position. Noise also lowers the top. Views see the ground under the overhang of a crown.
+//! the height between the foot of the crown (0) and its top (1). R is the profile of the crown:
+//! `√(1 − (2w − 1)²)` for a broad one, a cone with a rounded foot for a conical one. Bumps of
+//! foliage are noise in [−1, 1] of the position. Noise also lowers the top. Views see the ground
+//! under the overhang of a crown.
 //!
 //! A ray is marched through the cylinder around the crown in steps of [`STEP_M`], and the crossing
 //! is bisected. The height over a point is where a vertical ray enters, so that both agree.

@@ -1,6 +1,6 @@
 //! Seasons: how the scene and the sharpness of the images differ from date to date.
 //!
-//! The first date is as it would be without seasons. On each other date, the albedo of ground cover,
+//! The first date is as it would be without seasons. On each other date, the albedo of ground,
 //! trees and roofs is multiplied by a factor of the date, and by a factor of the place: patches of
 //! ground, single trees, single roofs. Factors are exp(uniform(−spread, spread)). A share of the
 //! variance of the fine texture is replaced by a texture of the date (litter, grass, leaves, dirt,
@@ -117,8 +117,8 @@ impl SeasonLook {
         (PLACE_SHARE * spread * (2.0 * lattice(paint ^ self.seed, 11, 0) - 1.0)).exp()
     }
 
-    /// Returns the fine texture of the date: the permanent one and one of its own, mixed so that the
-    /// variance stays the same.
+    /// Returns the fine texture of the date: the permanent one and one of its own, mixed so that
+    /// the variance stays the same.
     pub(crate) fn grain(&self, permanent: f64, seed: u64, x: f64, y: f64) -> f64 {
         let own = detail(seed ^ self.seed, x, y);
         (1.0 - self.config.texture_share).sqrt() * permanent + self.config.texture_share.sqrt() * own

@@ -212,8 +212,8 @@ impl Relief<'_> {
         self.config.pit_depth_m * inwards
     }
 
-    /// Cuts a height into benches. Three quarters of each step are almost level (they keep 6 % of the
-    /// slope), the rest is its face.
+    /// Cuts a height into benches. Three quarters of each step are almost level (they keep 6 % of
+    /// the slope), the rest is its face.
     fn benched(&self, height: f64) -> f64 {
         let bench = self.config.bench_height_m;
         if bench == 0.0 {

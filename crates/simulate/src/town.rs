@@ -227,8 +227,8 @@ impl Town<'_> {
         }
     }
 
-    /// Places one tower, two slabs or four towers up to the streets. Towers of neighbouring quarters
-    /// are 15 to 25 m apart.
+    /// Places one tower, two slabs or four towers up to the streets. Towers of neighbouring
+    /// quarters are 15 to 25 m apart.
     fn dense_towers(&mut self, [u, v]: [f64; 2], stream: &mut SplitMix64) {
         let half = self.half_m();
         let [low, high] = self.config.high_rise_height_m;

@@ -1,5 +1,5 @@
-//! The truth as rasters on the map grid: surface, terrain, classes, buildings, visibility in each view, and
-//! the view from above.
+//! The truth as rasters on the map grid: surface, terrain, classes, buildings, visibility in each
+//! view, and the view from above.
 //!
 //! Values belong to cell centres, and heights are rounded to a millimetre. The scene is the
 //! permanent one without vehicles, like a reference that was measured on another day. A view sees a
