@@ -10,9 +10,9 @@ const SHIFT: (i64, i64) = (3, -2);
 
 fn surface(column: i64, row: i64) -> f32 {
     let is_house = column.rem_euclid(23) < 11 && row.rem_euclid(29) < 13;
-    // Rough ground, so that the best shift is the planted one.
-    let rough = ((column * 37 + row * 91) % 13) as f32 * 0.05;
-    40.0 + 0.02 * column as f32 + rough + if is_house { 7.0 } else { 0.0 }
+    // Rolling ground, so that the best shift is the planted one.
+    let rolling = (column as f32 / 5.0).sin() + 0.8 * (row as f32 / 4.0).cos();
+    40.0 + 0.02 * column as f32 + rolling + if is_house { 7.0 } else { 0.0 }
 }
 
 fn grid<T>(cell: impl Fn(i64, i64) -> T) -> Grid<T> {
@@ -34,7 +34,7 @@ fn layers_are_read_where_the_alignment_puts_the_test() {
     let error = |column, row| if is_filled(column, row) { 3.0 } else { 0.0 };
     let test = grid(|column, row| surface(column + SHIFT.0, row + SHIFT.1) + error(column, row));
     let origins = grid(|c, r| if is_filled(c, r) { CellOrigin::Filled } else { CellOrigin::Observed });
-    let sigma = grid(|c, r| if is_filled(c, r) { 4.0 } else { 0.25 });
+    let sigma = grid(|c, r| if is_filled(c, r) { 4.0 } else { 0.5 });
     let confidence = grid(|c, r| if is_filled(c, r) { 0.15 } else { 0.85 });
     let plain = EvalInput::new(&test, &reference, &map, metres);
     let input = EvalInput { origins: Some(&origins), sigma_m: Some(&sigma), confidence: Some(&confidence), ..plain };
@@ -44,8 +44,9 @@ fn layers_are_read_where_the_alignment_puts_the_test() {
     assert_eq!((&alone.overall, &alone.edges, alone.sharpness), (&found.overall, &found.edges, found.sharpness));
     let split = found.origins.unwrap();
     let mae = |metrics: &eval::Metrics| metrics.errors.unwrap().mae;
-    assert!(mae(&split.observed.overall) < 1e-3, "{:?}", split.observed.overall);
-    assert!((mae(&split.filled.overall) - 3.0).abs() < 1e-3, "{:?}", split.filled.overall);
+    // The filled stripes move the best shift by a twentieth of a cell.
+    assert!(mae(&split.observed.overall) < 0.05, "{:?}", split.observed.overall);
+    assert!((mae(&split.filled.overall) - 3.0).abs() < 0.1, "{:?}", split.filled.overall);
     assert_eq!(split.observed.overall.n + split.filled.overall.n, found.overall.n);
     assert_eq!(split.unknown_cells, 0);
     let sigma = found.sigma.unwrap();
