@@ -93,7 +93,7 @@ fn settings_that_ask_for_terabytes_are_refused() {
     refused(&["dsm", &image, &path("view_3.tif"), "--threads", "100000", "-o", text(&out)], "at most 1024");
     let cameras = path("cameras/sparse/0");
     let priors = ["priors", town.as_str(), "--cameras", &cameras, "-o", text(&out), "--geometric-error", "1e-9"];
-    refused(&priors, "points");
+    refused(&priors, "the limit is 100000000");
 }
 
 #[test]

@@ -230,3 +230,61 @@ fn nothing_selected_is_an_error_that_names_the_levels() {
     convert().args(["--lod", "3"]).assert().code(0);
     assert!(out.metadata().unwrap().len() > 1000);
 }
+
+/// Attributes, generic attributes and addresses come through, from CityGML and from CityJSON, and
+/// what CityJSON has no place for in our model is counted.
+#[test]
+fn attributes_and_addresses_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let gml = folder.path().join("house.gml");
+    let content = r#"<CityModel xmlns="http://www.opengis.net/citygml/2.0" xmlns:gml="http://www.opengis.net/gml"
+        xmlns:bldg="http://www.opengis.net/citygml/building/2.0" xmlns:gen="http://www.opengis.net/citygml/generics/2.0"
+        xmlns:core="http://www.opengis.net/citygml/2.0" xmlns:xAL="urn:oasis:names:tc:ciq:xsdschema:xAL:2.0">
+        <gml:boundedBy><gml:Envelope srsName="urn:adv:crs:ETRS89_UTM32*DE_DHHN92_NH"/></gml:boundedBy>
+        <cityObjectMember><bldg:Building gml:id="house"><core:creationDate>2020-01-31</core:creationDate>
+        <core:externalReference><core:informationSystem>urn:alkis</core:informationSystem>
+        <core:externalObject><core:name>DE42</core:name></core:externalObject></core:externalReference>
+        <gen:stringAttribute name="owner"><gen:value>Bell &amp; Sons</gen:value></gen:stringAttribute>
+        <gen:intAttribute name="flats"><gen:value>7</gen:value></gen:intAttribute>
+        <bldg:function>31001_1000</bldg:function><bldg:roofType>3100</bldg:roofType>
+        <bldg:measuredHeight uom="urn:adv:uom:m">9.25</bldg:measuredHeight>
+        <bldg:storeysAboveGround>2</bldg:storeysAboveGround>
+        <bldg:lod2MultiSurface><gml:MultiSurface><gml:surfaceMember><gml:Polygon><gml:exterior><gml:LinearRing>
+        <gml:posList srsDimension="3">500000 5700000 30 500000 5700008 30 500008 5700008 30 500008 5700000 30
+        500000 5700000 30</gml:posList></gml:LinearRing></gml:exterior></gml:Polygon></gml:surfaceMember>
+        </gml:MultiSurface></bldg:lod2MultiSurface>
+        <bldg:address><core:Address><core:xalAddress><xAL:AddressDetails><xAL:Country><xAL:CountryName>Germany</xAL:CountryName>
+        <xAL:Locality Type="Town"><xAL:LocalityName>Aachen</xAL:LocalityName><xAL:Thoroughfare Type="Street">
+        <xAL:ThoroughfareNumber>3a</xAL:ThoroughfareNumber><xAL:ThoroughfareName>Domhof</xAL:ThoroughfareName>
+        </xAL:Thoroughfare></xAL:Locality></xAL:Country></xAL:AddressDetails></core:xalAddress></core:Address></bldg:address>
+        </bldg:Building></cityObjectMember></CityModel>"#;
+    std::fs::write(&gml, content).unwrap();
+    let convert = |from: &std::path::Path, to: &str| -> Value {
+        let out = folder.path().join(to);
+        let mut command = common::skysweep();
+        command.args(["city", "convert"]).arg(from).arg("-o").arg(&out).assert().code(0);
+        serde_json::from_slice(&std::fs::read(out).unwrap()).unwrap()
+    };
+    let first = convert(&gml, "a.city.json");
+    let second = convert(&folder.path().join("a.city.json"), "b.city.json");
+    assert_eq!(first["CityObjects"], second["CityObjects"]);
+    assert_eq!(first["metadata"]["referenceSystem"], "https://www.opengis.net/def/crs/EPSG/0/5555");
+    let house = &first["CityObjects"]["house"];
+    let expected = serde_json::json!({
+        "creationDate": "2020-01-31",
+        "externalReference": { "informationSystem": "urn:alkis", "externalObject": { "name": "DE42" } },
+        "owner": "Bell & Sons", "flats": 7, "function": "31001_1000", "roofType": "3100",
+        "measuredHeight": 9.25, "storeysAboveGround": 2,
+    });
+    assert_eq!(house["attributes"], expected);
+    let address = serde_json::json!([{
+        "CountryName": "Germany", "LocalityName": "Aachen", "ThoroughfareNumber": "3a", "ThoroughfareName": "Domhof",
+    }]);
+    assert_eq!(house["address"], address);
+    let footprint = &convert(&gml, "house.geojson")["features"][0]["properties"];
+    assert_eq!(
+        (&footprint["measuredHeight"], &footprint["address"]),
+        (&house["attributes"]["measuredHeight"], &address)
+    );
+    assert_eq!(footprint["height_m"], 0.0);
+}

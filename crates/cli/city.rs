@@ -167,6 +167,9 @@ fn summary_text(summary: &CitySummary) -> String {
     row("objects", format!("{} ({})", summary.objects, listed(&summary.statuses)));
     row("levels of detail", format!("{}; used: {}", listed(&summary.lods), listed(&summary.lods_used)));
     row("triangles", format!("{} ({})", summary.triangles, listed(&summary.triangles_by_class)));
+    if !summary.left_out.is_empty() {
+        row("left out", listed(&summary.left_out));
+    }
     row("defects", if summary.defects.is_empty() { "none".to_owned() } else { String::new() });
     for defect in &summary.defects {
         row("", format!("{} × {} ({}), {}", defect.count, defect.code, defect.meaning, defect.effect));

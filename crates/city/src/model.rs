@@ -5,6 +5,10 @@
 //! not repeat its first vertex at the end. The first ring of a surface is its outer boundary,
 //! counter-clockwise seen from outside. The other rings are holes.
 
+use std::collections::BTreeMap;
+
+use serde_json::{Map, Value};
+
 use crate::{CrsReference, Lod, ModelError, ModelPoint, ObjectKind, SurfaceClass};
 
 /// Content of a city model file.
@@ -16,6 +20,9 @@ pub struct CityModel {
     pub vertices: Vec<ModelPoint>,
     /// Objects in the order of the file.
     pub objects: Vec<CityObject>,
+    /// Things of the file that the model does not hold, such as appearances, by their kind with
+    /// their number.
+    pub left_out: BTreeMap<String, usize>,
 }
 
 /// An object of the city: a building, a part of one, a road.
@@ -27,6 +34,10 @@ pub struct CityObject {
     pub kind: ObjectKind,
     /// Index in [`CityModel::objects`] of the object that this one is a part of.
     pub parent: Option<usize>,
+    /// Attributes, also generic ones, by their names in the file.
+    pub attributes: Map<String, Value>,
+    /// Addresses as CityJSON has them.
+    pub addresses: Vec<Value>,
     /// Shapes of the object. A level of detail may have several.
     pub geometries: Vec<Geometry>,
 }
@@ -167,7 +178,14 @@ impl CityModel {
 impl CityObject {
     /// Creates an object without parent and geometry.
     pub fn new(id: impl Into<String>, kind: ObjectKind) -> Self {
-        Self { id: id.into(), kind, parent: None, geometries: Vec::new() }
+        Self {
+            id: id.into(),
+            kind,
+            parent: None,
+            attributes: Map::new(),
+            addresses: Vec::new(),
+            geometries: Vec::new(),
+        }
     }
 }
 

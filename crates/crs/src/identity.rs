@@ -225,6 +225,15 @@ fn epsg_code(text: &str) -> Option<u32> {
     plain.then(|| digits.parse().ok()).flatten()
 }
 
+/// Returns the EPSG code of the compound CRS of a horizontal and a vertical one, if EPSG has one.
+///
+/// ```
+/// assert_eq!(crs::compound_epsg(28992, 5709), Some(7415));
+/// ```
+pub fn compound_epsg(horizontal: u32, vertical: u32) -> Option<u32> {
+    proj_handle::code_of(&format!("EPSG:{horizontal}+{vertical}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -13,6 +13,6 @@ mod vertical;
 
 pub use area::AreaOfUse;
 pub use error::CrsError;
-pub use identity::{Crs, CrsIdentity, CrsRequest, VerticalDatum};
+pub use identity::{Crs, CrsIdentity, CrsRequest, VerticalDatum, compound_epsg};
 pub use projection::MapProjection;
 pub use vertical::HeightConverter;

@@ -298,6 +298,13 @@ pub(crate) struct Codes {
     pub(crate) three_dimensional: bool,
 }
 
+/// Returns the EPSG code of a whole CRS, if PROJ recognises it.
+pub(crate) fn code_of(definition: &str) -> Option<u32> {
+    let context = Context::new();
+    let crs = context.create(definition).ok()?;
+    context.epsg(&crs)
+}
+
 /// Finds the codes of a CRS.
 pub(crate) fn codes(definition: &str) -> Result<Codes, String> {
     let context = Context::new();

@@ -78,6 +78,13 @@ impl Builder {
         !self.unusable.contains(&vertex)
     }
 
+    /// Counts things in the file that the model cannot hold.
+    pub(super) fn left_out(&mut self, what: &str, count: usize) {
+        if count > 0 {
+            *self.model.left_out.entry(what.to_owned()).or_insert(0) += count;
+        }
+    }
+
     /// Adds a defect without consequence.
     pub(super) fn note(
         &mut self,

@@ -6,6 +6,7 @@
 //! (`urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH`). Any other name is kept without a code.
 
 use city::CrsReference;
+use crs::compound_epsg;
 
 /// German vertical systems: their names by the working group of the surveys (AdV), and their EPSG
 /// codes.
@@ -66,14 +67,14 @@ fn strip_prefix_ignoring_case<'a>(text: &'a str, prefix: &str) -> Option<&'a str
     head.eq_ignore_ascii_case(prefix).then(|| &text[prefix.len()..])
 }
 
-/// Returns OGC's URL of a reference, as CityJSON 2.0 has it, or `None` without an EPSG code.
+/// Returns OGC's URL of a reference, or `None` without an EPSG code. CityJSON 2.0 knows one code
+/// only, so a horizontal and a vertical one are written as the compound CRS of both where EPSG has
+/// one. Otherwise the horizontal one alone is written.
 pub(super) fn ogc_url(crs: &CrsReference) -> Option<String> {
     let url = |code: u32| format!("https://www.opengis.net/def/crs/EPSG/0/{code}");
     match (crs.epsg?, crs.vertical_epsg) {
         (epsg, None) => Some(url(epsg)),
-        (epsg, Some(vertical)) => {
-            Some(format!("https://www.opengis.net/def/crs-compound?1={}&2={}", url(epsg), url(vertical)))
-        }
+        (epsg, Some(vertical)) => Some(url(compound_epsg(epsg, vertical).unwrap_or(epsg))),
     }
 }
 
@@ -109,9 +110,16 @@ mod tests {
 
     #[test]
     fn urls_lead_back() {
-        for crs in [CrsReference::from_epsg(7415, None), CrsReference::from_epsg(25832, Some(7837))] {
-            let back = crs_reference(&ogc_url(&crs).unwrap());
-            assert_eq!((back.epsg, back.vertical_epsg), (crs.epsg, crs.vertical_epsg));
+        for (crs, code) in [
+            (CrsReference::from_epsg(7415, None), 7415),
+            (CrsReference::from_epsg(28992, Some(5709)), 7415),
+            (CrsReference::from_epsg(25832, Some(5783)), 5555),
+            (CrsReference::from_epsg(25832, None), 25832),
+        ] {
+            let url = ogc_url(&crs).unwrap();
+            // The pattern of CityJSON 2.0's schema.
+            assert!(url.starts_with("https://www.opengis.net/def/crs/"), "{url}");
+            assert_eq!(crs_reference(&url).epsg, Some(code));
         }
         assert!(ogc_url(&CrsReference::default()).is_none());
     }

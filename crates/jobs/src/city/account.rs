@@ -39,6 +39,8 @@ pub struct CitySummary {
     pub origin: [f64; 3],
     /// Number of defects per code and effect.
     pub defects: Vec<CityDefectCount>,
+    /// Things of the file that the model does not hold, such as appearances, by their kind.
+    pub left_out: BTreeMap<String, usize>,
     /// Whether objects have no usable surface, or the reader dropped surfaces.
     pub incomplete: bool,
 }
@@ -186,6 +188,7 @@ fn summary(opened: &OpenedCity) -> CitySummary {
         triangles_by_class: count((0..mesh.triangles.len()).map(|triangle| mesh.surface(triangle).class.to_string())),
         origin: [mesh.origin.x, mesh.origin.y, mesh.origin.z],
         defects: defect_counts(opened),
+        left_out: model.left_out.clone(),
         incomplete: is_incomplete(opened),
     }
 }

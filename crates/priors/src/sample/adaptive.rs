@@ -158,7 +158,8 @@ impl<'a> Work<'a> {
             }
             let made = self.made.fetch_add(1, Ordering::Relaxed);
             if made > MAX_CUTS || pieces.len() + open.len() >= PIECES_MAX || near.len() >= PIECES_MAX {
-                return Err(PriorsError::TooMany { asked: (made / CUTS_PER_POINT) as u64, limit: LIMIT });
+                let asked = (made / CUTS_PER_POINT).max(LIMIT + 1) as u64;
+                return Err(PriorsError::TooMany { asked, limit: LIMIT });
             }
             let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);
             let middle = [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]));

@@ -4,11 +4,13 @@
 //! predefined entities are expanded. Links (`xlink:href`) are followed only within the file, to a
 //! limited depth and number. Boundary surfaces give polygons their class. A solid that links to
 //! them becomes one geometry with classes. Implicit geometries are placed by their matrix and
-//! reference point. Curves, points, appearance and attributes are skipped.
+//! reference point. Attributes and addresses are kept as CityJSON has them. Curves, points and
+//! appearance are skipped.
 
 mod assemble;
 mod attributes;
 mod implicit;
+mod properties;
 mod walker;
 
 use std::borrow::Cow;
@@ -61,8 +63,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
             Event::End(_) => walker.end(),
             Event::Text(t) => walker.text(&t.xml10_content()),
             Event::CData(t) => walker.text(&t.xml10_content()),
-            // An entity among numbers makes the ring invalid. Other text is not read.
-            Event::GeneralRef(_) => walker.text("&"),
+            // An entity among numbers makes the ring invalid.
+            Event::GeneralRef(e) => walker.text(&entity(&e)),
             Event::DocType(_) => return Err(CityFault::in_line("the XML has a DTD, remove it", line)),
             Event::Eof if walker.depth() > 0 => return Err(CityFault::in_line("the XML ends inside an element", line)),
             Event::Eof => break,
@@ -72,6 +74,22 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     let version = version.ok_or_else(|| CityFault::in_line("the XML has no element", 1))?;
     let (model, defects) = walker.finish()?;
     Ok(Parsed { model, format: CityFormat::CityGml(version), defects })
+}
+
+/// Returns the character of a predefined entity or a character reference, and `&` for others.
+fn entity(e: &quick_xml::events::BytesRef<'_>) -> String {
+    if let Ok(Some(character)) = e.resolve_char_ref() {
+        return character.to_string();
+    }
+    let name: &str = e.as_ref();
+    match name {
+        "lt" => "<",
+        "gt" => ">",
+        "quot" => "\"",
+        "apos" => "'",
+        _ => "&",
+    }
+    .to_owned()
 }
 
 /// Decodes the text: UTF-8, or Latin-1 if the XML declaration names it.

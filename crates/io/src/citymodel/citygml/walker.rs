@@ -7,6 +7,7 @@ use city::{CityModel, Defect, DefectCode, GeometryKind, Lod, ModelPoint, ObjectK
 use super::assemble::{Group, Member, Named, Polygon, Target, assemble};
 use super::attributes::Attributes;
 use super::implicit::{Field, Implicit};
+use super::properties::Property;
 use crate::citymodel::builder::Builder;
 use crate::citymodel::crs_name::crs_reference;
 use crate::citymodel::error::CityFault;
@@ -60,6 +61,8 @@ pub(super) struct Walker {
     named: HashMap<String, Named>,
     /// State within a geometry property, while the walk is in one.
     geometry: Option<Progress>,
+    /// Attribute or address of the object, while the walk is in one.
+    property: Option<Property>,
 }
 
 /// An open element.
@@ -76,6 +79,8 @@ struct Frame {
 #[derive(Debug)]
 enum Mark {
     Nothing,
+    /// Part of an attribute or an address.
+    Property,
     Object {
         before: Option<usize>,
     },
@@ -139,10 +144,13 @@ impl Walker {
         }
         let id = attributes.get("id").map(str::to_owned);
         let dimension = attributes.get("srsDimension").and_then(|text| text.parse().ok());
-        let mark = if self.geometry.is_some() {
+        let mark = if let Some(property) = &mut self.property {
+            property.start(name, attributes);
+            Mark::Property
+        } else if self.geometry.is_some() {
             self.start_in_geometry(name, attributes, line)
         } else {
-            self.start_outside(name, id.as_deref(), attributes.get("href"), line)
+            self.start_outside(name, id.as_deref(), attributes, line)
         };
         self.stack.push(Frame { name: name.to_owned(), id, dimension, mark });
         Ok(())
@@ -153,7 +161,8 @@ impl Walker {
     }
 
     /// Begins an element outside a geometry: an object, a boundary surface, or a geometry property.
-    fn start_outside(&mut self, name: &str, id: Option<&str>, link: Option<&str>, line: usize) -> Mark {
+    fn start_outside(&mut self, name: &str, id: Option<&str>, attributes: &Attributes, line: usize) -> Mark {
+        let link = attributes.get("href");
         if OBJECT_PROPERTIES.contains(&self.parent()) {
             let id = id.map_or_else(|| format!("{name} in line {line}"), str::to_owned);
             let object = self.builder.object(id, ObjectKind::new(name.to_owned()));
@@ -180,8 +189,24 @@ impl Walker {
                 }
                 Mark::Geometry
             }
+            _ if self.is_attribute(name) => {
+                self.property = Some(Property::new(name, attributes));
+                Mark::Property
+            }
             _ => Mark::Nothing,
         }
+    }
+
+    /// Returns whether an element is an attribute or an address of the object that it is a child
+    /// of. Appearances are counted, because the model does not hold them.
+    fn is_attribute(&mut self, name: &str) -> bool {
+        let in_object = self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Object { .. }));
+        if in_object && name.starts_with("appearance") {
+            self.builder.left_out("appearances", 1);
+            return false;
+        }
+        let holds_more = OBJECT_PROPERTIES.contains(&name) || SURFACE_PROPERTIES.contains(&name);
+        in_object && !holds_more && !name.starts_with("lod")
     }
 
     /// Begins an element within a geometry property.
@@ -251,6 +276,9 @@ impl Walker {
 
     /// Adds text to the open element, if its text is read.
     pub(super) fn text(&mut self, text: &str) {
+        if let Some(property) = &mut self.property {
+            return property.text(text);
+        }
         let frame = self.stack.last_mut();
         if let Some(Mark::Positions { text: so_far } | Mark::Implicit { text: so_far, .. }) = frame.map(|f| &mut f.mark)
         {
@@ -263,6 +291,7 @@ impl Walker {
         let Some(frame) = self.stack.pop() else { return };
         match frame.mark {
             Mark::Nothing => {}
+            Mark::Property => self.end_property(),
             Mark::Object { before } => self.object = before,
             Mark::Class { before } => self.class = before,
             Mark::Geometry => self.end_geometry(),
@@ -285,6 +314,14 @@ impl Walker {
                     implicit.take(field, &text);
                 }
             }
+        }
+    }
+
+    /// Ends an element of an attribute or an address.
+    fn end_property(&mut self) {
+        let (Some(property), Some(object)) = (&mut self.property, self.object) else { return };
+        if property.end(self.builder.object_mut(object)) {
+            self.property = None;
         }
     }
 

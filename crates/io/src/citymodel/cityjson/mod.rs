@@ -2,8 +2,8 @@
 //! 2.0.
 //!
 //! A text that is not JSON, or has members of the wrong type, is refused with its line and column.
-//! Any other defect costs only the surface that has it. Extensions, appearance and attributes are
-//! skipped.
+//! Any other defect costs only the surface that has it. Attributes and addresses of objects are
+//! kept. Appearances and attributes of surfaces are counted and skipped, extensions are skipped.
 
 mod geometry;
 mod schema;
@@ -11,6 +11,7 @@ mod template;
 mod write;
 
 use city::{ModelPoint, ObjectKind};
+use serde_json::Value;
 
 use super::builder::Builder;
 use super::crs_name::crs_reference;
@@ -123,6 +124,10 @@ impl Reader {
         for (id, object) in objects.into_iter().flat_map(|pairs| pairs.0) {
             let kind = object.kind.unwrap_or_else(|| "Unknown".to_owned());
             let index = self.builder.object(id, ObjectKind::new(kind));
+            let (attributes, addresses) = (object.attributes.unwrap_or_default(), addresses(object.address));
+            let made = self.builder.object_mut(index);
+            (made.attributes, made.addresses) = (attributes, addresses);
+            self.count_left_out(object.geometry.iter().flatten());
             if let Some(parent) = object.parents.as_ref().and_then(|parents| parents.first()) {
                 self.builder.parent(index, parent.as_str());
             }
@@ -138,6 +143,25 @@ impl Reader {
             }
         }
         Ok(())
+    }
+
+    /// Counts what the model does not hold of the shapes of an object.
+    fn count_left_out<'a>(&mut self, shapes: impl Iterator<Item = &'a schema::Shape>) {
+        for shape in shapes {
+            let appearances = usize::from(shape.material.is_some()) + usize::from(shape.texture.is_some());
+            self.builder.left_out("appearances", appearances);
+            let surfaces = shape.semantics.iter().flat_map(|semantics| &semantics.surfaces);
+            self.builder.left_out("attributes of surfaces", surfaces.map(|surface| surface.others.len()).sum());
+        }
+    }
+}
+
+/// Returns the addresses of an object, which were one object before version 1.1.
+fn addresses(address: Option<Value>) -> Vec<Value> {
+    match address {
+        None | Some(Value::Null) => Vec::new(),
+        Some(Value::Array(list)) => list,
+        Some(one) => vec![one],
     }
 }
 

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::marker::PhantomData;
 
+use serde_json::{Map, Value};
+
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 /// A document (`CityJSON`) or a line of a sequence (`CityJSONFeature`).
@@ -38,6 +40,9 @@ pub(super) struct Object {
     #[serde(rename = "type")]
     pub(super) kind: Option<String>,
     pub(super) parents: Option<Vec<String>>,
+    pub(super) attributes: Option<Map<String, Value>>,
+    /// A list since version 1.1, one address before.
+    pub(super) address: Option<Value>,
     pub(super) geometry: Option<Vec<Shape>>,
 }
 
@@ -51,6 +56,8 @@ pub(super) struct Shape {
     pub(super) boundaries: Nested,
     pub(super) semantics: Option<Semantics>,
     pub(super) template: Option<u64>,
+    pub(super) material: Option<IgnoredAny>,
+    pub(super) texture: Option<IgnoredAny>,
     #[serde(rename = "transformationMatrix")]
     pub(super) matrix: Option<Vec<f64>>,
 }
@@ -67,6 +74,9 @@ pub(super) struct Semantics {
 pub(super) struct SemanticSurface {
     #[serde(rename = "type")]
     pub(super) kind: Option<String>,
+    /// Attributes of the surface, and its relations to others.
+    #[serde(flatten)]
+    pub(super) others: Map<String, Value>,
 }
 
 #[derive(Debug, serde::Deserialize)]

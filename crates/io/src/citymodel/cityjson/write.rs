@@ -120,6 +120,12 @@ fn object_value(model: &CityModel, object: &CityObject, children: Option<&Vec<&s
     if let Some(children) = children {
         value["children"] = json!(children);
     }
+    if !object.attributes.is_empty() {
+        value["attributes"] = Value::Object(object.attributes.clone());
+    }
+    if !object.addresses.is_empty() {
+        value["address"] = Value::Array(object.addresses.clone());
+    }
     let shapes = object.geometries.iter().filter(|geometry| !geometry.surfaces.is_empty());
     value["geometry"] = shapes.map(|geometry| geometry_value(model, geometry, lattice)).collect();
     value

@@ -2,16 +2,22 @@
 //! latitude, WGS 84).
 //!
 //! The footprint of an object consists of its ground surfaces, or if it has none, of its surfaces
-//! that face down. Polygons that touch are not merged.
+//! that face down. They are dissolved into polygons that are valid by OGC's rules. The attributes
+//! and addresses of an object are among its properties.
 
 use std::path::Path;
 
 use city::{CityModel, ModelPoint, ObjectReport, ObjectStatus, SurfaceClass, SurfacePolygon};
 use crs::MapProjection;
+use geo::orient::Direction;
+use geo::{Area, Coord, LineString, MultiPolygon, Orient, Polygon, unary_union};
 use serde_json::{Value, json};
 
 use crate::atomic::write_stream;
 use crate::citymodel::error::{CityError, CityFault};
+
+/// Area of a polygon below which it is a sliver of rounding, m².
+const AREA_MIN: f64 = 1e-4;
 
 /// Counts of the objects in a file of footprints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +33,8 @@ pub struct Footprints {
 ///
 /// `reports` has one entry per object. The properties of a footprint are `id`, `kind`, `parent`,
 /// `lod`, the heights `ground_m` and `top_m` in metres above the vertical datum of the model, and
-/// their difference `height_m`.
+/// their difference `height_m`. The attributes of the object follow, unless they have one of these
+/// names, and its addresses as `address`.
 ///
 /// # Errors
 /// - [`CityError::Refused`] when the model has no known reference system (1010, 1011), or
@@ -74,25 +81,35 @@ fn features(model: &CityModel, reports: &[ObjectReport]) -> Result<(Vec<Value>, 
         let surfaces: Vec<&SurfacePolygon> = geometries.flat_map(|geometry| &geometry.surfaces).collect();
         let heights = surfaces.iter().flat_map(|s| s.rings.iter().flatten()).map(|&i| position(model, i).z);
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
-        let polygons: Result<Vec<Value>, CityFault> =
-            bottom(model, &surfaces).into_iter().map(|surface| polygon(model, surface, &projection)).collect();
-        let polygons = polygons?;
-        if polygons.is_empty() {
+        let origin = surfaces.first().and_then(|s| s.rings.first()?.first()).map(|&i| position(model, i));
+        let origin = origin.unwrap_or_default();
+        let footprint = dissolved(model, &bottom(model, &surfaces), origin);
+        if footprint.0.is_empty() {
             count.without += 1;
             continue;
         }
+        let polygons = coordinates(&footprint, origin, &projection)?;
         count.written += 1;
+        let mut properties = json!({
+            "id": object.id,
+            "kind": object.kind.name(),
+            "parent": object.parent.map(|parent| model.objects[parent].id.as_str()),
+            "lod": report.lod.map(|lod| lod.to_string()),
+            "ground_m": millimetres(low),
+            "top_m": millimetres(high),
+            "height_m": millimetres(high - low),
+        });
+        if let Some(properties) = properties.as_object_mut() {
+            for (name, value) in &object.attributes {
+                properties.entry(name).or_insert_with(|| value.clone());
+            }
+            if !object.addresses.is_empty() {
+                properties.entry("address").or_insert_with(|| Value::Array(object.addresses.clone()));
+            }
+        }
         features.push(json!({
             "type": "Feature",
-            "properties": {
-                "id": object.id,
-                "kind": object.kind.name(),
-                "parent": object.parent.map(|parent| model.objects[parent].id.as_str()),
-                "lod": report.lod.map(|lod| lod.to_string()),
-                "ground_m": millimetres(low),
-                "top_m": millimetres(high),
-                "height_m": millimetres(high - low),
-            },
+            "properties": properties,
             "geometry": { "type": "MultiPolygon", "coordinates": polygons },
         }));
     }
@@ -131,29 +148,68 @@ fn faces_down(model: &CityModel, surface: &SurfacePolygon) -> bool {
     -normal[2] > normal[0].hypot(normal[1])
 }
 
-/// Returns the rings as GeoJSON: closed, the outer ring counter-clockwise seen from above, holes
-/// clockwise.
-fn polygon(model: &CityModel, surface: &SurfacePolygon, projection: &MapProjection) -> Result<Value, CityFault> {
-    let ring = |(number, ring): (usize, &Vec<u32>)| -> Result<Value, CityFault> {
-        let mut points: Vec<[f64; 2]> = Vec::with_capacity(ring.len() + 1);
-        for &vertex in ring {
-            let at = position(model, vertex);
-            let (lon, lat) = projection
-                .lonlat_from_map(at.x, at.y)
-                .map_err(|error| CityFault::new(city::DefectCode::CoordinateOutOfRange, error.to_string(), "model"))?;
-            // 1e-8 degrees are about a millimetre.
-            points.push([lon, lat].map(|degrees| (degrees * 1e8).round() / 1e8));
-        }
-        let turn = |i: usize| {
-            let (a, b) = (points[i], points[(i + 1) % points.len()]);
-            (a[0] - points[0][0]) * (b[1] - points[0][1]) - (b[0] - points[0][0]) * (a[1] - points[0][1])
+/// Dissolves surfaces into one footprint, whose polygons are valid by OGC's rules: touching surfaces
+/// are one polygon, and rings neither cross nor repeat themselves. Coordinates are metres (units of
+/// the model) from `origin`. Slivers below [`AREA_MIN`] are rounding.
+fn dissolved(model: &CityModel, surfaces: &[&SurfacePolygon], origin: ModelPoint) -> MultiPolygon {
+    let ring = |ring: &Vec<u32>| -> LineString {
+        let corner = |&vertex: &u32| {
+            let [x, y, _] = position(model, vertex).from_origin(origin);
+            // Whole millimetres, so that corners that are meant to be one are.
+            Coord { x: millimetres(x), y: millimetres(y) }
         };
-        let counter_clockwise = (0..points.len()).map(turn).sum::<f64>() > 0.0;
-        if counter_clockwise != (number == 0) {
-            points.reverse();
-        }
-        points.extend(points.first().copied());
-        Ok(json!(points))
+        ring.iter().map(corner).collect()
     };
-    surface.rings.iter().enumerate().map(ring).collect::<Result<Vec<Value>, _>>().map(Value::Array)
+    let polygon = |surface: &&SurfacePolygon| {
+        let mut rings = surface.rings.iter().map(ring);
+        let outer = rings.next().unwrap_or_else(|| LineString::new(Vec::new()));
+        Polygon::new(outer, rings.collect()).orient(Direction::Default)
+    };
+    let polygons: Vec<Polygon> = surfaces.iter().map(polygon).filter(|p| p.unsigned_area() > 0.0).collect();
+    let mut whole = unary_union(&polygons);
+    whole.0.retain(|polygon| polygon.unsigned_area() > AREA_MIN);
+    whole.orient(Direction::Default)
+}
+
+/// Returns polygons as GeoJSON: closed rings, the outer ones counter-clockwise seen from above,
+/// holes clockwise, in longitude and latitude.
+fn coordinates(footprint: &MultiPolygon, origin: ModelPoint, projection: &MapProjection) -> Result<Value, CityFault> {
+    let place = |at: &Coord| -> Result<[f64; 2], CityFault> {
+        let (lon, lat) = projection
+            .lonlat_from_map(at.x + origin.x, at.y + origin.y)
+            .map_err(|error| CityFault::new(city::DefectCode::CoordinateOutOfRange, error.to_string(), "model"))?;
+        // 1e-9 degrees are about a tenth of a millimetre: the rounding folds no ring of millimetres.
+        Ok([lon, lat].map(|degrees| (degrees * 1e9).round() / 1e9))
+    };
+    let ring = |ring: &LineString| ring.0.iter().map(place).collect::<Result<Vec<_>, _>>().map(|points| json!(points));
+    let polygon = |polygon: &Polygon| {
+        let rings = std::iter::once(polygon.exterior()).chain(polygon.interiors());
+        rings.map(ring).collect::<Result<Vec<Value>, _>>().map(Value::Array)
+    };
+    footprint.0.iter().map(polygon).collect::<Result<Vec<Value>, _>>().map(Value::Array)
+}
+
+#[cfg(test)]
+mod tests {
+    use city::{CrsReference, SurfaceClass};
+    use geo::Validation;
+
+    use super::*;
+
+    /// Two squares that share an edge, one that repeats the first, and one that touches a corner.
+    #[test]
+    fn touching_surfaces_are_one_valid_polygon() {
+        let mut model = CityModel::new(CrsReference::from_epsg(25832, None));
+        let mut surfaces = Vec::new();
+        for (x, y) in [(0.0, 0.0), (4.0, 0.0), (0.0, 0.0), (8.0, 4.0)] {
+            let first = model.vertices.len() as u32;
+            let corners = [(x, y), (x, y + 4.0), (x + 4.0, y + 4.0), (x + 4.0, y)];
+            model.vertices.extend(corners.map(|(x, y)| ModelPoint::new(500_000.0 + x, 5_700_000.0 + y, 30.0)));
+            surfaces.push(SurfacePolygon::new(vec![(first..first + 4).collect()], SurfaceClass::Ground));
+        }
+        let all: Vec<&SurfacePolygon> = surfaces.iter().collect();
+        let footprint = dissolved(&model, &all, model.vertices[0]);
+        assert!(footprint.is_valid(), "{footprint:?}");
+        assert_eq!((footprint.0.len(), footprint.unsigned_area()), (2, 48.0));
+    }
 }
