@@ -300,3 +300,45 @@ fn overwriting_removes_the_evaluation_of_the_old_surface() {
     let left: Vec<_> = std::fs::read_dir(out.join("eval")).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(left, ["notes.txt"]);
 }
+
+/// A folder is a likely first try: the error names the images in it.
+#[test]
+fn a_folder_as_an_image_is_told_from_one_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("")).arg("-o").arg(folder.path().join("out")).arg("-q");
+    let text = predicate::str::contains("a folder is given as an image").and(predicate::str::contains("view_2.tif"));
+    command.assert().code(2).stderr(text);
+}
+
+#[cfg(unix)]
+#[test]
+fn the_same_image_under_two_names_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = folder.path().join("other.tif");
+    std::os::unix::fs::symlink(town("view_1.tif"), &other).unwrap();
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(&other).arg("-o").arg(folder.path().join("out")).arg("-q");
+    command.assert().code(2).stderr(predicate::str::contains("the same image is given twice"));
+}
+
+/// Programs that follow the progress learn how the run ended, and `-v` shows the stages.
+#[test]
+fn progress_tells_the_end_and_verbose_the_stages() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let run = |arguments: &[&str]| {
+        let mut command = skysweep();
+        command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(&out).args(["--gsd", "2"]);
+        let output = command.args(["--preset", "fast"]).args(arguments).output().unwrap();
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let last = |text: &str| -> Value {
+        serde_json::from_str(text.lines().rfind(|line| line.starts_with('{')).unwrap()).unwrap()
+    };
+    assert_eq!(last(&run(&["--progress", "json"]))["event"], "done");
+    assert_eq!(last(&run(&["--progress", "json"]))["event"], "error", "the results exist");
+    let verbose = run(&["--progress", "none", "--overwrite", "-v"]);
+    assert!(verbose.contains("sweeping heights") && verbose.contains(" s\n"), "{verbose}");
+    assert!(!run(&["--progress", "none", "--overwrite"]).contains("sweeping heights"));
+}

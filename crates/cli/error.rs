@@ -7,6 +7,9 @@ use std::io::{ErrorKind, Write};
 /// Hint for an output that exists.
 pub(crate) const OVERWRITE: &str = "nothing was written: give --overwrite to replace it";
 
+/// Hint for an input on a network.
+const REMOTE: &str = "--allow-remote reads rasters from web addresses (https://…) that are given as inputs";
+
 /// Advice that names options of the command line; errors of the library do not know them.
 #[derive(Debug)]
 struct Hint(String);
@@ -42,7 +45,8 @@ pub(crate) fn report(e: &anyhow::Error) {
         text.push_str(&format!("  caused by: {cause}\n"));
     }
     let overwrite = || text.contains(io::atomic::OUTPUT_EXISTS).then(|| OVERWRITE.to_owned());
-    if let Some(hint) = hint.map(Hint::to_string).or_else(overwrite) {
+    let remote = || text.contains("or allow addresses").then(|| REMOTE.to_owned());
+    if let Some(hint) = hint.map(Hint::to_string).or_else(overwrite).or_else(remote) {
         text.push_str(&format!("  hint: {hint}\n"));
     }
     // Where even standard error is closed, only the exit code is left.

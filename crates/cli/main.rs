@@ -78,6 +78,9 @@ enum Command {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     log::init(cli.global);
+    if cli.global.allow_remote {
+        jobs::remote::allow_remote();
+    }
     match run(&cli) {
         Ok(Outcome::Complete) => ExitCode::SUCCESS,
         Ok(Outcome::Partial) => ExitCode::from(1),

@@ -33,10 +33,14 @@ pub(crate) struct ShowOptions {
 
 impl ShowOptions {
     /// Runs a job while its progress is shown.
-    pub(crate) fn watch<T>(self, global: Global, job: impl FnOnce(&Watcher) -> T) -> T {
+    pub(crate) fn watch<T, E: std::error::Error>(
+        self,
+        global: Global,
+        job: impl FnOnce(&Watcher) -> Result<T, E>,
+    ) -> Result<T, E> {
         let watcher = Watcher::new(self.progress, global);
         let result = job(&watcher);
-        watcher.finish();
+        watcher.finish(result.as_ref().err());
         result
     }
 
@@ -74,6 +78,8 @@ pub(crate) struct RunOptions {
 pub(crate) struct Watcher {
     style: ProgressStyle,
     quiet: bool,
+    /// Whether stages and their times are printed as lines.
+    verbose: bool,
     bar: ProgressBar,
     stage: Mutex<(String, Instant)>,
 }
@@ -84,14 +90,30 @@ impl Watcher {
         let bar = ProgressBar::new(0);
         let shown = style == ProgressStyle::Bar && !quiet;
         bar.set_draw_target(if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() });
-        if let Ok(look) = BarStyle::with_template("{msg:22} {bar:30} {pos}/{len}") {
+        if let Ok(look) = BarStyle::with_template("{msg:22} {bar:30} {percent:>3} % {eta:>4} left") {
             bar.set_style(look);
         }
-        Self { style, quiet, bar, stage: Mutex::new((String::new(), Instant::now())) }
+        let verbose = global.verbose > 0 && style != ProgressStyle::Json;
+        Self { style, quiet, verbose, bar, stage: Mutex::new((String::new(), Instant::now())) }
     }
 
-    pub(crate) fn finish(&self) {
+    /// Ends the bar, and says how the job ended.
+    pub(crate) fn finish(&self, error: Option<&impl std::error::Error>) {
         self.bar.finish_and_clear();
+        self.say_time();
+        self.line(&match error {
+            None => serde_json::json!({ "event": "done" }),
+            Some(error) => serde_json::json!({ "event": "error", "text": error.to_string() }),
+        });
+    }
+
+    /// Prints how long the stage took that ends.
+    fn say_time(&self) {
+        if let (true, Ok(stage)) = (self.verbose, self.stage.lock())
+            && !stage.0.is_empty()
+        {
+            self.say(&format!("{:<30} {:.1} s", stage.0, stage.1.elapsed().as_secs_f64()));
+        }
     }
 
     fn line(&self, value: &serde_json::Value) {
@@ -108,6 +130,7 @@ impl Watcher {
 
 impl Progress for Watcher {
     fn begin(&self, stage: &str, steps: usize) {
+        self.say_time();
         self.bar.set_length(steps as u64);
         self.bar.set_position(0);
         self.bar.set_message(stage.to_owned());
@@ -118,6 +141,10 @@ impl Progress for Watcher {
     }
 
     fn step(&self) {
+        // A stage may find that it has more steps than it said.
+        if Some(self.bar.position()) == self.bar.length() {
+            self.bar.inc_length(1);
+        }
         self.bar.inc(1);
         if let Ok(current) = self.stage.lock() {
             let seconds = current.1.elapsed().as_secs_f64();

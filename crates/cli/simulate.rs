@@ -10,7 +10,7 @@ use ::simulate::{PRESETS, SeasonsConfig, SimulationConfig};
 use jobs::simulate::{SimulateConfig, SimulateJobError};
 
 use crate::error::with_hint;
-use crate::progress::{ProgressStyle, Watcher};
+use crate::progress::{ProgressStyle, ShowOptions};
 use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep simulate`.
@@ -100,19 +100,19 @@ fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> 
     let mut config = SimulateConfig::new(scene, output.to_owned());
     config.flight = args.flight;
     config.overwrite = args.overwrite;
-    let watcher = Watcher::new(args.progress, global);
-    let made = jobs::simulate::run(&config, &watcher);
-    watcher.finish();
-    let report = made.map_err(|error| {
+    let show = ShowOptions { progress: args.progress, json: false };
+    let report = show.watch(global, |watcher| jobs::simulate::run(&config, watcher)).map_err(|error| {
         let full = matches!(error, SimulateJobError::NotEmpty { .. });
         with_hint(error, full.then_some("choose another folder or pass --overwrite"))
     })?;
-    tracing::info!(
-        "{} views of {} buildings and {} trees in {}",
-        report.views,
-        report.scene.buildings,
-        report.scene.trees,
-        report.output.display()
-    );
+    if !global.is_quiet() {
+        print::text(&format!(
+            "scene      {} views of {} buildings and {} trees\nwritten    {}\n",
+            report.views,
+            report.scene.buildings,
+            report.scene.trees,
+            report.output.display()
+        ))?;
+    }
     Ok(Outcome::Complete)
 }

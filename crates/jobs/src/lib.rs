@@ -18,6 +18,7 @@ pub mod ortho;
 mod output_folder;
 pub mod placed_model;
 pub mod priors;
+pub mod remote;
 pub mod rpc;
 pub mod simulate;
 pub mod splats;

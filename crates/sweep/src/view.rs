@@ -6,6 +6,17 @@ use raster::{Grid, Pyramid};
 
 /// Variance of the rounding error of integer grey values.
 pub(crate) const QUANTISATION_VARIANCE: f32 = 1.0 / 12.0;
+/// A pixel further from the median than this many spreads of the image is a defect of the sensor or
+/// of the file: glints and lamps stay within a few hundred. Sums of f32 over windows that hold one
+/// lose all other values.
+const HOT_SPREADS: f32 = 1000.0;
+/// Shares of the pixels below and above the spread of the grey values.
+const SPREAD_QUANTILES: [f64; 3] = [0.02, 0.5, 0.98];
+/// Largest number of hot pixels: one in this many, and a few in small images. More are content.
+const HOT_ONE_IN: usize = 10_000;
+const HOT_FEW: usize = 8;
+/// Number of pixels that give the quantiles of an image.
+const SAMPLES: f64 = 2.5e5;
 /// Smallest side of a pyramid level, pixels: a handful of patches.
 const SIDE_MIN: usize = 32;
 /// Largest number of levels: enough to reduce the largest image to a pixel.
@@ -51,6 +62,7 @@ impl SweepView {
     pub fn new(camera: RpcCamera, mut image: Grid<f32>) -> Self {
         // The quantisation of the census relies on the bits of this NaN.
         image.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = f32::NAN);
+        drop_hot(&mut image);
         let noise = noise_deviation(&image);
         let levels = Pyramid::new(image, LEVELS_MAX, SIDE_MIN).into_levels();
         let contrast = levels.iter().map(typical_difference).collect();
@@ -120,6 +132,22 @@ pub struct ViewLevel<'a> {
     pub contrast: f32,
 }
 
+/// Makes the few pixels invalid that are far beyond all others.
+fn drop_hot(image: &mut Grid<f32>) {
+    let step = 1.max((image.data().len() as f64 / SAMPLES) as usize);
+    let mut known: Vec<f32> = image.data().iter().step_by(step).copied().filter(|v| v.is_finite()).collect();
+    let last = known.len().saturating_sub(1) as f64;
+    let quantile = |share: f64, known: &mut [f32]| order_statistic(known, (share * last) as usize);
+    let [low, middle, high] = SPREAD_QUANTILES.map(|share| quantile(share, &mut known));
+    let (Some(low), Some(middle), Some(high)) = (low, middle, high) else { return };
+    let far = HOT_SPREADS * (high - low);
+    let is_hot = |v: f32| (v - middle).abs() > far;
+    let hot = image.data().iter().filter(|v| is_hot(**v)).count();
+    if far > 0.0 && hot > 0 && hot <= image.data().len() / HOT_ONE_IN + HOT_FEW {
+        image.data_mut().iter_mut().filter(|v| is_hot(**v)).for_each(|v| *v = f32::NAN);
+    }
+}
+
 /// Returns the median over the pixels of the greater difference to the left and to the upper
 /// neighbour; 0 for an image without valid differences.
 fn typical_difference(g: &Grid<f32>) -> f32 {
@@ -173,6 +201,26 @@ mod tests {
                 .blank(0);
         let expected = |i: usize| (3..5).contains(&(i % 9)) && (1..4).contains(&(i / 9));
         assert!((0..72).all(|i| blank.data()[i] == expected(i)), "{blank:?}");
+    }
+
+    /// One pixel of 1e10 would shift the mean of its tile so far that no other value is left in it.
+    #[test]
+    fn a_hot_pixel_costs_nothing_but_itself() {
+        let values = |i: usize| ((i * 7919) % 1009) as f32 * 0.5;
+        let plain = Grid::from_vec(200, 150, (0..200 * 150).map(values).collect()).unwrap();
+        let camera = || crate::testing::camera::leaning_camera(200, [0.0; 2]);
+        for hot in [1e10, f32::INFINITY, -3e8] {
+            let mut image = plain.clone();
+            image[(77, 31)] = hot;
+            let view = SweepView::new(camera(), image);
+            let level = view.levels[0].data().iter().zip(plain.data()).enumerate();
+            assert!(level.map(|(i, (a, b))| a == b || (a.is_nan() && i == 31 * 200 + 77)).all(|same| same), "{hot}");
+            assert!(view.levels[1].data().iter().all(|v| v.is_nan() || (0.0..=505.0).contains(v)), "{hot}");
+        }
+        // Values that are rare but not absurd stay.
+        let mut image = plain.clone();
+        image[(77, 31)] = 60_000.0;
+        assert_eq!(SweepView::new(camera(), image).levels[0][(77, 31)], 60_000.0);
     }
 
     #[test]

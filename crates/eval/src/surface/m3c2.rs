@@ -39,6 +39,10 @@ pub struct M3c2 {
     pub rmse_m: f64,
     /// Standard deviation.
     pub std_m: f64,
+    /// Median number of points of the reference that a normal rests on. With few, the normals and
+    /// so the distances depend on which points there are.
+    #[serde(skip)]
+    pub points_per_normal: usize,
     /// Number of distances with a level of detection.
     pub with_lod: usize,
     /// Median level of detection.
@@ -53,6 +57,8 @@ pub struct M3c2 {
 struct Core {
     distance_m: f64,
     lod_m: Option<f64>,
+    /// Number of points that the normal rests on.
+    near: usize,
 }
 
 /// Mean and sample variance (divided by n − 1) of positions along an axis.
@@ -78,7 +84,8 @@ pub(super) fn m3c2(
         let (first, second) = (along(in_reference, point, axis, config)?, along(in_test, point, axis, config)?);
         let spread = |side: &Along| side.variance.map(|variance| variance / side.count as f64);
         let lod_m = spread(&first).zip(spread(&second)).map(|(a, b)| Z95 * ((a + b).sqrt() + config.registration_m));
-        Some(Core { distance_m: second.mean - first.mean, lod_m })
+        let near = in_reference.within(point, 0.5 * config.normal_scale_m).count();
+        Some(Core { distance_m: second.mean - first.mean, lod_m, near })
     };
     let chosen: Vec<usize> = (0..reference.points.len()).step_by(step).collect();
     let found: Vec<Core> = chosen.par_iter().map(|&i| core(i)).collect::<Vec<_>>().into_iter().flatten().collect();
@@ -113,6 +120,7 @@ fn summary(core_points: usize, found: &[Core]) -> M3c2 {
     let mean = |values: &dyn Fn(f64) -> f64| found.iter().map(|c| values(c.distance_m)).sum::<f64>() / n as f64;
     let mean_m = mean(&|d| d);
     let mut distances: Vec<f64> = found.iter().map(|c| c.distance_m).collect();
+    let mut near: Vec<f64> = found.iter().map(|c| c.near as f64).collect();
     let mut lods: Vec<f64> = found.iter().filter_map(|c| c.lod_m).collect();
     let above = found.iter().filter(|c| c.lod_m.is_some_and(|lod| c.distance_m.abs() > lod)).count();
     M3c2 {
@@ -123,6 +131,7 @@ fn summary(core_points: usize, found: &[Core]) -> M3c2 {
         mean_abs_m: mean(&f64::abs),
         rmse_m: mean(&|d| d * d).sqrt(),
         std_m: mean(&|d| (d - mean_m).powi(2)).sqrt(),
+        points_per_normal: percentile(&mut near, 50.0).unwrap_or_default() as usize,
         with_lod: lods.len(),
         significant: (!lods.is_empty()).then(|| above as f64 / lods.len() as f64),
         median_lod_m: percentile(&mut lods, 50.0),

@@ -69,13 +69,20 @@ fn strip_prefix_ignoring_case<'a>(text: &'a str, prefix: &str) -> Option<&'a str
 
 /// Returns OGC's URL of a reference, or `None` without an EPSG code. CityJSON 2.0 knows one code
 /// only, so a horizontal and a vertical one are written as the compound CRS of both where EPSG has
-/// one. Otherwise the horizontal one alone is written.
+/// one. Otherwise this is the horizontal one alone, and [`lone_vertical_url`] is the other.
 pub(super) fn ogc_url(crs: &CrsReference) -> Option<String> {
     let url = |code: u32| format!("https://www.opengis.net/def/crs/EPSG/0/{code}");
     match (crs.epsg?, crs.vertical_epsg) {
         (epsg, None) => Some(url(epsg)),
         (epsg, Some(vertical)) => Some(url(compound_epsg(epsg, vertical).unwrap_or(epsg))),
     }
+}
+
+/// Returns OGC's URL of a vertical system that is not part of [`ogc_url`].
+pub(super) fn lone_vertical_url(crs: &CrsReference) -> Option<String> {
+    let (horizontal, vertical) = (crs.epsg?, crs.vertical_epsg?);
+    let is_lone = compound_epsg(horizontal, vertical).is_none();
+    is_lone.then(|| format!("https://www.opengis.net/def/crs/EPSG/0/{vertical}"))
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub enum RasterError {
         source: std::io::Error,
     },
     /// The name leads to a network or a service.
-    #[error("the name leads to a network or a service, expected a local file: download it first: {}", path.display())]
+    #[error("the name leads to a network or a service, expected a local file: download it first, or allow addresses: {}", path.display())]
     NotLocal {
         /// The name as given.
         path: PathBuf,

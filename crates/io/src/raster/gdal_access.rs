@@ -27,7 +27,7 @@ const FILE_SYSTEMS: [&str; 6] = ["/vsimem/", "/vsizip/", "/vsitar/", "/vsigzip/"
 
 /// The file system of user-named addresses. It opens the one address that
 /// `CPL_VSIL_CURL_ALLOWED_FILENAME` names, which is set while the user's file is opened.
-const GUARDED_FILE_SYSTEM: &str = "/vsicurl/";
+pub(super) const GUARDED_FILE_SYSTEM: &str = "/vsicurl/";
 
 /// File systems that [`VSIGetFileSystemsPrefixes`](gdal_sys::VSIGetFileSystemsPrefixes) leaves out.
 const UNLISTED_FILE_SYSTEMS: [&str; 2] = ["/vsicurl?", "/vsicurl_streaming/"];

@@ -7,12 +7,13 @@
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Once;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use gdal::errors::GdalError;
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, config};
 
 use super::error::RasterError;
-use super::gdal_access::{is_local_file_system, restrict};
+use super::gdal_access::{GUARDED_FILE_SYSTEM, is_local_file_system, restrict};
 
 /// Beginnings of names that lead to a network or a service.
 const REMOTE_SCHEMES: [&str; 8] = ["http", "https", "ftp", "ftps", "s3", "gs", "az", "hdfs"];
@@ -21,6 +22,14 @@ const REMOTE_SCHEMES: [&str; 8] = ["http", "https", "ftp", "ftps", "s3", "gs", "
 const CACHE_MB: &str = "128";
 /// Messages kept per call; further ones only repeat the cause.
 const MESSAGES_MAX: usize = 8;
+
+/// GDAL's option with the one name that its file system of addresses opens.
+const ALLOWED_ADDRESS: &str = "CPL_VSIL_CURL_ALLOWED_FILENAME";
+/// GDAL's option for looking at the files beside one that is opened.
+const BESIDE: &str = "GDAL_DISABLE_READDIR_ON_OPEN";
+
+/// Whether addresses that the user names may be opened.
+static REMOTE_ALLOWED: AtomicBool = AtomicBool::new(false);
 
 static READY: Once = Once::new();
 
@@ -57,7 +66,10 @@ pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
     let name = path.to_string_lossy();
     if !is_local_file_system(&name) {
         if leads_away(&name) && !path.exists() {
-            return Err(RasterError::NotLocal { path: path.to_owned() });
+            return match remote_name(&name) {
+                Some(remote) if REMOTE_ALLOWED.load(Ordering::Relaxed) => open_remote(path, &remote),
+                _ => Err(RasterError::NotLocal { path: path.to_owned() }),
+            };
         }
         let unreadable = |source| RasterError::Unreadable { path: path.to_owned(), source };
         let meta = std::fs::metadata(path).map_err(unreadable)?;
@@ -69,10 +81,42 @@ pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
             std::fs::File::open(path).map_err(unreadable)?;
         }
     }
+    open_name(path, path)
+}
+
+/// Opens the raster of a name of GDAL's; `path` is the name for errors.
+fn open_name(path: &Path, name: &Path) -> Result<Dataset, RasterError> {
     let open_flags =
         GdalOpenFlags::GDAL_OF_RASTER | GdalOpenFlags::GDAL_OF_READONLY | GdalOpenFlags::GDAL_OF_VERBOSE_ERROR;
-    with_gdal(|| Dataset::open_ex(path, DatasetOptions { open_flags, ..Default::default() }))
+    with_gdal(|| Dataset::open_ex(name, DatasetOptions { open_flags, ..Default::default() }))
         .map_err(|reason| RasterError::NotARaster { path: path.to_owned(), reason })
+}
+
+/// Lets [`open_dataset`] open addresses (`https://…`) for the rest of the process. Only the very
+/// name that it is given may be fetched, never one inside a file.
+pub fn allow_remote() {
+    REMOTE_ALLOWED.store(true, Ordering::Relaxed);
+}
+
+/// Returns GDAL's name of an address of the web; `None` for other services, which are not read.
+fn remote_name(name: &str) -> Option<String> {
+    let address = name.strip_prefix(GUARDED_FILE_SYSTEM).unwrap_or(name);
+    let lower = address.to_ascii_lowercase();
+    let is_web = lower.starts_with("http://") || lower.starts_with("https://");
+    is_web.then(|| format!("{GUARDED_FILE_SYSTEM}{address}"))
+}
+
+/// Opens an address that the user named: this name alone is allowed on this thread while it is
+/// opened, and files beside it are not looked for.
+fn open_remote(path: &Path, remote: &str) -> Result<Dataset, RasterError> {
+    prepare_gdal();
+    let allow = |key, value| drop(config::set_thread_local_config_option(key, value));
+    allow(ALLOWED_ADDRESS, remote);
+    allow(BESIDE, "EMPTY_DIR");
+    let opened = open_name(path, Path::new(remote));
+    // Clearing fails only when the text has a NUL.
+    [ALLOWED_ADDRESS, BESIDE].into_iter().for_each(|key| drop(config::clear_thread_local_config_option(key)));
+    opened
 }
 
 /// Whether a name begins with a scheme or with one of GDAL's file systems that are not local.
@@ -93,7 +137,7 @@ fn prepare() {
     });
     // Setting an option fails only when the text has a NUL, which these constants have not.
     let set = |key, value| drop(config::set_config_option(key, value));
-    set("CPL_VSIL_CURL_ALLOWED_FILENAME", "/vsicurl/nothing");
+    set(ALLOWED_ADDRESS, "/vsicurl/nothing");
     set("GDAL_VRT_ENABLE_PYTHON", "NO");
     if config::get_config_option("GDAL_CACHEMAX", "").is_ok_and(|value| value.is_empty()) {
         set("GDAL_CACHEMAX", CACHE_MB);

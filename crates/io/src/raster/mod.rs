@@ -2,8 +2,9 @@
 //! are written.
 //!
 //! Windows and images follow the toolkit's convention: the centre of the upper-left pixel is (0,
-//! 0). GDAL's convention (its corner) occurs only here and in `raster::GeoTransform`. Only local
-//! files are read, and nothing that a file names on a network is fetched. A file appears under its
+//! 0). GDAL's convention (its corner) occurs only here and in `raster::GeoTransform`. Local
+//! files are read, and addresses only after [`allow_remote`]; nothing that a file names on a network
+//! is fetched. A file appears under its
 //! final name when it is complete.
 
 mod band;
@@ -26,6 +27,7 @@ pub use band::{Band, BandData};
 pub use dem::{Dem, read_dem, read_dem_window};
 pub use depth_png::{DepthScale, write_depth_png};
 pub use error::RasterError;
+pub use gdal_setup::allow_remote;
 pub use geotiff::{CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
 pub use luma::LumaTile;
 pub use luma_rule::LumaRule;

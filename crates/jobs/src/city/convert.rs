@@ -57,14 +57,6 @@ pub fn convert(config: &CityConvertConfig, progress: &dyn Progress) -> Result<Ci
     for (what, count) in &account.summary.left_out {
         progress.warn(&format!("{count} {what} of the file are not written"));
     }
-    if format == CityOutputFormat::Cityjson
-        && let (Some(horizontal), Some(vertical)) = (opened.file.model.crs.epsg, opened.file.model.crs.vertical_epsg)
-        && crs::compound_epsg(horizontal, vertical).is_none()
-    {
-        progress.warn(&format!(
-            "CityJSON has no name for EPSG:{horizontal} with heights in EPSG:{vertical}: only the former is written"
-        ));
-    }
     account.write(&config.input)?;
     Ok(CityConvertReport { summary: account.summary, format, without_footprint })
 }

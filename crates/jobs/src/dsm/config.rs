@@ -13,6 +13,8 @@ use crate::dsm::values::{HeightRange, ImagePair, MapBounds};
 pub(crate) const EARTH_RANGE: HeightRange = HeightRange::new(-500.0, 9000.0);
 /// Smaller output tiles and chunks cost more to manage than to fill, cells.
 const SIDE_MIN: usize = 64;
+/// Most images of a folder that an error names.
+const NAMED_IMAGES: usize = 8;
 /// Side of the output tiles where none is given, cells.
 const TILE_DEFAULT: usize = 1024;
 
@@ -155,16 +157,36 @@ impl DsmConfig {
     /// setting that is wrong.
     pub fn validate(&self) -> Result<(), DsmError> {
         if self.images.len() < 2 {
-            return Err(DsmError::TooFewImages { found: self.images.len() });
+            return Err(self.folder().unwrap_or(DsmError::TooFewImages { found: self.images.len() }));
         }
         for (i, path) in self.images.iter().enumerate() {
-            if self.images[..i].contains(path) {
+            // The same file may be given under two names.
+            let same = |other: &PathBuf| {
+                other == path || other.canonicalize().ok().zip(path.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+            };
+            if self.images[..i].iter().any(same) {
                 return Err(DsmError::SameImage { path: path.clone() });
             }
         }
         self.validate_ground()?;
         self.validate_division()?;
         self.validate_positions()
+    }
+
+    /// Returns the error of a folder in the place of an image, if there is one.
+    fn folder(&self) -> Option<DsmError> {
+        let path = self.images.iter().find(|path| path.is_dir())?;
+        let is_image = |path: &PathBuf| {
+            path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tif") || e.eq_ignore_ascii_case("tiff"))
+        };
+        let entries = path.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
+        let mut images: Vec<String> = entries
+            .filter(is_image)
+            .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
+            .collect();
+        images.sort();
+        images.truncate(NAMED_IMAGES);
+        Some(DsmError::Folder { path: path.clone(), images })
     }
 
     fn validate_ground(&self) -> Result<(), DsmError> {

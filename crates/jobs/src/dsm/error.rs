@@ -61,6 +61,18 @@ pub enum DsmError {
         /// Number of images given.
         found: usize,
     },
+    /// A folder is given in the place of an image.
+    #[error(
+        "a folder is given as an image ({}); give the images in it: {}",
+        if images.is_empty() { "it holds no TIFF".to_owned() } else { format!("it holds {}", images.join(", ")) },
+        path.display()
+    )]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// Names of the TIFFs in it, a few at most.
+        images: Vec<String>,
+    },
     /// One image is given twice.
     #[error("the same image is given twice; remove one: {}", path.display())]
     SameImage {

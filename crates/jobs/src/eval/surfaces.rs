@@ -14,6 +14,10 @@ use super::surface_inputs::SurfaceInputs;
 use crate::output_folder::OutputFolder;
 use crate::{files, threads};
 
+/// Fewer points under a normal than this are worth a note: the normal of ten noisy points differs by
+/// several degrees from the normal of ten others.
+const POINTS_PER_NORMAL: usize = 10;
+
 /// A finished comparison of two surfaces.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
@@ -95,6 +99,14 @@ fn evaluate(config: &SurfaceEvalConfig, progress: &dyn Progress) -> Result<Surfa
     progress.step();
     progress.check_cancelled()?;
     let [test_format, reference_format] = inputs.formats;
+    let mut notes = inputs.notes;
+    if let Some(m3c2) = result.m3c2.filter(|m3c2| m3c2.points_per_normal < POINTS_PER_NORMAL) {
+        notes.push(format!(
+            "M3C2: the normals rest on {} points each (median), so the distances along them are uncertain by several \
+             percent; a larger scale of the normals, {} m now, or a denser reference gives more",
+            m3c2.points_per_normal, settings.normal_scale_m
+        ));
+    }
     let protocol = SurfaceProtocol {
         test: config.test.display().to_string(),
         reference: config.reference.display().to_string(),
@@ -105,7 +117,7 @@ fn evaluate(config: &SurfaceEvalConfig, progress: &dyn Progress) -> Result<Surfa
         local_origin: inputs.origin,
         alignment: "none",
         config: settings,
-        notes: inputs.notes,
+        notes,
         missed: missed(&config.requirements, &result),
     };
     let generator = format!("skysweep eval {}", env!("CARGO_PKG_VERSION"));

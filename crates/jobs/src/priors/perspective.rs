@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use ::priors::{PriorModel, Samples, Schedule, View, Visibility, Visible, buildings_of, error_curve, sample};
+use ::priors::{
+    Amount, DepthKind, NormalFrame, PriorModel, Samples, Schedule, Spacing, View, Visibility, Visible, buildings_of,
+    error_curve, sample,
+};
 use city::SurfaceClass;
 use numeric::Progress;
 use report::{ErrorRow, PriorsReport};
@@ -160,18 +163,44 @@ fn report(dataset: &Dataset<'_>, written: &WrittenMaps) -> Result<PriorsReport, 
     })
 }
 
+/// Describes the number of points in words.
+fn amount(amount: Amount) -> String {
+    match amount {
+        Amount::Count(count) => format!("{count} points"),
+        Amount::PerSquareMetre(density) => format!("{density} points per m²"),
+        Amount::Adaptive { error_m, max_spacing_m } => {
+            format!("as many points as an error of {error_m} m needs, at most {max_spacing_m} m apart")
+        }
+    }
+}
+
+/// Describes the distribution of the points in words.
+fn spacing(spacing: Spacing) -> &'static str {
+    match spacing {
+        Spacing::Random => "independent",
+        Spacing::Stratified => "stratified",
+        Spacing::PoissonDisk => "Poisson disks",
+    }
+}
+
 fn settings(dataset: &Dataset<'_>) -> Value {
     let Dataset { config, sampling, samples, frame, .. } = dataset;
     json!({
-        "sampling": format!("{:?}, {:?}, seed {}", sampling.amount, sampling.spacing, config.seed),
+        "sampling": format!("{}, {}, seed {}", amount(sampling.amount), spacing(sampling.spacing), config.seed),
         "disk_m": samples.disk_m,
         "margin_px": config.visibility.margin_px,
         "near_m": config.visibility.near_m,
         "epsilon_m": config.visibility.epsilon_m,
         "max_incidence_deg": config.visibility.max_incidence_deg,
         "max_observations": config.visibility.max_observations,
-        "depth": format!("{:?}", config.maps.depth),
-        "normals": format!("{:?}", config.maps.normals),
+        "depth": match config.maps.depth {
+            DepthKind::ZDepth => "along the optical axis",
+            DepthKind::RayLength => "along the ray",
+        },
+        "normals": match config.maps.normals {
+            NormalFrame::World => "in the axes of the world",
+            NormalFrame::Camera => "in the axes of each camera",
+        },
         "depth_miss": "+inf in npy, 0 in depth_png, -32768 in GeoTIFF",
         "units_per_metre": frame.scale(),
     })

@@ -36,7 +36,11 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
     let crs = first.metadata.and_then(|metadata| metadata.reference_system).unwrap_or_default();
     let mut reader =
         Reader { builder: Builder::default(), transform: first.transform, instances: Instances::default() };
-    reader.builder.set_crs(crs_reference(&crs));
+    let mut crs = crs_reference(&crs);
+    if let Some(vertical) = &first.vertical {
+        crs.vertical_epsg = crs.vertical_epsg.or(crs_reference(vertical).epsg);
+    }
+    reader.builder.set_crs(crs);
     reader.document(first.vertices, first.objects, first.templates.as_ref())?;
     let mut features = 0;
     for document in documents {

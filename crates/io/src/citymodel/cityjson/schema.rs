@@ -7,6 +7,9 @@ use serde_json::{Map, Value};
 
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
+/// Name of [`Document::vertical`] in the file.
+pub(super) const VERTICAL: &str = "+verticalReferenceSystem";
+
 /// A document (`CityJSON`) or a line of a sequence (`CityJSONFeature`).
 #[derive(Debug, serde::Deserialize)]
 pub(super) struct Document {
@@ -15,6 +18,9 @@ pub(super) struct Document {
     pub(super) version: Option<String>,
     pub(super) transform: Option<Transform>,
     pub(super) metadata: Option<Metadata>,
+    /// The vertical system of a pair that has no code of its own, as we write it.
+    #[serde(rename = "+verticalReferenceSystem")]
+    pub(super) vertical: Option<String>,
     #[serde(rename = "CityObjects")]
     pub(super) objects: Option<Pairs<Object>>,
     #[serde(default)]

@@ -10,8 +10,9 @@ use std::path::Path;
 use city::{BuildingRole, CityModel, CityObject, Geometry, GeometryKind, ModelPoint, SurfaceClass, SurfacePolygon};
 use serde_json::{Map, Value, json};
 
+use super::schema::VERTICAL;
 use crate::atomic::write_stream;
-use crate::citymodel::crs_name::ogc_url;
+use crate::citymodel::crs_name::{lone_vertical_url, ogc_url};
 use crate::citymodel::error::{CityError, CityFault};
 
 /// Options for writing a CityJSON file.
@@ -85,6 +86,10 @@ fn document(model: &CityModel, scale: f64) -> Result<Value, CityFault> {
     });
     if let Some(url) = ogc_url(&model.crs) {
         document["metadata"] = json!({ "referenceSystem": url });
+    }
+    // CityJSON has one name for both, and software leaves out members that begin with a plus.
+    if let Some(url) = lone_vertical_url(&model.crs) {
+        document[VERTICAL] = json!(url);
     }
     document["CityObjects"] = Value::Object(objects);
     document["vertices"] = json!(lattice.cells);

@@ -1,0 +1,87 @@
+//! Addresses as inputs: refused unless the user allows them, and then only those that the user
+//! named.
+
+mod common;
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::{Arc, Mutex};
+
+use common::{sample, skysweep};
+use predicates::str::contains;
+
+/// Serves files by name, whole or in parts, and notes which were asked for.
+fn server(files: Vec<(&'static str, Vec<u8>)>) -> (u16, Arc<Mutex<Vec<String>>>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let asked = Arc::new(Mutex::new(Vec::new()));
+    let noted = Arc::clone(&asked);
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            // A client that goes away is no fault of the server.
+            let _ = answer(stream, &files, &noted);
+        }
+    });
+    (port, asked)
+}
+
+fn answer(mut stream: TcpStream, files: &[(&str, Vec<u8>)], noted: &Mutex<Vec<String>>) -> std::io::Result<()> {
+    let mut lines = BufReader::new(stream.try_clone()?).lines();
+    let first = lines.next().unwrap_or(Ok(String::new()))?;
+    let mut words = first.split(' ');
+    let (method, name) = (words.next().unwrap_or_default(), words.next().unwrap_or_default().to_owned());
+    let mut range = None;
+    for line in lines {
+        let line = line?.to_ascii_lowercase();
+        if let Some((from, to)) = line.strip_prefix("range: bytes=").and_then(|range| range.split_once('-')) {
+            range = from.parse::<usize>().ok().zip(to.parse::<usize>().ok());
+        }
+        if line.is_empty() {
+            break;
+        }
+    }
+    noted.lock().unwrap().push(name.clone());
+    let Some((_, content)) = files.iter().find(|(known, _)| *known == name) else {
+        return stream.write_all(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+    };
+    let (from, to) = range.map_or((0, content.len()), |(from, to)| (from, (to + 1).min(content.len())));
+    let status = if range.is_some() { "206 Partial Content" } else { "200 OK" };
+    let head = format!(
+        "HTTP/1.1 {status}\r\nContent-Length: {}\r\nContent-Range: bytes {from}-{}/{}\r\nAccept-Ranges: bytes\r\nConnection: close\r\n\r\n",
+        to - from,
+        to.saturating_sub(1),
+        content.len()
+    );
+    stream.write_all(head.as_bytes())?;
+    if method == "HEAD" { Ok(()) } else { stream.write_all(&content[from..to]) }
+}
+
+#[test]
+fn addresses_are_read_only_when_the_user_says_so() {
+    let reference = sample("truth/dsm.tif");
+    let content = std::fs::read(&reference).unwrap();
+    let (port, asked) = server(vec![("/dsm.tif", content.clone()), ("/secret.tif", content)]);
+    let url = format!("http://127.0.0.1:{port}/dsm.tif");
+    let evaluate = |test: &str, options: &[&str]| {
+        let mut command = skysweep();
+        command.arg("eval").arg(test).arg(&reference).args(["--no-report"]).args(options).assert()
+    };
+    evaluate(&url, &[]).code(2).stderr(contains("--allow-remote"));
+    assert!(asked.lock().unwrap().is_empty(), "nothing is asked for without leave");
+    evaluate(&url, &["--allow-remote"]).code(0);
+    assert!(asked.lock().unwrap().iter().all(|name| name == "/dsm.tif"), "{asked:?}");
+    // Leave for what the user names is none for what a file names.
+    let folder = tempfile::tempdir().unwrap();
+    for (number, prefix) in ["/vsicurl/", "/vsicurl_streaming/", ""].iter().enumerate() {
+        let vrt = folder.path().join(format!("{number}.vrt"));
+        let text = format!(
+            "<VRTDataset rasterXSize=\"8\" rasterYSize=\"8\"><GeoTransform>693675, 1, 0, 4822500, 0, -1</GeoTransform>\
+             <VRTRasterBand dataType=\"Float32\" band=\"1\"><SimpleSource><SourceFilename>{prefix}\
+             http://127.0.0.1:{port}/secret.tif</SourceFilename><SourceBand>1</SourceBand></SimpleSource>\
+             </VRTRasterBand></VRTDataset>"
+        );
+        std::fs::write(&vrt, text).unwrap();
+        evaluate(vrt.to_str().unwrap(), &["--allow-remote"]).code(2);
+    }
+    assert!(asked.lock().unwrap().iter().all(|name| name != "/secret.tif"), "{asked:?}");
+}
