@@ -2,13 +2,7 @@
 //!
 //! `SKYSWEEP_LOG` (a `tracing` filter such as `io=trace`) replaces both options.
 
-use std::fmt;
-
-use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::EnvFilter;
-use tracing_subscriber::fmt::format::Writer;
-use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
-use tracing_subscriber::registry::LookupSpan;
 
 use crate::Global;
 
@@ -24,30 +18,11 @@ pub(crate) fn init(global: Global) {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        .with_target(false)
+        .with_level(false)
+        .without_time()
         .with_ansi(false)
         // The log would report a broken standard error on standard error, and panic.
         .log_internal_errors(false)
-        .event_format(Plain)
         .init();
-}
-
-/// Log lines as the other messages of the command: `warning: text`.
-struct Plain;
-
-impl<S, N> FormatEvent<S, N> for Plain
-where
-    S: Subscriber + for<'a> LookupSpan<'a>,
-    N: for<'a> FormatFields<'a> + 'static,
-{
-    fn format_event(&self, context: &FmtContext<'_, S, N>, mut out: Writer<'_>, event: &Event<'_>) -> fmt::Result {
-        let level = match *event.metadata().level() {
-            Level::ERROR => "error",
-            Level::WARN => "warning",
-            Level::INFO => "info",
-            _ => "debug",
-        };
-        write!(out, "{level}: ")?;
-        context.format_fields(out.by_ref(), event)?;
-        writeln!(out)
-    }
 }

@@ -198,11 +198,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let show = args.run.show;
     let report = show.watch(global, |watcher| jobs::priors::run(&config, watcher)).map_err(hinted)?;
     show.print(global, &report.product, || summary(args, &report.product))?;
-    let is_empty = matches!(&report.product, PriorsProduct::Dataset(made) if made.kept == 0);
-    if is_empty {
-        tracing::warn!("no point of a building is seen by enough cameras, so the dataset has no points");
-    }
-    Ok(if is_empty || report.unusable_objects > 0 { Outcome::Partial } else { Outcome::Complete })
+    Ok(if !report.is_whole() { Outcome::Partial } else { Outcome::Complete })
 }
 
 /// Names the options that mend an error.

@@ -182,6 +182,6 @@ impl Progress for Log {
     }
 
     fn warn(&self, text: &str) {
-        tracing::warn!("{text}");
+        tracing::warn!("warning: {text}");
     }
 }

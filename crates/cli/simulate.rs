@@ -105,14 +105,6 @@ fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> 
         let full = matches!(error, SimulateJobError::NotEmpty { .. });
         with_hint(error, full.then_some("choose another folder or pass --overwrite"))
     })?;
-    if !global.is_quiet() {
-        print::text(&format!(
-            "scene      {} views of {} buildings and {} trees\nwritten    {}\n",
-            report.views,
-            report.scene.buildings,
-            report.scene.trees,
-            report.output.display()
-        ))?;
-    }
+    show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }

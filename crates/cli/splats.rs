@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use crs::VerticalDatum;
-use jobs::splats::{SplatRenderConfig, SplatRenderReport, SplatsConfig, SplatsJobError, SplatsReport};
+use jobs::splats::{SplatRenderConfig, SplatsConfig, SplatsJobError, SplatsReport};
 use splats::DivisionConfig;
 
 use crate::corrections::corrections_of;
@@ -172,7 +172,7 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     config.corrections = corrections_of(args.corrections.as_deref());
     config.overwrite = args.overwrite;
     let report = args.show.watch(global, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
-    args.show.print(global, &report, || render_summary(&report, &args.output))?;
+    args.show.print(global, &report, || report.text(&args.output))?;
     Ok(Outcome::Complete)
 }
 
@@ -216,15 +216,6 @@ fn summary(report: &SplatsReport) -> String {
             &format!("equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n", count / made.splats as f64);
     }
     text + &format!("written    {}\n", report.output)
-}
-
-fn render_summary(report: &SplatRenderReport, folder: &Path) -> String {
-    let mut text = format!("splats     {}\n", report.splats);
-    for view in &report.views {
-        let (psnr, ssim) = (number(view.psnr_db), number(view.ssim));
-        text += &format!("{:20} {:.1} % covered, PSNR {psnr} dB, SSIM {ssim}\n", view.name, 100.0 * view.coverage);
-    }
-    text + &format!("written    {}\n", folder.display())
 }
 
 fn number(value: Option<f64>) -> String {

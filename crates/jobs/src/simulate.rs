@@ -86,6 +86,15 @@ pub enum SimulateJobError {
 
 from_steps!(SimulateJobError: Job(FileError, ThreadsError, Cancelled));
 
+impl SimulateReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
+        let SceneRecord { buildings, trees, .. } = &self.scene;
+        let (views, folder) = (self.views, self.output.display());
+        format!("scene      {views} views of {buildings} buildings and {trees} trees\nwritten    {folder}\n")
+    }
+}
+
 impl SimulateConfig {
     /// A simulation of `scene` without a flight, in a folder that is empty.
     pub fn new(scene: SimulationConfig, output: PathBuf) -> Self {

@@ -24,6 +24,14 @@ pub enum PriorsProduct {
     SatelliteMaps(Box<SatellitePriorsReport>),
 }
 
+impl PriorsJobReport {
+    /// Whether all objects of the model were used and, in a dataset, some point is seen.
+    pub fn is_whole(&self) -> bool {
+        let is_empty = matches!(&self.product, PriorsProduct::Dataset(made) if made.kept == 0);
+        !is_empty && self.unusable_objects == 0
+    }
+}
+
 impl PriorsProduct {
     /// Returns the report as it is written to `report.json`.
     ///

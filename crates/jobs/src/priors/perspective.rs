@@ -44,6 +44,9 @@ pub(super) fn make(config: &PriorsConfig, progress: &dyn Progress) -> Result<Pri
     let views = frame.views(&cameras);
     let samples = sample(&model, &sampling)?;
     let visible = visible(config, &model, &samples, &views, progress)?;
+    if visible.points.is_empty() {
+        progress.warn("no point of a building is seen by enough cameras, so the dataset has no points");
+    }
     let dataset = Dataset {
         config,
         file: &read.file,

@@ -84,6 +84,19 @@ pub struct SplatRenderView {
     pub ssim: Option<f64>,
 }
 
+impl SplatRenderReport {
+    /// Returns the report of the views in `folder` as text, which ends in a line break.
+    pub fn text(&self, folder: &Path) -> String {
+        let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2}"));
+        let mut text = format!("splats     {}\n", self.splats);
+        for view in &self.views {
+            let (psnr, ssim) = (number(view.psnr_db), number(view.ssim));
+            text += &format!("{:20} {:.1} % covered, PSNR {psnr} dB, SSIM {ssim}\n", view.name, 100.0 * view.coverage);
+        }
+        text + &format!("written    {}\n", folder.display())
+    }
+}
+
 impl SplatRenderConfig {
     /// Views of `splats` in `output`; at least images or cameras must be added.
     pub fn new(splats: PathBuf, output: PathBuf) -> Self {
