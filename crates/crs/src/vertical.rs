@@ -11,6 +11,7 @@ use std::path::Path;
 
 use geodesy::GeodesyError;
 
+use crate::area::AreaOfUse;
 use crate::error::CrsError;
 use crate::identity::VerticalDatum;
 use crate::proj_handle::{Direction, Pool, Recipe};
@@ -19,6 +20,17 @@ use crate::proj_handle::{Direction, Pool, Recipe};
 const EGM96_GRIDS: [&str; 2] = ["us_nga_egm96_15.tif", "egm96_15.gtx"];
 /// File names of the EGM2008 grid in current and older distributions of PROJ.
 const EGM2008_GRIDS: [&str; 2] = ["us_nga_egm08_25.tif", "egm08_25.gtx"];
+
+/// Grids of vertical CRSs, by EPSG code, where one file serves all of the area.
+const GRIDS: [(u32, &str); 5] = [
+    (3855, "us_nga_egm08_25.tif"),
+    (5709, "nl_nsgi_nlgeo2018.tif"),
+    (5720, "fr_ign_RAF20.tif"),
+    (5773, "us_nga_egm96_15.tif"),
+    (7837, "de_bkg_gcg2016.tif"),
+];
+/// Places along each side of the area of use at which a transformation is tried.
+const TRIED: usize = 7;
 
 /// Converts heights between the WGS 84 ellipsoid and one vertical datum. `Send` and `Sync`.
 #[derive(Debug)]
@@ -162,11 +174,32 @@ fn grid_pipeline(grid: &str) -> String {
 }
 
 /// Makes the transformation to a vertical CRS in PROJ's database. PROJ makes it even when its grids
-/// are missing, and then fails at every point, so no height is returned unchanged.
+/// are missing, and then fails at every point. So it is tried inside the area of use of the CRS.
 fn through_database(code: u32) -> Result<Pool, CrsError> {
     let target = format!("EPSG:4326+{code}");
     let recipe = Recipe::Spatial { source: "EPSG:4979".to_owned(), target: target.clone() };
-    Pool::new(recipe).map_err(|reason| no_transformation(&target, reason))
+    let pool = Pool::new(recipe).map_err(|reason| no_transformation(&target, reason))?;
+    match AreaOfUse::of_epsg(code) {
+        Ok(Some(area)) if !converts_somewhere(&pool, &area) => {
+            let known = GRIDS.iter().find(|(known, _)| *known == code).map(|(_, name)| (*name).to_owned());
+            let unknown = || format!("that `projinfo -s EPSG:4979 -t EPSG:4326+{code}` names");
+            Err(CrsError::MissingGrid { datum: format!("EPSG:{code}"), candidates: known.unwrap_or_else(unknown) })
+        }
+        _ => Ok(pool),
+    }
+}
+
+/// Whether a transformation has a value at one of a lattice of places in an area.
+fn converts_somewhere(pool: &Pool, area: &AreaOfUse) -> bool {
+    let width = (area.east_deg - area.west_deg).rem_euclid(360.0);
+    let share = |i: usize| (i as f64 + 0.5) / TRIED as f64;
+    let places = (0..TRIED * TRIED).map(|i| (share(i % TRIED), share(i / TRIED)));
+    let (mut lon, mut lat): (Vec<f64>, Vec<f64>) = places
+        .map(|(x, y)| (area.west_deg + x * width, area.south_deg + y * (area.north_deg - area.south_deg)))
+        .unzip();
+    let mut heights = vec![0.0; lon.len()];
+    let failed = pool.apply(Direction::Forward, &mut lon, &mut lat, &mut heights);
+    failed.is_ok_and(|failed| failed < heights.len())
 }
 
 fn no_transformation(target: &str, reason: String) -> CrsError {
@@ -198,6 +231,15 @@ mod tests {
         }
         let path = Path::new("/nonexistent/grid.gtx");
         assert!(matches!(HeightConverter::with_grid(VerticalDatum::Egm2008, path), Err(CrsError::UnusableGrid { .. })));
+    }
+
+    /// German heights need a grid that PROJ's own package lacks: the error names it.
+    #[test]
+    fn the_grid_of_a_national_datum_is_named() {
+        match HeightConverter::new(VerticalDatum::Epsg(7837)) {
+            Err(error) => assert!(error.to_string().contains("de_bkg_gcg2016.tif"), "{error}"),
+            Ok(converter) => assert!(converter.datum_from_ellipsoid(9.0, 51.0, 100.0).is_ok_and(|h| h < 60.0)),
+        }
     }
 
     #[test]

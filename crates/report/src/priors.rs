@@ -171,7 +171,10 @@ impl PriorsReport {
     fn setting_list(&self) -> String {
         let Value::Object(settings) = &self.settings else { return String::new() };
         let item = |(name, value): (&String, &Value)| {
-            let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            let text = match value {
+                Value::Null => "none".to_owned(),
+                value => value.as_str().map_or_else(|| value.to_string(), str::to_owned),
+            };
             format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(&text))
         };
         format!("<h2>Settings</h2><dl>{}</dl>", settings.iter().map(item).collect::<String>())
