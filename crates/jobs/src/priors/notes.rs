@@ -27,7 +27,8 @@ pub(super) fn notes(dataset: &Dataset<'_>) -> Vec<String> {
     }
     let blind = visible.per_view.iter().filter(|view| view.visible == 0).count();
     if blind > 0 {
-        notes.push(format!("{blind} views see no point of a building."));
+        let see = if blind == 1 { "view sees" } else { "views see" };
+        notes.push(format!("{blind} {see} no point of a building."));
     }
     if let Some(by) = dataset.frame.moved_by() {
         notes.push(format!(

@@ -218,7 +218,8 @@ fn report(
     }
     let blind = rows.iter().filter(|row| row.hit_pixels == 0).count();
     if blind > 0 {
-        notes.push(format!("{blind} images see no building."));
+        let see = if blind == 1 { "image sees" } else { "images see" };
+        notes.push(format!("{blind} {see} no building."));
     }
     SatellitePriorsReport {
         model: config.model.display().to_string(),
