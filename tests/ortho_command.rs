@@ -135,7 +135,8 @@ fn what_makes_no_ortho_is_refused() {
     refused(Path::new("none.tif"), &dsm, &[], "none.tif");
 }
 
-/// Bounds in other coordinates than the surface model's show nothing, which is an error and no file.
+/// Bounds in other coordinates than the surface model's show nothing, which is an error and no
+/// file.
 #[test]
 fn an_area_beside_the_surface_is_refused() {
     let folder = tempfile::tempdir().unwrap();

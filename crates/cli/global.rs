@@ -5,8 +5,8 @@ use clap::ArgAction;
 /// Options that every command takes.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(crate) struct Global {
-    /// Read rasters from the web addresses (https://…) that are given as inputs; what a file names is
-    /// never fetched.
+    /// Read rasters from the web addresses (https://…) that are given as inputs; what a file names
+    /// is never fetched.
     #[arg(long, global = true)]
     pub(crate) allow_remote: bool,
     /// Print errors only.

@@ -65,8 +65,8 @@ const PLAUSIBLE: [(&str, f64); 8] = [
     ("HEIGHT_OFF", 1e6),
     ("HEIGHT_SCALE", 1e6),
 ];
-/// Largest distance of a corner of the domain from the image's offset, pixels. Crops keep the domain
-/// of their scene, so this is the size of the longest strips and more.
+/// Largest distance of a corner of the domain from the image's offset, pixels. Crops keep the
+/// domain of their scene, so this is the size of the longest strips and more.
 const REACH_MAX_PX: f64 = 1e7;
 
 impl Rpc {
@@ -81,9 +81,9 @@ impl Rpc {
 
     /// Checks that the coefficients form a camera.
     ///
-    /// All entries must be finite, scales not zero, and angles valid, and scales and offsets such as
-    /// a sensor can have. At the centre the model must have no pole, and the image must depend on
-    /// longitude and latitude. The corners of the domain must not be far outside of the image.
+    /// All entries must be finite, scales not zero, and angles valid, and scales and offsets such
+    /// as a sensor can have. At the centre the model must have no pole, and the image must depend
+    /// on longitude and latitude. The corners of the domain must not be far outside of the image.
     ///
     /// # Errors
     /// The first check that fails.

@@ -356,8 +356,8 @@ unsafe fn text_of(text: *const c_char) -> Option<String> {
     (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())
 }
 
-/// Returns the bounds of the area of use of a CRS, degrees: west, south, east, north. `None` when the
-/// registry names none.
+/// Returns the bounds of the area of use of a CRS, degrees: west, south, east, north. `None` when
+/// the registry names none.
 pub(crate) fn area_of_use(definition: &str) -> Result<Option<[f64; 4]>, String> {
     let context = Context::new();
     let crs = context.create(definition)?;

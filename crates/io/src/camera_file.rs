@@ -1,5 +1,5 @@
-//! What the readers of camera files (COLMAP and `transforms.json`) share: the limit of the size, and
-//! the errors of a file.
+//! What the readers of camera files (COLMAP and `transforms.json`) share: the limit of the size,
+//! and the errors of a file.
 
 use std::path::{Path, PathBuf};
 

@@ -32,8 +32,8 @@ pub(super) fn compare_shells(shells: &[Patch]) -> Vec<MemberDefect> {
     found
 }
 
-/// Returns what is wrong with shell B, a cavity, in relation to shell A, which is the outer shell or
-/// another cavity; `None` if nothing is.
+/// Returns what is wrong with shell B, a cavity, in relation to shell A, which is the outer shell
+/// or another cavity; `None` if nothing is.
 fn cavity_defect(contact: &Contact, a_is_outer: bool) -> Option<DefectCode> {
     if contact.is_same() {
         return Some(DefectCode::DuplicateShells);

@@ -21,8 +21,8 @@ const ROUNDS: usize = 50;
 /// Ratio of the 99th percentile of |e| to its median for a normal vector of three equal components:
 /// 3.368 / 1.538.
 const PERCENTILE_99: f64 = 2.19;
-/// Least automatic threshold, metres. Positions are written with a few decimals, so the residuals of
-/// exact data are their rounding, and a multiple of its median leaves right positions out.
+/// Least automatic threshold, metres. Positions are written with a few decimals, so the residuals
+/// of exact data are their rounding, and a multiple of its median leaves right positions out.
 const FLOOR_M: f64 = 0.01;
 /// Share of the extent of the world's positions below which residuals are rounding errors.
 const ROUNDING: f64 = 1e-10;

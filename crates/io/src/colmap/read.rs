@@ -18,8 +18,8 @@ use crate::camera_file::Fault;
 /// # Errors
 /// - [`ColmapError::Missing`] when `cameras` or `images` is not there.
 /// - [`ColmapError::File`] when the system cannot read a file, or a file breaks its format, a lens
-///   is impossible, an image has no camera or no finite pose, an image name leads out of its folder,
-///   or an identifier occurs twice.
+///   is impossible, an image has no camera or no finite pose, an image name leads out of its
+///   folder, or an identifier occurs twice.
 ///
 /// # Examples
 /// ```

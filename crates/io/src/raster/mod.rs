@@ -2,10 +2,9 @@
 //! are written.
 //!
 //! Windows and images follow the toolkit's convention: the centre of the upper-left pixel is (0,
-//! 0). GDAL's convention (its corner) occurs only here and in `raster::GeoTransform`. Local
-//! files are read, and addresses only after [`allow_remote`]; nothing that a file names on a network
-//! is fetched. A file appears under its
-//! final name when it is complete.
+//! 0). GDAL's convention (its corner) occurs only here and in `raster::GeoTransform`. Local files
+//! are read, and addresses only after [`allow_remote`]; nothing that a file names on a network is
+//! fetched. A file appears under its final name when it is complete.
 
 mod band;
 mod colour;

@@ -28,9 +28,9 @@ pub struct CityConvertReport {
 /// (CityJSON 2.0) of a model.
 ///
 /// # Errors
-/// [`CityJobError::UnknownEnding`], [`CityJobError::NothingSelected`] when no object has a surface to
-/// write (CityJSON takes all objects and levels), [`CityJobError::Read`], [`CityJobError::Model`], and
-/// [`CityJobError::Job`] when an output exists or cannot be written.
+/// [`CityJobError::UnknownEnding`], [`CityJobError::NothingSelected`] when no object has a surface
+/// to write (CityJSON takes all objects and levels), [`CityJobError::Read`],
+/// [`CityJobError::Model`], and [`CityJobError::Job`] when an output exists or cannot be written.
 ///
 /// ```
 /// use jobs::city::{CityConvertConfig, convert};

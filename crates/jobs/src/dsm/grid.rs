@@ -12,8 +12,8 @@ use crate::dsm::notes::Notes;
 use crate::dsm::values::MapBounds;
 use crate::dsm::view_geometry::ViewGeometry;
 
-/// Beyond this distance from its area of use a CRS needs to be forced, degrees. Scenes at the border
-/// of two UTM zones are written in either, and half a zone beyond it distorts by 2 in 1000.
+/// Beyond this distance from its area of use a CRS needs to be forced, degrees. Scenes at the
+/// border of two UTM zones are written in either, and half a zone beyond it distorts by 2 in 1000.
 const FAR_OUTSIDE_DEG: f64 = 3.0;
 /// Grids of more cells than this come from a cell size or bounds in wrong units.
 const CELLS_MAX: f64 = 4e9;

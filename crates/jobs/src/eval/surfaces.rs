@@ -14,8 +14,8 @@ use super::surface_inputs::SurfaceInputs;
 use crate::output_folder::OutputFolder;
 use crate::{files, threads};
 
-/// Fewer points under a normal than this are worth a note: the normal of ten noisy points differs by
-/// several degrees from the normal of ten others.
+/// Fewer points under a normal than this are worth a note: the normal of ten noisy points differs
+/// by several degrees from the normal of ten others.
 const POINTS_PER_NORMAL: usize = 10;
 
 /// A finished comparison of two surfaces.

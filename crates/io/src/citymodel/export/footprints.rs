@@ -148,9 +148,9 @@ fn faces_down(model: &CityModel, surface: &SurfacePolygon) -> bool {
     -normal[2] > normal[0].hypot(normal[1])
 }
 
-/// Dissolves surfaces into one footprint, whose polygons are valid by OGC's rules: touching surfaces
-/// are one polygon, and rings neither cross nor repeat themselves. Coordinates are metres (units of
-/// the model) from `origin`. Slivers below [`AREA_MIN`] are rounding.
+/// Dissolves surfaces into one footprint, whose polygons are valid by OGC's rules: touching
+/// surfaces are one polygon, and rings neither cross nor repeat themselves. Coordinates are metres
+/// (units of the model) from `origin`. Slivers below [`AREA_MIN`] are rounding.
 fn dissolved(model: &CityModel, surfaces: &[&SurfacePolygon], origin: ModelPoint) -> MultiPolygon {
     let ring = |ring: &Vec<u32>| -> LineString {
         let corner = |&vertex: &u32| {
@@ -178,7 +178,8 @@ fn coordinates(footprint: &MultiPolygon, origin: ModelPoint, projection: &MapPro
         let (lon, lat) = projection
             .lonlat_from_map(at.x + origin.x, at.y + origin.y)
             .map_err(|error| CityFault::new(city::DefectCode::CoordinateOutOfRange, error.to_string(), "model"))?;
-        // 1e-9 degrees are about a tenth of a millimetre: the rounding folds no ring of millimetres.
+        // 1e-9 degrees are about a tenth of a millimetre: the rounding folds no ring of
+        // millimetres.
         Ok([lon, lat].map(|degrees| (degrees * 1e9).round() / 1e9))
     };
     let ring = |ring: &LineString| ring.0.iter().map(place).collect::<Result<Vec<_>, _>>().map(|points| json!(points));
