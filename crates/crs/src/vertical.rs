@@ -173,17 +173,22 @@ fn grid_pipeline(grid: &str) -> String {
     )
 }
 
-/// Makes the transformation to a vertical CRS in PROJ's database. PROJ makes it even when its grids
-/// are missing, and then fails at every point. So it is tried inside the area of use of the CRS.
+/// Makes the transformation to a vertical CRS in PROJ's database. When its grids are missing, PROJ
+/// makes none, or one that fails at every point. So it is tried inside the area of use of the CRS.
 fn through_database(code: u32) -> Result<Pool, CrsError> {
     let target = format!("EPSG:4326+{code}");
     let recipe = Recipe::Spatial { source: "EPSG:4979".to_owned(), target: target.clone() };
-    let pool = Pool::new(recipe).map_err(|reason| no_transformation(&target, reason))?;
+    let known = GRIDS.iter().find(|(known, _)| *known == code).map(|(_, name)| (*name).to_owned());
+    let missing = |candidates| CrsError::MissingGrid { datum: format!("EPSG:{code}"), candidates };
+    let pool = match (Pool::new(recipe), known.clone()) {
+        (Ok(pool), _) => pool,
+        (Err(_), Some(grid)) => return Err(missing(grid)),
+        (Err(reason), None) => return Err(no_transformation(&target, reason)),
+    };
     match AreaOfUse::of_epsg(code) {
         Ok(Some(area)) if !converts_somewhere(&pool, &area) => {
-            let known = GRIDS.iter().find(|(known, _)| *known == code).map(|(_, name)| (*name).to_owned());
             let unknown = || format!("that `projinfo -s EPSG:4979 -t EPSG:4326+{code}` names");
-            Err(CrsError::MissingGrid { datum: format!("EPSG:{code}"), candidates: known.unwrap_or_else(unknown) })
+            Err(missing(known.unwrap_or_else(unknown)))
         }
         _ => Ok(pool),
     }
