@@ -20,7 +20,7 @@ pub(crate) fn open(path: &Path) -> Result<File, Error> {
 /// Reads a regular file of at most `limit` bytes.
 ///
 /// # Errors
-/// As [`open`]; [`ErrorKind::FileTooLarge`] for a larger file.
+/// The errors of opening the file, and [`ErrorKind::FileTooLarge`] for a larger file.
 pub fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     let file = open(path)?;
     let too_large =

@@ -92,8 +92,8 @@ fn open_name(path: &Path, name: &Path) -> Result<Dataset, RasterError> {
         .map_err(|reason| RasterError::NotARaster { path: path.to_owned(), reason })
 }
 
-/// Lets [`open_dataset`] open addresses (`https://…`) for the rest of the process. Only the very
-/// name that it is given may be fetched, never one inside a file.
+/// Lets the readers of rasters open addresses (`https://…`) for the rest of the process. Only the
+/// very name that it is given may be fetched, never one inside a file.
 pub fn allow_remote() {
     REMOTE_ALLOWED.store(true, Ordering::Relaxed);
 }
