@@ -6,14 +6,19 @@
 //! be wrong on both sides. Heights at the upper side of a jump give little support: matching widens
 //! roofs, and a view that sees the ground beside them is more reliable there.
 
+mod border;
 mod cells;
+mod directions;
+mod envelope;
 mod fill;
 mod mesh;
+mod plane;
 mod reliability;
 mod speckle;
 
 pub use cells::{FusedSurface, FusionConfig, fuse_views};
-pub use fill::{FillConfig, fill_voids};
+pub use envelope::{GridSight, occlusion_bounds};
+pub use fill::{CellSource, FillConfig, FillRule, FilledVoids, fill_voids};
 pub use mesh::{GridFrame, PlacedView, mark_cells, place_view};
 pub use reliability::reliability;
 pub use speckle::remove_speckle;
