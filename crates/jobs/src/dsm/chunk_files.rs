@@ -122,7 +122,7 @@ fn write_rasters(folder: &Path, rasters: &ChunkRasters) -> Result<(), io::npy::N
     {
         io::npy::write(folder.join(name), &shape, grid.data(), true)?;
     }
-    for (name, grid) in [("views.npy", &rasters.views), ("filled.npy", &rasters.filled)] {
+    for (name, grid) in [("views.npy", &rasters.views), ("filled.npy", &rasters.filled), ("source.npy", &rasters.source)] {
         io::npy::write(folder.join(name), &shape, grid.data(), true)?;
     }
     Ok(())
@@ -149,6 +149,7 @@ fn read_rasters(folder: &Path, origin_m: f64, core: Window) -> Result<ChunkRaste
         views: bytes("views.npy")?,
         confidence: floats("confidence.npy")?,
         filled: bytes("filled.npy")?,
+        source: bytes("source.npy")?,
     })
 }
 

@@ -4,7 +4,9 @@
 //! Lengths are in metres, so that a result does not depend on the cell size more than it must.
 
 use raster::{Grid, Window};
-use sweep::fusion::{FillConfig, FusedSurface, fill_voids, reliability, remove_speckle};
+use sweep::fusion::{
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, fill_voids, occlusion_bounds, reliability, remove_speckle,
+};
 
 use crate::dsm::config::Fill;
 
@@ -13,20 +15,21 @@ use crate::dsm::config::Fill;
 const SPECKLE_SIDE_M: f64 = 5.0;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
 const SPECKLE_CELLS_MIN: usize = 9;
-/// Distance at which heights around a void are looked for, metres: the shadow side of a tower.
+/// Distance of known heights between which a void is filled, metres: a wide street or a house.
 const FILL_REACH_M: f64 = 40.0;
-/// Distance at which heights around a void are looked for where every void is to be closed, metres:
-/// the middle of a pond or of a hall.
-const FILL_REACH_ALL_M: f64 = 60.0;
+/// Distance of known heights where every void is to be closed, and of the ground with which a
+/// hidden void is filled, metres: the middle of a pond or of a hall; a view that leans by 30° does
+/// not see so much ground behind a tower of 100 m.
+const FILL_REACH_FAR_M: f64 = 60.0;
 /// Voids up to this wide are closed, whatever the images show there, metres: the shadow side of a
 /// house.
 const FILL_NARROW_M: f64 = 10.0;
-/// A surface hides what is this many times its height away: views lean by up to 30°, and shadows
-/// reach further.
-const FILL_HIDDEN: f64 = 1.0;
 /// Heights around a void that differ by more than this per metre between them are two surfaces:
 /// steeper than streets.
 const FILL_SLOPE: f64 = 0.05;
+/// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
+/// rises and falls, and something small may stand there.
+const FILL_SIGMA_SLOPE: f64 = 0.1;
 
 /// Number of cells after each step of the clean-up.
 #[derive(Debug, Clone, Copy)]
@@ -38,58 +41,69 @@ pub(crate) struct Cleaned {
 }
 
 /// Returns the width of the ground around a cell that decides its content, metres: speckle is
-/// judged, then voids are filled from this far.
-pub(crate) fn surroundings_m(fill: Fill) -> f64 {
-    fill_reach_m(fill).unwrap_or(0.0) + 2.0 * SPECKLE_SIDE_M
+/// judged, then voids are filled from this far. What hides a void stands nearer, unless it is a
+/// tower of more than 100 m: in a chunk the void then counts as seen at the far end of its shadow.
+pub(crate) fn surroundings_m(_fill: Fill) -> f64 {
+    FILL_REACH_FAR_M + 2.0 * SPECKLE_SIDE_M
 }
 
-/// Returns the distance at which heights around a void are looked for; `None` where voids stay.
-fn fill_reach_m(fill: Fill) -> Option<f64> {
-    match fill {
-        Fill::None => None,
-        Fill::Justified => Some(FILL_REACH_M),
-        Fill::All => Some(FILL_REACH_ALL_M),
-    }
+/// What is known about the voids of a surface.
+#[derive(Clone, Copy)]
+pub(crate) struct Voids<'a> {
+    /// Cells where the images have no texture.
+    pub(crate) blind: &'a Grid<bool>,
+    /// What each view sees of the grid.
+    pub(crate) sights: &'a [GridSight],
+    pub(crate) fill: Fill,
 }
 
-/// Cleans a surface on cells of `gsd_m`; returns the mask of filled cells and the counts of `core`.
+/// Cleans a surface on cells of `gsd_m`; returns the source of each cell and the counts of `core`.
 ///
-/// `step_m` is the distance of two hypotheses. `blind` marks the cells where the images have no
-/// texture.
+/// `step_m` is the distance of two hypotheses.
 pub(crate) fn clean_up(
     fused: &mut FusedSurface,
-    blind: &Grid<bool>,
-    fill: Fill,
+    voids: Voids<'_>,
     step_m: f64,
     gsd_m: f64,
     core: Window,
-) -> (Grid<bool>, Cleaned) {
+) -> (Grid<CellSource>, Cleaned) {
     let before = known(&fused.height_m, core);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);
     let observed = known(&fused.height_m, core);
     let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
     agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
-    let filled = match fill_config(fill, gsd_m) {
-        Some(fill) => fill_voids(&mut fused.height_m, blind, &fill),
-        None => fused.height_m.map(|_| false),
-    };
+    let bounds = |height_m: &Grid<f32>, cells: &[usize]| occlusion_bounds(height_m, voids.sights, cells);
+    let filled = fill_voids(&mut fused.height_m, voids.blind, bounds, &fill_config(voids.fill, gsd_m));
+    for ((sigma_m, filled_m), source) in
+        fused.sigma_m.data_mut().iter_mut().zip(filled.sigma_m.data()).zip(filled.source.data())
+    {
+        if source.is_filled() {
+            *sigma_m = *filled_m;
+        }
+    }
     let reach = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
     fused.confidence = reliability(&fused.height_m, &fused.confidence, reach, 2.0 * gsd_m);
-    (filled, Cleaned { observed, speckle_removed: before - observed })
+    (filled.source, Cleaned { observed, speckle_removed: before - observed })
 }
 
-/// Returns the parameters of filling on cells of `gsd_m`; `None` where voids stay.
-fn fill_config(fill: Fill, gsd_m: f64) -> Option<FillConfig> {
-    let narrow_m = if fill == Fill::All { f64::INFINITY } else { FILL_NARROW_M };
-    Some(FillConfig {
-        reach_cells: (fill_reach_m(fill)? / gsd_m).ceil() as usize,
-        narrow_cells: (narrow_m / gsd_m) as f32,
+/// Returns the parameters of filling on cells of `gsd_m`.
+fn fill_config(fill: Fill, gsd_m: f64) -> FillConfig {
+    let (rule, reach_m) = match fill {
+        Fill::None => (FillRule::Nothing, FILL_REACH_M),
+        Fill::Justified => (FillRule::Justified, FILL_REACH_M),
+        Fill::All => (FillRule::Everything, FILL_REACH_FAR_M),
+    };
+    FillConfig {
+        rule,
+        reach_cells: (reach_m / gsd_m).ceil() as usize,
+        hidden_reach_cells: (FILL_REACH_FAR_M / gsd_m).ceil() as usize,
+        narrow_cells: (FILL_NARROW_M / gsd_m) as f32,
         island_cells: (FILL_NARROW_M / gsd_m).powi(2) as usize,
-        hidden_cells_per_m: (FILL_HIDDEN / gsd_m) as f32,
         same_surface_m: (2.0 * gsd_m) as f32,
         slope_m: (FILL_SLOPE * gsd_m) as f32,
-    })
+        sigma_slope_m: (FILL_SIGMA_SLOPE * gsd_m) as f32,
+    }
 }
 
 /// Returns the number of cells of a window that have a height.

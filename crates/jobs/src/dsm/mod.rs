@@ -57,6 +57,7 @@ mod dem;
 mod error;
 mod footprints;
 mod grid;
+mod grid_sight;
 mod height_choice;
 mod image_checks;
 mod image_windows;

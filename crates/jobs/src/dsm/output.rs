@@ -23,11 +23,12 @@ use crate::output_folder::OutputFolder;
 
 /// Files of a run, relative to its folder. The report is the last to appear: a folder with a report
 /// is complete.
-pub(crate) const FILES: [&str; 9] = [
+pub(crate) const FILES: [&str; 10] = [
     "dsm/dsm.tif",
     "dsm/sigma.tif",
     "dsm/views.tif",
     "dsm/filled.tif",
+    "dsm/source.tif",
     "dsm/confidence.tif",
     "dsm/hillshade.png",
     "dsm/relief.png",
@@ -41,23 +42,28 @@ const PICTURE_SIDE: usize = 4096;
 const HEIGHTS: &str = "dsm.tif";
 
 /// Names and contents of the rasters, in the order of [`bands`].
-const BANDS: [(&str, SpoolBand<'static>); 5] = [
+const BANDS: [(&str, SpoolBand<'static>); 6] = [
     (HEIGHTS, SpoolBand { description: "height_m", is_float: true, no_data: NO_DATA as f64 }),
     ("sigma.tif", SpoolBand { description: "height_standard_deviation_m", is_float: true, no_data: NO_DATA as f64 }),
     ("views.tif", SpoolBand { description: "number_of_views", is_float: false, no_data: 0.0 }),
     ("confidence.tif", SpoolBand { description: "confidence_0_to_1", is_float: true, no_data: NO_DATA as f64 }),
     ("filled.tif", SpoolBand { description: "1_filled_0_observed", is_float: false, no_data: VOID as f64 }),
+    ("source.tif", SpoolBand { description: SOURCE_CODES, is_float: false, no_data: 0.0 }),
 ];
+/// Description of the codes of [`sweep::fusion::CellSource`].
+const SOURCE_CODES: &str = "0_outside_1_observed_2_filled_hidden_3_filled_surface_4_filled_narrow_\
+                            10_void_unmatched_11_void_blank_12_void_hidden";
 
 /// Returns the contents of the rasters in the order of [`BANDS`]; `heights` come from
 /// [`absolute_heights`].
-fn bands<'a>(rasters: &'a ChunkRasters, heights: &'a Grid<f32>) -> [BandData<'a>; 5] {
+fn bands<'a>(rasters: &'a ChunkRasters, heights: &'a Grid<f32>) -> [BandData<'a>; 6] {
     [
         BandData::F32(heights),
         BandData::F32(&rasters.sigma_m),
         BandData::U8(&rasters.views),
         BandData::F32(&rasters.confidence),
         BandData::U8(&rasters.filled),
+        BandData::U8(&rasters.source),
     ]
 }
 

@@ -1,7 +1,7 @@
 //! The rasters of a chunk.
 
 use raster::{Grid, Window};
-use sweep::fusion::FusedSurface;
+use sweep::fusion::{CellSource, FusedSurface};
 
 /// Value of `filled` in a cell that was filled.
 pub(crate) const FILLED: u8 = 1;
@@ -16,7 +16,8 @@ pub struct ChunkRasters {
     pub origin_m: f64,
     /// Heights above the origin, metres; NaN in voids.
     pub height_m: Grid<f32>,
-    /// Standard deviations of the heights, metres; NaN where no height was observed.
+    /// Standard deviations of the heights, metres; NaN in voids. They are estimates where
+    /// a height was filled.
     pub sigma_m: Grid<f32>,
     /// Number of views that observed the height.
     pub views: Grid<u8>,
@@ -24,27 +25,34 @@ pub struct ChunkRasters {
     pub confidence: Grid<f32>,
     /// 1 where a height was filled, 0 where it was observed, 255 in voids.
     pub filled: Grid<u8>,
+    /// Where each height comes from, or why there is none: codes of [`CellSource`].
+    pub source: Grid<u8>,
 }
 
 impl ChunkRasters {
-    /// Makes the rasters of a surface after its clean-up. `filled` marks the filled cells.
-    pub(crate) fn new(fused: FusedSurface, filled: Grid<bool>, origin_m: f64) -> Self {
-        let mut marks = filled.map(|f| if *f { FILLED } else { 0 });
+    /// Makes the rasters of a surface after its clean-up. `source` says where each
+    /// height comes from.
+    pub(crate) fn new(fused: FusedSurface, source: &Grid<CellSource>, origin_m: f64) -> Self {
+        let mark = |source: &CellSource| match source {
+            CellSource::Observed => 0,
+            source if source.is_filled() => FILLED,
+            _ => VOID,
+        };
+        let marks = source.map(mark);
         let FusedSurface { height_m, mut sigma_m, mut views, mut confidence } = fused;
         for (i, h) in height_m.data().iter().enumerate() {
             if h.is_nan() {
-                marks.data_mut()[i] = VOID;
+                sigma_m.data_mut()[i] = f32::NAN;
             }
             // No observation is behind a cell that was filled or removed as speckle.
             if h.is_nan() || marks.data()[i] == FILLED {
-                sigma_m.data_mut()[i] = f32::NAN;
                 views.data_mut()[i] = 0;
             }
         }
         for grid in [&mut sigma_m, &mut confidence] {
             grid.data_mut().iter_mut().for_each(|v| *v = shortened(*v));
         }
-        Self { origin_m, height_m, sigma_m, views, confidence, filled: marks }
+        Self { origin_m, height_m, sigma_m, views, confidence, filled: marks, source: source.map(|s| s.code()) }
     }
 
     /// Returns the cells of a window inside.
@@ -60,6 +68,7 @@ impl ChunkRasters {
             views: self.views.window(cells, 0),
             confidence: self.confidence.window(cells, f32::NAN),
             filled: self.filled.window(cells, VOID),
+            source: self.source.window(cells, CellSource::Outside.code()),
         }
     }
 }

@@ -11,10 +11,11 @@ use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::fusion::{FusionConfig, GridFrame, PlacedView, fuse_views, mark_cells, place_view};
 use sweep::{HeightMap, SweepView};
 
-use crate::dsm::clean_up::clean_up;
+use crate::dsm::clean_up::{Voids, clean_up};
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::grid::DsmGrid;
+use crate::dsm::grid_sight::{ViewPixels, grid_sights};
 use crate::dsm::rasters::{ChunkRasters, FILLED};
 use crate::dsm::scene_sweep::{SceneHeights, SceneSweep};
 use crate::dsm::values::{HeightRange, ImagePair};
@@ -134,8 +135,9 @@ pub(crate) fn make_surface(
     // Images and height maps are the most of a run's memory, and the fusion takes some of its own.
     drop(all);
     drop(heights);
+    let pixels = matched_pixels(sweep, &views);
     drop(views);
-    let (rasters, counts) = fuse(input, placed, &blind, origin_m);
+    let (rasters, counts) = fuse(input, placed, &blind, &pixels, origin_m)?;
     progress.step();
     Ok((rasters, SurfaceCounts { views: kept, ..counts }))
 }
@@ -144,8 +146,9 @@ fn fuse(
     input: SurfaceInput<'_>,
     placed: Vec<PlacedView>,
     blind: &Grid<bool>,
+    pixels: &[ViewPixels],
     origin_m: f64,
-) -> (ChunkRasters, SurfaceCounts) {
+) -> Result<(ChunkRasters, SurfaceCounts), DsmError> {
     let SurfaceInput { config, sweep, grid, core, .. } = input;
     // Heights and their places are as coarse as the level that they come from.
     let coarser = f64::from(1u32 << sweep.levels.finest);
@@ -157,8 +160,10 @@ fn fuse(
     };
     let mut fused = fuse_views(&placed, grid.size, &fusion);
     drop(placed);
-    let (filled, cleaned) = clean_up(&mut fused, blind, config.fill, step_m, grid.gsd_m, core);
-    let rasters = ChunkRasters::new(fused, filled, origin_m).cropped(core);
+    let sights = grid_sights(pixels, grid, &fused.height_m, origin_m)?;
+    let voids = Voids { blind, sights: &sights, fill: config.fill };
+    let (source, cleaned) = clean_up(&mut fused, voids, step_m, grid.gsd_m, core);
+    let rasters = ChunkRasters::new(fused, &source, origin_m).cropped(core);
     let filled = rasters.filled.data().iter().filter(|f| **f == FILLED).count();
     let counts = SurfaceCounts {
         observed: cleaned.observed,
@@ -167,7 +172,14 @@ fn fuse(
         speckle_removed: cleaned.speckle_removed,
         views: Vec::new(),
     };
-    (rasters, counts)
+    Ok((rasters, counts))
+}
+
+/// Returns the pixels of the views that were compared with others.
+fn matched_pixels(sweep: &SceneSweep, views: &[SweepView]) -> Vec<ViewPixels> {
+    let is_matched = |i: usize| !sweep.sources[i].is_empty() || sweep.sources.iter().any(|s| s.contains(&i));
+    let matched = views.iter().enumerate().filter(|(i, _)| is_matched(*i));
+    matched.map(|(_, view)| ViewPixels::of(view, sweep.levels.finest)).collect()
 }
 
 /// Returns the distance up to which heights on the grid may belong to one surface, metres.

@@ -210,12 +210,13 @@ impl Filling<'_> {
         let centre = [corner(column), corner(row)];
         let reach = self.config.hidden_reach_cells as f32;
         let (mut own, mut low) = (Vec::new(), Vec::new());
-        let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: CANDIDATES, reach };
+        let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: kv("FK",128.0) as usize, reach };
         self.border.nearest(centre, wanted, &mut own);
         // Where the void's own border near the cell is too high, the ground is further away.
         let bound_m = cells.iter().map(|c| c.bound_m).filter(|b| b.is_finite()).fold(f32::NEG_INFINITY, f32::max);
         let limit_m = |cell: &VoidCell| cell.bound_m + self.config.same_surface_m;
         let lacks = |cell: &VoidCell| cell.bound_m.is_finite() && !is_enough(&own, limit_m(cell));
+        let lacks = |cell: &VoidCell| kv("FLOW",1.0)>0.0 && lacks(cell) && (kv("FPL",1.0)==0.0 || self.planes[void as usize-1].is_none());
         if cells.iter().any(lacks) {
             let height_max_m = bound_m + self.config.same_surface_m;
             self.border.nearest(centre, Wanted { void: None, height_max_m, ..wanted }, &mut low);
@@ -233,7 +234,7 @@ impl Filling<'_> {
         let config = self.config;
         let is_outside = cell.bound_m == f32::INFINITY;
         let limit_m = cell.bound_m + config.same_surface_m;
-        let ground = if is_outside { None } else { self.lowest_surface(cell, under, limit_m) };
+        let ground = if is_outside { None } else { self.lowest_surface(cell, under, cell.bound_m + kv("FTOL",1.0)*config.same_surface_m) };
         let is_hidden = match &ground {
             Some((base_m, _)) => *base_m <= cell.bound_m,
             // With no height under the bound, those above it would have been seen.
@@ -286,12 +287,13 @@ impl Filling<'_> {
         let config = self.config;
         let usable = || all.iter().filter(|c| c.height_m <= limit_m);
         let count = usable().count();
+        let pen = kv("FPEN",1.0);
         let rank = count.div_ceil(LOWEST_SHARE).min(LOWEST);
         // The lowest few, in order: reduced height, height, distance.
         let mut lowest = [[f32::INFINITY; 3]; LOWEST];
         for c in usable() {
             let d = apart(cell, c);
-            let mut entry = [c.height_m + config.slope_m * d, c.height_m, d];
+            let mut entry = [c.height_m + pen * config.slope_m * d, c.height_m, d];
             if entry[0] < lowest[LOWEST - 1][0] {
                 for kept in lowest.iter_mut().filter(|kept| entry[0] < kept[0]).collect::<Vec<_>>() {
                     std::mem::swap(kept, &mut entry);
@@ -329,6 +331,7 @@ impl Filling<'_> {
     }
 }
 
+pub(super) fn kv(n:&str,d:f32)->f32{ std::env::var(n).ok().and_then(|v|v.parse().ok()).unwrap_or(d) }
 /// Returns whether candidates not above a height are enough to tell the ground.
 fn is_enough(all: &[BorderCell], limit_m: f32) -> bool {
     let low = all.iter().filter(|c| c.height_m <= limit_m).count();
