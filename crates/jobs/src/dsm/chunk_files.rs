@@ -122,7 +122,9 @@ fn write_rasters(folder: &Path, rasters: &ChunkRasters) -> Result<(), io::npy::N
     {
         io::npy::write(folder.join(name), &shape, grid.data(), true)?;
     }
-    for (name, grid) in [("views.npy", &rasters.views), ("filled.npy", &rasters.filled), ("source.npy", &rasters.source)] {
+    for (name, grid) in
+        [("views.npy", &rasters.views), ("filled.npy", &rasters.filled), ("source.npy", &rasters.source)]
+    {
         io::npy::write(folder.join(name), &shape, grid.data(), true)?;
     }
     Ok(())

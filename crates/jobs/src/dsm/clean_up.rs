@@ -5,7 +5,8 @@
 
 use raster::{Grid, Window};
 use sweep::fusion::{
-    CellSource, FillConfig, FillRule, FusedSurface, GridSight, fill_voids, occlusion_bounds, reliability, remove_speckle,
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, fill_voids, occlusion_bounds, reliability,
+    remove_speckle,
 };
 
 use crate::dsm::config::Fill;

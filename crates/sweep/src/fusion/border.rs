@@ -67,12 +67,7 @@ impl Border {
                         }
                     }
                 }
-                let cell = |void: &u32| BorderCell {
-                    x: x as f32,
-                    y: y as f32,
-                    height_m: sources[(x, y)],
-                    void: *void,
-                };
+                let cell = |void: &u32| BorderCell { x: x as f32, y: y as f32, height_m: sources[(x, y)], void: *void };
                 buckets[y / BUCKET * columns + x / BUCKET].extend(beside.iter().map(cell));
             }
         }

@@ -13,6 +13,8 @@ const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
 /// Nearest known height in one direction.
 #[derive(Debug, Clone, Copy)]
 struct Known {
+    /// Height above the origin, metres.
+    height_m: f32,
     /// Distance, cells.
     apart: f32,
     /// Whether no blind cell lies between.
@@ -31,6 +33,9 @@ pub(super) struct Setting {
     pub(super) width_cells: f32,
     /// Whether two opposite heights have no blind cell between them.
     pub(super) is_between: bool,
+    /// Second lowest of the nearest known heights, metres, as the lowest may be a pit; infinite
+    /// where there are fewer than two.
+    pub(super) low_m: f32,
 }
 
 /// Returns where each of `voids` lies among the heights within `reach` cells; in the order of
@@ -45,12 +50,14 @@ pub(super) fn settings(sources: &Grid<f32>, blind: &Grid<bool>, voids: &[usize],
 }
 
 fn setting(before: &Nearest, behind: &Nearest) -> Setting {
-    let known = before.iter().chain(behind).flatten().count();
+    let mut heights: Vec<f32> = before.iter().chain(behind).flatten().map(|k| k.height_m).collect();
+    heights.sort_by(f32::total_cmp);
     let across = || before.iter().zip(behind).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     Setting {
-        is_enclosed: known >= KNOWN_MIN,
+        is_enclosed: heights.len() >= KNOWN_MIN,
         width_cells: across().map(|(a, b)| a.apart + b.apart).fold(f32::INFINITY, f32::min),
         is_between: across().any(|(a, b)| a.in_sight && b.in_sight),
+        low_m: heights.get(1).copied().unwrap_or(f32::INFINITY),
     }
 }
 
@@ -86,11 +93,12 @@ fn known_before(
                 }
                 let length = if dx != 0 && dy != 0 { std::f32::consts::SQRT_2 } else { 1.0 };
                 let at = (u as usize, v as usize);
-                if !height_m[at].is_nan() {
-                    return Some(Known { apart: length, in_sight: true });
+                let own_m = height_m[at];
+                if !own_m.is_nan() {
+                    return Some(Known { height_m: own_m, apart: length, in_sight: true });
                 }
                 let next = rows[usize::from(dy == 0)][u as usize][d]?;
-                let known = Known { apart: next.apart + length, in_sight: next.in_sight && !blind[at] };
+                let known = Known { apart: next.apart + length, in_sight: next.in_sight && !blind[at], ..next };
                 (known.apart <= reach).then_some(known)
             });
             rows[1][x as usize] = nearest;

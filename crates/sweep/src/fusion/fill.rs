@@ -107,7 +107,7 @@ pub struct FilledVoids {
 /// Void cells are filled in blocks of this side, which share their candidates.
 const BLOCK: usize = 4;
 /// Number of candidates of a void cell: those all around a gap of a street's width.
-const CANDIDATES: usize = 128;
+const CANDIDATES: usize = 256;
 /// The lowest surface is the one with this many candidates under it: a few may be wrong.
 const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
@@ -138,9 +138,8 @@ pub fn fill_voids(
     let mut cells: Vec<VoidCell> = cells.map(|((&i, b), setting)| VoidCell::new(i, width, b, setting)).collect();
     // Stable, so that the cells of a block stay in the order of the rows.
     cells.sort_by_key(|cell| (cell.block(), numbers.data()[cell.index]));
-    let is_same = |a: &VoidCell, b: &VoidCell| {
-        a.block() == b.block() && numbers.data()[a.index] == numbers.data()[b.index]
-    };
+    let is_same =
+        |a: &VoidCell, b: &VoidCell| a.block() == b.block() && numbers.data()[a.index] == numbers.data()[b.index];
     let blocks: Vec<&[VoidCell]> = cells.chunk_by(is_same).collect();
     let found: Vec<Vec<Judged>> = blocks.par_iter().map(|block| filling.judge_block(block)).collect();
     for (cell, judged) in cells.iter().zip(found.iter().flatten()) {
@@ -191,6 +190,17 @@ struct Judged {
     estimate: Option<Estimate>,
 }
 
+/// Known heights from which a void cell may be filled.
+#[derive(Clone, Copy)]
+struct Candidates<'a> {
+    /// Nearest heights at the border of the cell's void.
+    own: &'a [BorderCell],
+    /// Heights among which ground under the cell's bound is looked for.
+    under: &'a [BorderCell],
+    /// Heights among which the lower of the surfaces around the cell is looked for.
+    beside: &'a [BorderCell],
+}
+
 /// Everything that decides about a void cell.
 struct Filling<'a> {
     numbers: &'a Grid<u32>,
@@ -210,31 +220,34 @@ impl Filling<'_> {
         let centre = [corner(column), corner(row)];
         let reach = self.config.hidden_reach_cells as f32;
         let (mut own, mut low) = (Vec::new(), Vec::new());
-        let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: kv("FK",128.0) as usize, reach };
+        let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: CANDIDATES, reach };
         self.border.nearest(centre, wanted, &mut own);
-        // Where the void's own border near the cell is too high, the ground is further away.
-        let bound_m = cells.iter().map(|c| c.bound_m).filter(|b| b.is_finite()).fold(f32::NEG_INFINITY, f32::max);
-        let limit_m = |cell: &VoidCell| cell.bound_m + self.config.same_surface_m;
-        let lacks = |cell: &VoidCell| cell.bound_m.is_finite() && !is_enough(&own, limit_m(cell));
-        let lacks = |cell: &VoidCell| kv("FLOW",1.0)>0.0 && lacks(cell) && (kv("FPL",1.0)==0.0 || self.planes[void as usize-1].is_none());
-        if cells.iter().any(lacks) {
-            let height_max_m = bound_m + self.config.same_surface_m;
+        // In a wide void the ground may be further away than the walls around it. A narrow one that
+        // the heights around it enclose is a gap in their surface.
+        let is_wide = self.planes[void as usize - 1].is_none();
+        let is_wide = |cell: &VoidCell| is_wide && cell.setting.width_cells > self.config.narrow_cells;
+        let limit_m = |cell: &VoidCell| cell.bound_m.max(cell.setting.low_m) + self.config.same_surface_m;
+        let seeks = |cell: &&VoidCell| is_wide(cell) && cell.bound_m < f32::INFINITY;
+        let lacks =
+            |cell: &VoidCell, height_m: f32| seeks(&cell) && !is_enough(&own, height_m + self.config.same_surface_m);
+        let height_max_m = cells.iter().filter(seeks).map(limit_m).fold(f32::NEG_INFINITY, f32::max);
+        if cells.iter().any(|c| lacks(c, c.bound_m) || lacks(c, c.setting.low_m)) {
             self.border.nearest(centre, Wanted { void: None, height_max_m, ..wanted }, &mut low);
         }
         let judge = |cell: &VoidCell| {
-            let under = if lacks(cell) { &low } else { &own };
-            self.judge(cell, void, &own, under)
+            let under = if lacks(cell, cell.bound_m) { &low } else { &own };
+            let beside = if lacks(cell, cell.setting.low_m) { &low } else { &own };
+            self.judge(cell, void, Candidates { own: &own, under, beside })
         };
         cells.iter().map(judge).collect()
     }
 
-    /// Judges a cell. `own` are candidates of its void, `under` those among which ground under its
-    /// bound is looked for.
-    fn judge(&self, cell: &VoidCell, void: u32, own: &[BorderCell], under: &[BorderCell]) -> Judged {
+    fn judge(&self, cell: &VoidCell, void: u32, candidates: Candidates<'_>) -> Judged {
+        let Candidates { own, under, beside } = candidates;
         let config = self.config;
         let is_outside = cell.bound_m == f32::INFINITY;
         let limit_m = cell.bound_m + config.same_surface_m;
-        let ground = if is_outside { None } else { self.lowest_surface(cell, under, cell.bound_m + kv("FTOL",1.0)*config.same_surface_m) };
+        let ground = if is_outside { None } else { self.lowest_surface(cell, under, limit_m) };
         let is_hidden = match &ground {
             Some((base_m, _)) => *base_m <= cell.bound_m,
             // With no height under the bound, those above it would have been seen.
@@ -267,7 +280,13 @@ impl Filling<'_> {
         }
         let estimate = match plane {
             Some(plane) => Some(self.on_plane(cell, own, plane)),
-            None => self.lowest_surface(cell, own, f32::INFINITY).map(|(_, estimate)| estimate),
+            None => {
+                // Not above what opposite sides of a wide void have in common.
+                let is_wide = !is_narrow && cell.setting.low_m.is_finite();
+                let limit_m = if is_wide { cell.setting.low_m + config.same_surface_m } else { f32::INFINITY };
+                let found = self.lowest_surface(cell, if is_wide { beside } else { own }, limit_m);
+                found.or_else(|| self.lowest_surface(cell, own, f32::INFINITY)).map(|(_, estimate)| estimate)
+            }
         };
         let source = if is_narrow { CellSource::FilledNarrow } else { CellSource::FilledSurface };
         if estimate.is_some() { Judged { source, estimate } } else { nothing }
@@ -287,13 +306,12 @@ impl Filling<'_> {
         let config = self.config;
         let usable = || all.iter().filter(|c| c.height_m <= limit_m);
         let count = usable().count();
-        let pen = kv("FPEN",1.0);
         let rank = count.div_ceil(LOWEST_SHARE).min(LOWEST);
         // The lowest few, in order: reduced height, height, distance.
         let mut lowest = [[f32::INFINITY; 3]; LOWEST];
         for c in usable() {
             let d = apart(cell, c);
-            let mut entry = [c.height_m + pen * config.slope_m * d, c.height_m, d];
+            let mut entry = [c.height_m + config.slope_m * d, c.height_m, d];
             if entry[0] < lowest[LOWEST - 1][0] {
                 for kept in lowest.iter_mut().filter(|kept| entry[0] < kept[0]).collect::<Vec<_>>() {
                     std::mem::swap(kept, &mut entry);
@@ -331,7 +349,6 @@ impl Filling<'_> {
     }
 }
 
-pub(super) fn kv(n:&str,d:f32)->f32{ std::env::var(n).ok().and_then(|v|v.parse().ok()).unwrap_or(d) }
 /// Returns whether candidates not above a height are enough to tell the ground.
 fn is_enough(all: &[BorderCell], limit_m: f32) -> bool {
     let low = all.iter().filter(|c| c.height_m <= limit_m).count();
@@ -350,7 +367,7 @@ mod tests {
     const CONFIG: FillConfig = FillConfig {
         rule: FillRule::Justified,
         reach_cells: 8,
-        hidden_reach_cells: 12,
+        hidden_reach_cells: 50,
         narrow_cells: 6.0,
         island_cells: 36,
         same_surface_m: 1.0,
@@ -405,9 +422,10 @@ mod tests {
         (15..25).for_each(|x| (0..60).for_each(|y| g[(x, y)] = if y < 45 { f32::NAN } else { 0.0 }));
         let street = g.clone();
         let found = fill_with(&mut g, 25.0, &CONFIG);
-        assert!((15..25).all(|x| (36..45).all(|y| g[(x, y)] == 0.0 && found.source[(x, y)] == CellSource::FilledHidden)));
-        // Beyond reach of the ground nothing is invented.
-        assert!((15..25).all(|x| (0..30).all(|y| g[(x, y)].is_nan() || g[(x, y)] < 26.0)), "{:?}", g.row(10));
+        assert!(
+            (15..25).all(|x| (36..45).all(|y| g[(x, y)] == 0.0 && found.source[(x, y)] == CellSource::FilledHidden))
+        );
+        assert!((15..25).all(|x| (0..36).all(|y| g[(x, y)].is_nan() || g[(x, y)] == 0.0)), "{:?}", g.row(10));
         let mut open = street.clone();
         let reasons = fill_with(&mut open, 25.0, &FillConfig { rule: FillRule::Nothing, ..CONFIG });
         assert_eq!((open[(20, 40)].is_nan(), reasons.source[(20, 40)]), (true, CellSource::Hidden));
@@ -446,7 +464,7 @@ mod tests {
         // Hidden, and no known height within reach.
         let mut g = void.clone();
         (0..60).for_each(|y| (10..50).for_each(|x| g[(x, y)] = if y < 20 { g[(x, y)] } else { f32::NAN }));
-        let found = fill_with(&mut g, 20.0, &CONFIG);
+        let found = fill_with(&mut g, 20.0, &FillConfig { hidden_reach_cells: 12, ..CONFIG });
         assert_eq!((found.source[(30, 50)], g[(30, 50)].is_nan()), (CellSource::Hidden, true));
     }
 

@@ -91,10 +91,9 @@ pub(super) fn border_planes(cells: &[BorderCell], voids: u32, tolerance_m: f32) 
         }
     }
     for (plane, sums) in planes.iter_mut().zip(&sums) {
-        *plane = plane.filter(|_| sums.on_plane >= SHARE_MIN * sums.n).map(|plane| Plane {
-            deviation_m: (sums.squares / sums.on_plane.max(1.0)).sqrt() as f32,
-            ..plane
-        });
+        *plane = plane
+            .filter(|_| sums.on_plane >= SHARE_MIN * sums.n)
+            .map(|plane| Plane { deviation_m: (sums.squares / sums.on_plane.max(1.0)).sqrt() as f32, ..plane });
     }
     planes
 }
