@@ -267,7 +267,7 @@ impl Filling<'_> {
         if let (true, Some((_, estimate))) = (is_hidden, ground) {
             return Judged { source: CellSource::FilledHidden, estimate: Some(estimate) };
         }
-        let Setting { is_enclosed, width_cells, is_between } = cell.setting;
+        let Setting { is_enclosed, width_cells, is_between, low_m } = cell.setting;
         let is_narrow = width_cells <= config.narrow_cells;
         let plane = self.planes[void as usize - 1].filter(|_| !is_blind);
         let is_wanted = match config.rule {
@@ -282,8 +282,8 @@ impl Filling<'_> {
             Some(plane) => Some(self.on_plane(cell, own, plane)),
             None => {
                 // Not above what opposite sides of a wide void have in common.
-                let is_wide = !is_narrow && cell.setting.low_m.is_finite();
-                let limit_m = if is_wide { cell.setting.low_m + config.same_surface_m } else { f32::INFINITY };
+                let is_wide = !is_narrow && low_m.is_finite();
+                let limit_m = if is_wide { low_m + config.same_surface_m } else { f32::INFINITY };
                 let found = self.lowest_surface(cell, if is_wide { beside } else { own }, limit_m);
                 found.or_else(|| self.lowest_surface(cell, own, f32::INFINITY)).map(|(_, estimate)| estimate)
             }
