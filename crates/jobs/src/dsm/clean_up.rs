@@ -11,9 +11,12 @@ use sweep::fusion::{
 
 use crate::dsm::config::Fill;
 
-/// Isolated patches of less ground than a square of this side are speckle, metres: smaller than a
-/// house.
-const SPECKLE_SIDE_M: f64 = 5.0;
+/// Isolated patches of less ground than a square of this side are speckle, metres: smaller than the
+/// crown of a single tree or a car port.
+const SPECKLE_SIDE_M: f64 = 2.5;
+/// A cell on whose height the views agree less than this has no height. Its evidence would be
+/// single pixels at a border, or single pixels which another height fits as well.
+const AGREEMENT_MIN: f32 = 0.05;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
 const SPECKLE_CELLS_MIN: usize = 9;
 /// Distance of known heights between which a void is filled, metres: a wide street or a house.
@@ -68,6 +71,8 @@ pub(crate) fn clean_up(
     gsd_m: f64,
     core: Window,
 ) -> (Grid<CellSource>, Cleaned) {
+    let weak = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data());
+    weak.filter(|(_, agreement)| **agreement < AGREEMENT_MIN).for_each(|(height, _)| *height = f32::NAN);
     let before = known(&fused.height_m, core);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);

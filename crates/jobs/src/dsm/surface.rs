@@ -23,15 +23,6 @@ use crate::dsm::values::{HeightRange, ImagePair};
 /// A facet steeper than this (rise over run) is a tear and not a surface: about 70°. Two hypotheses
 /// apart is not yet a tear.
 const TEAR_SLOPE: f64 = 2.75;
-/// A height around which the views agree on less of the picture's contrast than this has no picture
-/// behind it. The best of several unrelated pictures reaches nearly this.
-const SUPPORT_MIN: f32 = 0.2;
-/// A height that is better than all others by less than this share of the worst cost may be chance,
-/// as on water. The heights around it are better evidence. Half of this and twice this are alike on
-/// simulated towns. Chosen with JAX_068 in view, which gains in completeness with every set of its
-/// views and loses 0.02 m of MAE with one pair.
-const CONFIDENCE_MIN: f32 = 0.1;
-
 /// Everything but pixels and heights that a surface is made from.
 #[derive(Clone, Copy)]
 pub(crate) struct SurfaceInput<'a> {
@@ -199,12 +190,7 @@ fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[ImagePair], level: 
     }
     let counts = count_agreeing(own, &others, level, &ConsistencyConfig::default())?;
     let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
-    let mut keep = counts.map(|n| *n >= needed);
-    let reliability = own.map.support.data().iter().zip(own.map.confidence.data());
-    for (keep, (support, confidence)) in keep.data_mut().iter_mut().zip(reliability) {
-        *keep = *keep && *support >= SUPPORT_MIN && *confidence >= CONFIDENCE_MIN;
-    }
-    Ok(keep)
+    Ok(counts.map(|n| *n >= needed))
 }
 
 /// Marks the pixels that carry no evidence of what they show: blank ones, and those whose best

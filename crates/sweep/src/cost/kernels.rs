@@ -85,12 +85,52 @@ pub(crate) fn sort_pair(a: &mut [u8], b: &mut [u8]) {
     }
 }
 
+/// Averages every cost with those of its eight neighbours: four parts of its own and one of each.
+///
+/// `costs` are rows of `width` without gaps. Those in the first and last rows and columns become
+/// meaningless. An invalid cost stays invalid, and counts as the worst in its neighbours' averages;
+/// `is_hidden` tells whether there is one. `sums` is a scratch buffer as long as the costs.
+pub(crate) fn blend(costs: &mut [u8], width: usize, is_hidden: bool, sums: &mut [u16]) {
+    if is_hidden {
+        blend_rows(costs, width, sums, |cost| cost.min(COST_MAX), |own, mean| if own == INVALID { own } else { mean });
+    } else {
+        blend_rows(costs, width, sums, |cost| cost, |_, mean| mean);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn blend_rows(
+    costs: &mut [u8],
+    width: usize,
+    sums: &mut [u16],
+    cut: impl Fn(u8) -> u8,
+    pick: impl Fn(u8, u8) -> u8,
+) {
+    let n = costs.len();
+    if n < 2 * width + 2 {
+        return;
+    }
+    // Sums along the rows may run across their ends, where the result does not count.
+    for (i, sum) in sums[1..n - 1].iter_mut().enumerate() {
+        *sum = u16::from(cut(costs[i])) + u16::from(cut(costs[i + 1])) + u16::from(cut(costs[i + 2]));
+    }
+    let (above, own, below) = (&sums[1..], &sums[width + 1..], &sums[2 * width + 1..]);
+    let inner = n - 2 * width - 2;
+    let costs = &mut costs[width + 1..][..inner];
+    for (i, cost) in costs.iter_mut().enumerate() {
+        let all = above[i] + own[i] + below[i] + 3 * u16::from(cut(*cost));
+        // 5,462 is a twelfth of 2¹⁶.
+        *cost = pick(*cost, ((u32::from(all + 6) * 5_462) >> 16) as u8);
+    }
+}
+
 /// Writes the weighted mean of each pixel's costs. An invalid cost counts as [`COST_MAX`], the cost
 /// of unrelated pictures, with weight 1; a valid one has weight [`VALID_WEIGHT`].
 ///
 /// `is_hidden` tells whether any cost is invalid. `sums` and `weights` are scratch buffers.
 pub(crate) fn mean_cost(costs: &[Vec<u8>], is_hidden: bool, sums: &mut [u16], weights: &mut [u16], out: &mut [u8]) {
     match costs {
+        [a] if !is_hidden => out.copy_from_slice(a),
         [a, b] if !is_hidden => mean_of_two(a, b, out),
         [a, b, c] if !is_hidden => mean_of_three([a, b, c], out),
         _ => {
