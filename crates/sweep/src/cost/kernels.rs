@@ -179,7 +179,7 @@ fn divide(sums: &[u16], weights: &[u16], out: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use super::super::census::{CHUNK, Census, CensusScratch, census_cost, overhang};
-    use super::super::part::Part;
+    use super::super::part::{MARGIN, Part};
     use super::super::voids::Voids;
     use super::*;
     use proptest::prelude::*;
@@ -189,15 +189,25 @@ mod tests {
     /// Smallest difference of two costs.
     const UNIT: f64 = 1.0 / COST_MAX as f64;
 
-    /// Returns the costs of two tiles of `side` columns each, as the sweep computes them.
+    /// Repeats the border of a tile of `side` columns once around it.
+    fn bordered(tile: &[f32], side: usize) -> Vec<f32> {
+        let inside = |i: usize| i.clamp(1, side) - 1;
+        (0..(side + 2) * (side + 2)).map(|i| tile[inside(i / (side + 2)) * side + inside(i % (side + 2))]).collect()
+    }
+
+    /// Returns the costs of the inner pixels of two tiles of `side` columns each, as the sweep
+    /// computes them before costs are blended. The margin of a part is a pixel wider than the
+    /// census.
     fn tile_cost(a: &[f32], b: &[f32], (scale_a, scale_b): (f32, f32), side: usize) -> Vec<u8> {
+        let (a, b) = (&bordered(a, side)[..], &bordered(b, side)[..]);
+        let side = side + 2;
         let part = Part { within: [0; 2], width: side, height: side };
         let mut hidden = Vec::new();
         let mut graded = |tile: &[f32], scale: f32| {
             let (mut grey, mut voids, mut census) = (Vec::new(), Voids::default(), Census::default());
             let has_voids = quantise(tile, scale * FULL, overhang(side), &mut grey);
             census.fill(&grey, side, tile.len());
-            voids.mark(tile, side, 3, has_voids);
+            voids.mark(tile, side, 2 * MARGIN + 1, has_voids);
             hidden.push(voids);
             census
         };
@@ -207,7 +217,7 @@ mod tests {
         for voids in hidden {
             voids.hide((0, 0), part, INVALID, &mut costs);
         }
-        (1..side - 1).flat_map(|y| costs[y * side + 1..(y + 1) * side - 1].to_vec()).collect()
+        (MARGIN..side - MARGIN).flat_map(|y| costs[y * side + MARGIN..(y + 1) * side - MARGIN].to_vec()).collect()
     }
 
     /// Returns the cost of two tiles of one patch each.
@@ -283,11 +293,39 @@ mod tests {
     }
 
     #[test]
+    fn costs_are_averaged_over_nine_pixels_and_invalid_ones_stay_invalid() {
+        let (width, height) = (7, 6);
+        let own: Vec<u8> = (0..width * height).map(|i| (i * 29 % 113) as u8).collect();
+        let blended = |costs: &[u8], is_hidden| {
+            let mut out = costs.to_vec();
+            blend(&mut out, width, is_hidden, &mut vec![0; width * height]);
+            out
+        };
+        let expected = |costs: &[u8], x: usize, y: usize| {
+            let at = |u: usize, v: usize| f64::from(costs[v * width + u].min(COST_MAX));
+            let around = (y - 1..=y + 1).flat_map(|v| (x - 1..=x + 1).map(move |u| (u, v)));
+            (around.map(|(u, v)| at(u, v)).sum::<f64>() + 3.0 * at(x, y)) / 12.0
+        };
+        let mut holed = own.clone();
+        holed[2 * width + 3] = INVALID;
+        for (costs, is_hidden) in [(&own, false), (&own, true), (&holed, true)] {
+            let out = blended(costs, is_hidden);
+            for (x, y) in (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| (x, y))) {
+                let (found, own) = (out[y * width + x], costs[y * width + x]);
+                assert!(own != INVALID || found == INVALID);
+                assert!(own == INVALID || (f64::from(found) - expected(costs, x, y)).abs() <= 0.51, "at ({x}, {y})");
+            }
+        }
+    }
+
+    #[test]
     fn an_invalid_pixel_makes_every_patch_invalid_that_holds_it() {
         let mut a: Vec<f32> = (0..49).map(|i| ((i * 37) % 23) as f32).collect();
         a[0] = f32::NAN;
         let out = tile_cost(&a, &a, (0.1, 0.1), 7);
-        assert_eq!(out[0], INVALID);
-        assert!(out[1..].iter().all(|&c| c == 0));
+        // The inner pixels are 5 × 5; a pixel's patch reaches two pixels, its neighbours' averages included.
+        for (i, cost) in out.into_iter().enumerate() {
+            assert_eq!(cost, if i % 5 < 2 && i / 5 < 2 { INVALID } else { 0 }, "at {i}");
+        }
     }
 }

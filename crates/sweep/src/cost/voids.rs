@@ -85,8 +85,8 @@ mod tests {
             assert!(voids.hide((0, 0), part, 112, &mut costs));
             for (i, found) in costs.into_iter().enumerate() {
                 let (x, y) = (i % part.width, i / part.width);
-                let inside = (1..=inner).contains(&x) && (1..=3).contains(&y);
-                let is_raised = inside && is_void((y - 1) * stride + x - 1);
+                let inside = (MARGIN..inner + MARGIN).contains(&x) && (MARGIN..3 + MARGIN).contains(&y);
+                let is_raised = inside && is_void((y - MARGIN) * stride + x - MARGIN);
                 assert_eq!(found, if is_raised { cost(i).max(112) } else { cost(i) });
             }
         }
