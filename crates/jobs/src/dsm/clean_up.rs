@@ -5,7 +5,7 @@
 
 use raster::{Grid, Window};
 use sweep::fusion::{
-    CellSource, FillConfig, FillRule, FusedSurface, GridSight, fill_voids, occlusion_bounds, reliability,
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, TrustConfig, calibrate, fill_voids, occlusion_bounds,
     remove_speckle,
 };
 
@@ -34,6 +34,10 @@ const FILL_SLOPE: f64 = 0.05;
 /// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
 /// rises and falls, and something small may stand there.
 const FILL_SIGMA_SLOPE: f64 = 0.1;
+
+/// A height is right if its error is below this, or below two cells where those are larger, metres:
+/// the usual threshold of completeness.
+const RIGHT_M: f64 = 1.0;
 
 /// Number of cells after each step of the clean-up.
 #[derive(Debug, Clone, Copy)]
@@ -89,7 +93,9 @@ pub(crate) fn clean_up(
         }
     }
     let reach = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
-    fused.confidence = reliability(&fused.height_m, &fused.confidence, reach, 2.0 * gsd_m);
+    let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells: reach };
+    let is_observed = |i: usize| !filled.source.data()[i].is_filled();
+    fused.confidence = calibrate(&fused.height_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
     (filled.source, Cleaned { observed, speckle_removed: before - observed })
 }
 
