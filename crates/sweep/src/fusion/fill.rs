@@ -219,24 +219,29 @@ impl Filling<'_> {
         let (row, column) = cells[0].block();
         let centre = [corner(column), corner(row)];
         let reach = self.config.hidden_reach_cells as f32;
-        let (mut own, mut low) = (Vec::new(), Vec::new());
+        let (mut own, mut low, mut sides) = (Vec::new(), Vec::new(), Vec::new());
         let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: CANDIDATES, reach };
         self.border.nearest(centre, wanted, &mut own);
         // In a wide void the ground may be further away than the walls around it. A narrow one that
         // the heights around it enclose is a gap in their surface.
         let is_wide = self.planes[void as usize - 1].is_none();
         let is_wide = |cell: &VoidCell| is_wide && cell.setting.width_cells > self.config.narrow_cells;
-        let limit_m = |cell: &VoidCell| cell.bound_m.max(cell.setting.low_m) + self.config.same_surface_m;
-        let seeks = |cell: &&VoidCell| is_wide(cell) && cell.bound_m < f32::INFINITY;
-        let lacks =
-            |cell: &VoidCell, height_m: f32| seeks(&cell) && !is_enough(&own, height_m + self.config.same_surface_m);
-        let height_max_m = cells.iter().filter(seeks).map(limit_m).fold(f32::NEG_INFINITY, f32::max);
-        if cells.iter().any(|c| lacks(c, c.bound_m) || lacks(c, c.setting.low_m)) {
-            self.border.nearest(centre, Wanted { void: None, height_max_m, ..wanted }, &mut low);
-        }
+        let seeks = |cell: &VoidCell| is_wide(cell) && cell.bound_m < f32::INFINITY;
+        let tolerance_m = self.config.same_surface_m;
+        let lacks = |cell: &VoidCell, height_m: f32| seeks(cell) && !is_enough(&own, height_m + tolerance_m);
+        // One list for each limit: the nearest roofs would displace the ground from a shared one.
+        let further = |limit_m: fn(&VoidCell) -> f32, out: &mut Vec<BorderCell>| {
+            let lacking = cells.iter().filter(|c| lacks(c, limit_m(c))).map(limit_m);
+            let height_max_m = lacking.fold(f32::NEG_INFINITY, f32::max) + tolerance_m;
+            if height_max_m.is_finite() {
+                self.border.nearest(centre, Wanted { void: None, height_max_m, ..wanted }, out);
+            }
+        };
+        further(|cell| cell.bound_m, &mut low);
+        further(|cell| cell.setting.low_m, &mut sides);
         let judge = |cell: &VoidCell| {
             let under = if lacks(cell, cell.bound_m) { &low } else { &own };
-            let beside = if lacks(cell, cell.setting.low_m) { &low } else { &own };
+            let beside = if lacks(cell, cell.setting.low_m) { &sides } else { &own };
             self.judge(cell, void, Candidates { own: &own, under, beside })
         };
         cells.iter().map(judge).collect()
