@@ -18,8 +18,7 @@ use crate::window_sums::window_sums;
 /// scatters by a few percent only.
 const REACH: usize = 4;
 
-/// Returns the share of contrast that is agreed on for each pixel of the window, 0 to 1, or NaN where
-/// the picture around a pixel has no contrast at all. `best` are
+/// Returns the share of contrast that is agreed on for each pixel of the window, 0 to 1. `best` are
 /// the costs of its pixels at the hypotheses with the least aggregated cost.
 pub(crate) fn agreed_share(best: &[u8], view: &ViewLevel<'_>, window: Window) -> Vec<f32> {
     share(best, &census_contrast(view, window), window.width)
@@ -55,7 +54,7 @@ fn share(best: &[u8], contrast: &[f32], width: usize) -> Vec<f32> {
     let held = |i: usize| if contrast[i].is_nan() { 0 } else { (contrast[i] * f32::from(COST_MAX)).round() as u16 };
     let (costs, held) = (window_sums(best.len(), width, REACH, cost), window_sums(best.len(), width, REACH, held));
     let share = |(cost, held): (&u16, &u16)| match held {
-        0 => f32::NAN,
+        0 => 0.0,
         _ => (1.0 - f32::from(*cost) / f32::from(*held)).max(0.0),
     };
     costs.iter().zip(&held).map(share).collect()
@@ -77,10 +76,10 @@ mod tests {
         let all = share(&best, &contrast, width);
         assert!(all[10 * width + 5] == 0.0 && (all[10 * width + 35] - 0.5).abs() < 1e-6);
         assert!((all[10 * width + 20] - 0.5 * 5.0 / 9.0).abs() < 1e-6);
-        assert!(all[25 * width + 35].is_nan());
+        assert_eq!(all[25 * width + 35], 0.0);
         let invalid: Vec<f32> =
             (0..n).map(|p| if p % width < 20 { f32::NAN } else { 64.0 / f32::from(COST_MAX) }).collect();
         let right = share(&best, &invalid, width);
-        assert!((right[10 * width + 20] - 0.5).abs() < 1e-6 && right[0].is_nan());
+        assert!((right[10 * width + 20] - 0.5).abs() < 1e-6 && right[0] == 0.0);
     }
 }

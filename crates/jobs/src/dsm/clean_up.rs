@@ -14,9 +14,14 @@ use crate::dsm::config::Fill;
 /// Isolated patches of less ground than a square of this side are speckle, metres: smaller than the
 /// crown of a single tree or a car port.
 const SPECKLE_SIDE_M: f64 = 2.5;
-/// A cell on whose height the views agree less than this has no height. Its evidence would be
-/// single pixels at a border, or single pixels which another height fits as well.
+/// A cell on whose height the views agree less than this has no height: less than half of what a
+/// single view's height inside a surface has that another height fits as well. Below are heights at
+/// borders and lone pixels.
 const AGREEMENT_MIN: f32 = 0.05;
+/// A height that is right with a smaller probability is dropped, as on water.
+const RIGHT_MIN: f32 = 0.3;
+/// Voids are filled from heights that are rather right than wrong, and only these hide the ground.
+const TRUSTED: f32 = 0.5;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
 const SPECKLE_CELLS_MIN: usize = 9;
 /// Distance of known heights between which a void is filled, metres: a wide street or a house.
@@ -75,16 +80,17 @@ pub(crate) fn clean_up(
     gsd_m: f64,
     core: Window,
 ) -> (Grid<CellSource>, Cleaned) {
-    let weak = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data());
-    weak.filter(|(_, agreement)| **agreement < AGREEMENT_MIN).for_each(|(height, _)| *height = f32::NAN);
+    let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
+    let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells };
     let before = known(&fused.height_m, core);
+    drop_weak(fused, &trust);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);
+    forget_agreement_of_voids(fused);
     let observed = known(&fused.height_m, core);
-    let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
-    agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
+    let trusted = probability(fused, &trust).map(|p| *p >= TRUSTED);
     let bounds = |height_m: &Grid<f32>, cells: &[usize]| occlusion_bounds(height_m, voids.sights, cells);
-    let filled = fill_voids(&mut fused.height_m, voids.blind, bounds, &fill_config(voids.fill, gsd_m));
+    let filled = fill_voids(&mut fused.height_m, &trusted, voids.blind, bounds, &fill_config(voids.fill, gsd_m));
     for ((sigma_m, filled_m), source) in
         fused.sigma_m.data_mut().iter_mut().zip(filled.sigma_m.data()).zip(filled.source.data())
     {
@@ -92,11 +98,29 @@ pub(crate) fn clean_up(
             *sigma_m = *filled_m;
         }
     }
-    let reach = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
-    let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells: reach };
     let is_observed = |i: usize| !filled.source.data()[i].is_filled();
     fused.confidence = calibrate(&fused.height_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
     (filled.source, Cleaned { observed, speckle_removed: before - observed })
+}
+
+/// Drops the heights whose evidence is too weak.
+fn drop_weak(fused: &mut FusedSurface, trust: &TrustConfig) {
+    let agreement = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data());
+    agreement.filter(|(_, agreement)| **agreement < AGREEMENT_MIN).for_each(|(height, _)| *height = f32::NAN);
+    let right = probability(fused, trust);
+    let heights = fused.height_m.data_mut().iter_mut().zip(right.data());
+    heights.filter(|(_, right)| **right < RIGHT_MIN).for_each(|(height, _)| *height = f32::NAN);
+    forget_agreement_of_voids(fused);
+}
+
+/// Returns the probability that each height is right, before anything is filled.
+fn probability(fused: &FusedSurface, trust: &TrustConfig) -> Grid<f32> {
+    calibrate(&fused.height_m, &mut fused.sigma_m.clone(), &fused.confidence, |_| true, trust)
+}
+
+fn forget_agreement_of_voids(fused: &mut FusedSurface) {
+    let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
+    agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
 }
 
 /// Returns the parameters of filling on cells of `gsd_m`.

@@ -23,6 +23,9 @@ use crate::dsm::values::{HeightRange, ImagePair};
 /// A facet steeper than this (rise over run) is a tear and not a surface: about 70°. Two hypotheses
 /// apart is not yet a tear.
 const TEAR_SLOPE: f64 = 2.75;
+/// Reach of the patch that the cost of a pixel sees, pixels.
+const PATCH_REACH: usize = 2;
+
 /// Everything but pixels and heights that a surface is made from.
 #[derive(Clone, Copy)]
 pub(crate) struct SurfaceInput<'a> {
@@ -114,8 +117,10 @@ pub(crate) fn make_surface(
         let unseen = unseen(*own, sweep.levels.finest, config.height_range_m);
         mark_cells(*own, level, &unseen, &frame, &mut blind)?;
         let mut keep = agreeing(*own, &all, useful, level)?;
+        // A pixel that carries no evidence has its height from its surroundings.
+        keep.data_mut().iter_mut().zip(unseen.data()).for_each(|(keep, unseen)| *keep = *keep && !unseen);
         if let Some(asked) = config.height_range_m {
-            drop_outside(&mut keep, own.map, asked);
+            drop_beside_outside(&mut keep, own.map, asked);
         }
         let data = keep.data();
         kept[own.index] = KeptPixels { kept: data.iter().filter(|k| **k).count() as u64, all: data.len() as u64 };
@@ -205,10 +210,18 @@ fn unseen(own: Heights<'_>, level: usize, asked: Option<HeightRange>) -> Grid<bo
     out
 }
 
-/// Drops the pixels whose heights lie outside the range that was asked for.
-fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: HeightRange) {
-    for (keep, h) in keep.data_mut().iter_mut().zip(map.height_m.data()) {
-        *keep = *keep && !is_outside(map, *h, asked);
+/// Drops the pixels whose patch may hold one with a height outside the range that was asked for.
+fn drop_beside_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: HeightRange) {
+    let (width, height) = (keep.width(), keep.height());
+    for y in 0..height {
+        for x in 0..width {
+            let own = map.height_m[(x, y)];
+            if !own.is_nan() && is_outside(map, own, asked) {
+                for v in y.saturating_sub(PATCH_REACH)..(y + PATCH_REACH + 1).min(height) {
+                    keep.row_mut(v)[x.saturating_sub(PATCH_REACH)..(x + PATCH_REACH + 1).min(width)].fill(false);
+                }
+            }
+        }
     }
 }
 

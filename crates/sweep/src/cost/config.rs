@@ -17,7 +17,6 @@ pub enum Aggregation {
     BestOf(usize),
 }
 
-
 /// Parameters of the cost volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CostConfig {

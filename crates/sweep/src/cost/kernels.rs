@@ -99,13 +99,7 @@ pub(crate) fn blend(costs: &mut [u8], width: usize, is_hidden: bool, sums: &mut 
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn blend_rows(
-    costs: &mut [u8],
-    width: usize,
-    sums: &mut [u16],
-    cut: impl Fn(u8) -> u8,
-    pick: impl Fn(u8, u8) -> u8,
-) {
+fn blend_rows(costs: &mut [u8], width: usize, sums: &mut [u16], cut: impl Fn(u8) -> u8, pick: impl Fn(u8, u8) -> u8) {
     let n = costs.len();
     if n < 2 * width + 2 {
         return;

@@ -113,11 +113,12 @@ const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
 const LOWEST_SHARE: usize = 4;
 
-/// Fills voids of `height_m` in place. `blind` marks cells where the images could not show what
+/// Fills voids of `height_m` in place, from the heights that are `trusted`. `blind` marks cells where the images could not show what
 /// stands there. `bound_m` holds the greatest height at which a void cell may be hidden from all
 /// but one view: −∞ where two views see everything, +∞ where fewer image it.
 pub fn fill_voids(
     height_m: &mut Grid<f32>,
+    trusted: &Grid<bool>,
     blind: &Grid<bool>,
     bound_m: impl Fn(&Grid<f32>, &[usize]) -> Vec<f32>,
     config: &FillConfig,
@@ -126,8 +127,9 @@ pub fn fill_voids(
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
     let mut sigma_m = Grid::filled(width, height, f32::NAN);
-    let bounds = bound_m(height_m, &voids);
     let mut sources = height_m.clone();
+    sources.data_mut().iter_mut().zip(trusted.data()).filter(|(_, t)| !**t).for_each(|(h, _)| *h = f32::NAN);
+    let bounds = bound_m(&sources, &voids);
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
     let settings = settings(&sources, blind, &voids, config.reach_cells as f32);
     let (numbers, count) = number_voids(height_m);
@@ -382,7 +384,8 @@ mod tests {
 
     fn fill_with(height_m: &mut Grid<f32>, bound_m: f32, config: &FillConfig) -> FilledVoids {
         let blind = Grid::filled(height_m.width(), height_m.height(), false);
-        fill_voids(height_m, &blind, |_, voids| vec![bound_m; voids.len()], config)
+        let trusted = Grid::filled(height_m.width(), height_m.height(), true);
+        fill_voids(height_m, &trusted, &blind, |_, voids| vec![bound_m; voids.len()], config)
     }
 
     /// Fills with two views that see every void.
@@ -438,17 +441,17 @@ mod tests {
 
     #[test]
     fn blank_images_leave_a_wide_void_open_and_say_so() {
-        let mut blind = Grid::filled(40, 40, false);
+        let (mut blind, trusted) = (Grid::filled(40, 40, false), Grid::filled(40, 40, true));
         (12..20).for_each(|x| (0..40).for_each(|y| blind[(x, y)] = true));
         let (mut seen, mut unseen) = (void_in_a_plain(), void_in_a_plain());
         fill(&mut seen);
         assert!((10..20).all(|x| (10..20).all(|y| seen[(x, y)] == 1.0)), "{:?}", seen.row(15));
         let visible = |_: &Grid<f32>, voids: &[usize]| vec![f32::NEG_INFINITY; voids.len()];
-        let found = fill_voids(&mut unseen, &blind, visible, &CONFIG);
+        let found = fill_voids(&mut unseen, &trusted, &blind, visible, &CONFIG);
         assert!((12..20).all(|x| unseen[(x, 15)].is_nan()) && unseen[(10, 15)] == 1.0, "{:?}", unseen.row(15));
         assert_eq!(found.source[(15, 15)], CellSource::Blank);
         let everything = FillConfig { rule: FillRule::Everything, ..CONFIG };
-        fill_voids(&mut unseen, &blind, visible, &everything);
+        fill_voids(&mut unseen, &trusted, &blind, visible, &everything);
         assert!((10..20).all(|x| (10..20).all(|y| unseen[(x, y)] == 1.0)), "{:?}", unseen.row(15));
     }
 

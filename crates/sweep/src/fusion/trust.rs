@@ -140,7 +140,9 @@ mod tests {
         assert!(confidence[(20, 10)].is_nan());
         let [smooth, alone, rough] = [(16, 3), (2, 3), (36, 10)];
         assert!(sigma_m[smooth] < sigma_m[rough] && sigma_m[smooth] < sigma_m[alone]);
-        assert!(confidence[alone] < 0.6 && confidence[alone] < confidence[rough] && confidence[rough] < confidence[smooth]);
+        assert!(
+            confidence[alone] < 0.6 && confidence[alone] < confidence[rough] && confidence[rough] < confidence[smooth]
+        );
         assert_eq!(sigma_m.data()[filled], 2.5);
         assert!(confidence.data()[filled] < confidence[alone]);
     }
@@ -158,7 +160,8 @@ mod tests {
             (sigma_m.map(|s| s / scale), confidence)
         };
         let ((fine, p), (coarse, q)) = (calibrated(1.0), calibrated(4.0));
-        let near = |a: &Grid<f32>, b: &Grid<f32>| a.data().iter().zip(b.data()).all(|(a, b)| (a / b - 1.0).abs() < 1e-3);
+        let near =
+            |a: &Grid<f32>, b: &Grid<f32>| a.data().iter().zip(b.data()).all(|(a, b)| (a / b - 1.0).abs() < 1e-3);
         assert!(near(&fine, &coarse) && near(&p, &q));
     }
 }
