@@ -6,7 +6,7 @@
 use raster::{Grid, Window};
 use sweep::fusion::{
     CellSource, FillConfig, FillRule, FusedSurface, GridSight, TrustConfig, calibrate, fill_voids, occlusion_bounds,
-    remove_speckle,
+    remove_speckle, surroundings,
 };
 
 use crate::dsm::config::Fill;
@@ -18,8 +18,12 @@ const SPECKLE_SIDE_M: f64 = 2.5;
 /// single view's height inside a surface has that another height fits as well. Below are heights at
 /// borders and lone pixels.
 const AGREEMENT_MIN: f32 = 0.05;
-/// A height that is right with a smaller probability is dropped, as on water.
+/// A height that is right with a smaller probability than this is dropped where those around it are
+/// not much better, as on water. A tree stands among heights that are right.
 const RIGHT_MIN: f32 = 0.3;
+const RIGHT_MIN_AROUND: f32 = 0.45;
+/// Distance over which the heights around are judged, metres: half the width of a canal.
+const WATER_M: f64 = 10.0;
 /// Voids are filled from heights that are rather right than wrong, and only these hide the ground.
 const TRUSTED: f32 = 0.5;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
@@ -83,7 +87,7 @@ pub(crate) fn clean_up(
     let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
     let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells };
     let before = known(&fused.height_m, core);
-    drop_weak(fused, &trust);
+    drop_weak(fused, &trust, gsd_m);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);
     forget_agreement_of_voids(fused);
@@ -104,12 +108,14 @@ pub(crate) fn clean_up(
 }
 
 /// Drops the heights whose evidence is too weak.
-fn drop_weak(fused: &mut FusedSurface, trust: &TrustConfig) {
+fn drop_weak(fused: &mut FusedSurface, trust: &TrustConfig, gsd_m: f64) {
     let agreement = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data());
     agreement.filter(|(_, agreement)| **agreement < AGREEMENT_MIN).for_each(|(height, _)| *height = f32::NAN);
     let right = probability(fused, trust);
-    let heights = fused.height_m.data_mut().iter_mut().zip(right.data());
-    heights.filter(|(_, right)| **right < RIGHT_MIN).for_each(|(height, _)| *height = f32::NAN);
+    let around = surroundings(&right, (WATER_M / gsd_m).ceil() as usize);
+    let heights = fused.height_m.data_mut().iter_mut().zip(right.data().iter().zip(around.data()));
+    let is_weak = |right: f32, around: f32| right < RIGHT_MIN && around < RIGHT_MIN_AROUND;
+    heights.filter(|(_, (right, around))| is_weak(**right, **around)).for_each(|(height, _)| *height = f32::NAN);
     forget_agreement_of_voids(fused);
 }
 

@@ -21,4 +21,4 @@ pub use envelope::{GridSight, occlusion_bounds};
 pub use fill::{CellSource, FillConfig, FillRule, FilledVoids, fill_voids};
 pub use mesh::{GridFrame, PlacedView, mark_cells, place_view};
 pub use speckle::remove_speckle;
-pub use trust::{TrustConfig, calibrate};
+pub use trust::{TrustConfig, calibrate, surroundings};

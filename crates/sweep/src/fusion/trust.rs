@@ -98,6 +98,22 @@ pub fn calibrate(
     confidence
 }
 
+/// Averages the probabilities of right heights over the square that reaches `reach_cells` to each
+/// side. Voids count as 0: what cannot be matched speaks against the heights between.
+///
+/// The average is low on water and on what changed between the dates, and high around a tree, whose
+/// own heights are as uncertain.
+pub fn surroundings(confidence: &Grid<f32>, reach_cells: usize) -> Grid<f32> {
+    let (width, height) = (confidence.width(), confidence.height());
+    let values = confidence.data();
+    let sums =
+        window_sums(values.len(), width, reach_cells, |i| if values[i].is_nan() { 0.0 } else { f64::from(values[i]) });
+    let cells = |i: usize| span(i % width, reach_cells, width).len() * span(i / width, reach_cells, height).len();
+    let mut out = confidence.clone();
+    out.data_mut().iter_mut().zip(sums).enumerate().for_each(|(i, (out, sum))| *out = (sum / cells(i) as f64) as f32);
+    out
+}
+
 /// Returns the standard deviation of the known heights in the 3 × 3 cells around each cell.
 fn roughness(height_m: &Grid<f32>) -> Grid<f32> {
     let (width, heights) = (height_m.width(), height_m.data());
@@ -145,6 +161,15 @@ mod tests {
         );
         assert_eq!(sigma_m.data()[filled], 2.5);
         assert!(confidence.data()[filled] < confidence[alone]);
+    }
+
+    #[test]
+    fn surroundings_are_low_where_little_is_known_and_high_around_a_tree() {
+        let mut confidence = Grid::filled(60, 30, 0.9f32);
+        (0..30).for_each(|y| (30..60).for_each(|x| confidence[(x, y)] = if (x + y) % 2 == 0 { f32::NAN } else { 0.2 }));
+        (10..14).for_each(|y| (10..14).for_each(|x| confidence[(x, y)] = 0.2));
+        let around = surroundings(&confidence, 8);
+        assert!(around[(12, 12)] > 0.8 && around[(45, 15)] < 0.12, "{} {}", around[(12, 12)], around[(45, 15)]);
     }
 
     #[test]
