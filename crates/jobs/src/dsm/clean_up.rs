@@ -24,7 +24,8 @@ const RIGHT_MIN: f32 = 0.3;
 const RIGHT_MIN_AROUND: f32 = 0.45;
 /// Distance over which the heights around are judged, metres: half the width of a canal.
 const WATER_M: f64 = 10.0;
-/// Voids are filled from heights that are rather right than wrong, and only these hide the ground.
+/// Only heights that are rather right than wrong hide the ground: a single wrong one would throw a
+/// long shadow.
 const TRUSTED: f32 = 0.5;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
 const SPECKLE_CELLS_MIN: usize = 9;

@@ -113,7 +113,7 @@ const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
 const LOWEST_SHARE: usize = 4;
 
-/// Fills voids of `height_m` in place, from the heights that are `trusted`. `blind` marks cells where the images could not show what
+/// Fills voids of `height_m` in place. Only heights that are `trusted` hide the ground. `blind` marks cells where the images could not show what
 /// stands there. `bound_m` holds the greatest height at which a void cell may be hidden from all
 /// but one view: −∞ where two views see everything, +∞ where fewer image it.
 pub fn fill_voids(
@@ -127,9 +127,10 @@ pub fn fill_voids(
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
     let mut sigma_m = Grid::filled(width, height, f32::NAN);
+    let mut solid = height_m.clone();
+    solid.data_mut().iter_mut().zip(trusted.data()).filter(|(_, t)| !**t).for_each(|(h, _)| *h = f32::NAN);
+    let bounds = bound_m(&solid, &voids);
     let mut sources = height_m.clone();
-    sources.data_mut().iter_mut().zip(trusted.data()).filter(|(_, t)| !**t).for_each(|(h, _)| *h = f32::NAN);
-    let bounds = bound_m(&sources, &voids);
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
     let settings = settings(&sources, blind, &voids, config.reach_cells as f32);
     let (numbers, count) = number_voids(height_m);
