@@ -11,9 +11,9 @@ pub const COST_MAX: u8 = 112;
 pub enum Aggregation {
     /// Mean over all pairs of views, source–source pairs included: the variance over the views.
     Variance,
-    /// Mean of the best `K` reference–source pairs. With one pair a pixel needs a single source that
-    /// sees it on a similar date, which is the usual case beside a wall. A chance likeness of two
-    /// views is left to the consistency check.
+    /// Mean of the best `K` reference–source pairs. With one pair a pixel needs a single source
+    /// that sees it on a similar date, which is the usual case beside a wall. A chance likeness of
+    /// two views is left to the consistency check.
     BestOf(usize),
 }
 
@@ -27,8 +27,8 @@ pub struct CostConfig {
     pub tile: usize,
     /// Largest error of a tile's local map against the exact RPC chain, pixels.
     pub map_tolerance_px: f64,
-    /// Whether the cost of a pixel at a height is averaged with those of its eight neighbours at the
-    /// same height.
+    /// Whether the cost of a pixel at a height is averaged with those of its eight neighbours at
+    /// the same height.
     ///
     /// The larger patch finds more matches where texture is weak, but it widens what stands on the
     /// ground by a pixel. On a coarse level, where a house is a few pixels wide, it would lose the

@@ -317,7 +317,8 @@ mod tests {
         let mut a: Vec<f32> = (0..49).map(|i| ((i * 37) % 23) as f32).collect();
         a[0] = f32::NAN;
         let out = tile_cost(&a, &a, (0.1, 0.1), 7);
-        // The inner pixels are 5 × 5; a pixel's patch reaches two pixels, its neighbours' averages included.
+        // The inner pixels are 5 × 5; a pixel's patch reaches two pixels, its neighbours' averages
+        // included.
         for (i, cost) in out.into_iter().enumerate() {
             assert_eq!(cost, if i % 5 < 2 && i / 5 < 2 { INVALID } else { 0 }, "at {i}");
         }

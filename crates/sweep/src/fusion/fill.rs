@@ -113,9 +113,10 @@ const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
 const LOWEST_SHARE: usize = 4;
 
-/// Fills voids of `height_m` in place. Only heights that are `trusted` hide the ground. `blind` marks cells where the images could not show what
-/// stands there. `bound_m` holds the greatest height at which a void cell may be hidden from all
-/// but one view: −∞ where two views see everything, +∞ where fewer image it.
+/// Fills voids of `height_m` in place. Only heights that are `trusted` hide the ground. `blind`
+/// marks cells where the images could not show what stands there. `bound_m` holds the greatest
+/// height at which a void cell may be hidden from all but one view: −∞ where two views see
+/// everything, +∞ where fewer image it.
 pub fn fill_voids(
     height_m: &mut Grid<f32>,
     trusted: &Grid<bool>,
@@ -305,8 +306,8 @@ impl Filling<'_> {
         Estimate { height_m: plane.at(cell.at()), sigma_m: self.sigma_m(plane.deviation_m, nearest) }
     }
 
-    /// Returns the base of the lowest surface among candidates that are not above `limit_m`, and the
-    /// height that continues this surface into the cell; `None` without candidates.
+    /// Returns the base of the lowest surface among candidates that are not above `limit_m`, and
+    /// the height that continues this surface into the cell; `None` without candidates.
     ///
     /// Distance counts like height here, at the slope of one surface: a pit far away is not lower
     /// than the ground beside the cell.
@@ -426,7 +427,8 @@ mod tests {
 
     #[test]
     fn a_street_between_towers_is_not_filled_with_roof() {
-        // Roofs at 40 m on both sides of a street of 10 cells, whose ground is known at its end only.
+        // Roofs at 40 m on both sides of a street of 10 cells, whose ground is known at its end
+        // only.
         let mut g = Grid::filled(40, 60, 40.0f32);
         (15..25).for_each(|x| (0..60).for_each(|y| g[(x, y)] = if y < 45 { f32::NAN } else { 0.0 }));
         let street = g.clone();
