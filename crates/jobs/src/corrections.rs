@@ -111,7 +111,7 @@ impl Corrections {
         }
         let image = |(path, correction): &(PathBuf, ImageCorrection)| RunImage {
             path: path.clone(),
-            applied_correction: Some(correction.clone()),
+            applied_correction: Some(*correction),
         };
         files::write_json(path, &RunReport { images: self.images.iter().map(image).collect() }, overwrite)
     }

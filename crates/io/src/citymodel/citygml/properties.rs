@@ -70,7 +70,7 @@ impl Element {
             return self.below.first()?.generic();
         }
         let is_set = self.name.ends_with("GenericAttributeSet") || self.name.ends_with("genericAttributeSet");
-        if !is_set && !(self.name.ends_with("Attribute") && self.name.len() > "Attribute".len()) {
+        if !(is_set || self.name.ends_with("Attribute") && self.name.len() > "Attribute".len()) {
             return None;
         }
         let name = self.label.clone().or_else(|| Some(self.find("name")?.text.trim().to_owned()))?;
