@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use simulate::Simulation;
 use sweep::aggregation::Penalties;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::cost::Aggregation;
 use sweep::fusion::{FusionConfig, GridFrame, fuse_views, place_view};
 use sweep::ranges::{EDGE_REACH, Ranges};
 use sweep::{HeightMap, LevelConfig, Reference, SweepView, ViewLevel, source_from_reference, sweep_level};
@@ -101,8 +100,7 @@ impl<'a> Scene<'a> {
     fn sweep(&self, index: usize, level: usize, ranges: &Ranges, known: Known) -> anyhow::Result<HeightMap> {
         let at = |index: usize| self.views[index].on_level(index, level);
         let sources: Vec<ViewLevel<'_>> = (0..self.views.len()).filter(|&i| i != index).map(at).collect();
-        let mut config = LevelConfig::default();
-        config.cost.aggregation = Aggregation::of_sources(sources.len());
+        let config = LevelConfig::default();
         if known == Known::RangeAlone {
             config.penalties = Penalties { step: 0, jump: 0, jump_at_edge: 0 };
         }

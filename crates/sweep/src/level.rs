@@ -198,15 +198,16 @@ fn read_row_with<S: LeastSum>(token: S, row: ReadRow<'_, '_>) {
 }
 
 impl Reader<'_> {
-    /// Drops the heights that no texture supports, and returns the map.
+    /// Adds the support of the heights by the picture, and returns the map.
     fn finish(self) -> HeightMap {
         let Self { reference, window, core, best, mut out, .. } = self;
         let support = agreed_share(&best, &reference.view, window);
         for y in 0..core.height {
             for x in 0..core.width {
                 let from = ((core.x - window.x) as usize + x, (core.y - window.y) as usize + y);
-                out.support[(x, y)] = support[from.1 * window.width + from.0];
-                if out.height_m[(x, y)].is_nan() || out.support[(x, y)] == 0.0 {
+                let at = from.1 * window.width + from.0;
+                out.support[(x, y)] = support[at];
+                if out.height_m[(x, y)].is_nan() {
                     out.clear((x, y));
                 }
             }

@@ -5,15 +5,28 @@
 
 use raster::{Grid, Window};
 use sweep::fusion::{
-    CellSource, FillConfig, FillRule, FusedSurface, GridSight, fill_voids, occlusion_bounds, reliability,
-    remove_speckle,
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, TrustConfig, calibrate, fill_voids, occlusion_bounds,
+    remove_speckle, surroundings,
 };
 
 use crate::dsm::config::Fill;
 
-/// Isolated patches of less ground than a square of this side are speckle, metres: smaller than a
-/// house.
-const SPECKLE_SIDE_M: f64 = 5.0;
+/// Isolated patches of less ground than a square of this side are speckle, metres: smaller than the
+/// crown of a single tree or a car port.
+const SPECKLE_SIDE_M: f64 = 2.5;
+/// A cell on whose height the views agree less than this has no height: less than half of what a
+/// single view's height inside a surface has that another height fits as well. Below are heights at
+/// borders and lone pixels.
+const AGREEMENT_MIN: f32 = 0.05;
+/// A height that is right with a smaller probability than this is dropped where those around it are
+/// not much better, as on water. A tree stands among heights that are right.
+const RIGHT_MIN: f32 = 0.3;
+const RIGHT_MIN_AROUND: f32 = 0.45;
+/// Distance over which the heights around are judged, metres: half the width of a canal.
+const WATER_M: f64 = 10.0;
+/// Only heights that are rather right than wrong hide the ground: a single wrong one would throw a
+/// long shadow.
+const TRUSTED: f32 = 0.5;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
 const SPECKLE_CELLS_MIN: usize = 9;
 /// Distance of known heights between which a void is filled, metres: a wide street or a house.
@@ -31,6 +44,10 @@ const FILL_SLOPE: f64 = 0.05;
 /// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
 /// rises and falls, and something small may stand there.
 const FILL_SIGMA_SLOPE: f64 = 0.1;
+
+/// A height is right if its error is below this, or below two cells where those are larger, metres:
+/// the usual threshold of completeness.
+const RIGHT_M: f64 = 1.0;
 
 /// Number of cells after each step of the clean-up.
 #[derive(Debug, Clone, Copy)]
@@ -68,14 +85,17 @@ pub(crate) fn clean_up(
     gsd_m: f64,
     core: Window,
 ) -> (Grid<CellSource>, Cleaned) {
+    let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
+    let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells };
     let before = known(&fused.height_m, core);
+    drop_weak(fused, &trust, gsd_m);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);
+    forget_agreement_of_voids(fused);
     let observed = known(&fused.height_m, core);
-    let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
-    agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
+    let trusted = probability(fused, &trust).map(|p| *p >= TRUSTED);
     let bounds = |height_m: &Grid<f32>, cells: &[usize]| occlusion_bounds(height_m, voids.sights, cells);
-    let filled = fill_voids(&mut fused.height_m, voids.blind, bounds, &fill_config(voids.fill, gsd_m));
+    let filled = fill_voids(&mut fused.height_m, &trusted, voids.blind, bounds, &fill_config(voids.fill, gsd_m));
     for ((sigma_m, filled_m), source) in
         fused.sigma_m.data_mut().iter_mut().zip(filled.sigma_m.data()).zip(filled.source.data())
     {
@@ -83,9 +103,31 @@ pub(crate) fn clean_up(
             *sigma_m = *filled_m;
         }
     }
-    let reach = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
-    fused.confidence = reliability(&fused.height_m, &fused.confidence, reach, 2.0 * gsd_m);
+    let is_observed = |i: usize| !filled.source.data()[i].is_filled();
+    fused.confidence = calibrate(&fused.height_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
     (filled.source, Cleaned { observed, speckle_removed: before - observed })
+}
+
+/// Drops the heights whose evidence is too weak.
+fn drop_weak(fused: &mut FusedSurface, trust: &TrustConfig, gsd_m: f64) {
+    let agreement = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data());
+    agreement.filter(|(_, agreement)| **agreement < AGREEMENT_MIN).for_each(|(height, _)| *height = f32::NAN);
+    let right = probability(fused, trust);
+    let around = surroundings(&right, (WATER_M / gsd_m).ceil() as usize);
+    let heights = fused.height_m.data_mut().iter_mut().zip(right.data().iter().zip(around.data()));
+    let is_weak = |right: f32, around: f32| right < RIGHT_MIN && around < RIGHT_MIN_AROUND;
+    heights.filter(|(_, (right, around))| is_weak(**right, **around)).for_each(|(height, _)| *height = f32::NAN);
+    forget_agreement_of_voids(fused);
+}
+
+/// Returns the probability that each height is right, before anything is filled.
+fn probability(fused: &FusedSurface, trust: &TrustConfig) -> Grid<f32> {
+    calibrate(&fused.height_m, &mut fused.sigma_m.clone(), &fused.confidence, |_| true, trust)
+}
+
+fn forget_agreement_of_voids(fused: &mut FusedSurface) {
+    let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
+    agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
 }
 
 /// Returns the parameters of filling on cells of `gsd_m`.

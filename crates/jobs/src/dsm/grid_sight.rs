@@ -1,10 +1,10 @@
 //! What each view sees of the grid: the direction of its lines of sight there, and the cells that
 //! its image shows.
 //!
-//! The pixel of a cell is interpolated between cells of a lattice that are projected exactly, at the
-//! mean height known around them. Off the ground the pixel is wrong, by the lean of the view times
-//! the height: at the border of an image or beside a cloud, where a cell counts as imaged that is
-//! not.
+//! The pixel of a cell is interpolated between cells of a lattice that are projected exactly, at
+//! the mean height known around them. Off the ground the pixel is wrong, by the lean of the view
+//! times the height: at the border of an image or beside a cloud, where a cell counts as imaged
+//! that is not.
 
 use camera::{CameraError, RpcCamera};
 use crs::MapProjection;
@@ -22,7 +22,8 @@ const LATTICE: usize = 32;
 /// Lines of sight are followed up and down by this much, metres: the height of a tower.
 const ALONG_M: f64 = 50.0;
 
-/// The camera of a view and the valid pixels of one level. It takes a fraction of the view's memory.
+/// The camera of a view and the valid pixels of one level. It takes a fraction of the view's
+/// memory.
 pub(crate) struct ViewPixels {
     camera: RpcCamera,
     level: u32,

@@ -6,7 +6,6 @@
 use numeric::Progress;
 use rayon::prelude::*;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::cost::Aggregation;
 use sweep::ranges::Ranges;
 use sweep::{HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, ViewLevel, sweep_level};
 
@@ -19,6 +18,10 @@ use crate::dsm::values::HeightRange;
 /// Tolerance of the consistency check on coarse levels, pixels. Coarse heights are rough, and a
 /// wrong deletion costs more than a wide range.
 const COARSE_TOLERANCE_PX: f64 = 2.0;
+
+/// Penalty of a jump on coarse levels, three quarters of that on the finest. A house is few pixels
+/// wide there, and what the coarse levels smooth away is never searched again.
+const COARSE_JUMP: u8 = 93;
 
 /// Parameters of a sweep of all views.
 #[derive(Debug, Clone)]
@@ -129,7 +132,10 @@ fn sweep_view(
     };
     let sources: Vec<ViewLevel<'_>> = sweep.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
     let mut config = LevelConfig::default();
-    config.cost.aggregation = Aggregation::of_sources(sources.len());
+    if level > sweep.levels.finest {
+        config.cost.blends_neighbours = false;
+        config.penalties.jump = COARSE_JUMP;
+    }
     let reference = Reference { view: reference, level: level as u32, ranges: &ranges, prior };
     let map = sweep_level(reference, &sources, origin_m, &config)?;
     Ok((map, ranges.evaluations()))

@@ -23,14 +23,8 @@ use crate::dsm::values::{HeightRange, ImagePair};
 /// A facet steeper than this (rise over run) is a tear and not a surface: about 70°. Two hypotheses
 /// apart is not yet a tear.
 const TEAR_SLOPE: f64 = 2.75;
-/// A height around which the views agree on less of the picture's contrast than this has no picture
-/// behind it. The best of several unrelated pictures reaches nearly this.
-const SUPPORT_MIN: f32 = 0.2;
-/// A height that is better than all others by less than this share of the worst cost may be chance,
-/// as on water. The heights around it are better evidence. Half of this and twice this are alike on
-/// simulated towns. Chosen with JAX_068 in view, which gains in completeness with every set of its
-/// views and loses 0.02 m of MAE with one pair.
-const CONFIDENCE_MIN: f32 = 0.1;
+/// Reach of the patch that the cost of a pixel sees, pixels.
+const PATCH_REACH: usize = 2;
 
 /// Everything but pixels and heights that a surface is made from.
 #[derive(Clone, Copy)]
@@ -123,8 +117,10 @@ pub(crate) fn make_surface(
         let unseen = unseen(*own, sweep.levels.finest, config.height_range_m);
         mark_cells(*own, level, &unseen, &frame, &mut blind)?;
         let mut keep = agreeing(*own, &all, useful, level)?;
+        // A pixel that carries no evidence has its height from its surroundings.
+        keep.data_mut().iter_mut().zip(unseen.data()).for_each(|(keep, unseen)| *keep = *keep && !unseen);
         if let Some(asked) = config.height_range_m {
-            drop_outside(&mut keep, own.map, asked);
+            drop_beside_outside(&mut keep, own.map, asked);
         }
         let data = keep.data();
         kept[own.index] = KeptPixels { kept: data.iter().filter(|k| **k).count() as u64, all: data.len() as u64 };
@@ -199,12 +195,7 @@ fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[ImagePair], level: 
     }
     let counts = count_agreeing(own, &others, level, &ConsistencyConfig::default())?;
     let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
-    let mut keep = counts.map(|n| *n >= needed);
-    let reliability = own.map.support.data().iter().zip(own.map.confidence.data());
-    for (keep, (support, confidence)) in keep.data_mut().iter_mut().zip(reliability) {
-        *keep = *keep && *support >= SUPPORT_MIN && *confidence >= CONFIDENCE_MIN;
-    }
-    Ok(keep)
+    Ok(counts.map(|n| *n >= needed))
 }
 
 /// Marks the pixels that carry no evidence of what they show: blank ones, and those whose best
@@ -219,10 +210,18 @@ fn unseen(own: Heights<'_>, level: usize, asked: Option<HeightRange>) -> Grid<bo
     out
 }
 
-/// Drops the pixels whose heights lie outside the range that was asked for.
-fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: HeightRange) {
-    for (keep, h) in keep.data_mut().iter_mut().zip(map.height_m.data()) {
-        *keep = *keep && !is_outside(map, *h, asked);
+/// Drops the pixels whose patch may hold one with a height outside the range that was asked for.
+fn drop_beside_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: HeightRange) {
+    let (width, height) = (keep.width(), keep.height());
+    for y in 0..height {
+        for x in 0..width {
+            let own = map.height_m[(x, y)];
+            if !own.is_nan() && is_outside(map, own, asked) {
+                for v in y.saturating_sub(PATCH_REACH)..(y + PATCH_REACH + 1).min(height) {
+                    keep.row_mut(v)[x.saturating_sub(PATCH_REACH)..(x + PATCH_REACH + 1).min(width)].fill(false);
+                }
+            }
+        }
     }
 }
 

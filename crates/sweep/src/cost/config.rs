@@ -11,27 +11,10 @@ pub const COST_MAX: u8 = 112;
 pub enum Aggregation {
     /// Mean over all pairs of views, source–source pairs included: the variance over the views.
     Variance,
-    /// Mean of the best `K` reference–source pairs.
+    /// Mean of the best `K` reference–source pairs. With one pair a pixel needs a single source
+    /// that sees it on a similar date, which is the usual case beside a wall. A chance likeness of
+    /// two views is left to the consistency check.
     BestOf(usize),
-}
-
-/// Pairs that count by default. Two of the sources see even the ground beside a wall, and on dates
-/// like the reference's; the third best may not.
-const BEST: usize = 2;
-
-impl Aggregation {
-    /// Picks the aggregation for `count` sources: best-of-2 for more than two, the full variance
-    /// otherwise.
-    ///
-    /// ```
-    /// use sweep::cost::Aggregation;
-    ///
-    /// assert_eq!(Aggregation::of_sources(2), Aggregation::Variance);
-    /// assert_eq!(Aggregation::of_sources(6), Aggregation::BestOf(2));
-    /// ```
-    pub fn of_sources(count: usize) -> Self {
-        if count > BEST { Self::BestOf(BEST) } else { Self::Variance }
-    }
 }
 
 /// Parameters of the cost volume.
@@ -44,10 +27,17 @@ pub struct CostConfig {
     pub tile: usize,
     /// Largest error of a tile's local map against the exact RPC chain, pixels.
     pub map_tolerance_px: f64,
+    /// Whether the cost of a pixel at a height is averaged with those of its eight neighbours at
+    /// the same height.
+    ///
+    /// The larger patch finds more matches where texture is weak, but it widens what stands on the
+    /// ground by a pixel. On a coarse level, where a house is a few pixels wide, it would lose the
+    /// house.
+    pub blends_neighbours: bool,
 }
 
 impl Default for CostConfig {
     fn default() -> Self {
-        Self { aggregation: Aggregation::BestOf(BEST), tile: 64, map_tolerance_px: 0.02 }
+        Self { aggregation: Aggregation::BestOf(1), tile: 64, map_tolerance_px: 0.02, blends_neighbours: true }
     }
 }

@@ -6,7 +6,7 @@
 use multiversion::multiversion;
 use raster::Window;
 
-use super::part::CENSUS_REACH;
+use super::part::MARGIN;
 use super::shift::OVERHANG;
 use crate::ranges::Ranges;
 
@@ -61,8 +61,8 @@ pub(super) fn divide(
         return (0, asked);
     }
     // Every part pays for its own margin and for registers that are filled up.
-    let width = tile.width + 2 * CENSUS_REACH;
-    let area = (width + width.next_multiple_of(OVERHANG)) / 2 * (tile.height + 2 * CENSUS_REACH);
+    let width = tile.width + 2 * MARGIN;
+    let area = (width + width.next_multiple_of(OVERHANG)) / 2 * (tile.height + 2 * MARGIN);
     let whole = (own.1 - own.0) as usize * (area + PLANE_PIXELS) + area;
     if divided < whole {
         return (divided, asked);

@@ -85,12 +85,46 @@ pub(crate) fn sort_pair(a: &mut [u8], b: &mut [u8]) {
     }
 }
 
+/// Averages every cost with those of its eight neighbours: four parts of its own and one of each.
+///
+/// `costs` are rows of `width` without gaps. Those in the first and last rows and columns become
+/// meaningless. An invalid cost stays invalid, and counts as the worst in its neighbours' averages;
+/// `is_hidden` tells whether there is one. `sums` is a scratch buffer as long as the costs.
+pub(crate) fn blend(costs: &mut [u8], width: usize, is_hidden: bool, sums: &mut [u16]) {
+    if is_hidden {
+        blend_rows(costs, width, sums, |cost| cost.min(COST_MAX), |own, mean| if own == INVALID { own } else { mean });
+    } else {
+        blend_rows(costs, width, sums, |cost| cost, |_, mean| mean);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn blend_rows(costs: &mut [u8], width: usize, sums: &mut [u16], cut: impl Fn(u8) -> u8, pick: impl Fn(u8, u8) -> u8) {
+    let n = costs.len();
+    if n < 2 * width + 2 {
+        return;
+    }
+    // Sums along the rows may run across their ends, where the result does not count.
+    for (i, sum) in sums[1..n - 1].iter_mut().enumerate() {
+        *sum = u16::from(cut(costs[i])) + u16::from(cut(costs[i + 1])) + u16::from(cut(costs[i + 2]));
+    }
+    let (above, own, below) = (&sums[1..], &sums[width + 1..], &sums[2 * width + 1..]);
+    let inner = n - 2 * width - 2;
+    let costs = &mut costs[width + 1..][..inner];
+    for (i, cost) in costs.iter_mut().enumerate() {
+        let all = above[i] + own[i] + below[i] + 3 * u16::from(cut(*cost));
+        // 5,462 is a twelfth of 2¹⁶.
+        *cost = pick(*cost, ((u32::from(all + 6) * 5_462) >> 16) as u8);
+    }
+}
+
 /// Writes the weighted mean of each pixel's costs. An invalid cost counts as [`COST_MAX`], the cost
 /// of unrelated pictures, with weight 1; a valid one has weight [`VALID_WEIGHT`].
 ///
 /// `is_hidden` tells whether any cost is invalid. `sums` and `weights` are scratch buffers.
 pub(crate) fn mean_cost(costs: &[Vec<u8>], is_hidden: bool, sums: &mut [u16], weights: &mut [u16], out: &mut [u8]) {
     match costs {
+        [a] if !is_hidden => out.copy_from_slice(a),
         [a, b] if !is_hidden => mean_of_two(a, b, out),
         [a, b, c] if !is_hidden => mean_of_three([a, b, c], out),
         _ => {
@@ -139,7 +173,7 @@ fn divide(sums: &[u16], weights: &[u16], out: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use super::super::census::{CHUNK, Census, CensusScratch, census_cost, overhang};
-    use super::super::part::Part;
+    use super::super::part::{MARGIN, Part};
     use super::super::voids::Voids;
     use super::*;
     use proptest::prelude::*;
@@ -149,15 +183,25 @@ mod tests {
     /// Smallest difference of two costs.
     const UNIT: f64 = 1.0 / COST_MAX as f64;
 
-    /// Returns the costs of two tiles of `side` columns each, as the sweep computes them.
+    /// Repeats the border of a tile of `side` columns once around it.
+    fn bordered(tile: &[f32], side: usize) -> Vec<f32> {
+        let inside = |i: usize| i.clamp(1, side) - 1;
+        (0..(side + 2) * (side + 2)).map(|i| tile[inside(i / (side + 2)) * side + inside(i % (side + 2))]).collect()
+    }
+
+    /// Returns the costs of the inner pixels of two tiles of `side` columns each, as the sweep
+    /// computes them before costs are blended. The margin of a part is a pixel wider than the
+    /// census.
     fn tile_cost(a: &[f32], b: &[f32], (scale_a, scale_b): (f32, f32), side: usize) -> Vec<u8> {
+        let (a, b) = (&bordered(a, side)[..], &bordered(b, side)[..]);
+        let side = side + 2;
         let part = Part { within: [0; 2], width: side, height: side };
         let mut hidden = Vec::new();
         let mut graded = |tile: &[f32], scale: f32| {
             let (mut grey, mut voids, mut census) = (Vec::new(), Voids::default(), Census::default());
             let has_voids = quantise(tile, scale * FULL, overhang(side), &mut grey);
             census.fill(&grey, side, tile.len());
-            voids.mark(tile, side, 3, has_voids);
+            voids.mark(tile, side, 2 * MARGIN + 1, has_voids);
             hidden.push(voids);
             census
         };
@@ -167,7 +211,7 @@ mod tests {
         for voids in hidden {
             voids.hide((0, 0), part, INVALID, &mut costs);
         }
-        (1..side - 1).flat_map(|y| costs[y * side + 1..(y + 1) * side - 1].to_vec()).collect()
+        (MARGIN..side - MARGIN).flat_map(|y| costs[y * side + MARGIN..(y + 1) * side - MARGIN].to_vec()).collect()
     }
 
     /// Returns the cost of two tiles of one patch each.
@@ -243,11 +287,40 @@ mod tests {
     }
 
     #[test]
+    fn costs_are_averaged_over_nine_pixels_and_invalid_ones_stay_invalid() {
+        let (width, height) = (7, 6);
+        let own: Vec<u8> = (0..width * height).map(|i| (i * 29 % 113) as u8).collect();
+        let blended = |costs: &[u8], is_hidden| {
+            let mut out = costs.to_vec();
+            blend(&mut out, width, is_hidden, &mut vec![0; width * height]);
+            out
+        };
+        let expected = |costs: &[u8], x: usize, y: usize| {
+            let at = |u: usize, v: usize| f64::from(costs[v * width + u].min(COST_MAX));
+            let around = (y - 1..=y + 1).flat_map(|v| (x - 1..=x + 1).map(move |u| (u, v)));
+            (around.map(|(u, v)| at(u, v)).sum::<f64>() + 3.0 * at(x, y)) / 12.0
+        };
+        let mut holed = own.clone();
+        holed[2 * width + 3] = INVALID;
+        for (costs, is_hidden) in [(&own, false), (&own, true), (&holed, true)] {
+            let out = blended(costs, is_hidden);
+            for (x, y) in (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| (x, y))) {
+                let (found, own) = (out[y * width + x], costs[y * width + x]);
+                assert!(own != INVALID || found == INVALID);
+                assert!(own == INVALID || (f64::from(found) - expected(costs, x, y)).abs() <= 0.51, "at ({x}, {y})");
+            }
+        }
+    }
+
+    #[test]
     fn an_invalid_pixel_makes_every_patch_invalid_that_holds_it() {
         let mut a: Vec<f32> = (0..49).map(|i| ((i * 37) % 23) as f32).collect();
         a[0] = f32::NAN;
         let out = tile_cost(&a, &a, (0.1, 0.1), 7);
-        assert_eq!(out[0], INVALID);
-        assert!(out[1..].iter().all(|&c| c == 0));
+        // The inner pixels are 5 × 5; a pixel's patch reaches two pixels, its neighbours' averages
+        // included.
+        for (i, cost) in out.into_iter().enumerate() {
+            assert_eq!(cost, if i % 5 < 2 && i / 5 < 2 { INVALID } else { 0 }, "at {i}");
+        }
     }
 }

@@ -1,12 +1,16 @@
-//! A part of a tile with the margin that the census needs.
+//! A part of a tile with the margin that its costs need.
 
 /// Reach of the census, pixels: the eight neighbours.
 ///
 /// MicMac uses patches as small in cities. The aggregation brings the support that they lack, and
 /// roofs keep their edges.
-pub(super) const CENSUS_REACH: usize = 1;
+const CENSUS_REACH: usize = 1;
+/// Reach of the average of costs over neighbours, pixels.
+const BLEND_REACH: usize = 1;
+/// Margin of a part on each side, pixels.
+pub(super) const MARGIN: usize = CENSUS_REACH + BLEND_REACH;
 
-/// A part of a tile, with a margin of [`CENSUS_REACH`] pixels on each side.
+/// A part of a tile, with a margin of [`MARGIN`] pixels on each side.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
     /// Column and row of its first pixel in the tile with its margin.

@@ -7,7 +7,7 @@ use multiversion::multiversion;
 use raster::Window;
 
 use super::census::CHUNK;
-use super::part::CENSUS_REACH;
+use super::part::MARGIN;
 use super::transpose::{COLUMNS, ROWS, transpose};
 use crate::ranges::Ranges;
 use crate::simd::prefetch::prefetch;
@@ -82,7 +82,7 @@ pub(super) fn scatter(ranges: &Ranges, part: Window, run: PlaneRun, planes: &mut
     let PlaneRun { first, count, is_all } = run;
     let (bx, by) = ((part.x - block.window.x) as usize, (part.y - block.window.y) as usize);
     for y in 0..part.height {
-        let at = (y + CENSUS_REACH) * planes.width + CENSUS_REACH;
+        let at = (y + MARGIN) * planes.width + MARGIN;
         let offsets = &block.offsets[(by + y) * block.window.width + bx..][..part.width + 1];
         // Without prefetching the copies below would wait for the memory.
         let targets = &block.costs[offsets[0] as usize..offsets[part.width] as usize];

@@ -7,7 +7,7 @@ use super::config::{Aggregation, COST_MAX, CostConfig};
 use super::division::{SweptPart, TILE_MIN, divide, halves, plane_span};
 use super::kernels::{self, FULL, INVALID};
 use super::laid::{LaidSource, PlaneScratch};
-use super::part::{CENSUS_REACH, Part};
+use super::part::{MARGIN, Part};
 use super::planes::{BlockCosts, PLANES_AT_ONCE, PlaneRun, Planes, scatter};
 use super::scale::census_scale;
 use super::voids::Voids;
@@ -156,7 +156,7 @@ impl TileScratch {
         planes: (i32, i32),
         config: &CostConfig,
     ) {
-        let padded = tile.grown(CENSUS_REACH);
+        let padded = tile.grown(MARGIN);
         self.sources.resize_with(sources.len(), LaidSource::default);
         let step = reference.ranges.step_m;
         for ((laid, source), map) in self.sources.iter_mut().zip(sources).zip(maps) {
@@ -184,8 +184,8 @@ impl TileScratch {
         let is_all = swept.is_all && (planes.1 - planes.0) as usize <= PLANES_AT_ONCE;
         let padded = Part {
             within: [part.x - tile.x, part.y - tile.y],
-            width: part.width + 2 * CENSUS_REACH,
-            height: part.height + 2 * CENSUS_REACH,
+            width: part.width + 2 * MARGIN,
+            height: part.height + 2 * MARGIN,
         };
         for first in (planes.0..planes.1).step_by(PLANES_AT_ONCE) {
             let count = PLANES_AT_ONCE.min((planes.1 - first) as usize);
@@ -198,7 +198,7 @@ impl TileScratch {
 
     /// Grades the reference over a part of the tile and makes room for its planes.
     fn look_at(&mut self, reference: Reference<'_>, part: Window) {
-        let padded = part.grown(CENSUS_REACH);
+        let padded = part.grown(MARGIN);
         let area = padded.width * padded.height;
         let whole = area.next_multiple_of(CHUNK);
         self.grey.resize(area, 0.0);
@@ -209,7 +209,7 @@ impl TileScratch {
         copy_window(reference.view.image, padded, &mut self.grey);
         let scale = FULL * census_scale(&reference.view);
         let has_voids = kernels::quantise(&self.grey, scale, overhang(padded.width), &mut self.padded);
-        self.reference_voids.mark(&self.grey, padded.width, 2 * CENSUS_REACH + 1, has_voids);
+        self.reference_voids.mark(&self.grey, padded.width, 2 * MARGIN + 1, has_voids);
         self.reference.fill(&self.padded, padded.width, area);
     }
 
@@ -219,8 +219,14 @@ impl TileScratch {
         let out = planes.plane_mut(i);
         if let [only] = &mut sources[..] {
             only.place(height_m, part, scratch);
-            only.cost(reference, part, COST_MAX, scratch, out);
-            reference_voids.hide((0, 0), part, COST_MAX, out);
+            let is_hidden = only.cost(reference, part, INVALID, scratch, out);
+            let is_hidden = reference_voids.hide((0, 0), part, INVALID, out) || is_hidden;
+            if config.blends_neighbours {
+                kernels::blend(out, part.width, is_hidden, &mut self.sums);
+            }
+            if is_hidden {
+                out.iter_mut().for_each(|cost| *cost = (*cost).min(COST_MAX));
+            }
             return;
         }
         let mut costs = pair_costs.iter_mut();
@@ -242,7 +248,10 @@ impl TileScratch {
             Aggregation::Variance => self.pair_costs.len(),
             Aggregation::BestOf(k) => select_smallest(&mut self.pair_costs, k),
         };
-        let used = &self.pair_costs[..used];
+        let used = &mut self.pair_costs[..used];
+        if config.blends_neighbours {
+            used.iter_mut().for_each(|costs| kernels::blend(costs, part.width, is_hidden, &mut self.sums));
+        }
         kernels::mean_cost(used, is_hidden, &mut self.sums, &mut self.weights, out);
     }
 }

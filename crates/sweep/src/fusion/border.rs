@@ -85,8 +85,8 @@ impl Border {
         &self.cells
     }
 
-    /// Finds the nearest wanted cells around a place: all within a circle that holds enough of them,
-    /// or within reach.
+    /// Finds the nearest wanted cells around a place: all within a circle that holds enough of
+    /// them, or within reach.
     pub(super) fn nearest(&self, [x, y]: [f32; 2], wanted: Wanted, out: &mut Vec<BorderCell>) {
         out.clear();
         let mut found: Vec<(f32, BorderCell)> = Vec::new();
@@ -136,8 +136,9 @@ impl Border {
     }
 }
 
-/// Numbers the connected voids of a surface from 1, in the order of their first cells; 0 where there
-/// is a height. Cells are connected to their four neighbours. Returns the number of voids too.
+/// Numbers the connected voids of a surface from 1, in the order of their first cells; 0 where
+/// there is a height. Cells are connected to their four neighbours. Returns the number of voids
+/// too.
 pub(super) fn number_voids(height_m: &Grid<f32>) -> (Grid<u32>, u32) {
     let (w, h) = (height_m.width(), height_m.height());
     let mut out = Grid::filled(w, h, 0u32);

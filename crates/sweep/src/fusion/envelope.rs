@@ -3,12 +3,12 @@
 //! A point of height h in cell x is hidden from a view if the known surface z rises above its line
 //! of sight. With d the cells that the line moves per metre up, towards the sensor, the greatest
 //! hidden height is `H(x) = max over t > 0 of z(x + t·d) − t`. Cells without a height hide nothing.
-//! A view that does not image the cell sees nothing of it: H = +∞. The bound of a cell is the second
-//! smallest H over the views: anything higher is seen by two views past the known surface.
+//! A view that does not image the cell sees nothing of it: H = +∞. The bound of a cell is the
+//! second smallest H over the views: anything higher is seen by two views past the known surface.
 //!
-//! H is found by a recurrence along lines of cells in direction d, whose places are rounded to whole
-//! cells: a silhouette is off by at most half a cell. One direction serves a whole grid. Across
-//! 10 km it turns by about 1°, which moves the shadow of a tower of 100 m by less than 2 m.
+//! H is found by a recurrence along lines of cells in direction d, whose places are rounded to
+//! whole cells: a silhouette is off by at most half a cell. One direction serves a whole grid.
+//! Across 10 km it turns by about 1°, which moves the shadow of a tower of 100 m by less than 2 m.
 
 use raster::Grid;
 use rayon::prelude::*;

@@ -113,11 +113,13 @@ const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
 const LOWEST_SHARE: usize = 4;
 
-/// Fills voids of `height_m` in place. `blind` marks cells where the images could not show what
-/// stands there. `bound_m` holds the greatest height at which a void cell may be hidden from all
-/// but one view: −∞ where two views see everything, +∞ where fewer image it.
+/// Fills voids of `height_m` in place. Only heights that are `trusted` hide the ground. `blind`
+/// marks cells where the images could not show what stands there. `bound_m` holds the greatest
+/// height at which a void cell may be hidden from all but one view: −∞ where two views see
+/// everything, +∞ where fewer image it.
 pub fn fill_voids(
     height_m: &mut Grid<f32>,
+    trusted: &Grid<bool>,
     blind: &Grid<bool>,
     bound_m: impl Fn(&Grid<f32>, &[usize]) -> Vec<f32>,
     config: &FillConfig,
@@ -126,7 +128,9 @@ pub fn fill_voids(
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
     let mut sigma_m = Grid::filled(width, height, f32::NAN);
-    let bounds = bound_m(height_m, &voids);
+    let mut solid = height_m.clone();
+    solid.data_mut().iter_mut().zip(trusted.data()).filter(|(_, t)| !**t).for_each(|(h, _)| *h = f32::NAN);
+    let bounds = bound_m(&solid, &voids);
     let mut sources = height_m.clone();
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
     let settings = settings(&sources, blind, &voids, config.reach_cells as f32);
@@ -219,24 +223,29 @@ impl Filling<'_> {
         let (row, column) = cells[0].block();
         let centre = [corner(column), corner(row)];
         let reach = self.config.hidden_reach_cells as f32;
-        let (mut own, mut low) = (Vec::new(), Vec::new());
+        let (mut own, mut low, mut sides) = (Vec::new(), Vec::new(), Vec::new());
         let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: CANDIDATES, reach };
         self.border.nearest(centre, wanted, &mut own);
         // In a wide void the ground may be further away than the walls around it. A narrow one that
         // the heights around it enclose is a gap in their surface.
         let is_wide = self.planes[void as usize - 1].is_none();
         let is_wide = |cell: &VoidCell| is_wide && cell.setting.width_cells > self.config.narrow_cells;
-        let limit_m = |cell: &VoidCell| cell.bound_m.max(cell.setting.low_m) + self.config.same_surface_m;
-        let seeks = |cell: &&VoidCell| is_wide(cell) && cell.bound_m < f32::INFINITY;
-        let lacks =
-            |cell: &VoidCell, height_m: f32| seeks(&cell) && !is_enough(&own, height_m + self.config.same_surface_m);
-        let height_max_m = cells.iter().filter(seeks).map(limit_m).fold(f32::NEG_INFINITY, f32::max);
-        if cells.iter().any(|c| lacks(c, c.bound_m) || lacks(c, c.setting.low_m)) {
-            self.border.nearest(centre, Wanted { void: None, height_max_m, ..wanted }, &mut low);
-        }
+        let seeks = |cell: &VoidCell| is_wide(cell) && cell.bound_m < f32::INFINITY;
+        let tolerance_m = self.config.same_surface_m;
+        let lacks = |cell: &VoidCell, height_m: f32| seeks(cell) && !is_enough(&own, height_m + tolerance_m);
+        // One list for each limit: the nearest roofs would displace the ground from a shared one.
+        let further = |limit_m: fn(&VoidCell) -> f32, out: &mut Vec<BorderCell>| {
+            let lacking = cells.iter().filter(|c| lacks(c, limit_m(c))).map(limit_m);
+            let height_max_m = lacking.fold(f32::NEG_INFINITY, f32::max) + tolerance_m;
+            if height_max_m.is_finite() {
+                self.border.nearest(centre, Wanted { void: None, height_max_m, ..wanted }, out);
+            }
+        };
+        further(|cell| cell.bound_m, &mut low);
+        further(|cell| cell.setting.low_m, &mut sides);
         let judge = |cell: &VoidCell| {
             let under = if lacks(cell, cell.bound_m) { &low } else { &own };
-            let beside = if lacks(cell, cell.setting.low_m) { &low } else { &own };
+            let beside = if lacks(cell, cell.setting.low_m) { &sides } else { &own };
             self.judge(cell, void, Candidates { own: &own, under, beside })
         };
         cells.iter().map(judge).collect()
@@ -297,8 +306,8 @@ impl Filling<'_> {
         Estimate { height_m: plane.at(cell.at()), sigma_m: self.sigma_m(plane.deviation_m, nearest) }
     }
 
-    /// Returns the base of the lowest surface among candidates that are not above `limit_m`, and the
-    /// height that continues this surface into the cell; `None` without candidates.
+    /// Returns the base of the lowest surface among candidates that are not above `limit_m`, and
+    /// the height that continues this surface into the cell; `None` without candidates.
     ///
     /// Distance counts like height here, at the slope of one surface: a pit far away is not lower
     /// than the ground beside the cell.
@@ -377,7 +386,8 @@ mod tests {
 
     fn fill_with(height_m: &mut Grid<f32>, bound_m: f32, config: &FillConfig) -> FilledVoids {
         let blind = Grid::filled(height_m.width(), height_m.height(), false);
-        fill_voids(height_m, &blind, |_, voids| vec![bound_m; voids.len()], config)
+        let trusted = Grid::filled(height_m.width(), height_m.height(), true);
+        fill_voids(height_m, &trusted, &blind, |_, voids| vec![bound_m; voids.len()], config)
     }
 
     /// Fills with two views that see every void.
@@ -417,7 +427,8 @@ mod tests {
 
     #[test]
     fn a_street_between_towers_is_not_filled_with_roof() {
-        // Roofs at 40 m on both sides of a street of 10 cells, whose ground is known at its end only.
+        // Roofs at 40 m on both sides of a street of 10 cells, whose ground is known at its end
+        // only.
         let mut g = Grid::filled(40, 60, 40.0f32);
         (15..25).for_each(|x| (0..60).for_each(|y| g[(x, y)] = if y < 45 { f32::NAN } else { 0.0 }));
         let street = g.clone();
@@ -433,17 +444,17 @@ mod tests {
 
     #[test]
     fn blank_images_leave_a_wide_void_open_and_say_so() {
-        let mut blind = Grid::filled(40, 40, false);
+        let (mut blind, trusted) = (Grid::filled(40, 40, false), Grid::filled(40, 40, true));
         (12..20).for_each(|x| (0..40).for_each(|y| blind[(x, y)] = true));
         let (mut seen, mut unseen) = (void_in_a_plain(), void_in_a_plain());
         fill(&mut seen);
         assert!((10..20).all(|x| (10..20).all(|y| seen[(x, y)] == 1.0)), "{:?}", seen.row(15));
         let visible = |_: &Grid<f32>, voids: &[usize]| vec![f32::NEG_INFINITY; voids.len()];
-        let found = fill_voids(&mut unseen, &blind, visible, &CONFIG);
+        let found = fill_voids(&mut unseen, &trusted, &blind, visible, &CONFIG);
         assert!((12..20).all(|x| unseen[(x, 15)].is_nan()) && unseen[(10, 15)] == 1.0, "{:?}", unseen.row(15));
         assert_eq!(found.source[(15, 15)], CellSource::Blank);
         let everything = FillConfig { rule: FillRule::Everything, ..CONFIG };
-        fill_voids(&mut unseen, &blind, visible, &everything);
+        fill_voids(&mut unseen, &trusted, &blind, visible, &everything);
         assert!((10..20).all(|x| (10..20).all(|y| unseen[(x, y)] == 1.0)), "{:?}", unseen.row(15));
     }
 

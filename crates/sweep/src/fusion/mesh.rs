@@ -35,6 +35,11 @@ pub struct ViewSurface {
 
 /// Weight of a height at a border, against 1 inside a surface.
 const BORDER_WEIGHT: f32 = 0.25;
+/// Weight of a height that another one fits as well, against 1 for a distinct one. Such heights
+/// decide only where no view has a distinct one.
+const INDISTINCT_WEIGHT: f32 = 0.1;
+/// Share of its weight that a height has in its cell where no facet covers the centre of the cell.
+const LONE_SHARE: f32 = 0.5;
 /// Reach of a border beside a jump, pixels: half a patch, and the blur of the edge.
 const BORDER_REACH: usize = 2;
 /// Side of the tiles in which a local map replaces the exact projection to the grid, pixels.
@@ -68,7 +73,8 @@ pub struct PlacedView {
 /// Places the kept heights of one view on the grid.
 ///
 /// A height with another one lower by more than `jump_m` beside it is at a border and gets a
-/// smaller weight: patches that hold a roof's edge see the roof's height outside it too.
+/// smaller weight: patches that hold a roof's edge see the roof's height outside it too. The weight
+/// grows with the confidence of the height.
 ///
 /// # Errors
 /// Returns [`SweepError::Camera`] if the camera or the map projection fails inside the scene.
@@ -79,9 +85,12 @@ pub fn place_view(
     jump_m: f32,
     frame: &GridFrame<'_>,
 ) -> Result<PlacedView, SweepError> {
-    let weights = border_weights(&heights.map.height_m, jump_m);
+    let borders = border_weights(&heights.map.height_m, jump_m);
     let mut vertices = place(heights, level, keep, frame)?;
-    vertices.data_mut().iter_mut().zip(weights.data()).for_each(|(vertex, weight)| vertex.weight = *weight);
+    let weights = borders.data().iter().zip(heights.map.confidence.data());
+    for (vertex, (border, confidence)) in vertices.data_mut().iter_mut().zip(weights) {
+        vertex.weight = border * (INDISTINCT_WEIGHT + confidence).min(1.0);
+    }
     let windows = tiles(Window::whole(vertices.width(), vertices.height()), TILE);
     let extents = windows.into_iter().filter_map(|w| Some((w, extent(&vertices, w)?))).collect();
     Ok(PlacedView { vertices, extents })
@@ -136,18 +145,21 @@ fn extent(vertices: &Grid<Vertex>, w: Window) -> Option<[f32; 4]> {
 }
 
 impl PlacedView {
-    /// Samples the view's surface at the centres of the cells of a window of the grid.
+    /// Samples the view's surface on the cells of a window of the grid.
     ///
-    /// Facets with a height difference above `tear` metres are left out. Cells whose centre no
-    /// facet covers, at walls and beside what the view does not see, stay void.
+    /// Facets are sampled at the centres of the cells. Those with a height difference above `tear`
+    /// metres are left out. A cell whose centre no facet covers has the highest of the kept pixels
+    /// inside it. Cells without either, at walls and beside what the view does not see, stay void.
     pub fn rasterise(&self, cells: Window, tear: f32) -> ViewSurface {
-        let mut facets = ViewSurface::empty(cells);
+        let (mut facets, mut points) = (ViewSurface::empty(cells), ViewSurface::empty(cells));
         let (x1, y1) = ((cells.x + cells.width as i64) as f32, (cells.y + cells.height as i64) as f32);
         for (w, e) in &self.extents {
             if e[0] < x1 && e[1] < y1 && e[2] >= cells.x as f32 && e[3] >= cells.y as f32 {
                 rasterise_window(&self.vertices, *w, tear, &mut facets);
+                put_points(&self.vertices, *w, &mut points);
             }
         }
+        facets.complete(&points);
         facets
     }
 }
@@ -171,6 +183,15 @@ fn rasterise_window(vertices: &Grid<Vertex>, w: Window, tear: f32, facets: &mut 
             } else if let (Some(b), Some(c), Some(d)) = (right, below, across) {
                 facets.facet([b, c, d], tear);
             }
+        }
+    }
+}
+
+/// Puts the pixels of a window of the image into the cells that they fall into.
+fn put_points(vertices: &Grid<Vertex>, w: Window, points: &mut ViewSurface) {
+    for y in w.y as usize..w.y as usize + w.height {
+        for v in vertices.row(y)[w.x as usize..][..w.width].iter().filter(|v| !v.h.is_nan()) {
+            points.put(Vertex { x: v.x.round(), y: v.y.round(), weight: LONE_SHARE * v.weight, ..*v });
         }
     }
 }
@@ -262,6 +283,15 @@ impl ViewSurface {
             *own = sample.h;
             self.sigma_m[at] = sample.sigma;
             self.weight[at] = sample.weight;
+        }
+    }
+
+    /// Fills the cells that have no height with those of `other`.
+    fn complete(&mut self, other: &Self) {
+        for (i, own) in self.height_m.data_mut().iter_mut().enumerate().filter(|(_, own)| own.is_nan()) {
+            *own = other.height_m.data()[i];
+            self.sigma_m.data_mut()[i] = other.sigma_m.data()[i];
+            self.weight.data_mut()[i] = other.weight.data()[i];
         }
     }
 
