@@ -6,6 +6,8 @@
 
 use raster::Grid;
 
+use super::directions::Known;
+
 /// Distance to a void up to which a known cell belongs to its border, cells: the second cell is
 /// less affected by the edge than the first.
 const DEPTH: usize = 2;
@@ -28,8 +30,6 @@ pub(super) struct BorderCell {
 /// Cells that are wanted of a border.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wanted {
-    /// Void whose border is searched; `None` for all.
-    pub(super) void: Option<u32>,
     /// Greatest height, metres.
     pub(super) height_max_m: f32,
     /// Number of cells that are enough.
@@ -87,31 +87,31 @@ impl Border {
 
     /// Finds the nearest wanted cells around a place: all within a circle that holds enough of
     /// them, or within reach.
-    pub(super) fn nearest(&self, [x, y]: [f32; 2], wanted: Wanted, out: &mut Vec<BorderCell>) {
-        out.clear();
-        let mut found: Vec<(f32, BorderCell)> = Vec::new();
+    pub(super) fn nearest(&self, [x, y]: [f32; 2], wanted: Wanted) -> Vec<Known> {
+        let mut found: Vec<Known> = Vec::new();
+        // A cell beside several voids is listed several times in a row.
+        let mut last = None;
         let (u, v) = (x as usize / BUCKET, y as usize / BUCKET);
         let rings = self.columns.max(self.rows);
         for ring in 0..rings {
             self.ring(u, v, ring, |cell| {
-                let apart = (cell.x - x).powi(2) + (cell.y - y).powi(2);
-                let is_own = wanted.void.is_none_or(|void| void == cell.void);
-                if is_own && cell.height_m <= wanted.height_max_m && apart <= wanted.reach.powi(2) {
-                    found.push((apart, *cell));
+                let apart = (cell.x - x).hypot(cell.y - y);
+                let is_same_again = last.replace([cell.x, cell.y]) == Some([cell.x, cell.y]);
+                if !is_same_again && cell.height_m <= wanted.height_max_m && apart <= wanted.reach {
+                    found.push(Known::new(cell.height_m, apart));
                 }
             });
             // The place lies somewhere in its bucket, so that the rings complete this circle.
             let complete = (ring * BUCKET) as f32;
-            let inside = |f: &&(f32, BorderCell)| f.0 <= complete.powi(2);
-            if found.len() >= wanted.count && found.iter().filter(inside).count() >= wanted.count {
-                out.extend(found.iter().filter(inside).map(|f| f.1));
-                return;
+            if found.len() >= wanted.count && found.iter().filter(|k| k.apart <= complete).count() >= wanted.count {
+                found.retain(|k| k.apart <= complete);
+                break;
             }
             if complete > wanted.reach {
                 break;
             }
         }
-        out.extend(found.iter().map(|f| f.1));
+        found
     }
 
     /// Visits the cells of the buckets at a distance of `ring` buckets.

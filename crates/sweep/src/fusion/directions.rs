@@ -1,10 +1,6 @@
-//! Nearest known heights of voids in eight directions: whether a void is narrow, and whether it
-//! lies between known heights.
+//! Nearest known heights of voids in eight directions.
 
 use raster::Grid;
-
-/// Number of the eight directions that must have a known height: more than outside a straight edge.
-const KNOWN_MIN: usize = 4;
 
 /// Four of the eight directions: towards cells that come earlier row by row. The other four are
 /// their opposites.
@@ -12,53 +8,65 @@ const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
 
 /// Nearest known height in one direction.
 #[derive(Debug, Clone, Copy)]
-struct Known {
+pub(super) struct Known {
     /// Height above the origin, metres.
-    height_m: f32,
+    pub(super) height_m: f32,
     /// Distance, cells.
-    apart: f32,
+    pub(super) apart: f32,
     /// Whether no blind cell lies between.
     in_sight: bool,
+}
+
+impl Known {
+    /// A height found at a distance in cells.
+    pub(super) fn new(height_m: f32, apart: f32) -> Self {
+        Self { height_m, apart, in_sight: true }
+    }
 }
 
 /// Nearest known heights in the four directions before a cell, or in the four behind it.
 type Nearest = [Option<Known>; 4];
 
-/// Where a void lies among the known heights around it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Setting {
-    /// Whether known heights lie on more than one side.
-    pub(super) is_enclosed: bool,
-    /// Least distance of two opposite known heights, cells; infinite where there are none.
-    pub(super) width_cells: f32,
-    /// Whether two opposite heights have no blind cell between them.
-    pub(super) is_between: bool,
-    /// Second lowest of the nearest known heights, metres, as the lowest may be a pit; infinite
-    /// where there are fewer than two.
-    pub(super) low_m: f32,
+/// Nearest known heights around a void cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Around {
+    before: Nearest,
+    behind: Nearest,
 }
 
-/// Returns where each of `voids` lies among the heights within `reach` cells; in the order of
-/// `voids`, which are in the order of the rows. `blind` marks cells where the images could not show
-/// what stands there.
-pub(super) fn settings(sources: &Grid<f32>, blind: &Grid<bool>, voids: &[usize], reach: f32) -> Vec<Setting> {
+impl Around {
+    /// Returns the known heights, the lowest first.
+    pub(super) fn known(&self) -> Vec<Known> {
+        let mut out: Vec<Known> = self.before.iter().chain(&self.behind).copied().flatten().collect();
+        out.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
+        out
+    }
+
+    /// Returns the least distance of two opposite known heights, cells; infinite where there are
+    /// none.
+    pub(super) fn width_cells(&self) -> f32 {
+        self.across().map(|(a, b)| a.apart + b.apart).fold(f32::INFINITY, f32::min)
+    }
+
+    /// Returns whether two opposite heights have no blind cell between them.
+    pub(super) fn is_between(&self) -> bool {
+        self.across().any(|(a, b)| a.in_sight && b.in_sight)
+    }
+
+    fn across(&self) -> impl Iterator<Item = (Known, Known)> {
+        self.before.iter().zip(&self.behind).filter_map(|(a, b)| Some(((*a)?, (*b)?)))
+    }
+}
+
+/// Returns the heights within `reach` cells around each of `voids`; in the order of `voids`, which
+/// are in the order of the rows. `blind` marks cells where the images could not show what stands
+/// there.
+pub(super) fn around(sources: &Grid<f32>, blind: &Grid<bool>, voids: &[usize], reach: f32) -> Vec<Around> {
     let (before, behind) = rayon::join(
         || known_before(sources, blind, voids.iter().copied(), false, reach),
         || known_before(sources, blind, voids.iter().rev().copied(), true, reach),
     );
-    before.iter().zip(behind.iter().rev()).map(|(before, behind)| setting(before, behind)).collect()
-}
-
-fn setting(before: &Nearest, behind: &Nearest) -> Setting {
-    let mut heights: Vec<f32> = before.iter().chain(behind).flatten().map(|k| k.height_m).collect();
-    heights.sort_by(f32::total_cmp);
-    let across = || before.iter().zip(behind).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
-    Setting {
-        is_enclosed: heights.len() >= KNOWN_MIN,
-        width_cells: across().map(|(a, b)| a.apart + b.apart).fold(f32::INFINITY, f32::min),
-        is_between: across().any(|(a, b)| a.in_sight && b.in_sight),
-        low_m: heights.get(1).copied().unwrap_or(f32::INFINITY),
-    }
+    before.into_iter().zip(behind.into_iter().rev()).map(|(before, behind)| Around { before, behind }).collect()
 }
 
 /// Finds, for each of `voids`, the nearest known heights within reach in the four directions before
@@ -95,7 +103,7 @@ fn known_before(
                 let at = (u as usize, v as usize);
                 let own_m = height_m[at];
                 if !own_m.is_nan() {
-                    return Some(Known { height_m: own_m, apart: length, in_sight: true });
+                    return Some(Known::new(own_m, length));
                 }
                 let next = rows[usize::from(dy == 0)][u as usize][d]?;
                 let known = Known { apart: next.apart + length, in_sight: next.in_sight && !blind[at], ..next };

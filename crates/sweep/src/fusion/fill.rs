@@ -21,8 +21,8 @@
 use raster::Grid;
 use rayon::prelude::*;
 
-use super::border::{Border, BorderCell, Wanted, number_voids};
-use super::directions::{Setting, settings};
+use super::border::{Border, Wanted, number_voids};
+use super::directions::{Around, Known, around};
 use super::plane::{Plane, border_planes};
 use super::speckle::remove_speckle;
 
@@ -104,10 +104,10 @@ pub struct FilledVoids {
     pub sigma_m: Grid<f32>,
 }
 
-/// Void cells are filled in blocks of this side, which share their candidates.
-const BLOCK: usize = 4;
-/// Number of candidates of a void cell: those all around a gap of a street's width.
-const CANDIDATES: usize = 256;
+/// Number of the eight directions that must have a known height: more than outside a straight edge.
+const KNOWN_MIN: usize = 4;
+/// Number of heights among which ground under a bound is looked for: the far end of a street.
+const CANDIDATES: usize = 64;
 /// The lowest surface is the one with this many candidates under it: a few may be wrong.
 const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
@@ -133,54 +133,25 @@ pub fn fill_voids(
     let bounds = bound_m(&solid, &voids);
     let mut sources = height_m.clone();
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
-    let settings = settings(&sources, blind, &voids, config.reach_cells as f32);
+    let around = around(&sources, blind, &voids, config.reach_cells as f32);
     let (numbers, count) = number_voids(height_m);
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
     let filling = Filling { numbers: &numbers, border: &border, planes: &planes, blind, config };
-    let cells = voids.iter().zip(bounds).zip(settings);
-    let mut cells: Vec<VoidCell> = cells.map(|((&i, b), setting)| VoidCell::new(i, width, b, setting)).collect();
-    // Stable, so that the cells of a block stay in the order of the rows.
-    cells.sort_by_key(|cell| (cell.block(), numbers.data()[cell.index]));
-    let is_same =
-        |a: &VoidCell, b: &VoidCell| a.block() == b.block() && numbers.data()[a.index] == numbers.data()[b.index];
-    let blocks: Vec<&[VoidCell]> = cells.chunk_by(is_same).collect();
-    let found: Vec<Vec<Judged>> = blocks.par_iter().map(|block| filling.judge_block(block)).collect();
-    for (cell, judged) in cells.iter().zip(found.iter().flatten()) {
-        source.data_mut()[cell.index] = judged.source;
+    let cells = voids.par_iter().zip(bounds.par_iter().zip(&around));
+    let judged: Vec<Judged> =
+        cells.map(|(&index, (&bound_m, around))| filling.judge(index, bound_m, around)).collect();
+    for (&index, judged) in voids.iter().zip(judged) {
+        source.data_mut()[index] = judged.source;
         if let Some(estimate) = judged.estimate {
-            height_m.data_mut()[cell.index] = estimate.height_m;
-            sigma_m.data_mut()[cell.index] = estimate.sigma_m;
+            height_m.data_mut()[index] = estimate.height_m;
+            sigma_m.data_mut()[index] = estimate.sigma_m;
         }
     }
     FilledVoids { source, sigma_m }
 }
 
-/// A cell without a height.
-#[derive(Debug, Clone, Copy)]
-struct VoidCell {
-    index: usize,
-    x: usize,
-    y: usize,
-    bound_m: f32,
-    setting: Setting,
-}
-
-impl VoidCell {
-    fn new(index: usize, width: usize, bound_m: f32, setting: Setting) -> Self {
-        Self { index, x: index % width, y: index / width, bound_m, setting }
-    }
-
-    fn block(&self) -> (usize, usize) {
-        (self.y / BLOCK, self.x / BLOCK)
-    }
-
-    fn at(&self) -> [f32; 2] {
-        [self.x as f32, self.y as f32]
-    }
-}
-
-/// A height found from candidates.
+/// A height found from known ones.
 #[derive(Debug, Clone, Copy)]
 struct Estimate {
     height_m: f32,
@@ -194,17 +165,6 @@ struct Judged {
     estimate: Option<Estimate>,
 }
 
-/// Known heights from which a void cell may be filled.
-#[derive(Clone, Copy)]
-struct Candidates<'a> {
-    /// Nearest heights at the border of the cell's void.
-    own: &'a [BorderCell],
-    /// Heights among which ground under the cell's bound is looked for.
-    under: &'a [BorderCell],
-    /// Heights among which the lower of the surfaces around the cell is looked for.
-    beside: &'a [BorderCell],
-}
-
 /// Everything that decides about a void cell.
 struct Filling<'a> {
     numbers: &'a Grid<u32>,
@@ -216,157 +176,119 @@ struct Filling<'a> {
 }
 
 impl Filling<'_> {
-    /// Judges the cells of one block, which belong to one void.
-    fn judge_block(&self, cells: &[VoidCell]) -> Vec<Judged> {
-        let void = self.numbers.data()[cells[0].index];
-        let corner = |at: usize| (at * BLOCK) as f32 + 0.5 * (BLOCK - 1) as f32;
-        let (row, column) = cells[0].block();
-        let centre = [corner(column), corner(row)];
-        let reach = self.config.hidden_reach_cells as f32;
-        let (mut own, mut low, mut sides) = (Vec::new(), Vec::new(), Vec::new());
-        let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: CANDIDATES, reach };
-        self.border.nearest(centre, wanted, &mut own);
-        // In a wide void the ground may be further away than the walls around it. A narrow one that
-        // the heights around it enclose is a gap in their surface.
-        let is_wide = self.planes[void as usize - 1].is_none();
-        let is_wide = |cell: &VoidCell| is_wide && cell.setting.width_cells > self.config.narrow_cells;
-        let seeks = |cell: &VoidCell| is_wide(cell) && cell.bound_m < f32::INFINITY;
-        let tolerance_m = self.config.same_surface_m;
-        let lacks = |cell: &VoidCell, height_m: f32| seeks(cell) && !is_enough(&own, height_m + tolerance_m);
-        // One list for each limit: the nearest roofs would displace the ground from a shared one.
-        let further = |limit_m: fn(&VoidCell) -> f32, out: &mut Vec<BorderCell>| {
-            let lacking = cells.iter().filter(|c| lacks(c, limit_m(c))).map(limit_m);
-            let height_max_m = lacking.fold(f32::NEG_INFINITY, f32::max) + tolerance_m;
-            if height_max_m.is_finite() {
-                self.border.nearest(centre, Wanted { void: None, height_max_m, ..wanted }, out);
-            }
-        };
-        further(|cell| cell.bound_m, &mut low);
-        further(|cell| cell.setting.low_m, &mut sides);
-        let judge = |cell: &VoidCell| {
-            let under = if lacks(cell, cell.bound_m) { &low } else { &own };
-            let beside = if lacks(cell, cell.setting.low_m) { &sides } else { &own };
-            self.judge(cell, void, Candidates { own: &own, under, beside })
-        };
-        cells.iter().map(judge).collect()
-    }
-
-    fn judge(&self, cell: &VoidCell, void: u32, candidates: Candidates<'_>) -> Judged {
-        let Candidates { own, under, beside } = candidates;
+    fn judge(&self, index: usize, bound_m: f32, around: &Around) -> Judged {
         let config = self.config;
-        let is_outside = cell.bound_m == f32::INFINITY;
-        let limit_m = cell.bound_m + config.same_surface_m;
-        let ground = if is_outside { None } else { self.lowest_surface(cell, under, limit_m) };
-        let is_hidden = match &ground {
-            Some((base_m, _)) => *base_m <= cell.bound_m,
-            // With no height under the bound, those above it would have been seen.
-            None => !is_outside && own.is_empty() && cell.bound_m > f32::NEG_INFINITY,
+        let known = around.known();
+        let width_cells = around.width_cells();
+        let is_narrow = width_cells <= config.narrow_cells;
+        let is_outside = bound_m == f32::INFINITY;
+        let is_blind = self.blind.data()[index];
+        let plane = self.planes[self.numbers.data()[index] as usize - 1];
+        let lower = self.lower_level(&known);
+        let is_under = !is_outside && lower.is_some_and(|lower| lower.base_m <= bound_m);
+        // A narrow void, or one inside a plane, is a gap in what surrounds it. In another the
+        // ground may be further away than the walls.
+        let may_be_far = !is_outside && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
+        let hidden = match lower {
+            Some(lower) if is_under => Some(lower.estimate),
+            _ if may_be_far => self.ground_under(index, bound_m),
+            _ => None,
         };
-        let is_blind = self.blind.data()[cell.index];
+        // With no height around that would have been seen.
+        let is_hidden = hidden.is_some() || (may_be_far && known.is_empty());
         let open = match (is_outside, is_hidden, is_blind) {
             (true, ..) => CellSource::Outside,
             (_, true, _) => CellSource::Hidden,
             (_, _, true) => CellSource::Blank,
             _ => CellSource::Unmatched,
         };
-        let nothing = Judged { source: open, estimate: None };
-        if config.rule == FillRule::Nothing {
-            return nothing;
-        }
-        if let (true, Some((_, estimate))) = (is_hidden, ground) {
-            return Judged { source: CellSource::FilledHidden, estimate: Some(estimate) };
-        }
-        let Setting { is_enclosed, width_cells, is_between, low_m } = cell.setting;
-        let is_narrow = width_cells <= config.narrow_cells;
-        let plane = self.planes[void as usize - 1].filter(|_| !is_blind);
         let is_wanted = match config.rule {
             FillRule::Nothing => false,
-            FillRule::Justified => is_narrow || (!is_outside && (is_between || plane.is_some())),
+            FillRule::Justified => {
+                is_narrow || (!is_outside && (around.is_between() || (plane.is_some() && !is_blind)))
+            }
             FillRule::Everything => is_narrow || plane.is_some() || width_cells.is_finite(),
         };
-        if !is_enclosed || !is_wanted {
-            return nothing;
-        }
-        let estimate = match plane {
-            Some(plane) => Some(self.on_plane(cell, own, plane)),
-            None => {
-                // Not above what opposite sides of a wide void have in common.
-                let is_wide = !is_narrow && low_m.is_finite();
-                let limit_m = if is_wide { low_m + config.same_surface_m } else { f32::INFINITY };
-                let found = self.lowest_surface(cell, if is_wide { beside } else { own }, limit_m);
-                found.or_else(|| self.lowest_surface(cell, own, f32::INFINITY)).map(|(_, estimate)| estimate)
-            }
+        let seen = || {
+            let lower = lower.filter(|_| known.len() >= KNOWN_MIN && is_wanted)?;
+            let at = [index % self.numbers.width(), index / self.numbers.width()];
+            Some(match plane.filter(|_| !is_blind) {
+                Some(plane) => self.on_plane(at, plane, &known),
+                None => lower.estimate,
+            })
         };
-        let source = if is_narrow { CellSource::FilledNarrow } else { CellSource::FilledSurface };
-        if estimate.is_some() { Judged { source, estimate } } else { nothing }
+        let (source, estimate) = match hidden.filter(|_| config.rule != FillRule::Nothing) {
+            Some(estimate) => (CellSource::FilledHidden, Some(estimate)),
+            None => (if is_narrow { CellSource::FilledNarrow } else { CellSource::FilledSurface }, seen()),
+        };
+        Judged { source: if estimate.is_some() { source } else { open }, estimate }
     }
 
-    fn on_plane(&self, cell: &VoidCell, own: &[BorderCell], plane: Plane) -> Estimate {
-        let nearest = own.iter().map(|c| apart(cell, c)).fold(f32::INFINITY, f32::min);
-        Estimate { height_m: plane.at(cell.at()), sigma_m: self.sigma_m(plane.deviation_m, nearest) }
+    /// Returns the lower of the surfaces around a cell and the height that continues it into the
+    /// cell; `None` with fewer than two heights. `known` has the lowest height first.
+    fn lower_level(&self, known: &[Known]) -> Option<Level> {
+        // The lowest may be a pit.
+        self.level(known, *known.get(1)?)
     }
 
-    /// Returns the base of the lowest surface among candidates that are not above `limit_m`, and
-    /// the height that continues this surface into the cell; `None` without candidates.
+    /// Returns the surface through `base`. Weights are inverse distances: two opposite heights give
+    /// the straight line between them, so that slopes continue.
+    fn level(&self, known: &[Known], base: Known) -> Option<Level> {
+        let config = self.config;
+        let on_level = |k: &&Known| {
+            let off_m = (k.height_m - base.height_m).abs();
+            off_m <= config.same_surface_m + config.slope_m * (k.apart + base.apart)
+        };
+        let of_base = || known.iter().filter(on_level);
+        let mean = |of: &mut dyn Iterator<Item = [f32; 2]>| {
+            let (sum, weight) = of.fold((0.0, 0.0), |(s, w), [value, apart]| (s + value / apart, w + 1.0 / apart));
+            sum / weight
+        };
+        let height_m = base.height_m + mean(&mut of_base().map(|k| [k.height_m - base.height_m, k.apart]));
+        let variance = mean(&mut known.iter().map(|k| [(k.height_m - height_m).powi(2), k.apart]));
+        let nearest = of_base().map(|k| k.apart).fold(f32::INFINITY, f32::min);
+        let estimate = Estimate { height_m, sigma_m: self.sigma_m(variance.sqrt(), nearest) };
+        Some(Level { base_m: base.height_m, estimate })
+    }
+
+    /// Returns the lowest surface under a bound around a cell that has only higher ones beside it;
+    /// `None` if none is known.
     ///
     /// Distance counts like height here, at the slope of one surface: a pit far away is not lower
     /// than the ground beside the cell.
-    fn lowest_surface(&self, cell: &VoidCell, all: &[BorderCell], limit_m: f32) -> Option<(f32, Estimate)> {
+    fn ground_under(&self, index: usize, bound_m: f32) -> Option<Estimate> {
         let config = self.config;
-        let usable = || all.iter().filter(|c| c.height_m <= limit_m);
-        let count = usable().count();
-        let rank = count.div_ceil(LOWEST_SHARE).min(LOWEST);
-        // The lowest few, in order: reduced height, height, distance.
-        let mut lowest = [[f32::INFINITY; 3]; LOWEST];
-        for c in usable() {
-            let d = apart(cell, c);
-            let mut entry = [c.height_m + config.slope_m * d, c.height_m, d];
-            if entry[0] < lowest[LOWEST - 1][0] {
-                for kept in lowest.iter_mut().filter(|kept| entry[0] < kept[0]).collect::<Vec<_>>() {
-                    std::mem::swap(kept, &mut entry);
-                }
-            }
-        }
-        let [_, base_m, base_apart] = lowest[rank.checked_sub(1)?];
-        let (mut weight, mut sum, mut all_weight, mut squares) = (0.0, 0.0, 0.0, 0.0);
-        let mut nearest = f32::INFINITY;
-        for c in usable() {
-            let d = apart(cell, c);
-            let w = 1.0 / (d * d);
-            let off = c.height_m - base_m;
-            all_weight += w;
-            squares += w * off * off;
-            if off.abs() <= config.same_surface_m + config.slope_m * (d + base_apart) {
-                weight += w;
-                sum += w * off;
-                nearest = nearest.min(d);
-            }
-        }
-        let above_m = sum / weight;
-        // The mean square around the result instead of around the base.
-        let all_mean = usable().map(|c| (c.height_m - base_m) / apart(cell, c).powi(2)).sum::<f32>() / all_weight;
-        let spread = (squares / all_weight - 2.0 * above_m * all_mean + above_m * above_m).max(0.0).sqrt();
-        let estimate = Estimate { height_m: base_m + above_m, sigma_m: self.sigma_m(spread, nearest) };
-        Some((base_m, estimate))
+        let at = [index % self.numbers.width(), index / self.numbers.width()].map(|v| v as f32);
+        let wanted =
+            Wanted { height_max_m: bound_m, count: CANDIDATES, reach: config.hidden_reach_cells as f32 };
+        let known: Vec<Known> = self.border.nearest(at, wanted);
+        let reduced = |k: &Known| k.height_m + config.slope_m * k.apart;
+        let mut by_height = known.clone();
+        let rank = known.len().div_ceil(LOWEST_SHARE).min(LOWEST).checked_sub(1)?;
+        let (_, base, _) = by_height.select_nth_unstable_by(rank, |a, b| reduced(a).total_cmp(&reduced(b)));
+        Some(self.level(&known, *base)?.estimate)
     }
 
-    /// Returns the deviation of a filled height from the spread of its candidates and the distance
-    /// of the nearest, cells.
+    fn on_plane(&self, at: [usize; 2], plane: Plane, known: &[Known]) -> Estimate {
+        let nearest = known.iter().map(|k| k.apart).fold(f32::INFINITY, f32::min);
+        Estimate { height_m: plane.at(at.map(|v| v as f32)), sigma_m: self.sigma_m(plane.deviation_m, nearest) }
+    }
+
+    /// Returns the deviation of a filled height from the spread of the heights that it could have
+    /// been filled from and the distance of the nearest, cells.
     fn sigma_m(&self, spread_m: f32, nearest: f32) -> f32 {
         let grown = 0.5 * self.config.same_surface_m + self.config.sigma_slope_m * nearest;
         spread_m.hypot(grown)
     }
 }
 
-/// Returns whether candidates not above a height are enough to tell the ground.
-fn is_enough(all: &[BorderCell], limit_m: f32) -> bool {
-    let low = all.iter().filter(|c| c.height_m <= limit_m).count();
-    low >= LOWEST || (low > 0 && low * LOWEST_SHARE >= all.len())
-}
-
-/// Returns the distance of a candidate, cells.
-fn apart(cell: &VoidCell, c: &BorderCell) -> f32 {
-    (c.x - cell.x as f32).hypot(c.y - cell.y as f32)
+/// A surface beside a void cell.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    /// Height that tells the surface from others, metres.
+    base_m: f32,
+    /// The surface in the cell.
+    estimate: Estimate,
 }
 
 #[cfg(test)]
