@@ -85,7 +85,8 @@ mod tests {
             assert!(voids.hide((0, 0), part, 112, &mut costs));
             for (i, found) in costs.into_iter().enumerate() {
                 let (x, y) = (i % part.width, i / part.width);
-                let inside = (CENSUS_REACH..inner + CENSUS_REACH).contains(&x) && (CENSUS_REACH..3 + CENSUS_REACH).contains(&y);
+                let inside =
+                    (CENSUS_REACH..inner + CENSUS_REACH).contains(&x) && (CENSUS_REACH..3 + CENSUS_REACH).contains(&y);
                 let is_raised = inside && is_void((y - CENSUS_REACH) * stride + x - CENSUS_REACH);
                 assert_eq!(found, if is_raised { cost(i).max(112) } else { cost(i) });
             }

@@ -30,6 +30,8 @@ pub(super) struct BorderCell {
 /// Cells that are wanted of a border.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wanted {
+    /// Void whose border is searched; `None` for all.
+    pub(super) void: Option<u32>,
     /// Greatest height, metres.
     pub(super) height_max_m: f32,
     /// Number of cells that are enough.
@@ -97,7 +99,8 @@ impl Border {
             self.ring(u, v, ring, |cell| {
                 let apart = (cell.x - x).hypot(cell.y - y);
                 let is_same_again = last.replace([cell.x, cell.y]) == Some([cell.x, cell.y]);
-                if !is_same_again && cell.height_m <= wanted.height_max_m && apart <= wanted.reach {
+                let is_own = wanted.void.is_none_or(|void| void == cell.void);
+                if is_own && !is_same_again && cell.height_m <= wanted.height_max_m && apart <= wanted.reach {
                     found.push(Known::new(cell.height_m, apart));
                 }
             });
@@ -176,17 +179,24 @@ mod tests {
         let (voids, count) = number_voids(&height_m);
         assert_eq!((count, voids[(30, 30)], voids[(70, 70)], voids[(0, 0)]), (2, 1, 2, 0));
         let border = Border::new(&height_m, &voids);
-        let mut found = Vec::new();
         let wanted = Wanted { void: Some(1), height_max_m: 2.0, count: 20, reach: 30.0 };
-        border.nearest([25.0, 25.0], wanted, &mut found);
-        let at = |c: &BorderCell| (c.x - 25.0).hypot(c.y - 25.0);
-        let radius = found.iter().map(at).fold(0.0, f32::max);
-        let all = border.cells().iter().filter(|c| c.void == 1 && at(c) <= radius).count();
+        let found = border.nearest([25.0, 25.0], wanted);
+        let radius = found.iter().map(|k| k.apart).fold(0.0, f32::max);
+        let is_near = |c: &&BorderCell| c.void == 1 && (c.x - 25.0).hypot(c.y - 25.0) <= radius;
+        let all = border.cells().iter().filter(is_near).count();
         assert!(found.len() == all && all >= 20 && radius <= 30.0, "{} {all} {radius}", found.len());
         // The other void's border, and nothing that is too high.
-        border.nearest([25.0, 25.0], Wanted { void: Some(2), reach: 90.0, ..wanted }, &mut found);
-        assert_eq!(found.len(), 24);
-        border.nearest([25.0, 25.0], Wanted { height_max_m: 0.5, ..wanted }, &mut found);
-        assert!(found.is_empty());
+        assert_eq!(border.nearest([25.0, 25.0], Wanted { void: Some(2), reach: 90.0, ..wanted }).len(), 24);
+        assert!(border.nearest([25.0, 25.0], Wanted { height_max_m: 0.5, ..wanted }).is_empty());
+    }
+
+    #[test]
+    fn a_cell_beside_two_voids_is_found_once() {
+        let mut height_m = Grid::filled(20, 20, 1.0f32);
+        (height_m[(9, 10)], height_m[(11, 10)]) = (f32::NAN, f32::NAN);
+        let (voids, _) = number_voids(&height_m);
+        let border = Border::new(&height_m, &voids);
+        let wanted = Wanted { void: None, height_max_m: 2.0, count: 99, reach: 1.0 };
+        assert_eq!(border.nearest([10.0, 10.0], wanted).len(), 3);
     }
 }

@@ -1,16 +1,17 @@
 //! Filling of voids, each by its reason.
 //!
 //! Every void has a bound: the height above which two views see past the known surface (see
-//! `envelope`). Each void cell is judged by it:
+//! `envelope`). The surface around a cell is the lower one of the nearest known heights in eight
+//! directions. Each void cell is judged by both:
 //!
-//! - If the lowest surface around lies under the bound, the cell is *hidden* from all but one view.
-//!   It gets this surface: the heights not above the bound, near the lowest of them, weighted by
-//!   inverse squared distances. A street between towers is never filled with a roof, as two views
-//!   would have seen it.
+//! - If the surface around lies under the bound, the cell is *hidden* from all but one view, and
+//!   gets this surface. If it lies above, two views would have seen it. A wide void then gets the
+//!   nearest surface under the bound: a street between towers is not filled with a roof.
 //! - Otherwise two views see the cell and their pictures do not match. A *narrow* void is closed. A
 //!   wider one is completed where the known heights around it fit one plane, and where it lies
-//!   between two opposite heights. It stays open where the images are blank (a saturated roof), and
-//!   where heights are known on one side only (water).
+//!   between two opposite heights. If its border has ground lower by a storey, it gets the ground.
+//!   It stays open where the images are blank (a saturated roof), and where heights are known on
+//!   one side only (water).
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
 //!
 //! Small islands of heights may be chance, so that nothing is filled from them.
@@ -106,7 +107,9 @@ pub struct FilledVoids {
 
 /// Number of the eight directions that must have a known height: more than outside a straight edge.
 const KNOWN_MIN: usize = 4;
-/// Number of heights among which ground under a bound is looked for: the far end of a street.
+/// A surface that is lower by a storey is another one, metres.
+const STOREY_M: f32 = 3.0;
+/// Number of heights among which a lower surface is looked for: those at the far end of a street.
 const CANDIDATES: usize = 64;
 /// The lowest surface is the one with this many candidates under it: a few may be wrong.
 const LOWEST: usize = 5;
@@ -139,8 +142,7 @@ pub fn fill_voids(
     let planes = border_planes(border.cells(), count, config.same_surface_m);
     let filling = Filling { numbers: &numbers, border: &border, planes: &planes, blind, config };
     let cells = voids.par_iter().zip(bounds.par_iter().zip(&around));
-    let judged: Vec<Judged> =
-        cells.map(|(&index, (&bound_m, around))| filling.judge(index, bound_m, around)).collect();
+    let judged: Vec<Judged> = cells.map(|(&index, (&bound_m, around))| filling.judge(index, bound_m, around)).collect();
     for (&index, judged) in voids.iter().zip(judged) {
         source.data_mut()[index] = judged.source;
         if let Some(estimate) = judged.estimate {
@@ -183,7 +185,8 @@ impl Filling<'_> {
         let is_narrow = width_cells <= config.narrow_cells;
         let is_outside = bound_m == f32::INFINITY;
         let is_blind = self.blind.data()[index];
-        let plane = self.planes[self.numbers.data()[index] as usize - 1];
+        let void = self.numbers.data()[index];
+        let plane = self.planes[void as usize - 1];
         let lower = self.lower_level(&known);
         let is_under = !is_outside && lower.is_some_and(|lower| lower.base_m <= bound_m);
         // A narrow void, or one inside a plane, is a gap in what surrounds it. In another the
@@ -191,7 +194,7 @@ impl Filling<'_> {
         let may_be_far = !is_outside && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
         let hidden = match lower {
             Some(lower) if is_under => Some(lower.estimate),
-            _ if may_be_far => self.ground_under(index, bound_m),
+            _ if may_be_far => self.surface_under(index, bound_m, None),
             _ => None,
         };
         // With no height around that would have been seen.
@@ -212,9 +215,11 @@ impl Filling<'_> {
         let seen = || {
             let lower = lower.filter(|_| known.len() >= KNOWN_MIN && is_wanted)?;
             let at = [index % self.numbers.width(), index / self.numbers.width()];
+            let below = || self.surface_under(index, lower.base_m - STOREY_M, Some(void));
             Some(match plane.filter(|_| !is_blind) {
                 Some(plane) => self.on_plane(at, plane, &known),
-                None => lower.estimate,
+                None if is_narrow => lower.estimate,
+                None => below().unwrap_or(lower.estimate),
             })
         };
         let (source, estimate) = match hidden.filter(|_| config.rule != FillRule::Nothing) {
@@ -251,17 +256,16 @@ impl Filling<'_> {
         Some(Level { base_m: base.height_m, estimate })
     }
 
-    /// Returns the lowest surface under a bound around a cell that has only higher ones beside it;
-    /// `None` if none is known.
+    /// Returns the lowest surface around a cell that is not above a height, beside its own void or
+    /// beside any; `None` if none is known.
     ///
     /// Distance counts like height here, at the slope of one surface: a pit far away is not lower
     /// than the ground beside the cell.
-    fn ground_under(&self, index: usize, bound_m: f32) -> Option<Estimate> {
+    fn surface_under(&self, index: usize, height_max_m: f32, void: Option<u32>) -> Option<Estimate> {
         let config = self.config;
         let at = [index % self.numbers.width(), index / self.numbers.width()].map(|v| v as f32);
-        let wanted =
-            Wanted { height_max_m: bound_m, count: CANDIDATES, reach: config.hidden_reach_cells as f32 };
-        let known: Vec<Known> = self.border.nearest(at, wanted);
+        let reach = config.hidden_reach_cells as f32;
+        let known = self.border.nearest(at, Wanted { void, height_max_m, count: CANDIDATES, reach });
         let reduced = |k: &Known| k.height_m + config.slope_m * k.apart;
         let mut by_height = known.clone();
         let rank = known.len().div_ceil(LOWEST_SHARE).min(LOWEST).checked_sub(1)?;
