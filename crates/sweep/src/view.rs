@@ -59,19 +59,16 @@ pub struct SweepView {
 
 impl SweepView {
     /// Builds a view from an image that is NaN where invalid.
-    pub fn new(camera: RpcCamera, mut image: Grid<f32>) -> Self {
+    pub fn new(camera: RpcCamera, image: Grid<f32>) -> Self {
+        Self::from_level(camera, 0, image)
+    }
+
+    /// Builds a view without its finest levels: `image` is level `level`, NaN where invalid, and
+    /// finer levels are empty.
+    pub fn from_level(camera: RpcCamera, level: usize, mut image: Grid<f32>) -> Self {
         // The quantisation of the census relies on the bits of this NaN.
         image.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = f32::NAN);
         drop_hot(&mut image);
-        let noise = noise_deviation(&image);
-        let levels = Pyramid::new(image, LEVELS_MAX, SIDE_MIN).into_levels();
-        let contrast = levels.iter().map(typical_difference).collect();
-        Self { camera, levels, noise, contrast }
-    }
-
-    /// Builds a view without its finest levels: `image` is level `level`, and finer levels are
-    /// empty.
-    pub fn from_level(camera: RpcCamera, level: usize, image: Grid<f32>) -> Self {
         let noise = noise_deviation(&image) * (1 << level) as f32;
         let mut levels = vec![Grid::filled(0, 0, f32::NAN); level];
         levels.extend(Pyramid::new(image, LEVELS_MAX, SIDE_MIN).into_levels());
