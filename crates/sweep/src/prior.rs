@@ -6,6 +6,7 @@
 
 use raster::{Grid, Window};
 
+use crate::cost::COST_MAX;
 use crate::ranges::Ranges;
 
 /// Reduction of the cost at the prior's height, a tenth of [`crate::cost::COST_MAX`]. Where the
@@ -14,6 +15,8 @@ use crate::ranges::Ranges;
 const FAVOUR: f32 = 11.0;
 /// Smallest deviation of the prior, in steps of the search. A step is half a pixel of parallax.
 const STEPS: f64 = 2.0;
+/// Reach of a patch whose costs are averaged, and the blur of an edge, pixels.
+const PATCH_REACH: usize = 3;
 /// Neighbours whose prior heights differ by more steps than this belong to two surfaces.
 const JUMP_STEPS: f32 = 4.0;
 
@@ -61,20 +64,32 @@ impl Prior<'_> {
         ranges
     }
 
-    /// Lowers the costs of the heights around the prior.
+    /// Lowers the costs of the heights around the prior. Beside its surfaces their heights become
+    /// as much more expensive: a patch that holds a roof's edge sees the roof outside it, too.
     pub(crate) fn favour(&self, window: Window, step_m: f64, low: &[i32], offsets: &[u32], costs: &mut [u8]) {
         let reach = (self.reach_m(step_m) / step_m) as f32;
         for (pixel, low) in low.iter().enumerate() {
-            let prior = self.height_m[place(window, pixel)];
+            let at = place(window, pixel);
+            let (prior, is_own) = match self.height_m[at] {
+                own if own.is_nan() => (self.highest_beside(at), false),
+                own => (own, true),
+            };
             if prior.is_nan() {
                 continue;
             }
             let middle = (f64::from(prior) / step_m - f64::from(*low)) as f32;
             for (k, cost) in costs[offsets[pixel] as usize..offsets[pixel + 1] as usize].iter_mut().enumerate() {
-                let share = 1.0 - (k as f32 - middle).abs() / reach;
-                *cost = cost.saturating_sub((FAVOUR * share.max(0.0)) as u8);
+                let change = (FAVOUR * (1.0 - (k as f32 - middle).abs() / reach).max(0.0)) as u8;
+                *cost = if is_own { cost.saturating_sub(change) } else { (*cost + change).min(COST_MAX) };
             }
         }
+    }
+
+    /// Returns the greatest prior height within the reach of a patch, metres; NaN if there is none.
+    fn highest_beside(&self, (x, y): (usize, usize)) -> f32 {
+        let span = |at: usize, end: usize| at.saturating_sub(PATCH_REACH)..(at + PATCH_REACH + 1).min(end);
+        let (columns, rows) = (span(x, self.height_m.width()), span(y, self.height_m.height()));
+        rows.flat_map(|v| &self.height_m.row(v)[columns.clone()]).copied().fold(f32::NAN, f32::max)
     }
 
     /// Marks the pixels where the prior's surfaces end as image edges.
