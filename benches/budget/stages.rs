@@ -100,7 +100,7 @@ impl<'a> Scene<'a> {
     fn sweep(&self, index: usize, level: usize, ranges: &Ranges, known: Known) -> anyhow::Result<HeightMap> {
         let at = |index: usize| self.views[index].on_level(index, level);
         let sources: Vec<ViewLevel<'_>> = (0..self.views.len()).filter(|&i| i != index).map(at).collect();
-        let config = LevelConfig::default();
+        let mut config = LevelConfig::default();
         if known == Known::RangeAlone {
             config.penalties = Penalties { step: 0, jump: 0, jump_at_edge: 0 };
         }
