@@ -137,7 +137,7 @@ impl<'a> Scene<'a> {
             let others: Vec<Heights<'_>> = all.iter().filter(|o| o.index != own.index).copied().collect();
             let counts = count_agreeing(*own, &others, 0, &ConsistencyConfig::default())?;
             let keep = counts.map(|n| !checked || *n > 0);
-            placed.push(place_view(*own, 0, &keep, (2.0 * self.step_m) as f32, &frame)?);
+            placed.push(place_view(*own, 0, &keep, &own.view.blank(0), (2.0 * self.step_m) as f32, &frame)?);
         }
         let config = FusionConfig {
             same_surface_m: (2.0 * self.step_m).max(1.5 * cell_m) as f32,

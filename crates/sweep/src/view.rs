@@ -93,16 +93,18 @@ impl SweepView {
         }
     }
 
-    /// Marks the pixels of a level whose 3 × 3 patch holds a single value: saturated, or a void
-    /// that nothing declares. Images show no height there.
+    /// Marks the pixels of a level around which the image has a single value as far as their costs
+    /// see, 5 × 5 pixels: saturated, or a void that nothing declares. Images show no height there.
     pub fn blank(&self, level: usize) -> Grid<bool> {
+        let flat = |row: &[f32]| -> Vec<bool> { row.windows(5).map(|w| w.iter().all(|v| *v == w[0])).collect() };
         let image = &self.levels[level];
+        let rows: Vec<Vec<bool>> = (0..image.height()).map(|y| flat(image.row(y))).collect();
         let mut out = Grid::filled(image.width(), image.height(), false);
-        for y in 1..image.height().saturating_sub(1) {
-            let [above, own, below] = [y - 1, y, y + 1].map(|y| image.row(y).windows(3));
-            for (blank, ((a, b), c)) in out.row_mut(y)[1..].iter_mut().zip(above.zip(own).zip(below)) {
-                let all = |row: &[f32]| (row[0] == b[1]) & (row[1] == b[1]) & (row[2] == b[1]);
-                *blank = all(a) & all(b) & all(c);
+        for y in 2..image.height().saturating_sub(2) {
+            let around = &rows[y - 2..=y + 2];
+            for x in 2..image.width().saturating_sub(2) {
+                let value = image[(x, y)];
+                out[(x, y)] = (0..5).all(|dy| around[dy][x - 2] && image[(x, y + dy - 2)] == value);
             }
         }
         out

@@ -5,8 +5,8 @@
 
 use raster::{Grid, Window};
 use sweep::fusion::{
-    CellSource, FillConfig, FillRule, FusedSurface, GridSight, TrustConfig, calibrate, fill_voids, occlusion_bounds,
-    remove_speckle, surroundings,
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrustConfig, calibrate, fill_voids,
+    occlusion_bounds, remove_speckle, surroundings,
 };
 
 use crate::dsm::config::Fill;
@@ -87,6 +87,7 @@ pub(crate) fn clean_up(
 ) -> (Grid<CellSource>, Cleaned) {
     let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
     let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells };
+    let completed = take_unseen(fused);
     let before = known(&fused.height_m, core);
     drop_weak(fused, &trust, gsd_m);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
@@ -95,7 +96,8 @@ pub(crate) fn clean_up(
     let observed = known(&fused.height_m, core);
     let trusted = probability(fused, &trust).map(|p| *p >= TRUSTED);
     let bounds = |height_m: &Grid<f32>, cells: &[usize]| occlusion_bounds(height_m, voids.sights, cells);
-    let filled = fill_voids(&mut fused.height_m, &trusted, voids.blind, bounds, &fill_config(voids.fill, gsd_m));
+    let known = KnownVoids { trusted: &trusted, blind: voids.blind, completed_m: &completed };
+    let filled = fill_voids(&mut fused.height_m, known, bounds, &fill_config(voids.fill, gsd_m));
     for ((sigma_m, filled_m), source) in
         fused.sigma_m.data_mut().iter_mut().zip(filled.sigma_m.data()).zip(filled.source.data())
     {
@@ -106,6 +108,17 @@ pub(crate) fn clean_up(
     let is_observed = |i: usize| !filled.source.data()[i].is_filled();
     fused.confidence = calibrate(&fused.height_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
     (filled.source, Cleaned { observed, speckle_removed: before - observed })
+}
+
+/// Takes the heights that no view has seen out of a surface.
+fn take_unseen(fused: &mut FusedSurface) -> Grid<f32> {
+    let mut out = Grid::filled(fused.height_m.width(), fused.height_m.height(), f32::NAN);
+    let heights = fused.height_m.data_mut().iter_mut().zip(fused.seen.data());
+    for (out, (height, _)) in out.data_mut().iter_mut().zip(heights).filter(|(_, (_, seen))| !**seen) {
+        *out = std::mem::replace(height, f32::NAN);
+    }
+    forget_agreement_of_voids(fused);
+    out
 }
 
 /// Drops the heights whose evidence is too weak.

@@ -39,7 +39,7 @@ impl ChunkRasters {
             _ => VOID,
         };
         let marks = source.map(mark);
-        let FusedSurface { height_m, mut sigma_m, mut views, mut confidence } = fused;
+        let FusedSurface { height_m, mut sigma_m, mut views, mut confidence, .. } = fused;
         for (i, h) in height_m.data().iter().enumerate() {
             if h.is_nan() {
                 sigma_m.data_mut()[i] = f32::NAN;

@@ -114,17 +114,18 @@ pub(crate) fn make_surface(
     let mut blind = Grid::filled(grid.size.0, grid.size.1, false);
     for own in &all {
         progress.check_cancelled()?;
-        let unseen = unseen(*own, sweep.levels.finest, config.height_range_m);
-        mark_cells(*own, level, &unseen, &frame, &mut blind)?;
+        let blank = own.view.blank(sweep.levels.finest);
         let mut keep = agreeing(*own, &all, useful, level)?;
-        // A pixel that carries no evidence has its height from its surroundings.
-        keep.data_mut().iter_mut().zip(unseen.data()).for_each(|(keep, unseen)| *keep = *keep && !unseen);
+        let mut shows_nothing = blank.clone();
         if let Some(asked) = config.height_range_m {
-            drop_beside_outside(&mut keep, own.map, asked);
+            drop_outside(&mut keep, own.map, asked);
+            let heights = own.map.height_m.data();
+            shows_nothing.data_mut().iter_mut().zip(heights).for_each(|(m, h)| *m |= is_outside(own.map, *h, asked));
         }
+        mark_cells(*own, level, &shows_nothing, &frame, &mut blind)?;
         let data = keep.data();
         kept[own.index] = KeptPixels { kept: data.iter().filter(|k| **k).count() as u64, all: data.len() as u64 };
-        placed.push(place_view(*own, level, &keep, jump_m, &frame)?);
+        placed.push(place_view(*own, level, &keep, &blank, jump_m, &frame)?);
         progress.step();
     }
     let origin_m = heights.maps[0].origin_m;
@@ -198,20 +199,9 @@ fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[ImagePair], level: 
     Ok(counts.map(|n| *n >= needed))
 }
 
-/// Marks the pixels that carry no evidence of what they show: blank ones, and those whose best
-/// height lies outside the range that was asked for.
-fn unseen(own: Heights<'_>, level: usize, asked: Option<HeightRange>) -> Grid<bool> {
-    let mut out = own.view.blank(level);
-    if let Some(asked) = asked {
-        for (unseen, h) in out.data_mut().iter_mut().zip(own.map.height_m.data()) {
-            *unseen = *unseen || is_outside(own.map, *h, asked);
-        }
-    }
-    out
-}
-
-/// Drops the pixels whose patch may hold one with a height outside the range that was asked for.
-fn drop_beside_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: HeightRange) {
+/// Drops the pixels whose best height lies outside the range that was asked for, and those whose
+/// patch may hold one.
+fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: HeightRange) {
     let (width, height) = (keep.width(), keep.height());
     for y in 0..height {
         for x in 0..width {

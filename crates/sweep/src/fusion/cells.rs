@@ -4,7 +4,7 @@ use numeric::middle_values;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
-use super::mesh::{PlacedView, ViewSurface};
+use super::mesh::{PlacedView, SEEN_WEIGHT, ViewSurface};
 use crate::tiles::{paste, tiles};
 
 /// Parameters of the fusion.
@@ -31,6 +31,9 @@ pub struct FusedSurface {
     /// Agreement of the views on each height: `s / (s + o + 1)`, with s the summed weights of the
     /// views that support it and o those of the others; 0 in voids.
     pub confidence: Grid<f32>,
+    /// Whether a view has seen the height. A height that none has seen lies where the images are
+    /// blank, and continues what is around it in the images.
+    pub seen: Grid<bool>,
 }
 
 /// A view's height in a cell.
@@ -48,6 +51,7 @@ struct Cell {
     sigma_m: f32,
     views: u8,
     confidence: f32,
+    seen: bool,
 }
 
 /// Fuses the views on a grid of `size` (columns, rows), tile by tile.
@@ -74,6 +78,7 @@ pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionCon
         paste(&mut out.sigma_m, *w, &part.sigma_m);
         paste(&mut out.views, *w, &part.views);
         paste(&mut out.confidence, *w, &part.confidence);
+        paste(&mut out.seen, *w, &part.seen);
     }
     out
 }
@@ -85,6 +90,7 @@ impl FusedSurface {
             sigma_m: Grid::filled(columns, rows, f32::NAN),
             views: Grid::filled(columns, rows, 0),
             confidence: Grid::filled(columns, rows, 0.0),
+            seen: Grid::filled(columns, rows, false),
         }
     }
 }
@@ -106,6 +112,7 @@ fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> 
             out.sigma_m.data_mut()[i] = cell.sigma_m;
             out.views.data_mut()[i] = cell.views;
             out.confidence.data_mut()[i] = cell.confidence;
+            out.seen.data_mut()[i] = cell.seen;
         }
     }
     out
@@ -135,6 +142,7 @@ fn fuse_cell(samples: &mut [Sample], same_surface_m: f32) -> Option<Cell> {
         sigma_m: information.sqrt().recip(),
         views: mode.len().min(255) as u8,
         confidence: most / (all + 1.0),
+        seen: most >= SEEN_WEIGHT,
     })
 }
 
@@ -166,5 +174,12 @@ mod tests {
         assert_eq!((c.height_m, c.views), (10.0, 1));
         assert!((c.confidence - 1.0 / 2.75).abs() < 1e-6);
         assert!((cell(&[(30.0, 0.25), (30.1, 0.25)]).unwrap().height_m - 30.05).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_height_that_no_view_has_seen_stands_back_for_any_other() {
+        let c = cell(&[(30.0, 1e-4), (30.1, 1e-4), (10.0, 0.0125)]).unwrap();
+        assert!(c.height_m == 10.0 && c.seen);
+        assert!(!cell(&[(30.0, 1e-4), (30.1, 1e-4)]).unwrap().seen);
     }
 }

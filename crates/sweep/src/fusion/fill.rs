@@ -116,17 +116,28 @@ const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
 const LOWEST_SHARE: usize = 4;
 
-/// Fills voids of `height_m` in place. Only heights that are `trusted` hide the ground. `blind`
-/// marks cells where the images could not show what stands there. `bound_m` holds the greatest
-/// height at which a void cell may be hidden from all but one view: −∞ where two views see
-/// everything, +∞ where fewer image it.
+/// What is known about a surface and its voids.
+#[derive(Debug, Clone, Copy)]
+pub struct KnownVoids<'a> {
+    /// Whether a height may hide the ground behind it.
+    pub trusted: &'a Grid<bool>,
+    /// Whether the images could not show what stands in a cell.
+    pub blind: &'a Grid<bool>,
+    /// Heights that continue what is around them in the images, and on which the views agree,
+    /// where the images are blank; NaN elsewhere. Metres.
+    pub completed_m: &'a Grid<f32>,
+}
+
+/// Fills voids of `height_m` in place. `bound_m` returns the greatest height at which each void cell
+/// may be hidden from all but one view by the given surface: −∞ where two views see everything, +∞
+/// where fewer image it.
 pub fn fill_voids(
     height_m: &mut Grid<f32>,
-    trusted: &Grid<bool>,
-    blind: &Grid<bool>,
+    known: KnownVoids<'_>,
     bound_m: impl Fn(&Grid<f32>, &[usize]) -> Vec<f32>,
     config: &FillConfig,
 ) -> FilledVoids {
+    let KnownVoids { trusted, blind, completed_m } = known;
     let (width, height) = (height_m.width(), height_m.height());
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
@@ -140,7 +151,7 @@ pub fn fill_voids(
     let (numbers, count) = number_voids(height_m);
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
-    let filling = Filling { numbers: &numbers, border: &border, planes: &planes, blind, config };
+    let filling = Filling { numbers: &numbers, border: &border, planes: &planes, blind, completed_m, config };
     let cells = voids.par_iter().zip(bounds.par_iter().zip(&around));
     let judged: Vec<Judged> = cells.map(|(&index, (&bound_m, around))| filling.judge(index, bound_m, around)).collect();
     for (&index, judged) in voids.iter().zip(judged) {
@@ -174,6 +185,7 @@ struct Filling<'a> {
     /// Planes of the voids, by their numbers from 1.
     planes: &'a [Option<Plane>],
     blind: &'a Grid<bool>,
+    completed_m: &'a Grid<f32>,
     config: &'a FillConfig,
 }
 
@@ -222,9 +234,15 @@ impl Filling<'_> {
                 None => below().unwrap_or(lower.estimate),
             })
         };
-        let (source, estimate) = match hidden.filter(|_| config.rule != FillRule::Nothing) {
-            Some(estimate) => (CellSource::FilledHidden, Some(estimate)),
-            None => (if is_narrow { CellSource::FilledNarrow } else { CellSource::FilledSurface }, seen()),
+        let height_m = self.completed_m.data()[index];
+        let completed = (config.rule != FillRule::Nothing && !height_m.is_nan()).then(|| {
+            let nearest = known.iter().map(|k| k.apart).fold(config.reach_cells as f32, f32::min);
+            Estimate { height_m, sigma_m: self.sigma_m(0.0, nearest) }
+        });
+        let (source, estimate) = match (completed, hidden.filter(|_| config.rule != FillRule::Nothing)) {
+            (Some(estimate), _) => (CellSource::FilledSurface, Some(estimate)),
+            (_, Some(estimate)) => (CellSource::FilledHidden, Some(estimate)),
+            _ => (if is_narrow { CellSource::FilledNarrow } else { CellSource::FilledSurface }, seen()),
         };
         Judged { source: if estimate.is_some() { source } else { open }, estimate }
     }
@@ -312,8 +330,9 @@ mod tests {
 
     fn fill_with(height_m: &mut Grid<f32>, bound_m: f32, config: &FillConfig) -> FilledVoids {
         let blind = Grid::filled(height_m.width(), height_m.height(), false);
-        let trusted = Grid::filled(height_m.width(), height_m.height(), true);
-        fill_voids(height_m, &trusted, &blind, |_, voids| vec![bound_m; voids.len()], config)
+        let (trusted, completed_m) = (blind.map(|_| true), blind.map(|_| f32::NAN));
+        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
+        fill_voids(height_m, known, |_, voids| vec![bound_m; voids.len()], config)
     }
 
     /// Fills with two views that see every void.
@@ -370,18 +389,27 @@ mod tests {
 
     #[test]
     fn blank_images_leave_a_wide_void_open_and_say_so() {
-        let (mut blind, trusted) = (Grid::filled(40, 40, false), Grid::filled(40, 40, true));
+        let mut blind = Grid::filled(40, 40, false);
         (12..20).for_each(|x| (0..40).for_each(|y| blind[(x, y)] = true));
         let (mut seen, mut unseen) = (void_in_a_plain(), void_in_a_plain());
         fill(&mut seen);
         assert!((10..20).all(|x| (10..20).all(|y| seen[(x, y)] == 1.0)), "{:?}", seen.row(15));
         let visible = |_: &Grid<f32>, voids: &[usize]| vec![f32::NEG_INFINITY; voids.len()];
-        let found = fill_voids(&mut unseen, &trusted, &blind, visible, &CONFIG);
+        let (trusted, mut completed_m) = (blind.map(|_| true), blind.map(|_| f32::NAN));
+        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
+        let found = fill_voids(&mut unseen, known, visible, &CONFIG);
         assert!((12..20).all(|x| unseen[(x, 15)].is_nan()) && unseen[(10, 15)] == 1.0, "{:?}", unseen.row(15));
         assert_eq!(found.source[(15, 15)], CellSource::Blank);
         let everything = FillConfig { rule: FillRule::Everything, ..CONFIG };
-        fill_voids(&mut unseen, &trusted, &blind, visible, &everything);
+        fill_voids(&mut unseen, known, visible, &everything);
         assert!((10..20).all(|x| (10..20).all(|y| unseen[(x, y)] == 1.0)), "{:?}", unseen.row(15));
+        // What the views agree on without having seen it is a completion of the image.
+        completed_m[(15, 15)] = 1.2;
+        let known = KnownVoids { completed_m: &completed_m, ..known };
+        let mut completed = void_in_a_plain();
+        let found = fill_voids(&mut completed, known, visible, &CONFIG);
+        assert_eq!((completed[(15, 15)], found.source[(15, 15)]), (1.2, CellSource::FilledSurface));
+        assert!(completed[(16, 16)].is_nan() && found.sigma_m[(15, 15)] > 0.5);
     }
 
     #[test]

@@ -38,6 +38,12 @@ const BORDER_WEIGHT: f32 = 0.25;
 /// Weight of a height that another one fits as well, against 1 for a distinct one. Such heights
 /// decide only where no view has a distinct one.
 const INDISTINCT_WEIGHT: f32 = 0.1;
+/// Weight of a height where the image is blank, against 1 elsewhere. It comes from its surroundings
+/// in the image and decides only where no view has seen a height.
+const BLANK_WEIGHT: f32 = 1e-4;
+/// Least weight of a cell's height that was seen: below that of a single one at a border that
+/// another height fits as well.
+pub(super) const SEEN_WEIGHT: f32 = 5e-3;
 /// Share of its weight that a height has in its cell where no facet covers the centre of the cell.
 const LONE_SHARE: f32 = 0.5;
 /// Reach of a border beside a jump, pixels: half a patch, and the blur of the edge.
@@ -74,7 +80,7 @@ pub struct PlacedView {
 ///
 /// A height with another one lower by more than `jump_m` beside it is at a border and gets a
 /// smaller weight: patches that hold a roof's edge see the roof's height outside it too. The weight
-/// grows with the confidence of the height.
+/// grows with the confidence of the height. Heights of `blank` pixels count for next to nothing.
 ///
 /// # Errors
 /// Returns [`SweepError::Camera`] if the camera or the map projection fails inside the scene.
@@ -82,14 +88,16 @@ pub fn place_view(
     heights: Heights<'_>,
     level: u32,
     keep: &Grid<bool>,
+    blank: &Grid<bool>,
     jump_m: f32,
     frame: &GridFrame<'_>,
 ) -> Result<PlacedView, SweepError> {
     let borders = border_weights(&heights.map.height_m, jump_m);
     let mut vertices = place(heights, level, keep, frame)?;
-    let weights = borders.data().iter().zip(heights.map.confidence.data());
-    for (vertex, (border, confidence)) in vertices.data_mut().iter_mut().zip(weights) {
-        vertex.weight = border * (INDISTINCT_WEIGHT + confidence).min(1.0);
+    let weights = borders.data().iter().zip(heights.map.confidence.data()).zip(blank.data());
+    for (vertex, ((border, confidence), is_blank)) in vertices.data_mut().iter_mut().zip(weights) {
+        let seen = if *is_blank { BLANK_WEIGHT } else { 1.0 };
+        vertex.weight = seen * border * (INDISTINCT_WEIGHT + confidence).min(1.0);
     }
     let windows = tiles(Window::whole(vertices.width(), vertices.height()), TILE);
     let extents = windows.into_iter().filter_map(|w| Some((w, extent(&vertices, w)?))).collect();
@@ -356,7 +364,8 @@ mod tests {
         let geotransform = GeoTransform::north_up(false_origin[0] - 20.0, false_origin[1] + 20.0, 0.5);
         let frame = GridFrame { geotransform, map_from_ground: &to_map };
         let keep = Grid::filled(SIZE, SIZE, true);
-        place_view(heights, 0, &keep, 5.0, &frame).unwrap().rasterise(Window::whole(80, 80), 5.0)
+        let blank = Grid::filled(SIZE, SIZE, false);
+        place_view(heights, 0, &keep, &blank, 5.0, &frame).unwrap().rasterise(Window::whole(80, 80), 5.0)
     }
 
     /// At 5,000 km the resolution of an f32 is half a metre: no absolute coordinate may pass

@@ -18,7 +18,7 @@ mod trust;
 
 pub use cells::{FusedSurface, FusionConfig, fuse_views};
 pub use envelope::{GridSight, occlusion_bounds};
-pub use fill::{CellSource, FillConfig, FillRule, FilledVoids, fill_voids};
+pub use fill::{CellSource, FillConfig, FillRule, FilledVoids, KnownVoids, fill_voids};
 pub use mesh::{GridFrame, PlacedView, mark_cells, place_view};
 pub use speckle::remove_speckle;
 pub use trust::{TrustConfig, calibrate, surroundings};
