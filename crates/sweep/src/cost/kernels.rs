@@ -173,7 +173,7 @@ fn divide(sums: &[u16], weights: &[u16], out: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use super::super::census::{CHUNK, Census, CensusScratch, census_cost, overhang};
-    use super::super::part::{CENSUS_REACH, MARGIN, Part};
+    use super::super::part::{MARGIN, Part};
     use super::super::voids::Voids;
     use super::*;
     use proptest::prelude::*;
@@ -201,7 +201,7 @@ mod tests {
             let (mut grey, mut voids, mut census) = (Vec::new(), Voids::default(), Census::default());
             let has_voids = quantise(tile, scale * FULL, overhang(side), &mut grey);
             census.fill(&grey, side, tile.len());
-            voids.mark(tile, side, 2 * CENSUS_REACH + 1, has_voids);
+            voids.mark(tile, side, 2 * MARGIN + 1, has_voids);
             hidden.push(voids);
             census
         };

@@ -4,7 +4,7 @@ use raster::{Window, bicubic_along, cubic_weights};
 
 use super::census::{Census, CensusScratch, census_cost, overhang, picture_cost};
 use super::kernels::{self, FULL};
-use super::part::{CENSUS_REACH, Part};
+use super::part::{MARGIN, Part};
 use super::scale::census_scale;
 use super::shift::{BicubicShift, OVERHANG, Picture, shift_bicubic};
 use super::voids::Voids;
@@ -87,7 +87,7 @@ impl LaidSource {
             bicubic_along(source.image, from, [next[0] - from[0], next[1] - from[1]], out);
         }
         let has_voids = kernels::quantise(grey, FULL * census_scale(source), OVERHANG, &mut self.picture);
-        self.voids.mark(grey, self.stride, CUBIC_TAPS + 2 * CENSUS_REACH, has_voids);
+        self.voids.mark(grey, self.stride, CUBIC_TAPS + 2 * MARGIN, has_voids);
     }
 
     /// Shifts the picture so that the part lies over it at a height.

@@ -4,7 +4,7 @@
 ///
 /// MicMac uses patches as small in cities. The aggregation brings the support that they lack, and
 /// roofs keep their edges.
-pub(super) const CENSUS_REACH: usize = 1;
+const CENSUS_REACH: usize = 1;
 /// Reach of the average of costs over neighbours, pixels.
 const BLEND_REACH: usize = 1;
 /// Margin of a part on each side, pixels.

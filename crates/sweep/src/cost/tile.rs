@@ -7,7 +7,7 @@ use super::config::{Aggregation, COST_MAX, CostConfig};
 use super::division::{SweptPart, TILE_MIN, divide, halves, plane_span};
 use super::kernels::{self, FULL, INVALID};
 use super::laid::{LaidSource, PlaneScratch};
-use super::part::{CENSUS_REACH, MARGIN, Part};
+use super::part::{MARGIN, Part};
 use super::planes::{BlockCosts, PLANES_AT_ONCE, PlaneRun, Planes, scatter};
 use super::scale::census_scale;
 use super::voids::Voids;
@@ -209,7 +209,7 @@ impl TileScratch {
         copy_window(reference.view.image, padded, &mut self.grey);
         let scale = FULL * census_scale(&reference.view);
         let has_voids = kernels::quantise(&self.grey, scale, overhang(padded.width), &mut self.padded);
-        self.reference_voids.mark(&self.grey, padded.width, 2 * CENSUS_REACH + 1, has_voids);
+        self.reference_voids.mark(&self.grey, padded.width, 2 * MARGIN + 1, has_voids);
         self.reference.fill(&self.padded, padded.width, area);
     }
 

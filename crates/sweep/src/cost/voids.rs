@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::kernels::INVALID;
-use super::part::{CENSUS_REACH, Part};
+use super::part::{MARGIN, Part};
 use super::raise::{RaiseMarked, raise_marked};
 
 /// Marks of the places whose neighbourhood holds a void. There are none if the picture has no void.
@@ -32,11 +32,11 @@ impl Voids {
     }
 
     /// Raises the costs of a part to at least `worst` at marked pixels, where the mark of its first
-    /// pixel with a census is at `(x, y)`. Returns whether any row of the part has a mark.
+    /// inner pixel is at `(x, y)`. Returns whether any row of the part has a mark.
     pub(super) fn hide(&self, (x, y): (usize, usize), part: Part, worst: u8, costs: &mut [u8]) -> bool {
-        let (width, height) = (part.width - 2 * CENSUS_REACH, part.height - 2 * CENSUS_REACH);
+        let (width, height) = (part.width - 2 * MARGIN, part.height - 2 * MARGIN);
         let Some(rows) = self.rows.get(y..y + height).filter(|rows| rows.contains(&true)) else { return false };
-        let first = CENSUS_REACH * part.width + CENSUS_REACH;
+        let first = MARGIN * part.width + MARGIN;
         raise_marked(RaiseMarked {
             costs: &mut costs[first..],
             stride: part.width,
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn only_marked_pixels_are_raised() {
         for inner in [5, 32, 47, 64] {
-            let part = Part { within: [0; 2], width: inner + 2 * CENSUS_REACH, height: 3 + 2 * CENSUS_REACH };
+            let part = Part { within: [0; 2], width: inner + 2 * MARGIN, height: 3 + 2 * MARGIN };
             let stride = inner + 7;
             let cost = |i: usize| (i * 37 % 256) as u8;
             let is_void = |i: usize| i / stride != 1 && i % 5 < 2;
@@ -85,9 +85,8 @@ mod tests {
             assert!(voids.hide((0, 0), part, 112, &mut costs));
             for (i, found) in costs.into_iter().enumerate() {
                 let (x, y) = (i % part.width, i / part.width);
-                let inside =
-                    (CENSUS_REACH..inner + CENSUS_REACH).contains(&x) && (CENSUS_REACH..3 + CENSUS_REACH).contains(&y);
-                let is_raised = inside && is_void((y - CENSUS_REACH) * stride + x - CENSUS_REACH);
+                let inside = (MARGIN..inner + MARGIN).contains(&x) && (MARGIN..3 + MARGIN).contains(&y);
+                let is_raised = inside && is_void((y - MARGIN) * stride + x - MARGIN);
                 assert_eq!(found, if is_raised { cost(i).max(112) } else { cost(i) });
             }
         }
