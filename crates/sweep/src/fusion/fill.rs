@@ -149,6 +149,7 @@ pub fn fill_voids(
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
     let around = around(&sources, blind, &voids, config.reach_cells as f32);
     let (numbers, count) = number_voids(height_m);
+    sources.data_mut().iter_mut().zip(trusted.data()).filter(|(_, t)| !**t).for_each(|(h, _)| *h = f32::NAN);
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
     let filling = Filling { numbers: &numbers, border: &border, planes: &planes, blind, completed_m, config };
