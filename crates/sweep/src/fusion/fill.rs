@@ -111,6 +111,10 @@ const KNOWN_MIN: usize = 4;
 const STOREY_M: f32 = 3.0;
 /// Number of heights among which a lower surface is looked for: those at the far end of a street.
 const CANDIDATES: usize = 64;
+/// Number of heights that are all around a cell at the border of its void, and the part of them that
+/// a surface must have: fewer may be outliers.
+const AROUND: usize = 256;
+const LEAST_PART: usize = 10;
 /// The lowest surface is the one with this many candidates under it: a few may be wrong.
 const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
@@ -207,7 +211,7 @@ impl Filling<'_> {
         let may_be_far = !is_outside && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
         let hidden = match lower {
             Some(lower) if is_under => Some(lower.estimate),
-            _ if may_be_far => self.surface_under(index, bound_m, None),
+            _ if may_be_far => self.surface_under(index, bound_m),
             _ => None,
         };
         // With no height around that would have been seen.
@@ -228,7 +232,7 @@ impl Filling<'_> {
         let seen = || {
             let lower = lower.filter(|_| known.len() >= KNOWN_MIN && is_wanted)?;
             let at = [index % self.numbers.width(), index / self.numbers.width()];
-            let below = || self.surface_under(index, lower.base_m - STOREY_M, Some(void));
+            let below = || self.surface_below(index, lower.base_m - STOREY_M, void);
             Some(match plane.filter(|_| !is_blind) {
                 Some(plane) => self.on_plane(at, plane, &known),
                 None if is_narrow => lower.estimate,
@@ -275,21 +279,40 @@ impl Filling<'_> {
         Some(Level { base_m: base.height_m, estimate })
     }
 
-    /// Returns the lowest surface around a cell that is not above a height, beside its own void or
-    /// beside any; `None` if none is known.
+    /// Returns the lowest surface under a bound around a cell; `None` if none is known.
+    fn surface_under(&self, index: usize, bound_m: f32) -> Option<Estimate> {
+        let wanted = Wanted { void: None, height_max_m: bound_m, count: CANDIDATES, reach: self.far() };
+        self.lowest(&self.border.nearest(self.place(index), wanted))
+    }
+
+    /// Returns the surface below a height at the border of a void; `None` if it is a small part of
+    /// the border near a cell, which may be outliers.
+    fn surface_below(&self, index: usize, height_m: f32, void: u32) -> Option<Estimate> {
+        let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: AROUND, reach: self.far() };
+        let all = self.border.nearest(self.place(index), wanted);
+        let below: Vec<Known> = all.iter().copied().filter(|k| k.height_m <= height_m).collect();
+        if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
+    }
+
+    fn far(&self) -> f32 {
+        self.config.hidden_reach_cells as f32
+    }
+
+    fn place(&self, index: usize) -> [f32; 2] {
+        [index % self.numbers.width(), index / self.numbers.width()].map(|v| v as f32)
+    }
+
+    /// Returns the lowest surface among known heights.
     ///
     /// Distance counts like height here, at the slope of one surface: a pit far away is not lower
     /// than the ground beside the cell.
-    fn surface_under(&self, index: usize, height_max_m: f32, void: Option<u32>) -> Option<Estimate> {
+    fn lowest(&self, known: &[Known]) -> Option<Estimate> {
         let config = self.config;
-        let at = [index % self.numbers.width(), index / self.numbers.width()].map(|v| v as f32);
-        let reach = config.hidden_reach_cells as f32;
-        let known = self.border.nearest(at, Wanted { void, height_max_m, count: CANDIDATES, reach });
         let reduced = |k: &Known| k.height_m + config.slope_m * k.apart;
-        let mut by_height = known.clone();
+        let mut by_height = known.to_vec();
         let rank = known.len().div_ceil(LOWEST_SHARE).min(LOWEST).checked_sub(1)?;
         let (_, base, _) = by_height.select_nth_unstable_by(rank, |a, b| reduced(a).total_cmp(&reduced(b)));
-        Some(self.level(&known, *base)?.estimate)
+        Some(self.level(known, *base)?.estimate)
     }
 
     fn on_plane(&self, at: [usize; 2], plane: Plane, known: &[Known]) -> Estimate {
