@@ -46,7 +46,7 @@ pub(crate) struct Args {
     /// the images decide.
     #[arg(long, value_name = "MODEL")]
     prior: Option<PathBuf>,
-    /// What the DSM's heights are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
+    /// What the heights of the DSM are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
     /// Speed against accuracy.
@@ -159,7 +159,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let report = args.show.watch(global, |watcher| jobs::dsm::run(&args.config(), watcher)).map_err(|error| {
+    let report = args.show.watch(global, &args.output, |watcher| jobs::dsm::run(&args.config(), watcher)).map_err(|error| {
         let hint = hint(&error);
         with_hint(error, hint)
     })?;

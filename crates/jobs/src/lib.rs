@@ -16,6 +16,7 @@ pub mod heightmap;
 pub mod map_surface;
 pub mod ortho;
 mod output_folder;
+mod run_folder;
 pub mod placed_model;
 pub mod priors;
 pub mod remote;
