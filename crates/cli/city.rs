@@ -145,4 +145,3 @@ fn tell(summary: &CitySummary) {
 fn outcome(summary: &CitySummary) -> Outcome {
     if summary.incomplete { Outcome::Partial } else { Outcome::Complete }
 }
-

@@ -17,10 +17,7 @@ pub(crate) fn corrections_of(option: Option<&Path>) -> CorrectionSource {
 }
 
 /// Returns the codes of a CRS that must be named: the horizontal one and that of the heights.
-pub(crate) fn code_of(
-    crs: Option<CrsRequest>,
-    option: &str,
-) -> anyhow::Result<(Option<u32>, Option<VerticalDatum>)> {
+pub(crate) fn code_of(crs: Option<CrsRequest>, option: &str) -> anyhow::Result<(Option<u32>, Option<VerticalDatum>)> {
     match crs {
         Some(CrsRequest::Epsg { horizontal, vertical }) => Ok((Some(horizontal), vertical)),
         Some(CrsRequest::Auto) => bail!("{option} must name a code: EPSG:n"),

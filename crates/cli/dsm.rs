@@ -159,10 +159,11 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let report = args.show.watch(global, &args.output, |watcher| jobs::dsm::run(&args.config(), watcher)).map_err(|error| {
-        let hint = hint(&error);
-        with_hint(error, hint)
-    })?;
+    let report =
+        args.show.watch(global, &args.output, |watcher| jobs::dsm::run(&args.config(), watcher)).map_err(|error| {
+            let hint = hint(&error);
+            with_hint(error, hint)
+        })?;
     args.show.print(global, &report, || summary(args, &report))?;
     let is_whole = report.chunks.as_ref().is_none_or(|c| c.failed.is_empty());
     Ok(if is_whole { Outcome::Complete } else { Outcome::Partial })

@@ -115,7 +115,8 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 fn make(args: &MakeArgs, surface: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, surface, output)?;
-    let report = args.run.show.watch(global, output, |watcher| jobs::groundview::run(&config, watcher)).map_err(hinted)?;
+    let report =
+        args.run.show.watch(global, output, |watcher| jobs::groundview::run(&config, watcher)).map_err(hinted)?;
     report.failed.iter().take(SHOWN).for_each(|failure| tracing::error!("{}: {}", failure.id, failure.reason));
     args.run.show.print(global, &report, || report.text())?;
     Ok(if report.is_complete() { Outcome::Complete } else { Outcome::Partial })

@@ -172,7 +172,8 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 fn make(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, source, output)?;
-    let report = args.run.show.watch(global, output, |watcher| jobs::heightmap::run(&config, watcher)).map_err(hinted)?;
+    let report =
+        args.run.show.watch(global, output, |watcher| jobs::heightmap::run(&config, watcher)).map_err(hinted)?;
     let failed = log_failures(&report);
     args.run.show.print(global, &report, || report.text())?;
     Ok(if failed { Outcome::Partial } else { Outcome::Complete })

@@ -4,22 +4,64 @@
 use std::ffi::OsString;
 
 use clap::Command;
+use clap::error::ErrorKind;
 
 /// Groups of options, by the names of their fields. What is in no group chooses the method.
 const GROUPS: [(&str, &[&str]); 5] = [
     (
         "Inputs",
         &[
-            "classes", "mask", "dtm", "confidence", "buildings", "dem", "prior", "corrections", "maps", "lod", "all_objects",
-            "ref_cell", "test_vertical", "ref_vertical", "dsm_vertical", "surface_vertical", "source_crs", "source_vertical",
-            "positions_vertical", "offset", "transform", "image_size", "pictures", "cameras", "camera", "center", "positions",
+            "classes",
+            "mask",
+            "dtm",
+            "confidence",
+            "buildings",
+            "dem",
+            "prior",
+            "corrections",
+            "maps",
+            "lod",
+            "all_objects",
+            "ref_cell",
+            "test_vertical",
+            "ref_vertical",
+            "dsm_vertical",
+            "surface_vertical",
+            "source_crs",
+            "source_vertical",
+            "positions_vertical",
+            "offset",
+            "transform",
+            "image_size",
+            "pictures",
+            "cameras",
+            "camera",
+            "center",
+            "positions",
         ],
     ),
     (
         "Output",
         &[
-            "output", "gsd", "crs", "force", "bounds", "vertical", "format", "encoding", "geotiff", "extras", "previews",
-            "no_preview", "html", "no_report", "error_map", "report", "render", "noise_output", "overwrite",
+            "output",
+            "gsd",
+            "crs",
+            "force",
+            "bounds",
+            "vertical",
+            "format",
+            "encoding",
+            "geotiff",
+            "extras",
+            "previews",
+            "no_preview",
+            "html",
+            "no_report",
+            "error_map",
+            "report",
+            "render",
+            "noise_output",
+            "overwrite",
         ],
     ),
     ("Requirements (exit code 1 when missed)", &["max_mae", "min_completeness", "max_rmse"]),
@@ -56,8 +98,13 @@ pub(crate) fn without_gdal_spellings(arguments: impl Iterator<Item = OsString>, 
         let (spelling, value) = text.split_once('=').map_or((text.as_str(), None), |(name, value)| (name, Some(value)));
         let Some((_, ours)) = OF_GDAL.iter().find(|(theirs, ours)| *theirs == spelling && has(ours)) else { continue };
         let size = |after: usize| arguments.get(at + after)?.to_str()?.parse::<f64>().ok().map(f64::abs);
-        if *ours == "gsd" && value.is_none() && size(1).is_some() && size(1) == size(2) {
-            arguments.remove(at + 2);
+        match (*ours, size(1), size(2)) {
+            ("gsd", Some(x), Some(y)) if value.is_none() && x == y => drop(arguments.remove(at + 2)),
+            ("gsd", Some(_), Some(_)) if value.is_none() => {
+                let text = "the cells are square: -tr takes one size or two equal ones";
+                root.clone().error(ErrorKind::InvalidValue, text).exit();
+            }
+            _ => {}
         }
         arguments[at] = value.map_or(format!("--{ours}"), |value| format!("--{ours}={value}")).into();
     }

@@ -8,9 +8,7 @@ use ::priors::{Amount, DepthKind, NormalFrame, Spacing as Placement, VisibilityC
 use city::Lod;
 use clap::ValueEnum;
 use crs::{CrsRequest, VerticalDatum};
-use jobs::priors::{
-    LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, PriorsMode, PriorsTrainer,
-};
+use jobs::priors::{LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, PriorsMode, PriorsTrainer};
 
 use crate::corrections::code_of;
 use crate::error::with_hint;

@@ -162,7 +162,9 @@ impl Progress for Watcher {
 
     fn choice(&self, choice: &Choice) {
         if self.style == ProgressStyle::Json {
-            self.line(&json!({ "event": "choice", "name": choice.name, "value": choice.value, "reason": choice.reason }));
+            self.line(
+                &json!({ "event": "choice", "name": choice.name, "value": choice.value, "reason": choice.reason }),
+            );
         } else if !self.quiet {
             self.say(&format!("{:<13} {} ({})", choice.name, choice.value, choice.reason));
         }

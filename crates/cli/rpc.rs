@@ -222,4 +222,3 @@ fn point_line(direction: RpcDirection, RpcPoint { ground, image }: &RpcPoint, js
     };
     value.to_string()
 }
-

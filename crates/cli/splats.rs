@@ -171,7 +171,8 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     config.pictures.clone_from(&args.pictures);
     config.corrections = corrections_of(args.corrections.as_deref());
     config.overwrite = args.overwrite;
-    let report = args.show.watch(global, &args.output, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
+    let report =
+        args.show.watch(global, &args.output, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
     args.show.print(global, &report, || report.text(&args.output))?;
     Ok(Outcome::Complete)
 }
@@ -183,4 +184,3 @@ fn hinted(error: SplatsJobError) -> anyhow::Error {
     };
     with_hint(error, hint)
 }
-

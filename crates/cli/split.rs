@@ -76,4 +76,3 @@ fn config(args: &Args) -> SplitJobConfig {
     config.overwrite = args.overwrite;
     config
 }
-

@@ -35,4 +35,4 @@ pub use priors::{ErrorRow, PriorsReport, ViewRow};
 pub use protocol::Protocol;
 pub use satellite::{SatellitePriorsReport, SatelliteRow};
 pub use svg::{Axis, Chart};
-pub use words::counted;
+pub use words::{counted, plain_number};

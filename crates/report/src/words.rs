@@ -10,6 +10,19 @@ pub fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
+/// Returns a length or coordinate in metres without the rounding noise of its computation: to a
+/// micrometre, without trailing zeros.
+///
+/// ```
+/// assert_eq!(report::plain_number(693_800.1 + 150.5), "693950.6");
+/// assert_eq!([163.25, -0.0, 40.0].map(report::plain_number), ["163.25", "0", "40"]);
+/// ```
+pub fn plain_number(value: f64) -> String {
+    let rounded = format!("{value:.6}");
+    let short = rounded.trim_end_matches('0').trim_end_matches('.');
+    if short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
 /// Sets the numbers of a text as a page shows them: a hyphen before a number becomes a minus sign, a
 /// zero has no sign, and a lone hyphen becomes a dash. Hyphens inside words and names stay.
 pub(crate) fn typeset(text: &str) -> String {

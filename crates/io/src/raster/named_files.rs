@@ -77,7 +77,8 @@ fn names(text: &str) -> impl Iterator<Item = &str> {
     let pieces = pieces.filter(|piece| !piece.is_empty() && piece.len() <= NAME_MAX);
     pieces.flat_map(|piece| {
         let parts = piece.split([':', '?', ',', '=', '{', '}']);
-        let inner = parts.map(|part| part.strip_prefix("//").unwrap_or(part)).flat_map(|part| [part, behind_prefix(part)]);
+        let inner =
+            parts.map(|part| part.strip_prefix("//").unwrap_or(part)).flat_map(|part| [part, behind_prefix(part)]);
         std::iter::once(piece).chain(inner.filter(move |part| *part != piece && !part.is_empty()))
     })
 }

@@ -89,3 +89,32 @@ pub fn write_map_tile(path: impl AsRef<Path>, tile: &MapTile<'_>, overwrite: boo
         .map_err(|reason| RasterError::unwritable(path, reason))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::BandData;
+    use raster::Grid;
+
+    /// Viewers and cutters read a part of a large map, and its reductions, without the whole.
+    #[test]
+    fn large_maps_have_tiles_and_overviews() {
+        let folder = tempfile::tempdir().unwrap();
+        for (side, expected) in [(518, 2), (200, 0)] {
+            let path = folder.path().join(format!("{side}.tif"));
+            let heights = Grid::from_vec(side, side, (0..side * side).map(|i| i as f32).collect()).unwrap();
+            let bands = [Band { description: "height_m", data: BandData::F32(&heights) }];
+            let tile = MapTile {
+                bands: &bands,
+                geotransform: GeoTransform([500_000.0, 0.4, 0.3, 4_800_000.0, 0.3, -0.4]),
+                crs: "EPSG:32631",
+                height_from_value: Some(BandScale { scale: 1.0, offset: 100.0 }),
+                metadata: &[],
+            };
+            write_map_tile(&path, &tile, false).unwrap();
+            let dataset = crate::raster::gdal_setup::open_dataset(&path).unwrap();
+            let band = dataset.rasterband(1).unwrap();
+            assert_eq!((band.block_size(), band.overview_count().unwrap()), ((TILE, TILE), expected), "{side}");
+        }
+    }
+}

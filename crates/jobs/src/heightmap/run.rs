@@ -7,8 +7,8 @@ use super::error::HeightMapJobError;
 use super::list;
 use super::maker::Maker;
 use super::report::{HeightMapMade, HeightMapReport};
-use crate::run_folder::surface_file;
 use crate::camera_stand::{CameraStand, Cameras};
+use crate::run_folder::surface_file;
 use crate::{files, threads};
 
 /// Makes one height map, or one for each row of a list.

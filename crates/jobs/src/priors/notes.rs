@@ -54,5 +54,8 @@ pub(super) fn notes(dataset: &Dataset<'_>) -> Vec<String> {
 /// Returns the note about objects that could not be used.
 pub(super) fn unusable_note(unusable: usize) -> String {
     let objects = counted(unusable, "object");
-    format!("{objects} of the model could not be used; skysweep city info --report names {}.", if unusable == 1 { "it" } else { "them" })
+    format!(
+        "{objects} of the model could not be used; skysweep city info --report names {}.",
+        if unusable == 1 { "it" } else { "them" }
+    )
 }

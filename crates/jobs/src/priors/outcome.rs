@@ -44,8 +44,11 @@ impl PriorsJobReport {
     /// Returns the report as text, which ends in a line break.
     pub fn text(&self) -> String {
         let size = in_words(usize::try_from(self.bytes).unwrap_or(usize::MAX));
-        let written =
-            format!("written    {} ({size})\nreport     {}\n", self.output.display(), self.output.join("report.html").display());
+        let written = format!(
+            "written    {} ({size})\nreport     {}\n",
+            self.output.display(),
+            self.output.join("report.html").display()
+        );
         match &self.product {
             PriorsProduct::Dataset(made) => {
                 let (kept, all, least) = (made.kept, made.samples, made.min_views);
@@ -53,7 +56,9 @@ impl PriorsJobReport {
                 format!("points     {kept} of {all} are seen by {least} or more of {views}\n{written}")
             }
             PriorsProduct::SatelliteMaps(made) => {
-                let line = |row: &SatelliteRow| format!("image      {}: {} pixels see a building\n", row.image, row.hit_pixels);
+                let line = |row: &SatelliteRow| {
+                    format!("image      {}: {} pixels see a building\n", row.image, row.hit_pixels)
+                };
                 made.images.iter().map(line).collect::<String>() + &written
             }
         }

@@ -29,11 +29,14 @@ impl SplatsReport {
             );
         }
         for point in &made.uniform {
-            text += &format!("uniform    {} splats of {} cells: RMSE {:.3} m\n", point.splats, point.side, point.rmse_m);
+            text +=
+                &format!("uniform    {} splats of {} cells: RMSE {:.3} m\n", point.splats, point.side, point.rmse_m);
         }
         if let Some(count) = made.uniform_at_equal_rmse {
-            text +=
-                &format!("equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n", count / made.splats as f64);
+            text += &format!(
+                "equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n",
+                count / made.splats as f64
+            );
         }
         text + &format!("written    {}\n", self.output)
     }

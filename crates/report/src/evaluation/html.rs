@@ -19,11 +19,17 @@ const ABBREVIATIONS: [(&str, &str); 13] = [
     ("MAE", "mean absolute error"),
     ("RMSE", "root mean square error: the root of the mean of the squared errors"),
     ("std", "standard deviation of the errors"),
-    ("NMAD", "normalised median absolute deviation: 1.4826 times the median distance of the errors from their median; \
-              for normally distributed errors it is their standard deviation, and outliers hardly change it"),
+    (
+        "NMAD",
+        "normalised median absolute deviation: 1.4826 times the median distance of the errors from their median; \
+              for normally distributed errors it is their standard deviation, and outliers hardly change it",
+    ),
     ("LE68, LE90, LE95", "linear error: 68, 90 or 95 % of the errors are at most this large, without their signs"),
     ("robust_…", "the same without outliers"),
-    ("completeness_T", "share of reference_cells whose error is below T metres; cells without a height count as failures"),
+    (
+        "completeness_T",
+        "share of reference_cells whose error is below T metres; cells without a height count as failures",
+    ),
     ("pag_T", "percentage of accurate grid cells: share of n whose error is below T metres"),
     ("IoU", "intersection over union: what both surfaces have in common, as a share of what either has"),
 ];

@@ -49,9 +49,7 @@ impl EvaluationReport<'_> {
 
     /// Returns the tables of origins, uncertainty and objects, each for which there is an input.
     pub(super) fn judged_html(&self) -> String {
-        let of = |judged: JudgedTable| {
-            table(judged.corner, judged.heads.into_iter(), judged.rows.into_iter())
-        };
+        let of = |judged: JudgedTable| table(judged.corner, judged.heads.into_iter(), judged.rows.into_iter());
         self.judged_tables().into_iter().map(of).collect::<Vec<_>>().join("\n")
     }
 
