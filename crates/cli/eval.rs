@@ -22,8 +22,9 @@ use crate::{Global, Outcome, print};
 /// Arguments of `skysweep eval`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Surface model to evaluate, on any grid, or the folder of a run of skysweep dsm; or a mesh, city model or cloud (OBJ, PLY, CityJSON,
-    /// CityGML, LAS, LAZ) if REF is one, too; or a map of depths, normals or a mask (.npy).
+    /// Surface model to evaluate, on any grid, or the folder of a run of skysweep dsm; or a mesh,
+    /// city model or cloud (OBJ, PLY, CityJSON, CityGML, LAS, LAZ) if REF is one, too; or a map of
+    /// depths, normals or a mask (.npy).
     test: PathBuf,
     /// Reference of the same kind. For a grid it may also be a LAS or LAZ cloud; errors are then
     /// measured at its cells.

@@ -31,8 +31,8 @@ const SHOWN: usize = 20;
 pub(crate) struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Height map or surface model (raster, or the folder of a run of skysweep dsm), or city model (CityJSON, CityGML, OBJ, PLY), on a map
-    /// in metres.
+    /// Height map or surface model (raster, or the folder of a run of skysweep dsm), or city model
+    /// (CityJSON, CityGML, OBJ, PLY), on a map in metres.
     #[arg(required = true, value_name = "SURFACE")]
     surface: Option<PathBuf>,
     /// Folder to write.

@@ -39,8 +39,8 @@ const SHOWN: usize = 20;
 pub(crate) struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Surface model (raster, or the folder of a run of skysweep dsm), city model (CityJSON, CityGML, OBJ, PLY) or point cloud (LAS, LAZ,
-    /// COPC).
+    /// Surface model (raster, or the folder of a run of skysweep dsm), city model (CityJSON,
+    /// CityGML, OBJ, PLY) or point cloud (LAS, LAZ, COPC).
     #[arg(required = true, value_name = "SOURCE")]
     source: Option<PathBuf>,
     /// GeoTIFF to write; with --positions the folder for the maps.

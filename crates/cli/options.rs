@@ -85,8 +85,8 @@ pub(crate) fn grouped(command: Command) -> Command {
     })
 }
 
-/// Replaces the spellings of GDAL's users by ours, where the command has the option. `-tr` takes one
-/// size or two equal ones.
+/// Replaces the spellings of GDAL's users by ours, where the command has the option. `-tr` takes
+/// one size or two equal ones.
 pub(crate) fn without_gdal_spellings(arguments: impl Iterator<Item = OsString>, root: &Command) -> Vec<OsString> {
     let mut arguments: Vec<OsString> = arguments.collect();
     let name = arguments.iter().skip(1).find(|argument| !argument.to_string_lossy().starts_with('-'));

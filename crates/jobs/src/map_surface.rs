@@ -59,7 +59,8 @@ pub enum MapSurfaceError {
     },
 }
 
-/// Reads a surface model, or that of the folder of a DSM run; `stated` overrides the vertical datum that the file names.
+/// Reads a surface model, or that of the folder of a DSM run; `stated` overrides the vertical datum
+/// that the file names.
 ///
 /// # Errors
 /// [`MapSurfaceError`] if the raster cannot be read or does not lie on a projected map in metres.

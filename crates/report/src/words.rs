@@ -23,8 +23,8 @@ pub fn plain_number(value: f64) -> String {
     if short == "-0" { "0".to_owned() } else { short.to_owned() }
 }
 
-/// Sets the numbers of a text as a page shows them: a hyphen before a number becomes a minus sign, a
-/// zero has no sign, and a lone hyphen becomes a dash. Hyphens inside words and names stay.
+/// Sets the numbers of a text as a page shows them: a hyphen before a number becomes a minus sign,
+/// a zero has no sign, and a lone hyphen becomes a dash. Hyphens inside words and names stay.
 pub(crate) fn typeset(text: &str) -> String {
     if text == "-" {
         return "–".to_owned();

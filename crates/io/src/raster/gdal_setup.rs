@@ -64,7 +64,8 @@ pub(crate) fn with_gdal<T>(call: impl FnOnce() -> Result<T, GdalError>) -> Resul
 ///
 /// # Errors
 /// [`RasterError::NotLocal`] for a name on a network; [`RasterError::Unreadable`] for a file that
-/// cannot be opened; [`RasterError::Folder`] for a folder that is no raster; [`RasterError::NotAFile`] for a device or a pipe, also one that a VRT names;
+/// cannot be opened; [`RasterError::Folder`] for a folder that is no raster;
+/// [`RasterError::NotAFile`] for a device or a pipe, also one that a VRT names;
 /// [`RasterError::NotARaster`] for a file in no format that GDAL may read.
 pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
     tracing::debug!("opens {}", path.display());

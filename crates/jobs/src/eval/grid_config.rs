@@ -32,7 +32,8 @@ pub enum EvalTarget {
 pub struct GridEvalConfig {
     /// Surface model to evaluate, on any grid, or the folder of a DSM run.
     pub test: PathBuf,
-    /// Surface model that is believed, the folder of a DSM run, or a LAS or LAZ cloud. Errors are measured at its cells.
+    /// Surface model that is believed, the folder of a DSM run, or a LAS or LAZ cloud. Errors are
+    /// measured at its cells.
     pub reference: PathBuf,
     /// What is removed before the comparison.
     pub alignment: AlignmentMethod,

@@ -12,8 +12,8 @@ use super::dataset::Dataset;
 use super::labels::colour;
 use crate::files::{self, FileError};
 
-/// Writes the kept points as a COLMAP model and as PLY, and with extras as text, as a second PLY and
-/// as splats.
+/// Writes the kept points as a COLMAP model and as PLY, and with extras as text, as a second PLY
+/// and as splats.
 pub(super) fn write(dataset: &Dataset<'_>, folder: &Path) -> Result<(), FileError> {
     let kept = kept(dataset);
     let sparse = folder.join("sparse/0");
