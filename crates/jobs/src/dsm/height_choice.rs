@@ -52,10 +52,10 @@ pub(crate) fn choose_heights(
         );
         (with_margins(seen), reason)
     };
-    // A range that was given is printed as it was given.
+    // A range that was given is printed as it was given, unless it is extended to the tie points.
     let value = match config.height_range_m {
-        Some(_) => format!("{} to {} m", plain_number(range.low_m), plain_number(range.high_m)),
-        None => format!("{:.1} to {:.1} m", range.low_m, range.high_m),
+        Some(given) if given == range => format!("{} to {} m", plain_number(range.low_m), plain_number(range.high_m)),
+        _ => format!("{:.1} to {:.1} m", range.low_m, range.high_m),
     };
     notes.choose("height range", value, reason);
     Ok(range)
