@@ -165,8 +165,11 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
             with_hint(error, hint)
         })?;
     args.show.print(global, &report, || summary(args, &report))?;
-    let is_whole = report.chunks.as_ref().is_none_or(|c| c.failed.is_empty());
-    Ok(if is_whole { Outcome::Complete } else { Outcome::Partial })
+    let failed = report.chunks.as_ref().map_or(0, |chunks| chunks.failed.len());
+    if failed > 0 {
+        tracing::error!("chunks that could not be computed, whose cells are void: {failed}; the report names them");
+    }
+    Ok(if failed == 0 { Outcome::Complete } else { Outcome::Partial })
 }
 
 /// Returns the options that help against an error.

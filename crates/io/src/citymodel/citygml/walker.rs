@@ -198,7 +198,8 @@ impl Walker {
     }
 
     /// Returns whether an element is an attribute or an address of the object that it is a child
-    /// of. Appearances and attributes of surfaces are counted, because the model does not hold them.
+    /// of. Appearances and attributes of surfaces are counted, because the model does not hold
+    /// them.
     fn is_attribute(&mut self, name: &str) -> bool {
         let in_object = self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Object { .. }));
         if in_object && name.starts_with("appearance") {
