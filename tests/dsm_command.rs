@@ -152,11 +152,11 @@ fn too_few_images_and_the_same_image_twice_are_refused() {
 }
 
 #[test]
-fn copies_of_one_image_have_no_parallax() {
+fn copies_of_one_image_are_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let (copy, out) = (folder.path().join("copy.tif"), folder.path().join("out"));
     std::fs::copy(town("view_1.tif"), &copy).unwrap();
-    refused_beside_a_view(&copy, &out, "no parallax");
+    refused_beside_a_view(&copy, &out, "the same image is given twice");
 }
 
 #[test]
@@ -336,9 +336,40 @@ fn progress_tells_the_end_and_verbose_the_stages() {
     let last = |text: &str| -> Value {
         serde_json::from_str(text.lines().rfind(|line| line.starts_with('{')).unwrap()).unwrap()
     };
-    assert_eq!(last(&run(&["--progress", "json"]))["event"], "done");
-    assert_eq!(last(&run(&["--progress", "json"]))["event"], "error", "the results exist");
+    for (event, why) in [("done", "the folder is new"), ("error", "the results exist")] {
+        let told = last(&run(&["--progress", "json"]));
+        assert_eq!((told["event"].as_str(), told["output"].as_str()), (Some(event), out.to_str()), "{why}: {told}");
+    }
     let verbose = run(&["--progress", "none", "--overwrite", "-v"]);
     assert!(verbose.contains("sweeping heights") && verbose.contains(" s\n"), "{verbose}");
+    assert!(!verbose.contains("dsm.tif"));
+    let most = run(&["--progress", "none", "--overwrite", "-vv"]);
+    assert!(most.contains("sweeping heights") && most.contains("writes ") && most.contains("dsm.tif"), "{most}");
     assert!(!run(&["--progress", "none", "--overwrite"]).contains("sweeping heights"));
+}
+
+/// What is given is printed as it was given, under our names or GDAL's.
+#[test]
+fn given_values_are_printed_exactly() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |name: &str, options: &[&str]| {
+        let mut command = skysweep();
+        command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(folder.path().join(name));
+        let output = command.args(["--preset", "fast", "--progress", "none"]).args(options).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let heights = ["--height-range", "163.125", "268.0625"];
+    let area = ["693800.3", "4822300.75", "693920.3", "4822420.75"];
+    let ours = run("ours", &[&heights[..], &["--gsd", "1.25", "--crs", "EPSG:32631", "--bounds"], &area].concat());
+    assert!(ours.contains(" m (given 163.125 to 268.0625 m, tie points"), "{ours}");
+    let bounds = io::raster::read_dem(folder.path().join("ours/dsm/dsm.tif")).unwrap();
+    let corner = bounds.geotransform.map_from_cell(-0.5, bounds.heights.height() as f64 - 0.5);
+    let printed = ours.lines().find_map(|line| line.strip_prefix("bounds        [")).unwrap();
+    let printed: Vec<f64> =
+        printed.split(']').next().unwrap().split(", ").map(|value| value.parse().unwrap()).collect();
+    assert!((printed[0] - corner.0).abs() < 1e-6 && (printed[1] - corner.1).abs() < 1e-6, "{ours} {corner:?}");
+    let gdal = run("gdal", &[&heights[..], &["-tr", "1.25", "-1.25", "-t_srs=EPSG:32631", "-te"], &area].concat());
+    assert_eq!(ours.lines().filter(|l| l.contains("(given")).count(), 4);
+    assert!(ours.lines().filter(|l| l.contains("(given")).all(|line| gdal.contains(line)), "{gdal}");
 }

@@ -411,3 +411,27 @@ fn the_lidar_truth_is_brought_back_too() {
     assert!(found.to_string().contains("the class raster has no georeference"));
     assert!(found.pointer("/classes/6/mae").is_some());
 }
+
+/// The folder of a run stands for its surface model, here as in the other commands.
+#[test]
+fn the_folder_of_a_run_is_its_surface_model() {
+    let folder = TempDir::new().unwrap();
+    let reference = reference(&folder, VerticalDatum::Ellipsoid);
+    let run = folder.path().join("run");
+    std::fs::create_dir_all(run.join("dsm")).unwrap();
+    std::fs::copy(&reference, run.join("dsm/dsm.tif")).unwrap();
+    let report = json(&["--no-report", "--align", "none"], &run, &reference);
+    assert_eq!(number(&report, "/metrics/mae"), 0.0);
+    let report = json(&["--no-report", "--align", "none"], &reference, &run);
+    assert_eq!(number(&report, "/metrics/mae"), 0.0);
+    // -v says what is done, -vv which files are read.
+    let told = |option: &str| {
+        let output = skysweep(&["--no-report", option], &run, &reference).success().get_output().stderr.clone();
+        String::from_utf8(output).unwrap()
+    };
+    assert!(told("-v").contains("evaluation") && !told("-v").contains("dsm.tif"), "{}", told("-v"));
+    assert!(told("-vv").contains("dsm/dsm.tif"), "{}", told("-vv"));
+    skysweep(&[], folder.path(), &reference)
+        .code(2)
+        .stderr(contains("a folder is given").and(contains("reference.tif")));
+}

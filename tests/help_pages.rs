@@ -25,3 +25,116 @@ fn manual_pages_describe_a_command_and_its_subcommands() {
     let told = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
     assert!(told.contains("'nothing'") && told.contains("dsm"), "{told}");
 }
+
+/// Commands with options, as words of the command line.
+const COMMANDS: [&[&str]; 20] = [
+    &["align"],
+    &["city", "info"],
+    &["city", "convert"],
+    &["dsm"],
+    &["eval"],
+    &["groundview"],
+    &["groundview", "compose"],
+    &["heightmap"],
+    &["heightmap", "unproject"],
+    &["ortho"],
+    &["priors"],
+    &["rpc", "info"],
+    &["rpc", "project"],
+    &["rpc", "localize"],
+    &["rpc", "convert"],
+    &["simulate"],
+    &["splats"],
+    &["splats", "render"],
+    &["split"],
+    &["completions"],
+];
+
+/// Options of a help page: their group, their first line, and their text.
+fn options_of(command: &[&str]) -> Vec<(String, String, String)> {
+    let (mut group, mut found) = (String::new(), Vec::new());
+    for line in output_of(&[command, &["--help"]].concat()).lines() {
+        let text = line.trim().to_owned();
+        if !line.starts_with(' ') && line.ends_with(':') {
+            group = text;
+        } else if line.starts_with("  ")
+            && text.starts_with('-')
+            && text.contains("--")
+            && !line.starts_with("        ")
+        {
+            found.push((group.clone(), text, String::new()));
+        } else if let Some((_, _, about)) = found.last_mut() {
+            *about += &text;
+            *about += " ";
+        }
+    }
+    found
+}
+
+/// Who reads only the usage line knows the unit.
+#[test]
+fn lengths_name_metres_in_their_values() {
+    let mut seen = 0;
+    for command in COMMANDS {
+        for (_, option, about) in options_of(command) {
+            let is_length = about.to_lowercase().contains("metres") && option.contains('<');
+            let other = ["X_MIN", "LO", "DATUM", "CRS", "FILE", "OUT", "auto|S|none"];
+            if is_length && !other.iter().any(|name| option.contains(name)) && !option.contains("<PX/M>") {
+                assert!(option.contains("<METRES>"), "{command:?}: {option}: {about}");
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen > 20, "{seen}");
+}
+
+/// `--crs` and `--vertical` say what is written. What is known of an input names the input.
+#[test]
+fn one_option_has_one_meaning() {
+    let with = |name: &str| -> Vec<String> {
+        let has = |command: &&&[&str]| {
+            options_of(command).iter().any(|(_, option, _)| option.split_whitespace().any(|word| word == name))
+        };
+        COMMANDS.iter().filter(has).map(|command| command.join(" ")).collect()
+    };
+    assert_eq!(with("--vertical"), ["dsm"]);
+    assert_eq!(with("--crs"), ["align", "dsm", "heightmap"]);
+    assert_eq!(with("--dsm-vertical"), ["ortho", "splats"]);
+    for (command, old) in [("splats", "--vertical"), ("groundview", "--vertical"), ("align", "--vertical")] {
+        let told = Command::cargo_bin("skysweep").unwrap().args([command, old, "none"]).assert().code(2);
+        let told = String::from_utf8_lossy(&told.get_output().stderr).into_owned();
+        assert!(told.contains("invalid value"), "the old name still works: {told}");
+    }
+}
+
+#[test]
+fn options_are_in_groups() {
+    let group = |command: &[&str], name: &str| {
+        let found = options_of(command).into_iter().find(|(_, option, _)| option.contains(name));
+        found.unwrap_or_else(|| panic!("{command:?} has no {name}")).0
+    };
+    for command in COMMANDS {
+        assert_eq!([group(command, "--quiet"), group(command, "--verbose")], ["Messages:", "Messages:"]);
+    }
+    for command in [&["dsm"][..], &["ortho"], &["splats", "render"]] {
+        assert_eq!(group(command, "--overwrite"), "Output:");
+    }
+    assert_eq!(group(&["dsm"], "--memory"), "Run:");
+    assert_eq!(group(&["eval"], "--max-mae"), "Requirements (exit code 1 when missed):");
+    assert_eq!(group(&["eval"], "--voxel"), "Surfaces (meshes, city models, clouds):");
+}
+
+/// The cells of our grids are square.
+#[test]
+fn sizes_of_gdal_must_be_equal() {
+    let refused = |arguments: &[&str]| {
+        let told = Command::cargo_bin("skysweep").unwrap().args(arguments).assert().code(2);
+        String::from_utf8_lossy(&told.get_output().stderr).into_owned()
+    };
+    let inputs = ["ortho", "none.tif", "--dsm", "none.tif", "-o", "never.tif"];
+    let told = refused(&[&inputs[..], &["-tr", "0.5", "0.25"]].concat());
+    assert!(told.contains("square") && told.contains("-tr"), "{told}");
+    assert!(refused(&[&inputs[..], &["-tr", "0.5", "0.5"]].concat()).contains("none.tif"));
+    // A command without the option does not know GDAL's name for it either.
+    assert!(refused(&["split", "model", "-t_srs", "EPSG:32631"]).contains("unexpected argument '-t'"));
+}

@@ -105,7 +105,7 @@ fn ply_header(path: &Path) -> String {
 #[test]
 fn a_whole_dataset() {
     let bench = Bench::new();
-    let told = bench.run(&[&OFFSET[..], &["-o", "out", "--json", "--geotiff"]].concat()).code(0);
+    let told = bench.run(&[&OFFSET[..], &["-o", "out", "--json", "--geotiff", "--extras"]].concat()).code(0);
     let report: Value = serde_json::from_slice(&told.get_output().stdout).unwrap();
     assert_eq!(report, bench.json("out/report.json"));
     let kept = report["kept"].as_u64().unwrap() as usize;
@@ -178,6 +178,24 @@ fn a_whole_dataset() {
     assert!(!bench.path("out/.skysweep-partial").exists());
 }
 
+/// Each point is written once, and its size is said before the work and after it.
+#[test]
+fn a_dataset_is_compact_unless_more_is_asked_for() {
+    let bench = Bench::new();
+    let told = bench.run(&[&OFFSET[..], &["-o", "out"]].concat()).code(0);
+    let (before, after) = (&told.get_output().stderr, &told.get_output().stdout);
+    let (before, after) = (String::from_utf8_lossy(before), String::from_utf8_lossy(after));
+    let size = before.lines().find(|line| line.starts_with("size ")).unwrap_or_else(|| panic!("{before}"));
+    assert!(size.contains("at most ") && size.contains(" MB (the maps of 4 views and up to 2000 points)"), "{size}");
+    assert!(after.contains("or more of 4 views\nwritten    ") && after.contains(" MB)"), "{after}");
+    for file in ["sparse/0/points3D.bin", "sparse/0/images.bin", "sparse/0/points3D.ply", "raw_normal/view_1.npy"] {
+        assert!(bench.path("out").join(file).is_file(), "{file}");
+    }
+    for file in ["sparse/0/points3D.txt", "points3D.ply", "splats"] {
+        assert!(!bench.path("out").join(file).exists(), "{file}");
+    }
+}
+
 #[test]
 fn threads_change_nothing_and_overwrite_replaces() {
     let bench = Bench::new();
@@ -192,8 +210,8 @@ fn threads_change_nothing_and_overwrite_replaces() {
         let base = ["-o", out, "--threads", threads, "--spacing", "poisson"];
         bench.run(&[&OFFSET[..], &base, more].concat())
     };
-    go("one", "1", &[]).code(0);
-    go("four", "4", &[]).code(0);
+    go("one", "1", &["--extras"]).code(0);
+    go("four", "4", &["--extras"]).code(0);
     for file in files {
         let read = |out: &str| std::fs::read(bench.path(out).join(file)).unwrap();
         assert!(read("one") == read("four"), "{file}");
@@ -273,7 +291,7 @@ fn lenses_that_trainers_get_wrong_are_refused() {
     with(lens(LensModel::Pinhole, [60.0, 23.5], &[]));
     bench.refused(&["--recrop"], "less than half");
     with(lens(LensModel::SimplePinhole, [31.5, 23.5], &[]));
-    bench.run(&[&OFFSET[..], &["-o", "simple"]].concat()).code(0);
+    bench.run(&[&OFFSET[..], &["-o", "simple", "--extras"]].concat()).code(0);
     let text = std::fs::read_to_string(bench.path("simple/sparse/0/cameras.txt")).unwrap();
     assert!(text.contains("1 PINHOLE 64 48 50.0 50.0 32.0 24.0"), "{text}");
 }
@@ -346,7 +364,7 @@ fn lost_objects_are_told_by_the_exit_code() {
     std::fs::write(bench.path("house.city.json"), MODEL.replace("BROKEN", BROKEN)).unwrap();
     bench.run(&[&OFFSET[..], &["-o", "out"]].concat()).code(1);
     let notes = bench.json("out/report.json")["notes"].to_string();
-    assert!(notes.contains("1 objects of the model could not be used"), "{notes}");
+    assert!(notes.contains("1 object of the model could not be used"), "{notes}");
 }
 
 #[test]

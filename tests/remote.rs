@@ -85,3 +85,38 @@ fn addresses_are_read_only_when_the_user_says_so() {
     }
     assert!(asked.lock().unwrap().iter().all(|name| name != "/secret.tif"), "{asked:?}");
 }
+
+/// An image with its RPC inside is an image at an address, too. Files beside it are not fetched.
+#[test]
+fn images_at_addresses_bring_their_rpc() {
+    let names = ["view_1.tif", "view_2.tif"];
+    let mut files: Vec<(&'static str, Vec<u8>)> = vec![
+        ("/view_1.tif", std::fs::read(sample(names[0])).unwrap()),
+        ("/view_2.tif", std::fs::read(sample(names[1])).unwrap()),
+    ];
+    files.push(("/plain.tif", std::fs::read(sample("truth/ortho.tif")).unwrap()));
+    let (port, asked) = server(files);
+    let url = |name: &str| format!("http://127.0.0.1:{port}/{name}");
+    let folder = tempfile::tempdir().unwrap();
+    let dsm = |out: &str, images: [&str; 2], more: &[&str]| {
+        let mut command = skysweep();
+        command.arg("dsm").args(images.map(url)).arg("-o").arg(folder.path().join(out));
+        command.args(["--preset", "fast", "--gsd", "2", "--progress", "none"]).args(more).assert()
+    };
+    dsm("closed", names, &[]).code(2).stderr(contains("--allow-remote"));
+    assert!(asked.lock().unwrap().is_empty(), "nothing is asked for without leave");
+    dsm("open", names, &["--allow-remote"]).code(0);
+    let mut local = skysweep();
+    local.arg("dsm").args(names.map(sample)).arg("-o").arg(folder.path().join("local"));
+    local.args(["--preset", "fast", "--gsd", "2", "--progress", "none"]).assert().code(0);
+    let surface = |out: &str| common::band(&folder.path().join(out).join("dsm/dsm.tif"), 1);
+    // GDAL prints the RPC with 15 digits, and the file at hand has the numbers themselves.
+    let (open, local) = (surface("open"), surface("local"));
+    let differs = |(a, b): (&f32, &f32)| a.is_nan() != b.is_nan() || (a - b).abs() > 0.01;
+    let different = open.data().iter().zip(local.data()).filter(|cells| differs(*cells)).count();
+    assert!(different * 1000 < local.data().len(), "{different} cells differ");
+    let told = dsm("bare", ["view_1.tif", "plain.tif"], &["--allow-remote"]).code(2);
+    told.stderr(contains("files beside an address are not fetched"));
+    let known = ["/view_1.tif", "/view_2.tif", "/plain.tif"];
+    assert!(asked.lock().unwrap().iter().all(|name| known.contains(&name.as_str())), "{:?}", asked.lock().unwrap());
+}

@@ -53,6 +53,32 @@ fn a_simulation_is_written_whole_and_the_same_each_time() {
     assert!(record["views"][0]["rpc_fit_error_px"].as_f64().unwrap() < 1e-3);
 }
 
+/// A folder holds one scene: nothing is left of a larger one.
+#[test]
+fn overwriting_leaves_nothing_of_an_earlier_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene");
+    let simulate = |more: &[&str]| {
+        let arguments = SMALL.iter().take(if more.contains(&"--views") { 6 } else { 8 });
+        let text =
+            skysweep().args(arguments).args(more).arg("-o").arg(&scene).args(["--progress", "none"]).assert().code(0);
+        String::from_utf8(text.get_output().stdout.clone()).unwrap()
+    };
+    let told = simulate(&["--views", "4", "--flight", "3"][..]);
+    assert!(told.contains("4 views") && told.contains(scene.to_str().unwrap()), "{told}");
+    std::fs::write(scene.join("view_mine.tif"), b"mine").unwrap();
+    for name in ["view_4.tif", "truth/heights_3.tif", "cameras/sparse/0/images.txt"] {
+        assert!(scene.join(name).is_file(), "{name}");
+    }
+    simulate(&["--overwrite"]);
+    for name in
+        ["view_3.tif", "view_4.tif", "truth/heights_3.tif", "truth/heights_4.tif", "cameras/sparse/0/images.txt"]
+    {
+        assert!(!scene.join(name).exists(), "{name}");
+    }
+    assert!(FILES.iter().all(|name| scene.join(name).is_file()) && scene.join("view_mine.tif").is_file());
+}
+
 #[test]
 fn the_buildings_come_as_a_city_model_of_level_2() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,11 +3,13 @@
 
 use std::path::PathBuf;
 
-use colmap::align::{AlignConfig, Disturbance, NoiseConfig, NoiseLevel};
-use crs::VerticalDatum;
+use anyhow::ensure;
+use colmap::align::{AlignConfig, NoiseConfig};
+use crs::{CrsRequest, VerticalDatum};
 use io::colmap::ColmapEncoding;
 use jobs::align::{AlignJobConfig, AlignJobError, AlignJobReport};
 
+use crate::corrections::code_of;
 use crate::error::with_hint;
 use crate::progress::Log;
 use crate::{Global, Outcome, print};
@@ -30,11 +32,11 @@ pub(crate) struct Args {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Projected EPSG code of the world [default: the UTM zone of the positions].
-    #[arg(long, value_name = "EPSG")]
-    crs: Option<u32>,
+    #[arg(long, value_name = "CRS")]
+    crs: Option<CrsRequest>,
     /// What the heights of the positions are above: ellipsoid, egm96, egm2008 or an EPSG code.
-    #[arg(long, value_name = "DATUM", default_value = "ellipsoid")]
-    vertical: VerticalDatum,
+    #[arg(long, value_name = "DATUM", default_value = "ellipsoid", alias = "vertical")]
+    positions_vertical: VerticalDatum,
     /// Largest residual of an inlier, metres [default: estimated from the residuals].
     #[arg(long, value_name = "METRES")]
     threshold: Option<f64>,
@@ -96,7 +98,7 @@ struct NoiseArgs {
 
 /// Runs `skysweep align`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let report = jobs::align::run(&config(args), &Log).map_err(|error| {
+    let report = jobs::align::run(&config(args)?, &Log).map_err(|error| {
         let hint = match &error {
             AlignJobError::Threshold { .. } => Some("give --threshold a number of metres above 0"),
             AlignJobError::UnknownMap => Some("give the map of the positions with --crs"),
@@ -108,15 +110,17 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if args.json {
         print::json(&report)?;
     } else if !global.is_quiet() {
-        print::text(&summary(args, &report))?;
+        print::text(&report.text(&args.output))?;
     }
     Ok(outcome(args, &report))
 }
 
-fn config(args: &Args) -> AlignJobConfig {
+fn config(args: &Args) -> anyhow::Result<AlignJobConfig> {
     let mut config = AlignJobConfig::new(args.model.clone(), args.positions.clone(), args.output.clone());
-    config.crs_epsg = args.crs;
-    config.vertical = args.vertical;
+    let (code, datum) = code_of(args.crs, "--crs")?;
+    ensure!(datum.is_none(), "--crs takes a code without one of heights; --positions-vertical names their datum");
+    config.crs_epsg = code;
+    config.vertical = args.positions_vertical;
     config.threshold_m = args.threshold;
     config.seed = args.seed;
     config.encoding = args.encoding.into();
@@ -127,32 +131,7 @@ fn config(args: &Args) -> AlignJobConfig {
     });
     config.noise_output.clone_from(&args.noise.noise_output);
     config.overwrite = args.overwrite;
-    config
-}
-
-fn summary(args: &Args, report: &AlignJobReport) -> String {
-    let mut text = format!(
-        "positions  {} of {} agree within {:.3} m, RMSE {:.3} m\nscale      {:.6} m per unit of the model\n",
-        report.inliers, report.pairs, report.threshold_m, report.rmse_m, report.world_from_model.scale,
-    );
-    text += &report.noise.iter().map(noise_line).collect::<String>();
-    text + &format!("written    {}\n", args.output.display())
-}
-
-fn noise_line(level: &NoiseLevel) -> String {
-    let name = match level.disturbance {
-        Disturbance::TranslationM(m) => format!("{m} m"),
-        Disturbance::RotationDeg(deg) => format!("{deg}°"),
-    };
-    format!(
-        "noise      {name:>6}: cameras off by {:.2} ± {:.2} m, turned by {:.2} ± {:.2}°, scale by {:.2} ± {:.2} %\n",
-        level.position_m.mean,
-        level.position_m.std,
-        level.rotation_deg.mean,
-        level.rotation_deg.std,
-        level.scale_percent.mean,
-        level.scale_percent.std
-    )
+    Ok(config)
 }
 
 /// Whether a requested threshold was missed.

@@ -4,11 +4,9 @@
 //! surfaces that the reader had to leave out. The report names every object of the file, used or
 //! not, with the reason.
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use city::{CrsReference, Lod};
+use city::Lod;
 use clap::ValueEnum;
 use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityJobError, CityOutputFormat, CitySummary};
 
@@ -100,7 +98,7 @@ fn info(args: &InfoArgs) -> anyhow::Result<Outcome> {
     if args.json {
         print::json(&summary)?;
     } else {
-        print::text(&summary_text(&summary))?;
+        print::text(&summary.text())?;
     }
     Ok(outcome(&summary))
 }
@@ -146,40 +144,4 @@ fn tell(summary: &CitySummary) {
 
 fn outcome(summary: &CitySummary) -> Outcome {
     if summary.incomplete { Outcome::Partial } else { Outcome::Complete }
-}
-
-fn summary_text(summary: &CitySummary) -> String {
-    let mut text = format!("{}: {}\n", summary.source, summary.format);
-    let mut row = |name: &str, value: String| {
-        // Writing to a string does not fail.
-        let _ = writeln!(text, "  {name:<18}{value}");
-    };
-    let (name, epsg, vertical_epsg) = (summary.crs.name.clone(), summary.crs.epsg, summary.crs.vertical_epsg);
-    let shown_name = name.as_ref().filter(|_| epsg.is_some()).map(|name| format!(" ({name})")).unwrap_or_default();
-    row("reference system", format!("{}{shown_name}", CrsReference { name, epsg, vertical_epsg }));
-    match summary.bounds {
-        Some([low, high]) => {
-            row("from", format!("{:.3} {:.3} {:.3}", low[0], low[1], low[2]));
-            row("to", format!("{:.3} {:.3} {:.3}", high[0], high[1], high[2]));
-        }
-        None => row("extent", "no surfaces".to_owned()),
-    }
-    row("objects", format!("{} ({})", summary.objects, listed(&summary.statuses)));
-    row("levels of detail", format!("{}; used: {}", listed(&summary.lods), listed(&summary.lods_used)));
-    row("triangles", format!("{} ({})", summary.triangles, listed(&summary.triangles_by_class)));
-    if !summary.left_out.is_empty() {
-        row("left out", listed(&summary.left_out));
-    }
-    row("defects", if summary.defects.is_empty() { "none".to_owned() } else { String::new() });
-    for defect in &summary.defects {
-        row("", format!("{} × {} ({}), {}", defect.count, defect.code, defect.meaning, defect.effect));
-    }
-    text
-}
-
-fn listed(counts: &BTreeMap<String, usize>) -> String {
-    if counts.is_empty() {
-        return "none".to_owned();
-    }
-    counts.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join(", ")
 }

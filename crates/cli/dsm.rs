@@ -46,7 +46,7 @@ pub(crate) struct Args {
     /// the images decide.
     #[arg(long, value_name = "MODEL")]
     prior: Option<PathBuf>,
-    /// What the DSM's heights are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
+    /// What the heights of the DSM are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
     /// Speed against accuracy.
@@ -159,13 +159,17 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let report = args.show.watch(global, |watcher| jobs::dsm::run(&args.config(), watcher)).map_err(|error| {
-        let hint = hint(&error);
-        with_hint(error, hint)
-    })?;
+    let report =
+        args.show.watch(global, &args.output, |watcher| jobs::dsm::run(&args.config(), watcher)).map_err(|error| {
+            let hint = hint(&error);
+            with_hint(error, hint)
+        })?;
     args.show.print(global, &report, || summary(args, &report))?;
-    let is_whole = report.chunks.as_ref().is_none_or(|c| c.failed.is_empty());
-    Ok(if is_whole { Outcome::Complete } else { Outcome::Partial })
+    let failed = report.chunks.as_ref().map_or(0, |chunks| chunks.failed.len());
+    if failed > 0 {
+        tracing::error!("chunks that could not be computed, whose cells are void: {failed}; the report names them");
+    }
+    Ok(if failed == 0 { Outcome::Complete } else { Outcome::Partial })
 }
 
 /// Returns the options that help against an error.

@@ -22,8 +22,9 @@ use crate::{Global, Outcome, print};
 /// Arguments of `skysweep eval`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Surface model to evaluate, on any grid; or a mesh, city model or cloud (OBJ, PLY, CityJSON,
-    /// CityGML, LAS, LAZ) if REF is one, too; or a map of depths, normals or a mask (.npy).
+    /// Surface model to evaluate, on any grid, or the folder of a run of skysweep dsm; or a mesh,
+    /// city model or cloud (OBJ, PLY, CityJSON, CityGML, LAS, LAZ) if REF is one, too; or a map of
+    /// depths, normals or a mask (.npy).
     test: PathBuf,
     /// Reference of the same kind. For a grid it may also be a LAS or LAZ cloud; errors are then
     /// measured at its cells.
@@ -92,8 +93,6 @@ pub(crate) struct Args {
     /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
-    #[command(flatten)]
-    surface: SurfaceArgs,
     /// The files are maps of this kind in the pixels of one camera [default: found by shape and
     /// type of .npy files].
     #[arg(long, value_enum, value_name = "KIND")]
@@ -106,6 +105,8 @@ pub(crate) struct Args {
     /// names another threshold.
     #[arg(long, value_name = "[T=]SHARE", value_delimiter = ',')]
     min_completeness: Vec<MinCompleteness>,
+    #[command(flatten)]
+    surface: SurfaceArgs,
 }
 
 /// Options for surfaces that are not grids.

@@ -12,7 +12,7 @@ pub(crate) struct Global {
     /// Print errors only.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub(crate) quiet: bool,
-    /// Print more: -v says what is done, -vv everything.
+    /// Print more: -v the stages with their times, -vv also every file that is opened or written.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     pub(crate) verbose: u8,
 }

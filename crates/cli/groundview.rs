@@ -31,8 +31,8 @@ const SHOWN: usize = 20;
 pub(crate) struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Height map or surface model (raster), or city model (CityJSON, CityGML, OBJ, PLY), on a map
-    /// in metres.
+    /// Height map or surface model (raster, or the folder of a run of skysweep dsm), or city model
+    /// (CityJSON, CityGML, OBJ, PLY), on a map in metres.
     #[arg(required = true, value_name = "SURFACE")]
     surface: Option<PathBuf>,
     /// Folder to write.
@@ -98,8 +98,8 @@ struct MakeArgs {
     points: usize,
     /// Vertical datum of SURFACE, if the file names none or a wrong one: ellipsoid, egm96, egm2008
     /// or EPSG:n.
-    #[arg(long, value_name = "DATUM")]
-    vertical: Option<VerticalDatum>,
+    #[arg(long, value_name = "DATUM", alias = "vertical")]
+    surface_vertical: Option<VerticalDatum>,
     #[command(flatten)]
     run: RunOptions,
 }
@@ -115,7 +115,8 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 fn make(args: &MakeArgs, surface: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, surface, output)?;
-    let report = args.run.show.watch(global, |watcher| jobs::groundview::run(&config, watcher)).map_err(hinted)?;
+    let report =
+        args.run.show.watch(global, output, |watcher| jobs::groundview::run(&config, watcher)).map_err(hinted)?;
     report.failed.iter().take(SHOWN).for_each(|failure| tracing::error!("{}: {}", failure.id, failure.reason));
     args.run.show.print(global, &report, || report.text())?;
     Ok(if report.is_complete() { Outcome::Complete } else { Outcome::Partial })
@@ -134,7 +135,7 @@ fn config(args: &MakeArgs, surface: &Path, output: &Path) -> anyhow::Result<Grou
     config.crop_fov_deg = args.fov;
     config.pictures = args.pictures.clone();
     config.points_per_view = args.points;
-    config.surface_vertical = args.vertical;
+    config.surface_vertical = args.surface_vertical;
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     Ok(config)

@@ -18,6 +18,7 @@ use jobs::heightmap::{
     PointAxes, UnprojectConfig,
 };
 
+use crate::corrections::code_of;
 use crate::error::{OVERWRITE, with_hint};
 use crate::progress::{Log, RunOptions};
 use crate::stand::StandArgs;
@@ -38,8 +39,8 @@ const SHOWN: usize = 20;
 pub(crate) struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Surface model (raster), city model (CityJSON, CityGML, OBJ, PLY) or point cloud (LAS, LAZ,
-    /// COPC).
+    /// Surface model (raster, or the folder of a run of skysweep dsm), city model (CityJSON,
+    /// CityGML, OBJ, PLY) or point cloud (LAS, LAZ, COPC).
     #[arg(required = true, value_name = "SOURCE")]
     source: Option<PathBuf>,
     /// GeoTIFF to write; with --positions the folder for the maps.
@@ -171,7 +172,8 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 fn make(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, source, output)?;
-    let report = args.run.show.watch(global, |watcher| jobs::heightmap::run(&config, watcher)).map_err(hinted)?;
+    let report =
+        args.run.show.watch(global, output, |watcher| jobs::heightmap::run(&config, watcher)).map_err(hinted)?;
     let failed = log_failures(&report);
     args.run.show.print(global, &report, || report.text())?;
     Ok(if failed { Outcome::Partial } else { Outcome::Complete })
@@ -208,15 +210,9 @@ fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<Heigh
         Interpolation::Bilinear => Reading::Bilinear,
         Interpolation::Cubic => Reading::Cubic,
     };
-    config.source_vertical = args.source_vertical;
-    match args.source_crs {
-        Some(CrsRequest::Epsg { horizontal, vertical }) => {
-            config.source_epsg = Some(horizontal);
-            config.source_vertical = args.source_vertical.or(vertical);
-        }
-        Some(CrsRequest::Auto) => bail!("--source-crs must name a code: EPSG:n"),
-        None => {}
-    }
+    let (epsg, datum) = code_of(args.source_crs, "--source-crs")?;
+    config.source_epsg = epsg;
+    config.source_vertical = args.source_vertical.or(datum);
     config.lod = args.lod;
     config.all_objects = args.all_objects;
     config.previews = if args.stand.positions.is_some() { args.previews } else { !args.no_preview };

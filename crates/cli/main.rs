@@ -15,6 +15,7 @@ mod global;
 mod groundview;
 mod heightmap;
 mod log;
+mod options;
 mod ortho;
 mod print;
 mod priors;
@@ -27,7 +28,7 @@ mod stand;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::global::{Global, Outcome};
 
@@ -76,7 +77,9 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let command = options::grouped(Cli::command());
+    let arguments = options::without_gdal_spellings(std::env::args_os(), &command);
+    let cli = Cli::from_arg_matches(&command.get_matches_from(arguments)).unwrap_or_else(|error| error.exit());
     log::init(cli.global);
     if cli.global.allow_remote {
         jobs::remote::allow_remote();
@@ -96,13 +99,13 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Align(args) => align::run(args, cli.global),
         Command::City(command) => city::run(command),
-        Command::Completions(args) => completions::completions(args, &mut Cli::command()),
+        Command::Completions(args) => completions::completions(args, &mut options::grouped(Cli::command())),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
         Command::Groundview(args) => groundview::run(args, cli.global),
         Command::Heightmap(args) => heightmap::run(args, cli.global),
         Command::Ortho(args) => ortho::run(args, cli.global),
-        Command::Man(args) => completions::man(args, Cli::command()),
+        Command::Man(args) => completions::man(args, options::grouped(Cli::command())),
         Command::Priors(args) => priors::run(args, cli.global),
         Command::Rpc(command) => rpc::run(command),
         Command::Simulate(args) => simulate::run(args, cli.global),

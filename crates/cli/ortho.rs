@@ -58,7 +58,8 @@ pub(crate) struct Args {
 /// Runs `skysweep ortho`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let show = args.run.show;
-    let report = show.watch(global, |watcher| jobs::ortho::run(&args.config(), watcher)).map_err(hinted)?;
+    let report =
+        show.watch(global, &args.output, |watcher| jobs::ortho::run(&args.config(), watcher)).map_err(hinted)?;
     show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }

@@ -5,14 +5,12 @@
 use std::path::PathBuf;
 
 use ::priors::{Amount, DepthKind, NormalFrame, Spacing as Placement, VisibilityConfig};
-use anyhow::bail;
 use city::Lod;
 use clap::ValueEnum;
 use crs::{CrsRequest, VerticalDatum};
-use jobs::priors::{
-    LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, PriorsMode, PriorsProduct, PriorsTrainer,
-};
+use jobs::priors::{LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, PriorsMode, PriorsTrainer};
 
+use crate::corrections::code_of;
 use crate::error::with_hint;
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
@@ -53,12 +51,12 @@ pub(crate) struct Args {
 
     /// The model's map, where its file does not state it (satellite images): EPSG:n or EPSG:n+m
     /// with the code of the heights.
-    #[arg(long, value_name = "EPSG", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
-    crs: Option<CrsRequest>,
+    #[arg(long, value_name = "CRS", alias = "crs", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
+    model_crs: Option<CrsRequest>,
     /// Vertical datum of the model, where its file does not state it: ellipsoid, egm96, egm2008 or
     /// an EPSG code.
-    #[arg(long, value_name = "DATUM", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
-    vertical: Option<VerticalDatum>,
+    #[arg(long, value_name = "DATUM", alias = "vertical", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
+    model_vertical: Option<VerticalDatum>,
     /// Corrections of the images' pointing: the report of a run of skysweep dsm [default: RPCs as
     /// they are].
     #[arg(long, value_name = "report.json", help_heading = "Satellite images", conflicts_with_all = ["offset", "transform"])]
@@ -133,6 +131,10 @@ pub(crate) struct Args {
     /// The axes of normals.
     #[arg(long, value_enum, default_value_t = Normals::World)]
     normals: Normals,
+    /// Write more forms of the points: the COLMAP model as text, points3D.ply beside sparse, and
+    /// initial splats for 2DGS and 3DGS.
+    #[arg(long, conflicts_with = "maps_only")]
+    extras: bool,
     /// Write the maps as GeoTIFF too.
     #[arg(long)]
     geotiff: bool,
@@ -196,8 +198,8 @@ enum Normals {
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let config = args.config()?;
     let show = args.run.show;
-    let report = show.watch(global, |watcher| jobs::priors::run(&config, watcher)).map_err(hinted)?;
-    show.print(global, &report.product, || summary(args, &report.product))?;
+    let report = show.watch(global, &args.output, |watcher| jobs::priors::run(&config, watcher)).map_err(hinted)?;
+    show.print(global, &report.product, || report.text())?;
     Ok(if !report.is_whole() { Outcome::Partial } else { Outcome::Complete })
 }
 
@@ -206,9 +208,9 @@ fn hinted(error: PriorsJobError) -> anyhow::Error {
     let hint = match &error {
         PriorsJobError::Job(error) if error.is_existing_output() => Some("choose another folder or pass --overwrite"),
         PriorsJobError::NothingInSight { .. } => Some("state it with --offset or --transform"),
-        PriorsJobError::NotSatellite => Some("leave out --crs, --vertical and --corrections"),
+        PriorsJobError::NotSatellite => Some("leave out --model-crs, --model-vertical and --corrections"),
         PriorsJobError::NotPerspective => Some("leave out --offset and --transform"),
-        PriorsJobError::MapUnknown { .. } => Some("give --crs EPSG:n"),
+        PriorsJobError::MapUnknown { .. } => Some("give --model-crs EPSG:n"),
         PriorsJobError::NoObject { .. } => Some("skysweep city info names the reasons"),
         PriorsJobError::Offset(_) => Some("it is given by --offset"),
         PriorsJobError::Lens { source, .. } => match source {
@@ -223,40 +225,15 @@ fn hinted(error: PriorsJobError) -> anyhow::Error {
     with_hint(error, hint)
 }
 
-fn summary(args: &Args, product: &PriorsProduct) -> String {
-    let page = args.output.join("report.html").display().to_string();
-    match product {
-        PriorsProduct::Dataset(report) => format!(
-            "points     {} of {} are seen by {} or more of {} views\ndataset    {}\nreport     {page}\n",
-            report.kept,
-            report.samples,
-            report.min_views,
-            report.views.len(),
-            args.output.display(),
-        ),
-        PriorsProduct::SatelliteMaps(report) => {
-            let line = |row: &report::SatelliteRow| {
-                format!("image      {} pixels see a building: {}\n", row.hit_pixels, args.output.display())
-            };
-            report.images.iter().map(line).collect::<String>() + &format!("report     {page}\n")
-        }
-        _ => format!("report     {page}\n"),
-    }
-}
-
 impl Args {
     fn config(&self) -> anyhow::Result<PriorsConfig> {
         let mut config = PriorsConfig::new(self.model.clone(), self.cameras.clone(), self.output.clone());
         config.offset = self.offset.as_deref().and_then(|offset| offset.try_into().ok());
         config.transform.clone_from(&self.transform);
         config.image_size = self.image_size.as_deref().and_then(|size| size.try_into().ok());
-        let (map_epsg, datum) = match self.crs {
-            Some(CrsRequest::Epsg { horizontal, vertical }) => (Some(horizontal), vertical),
-            Some(CrsRequest::Auto) => bail!("--crs must name a code: EPSG:n"),
-            None => (None, None),
-        };
+        let (map_epsg, datum) = code_of(self.model_crs, "--model-crs")?;
         config.map_epsg = map_epsg;
-        config.vertical = self.vertical.or(datum);
+        config.vertical = self.model_vertical.or(datum);
         config.corrections.clone_from(&self.corrections);
         config.mode = match self.mode {
             Mode::BuildingOnly => PriorsMode::BuildingOnly,
@@ -287,6 +264,7 @@ impl Args {
             Normals::World => NormalFrame::World,
             Normals::Camera => NormalFrame::Camera,
         };
+        config.extras = self.extras;
         config.geotiff = self.geotiff;
         config.previews = self.previews;
         config.threads = self.run.threads.map(|threads| threads.max(1));

@@ -1,11 +1,13 @@
 //! Progress on stderr: bars for people, JSON lines for programs.
 
 use std::io::Write;
+use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use numeric::{Choice, Progress};
+use serde_json::json;
 
 use crate::{Global, print};
 
@@ -32,15 +34,16 @@ pub(crate) struct ShowOptions {
 }
 
 impl ShowOptions {
-    /// Runs a job while its progress is shown.
+    /// Runs a job that writes `output` while its progress is shown.
     pub(crate) fn watch<T, E: std::error::Error>(
         self,
         global: Global,
+        output: &Path,
         job: impl FnOnce(&Watcher) -> Result<T, E>,
     ) -> Result<T, E> {
         let watcher = Watcher::new(self.progress, global);
         let result = job(&watcher);
-        watcher.finish(result.as_ref().err());
+        watcher.finish(output, result.as_ref().err());
         result
     }
 
@@ -88,7 +91,8 @@ impl Watcher {
     pub(crate) fn new(style: ProgressStyle, global: Global) -> Self {
         let quiet = global.is_quiet();
         let bar = ProgressBar::new(0);
-        let shown = style == ProgressStyle::Bar && !quiet;
+        // At -vv the lines of files would tear the bar.
+        let shown = style == ProgressStyle::Bar && !quiet && global.verbose < 2;
         bar.set_draw_target(if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() });
         if let Ok(look) = BarStyle::with_template("{msg:22} {bar:30} {percent:>3} % {eta:>4} left") {
             bar.set_style(look);
@@ -97,13 +101,17 @@ impl Watcher {
         Self { style, quiet, verbose, bar, stage: Mutex::new((String::new(), Instant::now())) }
     }
 
-    /// Ends the bar, and says how the job ended.
-    pub(crate) fn finish(&self, error: Option<&impl std::error::Error>) {
+    /// Ends the bar, and says how the job ended that wrote, or was to write, `output`.
+    fn finish(&self, output: &Path, error: Option<&impl std::error::Error>) {
         self.bar.finish_and_clear();
         self.say_time();
         self.line(&match error {
-            None => serde_json::json!({ "event": "done" }),
-            Some(error) => serde_json::json!({ "event": "error", "text": error.to_string() }),
+            None => json!({ "event": "done", "output": output }),
+            Some(error) => {
+                let causes = std::iter::successors(error.source(), |cause| cause.source()).map(ToString::to_string);
+                let causes = causes.collect::<Vec<_>>();
+                json!({ "event": "error", "text": error.to_string(), "causes": causes, "output": output })
+            }
         });
     }
 
@@ -137,7 +145,7 @@ impl Progress for Watcher {
         if let Ok(mut current) = self.stage.lock() {
             *current = (stage.to_owned(), Instant::now());
         }
-        self.line(&serde_json::json!({ "event": "stage", "stage": stage, "steps": steps }));
+        self.line(&json!({ "event": "stage", "stage": stage, "steps": steps }));
     }
 
     fn step(&self) {
@@ -148,13 +156,15 @@ impl Progress for Watcher {
         self.bar.inc(1);
         if let Ok(current) = self.stage.lock() {
             let seconds = current.1.elapsed().as_secs_f64();
-            self.line(&serde_json::json!({ "event": "step", "stage": current.0, "done": self.bar.position(), "seconds": seconds }));
+            self.line(&json!({ "event": "step", "stage": current.0, "done": self.bar.position(), "seconds": seconds }));
         }
     }
 
     fn choice(&self, choice: &Choice) {
         if self.style == ProgressStyle::Json {
-            self.line(&serde_json::json!({ "event": "choice", "name": choice.name, "value": choice.value, "reason": choice.reason }));
+            self.line(
+                &json!({ "event": "choice", "name": choice.name, "value": choice.value, "reason": choice.reason }),
+            );
         } else if !self.quiet {
             self.say(&format!("{:<13} {} ({})", choice.name, choice.value, choice.reason));
         }
@@ -162,7 +172,7 @@ impl Progress for Watcher {
 
     fn warn(&self, text: &str) {
         if self.style == ProgressStyle::Json {
-            self.line(&serde_json::json!({ "event": "warning", "text": text }));
+            self.line(&json!({ "event": "warning", "text": text }));
         } else if !self.quiet {
             self.say(&format!("warning: {text}"));
         }
@@ -173,7 +183,9 @@ impl Progress for Watcher {
 pub(crate) struct Log;
 
 impl Progress for Log {
-    fn begin(&self, _: &str, _: usize) {}
+    fn begin(&self, stage: &str, _: usize) {
+        tracing::info!("{stage}");
+    }
 
     fn step(&self) {}
 
@@ -182,6 +194,6 @@ impl Progress for Log {
     }
 
     fn warn(&self, text: &str) {
-        tracing::warn!("warning: {text}");
+        tracing::warn!("{text}");
     }
 }

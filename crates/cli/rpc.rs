@@ -4,7 +4,6 @@
 //! A point without an answer gives `nan nan` (in JSON an `error`), a line on standard error, and
 //! exit code 1 at the end.
 
-use std::fmt::Write as _;
 use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 
@@ -13,7 +12,7 @@ use clap::ValueEnum;
 use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
 use jobs::rpc::{
-    RpcConvertConfig, RpcDirection, RpcInfoConfig, RpcInfoReport, RpcJobError, RpcLineAnswer, RpcLinesConfig, RpcPoint,
+    RpcConvertConfig, RpcDirection, RpcInfoConfig, RpcJobError, RpcLineAnswer, RpcLinesConfig, RpcPoint,
     RpcPointsConfig, RpcQuery,
 };
 use serde_json::{Value, json};
@@ -50,13 +49,13 @@ pub(crate) struct ProjectArgs {
     /// RPC file, or image with an RPC.
     file: PathBuf,
     /// Longitude, degrees.
-    #[arg(long, requires_all = ["lat", "height"], allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES", requires_all = ["lat", "height"], allow_negative_numbers = true)]
     lon: Option<f64>,
     /// Latitude, degrees.
-    #[arg(long, requires = "lon", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES", requires = "lon", allow_negative_numbers = true)]
     lat: Option<f64>,
     /// Height above the WGS 84 ellipsoid, metres.
-    #[arg(long, requires = "lon", allow_negative_numbers = true)]
+    #[arg(long, value_name = "METRES", requires = "lon", allow_negative_numbers = true)]
     height: Option<f64>,
     /// File with a point per line: longitude latitude height; - is standard input [default: -].
     #[arg(long, value_name = "FILE", conflicts_with_all = ["lon", "lat", "height"])]
@@ -71,13 +70,13 @@ pub(crate) struct LocalizeArgs {
     /// RPC file, or image with an RPC.
     file: PathBuf,
     /// Column; 0 is the centre of the first.
-    #[arg(long, requires_all = ["line", "height"], allow_negative_numbers = true)]
+    #[arg(long, value_name = "PX", requires_all = ["line", "height"], allow_negative_numbers = true)]
     sample: Option<f64>,
     /// Row; 0 is the centre of the first.
-    #[arg(long, requires = "sample", allow_negative_numbers = true)]
+    #[arg(long, value_name = "PX", requires = "sample", allow_negative_numbers = true)]
     line: Option<f64>,
     /// Height above the WGS 84 ellipsoid, metres.
-    #[arg(long, requires = "sample", allow_negative_numbers = true)]
+    #[arg(long, value_name = "METRES", requires = "sample", allow_negative_numbers = true)]
     height: Option<f64>,
     /// File with a point per line: sample line height; - is standard input [default: -].
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sample", "line", "height"])]
@@ -128,7 +127,7 @@ fn info(args: &InfoArgs) -> anyhow::Result<Outcome> {
     if args.json {
         print::json(&report)?;
     } else {
-        print::text(&info_text(&report))?;
+        print::text(&report.text())?;
     }
     Ok(Outcome::Complete)
 }
@@ -222,41 +221,4 @@ fn point_line(direction: RpcDirection, RpcPoint { ground, image }: &RpcPoint, js
         }
     };
     value.to_string()
-}
-
-fn info_text(info: &RpcInfoReport) -> String {
-    let rpc = &info.rpc;
-    let mut out = String::new();
-    let mut row = |name: &str, value: String| {
-        let _ = writeln!(out, "{name:<12}{value}");
-    };
-    row("file", info.file.clone());
-    row("format", info.format.to_string());
-    if info.source != info.file {
-        row("source", info.source.clone());
-    }
-    for (name, off, scale, unit) in [
-        ("line", rpc.line_off, rpc.line_scale, "px"),
-        ("sample", rpc.samp_off, rpc.samp_scale, "px"),
-        ("latitude", rpc.lat_off, rpc.lat_scale, "deg"),
-        ("longitude", rpc.long_off, rpc.long_scale, "deg"),
-        ("height", rpc.height_off, rpc.height_scale, "m"),
-    ] {
-        row(name, format!("offset {off}, scale {scale} {unit}"));
-    }
-    for (name, error) in [("bias error", rpc.err_bias_m), ("rand error", rpc.err_rand_m)] {
-        if let Some(error) = error {
-            row(name, format!("{error} m"));
-        }
-    }
-    let v = &info.validity;
-    row("valid for", format!("longitude {:.6} to {:.6} deg", v.lon_deg[0], v.lon_deg[1]));
-    row("", format!("latitude {:.6} to {:.6} deg", v.lat_deg[0], v.lat_deg[1]));
-    row("", format!("height {:.1} to {:.1} m above the ellipsoid", v.height_m[0], v.height_m[1]));
-    if let Some(c) = &info.centre {
-        row("centre", format!("sample {:.2}, line {:.2}", c.image.sample, c.image.line));
-        row("GSD", format!("{:.3} m along the sample, {:.3} m along the line", c.gsd_sample_m, c.gsd_line_m));
-        row("view", format!("incidence {:.2} deg, sensor at azimuth {:.1} deg", c.incidence_deg, c.azimuth_deg));
-    }
-    out
 }

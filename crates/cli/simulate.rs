@@ -24,10 +24,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Side of the square area, metres.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "METRES")]
     size: Option<f64>,
     /// Ground sampling distance of the images and of the truth, metres.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "METRES")]
     gsd: Option<f64>,
     /// Number of views.
     #[arg(long, value_name = "N")]
@@ -101,7 +101,7 @@ fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> 
     config.flight = args.flight;
     config.overwrite = args.overwrite;
     let show = ShowOptions { progress: args.progress, json: false };
-    let report = show.watch(global, |watcher| jobs::simulate::run(&config, watcher)).map_err(|error| {
+    let report = show.watch(global, output, |watcher| jobs::simulate::run(&config, watcher)).map_err(|error| {
         let full = matches!(error, SimulateJobError::NotEmpty { .. });
         with_hint(error, full.then_some("choose another folder or pass --overwrite"))
     })?;

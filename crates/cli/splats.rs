@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use crs::VerticalDatum;
-use jobs::splats::{SplatRenderConfig, SplatsConfig, SplatsJobError, SplatsReport};
+use jobs::splats::{SplatRenderConfig, SplatsConfig, SplatsJobError};
 use splats::DivisionConfig;
 
 use crate::corrections::corrections_of;
@@ -38,7 +38,7 @@ enum Command {
 /// Inputs and options of new splats.
 #[derive(Debug, clap::Args)]
 struct MakeArgs {
-    /// The surface model, in a projected CRS in metres.
+    /// The surface model, in a projected CRS in metres, or the folder of a run of skysweep dsm.
     #[arg(required = true, value_name = "DSM")]
     dsm: Option<PathBuf>,
     /// Images with RPCs that give the colours.
@@ -66,8 +66,8 @@ struct MakeArgs {
     corrections: Option<PathBuf>,
     /// Vertical datum of the DSM, where the file does not state it: ellipsoid, egm96, egm2008 or an
     /// EPSG code.
-    #[arg(long, value_name = "DATUM")]
-    vertical: Option<VerticalDatum>,
+    #[arg(long, value_name = "DATUM", alias = "vertical")]
+    dsm_vertical: Option<VerticalDatum>,
     /// Three scales per splat (3DGS) or two (2DGS).
     #[arg(long, value_enum, default_value_t = Form::ThreeD)]
     form: Form,
@@ -148,7 +148,7 @@ fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::R
     config.uniform_side = args.uniform;
     config.confidence.clone_from(&args.confidence);
     config.corrections = corrections_of(args.corrections.as_deref());
-    config.vertical = args.vertical;
+    config.vertical = args.dsm_vertical;
     config.discs = args.form == Form::TwoD;
     config.sh_degree = args.sh_degree;
     config.compare = args.compare;
@@ -159,7 +159,7 @@ fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::R
     if args.json {
         print::json(&report.to_json()?)?;
     } else if !global.is_quiet() {
-        print::text(&summary(&report))?;
+        print::text(&report.text())?;
     }
     Ok(Outcome::Complete)
 }
@@ -171,7 +171,8 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     config.pictures.clone_from(&args.pictures);
     config.corrections = corrections_of(args.corrections.as_deref());
     config.overwrite = args.overwrite;
-    let report = args.show.watch(global, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
+    let report =
+        args.show.watch(global, &args.output, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
     args.show.print(global, &report, || report.text(&args.output))?;
     Ok(Outcome::Complete)
 }
@@ -182,42 +183,4 @@ fn hinted(error: SplatsJobError) -> anyhow::Error {
         _ => None,
     };
     with_hint(error, hint)
-}
-
-fn summary(report: &SplatsReport) -> String {
-    let made = &report.made;
-    let share = 100.0 * made.splats as f64 / made.cells.max(1) as f64;
-    let mut text = format!(
-        "splats     {} for {} cells ({share:.1} %)\nplanes     within {:.3} m\n",
-        made.splats, made.cells, made.plane_error_max_m
-    );
-    if let Some(heights) = &made.mean_height {
-        text += &format!(
-            "heights    RMSE {:.3} m, MAE {:.3} m, median {:.3} m\n",
-            heights.rmse_m, heights.mae_m, heights.median_m
-        );
-    }
-    for image in &made.views {
-        let view = &image.view;
-        text += &format!(
-            "image      PSNR {} dB, SSIM {}, {:.1} % covered, sees {:.1} % of the cells: {}\n",
-            number(view.psnr_db),
-            number(view.ssim),
-            100.0 * view.coverage,
-            100.0 * view.seen,
-            image.image
-        );
-    }
-    for point in &made.uniform {
-        text += &format!("uniform    {} splats of {} cells: RMSE {:.3} m\n", point.splats, point.side, point.rmse_m);
-    }
-    if let Some(count) = made.uniform_at_equal_rmse {
-        text +=
-            &format!("equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n", count / made.splats as f64);
-    }
-    text + &format!("written    {}\n", report.output)
-}
-
-fn number(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |v| format!("{v:.2}"))
 }

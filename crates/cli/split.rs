@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use jobs::split::{SplitImage, SplitJobConfig, SplitJobReport};
+use jobs::split::SplitJobConfig;
 
 use crate::progress::Log;
 use crate::{Global, Outcome, print};
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if args.json {
         print::json(&report)?;
     } else if !global.is_quiet() || args.output.is_none() {
-        print::text(&summary(&report))?;
+        print::text(&report.text())?;
     }
     Ok(Outcome::Complete)
 }
@@ -75,16 +75,4 @@ fn config(args: &Args) -> SplitJobConfig {
     config.output.clone_from(&args.output);
     config.overwrite = args.overwrite;
     config
-}
-
-fn summary(report: &SplitJobReport) -> String {
-    let line = |what: &str, chosen: &SplitImage| {
-        let name = &chosen.image;
-        match (chosen.iou, chosen.wanted_iou) {
-            (Some(iou), Some(wanted)) => format!("{what:10} {iou:.3} (wanted {wanted:.3})  {name}\n"),
-            _ => format!("{what:10} first                  {name}\n"),
-        }
-    };
-    let contexts = report.contexts.iter().map(|chosen| line("context", chosen));
-    contexts.chain(report.targets.iter().map(|chosen| line("target", chosen))).collect()
 }

@@ -6,6 +6,7 @@
 //! counter-clockwise seen from outside. The other rings are holes.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
@@ -80,6 +81,9 @@ pub struct SurfacePolygon {
     pub solid: u32,
     /// Number of its shell within the solid; 0 is the outer shell.
     pub shell: u32,
+    /// Attributes of the surface by their names in the file, if it has any. Surfaces that the file
+    /// describes together share them.
+    pub attributes: Option<Arc<Map<String, Value>>>,
 }
 
 impl CityModel {
@@ -217,7 +221,7 @@ impl GeometryKind {
 impl SurfacePolygon {
     /// Creates a surface of the first solid and its outer shell.
     pub fn new(rings: Vec<Vec<u32>>, class: SurfaceClass) -> Self {
-        Self { rings, class, solid: 0, shell: 0 }
+        Self { rings, class, solid: 0, shell: 0, attributes: None }
     }
 }
 

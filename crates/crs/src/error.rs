@@ -43,9 +43,10 @@ pub enum CrsError {
     },
     /// The geoid grid that is needed is not installed.
     #[error(
-        "heights above {datum} need one of the geoid grids {candidates}, and none was found: put one into \
-         ~/.local/share/proj or into PROJ's folder, or give its path (PROJ_DATA replaces the folders \
-         that PROJ searches, so it must list PROJ's folder too)"
+        "heights above {datum} need {}, which PROJ does not find: put it into ~/.local/share/proj or into \
+         PROJ's folder (`projsync --file {}` fetches it where PROJ's tools are installed; PROJ_DATA replaces \
+         the folders that PROJ searches, so it must list PROJ's folder too)",
+        grids(.candidates), first(.candidates)
     )]
     MissingGrid {
         /// The datum requested.
@@ -70,4 +71,15 @@ pub enum CrsError {
         /// The lengths found.
         lengths: Vec<usize>,
     },
+}
+
+/// Names the grids of a list, which any of them serves.
+fn grids(candidates: &str) -> String {
+    let kind = if candidates.contains(", ") { "one of the geoid grids" } else { "the geoid grid" };
+    format!("{kind} {candidates}")
+}
+
+/// Returns the first grid of a list.
+fn first(candidates: &str) -> &str {
+    candidates.split(", ").next().unwrap_or_default()
 }

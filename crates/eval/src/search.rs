@@ -105,6 +105,11 @@ impl Search<'_> {
         let tried = steps.par_iter().map(|&(c, r)| self.candidate(&small, f64::from(c), f64::from(r))).collect();
         let ranked = ranked(tried);
         let found = ranked.first().map_or(0, |c| c.n);
+        // Without shared ground there is nothing to align.
+        if found == 0 {
+            let reference_cells = self.reference.data().iter().filter(|height| height.is_finite()).count();
+            return Err(EvalError::NoOverlap { reference_cells });
+        }
         if found < LEAST_CELLS {
             return Err(EvalError::TooFewCells { found, needed: LEAST_CELLS });
         }

@@ -160,6 +160,7 @@ const BUFFER: usize = 1 << 16;
 
 /// Gives a finished file its name.
 fn name_finished(finished: TempPath, path: &Path, overwrite: bool) -> Result<(), SaveError> {
+    tracing::debug!("writes {}", path.display());
     let named = if overwrite { finished.persist(path) } else { finished.persist_noclobber(path) };
     named.map_err(|e| match e.error.kind() {
         ErrorKind::AlreadyExists => SaveError::Exists { path: path.to_owned() },

@@ -175,6 +175,7 @@ fn model_of_all_kinds() -> CityModel {
                     class: [SurfaceClass::Ground, SurfaceClass::Roof, SurfaceClass::Unclassified][i % 3],
                     solid,
                     shell,
+                    attributes: None,
                 }));
             }
         }
@@ -242,4 +243,41 @@ fn the_3dbag_tile_is_read_whole() {
     assert!(file.defects.is_empty(), "{:?}", &file.defects[..1]);
     let lod22 = |g: &&Geometry| g.lod == Some(Lod::new(2, Some(2)));
     assert_eq!(file.model.objects.iter().flat_map(|o| &o.geometries).filter(lod22).count(), 430);
+}
+
+/// What the file says about single surfaces is kept, once for the surfaces that share it.
+#[test]
+fn attributes_of_surfaces_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, target) = (folder.path().join("a.city.json"), folder.path().join("b.city.json"));
+    let document = serde_json::json!({
+        "type": "CityJSON", "version": "2.0",
+        "transform": { "scale": [0.001, 0.001, 0.001], "translate": [0.0, 0.0, 0.0] },
+        "CityObjects": { "house": { "type": "Building", "geometry": [{
+            "type": "MultiSurface", "lod": "2",
+            "boundaries": [[[0, 1, 2]], [[0, 1, 3]], [[0, 2, 3]], [[1, 2, 3]]],
+            "semantics": {
+                "surfaces": [
+                    { "type": "RoofSurface", "slope": 31.5, "children": [3] },
+                    { "type": "WallSurface" },
+                    { "type": "RoofSurface", "slope": 12.0, "panel": { "kind": "solar" } },
+                    { "type": "+Gutter", "metal": "zinc" }
+                ],
+                "values": [0, 2, 0, 1]
+            }
+        }] } },
+        "vertices": [[0, 0, 0], [4000, 0, 0], [0, 4000, 0], [0, 0, 4000]]
+    });
+    std::fs::write(&source, document.to_string()).unwrap();
+    let model = read(&source).unwrap().model;
+    assert_eq!(model.left_out["relations of surfaces"], 1);
+    assert_eq!(model.left_out["attributes of surfaces"], 1, "CityJSON has no name for the gutter in our model");
+    write_cityjson(&target, &model, &CityJsonOptions::default()).unwrap();
+    let written: serde_json::Value = serde_json::from_slice(&std::fs::read(&target).unwrap()).unwrap();
+    let semantics = &written["CityObjects"]["house"]["geometry"][0]["semantics"];
+    let of = |surface: usize| &semantics["surfaces"][semantics["values"][surface].as_u64().unwrap() as usize];
+    assert_eq!(semantics["surfaces"].as_array().unwrap().len(), 3);
+    assert_eq!(*of(0), serde_json::json!({ "type": "RoofSurface", "slope": 31.5 }));
+    assert_eq!(*of(1), serde_json::json!({ "type": "RoofSurface", "slope": 12.0, "panel": { "kind": "solar" } }));
+    assert_eq!((of(2), of(3)), (of(0), &serde_json::json!({ "type": "WallSurface" })));
 }

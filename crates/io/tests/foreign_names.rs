@@ -155,3 +155,37 @@ fn devices_and_pipes_are_no_files() {
         testing::skip("mkfifo is not installed");
     }
 }
+
+/// GDAL would wait for a pipe for ever, and read a device without end.
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_inside_a_vrt_are_no_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.tif");
+    if !std::process::Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()) {
+        testing::skip("mkfifo is not installed");
+        return;
+    }
+    let full = pipe.to_str().unwrap();
+    let names = [
+        "/dev/zero".to_owned(),
+        "pipe.tif".to_owned(),
+        full.to_owned(),
+        format!("vrt://{full}?bands=1"),
+        format!("GTIFF_DIR:1:{full}"),
+        format!("/vsigzip/{full}"),
+        format!("/vsisubfile/0,{full}"),
+    ];
+    for (number, name) in names.iter().enumerate() {
+        let made = vrt(folder.path(), &format!("{number}.vrt"), name);
+        let nested = vrt(folder.path(), &format!("{number}_nested.vrt"), made.to_str().unwrap());
+        let in_text = std::fs::read_to_string(&made).unwrap();
+        let inline = vrt(folder.path(), &format!("{number}_inline.vrt"), &in_text);
+        let coded = folder.path().join(format!("{number}_coded.vrt"));
+        std::fs::write(&coded, in_text.replace("pipe", "&#112;ipe").replace("/dev", "&#x2f;dev")).unwrap();
+        for path in [made, nested, inline, coded] {
+            let found = read_dem(&path);
+            assert!(matches!(found, Err(RasterError::NotAFile { .. })), "{name} in {}: {found:?}", path.display());
+        }
+    }
+}

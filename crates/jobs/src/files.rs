@@ -140,3 +140,14 @@ pub(crate) fn write_json(path: &Path, value: &impl Serialize, overwrite: bool) -
     let text = serde_json::to_string_pretty(value)? + "\n";
     Ok(io::write_bytes(path, text.as_bytes(), overwrite)?)
 }
+
+/// Returns the size of all files in a folder, bytes. Links are not followed.
+pub(crate) fn bytes_below(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let size = |entry: fs::DirEntry| match entry.metadata() {
+        Ok(found) if found.is_dir() => bytes_below(&entry.path()),
+        Ok(found) => found.len(),
+        Err(_) => 0,
+    };
+    entries.map(size).sum()
+}

@@ -20,6 +20,7 @@ pub mod placed_model;
 pub mod priors;
 pub mod remote;
 pub mod rpc;
+mod run_folder;
 pub mod simulate;
 pub mod splats;
 pub mod split;

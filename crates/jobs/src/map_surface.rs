@@ -7,6 +7,8 @@ use io::raster::{Dem, RasterError, read_dem};
 
 use numeric::Progress;
 
+use crate::run_folder::surface_file;
+
 /// A surface model that has been read.
 pub struct MapSurface {
     /// The raster; heights in metres above the WGS 84 ellipsoid.
@@ -57,7 +59,8 @@ pub enum MapSurfaceError {
     },
 }
 
-/// Reads a surface model; `stated` overrides the vertical datum that the file names.
+/// Reads a surface model, or that of the folder of a DSM run; `stated` overrides the vertical datum
+/// that the file names.
 ///
 /// # Errors
 /// [`MapSurfaceError`] if the raster cannot be read or does not lie on a projected map in metres.
@@ -66,6 +69,7 @@ pub fn read(
     stated: Option<VerticalDatum>,
     progress: &dyn Progress,
 ) -> Result<MapSurface, MapSurfaceError> {
+    let path = &surface_file(path);
     let mut dem = read_dem(path)?;
     let definition = dem.horizontal_epsg.map(|code| format!("EPSG:{code}")).or_else(|| dem.crs_wkt.clone());
     let definition = definition.ok_or_else(|| MapSurfaceError::NoCrs { path: path.to_owned() })?;

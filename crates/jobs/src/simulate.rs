@@ -23,6 +23,10 @@ use crate::threads::{ThreadsError, install};
 
 /// The record, which is written last.
 const RECORD: &str = "scene.json";
+/// The parameters.
+const PARAMETERS: &str = "scene.toml";
+/// The folder of the perspective cameras.
+const FLIGHT: &str = "cameras/sparse/0";
 
 /// A scene to be simulated and the folder for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -146,6 +150,7 @@ pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateR
     progress.check_cancelled()?;
     // Without its record the folder counts as incomplete from here on.
     folder.remove(RECORD)?;
+    remove_earlier(&folder, config.flight > 0)?;
     folder.subfolder("truth")?;
     let writer = SceneWriter { simulation: &simulation, folder: output, overwrite: config.overwrite };
     install(config.threads, || writer.write(config.flight))??;
@@ -155,6 +160,28 @@ pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateR
         flight: config.flight,
         output: output.clone(),
     })
+}
+
+/// Removes what only an earlier simulation has: views and their truth beyond the number of this
+/// one, clouds, and the cameras of a flight. In a folder without its parameters nothing is removed.
+fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileError> {
+    if !folder.path().join(PARAMETERS).is_file() {
+        return Ok(());
+    }
+    for (below, stems) in [("", &["view"][..]), ("truth/", &["heights", "clouds"])] {
+        let entries = fs::read_dir(folder.path().join(below)).into_iter().flatten().flatten();
+        for name in entries.filter_map(|entry| entry.file_name().into_string().ok()) {
+            let numbered = name.strip_suffix(".tif").and_then(|name| name.rsplit_once('_'));
+            let is_earlier = |(stem, number): (&str, &str)| {
+                stems.contains(&stem) && !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
+            };
+            if numbered.is_some_and(is_earlier) {
+                folder.remove(&format!("{below}{name}"))?;
+            }
+        }
+    }
+    let cameras = ["cameras.txt", "images.txt", "points3D.txt"].map(|name| format!("{FLIGHT}/{name}"));
+    cameras.iter().filter(|_| !has_flight).try_for_each(|name| folder.remove(name))
 }
 
 /// A simulation and the folder that it is written to.
@@ -191,7 +218,7 @@ impl SceneWriter<'_> {
         // The parameters and the record of an earlier simulation are replaced: the folder was
         // checked at the start.
         let parameters = self.simulation.config.to_toml()?;
-        io::write_bytes(self.folder.join("scene.toml"), parameters.as_bytes(), true).map_err(FileError::write)?;
+        io::write_bytes(self.folder.join(PARAMETERS), parameters.as_bytes(), true).map_err(FileError::write)?;
         Ok(files::write_json(&self.folder.join(RECORD), &self.simulation.record(), true)?)
     }
 
@@ -216,7 +243,7 @@ impl SceneWriter<'_> {
         let (lens, poses) = self.simulation.flight(count as usize)?;
         let view = |(id, pose)| ColmapView { id, name: format!("flight_{id:02}.png"), lens: 0, pose };
         let model = ColmapModel { lenses: vec![lens], views: (1..).zip(poses).map(view).collect() };
-        let folder = self.folder.join("cameras/sparse/0");
+        let folder = self.folder.join(FLIGHT);
         files::create_folder(&folder)?;
         colmap::write(&folder, &model, &[], ColmapEncoding::Text, self.overwrite).map_err(FileError::write)?;
         Ok(())

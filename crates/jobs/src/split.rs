@@ -88,6 +88,21 @@ pub enum SplitJobError {
 
 from_steps!(SplitJobError: Job(FileError, Cancelled));
 
+impl SplitJobReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
+        let line = |what: &str, chosen: &SplitImage| {
+            let name = &chosen.image;
+            match (chosen.iou, chosen.wanted_iou) {
+                (Some(iou), Some(wanted)) => format!("{what:10} {iou:.3} (wanted {wanted:.3})  {name}\n"),
+                _ => format!("{what:10} first                  {name}\n"),
+            }
+        };
+        let contexts = self.contexts.iter().map(|chosen| line("context", chosen));
+        contexts.chain(self.targets.iter().map(|chosen| line("target", chosen))).collect()
+    }
+}
+
 impl SplitJobConfig {
     /// Two contexts of overlap 0.15 and targets of 0.02 to 0.1: the narrow preset of Cross-View
     /// Splatter.

@@ -4,7 +4,7 @@
 //! the terminal, JSON, and one HTML file that needs no network, no script and no other file.
 //! [`Chart`] draws plots as SVG, inside a page or as files of their own. A [`PriorsReport`]
 //! presents the priors of a city model, a [`SatellitePriorsReport`] those of satellite images.
-//! [`depth_preview`] and [`normal_preview`] are their pictures.
+//! [`depth_preview`], [`height_preview`] and [`normal_preview`] are their pictures.
 //!
 //! This crate touches no file. Everything is returned as text or bytes, the same for the same
 //! input.
@@ -22,6 +22,7 @@ mod priors;
 mod protocol;
 mod satellite;
 mod svg;
+mod words;
 
 pub use class::class_title;
 pub use escape::escape;
@@ -29,8 +30,9 @@ pub use evaluation::EvaluationReport;
 pub use palette::{MISSING, OUTSIDE, diverging};
 pub use parts::ViewPictures;
 pub use picture::{PictureError, error_picture, png};
-pub use preview::{depth_preview, mask_preview, normal_preview, side_by_side};
+pub use preview::{depth_preview, height_preview, mask_preview, normal_preview, side_by_side};
 pub use priors::{ErrorRow, PriorsReport, ViewRow};
 pub use protocol::Protocol;
 pub use satellite::{SatellitePriorsReport, SatelliteRow};
 pub use svg::{Axis, Chart};
+pub use words::{counted, plain_number};

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::escape::escape;
 use crate::picture::{PictureError, data_uri};
+use crate::words::typeset;
 
 /// Pictures of one view.
 #[derive(Debug, Clone)]
@@ -27,7 +28,7 @@ pub(crate) fn cards_of(cards: &[(String, &str)]) -> String {
 
 /// Returns the notes as a list, or an empty text without notes.
 pub(crate) fn notes(notes: &[String]) -> String {
-    let items: String = notes.iter().map(|note| format!("<li>{}</li>", escape(note))).collect();
+    let items: String = notes.iter().map(|note| format!("<li>{}</li>", typeset(&escape(note)))).collect();
     if items.is_empty() { items } else { format!("<div class=\"notes\"><ul>{items}</ul></div>") }
 }
 
@@ -51,7 +52,7 @@ pub(crate) fn table(title: &str, heads: &[&str], rows: impl Iterator<Item = Vec<
     let row = |cells: Vec<String>| {
         let mut cells = cells.iter().map(|cell| escape(cell));
         let first = cells.next().unwrap_or_default();
-        let rest: String = cells.map(|cell| format!("<td>{cell}</td>")).collect();
+        let rest: String = cells.map(|cell| format!("<td>{}</td>", typeset(&cell))).collect();
         format!("<tr><th scope=\"row\">{first}</th>{rest}</tr>")
     };
     let rows: String = rows.map(row).collect();

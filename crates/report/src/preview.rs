@@ -26,12 +26,25 @@ const BAR: [usize; 3] = [14, 10, 52];
 /// Number of labels at the bar.
 const MARKS: usize = 5;
 
-/// Colours depths from near (light) to far (dark), with a bar. Values that are not finite are grey.
+/// Colours depths from near (light) to far (dark), with a bar from the nearest downwards. Values
+/// that are not finite are grey.
 pub fn depth_preview(depth_m: &Grid<f32>) -> Grid<[u8; 3]> {
-    let depth = thinned(depth_m);
+    preview(depth_m, |low, high| (low, high))
+}
+
+/// Colours heights from high (light) to low (dark), with a bar from the highest downwards. Values
+/// that are not finite are grey.
+pub fn height_preview(height_m: &Grid<f32>) -> Grid<[u8; 3]> {
+    preview(height_m, |low, high| (high, low))
+}
+
+/// Colours values between their first and 99th percentiles. `ends` orders these two: the value of
+/// the light end, which is at the top of the bar, and that of the dark end.
+fn preview(values_m: &Grid<f32>, ends: fn(f64, f64) -> (f64, f64)) -> Grid<[u8; 3]> {
+    let depth = thinned(values_m);
     let range = raster::height_percentiles(&depth, 1.0, 99.0);
-    let (near, far) = range.map_or((0.0, 1.0), |(n, f)| (f64::from(n), f64::from(f)));
-    let span = if far > near { far - near } else { 1.0 };
+    let (near, far) = range.map_or((0.0, 1.0), |(n, f)| ends(f64::from(n), f64::from(f)));
+    let span = if far == near { 1.0 } else { far - near };
     let [bar, gap, text] = BAR;
     let (width, height) = (depth.width(), depth.height());
     let mut picture = Grid::filled(width + gap + bar + text, height.max(7 * MARKS), PAPER);
@@ -101,14 +114,16 @@ fn near_to_far(part: f64) -> [u8; 3] {
     })
 }
 
-/// Writes a depth in at most five characters, and its unit.
+/// Writes a depth or height in at most five digits, and its unit.
 fn short(value_m: f64) -> String {
-    let digits = if value_m < 9.995 { 2 } else { usize::from(value_m < 999.95) };
-    if value_m < 99_999.5 { format!("{value_m:.digits$}m") } else { format!("{:.0}km", value_m / 1e3) }
+    let size_m = value_m.abs();
+    let digits = if size_m < 9.995 { 2 } else { usize::from(size_m < 999.95) };
+    if size_m < 99_999.5 { format!("{value_m:.digits$}m") } else { format!("{:.0}km", value_m / 1e3) }
 }
 
 /// Letters of 5 × 7 pixels, one number per row. The highest of five bits is the leftmost pixel.
-const LETTERS: [(char, [u8; 7]); 13] = [
+const LETTERS: [(char, [u8; 7]); 14] = [
+    ('-', [0x00, 0x00, 0x00, 0x1f, 0x00, 0x00, 0x00]),
     ('0', [0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e]),
     ('1', [0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e]),
     ('2', [0x0e, 0x11, 0x01, 0x02, 0x04, 0x08, 0x1f]),
@@ -164,6 +179,17 @@ mod tests {
         // The bar ends in the colours of the range, and there are labels beside it.
         assert_eq!([picture[(112, 0)], picture[(112, 59)]], [near_to_far(0.0), near_to_far(1.0)]);
         assert!((127..176).any(|x| picture[(x, 2)] == INK));
+    }
+
+    /// The bar of heights stands like the ground: the highest is at its top.
+    #[test]
+    fn heights_are_high_at_the_top() {
+        let heights = Grid::from_vec(100, 60, (0..100 * 60).map(|i| -50.0 + (i % 100) as f32).collect()).unwrap();
+        let picture = height_preview(&heights);
+        let light = |x: usize, y: usize| picture[(x, y)].iter().map(|&c| u32::from(c)).sum::<u32>();
+        assert!(light(95, 30) > light(50, 30) && light(50, 30) > light(5, 30));
+        assert!(light(112, 0) > light(112, 30) && light(112, 30) > light(112, 59));
+        assert_eq!(["-0.50m", "-12.3m"], [-0.5, -12.34].map(short).each_ref().map(String::as_str));
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::escape::escape;
 use crate::page::page;
 use crate::parts::{ViewPictures, cards_of, figures, last_part, notes, table, with_generator};
 use crate::picture::PictureError;
+use crate::words::{counted, typeset};
 
 /// Report of the priors of a city model for a set of cameras.
 #[derive(Debug, Clone, Serialize)]
@@ -107,12 +108,12 @@ impl PriorsReport {
 
     fn lead(&self) -> String {
         format!(
-            "Of {} points on {} triangles, {} are seen by {} or more of {} views ({}).",
-            self.samples,
-            self.triangles,
+            "Of {} on {}, {} are seen by {} or more of {} ({}).",
+            counted(self.samples, "point"),
+            counted(self.triangles, "triangle"),
             self.kept,
             self.min_views,
-            self.views.len(),
+            counted(self.views.len(), "view"),
             self.mode
         )
     }
@@ -175,7 +176,7 @@ impl PriorsReport {
                 Value::Null => "none".to_owned(),
                 value => value.as_str().map_or_else(|| value.to_string(), str::to_owned),
             };
-            format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(&text))
+            format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(&typeset(&text)))
         };
         format!("<h2>Settings</h2><dl>{}</dl>", settings.iter().map(item).collect::<String>())
     }
@@ -227,7 +228,7 @@ mod tests {
             }])
             .unwrap();
         for words in
-            ["321 are seen by 2 or more of 1 views", "25.0 %", "3.0 to 9.5", "not sampled", "data:image/png", "50000"]
+            ["321 are seen by 2 or more of 1 view (", "25.0 %", "3.0 to 9.5", "not sampled", "data:image/png", "50000"]
         {
             assert!(page.contains(words), "{words}");
         }

@@ -8,6 +8,7 @@ use crate::escape::escape;
 use crate::page::page;
 use crate::parts::{ViewPictures, cards_of, figures, last_part, notes, table, with_generator};
 use crate::picture::PictureError;
+use crate::words::counted;
 
 /// Report of the priors of a city model for satellite images.
 #[derive(Debug, Clone, Serialize)]
@@ -68,11 +69,11 @@ impl SatellitePriorsReport {
     pub fn html(&self, pictures: &[ViewPictures]) -> Result<String, PictureError> {
         let title = format!("Priors of {} in satellite images", last_part(&self.model));
         let lead = format!(
-            "{} triangles in {}, heights above {}, seen from {} images.",
-            self.triangles,
+            "{} in {}, heights above {}, seen from {}.",
+            counted(self.triangles, "triangle"),
             self.map,
             self.model_heights_above,
-            self.images.len()
+            counted(self.images.len(), "image")
         );
         let body = [
             format!("<h1>{}</h1>", escape(&title)),

@@ -47,6 +47,30 @@ fn with_report(change: impl Fn(&mut Protocol), check: impl Fn(&EvaluationReport<
     check(&EvaluationReport { protocol: &protocol, found: &found, reference: &reference }, &found);
 }
 
+/// Signs are true minus signs, a zero has none, and the short names are explained.
+#[test]
+fn numbers_have_true_signs_and_short_names_are_explained() {
+    with_report(
+        |protocol| protocol.notes = vec!["off by -0.00 m and -1.25 m".into()],
+        |report, _| {
+            let html = report.html().unwrap();
+            let body = &html[html.find("<body>").unwrap()..];
+            for text in body.split('<').filter_map(|piece| piece.split_once('>')).map(|(_, text)| text) {
+                let wrong = text.match_indices('-').any(|(at, _)| {
+                    let is_free = text[..at].chars().next_back().is_none_or(|c| !c.is_alphanumeric());
+                    is_free && text[at + 1..].starts_with(|c: char| c.is_ascii_digit())
+                });
+                assert!(!wrong && text.trim() != "-", "{text}");
+                assert!(!text.contains("\u{2212}0.00 ") && !text.contains("\u{2212}0.000 "), "{text}");
+            }
+            assert!(body.contains("off by 0.00 m and \u{2212}1.25 m"));
+            for name in ["LE90", "NMAD", "pag_T", "completeness_T", "IoU"] {
+                assert!(body[body.find("Abbreviations").unwrap()..].contains(name), "{name}");
+            }
+        },
+    );
+}
+
 #[test]
 fn the_page_stands_alone_and_is_well_formed() {
     with_report(

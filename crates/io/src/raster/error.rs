@@ -29,6 +29,14 @@ pub enum RasterError {
         /// The name as given.
         path: PathBuf,
     },
+    /// A folder is given, and it is no raster itself.
+    #[error("a folder is given in the place of a raster (it holds {found}); give a raster in it: {}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// Names of the first TIFFs in it, or that there are none.
+        found: String,
+    },
     /// GDAL cannot open the file as a raster.
     #[error("not a raster that GDAL can open ({reason}): {}", path.display())]
     NotARaster {

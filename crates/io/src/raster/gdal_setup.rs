@@ -14,6 +14,7 @@ use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, config};
 
 use super::error::RasterError;
 use super::gdal_access::{GUARDED_FILE_SYSTEM, is_local_file_system, restrict};
+use super::named_files::refuse_named_devices;
 
 /// Beginnings of names that lead to a network or a service.
 const REMOTE_SCHEMES: [&str; 8] = ["http", "https", "ftp", "ftps", "s3", "gs", "az", "hdfs"];
@@ -22,6 +23,9 @@ const REMOTE_SCHEMES: [&str; 8] = ["http", "https", "ftp", "ftps", "s3", "gs", "
 const CACHE_MB: &str = "128";
 /// Messages kept per call; further ones only repeat the cause.
 const MESSAGES_MAX: usize = 8;
+
+/// TIFFs that the error about a folder names.
+const NAMED_TIFFS: usize = 8;
 
 /// GDAL's option with the one name that its file system of addresses opens.
 const ALLOWED_ADDRESS: &str = "CPL_VSIL_CURL_ALLOWED_FILENAME";
@@ -60,28 +64,60 @@ pub(crate) fn with_gdal<T>(call: impl FnOnce() -> Result<T, GdalError>) -> Resul
 ///
 /// # Errors
 /// [`RasterError::NotLocal`] for a name on a network; [`RasterError::Unreadable`] for a file that
-/// cannot be opened; [`RasterError::NotAFile`] for a device or a pipe; [`RasterError::NotARaster`]
-/// for a file in no format that GDAL may read.
+/// cannot be opened; [`RasterError::Folder`] for a folder that is no raster;
+/// [`RasterError::NotAFile`] for a device or a pipe, also one that a VRT names;
+/// [`RasterError::NotARaster`] for a file in no format that GDAL may read.
 pub(crate) fn open_dataset(path: &Path) -> Result<Dataset, RasterError> {
+    tracing::debug!("opens {}", path.display());
     let name = path.to_string_lossy();
     if !is_local_file_system(&name) {
-        if leads_away(&name) && !path.exists() {
-            return match remote_name(&name) {
-                Some(remote) if REMOTE_ALLOWED.load(Ordering::Relaxed) => open_remote(path, &remote),
-                _ => Err(RasterError::NotLocal { path: path.to_owned() }),
-            };
+        if let Some(opened) = open_address(path) {
+            return opened;
         }
         let unreadable = |source| RasterError::Unreadable { path: path.to_owned(), source };
         let meta = std::fs::metadata(path).map_err(unreadable)?;
         // A folder may be a raster to GDAL (SAFE).
-        if !meta.is_dir() {
-            if !meta.is_file() {
-                return Err(RasterError::NotAFile { path: path.to_owned() });
-            }
-            std::fs::File::open(path).map_err(unreadable)?;
+        if meta.is_dir() {
+            let folder = |_| RasterError::Folder { path: path.to_owned(), found: tiffs_in(path) };
+            return open_name(path, path).map_err(folder);
         }
+        if !meta.is_file() {
+            return Err(RasterError::NotAFile { path: path.to_owned() });
+        }
+        std::fs::File::open(path).map_err(unreadable)?;
+        refuse_named_devices(path)?;
     }
     open_name(path, path)
+}
+
+/// Returns the names of the first TIFFs in a folder, in words.
+fn tiffs_in(folder: &Path) -> String {
+    let is_tiff = |name: &String| {
+        let lower = name.to_ascii_lowercase();
+        lower.ends_with(".tif") || lower.ends_with(".tiff")
+    };
+    let entries = folder.read_dir().into_iter().flatten().flatten();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).filter(is_tiff).collect();
+    names.sort_unstable();
+    names.truncate(NAMED_TIFFS);
+    if names.is_empty() { "no TIFF".to_owned() } else { names.join(", ") }
+}
+
+/// Opens an address; `None` for the name of a local file.
+///
+/// # Errors
+/// [`RasterError::NotLocal`] where addresses are not allowed, and for services other than the web;
+/// [`RasterError::NotARaster`].
+pub(crate) fn open_address(path: &Path) -> Option<Result<Dataset, RasterError>> {
+    let name = path.to_string_lossy();
+    if is_local_file_system(&name) || !leads_away(&name) || path.exists() {
+        return None;
+    }
+    Some(match remote_name(&name) {
+        Some(remote) if REMOTE_ALLOWED.load(Ordering::Relaxed) => open_remote(path, &remote),
+        _ => Err(RasterError::NotLocal { path: path.to_owned() }),
+    })
 }
 
 /// Opens the raster of a name of GDAL's; `path` is the name for errors.

@@ -132,7 +132,7 @@ pub fn write_cog(path: impl AsRef<Path>, raster: &CogRaster<'_>, overwrite: bool
     write_path(path, overwrite, |made| {
         let mut memory = in_memory(path, raster.bands, raster.no_data)?;
         // The COG driver would build missing overviews in a temporary file.
-        let factors = overview_factors(memory.raster_size());
+        let factors = overview_factors(memory.raster_size(), BLOCK);
         with_gdal(|| memory.build_overviews(resampling(raster.overviews), &factors, &[]))
             .map_err(|reason| RasterError::unwritable(path, reason))?;
         set_colours(&memory, raster.colours).map_err(|reason| RasterError::unwritable(path, reason))?;
@@ -155,13 +155,13 @@ fn set_colours(dataset: &Dataset, colours: Option<[usize; 3]>) -> Result<(), Str
 }
 
 /// Returns the reduction of each overview: halves, until one tile holds the whole raster.
-fn overview_factors((width, height): (usize, usize)) -> Vec<i32> {
-    let halvings = width.max(height).div_ceil(BLOCK).next_power_of_two().ilog2();
+pub(super) fn overview_factors((width, height): (usize, usize), tile: usize) -> Vec<i32> {
+    let halvings = width.max(height).div_ceil(tile).next_power_of_two().ilog2();
     (1..=halvings).map(|k| 1 << k).collect()
 }
 
 /// Returns GDAL's name of the resampling.
-fn resampling(sampling: Sampling) -> &'static str {
+pub(super) fn resampling(sampling: Sampling) -> &'static str {
     match sampling {
         Sampling::Average => "AVERAGE",
         Sampling::Nearest => "NEAREST",

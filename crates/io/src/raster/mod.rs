@@ -16,6 +16,7 @@ mod gdal_setup;
 mod geotiff;
 mod luma;
 mod luma_rule;
+mod named_files;
 mod png;
 mod source;
 mod spool;
@@ -35,4 +36,4 @@ pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use tile::{BandScale, MapTile, write_map_tile};
 
-pub(crate) use gdal_setup::{prepare_gdal, with_gdal};
+pub(crate) use gdal_setup::{open_address, prepare_gdal, with_gdal};

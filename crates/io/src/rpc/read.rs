@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use gdal::Dataset;
+
 use super::detect::{self, Found};
 use super::error::{Attempt, Fault, RpcReadError};
 use super::file::{self, Content};
@@ -9,6 +11,7 @@ use super::format::RpcFormat;
 use super::rpc_file::{Parsed, RpcFile};
 use super::text_file::{finish, not_rpc, too_large};
 use super::{image, sidecar, tiff_tag};
+use crate::raster::{RasterError, open_address};
 
 /// Reads the RPC of a file: an RPC file, metadata that contains one, or an image (as
 /// [`read_for_image`]).
@@ -52,12 +55,15 @@ pub fn read(path: &Path) -> Result<RpcFile, RpcReadError> {
 }
 
 /// Finds the RPC of an image: GDAL's `RPC` metadata, TIFF tag 50844, the text of a virtual raster,
-/// then files beside it.
+/// then files beside it. Of an image at an address only what is inside it is read.
 ///
 /// # Errors
 /// Every variant of [`RpcReadError`] but [`RpcReadError::TooLarge`] for the image itself. A broken
 /// RPC in one place is an error, even where another place has a sound one.
 pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
+    if let Some(opened) = open_address(path) {
+        return read_address(path, opened);
+    }
     let mut tried = Vec::new();
     let mut dataset = None;
     let mut markup = false;
@@ -93,6 +99,15 @@ pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
         return Ok(file);
     }
     Err(not_rpc(path, tried))
+}
+
+/// Reads the RPC inside an image at an address that the user named. Nothing beside it is fetched.
+fn read_address(path: &Path, opened: Result<Dataset, RasterError>) -> Result<RpcFile, RpcReadError> {
+    let not_read = |why: String| not_rpc(path, vec![Attempt::new(RpcFormat::GdalMetadata, why)]);
+    let dataset = opened.map_err(|error| not_read(error.to_string()))?;
+    image::read(path, &dataset)?.ok_or_else(|| {
+        not_read("the image has no RPC inside, and files beside an address are not fetched: copy both here".to_owned())
+    })
 }
 
 /// Reads tag 50844 of a TIFF that GDAL does not open.

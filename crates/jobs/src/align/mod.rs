@@ -6,6 +6,7 @@
 mod config;
 mod error;
 mod output;
+mod text;
 mod world;
 
 use std::path::{Path, PathBuf};

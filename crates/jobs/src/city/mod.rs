@@ -10,6 +10,7 @@ mod config;
 mod convert;
 mod error;
 mod input;
+mod text;
 
 pub use account::{CityAccount, CityCrsSummary, CityDefectCount, CityDefectEntry, CityObjectEntry, CitySummary};
 pub use config::{CityConvertConfig, CityInfoConfig, CityInput, CityOutputFormat};

@@ -1,9 +1,11 @@
 //! A city model as the prior of the height sweep.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use city::{MeshConfig, TriangleMesh};
 use priors::{LinesOfSight, ModelPlace, PriorModel, SatelliteMaps, buildings_of};
+use report::counted;
 use sweep::SweepView;
 
 use crate::dsm::error::DsmError;
@@ -20,8 +22,8 @@ pub(crate) struct CityPrior {
     place: ModelPlace,
     /// Identifiers of all objects, in the order of their numbers.
     pub(crate) ids: Vec<String>,
-    /// Number of surfaces of buildings.
-    surfaces: usize,
+    /// Numbers of buildings' objects and of their surfaces, in words.
+    size: String,
 }
 
 impl CityPrior {
@@ -41,10 +43,11 @@ impl CityPrior {
         }
         let place = ModelPlace::of(&file.model.crs, None, None)?;
         place.to_ellipsoid(&mut mesh)?;
-        let surfaces = mesh.surfaces.len();
+        let objects: HashSet<u32> = mesh.surfaces.iter().map(|surface| surface.object).collect();
+        let size = format!("{} with {}", counted(objects.len(), "object"), counted(mesh.surfaces.len(), "surface"));
         let ids = file.model.objects.iter().map(|object| object.id.clone()).collect();
         let model = PriorModel::new(mesh, &buildings_of(&file.model))?;
-        Ok(Self { path: path.to_owned(), model, place, ids, surfaces })
+        Ok(Self { path: path.to_owned(), model, place, ids, size })
     }
 
     /// Notes the use of the model.
@@ -53,7 +56,7 @@ impl CityPrior {
         if self.place.datum.is_none() {
             notes.warn(format!("the model does not say what its heights are above, taken as the ellipsoid: {path}"));
         }
-        notes.choose("prior", format!("{} buildings' surfaces", self.surfaces), path.to_string());
+        notes.choose("prior", self.size.clone(), path.to_string());
     }
 
     /// Renders the model into every view; `None` for a view that does not see it. `gsd_m` is a

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use report::plain_number;
+
 use crate::dsm::values::{HeightRange, MapBounds};
 use crate::error::from_steps;
 use crate::files::FileError;
@@ -175,8 +177,8 @@ pub enum DsmError {
     },
     /// The requested area is not covered by the images.
     #[error(
-        "the bounds {:?} share no ground with the images, which cover {:?} in EPSG:{epsg}",
-        bounds.to_array(), covered.to_array()
+        "the bounds [{}] share no ground with the images, which cover [{}] in EPSG:{epsg}",
+        bounds.to_array().map(plain_number).join(", "), covered.to_array().map(plain_number).join(", ")
     )]
     BoundsMissScene {
         /// Requested area.

@@ -3,6 +3,7 @@
 use crs::{AreaOfUse, CrsError, MapProjection};
 use geodesy::utm_epsg;
 use raster::{GeoTransform, Window};
+use report::plain_number;
 use serde::{Deserialize, Serialize};
 
 use crate::dsm::config::{DsmConfig, Preset};
@@ -146,8 +147,8 @@ pub(crate) fn note_grid(config: &DsmConfig, grid: &DsmGrid, coarsest_gsd_m: f64,
     let coarsest = format!("{matched} {coarsest_gsd_m:.3} m, rounded to 5 cm");
     notes.choose("gsd", format!("{} m", grid.gsd_m), given(config.gsd_m.is_some(), coarsest));
     let seen = given(config.bounds.is_some(), "the ground that at least two images see".to_owned());
-    let bounds = grid.bounds().to_array();
-    notes.choose("bounds", format!("{bounds:.1?}, {} × {} cells", grid.size.0, grid.size.1), seen);
+    let bounds = grid.bounds().to_array().map(plain_number).join(", ");
+    notes.choose("bounds", format!("[{bounds}], {} × {} cells", grid.size.0, grid.size.1), seen);
 }
 
 /// Rounds to whole multiples of 5 cm: a tidy number costs no detail.

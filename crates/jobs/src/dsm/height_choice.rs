@@ -1,5 +1,7 @@
 //! The heights to search: given, from an elevation model, or from the tie points.
 
+use report::plain_number;
+
 use crate::dsm::config::{DsmConfig, EARTH_RANGE};
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::notes::Notes;
@@ -50,7 +52,12 @@ pub(crate) fn choose_heights(
         );
         (with_margins(seen), reason)
     };
-    notes.choose("height range", format!("{:.1} to {:.1} m", range.low_m, range.high_m), reason);
+    // A range that was given is printed as it was given, unless it is extended to the tie points.
+    let value = match config.height_range_m {
+        Some(given) if given == range => format!("{} to {} m", plain_number(range.low_m), plain_number(range.high_m)),
+        _ => format!("{:.1} to {:.1} m", range.low_m, range.high_m),
+    };
+    notes.choose("height range", value, reason);
     Ok(range)
 }
 
@@ -72,8 +79,11 @@ fn given_heights(
         ));
     }
     let reason = format!(
-        "given {:.1} to {:.1} m, tie points between {:.0} and {:.0} m",
-        given.low_m, given.high_m, seen.low_m, seen.high_m
+        "given {} to {} m, tie points between {:.0} and {:.0} m",
+        plain_number(given.low_m),
+        plain_number(given.high_m),
+        seen.low_m,
+        seen.high_m
     );
     Ok((searched(given, seen), reason))
 }

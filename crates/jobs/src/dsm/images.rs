@@ -73,9 +73,16 @@ impl SceneImage {
 ///
 /// # Errors
 /// [`DsmError::Image`] for a file that is no image, [`DsmError::Rpc`] for an image without a usable
-/// RPC.
+/// RPC, [`DsmError::SameImage`] for two images with the same camera.
 pub fn open(config: &DsmConfig) -> Result<Opened, DsmError> {
-    let images = config.images.iter().map(|path| open_one(path)).collect::<Result<_, _>>()?;
+    let images = config.images.iter().map(|path| open_one(path)).collect::<Result<Vec<_>, _>>()?;
+    // A copy has another name and the same camera, which no two images share.
+    let is_copy = |(i, image): &(usize, &SceneImage)| {
+        images[..*i].iter().any(|other| other.camera == image.camera && other.size == image.size)
+    };
+    if let Some((_, image)) = images.iter().enumerate().find(is_copy) {
+        return Err(DsmError::SameImage { path: image.path.clone() });
+    }
     Ok(Opened { images })
 }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::EvalJobError;
 use super::requirements::EvalRequirements;
+use crate::run_folder::surface_file;
 
 /// Folder of the report.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -29,9 +30,10 @@ pub enum EvalTarget {
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct GridEvalConfig {
-    /// Surface model to evaluate, on any grid.
+    /// Surface model to evaluate, on any grid, or the folder of a DSM run.
     pub test: PathBuf,
-    /// Surface model that is believed, or a LAS or LAZ cloud. Errors are measured at its cells.
+    /// Surface model that is believed, the folder of a DSM run, or a LAS or LAZ cloud. Errors are
+    /// measured at its cells.
     pub reference: PathBuf,
     /// What is removed before the comparison.
     pub alignment: AlignmentMethod,
@@ -105,6 +107,11 @@ impl GridEvalConfig {
             requirements: EvalRequirements::default(),
             threads: None,
         }
+    }
+
+    /// Returns the configuration with the surface models of runs in the places of their folders.
+    pub(super) fn with_surfaces_of_runs(&self) -> Self {
+        Self { test: surface_file(&self.test), reference: surface_file(&self.reference), ..self.clone() }
     }
 
     /// Checks the settings that can be judged without opening a file.

@@ -68,6 +68,7 @@ pub struct GridEvalReport {
 /// ```
 pub fn compare_grids(config: &GridEvalConfig, progress: &dyn Progress) -> Result<GridEvalReport, EvalJobError> {
     config.validate()?;
+    let config = &config.with_surfaces_of_runs();
     threads::install(config.threads, || compare(config, progress))?
 }
 

@@ -8,6 +8,7 @@ use super::list;
 use super::maker::Maker;
 use super::report::{HeightMapMade, HeightMapReport};
 use crate::camera_stand::{CameraStand, Cameras};
+use crate::run_folder::surface_file;
 use crate::{files, threads};
 
 /// Makes one height map, or one for each row of a list.
@@ -33,6 +34,7 @@ use crate::{files, threads};
 /// ```
 pub fn run(config: &HeightMapConfig, progress: &dyn Progress) -> Result<HeightMapReport, HeightMapJobError> {
     config.validate()?;
+    let config = &HeightMapConfig { source: surface_file(&config.source), ..config.clone() };
     threads::install(config.threads, || match config.stand.cameras()? {
         Cameras::One(stand) => one(config, &stand, progress).map(|made| HeightMapReport::One(Box::new(made))),
         Cameras::List(positions) => list::run(config, positions, progress).map(HeightMapReport::List),

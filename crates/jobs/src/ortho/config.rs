@@ -1,6 +1,6 @@
 //! The configuration of an ortho.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crs::VerticalDatum;
 use serde::{Deserialize, Serialize};
@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::error::OrthoError;
 use crate::corrections::CorrectionSource;
 use crate::error::SettingError;
+use crate::run_folder::surface_file;
 
 /// Most images of an ortho: the mask holds their numbers as bytes.
 const IMAGES_MAX: usize = 255;
@@ -89,7 +90,6 @@ impl OrthoConfig {
 
     /// Returns the file of the surface model.
     pub(super) fn surface_file(&self) -> PathBuf {
-        let surface: &Path = &self.surface;
-        if surface.is_dir() { surface.join("dsm/dsm.tif") } else { surface.to_owned() }
+        surface_file(&self.surface)
     }
 }

@@ -61,6 +61,10 @@ pub struct PriorsConfig {
     pub visibility: VisibilityConfig,
     /// Meaning of depths and normals in the maps.
     pub maps: MapConfig,
+    /// Whether files are written that repeat others in another form: the COLMAP model as text, the
+    /// points as PLY beside `sparse`, and initial splats of the points.
+    #[serde(default)]
+    pub extras: bool,
     /// Whether the maps are written as GeoTIFF too.
     pub geotiff: bool,
     /// Number of views with preview pictures.
@@ -149,6 +153,7 @@ impl PriorsConfig {
             seed: 0,
             visibility: VisibilityConfig::default(),
             maps: MapConfig::default(),
+            extras: false,
             geotiff: false,
             previews: 12,
             threads: None,

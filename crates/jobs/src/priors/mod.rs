@@ -23,6 +23,7 @@ mod perspective;
 mod points;
 mod previews;
 mod satellite;
+mod size;
 mod trainer;
 
 pub use config::{PriorsClassWeight, PriorsConfig, PriorsMode, PriorsTrainer};

@@ -1,6 +1,7 @@
 //! Notes of the reports: what the user should know about a dataset.
 
 use city::SurfaceClass;
+use report::counted;
 
 use super::config::PriorsMode;
 use super::dataset::Dataset;
@@ -23,7 +24,7 @@ pub(super) fn notes(dataset: &Dataset<'_>) -> Vec<String> {
     let visible = dataset.visible;
     if visible.points.is_empty() {
         let views = dataset.config.visibility.min_views;
-        notes.push(format!("No point is seen by {views} views: the dataset has no points."));
+        notes.push(format!("No point is seen by {}: the dataset has no points.", counted(views as usize, "view")));
     }
     let blind = visible.per_view.iter().filter(|view| view.visible == 0).count();
     if blind > 0 {
@@ -52,5 +53,9 @@ pub(super) fn notes(dataset: &Dataset<'_>) -> Vec<String> {
 
 /// Returns the note about objects that could not be used.
 pub(super) fn unusable_note(unusable: usize) -> String {
-    format!("{unusable} objects of the model could not be used; skysweep city info --report names them.")
+    let objects = counted(unusable, "object");
+    format!(
+        "{objects} of the model could not be used; skysweep city info --report names {}.",
+        if unusable == 1 { "it" } else { "them" }
+    )
 }

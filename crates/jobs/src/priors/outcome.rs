@@ -1,8 +1,12 @@
 //! What the priors job reports.
 
-use report::{PriorsReport, SatellitePriorsReport};
+use std::path::PathBuf;
+
+use report::{PriorsReport, SatellitePriorsReport, SatelliteRow, counted};
 use serde::{Serialize, Serializer};
 use serde_json::Value;
+
+use super::size::in_words;
 
 /// What was made, and what of the model could not be used.
 #[derive(Debug, Clone, Serialize)]
@@ -12,6 +16,10 @@ pub struct PriorsJobReport {
     pub product: PriorsProduct,
     /// Number of objects of the model that could not be used.
     pub unusable_objects: usize,
+    /// Folder of the files.
+    pub output: PathBuf,
+    /// Size of all files, bytes.
+    pub bytes: u64,
 }
 
 /// Priors of one kind of cameras.
@@ -29,6 +37,31 @@ impl PriorsJobReport {
     pub fn is_whole(&self) -> bool {
         let is_empty = matches!(&self.product, PriorsProduct::Dataset(made) if made.kept == 0);
         !is_empty && self.unusable_objects == 0
+    }
+}
+
+impl PriorsJobReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
+        let size = in_words(usize::try_from(self.bytes).unwrap_or(usize::MAX));
+        let written = format!(
+            "written    {} ({size})\nreport     {}\n",
+            self.output.display(),
+            self.output.join("report.html").display()
+        );
+        match &self.product {
+            PriorsProduct::Dataset(made) => {
+                let (kept, all, least) = (made.kept, made.samples, made.min_views);
+                let views = counted(made.views.len(), "view");
+                format!("points     {kept} of {all} are seen by {least} or more of {views}\n{written}")
+            }
+            PriorsProduct::SatelliteMaps(made) => {
+                let line = |row: &SatelliteRow| {
+                    format!("image      {}: {} pixels see a building\n", row.image, row.hit_pixels)
+                };
+                made.images.iter().map(line).collect::<String>() + &written
+            }
+        }
     }
 }
 

@@ -8,8 +8,8 @@ use ::priors::{
     error_curve, sample,
 };
 use city::SurfaceClass;
-use numeric::Progress;
-use report::{ErrorRow, PriorsReport};
+use numeric::{Choice, Progress};
+use report::{ErrorRow, PriorsReport, counted};
 use serde_json::{Value, json};
 
 use super::cameras::SceneCameras;
@@ -24,6 +24,7 @@ use super::model::UsableModel;
 use super::notes::notes;
 use super::outcome::{PriorsJobReport, PriorsProduct};
 use super::points;
+use super::size::{in_words, largest_bytes};
 use crate::files::{self, FileError};
 
 /// Geometric errors of the curve, relative to the one asked for.
@@ -43,6 +44,7 @@ pub(super) fn make(config: &PriorsConfig, progress: &dyn Progress) -> Result<Pri
     let model = PriorModel::new(read.meshed.mesh, &buildings_of(&read.file.model))?;
     let views = frame.views(&cameras);
     let samples = sample(&model, &sampling)?;
+    progress.choice(&size(config, &cameras, samples.points.len()));
     let visible = visible(config, &model, &samples, &views, progress)?;
     if visible.points.is_empty() {
         progress.warn("no point of a building is seen by enough cameras, so the dataset has no points");
@@ -60,8 +62,23 @@ pub(super) fn make(config: &PriorsConfig, progress: &dyn Progress) -> Result<Pri
         unusable,
     };
     let report = write(&dataset, partial.path(), progress)?;
+    let bytes = files::bytes_below(partial.path());
     partial.publish()?;
-    Ok(PriorsJobReport { product: PriorsProduct::Dataset(Box::new(report)), unusable_objects: unusable })
+    let (product, output) = (PriorsProduct::Dataset(Box::new(report)), config.output.clone());
+    Ok(PriorsJobReport { product, unusable_objects: unusable, output, bytes })
+}
+
+/// Says how large the dataset gets at most.
+fn size(config: &PriorsConfig, cameras: &SceneCameras, points: usize) -> Choice {
+    let lenses = &cameras.model.lenses;
+    let sizes = cameras.model.views.iter().map(|view| [lenses[view.lens].width(), lenses[view.lens].height()]);
+    let sizes: Vec<_> = sizes.collect();
+    let points_of = if config.maps_only { String::new() } else { format!(" and up to {}", counted(points, "point")) };
+    Choice {
+        name: "size".to_owned(),
+        value: format!("at most {}", in_words(largest_bytes(config, points, &sizes))),
+        reason: format!("the maps of {}{points_of}", counted(sizes.len(), "view")),
+    }
 }
 
 /// Finds the points that enough cameras see.

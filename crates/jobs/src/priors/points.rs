@@ -12,14 +12,16 @@ use super::dataset::Dataset;
 use super::labels::colour;
 use crate::files::{self, FileError};
 
-/// Writes the kept points as a COLMAP model, as PLY and as splats.
+/// Writes the kept points as a COLMAP model and as PLY, and with extras as text, as a second PLY
+/// and as splats.
 pub(super) fn write(dataset: &Dataset<'_>, folder: &Path) -> Result<(), FileError> {
     let kept = kept(dataset);
     let sparse = folder.join("sparse/0");
     files::create_folder(&sparse)?;
     let points = colmap_points(dataset, &kept);
     let model = colmap_model(dataset);
-    for encoding in [ColmapEncoding::Text, ColmapEncoding::Binary] {
+    let extras = dataset.config.extras;
+    for encoding in [ColmapEncoding::Binary].into_iter().chain(extras.then_some(ColmapEncoding::Text)) {
         colmap::write(&sparse, &model, &points, encoding, false).map_err(FileError::write)?;
     }
     let normals = kept.iter().map(|s| s.normal).chain(std::iter::repeat([0.0; 3]));
@@ -30,12 +32,13 @@ pub(super) fn write(dataset: &Dataset<'_>, folder: &Path) -> Result<(), FileErro
         .collect();
     let crs = &dataset.file.model.crs;
     let comment = format!("skysweep priors: the frame is described in origin.json; model CRS {crs}");
-    // 2DGS looks for the points beside the cameras, other loaders in the folder above.
-    for path in [sparse.join("points3D.ply"), folder.join("points3D.ply")] {
+    // 2DGS looks for the points beside the cameras, some other loaders in the folder above.
+    let above = extras.then(|| folder.join("points3D.ply"));
+    for path in [sparse.join("points3D.ply")].into_iter().chain(above) {
         ply::write_points(path, ply_points.iter().copied(), std::slice::from_ref(&comment), false)
             .map_err(FileError::write)?;
     }
-    write_splats(dataset, folder, &kept)
+    if extras { write_splats(dataset, folder, &kept) } else { Ok(()) }
 }
 
 /// Writes how the images are to be cropped, where any is.

@@ -12,7 +12,7 @@ use io::citymodel::CityFile;
 use io::raster::{Band, BandData, ImageSource, write_image_with_rpc, write_png_rgb};
 use numeric::Progress;
 use raster::NO_DATA;
-use report::{SatellitePriorsReport, SatelliteRow, ViewPictures, depth_preview, normal_preview};
+use report::{SatellitePriorsReport, SatelliteRow, ViewPictures, height_preview, normal_preview};
 use serde_json::json;
 
 use super::config::PriorsConfig;
@@ -62,8 +62,10 @@ pub(super) fn make(
     io::write_bytes(partial.path().join("report.html"), page.as_bytes(), false).map_err(FileError::from)?;
     files::write_json(&partial.path().join("labels.json"), &labels(&read.file.model, model.mesh()), false)?;
     files::write_json(&partial.path().join("report.json"), &report.json().map_err(FileError::from)?, false)?;
+    let bytes = files::bytes_below(partial.path());
     partial.publish()?;
-    Ok(PriorsJobReport { product: PriorsProduct::SatelliteMaps(Box::new(report)), unusable_objects: unusable })
+    let (product, output) = (PriorsProduct::SatelliteMaps(Box::new(report)), config.output.clone());
+    Ok(PriorsJobReport { product, unusable_objects: unusable, output, bytes })
 }
 
 fn read_images(
@@ -178,7 +180,7 @@ impl MapWriter<'_> {
     }
 
     fn write_previews(&self, image: &PriorsImage, maps: &SatelliteMaps) -> Result<ViewPictures, FileError> {
-        let (heights, normals) = (depth_preview(&maps.height_m), normal_preview(&maps.normal));
+        let (heights, normals) = (height_preview(&maps.height_m), normal_preview(&maps.normal));
         let path = |what: &str| self.folder.join("previews").join(format!("{}_{what}.png", image.stem));
         write_png_rgb(path("height"), &heights, false)?;
         write_png_rgb(path("normal"), &normals, false)?;

@@ -11,6 +11,7 @@ mod info;
 mod input;
 mod lines;
 mod points;
+mod text;
 
 pub use convert::{RpcConvertConfig, RpcConvertReport, convert};
 pub use error::RpcJobError;

@@ -8,6 +8,7 @@ mod error;
 mod image;
 mod make;
 mod render;
+mod text;
 
 pub use error::SplatsJobError;
 pub use make::{SplatsConfig, SplatsImageReport, SplatsReport, make};

@@ -7,6 +7,32 @@ use super::report::EvaluationReport;
 use crate::escape::escape;
 use crate::page::page;
 use crate::picture::PictureError;
+use crate::words::typeset;
+
+/// Short names of the page and what they mean. An error is the evaluated height minus that of the
+/// reference.
+const ABBREVIATIONS: [(&str, &str); 13] = [
+    ("reference_cells", "cells in which the reference has a height and which no class or mask leaves out"),
+    ("n", "those of them in which the evaluated surface has a height, too"),
+    ("valid_ratio", "n as a share of reference_cells"),
+    ("mean, bias", "mean of the errors, with their signs"),
+    ("MAE", "mean absolute error"),
+    ("RMSE", "root mean square error: the root of the mean of the squared errors"),
+    ("std", "standard deviation of the errors"),
+    (
+        "NMAD",
+        "normalised median absolute deviation: 1.4826 times the median distance of the errors from their median; \
+              for normally distributed errors it is their standard deviation, and outliers hardly change it",
+    ),
+    ("LE68, LE90, LE95", "linear error: 68, 90 or 95 % of the errors are at most this large, without their signs"),
+    ("robust_…", "the same without outliers"),
+    (
+        "completeness_T",
+        "share of reference_cells whose error is below T metres; cells without a height count as failures",
+    ),
+    ("pag_T", "percentage of accurate grid cells: share of n whose error is below T metres"),
+    ("IoU", "intersection over union: what both surfaces have in common, as a share of what either has"),
+];
 
 impl EvaluationReport<'_> {
     /// Returns the whole page.
@@ -36,6 +62,7 @@ impl EvaluationReport<'_> {
             self.judged(),
             "<h2>Protocol</h2>".to_owned(),
             self.protocol_list(),
+            abbreviations(),
         ];
         Ok(page(&title, &body.join("\n")))
     }
@@ -75,13 +102,13 @@ impl EvaluationReport<'_> {
             0 => String::new(),
             cells => format!(" {} cells are left out by class or mask.", grouped(cells)),
         };
-        let moved = moved.replace('-', "\u{2212}");
+        let moved = typeset(&moved);
         format!("{moved}. Vertical datum: {}. Grid: {}.{left_out}", self.protocol.vertical, self.protocol.crs)
     }
 
     fn cards(&self) -> String {
         let overall = &self.found.overall;
-        let metres = |value: Option<f64>| (value.map_or("–".into(), |v| format!("{v:.3}")), "m");
+        let metres = |value: Option<f64>| (value.map_or("–".into(), |v| typeset(&format!("{v:.3}"))), "m");
         let errors = overall.errors;
         let share = |value: Option<f64>| (percent(value), "%");
         let one = [1.0].into_iter().chain(overall.below.iter().map(|(t, _)| *t));
@@ -106,8 +133,8 @@ impl EvaluationReport<'_> {
             .protocol
             .missed
             .iter()
-            .map(|missed| format!("<li><b>missed:</b> {}</li>", escape(missed)))
-            .chain(self.protocol.notes.iter().map(|note| format!("<li>{}</li>", escape(note))))
+            .map(|missed| format!("<li><b>missed:</b> {}</li>", escape(&typeset(missed))))
+            .chain(self.protocol.notes.iter().map(|note| format!("<li>{}</li>", escape(&typeset(note)))))
             .collect();
         if all.is_empty() { String::new() } else { format!("<div class=\"notes\"><ul>{all}</ul></div>") }
     }
@@ -116,12 +143,12 @@ impl EvaluationReport<'_> {
         let sharpness = &self.found.sharpness;
         let places = format!("{} of {} places", grouped(sharpness.measured), grouped(sharpness.edges));
         match sharpness.overreach_m {
-            Some(e) => format!(
+            Some(e) => typeset(&format!(
                 "Roof edges reach out by {:+.2} m (median; NMAD {:.2} m, LE90 {:.2} m), measured at {places} \
                   where the reference \
                  is level on both sides of a jump. Positive is too large.",
                 e.median, e.nmad, e.le90
-            ),
+            )),
             None => format!("The overreach of roof edges could not be measured ({places})."),
         }
     }
@@ -129,9 +156,15 @@ impl EvaluationReport<'_> {
     fn protocol_list(&self) -> String {
         let lines = self.protocol.lines(self.found);
         let items: String =
-            lines.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{}</dd>", escape(text))).collect();
+            lines.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{}</dd>", escape(&typeset(text)))).collect();
         format!("<dl>{items}</dl>")
     }
+}
+
+/// Returns what the short names of the page mean.
+fn abbreviations() -> String {
+    let items: String = ABBREVIATIONS.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{text}</dd>")).collect();
+    format!("<h2>Abbreviations</h2><dl>{items}</dl>")
 }
 
 /// Returns the last three parts of a path, which are enough to recognise it.

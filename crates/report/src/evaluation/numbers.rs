@@ -25,7 +25,8 @@ pub(super) fn cell(name: &str, value: Option<f64>) -> String {
         None => "-".into(),
         Some(count) if is_count(name) => format!("{count:.0}"),
         Some(share) if is_share(name) => format!("{:.2}", 100.0 * share),
-        Some(metres) => format!("{metres:.3}"),
+        // A rounded zero has no sign.
+        Some(metres) => format!("{metres:.3}").replace("-0.000", "0.000"),
     }
 }
 
@@ -56,7 +57,7 @@ mod tests {
         assert_eq!((label("mae"), cell("mae", Some(0.12345))), ("mae m".into(), "0.123".into()));
         assert_eq!((label("pag_1"), cell("pag_1", Some(0.5))), ("pag_1 %".into(), "50.00".into()));
         assert_eq!((label("outliers"), cell("outliers", Some(7.0))), ("outliers".into(), "7".into()));
-        assert_eq!(cell("mae", None), "-");
+        assert_eq!((cell("mae", None), cell("mean", Some(-0.0001))), ("-".into(), "0.000".into()));
         assert_eq!((grouped(0), grouped(262_144)), ("0".into(), "262\u{202f}144".into()));
     }
 }

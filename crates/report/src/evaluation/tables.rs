@@ -4,6 +4,7 @@ use super::judged::JudgedTable;
 use super::numbers::{cell, grouped, is_count, label, percent};
 use super::report::EvaluationReport;
 use crate::escape::escape;
+use crate::words::typeset;
 
 impl EvaluationReport<'_> {
     /// Returns a table of every metric for every set of cells.
@@ -48,13 +49,7 @@ impl EvaluationReport<'_> {
 
     /// Returns the tables of origins, uncertainty and objects, each for which there is an input.
     pub(super) fn judged_html(&self) -> String {
-        let of = |judged: JudgedTable| {
-            let rows = judged
-                .rows
-                .into_iter()
-                .map(|(name, cells)| (name, cells.into_iter().map(|cell| cell.replace('-', "\u{2212}")).collect()));
-            table(judged.corner, judged.heads.into_iter(), rows)
-        };
+        let of = |judged: JudgedTable| table(judged.corner, judged.heads.into_iter(), judged.rows.into_iter());
         self.judged_tables().into_iter().map(of).collect::<Vec<_>>().join("\n")
     }
 
@@ -77,7 +72,7 @@ impl EvaluationReport<'_> {
 fn pretty(name: &str, value: Option<f64>) -> String {
     match value {
         Some(count) if is_count(name) => grouped(count as usize),
-        value => cell(name, value).replace('-', "\u{2212}"),
+        value => cell(name, value),
     }
 }
 
@@ -89,7 +84,7 @@ fn table<'a>(
     let heads: String = heads.map(|head| format!("<th scope=\"col\">{}</th>", escape(head))).collect();
     let rows: String = rows
         .map(|(name, values)| {
-            let cells: String = values.iter().map(|value| format!("<td>{}</td>", escape(value))).collect();
+            let cells: String = values.iter().map(|value| format!("<td>{}</td>", escape(&typeset(value)))).collect();
             format!("<tr><th scope=\"row\">{}</th>{cells}</tr>", escape(&name))
         })
         .collect();

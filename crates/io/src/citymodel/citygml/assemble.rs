@@ -216,6 +216,7 @@ fn surface(polygon: &Polygon, member: &Resolved) -> Option<SurfacePolygon> {
         class: polygon.class,
         solid: member.solid,
         shell: member.shell,
+        attributes: None,
     })
 }
 

@@ -198,7 +198,8 @@ impl Walker {
     }
 
     /// Returns whether an element is an attribute or an address of the object that it is a child
-    /// of. Appearances are counted, because the model does not hold them.
+    /// of. Appearances and attributes of surfaces are counted, because the model does not hold
+    /// them.
     fn is_attribute(&mut self, name: &str) -> bool {
         let in_object = self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Object { .. }));
         if in_object && name.starts_with("appearance") {
@@ -206,6 +207,10 @@ impl Walker {
             return false;
         }
         let holds_more = OBJECT_PROPERTIES.contains(&name) || SURFACE_PROPERTIES.contains(&name);
+        let in_surface = self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Class { .. }));
+        if in_surface && !holds_more && !name.starts_with("lod") && name != "boundedBy" {
+            self.builder.left_out("attributes of surfaces", 1);
+        }
         in_object && !holds_more && !name.starts_with("lod")
     }
 

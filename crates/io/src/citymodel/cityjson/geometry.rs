@@ -2,7 +2,7 @@
 
 use city::{DefectCode, Geometry, GeometryKind, Lod, SurfaceClass, SurfacePolygon};
 
-use super::schema::{Nested, Semantics, Shape};
+use super::schema::{Nested, SemanticSurface, Semantics, Shape};
 use crate::citymodel::builder::Builder;
 
 /// Object and number of a geometry, for its defects.
@@ -107,8 +107,16 @@ impl<F: FnMut(u64) -> Option<u32>> Unroll<'_, F> {
         let number = self.found.len();
         match self.rings(rings) {
             Ok(rings) => {
-                let class = value.map_or(SurfaceClass::Unclassified, |(s, value)| self.class(s, value, number));
-                self.found.push(SurfacePolygon { rings, class, solid, shell });
+                let described = value.and_then(|(semantics, value)| self.described(semantics, value, number));
+                let class = described.and_then(|surface| surface.kind.as_deref()).map(SurfaceClass::from_name);
+                let attributes = described.map(|surface| &surface.attributes).filter(|found| !found.is_empty());
+                self.found.push(SurfacePolygon {
+                    rings,
+                    class: class.unwrap_or(SurfaceClass::Unclassified),
+                    solid,
+                    shell,
+                    attributes: attributes.cloned(),
+                });
             }
             Err((code, detail)) => {
                 self.builder.dropped(code, self.place.object, self.place.surface(number), detail);
@@ -136,19 +144,24 @@ impl<F: FnMut(u64) -> Option<u32>> Unroll<'_, F> {
         Ok(vertex)
     }
 
-    fn class(&mut self, semantics: &Semantics, value: &Nested, surface: usize) -> SurfaceClass {
-        let name = match value {
-            Nested::Null => return SurfaceClass::Unclassified,
+    /// Returns the description of a surface, which names its class; a defect is noted for a number
+    /// without one.
+    fn described<'s>(
+        &mut self,
+        semantics: &'s Semantics,
+        value: &Nested,
+        surface: usize,
+    ) -> Option<&'s SemanticSurface> {
+        let found = match value {
+            Nested::Null => return None,
             Nested::Index(index) => usize::try_from(*index).ok().and_then(|i| semantics.surfaces.get(i)),
             _ => None,
         };
-        match name.and_then(|surface| surface.kind.as_deref()) {
-            Some(name) => SurfaceClass::from_name(name),
-            None => {
-                let place = self.place.surface(surface);
-                self.builder.note(DefectCode::SemanticsMismatch, Some(self.place.object), place, "");
-                SurfaceClass::Unclassified
-            }
+        let found = found.filter(|surface| surface.kind.is_some());
+        if found.is_none() {
+            let place = self.place.surface(surface);
+            self.builder.note(DefectCode::SemanticsMismatch, Some(self.place.object), place, "");
         }
+        found
     }
 }

@@ -10,7 +10,7 @@ mod schema;
 mod template;
 mod write;
 
-use city::{ModelPoint, ObjectKind};
+use city::{ModelPoint, ObjectKind, SurfaceClass};
 use serde_json::Value;
 
 use super::builder::Builder;
@@ -20,6 +20,7 @@ use super::format::{CityFormat, Parsed};
 use super::placement::Instances;
 use schema::{Document, Object, Pairs, Templates, Transform};
 
+use write::is_written;
 pub use write::{CityJsonOptions, write_cityjson};
 
 /// Versions that are read. A patch number may follow.
@@ -154,8 +155,17 @@ impl Reader {
         for shape in shapes {
             let appearances = usize::from(shape.material.is_some()) + usize::from(shape.texture.is_some());
             self.builder.left_out("appearances", appearances);
-            let surfaces = shape.semantics.iter().flat_map(|semantics| &semantics.surfaces);
-            self.builder.left_out("attributes of surfaces", surfaces.map(|surface| surface.others.len()).sum());
+            let surfaces = || shape.semantics.iter().flat_map(|semantics| &semantics.surfaces);
+            let relations = |surface: &schema::SemanticSurface| {
+                usize::from(surface.parent.is_some()) + usize::from(surface.children.is_some())
+            };
+            self.builder.left_out("relations of surfaces", surfaces().map(relations).sum());
+            // CityJSON describes only surfaces whose class has a name of its own.
+            let is_unnamed = |surface: &&schema::SemanticSurface| {
+                surface.kind.as_deref().is_none_or(|name| !is_written(SurfaceClass::from_name(name)))
+            };
+            let unnamed = surfaces().filter(is_unnamed).map(|surface| surface.attributes.len()).sum();
+            self.builder.left_out("attributes of surfaces", unnamed);
         }
     }
 }

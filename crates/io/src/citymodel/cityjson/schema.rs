@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
@@ -80,9 +81,18 @@ pub(super) struct Semantics {
 pub(super) struct SemanticSurface {
     #[serde(rename = "type")]
     pub(super) kind: Option<String>,
-    /// Attributes of the surface, and its relations to others.
-    #[serde(flatten)]
-    pub(super) others: Map<String, Value>,
+    /// Relations to other surfaces, by their numbers in this list.
+    #[serde(default)]
+    pub(super) parent: Option<IgnoredAny>,
+    #[serde(default)]
+    pub(super) children: Option<IgnoredAny>,
+    /// Attributes of the surface, shared by all that refer to it.
+    #[serde(flatten, deserialize_with = "shared")]
+    pub(super) attributes: Arc<Map<String, Value>>,
+}
+
+fn shared<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Arc<Map<String, Value>>, D::Error> {
+    Map::deserialize(deserializer).map(Arc::new)
 }
 
 #[derive(Debug, serde::Deserialize)]

@@ -6,6 +6,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
+use std::sync::Arc;
 
 use city::{BuildingRole, CityModel, CityObject, Geometry, GeometryKind, ModelPoint, SurfaceClass, SurfacePolygon};
 use serde_json::{Map, Value, json};
@@ -137,23 +138,60 @@ fn object_value(model: &CityModel, object: &CityObject, children: Option<&Vec<&s
 }
 
 fn geometry_value(model: &CityModel, geometry: &Geometry, lattice: &mut Lattice) -> Value {
-    let mut classes: Vec<SurfaceClass> = geometry.surfaces.iter().map(|surface| surface.class).collect();
-    classes.sort_unstable();
-    classes.dedup();
-    classes.retain(|class| !matches!(class, SurfaceClass::Unclassified | SurfaceClass::Other));
+    let described = Described::of(geometry);
     let boundary = |surface: &SurfacePolygon, lattice: &mut Lattice| -> Value {
         let vertex = |&i: &u32| model.vertices[i as usize];
         surface.rings.iter().map(|ring| ring.iter().map(|i| lattice.index(vertex(i))).collect::<Value>()).collect()
     };
-    let semantic = |surface: &SurfacePolygon| json!(classes.binary_search(&surface.class).ok());
+    let semantic = |surface: &SurfacePolygon| json!(described.index(surface));
     let boundaries = nest(geometry, |surface| boundary(surface, lattice));
     let lod = geometry.lod.map_or_else(|| "2".to_owned(), |lod| lod.to_string());
     let mut value = json!({ "type": geometry.kind.name(), "lod": lod, "boundaries": boundaries });
-    if !classes.is_empty() {
-        let surfaces: Vec<Value> = classes.iter().map(|class| json!({ "type": class.name() })).collect();
-        value["semantics"] = json!({ "surfaces": surfaces, "values": nest(geometry, semantic) });
+    if !described.surfaces.is_empty() {
+        value["semantics"] = json!({ "surfaces": described.surfaces, "values": nest(geometry, semantic) });
     }
     value
+}
+
+/// The descriptions of the surfaces of a geometry: one for each class and set of attributes.
+struct Described {
+    index_of: HashMap<DescriptionKey, usize>,
+    surfaces: Vec<Value>,
+}
+
+/// A class, and the place in memory of the attributes that surfaces share.
+type DescriptionKey = (SurfaceClass, Option<*const Map<String, Value>>);
+
+impl Described {
+    /// Collects the descriptions, ordered by class and then by the first surface.
+    fn of(geometry: &Geometry) -> Self {
+        let mut first: HashMap<DescriptionKey, (usize, &SurfacePolygon)> = HashMap::new();
+        for (number, surface) in geometry.surfaces.iter().enumerate().filter(|(_, s)| is_written(s.class)) {
+            first.entry(Self::key(surface)).or_insert((number, surface));
+        }
+        let mut all: Vec<_> = first.into_iter().collect();
+        all.sort_unstable_by_key(|((class, _), (number, _))| (*class, *number));
+        let value = |surface: &SurfacePolygon| {
+            let mut value = Map::from_iter([("type".to_owned(), json!(surface.class.name()))]);
+            value.extend(surface.attributes.as_deref().cloned().unwrap_or_default());
+            Value::Object(value)
+        };
+        let surfaces = all.iter().map(|(_, (_, surface))| value(surface)).collect();
+        Self { index_of: all.into_iter().enumerate().map(|(index, (key, _))| (key, index)).collect(), surfaces }
+    }
+
+    fn key(surface: &SurfacePolygon) -> DescriptionKey {
+        (surface.class, surface.attributes.as_ref().map(Arc::as_ptr))
+    }
+
+    fn index(&self, surface: &SurfacePolygon) -> Option<usize> {
+        self.index_of.get(&Self::key(surface)).copied()
+    }
+}
+
+/// Whether CityJSON has a name for a class; surfaces of others are written without a description.
+pub(super) fn is_written(class: SurfaceClass) -> bool {
+    !matches!(class, SurfaceClass::Unclassified | SurfaceClass::Other)
 }
 
 /// Nests one value per surface in arrays of solids and shells, as the kind of the geometry

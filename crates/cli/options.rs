@@ -1,0 +1,112 @@
+//! What holds for the options of all commands: their groups in `--help`, and the spellings of
+//! GDAL's users.
+
+use std::ffi::OsString;
+
+use clap::Command;
+use clap::error::ErrorKind;
+
+/// Groups of options, by the names of their fields. What is in no group chooses the method.
+const GROUPS: [(&str, &[&str]); 5] = [
+    (
+        "Inputs",
+        &[
+            "classes",
+            "mask",
+            "dtm",
+            "confidence",
+            "buildings",
+            "dem",
+            "prior",
+            "corrections",
+            "maps",
+            "lod",
+            "all_objects",
+            "ref_cell",
+            "test_vertical",
+            "ref_vertical",
+            "dsm_vertical",
+            "surface_vertical",
+            "source_crs",
+            "source_vertical",
+            "positions_vertical",
+            "offset",
+            "transform",
+            "image_size",
+            "pictures",
+            "cameras",
+            "camera",
+            "center",
+            "positions",
+        ],
+    ),
+    (
+        "Output",
+        &[
+            "output",
+            "gsd",
+            "crs",
+            "force",
+            "bounds",
+            "vertical",
+            "format",
+            "encoding",
+            "geotiff",
+            "extras",
+            "previews",
+            "no_preview",
+            "html",
+            "no_report",
+            "error_map",
+            "report",
+            "render",
+            "noise_output",
+            "overwrite",
+        ],
+    ),
+    ("Requirements (exit code 1 when missed)", &["max_mae", "min_completeness", "max_rmse"]),
+    ("Run", &["threads", "memory", "chunk", "tile", "allow_remote"]),
+    ("Messages", &["progress", "json", "quiet", "verbose", "help", "version"]),
+];
+
+/// GDAL's options and ours.
+const OF_GDAL: [(&str, &str); 4] = [("-t_srs", "crs"), ("-te", "bounds"), ("-tr", "gsd"), ("-overwrite", "overwrite")];
+
+/// Puts the options of a command and of its subcommands into their groups.
+pub(crate) fn grouped(command: Command) -> Command {
+    let names: Vec<String> = command.get_subcommands().map(|below| below.get_name().to_owned()).collect();
+    let command = names.into_iter().fold(command, |command, name| command.mut_subcommand(name, grouped));
+    command.mut_args(|option| {
+        let is_new = option.get_help_heading().is_none() && !option.is_positional();
+        match GROUPS.iter().find(|(_, names)| is_new && names.contains(&option.get_id().as_str())) {
+            Some((group, _)) => option.help_heading(*group),
+            None => option,
+        }
+    })
+}
+
+/// Replaces the spellings of GDAL's users by ours, where the command has the option. `-tr` takes
+/// one size or two equal ones.
+pub(crate) fn without_gdal_spellings(arguments: impl Iterator<Item = OsString>, root: &Command) -> Vec<OsString> {
+    let mut arguments: Vec<OsString> = arguments.collect();
+    let name = arguments.iter().skip(1).find(|argument| !argument.to_string_lossy().starts_with('-'));
+    let Some(command) = name.and_then(|name| root.find_subcommand(name)) else { return arguments };
+    let has = |id: &str| command.get_arguments().any(|option| option.get_id() == id);
+    let end = arguments.iter().position(|argument| argument == "--").unwrap_or(arguments.len());
+    for at in (0..end).rev() {
+        let text = arguments[at].to_string_lossy().into_owned();
+        let (spelling, value) = text.split_once('=').map_or((text.as_str(), None), |(name, value)| (name, Some(value)));
+        let Some((_, ours)) = OF_GDAL.iter().find(|(theirs, ours)| *theirs == spelling && has(ours)) else { continue };
+        let size = |after: usize| arguments.get(at + after)?.to_str()?.parse::<f64>().ok().map(f64::abs);
+        match (*ours, size(1), size(2)) {
+            ("gsd", Some(x), Some(y)) if value.is_none() && x == y => drop(arguments.remove(at + 2)),
+            ("gsd", Some(_), Some(_)) if value.is_none() => {
+                let text = "the cells are square: -tr takes one size or two equal ones";
+                root.clone().error(ErrorKind::InvalidValue, text).exit();
+            }
+            _ => {}
+        }
+        arguments[at] = value.map_or(format!("--{ours}"), |value| format!("--{ours}={value}")).into();
+    }
+    arguments
+}

@@ -1,0 +1,65 @@
+//! Numbers in sentences and on pages: counts with their nouns, true minus signs, no negative zero.
+
+/// Returns a count and its noun, in the plural unless the count is 1.
+///
+/// ```
+/// assert_eq!(report::counted(1, "view"), "1 view");
+/// assert_eq!(report::counted(0, "view"), "0 views");
+/// ```
+pub fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Returns a length or coordinate in metres without the rounding noise of its computation: to a
+/// micrometre, without trailing zeros.
+///
+/// ```
+/// assert_eq!(report::plain_number(693_800.1 + 150.5), "693950.6");
+/// assert_eq!([163.25, -0.0, 40.0].map(report::plain_number), ["163.25", "0", "40"]);
+/// ```
+pub fn plain_number(value: f64) -> String {
+    let rounded = format!("{value:.6}");
+    let short = rounded.trim_end_matches('0').trim_end_matches('.');
+    if short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
+/// Sets the numbers of a text as a page shows them: a hyphen before a number becomes a minus sign,
+/// a zero has no sign, and a lone hyphen becomes a dash. Hyphens inside words and names stay.
+pub(crate) fn typeset(text: &str) -> String {
+    if text == "-" {
+        return "–".to_owned();
+    }
+    let mut out = String::with_capacity(text.len());
+    let mut before = ' ';
+    for (at, character) in text.char_indices() {
+        let number = &text[at + character.len_utf8()..];
+        let is_sign = matches!(character, '-' | '+') && number.starts_with(|c: char| c.is_ascii_digit());
+        if !is_sign || before.is_alphanumeric() {
+            out.push(character);
+        } else if !is_zero(number) {
+            out.push(if character == '-' { '\u{2212}' } else { '+' });
+        }
+        before = character;
+    }
+    out
+}
+
+/// Whether the number at the beginning of a text is zero.
+fn is_zero(text: &str) -> bool {
+    let digits = text.bytes().take_while(|byte| byte.is_ascii_digit() || *byte == b'.');
+    !text.is_empty() && digits.filter(u8::is_ascii_digit).all(|digit| digit == b'0')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_true_signs_and_names_keep_their_hyphens() {
+        assert_eq!(typeset("dx -0.41 m, dy +6.39 m"), "dx \u{2212}0.41 m, dy +6.39 m");
+        assert_eq!(typeset("-0.00 m (-0.001)"), "0.00 m (\u{2212}0.001)");
+        assert_eq!(typeset("+0.00"), "0.00");
+        assert_eq!(typeset("nuth-kaab, view-2.tif, 2-3"), "nuth-kaab, view-2.tif, 2-3");
+        assert_eq!((typeset("-"), typeset("- 3")), ("–".to_owned(), "- 3".to_owned()));
+    }
+}
