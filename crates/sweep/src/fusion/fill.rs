@@ -419,7 +419,7 @@ mod tests {
         fill(&mut seen);
         assert!((10..20).all(|x| (10..20).all(|y| seen[(x, y)] == 1.0)), "{:?}", seen.row(15));
         let visible = |_: &Grid<f32>, voids: &[usize]| vec![f32::NEG_INFINITY; voids.len()];
-        let (trusted, mut completed_m) = (blind.map(|_| true), blind.map(|_| f32::NAN));
+        let (trusted, completed_m) = (blind.map(|_| true), blind.map(|_| f32::NAN));
         let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
         let found = fill_voids(&mut unseen, known, visible, &CONFIG);
         assert!((12..20).all(|x| unseen[(x, 15)].is_nan()) && unseen[(10, 15)] == 1.0, "{:?}", unseen.row(15));
@@ -428,6 +428,7 @@ mod tests {
         fill_voids(&mut unseen, known, visible, &everything);
         assert!((10..20).all(|x| (10..20).all(|y| unseen[(x, y)] == 1.0)), "{:?}", unseen.row(15));
         // What the views agree on without having seen it is a completion of the image.
+        let mut completed_m = completed_m.clone();
         completed_m[(15, 15)] = 1.2;
         let known = KnownVoids { completed_m: &completed_m, ..known };
         let mut completed = void_in_a_plain();
