@@ -53,7 +53,9 @@
 //!   heights
 
 mod cameras;
+mod evidence;
 mod geometry;
+mod inputs;
 mod invariance;
 mod radiometry;
 mod relief;
