@@ -44,17 +44,22 @@ pub(crate) fn is_beyond_chance(
 }
 
 /// Returns the distance of a tie from its height trajectory, with a sign, pixels; `None` where a
-/// camera fails.
+/// camera fails. The search for the nearest height begins at `height_m`.
 fn across_px(reference: &RpcCamera, source: &RpcCamera, tie: &Tie, height_m: f64) -> Option<f64> {
     /// Length of the piece of the trajectory that gives its direction, metres.
     const PIECE_M: f64 = 20.0;
+    /// Trajectories are nearly straight, so that the second round is exact.
+    const ROUNDS: usize = 3;
     let place = |h: f64| source_from_reference(reference, source, 0, tie.reference, h).ok();
-    let (from, to) = (place(height_m)?, place(height_m + PIECE_M)?);
-    let along = [to.sample - from.sample, to.line - from.line];
-    let found = [tie.source.sample - from.sample, tie.source.line - from.line];
-    let length = along[0].hypot(along[1]);
-    let across =
-        if length > 0.0 { (along[0] * found[1] - along[1] * found[0]) / length } else { found[0].hypot(found[1]) };
+    let (mut height_m, mut across) = (height_m, 0.0);
+    for _ in 0..ROUNDS {
+        let (from, to) = (place(height_m)?, place(height_m + PIECE_M)?);
+        let along = [to.sample - from.sample, to.line - from.line];
+        let found = [tie.source.sample - from.sample, tie.source.line - from.line];
+        let square = along[0] * along[0] + along[1] * along[1];
+        across = (along[0] * found[1] - along[1] * found[0]) / square.sqrt();
+        height_m += PIECE_M * (along[0] * found[0] + along[1] * found[1]) / square;
+    }
     across.is_finite().then_some(across)
 }
 

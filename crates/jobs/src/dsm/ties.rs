@@ -82,8 +82,14 @@ pub(crate) fn match_pairs(
         if found.ties.len() < TIES_MIN && near != range {
             found = verified(views, ties_of(range, &wide_search(config)));
         }
+        let was = near;
         if is_wide {
             near = narrowed(&found).unwrap_or(range);
+        }
+        if was == range && near != range {
+            // Over all heights the points were spread over more than both images see at one.
+            let again = ties_of(near, config);
+            found = if again.ties.len() > found.ties.len() { again } else { found };
         }
         out.push(found);
         done();

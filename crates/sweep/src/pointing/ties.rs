@@ -20,6 +20,8 @@ use super::patch::{Patch, padded, parabola_peak};
 use crate::geometry::source_column_row;
 use crate::view::SweepView;
 
+/// An image this many times smaller than the other one is searched from.
+const SMALLER: usize = 2;
 /// Largest distance of the search back from the corner, pixels.
 const RETURN_PX: f64 = 1.0;
 
@@ -34,15 +36,47 @@ pub fn match_pair(reference: &SweepView, source: &SweepView, range_m: (f64, f64)
         let [sample, line] = [p.sample, p.line].map(|v| level0_from_level(v, skipped as u32));
         ImagePoint::new(sample, line)
     };
-    let found = match_scaled(&Pair { reference: &reference, source: &source }, range_m, config);
+    let noise = (shared_noise(&reference, &source), shared_noise(&source, &reference));
+    let (reference, source) = if skip_reference + skip_source == 0 {
+        (reference, source)
+    } else {
+        let with = |view: Cow<'_, SweepView>, noise: f32| Cow::Owned(SweepView { noise, ..view.into_owned() });
+        (with(reference, noise.0), with(source, noise.1))
+    };
+    let pair = Pair { reference: &reference, source: &source };
+    let swapped = || {
+        let found = match_scaled(&Pair { reference: pair.source, source: pair.reference }, range_m, config)?;
+        let back = |tie: Tie| Tie { reference: tie.source, source: tie.reference, ..tie };
+        Some(found.into_iter().map(back).collect::<Vec<Tie>>())
+    };
+    // The smaller of two images sees less ground that the other one does not see. And a camera may
+    // fail far from the scene, where the other one does not.
+    let area = |view: &SweepView| view.levels[0].width() * view.levels[0].height();
+    let found = if SMALLER * area(&source) < area(&reference) {
+        swapped().or_else(|| match_scaled(&pair, range_m, config))
+    } else {
+        match_scaled(&pair, range_m, config).or_else(swapped)
+    };
+    let found = found.unwrap_or_default();
     let in_full =
         |tie: Tie| Tie { reference: full(tie.reference, skip_reference), source: full(tie.source, skip_source), ..tie };
     found.into_iter().map(in_full).collect()
 }
 
-/// Finds the tie points of a pair of about the same sampling distance.
-fn match_scaled(pair: &Pair<'_>, range_m: (f64, f64), config: &TieConfig) -> Vec<Tie> {
-    let Some(shared) = shared_window(pair, range_m, config.band_px) else { return Vec::new() };
+/// Returns the noise of a view beside another one of the same ground and sampling distance.
+///
+/// The detail of a coarse sensor looks like noise to an estimate from one image. A sharper image
+/// that was reduced shows how much of the texture is detail.
+fn shared_noise(view: &SweepView, other: &SweepView) -> f32 {
+    let contrast = |view: &SweepView| view.contrast.first().copied().filter(|c| *c > 0.0);
+    let expected = contrast(view).zip(contrast(other)).map(|(own, theirs)| other.noise * own / theirs);
+    expected.map_or(view.noise, |expected| view.noise.min(expected))
+}
+
+/// Finds the tie points of a pair of about the same sampling distance; `None` where the views do not
+/// meet or a camera fails in the range.
+fn match_scaled(pair: &Pair<'_>, range_m: (f64, f64), config: &TieConfig) -> Option<Vec<Tie>> {
+    let shared = shared_window(pair, range_m, config.band_px)?;
     let side = shared.width.min(shared.height).min(shorter_side(&pair.source.levels[0]));
     let enough = |(level, image): &(usize, &Grid<f32>)| (side >> level).min(shorter_side(image)) >= config.coarse_side;
     let top = pair.reference.levels.iter().enumerate().take_while(enough).count().saturating_sub(1);
@@ -51,8 +85,8 @@ fn match_scaled(pair: &Pair<'_>, range_m: (f64, f64), config: &TieConfig) -> Vec
     let cell = ((part.width * part.height) as f64 / config.points as f64).sqrt().ceil().max(4.0) as usize;
     let noise = pair.reference.noise_at(top);
     let points = corners(&pair.reference.levels[top], part, cell, config.radius as usize + 2, noise);
-    let Some(coarse) = Coarse::prepare(pair, top, range_m, config) else { return Vec::new() };
-    points.par_iter().filter_map(|&p| pair.follow(p, top, &coarse, config)).collect()
+    let coarse = Coarse::prepare(pair, top, range_m, config)?;
+    Some(points.par_iter().filter_map(|&p| pair.follow(p, top, &coarse, config)).collect())
 }
 
 fn shorter_side(image: &Grid<f32>) -> usize {
@@ -95,14 +129,16 @@ fn scaled(view: &SweepView, skipped: usize) -> Cow<'_, SweepView> {
 fn shared_window(pair: &Pair<'_>, range_m: (f64, f64), band_px: f64) -> Option<Window> {
     /// Fields of the lattice of places that are tried, on a side.
     const FIELDS: usize = 24;
+    /// Pieces of a height trajectory that count as straight.
+    const PIECES: usize = 4;
     let image = &pair.reference.levels[0];
     let source = &pair.source.levels[0];
-    let heights = [range_m.0, 0.5 * (range_m.0 + range_m.1), range_m.1];
-    let is_inside = |[x, y]: [f64; 2]| {
-        let within = |v: f64, size: usize| v >= -band_px && v <= size as f64 + band_px;
-        within(x, source.width()) && within(y, source.height())
+    let limits = [source.width() as f64 + band_px, source.height() as f64 + band_px];
+    let height_m = |i: usize| range_m.0 + (range_m.1 - range_m.0) * i as f64 / PIECES as f64;
+    let sees = |at: [f64; 2]| {
+        let places: Vec<[f64; 2]> = (0..=PIECES).filter_map(|i| pair.chain(at, 0, height_m(i)).ok()).collect();
+        places.iter().zip(places.iter().skip(1).chain(places.last())).any(|(a, b)| crosses(*a, *b, -band_px, limits))
     };
-    let sees = |at: [f64; 2]| heights.iter().any(|h| pair.chain(at, 0, *h).is_ok_and(is_inside));
     let place = |i: usize, size: usize| i as f64 * (size.max(1) - 1) as f64 / FIELDS as f64;
     let mut span: Option<[usize; 4]> = None;
     for j in 0..=FIELDS {
@@ -121,6 +157,24 @@ fn shared_window(pair: &Pair<'_>, range_m: (f64, f64), band_px: f64) -> Option<W
     let [x0, x1, y0, y1] = span?;
     let ((x, width), (y, height)) = (ends(x0, x1, image.width()), ends(y0, y1, image.height()));
     Some(Window { x: x as i64, y: y as i64, width, height })
+}
+
+/// Returns whether a straight piece enters the rectangle from `low` on both axes to `high`.
+fn crosses(from: [f64; 2], to: [f64; 2], low: f64, high: [f64; 2]) -> bool {
+    let (mut enter, mut leave) = (0.0f64, 1.0f64);
+    for axis in 0..2 {
+        let step = to[axis] - from[axis];
+        if step == 0.0 {
+            if !(low..=high[axis]).contains(&from[axis]) {
+                return false;
+            }
+            continue;
+        }
+        let (a, b) = ((low - from[axis]) / step, (high[axis] - from[axis]) / step);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    enter <= leave
 }
 
 /// Returns a window of the full resolution on a level, inside the image of the level.
