@@ -20,7 +20,7 @@ for tool in pkg-config c++; do command -v "$$tool" > /dev/null || MISSING="$$MIS
 for library in gdal proj sqlite3; do pkg-config --exists "$$library" 2> /dev/null || MISSING="$$MISSING $$library.pc"; done
 endef
 
-.PHONY: help setup check demo test lint readme bench bench-kernels
+.PHONY: help setup check demo test fuzz lint readme bench bench-kernels
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -60,6 +60,10 @@ demo: setup ## a surface model of the sample town, its accuracy and its picture,
 
 test: check ## unit, property, integration and documentation tests
 	@cargo test --workspace
+
+fuzz: check ## an hour of hostile input: 20,000 mutated files over all readers and 500 whole runs (SKYSWEEP_FUZZ_SEED chooses others)
+	@SKYSWEEP_FUZZ_INPUTS=20000 SKYSWEEP_FUZZ_RUNS=500 SKYSWEEP_FUZZ_SECONDS=3600 \
+	  cargo test --test fuzz -- --nocapture
 
 lint: check ## format, clippy on every target (benches too), documentation; warnings are errors
 	@cargo fmt --all --check

@@ -27,6 +27,28 @@ fn small(output: &Path) -> Command {
     command
 }
 
+/// The grid, the sources, the pointing and the fusion follow the content of the images. The report
+/// counts them as they were given.
+#[test]
+fn the_order_of_the_images_does_not_change_a_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second, third] = views();
+    let orders = [[&first, &second, &third], [&third, &first, &second], [&second, &third, &first]];
+    let mut expected: Option<Vec<Vec<u8>>> = None;
+    for (number, order) in orders.iter().enumerate() {
+        let out = folder.path().join(number.to_string());
+        skysweep().arg("dsm").args(order).arg("-o").arg(&out).args(["-q", "--gsd", "1"]).assert().code(0);
+        let files = ["dsm.tif", "sigma.tif", "confidence.tif", "views.tif", "filled.tif"];
+        let found: Vec<Vec<u8>> = files.iter().map(|name| std::fs::read(out.join("dsm").join(name)).unwrap()).collect();
+        let same = expected.get_or_insert_with(|| found.clone()).iter().zip(&found).all(|(a, b)| a == b);
+        assert!(same, "{order:?}");
+        let report: Value = serde_json::from_slice(&std::fs::read(out.join("report/report.json")).unwrap()).unwrap();
+        let names: Vec<&str> =
+            report["images"].as_array().unwrap().iter().map(|i| i["path"].as_str().unwrap()).collect();
+        assert!(names.iter().zip(order).all(|(name, path)| Path::new(name) == path.as_path()), "{names:?}");
+    }
+}
+
 #[test]
 fn the_town_is_found_where_it_is() {
     let folder = tempfile::tempdir().unwrap();

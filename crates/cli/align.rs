@@ -138,8 +138,8 @@ fn config(args: &Args) -> anyhow::Result<AlignJobConfig> {
 fn outcome(args: &Args, report: &AlignJobReport) -> Outcome {
     match args.max_rmse {
         Some(most) if report.rmse_m > most => {
-            tracing::error!("the residuals have a root mean square of {:.3} m, allowed are {most} m", report.rmse_m);
-            Outcome::Partial
+            let found = report.rmse_m;
+            Outcome::Partial(format!("the residuals have a root mean square of {found:.3} m, allowed are {most} m"))
         }
         _ => Outcome::Complete,
     }

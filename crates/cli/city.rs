@@ -143,5 +143,13 @@ fn tell(summary: &CitySummary) {
 }
 
 fn outcome(summary: &CitySummary) -> Outcome {
-    if summary.incomplete { Outcome::Partial } else { Outcome::Complete }
+    if !summary.incomplete {
+        return Outcome::Complete;
+    }
+    let defects: usize = summary.defects.iter().map(|defect| defect.count).sum();
+    Outcome::Partial(format!(
+        "the model is incomplete: some of its {} objects or their surfaces cannot be used ({defects} defects); \
+         --report FILE lists them",
+        summary.objects
+    ))
 }

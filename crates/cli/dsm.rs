@@ -165,11 +165,13 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
             with_hint(error, hint)
         })?;
     args.show.print(global, &report, || summary(args, &report))?;
-    let failed = report.chunks.as_ref().map_or(0, |chunks| chunks.failed.len());
-    if failed > 0 {
-        tracing::error!("chunks that could not be computed, whose cells are void: {failed}; the report names them");
-    }
-    Ok(if failed == 0 { Outcome::Complete } else { Outcome::Partial })
+    let failed = report.chunks.iter().flat_map(|chunks| &chunks.failed);
+    Ok(match failed.clone().next() {
+        None => Outcome::Complete,
+        Some(first) => {
+            Outcome::Partial(format!("{} chunks failed and are void, the first one: {}", failed.count(), first.reason))
+        }
+    })
 }
 
 /// Returns the options that help against an error.

@@ -202,8 +202,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         EvalKind::Surfaces => surfaces(args, global)?,
         _ => grids(args, global)?,
     };
-    missed.iter().for_each(|line| tracing::error!("{line}"));
-    Ok(if missed.is_empty() { Outcome::Complete } else { Outcome::Partial })
+    Ok(if missed.is_empty() { Outcome::Complete } else { Outcome::Partial(missed.join("; ")) })
 }
 
 /// Refuses options that only height grids have.

@@ -25,10 +25,11 @@ impl Global {
 }
 
 /// How a command ended that was not stopped by an error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// All that was asked for is done.
     Complete,
-    /// Parts failed, or a requested threshold was missed; the user has been told which.
-    Partial,
+    /// Parts failed, or a requested threshold was missed. The text says which; it is printed as an
+    /// error, so that no run ends with 1 and without a word.
+    Partial(String),
 }

@@ -119,7 +119,10 @@ fn make(args: &MakeArgs, surface: &Path, output: &Path, global: Global) -> anyho
         args.run.show.watch(global, output, |watcher| jobs::groundview::run(&config, watcher)).map_err(hinted)?;
     report.failed.iter().take(SHOWN).for_each(|failure| tracing::error!("{}: {}", failure.id, failure.reason));
     args.run.show.print(global, &report, || report.text())?;
-    Ok(if report.is_complete() { Outcome::Complete } else { Outcome::Partial })
+    if report.is_complete() {
+        return Ok(Outcome::Complete);
+    }
+    Ok(Outcome::Partial(format!("{} views could not be made", report.failed.len())))
 }
 
 fn config(args: &MakeArgs, surface: &Path, output: &Path) -> anyhow::Result<GroundViewConfig> {

@@ -176,18 +176,18 @@ fn make(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow
         args.run.show.watch(global, output, |watcher| jobs::heightmap::run(&config, watcher)).map_err(hinted)?;
     let failed = log_failures(&report);
     args.run.show.print(global, &report, || report.text())?;
-    Ok(if failed { Outcome::Partial } else { Outcome::Complete })
+    Ok(failed.map_or(Outcome::Complete, |count| Outcome::Partial(format!("{count} height maps could not be made"))))
 }
 
-/// Logs the first rows of a list that failed, and returns whether there are any.
-fn log_failures(report: &HeightMapReport) -> bool {
-    let HeightMapReport::List(list) = report else { return false };
+/// Logs the first rows of a list that failed, and returns their number, if there are any.
+fn log_failures(report: &HeightMapReport) -> Option<usize> {
+    let HeightMapReport::List(list) = report else { return None };
     let reasons = list.maps.iter().filter_map(|record| match &record.fate {
         HeightMapFate::Failed { reason } => Some((&record.id, reason)),
         _ => None,
     });
     reasons.take(SHOWN).for_each(|(id, reason)| tracing::error!("{id}: {reason}"));
-    list.failed > 0
+    (list.failed > 0).then_some(list.failed)
 }
 
 fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<HeightMapConfig> {

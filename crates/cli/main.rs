@@ -86,7 +86,10 @@ fn main() -> ExitCode {
     }
     match run(&cli) {
         Ok(Outcome::Complete) => ExitCode::SUCCESS,
-        Ok(Outcome::Partial) => ExitCode::from(1),
+        Ok(Outcome::Partial(what)) => {
+            error::report(&anyhow::Error::msg(what));
+            ExitCode::from(1)
+        }
         Err(e) if error::is_closed_pipe(&e) => ExitCode::SUCCESS,
         Err(e) => {
             error::report(&e);

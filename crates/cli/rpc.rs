@@ -203,8 +203,7 @@ fn answer(
     if report.failed == 0 {
         return Ok(Outcome::Complete);
     }
-    tracing::error!("{} points have no answer", report.failed);
-    Ok(Outcome::Partial)
+    Ok(Outcome::Partial(format!("{} points have no answer", report.failed)))
 }
 
 fn point_line(direction: RpcDirection, RpcPoint { ground, image }: &RpcPoint, json: bool) -> String {

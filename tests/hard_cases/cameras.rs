@@ -49,7 +49,7 @@ fn with_far_offsets(mut rpc: Rpc, offset: f64, scale: f64) -> Rpc {
 }
 
 /// Sets another HEIGHT_OFF and HEIGHT_SCALE without a change of the camera.
-fn with_heights_about(mut rpc: Rpc, offset_m: f64, scale_m: f64) -> Rpc {
+pub(crate) fn with_heights_about(mut rpc: Rpc, offset_m: f64, scale_m: f64) -> Rpc {
     let (shift, factor) = ((offset_m - rpc.height_off) / rpc.height_scale, scale_m / rpc.height_scale);
     for c in polynomials(&mut rpc) {
         c[0] += c[3] * shift;

@@ -165,6 +165,18 @@ pub enum DsmError {
         /// Heights of the tie points.
         seen: HeightRange,
     },
+    /// The elevation model has other heights than the scene.
+    #[error(
+        "the elevation model has heights from {:.0} to {:.0} m under the scene, whose tie points lie between {:.0} and \
+         {:.0} m above the ellipsoid; check the model, its unit and its vertical datum, or leave it out",
+        dem.low_m, dem.high_m, seen.low_m, seen.high_m
+    )]
+    DemMissesScene {
+        /// Heights of the model over the scene, metres above the ellipsoid.
+        dem: HeightRange,
+        /// Heights of the tie points.
+        seen: HeightRange,
+    },
     /// A setting has a value that cannot be used.
     #[error("{setting} is {found}, expected {expected}")]
     Value {

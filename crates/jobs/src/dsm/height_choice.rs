@@ -4,6 +4,7 @@ use report::plain_number;
 
 use crate::dsm::config::{DsmConfig, EARTH_RANGE};
 use crate::dsm::error::{DsmError, DsmSetting};
+use crate::dsm::evidence::dem_with_ties;
 use crate::dsm::notes::Notes;
 use crate::dsm::point::Pointed;
 use crate::dsm::ties::TIES_MIN;
@@ -25,7 +26,7 @@ const FAR_ABOVE_M: f64 = 500.0;
 /// Chooses the heights to search.
 ///
 /// # Errors
-/// [`DsmError::RangeMissesScene`], [`DsmError::NoTies`], and [`DsmError::Value`] for an elevation
+/// [`DsmError::RangeMissesScene`], [`DsmError::DemMissesScene`], [`DsmError::NoTies`], and [`DsmError::Value`] for an elevation
 /// model with heights that are not on Earth.
 pub(crate) fn choose_heights(
     config: &DsmConfig,
@@ -42,7 +43,8 @@ pub(crate) fn choose_heights(
                 "heights of the Earth's surface; is its no-data value declared?",
             ));
         }
-        (with_margins(dem), format!("the DEM's {:.0} to {:.0} m with margins", dem.low_m, dem.high_m))
+        let range = dem_with_ties(with_margins(dem), dem, pointed.tie_heights, notes)?;
+        (range, format!("the DEM's {:.0} to {:.0} m with margins", dem.low_m, dem.high_m))
     } else {
         let ties = pointed.pointing.inliers;
         let Some(seen) = pointed.tie_heights else { return Err(DsmError::NoTies { ties, needed: TIES_MIN }) };

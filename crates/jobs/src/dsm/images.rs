@@ -1,6 +1,6 @@
 //! The images of a run with their cameras, and how their pixels are read.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use camera::{ImagePoint, RpcCamera};
 use raster::{Grid, Window};
@@ -8,20 +8,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 
-use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 
 /// Side of a square of zeros that the dark noise of no sensor leaves, pixels.
 const BLACK_SIDE: usize = 5;
-
-/// First stage of a run: the images, known by their headers and RPCs. No pixel has been read.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct Opened {
-    /// Images in the order of the configuration, with the cameras of their providers.
-    pub images: Vec<SceneImage>,
-}
 
 /// An image file with its camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,12 +20,18 @@ pub struct Opened {
 pub struct SceneImage {
     /// File of the image.
     pub path: PathBuf,
+    /// Position at which the image was given, counted from 0.
+    pub number: usize,
     /// Name of the format in which the RPC was found.
     pub rpc_format: String,
     /// Camera in the frame of the whole image.
     pub camera: RpcCamera,
     /// Width and height, pixels.
     pub size: (usize, usize),
+    /// Factor of the grey values, a power of two: 1 unless a float image has a scale of its own, such
+    /// as reflectances from 0 to 1. Noise and texture are then measured in numbers like those of
+    /// sensors.
+    pub gain: f32,
     /// Part of the image that a run with given bounds reads; `None` when the whole image is used.
     pub part: Option<ImagePart>,
 }
@@ -69,40 +65,12 @@ impl SceneImage {
     }
 }
 
-/// Opens the images of a run and finds their RPCs.
-///
-/// # Errors
-/// [`DsmError::Image`] for a file that is no image, [`DsmError::Rpc`] for an image without a usable
-/// RPC, [`DsmError::SameImage`] for two images with the same camera.
-pub fn open(config: &DsmConfig) -> Result<Opened, DsmError> {
-    let images = config.images.iter().map(|path| open_one(path)).collect::<Result<Vec<_>, _>>()?;
-    // A copy has another name and the same camera, which no two images share.
-    let is_copy = |(i, image): &(usize, &SceneImage)| {
-        images[..*i].iter().any(|other| other.camera == image.camera && other.size == image.size)
-    };
-    if let Some((_, image)) = images.iter().enumerate().find(is_copy) {
-        return Err(DsmError::SameImage { path: image.path.clone() });
-    }
-    Ok(Opened { images })
-}
-
-fn open_one(path: &Path) -> Result<SceneImage, DsmError> {
-    let source = io::raster::ImageSource::open(path)?;
-    let file = io::rpc::read_for_image(path)?;
-    Ok(SceneImage {
-        path: path.to_owned(),
-        rpc_format: file.format.to_string(),
-        size: (source.info().width, source.info().height),
-        camera: RpcCamera::new(file.rpc),
-        part: None,
-    })
-}
-
 /// Reads a window of an image with its pyramid. The camera of the view is that of the window.
 pub(crate) fn read_view(image: &SceneImage, window: Window) -> Result<SweepView, DsmError> {
     let source = io::raster::ImageSource::open(&image.path)?;
     let mut pixels = source.read_luma(window)?.luma;
     mask_black(&mut pixels);
+    scale(&mut pixels, image.gain);
     Ok(SweepView::new(image.camera_of(window), pixels))
 }
 
@@ -112,6 +80,7 @@ pub(crate) fn read_coarse_view(image: &SceneImage, window: Window, level: usize)
     let source = io::raster::ImageSource::open(&image.path)?;
     let mut pixels = source.read_luma(window)?.luma;
     mask_black(&mut pixels);
+    scale(&mut pixels, image.gain);
     for _ in 0..level {
         pixels = raster::reduce(&pixels);
     }
@@ -131,6 +100,12 @@ pub(crate) fn read_views(
         view
     };
     images.par_iter().zip(windows).map(read).collect()
+}
+
+fn scale(pixels: &mut Grid<f32>, gain: f32) {
+    if gain != 1.0 {
+        pixels.data_mut().iter_mut().for_each(|value| *value *= gain);
+    }
 }
 
 /// Sets squares of zeros to NaN. They are voids that the file does not declare, and would be

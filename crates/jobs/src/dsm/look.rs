@@ -16,6 +16,7 @@ use crate::dsm::grid::{DsmGrid, choose_grid};
 use crate::dsm::image_windows::GroundBox;
 use crate::dsm::images::{SceneImage, read_views};
 use crate::dsm::memory;
+use crate::dsm::order::as_given;
 use crate::dsm::session::Session;
 use crate::dsm::shared_heights::{SharedHeights, validity_range};
 use crate::dsm::tie_windows::match_in_windows;
@@ -94,7 +95,7 @@ fn look_at(
     session: &mut Session<'_>,
 ) -> Result<FirstLook, DsmError> {
     let useful = geometry.useful_pairs()?;
-    let pairs = asked_pairs(config, &useful)?;
+    let pairs = asked_pairs(config, images, &useful)?;
     let gsd = images.iter().filter_map(|o| ground_sampling_m(o, geometry.centre)).fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, gsd)?;
     let windows = windows(config, images, &grid, search)?;
@@ -149,21 +150,25 @@ fn fits(config: &DsmConfig, images: &[SceneImage], windows: &[Option<Window>], g
 ///
 /// # Errors
 /// [`DsmError::Value`] when no useful pair is asked for.
-pub(crate) fn asked_pairs(config: &DsmConfig, useful: &[ImagePair]) -> Result<Vec<ImagePair>, DsmError> {
+pub(crate) fn asked_pairs(
+    config: &DsmConfig,
+    images: &[SceneImage],
+    useful: &[ImagePair],
+) -> Result<Vec<ImagePair>, DsmError> {
     let pairs: Vec<ImagePair> = match &config.pairs {
         None => useful.to_vec(),
         Some(asked) => useful.iter().copied().filter(|p| asked.iter().any(|a| a.ordered() == *p)).collect(),
     };
     if pairs.is_empty() {
         let found = "without a pair that shares ground under a useful angle";
-        return Err(DsmError::value(DsmSetting::Pairs, found, format!("some of {}", pair_names(useful))));
+        return Err(DsmError::value(DsmSetting::Pairs, found, format!("some of {}", pair_names(useful, images))));
     }
     Ok(pairs)
 }
 
-/// Returns the names of pairs, with the positions of the images counted from 1: `1-2 1-3`.
-pub(crate) fn pair_names(pairs: &[ImagePair]) -> String {
-    pairs.iter().map(ImagePair::to_string).collect::<Vec<_>>().join(" ")
+/// Returns the names of pairs, with the given positions of the images counted from 1: `1-2 1-3`.
+pub(crate) fn pair_names(pairs: &[ImagePair], images: &[SceneImage]) -> String {
+    pairs.iter().map(|pair| as_given(*pair, images).to_string()).collect::<Vec<_>>().join(" ")
 }
 
 /// Returns the part of each image to read: what the bounds may need, or the whole image (`None`)

@@ -17,6 +17,10 @@ use crate::dsm::surface::SurfaceCounts;
 use crate::dsm::values::HeightRange;
 use crate::error_text::with_causes;
 
+/// Below this share of observed cells a warning is given. Scenes that two images see in part have
+/// several times as many.
+const OBSERVED_WEAK: f64 = 0.1;
+
 /// Last stage of a run: the files that were written, and the report.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -132,6 +136,7 @@ impl<'a> Merger<'a> {
         if self.counts.observed == 0 {
             return Err(self.error.unwrap_or(DsmError::NoSurface { range: plan.height_range }));
         }
+        warn_of_share(plan.grid.size, &self.counts, &mut self.notes);
         let prior = plan.config.prior.clone().map(|model| self.findings.report(model, &mut self.notes));
         self.progress.begin("writing", 1);
         let scene = &plan.report;
@@ -142,7 +147,7 @@ impl<'a> Merger<'a> {
             pointing: scene.pointing.clone(),
             height_range_m: self.height_range.unwrap_or(plan.height_range),
             hypotheses: self.hypotheses,
-            surface: surface_report(plan.grid.size, &self.counts),
+            surface: surface_report(plan, &self.counts),
             chunks: plan.chunk_side.map(|_| self.chunks),
             prior,
             choices: self.notes.choices,
@@ -192,14 +197,27 @@ pub fn merge(
     merger.finish(&[])
 }
 
-fn surface_report(size: (usize, usize), counts: &SurfaceCounts) -> SurfaceReport {
-    let views = counts.views.iter().filter(|view| view.all > 0);
+/// Warns when hardly any cell has an observed height.
+fn warn_of_share(size: (usize, usize), counts: &SurfaceCounts, notes: &mut Notes<'_>) {
+    let share = counts.observed as f64 / (size.0 * size.1).max(1) as f64;
+    if share < OBSERVED_WEAK {
+        notes.warn(format!(
+            "only {:.1} % of the cells have an observed height: the images may not show the same ground, or its heights \
+             lie outside those that were searched",
+            100.0 * share
+        ));
+    }
+}
+
+fn surface_report(plan: &Plan, counts: &SurfaceCounts) -> SurfaceReport {
+    let mut views: Vec<_> = plan.images.iter().zip(&counts.views).filter(|(_, view)| view.all > 0).collect();
+    views.sort_by_key(|(image, _)| image.number);
     SurfaceReport {
-        cells: size.0 * size.1,
+        cells: plan.grid.size.0 * plan.grid.size.1,
         observed: counts.observed,
         filled: counts.filled,
         void: counts.void,
         speckle_removed: counts.speckle_removed,
-        kept_by_view: views.map(|view| view.kept as f64 / view.all as f64).collect(),
+        kept_by_view: views.into_iter().map(|(_, view)| view.kept as f64 / view.all as f64).collect(),
     }
 }

@@ -15,6 +15,7 @@ use crate::dsm::images::{SceneImage, read_view};
 use crate::dsm::levels::{SweepLevels, choose_levels, height_step_m, note_levels, note_step, smallest_sides};
 use crate::dsm::memory;
 use crate::dsm::notes::Notes;
+use crate::dsm::order::{as_given, in_order_of};
 use crate::dsm::point::Pointed;
 use crate::dsm::probe;
 use crate::dsm::report::{ImageReport, PairReport, PointingReport};
@@ -91,6 +92,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
     let tuning = config.preset.tuning();
     let mut notes = Notes::resume(&pointed.choices, &pointed.warnings, session.progress);
     let images = &pointed.images;
+    let (given, config) = (config, &in_order_of(config, images));
     let range = choose_heights(config, pointed, &mut notes)?;
     let geometry = ViewGeometry::at(images, middle_height_m(pointed.tie_heights, range))?;
     let gsds_m: Vec<Option<f64>> = images.iter().map(|o| ground_sampling_m(o, geometry.centre)).collect();
@@ -120,7 +122,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
     session.lap("planning");
     Ok(Plan {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        config: config.clone(),
+        config: given.clone(),
         images: images.clone(),
         characters: pointed.characters.clone(),
         useful: pointed.useful.clone(),
@@ -131,7 +133,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
         chunks,
         report: PlanReport {
             images: image_reports(images, &gsds_m, &geometry, &pointed.corrections),
-            pairs: pair_reports(&geometry, &pointed.ties),
+            pairs: pair_reports(images, &geometry, &pointed.ties),
             pointing: pointed.pointing.clone(),
         },
         grid,
@@ -269,13 +271,16 @@ fn image_reports(
         correction: corrections.get(i).copied(),
         applied_correction: image.camera.correction,
     };
-    images.iter().enumerate().map(one).collect()
+    let mut all: Vec<(usize, ImageReport)> = images.iter().enumerate().map(|(i, o)| (o.number, one((i, o)))).collect();
+    all.sort_by_key(|(number, _)| *number);
+    all.into_iter().map(|(_, report)| report).collect()
 }
 
-fn pair_reports(geometry: &ViewGeometry, ties: &[PairTies]) -> Vec<PairReport> {
+fn pair_reports(images: &[SceneImage], geometry: &ViewGeometry, ties: &[PairTies]) -> Vec<PairReport> {
     let one = |t: &PairTies| {
         let geometry = geometry.pair(t.pair).copied()?;
-        Some(PairReport { images: (t.pair.first + 1, t.pair.second + 1), geometry, ties: t.ties.len() })
+        let ImagePair { first, second } = as_given(t.pair, images);
+        Some(PairReport { images: (first + 1, second + 1), geometry, ties: t.ties.len() })
     };
     ties.iter().filter_map(one).collect()
 }

@@ -1,18 +1,21 @@
 //! Second stage of a run: tie points, and the correction of the cameras' pointing.
 
 use camera::{ImageCorrection, ImagePoint};
-use numeric::Choice;
+use numeric::{Choice, upper_median};
 use serde::{Deserialize, Serialize};
-use sweep::pointing::{AdjustConfig, Adjustment};
+use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
 
 use crate::dsm::character::ImageCharacter;
 use crate::dsm::config::DsmConfig;
 use crate::dsm::dem::dem_heights;
 use crate::dsm::error::DsmError;
+use crate::dsm::evidence::{PairHeight, off_along_sight, warn_of_domains};
 use crate::dsm::image_checks::{grossly_off, same_picture, unconnected};
-use crate::dsm::images::{ImagePart, Opened, SceneImage};
+use crate::dsm::images::{ImagePart, SceneImage};
 use crate::dsm::look::{FirstLook, asked_pairs, look, pair_names};
 use crate::dsm::notes::Notes;
+use crate::dsm::open::Opened;
+use crate::dsm::order::{as_given, in_order_of};
 use crate::dsm::report::{CorrectionOrder, PointingReport};
 use crate::dsm::session::Session;
 use crate::dsm::ties::{PairTies, TIES_MIN, adjust_cameras, tie_heights};
@@ -68,17 +71,19 @@ pub struct Pointed {
 pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> Result<Pointed, DsmError> {
     session.progress.check_cancelled()?;
     let mut images = opened.images.clone();
+    let config = &in_order_of(config, &images);
     let looked = look(config, &images, session)?;
     check_pictures(&images, &looked)?;
     let (found, tracks) = adjust_cameras(&looked.cameras, &looked.sizes, &looked.ties, &AdjustConfig::default());
     let mut notes = Notes::new(session.progress);
     let is_applied = is_applied(config, &found, &mut notes);
+    warn_of_sights(&images, &looked, &found, &mut notes);
     set_cameras(&mut images, session, &looked, is_applied.then_some(&found));
     let FirstLook { geometry, mut useful, ties, characters, is_whole, .. } = looked;
     if is_applied {
         drop_unconnected(config, &mut useful, &ties, &mut notes);
     }
-    let pairs = choose_pairs(config, &useful, &geometry, &mut notes)?;
+    let pairs = choose_pairs(config, &images, &useful, &geometry, &mut notes)?;
     session.lap("pointing");
     let dem_heights = config.dem.as_deref().map(|path| dem_heights(path, &geometry)).transpose()?;
     Ok(Pointed {
@@ -123,7 +128,12 @@ fn is_applied(config: &DsmConfig, found: &Adjustment, notes: &mut Notes<'_>) -> 
         return false;
     }
     if ties < TIES_MIN {
-        notes.warn(format!("the pointing of the RPCs is not corrected: {ties} tie points found, {TIES_MIN} needed"));
+        let names: Vec<String> = config.images.iter().map(|path| path.display().to_string()).collect();
+        notes.warn(format!(
+            "the pointing of the RPCs is not corrected: {ties} tie points found, {TIES_MIN} needed; check that the \
+             images show the same ground: {}",
+            names.join(", ")
+        ));
         return false;
     }
     for (view, apart_px) in grossly_off(&found.corrections) {
@@ -145,6 +155,37 @@ fn is_applied(config: &DsmConfig, found: &Adjustment, notes: &mut Notes<'_>) -> 
         format!("{ties} tie points, residual {before:.2} px before and {after:.2} px after, by BIC"),
     );
     true
+}
+
+/// Warns of images that are off along their lines of sight, which ties of one pair cannot tell from
+/// a height.
+fn warn_of_sights(images: &[SceneImage], looked: &FirstLook, found: &Adjustment, notes: &mut Notes<'_>) {
+    let as_given = AdjustConfig { max_order: ModelOrder::None, ..AdjustConfig::default() };
+    let height = |ties: &PairTies| {
+        let pair = ties.pair;
+        let geometry = looked.geometry.pair(pair).filter(|_| ties.ties.len() >= TIES_MIN)?;
+        let (seen, _) = adjust_cameras(&looked.cameras, &looked.sizes, std::slice::from_ref(ties), &as_given);
+        let mut heights: Vec<f64> = seen.ground.iter().flatten().map(|ground| ground.height_m).collect();
+        let views = [pair.first, pair.second];
+        let height_m = upper_median(&mut heights)?;
+        Some(PairHeight { views, height_m, px_per_m: geometry.parallax_px_per_m })
+    };
+    let pairs: Vec<PairHeight> = looked.ties.iter().filter_map(height).collect();
+    let correction_px = |view: usize| {
+        let [sample, line] = found.corrections[view].translation_px;
+        sample.hypot(line)
+    };
+    if let Some((view, apart_px)) = off_along_sight(&pairs, correction_px) {
+        notes.warn(format!(
+            "the pairs of an image see heights that are {apart_px:.0} px of parallax apart from those of the others: \
+             its pointing is off along the line of sight, and heights may be wrong; check that the RPC belongs to the \
+             image: {}",
+            images[view].path.display()
+        ));
+    }
+    if let Some(seen) = tie_heights(found) {
+        warn_of_domains(images, seen, notes);
+    }
 }
 
 /// Puts the corrections, if any, into the cameras of images, parts and views.
@@ -180,11 +221,12 @@ fn drop_unconnected(config: &DsmConfig, useful: &mut Vec<ImagePair>, ties: &[Pai
 /// Chooses the pairs to sweep.
 fn choose_pairs(
     config: &DsmConfig,
+    images: &[SceneImage],
     useful: &[ImagePair],
     geometry: &ViewGeometry,
     notes: &mut Notes<'_>,
 ) -> Result<Vec<ImagePair>, DsmError> {
-    let pairs = asked_pairs(config, useful)?;
+    let pairs = asked_pairs(config, images, useful)?;
     let widest = pairs.iter().filter_map(|p| geometry.pair(*p)).max_by(|a, b| a.angle_deg.total_cmp(&b.angle_deg));
     if let Some(pair) = widest.filter(|p| p.angle_deg < ANGLE_WEAK_DEG) {
         notes.warn(format!(
@@ -196,13 +238,14 @@ fn choose_pairs(
     }
     for pair in config.pairs.iter().flatten().filter(|p| !useful.contains(&p.ordered())) {
         notes.warn(format!(
-            "the pair {pair} is left out: it shares too little ground, looks along the same line or has no tie points"
+            "the pair {} is left out: it shares too little ground, looks along the same line or has no tie points",
+            as_given(*pair, images)
         ));
     }
     let reason = match config.pairs {
         Some(_) => "given".to_owned(),
         None => "all that share ground at a useful angle, best angle first".to_owned(),
     };
-    notes.choose("pairs", pair_names(&pairs), reason);
+    notes.choose("pairs", pair_names(&pairs, images), reason);
     Ok(pairs)
 }

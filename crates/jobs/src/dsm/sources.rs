@@ -42,7 +42,11 @@ pub(crate) fn choose_sources(
         own.sort_by(|&a, &b| merit(i, b).total_cmp(&merit(i, a)).then(a.cmp(&b)));
         own.truncate(tuning.sources);
     }
-    let text: Vec<String> = sources.iter().enumerate().map(|(i, s)| format!("{}←{}", i + 1, list(s))).collect();
+    let number = |view: usize| pointed.images[view].number + 1;
+    let mut text: Vec<(usize, String)> =
+        sources.iter().enumerate().map(|(i, s)| (number(i), format!("{}←{}", number(i), list(s, number)))).collect();
+    text.sort();
+    let text: Vec<String> = text.into_iter().map(|(_, text)| text).collect();
     notes.choose("sources", text.join(" "), format!("at most {} per view, by tie points and angle", tuning.sources));
     if sources.iter().all(Vec::is_empty) {
         return Err(DsmError::value(
@@ -54,8 +58,8 @@ pub(crate) fn choose_sources(
     Ok(sources)
 }
 
-fn list(views: &[usize]) -> String {
-    let names: Vec<String> = views.iter().map(|v| (v + 1).to_string()).collect();
+fn list(views: &[usize], number: impl Fn(usize) -> usize) -> String {
+    let names: Vec<String> = views.iter().map(|v| number(*v).to_string()).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(",") }
 }
 

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Tie, TieConfig, Track, adjust, match_pair};
 
+use crate::dsm::evidence::is_beyond_chance;
 use crate::dsm::values::{HeightRange, ImagePair};
 
 /// Fewer tie points than this do not determine the heights of a scene.
@@ -65,12 +66,30 @@ pub(crate) fn match_pairs(
             let few = TieConfig { points: config.points / FEW, ..*config };
             near = narrowed(&ties_of(range, &few)).unwrap_or(range);
         }
-        let mut found = ties_of(near, config);
+        let cameras = (&views[pair.first].camera, &views[pair.second].camera);
+        let true_ties = |found: PairTies| {
+            let is_true = is_beyond_chance(cameras, &found.ties, near.middle_m(), TIES_MIN);
+            if is_true { found } else { PairTies { pair, ties: Vec::new() } }
+        };
+        let mut found = true_ties(ties_of(near, config));
+        if found.ties.len() < TIES_MIN && near != range {
+            // A pointing error along the line of sight gives the pair other heights.
+            found = true_ties(ties_of(range, config));
+        }
         if found.ties.len() < TIES_MIN {
             found = verified(views, ties_of(near, &wide_search(config)));
         }
+        if found.ties.len() < TIES_MIN && near != range {
+            found = verified(views, ties_of(range, &wide_search(config)));
+        }
+        let was = near;
         if is_wide {
             near = narrowed(&found).unwrap_or(range);
+        }
+        if was == range && near != range {
+            // Over all heights the points were spread over more than both images see at one.
+            let again = ties_of(near, config);
+            found = if again.ties.len() > found.ties.len() { again } else { found };
         }
         out.push(found);
         done();

@@ -1,24 +1,29 @@
 //! Points worth matching: corners by the smaller eigenvalue of the structure tensor (Shi and Tomasi
 //! 1994), spread evenly over the image.
 
-use raster::Grid;
+use raster::{Grid, Window};
 
 /// Half width of the window over which gradients are summed, pixels.
 const WINDOW: usize = 3;
 
-/// Finds the strongest corner of every `cell × cell` square, at least `border` pixels inside the
-/// image.
+/// Finds the strongest corner of every `cell × cell` square of a part of the image, at least
+/// `border` pixels inside the image.
 ///
 /// Corners are (column, row), the strongest first. Squares without texture above the noise have
 /// none.
-pub(crate) fn corners(image: &Grid<f32>, cell: usize, border: usize, noise: f32) -> Vec<[usize; 2]> {
+pub(crate) fn corners(image: &Grid<f32>, part: Window, cell: usize, border: usize, noise: f32) -> Vec<[usize; 2]> {
     let (w, h) = (image.width(), image.height());
     let border = border.max(WINDOW + 1);
+    let ends = |from: i64, length: usize, size: usize| {
+        let from = from as usize;
+        from.max(border)..(from + length).min(size.saturating_sub(border))
+    };
+    let (columns, rows) = (ends(part.x, part.width, w), ends(part.y, part.height, h));
     let mut found = Vec::new();
-    for y0 in (border..h.saturating_sub(border)).step_by(cell) {
-        for x0 in (border..w.saturating_sub(border)).step_by(cell) {
-            let xs = x0..(x0 + cell).min(w - border);
-            let ys = y0..(y0 + cell).min(h - border);
+    for y0 in rows.clone().step_by(cell) {
+        for x0 in columns.clone().step_by(cell) {
+            let xs = x0..(x0 + cell).min(columns.end);
+            let ys = y0..(y0 + cell).min(rows.end);
             found.extend(strongest(image, xs, ys, noise));
         }
     }
@@ -73,7 +78,7 @@ mod tests {
                 g[(x, y)] = 100.0;
             }
         }
-        let found = corners(&g, 64, 4, 1.0);
+        let found = corners(&g, Window::whole(64, 64), 64, 4, 1.0);
         assert_eq!(found.len(), 1);
         assert!(found[0][0].abs_diff(20) <= 4 && found[0][1].abs_diff(32) <= 4, "{found:?}");
     }

@@ -6,8 +6,10 @@
 //! It is then followed down the pyramid to a fraction of a pixel, and kept if the search back from
 //! the source returns to the corner.
 
+use std::borrow::Cow;
+
 use camera::{CameraError, ImagePoint, RpcCamera};
-use raster::{Grid, bicubic_along, level_from_level0, level0_from_level};
+use raster::{Grid, Window, bicubic_along, level_from_level0, level0_from_level};
 use rayon::prelude::*;
 
 use super::coarse::Coarse;
@@ -18,24 +20,172 @@ use super::patch::{Patch, padded, parabola_peak};
 use crate::geometry::source_column_row;
 use crate::view::SweepView;
 
+/// An image this many times smaller than the other one is searched from.
+const SMALLER: usize = 2;
 /// Largest distance of the search back from the corner, pixels.
 const RETURN_PX: f64 = 1.0;
 
 /// Finds the tie points of a pair at heights in `range_m`, metres above the ellipsoid.
+///
+/// Points are spread over what both views see. Views of different sampling distances are matched at
+/// the coarser one.
 pub fn match_pair(reference: &SweepView, source: &SweepView, range_m: (f64, f64), config: &TieConfig) -> Vec<Tie> {
-    let top = coarse_level(reference, config).min(source.levels.len() - 1);
-    let image = &reference.levels[top];
-    let cell = ((image.width() * image.height()) as f64 / config.points as f64).sqrt().ceil().max(4.0) as usize;
-    let points = corners(image, cell, config.radius as usize + 2, reference.noise_at(top));
-    let pair = Pair { reference, source };
-    let Some(coarse) = Coarse::prepare(&pair, top, range_m, config) else { return Vec::new() };
-    points.par_iter().filter_map(|&p| pair.follow(p, top, &coarse, config)).collect()
+    let (skip_reference, skip_source) = skipped_levels(&Pair { reference, source }, range_m);
+    let (reference, source) = (scaled(reference, skip_reference), scaled(source, skip_source));
+    let full = |p: ImagePoint, skipped: usize| {
+        let [sample, line] = [p.sample, p.line].map(|v| level0_from_level(v, skipped as u32));
+        ImagePoint::new(sample, line)
+    };
+    let noise = (shared_noise(&reference, &source), shared_noise(&source, &reference));
+    let (reference, source) = if skip_reference + skip_source == 0 {
+        (reference, source)
+    } else {
+        let with = |view: Cow<'_, SweepView>, noise: f32| Cow::Owned(SweepView { noise, ..view.into_owned() });
+        (with(reference, noise.0), with(source, noise.1))
+    };
+    let pair = Pair { reference: &reference, source: &source };
+    let swapped = || {
+        let found = match_scaled(&Pair { reference: pair.source, source: pair.reference }, range_m, config)?;
+        let back = |tie: Tie| Tie { reference: tie.source, source: tie.reference, ..tie };
+        Some(found.into_iter().map(back).collect::<Vec<Tie>>())
+    };
+    // The smaller of two images sees less ground that the other one does not see. And a camera may
+    // fail far from the scene, where the other one does not.
+    let area = |view: &SweepView| view.levels[0].width() * view.levels[0].height();
+    let found = if SMALLER * area(&source) < area(&reference) {
+        swapped().or_else(|| match_scaled(&pair, range_m, config))
+    } else {
+        match_scaled(&pair, range_m, config).or_else(swapped)
+    };
+    let found = found.unwrap_or_default();
+    let in_full =
+        |tie: Tie| Tie { reference: full(tie.reference, skip_reference), source: full(tie.source, skip_source), ..tie };
+    found.into_iter().map(in_full).collect()
 }
 
-/// Returns the coarsest level that is large enough for the search.
-fn coarse_level(view: &SweepView, config: &TieConfig) -> usize {
-    let enough = |g: &&Grid<f32>| g.width().min(g.height()) >= config.coarse_side;
-    view.levels.iter().take_while(enough).count().saturating_sub(1)
+/// Returns the noise of a view beside another one of the same ground and sampling distance.
+///
+/// The detail of a coarse sensor looks like noise to an estimate from one image. A sharper image
+/// that was reduced shows how much of the texture is detail.
+fn shared_noise(view: &SweepView, other: &SweepView) -> f32 {
+    let contrast = |view: &SweepView| view.contrast.first().copied().filter(|c| *c > 0.0);
+    let expected = contrast(view).zip(contrast(other)).map(|(own, theirs)| other.noise * own / theirs);
+    expected.map_or(view.noise, |expected| view.noise.min(expected))
+}
+
+/// Finds the tie points of a pair of about the same sampling distance; `None` where the views do not
+/// meet or a camera fails in the range.
+fn match_scaled(pair: &Pair<'_>, range_m: (f64, f64), config: &TieConfig) -> Option<Vec<Tie>> {
+    let shared = shared_window(pair, range_m, config.band_px)?;
+    let side = shared.width.min(shared.height).min(shorter_side(&pair.source.levels[0]));
+    let enough = |(level, image): &(usize, &Grid<f32>)| (side >> level).min(shorter_side(image)) >= config.coarse_side;
+    let top = pair.reference.levels.iter().enumerate().take_while(enough).count().saturating_sub(1);
+    let top = top.min(pair.source.levels.len() - 1);
+    let part = on_level(shared, top, &pair.reference.levels[top]);
+    let cell = ((part.width * part.height) as f64 / config.points as f64).sqrt().ceil().max(4.0) as usize;
+    let noise = pair.reference.noise_at(top);
+    let points = corners(&pair.reference.levels[top], part, cell, config.radius as usize + 2, noise);
+    let coarse = Coarse::prepare(pair, top, range_m, config)?;
+    Some(points.par_iter().filter_map(|&p| pair.follow(p, top, &coarse, config)).collect())
+}
+
+fn shorter_side(image: &Grid<f32>) -> usize {
+    image.width().min(image.height())
+}
+
+/// Returns how many levels of the reference and of the source to leave out, so that pixels of both
+/// are about the same size on the ground.
+fn skipped_levels(pair: &Pair<'_>, range_m: (f64, f64)) -> (usize, usize) {
+    let image = &pair.reference.levels[0];
+    let middle = [0.5 * image.width() as f64, 0.5 * image.height() as f64];
+    let height_m = 0.5 * (range_m.0 + range_m.1);
+    let Ok(frame) = LocalFrame::at(&pair.reference.camera, &pair.source.camera, 0, middle, height_m) else {
+        return (0, 0);
+    };
+    // Source pixels per reference pixel, as a side.
+    let levels = frame.area().abs().sqrt().log2();
+    if !levels.is_finite() {
+        return (0, 0);
+    }
+    let skipped = |levels: f64, view: &SweepView| (levels.round().max(0.0) as usize).min(view.levels.len() - 1);
+    (skipped(-levels, pair.reference), skipped(levels, pair.source))
+}
+
+/// Returns a view without its finest levels; its camera is that of the finest level left.
+fn scaled(view: &SweepView, skipped: usize) -> Cow<'_, SweepView> {
+    if skipped == 0 {
+        return Cow::Borrowed(view);
+    }
+    Cow::Owned(SweepView {
+        camera: view.camera.rescaled(1.0 / f64::from(1u32 << skipped)),
+        levels: view.levels[skipped..].to_vec(),
+        noise: view.noise_at(skipped),
+        contrast: view.contrast[skipped..].to_vec(),
+    })
+}
+
+/// Returns the window of the reference at full resolution that the source may see at some height,
+/// grown by the pointing error; `None` when it sees none of it.
+fn shared_window(pair: &Pair<'_>, range_m: (f64, f64), band_px: f64) -> Option<Window> {
+    /// Fields of the lattice of places that are tried, on a side.
+    const FIELDS: usize = 24;
+    /// Pieces of a height trajectory that count as straight.
+    const PIECES: usize = 4;
+    let image = &pair.reference.levels[0];
+    let source = &pair.source.levels[0];
+    let limits = [source.width() as f64 + band_px, source.height() as f64 + band_px];
+    let height_m = |i: usize| range_m.0 + (range_m.1 - range_m.0) * i as f64 / PIECES as f64;
+    let sees = |at: [f64; 2]| {
+        let places: Vec<[f64; 2]> = (0..=PIECES).filter_map(|i| pair.chain(at, 0, height_m(i)).ok()).collect();
+        places.iter().zip(places.iter().skip(1).chain(places.last())).any(|(a, b)| crosses(*a, *b, -band_px, limits))
+    };
+    let place = |i: usize, size: usize| i as f64 * (size.max(1) - 1) as f64 / FIELDS as f64;
+    let mut span: Option<[usize; 4]> = None;
+    for j in 0..=FIELDS {
+        for i in 0..=FIELDS {
+            if sees([place(i, image.width()), place(j, image.height())]) {
+                let [x0, x1, y0, y1] = span.unwrap_or([i, i, j, j]);
+                span = Some([x0.min(i), x1.max(i), y0.min(j), y1.max(j)]);
+            }
+        }
+    }
+    // What is seen begins at most a field beyond the places that are.
+    let ends = |from: usize, to: usize, size: usize| {
+        let (from, to) = (place(from.saturating_sub(1), size).floor(), place((to + 1).min(FIELDS), size).ceil());
+        (from as usize, to as usize + 1 - from as usize)
+    };
+    let [x0, x1, y0, y1] = span?;
+    let ((x, width), (y, height)) = (ends(x0, x1, image.width()), ends(y0, y1, image.height()));
+    Some(Window { x: x as i64, y: y as i64, width, height })
+}
+
+/// Returns whether a straight piece enters the rectangle from `low` on both axes to `high`.
+fn crosses(from: [f64; 2], to: [f64; 2], low: f64, high: [f64; 2]) -> bool {
+    let (mut enter, mut leave) = (0.0f64, 1.0f64);
+    for axis in 0..2 {
+        let step = to[axis] - from[axis];
+        if step == 0.0 {
+            if !(low..=high[axis]).contains(&from[axis]) {
+                return false;
+            }
+            continue;
+        }
+        let (a, b) = ((low - from[axis]) / step, (high[axis] - from[axis]) / step);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    enter <= leave
+}
+
+/// Returns a window of the full resolution on a level, inside the image of the level.
+fn on_level(window: Window, level: usize, image: &Grid<f32>) -> Window {
+    let ends = |from: i64, length: usize, size: usize| {
+        let (low, high) = (from as usize >> level, (from as usize + length).div_ceil(1 << level).min(size));
+        (low as i64, high.saturating_sub(low))
+    };
+    let (x, width) = ends(window.x, window.width, image.width());
+    let (y, height) = ends(window.y, window.height, image.height());
+    Window { x, y, width, height }
 }
 
 impl Pair<'_> {
@@ -146,6 +296,12 @@ impl LocalFrame {
     /// Returns a source position moved by whole reference columns and rows.
     fn place(&self, centre: [f64; 2], i: i32, j: i32) -> [f64; 2] {
         self.moved(centre, f64::from(i), f64::from(j))
+    }
+
+    /// Returns the number of source pixels in a reference pixel.
+    fn area(&self) -> f64 {
+        let [[a, b], [c, d]] = self.0;
+        a * d - b * c
     }
 
     /// Returns the step in the source from one reference column to the next.

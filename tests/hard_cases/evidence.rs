@@ -1,0 +1,132 @@
+//! Wrong inputs that look right: each ends with a refusal, or with a warning that names the image.
+
+use camera::ImagePoint;
+use crs::Crs;
+use io::raster::{Band, BandData, CogRaster, write_cog};
+use jobs::dsm::{DsmConfig, DsmError};
+use raster::Window;
+
+use crate::stage::{EASY, Shot, Stage, triplet};
+
+/// Runs shots and expects a refusal, or a warning that names the second image. A small error that
+/// is taken out needs none: the heights are then right.
+#[track_caller]
+fn named_or_refused(case: &str, shots: &[Shot], set: impl FnOnce(&mut DsmConfig)) {
+    if let Ok(outcome) = EASY.stage.run(shots, set) {
+        let score = EASY.stage.aligned_score(&outcome);
+        let is_right = score.right > 0.95 && EASY.stage.score(&outcome).bias_m.abs() < 2.0;
+        assert!(outcome.warns("view_2.tif") || is_right, "{case}: {:?} {score:?}", outcome.report);
+    }
+}
+
+/// Changes the second of the easy shots, and runs all three and the first two alone.
+#[track_caller]
+fn second_is_wrong(case: &str, change: impl Fn(&mut Shot)) {
+    let mut shots = EASY.shots.clone();
+    change(&mut shots[1]);
+    named_or_refused(&format!("{case}, three views"), &shots, |_| {});
+    named_or_refused(&format!("{case}, two views"), &shots[..2], |_| {});
+}
+
+#[test]
+fn easy_scenes_have_no_warning() {
+    assert!(EASY.outcome.report.warnings.is_empty(), "{:?}", EASY.outcome.report.warnings);
+    let pair = EASY.stage.run(&EASY.shots[..2], |_| {}).unwrap();
+    assert!(pair.report.warnings.is_empty(), "{:?}", pair.report.warnings);
+}
+
+#[test]
+fn a_negative_image_is_named_or_refused() {
+    second_is_wrong("a negative image", |shot| shot.image = shot.image.map(|v| 2048 - v));
+}
+
+#[test]
+fn a_mirrored_rpc_is_named_or_refused() {
+    second_is_wrong("a mirrored RPC", |shot| {
+        shot.rpc.samp_num.iter_mut().for_each(|c| *c = -*c);
+    });
+}
+
+#[test]
+fn an_image_of_another_scene_is_named_or_refused() {
+    let other = Stage {
+        paint: Box::new(|[x, y, z], _| crate::stage::weathered([x + 5000.0, y - 3000.0, z])),
+        ..Stage::default()
+    };
+    let looks = triplet(0.5);
+    let shot = other.shot(other.rpc(&looks[1]), 1);
+    second_is_wrong("an image of another scene", |own| own.image = shot.image.clone());
+}
+
+#[test]
+fn an_rpc_that_is_thirty_metres_off_is_named_or_refused() {
+    for [sample, line] in [[60.0, 0.0], [0.0, 60.0], [-42.0, 42.0]] {
+        let mut shots = EASY.shots.clone();
+        shots[1].rpc.samp_off += sample;
+        shots[1].rpc.line_off += line;
+        named_or_refused(&format!("{sample} {line} px off"), &shots, |_| {});
+    }
+}
+
+#[test]
+fn a_height_offset_of_fifty_metres_is_named_or_refused() {
+    let mut shots = EASY.shots.clone();
+    shots[1].rpc.height_off += 50.0;
+    named_or_refused("HEIGHT_OFF + 50 m", &shots, |_| {});
+}
+
+#[test]
+fn pointing_errors_of_eighty_to_a_hundred_pixels_are_named_or_refused() {
+    for [sample, line] in [[80.0, 0.0], [0.0, 100.0], [-64.0, 64.0]] {
+        let mut shots = EASY.shots.clone();
+        shots[1].rpc.samp_off += sample;
+        shots[1].rpc.line_off += line;
+        named_or_refused(&format!("{sample} {line} px off"), &shots, |_| {});
+    }
+}
+
+/// Two views tell an error along the line of sight from a height by the heights for which the RPCs
+/// are made.
+#[test]
+fn two_views_that_are_off_along_the_line_of_sight_are_named_or_refused() {
+    let mut shots: Vec<Shot> = EASY.shots[..2].to_vec();
+    for shot in &mut shots {
+        shot.rpc = crate::cameras::with_heights_about(shot.rpc.clone(), 190.0, 60.0);
+    }
+    shots[1].rpc.line_off += 100.0;
+    named_or_refused("100 lines", &shots, |_| {});
+}
+
+#[test]
+fn an_elevation_model_at_other_heights_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dem.tif");
+    let heights = EASY.outcome.dem.heights.map(|h| if h.is_nan() { 180.0 } else { *h });
+    let write = |by: f32| {
+        let heights = heights.map(|h| h + by);
+        let bands = [Band { description: "height_m", data: BandData::F32(&heights) }];
+        let crs = Crs::ellipsoidal(EASY.outcome.dem.horizontal_epsg.unwrap());
+        write_cog(&path, &CogRaster::new(&bands, EASY.outcome.dem.geotransform, crs), true).unwrap();
+    };
+    write(300.0);
+    let refused = EASY.stage.run(&EASY.shots, |c| c.dem = Some(path.clone())).err();
+    assert!(matches!(refused, Some(DsmError::DemMissesScene { .. })), "{refused:?}");
+    write(0.0);
+    let outcome = EASY.stage.run(&EASY.shots, |c| c.dem = Some(path.clone())).unwrap();
+    assert!(outcome.report.warnings.is_empty(), "{:?}", outcome.report.warnings);
+}
+
+/// The last lines of the first image and the first lines of the second one show the same ground.
+#[test]
+fn an_overlap_of_twenty_lines_is_named_or_refused() {
+    let cut = |shot: &Shot, from: usize, lines: usize| {
+        let window = Window { x: 0, y: from as i64, width: shot.image.width(), height: lines };
+        let rpc = shot.rpc.cropped(ImagePoint::new(0.0, from as f64));
+        Shot { image: shot.image.window(window, 0), rpc, ..shot.clone() }
+    };
+    let shots = [cut(&EASY.shots[0], 0, 150), cut(&EASY.shots[1], 130, 150)];
+    named_or_refused("20 lines", &shots, |_| {});
+    named_or_refused("20 lines and a range", &shots, |c| {
+        c.height_range_m = Some(jobs::dsm::HeightRange::new(160.0, 240.0));
+    });
+}
