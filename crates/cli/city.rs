@@ -143,13 +143,6 @@ fn tell(summary: &CitySummary) {
 }
 
 fn outcome(summary: &CitySummary) -> Outcome {
-    if !summary.incomplete {
-        return Outcome::Complete;
-    }
-    let defects: usize = summary.defects.iter().map(|defect| defect.count).sum();
-    Outcome::Partial(format!(
-        "the model is incomplete: some of its {} objects or their surfaces cannot be used ({defects} defects); \
-         --report FILE lists them",
-        summary.objects
-    ))
+    let what = "the model is incomplete: objects or surfaces of it cannot be used; --report FILE lists them";
+    if summary.incomplete { Outcome::Partial(what.to_owned()) } else { Outcome::Complete }
 }

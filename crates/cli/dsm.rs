@@ -165,13 +165,9 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
             with_hint(error, hint)
         })?;
     args.show.print(global, &report, || summary(args, &report))?;
-    let failed = report.chunks.iter().flat_map(|chunks| &chunks.failed);
-    Ok(match failed.clone().next() {
-        None => Outcome::Complete,
-        Some(first) => {
-            Outcome::Partial(format!("{} chunks failed and are void, the first one: {}", failed.count(), first.reason))
-        }
-    })
+    let failed = report.chunks.as_ref().map_or(0, |chunks| chunks.failed.len());
+    let what = || format!("chunks that could not be computed, whose cells are void: {failed}; the report names them");
+    Ok(if failed == 0 { Outcome::Complete } else { Outcome::Partial(what()) })
 }
 
 /// Returns the options that help against an error.

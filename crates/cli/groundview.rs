@@ -119,10 +119,8 @@ fn make(args: &MakeArgs, surface: &Path, output: &Path, global: Global) -> anyho
         args.run.show.watch(global, output, |watcher| jobs::groundview::run(&config, watcher)).map_err(hinted)?;
     report.failed.iter().take(SHOWN).for_each(|failure| tracing::error!("{}: {}", failure.id, failure.reason));
     args.run.show.print(global, &report, || report.text())?;
-    if report.is_complete() {
-        return Ok(Outcome::Complete);
-    }
-    Ok(Outcome::Partial(format!("{} views could not be made", report.failed.len())))
+    let what = || format!("{} views could not be made", report.failed.len());
+    Ok(if report.is_complete() { Outcome::Complete } else { Outcome::Partial(what()) })
 }
 
 fn config(args: &MakeArgs, surface: &Path, output: &Path) -> anyhow::Result<GroundViewConfig> {

@@ -200,13 +200,8 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let show = args.run.show;
     let report = show.watch(global, &args.output, |watcher| jobs::priors::run(&config, watcher)).map_err(hinted)?;
     show.print(global, &report.product, || report.text())?;
-    if report.is_whole() {
-        return Ok(Outcome::Complete);
-    }
-    Ok(Outcome::Partial(match report.unusable_objects {
-        0 => "no point of the model is seen by enough cameras".to_owned(),
-        count => format!("{count} objects of the model have no usable surface"),
-    }))
+    let what = "no point of the model is seen by enough cameras, or objects of it have no usable surface";
+    Ok(if report.is_whole() { Outcome::Complete } else { Outcome::Partial(what.to_owned()) })
 }
 
 /// Names the options that mend an error.

@@ -38,10 +38,10 @@
 //!   elsewhere
 //! - latitude 85° (`geometry::a_scene_at_85_degrees_…`; `geodesy: zones_follow_…`): as elsewhere,
 //!   in EPSG:5041
-//! - wrong inputs that look right (`evidence`): a negative, another scene, a mirrored or shifted RPC,
-//!   other heights in the elevation model: named or refused
-//! - unlike inputs (`inputs`): floats of any scale, a crop or strip, a quarter of the resolution: tie
-//!   points where both see
+//! - wrong inputs that look right (`evidence`): a negative, another scene, a mirrored or
+//!   shifted RPC, other heights in the elevation model: named or refused
+//! - unlike inputs (`inputs`): floats of any scale, a crop or strip, a quarter of the
+//!   resolution: tie points where both see
 //! - sliver of overlap (`geometry::a_sliver_…`): right in the sliver; refused with the share below
 //!   5 %
 //! - wrong height range (`relief::a_range_…` (3); `dsm_command::a_height_range_…`): refused when it

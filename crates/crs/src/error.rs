@@ -44,9 +44,9 @@ pub enum CrsError {
     /// The geoid grid that is needed is not installed.
     #[error(
         "heights above {datum} need {}, which PROJ does not find: put it into ~/.local/share/proj or into \
-         PROJ's folder (`projsync --file {}` fetches it where PROJ's tools are installed; PROJ_DATA replaces \
+         PROJ's folder (PROJ's tool projsync fetches grids by their names; PROJ_DATA replaces \
          the folders that PROJ searches, so it must list PROJ's folder too)",
-        grids(.candidates), first(.candidates)
+        grids(.candidates)
     )]
     MissingGrid {
         /// The datum requested.
@@ -77,9 +77,4 @@ pub enum CrsError {
 fn grids(candidates: &str) -> String {
     let kind = if candidates.contains(", ") { "one of the geoid grids" } else { "the geoid grid" };
     format!("{kind} {candidates}")
-}
-
-/// Returns the first grid of a list.
-fn first(candidates: &str) -> &str {
-    candidates.split(", ").next().unwrap_or_default()
 }

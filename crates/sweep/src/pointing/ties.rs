@@ -73,8 +73,8 @@ fn shared_noise(view: &SweepView, other: &SweepView) -> f32 {
     expected.map_or(view.noise, |expected| view.noise.min(expected))
 }
 
-/// Finds the tie points of a pair of about the same sampling distance; `None` where the views do not
-/// meet or a camera fails in the range.
+/// Finds the tie points of a pair of about the same sampling distance; `None` where the views do
+/// not meet or a camera fails in the range.
 fn match_scaled(pair: &Pair<'_>, range_m: (f64, f64), config: &TieConfig) -> Option<Vec<Tie>> {
     let shared = shared_window(pair, range_m, config.band_px)?;
     let side = shared.width.min(shared.height).min(shorter_side(&pair.source.levels[0]));
