@@ -100,6 +100,33 @@ fn wrong_model(path: &Path) {
     std::fs::write(path, serde_json::to_vec(&model).unwrap()).unwrap();
 }
 
+/// Writes the town's model with every other building, or every one, too high or too low by 4 to
+/// 7 m: a building keeps its walls' feet.
+fn model_with_wrong_heights(path: &Path, every: usize) -> usize {
+    let mut model: Value = serde_json::from_slice(&std::fs::read(town("truth/buildings.city.json")).unwrap()).unwrap();
+    let scale = model["transform"]["scale"][2].as_f64().unwrap();
+    let mut vertices = model["vertices"].as_array().unwrap().clone();
+    let mut wrong = 0;
+    for (number, object) in model["CityObjects"].as_object().unwrap().values().enumerate() {
+        let mut used = Vec::new();
+        object["geometry"].as_array().into_iter().flatten().for_each(|g| indices(&g["boundaries"], &mut used));
+        if used.is_empty() || number % every != 0 {
+            continue;
+        }
+        let height = |i: &usize| vertices[*i][2].as_i64().unwrap();
+        let (low, by_m) = (used.iter().map(height).min().unwrap(), [4.0, -5.0, 7.0][number / every % 3]);
+        used.sort_unstable();
+        used.dedup();
+        for i in used.into_iter().filter(|i| height(i) as f64 * scale > low as f64 * scale + 0.5).collect::<Vec<_>>() {
+            vertices[i][2] = json!(vertices[i][2].as_i64().unwrap() + (by_m / scale) as i64);
+        }
+        wrong += 1;
+    }
+    model["vertices"] = json!(vertices);
+    std::fs::write(path, serde_json::to_vec(&model).unwrap()).unwrap();
+    wrong
+}
+
 /// Heights within the square around the open place.
 fn heights_in_the_open_place(dsm: &Path) -> Vec<f64> {
     let dem = io::raster::read_dem(dsm).unwrap();
@@ -136,6 +163,25 @@ fn a_model_that_lacks_a_building_and_has_one_too_many_still_helps() {
     let (open, beside) = (heights_in_the_open_place(&without), heights_in_the_open_place(&with));
     let changed = open.iter().zip(&beside).filter(|(a, b)| (*a - *b).abs() > 1.0).count();
     assert!(changed * 50 < open.len(), "the wrong building shows in {changed} of {} cells", open.len());
+}
+
+#[test]
+fn buildings_with_wrong_heights_are_refuted_one_by_one_and_cost_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let before = evaluation(&surface(folder.path(), "without", None));
+    for every in [1, 2] {
+        let (name, model) = (format!("every-{every}"), folder.path().join(format!("{every}.city.json")));
+        let wrong = model_with_wrong_heights(&model, every);
+        let after = evaluation(&surface(folder.path(), &name, Some(&model)));
+        let report = std::fs::read(folder.path().join(&name).join("report/report.json")).unwrap();
+        let report: Value = serde_json::from_slice(&report).unwrap();
+        let left_out = report["prior"]["left_out"].as_array().unwrap().len();
+        assert!(left_out * 10 >= wrong * 8, "{left_out} of {wrong} wrong buildings are left out");
+        for path in ["/metrics/mae".to_owned(), format!("/classes/{ROOF}/mae")] {
+            let (without, with) = (mae(&before, &path), mae(&after, &path));
+            assert!(with < 1.02 * without, "{path}: {without} m without, {with} m with {wrong} wrong buildings");
+        }
+    }
 }
 
 #[test]

@@ -26,8 +26,8 @@ const FAR_ABOVE_M: f64 = 500.0;
 /// Chooses the heights to search.
 ///
 /// # Errors
-/// [`DsmError::RangeMissesScene`], [`DsmError::DemMissesScene`], [`DsmError::NoTies`], and [`DsmError::Value`] for an elevation
-/// model with heights that are not on Earth.
+/// [`DsmError::RangeMissesScene`], [`DsmError::DemMissesScene`], [`DsmError::NoTies`], and
+/// [`DsmError::Value`] for an elevation model with heights that are not on Earth.
 pub(crate) fn choose_heights(
     config: &DsmConfig,
     pointed: &Pointed,

@@ -29,8 +29,8 @@ pub struct SceneImage {
     /// Width and height, pixels.
     pub size: (usize, usize),
     /// Factor of the grey values, a power of two: 1 unless a float image has a scale of its own,
-    /// such as reflectances from 0 to 1. Noise and texture are then measured in numbers like those of
-    /// sensors.
+    /// such as reflectances from 0 to 1. Noise and texture are then measured in numbers like those
+    /// of sensors.
     pub gain: f32,
     /// Part of the image that a run with given bounds reads; `None` when the whole image is used.
     pub part: Option<ImagePart>,

@@ -74,6 +74,7 @@ mod output;
 mod plan;
 mod point;
 mod prior_findings;
+mod prior_verdict;
 mod prior_view;
 mod probe;
 mod rasters;

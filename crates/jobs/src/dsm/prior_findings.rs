@@ -1,6 +1,6 @@
 //! The agreement of the swept heights with the buildings of a city model.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -8,35 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::dsm::notes::Notes;
 use crate::dsm::report::{LeftOut, PriorReport};
 
-/// A building is taken to be gone when a smaller share of its pixels agrees with the heights found.
-/// On small buildings the coarse heights are wrong more often than right.
-const BUILDING_MIN: f64 = 0.1;
 /// Number of buildings that are named in the choice; the report names all.
 const NAMED: usize = 3;
-
-/// Pixels of a building in a view.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Vote {
-    /// Pixels whose height agrees with the height found.
-    pub(crate) agreeing: u64,
-    /// Pixels with a height to compare with.
-    pub(crate) compared: u64,
-}
-
-impl Vote {
-    /// Returns whether too few pixels agree.
-    pub(crate) fn is_gone(&self) -> bool {
-        (self.agreeing as f64) < BUILDING_MIN * self.compared as f64
-    }
-}
-
-/// Agreement of the heights of one view with the buildings that it sees.
-#[derive(Debug, Clone)]
-pub(crate) struct Evidence {
-    pub(crate) votes: BTreeMap<u32, Vote>,
-    /// Largest difference of heights that agree, metres.
-    pub(crate) tolerance_m: f32,
-}
 
 /// Agreement of the heights of several views, or chunks, with the buildings of a city model.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -86,18 +59,24 @@ impl ViewVotes {
 }
 
 impl PriorFindings {
-    /// Adds a view that sees the model; its evidence is `None` where hardly anything agrees.
-    pub(crate) fn add(&mut self, evidence: Option<&Evidence>) {
-        let Some(evidence) = evidence else {
-            self.disagreeing_views += 1;
-            return;
-        };
-        self.tolerance_m = evidence.tolerance_m;
-        for (&number, vote) in &evidence.votes {
-            let building = self.buildings.entry(number).or_default();
-            let votes = if vote.is_gone() { &mut building.gone } else { &mut building.kept };
-            votes.add(ViewVotes { views: 1, agreeing_pixels: vote.agreeing, compared_pixels: vote.compared });
+    /// Makes the findings of views from the differences of the heights found to the model's, by view
+    /// and building, metres; `None` for a view whose heights hardly agree with any of the model.
+    /// `gone` are the buildings that are not used.
+    pub(crate) fn new(views: &[Option<BTreeMap<u32, Vec<f32>>>], gone: &BTreeSet<u32>, tolerance_m: f32) -> Self {
+        let mut out = Self { tolerance_m, ..Self::default() };
+        for view in views {
+            let Some(differences) = view else {
+                out.disagreeing_views += 1;
+                continue;
+            };
+            for (&number, all) in differences {
+                let building = out.buildings.entry(number).or_default();
+                let votes = if gone.contains(&number) { &mut building.gone } else { &mut building.kept };
+                let agreeing = all.iter().filter(|d| d.abs() <= tolerance_m).count() as u64;
+                votes.add(ViewVotes { views: 1, agreeing_pixels: agreeing, compared_pixels: all.len() as u64 });
+            }
         }
+        out
     }
 
     /// Sets the identifiers of the buildings, given in the order of their numbers.
@@ -146,16 +125,12 @@ impl PriorFindings {
             0 => format!("none of {}", self.buildings.len()),
             count => format!("{count} of {}: {}{more}", self.buildings.len(), names.join(", ")),
         };
-        let reason = format!(
-            "fewer than {:.0} % of their pixels are at the heights that a coarser level found",
-            100.0 * BUILDING_MIN
-        );
+        let reason = "the images alone show other heights there, or nothing where much of the model is wrong";
         notes.choose("buildings left out", value, reason);
         PriorReport {
             model,
             buildings_seen: self.buildings.len(),
             disagreeing_views: self.disagreeing_views,
-            least_agreeing: BUILDING_MIN,
             tolerance_m: f64::from(self.tolerance_m),
             left_out,
         }

@@ -1,18 +1,17 @@
 //! What one view sees of a city model, held against the heights that a coarse level found.
 //!
 //! The pointing of the images and the place of the model are each off by metres. The prior is
-//! therefore moved to where most of its pixels agree with the heights found. Buildings that still
-//! do not agree are left out, because they may be gone.
+//! therefore moved to where most of its pixels agree with the heights found. What then differs
+//! tells which buildings are wrong (`prior_verdict`).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use numeric::upper_median;
 use priors::NO_OBJECT;
 use raster::Grid;
 use rayon::prelude::*;
 use sweep::HeightMap;
 
-use crate::dsm::prior_findings::{Evidence, Vote};
+use crate::dsm::prior_verdict::densest;
 
 /// Standard deviation of the heights of city models, metres: roofs of LoD2 models lie within half a
 /// metre of laser heights.
@@ -27,8 +26,9 @@ const REACH_MAX: i64 = 12;
 const SAMPLES_MAX: usize = 4000;
 /// Heights of a level are off by up to this many of its steps.
 const AGREEING_STEPS: f64 = 2.0;
-/// A model with a smaller share of agreeing pixels has nothing to do with the scene.
-const AGREEING_MIN: f64 = 0.3;
+/// A model with a smaller share of agreeing pixels has nothing to do with the scene. Most of its
+/// buildings may be wrong, and the place of the others is still found.
+const AGREEING_MIN: f64 = 0.2;
 /// A shift must raise the share of agreeing pixels by this much. Walls that hide what is behind
 /// them draw the model a pixel to their side.
 const MOVE_GAIN: f64 = 0.05;
@@ -78,13 +78,10 @@ impl ViewPrior {
         out
     }
 
-    /// Moves the prior to the heights that a level found, and leaves out buildings that do not
-    /// agree with them.
-    ///
-    /// Returns `None` when hardly anything agrees, because then the place of the rest is not known
-    /// either.
-    pub(crate) fn checked(&self, map: &HeightMap, level: usize, step_m: f64) -> Option<(Self, Evidence)> {
-        let tolerance_m = (AGREEING_STEPS * step_m).max(DEVIATION_M) as f32;
+    /// Moves the prior to the heights that a level found. Returns `None` when hardly anything agrees
+    /// anywhere.
+    pub(crate) fn placed(&self, map: &HeightMap, level: usize, step_m: f64) -> Option<Self> {
+        let tolerance_m = tolerance_m(step_m);
         let side = 1i64 << level;
         let reach = ((SEARCH_M / (self.gsd_m * side as f64)).ceil() as i64).min(REACH_MAX);
         let samples = self.samples(side as usize);
@@ -96,10 +93,7 @@ impl ViewPrior {
         let order = |a: &&Shift, b: &&Shift| a.agreeing.total_cmp(&b.agreeing).then(far(b).cmp(&far(a)));
         let best = scored.iter().max_by(order).filter(|best| best.agreeing >= AGREEING_MIN)?;
         let unmoved = scored.iter().find(|s| far(s) == 0 && s.agreeing + MOVE_GAIN >= best.agreeing);
-        let best = *unmoved.unwrap_or(best);
-        let moved = self.moved(best);
-        let votes = moved.votes(map, side as usize, tolerance_m);
-        Some((moved.without(&votes), Evidence { votes, tolerance_m }))
+        Some(self.moved(*unmoved.unwrap_or(best)))
     }
 
     /// Returns the known pixels in the middles of coarse pixels, at most [`SAMPLES_MAX`].
@@ -133,32 +127,38 @@ impl ViewPrior {
         out
     }
 
-    /// Counts the pixels of each building that agree with the heights found.
-    fn votes(&self, map: &HeightMap, side: usize, tolerance_m: f32) -> BTreeMap<u32, Vote> {
-        let mut votes: BTreeMap<u32, Vote> = BTreeMap::new();
-        for y in 0..self.height_m.height() {
-            for x in 0..self.height_m.width() {
+    /// Returns the differences of the heights that a level found to those of the model, metres, by
+    /// the number of the building.
+    pub(crate) fn differences(&self, map: &HeightMap, level: usize) -> BTreeMap<u32, Vec<f32>> {
+        let side = 1usize << level;
+        let mut out: BTreeMap<u32, Vec<f32>> = BTreeMap::new();
+        for y in (side / 2..self.height_m.height()).step_by(side) {
+            for x in (side / 2..self.height_m.width()).step_by(side) {
                 let object = self.object[(x, y)];
-                let found = found_at(map, x as i64 / side as i64, y as i64 / side as i64);
+                let found = found_at(map, (x / side) as i64, (y / side) as i64);
                 if let (true, Some(found)) = (object != NO_OBJECT, found) {
-                    let vote = votes.entry(object).or_default();
-                    vote.agreeing += u64::from((found - self.height_m[(x, y)]).abs() <= tolerance_m);
-                    vote.compared += 1;
+                    out.entry(object).or_default().push(found - self.height_m[(x, y)]);
                 }
             }
         }
-        votes
+        out
     }
 
-    /// Returns the prior without the buildings that are gone.
-    fn without(mut self, votes: &BTreeMap<u32, Vote>) -> Self {
+    /// Returns the prior without some of its buildings.
+    pub(crate) fn without(mut self, gone: &BTreeSet<u32>) -> Self {
         for (object, height_m) in self.object.data_mut().iter_mut().zip(self.height_m.data_mut()) {
-            if votes.get(object).is_some_and(Vote::is_gone) {
+            if gone.contains(object) {
                 (*object, *height_m) = (NO_OBJECT, f32::NAN);
             }
         }
         self
     }
+}
+
+/// Returns the largest difference of a model's height and a right one found with this distance of
+/// hypotheses, metres.
+pub(crate) fn tolerance_m(step_m: f64) -> f32 {
+    (AGREEING_STEPS * step_m).max(DEVIATION_M) as f32
 }
 
 /// Returns the height that a level found at its pixel, metres above the ellipsoid.
@@ -169,24 +169,22 @@ fn found_at(map: &HeightMap, x: i64, y: i64) -> Option<f32> {
 }
 
 /// Rates a shift by `(dx, dy)` coarse pixels: the share of samples that agree with the heights
-/// found once the median difference is added to all. Returns `None` when no sample has a height to
-/// compare with, or the difference is too large.
+/// found once the most frequent difference is added to all. Returns `None` when no sample has a
+/// height to compare with, or the difference is too large.
 fn score(map: &HeightMap, samples: &[Sample], side: i64, (dx, dy): (i64, i64), tolerance_m: f32) -> Option<Shift> {
     let difference =
         |s: &Sample| Some(found_at(map, s.x.div_euclid(side) + dx, s.y.div_euclid(side) + dy)? - s.height_m);
     let mut off: Vec<f32> = samples.iter().filter_map(difference).collect();
-    let height_m = upper_median(&mut off)?;
-    if f64::from(height_m.abs()) > SEARCH_M {
-        return None;
-    }
-    let agreeing = off.iter().filter(|d| (**d - height_m).abs() <= tolerance_m).count() as f64 / samples.len() as f64;
-    Some(Shift { x: dx * side, y: dy * side, height_m, agreeing })
+    off.sort_by(f32::total_cmp);
+    let agreeing = densest(&off, 2.0 * tolerance_m, |_| true)?;
+    let height_m = off[agreeing.start + agreeing.len() / 2];
+    let agreeing = agreeing.len() as f64 / samples.len() as f64;
+    (f64::from(height_m.abs()) <= SEARCH_M).then_some(Shift { x: dx * side, y: dy * side, height_m, agreeing })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dsm::prior_findings::PriorFindings;
 
     /// Two boxes of 12 and 20 m over ground at 0, numbered 1 and 2, 64 × 64 pixels.
     fn boxes() -> ViewPrior {
@@ -216,25 +214,24 @@ mod tests {
 
     #[test]
     fn a_model_that_lies_elsewhere_is_moved_there() {
-        let (checked, evidence) = boxes().checked(&found((4, -6), 3.5, |_| true), 1, 0.5).unwrap();
-        assert!(evidence.votes.values().all(|vote| !vote.is_gone() && vote.compared == 18 * 18));
+        let map = found((4, -6), 3.5, |_| true);
+        let placed = boxes().placed(&map, 1, 0.5).unwrap();
         let expected = boxes().moved(Shift { x: 4, y: -6, height_m: 3.5, agreeing: 1.0 });
         let same = |(a, b): (&f32, &f32)| a == b || a.is_nan() && b.is_nan();
-        assert!(checked.height_m.data().iter().zip(expected.height_m.data()).all(same));
-        assert_eq!(checked.object, expected.object);
+        assert!(placed.height_m.data().iter().zip(expected.height_m.data()).all(same));
+        assert_eq!(placed.object, expected.object);
+        assert!(placed.differences(&map, 1).values().all(|all| *all == [0.0; 81]));
     }
 
     #[test]
-    fn a_building_that_is_gone_is_left_out_and_the_other_stays() {
-        let (checked, evidence) = boxes().checked(&found((0, 0), 0.0, |number| number == 1), 1, 0.5).unwrap();
-        let kept = |number| checked.object.data().iter().filter(|o| **o == number).count();
+    fn the_place_of_a_model_is_found_by_the_building_that_is_right() {
+        let map = found((0, 0), 0.0, |number| number == 1);
+        let placed = boxes().placed(&map, 1, 0.5).unwrap();
+        let differences = placed.differences(&map, 1);
+        assert_eq!((&differences[&1][..], &differences[&2][..]), (&[0.0; 81][..], &[-20.0; 81][..]));
+        let without = placed.without(&BTreeSet::from([2]));
+        let kept = |number| without.object.data().iter().filter(|o| **o == number).count();
         assert_eq!((kept(1), kept(2)), (18 * 18, 0));
-        assert_eq!(evidence.votes[&2], Vote { agreeing: 0, compared: 18 * 18 });
-        let mut findings = PriorFindings::default();
-        findings.add(Some(&evidence));
-        findings.extend(&findings.clone());
-        let of = |number| [findings.buildings[&number].kept.views, findings.buildings[&number].gone.views];
-        assert_eq!((of(1), of(2)), ([2, 0], [0, 2]));
     }
 
     #[test]

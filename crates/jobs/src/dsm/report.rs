@@ -165,8 +165,6 @@ pub struct PriorReport {
     /// Number of views that see the model, agree with hardly any of it, and do without it. A view
     /// counts once per chunk.
     pub disagreeing_views: usize,
-    /// Share of a building's pixels below which a view leaves it out.
-    pub least_agreeing: f64,
     /// Largest difference of heights that agree, metres.
     pub tolerance_m: f64,
     /// Buildings that some view leaves out.

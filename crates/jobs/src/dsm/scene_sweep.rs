@@ -1,7 +1,10 @@
 //! The heights of all views of a scene or chunk, from the coarsest pyramid level to the finest.
 //!
 //! The coarsest level covers the whole height range. Each finer level searches, per pixel, around
-//! the heights that the coarser level found at this pixel and next to it.
+//! the heights that the coarser level found at this pixel and next to it. Before a city
+//! model is used, the coarse levels are swept without it, to tell which of its buildings are there.
+
+use std::collections::BTreeMap;
 
 use numeric::Progress;
 use rayon::prelude::*;
@@ -12,7 +15,9 @@ use sweep::{HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, Vie
 use crate::dsm::error::DsmError;
 use crate::dsm::levels::SweepLevels;
 use crate::dsm::prior_findings::PriorFindings;
-use crate::dsm::prior_view::{DEVIATION_M, ViewPrior};
+use crate::dsm::prior_verdict::refuted;
+use crate::dsm::prior_view::{DEVIATION_M, ViewPrior, tolerance_m};
+use crate::dsm::session::Muted;
 use crate::dsm::values::HeightRange;
 
 /// Tolerance of the consistency check on coarse levels, pixels. Coarse heights are rough, and a
@@ -68,38 +73,82 @@ pub(crate) fn sweep_scene(
     progress: &dyn Progress,
 ) -> Result<SceneHeights, DsmError> {
     let SweepLevels { finest, coarsest } = sweep.levels;
-    let mut maps: Vec<HeightMap> = Vec::new();
-    let mut hypotheses = 0;
-    // Where there are coarser levels, the place of the model is first found from their heights.
-    let is_single = finest == coarsest;
-    let mut priors: Vec<Option<ViewPrior>> = if is_single { sweep.priors.clone() } else { Vec::new() };
-    priors.resize(views.len(), None);
-    let mut findings = PriorFindings::default();
-    for level in (finest..=coarsest).rev() {
+    let none = PlacedModel { priors: vec![None; views.len()], findings: PriorFindings::default(), hypotheses: 0 };
+    let model = if sweep.priors.iter().any(Option::is_some) {
+        let level = (finest + 1).min(coarsest);
+        let alone = sweep_down(views, sweep, level, &none.priors, &Muted(progress))?;
+        place_model(sweep, &alone, level)
+    } else {
+        none
+    };
+    let SweptLevels { maps, hypotheses } = sweep_down(views, sweep, finest, &model.priors, progress)?;
+    Ok(SceneHeights { maps, hypotheses: hypotheses + model.hypotheses, findings: model.findings })
+}
+
+/// Heights of all views after several levels.
+struct SweptLevels {
+    maps: Vec<HeightMap>,
+    /// Number of pixel-hypothesis pairs evaluated.
+    hypotheses: u64,
+}
+
+/// Sweeps all views from the coarsest level down to `last`. Heights of a coarse level that no
+/// source shares are dropped.
+fn sweep_down(
+    views: &[SweepView],
+    sweep: &SceneSweep,
+    last: usize,
+    priors: &[Option<ViewPrior>],
+    progress: &dyn Progress,
+) -> Result<SweptLevels, DsmError> {
+    let mut out = SweptLevels { maps: Vec::new(), hypotheses: 0 };
+    for level in (last..=sweep.levels.coarsest).rev() {
         progress.check_cancelled()?;
         let swept: Vec<(HeightMap, u64)> = (0..views.len())
             .into_par_iter()
             .map(|i| {
-                let out = sweep_view(views, sweep, i, level, maps.get(i), priors[i].as_ref());
+                let out = sweep_view(views, sweep, i, level, out.maps.get(i), priors[i].as_ref());
                 progress.step();
                 out
             })
             .collect::<Result<_, SweepError>>()?;
-        hypotheses += swept.iter().map(|(_, n)| n).sum::<u64>();
-        maps = swept.into_iter().map(|(m, _)| m).collect();
-        if level > finest {
-            maps = drop_lone_heights(views, sweep, &maps, level as u32)?;
-            findings = PriorFindings::default();
-            let mut checked = |(prior, map): (&Option<ViewPrior>, &HeightMap)| {
-                let held = prior.as_ref()?.checked(map, level, sweep.step_at(level));
-                findings.add(held.as_ref().map(|(_, evidence)| evidence));
-                Some(held?.0)
-            };
-            priors = sweep.priors.iter().zip(&maps).map(&mut checked).collect();
-            priors.resize(views.len(), None);
+        out.hypotheses += swept.iter().map(|(_, n)| n).sum::<u64>();
+        out.maps = swept.into_iter().map(|(map, _)| map).collect();
+        if level > sweep.levels.finest {
+            out.maps = drop_lone_heights(views, sweep, &out.maps, level as u32)?;
         }
     }
-    Ok(SceneHeights { maps, hypotheses, findings })
+    Ok(out)
+}
+
+/// A city model at its place in the images, without the buildings that they refute.
+struct PlacedModel {
+    /// What each view sees of it.
+    priors: Vec<Option<ViewPrior>>,
+    findings: PriorFindings,
+    /// Number of pixel-hypothesis pairs that were evaluated to find it.
+    hypotheses: u64,
+}
+
+/// Places the model at the heights of a level that was swept without it.
+fn place_model(sweep: &SceneSweep, alone: &SweptLevels, level: usize) -> PlacedModel {
+    let step_m = sweep.step_at(level);
+    let of_views = || sweep.priors.iter().zip(&alone.maps).filter_map(|(prior, map)| Some((prior.as_ref()?, map)));
+    let placed: Vec<Option<ViewPrior>> = of_views().map(|(prior, map)| prior.placed(map, level, step_m)).collect();
+    let differences: Vec<Option<BTreeMap<u32, Vec<f32>>>> = of_views()
+        .zip(&placed)
+        .map(|((_, map), placed)| placed.as_ref().map(|placed| placed.differences(map, level)))
+        .collect();
+    let mut together: BTreeMap<u32, Vec<f32>> = BTreeMap::new();
+    for (number, all) in differences.iter().flatten().flatten() {
+        together.entry(*number).or_default().extend(all);
+    }
+    let tolerance_m = tolerance_m(step_m);
+    let gone = refuted(&together, tolerance_m);
+    let findings = PriorFindings::new(&differences, &gone, tolerance_m);
+    let mut placed = placed.into_iter().map(|prior| prior.map(|prior| prior.without(&gone)));
+    let priors = sweep.priors.iter().map(|prior| prior.as_ref().and_then(|_| placed.next().flatten()));
+    PlacedModel { priors: priors.collect(), findings, hypotheses: alone.hypotheses }
 }
 
 /// Sweeps one view on one level; returns its heights and the number of hypotheses.

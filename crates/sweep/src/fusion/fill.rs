@@ -111,8 +111,8 @@ const KNOWN_MIN: usize = 4;
 const STOREY_M: f32 = 3.0;
 /// Number of heights among which a lower surface is looked for: those at the far end of a street.
 const CANDIDATES: usize = 64;
-/// Number of heights that are all around a cell at the border of its void, and the part of them that
-/// a surface must have: fewer may be outliers.
+/// Number of heights that are all around a cell at the border of its void, and the part of them
+/// that a surface must have: fewer may be outliers.
 const AROUND: usize = 256;
 const LEAST_PART: usize = 10;
 /// The lowest surface is the one with this many candidates under it: a few may be wrong.
@@ -132,9 +132,9 @@ pub struct KnownVoids<'a> {
     pub completed_m: &'a Grid<f32>,
 }
 
-/// Fills voids of `height_m` in place. `bound_m` returns the greatest height at which each void cell
-/// may be hidden from all but one view by the given surface: −∞ where two views see everything, +∞
-/// where fewer image it.
+/// Fills voids of `height_m` in place. `bound_m` returns the greatest height at which each void
+/// cell may be hidden from all but one view by the given surface: −∞ where two views see
+/// everything, +∞ where fewer image it.
 pub fn fill_voids(
     height_m: &mut Grid<f32>,
     known: KnownVoids<'_>,
