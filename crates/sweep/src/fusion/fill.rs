@@ -10,8 +10,8 @@
 //! - Otherwise two views see the cell and their pictures do not match. A *narrow* void is closed. A
 //!   wider one is completed where the known heights around it fit one plane, and where it lies
 //!   between two opposite heights. If its border has ground lower by a storey, it gets the ground.
-//!   It stays open where the images are blank (a saturated roof), and where heights are known on
-//!   one side only (water).
+//!   It stays open where heights are known on one side only (water), and where the images are
+//!   blank, unless the views agree on a raised surface there (a saturated roof).
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
 //!
 //! Small islands of heights may be chance, so that nothing is filled from them.
@@ -240,7 +240,8 @@ impl Filling<'_> {
             })
         };
         let height_m = self.completed_m.data()[index];
-        let completed = (config.rule != FillRule::Nothing && !height_m.is_nan()).then(|| {
+        let is_completed = config.rule != FillRule::Nothing && !height_m.is_nan() && self.is_raised(index, height_m);
+        let completed = is_completed.then(|| {
             let nearest = known.iter().map(|k| k.apart).fold(config.reach_cells as f32, f32::min);
             Estimate { height_m, sigma_m: self.sigma_m(0.0, nearest) }
         });
@@ -292,6 +293,16 @@ impl Filling<'_> {
         let all = self.border.nearest(self.place(index), wanted);
         let below: Vec<Known> = all.iter().copied().filter(|k| k.height_m <= height_m).collect();
         if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
+    }
+
+    /// Returns whether a height is a storey above other surfaces around. The views agree on a raised
+    /// blank surface because its outline shows it. In a blank area on the ground anything may
+    /// stand.
+    fn is_raised(&self, index: usize, height_m: f32) -> bool {
+        let wanted = Wanted { void: None, height_max_m: f32::INFINITY, count: AROUND, reach: self.far() };
+        let all = self.border.nearest(self.place(index), wanted);
+        let lower = all.iter().filter(|k| k.height_m <= height_m - STOREY_M).count();
+        lower > 0 && lower * LEAST_PART >= all.len()
     }
 
     fn far(&self) -> f32 {
@@ -427,14 +438,18 @@ mod tests {
         let everything = FillConfig { rule: FillRule::Everything, ..CONFIG };
         fill_voids(&mut unseen, known, visible, &everything);
         assert!((10..20).all(|x| (10..20).all(|y| unseen[(x, y)] == 1.0)), "{:?}", unseen.row(15));
-        // What the views agree on without having seen it is a completion of the image.
-        let mut completed_m = completed_m.clone();
-        completed_m[(15, 15)] = 1.2;
-        let known = KnownVoids { completed_m: &completed_m, ..known };
-        let mut completed = void_in_a_plain();
-        let found = fill_voids(&mut completed, known, visible, &CONFIG);
-        assert_eq!((completed[(15, 15)], found.source[(15, 15)]), (1.2, CellSource::FilledSurface));
-        assert!(completed[(16, 16)].is_nan() && found.sigma_m[(15, 15)] > 0.5);
+        // What the views agree on without having seen it is a completion of the image if it is
+        // raised.
+        for (height_m, is_raised) in [(6.0, true), (1.2, false)] {
+            let mut completed_m = completed_m.clone();
+            completed_m[(15, 15)] = height_m;
+            let known = KnownVoids { completed_m: &completed_m, ..known };
+            let mut completed = void_in_a_plain();
+            let found = fill_voids(&mut completed, known, visible, &CONFIG);
+            assert_eq!(completed[(15, 15)] == height_m, is_raised);
+            assert_eq!(found.source[(15, 15)] == CellSource::FilledSurface, is_raised);
+            assert!(completed[(16, 16)].is_nan() && (found.sigma_m[(15, 15)] > 0.5) == is_raised);
+        }
     }
 
     #[test]
