@@ -198,3 +198,23 @@ fn a_prior_that_is_none_is_refused_before_anything_is_written() {
     command.assert().code(2).stderr(predicate::str::contains("empty.city.json"));
     assert!(!out.exists());
 }
+
+/// A model of another place is no help, and is said to be none.
+#[test]
+fn a_model_of_another_place_is_named_with_both_extents() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, out) = (folder.path().join("away.city.json"), folder.path().join("out"));
+    let mut model: Value = serde_json::from_slice(&std::fs::read(town("truth/buildings.city.json")).unwrap()).unwrap();
+    let east = model["transform"]["translate"][0].as_f64().unwrap();
+    model["transform"]["translate"][0] = json!(east + 3000.0);
+    std::fs::write(&path, model.to_string()).unwrap();
+    let mut command = skysweep();
+    command.arg("dsm").args(["view_1.tif", "view_3.tif"].map(town)).args(["--gsd", "2", "--preset", "fast", "-o"]);
+    let warned = predicate::str::contains("no building of the city model stands in the scene")
+        .and(predicate::str::contains("the model covers [69"))
+        .and(predicate::str::contains("away.city.json"));
+    command.arg(&out).arg("--prior").arg(&path).assert().code(0).stderr(warned);
+    let report: Value = serde_json::from_slice(&std::fs::read(out.join("report/report.json")).unwrap()).unwrap();
+    let warnings = report["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|text| text.as_str().unwrap().contains("away.city.json")), "{warnings:?}");
+}

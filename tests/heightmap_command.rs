@@ -376,7 +376,8 @@ fn a_list_is_made_whole_with_its_bad_rows_named_and_goes_on_where_it_was() {
     let bytes = |id: &str| std::fs::read(out.join(id)).unwrap();
     let (a, north) = (bytes("a.tif"), bytes("north.tif"));
     std::fs::remove_file(out.join("a.tif")).unwrap();
-    run(&["--threads", "1"]).code(1);
+    // Quiet is not silent about what failed.
+    run(&["--threads", "1", "-q"]).code(1).stderr(predicate::str::contains("error: 2 height maps could not be made"));
     assert_eq!((report()["made"].as_u64(), report()["kept"].as_u64()), (Some(1), Some(1)));
     assert!(bytes("a.tif") == a && bytes("north.tif") == north);
     // Other options ask for other maps.

@@ -9,8 +9,9 @@
 //! - zero baseline (`geometry::views_from_one_direction_…`): refused: no parallax, with the angle
 //! - tiny baseline (1°) (`geometry::a_tiny_baseline_…`): heights within metres, σ says so, a
 //!   warning names the angle
-//! - identical images (`geometry::one_picture_under_two_rpcs_…`;
-//!   `dsm_command::copies_of_one_image_…`): refused: no parallax
+//! - identical images: one picture under two RPCs (`geometry::one_picture_under_two_rpcs_…`) is
+//!   refused for want of parallax; an image and its copy (`dsm_command::copies_of_one_image_…`) as
+//!   the same image given twice
 //! - constant images (`radiometry::blank_images_…`, `one_blank_view_…`; `sweep:
 //!   blank_and_missing_images_…`): refused, or the view set aside by name
 //! - saturated image (`radiometry::a_saturated_roof_…`): right or void, the rest untouched

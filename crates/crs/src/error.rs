@@ -25,6 +25,25 @@ pub enum CrsError {
         /// The text as given.
         text: String,
     },
+    /// The CRS has no map coordinates.
+    #[error("{crs} is {found}, which has no map: expected a projected CRS, such as the UTM zone of the scene")]
+    NotAMap {
+        /// The CRS.
+        crs: String,
+        /// Its kind and name in words.
+        found: String,
+    },
+    /// The code of another kind of CRS is given as a vertical datum.
+    #[error(
+        "EPSG:{code} is {found}, expected a vertical datum: 'ellipsoid', 'egm96', 'egm2008' or the code of a vertical \
+         CRS such as EPSG:5773"
+    )]
+    NotVertical {
+        /// The code.
+        code: u32,
+        /// Kind and name of its CRS in words.
+        found: String,
+    },
     /// The position is not on the Earth or outside the map projection.
     #[error(transparent)]
     Position(#[from] GeodesyError),

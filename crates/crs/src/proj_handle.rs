@@ -7,14 +7,16 @@
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::fmt;
 use std::ptr;
 use std::sync::{Mutex, PoisonError};
 
 use proj_sys::{
     PJ, PJ_CONTEXT, PJ_DIRECTION, PJ_DIRECTION_PJ_FWD, PJ_DIRECTION_PJ_INV, PJ_LOG_LEVEL_PJ_LOG_NONE,
-    PJ_TYPE_PJ_TYPE_BOUND_CRS, PJ_TYPE_PJ_TYPE_COMPOUND_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS,
-    PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS, PJ_WKT_TYPE_PJ_WKT2_2019, proj_as_wkt, proj_context_create,
-    proj_context_destroy, proj_context_errno, proj_context_errno_string, proj_context_set_enable_network, proj_create,
+    PJ_TYPE_PJ_TYPE_BOUND_CRS, PJ_TYPE_PJ_TYPE_COMPOUND_CRS, PJ_TYPE_PJ_TYPE_GEOCENTRIC_CRS,
+    PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS, PJ_TYPE_PJ_TYPE_PROJECTED_CRS,
+    PJ_TYPE_PJ_TYPE_VERTICAL_CRS, PJ_WKT_TYPE_PJ_WKT2_2019, proj_as_wkt, proj_context_create, proj_context_destroy,
+    proj_context_errno, proj_context_errno_string, proj_context_set_enable_network, proj_create,
     proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D, proj_crs_get_coordinate_system, proj_crs_get_sub_crs,
     proj_crs_promote_to_3D, proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_area_of_use,
     proj_get_id_auth_name, proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify,
@@ -282,8 +284,8 @@ impl Pool {
     }
 }
 
-impl std::fmt::Debug for Pool {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Debug for Pool {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Pool").field(&self.recipe).finish()
     }
 }
@@ -370,6 +372,62 @@ pub(crate) fn area_of_use(definition: &str) -> Result<Option<[f64; 4]>, String> 
     // PROJ writes −1000 where a bound is not known.
     let bounds = [west, south, east, north];
     Ok((found != 0 && bounds.iter().all(|b| *b > -999.0)).then_some(bounds))
+}
+
+/// What a CRS can be used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum CrsKind {
+    Projected,
+    Geographic,
+    /// Three axes from the centre of the Earth.
+    Geocentric,
+    Vertical,
+    Compound,
+    Other,
+}
+
+/// Kind and name of a CRS. It is displayed as `a projected CRS (WGS 84 / UTM zone 31N)`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct NamedKind {
+    pub(crate) kind: CrsKind,
+    name: String,
+}
+
+impl fmt::Display for NamedKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.kind {
+            CrsKind::Projected => "a projected",
+            CrsKind::Geographic => "a geographic",
+            CrsKind::Geocentric => "a geocentric",
+            CrsKind::Vertical => "a vertical",
+            CrsKind::Compound => "a compound",
+            CrsKind::Other => "another kind of",
+        };
+        write!(f, "{kind} CRS ({})", self.name)
+    }
+}
+
+/// Returns the kind and the name of a CRS.
+pub(crate) fn named_kind(definition: &str) -> Result<NamedKind, String> {
+    let context = Context::new();
+    let crs = context.create(definition)?;
+    // SAFETY: the object belongs to the context and is alive; the text belongs to it and is copied
+    // at once.
+    let (kind, name) = unsafe { (proj_get_type(crs.0), text_of(proj_get_name(crs.0)).unwrap_or_default()) };
+    let kind = if kind == PJ_TYPE_PJ_TYPE_PROJECTED_CRS {
+        CrsKind::Projected
+    } else if kind == PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS || kind == PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS {
+        CrsKind::Geographic
+    } else if kind == PJ_TYPE_PJ_TYPE_GEOCENTRIC_CRS {
+        CrsKind::Geocentric
+    } else if kind == PJ_TYPE_PJ_TYPE_VERTICAL_CRS {
+        CrsKind::Vertical
+    } else if kind == PJ_TYPE_PJ_TYPE_COMPOUND_CRS {
+        CrsKind::Compound
+    } else {
+        CrsKind::Other
+    };
+    Ok(NamedKind { kind, name })
 }
 
 /// Returns the metres per unit of a CRS's horizontal axes; `None` when the units are angles.

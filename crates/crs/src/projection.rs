@@ -9,7 +9,7 @@
 use geodesy::{GeodesyError, MapPoint};
 
 use crate::error::CrsError;
-use crate::proj_handle::{Direction, Pool, Recipe, metres_per_unit};
+use crate::proj_handle::{CrsKind, Direction, Pool, Recipe, metres_per_unit, named_kind};
 
 /// The conversion between WGS 84 longitude and latitude and a map CRS.
 #[derive(Debug)]
@@ -31,6 +31,7 @@ impl MapProjection {
     /// ```
     ///
     /// # Errors
+    /// [`CrsError::NotAMap`] for a code that is geocentric or vertical;
     /// [`CrsError::NoTransformation`] when PROJ does not know the code or has no transformation to
     /// it from WGS 84.
     pub fn from_epsg(code: u32) -> Result<Self, CrsError> {
@@ -41,6 +42,7 @@ impl MapProjection {
     /// of a compound CRS is ignored. Transformations of unknown accuracy ("ballpark") are refused.
     ///
     /// # Errors
+    /// [`CrsError::NotAMap`] for a CRS that is geocentric or vertical;
     /// [`CrsError::NoTransformation`] when PROJ does not know the CRS or has no transformation to
     /// it from WGS 84.
     pub fn from_definition(definition: &str) -> Result<Self, CrsError> {
@@ -49,6 +51,10 @@ impl MapProjection {
             target_crs: first_line(definition),
             reason,
         };
+        let found = named_kind(definition).map_err(fails)?;
+        if matches!(found.kind, CrsKind::Geocentric | CrsKind::Vertical) {
+            return Err(CrsError::NotAMap { crs: first_line(definition), found: found.to_string() });
+        }
         let recipe = Recipe::Horizontal { source: "EPSG:4326".to_owned(), target: definition.to_owned() };
         let metres_per_unit = metres_per_unit(definition).map_err(fails)?;
         let pool = Pool::new(recipe).map_err(fails)?;
@@ -196,6 +202,15 @@ mod tests {
         assert!((feet - 0.3048).abs() < 1e-5);
         let degrees = MapProjection::from_epsg(4326).unwrap().map_from_lonlat(-81.0, 30.0).unwrap();
         assert_eq!(degrees, MapPoint { x: -81.0, y: 30.0 });
+    }
+
+    #[test]
+    fn systems_without_a_map_are_refused_by_kind() {
+        for (code, kind) in [(4978, "geocentric"), (5773, "vertical")] {
+            let error = MapProjection::from_epsg(code).unwrap_err();
+            assert!(matches!(error, CrsError::NotAMap { .. }), "{error}");
+            assert!(error.to_string().contains(kind), "{error}");
+        }
     }
 
     #[test]

@@ -14,7 +14,7 @@ use geodesy::GeodesyError;
 use crate::area::AreaOfUse;
 use crate::error::CrsError;
 use crate::identity::VerticalDatum;
-use crate::proj_handle::{Direction, Pool, Recipe};
+use crate::proj_handle::{CrsKind, Direction, Pool, Recipe, named_kind};
 
 /// File names of the EGM96 grid in current and older distributions of PROJ.
 const EGM96_GRIDS: [&str; 2] = ["us_nga_egm96_15.tif", "egm96_15.gtx"];
@@ -54,6 +54,7 @@ impl HeightConverter {
     ///
     /// # Errors
     /// [`CrsError::MissingGrid`] when the geoid's grid is not installed;
+    /// [`CrsError::NotVertical`] for the EPSG code of another kind of CRS;
     /// [`CrsError::NoTransformation`] when PROJ has no transformation from the ellipsoid to the
     /// EPSG code.
     pub fn new(datum: VerticalDatum) -> Result<Self, CrsError> {
@@ -176,6 +177,11 @@ fn grid_pipeline(grid: &str) -> String {
 /// Makes the transformation to a vertical CRS in PROJ's database. When its grids are missing, PROJ
 /// makes none, or one that fails at every point. So it is tried inside the area of use of the CRS.
 fn through_database(code: u32) -> Result<Pool, CrsError> {
+    if let Ok(found) = named_kind(&format!("EPSG:{code}"))
+        && found.kind != CrsKind::Vertical
+    {
+        return Err(CrsError::NotVertical { code, found: found.to_string() });
+    }
     let target = format!("EPSG:4326+{code}");
     let recipe = Recipe::Spatial { source: "EPSG:4979".to_owned(), target: target.clone() };
     let known = GRIDS.iter().find(|(known, _)| *known == code).map(|(_, name)| (*name).to_owned());
@@ -236,6 +242,16 @@ mod tests {
         }
         let path = Path::new("/nonexistent/grid.gtx");
         assert!(matches!(HeightConverter::with_grid(VerticalDatum::Egm2008, path), Err(CrsError::UnusableGrid { .. })));
+    }
+
+    /// The code of a map, of the ellipsoid's heights or of a compound CRS is no vertical datum.
+    #[test]
+    fn codes_of_other_systems_are_refused_by_name() {
+        for (code, name) in [(32631, "UTM zone 31N"), (4979, "WGS 84"), (7415, "NAP"), (4978, "geocentric")] {
+            let error = HeightConverter::new(VerticalDatum::Epsg(code)).unwrap_err();
+            assert!(matches!(error, CrsError::NotVertical { .. }), "{error}");
+            assert!(error.to_string().contains(name), "{error}");
+        }
     }
 
     /// German heights need a grid that PROJ's own package lacks: the error names it.

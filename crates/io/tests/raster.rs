@@ -44,6 +44,29 @@ fn rpc() -> Rpc {
     }
 }
 
+/// A surface with −9999 in its voids is refused where the file does not declare the value, and read
+/// where it does.
+#[test]
+fn a_no_data_value_that_is_not_declared_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut grid = heights(40, 30);
+    grid.data_mut().iter_mut().for_each(|h| *h = if h.is_nan() { 200.0 } else { *h });
+    (0..40).for_each(|column| grid[(column, 7)] = -9999.0);
+    let bands = [Band { description: "height_m", data: BandData::F32(&grid) }];
+    let of = |no_data: Option<f64>| {
+        let path = folder.path().join("surface.tif");
+        let place = GeoTransform::north_up(436_000.0, 3_358_000.0, 0.5);
+        let surface = CogRaster { no_data, ..CogRaster::new(&bands, place, Crs::ellipsoidal(32617)) };
+        write_cog(&path, &surface, true).unwrap();
+        read_dem(&path)
+    };
+    let error = of(None).unwrap_err();
+    assert!(matches!(error, RasterError::UndeclaredNoData { value: -9999.0, cells: 40, .. }), "{error}");
+    assert!(error.to_string().contains("surface.tif"), "{error}");
+    let dem = of(Some(-9999.0)).unwrap();
+    assert_eq!(dem.heights.data().iter().filter(|h| h.is_nan()).count(), 40);
+}
+
 fn shared(name: &str) -> Option<PathBuf> {
     testing::shared_data(&format!("stereo/{name}"))
 }

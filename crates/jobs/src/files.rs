@@ -40,6 +40,20 @@ pub enum FileError {
         /// Reason given by the operating system.
         source: std::io::Error,
     },
+    /// The name of an output folder is not text that the libraries for rasters take.
+    #[error("the name of the output folder is not UTF-8, which raster files need; choose another: {}", path.display())]
+    NotUtf8 {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A folder cannot be written into.
+    #[error("cannot write into the folder; check its permissions and space, or choose another: {}", path.display())]
+    Unwritable {
+        /// The folder.
+        path: PathBuf,
+        /// Reason given by the operating system.
+        source: std::io::Error,
+    },
     /// Another run writes into the folder.
     #[error("another run is writing into the folder; wait for its end or choose another folder: {}", path.display())]
     InUse {

@@ -30,12 +30,32 @@ pub(crate) struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Makes the folder if need be, and takes it for this run.
+    /// Makes the folder if need be, and takes it for this run. What would fail when the results are
+    /// written fails here.
     ///
     /// # Errors
     /// [`FileError::InUse`] when another run writes into it, [`FileError::Folder`] when it cannot
-    /// be made or is a file.
+    /// be made or is a file, [`FileError::Unwritable`], [`FileError::NotUtf8`].
     pub(crate) fn take(path: &Path) -> Result<Self, FileError> {
+        if path.to_str().is_none() {
+            return Err(FileError::NotUtf8 { path: path.to_owned() });
+        }
+        let folder = Self::lock(path)?;
+        match tempfile::Builder::new().prefix(WORK).tempfile_in(path) {
+            Ok(_) => Ok(folder),
+            Err(source) => Err(FileError::Unwritable { path: path.to_owned(), source }),
+        }
+    }
+
+    /// Checks that a run could take the folder, and leaves it as it was.
+    ///
+    /// # Errors
+    /// As [`Self::take`].
+    pub(crate) fn check(path: &Path) -> Result<(), FileError> {
+        Self::take(path).map(drop)
+    }
+
+    fn lock(path: &Path) -> Result<Self, FileError> {
         for _ in 0..ATTEMPTS {
             let created = path.symlink_metadata().is_err();
             create_folder(path)?;
@@ -168,6 +188,28 @@ mod tests {
         fs::write(path.join("kept"), b"").unwrap();
         drop(third);
         assert!(path.exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn folders_that_cannot_take_results_are_refused_before_the_work() {
+        use std::os::unix::ffi::OsStrExt;
+        let root = tempfile::tempdir().unwrap();
+        let file = root.path().join("file");
+        fs::write(&file, b"").unwrap();
+        for path in [file.clone(), file.join("below")] {
+            let error = OutputFolder::check(&path).unwrap_err();
+            assert!(matches!(error, FileError::Folder { .. }), "{error}");
+        }
+        // Nobody makes files here, not even root.
+        let error = OutputFolder::check(Path::new("/proc/self")).unwrap_err();
+        assert!(matches!(error, FileError::Unwritable { .. }), "{error}");
+        let strange = root.path().join(std::ffi::OsStr::from_bytes(b"\xff"));
+        let error = OutputFolder::check(&strange).unwrap_err();
+        assert!(matches!(error, FileError::NotUtf8 { .. }), "{error}");
+        let new = root.path().join("new");
+        OutputFolder::check(&new).unwrap();
+        assert!(!new.exists() && !strange.exists());
     }
 
     #[cfg(unix)]

@@ -136,3 +136,39 @@ fn a_cancelled_run_leaves_nothing() {
         assert!(!config.output.exists(), "{chunk:?} after {steps} steps");
     }
 }
+
+/// Appends a byte to a file when a stage begins.
+struct ChangeAt<'a>(&'a str, &'a Path);
+
+impl Progress for ChangeAt<'_> {
+    fn begin(&self, stage: &str, _: usize) {
+        if stage == self.0 {
+            let mut bytes = std::fs::read(self.1).unwrap();
+            bytes.push(0);
+            std::fs::write(self.1, bytes).unwrap();
+        }
+    }
+
+    fn step(&self) {}
+    fn choice(&self, _: &Choice) {}
+    fn warn(&self, _: &str) {}
+
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn an_input_that_changes_during_the_run_is_named() {
+    for (chunk, stage) in [(None, "sweeping heights"), (Some(150), "sweeping chunks")] {
+        let folder = tempfile::tempdir().unwrap();
+        let image = folder.path().join("image.tif");
+        std::fs::copy(town("view_2.tif"), &image).unwrap();
+        let mut config = config(&folder.path().join("out"));
+        (config.prior, config.chunk) = (None, chunk);
+        config.images[1].clone_from(&image);
+        let ended = run(&config, &ChangeAt(stage, &image));
+        assert!(matches!(&ended, Err(DsmError::InputChanged { path }) if *path == image), "{ended:?}");
+        assert!(!config.output.exists());
+    }
+}

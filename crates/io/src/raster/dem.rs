@@ -15,6 +15,7 @@ use super::error::RasterError;
 use super::gdal_setup::{open_dataset, with_gdal};
 use super::geotiff::VERTICAL_DATUM;
 use super::source::read_as;
+use super::undeclared::undeclared_no_data;
 
 /// Most cells that are read at once (4 GiB of f32).
 const CELLS_MAX: usize = 1 << 30;
@@ -45,6 +46,8 @@ pub struct Dem {
 ///   the file cannot be opened.
 /// - [`RasterError::Unsupported`] without bands or georeference, or with more than 2³⁰ cells.
 /// - [`RasterError::Damaged`] when GDAL cannot decode the cells.
+/// - [`RasterError::UndeclaredNoData`] for cells with a lone value such as −9999 that the file does
+///   not declare as no-data.
 /// - [`RasterError::Crs`] for a CRS that PROJ cannot read.
 pub fn read_dem(path: impl AsRef<Path>) -> Result<Dem, RasterError> {
     let dataset = open_dataset(path.as_ref())?;
@@ -116,6 +119,13 @@ fn heights(path: &Path, dataset: &Dataset, inside: Window) -> Result<(Grid<f32>,
         } else {
             (f64::from(*value) * scale + offset) as f32
         };
+    }
+    // A scaled band has counts, which are no heights.
+    if scale == 1.0
+        && offset == 0.0
+        && let Some((value, cells)) = undeclared_no_data(heights.data())
+    {
+        return Err(RasterError::UndeclaredNoData { path: path.to_owned(), value, cells });
     }
     Ok((heights, no_data))
 }

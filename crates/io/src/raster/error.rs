@@ -63,6 +63,21 @@ pub enum RasterError {
         /// The property required.
         expected: &'static str,
     },
+    /// A value that looks like no-data is not declared as such. As a height it would spoil every
+    /// result.
+    #[error(
+        "{cells} cells have exactly the value {value}, far from all others, which looks like a no-data value that the \
+         file does not declare: declare it (gdal_edit.py -a_nodata {value}), or set the cells to another value: {}",
+        path.display()
+    )]
+    UndeclaredNoData {
+        /// The file.
+        path: PathBuf,
+        /// The value.
+        value: f32,
+        /// Number of cells that have it.
+        cells: usize,
+    },
     /// The file was not written: it exists, or the system or GDAL refused.
     #[error(transparent)]
     NotWritten(#[from] SaveError),

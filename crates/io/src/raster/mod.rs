@@ -21,6 +21,7 @@ mod png;
 mod source;
 mod spool;
 mod tile;
+mod undeclared;
 mod verify;
 
 pub use band::{Band, BandData};

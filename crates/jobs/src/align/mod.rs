@@ -100,6 +100,7 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     config.validate()?;
     let report_path = config.output.join(REPORT);
     files::refuse_existing(&report_path, config.overwrite)?;
+    let folder = OutputFolder::take(&config.output)?;
     let model = read_model(&config.model, progress)?;
     let positions = io::control::read(&config.positions)?;
     let world = World::of(&positions, config.crs_epsg, config.vertical)?;
@@ -111,7 +112,6 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     let levels = noise.map(|noise| sensitivity(&known.pairs, &alignment, noise, &search)).unwrap_or_default();
     progress.check_cancelled()?;
     let report = report(config, &world, &known, &alignment, levels);
-    let folder = OutputFolder::take(&config.output)?;
     folder.remove(REPORT)?;
     let writer =
         ModelWriter { model: &model, origin: &world.origin, encoding: config.encoding, overwrite: config.overwrite };

@@ -4,13 +4,16 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use city::{MeshConfig, TriangleMesh};
+use crs::CrsError;
 use priors::{LinesOfSight, ModelPlace, PriorModel, SatelliteMaps, buildings_of};
-use report::counted;
+use report::{counted, plain_number};
 use sweep::SweepView;
 
 use crate::dsm::error::DsmError;
+use crate::dsm::grid::DsmGrid;
 use crate::dsm::notes::Notes;
 use crate::dsm::prior_view::ViewPrior;
+use crate::dsm::values::MapBounds;
 
 type Cause = Box<dyn std::error::Error + Send + Sync>;
 
@@ -24,6 +27,14 @@ pub(crate) struct CityPrior {
     pub(crate) ids: Vec<String>,
     /// Numbers of buildings' objects and of their surfaces, in words.
     size: String,
+}
+
+/// Where the buildings of a model stand on the map of a grid.
+struct ModelExtent {
+    /// Smallest rectangle around them.
+    bounds: MapBounds,
+    /// Whether one of them stands on the grid.
+    has_building: bool,
 }
 
 impl CityPrior {
@@ -50,13 +61,45 @@ impl CityPrior {
         Ok(Self { path: path.to_owned(), model, place, ids, size })
     }
 
-    /// Notes the use of the model.
-    pub(crate) fn note(&self, notes: &mut Notes<'_>) {
+    /// Notes the use of the model, and warns when none of its buildings stands in the scene.
+    ///
+    /// # Errors
+    /// [`DsmError::Crs`].
+    pub(crate) fn note(&self, grid: &DsmGrid, notes: &mut Notes<'_>) -> Result<(), DsmError> {
         let path = self.path.display();
         if self.place.datum.is_none() {
             notes.warn(format!("the model does not say what its heights are above, taken as the ellipsoid: {path}"));
         }
         notes.choose("prior", self.size.clone(), path.to_string());
+        let (scene, extent) = (grid.bounds(), self.extent_on(grid)?);
+        if !extent.has_building {
+            let in_words = |bounds: MapBounds| bounds.to_array().map(plain_number).join(", ");
+            notes.warn(format!(
+                "no building of the city model stands in the scene, so it does not help: the model covers [{}], the \
+                 scene [{}] in EPSG:{}; check the model's place and CRS: {path}",
+                in_words(extent.bounds),
+                in_words(scene),
+                grid.epsg
+            ));
+        }
+        Ok(())
+    }
+
+    /// Finds where the buildings stand on the map of a grid.
+    fn extent_on(&self, grid: &DsmGrid) -> Result<ModelExtent, CrsError> {
+        let (mesh, scene) = (self.model.mesh(), grid.bounds());
+        let place = |p: &[f64; 3]| (p[0] + mesh.origin.x, p[1] + mesh.origin.y);
+        let (mut x, mut y): (Vec<f64>, Vec<f64>) = mesh.positions.iter().map(place).unzip();
+        self.place.projection.lonlat_from_map_slices(&mut x, &mut y)?;
+        grid.projection()?.map_from_lonlat_slices(&mut x, &mut y)?;
+        let mut extent = ModelExtent { bounds: MapBounds::EMPTY, has_building: false };
+        for (_, triangle) in mesh.triangles.iter().enumerate().filter(|(t, _)| self.model.is_building(*t)) {
+            let corners = triangle.map(|corner| (x[corner as usize], y[corner as usize]));
+            let covered = corners.iter().fold(MapBounds::EMPTY, |bounds, (x, y)| bounds.including(*x, *y));
+            extent.has_building |= covered.meets(scene);
+            extent.bounds = corners.iter().fold(extent.bounds, |bounds, (x, y)| bounds.including(*x, *y));
+        }
+        Ok(extent)
     }
 
     /// Renders the model into every view; `None` for a view that does not see it. `gsd_m` is a

@@ -81,6 +81,12 @@ pub enum DsmError {
         /// File of the image.
         path: PathBuf,
     },
+    /// An input changed while it was read.
+    #[error("an input was changed or replaced during the run, which may have read both; run again: {}", path.display())]
+    InputChanged {
+        /// The input.
+        path: PathBuf,
+    },
     /// The city model cannot serve as prior.
     #[error("cannot use the city model as prior: {}", path.display())]
     Prior {
@@ -295,7 +301,9 @@ impl From<FileError> for DsmError {
         match error {
             FileError::Exists { path } => Self::Exists { path },
             FileError::InUse { path } => Self::InUse { path },
-            FileError::Folder { path, source } => Self::Output { path, source },
+            FileError::Folder { path, source } | FileError::Unwritable { path, source } => {
+                Self::Output { path, source }
+            }
             other => Self::File(other),
         }
     }

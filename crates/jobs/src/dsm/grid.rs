@@ -1,6 +1,6 @@
 //! The grid of the DSM: CRS, cell size and extent.
 
-use crs::{AreaOfUse, CrsError, MapProjection};
+use crs::{AreaOfUse, CrsError, HeightConverter, MapProjection};
 use geodesy::utm_epsg;
 use raster::{GeoTransform, Window};
 use report::plain_number;
@@ -94,6 +94,8 @@ pub(crate) fn choose_grid(
     {
         return Err(DsmError::value(DsmSetting::Crs, area.text, "a CRS for the place of the scene"));
     }
+    // What cannot be converted at the end fails before the computation.
+    HeightConverter::new(config.vertical)?;
     let gsd_m = config.gsd_m.unwrap_or_else(|| rounded_gsd_m(coarsest_gsd_m * config.preset.pixels_per_cell()));
     let covered = covered_bounds(geometry, &projection)?;
     let bounds = config.bounds.unwrap_or(covered);

@@ -63,6 +63,7 @@ mod height_choice;
 mod image_checks;
 mod image_windows;
 mod images;
+mod input_stamps;
 mod levels;
 mod look;
 mod memory;

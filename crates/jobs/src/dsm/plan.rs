@@ -101,7 +101,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
     note_grid(config, &grid, pixel_m, &mut notes);
     let sources = choose_sources(config, &geometry, pointed, &tuning, &mut notes)?;
     if let Some(path) = &config.prior {
-        session.prior(path)?.note(&mut notes);
+        session.prior(path)?.note(&grid, &mut notes)?;
     }
     let widest = widest_parallax(&sources, &geometry);
     let scene = PlannedScene {

@@ -5,6 +5,7 @@ use numeric::Progress;
 use crate::dsm::chunk::run_chunk;
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
+use crate::dsm::input_stamps::InputStamps;
 use crate::dsm::merge::{Merger, Product};
 use crate::dsm::open::open;
 use crate::dsm::output::DsmFolder;
@@ -41,18 +42,24 @@ use crate::threads;
 pub fn run(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, DsmError> {
     config.validate()?;
     let folder = DsmFolder::take(config)?;
+    let inputs = InputStamps::of(config);
     threads::install(config.threads, || {
         let mut session = Session::new(progress);
         let opened = open(config)?;
         let pointed = point(config, &opened, &mut session)?;
         let plan = plan(config, &pointed, &mut session)?;
         drop((opened, pointed));
-        Ok(sweep_and_merge(&plan, folder, &mut session)?.report)
+        Ok(sweep_and_merge(&plan, folder, &inputs, &mut session)?.report)
     })?
 }
 
 /// Computes all chunks of a plan and merges them.
-fn sweep_and_merge(plan: &Plan, folder: DsmFolder, session: &mut Session<'_>) -> Result<Product, DsmError> {
+fn sweep_and_merge(
+    plan: &Plan,
+    folder: DsmFolder,
+    inputs: &InputStamps,
+    session: &mut Session<'_>,
+) -> Result<Product, DsmError> {
     let progress = session.progress;
     let is_chunked = plan.chunk_side.is_some();
     let mut merger = Merger::begin(plan, folder, progress)?;
@@ -60,7 +67,9 @@ fn sweep_and_merge(plan: &Plan, folder: DsmFolder, session: &mut Session<'_>) ->
         progress.begin("sweeping chunks", plan.chunks.len());
     }
     for (index, chunk) in plan.chunks.iter().enumerate() {
-        match run_chunk(plan, index, session) {
+        let result = run_chunk(plan, index, session);
+        inputs.check()?;
+        match result {
             Ok(result) => merger.add(result)?,
             Err(DsmError::Cancelled) => return Err(DsmError::Cancelled),
             Err(error) if is_chunked => merger.add_error(chunk.core, error),

@@ -65,7 +65,9 @@ pub(super) fn check(config: &GridEvalConfig, target: Option<&Target>) -> Result<
     for path in config.error_map.iter().chain(&config.page) {
         files::refuse_existing(path, config.overwrite)?;
     }
-    target.filter(|target| !target.automatic).map_or(Ok(()), |target| target.check(config.overwrite))
+    let Some(target) = target.filter(|target| !target.automatic) else { return Ok(()) };
+    target.check(config.overwrite)?;
+    Ok(OutputFolder::check(&target.folder)?)
 }
 
 /// Writes the outputs that were asked for, and the report folder.

@@ -89,6 +89,7 @@ pub fn evaluate_surfaces(
 fn evaluate(config: &SurfaceEvalConfig, progress: &dyn Progress) -> Result<SurfaceEvalReport, EvalJobError> {
     if let Some(folder) = &config.output {
         check_ours(folder, &[folder.join(REPORT_JSON)], config.overwrite)?;
+        OutputFolder::check(folder)?;
     }
     progress.begin("evaluation", 2);
     let settings = config.surface_config();

@@ -30,9 +30,9 @@ pub(super) fn run(
     positions: &Path,
     progress: &dyn Progress,
 ) -> Result<HeightMapList, HeightMapJobError> {
+    let _taken = OutputFolder::take(&config.output)?;
     let rows = read_positions(positions)?;
     let maker = Maker::open(config, progress)?;
-    let _taken = OutputFolder::take(&config.output)?;
     let report = Run { config, maker: &maker, begun: Instant::now() }.all(&rows, progress)?;
     files::write_json(&report.written, &report, true)?;
     Ok(report)

@@ -19,6 +19,7 @@ use super::image::{self, ColourImage};
 use crate::corrections::{CorrectionSource, Corrections};
 use crate::files::{self, FileError};
 use crate::map_surface::{self, MapSurface};
+use crate::output_folder::OutputFolder;
 use crate::threads::install;
 
 /// A surface model and its images, to be turned into splats.
@@ -169,6 +170,9 @@ impl SplatsReport {
 pub fn make(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, SplatsJobError> {
     for path in [Some(&config.output), config.report.as_ref()].into_iter().flatten() {
         files::refuse_existing(path, config.overwrite)?;
+    }
+    if let Some(folder) = &config.renderings {
+        OutputFolder::check(folder)?;
     }
     let report = install(config.threads, || make_and_write(config, progress))??;
     if let Some(path) = &config.report {

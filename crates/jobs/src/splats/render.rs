@@ -147,12 +147,12 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
     let report_path = config.output.join(REPORT);
     files::refuse_existing(&report_path, config.overwrite)?;
     config.validate()?;
+    let folder = OutputFolder::take(&config.output)?;
     let file = io::splat_ply::read(&config.splats)?;
     let origin = file
         .origin
         .clone()
         .ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?;
-    let folder = OutputFolder::take(&config.output)?;
     folder.remove(REPORT)?;
     let session = RenderSession { config, file: &file, origin, taken: HashSet::new(), views: Vec::new() };
     let views = install(config.threads, || session.run(progress))??;
