@@ -198,16 +198,20 @@ fn read_row_with<S: LeastSum>(token: S, row: ReadRow<'_, '_>) {
 }
 
 impl Reader<'_> {
-    /// Adds the support of the heights by the picture, and returns the map.
+    /// Adds the support of the heights by the picture, and returns the map. A block whose picture has
+    /// a single value has no heights.
     fn finish(self) -> HeightMap {
         let Self { reference, window, core, best, mut out, .. } = self;
         let support = agreed_share(&best, &reference.view, window);
+        let columns = window.x as usize..window.x as usize + window.width;
+        let rows = window.y as usize..window.y as usize + window.height;
+        let mut values = rows.flat_map(|y| &reference.view.image.row(y)[columns.clone()]).filter(|v| !v.is_nan());
+        let is_blank = values.next().is_none_or(|first| values.all(|v| v == first));
         for y in 0..core.height {
             for x in 0..core.width {
                 let from = ((core.x - window.x) as usize + x, (core.y - window.y) as usize + y);
-                let at = from.1 * window.width + from.0;
-                out.support[(x, y)] = support[at];
-                if out.height_m[(x, y)].is_nan() {
+                out.support[(x, y)] = support[from.1 * window.width + from.0];
+                if out.height_m[(x, y)].is_nan() || is_blank {
                     out.clear((x, y));
                 }
             }

@@ -4,15 +4,16 @@
 //! that of the content the result has the same bytes in whatever order the images are given.
 //! Messages and reports count the images as they were given.
 
-use numeric::random::hash64;
+use std::cmp::Ordering;
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::images::SceneImage;
 use crate::dsm::values::ImagePair;
 
-/// Sorts images by their RPCs and sizes, which no two images of a run share.
+/// Sorts images by their RPCs and sizes, which no two images of a run share. Numbers are compared in
+/// turn, so that the order survives the rounding of an RPC in another file format.
 pub(crate) fn sort_by_content(images: &mut [SceneImage]) {
-    images.sort_by_cached_key(|image| (camera_key(image), image.number));
+    images.sort_by(|a, b| by_camera(a, b).then(a.number.cmp(&b.number)));
 }
 
 /// Returns the configuration with the images, pairs and references in the order of `images`.
@@ -32,8 +33,8 @@ pub(crate) fn as_given(pair: ImagePair, images: &[SceneImage]) -> ImagePair {
     ImagePair::new(images[pair.first].number, images[pair.second].number).ordered()
 }
 
-fn camera_key(image: &SceneImage) -> u64 {
-    let size = [image.size.0 as u64, image.size.1 as u64];
-    let numbers = image.camera.rpc.numbers().map(f64::to_bits);
-    numbers.chain(size).fold(0, |key, part| hash64(key ^ part))
+fn by_camera(a: &SceneImage, b: &SceneImage) -> Ordering {
+    let (numbers, others) = (a.camera.rpc.numbers(), b.camera.rpc.numbers());
+    let differing = numbers.zip(others).map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne());
+    differing.unwrap_or(Ordering::Equal).then(a.size.cmp(&b.size))
 }
