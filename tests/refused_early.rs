@@ -28,7 +28,7 @@ fn commands_of_folders(output: &Path) -> Vec<Command> {
         (&["groundview", "no.tif", "--center", "5.4", "43.53"], "-o"),
         (&["heightmap", "no.tif", "--positions", "no.csv"], "-o"),
         (&["align", "no_model", "--positions", "no.csv"], "-o"),
-        (&["splats", "render", "no.ply"], "-o"),
+        (&["splats", "render", "no.ply", "no_1.tif"], "-o"),
         (&["splats", "no.tif", "no_1.tif", "-o", "no.ply"], "--render"),
     ];
     let make = |(arguments, option): (&[&str], &str)| {
@@ -102,7 +102,7 @@ fn a_surface_with_an_undeclared_no_data_value_is_refused_by_name() {
     let cases: [(&str, Vec<&OsStr>); 5] = [
         ("eval", vec![path.as_os_str(), truth.as_os_str()]),
         ("eval", vec![truth.as_os_str(), path.as_os_str()]),
-        ("ortho", vec![path.as_os_str(), image.as_os_str(), "-o".as_ref(), out.as_os_str()]),
+        ("ortho", vec!["--dsm".as_ref(), path.as_os_str(), image.as_os_str(), "-o".as_ref(), out.as_os_str()]),
         ("splats", vec![path.as_os_str(), image.as_os_str(), "-o".as_ref(), out.as_os_str()]),
         (
             "heightmap",

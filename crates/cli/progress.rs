@@ -105,6 +105,7 @@ impl Watcher {
     fn finish(&self, output: &Path, error: Option<&impl std::error::Error>) {
         self.bar.finish_and_clear();
         self.say_time();
+        let output = output.to_string_lossy();
         self.line(&match error {
             None => json!({ "event": "done", "output": output }),
             Some(error) => {

@@ -1,7 +1,7 @@
 //! No-data values that a file of heights does not declare.
 //!
-//! Such a value is a whole number beyond the heights of the Earth, and far from all others. Outliers
-//! of a surface model have fractions.
+//! Such a value is a whole number beyond the heights of the Earth, and far from all others.
+//! Outliers of a surface model have fractions.
 
 use std::ops::RangeInclusive;
 
