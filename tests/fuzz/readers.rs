@@ -63,21 +63,26 @@ impl Reader {
 
 type Outcome = Result<(), Box<dyn Error>>;
 
+/// Returns whether a file was read.
+fn whether<T, E: Into<Box<dyn Error>>>(found: Result<T, E>) -> Outcome {
+    found.map(drop).map_err(Into::into)
+}
+
 /// Reads a file and uses the result. Files are written beside it.
 pub(crate) fn call(reader: Reader, path: &Path) -> Outcome {
     let folder = path.parent().expect("a file in a folder");
     match reader {
         Reader::Rpc => use_rpc(&io::rpc::read(path)?.rpc),
         Reader::Image => image(path),
-        Reader::Dem => Ok(drop(io::raster::read_dem(path)?)),
+        Reader::Dem => whether(io::raster::read_dem(path)),
         Reader::City => city_model(path, folder),
-        Reader::Surface => Ok(drop(io::surfaces::read(path, &MeshConfig::default())?)),
+        Reader::Surface => whether(io::surfaces::read(path, &MeshConfig::default())),
         Reader::Cloud => {
             let anchor = MapPoint { x: 0.0, y: 0.0 };
             let cloud = PointCloud::open(path)?;
             let grid = cloud.highest(CellLattice { cell_x: 1.0, cell_y: 1.0, anchor });
             PointCloud::open(path)?.positions(1_000_000)?;
-            Ok(drop(grid?))
+            whether(grid)
         }
         Reader::Colmap => {
             let (model, points) = io::colmap::read_with_points(folder)?;
@@ -85,21 +90,21 @@ pub(crate) fn call(reader: Reader, path: &Path) -> Outcome {
             std::fs::create_dir_all(folder.join("again"))?;
             Ok(io::colmap::write(&folder.join("again"), &model, &points, encoding, true)?)
         }
-        Reader::Transforms => Ok(drop(io::transforms::read(path, Some([64, 48]))?)),
-        Reader::Positions => Ok(drop(io::positions::read_positions(path)?)),
-        Reader::Control => Ok(drop(io::control::read(path)?)),
-        Reader::Similarity => Ok(io::similarity::read(path).map(|_| ())?),
-        Reader::Npy => Ok(drop(io::npy::read(path)?)),
-        Reader::Map => Ok(drop(io::maps::read(path)?)),
+        Reader::Transforms => whether(io::transforms::read(path, Some([64, 48]))),
+        Reader::Positions => whether(io::positions::read_positions(path)),
+        Reader::Control => whether(io::control::read(path)),
+        Reader::Similarity => whether(io::similarity::read(path)),
+        Reader::Npy => whether(io::npy::read(path)),
+        Reader::Map => whether(io::maps::read(path)),
         Reader::Splats => {
             io::splat_ply::LocalOrigin::read_beside(path)?;
-            Ok(drop(io::splat_ply::read(path)?))
+            whether(io::splat_ply::read(path))
         }
-        Reader::Corrections => Ok(drop(jobs::corrections::Corrections::read(path)?)),
+        Reader::Corrections => whether(jobs::corrections::Corrections::read(path)),
         Reader::Opened => opened(path),
         Reader::Report => {
             let text = io::read_regular_text(path, 1 << 26)?;
-            Ok(drop(serde_json::from_str::<jobs::dsm::DsmReport>(&text)?))
+            whether(serde_json::from_str::<jobs::dsm::DsmReport>(&text))
         }
         Reader::Scene => Ok(simulate::SimulationConfig::from_toml(&std::fs::read_to_string(path)?)?.validate()?),
     }
