@@ -175,8 +175,12 @@ fn buildings_with_wrong_heights_are_refuted_one_by_one_and_cost_nothing() {
         let after = evaluation(&surface(folder.path(), &name, Some(&model)));
         let report = std::fs::read(folder.path().join(&name).join("report/report.json")).unwrap();
         let report: Value = serde_json::from_slice(&report).unwrap();
-        let left_out = report["prior"]["left_out"].as_array().unwrap().len();
-        assert!(left_out * 10 >= wrong * 8, "{left_out} of {wrong} wrong buildings are left out");
+        let (left_out, seen) =
+            (report["prior"]["left_out"].as_array().unwrap().len(), &report["prior"]["buildings_seen"]);
+        // A third of the wrong heights are wrong by the same amount, so that the model as a whole
+        // may be moved by it and they become right.
+        let expected = seen.as_u64().unwrap() as usize * 6 / 10 / every;
+        assert!(left_out >= expected, "{left_out} buildings are left out, {wrong} of all are wrong, {seen} are seen");
         for path in ["/metrics/mae".to_owned(), format!("/classes/{ROOF}/mae")] {
             let (without, with) = (mae(&before, &path), mae(&after, &path));
             assert!(with < 1.02 * without, "{path}: {without} m without, {with} m with {wrong} wrong buildings");

@@ -68,7 +68,7 @@ pub(crate) fn folder(name: &str) -> PathBuf {
 /// Fails with the failures of a campaign, if there are any.
 #[track_caller]
 fn expect_none(failures: &[String], tried: u64, what: &str, campaign: Campaign) {
-    println!("fuzz: {tried} of {} {what} with seed {}, {} failures", campaign.count, campaign.seed, failures.len());
+    eprintln!("fuzz: {tried} of {} {what} with seed {}, {} failures", campaign.count, campaign.seed, failures.len());
     assert!(failures.is_empty(), "{} of {tried} {what}:\n{}", failures.len(), failures.join("\n"));
     assert!(tried > 0, "no time for a single one");
 }

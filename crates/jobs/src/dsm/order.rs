@@ -10,8 +10,8 @@ use crate::dsm::config::DsmConfig;
 use crate::dsm::images::SceneImage;
 use crate::dsm::values::ImagePair;
 
-/// Sorts images by their RPCs and sizes, which no two images of a run share. Numbers are compared in
-/// turn, so that the order survives the rounding of an RPC in another file format.
+/// Sorts images by their RPCs and sizes, which no two images of a run share. Numbers are compared
+/// in turn, so that the order survives the rounding of an RPC in another file format.
 pub(crate) fn sort_by_content(images: &mut [SceneImage]) {
     images.sort_by(|a, b| by_camera(a, b).then(a.number.cmp(&b.number)));
 }

@@ -59,9 +59,9 @@ impl ViewVotes {
 }
 
 impl PriorFindings {
-    /// Makes the findings of views from the differences of the heights found to the model's, by view
-    /// and building, metres; `None` for a view whose heights hardly agree with any of the model.
-    /// `gone` are the buildings that are not used.
+    /// Makes the findings of views from the differences of the heights found to the model's, by
+    /// view and building, metres; `None` for a view whose heights hardly agree with any of the
+    /// model. `gone` are the buildings that are not used.
     pub(crate) fn new(views: &[Option<BTreeMap<u32, Vec<f32>>>], gone: &BTreeSet<u32>, tolerance_m: f32) -> Self {
         let mut out = Self { tolerance_m, ..Self::default() };
         for view in views {

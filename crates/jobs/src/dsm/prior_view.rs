@@ -78,8 +78,8 @@ impl ViewPrior {
         out
     }
 
-    /// Moves the prior to the heights that a level found. Returns `None` when hardly anything agrees
-    /// anywhere.
+    /// Moves the prior to the heights that a level found. Returns `None` when hardly anything
+    /// agrees anywhere.
     pub(crate) fn placed(&self, map: &HeightMap, level: usize, step_m: f64) -> Option<Self> {
         let tolerance_m = tolerance_m(step_m);
         let side = 1i64 << level;

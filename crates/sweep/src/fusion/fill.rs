@@ -295,9 +295,9 @@ impl Filling<'_> {
         if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
     }
 
-    /// Returns whether a height is a storey above other surfaces around. The views agree on a raised
-    /// blank surface because its outline shows it. In a blank area on the ground anything may
-    /// stand.
+    /// Returns whether a height is a storey above other surfaces around. The views agree on a
+    /// raised blank surface because its outline shows it. In a blank area on the ground anything
+    /// may stand.
     fn is_raised(&self, index: usize, height_m: f32) -> bool {
         let wanted = Wanted { void: None, height_max_m: f32::INFINITY, count: AROUND, reach: self.far() };
         let all = self.border.nearest(self.place(index), wanted);
