@@ -41,7 +41,7 @@ fn commands_of_folders(output: &Path) -> Vec<Command> {
 
 /// A file in the place of the folder, a folder in which nobody can write, and a name that is not
 /// UTF-8 are found before the inputs are.
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 #[test]
 fn an_output_folder_that_cannot_take_results_is_refused_first() {
     use std::os::unix::ffi::OsStrExt;

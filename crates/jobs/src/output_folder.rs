@@ -190,7 +190,7 @@ mod tests {
         assert!(path.exists());
     }
 
-    #[cfg(unix)]
+    #[cfg(target_os = "linux")]
     #[test]
     fn folders_that_cannot_take_results_are_refused_before_the_work() {
         use std::os::unix::ffi::OsStrExt;
