@@ -93,18 +93,16 @@ impl SweepView {
         }
     }
 
-    /// Marks the pixels of a level around which the image has a single value as far as their costs
-    /// see, 5 × 5 pixels: saturated, or a void that nothing declares. Images show no height there.
+    /// Marks the pixels of a level whose 3 × 3 patch holds a single value: saturated, or a void
+    /// that nothing declares. Images show no height there.
     pub fn blank(&self, level: usize) -> Grid<bool> {
-        let flat = |row: &[f32]| -> Vec<bool> { row.windows(5).map(|w| w.iter().all(|v| *v == w[0])).collect() };
         let image = &self.levels[level];
-        let rows: Vec<Vec<bool>> = (0..image.height()).map(|y| flat(image.row(y))).collect();
         let mut out = Grid::filled(image.width(), image.height(), false);
-        for y in 2..image.height().saturating_sub(2) {
-            let around = &rows[y - 2..=y + 2];
-            for x in 2..image.width().saturating_sub(2) {
-                let value = image[(x, y)];
-                out[(x, y)] = (0..5).all(|dy| around[dy][x - 2] && image[(x, y + dy - 2)] == value);
+        for y in 1..image.height().saturating_sub(1) {
+            let [above, own, below] = [y - 1, y, y + 1].map(|y| image.row(y).windows(3));
+            for (blank, ((a, b), c)) in out.row_mut(y)[1..].iter_mut().zip(above.zip(own).zip(below)) {
+                let all = |row: &[f32]| (row[0] == b[1]) & (row[1] == b[1]) & (row[2] == b[1]);
+                *blank = all(a) & all(b) & all(c);
             }
         }
         out
@@ -193,12 +191,12 @@ mod tests {
 
     #[test]
     fn a_pixel_is_blank_where_its_whole_patch_has_one_value() {
-        let value = |i: usize| if (1..7).contains(&(i % 9)) && i / 9 < 7 { 255.0 } else { (i * i % 251) as f32 };
+        let value = |i: usize| if (2..6).contains(&(i % 9)) && i / 9 < 5 { 255.0 } else { (i * i % 251) as f32 };
         let image = Grid::from_vec(9, 8, (0..72).map(value).collect()).unwrap();
         let blank =
             SweepView { levels: vec![image], ..SweepView::absent(crate::testing::camera::leaning_camera(9, [0.0; 2])) }
                 .blank(0);
-        let expected = |i: usize| (3..5).contains(&(i % 9)) && (2..5).contains(&(i / 9));
+        let expected = |i: usize| (3..5).contains(&(i % 9)) && (1..4).contains(&(i / 9));
         assert!((0..72).all(|i| blank.data()[i] == expected(i)), "{blank:?}");
     }
 

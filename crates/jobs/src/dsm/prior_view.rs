@@ -170,16 +170,16 @@ fn found_at(map: &HeightMap, x: i64, y: i64) -> Option<f32> {
 
 /// Rates a shift by `(dx, dy)` coarse pixels: the share of samples that agree with the heights
 /// found once the most frequent difference is added to all. Returns `None` when no sample has a
-/// height to compare with, or the difference is too large.
+/// height to compare with, or all differences are too large.
 fn score(map: &HeightMap, samples: &[Sample], side: i64, (dx, dy): (i64, i64), tolerance_m: f32) -> Option<Shift> {
     let difference =
         |s: &Sample| Some(found_at(map, s.x.div_euclid(side) + dx, s.y.div_euclid(side) + dy)? - s.height_m);
     let mut off: Vec<f32> = samples.iter().filter_map(difference).collect();
     off.sort_by(f32::total_cmp);
-    let agreeing = densest(&off, 2.0 * tolerance_m, |_| true)?;
+    let agreeing = densest(&off, 2.0 * tolerance_m, |middle_m| f64::from(middle_m.abs()) <= SEARCH_M)?;
     let height_m = off[agreeing.start + agreeing.len() / 2];
     let agreeing = agreeing.len() as f64 / samples.len() as f64;
-    (f64::from(height_m.abs()) <= SEARCH_M).then_some(Shift { x: dx * side, y: dy * side, height_m, agreeing })
+    Some(Shift { x: dx * side, y: dy * side, height_m, agreeing })
 }
 
 #[cfg(test)]
