@@ -11,7 +11,7 @@
 //!   wider one is completed where the known heights around it fit one plane, and where it lies
 //!   between two opposite heights. If its border has ground lower by a storey, it gets the ground.
 //!   It stays open where heights are known on one side only (water), and where the images are
-//!   blank, unless the views agree on a raised surface there (a saturated roof).
+//!   blank, unless the views agree there on a roof whose rim was seen.
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
 //!
 //! Small islands of heights may be chance, so that nothing is filled from them.
@@ -240,7 +240,7 @@ impl Filling<'_> {
             })
         };
         let height_m = self.completed_m.data()[index];
-        let is_completed = config.rule != FillRule::Nothing && !height_m.is_nan() && self.is_raised(index, height_m);
+        let is_completed = config.rule != FillRule::Nothing && self.is_raised_roof(index, height_m, &known);
         let completed = is_completed.then(|| {
             let nearest = known.iter().map(|k| k.apart).fold(config.reach_cells as f32, f32::min);
             Estimate { height_m, sigma_m: self.sigma_m(0.0, nearest) }
@@ -295,10 +295,15 @@ impl Filling<'_> {
         if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
     }
 
-    /// Returns whether a height is a storey above other surfaces around. The views agree on a
-    /// raised blank surface because its outline shows it. In a blank area on the ground anything
-    /// may stand.
-    fn is_raised(&self, index: usize, height_m: f32) -> bool {
+    /// Returns whether a height continues what is known on most sides, a storey above other surfaces
+    /// around: a saturated roof whose rim was seen. In a blank area on the ground anything may
+    /// stand. `known` are the nearest heights in eight directions.
+    fn is_raised_roof(&self, index: usize, height_m: f32, known: &[Known]) -> bool {
+        let config = self.config;
+        let continues = |k: &&Known| (k.height_m - height_m).abs() <= config.same_surface_m + config.slope_m * k.apart;
+        if height_m.is_nan() || known.iter().filter(continues).count() < KNOWN_MIN {
+            return false;
+        }
         let wanted = Wanted { void: None, height_max_m: f32::INFINITY, count: AROUND, reach: self.far() };
         let all = self.border.nearest(self.place(index), wanted);
         let lower = all.iter().filter(|k| k.height_m <= height_m - STOREY_M).count();
@@ -438,17 +443,25 @@ mod tests {
         let everything = FillConfig { rule: FillRule::Everything, ..CONFIG };
         fill_voids(&mut unseen, known, visible, &everything);
         assert!((10..20).all(|x| (10..20).all(|y| unseen[(x, y)] == 1.0)), "{:?}", unseen.row(15));
-        // What the views agree on without having seen it is a completion of the image if it is
-        // raised.
-        for (height_m, is_raised) in [(6.0, true), (1.2, false)] {
-            let mut completed_m = completed_m.clone();
-            completed_m[(15, 15)] = height_m;
-            let known = KnownVoids { completed_m: &completed_m, ..known };
-            let mut completed = void_in_a_plain();
-            let found = fill_voids(&mut completed, known, visible, &CONFIG);
-            assert_eq!(completed[(15, 15)] == height_m, is_raised);
-            assert_eq!(found.source[(15, 15)] == CellSource::FilledSurface, is_raised);
-            assert!(completed[(16, 16)].is_nan() && (found.sigma_m[(15, 15)] > 0.5) == is_raised);
+    }
+
+    #[test]
+    fn a_blank_roof_is_completed_where_its_rim_was_seen_and_blank_ground_is_not() {
+        // A roof at 6 m with a blank middle, and a void in the ground at 1 m.
+        let mut roof = Grid::filled(40, 40, 1.0f32);
+        (5..25).for_each(|x| (5..25).for_each(|y| roof[(x, y)] = 6.0));
+        (10..20).for_each(|x| (10..20).for_each(|y| roof[(x, y)] = f32::NAN));
+        (30..36).for_each(|x| (30..36).for_each(|y| roof[(x, y)] = f32::NAN));
+        let (blind, trusted) = (roof.map(|h| h.is_nan()), roof.map(|_| true));
+        for (at, height_m, is_completed) in [((15, 15), 6.4, true), ((15, 15), 16.0, false), ((33, 33), 1.0, false)] {
+            let mut completed_m = roof.map(|_| f32::NAN);
+            completed_m[at] = height_m;
+            let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
+            let mut filled = roof.clone();
+            let config = FillConfig { narrow_cells: 3.0, ..CONFIG };
+            let found = fill_voids(&mut filled, known, |_, voids| vec![f32::NEG_INFINITY; voids.len()], &config);
+            assert_eq!(filled[at] == height_m, is_completed, "{height_m}");
+            assert_eq!(found.source[at] == CellSource::FilledSurface, is_completed, "{height_m}");
         }
     }
 
