@@ -295,9 +295,9 @@ impl Filling<'_> {
         if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
     }
 
-    /// Returns whether a height continues what is known on most sides, a storey above other surfaces
-    /// around: a saturated roof whose rim was seen. In a blank area on the ground anything may
-    /// stand. `known` are the nearest heights in eight directions.
+    /// Returns whether a height continues what is known on most sides, a storey above other
+    /// surfaces around: a saturated roof whose rim was seen. In a blank area on the ground anything
+    /// may stand. `known` are the nearest heights in eight directions.
     fn is_raised_roof(&self, index: usize, height_m: f32, known: &[Known]) -> bool {
         let config = self.config;
         let continues = |k: &&Known| (k.height_m - height_m).abs() <= config.same_surface_m + config.slope_m * k.apart;
