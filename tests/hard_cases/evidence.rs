@@ -58,14 +58,19 @@ fn an_image_of_another_scene_is_named_or_refused() {
     second_is_wrong("an image of another scene", |own| own.image = shot.image.clone());
 }
 
-#[test]
-fn an_rpc_that_is_thirty_metres_off_is_named_or_refused() {
-    for [sample, line] in [[60.0, 0.0], [0.0, 60.0], [-42.0, 42.0]] {
+/// Each shift of the second image, columns and rows, is named or refused.
+fn shifts_are_named_or_refused(shifts: [[f64; 2]; 3]) {
+    for [sample, line] in shifts {
         let mut shots = EASY.shots.clone();
         shots[1].rpc.samp_off += sample;
         shots[1].rpc.line_off += line;
         named_or_refused(&format!("{sample} {line} px off"), &shots, |_| {});
     }
+}
+
+#[test]
+fn an_rpc_that_is_thirty_metres_off_is_named_or_refused() {
+    shifts_are_named_or_refused([[60.0, 0.0], [0.0, 60.0], [-42.0, 42.0]]);
 }
 
 #[test]
@@ -77,12 +82,7 @@ fn a_height_offset_of_fifty_metres_is_named_or_refused() {
 
 #[test]
 fn pointing_errors_of_eighty_to_a_hundred_pixels_are_named_or_refused() {
-    for [sample, line] in [[80.0, 0.0], [0.0, 100.0], [-64.0, 64.0]] {
-        let mut shots = EASY.shots.clone();
-        shots[1].rpc.samp_off += sample;
-        shots[1].rpc.line_off += line;
-        named_or_refused(&format!("{sample} {line} px off"), &shots, |_| {});
-    }
+    shifts_are_named_or_refused([[80.0, 0.0], [0.0, 100.0], [-64.0, 64.0]]);
 }
 
 /// Two views tell an error along the line of sight from a height by the heights for which the RPCs

@@ -151,7 +151,7 @@ impl ChunkPlanner<'_> {
     }
 
     fn plan(&self, core: Window) -> Result<Planned, DsmError> {
-        let extent = with_rim(self.config, self.grid, core);
+        let extent = with_rim(self.grid, core);
         let grid = self.grid.part(extent);
         let seen = self.seen(&grid)?;
         let own = |(i, sources): (usize, &Vec<usize>)| -> Vec<usize> {

@@ -5,7 +5,7 @@
 
 use raster::Window;
 
-use crate::dsm::clean_up::surroundings_m;
+use crate::dsm::clean_up::SURROUNDINGS_M;
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::grid::DsmGrid;
@@ -44,7 +44,7 @@ pub(crate) fn choose_side(
             width: side,
             height: side,
         };
-        let extent = grid.part(chunk.grown(rim(config, grid)));
+        let extent = grid.part(chunk.grown(rim(grid)));
         let ground = GroundBox::new(&extent, &projection, range)?;
         let windows = images.iter().map(|image| ground.span_in(image, MARGIN_PX).map(aligned));
         Ok::<u64, DsmError>(needed_mb(&windows.collect::<Result<Vec<_>, _>>()?, &extent))
@@ -68,13 +68,13 @@ pub(crate) fn needed_mb(windows: &[Window], grid: &DsmGrid) -> u64 {
 }
 
 /// Returns the cells of a core with its rim, inside the grid.
-pub(crate) fn with_rim(config: &DsmConfig, grid: &DsmGrid, core: Window) -> Window {
-    core.grown(rim(config, grid)).intersection(&grid.whole()).unwrap_or(core)
+pub(crate) fn with_rim(grid: &DsmGrid, core: Window) -> Window {
+    core.grown(rim(grid)).intersection(&grid.whole()).unwrap_or(core)
 }
 
 /// Returns the width of the rim around a core, cells.
-fn rim(config: &DsmConfig, grid: &DsmGrid) -> usize {
-    (surroundings_m(config.fill) / grid.gsd_m).ceil() as usize
+fn rim(grid: &DsmGrid) -> usize {
+    (SURROUNDINGS_M / grid.gsd_m).ceil() as usize
 }
 
 /// Returns cores of about equal size that cover the grid, row after row. They are at most `side`

@@ -58,12 +58,10 @@ pub(crate) struct Cleaned {
     pub(crate) speckle_removed: usize,
 }
 
-/// Returns the width of the ground around a cell that decides its content, metres: speckle is
+/// Width of the ground around a cell that decides its content, metres: speckle is
 /// judged, then voids are filled from this far. What hides a void stands nearer, unless it is a
 /// tower of more than 100 m: in a chunk the void then counts as seen at the far end of its shadow.
-pub(crate) fn surroundings_m(_fill: Fill) -> f64 {
-    FILL_REACH_FAR_M + 2.0 * SPECKLE_SIDE_M
-}
+pub(crate) const SURROUNDINGS_M: f64 = FILL_REACH_FAR_M + 2.0 * SPECKLE_SIDE_M;
 
 /// What is known about the voids of a surface.
 #[derive(Clone, Copy)]

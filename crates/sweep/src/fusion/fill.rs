@@ -146,14 +146,18 @@ pub fn fill_voids(
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
     let mut sigma_m = Grid::filled(width, height, f32::NAN);
+    let keep_trusted = |heights: &mut Grid<f32>| {
+        let cells = heights.data_mut().iter_mut().zip(trusted.data());
+        cells.filter(|(_, is_trusted)| !**is_trusted).for_each(|(height, _)| *height = f32::NAN);
+    };
     let mut solid = height_m.clone();
-    solid.data_mut().iter_mut().zip(trusted.data()).filter(|(_, t)| !**t).for_each(|(h, _)| *h = f32::NAN);
+    keep_trusted(&mut solid);
     let bounds = bound_m(&solid, &voids);
     let mut sources = height_m.clone();
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
     let around = around(&sources, blind, &voids, config.reach_cells as f32);
     let (numbers, count) = number_voids(height_m);
-    sources.data_mut().iter_mut().zip(trusted.data()).filter(|(_, t)| !**t).for_each(|(h, _)| *h = f32::NAN);
+    keep_trusted(&mut sources);
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
     let filling = Filling { numbers: &numbers, border: &border, planes: &planes, blind, completed_m, config };
@@ -231,10 +235,9 @@ impl Filling<'_> {
         };
         let seen = || {
             let lower = lower.filter(|_| known.len() >= KNOWN_MIN && is_wanted)?;
-            let at = [index % self.numbers.width(), index / self.numbers.width()];
             let below = || self.surface_below(index, lower.base_m - STOREY_M, void);
             Some(match plane.filter(|_| !is_blind) {
-                Some(plane) => self.on_plane(at, plane, &known),
+                Some(plane) => self.on_plane(self.place(index), plane, &known),
                 None if is_narrow => lower.estimate,
                 None => below().unwrap_or(lower.estimate),
             })
@@ -257,12 +260,12 @@ impl Filling<'_> {
     /// cell; `None` with fewer than two heights. `known` has the lowest height first.
     fn lower_level(&self, known: &[Known]) -> Option<Level> {
         // The lowest may be a pit.
-        self.level(known, *known.get(1)?)
+        Some(self.level(known, *known.get(1)?))
     }
 
     /// Returns the surface through `base`. Weights are inverse distances: two opposite heights give
     /// the straight line between them, so that slopes continue.
-    fn level(&self, known: &[Known], base: Known) -> Option<Level> {
+    fn level(&self, known: &[Known], base: Known) -> Level {
         let config = self.config;
         let on_level = |k: &&Known| {
             let off_m = (k.height_m - base.height_m).abs();
@@ -277,7 +280,7 @@ impl Filling<'_> {
         let variance = mean(&mut known.iter().map(|k| [(k.height_m - height_m).powi(2), k.apart]));
         let nearest = of_base().map(|k| k.apart).fold(f32::INFINITY, f32::min);
         let estimate = Estimate { height_m, sigma_m: self.sigma_m(variance.sqrt(), nearest) };
-        Some(Level { base_m: base.height_m, estimate })
+        Level { base_m: base.height_m, estimate }
     }
 
     /// Returns the lowest surface under a bound around a cell; `None` if none is known.
@@ -289,8 +292,7 @@ impl Filling<'_> {
     /// Returns the surface below a height at the border of a void; `None` if it is a small part of
     /// the border near a cell, which may be outliers.
     fn surface_below(&self, index: usize, height_m: f32, void: u32) -> Option<Estimate> {
-        let wanted = Wanted { void: Some(void), height_max_m: f32::INFINITY, count: AROUND, reach: self.far() };
-        let all = self.border.nearest(self.place(index), wanted);
+        let all = self.border_around(index, Some(void));
         let below: Vec<Known> = all.iter().copied().filter(|k| k.height_m <= height_m).collect();
         if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
     }
@@ -304,10 +306,15 @@ impl Filling<'_> {
         if height_m.is_nan() || known.iter().filter(continues).count() < KNOWN_MIN {
             return false;
         }
-        let wanted = Wanted { void: None, height_max_m: f32::INFINITY, count: AROUND, reach: self.far() };
-        let all = self.border.nearest(self.place(index), wanted);
+        let all = self.border_around(index, None);
         let lower = all.iter().filter(|k| k.height_m <= height_m - STOREY_M).count();
         lower > 0 && lower * LEAST_PART >= all.len()
+    }
+
+    /// Returns the known heights all around a cell at the border of a void, or of any.
+    fn border_around(&self, index: usize, void: Option<u32>) -> Vec<Known> {
+        let wanted = Wanted { void, height_max_m: f32::INFINITY, count: AROUND, reach: self.far() };
+        self.border.nearest(self.place(index), wanted)
     }
 
     fn far(&self) -> f32 {
@@ -328,12 +335,12 @@ impl Filling<'_> {
         let mut by_height = known.to_vec();
         let rank = known.len().div_ceil(LOWEST_SHARE).min(LOWEST).checked_sub(1)?;
         let (_, base, _) = by_height.select_nth_unstable_by(rank, |a, b| reduced(a).total_cmp(&reduced(b)));
-        Some(self.level(known, *base)?.estimate)
+        Some(self.level(known, *base).estimate)
     }
 
-    fn on_plane(&self, at: [usize; 2], plane: Plane, known: &[Known]) -> Estimate {
+    fn on_plane(&self, at: [f32; 2], plane: Plane, known: &[Known]) -> Estimate {
         let nearest = known.iter().map(|k| k.apart).fold(f32::INFINITY, f32::min);
-        Estimate { height_m: plane.at(at.map(|v| v as f32)), sigma_m: self.sigma_m(plane.deviation_m, nearest) }
+        Estimate { height_m: plane.at(at), sigma_m: self.sigma_m(plane.deviation_m, nearest) }
     }
 
     /// Returns the deviation of a filled height from the spread of the heights that it could have
