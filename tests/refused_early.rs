@@ -62,6 +62,38 @@ fn an_output_folder_that_cannot_take_results_is_refused_first() {
     assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 1);
 }
 
+/// A missing folder, a folder in the place of the file, and a folder in which nobody can write are
+/// found before the inputs are, which do not exist.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_file_that_cannot_be_written_is_refused_first() {
+    let root = tempfile::tempdir().unwrap();
+    let missing = root.path().join("missing");
+    let commands: [(&[&str], &str); 7] = [
+        (&["ortho", "no.tif", "--dsm", "no_dsm.tif"], "-o"),
+        (&["heightmap", "no.tif", "--center", "5.4", "43.53"], "-o"),
+        (&["splats", "no.tif", "no_1.tif"], "-o"),
+        (&["city", "convert", "no.city.json", "--format", "obj"], "-o"),
+        (&["eval", "no_1.tif", "no_2.tif", "--no-report"], "--error-map"),
+        (&["eval", "no_1.tif", "no_2.tif", "--no-report"], "--html"),
+        (&["split", "no_model"], "-o"),
+    ];
+    for (arguments, option) in commands {
+        for (place, named) in [
+            (missing.join("out.tif"), "folder does not exist"),
+            (root.path().to_owned(), "a folder has this name"),
+            ("/proc/self/out.tif".into(), "/proc/self/out.tif"),
+        ] {
+            let mut command = skysweep();
+            // Without it the folder would be refused as an output that exists already.
+            command.args(arguments).arg("--overwrite").arg(option).arg(&place);
+            let error = refused(command);
+            assert!(error.contains(named), "{arguments:?}: {error}");
+        }
+    }
+    assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 0);
+}
+
 /// A DSM is on a map in metres, near the place of the CRS, and above a vertical datum.
 #[test]
 fn systems_of_another_kind_or_place_are_refused() {

@@ -11,8 +11,8 @@ use jobs::align::{AlignJobConfig, AlignJobError, AlignJobReport};
 
 use crate::corrections::code_of;
 use crate::error::with_hint;
-use crate::progress::Log;
-use crate::{Global, Outcome, print};
+use crate::progress::ShowOptions;
+use crate::{Global, Outcome};
 
 /// Arguments of `skysweep align`.
 #[derive(Debug, clap::Args)]
@@ -54,9 +54,8 @@ pub(crate) struct Args {
     /// Replace files that exist.
     #[arg(long)]
     overwrite: bool,
-    /// Print the report as JSON instead of text.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -98,20 +97,18 @@ struct NoiseArgs {
 
 /// Runs `skysweep align`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let report = jobs::align::run(&config(args)?, &Log).map_err(|error| {
-        let hint = match &error {
-            AlignJobError::Threshold { .. } => Some("give --threshold a number of metres above 0"),
-            AlignJobError::UnknownMap => Some("give the map of the positions with --crs"),
-            AlignJobError::NotMetres { .. } => Some("choose another --crs"),
-            _ => None,
-        };
-        with_hint(error, hint)
-    })?;
-    if args.json {
-        print::json(&report)?;
-    } else if !global.is_quiet() {
-        print::text(&report.text(&args.output))?;
-    }
+    let config = config(args)?;
+    let report =
+        args.show.watch(global, &args.output, |watcher| jobs::align::run(&config, watcher)).map_err(|error| {
+            let hint = match &error {
+                AlignJobError::Threshold { .. } => Some("give --threshold a number of metres above 0"),
+                AlignJobError::UnknownMap => Some("give the map of the positions with --crs"),
+                AlignJobError::NotMetres { .. } => Some("choose another --crs"),
+                _ => None,
+            };
+            with_hint(error, hint)
+        })?;
+    args.show.print(global, &report, || report.text(&args.output))?;
     Ok(outcome(args, &report))
 }
 

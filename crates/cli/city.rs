@@ -11,8 +11,8 @@ use clap::ValueEnum;
 use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityJobError, CityOutputFormat, CitySummary};
 
 use crate::error::with_hint;
-use crate::progress::Log;
-use crate::{Outcome, print};
+use crate::progress::ShowOptions;
+use crate::{Global, Outcome};
 
 /// The commands of `skysweep city`.
 #[derive(Debug, clap::Subcommand)]
@@ -51,9 +51,8 @@ struct Input {
 pub(crate) struct InfoArgs {
     #[command(flatten)]
     input: Input,
-    /// Print JSON instead of text.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 #[derive(Debug, clap::Args)]
@@ -66,6 +65,8 @@ pub(crate) struct ConvertArgs {
     /// Format to write [default: by the ending of OUT: .obj, .ply, .glb, .geojson or .json].
     #[arg(long)]
     format: Option<Format>,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -83,27 +84,25 @@ enum Format {
 }
 
 /// Runs `skysweep city`.
-pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
+pub(crate) fn run(command: &Command, global: Global) -> anyhow::Result<Outcome> {
     match command {
-        Command::Info(args) => info(args),
-        Command::Convert(args) => convert(args),
+        Command::Info(args) => info(args, global),
+        Command::Convert(args) => convert(args, global),
     }
 }
 
-fn info(args: &InfoArgs) -> anyhow::Result<Outcome> {
+fn info(args: &InfoArgs, global: Global) -> anyhow::Result<Outcome> {
     let mut config = CityInfoConfig::new(args.input.file.clone());
     args.input.set(&mut config.input);
-    let summary = jobs::city::info(&config, &Log).map_err(hinted)?;
+    let file = &args.input.file;
+    let summary = args.show.watch(global, file, |watcher| jobs::city::info(&config, watcher)).map_err(hinted)?;
     tell(&summary);
-    if args.json {
-        print::json(&summary)?;
-    } else {
-        print::text(&summary.text())?;
-    }
+    // The text is the only result.
+    args.show.print(Global { quiet: false, ..global }, &summary, || summary.text())?;
     Ok(outcome(&summary))
 }
 
-fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
+fn convert(args: &ConvertArgs, global: Global) -> anyhow::Result<Outcome> {
     let mut config = CityConvertConfig::new(args.input.file.clone(), args.output.clone());
     args.input.set(&mut config.input);
     config.format = args.format.map(|format| match format {
@@ -113,7 +112,9 @@ fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
         Format::Geojson => CityOutputFormat::Geojson,
         Format::Cityjson => CityOutputFormat::Cityjson,
     });
-    let report = jobs::city::convert(&config, &Log).map_err(hinted)?;
+    let output = &args.output;
+    let report = args.show.watch(global, output, |watcher| jobs::city::convert(&config, watcher)).map_err(hinted)?;
+    args.show.print(global, &report, String::new)?;
     tell(&report.summary);
     Ok(outcome(&report.summary))
 }

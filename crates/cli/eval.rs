@@ -4,7 +4,7 @@
 //! (both are meshes, city models or clouds), or maps in the pixels of a camera (both are `.npy`, or
 //! `--maps` names their kind).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{bail, ensure};
 use city::Lod;
@@ -16,7 +16,7 @@ use jobs::eval::{
 };
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::Log;
+use crate::progress::{ShowOptions, Watcher};
 use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep eval`.
@@ -90,9 +90,8 @@ pub(crate) struct Args {
     /// Replace files that exist, also files that no evaluation wrote.
     #[arg(long)]
     overwrite: bool,
-    /// Print JSON instead of a table.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
     /// The files are maps of this kind in the pixels of one camera [default: found by shape and
     /// type of .npy files].
     #[arg(long, value_enum, value_name = "KIND")]
@@ -198,11 +197,16 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         None => jobs::eval::detect_kind(&args.test, &args.reference),
     };
     let missed = match kind {
-        EvalKind::Maps => maps(args)?,
+        EvalKind::Maps => maps(args, global)?,
         EvalKind::Surfaces => surfaces(args, global)?,
         _ => grids(args, global)?,
     };
     Ok(if missed.is_empty() { Outcome::Complete } else { Outcome::Partial(missed.join("; ")) })
+}
+
+/// Runs a comparison while its progress is shown.
+fn watch<T>(args: &Args, global: Global, job: impl FnOnce(&Watcher) -> Result<T, EvalJobError>) -> anyhow::Result<T> {
+    args.show.watch(global, args.output.as_deref().unwrap_or(Path::new("")), job).map_err(hinted)
 }
 
 /// Refuses options that only height grids have.
@@ -231,8 +235,8 @@ fn requirements(args: &Args) -> EvalRequirements {
 
 /// Compares height grids and returns the requirements that were missed.
 fn grids(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
-    let report = jobs::eval::compare_grids(&grid_config(args), &Log).map_err(hinted)?;
-    if args.json {
+    let report = watch(args, global, |watcher| jobs::eval::compare_grids(&grid_config(args), watcher))?;
+    if args.show.json {
         print::json(&report)?;
     } else {
         print::text(&report.table())?;
@@ -290,8 +294,8 @@ fn written(args: &Args, report: &GridEvalReport) -> Vec<String> {
 /// Compares surfaces and returns the requirements that were missed.
 fn surfaces(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     refuse_grid_options(args, "surfaces")?;
-    let report = jobs::eval::evaluate_surfaces(&surface_config(args), &Log).map_err(hinted)?;
-    if args.json {
+    let report = watch(args, global, |watcher| jobs::eval::evaluate_surfaces(&surface_config(args), watcher))?;
+    if args.show.json {
         print::json(&report)?;
     } else {
         print::text(&report.table())?;
@@ -326,19 +330,15 @@ fn surface_config(args: &Args) -> SurfaceEvalConfig {
 }
 
 /// Compares maps and returns the requirements that were missed.
-fn maps(args: &Args) -> anyhow::Result<Vec<String>> {
+fn maps(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     refuse_grid_options(args, "maps")?;
     ensure!(args.output.is_none(), "maps are compared on the terminal or with --json: leave -o out");
     ensure!(args.min_completeness.is_empty(), "--min-completeness is not for maps: leave it out");
     let mut config = MapEvalConfig::new(args.test.clone(), args.reference.clone());
     config.kind = args.maps.map(Into::into);
     config.max_mae = args.max_mae;
-    let report = jobs::eval::compare_maps(&config, &Log).map_err(hinted)?;
-    if args.json {
-        print::json(&report)?;
-    } else {
-        print::text(&report.table())?;
-    }
+    let report = watch(args, global, |watcher| jobs::eval::compare_maps(&config, watcher))?;
+    args.show.print(Global { quiet: false, ..global }, &report, || report.table())?;
     Ok(report.missed)
 }
 

@@ -101,7 +101,7 @@ fn main() -> ExitCode {
 fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Align(args) => align::run(args, cli.global),
-        Command::City(command) => city::run(command),
+        Command::City(command) => city::run(command, cli.global),
         Command::Completions(args) => completions::completions(args, &mut options::grouped(Cli::command())),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),

@@ -1,11 +1,11 @@
 //! `skysweep split`: context and target views of a COLMAP model, by the overlap of what they see.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use jobs::split::SplitJobConfig;
 
-use crate::progress::Log;
-use crate::{Global, Outcome, print};
+use crate::progress::ShowOptions;
+use crate::{Global, Outcome};
 
 /// Arguments of `skysweep split`.
 #[derive(Debug, clap::Args)]
@@ -39,9 +39,8 @@ pub(crate) struct Args {
     /// Replace the file if it exists.
     #[arg(long)]
     overwrite: bool,
-    /// Print JSON instead of text.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    show: ShowOptions,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -52,12 +51,11 @@ enum Preset {
 
 /// Runs `skysweep split`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let report = jobs::split::run(&config(args), &Log)?;
-    if args.json {
-        print::json(&report)?;
-    } else if !global.is_quiet() || args.output.is_none() {
-        print::text(&report.text())?;
-    }
+    let output = args.output.as_deref();
+    let written = output.unwrap_or(Path::new(""));
+    let report = args.show.watch(global, written, |watcher| jobs::split::run(&config(args), watcher))?;
+    // Without a file the text is the only result.
+    args.show.print(Global { quiet: global.quiet && output.is_some(), ..global }, &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 

@@ -77,6 +77,23 @@ pub fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), SaveError> {
     Ok(())
 }
 
+/// Checks that a file can be written to `path`, before the work whose result it will hold. A file
+/// is made in the folder and removed again.
+///
+/// # Errors
+/// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`] for a folder that is missing
+/// or cannot be written into, and for a path that is a folder.
+pub fn check_destination(path: &Path, overwrite: bool) -> Result<(), SaveError> {
+    let folder = destination_folder(path, overwrite)?;
+    if path.file_name().is_none() {
+        return Err(SaveError::unwritable(path, "the path has no file name"));
+    }
+    if !folder.is_dir() {
+        return Err(SaveError::unwritable(path, "its folder does not exist"));
+    }
+    Builder::new().prefix(PREFIX).tempfile_in(folder).map(drop).map_err(|error| SaveError::system(path, &error))
+}
+
 /// Writes `bytes` to `path`.
 ///
 /// ```

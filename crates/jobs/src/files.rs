@@ -40,10 +40,10 @@ pub enum FileError {
         /// Reason given by the operating system.
         source: std::io::Error,
     },
-    /// The name of an output folder is not text that the libraries for rasters take.
-    #[error("the name of the output folder is not UTF-8, which raster files need; choose another: {}", path.display())]
+    /// The name of an output is not text that the libraries for rasters take.
+    #[error("the name of the output is not UTF-8, which raster files need; choose another: {}", path.display())]
     NotUtf8 {
-        /// The folder.
+        /// The file or folder.
         path: PathBuf,
     },
     /// A folder cannot be written into.
@@ -126,6 +126,19 @@ impl FileError {
 /// Fails when `path` exists and must not be replaced, so that a job stops before it computes.
 pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), FileError> {
     Ok(io::atomic::refuse_existing(path, overwrite)?)
+}
+
+/// Fails when a file cannot be written to `path`, so that a job stops before it computes.
+pub(crate) fn check_destination(path: &Path, overwrite: bool) -> Result<(), FileError> {
+    Ok(io::atomic::check_destination(path, overwrite)?)
+}
+
+/// Fails when a raster cannot be written to `path`. GDAL takes only names that are text.
+pub(crate) fn check_raster_destination(path: &Path, overwrite: bool) -> Result<(), FileError> {
+    if path.to_str().is_none() {
+        return Err(FileError::NotUtf8 { path: path.to_owned() });
+    }
+    check_destination(path, overwrite)
 }
 
 /// Makes a folder and the folders above it.

@@ -136,7 +136,12 @@ impl SplitJobConfig {
 /// assert!(matches!(refused, Err(SplitJobError::Split(_) | SplitJobError::Model(_))));
 /// ```
 pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobReport, SplitJobError> {
+    if let Some(path) = &config.output {
+        files::check_destination(path, config.overwrite)?;
+    }
+    progress.begin("split", 2);
     let (model, points) = io::colmap::read_with_points(&config.model)?;
+    progress.step();
     progress.check_cancelled()?;
     let found = split(&points_by_view(&model, &points), &goal(config, &model)?)?;
     let image = |choice: &ChosenView| SplitImage {
@@ -153,6 +158,7 @@ pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobR
     if let Some(path) = &config.output {
         files::write_json(path, &report, config.overwrite)?;
     }
+    progress.step();
     Ok(report)
 }
 

@@ -160,15 +160,19 @@ impl Progress for ChangeAt<'_> {
 
 #[test]
 fn an_input_that_changes_during_the_run_is_named() {
-    for (chunk, stage) in [(None, "sweeping heights"), (Some(150), "sweeping chunks")] {
+    let (whole, chunked) = ((None, "sweeping heights"), (Some(150), "sweeping chunks"));
+    for ((chunk, stage), changed) in [(whole, "image.tif"), (chunked, "image.tif"), (whole, "image_RPC.TXT")] {
         let folder = tempfile::tempdir().unwrap();
         let image = folder.path().join("image.tif");
         std::fs::copy(town("view_2.tif"), &image).unwrap();
+        let rpc = io::rpc::read_for_image(&image).unwrap().rpc;
+        io::rpc::write(&folder.path().join("image_RPC.TXT"), &rpc, io::rpc::RpcFormat::Text, false).unwrap();
         let mut config = config(&folder.path().join("out"));
         (config.prior, config.chunk) = (None, chunk);
         config.images[1].clone_from(&image);
-        let ended = run(&config, &ChangeAt(stage, &image));
-        assert!(matches!(&ended, Err(DsmError::InputChanged { path }) if *path == image), "{ended:?}");
+        let changed = folder.path().join(changed);
+        let ended = run(&config, &ChangeAt(stage, &changed));
+        assert!(matches!(&ended, Err(DsmError::InputChanged { path }) if *path == changed), "{ended:?}");
         assert!(!config.output.exists());
     }
 }

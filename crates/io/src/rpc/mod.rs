@@ -39,4 +39,5 @@ pub use file::TEXT_LIMIT;
 pub use format::RpcFormat;
 pub use read::{read, read_for_image};
 pub use rpc_file::RpcFile;
+pub use sidecar::side_files;
 pub use write::{to_text, write};

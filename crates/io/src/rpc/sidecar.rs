@@ -41,6 +41,12 @@ pub(super) fn read(
     Ok(None)
 }
 
+/// Returns the files beside an image that may hold its RPC, best first; none where the folder
+/// cannot be read.
+pub fn side_files(image: &Path) -> Vec<PathBuf> {
+    candidates(image, &mut Vec::new()).unwrap_or_default()
+}
+
 /// Returns the existing files whose names fit, best first.
 fn candidates(image: &Path, tried: &mut Vec<Attempt>) -> Result<Vec<PathBuf>, RpcReadError> {
     let stem = image.file_stem().map(|s| s.to_string_lossy().to_lowercase()).unwrap_or_default();

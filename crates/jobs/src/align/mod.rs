@@ -101,7 +101,9 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     let report_path = config.output.join(REPORT);
     files::refuse_existing(&report_path, config.overwrite)?;
     let folder = OutputFolder::take(&config.output)?;
+    progress.begin("alignment", 3);
     let model = read_model(&config.model, progress)?;
+    progress.step();
     let positions = io::control::read(&config.positions)?;
     let world = World::of(&positions, config.crs_epsg, config.vertical)?;
     let known = world.known(&positions, &model.cameras)?;
@@ -110,6 +112,7 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
         align(&known.pairs, &search).map_err(|source| AlignJobError::Alignment { pairs: known.pairs.len(), source })?;
     let noise = config.noise.as_ref();
     let levels = noise.map(|noise| sensitivity(&known.pairs, &alignment, noise, &search)).unwrap_or_default();
+    progress.step();
     progress.check_cancelled()?;
     let report = report(config, &world, &known, &alignment, levels);
     folder.remove(REPORT)?;
@@ -118,6 +121,7 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     writer.write(&config.output, &alignment.world_from_model)?;
     write_under_noise(config, &known, &alignment, &search, &writer, progress)?;
     files::write_json(&report_path, &report, config.overwrite)?;
+    progress.step();
     warn_of(&report, progress);
     Ok(report)
 }

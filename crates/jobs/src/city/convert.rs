@@ -9,6 +9,7 @@ use super::account::{CityAccount, CitySummary};
 use super::config::{CityConvertConfig, CityOutputFormat};
 use super::error::CityJobError;
 use super::input::{self, OpenedCity};
+use crate::files;
 use numeric::Progress;
 
 /// What a conversion wrote.
@@ -44,6 +45,9 @@ pub struct CityConvertReport {
 pub fn convert(config: &CityConvertConfig, progress: &dyn Progress) -> Result<CityConvertReport, CityJobError> {
     config.validate()?;
     let format = config.output_format()?;
+    for path in [Some(&config.output), config.input.account.as_ref()].into_iter().flatten() {
+        files::check_destination(path, config.input.overwrite)?;
+    }
     let opened = input::open(&config.input, progress)?;
     let account = CityAccount::of(&opened);
     if format != CityOutputFormat::Cityjson && account.summary.triangles == 0 {

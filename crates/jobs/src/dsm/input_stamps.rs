@@ -23,10 +23,12 @@ struct Stamp {
 }
 
 impl InputStamps {
-    /// Notes the files of a configuration. Addresses have no stamp.
+    /// Notes the files of a configuration, with the files beside the images that may hold their
+    /// RPCs. Addresses have no stamp.
     pub(crate) fn of(config: &DsmConfig) -> Self {
-        let paths = config.images.iter().chain(&config.dem).chain(&config.prior);
-        Self(paths.filter_map(|path| Some((path.clone(), stamp(path)?))).collect())
+        let beside = config.images.iter().filter(|path| path.is_file()).flat_map(|path| io::rpc::side_files(path));
+        let given = config.images.iter().chain(&config.dem).chain(&config.prior).cloned();
+        Self(given.chain(beside).filter_map(|path| stamp(&path).map(|stamp| (path, stamp))).collect())
     }
 
     /// Compares the files with what they were. A file that is gone cannot be mixed with another,

@@ -86,6 +86,7 @@ mod session;
 mod shared_heights;
 mod sources;
 mod surface;
+mod tie_quality;
 mod tie_windows;
 mod ties;
 mod tuning;
@@ -107,8 +108,8 @@ pub use point::{Pointed, point};
 pub use prior_findings::{BuildingFinding, PriorFindings, ViewVotes};
 pub use rasters::ChunkRasters;
 pub use report::{
-    ChunksReport, CorrectionOrder, DsmReport, FailedChunk, ImageReport, LeftOut, PairReport, PointingReport,
-    PriorReport, StageTime, SurfaceReport,
+    ChunksReport, CorrectionOrder, DsmReport, FailedChunk, ImagePointing, ImageReport, LeftOut, PairReport,
+    PointingReport, PriorReport, StageTime, SurfaceReport,
 };
 pub use run::run;
 pub use session::Session;

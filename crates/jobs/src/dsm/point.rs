@@ -18,6 +18,7 @@ use crate::dsm::open::Opened;
 use crate::dsm::order::{as_given, in_order_of};
 use crate::dsm::report::{CorrectionOrder, PointingReport};
 use crate::dsm::session::Session;
+use crate::dsm::tie_quality::{by_image, warn_of_images};
 use crate::dsm::ties::{PairTies, TIES_MIN, adjust_cameras, tie_heights};
 use crate::dsm::values::{HeightRange, ImagePair};
 use crate::dsm::view_geometry::ViewGeometry;
@@ -78,6 +79,10 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     let mut notes = Notes::new(session.progress);
     let is_applied = is_applied(config, &found, &mut notes);
     warn_of_sights(&images, &looked, &found, &mut notes);
+    let by_image = by_image(&images, &looked, &found, &tracks);
+    if is_applied {
+        warn_of_images(&by_image, &mut notes);
+    }
     set_cameras(&mut images, session, &looked, is_applied.then_some(&found));
     let FirstLook { geometry, mut useful, ties, characters, is_whole, .. } = looked;
     if is_applied {
@@ -93,7 +98,7 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
         useful,
         pairs,
         ties,
-        pointing: PointingReport::new(&found, tracks.len(), is_applied),
+        pointing: PointingReport::new(&found, tracks.len(), is_applied, by_image),
         tie_heights: tie_heights(&found),
         corrections: found.corrections,
         dem_heights,

@@ -98,6 +98,28 @@ pub struct PointingReport {
     /// Root mean square of the inliers' residuals after the correction, pixels.
     #[serde(with = "null_is_nan")]
     pub rms_px: f64,
+    /// What the tie points show of each image, in the order of the configuration.
+    pub images: Vec<ImagePointing>,
+}
+
+/// What the tie points show of the pointing of an image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ImagePointing {
+    /// File of the image.
+    pub path: PathBuf,
+    /// Number of ground points that were found in this image and in others.
+    pub tracks: usize,
+    /// Number of them that are no outliers.
+    pub inliers: usize,
+    /// Share of the ground shared with other images that has inliers nearby, 0 to 1; NaN when no
+    /// ground is known to be shared.
+    #[serde(with = "null_is_nan")]
+    pub covered: f64,
+    /// Robust standard deviation of the residuals in this image after the correction, outliers
+    /// included, pixels; NaN without tracks.
+    #[serde(with = "null_is_nan")]
+    pub residual_px: f64,
 }
 
 /// The kind of a correction of the pointing.
@@ -123,7 +145,7 @@ impl From<ModelOrder> for CorrectionOrder {
 }
 
 impl PointingReport {
-    pub(crate) fn new(found: &Adjustment, tracks: usize, applied: bool) -> Self {
+    pub(crate) fn new(found: &Adjustment, tracks: usize, applied: bool, images: Vec<ImagePointing>) -> Self {
         Self {
             applied,
             order: found.order.into(),
@@ -132,6 +154,7 @@ impl PointingReport {
             residual_before_px: found.residual_px.0,
             residual_after_px: found.residual_px.1,
             rms_px: found.rms_px,
+            images,
         }
     }
 }

@@ -62,9 +62,9 @@ impl Target {
 
 /// Refuses before the work what would fail after it.
 pub(super) fn check(config: &GridEvalConfig, target: Option<&Target>) -> Result<(), EvalJobError> {
-    for path in config.error_map.iter().chain(&config.page) {
-        files::refuse_existing(path, config.overwrite)?;
-    }
+    let (error_map, page) = (config.error_map.as_deref(), config.page.as_deref());
+    error_map.map_or(Ok(()), |path| files::check_raster_destination(path, config.overwrite))?;
+    page.map_or(Ok(()), |path| files::check_destination(path, config.overwrite))?;
     let Some(target) = target.filter(|target| !target.automatic) else { return Ok(()) };
     target.check(config.overwrite)?;
     Ok(OutputFolder::check(&target.folder)?)

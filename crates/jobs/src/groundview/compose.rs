@@ -47,9 +47,9 @@ impl ComposeConfig {
     /// Checks that the output may be written.
     ///
     /// # Errors
-    /// [`GroundViewError::Job`] if the output exists and may not be replaced.
+    /// [`GroundViewError::Job`] if the output cannot be written, or exists and may not be replaced.
     pub fn validate(&self) -> Result<(), GroundViewError> {
-        Ok(files::refuse_existing(&self.output, self.overwrite)?)
+        Ok(files::check_destination(&self.output, self.overwrite)?)
     }
 }
 

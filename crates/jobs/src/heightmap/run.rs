@@ -47,7 +47,7 @@ fn one(
     stand: &CameraStand,
     progress: &dyn Progress,
 ) -> Result<HeightMapMade, HeightMapJobError> {
-    files::refuse_existing(&config.output, config.overwrite)?;
+    files::check_raster_destination(&config.output, config.overwrite)?;
     let maker = Maker::open(config, progress)?;
     progress.check_cancelled()?;
     let laid = maker.source.lay(&maker.settings, &[*stand]).pop().ok_or(HeightMapJobError::WorkerLost)??;

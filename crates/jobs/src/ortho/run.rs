@@ -32,8 +32,8 @@ use crate::{files, threads};
 /// ```
 pub fn run(config: &OrthoConfig, progress: &dyn Progress) -> Result<OrthoReport, OrthoError> {
     config.validate()?;
-    files::refuse_existing(&config.output, config.overwrite)?;
-    files::refuse_existing(&config.mask(), config.overwrite)?;
+    files::check_raster_destination(&config.output, config.overwrite)?;
+    files::check_raster_destination(&config.mask(), config.overwrite)?;
     threads::install(config.threads, || {
         let inputs = OrthoInputs::open(config, progress)?;
         let made = mosaic::make(&inputs, config, progress)?;

@@ -169,7 +169,7 @@ impl SplatsReport {
 /// ```
 pub fn make(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, SplatsJobError> {
     for path in [Some(&config.output), config.report.as_ref()].into_iter().flatten() {
-        files::refuse_existing(path, config.overwrite)?;
+        files::check_destination(path, config.overwrite)?;
     }
     if let Some(folder) = &config.renderings {
         OutputFolder::check(folder)?;

@@ -71,6 +71,9 @@ pub struct Adjustment {
     pub rms_px: f64,
     /// Ground point of each track under the corrections; `None` for an outlier.
     pub ground: Vec<Option<LonLatHeight>>,
+    /// Robust standard deviation of the residuals in each view after the adjustment, outliers
+    /// included, pixels; NaN for a view without tracks.
+    pub view_residual_px: Vec<f64>,
 }
 
 /// Largest number of rounds of triangulation and reweighting. The problem is nearly linear, so that
@@ -87,6 +90,8 @@ const OUTLIER: f64 = 4.0;
 const INDEPENDENT: f64 = 25.0;
 /// Smallest robust scale, pixels: matching is not more precise.
 const SCALE_MIN_PX: f64 = 0.05;
+/// Median of the size of a normal deviate, standard deviations.
+const NORMAL_MEDIAN: f64 = 0.6745;
 
 /// Residuals of one track without those that its ground point explains.
 struct Reduced {
@@ -94,6 +99,8 @@ struct Reduced {
     residual: DVector<f64>,
     /// Derivatives with respect to all parameters.
     design: DMatrix<f64>,
+    /// Root mean square residual in each view of the track per degree of freedom, pixels.
+    by_view: Vec<(usize, f64)>,
 }
 
 /// Adjusts the pointing of `cameras` so that the rays of each track meet. `sizes` are the images'
@@ -132,6 +139,7 @@ fn unadjusted(views: usize, tracks: usize) -> Adjustment {
         residual_px: (f64::NAN, f64::NAN),
         rms_px: f64::NAN,
         ground: vec![None; tracks],
+        view_residual_px: vec![f64::NAN; views],
     }
 }
 
@@ -168,10 +176,11 @@ fn fit(
     let limit = OUTLIER * scale;
     let inliers: Vec<f64> = norms.iter().copied().filter(|r| *r <= limit).collect();
     let rms_px = (inliers.iter().map(|r| r * r).sum::<f64>() / inliers.len().max(1) as f64).sqrt();
+    let view_residual_px = by_view(found.iter().flatten().map(|(r, _)| r), cameras.len());
     let ground =
         found.into_iter().map(|f| f.filter(|(r, _)| norm_px(&r.residual) <= limit).map(|(_, ground)| ground)).collect();
     let corrections = current.into_iter().map(|c| c.correction).collect();
-    let fit = Adjustment { order, corrections, residual_px: (f64::NAN, scale), rms_px, ground };
+    let fit = Adjustment { order, corrections, residual_px: (f64::NAN, scale), rms_px, ground, view_residual_px };
     (information(&norms, scale, n), fit)
 }
 
@@ -188,11 +197,17 @@ fn norm_px(r: &DVector<f64>) -> f64 {
     (r.norm_squared() / r.len().max(1) as f64).sqrt()
 }
 
+/// Returns the robust standard deviation of the residuals in each view; NaN where there are none.
+fn by_view<'a>(reduced: impl Iterator<Item = &'a Reduced>, views: usize) -> Vec<f64> {
+    let mut all = vec![Vec::new(); views];
+    reduced.flat_map(|r| &r.by_view).for_each(|&(view, px)| all[view].push(px));
+    all.iter_mut().map(|px| upper_median(px).map_or(f64::NAN, |median| median / NORMAL_MEDIAN)).collect()
+}
+
 /// Estimates the standard deviation of residuals from their median.
 fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = residuals.collect();
-    // The median of |r| of a normal deviate is 0.6745 standard deviations.
-    upper_median(&mut all).map_or(SCALE_MIN_PX, |median| (median / 0.6745).max(SCALE_MIN_PX))
+    upper_median(&mut all).map_or(SCALE_MIN_PX, |median| (median / NORMAL_MEDIAN).max(SCALE_MIN_PX))
 }
 
 /// Returns the weights of the prior on every parameter.
@@ -279,11 +294,14 @@ fn reduce(
     }
     // Multiplied by Qᵀ of J = QR, all but the first three rows are independent of the ground point.
     let freedom = rows.checked_sub(3)?;
+    let share = rows as f64 / freedom as f64;
+    let in_view = |i: usize| (0.5 * share * residual.rows(2 * i, 2).norm_squared()).sqrt();
+    let by_view = track.iter().enumerate().map(|(i, (view, _))| (*view, in_view(i))).collect();
     let qr = jacobian.qr();
     qr.q_tr_mul(&mut residual);
     qr.q_tr_mul(&mut design);
-    let free = Reduced { residual: residual.rows(3, freedom).into(), design: design.rows(3, freedom).into() };
-    Some((free, ground))
+    let (residual, design) = (residual.rows(3, freedom).into(), design.rows(3, freedom).into());
+    Some((Reduced { residual, design, by_view }, ground))
 }
 
 /// Ground point of a track, residuals and their Jacobian.
