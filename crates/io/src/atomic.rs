@@ -81,8 +81,8 @@ pub fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), SaveError> {
 /// is made in the folder and removed again.
 ///
 /// # Errors
-/// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`] for a folder that is missing
-/// or cannot be written into, and for a path that is a folder.
+/// [`SaveError::Exists`] without `overwrite`; [`SaveError::Unwritable`] for a folder that is
+/// missing or cannot be written into, and for a path that is a folder.
 pub fn check_destination(path: &Path, overwrite: bool) -> Result<(), SaveError> {
     let folder = destination_folder(path, overwrite)?;
     if path.file_name().is_none() {

@@ -47,7 +47,8 @@ impl ComposeConfig {
     /// Checks that the output may be written.
     ///
     /// # Errors
-    /// [`GroundViewError::Job`] if the output cannot be written, or exists and may not be replaced.
+    /// [`GroundViewError::Job`] if the output cannot be written, or exists and may not be
+    /// replaced.
     pub fn validate(&self) -> Result<(), GroundViewError> {
         Ok(files::check_destination(&self.output, self.overwrite)?)
     }
