@@ -27,7 +27,7 @@ fn manual_pages_describe_a_command_and_its_subcommands() {
 }
 
 /// Commands with options, as words of the command line.
-const COMMANDS: [&[&str]; 20] = [
+const COMMANDS: [&[&str]; 24] = [
     &["align"],
     &["city", "info"],
     &["city", "convert"],
@@ -37,16 +37,20 @@ const COMMANDS: [&[&str]; 20] = [
     &["groundview", "compose"],
     &["heightmap"],
     &["heightmap", "unproject"],
+    &["merge"],
     &["ortho"],
+    &["plan"],
     &["priors"],
     &["rpc", "info"],
     &["rpc", "project"],
     &["rpc", "localize"],
     &["rpc", "convert"],
+    &["run"],
     &["simulate"],
     &["splats"],
     &["splats", "render"],
     &["split"],
+    &["template"],
     &["completions"],
 ];
 
@@ -97,8 +101,8 @@ fn one_option_has_one_meaning() {
         };
         COMMANDS.iter().filter(has).map(|command| command.join(" ")).collect()
     };
-    assert_eq!(with("--vertical"), ["dsm"]);
-    assert_eq!(with("--crs"), ["align", "dsm", "heightmap"]);
+    assert_eq!(with("--vertical"), ["dsm", "plan"]);
+    assert_eq!(with("--crs"), ["align", "dsm", "heightmap", "plan"]);
     assert_eq!(with("--dsm-vertical"), ["ortho", "splats"]);
     for (command, old) in [("splats", "--vertical"), ("groundview", "--vertical"), ("align", "--vertical")] {
         let told = Command::cargo_bin("skysweep").unwrap().args([command, old, "none"]).assert().code(2);

@@ -11,6 +11,7 @@ use jobs::align::{AlignJobConfig, AlignJobError, AlignJobReport};
 
 use crate::corrections::code_of;
 use crate::error::with_hint;
+use crate::options::{Named, named};
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
 
@@ -44,8 +45,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = AlignConfig::default().seed)]
     seed: u64,
     /// Text or binary files.
-    #[arg(long, value_enum, default_value_t = Encoding::Bin)]
-    encoding: Encoding,
+    #[arg(long, value_parser = named(&ENCODINGS), default_value = "bin")]
+    encoding: ColmapEncoding,
     #[command(flatten)]
     noise: NoiseArgs,
     /// Exit with 1 when the root mean square residual is above this, metres.
@@ -58,20 +59,8 @@ pub(crate) struct Args {
     show: ShowOptions,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Encoding {
-    Bin,
-    Txt,
-}
-
-impl From<Encoding> for ColmapEncoding {
-    fn from(encoding: Encoding) -> Self {
-        match encoding {
-            Encoding::Bin => Self::Binary,
-            Encoding::Txt => Self::Text,
-        }
-    }
-}
+const ENCODINGS: [Named<ColmapEncoding>; 2] =
+    [("bin", ColmapEncoding::Binary, "COLMAP's binary files"), ("txt", ColmapEncoding::Text, "COLMAP's text files")];
 
 /// Options of the repetition under noise.
 #[derive(Debug, clap::Args)]
@@ -120,7 +109,7 @@ fn config(args: &Args) -> anyhow::Result<AlignJobConfig> {
     config.vertical = args.positions_vertical;
     config.threshold_m = args.threshold;
     config.seed = args.seed;
-    config.encoding = args.encoding.into();
+    config.encoding = args.encoding;
     config.noise = args.noise.noise.then(|| NoiseConfig {
         translation_m: args.noise.noise_translation.clone(),
         rotation_deg: args.noise.noise_rotation.clone(),

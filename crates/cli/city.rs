@@ -7,10 +7,10 @@
 use std::path::PathBuf;
 
 use city::Lod;
-use clap::ValueEnum;
 use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityJobError, CityOutputFormat, CitySummary};
 
 use crate::error::with_hint;
+use crate::options::{Named, named};
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
 
@@ -63,25 +63,19 @@ pub(crate) struct ConvertArgs {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Format to write [default: by the ending of OUT: .obj, .ply, .glb, .geojson or .json].
-    #[arg(long)]
-    format: Option<Format>,
+    #[arg(long, value_parser = named(&FORMATS))]
+    format: Option<CityOutputFormat>,
     #[command(flatten)]
     show: ShowOptions,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// Wavefront OBJ, whole coordinates.
-    Obj,
-    /// Binary PLY, f32 from an origin that the header names.
-    Ply,
-    /// Binary glTF, f32 from an origin that the extras name.
-    Glb,
-    /// Footprints with heights in longitude and latitude.
-    Geojson,
-    /// CityJSON 2.0 with all objects and levels.
-    Cityjson,
-}
+const FORMATS: [Named<CityOutputFormat>; 5] = [
+    ("obj", CityOutputFormat::Obj, "Wavefront OBJ, whole coordinates"),
+    ("ply", CityOutputFormat::Ply, "Binary PLY, f32 from an origin that the header names"),
+    ("glb", CityOutputFormat::Glb, "Binary glTF, f32 from an origin that the extras name"),
+    ("geojson", CityOutputFormat::Geojson, "Footprints with heights in longitude and latitude"),
+    ("cityjson", CityOutputFormat::Cityjson, "CityJSON 2.0 with all objects and levels"),
+];
 
 /// Runs `skysweep city`.
 pub(crate) fn run(command: &Command, global: Global) -> anyhow::Result<Outcome> {
@@ -105,13 +99,7 @@ fn info(args: &InfoArgs, global: Global) -> anyhow::Result<Outcome> {
 fn convert(args: &ConvertArgs, global: Global) -> anyhow::Result<Outcome> {
     let mut config = CityConvertConfig::new(args.input.file.clone(), args.output.clone());
     args.input.set(&mut config.input);
-    config.format = args.format.map(|format| match format {
-        Format::Obj => CityOutputFormat::Obj,
-        Format::Ply => CityOutputFormat::Ply,
-        Format::Glb => CityOutputFormat::Glb,
-        Format::Geojson => CityOutputFormat::Geojson,
-        Format::Cityjson => CityOutputFormat::Cityjson,
-    });
+    config.format = args.format;
     let output = &args.output;
     let report = args.show.watch(global, output, |watcher| jobs::city::convert(&config, watcher)).map_err(hinted)?;
     args.show.print(global, &report, String::new)?;

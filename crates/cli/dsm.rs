@@ -1,13 +1,16 @@
 //! `skysweep dsm`: satellite images with RPCs in, a georeferenced DSM out.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crs::{CrsRequest, VerticalDatum};
 use jobs::dsm::{
     DsmConfig, DsmError, DsmReport, DsmSetting, Fill, HeightRange, ImagePair, MapBounds, Preset, SweepError,
 };
+use jobs::job_file::{is_job_file, read_dsm_job};
+use jobs::production::{ProductionError, make_plan};
 
 use crate::error::{OVERWRITE, with_hint};
+use crate::options::{Named, named};
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
 
@@ -18,18 +21,31 @@ use crate::{Global, Outcome};
                         printed with its reason. Example: skysweep dsm left.tif right.tif -o out"
 )]
 pub(crate) struct Args {
-    /// The images, two or more: anything GDAL reads, with its RPC inside or beside it.
-    #[arg(required = true, value_name = "IMAGE")]
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Print the plan (images, grid, chunks, memory and time, choices) and write nothing.
+    #[arg(long)]
+    dry_run: bool,
+    #[command(flatten)]
+    show: ShowOptions,
+}
+
+/// Inputs and settings of a surface model.
+#[derive(Debug, clap::Args)]
+pub(crate) struct SceneArgs {
+    /// The images, two or more: anything GDAL reads, with its RPC inside or beside it. Or one job
+    /// file (see skysweep template dsm), whose settings the options replace.
+    #[arg(required = true, value_name = "IMAGE|JOB.toml")]
     images: Vec<PathBuf>,
-    /// Folder for the results.
+    /// Folder for the results [default: the job file's].
     #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
+    output: Option<PathBuf>,
     /// Cell size of the DSM in metres [default: the coarsest image's].
     #[arg(long, value_name = "METRES")]
     gsd: Option<f64>,
     /// CRS of the DSM: auto, or a projected EPSG code [default: the scene's UTM zone].
-    #[arg(long, value_name = "CRS", default_value = "auto", hide_default_value = true)]
-    crs: CrsRequest,
+    #[arg(long, value_name = "CRS")]
+    crs: Option<CrsRequest>,
     /// Use the CRS although the scene lies far outside its area of use.
     #[arg(long)]
     force: bool,
@@ -49,16 +65,16 @@ pub(crate) struct Args {
     /// What the heights of the DSM are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
-    /// Speed against accuracy.
-    #[arg(long, value_enum, default_value_t = PresetName::Balanced)]
-    preset: PresetName,
+    /// Speed against accuracy [default: balanced].
+    #[arg(long, value_parser = named(&PRESETS))]
+    preset: Option<Preset>,
     /// Voids to close from the heights around them, marked in filled.tif: none, justified (narrow
     /// voids, voids behind buildings, voids between known heights where the images have texture) or
-    /// all within reach of known heights.
-    #[arg(long, value_enum, default_value_t = FillName::Justified)]
-    fill: FillName,
+    /// all within reach of known heights [default: justified].
+    #[arg(long, value_parser = named(&FILLS))]
+    fill: Option<Fill>,
     /// Pairs of images to match, by position: 1-2,1-3 [default: all that are useful].
-    #[arg(long, value_name = "I-J,…", value_delimiter = ',', value_parser = parse_pair)]
+    #[arg(long, value_name = "I-J,…", value_delimiter = ',')]
     pairs: Option<Vec<ImagePair>>,
     /// Images to compute heights for, by position: 1,3 [default: all].
     #[arg(long, value_name = "I,…", value_delimiter = ',', value_parser = parse_position)]
@@ -76,39 +92,25 @@ pub(crate) struct Args {
     #[arg(long, value_name = "CELLS")]
     chunk: Option<usize>,
     /// Side of the tiles that are fused at a time, cells; it changes the memory needed, never the
-    /// result.
-    #[arg(long, value_name = "CELLS", default_value_t = 1024)]
-    tile: usize,
+    /// result [default: 1024].
+    #[arg(long, value_name = "CELLS")]
+    tile: Option<usize>,
     /// Replace existing results.
     #[arg(long)]
     overwrite: bool,
-    #[command(flatten)]
-    show: ShowOptions,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum PresetName {
-    Fast,
-    Balanced,
-    Accurate,
-}
+const PRESETS: [Named<Preset>; 3] = [
+    ("fast", Preset::Fast, "half the resolution in matching and in the DSM, two sources per view"),
+    ("balanced", Preset::Balanced, "full resolution, up to four sources per view"),
+    ("accurate", Preset::Accurate, "full resolution, up to eight sources per view"),
+];
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum FillName {
-    None,
-    Justified,
-    All,
-}
-
-/// Parses `2-3` into the pair (1, 2): people count positions from 1.
-fn parse_pair(text: &str) -> Result<ImagePair, String> {
-    let (i, j) = text.split_once('-').ok_or_else(|| format!("expected two positions like 1-2, found {text:?}"))?;
-    let pair = ImagePair::new(parse_position(i)?, parse_position(j)?);
-    if pair.first == pair.second {
-        return Err(format!("a pair needs two different images, found {text:?}"));
-    }
-    Ok(pair)
-}
+const FILLS: [Named<Fill>; 3] = [
+    ("none", Fill::None, "no void: every height was observed"),
+    ("justified", Fill::Justified, "narrow voids, voids behind buildings, voids between known heights on texture"),
+    ("all", Fill::All, "all within reach of known heights"),
+];
 
 /// Parses a position, which people count from 1, into one counted from 0.
 fn parse_position(text: &str) -> Result<usize, String> {
@@ -118,56 +120,85 @@ fn parse_position(text: &str) -> Result<usize, String> {
     }
 }
 
-impl Args {
-    fn config(&self) -> DsmConfig {
-        let (crs_epsg, datum) = match self.crs {
-            CrsRequest::Auto => (None, None),
-            CrsRequest::Epsg { horizontal, vertical } => (Some(horizontal), vertical),
+impl SceneArgs {
+    /// Returns the configuration: that of the job file, or the defaults, with the options given.
+    pub(crate) fn config(&self) -> anyhow::Result<DsmConfig> {
+        let mut config = match self.images.as_slice() {
+            [file] if is_job_file(file) => read_dsm_job(file)?,
+            images => DsmConfig::new(images.to_vec(), PathBuf::new()),
         };
         let range = |v: &Vec<f64>| Some(HeightRange::new(*v.first()?, *v.get(1)?));
         let bounds = |b: &Vec<f64>| <[f64; 4]>::try_from(b.as_slice()).ok().map(MapBounds::from);
-        let mut config = DsmConfig::new(self.images.clone(), self.output.clone());
-        config.gsd_m = self.gsd;
-        config.crs_epsg = crs_epsg;
-        config.force_crs = self.force;
-        config.bounds = self.bounds.as_ref().and_then(bounds);
-        config.height_range_m = self.height_range.as_ref().and_then(range);
-        config.dem = self.dem.clone();
-        config.prior = self.prior.clone();
-        config.vertical = self.vertical.or(datum).unwrap_or_default();
-        config.preset = match self.preset {
-            PresetName::Fast => Preset::Fast,
-            PresetName::Balanced => Preset::Balanced,
-            PresetName::Accurate => Preset::Accurate,
-        };
-        config.fill = match self.fill {
-            FillName::None => Fill::None,
-            FillName::Justified => Fill::Justified,
-            FillName::All => Fill::All,
-        };
-        config.pairs = self.pairs.clone();
-        config.references = self.reference.clone();
-        config.pointing = !self.no_pointing;
-        config.threads = self.threads;
-        config.memory_mb = self.memory;
-        config.chunk = self.chunk;
-        config.tile = self.tile;
-        config.overwrite = self.overwrite;
-        config
+        config.output = self.output.clone().unwrap_or(config.output);
+        config.gsd_m = self.gsd.or(config.gsd_m);
+        match self.crs {
+            None => {}
+            Some(CrsRequest::Auto) => config.crs_epsg = None,
+            Some(CrsRequest::Epsg { horizontal, vertical }) => {
+                config.crs_epsg = Some(horizontal);
+                config.vertical = vertical.unwrap_or(config.vertical);
+            }
+        }
+        config.vertical = self.vertical.unwrap_or(config.vertical);
+        config.force_crs |= self.force;
+        config.bounds = self.bounds.as_ref().and_then(bounds).or(config.bounds);
+        if self.height_range.is_some() || self.dem.is_some() {
+            config.height_range_m = self.height_range.as_ref().and_then(range);
+            config.dem.clone_from(&self.dem);
+        }
+        config.prior = self.prior.clone().or(config.prior);
+        config.preset = self.preset.unwrap_or(config.preset);
+        config.fill = self.fill.unwrap_or(config.fill);
+        config.pairs = self.pairs.clone().or(config.pairs);
+        config.references = self.reference.clone().or(config.references);
+        config.pointing &= !self.no_pointing;
+        config.threads = self.threads.or(config.threads);
+        config.memory_mb = self.memory.or(config.memory_mb);
+        config.chunk = self.chunk.or(config.chunk);
+        config.tile = self.tile.unwrap_or(config.tile);
+        config.overwrite |= self.overwrite;
+        Ok(config)
     }
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let report =
-        args.show.watch(global, &args.output, |watcher| jobs::dsm::run(&args.config(), watcher)).map_err(|error| {
-            let hint = hint(&error);
-            with_hint(error, hint)
-        })?;
-    args.show.print(global, &report, || summary(args, &report))?;
+    let config = args.scene.config()?;
+    if args.dry_run {
+        let plan = args.show.watch(global, &config.output, |watcher| make_plan(&config, watcher));
+        let plan = plan.map_err(production_hinted)?;
+        args.show.print(global, &plan, || plan.text())?;
+        return Ok(Outcome::Complete);
+    }
+    let report = args.show.watch(global, &config.output, |watcher| jobs::dsm::run(&config, watcher)).map_err(hinted)?;
+    print(args.show, global, &report, &config.output)
+}
+
+/// Prints the report of a surface model.
+pub(crate) fn print(show: ShowOptions, global: Global, report: &DsmReport, output: &Path) -> anyhow::Result<Outcome> {
+    show.print(global, report, || report.text(output))?;
     let failed = report.chunks.as_ref().map_or(0, |chunks| chunks.failed.len());
     let what = || format!("chunks that could not be computed, whose cells are void: {failed}; the report names them");
     Ok(if failed == 0 { Outcome::Complete } else { Outcome::Partial(what()) })
+}
+
+fn hinted(error: DsmError) -> anyhow::Error {
+    let hint = hint(&error);
+    with_hint(error, hint)
+}
+
+/// Adds the option that helps with an error of a planned run.
+pub(crate) fn production_hinted(error: ProductionError) -> anyhow::Error {
+    let hint = match &error {
+        ProductionError::Dsm(error) => hint(error),
+        ProductionError::NoPlan { .. } => Some("skysweep plan IMAGES… -o RUN makes one"),
+        ProductionError::ConfigChanged { .. } | ProductionError::InputChanged { .. } => {
+            Some("skysweep run RUN --resume plans and computes again")
+        }
+        ProductionError::ChunksMissing { .. } => Some("skysweep run RUN computes them, --partial leaves them void"),
+        _ => None,
+    };
+    with_hint(error, hint)
 }
 
 /// Returns the options that help against an error.
@@ -180,6 +211,7 @@ fn hint(error: &DsmError) -> Option<&'static str> {
         DsmError::BoundsMissScene { .. } => "without --bounds the DSM covers all the ground that two images see",
         DsmError::Prior { .. } => "`skysweep city info MODEL` checks a city model",
         DsmError::Value { setting, .. } => match setting {
+            DsmSetting::Output => "-o DIR names it",
             DsmSetting::CellSize => "the cell size is set by --gsd",
             DsmSetting::Crs => "the CRS is set by --crs; --force uses it outside its area of use",
             DsmSetting::Bounds => "the grid is set by --bounds and --gsd",
@@ -197,24 +229,4 @@ fn hint(error: &DsmError) -> Option<&'static str> {
         }
         _ => return None,
     })
-}
-
-fn summary(args: &Args, report: &DsmReport) -> String {
-    let s = &report.surface;
-    let share = |n: usize| 100.0 * n as f64 / s.cells.max(1) as f64;
-    let seconds: f64 = report.stages.iter().map(|t| t.seconds).sum();
-    format!(
-        "DSM        {}\n\
-         cells      {} ({:.1} % observed, {:.1} % filled, {:.1} % void)\n\
-         picture    {}\n\
-         report     {}\n\
-         time       {seconds:.1} s\n",
-        args.output.join("dsm/dsm.tif").display(),
-        s.cells,
-        share(s.observed),
-        share(s.filled),
-        share(s.void),
-        args.output.join("dsm/relief.png").display(),
-        args.output.join("report/report.json").display(),
-    )
 }

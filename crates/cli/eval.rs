@@ -11,12 +11,14 @@ use city::Lod;
 use crs::VerticalDatum;
 use eval::{AlignmentMethod, EvalConfig, SurfaceComparisonConfig};
 use jobs::eval::{
-    EvalJobError, EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, GridEvalReport, MapEvalConfig,
+    EvalJobError, EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, GridEvalReport, MapEvalConfig, MapKind,
     MinCompleteness, SurfaceEvalConfig,
 };
+use numeric::Progress;
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::progress::{ShowOptions, Watcher};
+use crate::options::{Named, named};
+use crate::progress::ShowOptions;
 use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep eval`.
@@ -32,8 +34,8 @@ pub(crate) struct Args {
     reference: PathBuf,
     /// What is removed before the comparison [default: xyz for grids; surfaces and maps are
     /// compared as they are].
-    #[arg(long, value_enum)]
-    align: Option<Align>,
+    #[arg(long, value_parser = named(&ALIGNMENTS))]
+    align: Option<AlignmentMethod>,
     /// Radius of the horizontal search of --align xyz and nuth-kaab, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 5.0)]
     search_m: f64,
@@ -94,7 +96,7 @@ pub(crate) struct Args {
     show: ShowOptions,
     /// The files are maps of this kind in the pixels of one camera [default: found by shape and
     /// type of .npy files].
-    #[arg(long, value_enum, value_name = "KIND")]
+    #[arg(long, value_parser = named(&MAP_KINDS), value_name = "KIND")]
     maps: Option<MapKind>,
     /// Exit with 1 if the MAE over all cells is above this, in metres; for surfaces the mean
     /// distance of TEST to REF.
@@ -142,50 +144,23 @@ struct SurfaceArgs {
 }
 
 /// `--align`.
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Align {
-    /// Nothing is removed.
-    None,
-    /// The median of the differences.
-    Z,
-    /// The translation with the least NMAD, then the median of the differences.
-    Xyz,
-    /// The translation that follows from slopes and aspects (Nuth and Kääb 2011), then the median
-    /// of the differences.
-    NuthKaab,
-}
-
-impl From<Align> for AlignmentMethod {
-    fn from(align: Align) -> Self {
-        match align {
-            Align::None => Self::None,
-            Align::Z => Self::Z,
-            Align::Xyz => Self::Xyz,
-            Align::NuthKaab => Self::NuthKaab,
-        }
-    }
-}
+const ALIGNMENTS: [Named<AlignmentMethod>; 4] = [
+    ("none", AlignmentMethod::None, "Nothing is removed"),
+    ("z", AlignmentMethod::Z, "The median of the differences"),
+    ("xyz", AlignmentMethod::Xyz, "The translation with the least NMAD, then the median of the differences"),
+    (
+        "nuth-kaab",
+        AlignmentMethod::NuthKaab,
+        "The translation that follows from slopes and aspects (Nuth and Kääb 2011), then the median of the differences",
+    ),
+];
 
 /// `--maps`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum MapKind {
-    /// Depths, one number a pixel; 0, NaN and infinity are no depth.
-    Depth,
-    /// Normals, three numbers a pixel; zeros are no normal.
-    Normals,
-    /// Masks; every value but 0 is set.
-    Mask,
-}
-
-impl From<MapKind> for jobs::eval::MapKind {
-    fn from(kind: MapKind) -> Self {
-        match kind {
-            MapKind::Depth => Self::Depth,
-            MapKind::Normals => Self::Normals,
-            MapKind::Mask => Self::Mask,
-        }
-    }
-}
+const MAP_KINDS: [Named<MapKind>; 3] = [
+    ("depth", MapKind::Depth, "Depths, one number a pixel; 0, NaN and infinity are no depth"),
+    ("normals", MapKind::Normals, "Normals, three numbers a pixel; zeros are no normal"),
+    ("mask", MapKind::Mask, "Masks; every value but 0 is set"),
+];
 
 /// Runs `skysweep eval`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
@@ -205,14 +180,18 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 }
 
 /// Runs a comparison while its progress is shown.
-fn watch<T>(args: &Args, global: Global, job: impl FnOnce(&Watcher) -> Result<T, EvalJobError>) -> anyhow::Result<T> {
+fn watch<T>(
+    args: &Args,
+    global: Global,
+    job: impl FnOnce(&dyn Progress) -> Result<T, EvalJobError>,
+) -> anyhow::Result<T> {
     args.show.watch(global, args.output.as_deref().unwrap_or(Path::new("")), job).map_err(hinted)
 }
 
 /// Refuses options that only height grids have.
 fn refuse_grid_options(args: &Args, what: &str) -> anyhow::Result<()> {
     let given = [
-        ("--align", args.align.is_some_and(|align| !matches!(align, Align::None))),
+        ("--align", args.align.is_some_and(|align| !matches!(align, AlignmentMethod::None))),
         ("--classes", args.classes.is_some()),
         ("--confidence", args.confidence.is_some()),
         ("--buildings", args.buildings.is_some()),
@@ -249,7 +228,7 @@ fn grids(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
 
 fn grid_config(args: &Args) -> GridEvalConfig {
     let mut config = GridEvalConfig::new(args.test.clone(), args.reference.clone());
-    config.alignment = args.align.unwrap_or(Align::Xyz).into();
+    config.alignment = args.align.unwrap_or(AlignmentMethod::Xyz);
     config.search_m = args.search_m;
     if !args.thresholds.is_empty() {
         config.thresholds_m = args.thresholds.clone();
@@ -335,7 +314,7 @@ fn maps(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     ensure!(args.output.is_none(), "maps are compared on the terminal or with --json: leave -o out");
     ensure!(args.min_completeness.is_empty(), "--min-completeness is not for maps: leave it out");
     let mut config = MapEvalConfig::new(args.test.clone(), args.reference.clone());
-    config.kind = args.maps.map(Into::into);
+    config.kind = args.maps;
     config.max_mae = args.max_mae;
     let report = watch(args, global, |watcher| jobs::eval::compare_maps(&config, watcher))?;
     args.show.print(Global { quiet: false, ..global }, &report, || report.table())?;

@@ -14,12 +14,12 @@ use heightmap::{HeightMapError, Reading};
 use jobs::camera_stand::StandError;
 use jobs::city_files::CitySurfaceError;
 use jobs::heightmap::{
-    ConfidenceSource, HeightMapConfig, HeightMapFate, HeightMapJobError, HeightMapReport, MapChoice, Normalization,
-    PointAxes, UnprojectConfig,
+    ConfidenceSource, HeightMapConfig, HeightMapJobError, MapChoice, Normalization, PointAxes, UnprojectConfig,
 };
 
 use crate::corrections::code_of;
 use crate::error::{OVERWRITE, with_hint};
+use crate::options::{Named, named};
 use crate::progress::{Log, RunOptions};
 use crate::stand::StandArgs;
 use crate::{Global, Outcome, print};
@@ -65,8 +65,8 @@ struct UnprojectArgs {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Axes of points in a PLY.
-    #[arg(long, value_enum, default_value_t = Frame::World)]
-    frame: Frame,
+    #[arg(long, value_parser = named(&FRAMES), default_value = "world")]
+    frame: PointAxes,
     /// Write Gaussian splats as 3DGS viewers and trainers read them (.ply, its origin beside it),
     /// one for each pixel.
     #[arg(long)]
@@ -87,24 +87,17 @@ struct UnprojectArgs {
 }
 
 /// `--frame`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Frame {
-    /// East, north, up of the camera.
-    World,
-    /// (u / r, v / r, h): right of the camera, behind it, up.
-    Camera,
-}
+const FRAMES: [Named<PointAxes>; 2] = [
+    ("world", PointAxes::World, "East, north, up of the camera"),
+    ("camera", PointAxes::Camera, "(u / r, v / r, h): right of the camera, behind it, up"),
+];
 
 /// `--interpolation`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Interpolation {
-    /// The nearest cell.
-    Nearest,
-    /// Between four cells.
-    Bilinear,
-    /// Between sixteen cells.
-    Cubic,
-}
+const INTERPOLATIONS: [Named<Reading>; 3] = [
+    ("nearest", Reading::Nearest, "The nearest cell"),
+    ("bilinear", Reading::Bilinear, "Between four cells"),
+    ("cubic", Reading::Cubic, "Between sixteen cells"),
+];
 
 /// How maps are made.
 #[derive(Debug, clap::Args)]
@@ -137,8 +130,8 @@ struct MakeArgs {
     #[arg(long, value_name = "CRS", default_value = "local")]
     crs: MapChoice,
     /// Interpolation between the cells of a raster.
-    #[arg(long, value_enum, default_value_t = Interpolation::Bilinear)]
-    interpolation: Interpolation,
+    #[arg(long, value_parser = named(&INTERPOLATIONS), default_value = "bilinear")]
+    interpolation: Reading,
     /// Coordinate system of SOURCE, if the file names none or a wrong one: EPSG:n.
     #[arg(long, value_name = "CRS")]
     source_crs: Option<CrsRequest>,
@@ -174,20 +167,11 @@ fn make(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow
     let config = config(args, source, output)?;
     let report =
         args.run.show.watch(global, output, |watcher| jobs::heightmap::run(&config, watcher)).map_err(hinted)?;
-    let failed = log_failures(&report);
+    let failed = report.failures();
+    failed.iter().take(SHOWN).for_each(|(id, reason)| tracing::error!("{id}: {reason}"));
     args.run.show.print(global, &report, || report.text())?;
-    Ok(failed.map_or(Outcome::Complete, |count| Outcome::Partial(format!("{count} height maps could not be made"))))
-}
-
-/// Logs the first rows of a list that failed, and returns their number, if there are any.
-fn log_failures(report: &HeightMapReport) -> Option<usize> {
-    let HeightMapReport::List(list) = report else { return None };
-    let reasons = list.maps.iter().filter_map(|record| match &record.fate {
-        HeightMapFate::Failed { reason } => Some((&record.id, reason)),
-        _ => None,
-    });
-    reasons.take(SHOWN).for_each(|(id, reason)| tracing::error!("{id}: {reason}"));
-    (list.failed > 0).then_some(list.failed)
+    let what = || format!("{} height maps could not be made", failed.len());
+    Ok(if failed.is_empty() { Outcome::Complete } else { Outcome::Partial(what()) })
 }
 
 fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<HeightMapConfig> {
@@ -205,11 +189,7 @@ fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<Heigh
         Some(raster) => ConfidenceSource::Raster(raster.clone()),
     };
     config.map = args.crs;
-    config.interpolation = match args.interpolation {
-        Interpolation::Nearest => Reading::Nearest,
-        Interpolation::Bilinear => Reading::Bilinear,
-        Interpolation::Cubic => Reading::Cubic,
-    };
+    config.interpolation = args.interpolation;
     let (epsg, datum) = code_of(args.source_crs, "--source-crs")?;
     config.source_epsg = epsg;
     config.source_vertical = args.source_vertical.or(datum);
@@ -223,20 +203,13 @@ fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<Heigh
 
 fn unproject(args: &UnprojectArgs, global: Global) -> anyhow::Result<Outcome> {
     let mut config = UnprojectConfig::new(args.map.clone(), args.output.clone());
-    config.axes = match args.frame {
-        Frame::World => PointAxes::World,
-        Frame::Camera => PointAxes::Camera,
-    };
+    config.axes = args.frame;
     config.splats = args.splats;
     config.picture = args.picture.clone();
     config.merge_m = args.merge;
     config.overwrite = args.overwrite;
     let report = jobs::heightmap::unproject(&config, &Log).map_err(hinted)?;
-    if args.json {
-        print::json(&report)?;
-    } else if !global.is_quiet() {
-        print::text(&report.text())?;
-    }
+    print::report(args.json, !global.is_quiet(), &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 

@@ -19,6 +19,7 @@ mod options;
 mod ortho;
 mod print;
 mod priors;
+mod production;
 mod progress;
 mod rpc;
 mod simulate;
@@ -59,21 +60,29 @@ enum Command {
     Groundview(Box<groundview::Args>),
     /// Make height maps seen from above around a camera, turned to its heading.
     Heightmap(Box<heightmap::Args>),
+    /// Make a surface model of the computed chunks of a planned run.
+    Merge(production::MergeArgs),
     /// Lay satellite images on a surface model, hidden cells marked.
     Ortho(Box<ortho::Args>),
     /// Print the manual page of a command.
     Man(completions::ManArgs),
+    /// Plan a surface model in parts, and write the plan into a run folder.
+    Plan(Box<production::PlanArgs>),
     /// Make depth, normal and mask priors of a city model for the cameras of a scene.
     Priors(Box<priors::Args>),
     /// Show, use and convert RPC camera models.
     #[command(subcommand)]
     Rpc(rpc::Command),
+    /// Compute chunks of a planned run.
+    Run(production::ChunkArgs),
     /// Make a scene seen through RPC cameras, with its exact surface.
     Simulate(simulate::Args),
     /// Make Gaussian splats of a surface model and its images.
     Splats(Box<splats::Args>),
     /// Choose context and target views of a COLMAP model by their overlap.
     Split(split::Args),
+    /// Print a commented job file.
+    Template(production::TemplateArgs),
 }
 
 fn main() -> ExitCode {
@@ -107,12 +116,16 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Eval(args) => eval::run(args, cli.global),
         Command::Groundview(args) => groundview::run(args, cli.global),
         Command::Heightmap(args) => heightmap::run(args, cli.global),
+        Command::Merge(args) => production::merge(args, cli.global),
         Command::Ortho(args) => ortho::run(args, cli.global),
         Command::Man(args) => completions::man(args, options::grouped(Cli::command())),
+        Command::Plan(args) => production::plan(args, cli.global),
         Command::Priors(args) => priors::run(args, cli.global),
         Command::Rpc(command) => rpc::run(command),
+        Command::Run(args) => production::run(args, cli.global),
         Command::Simulate(args) => simulate::run(args, cli.global),
         Command::Splats(args) => splats::run(args, cli.global),
         Command::Split(args) => split::run(args, cli.global),
+        Command::Template(args) => production::template(args),
     }
 }

@@ -4,6 +4,7 @@
 use std::ffi::OsString;
 
 use clap::Command;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
 
 /// Groups of options, by the names of their fields. What is in no group chooses the method.
@@ -71,6 +72,20 @@ const GROUPS: [(&str, &[&str]); 5] = [
 
 /// GDAL's options and ours.
 const OF_GDAL: [(&str, &str); 4] = [("-t_srs", "crs"), ("-te", "bounds"), ("-tr", "gsd"), ("-overwrite", "overwrite")];
+
+/// A value of an option with its name and, for the help, its meaning.
+pub(crate) type Named<T> = (&'static str, T, &'static str);
+
+/// Parses the values of an option by their names.
+pub(crate) fn named<T: Clone + Send + Sync + 'static>(
+    values: &'static [Named<T>],
+) -> impl TypedValueParser<Value = T> + Clone {
+    let shown = values.iter().map(|(name, _, about)| PossibleValue::new(name).help(about));
+    PossibleValuesParser::new(shown).try_map(move |name| {
+        let value = values.iter().find(|(other, ..)| *other == name);
+        value.map(|(_, value, _)| value.clone()).ok_or("not a value of this option")
+    })
+}
 
 /// Puts the options of a command and of its subcommands into their groups.
 pub(crate) fn grouped(command: Command) -> Command {

@@ -4,14 +4,14 @@
 
 use std::path::PathBuf;
 
-use ::priors::{Amount, DepthKind, NormalFrame, Spacing as Placement, VisibilityConfig};
+use ::priors::{Amount, DepthKind, NormalFrame, Spacing, VisibilityConfig};
 use city::Lod;
-use clap::ValueEnum;
 use crs::{CrsRequest, VerticalDatum};
 use jobs::priors::{LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, PriorsMode, PriorsTrainer};
 
 use crate::corrections::code_of;
 use crate::error::with_hint;
+use crate::options::{Named, named};
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
 
@@ -63,11 +63,11 @@ pub(crate) struct Args {
     corrections: Option<PathBuf>,
 
     /// What is to be trained: only the buildings, or the whole scene with priors on them.
-    #[arg(long, value_enum, default_value_t = Mode::BuildingOnly)]
-    mode: Mode,
+    #[arg(long, value_parser = named(&MODES), default_value = "building-only")]
+    mode: PriorsMode,
     /// The trainer that the dataset is for; 2DGS ignores the principal point, gsplat uses it.
-    #[arg(long, value_enum, default_value_t = Trainer::TwoDgs)]
-    trainer: Trainer,
+    #[arg(long, value_parser = named(&TRAINERS), default_value = "2dgs")]
+    trainer: PriorsTrainer,
     /// Crop cameras whose principal point is not in the middle; crops.json says how to crop the
     /// images.
     #[arg(long)]
@@ -97,7 +97,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "METRES", default_value_t = 2.0)]
     max_spacing: f64,
     /// How points keep a distance from each other.
-    #[arg(long, value_enum, default_value_t = Spacing::Stratified)]
+    #[arg(long, value_parser = named(&SPACINGS), default_value = "stratified")]
     spacing: Spacing,
     /// Weight of a class of surfaces, such as RoofSurface=2; 0 leaves it out.
     #[arg(long, value_name = "CLASS=WEIGHT")]
@@ -126,11 +126,11 @@ pub(crate) struct Args {
     max_observations: usize,
 
     /// What depth means.
-    #[arg(long, value_enum, default_value_t = Depth::Z)]
-    depth: Depth,
+    #[arg(long, value_parser = named(&DEPTHS), default_value = "z")]
+    depth: DepthKind,
     /// The axes of normals.
-    #[arg(long, value_enum, default_value_t = Normals::World)]
-    normals: Normals,
+    #[arg(long, value_parser = named(&NORMALS), default_value = "world")]
+    normals: NormalFrame,
     /// Write more forms of the points: the COLMAP model as text, points3D.ply beside sparse, and
     /// initial splats for 2DGS and 3DGS.
     #[arg(long, conflicts_with = "maps_only")]
@@ -147,52 +147,33 @@ pub(crate) struct Args {
 }
 
 /// What is to be trained.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Mode {
-    /// Everything masked to buildings.
-    BuildingOnly,
-    /// The whole scene, with priors on buildings.
-    BuildingEnhanced,
-}
+const MODES: [Named<PriorsMode>; 2] = [
+    ("building-only", PriorsMode::BuildingOnly, "Everything masked to buildings"),
+    ("building-enhanced", PriorsMode::BuildingEnhanced, "The whole scene, with priors on buildings"),
+];
 
 /// The program that reads the dataset.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Trainer {
-    /// 2DGS and the trainers made from it.
-    #[value(name = "2dgs")]
-    TwoDgs,
-    /// gsplat, nerfstudio.
-    Gsplat,
-}
+const TRAINERS: [Named<PriorsTrainer>; 2] = [
+    ("2dgs", PriorsTrainer::TwoDgs, "2DGS and the trainers made from it"),
+    ("gsplat", PriorsTrainer::Gsplat, "gsplat, nerfstudio"),
+];
 
 /// How points keep a distance from each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Spacing {
-    /// Independent points.
-    Random,
-    /// Even shares, low discrepancy.
-    Stratified,
-    /// A least distance.
-    Poisson,
-}
+const SPACINGS: [Named<Spacing>; 3] = [
+    ("random", Spacing::Random, "Independent points"),
+    ("stratified", Spacing::Stratified, "Even shares, low discrepancy"),
+    ("poisson", Spacing::PoissonDisk, "A least distance"),
+];
 
 /// What depth means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Depth {
-    /// Along the axis of the camera.
-    Z,
-    /// Along the ray.
-    Ray,
-}
+const DEPTHS: [Named<DepthKind>; 2] =
+    [("z", DepthKind::ZDepth, "Along the axis of the camera"), ("ray", DepthKind::RayLength, "Along the ray")];
 
 /// The axes of normals.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Normals {
-    /// The axes of the cameras' frame.
-    World,
-    /// The axes of each camera.
-    Camera,
-}
+const NORMALS: [Named<NormalFrame>; 2] = [
+    ("world", NormalFrame::World, "The axes of the cameras' frame"),
+    ("camera", NormalFrame::Camera, "The axes of each camera"),
+];
 
 /// Runs `skysweep priors`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
@@ -236,14 +217,8 @@ impl Args {
         config.map_epsg = map_epsg;
         config.vertical = self.model_vertical.or(datum);
         config.corrections.clone_from(&self.corrections);
-        config.mode = match self.mode {
-            Mode::BuildingOnly => PriorsMode::BuildingOnly,
-            Mode::BuildingEnhanced => PriorsMode::BuildingEnhanced,
-        };
-        config.trainer = match self.trainer {
-            Trainer::TwoDgs => PriorsTrainer::TwoDgs,
-            Trainer::Gsplat => PriorsTrainer::Gsplat,
-        };
+        config.mode = self.mode;
+        config.trainer = self.trainer;
         config.recrop = self.recrop;
         config.maps_only = self.maps_only;
         config.lod = self.lod;
@@ -257,14 +232,8 @@ impl Args {
             min_views: self.min_views,
             max_observations: self.max_observations,
         };
-        config.maps.depth = match self.depth {
-            Depth::Z => DepthKind::ZDepth,
-            Depth::Ray => DepthKind::RayLength,
-        };
-        config.maps.normals = match self.normals {
-            Normals::World => NormalFrame::World,
-            Normals::Camera => NormalFrame::Camera,
-        };
+        config.maps.depth = self.depth;
+        config.maps.normals = self.normals;
         config.extras = self.extras;
         config.geotiff = self.geotiff;
         config.previews = self.previews;
@@ -279,11 +248,7 @@ impl Args {
             (_, _, Some(error_m)) => Amount::Adaptive { error_m, max_spacing_m: self.max_spacing },
             (points, None, None) => points.map_or(config.amount, Amount::Count),
         };
-        config.spacing = match self.spacing {
-            Spacing::Random => Placement::Random,
-            Spacing::Stratified => Placement::Stratified,
-            Spacing::Poisson => Placement::PoissonDisk,
-        };
+        config.spacing = self.spacing;
         config.class_weights.clone_from(&self.class_weight);
         config.seed = self.seed;
     }

@@ -6,8 +6,8 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
+use jobs::event_lines::EventLines;
 use numeric::{Choice, Progress};
-use serde_json::json;
 
 use crate::{Global, print};
 
@@ -39,11 +39,18 @@ impl ShowOptions {
         self,
         global: Global,
         output: &Path,
-        job: impl FnOnce(&Watcher) -> Result<T, E>,
+        job: impl FnOnce(&dyn Progress) -> Result<T, E>,
     ) -> Result<T, E> {
+        if self.progress == ProgressStyle::Json {
+            let lines = EventLines::new(say);
+            let result = job(&lines);
+            lines.finish(output, result.as_ref().err().map(|error| error as _));
+            return result;
+        }
         let watcher = Watcher::new(self.progress, global);
         let result = job(&watcher);
-        watcher.finish(output, result.as_ref().err());
+        watcher.bar.finish_and_clear();
+        watcher.say_time();
         result
     }
 
@@ -54,13 +61,7 @@ impl ShowOptions {
         report: &impl serde::Serialize,
         text: impl FnOnce() -> String,
     ) -> anyhow::Result<()> {
-        if self.json {
-            print::json(report)
-        } else if global.is_quiet() {
-            Ok(())
-        } else {
-            print::text(&text())
-        }
+        print::report(self.json, !global.is_quiet(), report, text)
     }
 }
 
@@ -78,8 +79,7 @@ pub(crate) struct RunOptions {
 }
 
 /// Shows a job's progress.
-pub(crate) struct Watcher {
-    style: ProgressStyle,
+struct Watcher {
     quiet: bool,
     /// Whether stages and their times are printed as lines.
     verbose: bool,
@@ -88,7 +88,7 @@ pub(crate) struct Watcher {
 }
 
 impl Watcher {
-    pub(crate) fn new(style: ProgressStyle, global: Global) -> Self {
+    fn new(style: ProgressStyle, global: Global) -> Self {
         let quiet = global.is_quiet();
         let bar = ProgressBar::new(0);
         // At -vv the lines of files would tear the bar.
@@ -97,23 +97,7 @@ impl Watcher {
         if let Ok(look) = BarStyle::with_template("{msg:22} {bar:30} {percent:>3} % {eta:>4} left") {
             bar.set_style(look);
         }
-        let verbose = global.verbose > 0 && style != ProgressStyle::Json;
-        Self { style, quiet, verbose, bar, stage: Mutex::new((String::new(), Instant::now())) }
-    }
-
-    /// Ends the bar, and says how the job ended that wrote, or was to write, `output`.
-    fn finish(&self, output: &Path, error: Option<&impl std::error::Error>) {
-        self.bar.finish_and_clear();
-        self.say_time();
-        let output = output.to_string_lossy();
-        self.line(&match error {
-            None => json!({ "event": "done", "output": output }),
-            Some(error) => {
-                let causes = std::iter::successors(error.source(), |cause| cause.source()).map(ToString::to_string);
-                let causes = causes.collect::<Vec<_>>();
-                json!({ "event": "error", "text": error.to_string(), "causes": causes, "output": output })
-            }
-        });
+        Self { quiet, verbose: global.verbose > 0, bar, stage: Mutex::new((String::new(), Instant::now())) }
     }
 
     /// Prints how long the stage took that ends.
@@ -125,16 +109,14 @@ impl Watcher {
         }
     }
 
-    fn line(&self, value: &serde_json::Value) {
-        if self.style == ProgressStyle::Json {
-            self.say(&value.to_string());
-        }
-    }
-
-    /// Writes a line to standard error. Where that is closed or full, the work goes on in silence.
     fn say(&self, text: &str) {
-        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{text}")));
+        self.bar.suspend(|| say(text));
     }
+}
+
+/// Writes a line to standard error. Where that is closed or full, the work goes on in silence.
+fn say(text: &str) {
+    drop(writeln!(std::io::stderr(), "{text}"));
 }
 
 impl Progress for Watcher {
@@ -146,7 +128,6 @@ impl Progress for Watcher {
         if let Ok(mut current) = self.stage.lock() {
             *current = (stage.to_owned(), Instant::now());
         }
-        self.line(&json!({ "event": "stage", "stage": stage, "steps": steps }));
     }
 
     fn step(&self) {
@@ -155,26 +136,16 @@ impl Progress for Watcher {
             self.bar.inc_length(1);
         }
         self.bar.inc(1);
-        if let Ok(current) = self.stage.lock() {
-            let seconds = current.1.elapsed().as_secs_f64();
-            self.line(&json!({ "event": "step", "stage": current.0, "done": self.bar.position(), "seconds": seconds }));
-        }
     }
 
     fn choice(&self, choice: &Choice) {
-        if self.style == ProgressStyle::Json {
-            self.line(
-                &json!({ "event": "choice", "name": choice.name, "value": choice.value, "reason": choice.reason }),
-            );
-        } else if !self.quiet {
+        if !self.quiet {
             self.say(&format!("{:<13} {} ({})", choice.name, choice.value, choice.reason));
         }
     }
 
     fn warn(&self, text: &str) {
-        if self.style == ProgressStyle::Json {
-            self.line(&json!({ "event": "warning", "text": text }));
-        } else if !self.quiet {
+        if !self.quiet {
             self.say(&format!("warning: {text}"));
         }
     }

@@ -8,16 +8,16 @@ use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 
 use camera::ImagePoint;
-use clap::ValueEnum;
 use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
 use jobs::rpc::{
-    RpcConvertConfig, RpcDirection, RpcInfoConfig, RpcJobError, RpcLineAnswer, RpcLinesConfig, RpcPoint,
-    RpcPointsConfig, RpcQuery,
+    RpcConvertConfig, RpcDirection, RpcInfoConfig, RpcJobError, RpcLineAnswer, RpcLinesConfig, RpcPointsConfig,
+    RpcQuery,
 };
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::error::with_hint;
+use crate::options::{Named, named};
 use crate::progress::Log;
 use crate::{Outcome, print};
 
@@ -94,22 +94,18 @@ pub(crate) struct ConvertArgs {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Format to write [default: by the ending of OUT: .txt, .rpb or .json].
-    #[arg(long)]
-    format: Option<OutputFormat>,
+    #[arg(long, value_parser = named(&FORMATS))]
+    format: Option<RpcFormat>,
     /// Replace OUT where it exists.
     #[arg(long)]
     overwrite: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum OutputFormat {
-    /// `KEY: value` lines, as _RPC.TXT.
-    Text,
-    /// DigitalGlobe's RPB.
-    Rpb,
-    /// JSON with rpcm's names.
-    Json,
-}
+const FORMATS: [Named<RpcFormat>; 3] = [
+    ("text", RpcFormat::Text, "`KEY: value` lines, as _RPC.TXT"),
+    ("rpb", RpcFormat::Rpb, "DigitalGlobe's RPB"),
+    ("json", RpcFormat::Json, "JSON with rpcm's names"),
+];
 
 /// Runs `skysweep rpc`.
 pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
@@ -124,22 +120,14 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
 fn info(args: &InfoArgs) -> anyhow::Result<Outcome> {
     let report = jobs::rpc::info(&RpcInfoConfig::new(args.file.clone()), &Log)?;
     tracing::info!("{}: {}", report.source, report.format);
-    if args.json {
-        print::json(&report)?;
-    } else {
-        print::text(&report.text())?;
-    }
+    print::report(args.json, true, &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 
 fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
     let mut config = RpcConvertConfig::new(args.file.clone(), args.output.clone());
     config.overwrite = args.overwrite;
-    config.format = args.format.map(|format| match format {
-        OutputFormat::Text => RpcFormat::Text,
-        OutputFormat::Rpb => RpcFormat::Rpb,
-        OutputFormat::Json => RpcFormat::Json,
-    });
+    config.format = args.format;
     let report = jobs::rpc::convert(&config, &Log).map_err(|error| {
         let hint = match &error {
             RpcJobError::UnknownEnding { .. } => Some("give --format text, rpb or json"),
@@ -178,7 +166,7 @@ fn answer(
 ) -> anyhow::Result<Outcome> {
     if let Some(query) = query {
         let report = jobs::rpc::points(&RpcPointsConfig::new(file.to_owned(), vec![query]), &Log)?;
-        let lines: String = report.points.iter().map(|point| point_line(direction, point, json) + "\n").collect();
+        let lines: String = report.points.iter().map(|point| point.line(direction, json) + "\n").collect();
         print::text(&lines)?;
         return Ok(Outcome::Complete);
     }
@@ -189,7 +177,7 @@ fn answer(
     let mut output = std::io::BufWriter::new(std::io::stdout().lock());
     let mut receive = |answer: RpcLineAnswer| {
         let text = match &answer.point {
-            Ok(point) => point_line(direction, point, json),
+            Ok(point) => point.line(direction, json),
             Err(e) => {
                 tracing::warn!("line {}: {e}", answer.line);
                 if json { json!({ "error": e.to_string() }).to_string() } else { "nan nan".to_owned() }
@@ -204,20 +192,4 @@ fn answer(
         return Ok(Outcome::Complete);
     }
     Ok(Outcome::Partial(format!("{} points have no answer", report.failed)))
-}
-
-fn point_line(direction: RpcDirection, RpcPoint { ground, image }: &RpcPoint, json: bool) -> String {
-    let (lon, lat, height) = (ground.lon_deg, ground.lat_deg, ground.height_m);
-    let (sample, line) = (image.sample, image.line);
-    let value: Value = match direction {
-        RpcDirection::Project if !json => return format!("{sample:.9} {line:.9}"),
-        RpcDirection::Localize if !json => return format!("{lon:.12} {lat:.12} {height}"),
-        RpcDirection::Project => {
-            json!({ "lon_deg": lon, "lat_deg": lat, "height_m": height, "sample": sample, "line": line })
-        }
-        RpcDirection::Localize => {
-            json!({ "sample": sample, "line": line, "lon_deg": lon, "lat_deg": lat, "height_m": height })
-        }
-    };
-    value.to_string()
 }

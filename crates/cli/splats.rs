@@ -11,6 +11,7 @@ use splats::DivisionConfig;
 
 use crate::corrections::corrections_of;
 use crate::error::with_hint;
+use crate::options::{Named, named};
 use crate::progress::{Log, ShowOptions};
 use crate::{Global, Outcome, print};
 
@@ -69,8 +70,8 @@ struct MakeArgs {
     #[arg(long, value_name = "DATUM", alias = "vertical")]
     dsm_vertical: Option<VerticalDatum>,
     /// Three scales per splat (3DGS) or two (2DGS).
-    #[arg(long, value_enum, default_value_t = Form::ThreeD)]
-    form: Form,
+    #[arg(long, value_parser = named(&FORMS), default_value = "3d")]
+    form: bool,
     /// Degree of the harmonics in the file, 0 to 3; the loaders of the original 3DGS and 2DGS code
     /// want 3.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
@@ -92,13 +93,8 @@ struct MakeArgs {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Form {
-    #[value(name = "3d")]
-    ThreeD,
-    #[value(name = "2d")]
-    TwoD,
-}
+/// Whether splats are discs.
+const FORMS: [Named<bool>; 2] = [("3d", false, "three scales: ellipsoids"), ("2d", true, "two scales: discs")];
 
 /// Arguments of `skysweep splats render`.
 #[derive(Debug, clap::Args)]
@@ -149,18 +145,14 @@ fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::R
     config.confidence.clone_from(&args.confidence);
     config.corrections = corrections_of(args.corrections.as_deref());
     config.vertical = args.dsm_vertical;
-    config.discs = args.form == Form::TwoD;
+    config.discs = args.form;
     config.sh_degree = args.sh_degree;
     config.compare = args.compare;
     config.report.clone_from(&args.report);
     config.renderings.clone_from(&args.render);
     config.overwrite = args.overwrite;
     let report = jobs::splats::make(&config, &Log).map_err(hinted)?;
-    if args.json {
-        print::json(&report.to_json()?)?;
-    } else if !global.is_quiet() {
-        print::text(&report.text())?;
-    }
+    print::report(args.json, !global.is_quiet(), &report.to_json()?, || report.text())?;
     Ok(Outcome::Complete)
 }
 

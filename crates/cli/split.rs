@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use jobs::split::SplitJobConfig;
 
+use crate::options::{Named, named};
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
 
@@ -22,7 +23,7 @@ pub(crate) struct Args {
     output: Option<PathBuf>,
     /// The paper's overlaps: contexts 0.15 and targets 0.02 to 0.1 (narrow), or contexts 0.25 and
     /// targets 0.03 to 0.15 (wide).
-    #[arg(long, value_enum, default_value_t = Preset::Narrow)]
+    #[arg(long, value_parser = named(&PRESETS), default_value = "narrow")]
     preset: Preset,
     /// Number of contexts.
     #[arg(long, value_name = "N", default_value_t = 2)]
@@ -43,11 +44,13 @@ pub(crate) struct Args {
     show: ShowOptions,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Preset {
-    Narrow,
-    Wide,
-}
+/// Makes the configuration of a preset.
+type Preset = fn(PathBuf) -> SplitJobConfig;
+
+const PRESETS: [Named<Preset>; 2] = [
+    ("narrow", SplitJobConfig::narrow, "contexts 0.15, targets 0.02 to 0.1"),
+    ("wide", SplitJobConfig::wide, "contexts 0.25, targets 0.03 to 0.15"),
+];
 
 /// Runs `skysweep split`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
@@ -60,10 +63,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 }
 
 fn config(args: &Args) -> SplitJobConfig {
-    let mut config = match args.preset {
-        Preset::Narrow => SplitJobConfig::narrow(args.model.clone()),
-        Preset::Wide => SplitJobConfig::wide(args.model.clone()),
-    };
+    let mut config = (args.preset)(args.model.clone());
     config.contexts = args.contexts;
     config.context_iou = args.context_iou.unwrap_or(config.context_iou);
     if let Some(ious) = &args.target_ious {

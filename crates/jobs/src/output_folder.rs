@@ -47,6 +47,22 @@ impl OutputFolder {
         }
     }
 
+    /// Takes a folder that exists for work that several processes share. It keeps out runs that
+    /// want the folder for themselves.
+    ///
+    /// # Errors
+    /// [`FileError::InUse`] when a run has the folder for itself, [`FileError::Folder`] when there
+    /// is none.
+    pub(crate) fn share(path: &Path) -> Result<Self, FileError> {
+        let handle = File::open(path).map_err(|source| FileError::Folder { path: path.to_owned(), source })?;
+        let lock = match handle.try_lock_shared() {
+            Ok(()) => Some(handle),
+            Err(TryLockError::WouldBlock) => return Err(FileError::InUse { path: path.to_owned() }),
+            Err(TryLockError::Error(_)) => None,
+        };
+        Ok(Self { path: path.to_owned(), created: false, _lock: lock })
+    }
+
     /// Checks that a run could take the folder, and leaves it as it was.
     ///
     /// # Errors

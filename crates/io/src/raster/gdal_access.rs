@@ -104,6 +104,26 @@ fn file_systems() -> Vec<String> {
     prefixes
 }
 
+/// Returns the files that a raster consists of: its own, those beside it and those it names.
+pub(super) fn files_of(dataset: &gdal::Dataset) -> Vec<String> {
+    // SAFETY: the handle is of a dataset that is open and borrowed during the call, which returns a
+    // list that belongs to the caller, or null.
+    let list = unsafe { gdal_sys::GDALGetFileList(dataset.c_dataset()) };
+    let mut files = Vec::new();
+    let mut next = list;
+    // SAFETY: the list is null or an array of pointers that ends with null, so every pointer up to
+    // the null may be read, and each is to a text that ends with NUL.
+    while !next.is_null() && !unsafe { *next }.is_null() {
+        // SAFETY: as above: `*next` is a text that ends with NUL, and it is copied here.
+        files.push(unsafe { CStr::from_ptr(*next) }.to_string_lossy().into_owned());
+        // SAFETY: the pointer just read was not the null at the end, so the next one exists.
+        next = unsafe { next.add(1) };
+    }
+    // SAFETY: the list belongs to us and is not used any more; null is allowed.
+    unsafe { gdal_sys::CSLDestroy(list) };
+    files
+}
+
 /// Replaces a file system of GDAL by one that opens nothing.
 fn close_file_system(prefix: &str) {
     let Ok(prefix) = CString::new(prefix) else { return };

@@ -10,6 +10,7 @@ use gdal::{Dataset, Metadata};
 use raster::{GeoTransform, Grid, Window};
 
 use super::error::RasterError;
+use super::gdal_access::files_of;
 use super::gdal_setup::{open_dataset, with_gdal};
 use super::luma_rule::LumaRule;
 
@@ -106,6 +107,12 @@ impl ImageSource {
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Returns the files that the image consists of: its own, those beside it, and those that a
+    /// virtual raster names.
+    pub fn files(&self) -> Vec<PathBuf> {
+        files_of(&self.dataset).into_iter().map(PathBuf::from).collect()
     }
 
     /// Size, sample type, georeference.

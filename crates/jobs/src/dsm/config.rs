@@ -1,6 +1,6 @@
 //! The configuration of a DSM run and its validation.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crs::VerticalDatum;
 use serde::{Deserialize, Serialize};
@@ -67,6 +67,7 @@ pub struct DsmConfig {
     /// Image files, two or more, each with its RPC inside or beside it.
     pub images: Vec<PathBuf>,
     /// Folder for the results.
+    #[serde(default)]
     pub output: PathBuf,
     /// Cell size of the DSM, metres.
     pub gsd_m: Option<f64>,
@@ -150,6 +151,14 @@ impl DsmConfig {
         }
     }
 
+    /// Replaces every path by what `change` makes of it.
+    pub(crate) fn map_paths(&mut self, change: impl Fn(&Path) -> PathBuf) {
+        let others = [&mut self.dem, &mut self.prior].into_iter().flatten();
+        for path in self.images.iter_mut().chain([&mut self.output]).chain(others) {
+            *path = change(path);
+        }
+    }
+
     /// Checks everything that can be wrong before a file is opened.
     ///
     /// # Errors
@@ -167,6 +176,9 @@ impl DsmConfig {
             if self.images[..i].iter().any(same) {
                 return Err(DsmError::SameImage { path: path.clone() });
             }
+        }
+        if self.output.as_os_str().is_empty() {
+            return Err(DsmError::value(DsmSetting::Output, "missing", "a folder for the results"));
         }
         self.validate_ground()?;
         self.validate_division()?;

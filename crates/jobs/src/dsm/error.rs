@@ -14,6 +14,8 @@ use crate::threads::ThreadsError;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DsmSetting {
+    /// `output`.
+    Output,
     /// `gsd_m`.
     CellSize,
     /// `crs_epsg`.
@@ -39,6 +41,7 @@ pub enum DsmSetting {
 impl fmt::Display for DsmSetting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::Output => "the output folder",
             Self::CellSize => "the cell size",
             Self::Crs => "the coordinate reference system",
             Self::Bounds => "the bounds",

@@ -113,7 +113,8 @@ impl<'a> Merger<'a> {
         self.error.get_or_insert(error);
     }
 
-    fn add_failed(&mut self, core: Window, reason: String) {
+    /// Leaves a chunk void for a reason.
+    pub(crate) fn add_failed(&mut self, core: Window, reason: String) {
         let bounds = self.plan.grid.part(core).bounds();
         self.notes.warn(format!("the chunk {:.1?} is left void: {reason}", bounds.to_array()));
         self.chunks.failed.push(FailedChunk { bounds, reason });

@@ -19,6 +19,7 @@ use crate::dsm::rasters::{ChunkRasters, VOID};
 use crate::dsm::report::DsmReport;
 use crate::eval::remove_evaluation;
 use crate::files::{FileError, create_folder, write_json};
+use crate::job_paths::relative;
 use crate::output_folder::OutputFolder;
 
 /// Files of a run, relative to its folder. The report is the last to appear: a folder with a report
@@ -32,9 +33,11 @@ pub(crate) const FILES: [&str; 10] = [
     "dsm/confidence.tif",
     "dsm/hillshade.png",
     "dsm/relief.png",
-    "used_config.toml",
+    USED_CONFIG,
     "report/report.json",
 ];
+/// Configuration of the run, as a job file.
+pub(crate) const USED_CONFIG: &str = "used_config.toml";
 /// Largest width and height of the pictures of a large scene, pixels.
 const PICTURE_SIDE: usize = 4096;
 
@@ -83,10 +86,17 @@ impl DsmFolder {
     /// results that may not be replaced, [`DsmError::Output`] for a folder that cannot be written.
     pub(crate) fn take(config: &DsmConfig) -> Result<Self, DsmError> {
         let folder = OutputFolder::take(&config.output)?;
-        let existing = FILES.iter().map(|f| config.output.join(f)).find(|p| p.symlink_metadata().is_ok());
-        if let (Some(path), false) = (existing, config.overwrite) {
-            return Err(DsmError::Exists { path });
+        if !config.overwrite {
+            refuse_results(&config.output, &FILES)?;
         }
+        Self::inside(folder)
+    }
+
+    /// Makes the work folder inside a folder that this run has taken.
+    ///
+    /// # Errors
+    /// [`DsmError::Output`].
+    pub(crate) fn inside(folder: OutputFolder) -> Result<Self, DsmError> {
         let work = folder.work_folder()?;
         for name in ["dsm", "report", "spool"] {
             create_folder(&work.path().join(name))?;
@@ -110,6 +120,27 @@ impl DsmFolder {
         remove_evaluation(&self.folder)?;
         Ok(FILES.iter().try_for_each(|name| self.folder.publish(self.work.path(), name))?)
     }
+}
+
+/// Refuses results of these names in a folder.
+///
+/// # Errors
+/// [`DsmError::Exists`] with the first that is there.
+pub(crate) fn refuse_results(folder: &Path, names: &[&str]) -> Result<(), DsmError> {
+    let existing = names.iter().map(|name| folder.join(name)).find(|path| path.symlink_metadata().is_ok());
+    existing.map_or(Ok(()), |path| Err(DsmError::Exists { path }))
+}
+
+/// Writes a configuration as a job file, whose paths are relative to `folder`.
+///
+/// # Errors
+/// [`DsmError::Output`], [`DsmError::File`].
+pub(crate) fn write_config(path: &Path, config: &DsmConfig, folder: &Path) -> Result<(), DsmError> {
+    let mut named = config.clone();
+    named.map_paths(|path| relative(path, folder));
+    let text = toml::to_string_pretty(&named)
+        .map_err(|e| DsmError::Output { path: path.to_owned(), source: std::io::Error::other(e) })?;
+    Ok(io::write_bytes(path, text.as_bytes(), false).map_err(FileError::from)?)
 }
 
 /// Writes the results of a scene that was computed at once.
@@ -215,10 +246,7 @@ fn reduced(spool: &RasterSpool, factor: usize) -> Result<Grid<f32>, DsmError> {
 fn write_texts(folder: &DsmFolder, config: &DsmConfig, report: &DsmReport) -> Result<(), DsmError> {
     let root = folder.work.path();
     write_json(&root.join("report/report.json"), report, false)?;
-    let path = root.join("used_config.toml");
-    let used = toml::to_string_pretty(config)
-        .map_err(|e| DsmError::Output { path: path.clone(), source: std::io::Error::other(e) })?;
-    Ok(io::write_bytes(&path, used.as_bytes(), false).map_err(FileError::from)?)
+    write_config(&root.join(USED_CONFIG), config, folder.folder.path())
 }
 
 /// Writes hillshade and coloured relief of heights in cells of `cell_m`.

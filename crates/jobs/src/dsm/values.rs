@@ -4,6 +4,7 @@
 //! reports have.
 
 use std::fmt;
+use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
@@ -123,6 +124,24 @@ impl fmt::Display for ImagePair {
     }
 }
 
+impl FromStr for ImagePair {
+    type Err = String;
+
+    /// Reads two different positions as people count them, from 1: `1-2`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let position = |part: &str| part.trim().parse::<usize>().ok()?.checked_sub(1);
+        let pair =
+            text.split_once('-').and_then(|(first, second)| Some(Self::new(position(first)?, position(second)?)));
+        match pair {
+            None => Err(format!("expected two positions of images, counted from 1, such as 1-2, found {text:?}")),
+            Some(pair) if pair.first == pair.second => {
+                Err(format!("a pair needs two different images, found {text:?}"))
+            }
+            Some(pair) => Ok(pair),
+        }
+    }
+}
+
 /// A rectangle on the map, in the units of its CRS. It is written as `[x_min, y_min, x_max,
 /// y_max]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -196,5 +215,7 @@ mod tests {
         assert_eq!(serde_json::to_string(&MapBounds::from([1.0, 2.0, 3.0, 4.0])).unwrap(), "[1.0,2.0,3.0,4.0]");
         assert_eq!(serde_json::from_str::<HeightRange>("[3,4]").unwrap(), HeightRange::new(3.0, 4.0));
         assert_eq!(ImagePair::new(2, 0).ordered().to_string(), "1-3");
+        assert_eq!("1-3".parse(), Ok(ImagePair::new(0, 2)));
+        assert!(["", "1", "0-1", "2-2", "1-2-3"].iter().all(|text| text.parse::<ImagePair>().is_err()));
     }
 }

@@ -88,6 +88,16 @@ impl HeightMapReport {
             Self::List(list) => list.text(),
         }
     }
+
+    /// Returns the cameras of a list whose maps could not be made, each with the reason.
+    pub fn failures(&self) -> Vec<(&str, &str)> {
+        let Self::List(list) = self else { return Vec::new() };
+        let failures = list.maps.iter().filter_map(|record| match &record.fate {
+            HeightMapFate::Failed { reason } => Some((record.id.as_str(), reason.as_str())),
+            _ => None,
+        });
+        failures.collect()
+    }
 }
 
 impl HeightMapMade {

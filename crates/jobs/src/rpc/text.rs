@@ -2,7 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::RpcInfoReport;
+use camera::ImagePoint;
+use geodesy::LonLatHeight;
+use serde_json::json;
+
+use super::{RpcDirection, RpcInfoReport, RpcPoint};
 
 impl RpcInfoReport {
     /// Returns the report as text, which ends in a line break.
@@ -41,5 +45,25 @@ impl RpcInfoReport {
             row("view", format!("incidence {:.2} deg, sensor at azimuth {:.1} deg", c.incidence_deg, c.azimuth_deg));
         }
         out
+    }
+}
+
+impl RpcPoint {
+    /// Returns the answer to a question of a direction as a line of numbers, or as JSON with the
+    /// question.
+    pub fn line(&self, direction: RpcDirection, as_json: bool) -> String {
+        let LonLatHeight { lon_deg: lon, lat_deg: lat, height_m: height } = self.ground;
+        let ImagePoint { sample, line } = self.image;
+        let value = match direction {
+            RpcDirection::Project if !as_json => return format!("{sample:.9} {line:.9}"),
+            RpcDirection::Localize if !as_json => return format!("{lon:.12} {lat:.12} {height}"),
+            RpcDirection::Project => {
+                json!({ "lon_deg": lon, "lat_deg": lat, "height_m": height, "sample": sample, "line": line })
+            }
+            RpcDirection::Localize => {
+                json!({ "sample": sample, "line": line, "lon_deg": lon, "lat_deg": lat, "height_m": height })
+            }
+        };
+        value.to_string()
     }
 }

@@ -1,0 +1,113 @@
+//! The files that a plan rests on, known by the hash of their content.
+//!
+//! A file with the size and the times that it had when it was planned is taken as unchanged. The
+//! time of change is the system's own, and no program sets it. Only a file whose times differ, such
+//! as a copy on another machine, is read again.
+
+use std::collections::BTreeSet;
+use std::fs::Metadata;
+use std::path::{Path, PathBuf};
+
+use io::raster::ImageSource;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::dsm::DsmConfig;
+use crate::files::FileError;
+use crate::production::content_hash;
+use crate::production::error::ProductionError;
+
+/// A file that a plan rests on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct InputFile {
+    /// The file.
+    pub path: PathBuf,
+    /// Size, bytes.
+    pub bytes: u64,
+    /// SHA-256 of the content.
+    pub sha256: String,
+    /// Times of modification and of change when it was planned, nanoseconds since 1970.
+    pub times_ns: [i128; 2],
+}
+
+impl InputFile {
+    fn of(path: &Path) -> Result<Self, FileError> {
+        let failed = |source| FileError::Read { path: path.to_owned(), source };
+        let found = path.metadata().map_err(failed)?;
+        let sha256 = content_hash::of_file(path).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), bytes: found.len(), sha256, times_ns: times_ns(&found) })
+    }
+
+    fn is_unchanged(&self) -> Result<bool, FileError> {
+        let failed = |source| FileError::Read { path: self.path.clone(), source };
+        let found = self.path.metadata().map_err(failed)?;
+        if found.len() != self.bytes {
+            return Ok(false);
+        }
+        Ok(times_ns(&found) == self.times_ns || content_hash::of_file(&self.path).map_err(failed)? == self.sha256)
+    }
+}
+
+/// Returns the files of a configuration: images with the files that belong to them, elevation and
+/// city model. Addresses are not among them.
+///
+/// # Errors
+/// [`ProductionError::File`], [`ProductionError::Dsm`].
+pub(super) fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, ProductionError> {
+    let mut files: BTreeSet<PathBuf> = config.dem.iter().chain(&config.prior).cloned().collect();
+    for image in &config.images {
+        let source = ImageSource::open(image).map_err(crate::dsm::DsmError::from)?;
+        files.extend(source.files());
+        files.extend(io::rpc::side_files(image));
+        files.insert(image.clone());
+    }
+    let files: Vec<PathBuf> = files.into_iter().filter(|path| path.is_file()).collect();
+    Ok(files.par_iter().map(|path| InputFile::of(path)).collect::<Result<_, _>>()?)
+}
+
+/// Compares files with what they were when they were planned.
+///
+/// # Errors
+/// [`ProductionError::InputChanged`], [`ProductionError::File`] for a file that is gone.
+pub(super) fn check(inputs: &[InputFile]) -> Result<(), ProductionError> {
+    inputs.par_iter().try_for_each(|input| {
+        let changed = || ProductionError::InputChanged { path: input.path.clone() };
+        if input.is_unchanged()? { Ok(()) } else { Err(changed()) }
+    })
+}
+
+#[cfg(unix)]
+fn times_ns(found: &Metadata) -> [i128; 2] {
+    use std::os::unix::fs::MetadataExt;
+    let ns = |seconds: i64, rest: i64| i128::from(seconds) * 1_000_000_000 + i128::from(rest);
+    [ns(found.mtime(), found.mtime_nsec()), ns(found.ctime(), found.ctime_nsec())]
+}
+
+/// Without a time of change every file is read again.
+#[cfg(not(unix))]
+fn times_ns(_: &Metadata) -> [i128; 2] {
+    [-1, -1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_counts_and_times_do_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        std::fs::write(&path, "old").unwrap();
+        let input = InputFile::of(&path).unwrap();
+        check(std::slice::from_ref(&input)).unwrap();
+        std::fs::write(&path, "old").unwrap();
+        check(std::slice::from_ref(&input)).unwrap();
+        std::fs::write(&path, "new").unwrap();
+        let changed = check(std::slice::from_ref(&input)).unwrap_err();
+        assert!(matches!(changed, ProductionError::InputChanged { .. }), "{changed}");
+        std::fs::remove_file(&path).unwrap();
+        assert!(matches!(check(&[input]), Err(ProductionError::File(_))));
+    }
+}

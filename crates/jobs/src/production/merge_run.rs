@@ -1,0 +1,111 @@
+//! Merging the chunks of a planned run into its products.
+
+use std::path::PathBuf;
+
+use numeric::Progress;
+
+use crate::dsm::{ChunkResult, DsmError, DsmFolder, FILES, Merger, Product, StageTime, USED_CONFIG, refuse_results};
+use crate::output_folder::OutputFolder;
+use crate::production::chunk_folder::{ChunkFolder, ChunkState};
+use crate::production::error::ProductionError;
+use crate::production::plan_file::PlanFile;
+use crate::threads;
+
+/// Reason of a chunk that was not computed before a partial merge.
+const NOT_COMPUTED: &str = "not computed";
+
+/// Configuration of a merge.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct MergeConfig {
+    /// Folder of a planned run.
+    pub folder: PathBuf,
+    /// Whether chunks without a result are left void. Otherwise they are an error.
+    pub partial: bool,
+    /// Whether existing products may be replaced.
+    pub overwrite: bool,
+    /// Worker threads; all cores when `None`.
+    pub threads: Option<usize>,
+}
+
+impl MergeConfig {
+    /// Makes the configuration of a merge of all chunks.
+    pub fn new(folder: PathBuf) -> Self {
+        Self { folder, partial: false, overwrite: false, threads: None }
+    }
+}
+
+/// Merges the chunks of a planned run. Failed chunks are void, and the report names them.
+///
+/// # Errors
+/// [`ProductionError::NoPlan`], [`ProductionError::Plan`], [`ProductionError::OtherVersion`],
+/// [`ProductionError::ConfigChanged`]; [`ProductionError::ChunksMissing`] unless a partial result
+/// is allowed; [`ProductionError::NothingDone`]; [`ProductionError::Dsm`] for products that exist,
+/// for a folder in which chunks are computed, for what cannot be read or written, and when
+/// cancelled. Nothing is left half-written.
+pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Product, ProductionError> {
+    // A folder without a plan is no run folder, and not worth a lock.
+    PlanFile::read_current(&config.folder)?;
+    let folder = OutputFolder::take(&config.folder).map_err(DsmError::from)?;
+    let file = PlanFile::read_current(&config.folder)?;
+    if !config.overwrite {
+        let products: Vec<&str> = FILES.into_iter().filter(|name| *name != USED_CONFIG).collect();
+        refuse_results(&config.folder, &products)?;
+    }
+    let states = states(config, &file)?;
+    threads::install(config.threads, || merge(&file, &states, DsmFolder::inside(folder)?, progress))?
+}
+
+/// Returns the states of all chunks: `None` for one without a result.
+fn states(config: &MergeConfig, file: &PlanFile) -> Result<Vec<Option<ChunkState>>, ProductionError> {
+    let count = file.plan.chunks.len();
+    let mut states = Vec::with_capacity(count);
+    for index in 0..count {
+        let folder = ChunkFolder::of(&config.folder, index);
+        // Nobody computes now: this run has the folder for itself.
+        folder.remove_left_over()?;
+        let state = folder.status(&file.id).map(|status| status.state);
+        states.push(state.filter(|state| !matches!(state, ChunkState::Running(_))));
+    }
+    let missing: Vec<usize> = (0..count).filter(|index| states[*index].is_none()).collect();
+    if !config.partial && !missing.is_empty() {
+        return Err(ProductionError::ChunksMissing { missing, count });
+    }
+    Ok(states)
+}
+
+fn merge(
+    file: &PlanFile,
+    states: &[Option<ChunkState>],
+    folder: DsmFolder,
+    progress: &dyn Progress,
+) -> Result<Product, ProductionError> {
+    let mut merger = Merger::begin(&file.plan, folder, progress)?;
+    let (mut seconds, mut first) = (0.0, None);
+    progress.begin("merging chunks", states.len());
+    for (index, (chunk, state)) in file.plan.chunks.iter().zip(states).enumerate() {
+        let reason = match state {
+            Some(ChunkState::Done { seconds: taken }) => {
+                progress.check_cancelled().map_err(DsmError::from)?;
+                let place = ChunkFolder::of(&file.plan.config.output, index).result();
+                let result = ChunkResult::read(&place)?;
+                if result.core != chunk.core {
+                    let reason = "it belongs to other cells".to_owned();
+                    return Err(DsmError::ChunkFile { path: place, reason }.into());
+                }
+                merger.add(result)?;
+                seconds += taken;
+                progress.step();
+                continue;
+            }
+            Some(ChunkState::Failed { reason }) => reason.clone(),
+            _ => NOT_COMPUTED.to_owned(),
+        };
+        first.get_or_insert_with(|| reason.clone());
+        merger.add_failed(chunk.core, reason);
+    }
+    match (merger.finish(&[StageTime { stage: "chunks".to_owned(), seconds }]), first) {
+        (Err(DsmError::NoSurface { .. }), Some(reason)) => Err(ProductionError::NothingDone { reason }),
+        (result, _) => Ok(result?),
+    }
+}

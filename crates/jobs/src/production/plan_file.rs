@@ -1,0 +1,139 @@
+//! The plan of a run as a file.
+//!
+//! Paths in the file are relative to its folder. The identity of a plan is a hash of all that
+//! decides the bytes of the result: version, configuration, contents of the inputs, chunks.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::dsm::{DsmConfig, Plan, USED_CONFIG};
+use crate::files::TEXT_LIMIT;
+use crate::job_file::read_dsm_job;
+use crate::job_paths::{relative, resolved};
+use crate::production::content_hash;
+use crate::production::error::ProductionError;
+use crate::production::estimate::PlanEstimate;
+use crate::production::input_files::{self, InputFile};
+
+/// Name of the plan in the folder of a run.
+pub(super) const PLAN: &str = "plan.json";
+/// Name of the pointing corrections with their residuals, which later runs can use.
+pub(super) const POINTING: &str = "pointing.json";
+
+/// The plan of a run with the files that it rests on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct PlanFile {
+    /// Identity: a hash of everything below but the times of the files.
+    pub id: String,
+    /// Memory and processor time.
+    pub estimate: PlanEstimate,
+    /// Files that the plan rests on.
+    pub inputs: Vec<InputFile>,
+    /// Grid, chunks with their windows, sources, heights and levels, choices with reasons.
+    pub plan: Plan,
+}
+
+impl PlanFile {
+    /// Puts a plan together with its inputs. Their paths become relative to `folder`.
+    ///
+    /// # Errors
+    /// [`ProductionError::File`] when the plan cannot be written as JSON.
+    pub(super) fn stored(plan: &Plan, inputs: Vec<InputFile>, folder: &Path) -> Result<Self, ProductionError> {
+        let mut file = Self { id: String::new(), estimate: PlanEstimate::of(plan), inputs, plan: plan.clone() };
+        // Whether files may be replaced is asked again of every command.
+        file.plan.config.overwrite = false;
+        file.map_paths(|path| relative(path, folder));
+        file.id = file.identity()?;
+        Ok(file)
+    }
+
+    fn identity(&self) -> Result<String, ProductionError> {
+        let inputs: Vec<_> = self.inputs.iter().map(|input| (&input.path, &input.sha256)).collect();
+        Ok(content_hash::of_value(&(inputs, &self.plan)).map_err(crate::files::FileError::from)?)
+    }
+
+    fn map_paths(&mut self, change: impl Fn(&Path) -> PathBuf) {
+        self.plan.config.map_paths(&change);
+        let images = self.plan.images.iter_mut().map(|image| &mut image.path);
+        let reported = self.plan.report.images.iter_mut().map(|image| &mut image.path);
+        for path in images.chain(reported).chain(self.inputs.iter_mut().map(|input| &mut input.path)) {
+            *path = change(path);
+        }
+    }
+
+    /// Reads the plan in the folder of a run.
+    ///
+    /// # Errors
+    /// [`ProductionError::NoPlan`], [`ProductionError::Plan`] for a file that is damaged or was
+    /// edited, [`ProductionError::OtherVersion`].
+    pub fn read(folder: &Path) -> Result<Self, ProductionError> {
+        let path = folder.join(PLAN);
+        let failed = |reason: String| ProductionError::Plan { path: path.clone(), reason };
+        if !path.exists() {
+            return Err(ProductionError::NoPlan { path });
+        }
+        let json = io::read_regular(&path, TEXT_LIMIT).map_err(|e| failed(e.to_string()))?;
+        let here = env!("CARGO_PKG_VERSION");
+        if let Some(planned) = version_of(&json).filter(|planned| planned != here) {
+            return Err(ProductionError::OtherVersion { path, planned, here: here.to_owned() });
+        }
+        let mut file: Self = serde_json::from_slice(&json).map_err(|e| failed(e.to_string()))?;
+        if file.identity()? != file.id {
+            return Err(failed("it is not as it was written".to_owned()));
+        }
+        file.map_paths(|path| resolved(path, folder));
+        // As the caller names it, so that messages and reports do.
+        folder.clone_into(&mut file.plan.config.output);
+        Ok(file)
+    }
+
+    /// Reads the plan in the folder of a run, and checks that the configuration there is still the
+    /// one that it was made from.
+    ///
+    /// # Errors
+    /// As [`Self::read`]; [`ProductionError::Job`], [`ProductionError::ConfigChanged`].
+    pub(super) fn read_current(folder: &Path) -> Result<Self, ProductionError> {
+        let file = Self::read(folder)?;
+        let path = folder.join(USED_CONFIG);
+        if !same(&read_dsm_job(&path)?, &file.plan.config, folder) {
+            return Err(ProductionError::ConfigChanged { path });
+        }
+        Ok(file)
+    }
+
+    /// Checks that the inputs have the content that was planned.
+    ///
+    /// # Errors
+    /// [`ProductionError::InputChanged`], [`ProductionError::File`].
+    pub(super) fn check_inputs(&self) -> Result<(), ProductionError> {
+        input_files::check(&self.inputs)
+    }
+}
+
+/// Whether two configurations of a folder ask for the same result.
+fn same(a: &DsmConfig, b: &DsmConfig, folder: &Path) -> bool {
+    let plain = |config: &DsmConfig| {
+        let mut config = config.clone();
+        config.output = PathBuf::new();
+        config.overwrite = false;
+        config.map_paths(|path| relative(path, folder));
+        config
+    };
+    plain(a) == plain(b)
+}
+
+/// Returns the version that made a plan, also one whose fields this version does not know.
+fn version_of(json: &[u8]) -> Option<String> {
+    #[derive(Deserialize)]
+    struct Versioned {
+        version: String,
+    }
+    #[derive(Deserialize)]
+    struct Outer {
+        plan: Versioned,
+    }
+    serde_json::from_slice::<Outer>(json).ok().map(|outer| outer.plan.version)
+}

@@ -1,0 +1,96 @@
+//! Planning a run: the scene is looked at once, and what was found is written for the chunks.
+
+use std::path::Path;
+
+use numeric::Progress;
+use serde::Serialize;
+
+use crate::dsm::{
+    DsmConfig, DsmError, FILES, Plan, PlanReport, Session, USED_CONFIG, open, plan, point, refuse_results, write_config,
+};
+use crate::files::write_json;
+use crate::job_paths::resolved;
+use crate::output_folder::OutputFolder;
+use crate::production::chunk_folder;
+use crate::production::error::ProductionError;
+use crate::production::input_files::inputs_of;
+use crate::production::plan_file::{PLAN, POINTING, PlanFile};
+use crate::threads;
+
+/// What `pointing.json` holds: the pointing part of a plan, in the form of a report.
+#[derive(Serialize)]
+struct PointingFile<'a> {
+    version: &'a str,
+    #[serde(flatten)]
+    found: PlanReport,
+}
+
+/// Plans a run and writes nothing.
+///
+/// # Errors
+/// [`ProductionError::Dsm`], [`ProductionError::File`], [`ProductionError::Threads`].
+pub fn make_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
+    config.validate()?;
+    threads::install(config.threads, || {
+        // Hashed first: a file that changes while it is read differs from its hash afterwards.
+        let inputs = inputs_of(config)?;
+        let found = chain(config, &mut Session::new(progress))?;
+        PlanFile::stored(&found, inputs, &config.output)
+    })?
+}
+
+fn chain(config: &DsmConfig, session: &mut Session<'_>) -> Result<Plan, DsmError> {
+    let pointed = point(config, &open(config)?, session)?;
+    plan(config, &pointed, session)
+}
+
+/// Plans a run into its output folder: `used_config.toml`, `pointing.json` and `plan.json`.
+///
+/// Results of chunks stay when the same plan is made again, and are removed when it is another one.
+///
+/// # Errors
+/// As [`make_plan`]; [`DsmError::Exists`] for a folder with a plan or results, unless the
+/// configuration allows to replace them; [`DsmError::InUse`].
+pub fn plan_run(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
+    config.validate()?;
+    let folder = OutputFolder::take(&config.output).map_err(DsmError::from)?;
+    if !config.overwrite {
+        refuse_results(folder.path(), &[PLAN])?;
+        refuse_results(folder.path(), &FILES)?;
+    }
+    let file = make_plan(config, progress)?;
+    write(&folder, config, &file)?;
+    chunk_folder::remove_others(folder.path(), &file.id)?;
+    Ok(file)
+}
+
+/// Writes the files of a plan. The plan itself goes first and comes last.
+fn write(folder: &OutputFolder, config: &DsmConfig, file: &PlanFile) -> Result<(), ProductionError> {
+    let work = folder.work_folder()?;
+    let asked = DsmConfig { overwrite: false, ..config.clone() };
+    write_config(&work.path().join(USED_CONFIG), &asked, folder.path())?;
+    let mut found = file.plan.report.clone();
+    for image in &mut found.images {
+        image.path = resolved(&image.path, folder.path());
+    }
+    let pointing = PointingFile { version: &file.plan.version, found };
+    write_json(&work.path().join(POINTING), &pointing, false)?;
+    write_json(&work.path().join(PLAN), file, false)?;
+    folder.remove(PLAN)?;
+    for name in [USED_CONFIG, POINTING, PLAN] {
+        folder.publish(work.path(), name)?;
+    }
+    Ok(())
+}
+
+/// Plans the run of a folder again from the configuration there.
+///
+/// # Errors
+/// As [`plan_run`]; [`ProductionError::Job`].
+pub(super) fn plan_again(folder: &Path, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
+    let mut config = crate::job_file::read_dsm_job(&folder.join(USED_CONFIG))?;
+    folder.clone_into(&mut config.output);
+    config.overwrite = true;
+    plan_run(&config, progress)?;
+    PlanFile::read(folder)
+}

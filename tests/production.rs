@@ -1,0 +1,282 @@
+//! `skysweep plan`, `run` and `merge`: the bytes of `skysweep dsm` whatever happens on the way, and
+//! job files.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use common::{sample, skysweep};
+use numeric::RandomByIndex;
+use predicates::prelude::*;
+use serde_json::Value;
+
+/// Settings of a scene of four chunks that takes a second.
+const SMALL: [&str; 7] = ["--gsd", "2", "--preset", "fast", "--chunk", "128", "-q"];
+/// Files of a run that have the same bytes however it is computed.
+const PRODUCTS: [&str; 9] = [
+    "dsm/dsm.tif",
+    "dsm/sigma.tif",
+    "dsm/views.tif",
+    "dsm/filled.tif",
+    "dsm/source.tif",
+    "dsm/confidence.tif",
+    "dsm/hillshade.png",
+    "dsm/relief.png",
+    "used_config.toml",
+];
+
+fn views() -> [PathBuf; 2] {
+    ["view_1.tif", "view_3.tif"].map(sample)
+}
+
+/// Runs a command of skysweep; returns what it wrote to standard output and error.
+#[track_caller]
+fn run(command: &str, arguments: &[&str], folder: &Path, code: i32) -> (String, String) {
+    let assert = skysweep().arg(command).args(arguments).current_dir(folder).assert().code(code);
+    let output = assert.get_output();
+    (String::from_utf8_lossy(&output.stdout).into_owned(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Plans the small scene into `name`.
+fn plan(folder: &Path, name: &str, options: &[&str]) {
+    let mut command = skysweep();
+    command.current_dir(folder).arg("plan").args(views()).args(["-o", name]).args(SMALL).args(options);
+    command.assert().code(0);
+}
+
+/// The bytes of the products of a run.
+fn products(run: &Path) -> Vec<Vec<u8>> {
+    PRODUCTS.map(|name| std::fs::read(run.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))).into()
+}
+
+/// The small scene by `skysweep dsm`.
+static EXPECTED: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    skysweep().arg("dsm").args(views()).arg("-o").arg(folder.path().join("out")).args(SMALL).assert().code(0);
+    products(&folder.path().join("out"))
+});
+
+/// Names of files and folders below a folder that are neither products nor results of chunks.
+fn temporary(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with('.') || name.ends_with(".partial") {
+            found.push(name);
+        }
+        if entry.path().is_dir() {
+            found.extend(temporary(&entry.path()));
+        }
+    }
+    found
+}
+
+#[test]
+fn plan_run_and_merge_give_the_bytes_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    plan(folder.path(), "run", &[]);
+    let missing = run("merge", &["run"], folder.path(), 2).1;
+    assert!(
+        missing.contains("4 of 4 chunks have no result (0, 1, 2, 3)") && missing.contains("--partial"),
+        "{missing}"
+    );
+    run("run", &["run", "--chunks", "2", "-q"], folder.path(), 0);
+    let report = run("run", &["run", "--json"], folder.path(), 0).0;
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!((&report["computed"], &report["done_before"]), (&3.into(), &1.into()), "{report}");
+    run("merge", &["run", "-q"], folder.path(), 0);
+    assert!(products(&folder.path().join("run")) == *EXPECTED);
+    assert!(temporary(folder.path()).is_empty(), "{:?}", temporary(folder.path()));
+    // What is there is not replaced unasked.
+    run("merge", &["run", "-q"], folder.path(), 2);
+    run("merge", &["run", "-q", "--overwrite"], folder.path(), 0);
+    assert!(products(&folder.path().join("run")) == *EXPECTED);
+}
+
+#[test]
+fn a_scene_in_one_chunk_has_the_same_bytes_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = ["--gsd", "2", "--preset", "fast", "-q"];
+    skysweep().current_dir(folder.path()).arg("dsm").args(views()).args(["-o", "once"]).args(settings).assert().code(0);
+    skysweep().current_dir(folder.path()).arg("plan").args(views()).args(["-o", "run"]).args(settings).assert().code(0);
+    run("run", &["run", "-q"], folder.path(), 0);
+    run("merge", &["run", "-q"], folder.path(), 0);
+    assert!(products(&folder.path().join("run")) == products(&folder.path().join("once")));
+    // The saved pointing serves as a report does.
+    let view = sample("view_1.tif");
+    let ortho = |name: &str, corrections: &str| {
+        let mut command = skysweep();
+        command.current_dir(folder.path()).arg("ortho").arg(&view).args(["--dsm", "run", "-q", "-o", name]);
+        command.args(["--corrections", corrections]).assert().code(0);
+        std::fs::read(folder.path().join(name)).unwrap()
+    };
+    assert!(ortho("a.tif", "run/pointing.json") == ortho("b.tif", "once/report/report.json"));
+}
+
+/// Starts a process that computes chunks.
+fn worker(folder: &Path, options: &[&str]) -> Child {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("skysweep"));
+    command.current_dir(folder).args(["run", "run", "-q", "--threads", "1"]).args(options);
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+#[test]
+fn two_processes_share_a_folder() {
+    for options in [[&["--chunks", "1/2"][..], &["--chunks", "2/2"]], [&[], &[]]] {
+        let folder = tempfile::tempdir().unwrap();
+        plan(folder.path(), "run", &[]);
+        let mut workers = options.map(|options| worker(folder.path(), options));
+        assert!(workers.iter_mut().all(|worker| worker.wait().unwrap().success()));
+        run("merge", &["run", "-q"], folder.path(), 0);
+        assert!(products(&folder.path().join("run")) == *EXPECTED, "{options:?}");
+        assert!(temporary(folder.path()).is_empty(), "{:?}", temporary(folder.path()));
+    }
+}
+
+/// The moments are random, and the same in every run of the test.
+#[test]
+fn killed_at_any_moment_a_run_goes_on_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    plan(folder.path(), "run", &[]);
+    let moments = RandomByIndex::new(18, 0);
+    for kill in 0..6 {
+        let mut worker = worker(folder.path(), &["--resume"]);
+        // The result does not depend on the moment.
+        std::thread::sleep(Duration::from_millis(20 + (500.0 * moments.uniform(kill)) as u64));
+        // It may have ended by itself.
+        let _ = worker.kill();
+        worker.wait().unwrap();
+    }
+    run("run", &["run", "--resume", "-q"], folder.path(), 0);
+    // A merge, too.
+    let mut merge = Command::new(assert_cmd::cargo::cargo_bin("skysweep"));
+    let mut merge = merge.current_dir(folder.path()).args(["merge", "run", "-q"]).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(60));
+    let _ = merge.kill();
+    merge.wait().unwrap();
+    run("merge", &["run", "-q", "--overwrite"], folder.path(), 0);
+    assert!(products(&folder.path().join("run")) == *EXPECTED);
+    assert!(temporary(folder.path()).is_empty(), "{:?}", temporary(folder.path()));
+}
+
+#[test]
+fn changed_inputs_and_settings_are_refused_or_computed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, view) in ["left.tif", "right.tif"].iter().zip(views()) {
+        std::fs::copy(view, folder.path().join(name)).unwrap();
+    }
+    run("plan", &[&["left.tif", "right.tif", "-o", "run"][..], &SMALL].concat(), folder.path(), 0);
+    run("run", &["run", "--chunks", "0", "-q"], folder.path(), 0);
+    // Another content under the same name.
+    std::fs::copy(sample("view_2.tif"), folder.path().join("right.tif")).unwrap();
+    let refused = run("run", &["run", "-q"], folder.path(), 2).1;
+    assert!(
+        refused.contains("another content") && refused.contains("right.tif") && refused.contains("--resume"),
+        "{refused}"
+    );
+    // The old content under a new date is the old input.
+    std::fs::copy(sample("view_3.tif"), folder.path().join("right.tif")).unwrap();
+    run("run", &["run", "--chunks", "1", "-q"], folder.path(), 0);
+    let config = folder.path().join("run/used_config.toml");
+    let text = std::fs::read_to_string(&config).unwrap();
+    std::fs::write(&config, text.replace("gsd_m = 2.0", "gsd_m = 2.5")).unwrap();
+    let refused = run("merge", &["run", "--partial", "-q"], folder.path(), 2).1;
+    assert!(refused.contains("the configuration was changed"), "{refused}");
+    let report: Value = serde_json::from_str(&run("run", &["run", "--resume", "--json"], folder.path(), 0).0).unwrap();
+    assert_eq!(report["done_before"], 0, "chunks of the old plan are not mixed in: {report}");
+    run("merge", &["run", "-q"], folder.path(), 0);
+    let dsm = io::raster::read_dem(folder.path().join("run/dsm/dsm.tif")).unwrap();
+    assert_eq!(dsm.geotransform.0[1], 2.5);
+    // An edited plan is no plan.
+    let plan = folder.path().join("run/plan.json");
+    let text = std::fs::read_to_string(&plan).unwrap();
+    std::fs::write(&plan, text.replacen("\"step_m\": ", "\"step_m\": 1", 1)).unwrap();
+    assert!(run("run", &["run", "-q"], folder.path(), 2).1.contains("it is not as it was written"));
+}
+
+#[test]
+fn missing_and_failed_chunks_are_void_counted_and_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, view) in ["left.tif", "right.tif"].iter().zip(views()) {
+        std::fs::copy(view, folder.path().join(name)).unwrap();
+    }
+    run("plan", &[&["left.tif", "right.tif", "-o", "run"][..], &SMALL].concat(), folder.path(), 0);
+    run("run", &["run", "--chunks", "1,2,3", "-q"], folder.path(), 0);
+    let (out, told) = run("merge", &["run", "--partial", "--json"], folder.path(), 1);
+    let report: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(report["chunks"]["failed"][0]["reason"], "not computed", "{report}");
+    assert!(told.contains("chunks that could not be computed"), "{told}");
+    assert!(run("run", &["run", "--chunks", "4"], folder.path(), 2).1.contains("none with number 4"));
+    assert!(run("run", &["run", "--chunks", "3/2"], folder.path(), 2).1.contains("such as 2/5"));
+    assert!(run("run", &["."], folder.path(), 2).1.contains("the folder has no plan"));
+    assert!(run("merge", &["."], folder.path(), 2).1.contains("skysweep plan"));
+}
+
+/// Two runs without a plan into one folder would mix their files, and so would a merge beside a
+/// process that computes chunks.
+#[test]
+fn a_folder_in_which_chunks_are_computed_is_not_merged() {
+    let folder = tempfile::tempdir().unwrap();
+    plan(folder.path(), "run", &[]);
+    let share = std::fs::File::open(folder.path().join("run")).unwrap();
+    share.lock_shared().unwrap();
+    for command in [&["merge", "run", "--partial"][..], &["run", "run", "--resume", "-q"]] {
+        let code = if command[0] == "run" { 0 } else { 2 };
+        let told = run(command[0], &command[1..], folder.path(), code).1;
+        assert_eq!(told.contains("another run"), code == 2, "{told}");
+    }
+    let mut again = skysweep();
+    again.current_dir(folder.path()).arg("plan").args(views()).args(["-o", "run"]).args(SMALL).arg("--overwrite");
+    again.assert().code(2).stderr(predicate::str::contains("another run"));
+}
+
+#[test]
+fn a_dry_run_prints_the_plan_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = skysweep();
+    command.current_dir(folder.path()).arg("dsm").args(views()).args(["-o", "out"]).args(&SMALL[..6]).arg("--dry-run");
+    let output = command.assert().code(0).get_output().stdout.clone();
+    let text = String::from_utf8(output).unwrap();
+    for words in
+        ["view_1.tif", "EPSG:32631", "chunks     4; about ", " MB and ", "of processor time", "height range", "(given)"]
+    {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_used_configuration_fed_back_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    plan(folder.path(), "first", &["--bounds", "693812", "4822332", "694012", "4822532"]);
+    run("run", &["first", "-q"], folder.path(), 0);
+    run("merge", &["first", "-q"], folder.path(), 0);
+    // From another folder: the paths are relative to the file.
+    let elsewhere = folder.path().join("elsewhere");
+    std::fs::create_dir(&elsewhere).unwrap();
+    run("dsm", &["../first/used_config.toml", "-o", "second", "-q"], &elsewhere, 0);
+    assert!(products(&elsewhere.join("second")) == products(&folder.path().join("first")));
+    // Options replace settings of the file.
+    run("dsm", &["../first/used_config.toml", "-o", "third", "--gsd", "4", "-q"], &elsewhere, 0);
+    let dsm = io::raster::read_dem(elsewhere.join("third/dsm/dsm.tif")).unwrap();
+    assert_eq!((dsm.geotransform.0[1], dsm.heights.width()), (4.0, 50));
+}
+
+#[test]
+fn job_files_are_checked_and_have_a_template() {
+    let folder = tempfile::tempdir().unwrap();
+    let template = run("template", &["dsm"], folder.path(), 0).0;
+    assert!(template.contains("# gsd_m = "), "{template}");
+    let job = folder.path().join("job.toml");
+    std::fs::write(&job, template.replace("# gsd_m", "gsd")).unwrap();
+    let told = run("dsm", &["job.toml"], folder.path(), 2).1;
+    assert!(told.contains("unknown key `gsd` (line ") && told.contains("did you mean `gsd_m`?"), "{told}");
+    std::fs::write(&job, "images = ['left.tif', 'right.tif']").unwrap();
+    let told = run("dsm", &["job.toml"], folder.path(), 2).1;
+    assert!(told.contains("the output folder is missing") && told.contains("-o DIR"), "{told}");
+    let told = run("plan", &["job.toml", "-o", "out"], folder.path(), 2).1;
+    assert!(told.contains("left.tif"), "{told}");
+}
