@@ -77,9 +77,7 @@ const OF_GDAL: [(&str, &str); 4] = [("-t_srs", "crs"), ("-te", "bounds"), ("-tr"
 pub(crate) type Named<T> = (&'static str, T, &'static str);
 
 /// Parses the values of an option by their names.
-pub(crate) fn named<T: Clone + Send + Sync + 'static>(
-    values: &'static [Named<T>],
-) -> impl TypedValueParser<Value = T> + Clone {
+pub(crate) fn named<T: Clone + Send + Sync + 'static>(values: &'static [Named<T>]) -> impl TypedValueParser<Value = T> {
     let shown = values.iter().map(|(name, _, about)| PossibleValue::new(name).help(about));
     PossibleValuesParser::new(shown).try_map(move |name| {
         let value = values.iter().find(|(other, ..)| *other == name);
