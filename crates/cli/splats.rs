@@ -70,7 +70,7 @@ struct MakeArgs {
     #[arg(long, value_name = "DATUM", alias = "vertical")]
     dsm_vertical: Option<VerticalDatum>,
     /// Three scales per splat (3DGS) or two (2DGS).
-    #[arg(long, value_parser = named(&FORMS), default_value = "3d")]
+    #[arg(long, action = clap::ArgAction::Set, value_parser = named(&FORMS), default_value = "3d")]
     form: bool,
     /// Degree of the harmonics in the file, 0 to 3; the loaders of the original 3DGS and 2DGS code
     /// want 3.
