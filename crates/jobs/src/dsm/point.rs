@@ -3,7 +3,7 @@
 use camera::{ImageCorrection, ImagePoint};
 use numeric::{Choice, upper_median};
 use serde::{Deserialize, Serialize};
-use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
+use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, adjust};
 
 use crate::dsm::character::ImageCharacter;
 use crate::dsm::config::DsmConfig;
@@ -19,7 +19,7 @@ use crate::dsm::order::{as_given, in_order_of};
 use crate::dsm::report::{CorrectionOrder, PointingReport};
 use crate::dsm::session::Session;
 use crate::dsm::tie_quality::{by_image, warn_of_images};
-use crate::dsm::ties::{PairTies, TIES_MIN, adjust_cameras, tie_heights};
+use crate::dsm::ties::{PairTies, TIES_MIN, adjust_cameras, join_pairs, tie_heights};
 use crate::dsm::values::{HeightRange, ImagePair};
 use crate::dsm::view_geometry::ViewGeometry;
 
@@ -75,7 +75,8 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     let config = &in_order_of(config, &images);
     let looked = look(config, &images, session)?;
     check_pictures(&images, &looked)?;
-    let (found, tracks) = adjust_cameras(&looked.cameras, &looked.sizes, &looked.ties, &AdjustConfig::default());
+    let (tracks, contradictory) = join_pairs(&looked.ties);
+    let found = adjust(&looked.cameras, &looked.sizes, &tracks, &AdjustConfig::default());
     let mut notes = Notes::new(session.progress);
     let is_applied = is_applied(config, &found, &mut notes);
     warn_of_sights(&images, &looked, &found, &mut notes);
@@ -98,7 +99,7 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
         useful,
         pairs,
         ties,
-        pointing: PointingReport::new(&found, tracks.len(), is_applied, by_image),
+        pointing: PointingReport::new(&found, (tracks.len(), contradictory), is_applied, by_image),
         tie_heights: tie_heights(&found),
         corrections: found.corrections,
         dem_heights,
@@ -151,6 +152,7 @@ fn is_applied(config: &DsmConfig, found: &Adjustment, notes: &mut Notes<'_>) -> 
     let order = match CorrectionOrder::from(found.order) {
         CorrectionOrder::None => "none needed",
         CorrectionOrder::Translation => "a shift per image",
+        CorrectionOrder::Drift => "a shift per image that grows along it",
         CorrectionOrder::Affine => "an affine map per image",
     };
     let (before, after) = found.residual_px;

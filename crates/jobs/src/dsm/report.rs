@@ -89,6 +89,8 @@ pub struct PointingReport {
     pub tracks: usize,
     /// Number of tracks that are no outliers.
     pub inliers: usize,
+    /// Number of tie points that contradict better ones and were left out.
+    pub contradictory_ties: usize,
     /// Robust standard deviation of the residuals before the correction, pixels.
     #[serde(with = "null_is_nan")]
     pub residual_before_px: f64,
@@ -130,6 +132,8 @@ pub enum CorrectionOrder {
     None,
     /// One shift per image.
     Translation,
+    /// One shift per image that grows with the line.
+    Drift,
     /// One affine map per image.
     Affine,
 }
@@ -139,18 +143,25 @@ impl From<ModelOrder> for CorrectionOrder {
         match order {
             ModelOrder::None => Self::None,
             ModelOrder::Translation => Self::Translation,
+            ModelOrder::Drift => Self::Drift,
             ModelOrder::Affine => Self::Affine,
         }
     }
 }
 
 impl PointingReport {
-    pub(crate) fn new(found: &Adjustment, tracks: usize, applied: bool, images: Vec<ImagePointing>) -> Self {
+    pub(crate) fn new(
+        found: &Adjustment,
+        (tracks, contradictory_ties): (usize, usize),
+        applied: bool,
+        images: Vec<ImagePointing>,
+    ) -> Self {
         Self {
             applied,
             order: found.order.into(),
             tracks,
             inliers: found.ground.iter().flatten().count(),
+            contradictory_ties,
             residual_before_px: found.residual_px.0,
             residual_after_px: found.residual_px.1,
             rms_px: found.rms_px,

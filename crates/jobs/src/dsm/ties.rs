@@ -1,11 +1,11 @@
 //! Tie points over the pairs of views and the joint correction of all cameras.
 
-use std::collections::BTreeMap;
-
 use camera::RpcCamera;
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
-use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Tie, TieConfig, Track, adjust, match_pair};
+use sweep::pointing::{
+    AdjustConfig, Adjustment, ModelOrder, PlacedTie, Tie, TieConfig, Track, adjust, join_ties, match_pair,
+};
 
 use crate::dsm::evidence::is_beyond_chance;
 use crate::dsm::values::{HeightRange, ImagePair};
@@ -105,7 +105,7 @@ fn verified(views: &[SweepView], found: PairTies) -> PairTies {
         return PairTies { ties: Vec::new(), ..found };
     }
     let fits = |t: &&Tie| {
-        let at = |track: &Track| track.first().is_some_and(|(_, p)| *p == t.reference);
+        let at = |track: &Track| track.contains(&(found.pair.first, t.reference));
         tracks.iter().zip(&adjustment.ground).any(|(track, ground)| ground.is_some() && at(track))
     };
     PairTies { ties: found.ties.iter().filter(fits).copied().collect(), ..found }
@@ -144,27 +144,25 @@ fn adjust_views(views: &[SweepView], pairs: &[PairTies], config: &AdjustConfig) 
     adjust_cameras(&cameras, &sizes, pairs, config)
 }
 
-/// Joins the ties of all pairs to tracks and adjusts all cameras. A track is one corner of a
-/// reference with its places in all sources. `sizes` are the columns and rows of the cameras'
-/// images.
+/// Joins the ties of all pairs to tracks. Returns also the number of ties that contradict better
+/// ones.
+pub(crate) fn join_pairs(pairs: &[PairTies]) -> (Vec<Track>, usize) {
+    let placed = |found: &PairTies| {
+        let ImagePair { first: reference, second: source } = found.pair;
+        found.ties.iter().map(move |&tie| PlacedTie { reference, source, tie }).collect::<Vec<_>>()
+    };
+    join_ties(&pairs.iter().flat_map(placed).collect::<Vec<_>>())
+}
+
+/// Joins the ties of all pairs to tracks and adjusts all cameras. `sizes` are the columns and rows
+/// of the cameras' images.
 pub(crate) fn adjust_cameras(
     cameras: &[RpcCamera],
     sizes: &[(usize, usize)],
     pairs: &[PairTies],
     config: &AdjustConfig,
 ) -> (Adjustment, Vec<Track>) {
-    let mut by_corner: BTreeMap<(usize, u64, u64), Track> = BTreeMap::new();
-    for found in pairs {
-        let ImagePair { first: reference, second: source } = found.pair;
-        for tie in &found.ties {
-            let corner = tie.reference;
-            let track = by_corner
-                .entry((reference, corner.sample.to_bits(), corner.line.to_bits()))
-                .or_insert_with(|| vec![(reference, corner)]);
-            track.push((source, tie.source));
-        }
-    }
-    let tracks: Vec<Track> = by_corner.into_values().collect();
+    let (tracks, _) = join_pairs(pairs);
     (adjust(cameras, sizes, &tracks, config), tracks)
 }
 

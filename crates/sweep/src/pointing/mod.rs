@@ -4,13 +4,25 @@
 //! from 1.93 m to 1.33 m).
 
 mod adjust;
+#[cfg(test)]
+mod adjust_tests;
+mod block_system;
 mod coarse;
+mod control;
 mod interest;
+mod intersect;
+mod model;
 mod moments;
 mod pair;
 mod patch;
+mod reduce;
 mod ties;
+mod tracks;
 
-pub use adjust::{AdjustConfig, Adjustment, ModelOrder, Track, adjust};
+pub use adjust::{AdjustConfig, Adjustment, Observations, adjust, adjust_to_control};
+pub use control::ControlPoint;
+pub use intersect::{Track, ground_of};
+pub use model::ModelOrder;
 pub use pair::{Tie, TieConfig};
 pub use ties::match_pair;
+pub use tracks::{PlacedTie, join_ties};
