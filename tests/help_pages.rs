@@ -27,8 +27,9 @@ fn manual_pages_describe_a_command_and_its_subcommands() {
 }
 
 /// Commands with options, as words of the command line.
-const COMMANDS: [&[&str]; 24] = [
+const COMMANDS: [&[&str]; 25] = [
     &["align"],
+    &["batch"],
     &["city", "info"],
     &["city", "convert"],
     &["dsm"],

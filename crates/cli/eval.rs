@@ -11,8 +11,8 @@ use city::Lod;
 use crs::VerticalDatum;
 use eval::{AlignmentMethod, EvalConfig, SurfaceComparisonConfig};
 use jobs::eval::{
-    EvalJobError, EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, GridEvalReport, MapEvalConfig, MapKind,
-    MinCompleteness, SurfaceEvalConfig,
+    EvalJobError, EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, MapEvalConfig, MapKind, MinCompleteness,
+    SurfaceEvalConfig,
 };
 use numeric::Progress;
 
@@ -220,7 +220,10 @@ fn grids(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     } else {
         print::text(&report.table())?;
         if !global.is_quiet() {
-            print::text(&(written(args, &report).join("\n") + "\n"))?;
+            let has_none = report.report_page.is_none() && report.report_failure.is_none();
+            let is_news = has_none && args.html.is_none() && !args.no_report;
+            let hint = "report     none; -o DIR writes one (page, JSON, error map)\n";
+            print::text(&(report.files() + if is_news { hint } else { "" }))?;
         }
     }
     Ok(report.missed().to_vec())
@@ -253,21 +256,6 @@ fn grid_config(args: &Args) -> GridEvalConfig {
     config.overwrite = args.overwrite;
     config.requirements = requirements(args);
     config
-}
-
-/// Names the files that were written, one a line.
-fn written(args: &Args, report: &GridEvalReport) -> Vec<String> {
-    let mut lines = Vec::new();
-    lines.extend(report.error_map.as_ref().map(|path| format!("error map  {}", path.display())));
-    lines.extend(report.page.as_ref().map(|path| format!("page       {}", path.display())));
-    match &report.report_page {
-        Some(page) => lines.push(format!("report     {}", page.display())),
-        None if report.report_failure.is_none() && args.html.is_none() && !args.no_report => {
-            lines.push("report     none; -o DIR writes one (page, JSON, error map)".to_owned());
-        }
-        None => {}
-    }
-    lines
 }
 
 /// Compares surfaces and returns the requirements that were missed.

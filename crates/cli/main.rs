@@ -5,6 +5,7 @@
 //! complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
 
 mod align;
+mod batch;
 mod city;
 mod completions;
 mod corrections;
@@ -47,6 +48,8 @@ struct Cli {
 enum Command {
     /// Bring a COLMAP model to the world by GPS or point pairs.
     Align(Box<align::Args>),
+    /// Do many scenes and tasks that a file names; what is done stays done.
+    Batch(batch::Args),
     /// Show and convert city models.
     #[command(subcommand)]
     City(city::Command),
@@ -110,6 +113,7 @@ fn main() -> ExitCode {
 fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Align(args) => align::run(args, cli.global),
+        Command::Batch(args) => batch::run(args, cli.global),
         Command::City(command) => city::run(command, cli.global),
         Command::Completions(args) => completions::completions(args, &mut options::grouped(Cli::command())),
         Command::Dsm(args) => dsm::run(args, cli.global),

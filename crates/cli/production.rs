@@ -64,7 +64,10 @@ pub(crate) struct TemplateArgs {
     template: &'static str,
 }
 
-const TEMPLATES: [Named<&str>; 1] = [("dsm", jobs::job_file::DSM_TEMPLATE, "A surface model: skysweep dsm JOB.toml")];
+const TEMPLATES: [Named<&str>; 2] = [
+    ("dsm", jobs::job_file::DSM_TEMPLATE, "A surface model: skysweep dsm JOB.toml"),
+    ("batch", jobs::batch::BATCH_TEMPLATE, "Many scenes: skysweep batch BATCH.toml"),
+];
 
 /// Runs `skysweep plan`.
 pub(crate) fn plan(args: &PlanArgs, global: Global) -> anyhow::Result<Outcome> {

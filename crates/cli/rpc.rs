@@ -14,7 +14,6 @@ use jobs::rpc::{
     RpcConvertConfig, RpcDirection, RpcInfoConfig, RpcJobError, RpcLineAnswer, RpcLinesConfig, RpcPointsConfig,
     RpcQuery,
 };
-use serde_json::json;
 
 use crate::error::with_hint;
 use crate::options::{Named, named};
@@ -176,14 +175,10 @@ fn answer(
     };
     let mut output = std::io::BufWriter::new(std::io::stdout().lock());
     let mut receive = |answer: RpcLineAnswer| {
-        let text = match &answer.point {
-            Ok(point) => point.line(direction, json),
-            Err(e) => {
-                tracing::warn!("line {}: {e}", answer.line);
-                if json { json!({ "error": e.to_string() }).to_string() } else { "nan nan".to_owned() }
-            }
-        };
-        writeln!(output, "{text}")
+        if let Err(error) = &answer.point {
+            tracing::warn!("line {}: {error}", answer.line);
+        }
+        writeln!(output, "{}", answer.text(direction, json))
     };
     let config = RpcLinesConfig::new(file.to_owned(), direction);
     let report = jobs::rpc::answer_lines(&config, &mut *input, &mut receive, &Log)?;

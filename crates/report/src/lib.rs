@@ -4,12 +4,13 @@
 //! the terminal, JSON, and one HTML file that needs no network, no script and no other file.
 //! [`Chart`] draws plots as SVG, inside a page or as files of their own. A [`PriorsReport`]
 //! presents the priors of a city model, a [`SatellitePriorsReport`] those of satellite images.
-//! [`depth_preview`], [`height_preview`] and [`normal_preview`] are their pictures.
+//! A [`BatchPage`] lists what became of a batch. [`depth_preview`], [`height_preview`] and [`normal_preview`] are their pictures.
 //!
 //! This crate touches no file. Everything is returned as text or bytes, the same for the same
 //! input.
 
 mod base64;
+mod batch;
 mod class;
 mod escape;
 mod evaluation;
@@ -24,6 +25,7 @@ mod satellite;
 mod svg;
 mod words;
 
+pub use batch::{BatchPage, BatchRow};
 pub use class::class_title;
 pub use escape::escape;
 pub use evaluation::EvaluationReport;

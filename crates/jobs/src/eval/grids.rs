@@ -124,6 +124,13 @@ impl GridEvalReport {
         self.view().table()
     }
 
+    /// Returns the files that were written, a line for each.
+    pub fn files(&self) -> String {
+        let named = [("error map", &self.error_map), ("page", &self.page), ("report", &self.report_page)];
+        let line = |(name, path): (&str, &Option<PathBuf>)| Some(format!("{name:<11}{}\n", path.as_ref()?.display()));
+        named.into_iter().filter_map(line).collect()
+    }
+
     /// Returns the requirements that are not met, in words.
     pub fn missed(&self) -> &[String] {
         &self.protocol.missed

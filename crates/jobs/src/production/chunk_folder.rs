@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::files::{FileError, TEXT_LIMIT, create_folder};
 
 /// Folder of all chunks.
-const CHUNKS: &str = "chunks";
+pub(super) const CHUNKS: &str = "chunks";
 /// Name of the status of a chunk.
 const STATUS: &str = "status";
 /// Name of the folder of the result.

@@ -33,7 +33,11 @@ pub struct InputFile {
 }
 
 impl InputFile {
-    fn of(path: &Path) -> Result<Self, FileError> {
+    /// Reads a file for its hash.
+    ///
+    /// # Errors
+    /// [`FileError::Read`].
+    pub(crate) fn of(path: &Path) -> Result<Self, FileError> {
         let failed = |source| FileError::Read { path: path.to_owned(), source };
         let found = path.metadata().map_err(failed)?;
         let sha256 = content_hash::of_file(path).map_err(failed)?;
@@ -55,7 +59,7 @@ impl InputFile {
 ///
 /// # Errors
 /// [`ProductionError::File`], [`ProductionError::Dsm`].
-pub(super) fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, ProductionError> {
+pub(crate) fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, ProductionError> {
     let mut files: BTreeSet<PathBuf> = config.dem.iter().chain(&config.prior).cloned().collect();
     for image in &config.images {
         let source = ImageSource::open(image).map_err(crate::dsm::DsmError::from)?;
@@ -71,7 +75,7 @@ pub(super) fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, Production
 ///
 /// # Errors
 /// [`ProductionError::InputChanged`], [`ProductionError::File`] for a file that is gone.
-pub(super) fn check(inputs: &[InputFile]) -> Result<(), ProductionError> {
+pub(crate) fn check(inputs: &[InputFile]) -> Result<(), ProductionError> {
     inputs.par_iter().try_for_each(|input| {
         let changed = || ProductionError::InputChanged { path: input.path.clone() };
         if input.is_unchanged()? { Ok(()) } else { Err(changed()) }

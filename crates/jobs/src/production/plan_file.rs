@@ -104,6 +104,11 @@ impl PlanFile {
         Ok(file)
     }
 
+    /// Whether the plan is of a configuration.
+    pub(super) fn is_of(&self, config: &DsmConfig) -> bool {
+        same(&self.plan.config, config, &config.output)
+    }
+
     /// Checks that the inputs have the content that was planned.
     ///
     /// # Errors

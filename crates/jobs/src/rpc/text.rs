@@ -6,7 +6,7 @@ use camera::ImagePoint;
 use geodesy::LonLatHeight;
 use serde_json::json;
 
-use super::{RpcDirection, RpcInfoReport, RpcPoint};
+use super::{RpcDirection, RpcInfoReport, RpcLineAnswer, RpcPoint};
 
 impl RpcInfoReport {
     /// Returns the report as text, which ends in a line break.
@@ -45,6 +45,17 @@ impl RpcInfoReport {
             row("view", format!("incidence {:.2} deg, sensor at azimuth {:.1} deg", c.incidence_deg, c.azimuth_deg));
         }
         out
+    }
+}
+
+impl RpcLineAnswer {
+    /// Returns the answer as a line: a point, or `nan nan` (in JSON the error) where there is none.
+    pub fn text(&self, direction: RpcDirection, as_json: bool) -> String {
+        match &self.point {
+            Ok(point) => point.line(direction, as_json),
+            Err(error) if as_json => json!({ "error": error.to_string() }).to_string(),
+            Err(_) => "nan nan".to_owned(),
+        }
     }
 }
 

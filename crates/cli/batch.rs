@@ -1,0 +1,30 @@
+//! `skysweep batch`: many scenes and tasks that a file names.
+
+use std::path::PathBuf;
+
+use jobs::batch::read_batch;
+
+use crate::progress::ShowOptions;
+use crate::{Global, Outcome};
+
+/// Arguments of `skysweep batch`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "skysweep template batch prints a file to begin with. Started again, a batch goes on where it was."
+)]
+pub(crate) struct Args {
+    /// The batch file.
+    #[arg(value_name = "BATCH.toml")]
+    file: PathBuf,
+    #[command(flatten)]
+    show: ShowOptions,
+}
+
+/// Runs `skysweep batch`.
+pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
+    let batch = read_batch(&args.file)?;
+    let report = args.show.watch(global, &batch.output, |watcher| jobs::batch::run(&batch, watcher))?;
+    args.show.print(global, &report, || report.text())?;
+    let what = || format!("tasks that are not complete: {}; the report names the reasons", report.incomplete);
+    Ok(if report.incomplete == 0 { Outcome::Complete } else { Outcome::Partial(what()) })
+}

@@ -1,0 +1,184 @@
+//! Batch files: TOML with `[defaults]`, `[limits]` and one `[[scene]]` for each scene.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use crate::batch::error::BatchError;
+use crate::batch::task::TaskKind;
+use crate::dsm::MapBounds;
+use crate::files::read_text;
+use crate::job_file;
+use crate::job_paths::resolved;
+
+/// A batch: scenes and what is to be made of them.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
+pub struct BatchConfig {
+    /// Folder of the results, with a folder for each scene.
+    pub output: PathBuf,
+    /// Limits of the whole batch.
+    pub limits: BatchLimits,
+    /// Tasks and settings of scenes that have none of their own.
+    pub defaults: BatchDefaults,
+    /// The scenes.
+    #[serde(rename = "scene")]
+    pub scenes: Vec<BatchScene>,
+    /// Folder that paths in the settings are relative to.
+    #[serde(skip)]
+    pub(crate) folder: PathBuf,
+}
+
+/// Limits of the whole batch.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
+pub struct BatchLimits {
+    /// Worker threads of all tasks together; all cores when `None`.
+    pub threads: Option<usize>,
+    /// Memory of all surface models that are computed at a time together, megabytes.
+    pub memory_mb: Option<u64>,
+    /// Scenes that are computed at a time.
+    pub parallel: usize,
+    /// Times that a failed task is tried again.
+    pub retries: usize,
+}
+
+impl Default for BatchLimits {
+    fn default() -> Self {
+        Self { threads: None, memory_mb: None, parallel: 1, retries: 0 }
+    }
+}
+
+/// Tasks and settings of scenes that have none of their own.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
+pub struct BatchDefaults {
+    /// Tasks of each scene.
+    pub tasks: Option<Vec<String>>,
+    /// Settings of surface models.
+    pub dsm: Table,
+    /// Settings of orthos.
+    pub ortho: Table,
+    /// Settings of evaluations.
+    pub eval: Table,
+    /// Settings of height maps.
+    pub heightmap: Table,
+    /// Settings of priors.
+    pub priors: Table,
+}
+
+/// A scene of a batch.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct BatchScene {
+    /// Name, which is that of its folder.
+    pub name: String,
+    /// Images: files, or patterns with `*`, `?` and `[…]`.
+    pub images: Vec<String>,
+    /// Area of the surface model, in its CRS.
+    pub bounds: Option<MapBounds>,
+    /// What is to be made; the defaults' when `None`.
+    pub tasks: Option<Vec<String>>,
+    /// Settings of the surface model that differ from the defaults.
+    #[serde(default)]
+    pub dsm: Table,
+    /// Settings of the ortho that differ from the defaults.
+    #[serde(default)]
+    pub ortho: Table,
+    /// Settings of the evaluation that differ from the defaults.
+    #[serde(default)]
+    pub eval: Table,
+    /// Settings of the height maps that differ from the defaults.
+    #[serde(default)]
+    pub heightmap: Table,
+    /// Settings of the priors that differ from the defaults.
+    #[serde(default)]
+    pub priors: Table,
+}
+
+/// Settings of one task: the defaults' and the scene's own.
+#[derive(Debug, Clone, Copy)]
+pub struct TaskSettings<'a> {
+    /// Settings of all scenes.
+    pub defaults: &'a Table,
+    /// Settings of this scene, which go before.
+    pub own: &'a Table,
+}
+
+impl BatchConfig {
+    /// Returns the settings of a task of a scene.
+    pub(super) fn settings<'a>(&'a self, scene: &'a BatchScene, task: TaskKind) -> TaskSettings<'a> {
+        let (defaults, own) = match task {
+            TaskKind::Dsm => (&self.defaults.dsm, &scene.dsm),
+            TaskKind::Ortho => (&self.defaults.ortho, &scene.ortho),
+            TaskKind::Eval => (&self.defaults.eval, &scene.eval),
+            TaskKind::HeightMap => (&self.defaults.heightmap, &scene.heightmap),
+            TaskKind::Priors => (&self.defaults.priors, &scene.priors),
+        };
+        TaskSettings { defaults, own }
+    }
+
+    /// Returns the tasks of a scene, in the order in which they are done.
+    ///
+    /// # Errors
+    /// [`BatchError::UnknownTask`].
+    pub(super) fn tasks(&self, scene: &BatchScene) -> Result<Vec<TaskKind>, BatchError> {
+        let fallback = || vec![TaskKind::Dsm.name().to_owned()];
+        let names = scene.tasks.clone().or_else(|| self.defaults.tasks.clone()).unwrap_or_else(fallback);
+        let one = |name: &String| {
+            TaskKind::ALL.into_iter().find(|task| task.name() == name).ok_or_else(|| BatchError::UnknownTask {
+                scene: scene.name.clone(),
+                task: name.clone(),
+                known: TaskKind::ALL.map(TaskKind::name).join(", "),
+            })
+        };
+        let mut tasks = names.iter().map(one).collect::<Result<Vec<_>, _>>()?;
+        tasks.sort_unstable();
+        tasks.dedup();
+        Ok(tasks)
+    }
+
+    fn validate(&self, path: &Path) -> Result<(), BatchError> {
+        if self.output.as_os_str().is_empty() {
+            return Err(BatchError::NoOutput { path: path.to_owned() });
+        }
+        if self.scenes.is_empty() {
+            return Err(BatchError::NoScene { path: path.to_owned() });
+        }
+        let limits = [("parallel", self.limits.parallel), ("threads", self.limits.threads.unwrap_or(1))];
+        if let Some((name, _)) = limits.into_iter().find(|(_, value)| *value == 0) {
+            return Err(BatchError::Limit { name });
+        }
+        for (i, scene) in self.scenes.iter().enumerate() {
+            let name = scene.name.clone();
+            let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
+            if name.is_empty() || name.starts_with(['.', ' ']) || !name.chars().all(is_plain) {
+                return Err(BatchError::SceneName { name });
+            }
+            if self.scenes[..i].iter().any(|other| other.name == name) {
+                return Err(BatchError::SameName { name });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads a batch file.
+///
+/// # Errors
+/// [`BatchError::Job`] also for unknown keys; [`BatchError::NoScene`], [`BatchError::NoOutput`],
+/// [`BatchError::SceneName`], [`BatchError::SameName`], [`BatchError::Limit`]. Tasks and their
+/// settings are checked when the batch begins.
+pub fn read_batch(path: &Path) -> Result<BatchConfig, BatchError> {
+    let text = read_text(path).map_err(job_file::JobFileError::from)?;
+    let mut batch: BatchConfig = job_file::parse(&text, path)?;
+    batch.validate(path)?;
+    path.parent().unwrap_or(Path::new("")).clone_into(&mut batch.folder);
+    batch.output = resolved(&batch.output, &batch.folder);
+    Ok(batch)
+}

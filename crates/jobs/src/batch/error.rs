@@ -1,0 +1,71 @@
+//! The errors of batches.
+
+use std::path::PathBuf;
+
+use crate::files::FileError;
+use crate::job_file::JobFileError;
+
+/// The reason why a batch did not start, or stopped. A task that fails is no error.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BatchError {
+    /// The batch file cannot be read.
+    #[error(transparent)]
+    Job(#[from] JobFileError),
+    /// The output folder or a report cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file names no scene.
+    #[error("the batch has no scene; give at least one [[scene]] with a name and images: {}", path.display())]
+    NoScene {
+        /// The batch file.
+        path: PathBuf,
+    },
+    /// The file names no output folder.
+    #[error("the batch has no folder for its results; give the key `output`: {}", path.display())]
+    NoOutput {
+        /// The batch file.
+        path: PathBuf,
+    },
+    /// A name that is no name of a folder.
+    #[error("the scene name {name:?} cannot be the name of a folder; use letters, digits, - and _")]
+    SceneName {
+        /// The name.
+        name: String,
+    },
+    /// Two scenes have one name.
+    #[error("two scenes have the name {name:?}; each needs a folder of its own")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// A task that does not exist.
+    #[error("the scene {scene:?} asks for the task `{task}`, which is not known; known are {known}")]
+    UnknownTask {
+        /// Name of the scene.
+        scene: String,
+        /// The task.
+        task: String,
+        /// Known tasks.
+        known: String,
+    },
+    /// Settings of a task that cannot be used.
+    #[error("the task `{task}` of the scene {scene:?} has wrong settings: {what}")]
+    Settings {
+        /// Name of the scene.
+        scene: String,
+        /// The task.
+        task: String,
+        /// Text found and expected.
+        what: String,
+    },
+    /// A limit that allows no work.
+    #[error("the limit `{name}` is 0, expected 1 or more")]
+    Limit {
+        /// The limit.
+        name: &'static str,
+    },
+    /// The caller asked the batch to stop.
+    #[error(transparent)]
+    Cancelled(#[from] numeric::Cancelled),
+}

@@ -1,0 +1,24 @@
+//! Batches: many scenes, each with its tasks, in one run that survives the night.
+//!
+//! A batch file names scenes (images, area, settings) and what is to be made of each. A scene that
+//! cannot be computed does not stop the others. A batch that is killed goes on where it was: a task
+//! whose settings, inputs and product are as they were is left alone.
+
+mod batch_file;
+mod batch_report;
+mod error;
+mod images;
+mod record;
+mod run;
+mod task;
+mod task_log;
+mod tasks_of_scene;
+
+pub use batch_file::{BatchConfig, BatchDefaults, BatchLimits, BatchScene, TaskSettings, read_batch};
+pub use batch_report::{BatchReport, SceneReport, TaskReport, TaskState};
+pub use error::BatchError;
+pub use run::run;
+pub use task::TaskKind;
+
+/// A commented batch file with every key.
+pub const BATCH_TEMPLATE: &str = include_str!("batch.toml");

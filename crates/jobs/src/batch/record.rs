@@ -1,0 +1,89 @@
+//! What is known of a task from earlier runs of the batch, so that what is complete is left alone.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::batch::task::TaskJob;
+use crate::error_text::with_causes;
+use crate::files::{TEXT_LIMIT, write_json};
+use crate::production::{InputFile, check_inputs, inputs_of};
+
+/// The record of a task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct TaskRecord {
+    /// Hash of the settings and of the version.
+    pub(super) key: String,
+    /// Whether the task was done to the end.
+    pub(super) is_done: bool,
+    /// Files that the task read.
+    pub(super) inputs: Vec<InputFile>,
+}
+
+impl TaskRecord {
+    /// Makes the record of a task that begins.
+    ///
+    /// # Errors
+    /// A text for an input that cannot be read.
+    pub(super) fn begin(job: &TaskJob) -> Result<Self, String> {
+        Ok(Self { key: key_of(job)?, is_done: false, inputs: inputs_of_job(job)? })
+    }
+
+    /// Reads a record; `None` when there is none.
+    pub(super) fn read(path: &Path) -> Option<Self> {
+        serde_json::from_slice(&io::read_regular(path, TEXT_LIMIT).ok()?).ok()
+    }
+
+    /// Writes the record.
+    ///
+    /// # Errors
+    /// A text for a file that cannot be written.
+    pub(super) fn write(&self, path: &Path) -> Result<(), String> {
+        write_json(path, self, true).map_err(|e| with_causes(&e))
+    }
+
+    /// Whether the task is done, and neither its settings nor its inputs have changed since.
+    pub(super) fn is_current(&self, job: &TaskJob) -> bool {
+        self.is_done
+            && key_of(job).is_ok_and(|key| key == self.key)
+            && check_inputs(&self.inputs).is_ok()
+            && job.product().exists()
+    }
+}
+
+/// Returns the hash of all settings that decide the result.
+fn key_of(job: &TaskJob) -> Result<String, String> {
+    let mut plain = job.clone();
+    plain.set_running(None, false);
+    crate::production::hash_of(&(env!("CARGO_PKG_VERSION"), plain)).map_err(|e| e.to_string())
+}
+
+/// Returns the files that a task reads: those of the images of a surface model, and for other tasks
+/// every file that the settings name, with the files of a surface model.
+fn inputs_of_job(job: &TaskJob) -> Result<Vec<InputFile>, String> {
+    if let TaskJob::Dsm(config) = job {
+        return inputs_of(config).map_err(|e| with_causes(&e));
+    }
+    let mut files = BTreeSet::new();
+    collect(&serde_json::to_value(job).map_err(|e| e.to_string())?, &mut files);
+    let product = job.product();
+    let one = |path: &PathBuf| InputFile::of(path).map_err(|e| with_causes(&e));
+    files.iter().filter(|path| !path.starts_with(&product)).map(one).collect()
+}
+
+/// Collects the files that the texts of a value name. A folder of a run stands for its surface
+/// model.
+fn collect(value: &Value, files: &mut BTreeSet<PathBuf>) {
+    match value {
+        Value::String(text) => {
+            let path = Path::new(text);
+            let inside = path.join("dsm/dsm.tif");
+            files.extend([path.to_owned(), inside].into_iter().filter(|path| path.is_file()));
+        }
+        Value::Array(all) => all.iter().for_each(|value| collect(value, files)),
+        Value::Object(all) => all.values().for_each(|value| collect(value, files)),
+        _ => {}
+    }
+}

@@ -1,0 +1,306 @@
+//! The tasks of a batch: the configuration of a job from the settings of a scene, and the job
+//! itself.
+
+use std::path::{Path, PathBuf};
+
+use numeric::Progress;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use crate::batch::batch_file::TaskSettings;
+use crate::camera_stand::{StandConfig, StandSource};
+use crate::dsm::{DsmConfig, MapBounds};
+use crate::error_text::with_causes;
+use crate::eval::GridEvalConfig;
+use crate::heightmap::HeightMapConfig;
+use crate::job_file::{JobFileError, defect};
+use crate::job_paths::resolved;
+use crate::ortho::OrthoConfig;
+use crate::priors::PriorsConfig;
+use crate::production::make_or_resume;
+
+/// What a batch can make of a scene, in the order in which it is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum TaskKind {
+    /// The surface model.
+    Dsm,
+    /// The images laid on it.
+    Ortho,
+    /// Its errors against a reference.
+    Eval,
+    /// Height maps of it.
+    HeightMap,
+    /// Priors of a city model for the images.
+    Priors,
+}
+
+impl TaskKind {
+    /// All tasks.
+    pub const ALL: [Self; 5] = [Self::Dsm, Self::Ortho, Self::Eval, Self::HeightMap, Self::Priors];
+
+    /// Returns the name that batch files have for the task.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Dsm => "dsm",
+            Self::Ortho => "ortho",
+            Self::Eval => "eval",
+            Self::HeightMap => "heightmap",
+            Self::Priors => "priors",
+        }
+    }
+
+    /// Settings that the batch itself makes.
+    const fn made(self) -> &'static [&'static str] {
+        match self {
+            Self::Dsm => &["images", "output", "threads", "overwrite", "bounds"],
+            Self::Ortho => &["images", "surface", "output", "threads", "overwrite"],
+            Self::Eval => &["test", "target", "page", "error_map", "threads", "overwrite"],
+            Self::HeightMap => &["source", "output", "threads", "overwrite"],
+            Self::Priors => &["cameras", "output", "threads", "overwrite"],
+        }
+    }
+
+    /// Settings that must be given.
+    const fn needed(self) -> &'static [&'static str] {
+        match self {
+            Self::Dsm | Self::Ortho => &[],
+            Self::Eval => &["reference"],
+            Self::HeightMap => &["stand"],
+            Self::Priors => &["model"],
+        }
+    }
+
+    /// Settings that are paths.
+    const fn paths(self) -> &'static [&'static str] {
+        match self {
+            Self::Dsm => &["dem", "prior"],
+            Self::Ortho => &["report"],
+            Self::Eval => &["reference", "classes", "mask", "terrain", "confidence", "objects"],
+            Self::HeightMap => &["terrain", "raster", "list", "camera_file"],
+            Self::Priors => &["model", "transform", "corrections"],
+        }
+    }
+}
+
+/// The scene that a task works on.
+#[derive(Debug, Clone)]
+pub(super) struct TaskScene<'a> {
+    /// Folder of the batch file.
+    pub(super) base: &'a Path,
+    /// Images.
+    pub(super) images: Vec<PathBuf>,
+    /// Folder of the scene.
+    pub(super) folder: PathBuf,
+    /// Whether a surface model is made before the other tasks.
+    pub(super) has_surface: bool,
+    /// Area of the surface model.
+    pub(super) bounds: Option<MapBounds>,
+}
+
+/// The job of a task, ready to run.
+#[derive(Debug, Clone, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum TaskJob {
+    Dsm(Box<DsmConfig>),
+    Ortho(OrthoConfig),
+    Eval(Box<GridEvalConfig>),
+    HeightMap(Box<HeightMapConfig>),
+    Priors(Box<PriorsConfig>),
+}
+
+impl TaskJob {
+    /// Makes the job of a task from the settings of a scene.
+    ///
+    /// # Errors
+    /// A text for settings that the job does not have, or that the batch makes itself.
+    pub(super) fn new(kind: TaskKind, settings: TaskSettings<'_>, scene: &TaskScene<'_>) -> Result<Self, String> {
+        let mut given = settings.defaults.clone();
+        lay_over(&mut given, settings.own);
+        if let Some(key) = kind.made().iter().find(|key| given.contains_key(**key)) {
+            return Err(format!("`{key}` is set by the batch itself; leave it out"));
+        }
+        if let Some(key) = kind.needed().iter().find(|key| !given.contains_key(**key)) {
+            return Err(format!("`{key}` is missing"));
+        }
+        resolve_paths(&mut given, kind.paths(), scene.base);
+        let (images, folder) = (scene.images.clone(), scene.folder.clone());
+        Ok(match kind {
+            TaskKind::Dsm => {
+                let mut base = DsmConfig::new(images, folder);
+                base.bounds = scene.bounds;
+                Self::Dsm(Box::new(with(&base, &given)?))
+            }
+            TaskKind::Ortho => {
+                let output = folder.join("ortho/ortho.tif");
+                Self::Ortho(with(&OrthoConfig::new(images, folder, output), &given)?)
+            }
+            TaskKind::Eval => {
+                Self::Eval(Box::new(with(&GridEvalConfig::new(folder.join("dsm/dsm.tif"), PathBuf::new()), &given)?))
+            }
+            TaskKind::HeightMap => Self::HeightMap(Box::new(height_map(&folder, &given)?)),
+            TaskKind::Priors => {
+                let mut base = PriorsConfig::new(PathBuf::new(), images, folder.join("priors"));
+                base.corrections = scene.has_surface.then(|| folder.join("report/report.json"));
+                Self::Priors(Box::new(with(&base, &given)?))
+            }
+        })
+    }
+
+    /// Keeps the memory of a surface model within a limit, megabytes.
+    pub(super) fn limited(mut self, memory_mb: u64) -> Self {
+        if let Self::Dsm(config) = &mut self {
+            config.memory_mb = Some(config.memory_mb.unwrap_or(memory_mb).min(memory_mb));
+        }
+        self
+    }
+
+    /// Returns why the task must not begin: a product that no earlier run of the batch made.
+    pub(super) fn refused(&self) -> Option<String> {
+        let may_replace = match self {
+            Self::Dsm(config) => config.overwrite,
+            Self::Ortho(config) => config.overwrite,
+            Self::Eval(config) => config.overwrite,
+            Self::HeightMap(config) => config.overwrite,
+            Self::Priors(config) => config.overwrite,
+        };
+        let product = self.product();
+        let is_foreign = !may_replace && product.exists();
+        is_foreign.then(|| format!("a result is there that the batch did not make: {}", product.display()))
+    }
+
+    /// The kind of the task.
+    pub(super) const fn kind(&self) -> TaskKind {
+        match self {
+            Self::Dsm(_) => TaskKind::Dsm,
+            Self::Ortho(_) => TaskKind::Ortho,
+            Self::Eval(_) => TaskKind::Eval,
+            Self::HeightMap(_) => TaskKind::HeightMap,
+            Self::Priors(_) => TaskKind::Priors,
+        }
+    }
+
+    /// The file or folder that is there when the task is done.
+    pub(super) fn product(&self) -> PathBuf {
+        match self {
+            Self::Dsm(config) => config.output.join("report/report.json"),
+            Self::Ortho(config) => config.output.clone(),
+            Self::Eval(config) => {
+                let run = config.test.parent().and_then(Path::parent).unwrap_or(Path::new(""));
+                run.join("eval/report.json")
+            }
+            Self::HeightMap(config) => config.output.clone(),
+            Self::Priors(config) => config.output.clone(),
+        }
+    }
+
+    /// Sets what does not change the result: threads, and whether files may be replaced.
+    pub(super) fn set_running(&mut self, threads: Option<usize>, overwrite: bool) {
+        let (own_threads, own_overwrite) = match self {
+            Self::Dsm(config) => (&mut config.threads, &mut config.overwrite),
+            Self::Ortho(config) => (&mut config.threads, &mut config.overwrite),
+            Self::Eval(config) => (&mut config.threads, &mut config.overwrite),
+            Self::HeightMap(config) => (&mut config.threads, &mut config.overwrite),
+            Self::Priors(config) => (&mut config.threads, &mut config.overwrite),
+        };
+        (*own_threads, *own_overwrite) = (threads, overwrite);
+    }
+
+    /// Runs the job. The text says what is missing from a result that is there, but not whole.
+    ///
+    /// # Errors
+    /// The reason why there is no result.
+    pub(super) fn run(&self, progress: &dyn Progress) -> Result<Option<String>, String> {
+        match self {
+            Self::Dsm(config) => {
+                let report = make_or_resume(config, progress).map_err(|e| with_causes(&e))?;
+                let failed = report.chunks.map_or(0, |chunks| chunks.failed.len());
+                Ok((failed > 0).then(|| format!("{failed} chunks could not be computed and are void")))
+            }
+            Self::Ortho(config) => {
+                let folder = config.output.parent().unwrap_or(Path::new(""));
+                crate::files::create_folder(folder).map_err(|e| with_causes(&e))?;
+                crate::ortho::run(config, progress).map(|_| None).map_err(|e| with_causes(&e))
+            }
+            Self::Eval(config) => {
+                let report = crate::eval::compare_grids(config, progress).map_err(|e| with_causes(&e))?;
+                let missed = report.missed();
+                Ok((!missed.is_empty()).then(|| missed.join("; ")))
+            }
+            Self::HeightMap(config) => {
+                let report = crate::heightmap::run(config, progress).map_err(|e| with_causes(&e))?;
+                let crate::heightmap::HeightMapReport::List(list) = report else { return Ok(None) };
+                Ok((list.failed > 0).then(|| format!("{} height maps could not be made", list.failed)))
+            }
+            Self::Priors(config) => {
+                let report = crate::priors::run(config, progress).map_err(|e| with_causes(&e))?;
+                Ok((!report.is_whole()).then(|| "objects of the model cannot be used or are not seen".to_owned()))
+            }
+        }
+    }
+}
+
+/// Makes the configuration of height maps: a folder for a list of cameras, else one file.
+fn height_map(folder: &Path, given: &Table) -> Result<HeightMapConfig, String> {
+    let stand = StandConfig::new(StandSource::Position { lon_deg: 0.0, lat_deg: 0.0 });
+    let mut given = given.clone();
+    let own: StandConfig = match given.remove("stand") {
+        Some(Value::Table(own)) => {
+            let source = own.get("source").ok_or("`stand.source` is missing")?.clone();
+            let source = StandSource::deserialize(source).map_err(|e| in_words(e.message()))?;
+            with(&StandConfig { source, ..stand }, &own)?
+        }
+        _ => return Err("`stand` is no table".to_owned()),
+    };
+    let output = match own.source {
+        StandSource::List(_) => folder.join("heightmaps"),
+        _ => folder.join("heightmap.tif"),
+    };
+    with(&HeightMapConfig::new(folder.to_owned(), output, own), &given)
+}
+
+/// Returns a configuration with the settings of a table.
+fn with<T: Serialize + DeserializeOwned>(base: &T, given: &Table) -> Result<T, String> {
+    let mut all = Table::try_from(base).map_err(|e| e.to_string())?;
+    lay_over(&mut all, given);
+    T::deserialize(all).map_err(|error| in_words(error.message()))
+}
+
+/// Returns the text of serde in the words of job files.
+fn in_words(message: &str) -> String {
+    match defect(message, 0, Path::new("")) {
+        JobFileError::UnknownKey { key, nearest: Some(nearest), .. } => {
+            format!("unknown key `{key}`; did you mean `{nearest}`?")
+        }
+        JobFileError::UnknownKey { key, known, .. } => format!("unknown key `{key}`; known are {}", known.join(", ")),
+        _ => message.trim().replace('\n', " "),
+    }
+}
+
+/// Replaces the values of a table by those of another, key by key.
+fn lay_over(table: &mut Table, over: &Table) {
+    for (key, value) in over {
+        match (table.get_mut(key), value) {
+            // A choice with a value, such as { epsg = 1 }, is one value and not two.
+            (Some(Value::Table(inner)), Value::Table(own)) if inner.keys().any(|key| own.contains_key(key)) => {
+                lay_over(inner, own);
+            }
+            _ => drop(table.insert(key.clone(), value.clone())),
+        }
+    }
+}
+
+/// Makes the paths of a table relative to the folder of the file absolute.
+fn resolve_paths(table: &mut Table, paths: &[&str], folder: &Path) {
+    for (key, value) in table.iter_mut() {
+        match value {
+            Value::String(text) if paths.contains(&key.as_str()) => {
+                *text = resolved(Path::new(text.as_str()), folder).to_string_lossy().into_owned();
+            }
+            Value::Table(inner) => resolve_paths(inner, paths, folder),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! The tasks of one scene, one after the other.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use numeric::Progress;
+
+use crate::batch::batch_report::{SceneReport, TaskReport, TaskState};
+use crate::batch::record::TaskRecord;
+use crate::batch::task::{TaskJob, TaskKind};
+use crate::batch::task_log;
+use crate::error_text::with_causes;
+use crate::files::create_folder;
+
+/// Folder of the records and logs of a scene's tasks.
+const TASKS: &str = "tasks";
+
+/// A scene with its jobs.
+#[derive(Debug)]
+pub(super) struct SceneJobs {
+    pub(super) name: String,
+    pub(super) folder: PathBuf,
+    /// The tasks in the order in which they are done.
+    pub(super) tasks: Vec<TaskKind>,
+    /// Their jobs, or the reason why the scene has none.
+    pub(super) jobs: Result<Vec<TaskJob>, String>,
+}
+
+/// What holds for all tasks of a batch.
+pub(super) struct TaskLimits<'a> {
+    /// Worker threads of a task.
+    pub(super) threads: Option<usize>,
+    /// Times that a failed task is tried again.
+    pub(super) retries: usize,
+    /// Watcher of the batch.
+    pub(super) progress: &'a dyn Progress,
+}
+
+/// What a task left.
+struct Ended {
+    state: TaskState,
+    reason: Option<String>,
+    attempts: usize,
+}
+
+impl Ended {
+    fn failed(reason: impl Into<String>) -> Self {
+        Self { state: TaskState::Failed, reason: Some(reason.into()), attempts: 0 }
+    }
+}
+
+impl SceneJobs {
+    /// Does the tasks that are not done. Tasks that rest on one without a result are not begun.
+    pub(super) fn run(&self, limits: &TaskLimits<'_>) -> SceneReport {
+        let mut tasks = Vec::with_capacity(self.tasks.len());
+        let jobs = match &self.jobs {
+            Ok(jobs) => jobs.as_slice(),
+            Err(reason) => {
+                let failed = |(i, task): (usize, &TaskKind)| match i {
+                    0 => TaskReport { state: TaskState::Failed, ..TaskReport::not_begun(*task, reason) },
+                    _ => TaskReport::not_begun(*task, "the scene has no images"),
+                };
+                tasks.extend(self.tasks.iter().enumerate().map(failed));
+                limits.progress.warn(&format!("{}: {reason}", self.name));
+                tasks.iter().for_each(|_| limits.progress.step());
+                &[]
+            }
+        };
+        for job in jobs {
+            let has_no_surface = tasks.first().is_some_and(|first: &TaskReport| {
+                first.task == TaskKind::Dsm && matches!(first.state, TaskState::Failed | TaskState::NotBegun)
+            });
+            if has_no_surface || limits.progress.is_cancelled() {
+                tasks.push(TaskReport::not_begun(job.kind(), "there is no surface model"));
+            } else {
+                let since = Instant::now();
+                let Ended { state, reason, attempts } = self.work(job, limits);
+                if let Some(reason) = &reason {
+                    limits.progress.warn(&format!("{} {}: {reason}", self.name, job.kind().name()));
+                }
+                let seconds = since.elapsed().as_secs_f64();
+                tasks.push(TaskReport { task: job.kind(), state, reason, attempts, seconds });
+            }
+            limits.progress.step();
+        }
+        SceneReport { name: self.name.clone(), folder: self.folder.clone(), tasks }
+    }
+
+    fn work(&self, job: &TaskJob, limits: &TaskLimits<'_>) -> Ended {
+        let folder = self.folder.join(TASKS);
+        if let Err(error) = create_folder(&folder) {
+            return Ended::failed(with_causes(&error));
+        }
+        let name = job.kind().name();
+        let place = folder.join(format!("{name}.json"));
+        let record = TaskRecord::read(&place);
+        if record.as_ref().is_some_and(|record| record.is_current(job)) {
+            return Ended { state: TaskState::DoneBefore, reason: None, attempts: 0 };
+        }
+        let log = match task_log::open(&folder.join(format!("{name}.jsonl")), limits.progress) {
+            Ok(log) => log,
+            Err(error) => return Ended::failed(format!("cannot write the log: {error}")),
+        };
+        // What an earlier run of the batch made may be replaced, and nothing else.
+        let mut job = job.clone();
+        job.set_running(limits.threads, record.is_some());
+        let mut ended = Ended::failed("it was not tried");
+        for attempt in 1..=limits.retries + 1 {
+            ended = Ended { attempts: attempt, ..try_once(&job, &place, &log) };
+            log.finish(&job.product(), ended.reason.as_deref());
+            if ended.state != TaskState::Failed || limits.progress.is_cancelled() {
+                break;
+            }
+            job.set_running(limits.threads, place.exists());
+        }
+        ended
+    }
+}
+
+/// Tries a task and keeps its record.
+fn try_once(job: &TaskJob, place: &Path, log: &dyn Progress) -> Ended {
+    let begun = TaskRecord::begin(job).and_then(|record| match job.refused() {
+        Some(reason) => Err(reason),
+        None => record.write(place).map(|()| record),
+    });
+    let mut record = match begun {
+        Ok(record) => record,
+        Err(reason) => return Ended::failed(reason),
+    };
+    // A defect of ours in one task is no reason to lose the night.
+    let result = catch_unwind(AssertUnwindSafe(|| job.run(log)));
+    match result.unwrap_or_else(|_| Err("the program has a defect; the log ends where it was met".to_owned())) {
+        Err(reason) => Ended::failed(reason),
+        Ok(Some(reason)) => Ended { state: TaskState::Partial, reason: Some(reason), attempts: 0 },
+        Ok(None) => {
+            record.is_done = true;
+            match record.write(place) {
+                Ok(()) => Ended { state: TaskState::Done, reason: None, attempts: 0 },
+                Err(reason) => Ended::failed(reason),
+            }
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! A surface model that goes on where an earlier run was stopped, in one call.
+
+use std::fs;
+
+use numeric::Progress;
+
+use crate::dsm::{DsmConfig, DsmReport};
+use crate::files::FileError;
+use crate::production::chunk_folder::CHUNKS;
+use crate::production::chunk_run::{ChunkRunConfig, run_chunks};
+use crate::production::error::ProductionError;
+use crate::production::merge_run::{MergeConfig, merge_run};
+use crate::production::plan_file::PlanFile;
+use crate::production::plan_run::plan_run;
+
+/// Plans, computes and merges a surface model in its output folder. A plan of the same
+/// configuration and inputs that is there is gone on with. The results of the chunks are removed
+/// when the surface model is whole.
+///
+/// # Errors
+/// Those of [`plan_run`], [`run_chunks`] and [`merge_run`].
+pub(crate) fn make_or_resume(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, ProductionError> {
+    config.validate()?;
+    let planned = PlanFile::read_current(&config.output);
+    let fits = planned.is_ok_and(|file| file.is_of(config) && file.check_inputs().is_ok());
+    if !(fits && config.overwrite) {
+        plan_run(config, progress)?;
+    }
+    let mut chunks = ChunkRunConfig::new(config.output.clone());
+    (chunks.resume, chunks.threads) = (true, config.threads);
+    run_chunks(&chunks, progress)?;
+    let mut merge = MergeConfig::new(config.output.clone());
+    (merge.overwrite, merge.threads) = (true, config.threads);
+    let report = merge_run(&merge, progress)?.report;
+    if report.chunks.as_ref().is_none_or(|chunks| chunks.failed.is_empty()) {
+        let path = config.output.join(CHUNKS);
+        fs::remove_dir_all(&path).map_err(|source| FileError::Remove { path, source })?;
+    }
+    Ok(report)
+}

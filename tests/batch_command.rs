@@ -1,0 +1,217 @@
+//! `skysweep batch`: scenes that fail do not stop the others, and a batch that is killed again and
+//! again ends with the bytes of one that was left alone.
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use common::{sample, skysweep};
+use numeric::RandomByIndex;
+use serde_json::Value;
+
+/// Files that a complete batch has among others.
+const PRODUCTS: [&str; 11] = [
+    "both/dsm/dsm.tif",
+    "both/dsm/source.tif",
+    "both/dsm/relief.png",
+    "both/used_config.toml",
+    "both/ortho/ortho.tif",
+    "both/ortho/ortho_mask.tif",
+    "both/priors/report.html",
+    "chunks/dsm/dsm.tif",
+    "chunks/dsm/confidence.tif",
+    "chunks/used_config.toml",
+    "chunks/heightmap.tif",
+];
+
+/// A batch file whose results go to `night`: two scenes that can be computed and three that
+/// cannot.
+fn batch_file(folder: &Path) -> PathBuf {
+    let town = sample("");
+    let file = folder.join("batch.toml");
+    let text = format!(
+        "output = 'night'\n\
+         [limits]\nparallel = 2\nthreads = 2\n\
+         [defaults]\ntasks = ['dsm']\ndsm = {{ gsd_m = 2.0, preset = 'fast' }}\n\
+         [[scene]]\nname = 'both'\nimages = ['{town}/view_[13].tif']\ntasks = ['dsm', 'ortho', 'eval', 'priors']\n\
+         eval.reference = '{town}/truth/dsm.tif'\npriors = {{ model = '{town}/truth/buildings.city.json' }}\n\
+         [[scene]]\nname = 'no_rpc'\nimages = ['{town}/view_1.tif', 'plain.png']\ntasks = ['dsm', 'ortho']\n\
+         [[scene]]\nname = 'corrupt'\nimages = ['{town}/view_1.tif', 'corrupt.tif']\n\
+         [[scene]]\nname = 'apart'\nimages = ['{town}/view_1.tif', 'far.tif']\n\
+         [[scene]]\nname = 'chunks'\nimages = ['{town}/view_1.tif', '{town}/view_3.tif']\ntasks = ['heightmap', 'dsm']\n\
+         dsm.chunk = 128\nheightmap.stand = {{ source = {{ position = {{ lon_deg = 5.4, lat_deg = 43.53 }} }} }}\n",
+        town = town.display()
+    );
+    std::fs::write(&file, text).unwrap();
+    file
+}
+
+/// Writes the images that cannot be used.
+fn bad_images(folder: &Path) {
+    io::raster::write_png_gray(folder.join("plain.png"), &raster::Grid::filled(64, 64, 7), false).unwrap();
+    let bytes = std::fs::read(sample("view_2.tif")).unwrap();
+    std::fs::write(folder.join("corrupt.tif"), &bytes[..bytes.len() / 2]).unwrap();
+    let mut rpc = io::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
+    rpc.long_off += 0.5;
+    let pixels = raster::Grid::filled(722, 752, 100u16);
+    let bands = [io::raster::Band { description: "pan", data: io::raster::BandData::U16(&pixels) }];
+    io::raster::write_image_with_rpc(folder.join("far.tif"), &bands, &rpc, None, false).unwrap();
+}
+
+/// Runs a batch to its end and returns its report.
+#[track_caller]
+fn run(file: &Path, code: i32) -> Value {
+    let assert = skysweep().arg("batch").arg(file).args(["-q", "--json"]).assert().code(code);
+    serde_json::from_slice(&assert.get_output().stdout).unwrap()
+}
+
+/// State and reason of the tasks of a report: (scene, task, state, reason).
+fn states(report: &Value) -> Vec<(String, String, String, String)> {
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let scenes = report["scenes"].as_array().unwrap().iter();
+    let of_scene = |scene: &Value| -> Vec<_> {
+        let tasks = scene["tasks"].as_array().unwrap().iter();
+        let state =
+            |task: &Value| (text(&scene["name"]), text(&task["task"]), text(&task["state"]), text(&task["reason"]));
+        tasks.map(state).collect()
+    };
+    scenes.flat_map(of_scene).collect()
+}
+
+/// Names and contents of all files of a batch but those that hold times.
+fn products(output: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![output.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            // A height map names the state of its source's file.
+            let has_times = name.contains("report.") || name == "plan.json" || name == "heightmap.tif";
+            if path.is_dir() && name != "tasks" {
+                folders.push(path);
+            } else if path.is_file() && !has_times {
+                let inside = path.strip_prefix(output).unwrap().to_owned();
+                found.insert(inside, std::fs::read(path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+/// Names of files and folders that a killed run could have left.
+fn temporary(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            found.extend(temporary(&path));
+        }
+        if name.starts_with('.') || name.ends_with(".partial") || name == "chunks" && path.join("0000").exists() {
+            found.push(path);
+        }
+    }
+    found
+}
+
+#[test]
+fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    bad_images(folder.path());
+    let file = batch_file(folder.path());
+    let report = run(&file, 1);
+    let expected = [
+        ("both", "dsm", "done", ""),
+        ("both", "ortho", "done", ""),
+        ("both", "eval", "done", ""),
+        ("both", "priors", "done", ""),
+        ("no_rpc", "dsm", "failed", "no usable RPC"),
+        ("no_rpc", "ortho", "not_begun", "no surface model"),
+        ("corrupt", "dsm", "failed", "corrupt.tif"),
+        ("apart", "dsm", "failed", "share no ground"),
+        ("chunks", "dsm", "done", ""),
+        ("chunks", "heightmap", "done", ""),
+    ];
+    let check = |report: &Value| {
+        let states = states(report);
+        assert_eq!(states.len(), expected.len(), "{report}");
+        for ((scene, task, state, reason), wanted) in states.iter().zip(expected) {
+            let is_state = state == wanted.2 || wanted.2 == "done" && state == "done_before";
+            assert!(
+                (scene.as_str(), task.as_str()) == (wanted.0, wanted.1) && is_state,
+                "{scene} {task} {state}: {reason}"
+            );
+            assert!(reason.contains(wanted.3), "{scene} {task}: {reason}");
+        }
+    };
+    check(&report);
+    let night = folder.path().join("night");
+    let expected_bytes = products(&night);
+    assert!(PRODUCTS.iter().all(|name| night.join(name).is_file()));
+    assert!(night.join("both/eval/report.html").is_file() && night.join("both/tasks/dsm.jsonl").is_file());
+    let page = std::fs::read_to_string(night.join("batch_report.html")).unwrap();
+    assert!(page.contains("share no ground"), "{page}");
+    // Once more: what is complete is left alone.
+    let again = run(&file, 1);
+    assert_eq!(states(&again).iter().filter(|state| state.2 == "done_before").count(), 6, "{again}");
+
+    std::fs::remove_dir_all(&night).unwrap();
+    let moments = RandomByIndex::new(18, 1);
+    for kill in 0..8 {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin("skysweep"));
+        let mut batch =
+            command.arg("batch").arg(&file).arg("-q").stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+        // The result does not depend on the moment.
+        std::thread::sleep(Duration::from_millis(20 + (900.0 * moments.uniform(kill)) as u64));
+        // It may have ended by itself.
+        let _ = batch.kill();
+        batch.wait().unwrap();
+    }
+    let report = run(&file, 1);
+    check(&report);
+    let found = products(&night);
+    let other: Vec<_> =
+        expected_bytes.iter().filter(|(name, bytes)| found.get(*name) != Some(bytes)).map(|(name, _)| name).collect();
+    assert!(other.is_empty() && found.len() == expected_bytes.len(), "other bytes: {other:?}");
+    assert!(temporary(&night).is_empty(), "{:?}", temporary(&night));
+    // A changed setting is noticed, in its scene only.
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("dsm.chunk = 128", "dsm.chunk = 150")).unwrap();
+    let report = run(&file, 1);
+    let states = states(&report);
+    let of = |scene: &str, task: &str| states.iter().find(|s| s.0 == scene && s.1 == task).unwrap().2.clone();
+    assert_eq!([of("both", "dsm"), of("chunks", "dsm")], ["done_before", "done"]);
+}
+
+#[test]
+fn batch_files_are_checked_before_anything_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("batch.toml");
+    let scene = "output = 'out'\n[[scene]]\nname = 'a'\nimages = ['a.tif', 'b.tif']\n";
+    for (text, words) in [
+        ("output = 'out'\n".to_owned(), "the batch has no scene"),
+        (scene.replace("images", "image"), "unknown key `image` (line 4); did you mean `images`?"),
+        (scene.replace("output = 'out'\n", ""), "no folder for its results"),
+        (scene.replace("'a'\n", "'../a'\n"), "cannot be the name of a folder"),
+        (format!("{scene}[[scene]]\nname = 'a'\nimages = []\n"), "two scenes have the name"),
+        (format!("{scene}tasks = ['dem']\n"), "known are dsm, ortho, eval, heightmap, priors"),
+        (format!("{scene}dsm.gsd = 1\n"), "unknown key `gsd`; did you mean `gsd_m`?"),
+        (format!("{scene}tasks = ['eval']\n"), "`reference` is missing"),
+        (format!("{scene}dsm.output = 'x'\n"), "`output` is set by the batch itself"),
+        (format!("{scene}dsm.preset = 'slow'\n"), "unknown variant `slow`"),
+        (format!("limits.parallel = 0\n{scene}"), "the limit `parallel` is 0"),
+    ] {
+        std::fs::write(&file, &text).unwrap();
+        let assert = skysweep().arg("batch").arg(&file).assert().code(2);
+        let told = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert!(told.contains(words), "{text}: {told}");
+        assert!(!folder.path().join("out").exists());
+    }
+    let template = skysweep().args(["template", "batch"]).output().unwrap().stdout;
+    std::fs::write(&file, template).unwrap();
+    let report = run(&file, 1);
+    let reasons = states(&report).into_iter().map(|state| state.3).collect::<Vec<_>>();
+    assert!(reasons[0].contains("no file matches the pattern"), "{reasons:?}");
+}
