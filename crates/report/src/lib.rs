@@ -4,7 +4,8 @@
 //! the terminal, JSON, and one HTML file that needs no network, no script and no other file.
 //! [`Chart`] draws plots as SVG, inside a page or as files of their own. A [`PriorsReport`]
 //! presents the priors of a city model, a [`SatellitePriorsReport`] those of satellite images.
-//! A [`BatchPage`] lists what became of a batch. [`depth_preview`], [`height_preview`] and [`normal_preview`] are their pictures.
+//! [`depth_preview`], [`height_preview`] and [`normal_preview`] are their pictures. A [`BatchPage`]
+//! lists what became of a batch.
 //!
 //! This crate touches no file. Everything is returned as text or bytes, the same for the same
 //! input.

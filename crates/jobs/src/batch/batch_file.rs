@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use crate::batch::error::BatchError;
-use crate::batch::task::TaskKind;
+use crate::batch::task::{TaskKind, TaskSettings};
 use crate::dsm::MapBounds;
 use crate::files::read_text;
 use crate::job_file;
@@ -99,15 +99,6 @@ pub struct BatchScene {
     /// Settings of the priors that differ from the defaults.
     #[serde(default)]
     pub priors: Table,
-}
-
-/// Settings of one task: the defaults' and the scene's own.
-#[derive(Debug, Clone, Copy)]
-pub struct TaskSettings<'a> {
-    /// Settings of all scenes.
-    pub defaults: &'a Table,
-    /// Settings of this scene, which go before.
-    pub own: &'a Table,
 }
 
 impl BatchConfig {

@@ -14,11 +14,11 @@ mod task;
 mod task_log;
 mod tasks_of_scene;
 
-pub use batch_file::{BatchConfig, BatchDefaults, BatchLimits, BatchScene, TaskSettings, read_batch};
+pub use batch_file::{BatchConfig, BatchDefaults, BatchLimits, BatchScene, read_batch};
 pub use batch_report::{BatchReport, SceneReport, TaskReport, TaskState};
 pub use error::BatchError;
 pub use run::run;
-pub use task::TaskKind;
+pub use task::{TaskKind, TaskSettings};
 
 /// A commented batch file with every key.
 pub const BATCH_TEMPLATE: &str = include_str!("batch.toml");

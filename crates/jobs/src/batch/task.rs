@@ -8,7 +8,6 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use crate::batch::batch_file::TaskSettings;
 use crate::camera_stand::{StandConfig, StandSource};
 use crate::dsm::{DsmConfig, MapBounds};
 use crate::error_text::with_causes;
@@ -83,6 +82,15 @@ impl TaskKind {
             Self::Priors => &["model", "transform", "corrections"],
         }
     }
+}
+
+/// Settings of one task: the defaults' and the scene's own.
+#[derive(Debug, Clone, Copy)]
+pub struct TaskSettings<'a> {
+    /// Settings of all scenes.
+    pub defaults: &'a Table,
+    /// Settings of this scene, which go before.
+    pub own: &'a Table,
 }
 
 /// The scene that a task works on.
