@@ -37,6 +37,7 @@ fn batch_file(folder: &Path) -> PathBuf {
          [limits]\nparallel = 2\nthreads = 2\n\
          [defaults]\ntasks = ['dsm']\ndsm = {{ gsd_m = 2.0, preset = 'fast' }}\n\
          [[scene]]\nname = 'both'\nimages = ['{town}/view_[13].tif']\ntasks = ['dsm', 'ortho', 'eval', 'priors']\n\
+         area = {{ file = 'areas.geojson', name = 'middle' }}\n\
          eval.reference = '{town}/truth/dsm.tif'\npriors = {{ model = '{town}/truth/buildings.city.json' }}\n\
          [[scene]]\nname = 'no_rpc'\nimages = ['{town}/view_1.tif', 'plain.png']\ntasks = ['dsm', 'ortho']\n\
          [[scene]]\nname = 'corrupt'\nimages = ['{town}/view_1.tif', 'corrupt.tif']\n\
@@ -49,8 +50,13 @@ fn batch_file(folder: &Path) -> PathBuf {
     file
 }
 
-/// Writes the images that cannot be used.
-fn bad_images(folder: &Path) {
+/// Writes the images that cannot be used, and the area of a scene.
+fn inputs(folder: &Path) {
+    let polygon = "[[[5.398,43.528],[5.402,43.528],[5.402,43.531],[5.398,43.531],[5.398,43.528]]]";
+    let geometry = format!("{{\"type\":\"Polygon\",\"coordinates\":{polygon}}}");
+    let feature = format!("{{\"type\":\"Feature\",\"properties\":{{\"name\":\"middle\"}},\"geometry\":{geometry}}}");
+    let areas = format!("{{\"type\":\"FeatureCollection\",\"features\":[{feature}]}}");
+    std::fs::write(folder.join("areas.geojson"), areas).unwrap();
     io::raster::write_png_gray(folder.join("plain.png"), &raster::Grid::filled(64, 64, 7), false).unwrap();
     let bytes = std::fs::read(sample("view_2.tif")).unwrap();
     std::fs::write(folder.join("corrupt.tif"), &bytes[..bytes.len() / 2]).unwrap();
@@ -119,7 +125,7 @@ fn temporary(folder: &Path) -> Vec<PathBuf> {
 #[test]
 fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
     let folder = tempfile::tempdir().unwrap();
-    bad_images(folder.path());
+    inputs(folder.path());
     let file = batch_file(folder.path());
     let report = run(&file, 1);
     let expected = [
@@ -153,6 +159,11 @@ fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
     assert!(night.join("both/eval/report.html").is_file() && night.join("both/tasks/dsm.jsonl").is_file());
     let page = std::fs::read_to_string(night.join("batch_report.html")).unwrap();
     assert!(page.contains("share no ground"), "{page}");
+    // The corner of the area. A polygon of longitudes and latitudes is not level on the map.
+    let dsm = io::raster::read_dem(night.join("both/dsm/dsm.tif")).unwrap();
+    let corner = crs::MapProjection::from_epsg(32631).unwrap().map_from_lonlat(5.398, 43.531).unwrap();
+    let (x, y) = dsm.geotransform.map_from_cell(-0.5, -0.5);
+    assert!((x - corner.x).abs() < 15.0 && (y - corner.y).abs() < 15.0, "{x} {y} {corner:?}");
     // Once more: what is complete is left alone.
     let again = run(&file, 1);
     assert_eq!(states(&again).iter().filter(|state| state.2 == "done_before").count(), 6, "{again}");

@@ -5,6 +5,7 @@
 //! refuse to replace a file unless `overwrite` is set, and a file appears under its name only when
 //! it is complete ([`atomic`]).
 
+pub mod areas;
 pub mod atomic;
 pub mod camera_file;
 pub mod citymodel;

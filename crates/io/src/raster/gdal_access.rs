@@ -10,7 +10,7 @@
 
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::null_mut;
-use std::sync::OnceLock;
+use std::sync::{Once, OnceLock};
 
 use gdal::errors::GdalError;
 use gdal::{Driver, DriverManager};
@@ -32,18 +32,20 @@ pub(super) const GUARDED_FILE_SYSTEM: &str = "/vsicurl/";
 /// File systems that [`VSIGetFileSystemsPrefixes`](gdal_sys::VSIGetFileSystemsPrefixes) leaves out.
 const UNLISTED_FILE_SYSTEMS: [&str; 2] = ["/vsicurl?", "/vsicurl_streaming/"];
 
-/// GDAL's driver of rasters in memory, which is not registered: a registered one opens names that
-/// hold an address in memory.
-struct MemoryDriver(gdal_sys::GDALDriverH);
+/// A driver of GDAL that is kept beside the registered ones. The driver of rasters in memory would
+/// open names that hold an address in memory. That of GeoPackages opens databases, and is registered
+/// when the user gives one.
+struct KeptDriver(gdal_sys::GDALDriverH);
 
 // SAFETY: the pointer is to a driver of GDAL, which lives until the end of the process (drivers are
 // freed with the manager only, which this crate never destroys), and `Create` of the MEM driver
 // touches no state of the driver.
-unsafe impl Send for MemoryDriver {}
+unsafe impl Send for KeptDriver {}
 // SAFETY: as for `Send`: all threads may read the pointer, and the driver behind it is not changed.
-unsafe impl Sync for MemoryDriver {}
+unsafe impl Sync for KeptDriver {}
 
-static MEMORY: OnceLock<MemoryDriver> = OnceLock::new();
+static MEMORY: OnceLock<KeptDriver> = OnceLock::new();
+static GEOPACKAGE: OnceLock<KeptDriver> = OnceLock::new();
 
 /// Whether a path as the user wrote it is in one of GDAL's file systems for local files, and leads
 /// through no other one.
@@ -55,11 +57,13 @@ pub(super) fn is_local_file_system(name: &str) -> bool {
 /// Removes all drivers and file systems that are not listed. To be called once, after the drivers
 /// are registered.
 pub(super) fn restrict() {
-    if let Ok(memory) = DriverManager::get_driver_by_name("MEM") {
-        // SAFETY: the function only reads the pointer that the driver holds, and the driver is one
-        // that GDAL registered.
-        let handle = unsafe { memory.c_driver() };
-        MEMORY.get_or_init(|| MemoryDriver(handle));
+    for (name, place) in [("MEM", &MEMORY), ("GPKG", &GEOPACKAGE)] {
+        if let Ok(driver) = DriverManager::get_driver_by_name(name) {
+            // SAFETY: the function only reads the pointer that the driver holds, and the driver is
+            // one that GDAL registered.
+            let handle = unsafe { driver.c_driver() };
+            place.get_or_init(|| KeptDriver(handle));
+        }
     }
     let drivers = (0..DriverManager::count()).filter_map(|index| DriverManager::get_driver(index).ok());
     let strange: Vec<Driver> =
@@ -71,6 +75,18 @@ pub(super) fn restrict() {
             close_file_system(&prefix);
         }
     }
+}
+
+/// Registers GDAL's driver of GeoPackages for the rest of the process, where GDAL was built with it.
+/// To be called for a file that the user names, after [`restrict`].
+pub(crate) fn register_geopackage() {
+    static REGISTERED: Once = Once::new();
+    REGISTERED.call_once(|| {
+        if let Some(driver) = GEOPACKAGE.get() {
+            // SAFETY: the pointer came from a driver of GDAL, which is never freed.
+            DriverManager::register_driver(&unsafe { Driver::from_c_driver(driver.0) });
+        }
+    });
 }
 
 /// Returns GDAL's driver of rasters in memory.

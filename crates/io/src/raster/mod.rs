@@ -37,4 +37,5 @@ pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use tile::{BandScale, MapTile, write_map_tile};
 
+pub(crate) use gdal_access::register_geopackage;
 pub(crate) use gdal_setup::{open_address, prepare_gdal, with_gdal};

@@ -82,6 +82,8 @@ pub struct BatchScene {
     pub images: Vec<String>,
     /// Area of the surface model, in its CRS.
     pub bounds: Option<MapBounds>,
+    /// Area of the surface model: a polygon of a layer, in place of bounds.
+    pub area: Option<SceneArea>,
     /// What is to be made; the defaults' when `None`.
     pub tasks: Option<Vec<String>>,
     /// Settings of the surface model that differ from the defaults.
@@ -99,6 +101,26 @@ pub struct BatchScene {
     /// Settings of the priors that differ from the defaults.
     #[serde(default)]
     pub priors: Table,
+}
+
+/// A polygon of a layer.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct SceneArea {
+    /// GeoPackage or GeoJSON.
+    pub file: PathBuf,
+    /// Layer; the only one when `None`.
+    pub layer: Option<String>,
+    /// Field that holds the names of the polygons.
+    #[serde(default = "name_field")]
+    pub field: String,
+    /// Name of the polygon; the scene's when `None`.
+    pub name: Option<String>,
+}
+
+fn name_field() -> String {
+    "name".to_owned()
 }
 
 impl BatchConfig {
@@ -171,5 +193,8 @@ pub fn read_batch(path: &Path) -> Result<BatchConfig, BatchError> {
     batch.validate(path)?;
     path.parent().unwrap_or(Path::new("")).clone_into(&mut batch.folder);
     batch.output = resolved(&batch.output, &batch.folder);
+    for area in batch.scenes.iter_mut().filter_map(|scene| scene.area.as_mut()) {
+        area.file = resolved(&area.file, &batch.folder);
+    }
     Ok(batch)
 }

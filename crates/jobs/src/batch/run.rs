@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use numeric::Progress;
 
+use crate::batch::area::set_area;
 use crate::batch::batch_file::{BatchConfig, BatchScene};
 use crate::batch::batch_report::{BatchReport, SceneReport};
 use crate::batch::error::BatchError;
@@ -70,8 +71,8 @@ fn take_next<'a>(next: &AtomicUsize, scenes: &'a [SceneJobs]) -> Option<(usize, 
     scenes.get(at).map(|scene| (at, scene))
 }
 
-/// Makes the jobs of a scene. Settings that are wrong stop the batch, images that are missing do
-/// not.
+/// Makes the jobs of a scene. Settings that are wrong stop the batch. Images and areas that are
+/// missing do not.
 fn prepare(batch: &BatchConfig, scene: &BatchScene) -> Result<SceneJobs, BatchError> {
     let tasks = batch.tasks(scene)?;
     let folder = batch.output.join(&scene.name);
@@ -83,16 +84,20 @@ fn prepare(batch: &BatchConfig, scene: &BatchScene) -> Result<SceneJobs, BatchEr
         has_surface: tasks.contains(&TaskKind::Dsm),
         bounds: scene.bounds,
     };
+    let mut fault = images.as_ref().err().cloned();
     let mut jobs = Vec::with_capacity(tasks.len());
     for &task in &tasks {
-        let job = TaskJob::new(task, batch.settings(scene, task), &place).map_err(|what| BatchError::Settings {
+        let mut job = TaskJob::new(task, batch.settings(scene, task), &place).map_err(|what| BatchError::Settings {
             scene: scene.name.clone(),
             task: task.name().to_owned(),
             what,
         })?;
+        if let (TaskJob::Dsm(config), Some(area)) = (&mut job, &scene.area) {
+            fault = fault.or(set_area(config, area, &scene.name).err());
+        }
         jobs.push(job.limited(memory_mb(batch)));
     }
-    Ok(SceneJobs { name: scene.name.clone(), folder, tasks, jobs: images.map(|_| jobs) })
+    Ok(SceneJobs { name: scene.name.clone(), folder, tasks, jobs: fault.map_or(Ok(jobs), Err) })
 }
 
 /// Returns the memory that one surface model may take, megabytes.

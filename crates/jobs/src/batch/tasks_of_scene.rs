@@ -59,7 +59,7 @@ impl SceneJobs {
             Err(reason) => {
                 let failed = |(i, task): (usize, &TaskKind)| match i {
                     0 => TaskReport { state: TaskState::Failed, ..TaskReport::not_begun(*task, reason) },
-                    _ => TaskReport::not_begun(*task, "the scene has no images"),
+                    _ => TaskReport::not_begun(*task, "the scene has no images or no area"),
                 };
                 tasks.extend(self.tasks.iter().enumerate().map(failed));
                 limits.progress.warn(&format!("{}: {reason}", self.name));
