@@ -32,8 +32,8 @@ pub(super) const GUARDED_FILE_SYSTEM: &str = "/vsicurl/";
 /// File systems that [`VSIGetFileSystemsPrefixes`](gdal_sys::VSIGetFileSystemsPrefixes) leaves out.
 const UNLISTED_FILE_SYSTEMS: [&str; 2] = ["/vsicurl?", "/vsicurl_streaming/"];
 
-/// A driver of GDAL that is kept beside the registered ones. The driver of rasters in memory would
-/// open names that hold an address in memory. That of GeoPackages opens databases, and is registered
+/// A driver of GDAL that is kept beside the registered ones. That of rasters in memory would open
+/// names that hold an address in memory. That of GeoPackages opens databases, and is registered
 /// when the user gives one.
 struct KeptDriver(gdal_sys::GDALDriverH);
 
@@ -77,8 +77,8 @@ pub(super) fn restrict() {
     }
 }
 
-/// Registers GDAL's driver of GeoPackages for the rest of the process, where GDAL was built with it.
-/// To be called for a file that the user names, after [`restrict`].
+/// Registers GDAL's driver of GeoPackages, where there is one, for the rest of the process. To be
+/// called for a file that the user names, after [`restrict`].
 pub(crate) fn register_geopackage() {
     static REGISTERED: Once = Once::new();
     REGISTERED.call_once(|| {
