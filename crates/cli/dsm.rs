@@ -62,6 +62,12 @@ pub(crate) struct SceneArgs {
     /// the images decide.
     #[arg(long, value_name = "MODEL")]
     prior: Option<PathBuf>,
+    /// Ground control points and check points with their places in the images (CSV, GeoJSON).
+    #[arg(long, value_name = "FILE")]
+    control: Option<PathBuf>,
+    /// Pointing corrections of an earlier run to start from: its pointing.json or report.json.
+    #[arg(long, value_name = "FILE")]
+    corrections: Option<PathBuf>,
     /// What the heights of the DSM are measured from: ellipsoid, egm96, egm2008 or an EPSG code.
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
@@ -147,6 +153,8 @@ impl SceneArgs {
             config.dem.clone_from(&self.dem);
         }
         config.prior = self.prior.clone().or(config.prior);
+        config.control = self.control.clone().or(config.control);
+        config.corrections = self.corrections.clone().or(config.corrections);
         config.preset = self.preset.unwrap_or(config.preset);
         config.fill = self.fill.unwrap_or(config.fill);
         config.pairs = self.pairs.clone().or(config.pairs);

@@ -19,6 +19,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "buildings",
             "dem",
             "prior",
+            "control",
             "corrections",
             "maps",
             "lod",

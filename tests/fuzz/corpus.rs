@@ -20,6 +20,12 @@ const CSV: &str = "id,lon,lat,heading,height_m\ndoor,4.36,52.01,90,12\nroof,4.36
 const GEOJSON: &str = r#"{"type":"FeatureCollection","features":[
 {"type":"Feature","properties":{"id":"a","heading":12.5},"geometry":{"type":"Point","coordinates":[5.4,43.5]}},
 {"type":"Feature","properties":{"name":"b","height_m":20},"geometry":{"type":"Point","coordinates":[5.41,43.5,3]}}]}"#;
+const GROUND_POINTS: &str = "name,x,y,height,crs,accuracy_m,pixel_px,role,image,sample,line\n\
+                             a,691000,4822000,210.5,EPSG:32631+5773,0.1,0.5,control,view_1.tif,120.25,88.5\n\
+                             b,691100,4822100,205,EPSG:32631,0.2,,check,view_2.tif,13,77\n";
+const GROUND_POINTS_JSON: &str = r#"{"type": "FeatureCollection", "features": [{"type": "Feature", "id": "a",
+    "geometry": {"type": "Point", "coordinates": [5.4, 43.5, 200]}, "properties": {"accuracy_m": 0.1,
+    "role": "check", "images": {"view_1.tif": [100, 120.5], "view_2.tif": [90, 131]}}}]}"#;
 const CONTROL: &str = "name,lon,lat,height\nflight_01.png,5.4,43.5,300\nflight_02.png,5.41,43.51,310.5\n";
 const SIMILARITY: &str = r#"{"scale": 1.5, "rotation": [1, 0, 0, 0], "translation": [-690000.0, -5336000.0, 0.0], "vertical_offset_m": 45.2}"#;
 const TRANSFORMS: &str = r#"{"w": 64, "h": 48, "fl_x": 50, "fl_y": 51, "cx": 30, "cy": 25, "k1": 0.1, "p1": 1e-3,
@@ -78,6 +84,8 @@ pub(crate) fn write(home: &Path) -> Vec<Seed> {
     corpus.text(Reader::Positions, "list.csv", CSV);
     corpus.text(Reader::Positions, "list.geojson", GEOJSON);
     corpus.text(Reader::Control, "control.csv", CONTROL);
+    corpus.text(Reader::GroundPoints, "points.csv", GROUND_POINTS);
+    corpus.text(Reader::GroundPoints, "points.geojson", GROUND_POINTS_JSON);
     corpus.text(Reader::Similarity, "similarity.json", SIMILARITY);
     corpus.add(Reader::Npy, &made("gv/depth/panorama.npy"), &[]);
     for name in ["gv/depth/panorama.npy", "gv/mask/panorama.png", "map.tif"] {

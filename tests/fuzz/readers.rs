@@ -28,6 +28,7 @@ pub(crate) enum Reader {
     Transforms,
     Positions,
     Control,
+    GroundPoints,
     Similarity,
     Npy,
     Map,
@@ -39,7 +40,7 @@ pub(crate) enum Reader {
 }
 
 impl Reader {
-    pub(crate) const ALL: [Self; 18] = [
+    pub(crate) const ALL: [Self; 19] = [
         Self::Rpc,
         Self::Image,
         Self::Dem,
@@ -50,6 +51,7 @@ impl Reader {
         Self::Transforms,
         Self::Positions,
         Self::Control,
+        Self::GroundPoints,
         Self::Similarity,
         Self::Npy,
         Self::Map,
@@ -93,6 +95,7 @@ pub(crate) fn call(reader: Reader, path: &Path) -> Outcome {
         Reader::Transforms => whether(io::transforms::read(path, Some([64, 48]))),
         Reader::Positions => whether(io::positions::read_positions(path)),
         Reader::Control => whether(io::control::read(path)),
+        Reader::GroundPoints => whether(io::ground_points::read_ground_points(path)),
         Reader::Similarity => whether(io::similarity::read(path)),
         Reader::Npy => whether(io::npy::read(path)),
         Reader::Map => whether(io::maps::read(path)),

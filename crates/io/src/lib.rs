@@ -11,6 +11,7 @@ pub mod camera_file;
 pub mod citymodel;
 pub mod colmap;
 pub mod control;
+pub mod ground_points;
 mod lines;
 pub mod maps;
 pub mod npy;

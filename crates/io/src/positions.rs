@@ -149,7 +149,7 @@ fn from_csv(text: &str) -> Result<Vec<PositionRow>, String> {
 }
 
 /// Splits a CSV text into records of fields, without empty lines.
-fn records(text: &str) -> Vec<Vec<String>> {
+pub(crate) fn records(text: &str) -> Vec<Vec<String>> {
     let (mut records, mut fields, mut field) = (Vec::new(), Vec::new(), String::new());
     let mut quoted = false;
     let mut characters = text.chars().peekable();

@@ -81,6 +81,10 @@ pub struct DsmConfig {
     pub dem: Option<PathBuf>,
     /// City model whose roofs are expected.
     pub prior: Option<PathBuf>,
+    /// Ground control points and check points with their places in the images (CSV, GeoJSON).
+    pub control: Option<PathBuf>,
+    /// Pointing corrections of an earlier run to start from: its `pointing.json` or its report.
+    pub corrections: Option<PathBuf>,
     /// Whether a CRS may be used far outside its area of use, where its coordinates mean little.
     #[serde(default)]
     pub force_crs: bool,
@@ -136,6 +140,8 @@ impl DsmConfig {
             height_range_m: None,
             dem: None,
             prior: None,
+            control: None,
+            corrections: None,
             force_crs: false,
             vertical: VerticalDatum::Ellipsoid,
             preset: Preset::default(),
@@ -151,9 +157,14 @@ impl DsmConfig {
         }
     }
 
+    /// Returns the inputs beside the images.
+    pub(crate) fn side_inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        [&self.dem, &self.prior, &self.control, &self.corrections].into_iter().flatten()
+    }
+
     /// Replaces every path by what `change` makes of it.
     pub(crate) fn map_paths(&mut self, change: impl Fn(&Path) -> PathBuf) {
-        let others = [&mut self.dem, &mut self.prior].into_iter().flatten();
+        let others = [&mut self.dem, &mut self.prior, &mut self.control, &mut self.corrections].into_iter().flatten();
         for path in self.images.iter_mut().chain([&mut self.output]).chain(others) {
             *path = change(path);
         }

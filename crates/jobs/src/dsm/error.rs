@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use report::plain_number;
 
+use crate::corrections::CorrectionsError;
 use crate::dsm::values::{HeightRange, MapBounds};
 use crate::error::from_steps;
 use crate::files::FileError;
@@ -26,6 +27,8 @@ pub enum DsmSetting {
     HeightRange,
     /// `dem`.
     Dem,
+    /// `control`.
+    Control,
     /// `pairs`.
     Pairs,
     /// `references`.
@@ -47,6 +50,7 @@ impl fmt::Display for DsmSetting {
             Self::Bounds => "the bounds",
             Self::HeightRange => "the height range",
             Self::Dem => "the elevation model",
+            Self::Control => "the file of ground points",
             Self::Pairs => "the list of image pairs",
             Self::References => "the list of reference images",
             Self::Threads => "the number of threads",
@@ -98,6 +102,12 @@ pub enum DsmError {
         /// Cause.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// The ground points cannot be used.
+    #[error(transparent)]
+    Control(#[from] io::ground_points::GroundPointsError),
+    /// The pointing corrections to start from cannot be read.
+    #[error(transparent)]
+    Corrections(#[from] CorrectionsError),
     /// An image cannot be read, or a raster cannot be written.
     #[error("cannot read the image")]
     Image(#[from] io::raster::RasterError),

@@ -27,7 +27,7 @@ impl InputStamps {
     /// RPCs. Addresses have no stamp.
     pub(crate) fn of(config: &DsmConfig) -> Self {
         let beside = config.images.iter().filter(|path| path.is_file()).flat_map(|path| io::rpc::side_files(path));
-        let given = config.images.iter().chain(&config.dem).chain(&config.prior).cloned();
+        let given = config.images.iter().chain(config.side_inputs()).cloned();
         Self(given.chain(beside).filter_map(|path| stamp(&path).map(|stamp| (path, stamp))).collect())
     }
 

@@ -53,6 +53,7 @@ mod chunk_side;
 mod city_prior;
 mod clean_up;
 mod config;
+mod control;
 mod dem;
 mod error;
 mod evidence;
@@ -112,8 +113,8 @@ pub use point::{Pointed, point};
 pub use prior_findings::{BuildingFinding, PriorFindings, ViewVotes};
 pub use rasters::ChunkRasters;
 pub use report::{
-    ChunksReport, CorrectionOrder, DsmReport, FailedChunk, ImagePointing, ImageReport, LeftOut, PairReport,
-    PointingReport, PriorReport, StageTime, SurfaceReport,
+    CheckPointReport, ChunksReport, ControlPointReport, ControlReport, CorrectionOrder, DsmReport, FailedChunk,
+    ImagePointing, ImageReport, LeftOut, PairReport, PointingReport, PriorReport, StageTime, SurfaceReport,
 };
 pub use run::run;
 pub use session::Session;

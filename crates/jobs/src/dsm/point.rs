@@ -3,10 +3,12 @@
 use camera::{ImageCorrection, ImagePoint};
 use numeric::{Choice, upper_median};
 use serde::{Deserialize, Serialize};
-use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, adjust};
+use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Observations, adjust_to_control};
 
+use crate::corrections::Corrections;
 use crate::dsm::character::ImageCharacter;
 use crate::dsm::config::DsmConfig;
+use crate::dsm::control::GroundControl;
 use crate::dsm::dem::dem_heights;
 use crate::dsm::error::DsmError;
 use crate::dsm::evidence::{PairHeight, off_along_sight, warn_of_domains};
@@ -73,10 +75,18 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     session.progress.check_cancelled()?;
     let mut images = opened.images.clone();
     let config = &in_order_of(config, &images);
+    if let Some(path) = &config.corrections {
+        let earlier = Corrections::read(path)?;
+        for image in &mut images {
+            image.camera.correction = earlier.for_image(&image.path, session.progress);
+        }
+    }
     let looked = look(config, &images, session)?;
     check_pictures(&images, &looked)?;
+    let points = GroundControl::read(config.control.as_deref(), &images, &looked)?;
     let (tracks, contradictory) = join_pairs(&looked.ties);
-    let found = adjust(&looked.cameras, &looked.sizes, &tracks, &AdjustConfig::default());
+    let observations = Observations { tracks: &tracks, control: &points.control };
+    let found = adjust_to_control(&looked.cameras, &looked.sizes, observations, &AdjustConfig::default());
     let mut notes = Notes::new(session.progress);
     let is_applied = is_applied(config, &found, &mut notes);
     warn_of_sights(&images, &looked, &found, &mut notes);
@@ -84,6 +94,8 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     if is_applied {
         warn_of_images(&by_image, &mut notes);
     }
+    let mut pointing = PointingReport::new(&found, (tracks.len(), contradictory), is_applied, by_image);
+    pointing.control = points.report(&looked.cameras, &found, is_applied, &mut notes);
     set_cameras(&mut images, session, &looked, is_applied.then_some(&found));
     let FirstLook { geometry, mut useful, ties, characters, is_whole, .. } = looked;
     if is_applied {
@@ -99,7 +111,7 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
         useful,
         pairs,
         ties,
-        pointing: PointingReport::new(&found, (tracks.len(), contradictory), is_applied, by_image),
+        pointing,
         tie_heights: tie_heights(&found),
         corrections: found.corrections,
         dem_heights,

@@ -102,6 +102,49 @@ pub struct PointingReport {
     pub rms_px: f64,
     /// What the tie points show of each image, in the order of the configuration.
     pub images: Vec<ImagePointing>,
+    /// Control points and check points; absent without them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub control: Option<ControlReport>,
+}
+
+/// What ground points with known positions show of the pointing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ControlReport {
+    /// Points that took part in the adjustment.
+    pub control: Vec<ControlPointReport>,
+    /// Points that only measure.
+    pub checks: Vec<CheckPointReport>,
+    /// Number of check points that fewer than two images show.
+    pub unmeasured: usize,
+    /// Horizontal error that nine of ten check points do not exceed, metres; `None` without check
+    /// points.
+    pub ce90_m: Option<f64>,
+    /// Vertical error that nine of ten check points do not exceed, metres; `None` without check
+    /// points.
+    pub le90_m: Option<f64>,
+}
+
+/// A control point after the adjustment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ControlPointReport {
+    /// Name of the point.
+    pub name: String,
+    /// Root mean square residual, in standard deviations of its position and places; NaN when no
+    /// camera sees it.
+    #[serde(with = "null_is_nan")]
+    pub residual: f64,
+}
+
+/// A check point after the adjustment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct CheckPointReport {
+    /// Name of the point.
+    pub name: String,
+    /// Found position minus known position east, north and up, metres.
+    pub error_m: [f64; 3],
 }
 
 /// What the tie points show of the pointing of an image.
@@ -166,6 +209,7 @@ impl PointingReport {
             residual_after_px: found.residual_px.1,
             rms_px: found.rms_px,
             images,
+            control: None,
         }
     }
 }

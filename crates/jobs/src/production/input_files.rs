@@ -55,12 +55,12 @@ impl InputFile {
 }
 
 /// Returns the files of a configuration: images with the files that belong to them, elevation and
-/// city model. Addresses are not among them.
+/// city model, ground points, corrections. Addresses are not among them.
 ///
 /// # Errors
 /// [`ProductionError::File`], [`ProductionError::Dsm`].
 pub(crate) fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, ProductionError> {
-    let mut files: BTreeSet<PathBuf> = config.dem.iter().chain(&config.prior).cloned().collect();
+    let mut files: BTreeSet<PathBuf> = config.side_inputs().cloned().collect();
     for image in &config.images {
         let source = ImageSource::open(image).map_err(crate::dsm::DsmError::from)?;
         files.extend(source.files());

@@ -53,7 +53,7 @@ pub struct Observations<'a> {
 pub struct Adjustment {
     /// Order chosen.
     pub order: ModelOrder,
-    /// Correction of each view.
+    /// Correction of each view, with the one that its camera had.
     pub corrections: Vec<ImageCorrection>,
     /// Robust standard deviation of the residuals before and after the adjustment, pixels.
     pub residual_px: (f64, f64),
@@ -112,7 +112,8 @@ struct Round {
 /// Adjusts the pointing of `cameras` so that the rays of each track meet. `sizes` are the images'
 /// columns and rows.
 ///
-/// Without tracks the corrections are identities.
+/// Corrections that the cameras have are where the search starts, and what the prior holds them to.
+/// Without tracks they stay.
 ///
 /// ```
 /// use sweep::pointing::{AdjustConfig, ModelOrder, adjust};

@@ -82,6 +82,34 @@ fn good_pointing_is_left_alone_and_no_ties_change_nothing() {
     assert!(found.corrections.iter().all(|c| *c == ImageCorrection::IDENTITY));
 }
 
+/// A second adjustment that starts from the first one's corrections has nothing left to do.
+#[test]
+fn an_adjustment_starts_from_the_corrections_that_cameras_have() {
+    let cameras = three_cameras();
+    let tracks = seen(&lattice(), &cameras, |view, p| error(ModelOrder::Drift, view, p));
+    let sizes = [(SIZE, SIZE); 3];
+    let first = adjust(&cameras, &sizes, &tracks, &AdjustConfig::default());
+    assert_eq!(first.order, ModelOrder::Drift);
+    let corrected = |(camera, correction): (&RpcCamera, &ImageCorrection)| RpcCamera {
+        rpc: camera.rpc.clone(),
+        correction: *correction,
+    };
+    let corrected: Vec<RpcCamera> = cameras.iter().zip(&first.corrections).map(corrected).collect();
+    let second = adjust(&corrected, &sizes, &tracks, &AdjustConfig::default());
+    assert_eq!(second.order, ModelOrder::None);
+    assert_eq!(second.corrections, first.corrections);
+    let more = adjust(
+        &corrected,
+        &sizes,
+        &seen(&lattice(), &cameras, |view, p| {
+            let [sample, line] = error(ModelOrder::Drift, view, p);
+            [sample + 2.0 * view as f64, line]
+        }),
+        &AdjustConfig::default(),
+    );
+    assert!(more.order > ModelOrder::None && more.residual_px.1 < 0.2, "{:?}", more.residual_px);
+}
+
 /// Errors of each kind, with noise of a fifth of a pixel: shifts, drifts along the lines, and
 /// changes along the samples.
 fn error(kind: ModelOrder, view: usize, p: ImagePoint) -> [f64; 2] {

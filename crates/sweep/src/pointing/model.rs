@@ -48,7 +48,8 @@ impl ModelOrder {
     }
 }
 
-/// Returns the cameras with the corrections of the parameters.
+/// Returns the cameras with the corrections of the parameters, which follow the ones that the
+/// cameras have.
 pub(super) fn corrected(
     cameras: &[RpcCamera],
     sizes: &[(usize, usize)],
@@ -57,13 +58,15 @@ pub(super) fn corrected(
 ) -> Vec<RpcCamera> {
     let one = |((c, size), p): ((&RpcCamera, &(usize, usize)), &Parameters)| {
         let (centre, half) = frame(*size);
+        let found = ImageCorrection {
+            translation_px: [p[0], p[1]],
+            linear: [[p[2] / half, p[3] / half], [p[4] / half, p[5] / half]],
+            centre,
+        };
         let correction = match order {
-            ModelOrder::None => ImageCorrection::IDENTITY,
-            _ => ImageCorrection {
-                translation_px: [p[0], p[1]],
-                linear: [[p[2] / half, p[3] / half], [p[4] / half, p[5] / half]],
-                centre,
-            },
+            ModelOrder::None => c.correction,
+            _ if c.correction == ImageCorrection::IDENTITY => found,
+            _ => c.correction.then(&found),
         };
         RpcCamera { rpc: c.rpc.clone(), correction }
     };
