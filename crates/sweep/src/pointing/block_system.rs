@@ -3,7 +3,8 @@
 //! A block of the matrix exists where two views share a track. The system is solved by Cholesky's
 //! method on blocks. The view with the fewest neighbours is eliminated first (minimum degree),
 //! which keeps the number of new blocks small: the cost of a strip of images grows with its length,
-//! and not with its cube. Sums are formed in a fixed order, so that the result has the same bytes always.
+//! and not with its cube. Sums are formed in a fixed order, so that the result has the same bytes
+//! always.
 
 use std::collections::{BTreeMap, BTreeSet};
 
