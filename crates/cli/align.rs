@@ -12,7 +12,7 @@ use jobs::align::{AlignJobConfig, AlignJobError, AlignJobReport};
 use crate::corrections::code_of;
 use crate::error::with_hint;
 use crate::options::{Named, named};
-use crate::progress::ShowOptions;
+use crate::progress::WriteOptions;
 use crate::{Global, Outcome};
 
 /// Arguments of `skysweep align`.
@@ -52,11 +52,8 @@ pub(crate) struct Args {
     /// Exit with 1 when the root mean square residual is above this, metres.
     #[arg(long, value_name = "METRES")]
     max_rmse: Option<f64>,
-    /// Replace files that exist.
-    #[arg(long)]
-    overwrite: bool,
     #[command(flatten)]
-    show: ShowOptions,
+    write: WriteOptions,
 }
 
 const ENCODINGS: [Named<ColmapEncoding>; 2] =
@@ -88,7 +85,7 @@ struct NoiseArgs {
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args)?;
     let report =
-        args.show.watch(global, &args.output, |watcher| jobs::align::run(&config, watcher)).map_err(|error| {
+        args.write.show.watch(global, &args.output, |watcher| jobs::align::run(&config, watcher)).map_err(|error| {
             let hint = match &error {
                 AlignJobError::Threshold { .. } => Some("give --threshold a number of metres above 0"),
                 AlignJobError::UnknownMap => Some("give the map of the positions with --crs"),
@@ -97,7 +94,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
             };
             with_hint(error, hint)
         })?;
-    args.show.print(global, &report, || report.text(&args.output))?;
+    args.write.show.print(global, &report, || report.text(&args.output))?;
     Ok(outcome(args, &report))
 }
 
@@ -116,7 +113,7 @@ fn config(args: &Args) -> anyhow::Result<AlignJobConfig> {
         seeds: args.noise.noise_seeds,
     });
     config.noise_output.clone_from(&args.noise.noise_output);
-    config.overwrite = args.overwrite;
+    config.overwrite = args.write.overwrite;
     Ok(config)
 }
 

@@ -11,7 +11,7 @@ use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityJobError, Cit
 
 use crate::error::with_hint;
 use crate::options::{Named, named};
-use crate::progress::ShowOptions;
+use crate::progress::WriteOptions;
 use crate::{Global, Outcome};
 
 /// The commands of `skysweep city`.
@@ -42,17 +42,14 @@ struct Input {
     /// parts that overlap (codes 306, 4xx, 5xx, 601).
     #[arg(long, value_name = "REPORT.json")]
     report: Option<PathBuf>,
-    /// Replace files that exist.
-    #[arg(long)]
-    overwrite: bool,
+    #[command(flatten)]
+    write: WriteOptions,
 }
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct InfoArgs {
     #[command(flatten)]
     input: Input,
-    #[command(flatten)]
-    show: ShowOptions,
 }
 
 #[derive(Debug, clap::Args)]
@@ -65,8 +62,6 @@ pub(crate) struct ConvertArgs {
     /// Format to write [default: by the ending of OUT: .obj, .ply, .glb, .geojson or .json].
     #[arg(long, value_parser = named(&FORMATS))]
     format: Option<CityOutputFormat>,
-    #[command(flatten)]
-    show: ShowOptions,
 }
 
 const FORMATS: [Named<CityOutputFormat>; 5] = [
@@ -89,10 +84,11 @@ fn info(args: &InfoArgs, global: Global) -> anyhow::Result<Outcome> {
     let mut config = CityInfoConfig::new(args.input.file.clone());
     args.input.set(&mut config.input);
     let file = &args.input.file;
-    let summary = args.show.watch(global, file, |watcher| jobs::city::info(&config, watcher)).map_err(hinted)?;
+    let summary =
+        args.input.write.show.watch(global, file, |watcher| jobs::city::info(&config, watcher)).map_err(hinted)?;
     tell(&summary);
     // The text is the only result.
-    args.show.print(Global { quiet: false, ..global }, &summary, || summary.text())?;
+    args.input.write.show.print(Global { quiet: false, ..global }, &summary, || summary.text())?;
     Ok(outcome(&summary))
 }
 
@@ -101,8 +97,9 @@ fn convert(args: &ConvertArgs, global: Global) -> anyhow::Result<Outcome> {
     args.input.set(&mut config.input);
     config.format = args.format;
     let output = &args.output;
-    let report = args.show.watch(global, output, |watcher| jobs::city::convert(&config, watcher)).map_err(hinted)?;
-    args.show.print(global, &report, String::new)?;
+    let report =
+        args.input.write.show.watch(global, output, |watcher| jobs::city::convert(&config, watcher)).map_err(hinted)?;
+    args.input.write.show.print(global, &report, String::new)?;
     tell(&report.summary);
     Ok(outcome(&report.summary))
 }
@@ -112,7 +109,7 @@ impl Input {
         input.lod = self.lod;
         input.all_objects = self.all_objects;
         input.account = self.report.clone();
-        input.overwrite = self.overwrite;
+        input.overwrite = self.write.overwrite;
     }
 }
 

@@ -19,7 +19,7 @@ use numeric::Progress;
 use crate::error::{OVERWRITE, with_hint};
 use crate::options::{Named, named};
 use crate::progress::ShowOptions;
-use crate::{Global, Outcome, print};
+use crate::{Global, Outcome};
 
 /// Arguments of `skysweep eval`.
 #[derive(Debug, clap::Args)]
@@ -215,17 +215,12 @@ fn requirements(args: &Args) -> EvalRequirements {
 /// Compares height grids and returns the requirements that were missed.
 fn grids(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     let report = watch(args, global, |watcher| jobs::eval::compare_grids(&grid_config(args), watcher))?;
-    if args.show.json {
-        print::json(&report)?;
-    } else {
-        print::text(&report.table())?;
-        if !global.is_quiet() {
-            let has_none = report.report_page.is_none() && report.report_failure.is_none();
-            let is_news = has_none && args.html.is_none() && !args.no_report;
-            let hint = "report     none; -o DIR writes one (page, JSON, error map)\n";
-            print::text(&(report.files() + if is_news { hint } else { "" }))?;
-        }
-    }
+    let has_none = report.report_page.is_none() && report.report_failure.is_none();
+    let is_news = has_none && args.html.is_none() && !args.no_report;
+    let hint = if is_news { "report     none; -o DIR writes one (page, JSON, error map)\n" } else { "" };
+    let files = if global.is_quiet() { String::new() } else { report.files() + hint };
+    // The table is the result, and no message.
+    args.show.print(Global { quiet: false, ..global }, &report, || report.table() + &files)?;
     Ok(report.missed().to_vec())
 }
 
@@ -262,14 +257,9 @@ fn grid_config(args: &Args) -> GridEvalConfig {
 fn surfaces(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     refuse_grid_options(args, "surfaces")?;
     let report = watch(args, global, |watcher| jobs::eval::evaluate_surfaces(&surface_config(args), watcher))?;
-    if args.show.json {
-        print::json(&report)?;
-    } else {
-        print::text(&report.table())?;
-        if let (Some(path), false) = (&report.written, global.is_quiet()) {
-            print::text(&format!("report     {}\n", path.display()))?;
-        }
-    }
+    let written = report.written.as_ref().filter(|_| !global.is_quiet());
+    let files = written.map(|path| format!("report     {}\n", path.display())).unwrap_or_default();
+    args.show.print(Global { quiet: false, ..global }, &report, || report.table() + &files)?;
     Ok(report.missed().to_vec())
 }
 

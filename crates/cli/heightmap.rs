@@ -20,9 +20,9 @@ use jobs::heightmap::{
 use crate::corrections::code_of;
 use crate::error::{OVERWRITE, with_hint};
 use crate::options::{Named, named};
-use crate::progress::{Log, RunOptions};
+use crate::progress::{RunOptions, WriteOptions};
 use crate::stand::StandArgs;
-use crate::{Global, Outcome, print};
+use crate::{Global, Outcome};
 
 /// Failed rows that are printed one by one.
 const SHOWN: usize = 20;
@@ -78,12 +78,8 @@ struct UnprojectArgs {
     /// alike.
     #[arg(long, value_name = "METRES", requires = "splats")]
     merge: Option<f64>,
-    /// Replace a file that exists.
-    #[arg(long)]
-    overwrite: bool,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    write: WriteOptions,
 }
 
 /// `--frame`.
@@ -207,9 +203,11 @@ fn unproject(args: &UnprojectArgs, global: Global) -> anyhow::Result<Outcome> {
     config.splats = args.splats;
     config.picture = args.picture.clone();
     config.merge_m = args.merge;
-    config.overwrite = args.overwrite;
-    let report = jobs::heightmap::unproject(&config, &Log).map_err(hinted)?;
-    print::report(args.json, !global.is_quiet(), &report, || report.text())?;
+    config.overwrite = args.write.overwrite;
+    let show = args.write.show;
+    let report = show.watch(global, &args.output, |watcher| jobs::heightmap::unproject(&config, watcher));
+    let report = report.map_err(hinted)?;
+    show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 

@@ -65,6 +65,16 @@ impl ShowOptions {
     }
 }
 
+/// What becomes of earlier outputs, and what a command shows.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(crate) struct WriteOptions {
+    /// Replace files that exist.
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    #[command(flatten)]
+    pub(crate) show: ShowOptions,
+}
+
 /// How a job runs, what becomes of earlier outputs, and what it shows.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(crate) struct RunOptions {

@@ -12,8 +12,8 @@ use splats::DivisionConfig;
 use crate::corrections::corrections_of;
 use crate::error::with_hint;
 use crate::options::{Named, named};
-use crate::progress::{Log, ShowOptions};
-use crate::{Global, Outcome, print};
+use crate::progress::WriteOptions;
+use crate::{Global, Outcome};
 
 /// Arguments of `skysweep splats`.
 #[derive(Debug, clap::Args)]
@@ -85,12 +85,8 @@ struct MakeArgs {
     /// Write the splats as each image sees them to this folder (IMAGE.png, in the display range).
     #[arg(long, value_name = "DIR")]
     render: Option<PathBuf>,
-    /// Replace files that exist.
-    #[arg(long)]
-    overwrite: bool,
-    /// Print the report as JSON instead of text.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    write: WriteOptions,
 }
 
 /// Whether splats are discs.
@@ -121,11 +117,8 @@ struct RenderArgs {
     /// Folder to write.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Replace files that exist.
-    #[arg(long)]
-    overwrite: bool,
     #[command(flatten)]
-    show: ShowOptions,
+    write: WriteOptions,
 }
 
 /// Runs `skysweep splats`.
@@ -150,9 +143,10 @@ fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::R
     config.compare = args.compare;
     config.report.clone_from(&args.report);
     config.renderings.clone_from(&args.render);
-    config.overwrite = args.overwrite;
-    let report = jobs::splats::make(&config, &Log).map_err(hinted)?;
-    print::report(args.json, !global.is_quiet(), &report.to_json()?, || report.text())?;
+    config.overwrite = args.write.overwrite;
+    let show = args.write.show;
+    let report = show.watch(global, output, |watcher| jobs::splats::make(&config, watcher)).map_err(hinted)?;
+    show.print(global, &report.to_json()?, || report.text())?;
     Ok(Outcome::Complete)
 }
 
@@ -162,10 +156,13 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     config.cameras.clone_from(&args.cameras);
     config.pictures.clone_from(&args.pictures);
     config.corrections = corrections_of(args.corrections.as_deref());
-    config.overwrite = args.overwrite;
-    let report =
-        args.show.watch(global, &args.output, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
-    args.show.print(global, &report, || report.text(&args.output))?;
+    config.overwrite = args.write.overwrite;
+    let report = args
+        .write
+        .show
+        .watch(global, &args.output, |watcher| jobs::splats::render(&config, watcher))
+        .map_err(hinted)?;
+    args.write.show.print(global, &report, || report.text(&args.output))?;
     Ok(Outcome::Complete)
 }
 

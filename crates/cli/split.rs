@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use jobs::split::SplitJobConfig;
 
 use crate::options::{Named, named};
-use crate::progress::ShowOptions;
+use crate::progress::WriteOptions;
 use crate::{Global, Outcome};
 
 /// Arguments of `skysweep split`.
@@ -37,11 +37,8 @@ pub(crate) struct Args {
     /// Name of the first context [default: the one with the best split].
     #[arg(long, value_name = "IMAGE")]
     first: Option<String>,
-    /// Replace the file if it exists.
-    #[arg(long)]
-    overwrite: bool,
     #[command(flatten)]
-    show: ShowOptions,
+    write: WriteOptions,
 }
 
 /// Makes the configuration of a preset.
@@ -56,9 +53,9 @@ const PRESETS: [Named<Preset>; 2] = [
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let output = args.output.as_deref();
     let written = output.unwrap_or(Path::new(""));
-    let report = args.show.watch(global, written, |watcher| jobs::split::run(&config(args), watcher))?;
+    let report = args.write.show.watch(global, written, |watcher| jobs::split::run(&config(args), watcher))?;
     // Without a file the text is the only result.
-    args.show.print(Global { quiet: global.quiet && output.is_some(), ..global }, &report, || report.text())?;
+    args.write.show.print(Global { quiet: global.quiet && output.is_some(), ..global }, &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 
@@ -71,6 +68,6 @@ fn config(args: &Args) -> SplitJobConfig {
     }
     config.first.clone_from(&args.first);
     config.output.clone_from(&args.output);
-    config.overwrite = args.overwrite;
+    config.overwrite = args.write.overwrite;
     config
 }
