@@ -140,8 +140,18 @@ fn two_processes_share_a_folder() {
 #[test]
 fn killed_at_any_moment_a_run_goes_on_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
-    plan(folder.path(), "run", &[]);
     let moments = RandomByIndex::new(18, 0);
+    for kill in 6..9 {
+        let mut planner = Command::new(assert_cmd::cargo::cargo_bin("skysweep"));
+        planner.current_dir(folder.path()).arg("plan").args(views()).args(["-o", "run"]).args(SMALL);
+        let mut planner = planner.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis((300.0 * moments.uniform(kill)) as u64));
+        let _ = planner.kill();
+        planner.wait().unwrap();
+    }
+    if !folder.path().join("run/plan.json").exists() {
+        plan(folder.path(), "run", &[]);
+    }
     for kill in 0..6 {
         let mut worker = worker(folder.path(), &["--resume"]);
         // The result does not depend on the moment.

@@ -56,7 +56,9 @@ pub fn plan_run(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile,
     let folder = OutputFolder::take(&config.output).map_err(DsmError::from)?;
     if !config.overwrite {
         refuse_results(folder.path(), &[PLAN])?;
-        refuse_results(folder.path(), &FILES)?;
+        // A configuration alone is a job file, or what a killed process left.
+        let results: Vec<&str> = FILES.into_iter().filter(|name| *name != USED_CONFIG).collect();
+        refuse_results(folder.path(), &results)?;
     }
     let file = make_plan(config, progress)?;
     write(&folder, config, &file)?;
