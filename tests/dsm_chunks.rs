@@ -1,6 +1,6 @@
 //! `skysweep dsm` by chunks: the town in one piece and in four has the same accuracy, no seam
-//! shows, and threads change nothing. `cargo bench --bench scale` measures time and memory of large
-//! scenes.
+//! shows, overlapping bounds agree, and threads change nothing. `cargo bench --bench scale`
+//! measures time and memory of large scenes.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -99,7 +99,46 @@ fn no_seam_shows() {
     let near = |d: f32| d.is_finite() && d.abs() <= 0.3;
     let known = once.data().iter().zip(four.data()).filter(|(a, b)| !(a.is_nan() && b.is_nan()));
     let (same, all) = known.fold((0, 0), |(s, n), (a, b)| (s + usize::from(near(a - b)), n + 1));
-    assert!(same * 100 >= 98 * all, "{same} of {all} cells are the same");
+    assert!(same * 100 >= 99 * all, "{same} of {all} cells are the same");
+    let apart = share_apart(&once, &four);
+    assert!(apart < 0.005, "{:.2} % of the cells are more than a metre apart", 100.0 * apart);
+}
+
+/// Returns the share of the cells with two heights that are more than a metre apart.
+fn share_apart(a: &Grid<f32>, b: &Grid<f32>) -> f64 {
+    let apart: Vec<f32> = a.data().iter().zip(b.data()).map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
+    assert!(apart.len() > 1000, "{} cells have two heights", apart.len());
+    apart.iter().filter(|d| **d > 1.0).count() as f64 / apart.len() as f64
+}
+
+/// Pointing, noise and heights come from the whole scene, whatever the bounds.
+#[test]
+fn overlapping_bounds_agree_where_they_overlap() {
+    let whole = io::raster::read_dem(BOTH.folder.path().join("once/dsm/dsm.tif")).unwrap();
+    let (columns, rows) = (whole.heights.width(), whole.heights.height());
+    let folder = tempfile::tempdir().unwrap();
+    let part = |name: &str, from: usize, to: usize| {
+        let (x_min, y_max) = whole.geotransform.map_from_cell(from as f64 - 0.5, -0.5);
+        let (x_max, y_min) = whole.geotransform.map_from_cell(to as f64 - 0.5, rows as f64 - 0.5);
+        let bounds = [x_min, y_min, x_max, y_max].map(|v| v.to_string());
+        let out = folder.path().join(name);
+        let mut options = vec!["--bounds"];
+        options.extend(bounds.iter().map(String::as_str));
+        assert!(run(&out, &options)["chunks"].is_null());
+        io::raster::read_dem(out.join("dsm/dsm.tif")).unwrap().heights
+    };
+    let (first, last) = (columns / 3, columns * 2 / 3);
+    let (west, east) = (part("west", 0, last), part("east", first, columns));
+    assert_eq!((west.width(), east.width(), west.height()), (last, columns - first, rows));
+    let cut = |heights: &Grid<f32>, from: usize| {
+        let cells = (0..rows).flat_map(|y| &heights.row(y)[from..][..last - first]).copied().collect();
+        Grid::from_vec(last - first, rows, cells).unwrap()
+    };
+    let shared = [cut(&whole.heights, first), cut(&west, first), cut(&east, 0)];
+    for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+        let apart = share_apart(&shared[a], &shared[b]);
+        assert!(apart < 0.005, "runs {a} and {b}: {:.2} % of the cells are more than a metre apart", 100.0 * apart);
+    }
 }
 
 #[test]

@@ -109,7 +109,7 @@ pub(crate) struct SceneArgs {
 const PRESETS: [Named<Preset>; 3] = [
     ("fast", Preset::Fast, "half the resolution in matching and in the DSM, two sources per view"),
     ("balanced", Preset::Balanced, "full resolution, up to four sources per view"),
-    ("accurate", Preset::Accurate, "full resolution, up to eight sources per view"),
+    ("accurate", Preset::Accurate, "full resolution, up to eight sources per view, wider search"),
 ];
 
 const FILLS: [Named<Fill>; 3] = [

@@ -24,8 +24,9 @@ use crate::volume::CostVolume;
 
 /// Side of a block's core, pixels.
 const BLOCK: usize = 1024;
-/// Overlap of a block on each side, pixels. A path forgets its start within a few tens of pixels.
-const BLOCK_MARGIN: usize = 48;
+/// Overlap of a block on each side, pixels: one tile of the cost volume, so that the tiles of all
+/// blocks lie on one lattice. A path forgets its start within a few tens of pixels.
+const BLOCK_MARGIN: usize = 64;
 
 /// Largest number of hypotheses whose buffers are kept for the next block: four times a usual
 /// block's.

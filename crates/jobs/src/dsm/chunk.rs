@@ -95,6 +95,7 @@ fn sweep_chunk(
         levels: work.levels,
         sources: work.sources.clone(),
         reach: plan.tuning.reach,
+        jump_at_edge: plan.tuning.jump_at_edge,
         priors: Vec::new(),
     };
     let mut ids: &[String] = &[];

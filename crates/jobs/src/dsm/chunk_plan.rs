@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 
 use crate::dsm::character::ImageCharacter;
-use crate::dsm::chunk_side::{ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
+use crate::dsm::chunk_side::{ENDS_ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::grid::DsmGrid;
@@ -39,6 +39,9 @@ const SURE_MIN: usize = 200;
 /// Searched beyond the sure heights of the coarse sweep, metres, or a tenth of their span: what the
 /// sweep does not resolve.
 const MARGIN_M: f64 = 25.0;
+/// A chunk is swept through its own heights if these take so many pyramid levels less than those of
+/// the scene. Where few levels are saved, the same heights for all chunks make them agree.
+const LEVELS_SAVED: u32 = 2;
 /// Bytes per pixel while a chunk is read for the coarse sweep: samples, grey values, flags.
 const BYTES_PER_COARSE_PIXEL: u64 = 14;
 
@@ -219,11 +222,13 @@ impl ChunkPlanner<'_> {
     }
 
     /// Returns the heights of a chunk, from a coarse sweep over all heights that the scene may
-    /// have.
+    /// have: those of the scene if all that was found lies among them, and otherwise those found.
+    /// Where the scene's are so many that they take [`LEVELS_SAVED`] pyramid levels more, those
+    /// found are used as well, because small things are lost on coarse levels.
     fn heights(&self, windows: &[Option<Window>], sources: &[Vec<usize>]) -> Result<HeightRange, DsmError> {
         let wide = self.wide_range();
         let side = windows.iter().flatten().map(|w| w.width.min(w.height)).min().unwrap_or(0);
-        let sides: Vec<usize> = (0..ALIGNED.ilog2()).map(|level| side >> level).collect();
+        let sides: Vec<usize> = (0..ENDS_ALIGNED.ilog2()).map(|level| side >> level).collect();
         let level = probe::level_of(self.pixel_m, &sides);
         let views = read_chunk_views(self.images, self.characters, windows, |image, window| {
             read_coarse_view(image, window, level)
@@ -234,14 +239,23 @@ impl ChunkPlanner<'_> {
             levels: SweepLevels::only(level),
             sources: sources.to_vec(),
             reach: self.tuning.reach,
+            jump_at_edge: self.tuning.jump_at_edge,
             priors: Vec::new(),
         };
         let found = probe::seen_range(&views, &sweep, self.range, &Muted(self.progress))?;
         let Some(found) = found else { return Ok(self.range) };
         let margin = MARGIN_M.max(0.1 * found.range.span_m());
         let near = found.range.grown(margin, margin).cut_to(wide);
-        let is_sure = found.pixels >= SURE_MIN;
-        Ok(if is_sure { near } else { near.union(self.range) })
+        if found.pixels < SURE_MIN {
+            return Ok(near.union(self.range));
+        }
+        let is_usual = near.span_m() * f64::from(1u32 << LEVELS_SAVED) > self.range.span_m();
+        let is_inside = self.range.contains(found.range.low_m) && self.range.contains(found.range.high_m);
+        Ok(match (is_usual, is_inside) {
+            (false, _) => near,
+            (true, true) => self.range,
+            (true, false) => near.union(self.range),
+        })
     }
 }
 

@@ -18,11 +18,14 @@ use crate::dsm::values::HeightRange;
 const SIDE_MAX: usize = 8192;
 /// Least side of a chunk, cells: smaller ones are mostly rim.
 pub(crate) const SIDE_MIN: usize = 256;
-/// Pixels read around what shows a chunk with its rim. Patches and the aggregation reach out, and
-/// what stands beyond the rim is only looked at from the core.
-pub(crate) const MARGIN_PX: usize = 32;
-/// Windows begin and end on multiples of this, pixels: whole pixels of seven levels.
-pub(crate) const ALIGNED: i64 = 64;
+/// Pixels read around what shows a chunk with its rim. Patches and the aggregation reach out, on
+/// coarse levels by several pixels of the image for each of their own.
+pub(crate) const MARGIN_PX: usize = 96;
+/// Windows begin on multiples of this, pixels: on the tiles of the sweep, of 64 pixels, on four
+/// levels. Costs then do not depend on the window in which they are computed.
+const ALIGNED: i64 = 512;
+/// Windows end on multiples of this, pixels: whole pixels of seven levels.
+pub(crate) const ENDS_ALIGNED: i64 = 64;
 
 /// Returns the largest side of a chunk that the memory allows, cells, when its heights lie in
 /// `range`.
@@ -100,12 +103,13 @@ pub(crate) fn quarters(core: Window) -> Vec<Window> {
     cores((core.width, core.height), half).into_iter().map(moved).collect()
 }
 
-/// Returns a window widened to multiples of [`ALIGNED`].
+/// Returns a window widened to multiples of [`ALIGNED`] at its start and [`ENDS_ALIGNED`] at its
+/// end.
 pub(crate) fn aligned(w: Window) -> Window {
     let (x, y) = (w.x.div_euclid(ALIGNED) * ALIGNED, w.y.div_euclid(ALIGNED) * ALIGNED);
     let length = |from: i64, start: i64, length: usize| {
         let all = (start - from) as usize + length;
-        all.next_multiple_of(ALIGNED as usize)
+        all.next_multiple_of(ENDS_ALIGNED as usize)
     };
     Window { x, y, width: length(x, w.x, w.width), height: length(y, w.y, w.height) }
 }

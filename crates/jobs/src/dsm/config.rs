@@ -27,7 +27,8 @@ pub enum Preset {
     /// Full resolution and up to four sources per view.
     #[default]
     Balanced,
-    /// Full resolution and up to eight sources per view.
+    /// Full resolution, up to eight sources per view, a wider search around the heights of coarse
+    /// levels, and sharper edges of roofs.
     Accurate,
 }
 

@@ -17,7 +17,6 @@ use sweep::pointing::{Adjustment, ControlPoint, Track, ground_of};
 
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::images::SceneImage;
-use crate::dsm::look::FirstLook;
 use crate::dsm::notes::Notes;
 use crate::dsm::report::{CheckPointReport, ControlPointReport, ControlReport};
 
@@ -47,11 +46,11 @@ impl GroundControl {
     /// # Errors
     /// [`DsmError::Control`] for a file that cannot be used, [`DsmError::Value`] when no image of
     /// the run shows a point, or a place lies outside its image; [`DsmError::Crs`].
-    pub(crate) fn read(path: Option<&Path>, images: &[SceneImage], looked: &FirstLook) -> Result<Self, DsmError> {
+    pub(crate) fn read(path: Option<&Path>, images: &[SceneImage]) -> Result<Self, DsmError> {
         let Some(path) = path else { return Ok(Self::default()) };
         let mut out = Self::default();
         for point in read_ground_points(path)? {
-            let seen = places(&point, images, looked)?;
+            let seen = places(&point, images)?;
             if seen.is_empty() {
                 continue;
             }
@@ -127,7 +126,7 @@ fn ninetieth(values: &mut [f64]) -> Option<f64> {
 }
 
 /// Returns the places of a point in the images of the run.
-fn places(point: &GroundPoint, images: &[SceneImage], looked: &FirstLook) -> Result<Track, DsmError> {
+fn places(point: &GroundPoint, images: &[SceneImage]) -> Result<Track, DsmError> {
     let place = |view: usize| {
         let path = &images[view].path;
         let is_own = |name: &str| path == Path::new(name) || path.file_name().is_some_and(|own| own == name);
@@ -139,9 +138,7 @@ fn places(point: &GroundPoint, images: &[SceneImage], looked: &FirstLook) -> Res
             let expected = format!("places inside of the {width} x {height} pixels of that image");
             return Some(Err(DsmError::value(DsmSetting::Control, found, expected)));
         }
-        let origin = looked.windows[view].map_or((0, 0), |window| (window.x, window.y));
-        let at = ImagePoint::new(place.sample - origin.0 as f64, place.line - origin.1 as f64);
-        Some(Ok((view, at)))
+        Some(Ok((view, *place)))
     };
     (0..images.len()).filter_map(place).collect()
 }

@@ -32,22 +32,6 @@ pub struct SceneImage {
     /// such as reflectances from 0 to 1. Noise and texture are then measured in numbers like those
     /// of sensors.
     pub gain: f32,
-    /// Part of the image that a run with given bounds reads; `None` when the whole image is used.
-    pub part: Option<ImagePart>,
-}
-
-/// A part of an image with its camera.
-///
-/// The camera is kept beside that of the whole image because moving a camera from one frame to
-/// another and back changes its last bits.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct ImagePart {
-    /// Pixels of the part.
-    pub window: Window,
-    /// Camera in the frame of the part.
-    pub camera: RpcCamera,
 }
 
 impl SceneImage {
@@ -58,10 +42,7 @@ impl SceneImage {
 
     /// Returns the camera in the frame of a window.
     fn camera_of(&self, window: Window) -> RpcCamera {
-        match &self.part {
-            Some(part) if part.window == window => part.camera.clone(),
-            _ => self.camera.cropped(ImagePoint::new(window.x as f64, window.y as f64)),
-        }
+        self.camera.cropped(ImagePoint::new(window.x as f64, window.y as f64))
     }
 }
 
@@ -87,19 +68,14 @@ pub(crate) fn read_coarse_view(image: &SceneImage, window: Window, level: usize)
     Ok(SweepView::from_level(image.camera_of(window), level, pixels))
 }
 
-/// Reads one window per image (`None` is the whole image), in parallel. `done` is called after each
-/// image.
-pub(crate) fn read_views(
-    images: &[SceneImage],
-    windows: &[Option<Window>],
-    done: &(dyn Fn() + Sync),
-) -> Result<Vec<SweepView>, DsmError> {
-    let read = |(image, window): (&SceneImage, &Option<Window>)| {
-        let view = read_view(image, window.unwrap_or(image.whole()));
+/// Reads whole images, in parallel. `done` is called after each image.
+pub(crate) fn read_views(images: &[SceneImage], done: &(dyn Fn() + Sync)) -> Result<Vec<SweepView>, DsmError> {
+    let read = |image: &SceneImage| {
+        let view = read_view(image, image.whole());
         done();
         view
     };
-    images.par_iter().zip(windows).map(read).collect()
+    images.par_iter().map(read).collect()
 }
 
 fn scale(pixels: &mut Grid<f32>, gain: f32) {

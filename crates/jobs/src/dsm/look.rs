@@ -5,7 +5,6 @@
 //! no ties, it is repeated at all heights at which the images share ground, see [`SharedHeights`].
 
 use camera::RpcCamera;
-use raster::Window;
 use sweep::pointing::TieConfig;
 
 use crate::dsm::character::ImageCharacter;
@@ -13,7 +12,6 @@ use crate::dsm::chunk_side::choose_side;
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::grid::{DsmGrid, choose_grid};
-use crate::dsm::image_windows::GroundBox;
 use crate::dsm::images::{SceneImage, read_views};
 use crate::dsm::memory;
 use crate::dsm::order::as_given;
@@ -24,26 +22,20 @@ use crate::dsm::ties::{PairTies, TIES_MIN, match_pairs};
 use crate::dsm::values::{HeightRange, ImagePair};
 use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
 
-/// Pixels read around what the bounds show, at full resolution: patches, aggregation and pointing
-/// errors reach out.
-const WINDOW_MARGIN: usize = 96;
-
 /// What is known before the pointing is corrected.
 pub(crate) struct FirstLook {
     /// Geometry at the height where ties were searched for, with the cameras of the providers.
     pub(crate) geometry: ViewGeometry,
     /// Pairs that can give heights, the best angles first.
     pub(crate) useful: Vec<ImagePair>,
-    /// Ties of the pairs to match, in the frames of `windows`.
+    /// Ties of the pairs to match.
     pub(crate) ties: Vec<PairTies>,
-    /// Part of each image that is used; `None` is the whole image.
-    pub(crate) windows: Vec<Option<Window>>,
-    /// Cameras in the frames of the windows.
+    /// Cameras of the providers.
     pub(crate) cameras: Vec<RpcCamera>,
-    /// Columns and rows of the windows.
+    /// Columns and rows of the images.
     pub(crate) sizes: Vec<(usize, usize)>,
     pub(crate) characters: Vec<ImageCharacter>,
-    /// Whether the scene is computed at once. The session then holds the views of the windows.
+    /// Whether the whole scene is computed at once. The session then holds the views.
     pub(crate) is_whole: bool,
 }
 
@@ -98,50 +90,34 @@ fn look_at(
     let pairs = asked_pairs(config, images, &useful)?;
     let gsd = images.iter().filter_map(|o| ground_sampling_m(o, geometry.centre)).fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, gsd)?;
-    let windows = windows(config, images, &grid, search)?;
     let progress = session.progress;
-    if !fits(config, images, &windows, &grid) {
+    let cameras = images.iter().map(|o| o.camera.clone()).collect();
+    let sizes = images.iter().map(|o| o.size).collect();
+    if config.bounds.is_some() || !fits(config, images, &grid) {
         // A limit too small for the smallest chunk is refused before anything is read.
         choose_side(config, images, &grid, HeightRange::at(geometry.centre.height_m))?;
-        let (ties, characters) = match_in_windows(images, &grid, &pairs, search, progress)?;
-        return Ok(FirstLook {
-            geometry,
-            useful,
-            ties,
-            windows: vec![None; images.len()],
-            cameras: images.iter().map(|o| o.camera.clone()).collect(),
-            sizes: images.iter().map(|o| o.size).collect(),
-            characters,
-            is_whole: false,
-        });
+        // Ties come from all over the scene, so that runs with other bounds find the same pointing.
+        let whole = DsmConfig { bounds: None, gsd_m: None, ..config.clone() };
+        let (ties, characters) =
+            match_in_windows(images, &choose_grid(&whole, &geometry, gsd)?, &pairs, search, progress)?;
+        return Ok(FirstLook { geometry, useful, ties, cameras, sizes, characters, is_whole: false });
     }
     progress.begin("reading images", images.len());
-    let views = read_views(images, &windows, &|| progress.step())?;
+    let views = read_views(images, &|| progress.step())?;
     session.lap("read");
     progress.check_cancelled()?;
     progress.begin("matching tie points", pairs.len());
     let ties = match_pairs(&views, &pairs, search, &TieConfig::default(), &|| progress.step());
     let mut characters = vec![ImageCharacter::default(); images.len()];
     characters.iter_mut().zip(&views).for_each(|(character, view)| character.learn(view));
-    let looked = FirstLook {
-        geometry,
-        useful,
-        ties,
-        windows,
-        cameras: views.iter().map(|v| v.camera.clone()).collect(),
-        sizes: views.iter().map(|v| (v.levels[0].width(), v.levels[0].height())).collect(),
-        characters,
-        is_whole: true,
-    };
     session.views = Some(views);
-    Ok(looked)
+    Ok(FirstLook { geometry, useful, ties, cameras, sizes, characters, is_whole: true })
 }
 
 /// Returns whether the scene may be computed at once: it fits the memory, and smaller chunks are
 /// not asked for.
-fn fits(config: &DsmConfig, images: &[SceneImage], windows: &[Option<Window>], grid: &DsmGrid) -> bool {
-    let pixels = images.iter().zip(windows).map(|(image, window)| memory::area(&window.unwrap_or(image.whole())));
-    let pixels: Vec<u64> = pixels.collect();
+fn fits(config: &DsmConfig, images: &[SceneImage], grid: &DsmGrid) -> bool {
+    let pixels: Vec<u64> = images.iter().map(|image| memory::area(&image.whole())).collect();
     let is_one_chunk = config.chunk.is_none_or(|side| side >= grid.size.0.max(grid.size.1));
     is_one_chunk && memory::needed_mb(&pixels, memory::area(&grid.whole())) <= memory::limit_mb(config)
 }
@@ -169,26 +145,4 @@ pub(crate) fn asked_pairs(
 /// Returns the names of pairs, with the given positions of the images counted from 1: `1-2 1-3`.
 pub(crate) fn pair_names(pairs: &[ImagePair], images: &[SceneImage]) -> String {
     pairs.iter().map(|pair| as_given(*pair, images).to_string()).collect::<Vec<_>>().join(" ")
-}
-
-/// Returns the part of each image to read: what the bounds may need, or the whole image (`None`)
-/// without bounds.
-fn windows(
-    config: &DsmConfig,
-    images: &[SceneImage],
-    grid: &DsmGrid,
-    search: HeightRange,
-) -> Result<Vec<Option<Window>>, DsmError> {
-    if config.bounds.is_none() {
-        return Ok(vec![None; images.len()]);
-    }
-    let ground = GroundBox::new(grid, &grid.projection()?, config.height_range_m.unwrap_or(search))?;
-    let window = |image: &SceneImage| {
-        ground.window_in(image, WINDOW_MARGIN)?.map(Some).ok_or_else(|| {
-            let found = format!("an area that an image does not see: {}", image.path.display());
-            let expected = "an area that every image sees, or only the images that see it";
-            DsmError::value(DsmSetting::Bounds, found, expected)
-        })
-    };
-    images.iter().map(window).collect()
 }

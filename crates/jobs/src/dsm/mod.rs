@@ -101,7 +101,7 @@ pub use chunk_plan::{ChunkPlan, ChunkSweep, ChunkWork};
 pub use config::{DsmConfig, Fill, Preset};
 pub use error::{DsmError, DsmSetting};
 pub use grid::DsmGrid;
-pub use images::{ImagePart, SceneImage};
+pub use images::SceneImage;
 pub(crate) use input_stamps::InputStamps;
 pub use levels::SweepLevels;
 pub(crate) use merge::Merger;

@@ -61,7 +61,6 @@ fn open_one(path: &Path, number: usize) -> Result<SceneImage, DsmError> {
             SampleType::F32 | SampleType::F64 => gain(&source)?,
             _ => 1.0,
         },
-        part: None,
     })
 }
 

@@ -8,7 +8,7 @@ use crate::dsm::character::ImageCharacter;
 use crate::dsm::chunk_plan::{ChunkPlan, ChunkPlanner, ChunkSweep, ChunkWork, read_chunk_views};
 use crate::dsm::chunk_side::{choose_side, cores, needed_mb};
 use crate::dsm::config::DsmConfig;
-use crate::dsm::error::DsmError;
+use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::grid::{DsmGrid, choose_grid, note_grid};
 use crate::dsm::height_choice::{choose_heights, middle_height_m};
 use crate::dsm::images::{SceneImage, read_view};
@@ -160,7 +160,7 @@ struct PlannedScene<'a> {
 type Division = (HeightRange, Option<usize>, Vec<ChunkPlan>);
 
 impl PlannedScene<'_> {
-    /// Plans the scene as one chunk, whose windows are the parts of the images in use.
+    /// Plans the scene as one chunk, whose windows are the whole images.
     fn at_once(
         &self,
         range: HeightRange,
@@ -168,7 +168,7 @@ impl PlannedScene<'_> {
         notes: &mut Notes<'_>,
     ) -> Result<Division, DsmError> {
         let images = &self.pointed.images;
-        let windows: Vec<_> = images.iter().map(|o| o.part.as_ref().map_or(o.whole(), |part| part.window)).collect();
+        let windows: Vec<_> = images.iter().map(SceneImage::whole).collect();
         let sides = smallest_sides(&windows);
         let range = match self.config.height_range_m {
             Some(_) => range,
@@ -201,8 +201,7 @@ impl PlannedScene<'_> {
             Some(views) => views,
             None => {
                 let images = &self.pointed.images;
-                let part = |o: &SceneImage| Some(o.part.as_ref().map_or(o.whole(), |part| part.window));
-                let windows: Vec<_> = images.iter().map(part).collect();
+                let windows: Vec<_> = images.iter().map(|image| Some(image.whole())).collect();
                 read_chunk_views(images, &self.pointed.characters, &windows, read_view)?
             }
         };
@@ -212,6 +211,7 @@ impl PlannedScene<'_> {
             levels: SweepLevels::only(0),
             sources: self.sources.to_vec(),
             reach: self.tuning.reach,
+            jump_at_edge: self.tuning.jump_at_edge,
             priors: Vec::new(),
         };
         let found = probe::extended_range(&views, &sweep, self.pixel_m, sides, &Muted(session.progress));
@@ -223,7 +223,8 @@ impl PlannedScene<'_> {
         Ok(found.range)
     }
 
-    /// Divides the scene into chunks.
+    /// Divides the scene, or the part of it inside the bounds, into chunks. A part that fits the
+    /// memory is one chunk.
     fn by_chunks(
         &self,
         range: HeightRange,
@@ -233,12 +234,6 @@ impl PlannedScene<'_> {
         let config = self.config;
         note_step(self.widest, self.tuning, notes);
         let side = choose_side(config, &self.pointed.images, self.grid, range)?;
-        let cores = cores(self.grid.size, side);
-        let reason = match config.chunk {
-            Some(_) => "given".to_owned(),
-            None => format!("the largest that {} MB allow", memory::limit_mb(config)),
-        };
-        notes.choose("chunks", format!("{} of up to {side} cells a side", cores.len()), reason);
         let planner = ChunkPlanner {
             config,
             tuning: self.tuning,
@@ -252,7 +247,21 @@ impl PlannedScene<'_> {
             range,
             progress: session.progress,
         };
-        Ok((range, Some(side), planner.chunks(cores)?))
+        let chunks = planner.chunks(cores(self.grid.size, side))?;
+        if let [only] = &chunks[..] {
+            let ChunkWork::Sweep(sweep) = &only.work else {
+                let found = "an area that fewer than two images see";
+                return Err(DsmError::value(DsmSetting::Bounds, found, "an area that at least two images see"));
+            };
+            note_levels(sweep.levels, sweep.height_range, self.step_m, notes);
+            return Ok((sweep.height_range, None, chunks));
+        }
+        let reason = match config.chunk {
+            Some(_) => "given".to_owned(),
+            None => format!("the largest that {} MB allow", memory::limit_mb(config)),
+        };
+        notes.choose("chunks", format!("{} of up to {side} cells a side", chunks.len()), reason);
+        Ok((range, Some(side), chunks))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Second stage of a run: tie points, and the correction of the cameras' pointing.
 
-use camera::{ImageCorrection, ImagePoint};
+use camera::ImageCorrection;
 use numeric::{Choice, upper_median};
 use serde::{Deserialize, Serialize};
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Observations, adjust_to_control};
@@ -13,7 +13,7 @@ use crate::dsm::dem::dem_heights;
 use crate::dsm::error::DsmError;
 use crate::dsm::evidence::{PairHeight, off_along_sight, warn_of_domains};
 use crate::dsm::image_checks::{grossly_off, same_picture, unconnected};
-use crate::dsm::images::{ImagePart, SceneImage};
+use crate::dsm::images::SceneImage;
 use crate::dsm::look::{FirstLook, asked_pairs, look, pair_names};
 use crate::dsm::notes::Notes;
 use crate::dsm::open::Opened;
@@ -46,10 +46,9 @@ pub struct Pointed {
     pub useful: Vec<ImagePair>,
     /// Pairs to match: the useful ones that are asked for.
     pub pairs: Vec<ImagePair>,
-    /// Tie points by pair, in the frames of the parts of the images that were read.
+    /// Tie points by pair.
     pub ties: Vec<PairTies>,
-    /// Corrections found, one per image, in the same frames. They are in the cameras only if
-    /// `pointing.applied`.
+    /// Corrections found, one per image. They are in the cameras only if `pointing.applied`.
     pub corrections: Vec<ImageCorrection>,
     /// Size of the correction and residuals.
     pub pointing: PointingReport,
@@ -83,7 +82,7 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     }
     let looked = look(config, &images, session)?;
     check_pictures(&images, &looked)?;
-    let points = GroundControl::read(config.control.as_deref(), &images, &looked)?;
+    let points = GroundControl::read(config.control.as_deref(), &images)?;
     let (tracks, contradictory) = join_pairs(&looked.ties);
     let observations = Observations { tracks: &tracks, control: &points.control };
     let found = adjust_to_control(&looked.cameras, &looked.sizes, observations, &AdjustConfig::default());
@@ -93,10 +92,10 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     let by_image = by_image(&images, &looked, &found, &tracks);
     if is_applied {
         warn_of_images(&by_image, &mut notes);
+        correct_cameras(&mut images, session, &found.corrections);
     }
     let mut pointing = PointingReport::new(&found, (tracks.len(), contradictory), is_applied, by_image);
     pointing.control = points.report(&looked.cameras, &found, is_applied, &mut notes);
-    set_cameras(&mut images, session, &looked, is_applied.then_some(&found));
     let FirstLook { geometry, mut useful, ties, characters, is_whole, .. } = looked;
     if is_applied {
         drop_unconnected(config, &mut useful, &ties, &mut notes);
@@ -128,10 +127,7 @@ fn check_pictures(images: &[SceneImage], looked: &FirstLook) -> Result<(), DsmEr
     if let (Some(first), true) = (blank, pictures < 2) {
         return Err(DsmError::Blank { path: path(first) });
     }
-    let origin = |w: &raster::Window| ImagePoint::new(w.x as f64, w.y as f64);
-    let origins: Vec<ImagePoint> =
-        looked.windows.iter().map(|w| w.as_ref().map_or(ImagePoint::new(0.0, 0.0), origin)).collect();
-    match same_picture(&looked.ties, &origins) {
+    match same_picture(&looked.ties) {
         Some(pair) => Err(DsmError::SamePixels { first: path(pair.first), second: path(pair.second) }),
         None => Ok(()),
     }
@@ -207,20 +203,13 @@ fn warn_of_sights(images: &[SceneImage], looked: &FirstLook, found: &Adjustment,
     }
 }
 
-/// Puts the corrections, if any, into the cameras of images, parts and views.
-fn set_cameras(images: &mut [SceneImage], session: &mut Session<'_>, looked: &FirstLook, found: Option<&Adjustment>) {
-    for (i, (image, camera)) in images.iter_mut().zip(&looked.cameras).enumerate() {
-        let mut camera = camera.clone();
-        if let Some(found) = found {
-            camera.correction = found.corrections[i];
-            let origin =
-                looked.windows[i].map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(-w.x as f64, -w.y as f64));
-            image.camera = camera.cropped(origin);
-        }
-        if let Some(views) = &mut session.views {
-            views[i].camera = camera.clone();
-        }
-        image.part = looked.windows[i].map(|window| ImagePart { window, camera });
+/// Puts corrections into the cameras of images and views.
+fn correct_cameras(images: &mut [SceneImage], session: &mut Session<'_>, corrections: &[ImageCorrection]) {
+    for (image, correction) in images.iter_mut().zip(corrections) {
+        image.camera.correction = *correction;
+    }
+    for (view, correction) in session.views.iter_mut().flatten().zip(corrections) {
+        view.camera.correction = *correction;
     }
 }
 

@@ -40,6 +40,8 @@ pub(crate) struct SceneSweep {
     pub(crate) sources: Vec<Vec<usize>>,
     /// Distance around a coarse pixel from which heights are taken over, coarse pixels.
     pub(crate) reach: usize,
+    /// Penalty of a jump across the strongest image edges on the finest level.
+    pub(crate) jump_at_edge: u8,
     /// For each view, what it sees of a city model; empty without a model.
     pub(crate) priors: Vec<Option<ViewPrior>>,
 }
@@ -184,6 +186,8 @@ fn sweep_view(
     if level > sweep.levels.finest {
         config.cost.blends_neighbours = false;
         config.penalties.jump = COARSE_JUMP;
+    } else {
+        config.penalties.jump_at_edge = sweep.jump_at_edge;
     }
     let reference = Reference { view: reference, level: level as u32, ranges: &ranges, prior };
     let map = sweep_level(reference, &sources, origin_m, &config)?;

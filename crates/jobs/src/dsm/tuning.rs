@@ -1,6 +1,7 @@
 //! The parameters of the sweep that a preset stands for.
 
 use serde::{Deserialize, Serialize};
+use sweep::aggregation::Penalties;
 use sweep::ranges::EDGE_REACH;
 
 use crate::dsm::config::Preset;
@@ -21,6 +22,9 @@ pub struct SweepTuning {
     /// Distance around a coarse pixel from which the next finer level takes over heights to search,
     /// coarse pixels.
     pub reach: usize,
+    /// Penalty of a height jump across the strongest image edges on the finest level, of 112 for
+    /// the worst cost.
+    pub jump_at_edge: u8,
 }
 
 impl Preset {
@@ -32,11 +36,13 @@ impl Preset {
 
     /// Returns the parameters of the preset.
     pub(crate) fn tuning(self) -> SweepTuning {
-        let (finest_level, sources, reach) = match self {
-            Self::Fast => (1, 2, EDGE_REACH),
-            Self::Balanced => (0, 4, EDGE_REACH),
-            Self::Accurate => (0, 8, 2 * EDGE_REACH),
+        let usual = Penalties::default().jump_at_edge;
+        let (finest_level, sources, reach, jump_at_edge) = match self {
+            Self::Fast => (1, 2, EDGE_REACH, usual),
+            Self::Balanced => (0, 4, EDGE_REACH, usual),
+            // Roofs end at image edges. Cheaper jumps there bring lower errors and fewer heights.
+            Self::Accurate => (0, 8, 2 * EDGE_REACH, usual / 2),
         };
-        SweepTuning { step_px: 0.5, finest_level, sources, reach }
+        SweepTuning { step_px: 0.5, finest_level, sources, reach, jump_at_edge }
     }
 }

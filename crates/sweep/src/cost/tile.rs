@@ -16,6 +16,11 @@ use crate::geometry::{LocalMap, PixelBox, source_column_row};
 use crate::reference::Reference;
 use crate::view::ViewLevel;
 
+/// Local maps are fitted between multiples of this many planes. A source is resampled at the middle
+/// of these heights, and the phase of the resampling changes costs. Two runs whose heights differ a
+/// little shall get the same costs, so that the middle must not follow every plane. More planes
+/// would make the resampled pictures larger.
+const PLANES_ALIGNED: i32 = 64;
 /// A range of this many planes or fewer is not divided further.
 const PLANES_MIN: i32 = 4;
 
@@ -115,7 +120,9 @@ fn fit_maps(
     config: &CostConfig,
 ) -> Result<Fitted, SweepError> {
     let step = reference.ranges.step_m;
-    let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
+    let first = planes.0.div_euclid(PLANES_ALIGNED) * PLANES_ALIGNED;
+    let last = ((planes.1 - 1).div_euclid(PLANES_ALIGNED) + 1) * PLANES_ALIGNED;
+    let heights = (f64::from(first) * step, f64::from(last) * step);
     let area = PixelBox::of_window(tile);
     let mut maps = Vec::with_capacity(sources.len());
     for s in sources {
