@@ -135,8 +135,8 @@ mod tests {
     }
 
     #[test]
-    fn windows_are_widened_to_whole_pixels_of_all_levels() {
+    fn windows_begin_on_tiles_and_end_on_whole_pixels_of_all_levels() {
         let window = aligned(Window { x: -5, y: 70, width: 100, height: 58 });
-        assert_eq!(window, Window { x: -64, y: 64, width: 192, height: 64 });
+        assert_eq!(window, Window { x: -512, y: 0, width: 640, height: 128 });
     }
 }
