@@ -120,14 +120,19 @@ fn fit_maps(
     config: &CostConfig,
 ) -> Result<Fitted, SweepError> {
     let step = reference.ranges.step_m;
-    let first = planes.0.div_euclid(PLANES_ALIGNED) * PLANES_ALIGNED;
-    let last = ((planes.1 - 1).div_euclid(PLANES_ALIGNED) + 1) * PLANES_ALIGNED;
-    let heights = (f64::from(first) * step, f64::from(last) * step);
+    let between = |first: i32, last: i32| (f64::from(first) * step, f64::from(last) * step);
+    let heights = between(planes.0, planes.1 - 1);
+    let wider = between(
+        planes.0.div_euclid(PLANES_ALIGNED) * PLANES_ALIGNED,
+        ((planes.1 - 1).div_euclid(PLANES_ALIGNED) + 1) * PLANES_ALIGNED,
+    );
     let area = PixelBox::of_window(tile);
     let mut maps = Vec::with_capacity(sources.len());
     for s in sources {
         let exact = |p, h| source_column_row(reference.view.camera, s.camera, reference.level, p, h);
-        let Ok(map) = LocalMap::fit(area, heights, exact) else {
+        // A camera may fail, or bend, at heights that the tile does not have.
+        let aligned = LocalMap::fit(area, wider, exact).ok().filter(|map| map.max_error_px <= config.map_tolerance_px);
+        let Some(map) = aligned.or_else(|| LocalMap::fit(area, heights, exact).ok()) else {
             maps.push(None);
             continue;
         };

@@ -111,6 +111,9 @@ const KNOWN_MIN: usize = 4;
 const STOREY_M: f32 = 3.0;
 /// Number of heights among which a lower surface is looked for: those at the far end of a street.
 const CANDIDATES: usize = 64;
+/// Part of the border of a void that continues a roof in it. A blank patch over a roof and the ground
+/// beside it is matched as a whole, at a height between them, and has less.
+const RIM_PART: f32 = 0.75;
 /// Number of heights that are all around a cell at the border of its void, and the part of them
 /// that a surface must have: fewer may be outliers.
 const AROUND: usize = 256;
@@ -297,13 +300,18 @@ impl Filling<'_> {
         if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
     }
 
-    /// Returns whether a height continues what is known on most sides, a storey above other
-    /// surfaces around: a saturated roof whose rim was seen. In a blank area on the ground anything
-    /// may stand. `known` are the nearest heights in eight directions.
+    /// Returns whether a height continues what is known on most sides and at most of the border of
+    /// its void, a storey above other surfaces around: a saturated roof whose rim was seen. In a blank
+    /// area that holds ground anything may stand. `known` are the nearest heights in eight
+    /// directions.
     fn is_raised_roof(&self, index: usize, height_m: f32, known: &[Known]) -> bool {
         let config = self.config;
         let continues = |k: &&Known| (k.height_m - height_m).abs() <= config.same_surface_m + config.slope_m * k.apart;
         if height_m.is_nan() || known.iter().filter(continues).count() < KNOWN_MIN {
+            return false;
+        }
+        let own = self.border_around(index, Some(self.numbers.data()[index]));
+        if (own.iter().filter(continues).count() as f32) < RIM_PART * own.len() as f32 {
             return false;
         }
         let all = self.border_around(index, None);
