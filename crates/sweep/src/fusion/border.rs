@@ -46,6 +46,8 @@ pub(super) struct Border {
     cells: Vec<BorderCell>,
     /// First cell of each bucket, row by row, and the number of cells.
     starts: Vec<usize>,
+    /// Least height of each bucket, metres; infinite without cells.
+    lowest_m: Vec<f32>,
     columns: usize,
     rows: usize,
 }
@@ -75,11 +77,13 @@ impl Border {
         }
         let mut starts = vec![0];
         let mut cells = Vec::new();
+        let mut lowest_m = Vec::with_capacity(buckets.len());
         for bucket in buckets {
+            lowest_m.push(bucket.iter().map(|cell| cell.height_m).fold(f32::INFINITY, f32::min));
             cells.extend(bucket);
             starts.push(cells.len());
         }
-        Self { cells, starts, columns, rows }
+        Self { cells, starts, lowest_m, columns, rows }
     }
 
     /// Returns all cells, bucket by bucket.
@@ -96,11 +100,14 @@ impl Border {
         let (u, v) = (x as usize / BUCKET, y as usize / BUCKET);
         let rings = self.columns.max(self.rows);
         for ring in 0..rings {
-            self.ring(u, v, ring, |cell| {
-                let apart = (cell.x - x).hypot(cell.y - y);
-                let is_same_again = last.replace([cell.x, cell.y]) == Some([cell.x, cell.y]);
+            self.ring(u, v, ring, wanted.height_max_m, |cell| {
                 let is_own = wanted.void.is_none_or(|void| void == cell.void);
-                if is_own && !is_same_again && cell.height_m <= wanted.height_max_m && apart <= wanted.reach {
+                if !is_own || cell.height_m > wanted.height_max_m {
+                    return;
+                }
+                let (dx, dy) = (cell.x - x, cell.y - y);
+                let apart = (dx * dx + dy * dy).sqrt();
+                if apart <= wanted.reach && last.replace((cell.x, cell.y)) != Some((cell.x, cell.y)) {
                     found.push(Known::new(cell.height_m, apart));
                 }
             });
@@ -117,12 +124,16 @@ impl Border {
         found
     }
 
-    /// Visits the cells of the buckets at a distance of `ring` buckets.
-    fn ring(&self, u: usize, v: usize, ring: usize, mut visit: impl FnMut(&BorderCell)) {
+    /// Visits the cells of the buckets at a distance of `ring` buckets. Buckets without a height up
+    /// to `height_max_m` are left out.
+    fn ring(&self, u: usize, v: usize, ring: usize, height_max_m: f32, mut visit: impl FnMut(&BorderCell)) {
         let (left, right) = (u.saturating_sub(ring), (u + ring).min(self.columns - 1));
         for row in v.saturating_sub(ring)..=(v + ring).min(self.rows - 1) {
             let mut see = |column: usize| {
                 let bucket = row * self.columns + column;
+                if self.lowest_m[bucket] > height_max_m {
+                    return;
+                }
                 self.cells[self.starts[bucket]..self.starts[bucket + 1]].iter().for_each(&mut visit);
             };
             if row.abs_diff(v) == ring {
