@@ -300,9 +300,9 @@ impl Filling<'_> {
         if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
     }
 
-    /// Returns whether a height continues what is known on most sides and at most of the border of
-    /// its void, a storey above other surfaces around: a saturated roof whose rim was seen. In a blank
-    /// area that holds ground anything may stand. `known` are the nearest heights in eight
+    /// Returns whether a height continues what is known on most sides and at most of the border
+    /// of its void, a storey above other surfaces around: a saturated roof whose rim was seen. In
+    /// a blank area that holds ground anything may stand. `known` are the nearest heights in eight
     /// directions.
     fn is_raised_roof(&self, index: usize, height_m: f32, known: &[Known]) -> bool {
         let config = self.config;
