@@ -288,3 +288,38 @@ fn attributes_and_addresses_are_kept() {
     );
     assert_eq!(footprint["height_m"], 0.0);
 }
+
+/// Materials and textures reach CityJSON, with paths of images that lead from the new file; formats
+/// without them count them.
+#[test]
+fn appearances_are_kept_or_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("out")).unwrap();
+    let model = serde_json::json!({
+        "type": "CityJSON", "version": "2.0", "transform": { "scale": [1, 1, 1], "translate": [0, 0, 0] },
+        "metadata": { "referenceSystem": "https://www.opengis.net/def/crs/EPSG/0/25832" },
+        "appearance": {
+            "materials": [{ "name": "brick" }], "textures": [{ "type": "PNG", "image": "looks/a.png" }],
+            "vertices-texture": [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], "default-theme-texture": "t",
+        },
+        "CityObjects": { "b": { "type": "Building", "geometry": [{
+            "type": "MultiSurface", "lod": "2", "boundaries": [[[0, 1, 2]]],
+            "material": { "t": { "values": [0] } }, "texture": { "t": { "values": [[[0, 0, 1, 2]]] } },
+        }] } },
+        "vertices": [[0, 0, 0], [9, 0, 0], [0, 9, 0]],
+    });
+    std::fs::write(folder.path().join("in.city.json"), model.to_string()).unwrap();
+    let convert = |to: &str| {
+        let mut command = common::skysweep();
+        let run = command.current_dir(folder.path()).args(["city", "convert", "in.city.json", "-o", to]).assert();
+        String::from_utf8(run.code(0).get_output().stderr.clone()).unwrap()
+    };
+    assert!(!convert("out/b.city.json").contains("not written"));
+    let written = std::fs::read(folder.path().join("out/b.city.json")).unwrap();
+    let written: Value = serde_json::from_slice(&written).unwrap();
+    assert_eq!(written["appearance"]["textures"][0]["image"], "../looks/a.png");
+    let geometry = &written["CityObjects"]["b"]["geometry"][0];
+    let source = &model["CityObjects"]["b"]["geometry"][0];
+    assert_eq!((&geometry["texture"], &geometry["material"]), (&source["texture"], &source["material"]));
+    assert!(convert("b.obj").contains("2 materials and textures"));
+}

@@ -46,6 +46,15 @@ pub enum ModelError {
         /// Identifier of the object.
         object: String,
     },
+    /// The materials and textures of a surface do not fit its rings or the model.
+    #[error(
+        "a surface of object {object:?} names a material, texture or texture coordinate that does not exist, or not \
+         one coordinate per vertex"
+    )]
+    Appearance {
+        /// Identifier of the object.
+        object: String,
+    },
     /// A triangle names a corner or a surface that does not exist.
     #[error("triangle {triangle} names a corner or a surface that does not exist")]
     Triangle {

@@ -11,6 +11,7 @@
 //! whether it was used. [`check_solids`] runs the slow checks that only a report needs: shells that
 //! intersect themselves, cavities, overlapping solids and building parts.
 
+mod appearance;
 mod class;
 mod crs;
 mod defect;
@@ -30,6 +31,7 @@ mod triangle_mesh;
 mod triangulate;
 mod validity;
 
+pub use appearance::{Appearance, RingTexture, SurfaceAppearance, SurfaceMaterial, SurfaceTexture};
 pub use class::SurfaceClass;
 pub use crs::CrsReference;
 pub use defect::{Defect, DefectCode, Effect};

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
-use crate::{CrsReference, Lod, ModelError, ModelPoint, ObjectKind, SurfaceClass};
+use crate::{Appearance, CrsReference, Lod, ModelError, ModelPoint, ObjectKind, SurfaceAppearance, SurfaceClass};
 
 /// Content of a city model file.
 #[derive(Debug, Clone, Default)]
@@ -21,8 +21,10 @@ pub struct CityModel {
     pub vertices: Vec<ModelPoint>,
     /// Objects in the order of the file.
     pub objects: Vec<CityObject>,
-    /// Things of the file that the model does not hold, such as appearances, by their kind with
-    /// their number.
+    /// Materials and textures that surfaces refer to.
+    pub appearance: Appearance,
+    /// Things of the file that the model does not hold, such as georeferenced textures, by their
+    /// kind with their number.
     pub left_out: BTreeMap<String, usize>,
 }
 
@@ -84,6 +86,8 @@ pub struct SurfacePolygon {
     /// Attributes of the surface by their names in the file, if it has any. Surfaces that the file
     /// describes together share them.
     pub attributes: Option<Arc<Map<String, Value>>>,
+    /// Materials and textures of the surface, if it has any. Instances of a surface share them.
+    pub appearance: Option<Arc<SurfaceAppearance>>,
 }
 
 impl CityModel {
@@ -127,7 +131,7 @@ impl CityModel {
     }
 
     /// Checks the invariants of a model: coordinates are finite, indices are in range, each surface
-    /// has an outer ring, and no object is its own ancestor.
+    /// has an outer ring, textures have a coordinate per vertex, and no object is its own ancestor.
     ///
     /// # Errors
     /// [`ModelError`] with the first violation.
@@ -169,6 +173,9 @@ impl CityModel {
     fn validate_surface(&self, surface: &SurfacePolygon, object: &str) -> Result<(), ModelError> {
         if surface.rings.is_empty() {
             return Err(ModelError::NoRing { object: object.to_owned() });
+        }
+        if surface.appearance.as_ref().is_some_and(|found| !found.fits(&self.appearance, &surface.rings)) {
+            return Err(ModelError::Appearance { object: object.to_owned() });
         }
         match surface.rings.iter().flatten().find(|&&i| i as usize >= self.vertices.len()) {
             Some(&index) => {
@@ -221,7 +228,7 @@ impl GeometryKind {
 impl SurfacePolygon {
     /// Creates a surface of the first solid and its outer shell.
     pub fn new(rings: Vec<Vec<u32>>, class: SurfaceClass) -> Self {
-        Self { rings, class, solid: 0, shell: 0, attributes: None }
+        Self { rings, class, solid: 0, shell: 0, attributes: None, appearance: None }
     }
 }
 
@@ -265,6 +272,12 @@ mod tests {
         assert!(matches!(broken(|m| m.objects[0].parent = Some(1)), ModelError::ParentIndex { .. }));
         assert!(matches!(broken(|m| m.objects[0].parent = Some(0)), ModelError::ParentCircle { .. }));
         assert!(matches!(broken(|m| m.objects[0].geometries[0].surfaces[0].rings.clear()), ModelError::NoRing { .. }));
+        let painted = |m: &mut CityModel| {
+            let mut appearance = SurfaceAppearance::default();
+            appearance.set_material(0, 0);
+            m.objects[0].geometries[0].surfaces[0].appearance = Some(Arc::new(appearance));
+        };
+        assert!(matches!(broken(painted), ModelError::Appearance { .. }));
     }
 
     #[test]

@@ -176,6 +176,7 @@ fn model_of_all_kinds() -> CityModel {
                     solid,
                     shell,
                     attributes: None,
+                    appearance: None,
                 }));
             }
         }

@@ -3,6 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::palette::Palette;
 use city::{CityModel, CityObject, CrsReference, Defect, DefectCode, Effect, ModelPoint, ObjectKind};
 
 /// Largest absolute coordinate. Coordinates on the Earth are smaller, even in feet.
@@ -18,6 +19,8 @@ pub(super) struct Builder {
     unusable: HashSet<u32>,
     /// Objects and the identifiers of their parents.
     parents: Vec<(usize, String)>,
+    /// Materials, textures and themes of the model.
+    pub(super) palette: Palette,
 }
 
 impl Builder {
@@ -130,6 +133,7 @@ impl Builder {
             }
         }
         self.cut_circles();
+        self.model.appearance = std::mem::take(&mut self.palette).finish();
         (self.model, self.defects)
     }
 

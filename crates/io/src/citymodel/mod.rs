@@ -13,7 +13,9 @@ mod crs_name;
 mod error;
 mod export;
 mod format;
+mod images;
 mod obj;
+mod palette;
 mod placement;
 mod ply;
 mod read;
@@ -22,6 +24,7 @@ pub use cityjson::{CityJsonOptions, write_cityjson};
 pub use error::{CityError, CityFault};
 pub use export::{Footprints, MeshFormat, write_footprints, write_mesh};
 pub use format::CityFormat;
+pub use images::move_images;
 pub use read::{CityFile, SIZE_LIMIT, read};
 
 pub(crate) use ply::points as ply_points;

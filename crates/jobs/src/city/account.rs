@@ -39,7 +39,7 @@ pub struct CitySummary {
     pub origin: [f64; 3],
     /// Number of defects per code and effect.
     pub defects: Vec<CityDefectCount>,
-    /// Things of the file that the model does not hold, such as appearances, by their kind.
+    /// Things of the file that are not carried, such as georeferenced textures, by their kind.
     pub left_out: BTreeMap<String, usize>,
     /// Whether objects have no usable surface, or the reader dropped surfaces.
     pub incomplete: bool,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use io::citymodel::{CityJsonOptions, MeshFormat, write_cityjson, write_footprints, write_mesh};
+use io::citymodel::{CityJsonOptions, MeshFormat, move_images, write_cityjson, write_footprints, write_mesh};
 use serde::Serialize;
 
 use super::account::{CityAccount, CitySummary};
@@ -48,8 +48,15 @@ pub fn convert(config: &CityConvertConfig, progress: &dyn Progress) -> Result<Ci
     for path in [Some(&config.output), config.input.account.as_ref()].into_iter().flatten() {
         files::check_destination(path, config.input.overwrite)?;
     }
-    let opened = input::open(&config.input, progress)?;
-    let account = CityAccount::of(&opened);
+    let mut opened = input::open(&config.input, progress)?;
+    let mut account = CityAccount::of(&opened);
+    let appearance = &opened.file.model.appearance;
+    if format == CityOutputFormat::Cityjson {
+        move_images(&mut opened.file.model, &config.input.file, &config.output);
+    } else if !appearance.is_empty() {
+        let count = appearance.materials.len() + appearance.textures.len();
+        account.summary.left_out.insert("materials and textures".to_owned(), count);
+    }
     if format != CityOutputFormat::Cityjson && account.summary.triangles == 0 {
         account.write(&config.input)?;
         return Err(nothing_selected(config, &account.summary));

@@ -2,88 +2,35 @@
 //! a solid repeats.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
 
 use city::{DefectCode, Geometry, GeometryKind, Lod, ModelPoint, SurfaceClass, SurfacePolygon};
 
+use super::appearance::Appearances;
 use super::implicit::Implicit;
+use super::links::{Group, Links, Named, Resolved};
+use super::paint::{Polygon, Rings, paint};
 use crate::citymodel::builder::Builder;
 use crate::citymodel::error::CityFault;
-use crate::citymodel::placement::{Expansion, Instances, surface_size};
+use crate::citymodel::placement::{Expansion, Instances};
 
-/// Limit of the depth of links that lead to links.
-const LINK_DEPTH_MAX: usize = 4;
-/// Limit of the links that are followed in a file. Links to sets of links multiply.
-const LINKED_MAX: usize = 10_000_000;
-
-/// A polygon. It has no rings when it cannot be used.
-#[derive(Debug)]
-pub(super) struct Polygon {
-    pub(super) rings: Vec<Vec<u32>>,
-    pub(super) class: SurfaceClass,
-}
-
-/// The geometry of a property of an object.
-#[derive(Debug)]
-pub(super) struct Group {
-    pub(super) object: usize,
-    pub(super) lod: Lod,
-    pub(super) kind: GeometryKind,
-    /// Whether it belongs to a boundary surface.
-    pub(super) in_boundary: bool,
-    pub(super) members: Vec<Member>,
-    /// Placement of its surfaces, when they have their own coordinates.
-    pub(super) implicit: Option<Implicit>,
-    /// Line of the property in the file.
-    pub(super) line: usize,
-}
-
-/// A surface of a geometry.
-#[derive(Debug, Clone)]
-pub(super) struct Member {
-    pub(super) target: Target,
-    pub(super) solid: u32,
-    pub(super) shell: u32,
-    pub(super) turned: bool,
-    pub(super) class: SurfaceClass,
-    pub(super) line: usize,
-}
-
-/// The polygon of a member.
-#[derive(Debug, Clone)]
-pub(super) enum Target {
-    /// Index of a polygon.
-    Polygon(usize),
-    /// The value of a `xlink:href`.
-    Link(String),
-}
-
-/// The element with an identifier.
-#[derive(Debug)]
-pub(super) enum Named {
-    /// Index of a polygon.
-    Polygon(usize),
-    /// A range of the members of a group.
-    Members { group: usize, first: usize, last: usize },
-}
-
-/// A member after its links have been followed.
-#[derive(Debug, Clone, Copy)]
-struct Resolved {
-    polygon: usize,
-    solid: u32,
-    shell: u32,
-    turned: bool,
-    class: SurfaceClass,
+/// What the walk over a document found.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    pub(super) groups: Vec<Group>,
+    pub(super) polygons: Vec<Polygon>,
+    pub(super) named: HashMap<String, Named>,
+    pub(super) rings: Rings,
+    pub(super) appearances: Appearances,
 }
 
 /// Adds the geometries of all groups to their objects.
-pub(super) fn assemble(
-    builder: &mut Builder,
-    groups: &[Group],
-    mut polygons: Vec<Polygon>,
-    named: &HashMap<String, Named>,
-) -> Result<(), CityFault> {
-    let resolved = resolve(builder, groups, &mut polygons, named)?;
+pub(super) fn assemble(builder: &mut Builder, found: Found) -> Result<(), CityFault> {
+    let Found { groups, mut polygons, named, rings, appearances } = found;
+    let groups = &groups[..];
+    let mut links = Links::new(groups, &named);
+    paint(builder, &mut polygons, &appearances, &rings, &mut links)?;
+    let resolved = resolve(builder, groups, &mut polygons, &mut links)?;
     let in_solids: HashSet<(usize, Lod, usize)> = groups
         .iter()
         .zip(&resolved)
@@ -123,18 +70,16 @@ pub(super) fn assemble(
 }
 
 /// Follows the links of all groups, and gives unclassified polygons the class of their members.
-fn resolve(
+fn resolve<'a>(
     builder: &mut Builder,
-    groups: &[Group],
+    groups: &'a [Group],
     polygons: &mut [Polygon],
-    named: &HashMap<String, Named>,
+    links: &mut Links<'a>,
 ) -> Result<Vec<Vec<Resolved>>, CityFault> {
-    let sizes: Vec<usize> =
-        polygons.iter().map(|p| surface_size(p.rings.len(), p.rings.iter().map(Vec::len).sum())).collect();
+    let sizes: Vec<usize> = polygons.iter().map(Polygon::size).collect();
     // A polygon that its own element uses and that a solid links to is in the model twice.
     let own = sizes.iter().sum::<usize>().saturating_mul(4);
     let mut expansion = Expansion::default();
-    let mut links = Links { groups, named, followed: 0 };
     let mut resolved: Vec<Vec<Resolved>> = Vec::with_capacity(groups.len());
     for group in groups {
         let mut found = Vec::with_capacity(group.members.len());
@@ -211,62 +156,14 @@ fn surface(polygon: &Polygon, member: &Resolved) -> Option<SurfacePolygon> {
     if member.turned {
         rings.iter_mut().for_each(|ring| ring.reverse());
     }
+    let appearance = polygon.appearance.as_ref();
+    let appearance = appearance.map(|found| if member.turned { Arc::new(found.reversed()) } else { found.clone() });
     (!rings.is_empty()).then_some(SurfacePolygon {
         rings,
         class: polygon.class,
         solid: member.solid,
         shell: member.shell,
         attributes: None,
+        appearance,
     })
-}
-
-/// Follows links, and counts them.
-struct Links<'a> {
-    groups: &'a [Group],
-    named: &'a HashMap<String, Named>,
-    followed: usize,
-}
-
-impl<'a> Links<'a> {
-    /// Follows a member to its polygons. The inner error is a link that leads nowhere.
-    fn follow(
-        &mut self,
-        member: &'a Member,
-        depth: usize,
-        found: &mut Vec<Resolved>,
-    ) -> Result<Result<(), &'a str>, CityFault> {
-        let Member { solid, shell, turned, class, .. } = *member;
-        let link = match &member.target {
-            Target::Polygon(polygon) => {
-                found.push(Resolved { polygon: *polygon, solid, shell, turned, class });
-                return Ok(Ok(()));
-            }
-            Target::Link(link) => link.as_str(),
-        };
-        self.followed += 1;
-        if self.followed > LINKED_MAX {
-            let what = format!("the file has more than {LINKED_MAX} links to surfaces, counting links behind links");
-            return Err(CityFault::unsupported(what, format!("line {}", member.line)));
-        }
-        let target = link.strip_prefix('#').and_then(|id| self.named.get(id));
-        match target {
-            Some(&Named::Polygon(polygon)) => {
-                found.push(Resolved { polygon, solid, shell, turned, class });
-                Ok(Ok(()))
-            }
-            Some(&Named::Members { group, first, last }) if depth < LINK_DEPTH_MAX => {
-                let start = found.len();
-                for below in &self.groups[group].members[first..last] {
-                    if let Err(lost) = self.follow(below, depth + 1, found)? {
-                        return Ok(Err(lost));
-                    }
-                }
-                for below in &mut found[start..] {
-                    *below = Resolved { solid, shell, turned: below.turned ^ turned, class, ..*below };
-                }
-                Ok(Ok(()))
-            }
-            _ => Ok(Err(link)),
-        }
-    }
 }

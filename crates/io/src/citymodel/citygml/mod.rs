@@ -4,12 +4,15 @@
 //! predefined entities are expanded. Links (`xlink:href`) are followed only within the file, to a
 //! limited depth and number. Boundary surfaces give polygons their class. A solid that links to
 //! them becomes one geometry with classes. Implicit geometries are placed by their matrix and
-//! reference point. Attributes and addresses are kept as CityJSON has them. Curves, points and
-//! appearance are skipped.
+//! reference point. Attributes, addresses, materials and textures are kept as CityJSON has them.
+//! Curves and points are skipped.
 
+mod appearance;
 mod assemble;
 mod attributes;
 mod implicit;
+mod links;
+mod paint;
 mod properties;
 mod walker;
 

@@ -1,12 +1,13 @@
 //! Walks over the elements of a document, and collects objects, polygons and geometries.
 
-use std::collections::HashMap;
-
 use city::{CityModel, Defect, DefectCode, GeometryKind, Lod, ModelPoint, ObjectKind, SurfaceClass, VertexPool};
 
-use super::assemble::{Group, Member, Named, Polygon, Target, assemble};
+use super::appearance::OpenAppearance;
+use super::assemble::{Found, assemble};
 use super::attributes::Attributes;
 use super::implicit::{Field, Implicit};
+use super::links::{Group, Member, Named, Target};
+use super::paint::Polygon;
 use super::properties::Property;
 use crate::citymodel::builder::Builder;
 use crate::citymodel::crs_name::crs_reference;
@@ -56,13 +57,13 @@ pub(super) struct Walker {
     /// Class of the boundary surface that the walk is in.
     class: SurfaceClass,
     srs_name: Option<String>,
-    groups: Vec<Group>,
-    polygons: Vec<Polygon>,
-    named: HashMap<String, Named>,
+    found: Found,
     /// State within a geometry property, while the walk is in one.
     geometry: Option<Progress>,
     /// Attribute or address of the object, while the walk is in one.
     property: Option<Property>,
+    /// Appearance that the walk is in.
+    appearance: Option<OpenAppearance>,
 }
 
 /// An open element.
@@ -81,6 +82,8 @@ enum Mark {
     Nothing,
     /// Part of an attribute or an address.
     Property,
+    /// An appearance or part of one.
+    Appearance,
     Object {
         before: Option<usize>,
     },
@@ -122,6 +125,8 @@ struct Progress {
 struct OpenPolygon {
     /// Complete rings.
     rings: Vec<Vec<u32>>,
+    /// Identifiers of the rings, with their numbers.
+    ids: Vec<(String, usize)>,
     /// Coordinates of the open ring.
     ring: Option<Vec<f64>>,
     /// First defect that makes the polygon unusable.
@@ -147,6 +152,9 @@ impl Walker {
         let mark = if let Some(property) = &mut self.property {
             property.start(name, attributes);
             Mark::Property
+        } else if let Some(appearance) = &mut self.appearance {
+            appearance.start(name, attributes);
+            Mark::Appearance
         } else if self.geometry.is_some() {
             self.start_in_geometry(name, attributes, line)
         } else {
@@ -163,6 +171,10 @@ impl Walker {
     /// Begins an element outside a geometry: an object, a boundary surface, or a geometry property.
     fn start_outside(&mut self, name: &str, id: Option<&str>, attributes: &Attributes, line: usize) -> Mark {
         let link = attributes.get("href");
+        if name == "Appearance" && self.parent().starts_with("appearance") {
+            self.appearance = Some(OpenAppearance::default());
+            return Mark::Appearance;
+        }
         if OBJECT_PROPERTIES.contains(&self.parent()) {
             let id = id.map_or_else(|| format!("{name} in line {line}"), str::to_owned);
             let object = self.builder.object(id, ObjectKind::new(name.to_owned()));
@@ -180,7 +192,15 @@ impl Walker {
             (Some(object), Some(lod)) => {
                 let kind = GeometryKind::MultiSurface;
                 let in_boundary = self.class != SurfaceClass::Unclassified;
-                self.groups.push(Group { object, lod, kind, in_boundary, members: Vec::new(), implicit: None, line });
+                self.found.groups.push(Group {
+                    object,
+                    lod,
+                    kind,
+                    in_boundary,
+                    members: Vec::new(),
+                    implicit: None,
+                    line,
+                });
                 let implicit = name.ends_with("ImplicitRepresentation").then(Implicit::default);
                 let is_link_to_surfaces = implicit.is_none();
                 self.geometry = Some(Progress { implicit, ..Progress::default() });
@@ -198,12 +218,10 @@ impl Walker {
     }
 
     /// Returns whether an element is an attribute or an address of the object that it is a child
-    /// of. Appearances and attributes of surfaces are counted, because the model does not hold
-    /// them.
+    /// of. Attributes of surfaces are counted, because the model does not hold them.
     fn is_attribute(&mut self, name: &str) -> bool {
         let in_object = self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Object { .. }));
-        if in_object && name.starts_with("appearance") {
-            self.builder.left_out("appearances", 1);
+        if name.starts_with("appearance") {
             return false;
         }
         let holds_more = OBJECT_PROPERTIES.contains(&name) || SURFACE_PROPERTIES.contains(&name);
@@ -218,15 +236,20 @@ impl Walker {
     fn start_in_geometry(&mut self, name: &str, attributes: &Attributes, line: usize) -> Mark {
         let in_polygon = self.geometry.as_ref().is_some_and(|g| g.polygon.is_some());
         let parent = self.parent().to_owned();
-        let first = self.groups.last().map_or(0, |group| group.members.len());
+        let first = self.found.groups.last().map_or(0, |group| group.members.len());
         if let Some(field) = self.field(name).filter(|_| !in_polygon) {
             return Mark::Implicit { field, text: String::new() };
+        }
+        if ["SimpleTexture", "Material"].contains(&name) {
+            self.builder.left_out("appearances of textured surfaces", 1);
         }
         let in_reference = name == "referencePoint" || parent == "referencePoint";
         if let (Some(link), false) = (attributes.get("href"), in_polygon || in_reference) {
             self.member(Target::Link(link.to_owned()), line);
         }
-        let (Some(progress), Some(group)) = (&mut self.geometry, self.groups.last_mut()) else { return Mark::Nothing };
+        let (Some(progress), Some(group)) = (&mut self.geometry, self.found.groups.last_mut()) else {
+            return Mark::Nothing;
+        };
         match name {
             "Solid" => {
                 group.kind = if group.kind.is_solid() { group.kind } else { GeometryKind::Solid };
@@ -252,8 +275,8 @@ impl Walker {
                 Mark::Orientable { before }
             }
             "Polygon" | "Triangle" | "Rectangle" | "PolygonPatch" if !in_polygon => {
-                let (rings, ring) = (Vec::new(), None);
-                progress.polygon = Some(OpenPolygon { rings, ring, problem: None, unclosed: 0, line });
+                let (rings, ids, ring) = (Vec::new(), Vec::new(), None);
+                progress.polygon = Some(OpenPolygon { rings, ids, ring, problem: None, unclosed: 0, line });
                 Mark::Polygon
             }
             "LinearRing" => match &mut progress.polygon {
@@ -284,6 +307,9 @@ impl Walker {
         if let Some(property) = &mut self.property {
             return property.text(text);
         }
+        if let Some(appearance) = &mut self.appearance {
+            return appearance.text(text);
+        }
         let frame = self.stack.last_mut();
         if let Some(Mark::Positions { text: so_far } | Mark::Implicit { text: so_far, .. }) = frame.map(|f| &mut f.mark)
         {
@@ -297,6 +323,7 @@ impl Walker {
         match frame.mark {
             Mark::Nothing => {}
             Mark::Property => self.end_property(),
+            Mark::Appearance => self.end_appearance(),
             Mark::Object { before } => self.object = before,
             Mark::Class { before } => self.class = before,
             Mark::Geometry => self.end_geometry(),
@@ -305,11 +332,11 @@ impl Walker {
                 if let Some(progress) = &mut self.geometry {
                     progress.turned = before;
                 }
-                let last = self.groups.last().map_or(0, |group| group.members.len());
+                let last = self.found.groups.last().map_or(0, |group| group.members.len());
                 self.name_members(frame.id, last.saturating_sub(1));
             }
             Mark::Polygon => self.end_polygon(frame.id),
-            Mark::Ring => self.end_ring(),
+            Mark::Ring => self.end_ring(frame.id),
             Mark::Positions { text } => {
                 let dimension = frame.dimension.or_else(|| self.stack.iter().rev().find_map(|frame| frame.dimension));
                 self.positions(&text, &frame.name, dimension.unwrap_or(3));
@@ -330,9 +357,17 @@ impl Walker {
         }
     }
 
+    /// Ends an element of an appearance.
+    fn end_appearance(&mut self) {
+        let Some(appearance) = &mut self.appearance else { return };
+        if appearance.end(&mut self.found.appearances, &mut self.builder.palette) {
+            self.appearance = None;
+        }
+    }
+
     /// Adds a member to the open geometry.
     fn member(&mut self, target: Target, line: usize) {
-        if let (Some(progress), Some(group)) = (&self.geometry, self.groups.last_mut()) {
+        if let (Some(progress), Some(group)) = (&self.geometry, self.found.groups.last_mut()) {
             let (shell, turned, class) = (progress.shell, progress.turned, self.class);
             let solid = progress.solids.saturating_sub(1);
             group.members.push(Member { target, solid, shell, turned, class, line });
@@ -341,17 +376,17 @@ impl Walker {
 
     /// Gives an identifier to the members of the open geometry from `first` on.
     fn name_members(&mut self, id: Option<String>, first: usize) {
-        let last = self.groups.last().map_or(0, |group| group.members.len());
+        let last = self.found.groups.last().map_or(0, |group| group.members.len());
         if let (Some(id), true) = (id, first < last) {
-            let group = self.groups.len() - 1;
-            self.named.entry(id).or_insert(Named::Members { group, first, last });
+            let group = self.found.groups.len() - 1;
+            self.found.named.entry(id).or_insert(Named::Members { group, first, last });
         }
     }
 
     /// Ends a geometry property, and drops it when it has no surface.
     fn end_geometry(&mut self) {
         let Some(Progress { implicit, .. }) = self.geometry.take() else { return };
-        let Some(group) = self.groups.last_mut() else { return };
+        let Some(group) = self.found.groups.last_mut() else { return };
         if !group.members.is_empty() {
             group.implicit = implicit;
             return;
@@ -362,7 +397,7 @@ impl Walker {
         };
         let (object, place) = (group.object, format!("line {}", group.line));
         self.builder.dropped(code, object, place, detail);
-        self.groups.pop();
+        self.found.groups.pop();
     }
 
     /// Adds the numbers of `pos`, `posList` or `coordinates` to the open ring.
@@ -390,7 +425,7 @@ impl Walker {
     }
 
     /// Ends a ring: makes vertices of its coordinates.
-    fn end_ring(&mut self) {
+    fn end_ring(&mut self, id: Option<String>) {
         let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.as_mut()) else { return };
         let numbers = polygon.ring.take().unwrap_or_default();
         let (points, rest) = numbers.as_chunks::<3>();
@@ -420,13 +455,14 @@ impl Walker {
                 }
             }
         }
+        polygon.ids.extend(id.map(|id| (id, polygon.rings.len())));
         polygon.rings.push(ring);
     }
 
     /// Ends a polygon, and reports it when it cannot be used.
     fn end_polygon(&mut self, id: Option<String>) {
         let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.take()) else { return };
-        let object = self.groups.last().map_or(0, |group| group.object);
+        let object = self.found.groups.last().map_or(0, |group| group.object);
         let place = || match &id {
             Some(id) => format!("line {}, {id}", polygon.line),
             None => format!("line {}", polygon.line),
@@ -444,13 +480,16 @@ impl Walker {
             self.builder.note(DefectCode::RingNotClosed, Some(object), place(), "");
         }
         let rings = if usable { polygon.rings } else { Vec::new() };
-        let number = self.polygons.len();
-        self.polygons.push(Polygon { rings, class: self.class });
+        let number = self.found.polygons.len();
+        self.found.polygons.push(Polygon { rings, class: self.class, appearance: None });
+        for (id, ring) in polygon.ids.into_iter().filter(|_| usable) {
+            self.found.rings.entry(id).or_insert((number, ring));
+        }
         if let Some(id) = id.clone() {
-            if self.named.contains_key(&id) {
+            if self.found.named.contains_key(&id) {
                 self.builder.note(DefectCode::DuplicateId, Some(object), place(), "a polygon");
             }
-            self.named.entry(id).or_insert(Named::Polygon(number));
+            self.found.named.entry(id).or_insert(Named::Polygon(number));
         }
         if usable {
             self.member(Target::Polygon(number), polygon.line);
@@ -460,7 +499,7 @@ impl Walker {
     /// Assembles the geometries, and returns the model and its defects.
     pub(super) fn finish(mut self) -> Result<(CityModel, Vec<Defect>), CityFault> {
         self.builder.set_crs(crs_reference(self.srs_name.as_deref().unwrap_or_default()));
-        assemble(&mut self.builder, &self.groups, self.polygons, &self.named)?;
+        assemble(&mut self.builder, self.found)?;
         Ok(self.builder.finish())
     }
 }

@@ -2,6 +2,7 @@
 
 use city::{DefectCode, Geometry, GeometryKind, Lod, SurfaceClass, SurfacePolygon};
 
+use super::appearance::{Numbers, Themes};
 use super::schema::{Nested, SemanticSurface, Semantics, Shape};
 use crate::citymodel::builder::Builder;
 
@@ -28,14 +29,22 @@ pub(super) fn surface_kind(name: &str) -> Option<GeometryKind> {
     [MultiSurface, CompositeSurface, Solid, MultiSolid, CompositeSolid].into_iter().find(|kind| kind.name() == name)
 }
 
-/// Adds a geometry to its object. Surfaces that cannot be used become defects.
-pub(super) fn add(builder: &mut Builder, shape: &Shape, vertex_at: impl FnMut(u64) -> Option<u32>, place: Place) {
+/// Adds a geometry to its object. Surfaces that cannot be used become defects. `numbers` are of the
+/// document that holds the shape.
+pub(super) fn add(
+    builder: &mut Builder,
+    shape: &Shape,
+    numbers: &Numbers,
+    vertex_at: impl FnMut(u64) -> Option<u32>,
+    place: Place,
+) {
     let name = shape.kind.as_deref().unwrap_or_default();
     let Some(kind) = surface_kind(name) else {
         let detail = if name.is_empty() { "the geometry has no type" } else { name };
         return builder.dropped(DefectCode::NotASurface, place.object, place.text(), detail);
     };
-    let mut unroll = Unroll { builder, vertex_at, place, found: Vec::new() };
+    let themes = Themes::of(builder, shape, numbers);
+    let mut unroll = Unroll { builder, vertex_at, themes, place, path: Vec::new(), found: Vec::new() };
     let depth = match kind {
         GeometryKind::MultiSurface | GeometryKind::CompositeSurface => 0,
         GeometryKind::Solid => 1,
@@ -77,7 +86,10 @@ struct Member {
 struct Unroll<'a, F> {
     builder: &'a mut Builder,
     vertex_at: F,
+    themes: Themes<'a>,
     place: Place,
+    /// Numbers of the solid, shell and surface, as deep as the boundaries are nested.
+    path: Vec<usize>,
     found: Vec<SurfacePolygon>,
 }
 
@@ -94,11 +106,13 @@ impl<F: FnMut(u64) -> Option<u32>> Unroll<'_, F> {
         for (i, below) in boundaries.list().iter().enumerate() {
             let number = i as u32;
             let value = values.and_then(|(semantics, nested)| Some((semantics, nested.list().get(i)?)));
+            self.path.push(i);
             match depth {
                 0 => self.surface(below, member, value),
                 1 => self.level(below, 0, Member { shell: number, ..member }, value),
                 _ => self.level(below, depth - 1, Member { solid: number, shell: 0 }, value),
             }
+            self.path.pop();
         }
     }
 
@@ -110,12 +124,14 @@ impl<F: FnMut(u64) -> Option<u32>> Unroll<'_, F> {
                 let described = value.and_then(|(semantics, value)| self.described(semantics, value, number));
                 let class = described.and_then(|surface| surface.kind.as_deref()).map(SurfaceClass::from_name);
                 let attributes = described.map(|surface| &surface.attributes).filter(|found| !found.is_empty());
+                let appearance = self.themes.of_surface(self.builder, &self.path, &rings);
                 self.found.push(SurfacePolygon {
                     rings,
                     class: class.unwrap_or(SurfaceClass::Unclassified),
                     solid,
                     shell,
                     attributes: attributes.cloned(),
+                    appearance,
                 });
             }
             Err((code, detail)) => {

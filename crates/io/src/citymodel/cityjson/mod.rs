@@ -2,9 +2,10 @@
 //! 2.0.
 //!
 //! A text that is not JSON, or has members of the wrong type, is refused with its line and column.
-//! Any other defect costs only the surface that has it. Attributes and addresses of objects are
-//! kept. Appearances and attributes of surfaces are counted and skipped, extensions are skipped.
+//! Any other defect costs only the surface that has it. Attributes, addresses and appearances are
+//! kept; what refers to nothing is counted. Extensions are skipped.
 
+mod appearance;
 mod geometry;
 mod schema;
 mod template;
@@ -18,7 +19,9 @@ use super::crs_name::crs_reference;
 use super::error::CityFault;
 use super::format::{CityFormat, Parsed};
 use super::placement::Instances;
-use schema::{Document, Object, Pairs, Templates, Transform};
+use appearance::Numbers;
+use schema::{Document, Object, Pairs, Transform};
+use template::Library;
 
 use write::is_written;
 pub use write::{CityJsonOptions, write_cityjson};
@@ -42,11 +45,13 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
         crs.vertical_epsg = crs.vertical_epsg.or(crs_reference(vertical).epsg);
     }
     reader.builder.set_crs(crs);
-    reader.document(first.vertices, first.objects, first.templates.as_ref())?;
+    let numbers = Numbers::register(&mut reader.builder, first.appearance.unwrap_or_default());
+    let library = Library { templates: first.templates.as_ref(), numbers: &numbers };
+    reader.document(first.vertices, first.objects, library, &numbers)?;
     let mut features = 0;
     for document in documents {
         let place = format!("feature {}", features + 1);
-        reader.feature(document.map_err(syntax)?, first.templates.as_ref(), &place)?;
+        reader.feature(document.map_err(syntax)?, library, &place)?;
         features += 1;
     }
     let format = if features == 0 { CityFormat::CityJson(version) } else { CityFormat::CityJsonSeq(version) };
@@ -99,7 +104,7 @@ struct Reader {
 
 impl Reader {
     /// Adds the objects of a line of a sequence.
-    fn feature(&mut self, feature: Document, shared: Option<&Templates>, place: &str) -> Result<(), CityFault> {
+    fn feature(&mut self, feature: Document, library: Library<'_>, place: &str) -> Result<(), CityFault> {
         if feature.kind.as_deref() != Some("CityJSONFeature") {
             return Err(CityFault::invalid("the line is not a CityJSONFeature", place));
         }
@@ -107,7 +112,8 @@ impl Reader {
             let what = "the first line of the sequence has no transform, so its features have no coordinates";
             return Err(CityFault::invalid(what, "line 1"));
         }
-        self.document(feature.vertices, feature.objects, shared)
+        let numbers = Numbers::register(&mut self.builder, feature.appearance.unwrap_or_default());
+        self.document(feature.vertices, feature.objects, library, &numbers)
     }
 
     /// Adds the objects of a document. Its boundaries are indices of `vertices`.
@@ -115,7 +121,8 @@ impl Reader {
         &mut self,
         vertices: Vec<[f64; 3]>,
         objects: Option<Pairs<Object>>,
-        templates: Option<&Templates>,
+        library: Library<'_>,
+        numbers: &Numbers,
     ) -> Result<(), CityFault> {
         let first = self.builder.vertex_count();
         let count = vertices.len();
@@ -140,10 +147,10 @@ impl Reader {
                 let place = geometry::Place { object: index, geometry: number };
                 if shape.kind.as_deref() == Some("GeometryInstance") {
                     let (builder, vertices) = (&mut self.builder, first..first + count);
-                    template::add_instance(builder, &mut self.instances, shape, templates, vertices, place)?;
+                    template::add_instance(builder, &mut self.instances, shape, library, vertices, place)?;
                 } else {
                     let vertex_at = |i: u64| usize::try_from(i).ok().filter(|&i| i < count).map(|i| (first + i) as u32);
-                    geometry::add(&mut self.builder, shape, vertex_at, place);
+                    geometry::add(&mut self.builder, shape, numbers, vertex_at, place);
                 }
             }
         }
@@ -153,8 +160,6 @@ impl Reader {
     /// Counts what the model does not hold of the shapes of an object.
     fn count_left_out<'a>(&mut self, shapes: impl Iterator<Item = &'a schema::Shape>) {
         for shape in shapes {
-            let appearances = usize::from(shape.material.is_some()) + usize::from(shape.texture.is_some());
-            self.builder.left_out("appearances", appearances);
             let surfaces = || shape.semantics.iter().flat_map(|semantics| &semantics.surfaces);
             let relations = |surface: &schema::SemanticSurface| {
                 usize::from(surface.parent.is_some()) + usize::from(surface.children.is_some())

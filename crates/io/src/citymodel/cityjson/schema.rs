@@ -28,6 +28,22 @@ pub(super) struct Document {
     pub(super) vertices: Vec<[f64; 3]>,
     #[serde(rename = "geometry-templates")]
     pub(super) templates: Option<Templates>,
+    pub(super) appearance: Option<Looks>,
+}
+
+/// The materials and textures of a document.
+#[derive(Debug, Default, serde::Deserialize)]
+pub(super) struct Looks {
+    #[serde(default)]
+    pub(super) materials: Vec<Value>,
+    #[serde(default)]
+    pub(super) textures: Vec<Value>,
+    #[serde(default, rename = "vertices-texture")]
+    pub(super) vertices: Vec<[f64; 2]>,
+    #[serde(rename = "default-theme-material")]
+    pub(super) default_material: Option<String>,
+    #[serde(rename = "default-theme-texture")]
+    pub(super) default_texture: Option<String>,
 }
 
 #[derive(Debug, Clone, Copy, serde::Deserialize)]
@@ -63,10 +79,23 @@ pub(super) struct Shape {
     pub(super) boundaries: Nested,
     pub(super) semantics: Option<Semantics>,
     pub(super) template: Option<u64>,
-    pub(super) material: Option<IgnoredAny>,
-    pub(super) texture: Option<IgnoredAny>,
+    /// Materials by theme.
+    pub(super) material: Option<Pairs<ThemeValues>>,
+    /// Textures by theme.
+    pub(super) texture: Option<Pairs<ThemeValues>>,
     #[serde(rename = "transformationMatrix")]
     pub(super) matrix: Option<Vec<f64>>,
+}
+
+/// Materials or textures of a geometry in a theme.
+#[derive(Debug, serde::Deserialize)]
+pub(super) struct ThemeValues {
+    /// Material of all surfaces.
+    #[serde(default)]
+    pub(super) value: Nested,
+    /// One material per surface, or one texture with its coordinates per ring.
+    #[serde(default)]
+    pub(super) values: Nested,
 }
 
 #[derive(Debug, serde::Deserialize)]

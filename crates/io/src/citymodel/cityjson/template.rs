@@ -5,23 +5,31 @@ use std::ops::Range;
 
 use city::DefectCode;
 
+use super::appearance::Numbers;
 use super::geometry::{Place, add};
 use super::schema::{Nested, Shape, Templates};
 use crate::citymodel::builder::Builder;
 use crate::citymodel::error::CityFault;
 use crate::citymodel::placement::{Instances, Placement, surface_size};
 
+/// The templates of a file, and the appearance that they refer to.
+#[derive(Clone, Copy)]
+pub(super) struct Library<'a> {
+    pub(super) templates: Option<&'a Templates>,
+    pub(super) numbers: &'a Numbers,
+}
+
 /// Adds an instance as a geometry. `vertices` is the range of the document's vertices in the model.
 pub(super) fn add_instance(
     builder: &mut Builder,
     instances: &mut Instances,
     instance: &Shape,
-    templates: Option<&Templates>,
+    library: Library<'_>,
     vertices: Range<usize>,
     place: Place,
 ) -> Result<(), CityFault> {
     let at = format!("geometry {}", place.geometry);
-    let found = template(instance, templates).and_then(|(shape, all)| {
+    let found = template(instance, library.templates).and_then(|(shape, all)| {
         let [Nested::Index(anchor)] = instance.boundaries.list() else { return Err("one vertex as boundaries") };
         let anchor = usize::try_from(*anchor).ok().filter(|&i| i < vertices.len());
         let anchor = anchor.ok_or("a vertex of the model as boundaries")?;
@@ -41,10 +49,10 @@ pub(super) fn add_instance(
     }
     let placement = Placement { matrix, origin: builder.position(anchor) };
     let used = used_vertices(shape, positions.len());
-    instances.expansion.add(size(&shape.boundaries), 0, &at)?;
+    instances.expansion.add(size(&shape.boundaries).saturating_add(appearance_size(shape)), 0, &at)?;
     let index_of =
         instances.place(builder, &placement, used.into_iter().map(|index| (index as u64, positions[index])), &at)?;
-    add(builder, shape, |index| index_of.get(&index).copied(), place);
+    add(builder, shape, library.numbers, |index| index_of.get(&index).copied(), place);
     Ok(())
 }
 
@@ -76,6 +84,14 @@ fn size(boundaries: &Nested) -> usize {
         }
     }
     total
+}
+
+/// Returns the size of the materials and textures of a shape. A material of all surfaces costs
+/// each of them an entry.
+fn appearance_size(shape: &Shape) -> usize {
+    let themes = || [&shape.material, &shape.texture].into_iter().flatten().flat_map(|themes| &themes.0);
+    let values: usize = themes().map(|(_, theme)| size(&theme.values)).fold(0, usize::saturating_add);
+    values.saturating_add(themes().count().saturating_mul(size(&shape.boundaries)))
 }
 
 /// Returns the vertices that a shape uses, ascending. [`add`] reports indices that do not exist.

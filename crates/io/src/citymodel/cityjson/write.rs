@@ -4,11 +4,14 @@
 //! model. Vertices that get the same coordinates are merged. Classes that CityJSON has no name for
 //! are written without semantics.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
-use city::{BuildingRole, CityModel, CityObject, Geometry, GeometryKind, ModelPoint, SurfaceClass, SurfacePolygon};
+use city::{
+    Appearance, BuildingRole, CityModel, CityObject, Geometry, GeometryKind, ModelPoint, SurfaceAppearance,
+    SurfaceClass, SurfacePolygon,
+};
 use serde_json::{Map, Value, json};
 
 use super::schema::VERTICAL;
@@ -92,6 +95,9 @@ fn document(model: &CityModel, scale: f64) -> Result<Value, CityFault> {
     if let Some(url) = lone_vertical_url(&model.crs) {
         document[VERTICAL] = json!(url);
     }
+    if !model.appearance.is_empty() {
+        document["appearance"] = appearance_value(&model.appearance);
+    }
     document["CityObjects"] = Value::Object(objects);
     document["vertices"] = json!(lattice.cells);
     Ok(document)
@@ -150,7 +156,58 @@ fn geometry_value(model: &CityModel, geometry: &Geometry, lattice: &mut Lattice)
     if !described.surfaces.is_empty() {
         value["semantics"] = json!({ "surfaces": described.surfaces, "values": nest(geometry, semantic) });
     }
+    let materials = themes(model, geometry, |found| found.materials.iter().map(|m| m.theme).collect());
+    for &(theme, name) in &materials {
+        let material = |surface: &SurfacePolygon| json!(surface.appearance.as_ref().and_then(|a| a.material(theme)));
+        value["material"][name] = json!({ "values": nest(geometry, material) });
+    }
+    let textures = themes(model, geometry, |found| found.textures.iter().map(|t| t.theme).collect());
+    for &(theme, name) in &textures {
+        value["texture"][name] = json!({ "values": nest(geometry, |surface| texture_value(surface, theme)) });
+    }
     value
+}
+
+/// Returns the themes that the surfaces of a geometry have, with their names, in the order of the
+/// model.
+fn themes<'a>(
+    model: &'a CityModel,
+    geometry: &Geometry,
+    of: impl Fn(&SurfaceAppearance) -> Vec<u32>,
+) -> Vec<(u32, &'a str)> {
+    let found: BTreeSet<u32> = geometry.surfaces.iter().flat_map(|s| &s.appearance).flat_map(|a| of(a)).collect();
+    found.into_iter().map(|theme| (theme, model.appearance.themes[theme as usize].as_str())).collect()
+}
+
+/// Returns the textures of the rings of a surface: the number of the texture, then of its
+/// coordinates; `null` alone for a ring without one.
+fn texture_value(surface: &SurfacePolygon, theme: u32) -> Value {
+    let rings = surface.appearance.as_ref().and_then(|found| found.texture(theme));
+    let ring = |number: usize| match rings.and_then(|found| found.rings[number].as_ref()) {
+        Some(ring) => json!(std::iter::once(ring.texture).chain(ring.vertices.iter().copied()).collect::<Vec<u32>>()),
+        None => json!([null]),
+    };
+    (0..surface.rings.len()).map(ring).collect()
+}
+
+/// Returns the member `appearance` of the document.
+fn appearance_value(appearance: &Appearance) -> Value {
+    let mut value = Map::new();
+    let lists = [("materials", &appearance.materials), ("textures", &appearance.textures)];
+    for (name, list) in lists.into_iter().filter(|(_, list)| !list.is_empty()) {
+        value.insert(name.to_owned(), json!(list));
+    }
+    if !appearance.vertices.is_empty() {
+        value.insert("vertices-texture".to_owned(), json!(appearance.vertices));
+    }
+    let defaults = [
+        ("default-theme-texture", &appearance.default_texture_theme),
+        ("default-theme-material", &appearance.default_material_theme),
+    ];
+    for (name, theme) in defaults {
+        value.extend(theme.iter().map(|theme| (name.to_owned(), json!(theme))));
+    }
+    Value::Object(value)
 }
 
 /// The descriptions of the surfaces of a geometry: one for each class and set of attributes.
