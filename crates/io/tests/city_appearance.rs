@@ -1,5 +1,5 @@
-//! Materials and textures go from CityGML and CityJSON to CityJSON, each to the surface and the ring
-//! that it belongs to.
+//! Materials and textures go from CityGML and CityJSON to CityJSON, each to the surface and the
+//! ring that it belongs to.
 
 use std::path::PathBuf;
 

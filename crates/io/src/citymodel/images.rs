@@ -1,7 +1,7 @@
 //! Keeps the paths of texture images valid when a model is written to another folder.
 //!
-//! Images are neither opened nor copied. A relative path gets a prefix that leads from the folder of
-//! the new file to the folder of the old one. Absolute paths and addresses stay as they are.
+//! Images are neither opened nor copied. A relative path gets a prefix that leads from the folder
+//! of the new file to the folder of the old one. Absolute paths and addresses stay as they are.
 
 use std::path::{Component, Path, PathBuf};
 
