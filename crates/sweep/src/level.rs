@@ -12,6 +12,7 @@ use crate::aggregation::{Penalties, RowSums, VolumeBlock};
 use crate::cost::{COST_MAX, CostConfig};
 use crate::error::SweepError;
 use crate::height_map::HeightMap;
+use crate::ranges::Ranges;
 use crate::readout::{Estimates, LeastSum, Modes, TOGETHER};
 use crate::reference::Reference;
 #[cfg(target_arch = "x86_64")]
@@ -22,15 +23,17 @@ use crate::tiles::tiles;
 use crate::view::ViewLevel;
 use crate::volume::CostVolume;
 
-/// Side of a block's core, pixels.
+/// Largest side of a block's core, pixels.
 const BLOCK: usize = 1024;
+/// Smallest side of a block's core, pixels: four times its margin, which is computed as well.
+const BLOCK_MIN: usize = 256;
 /// Overlap of a block on each side, pixels: one tile of the cost volume, so that the tiles of all
 /// blocks lie on one lattice. A path forgets its start within a few tens of pixels.
 const BLOCK_MARGIN: usize = 64;
 
-/// Largest number of hypotheses whose buffers are kept for the next block: four times a usual
-/// block's.
-const KEPT_MAX: usize = 64 << 20;
+/// Largest number of hypotheses of a block's core, and of those whose buffers are kept for the next
+/// block: about four times those of a usual one.
+const BLOCK_HYPOTHESES: usize = 64 << 20;
 
 /// Parameters of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +67,7 @@ pub fn sweep_level(
     config: &LevelConfig,
 ) -> Result<HeightMap, SweepError> {
     let (width, height) = (reference.view.image.width(), reference.view.image.height());
-    let cores = tiles(Window::whole(width, height), BLOCK);
+    let cores = tiles(Window::whole(width, height), block_side(reference.ranges));
     let mut parts: Vec<HeightMap> = cores
         .par_iter()
         .map(|core| sweep_block(reference, sources, *core, origin_m, config))
@@ -77,6 +80,16 @@ pub fn sweep_level(
         out.put(*core, &part);
     }
     Ok(out)
+}
+
+/// Returns the side of the blocks' cores: a level of many hypotheses is swept in smaller ones.
+fn block_side(ranges: &Ranges) -> usize {
+    let mean = ranges.evaluations() as usize / ranges.count.data().len().max(1);
+    let mut side = BLOCK;
+    while side > BLOCK_MIN && side * side * mean > BLOCK_HYPOTHESES {
+        side /= 2;
+    }
+    side
 }
 
 fn sweep_block(
@@ -100,7 +113,7 @@ fn sweep_block(
     };
     let block = volume.as_block();
     volume.aggregate(config.penalties, &mut forward, |y, sums| read_row(&mut reader, &block, y, sums));
-    if volume.hypotheses() <= KEPT_MAX {
+    if volume.hypotheses() <= BLOCK_HYPOTHESES {
         SCRATCH.set(LevelScratch { costs: volume.into_buffer(), forward });
     }
     Ok(reader.finish())
@@ -225,7 +238,6 @@ impl Reader<'_> {
 mod tests {
     use super::*;
     use crate::cost::Aggregation;
-    use crate::ranges::Ranges;
     use crate::testing::camera::leaning_camera;
     use crate::testing::plane::view_of_plane;
     use crate::view::SweepView;

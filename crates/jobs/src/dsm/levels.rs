@@ -7,9 +7,6 @@ use crate::dsm::notes::Notes;
 use crate::dsm::tuning::SweepTuning;
 use crate::dsm::values::HeightRange;
 
-/// The coarsest level is chosen so that the height range is at most this many of its steps. The
-/// full range is then searched where that is cheap, and still at several pixels per building.
-const TOP_HYPOTHESES: f64 = 64.0;
 /// The coarsest level keeps at least this many pixels on a side, or its aggregation has nothing to
 /// work with.
 const TOP_SIDE_MIN: usize = 48;
@@ -60,7 +57,7 @@ pub(crate) fn note_step(widest: f64, tuning: &SweepTuning, notes: &mut Notes<'_>
 /// [`smallest_sides`].
 pub(crate) fn choose_levels(range: HeightRange, step_m: f64, sides: &[usize], tuning: &SweepTuning) -> SweepLevels {
     let deepest = sides.iter().filter(|s| **s >= TOP_SIDE_MIN).count().saturating_sub(1);
-    let too_many = |level: &usize| range.span_m() / (step_m * f64::from(1u32 << *level)) > TOP_HYPOTHESES;
+    let too_many = |level: &usize| range.span_m() / (step_m * f64::from(1u32 << *level)) > tuning.top_hypotheses;
     let finest = tuning.finest_level.min(deepest);
     SweepLevels { finest, coarsest: (0..deepest).take_while(too_many).count().max(finest) }
 }

@@ -17,6 +17,9 @@ pub struct SweepTuning {
     pub step_px: f64,
     /// Finest pyramid level whose heights are computed; 0 is the full resolution.
     pub finest_level: usize,
+    /// Largest number of hypotheses on the coarsest level: the height range is at most this many
+    /// of its steps.
+    pub top_hypotheses: f64,
     /// Largest number of sources per view.
     pub sources: usize,
     /// Distance around a coarse pixel from which the next finer level takes over heights to search,
@@ -26,6 +29,11 @@ pub struct SweepTuning {
     /// the worst cost.
     pub jump_at_edge: u8,
 }
+
+/// A search of the full range by this many hypotheses is cheap on a level of a quarter of the
+/// pixels, which still has several pixels per building and a few per tree. With half as many
+/// hypotheses that level would be coarser by one, and lose small trees and narrow streets.
+const TOP_HYPOTHESES: f64 = 128.0;
 
 impl Preset {
     /// Returns the side of a cell where none is given, in pixels of the coarsest image: that of the
@@ -37,12 +45,19 @@ impl Preset {
     /// Returns the parameters of the preset.
     pub(crate) fn tuning(self) -> SweepTuning {
         let usual = Penalties::default().jump_at_edge;
-        let (finest_level, sources, reach, jump_at_edge) = match self {
-            Self::Fast => (1, 2, EDGE_REACH, usual),
-            Self::Balanced => (0, 4, EDGE_REACH, usual),
-            // Roofs end at image edges. Cheaper jumps there bring lower errors and fewer heights.
-            Self::Accurate => (0, 8, 2 * EDGE_REACH, usual / 2),
+        let balanced = SweepTuning {
+            step_px: 0.5,
+            finest_level: 0,
+            top_hypotheses: TOP_HYPOTHESES,
+            sources: 4,
+            reach: EDGE_REACH,
+            jump_at_edge: usual,
         };
-        SweepTuning { step_px: 0.5, finest_level, sources, reach, jump_at_edge }
+        match self {
+            Self::Fast => SweepTuning { finest_level: 1, top_hypotheses: TOP_HYPOTHESES / 2.0, sources: 2, ..balanced },
+            Self::Balanced => balanced,
+            // Roofs end at image edges. Cheaper jumps there bring lower errors and fewer heights.
+            Self::Accurate => SweepTuning { sources: 8, reach: 2 * EDGE_REACH, jump_at_edge: usual / 2, ..balanced },
+        }
     }
 }
