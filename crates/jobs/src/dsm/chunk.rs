@@ -117,6 +117,7 @@ fn sweep_chunk(
         useful: &plan.useful,
         grid: &grid,
         pixel_m: plan.pixel_m,
+        camera_m: plan.camera_deviation_m(),
         core: Window { x: core.x - work.extent.x, y: core.y - work.extent.y, ..core },
     };
     progress.begin("fusing", 1 + work.sources.iter().filter(|s| !s.is_empty()).count());

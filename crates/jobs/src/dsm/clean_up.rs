@@ -73,18 +73,27 @@ pub(crate) struct Voids<'a> {
     pub(crate) fill: Fill,
 }
 
-/// Cleans a surface on cells of `gsd_m`; returns the source of each cell and the counts of `core`.
-///
-/// `step_m` is the distance of two hypotheses.
+/// Lengths on which the clean-up depends, metres.
+#[derive(Clone, Copy)]
+pub(crate) struct Lengths {
+    /// Side of a cell.
+    pub(crate) gsd_m: f64,
+    /// Distance of two hypotheses.
+    pub(crate) step_m: f64,
+    /// Deviation of heights that the cameras leave.
+    pub(crate) camera_m: f64,
+}
+
+/// Cleans a surface; returns the source of each cell and the counts of `core`.
 pub(crate) fn clean_up(
     fused: &mut FusedSurface,
     voids: Voids<'_>,
-    step_m: f64,
-    gsd_m: f64,
+    lengths: Lengths,
     core: Window,
 ) -> (Grid<CellSource>, Cleaned) {
+    let Lengths { gsd_m, step_m, camera_m } = lengths;
     let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
-    let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells };
+    let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells, camera_m };
     let completed = take_unseen(fused);
     let before = known(&fused.height_m, core);
     drop_weak(fused, &trust, gsd_m);

@@ -11,7 +11,7 @@ use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::fusion::{FusionConfig, GridFrame, PlacedView, fuse_views, mark_cells, place_view};
 use sweep::{HeightMap, SweepView};
 
-use crate::dsm::clean_up::{Voids, clean_up};
+use crate::dsm::clean_up::{Lengths, Voids, clean_up};
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::grid::DsmGrid;
@@ -37,6 +37,8 @@ pub(crate) struct SurfaceInput<'a> {
     pub(crate) grid: &'a DsmGrid,
     /// Side of a pixel of the coarsest image on the ground, metres.
     pub(crate) pixel_m: f64,
+    /// Deviation of heights that the cameras leave, metres.
+    pub(crate) camera_m: f64,
     /// Cells of the grid that are kept.
     pub(crate) core: Window,
 }
@@ -158,8 +160,9 @@ fn fuse(
     let mut fused = fuse_views(&placed, grid.size, &fusion);
     drop(placed);
     let sights = grid_sights(pixels, grid, &fused.height_m, origin_m)?;
+    let lengths = Lengths { gsd_m: grid.gsd_m, step_m, camera_m: input.camera_m };
     let voids = Voids { blind, sights: &sights, fill: config.fill };
-    let (source, cleaned) = clean_up(&mut fused, voids, step_m, grid.gsd_m, core);
+    let (source, cleaned) = clean_up(&mut fused, voids, lengths, core);
     let rasters = ChunkRasters::new(fused, &source, origin_m).cropped(core);
     let filled = rasters.filled.data().iter().filter(|f| **f == FILLED).count();
     let counts = SurfaceCounts {

@@ -20,7 +20,7 @@ use crate::window_sums::window_sums;
 const UNOBSERVED: f64 = 0.1;
 /// Natural logarithm of the deviation, in height steps, of a cell with deviation and roughness of
 /// one step and without agreement.
-const SIGMA_BASE: f64 = 2.6;
+const SIGMA_BASE: f64 = 2.55;
 /// Exponent of the deviation from the sharpness of the costs.
 const SIGMA_SHARPNESS: f64 = 0.35;
 /// Exponent of the roughness.
@@ -45,10 +45,14 @@ pub struct TrustConfig {
     pub tolerance_m: f64,
     /// Distance around a cell over which the agreement is averaged, cells.
     pub reach_cells: usize,
+    /// Deviation of heights that the cameras leave, metres: their errors move whole surfaces, which
+    /// neither costs nor surroundings show.
+    pub camera_m: f64,
 }
 
 /// Replaces the deviations of the observed heights by calibrated ones, and returns the probability
-/// that each height is right within the tolerance; NaN in voids.
+/// that each height is right within the tolerance; NaN in voids. The deviation of the cameras
+/// enters the deviations only: it is much smaller than the tolerance.
 ///
 /// `sigma_m` holds the deviation from the sharpness of the costs where `is_observed`, and a final
 /// deviation in filled cells, metres. `agreement` is 0 to 1 where a height was observed and 0
@@ -60,7 +64,7 @@ pub struct TrustConfig {
 ///
 /// let height_m = Grid::filled(9, 9, 5.0f32);
 /// let (mut sigma_m, agreement) = (Grid::filled(9, 9, 0.1f32), Grid::filled(9, 9, 0.7f32));
-/// let config = TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3 };
+/// let config = TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3, camera_m: 0.0 };
 /// let confidence = calibrate(&height_m, &mut sigma_m, &agreement, |_| true, &config);
 /// assert!(confidence[(4, 4)] > 0.95 && sigma_m[(4, 4)] < 0.5);
 /// ```
@@ -84,7 +88,9 @@ pub fn calibrate(
         let cells = span(i % width, reach, width).len() * span(i / width, reach, height).len();
         let share = (UNOBSERVED + agreed[i] / cells as f64) / (UNOBSERVED + 1.0);
         let sigma = &mut sigma_m.data_mut()[i];
+        let mut camera_m = 0.0;
         if is_observed(i) {
+            camera_m = config.camera_m;
             let log = SIGMA_BASE
                 + SIGMA_SHARPNESS * in_steps(*sigma)
                 + SIGMA_ROUGHNESS * in_steps(roughness_m.data()[i])
@@ -94,6 +100,7 @@ pub fn calibrate(
         let ratio = config.tolerance_m / f64::from(*sigma).max(f64::MIN_POSITIVE);
         let odds = ODDS_BASE + ODDS_TOLERANCE * ratio.ln() + ODDS_AGREEMENT * share;
         *confidence = (1.0 / (1.0 + (-odds).exp())) as f32;
+        *sigma = f64::from(*sigma).hypot(camera_m) as f32;
     }
     confidence
 }
@@ -140,7 +147,7 @@ fn span(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
 mod tests {
     use super::*;
 
-    const CONFIG: TrustConfig = TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3 };
+    const CONFIG: TrustConfig = TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3, camera_m: 0.0 };
 
     #[test]
     fn what_stands_alone_or_is_rough_is_believed_less_and_filled_deviations_stay() {
@@ -161,6 +168,20 @@ mod tests {
         );
         assert_eq!(sigma_m.data()[filled], 2.5);
         assert!(confidence.data()[filled] < confidence[alone]);
+    }
+
+    #[test]
+    fn what_the_cameras_leave_adds_to_the_deviation_of_observed_heights() {
+        let (height_m, agreement) = (Grid::filled(9, 9, 5.0f32), Grid::filled(9, 9, 0.7f32));
+        let calibrated = |camera_m: f64| {
+            let mut sigma_m = Grid::filled(9, 9, 0.1f32);
+            let config = TrustConfig { camera_m, ..CONFIG };
+            let confidence = calibrate(&height_m, &mut sigma_m, &agreement, |i| i != 0, &config);
+            (sigma_m, confidence)
+        };
+        let ((exact, p), (off, q)) = (calibrated(0.0), calibrated(0.3));
+        assert!((off[(4, 4)] - exact[(4, 4)].hypot(0.3)).abs() < 1e-6);
+        assert_eq!((off[(0, 0)], p), (exact[(0, 0)], q));
     }
 
     #[test]
