@@ -196,6 +196,33 @@ fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
     assert_eq!([of("both", "dsm"), of("chunks", "dsm")], ["done_before", "done"]);
 }
 
+/// A batch replaces what an earlier run of it made, and nothing else.
+#[test]
+fn results_that_the_batch_did_not_make_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("batch.toml");
+    for (task, foreign) in
+        [("dsm", "dsm/dsm.tif"), ("dsm", "dsm/relief.png"), ("dsm", "plan.json"), ("ortho", "ortho/ortho_mask.tif")]
+    {
+        let text = format!(
+            "output = 'out'\n[[scene]]\nname = 'a'\nimages = ['{0}/view_1.tif', '{0}/view_3.tif']\ntasks = ['{task}']\n",
+            sample("").display()
+        );
+        std::fs::write(&file, text).unwrap();
+        let place = folder.path().join("out/a").join(foreign);
+        std::fs::create_dir_all(place.parent().unwrap()).unwrap();
+        std::fs::write(&place, "precious").unwrap();
+        let report = run(&file, 1);
+        let state = states(&report).remove(0);
+        assert!(
+            state.2 == "failed" && state.3.contains("the batch did not make") && state.3.contains(foreign),
+            "{state:?}"
+        );
+        assert_eq!(std::fs::read_to_string(&place).unwrap(), "precious");
+        std::fs::remove_dir_all(folder.path().join("out")).unwrap();
+    }
+}
+
 #[test]
 fn batch_files_are_checked_before_anything_is_done() {
     let folder = tempfile::tempdir().unwrap();

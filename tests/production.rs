@@ -192,6 +192,9 @@ fn changed_inputs_and_settings_are_refused_or_computed_again() {
     run("run", &["run", "--chunks", "1", "-q"], folder.path(), 0);
     let config = folder.path().join("run/used_config.toml");
     let text = std::fs::read_to_string(&config).unwrap();
+    // Threads do not change the result, and are no change.
+    std::fs::write(&config, format!("threads = 2\n{text}")).unwrap();
+    run("run", &["run", "--chunks", "1", "-q"], folder.path(), 0);
     std::fs::write(&config, text.replace("gsd_m = 2.0", "gsd_m = 2.5")).unwrap();
     let refused = run("merge", &["run", "--partial", "-q"], folder.path(), 2).1;
     assert!(refused.contains("the configuration was changed"), "{refused}");
@@ -205,6 +208,24 @@ fn changed_inputs_and_settings_are_refused_or_computed_again() {
     let text = std::fs::read_to_string(&plan).unwrap();
     std::fs::write(&plan, text.replacen("\"step_m\": ", "\"step_m\": 1", 1)).unwrap();
     assert!(run("run", &["run", "-q"], folder.path(), 2).1.contains("it is not as it was written"));
+}
+
+/// One process of an array job plans again, and the others wait for it.
+#[test]
+fn an_array_job_is_resumed_after_a_change() {
+    let folder = tempfile::tempdir().unwrap();
+    plan(folder.path(), "run", &[]);
+    run("run", &["run", "--chunks", "1", "-q"], folder.path(), 0);
+    let config = folder.path().join("run/used_config.toml");
+    let text = std::fs::read_to_string(&config).unwrap();
+    std::fs::write(&config, text.replace("gsd_m = 2.0", "gsd_m = 2.5")).unwrap();
+    let mut workers = ["1/3", "2/3", "3/3"].map(|share| worker(folder.path(), &["--resume", "--chunks", share]));
+    let ended = workers.each_mut().map(|worker| worker.wait().unwrap().code());
+    assert_eq!(ended, [Some(0); 3]);
+    run("merge", &["run", "-q"], folder.path(), 0);
+    let dsm = io::raster::read_dem(folder.path().join("run/dsm/dsm.tif")).unwrap();
+    assert_eq!(dsm.geotransform.0[1], 2.5);
+    assert!(temporary(folder.path()).is_empty(), "{:?}", temporary(folder.path()));
 }
 
 #[test]

@@ -57,6 +57,9 @@ impl TaskRecord {
 fn key_of(job: &TaskJob) -> Result<String, String> {
     let mut plain = job.clone();
     plain.set_running(None, false);
+    if let TaskJob::Dsm(config) = &mut plain {
+        **config = config.deciding();
+    }
     crate::production::hash_of(&(env!("CARGO_PKG_VERSION"), plain)).map_err(|e| e.to_string())
 }
 

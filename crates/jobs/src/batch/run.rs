@@ -102,8 +102,8 @@ fn prepare(batch: &BatchConfig, scene: &BatchScene) -> Result<SceneJobs, BatchEr
 
 /// Returns the memory that one surface model may take, megabytes.
 fn memory_mb(batch: &BatchConfig) -> u64 {
-    let parallel = batch.limits.parallel.min(batch.scenes.len()).max(1) as u64;
-    batch.limits.memory_mb.unwrap_or(MEMORY_MB) / parallel
+    // Whatever the number of scenes: one more must not change the plans of the others.
+    batch.limits.memory_mb.unwrap_or(MEMORY_MB) / batch.limits.parallel.max(1) as u64
 }
 
 /// Removes the files that killed runs left in a folder.
@@ -129,4 +129,19 @@ fn remove_left_over_below(folder: &Path) -> Result<(), FileError> {
         folders.extend(remove_left_over(&folder)?);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_scene_does_not_change_the_memory_of_the_others() {
+        let mut batch = BatchConfig::default();
+        batch.limits.parallel = 3;
+        batch.limits.memory_mb = Some(900);
+        assert_eq!(memory_mb(&batch), 300);
+        batch.scenes = vec![BatchScene::default()];
+        assert_eq!(memory_mb(&batch), 300);
+    }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use crate::camera_stand::{StandConfig, StandSource};
-use crate::dsm::{DsmConfig, MapBounds};
+use crate::dsm::{DsmConfig, FILES, MapBounds, USED_CONFIG};
 use crate::error_text::with_causes;
 use crate::eval::GridEvalConfig;
 use crate::heightmap::HeightMapConfig;
@@ -17,7 +17,7 @@ use crate::job_file::{JobFileError, defect};
 use crate::job_paths::resolved;
 use crate::ortho::OrthoConfig;
 use crate::priors::PriorsConfig;
-use crate::production::make_or_resume;
+use crate::production::{PLAN, POINTING, make_or_resume};
 
 /// What a batch can make of a scene, in the order in which it is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -75,7 +75,7 @@ impl TaskKind {
     /// Settings that are paths.
     const fn paths(self) -> &'static [&'static str] {
         match self {
-            Self::Dsm => &["dem", "prior"],
+            Self::Dsm => &["dem", "prior", "control", "corrections"],
             Self::Ortho => &["report"],
             Self::Eval => &["reference", "classes", "mask", "terrain", "confidence", "objects"],
             Self::HeightMap => &["terrain", "raster", "list", "camera_file"],
@@ -174,9 +174,20 @@ impl TaskJob {
             Self::HeightMap(config) => config.overwrite,
             Self::Priors(config) => config.overwrite,
         };
-        let product = self.product();
-        let is_foreign = !may_replace && product.exists();
-        is_foreign.then(|| format!("a result is there that the batch did not make: {}", product.display()))
+        let foreign = self.results().into_iter().find(|path| !may_replace && path.symlink_metadata().is_ok())?;
+        Some(format!("a result is there that the batch did not make: {}", foreign.display()))
+    }
+
+    /// Every file or folder that the task would replace. A configuration alone is no result.
+    fn results(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Dsm(config) => {
+                let names = FILES.into_iter().filter(|name| *name != USED_CONFIG).chain([PLAN, POINTING]);
+                names.map(|name| config.output.join(name)).collect()
+            }
+            Self::Ortho(config) => vec![config.output.clone(), config.mask()],
+            _ => vec![self.product()],
+        }
     }
 
     /// The kind of the task.

@@ -163,6 +163,13 @@ impl DsmConfig {
         [&self.dem, &self.prior, &self.control, &self.corrections].into_iter().flatten()
     }
 
+    /// Returns the configuration with the defaults for what does not change the result: threads,
+    /// tiles, and whether files may be replaced.
+    pub(crate) fn deciding(&self) -> Self {
+        let plain = Self::new(Vec::new(), PathBuf::new());
+        Self { threads: plain.threads, tile: plain.tile, overwrite: plain.overwrite, ..self.clone() }
+    }
+
     /// Replaces every path by what `change` makes of it.
     pub(crate) fn map_paths(&mut self, change: impl Fn(&Path) -> PathBuf) {
         let others = [&mut self.dem, &mut self.prior, &mut self.control, &mut self.corrections].into_iter().flatten();

@@ -83,7 +83,7 @@ impl OrthoConfig {
     }
 
     /// Returns the file of the mask.
-    pub(super) fn mask(&self) -> PathBuf {
+    pub(crate) fn mask(&self) -> PathBuf {
         let stem = self.output.file_stem().unwrap_or_default().to_string_lossy();
         self.output.with_file_name(format!("{stem}_mask.tif"))
     }

@@ -5,6 +5,7 @@
 //! renaming, so a reader never sees a half-written one. A status belongs to the plan that it names.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -13,6 +14,8 @@ use crate::files::{FileError, TEXT_LIMIT, create_folder};
 
 /// Folder of all chunks.
 pub(super) const CHUNKS: &str = "chunks";
+/// Beginning of the names of files that become claims, or were some.
+pub(super) const CLAIM_WORK: &str = ".claim-";
 /// Name of the status of a chunk.
 const STATUS: &str = "status";
 /// Name of the folder of the result.
@@ -107,15 +110,16 @@ impl ChunkFolder {
         Ok(io::write_bytes(self.status_file(), json.as_bytes(), true)?)
     }
 
-    /// Removes all but the status: an old result, and what a killed process left.
+    /// Removes an old result, and what a killed process left of one. Files of claims stay: another
+    /// process may be asking for the chunk at this moment.
     ///
     /// # Errors
     /// [`FileError::Remove`].
     pub(super) fn clear(&self) -> Result<(), FileError> {
-        self.remove(|name| name != STATUS)
+        self.remove(|name| name != STATUS && !name.starts_with(CLAIM_WORK))
     }
 
-    /// Removes what a killed process left in the folder.
+    /// Removes what a killed process left in the folder. The caller has the run folder for itself.
     ///
     /// # Errors
     /// [`FileError::Remove`].
@@ -129,10 +133,24 @@ impl ChunkFolder {
                 let path = entry.path();
                 let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
                 let removed = if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
-                removed.map_err(|source| FileError::Remove { path, source })?;
+                match removed {
+                    // Another process was faster.
+                    Err(error) if error.kind() == ErrorKind::NotFound => {}
+                    other => other.map_err(|source| FileError::Remove { path, source })?,
+                }
             }
         }
         Ok(())
+    }
+
+    /// Removes the folder. The status goes first, so that what a killed process leaves of a result
+    /// never counts as one.
+    ///
+    /// # Errors
+    /// [`FileError::Remove`].
+    fn remove_whole(&self) -> Result<(), FileError> {
+        crate::files::remove(&self.status_file())?;
+        fs::remove_dir_all(&self.0).map_err(|source| FileError::Remove { path: self.0.clone(), source })
     }
 }
 
@@ -145,7 +163,7 @@ pub(super) fn remove_others(run: &Path, plan: &str) -> Result<(), FileError> {
     for entry in fs::read_dir(run.join(CHUNKS)).into_iter().flatten().flatten() {
         let folder = ChunkFolder(entry.path());
         if folder.status(plan).is_none() {
-            fs::remove_dir_all(entry.path()).map_err(|source| FileError::Remove { path: entry.path(), source })?;
+            folder.remove_whole()?;
         }
     }
     Ok(())

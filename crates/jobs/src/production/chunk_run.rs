@@ -1,7 +1,7 @@
 //! Computing chunks of a planned run.
 
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use numeric::Progress;
 use serde::Serialize;
@@ -16,6 +16,11 @@ use crate::production::error::ProductionError;
 use crate::production::plan_file::PlanFile;
 use crate::production::plan_run::plan_again;
 use crate::threads;
+
+/// Time between two looks at a run folder that another process has for itself.
+const WAIT: Duration = Duration::from_millis(200);
+/// Times that a run is planned again because something changed meanwhile.
+const CHANGES: usize = 3;
 
 /// Configuration of a process that computes chunks.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -114,24 +119,38 @@ pub fn run_chunks(config: &ChunkRunConfig, progress: &dyn Progress) -> Result<Ch
 }
 
 /// Returns the plan with a share of its folder. A plan that no longer fits is made again when the
-/// run is resumed.
+/// run is resumed: by one of the processes that see it, while the others wait for it.
 fn current_plan(config: &ChunkRunConfig, progress: &dyn Progress) -> Result<(OutputFolder, PlanFile), ProductionError> {
     let read = || {
         let file = PlanFile::read_current(&config.folder)?;
         threads::install(config.threads, || file.check_inputs())??;
         Ok::<_, ProductionError>(file)
     };
-    // A folder without a plan is no run folder, and not worth a lock.
-    match read() {
-        Err(error) if config.resume && error.is_change() => {
-            progress.warn(&format!("the run is planned and computed again: {error}"));
-            plan_again(&config.folder, progress)?;
+    let (mut is_waiting, mut changes) = (false, 0);
+    loop {
+        // A folder without a plan is no run folder, and not worth a lock.
+        let found = match read() {
+            Err(error) if config.resume && error.is_change() => plan_again(&config.folder, config.threads, progress),
+            other => other.map(|_| ()),
+        };
+        // What the plan rests on may have changed before the share was taken.
+        let shared = found.and_then(|()| {
+            let share = OutputFolder::share(&config.folder)?;
+            Ok((share, read()?))
+        });
+        match shared {
+            Ok(found) => return Ok(found),
+            Err(error) if config.resume && error.is_change() && changes < CHANGES => changes += 1,
+            Err(error) if config.resume && error.is_in_use() => {
+                if !std::mem::replace(&mut is_waiting, true) {
+                    progress.warn("another process has the run folder for itself; waiting for it");
+                }
+                std::thread::sleep(WAIT);
+            }
+            Err(error) => return Err(error),
         }
-        Err(error) => return Err(error),
-        Ok(_) => {}
+        progress.check_cancelled().map_err(DsmError::from)?;
     }
-    let share = OutputFolder::share(&config.folder)?;
-    Ok((share, PlanFile::read_current(&config.folder)?))
 }
 
 /// What the work on a chunk needs.
@@ -162,15 +181,18 @@ impl Worker<'_> {
         let since = Instant::now();
         let result = run_chunk(&self.file.plan, index, session);
         self.inputs.check()?;
+        if matches!(result, Err(DsmError::Cancelled)) {
+            return Err(DsmError::Cancelled.into());
+        }
+        // Whoever took the claim over says how the chunk stands.
+        if !claim.is_ours() {
+            report.elsewhere += 1;
+            return Ok(());
+        }
         let state = match result {
-            Err(DsmError::Cancelled) => return Err(DsmError::Cancelled.into()),
             Err(error) => ChunkState::Failed { reason: with_causes(&error) },
             Ok(ChunkResult { content: ChunkContent::Failed { reason }, .. }) => ChunkState::Failed { reason },
             Ok(result) => {
-                if !claim.is_ours() {
-                    report.elsewhere += 1;
-                    return Ok(());
-                }
                 result.write(&folder.result())?;
                 ChunkState::Done { seconds: since.elapsed().as_secs_f64() }
             }

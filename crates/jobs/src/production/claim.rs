@@ -16,14 +16,12 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
 use crate::files::FileError;
-use crate::production::chunk_folder::{ChunkFolder, ChunkState, ChunkStatus, ChunkWorker};
+use crate::production::chunk_folder::{CLAIM_WORK, ChunkFolder, ChunkState, ChunkStatus, ChunkWorker};
 
 /// Time between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(10);
 /// A process without a heartbeat for this time is gone.
 const GONE: Duration = Duration::from_secs(60);
-/// Beginning of the names of files that become claims, or were some.
-const WORK: &str = ".claim-";
 
 /// The right to compute a chunk. Dropping it gives the chunk back, unless another status was set.
 #[derive(Debug)]
@@ -63,13 +61,13 @@ impl Claim {
             _ => {}
         }
         // Moving an old status away is for one process only: for the others it is gone.
-        let aside = inside.join(format!("{WORK}{}", std::process::id()));
+        let work = || tempfile::Builder::new().prefix(CLAIM_WORK).tempfile_in(inside).map_err(failed);
+        let aside = work()?.into_temp_path();
         match if is_new { Err(ErrorKind::NotFound.into()) } else { fs::rename(&path, &aside) } {
-            Ok(()) => fs::remove_file(&aside).map_err(failed)?,
-            Err(error) if error.kind() == ErrorKind::NotFound => {}
-            Err(error) => return Err(failed(error)),
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(error)),
+            _ => drop(aside),
         }
-        let made = tempfile::Builder::new().prefix(WORK).tempfile_in(inside).map_err(failed)?;
+        let made = work()?;
         // Where the file system knows no locks, the heartbeat alone says that we live.
         let _ = made.as_file().try_lock();
         let state = ChunkState::Running(ChunkWorker::here());
@@ -77,7 +75,10 @@ impl Claim {
         made.as_file().write_all(json.as_bytes()).map_err(failed)?;
         let file = match made.persist_noclobber(&path) {
             Ok(file) => file,
-            Err(error) if error.error.kind() == ErrorKind::AlreadyExists => return Ok(Claimed::Theirs),
+            // Without the file or its folder, another process has removed what was there.
+            Err(error) if matches!(error.error.kind(), ErrorKind::AlreadyExists | ErrorKind::NotFound) => {
+                return Ok(Claimed::Theirs);
+            }
             Err(error) => return Err(failed(error.error)),
         };
         let beat = Some(heartbeat(file.try_clone().map_err(failed)?));
@@ -193,6 +194,11 @@ mod tests {
         left(&ChunkWorker::here().host, 0);
         drop(ours(Claim::take(&folder, "p", NEVER).unwrap()));
         assert!(!folder.result().exists());
+        // The file of a process that asks for the chunk at the same time is its own.
+        let asking = folder.create().unwrap().join(".claim-asking");
+        fs::write(&asking, "").unwrap();
+        drop(ours(Claim::take(&folder, "p", NEVER).unwrap()));
+        assert!(asking.exists());
         left("another machine", 5);
         assert!(matches!(Claim::take(&folder, "p", NEVER).unwrap(), Claimed::Theirs));
         left("another machine", 90);

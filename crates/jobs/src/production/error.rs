@@ -82,6 +82,11 @@ pub enum ProductionError {
 }
 
 impl ProductionError {
+    /// Returns whether another process has the folder for itself.
+    pub(super) fn is_in_use(&self) -> bool {
+        matches!(self, Self::File(FileError::InUse { .. }) | Self::Dsm(DsmError::InUse { .. }))
+    }
+
     /// Returns whether a part of what the plan rests on has changed, so that it must be made again.
     pub(crate) fn is_change(&self) -> bool {
         matches!(self, Self::OtherVersion { .. } | Self::ConfigChanged { .. } | Self::InputChanged { .. })

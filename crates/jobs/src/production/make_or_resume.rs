@@ -6,6 +6,7 @@ use numeric::Progress;
 
 use crate::dsm::{DsmConfig, DsmReport};
 use crate::files::FileError;
+use crate::output_folder::OutputFolder;
 use crate::production::chunk_folder::CHUNKS;
 use crate::production::chunk_run::{ChunkRunConfig, run_chunks};
 use crate::production::error::ProductionError;
@@ -33,8 +34,22 @@ pub(crate) fn make_or_resume(config: &DsmConfig, progress: &dyn Progress) -> Res
     (merge.overwrite, merge.threads) = (true, config.threads);
     let report = merge_run(&merge, progress)?.report;
     if report.chunks.as_ref().is_none_or(|chunks| chunks.failed.is_empty()) {
-        let path = config.output.join(CHUNKS);
-        fs::remove_dir_all(&path).map_err(|source| FileError::Remove { path, source })?;
+        remove_chunks(config)?;
     }
     Ok(report)
+}
+
+/// Removes the results of the chunks. They leave their name at once, so that a killed process leaves
+/// none that looks whole, and only while nobody works on them.
+fn remove_chunks(config: &DsmConfig) -> Result<(), FileError> {
+    let path = config.output.join(CHUNKS);
+    let folder = match OutputFolder::take(&config.output) {
+        // Whoever has the folder now goes on with them.
+        Err(FileError::InUse { .. }) => return Ok(()),
+        other => other?,
+    };
+    let work = folder.work_folder()?;
+    let failed = |source| FileError::Remove { path: path.clone(), source };
+    fs::rename(&path, work.path().join(CHUNKS)).map_err(failed)?;
+    work.close().map_err(failed)
 }

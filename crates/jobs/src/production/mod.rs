@@ -36,4 +36,5 @@ pub(crate) use input_files::{check as check_inputs, inputs_of};
 pub(crate) use make_or_resume::make_or_resume;
 pub use merge_run::{MergeConfig, merge_run};
 pub use plan_file::PlanFile;
+pub(crate) use plan_file::{PLAN, POINTING};
 pub use plan_run::{make_plan, plan_run};

@@ -17,9 +17,9 @@ use crate::production::estimate::PlanEstimate;
 use crate::production::input_files::{self, InputFile};
 
 /// Name of the plan in the folder of a run.
-pub(super) const PLAN: &str = "plan.json";
+pub(crate) const PLAN: &str = "plan.json";
 /// Name of the pointing corrections with their residuals, which later runs can use.
-pub(super) const POINTING: &str = "pointing.json";
+pub(crate) const POINTING: &str = "pointing.json";
 
 /// The plan of a run with the files that it rests on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,7 +52,8 @@ impl PlanFile {
 
     fn identity(&self) -> Result<String, ProductionError> {
         let inputs: Vec<_> = self.inputs.iter().map(|input| (&input.path, &input.sha256)).collect();
-        Ok(content_hash::of_value(&(inputs, &self.plan)).map_err(crate::files::FileError::from)?)
+        let plan = Plan { config: self.plan.config.deciding(), ..self.plan.clone() };
+        Ok(content_hash::of_value(&(inputs, plan)).map_err(crate::files::FileError::from)?)
     }
 
     fn map_paths(&mut self, change: impl Fn(&Path) -> PathBuf) {
@@ -121,9 +122,8 @@ impl PlanFile {
 /// Whether two configurations of a folder ask for the same result.
 fn same(a: &DsmConfig, b: &DsmConfig, folder: &Path) -> bool {
     let plain = |config: &DsmConfig| {
-        let mut config = config.clone();
+        let mut config = config.deciding();
         config.output = PathBuf::new();
-        config.overwrite = false;
         config.map_paths(|path| relative(path, folder));
         config
     };

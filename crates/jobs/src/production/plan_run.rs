@@ -61,12 +61,18 @@ pub fn plan_run(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile,
         refuse_results(folder.path(), &results)?;
     }
     let file = make_plan(config, progress)?;
-    write(&folder, config, &file)?;
-    chunk_folder::remove_others(folder.path(), &file.id)?;
+    replace(&folder, config, &file)?;
     Ok(file)
 }
 
-/// Writes the files of a plan. The plan itself goes first and comes last.
+/// Writes a plan, and removes the chunks of others.
+fn replace(folder: &OutputFolder, config: &DsmConfig, file: &PlanFile) -> Result<(), ProductionError> {
+    write(folder, config, file)?;
+    Ok(chunk_folder::remove_others(folder.path(), &file.id)?)
+}
+
+/// Writes the files of a plan. The plan itself comes last. Until then the folder has the old one,
+/// which the new configuration or the new inputs make void.
 fn write(folder: &OutputFolder, config: &DsmConfig, file: &PlanFile) -> Result<(), ProductionError> {
     let work = folder.work_folder()?;
     let asked = DsmConfig { overwrite: false, ..config.clone() };
@@ -78,21 +84,31 @@ fn write(folder: &OutputFolder, config: &DsmConfig, file: &PlanFile) -> Result<(
     let pointing = PointingFile { version: &file.plan.version, found };
     write_json(&work.path().join(POINTING), &pointing, false)?;
     write_json(&work.path().join(PLAN), file, false)?;
-    folder.remove(PLAN)?;
     for name in [USED_CONFIG, POINTING, PLAN] {
         folder.publish(work.path(), name)?;
     }
     Ok(())
 }
 
-/// Plans the run of a folder again from the configuration there.
+/// Plans the run of a folder again from the configuration there, with `threads` where given.
+/// Does nothing when another process was faster, and the plan fits.
 ///
 /// # Errors
 /// As [`plan_run`]; [`ProductionError::Job`].
-pub(super) fn plan_again(folder: &Path, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
+pub(super) fn plan_again(
+    folder: &Path,
+    threads: Option<usize>,
+    progress: &dyn Progress,
+) -> Result<(), ProductionError> {
+    let taken = OutputFolder::take(folder)?;
+    let fits = |file: PlanFile| threads::install(threads, || file.check_inputs())?;
+    match PlanFile::read_current(folder).and_then(fits) {
+        Ok(()) => return Ok(()),
+        Err(error) => progress.warn(&format!("the run is planned and computed again: {error}")),
+    }
     let mut config = crate::job_file::read_dsm_job(&folder.join(USED_CONFIG))?;
     folder.clone_into(&mut config.output);
-    config.overwrite = true;
-    plan_run(&config, progress)?;
-    PlanFile::read(folder)
+    config.validate()?;
+    let file = make_plan(&DsmConfig { threads: threads.or(config.threads), ..config.clone() }, progress)?;
+    replace(&taken, &config, &file)
 }
