@@ -11,7 +11,7 @@ use jobs::align::{AlignJobConfig, AlignJobError, AlignJobReport};
 
 use crate::corrections::code_of;
 use crate::error::with_hint;
-use crate::options::{Named, named};
+use crate::options::named;
 use crate::progress::WriteOptions;
 use crate::{Global, Outcome};
 
@@ -45,7 +45,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = AlignConfig::default().seed)]
     seed: u64,
     /// Text or binary files.
-    #[arg(long, value_parser = named(&ENCODINGS), default_value = "bin")]
+    #[arg(long, value_parser = named(&ColmapEncoding::CHOICES), default_value = "bin")]
     encoding: ColmapEncoding,
     #[command(flatten)]
     noise: NoiseArgs,
@@ -55,9 +55,6 @@ pub(crate) struct Args {
     #[command(flatten)]
     write: WriteOptions,
 }
-
-const ENCODINGS: [Named<ColmapEncoding>; 2] =
-    [("bin", ColmapEncoding::Binary, "COLMAP's binary files"), ("txt", ColmapEncoding::Text, "COLMAP's text files")];
 
 /// Options of the repetition under noise.
 #[derive(Debug, clap::Args)]

@@ -10,7 +10,7 @@ use city::Lod;
 use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityJobError, CityOutputFormat, CitySummary};
 
 use crate::error::with_hint;
-use crate::options::{Named, named};
+use crate::options::named;
 use crate::progress::WriteOptions;
 use crate::{Global, Outcome};
 
@@ -60,17 +60,9 @@ pub(crate) struct ConvertArgs {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Format to write [default: by the ending of OUT: .obj, .ply, .glb, .geojson or .json].
-    #[arg(long, value_parser = named(&FORMATS))]
+    #[arg(long, value_parser = named(&CityOutputFormat::CHOICES))]
     format: Option<CityOutputFormat>,
 }
-
-const FORMATS: [Named<CityOutputFormat>; 5] = [
-    ("obj", CityOutputFormat::Obj, "Wavefront OBJ, whole coordinates"),
-    ("ply", CityOutputFormat::Ply, "Binary PLY, f32 from an origin that the header names"),
-    ("glb", CityOutputFormat::Glb, "Binary glTF, f32 from an origin that the extras name"),
-    ("geojson", CityOutputFormat::Geojson, "Footprints with heights in longitude and latitude"),
-    ("cityjson", CityOutputFormat::Cityjson, "CityJSON 2.0 with all objects and levels"),
-];
 
 /// Runs `skysweep city`.
 pub(crate) fn run(command: &Command, global: Global) -> anyhow::Result<Outcome> {

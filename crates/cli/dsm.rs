@@ -10,7 +10,7 @@ use jobs::job_file::{is_job_file, read_dsm_job};
 use jobs::production::{ProductionError, make_plan};
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::options::{Named, named};
+use crate::options::named;
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
 
@@ -72,12 +72,12 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "DATUM")]
     vertical: Option<VerticalDatum>,
     /// Speed against accuracy [default: balanced].
-    #[arg(long, value_parser = named(&PRESETS))]
+    #[arg(long, value_parser = named(&Preset::CHOICES))]
     preset: Option<Preset>,
     /// Voids to close from the heights around them, marked in filled.tif: none, justified (narrow
     /// voids, voids behind buildings, voids between known heights where the images have texture) or
     /// all within reach of known heights [default: justified].
-    #[arg(long, value_parser = named(&FILLS))]
+    #[arg(long, value_parser = named(&Fill::CHOICES))]
     fill: Option<Fill>,
     /// Pairs of images to match, by position: 1-2,1-3 [default: all that are useful].
     #[arg(long, value_name = "I-J,…", value_delimiter = ',')]
@@ -105,18 +105,6 @@ pub(crate) struct SceneArgs {
     #[arg(long)]
     overwrite: bool,
 }
-
-const PRESETS: [Named<Preset>; 3] = [
-    ("fast", Preset::Fast, "half the resolution in matching and in the DSM, two sources per view"),
-    ("balanced", Preset::Balanced, "full resolution, up to four sources per view"),
-    ("accurate", Preset::Accurate, "full resolution, up to eight sources per view, wider search"),
-];
-
-const FILLS: [Named<Fill>; 3] = [
-    ("none", Fill::None, "no void: every height was observed"),
-    ("justified", Fill::Justified, "narrow voids, voids behind buildings, voids between known heights on texture"),
-    ("all", Fill::All, "all within reach of known heights"),
-];
 
 /// Parses a position, which people count from 1, into one counted from 0.
 fn parse_position(text: &str) -> Result<usize, String> {

@@ -17,7 +17,7 @@ use jobs::eval::{
 use numeric::Progress;
 
 use crate::error::{OVERWRITE, with_hint};
-use crate::options::{Named, named};
+use crate::options::named;
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
 
@@ -34,7 +34,7 @@ pub(crate) struct Args {
     reference: PathBuf,
     /// What is removed before the comparison [default: xyz for grids; surfaces and maps are
     /// compared as they are].
-    #[arg(long, value_parser = named(&ALIGNMENTS))]
+    #[arg(long, value_parser = named(&AlignmentMethod::CHOICES))]
     align: Option<AlignmentMethod>,
     /// Radius of the horizontal search of --align xyz and nuth-kaab, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 5.0)]
@@ -96,7 +96,7 @@ pub(crate) struct Args {
     show: ShowOptions,
     /// The files are maps of this kind in the pixels of one camera [default: found by shape and
     /// type of .npy files].
-    #[arg(long, value_parser = named(&MAP_KINDS), value_name = "KIND")]
+    #[arg(long, value_parser = named(&MapKind::CHOICES), value_name = "KIND")]
     maps: Option<MapKind>,
     /// Exit with 1 if the MAE over all cells is above this, in metres; for surfaces the mean
     /// distance of TEST to REF.
@@ -142,25 +142,6 @@ struct SurfaceArgs {
     #[arg(long)]
     all_objects: bool,
 }
-
-/// `--align`.
-const ALIGNMENTS: [Named<AlignmentMethod>; 4] = [
-    ("none", AlignmentMethod::None, "Nothing is removed"),
-    ("z", AlignmentMethod::Z, "The median of the differences"),
-    ("xyz", AlignmentMethod::Xyz, "The translation with the least NMAD, then the median of the differences"),
-    (
-        "nuth-kaab",
-        AlignmentMethod::NuthKaab,
-        "The translation that follows from slopes and aspects (Nuth and Kääb 2011), then the median of the differences",
-    ),
-];
-
-/// `--maps`.
-const MAP_KINDS: [Named<MapKind>; 3] = [
-    ("depth", MapKind::Depth, "Depths, one number a pixel; 0, NaN and infinity are no depth"),
-    ("normals", MapKind::Normals, "Normals, three numbers a pixel; zeros are no normal"),
-    ("mask", MapKind::Mask, "Masks; every value but 0 is set"),
-];
 
 /// Runs `skysweep eval`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {

@@ -19,7 +19,7 @@ use jobs::heightmap::{
 
 use crate::corrections::code_of;
 use crate::error::{OVERWRITE, with_hint};
-use crate::options::{Named, named};
+use crate::options::named;
 use crate::progress::{RunOptions, WriteOptions};
 use crate::stand::StandArgs;
 use crate::{Global, Outcome};
@@ -65,7 +65,7 @@ struct UnprojectArgs {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Axes of points in a PLY.
-    #[arg(long, value_parser = named(&FRAMES), default_value = "world")]
+    #[arg(long, value_parser = named(&PointAxes::CHOICES), default_value = "world")]
     frame: PointAxes,
     /// Write Gaussian splats as 3DGS viewers and trainers read them (.ply, its origin beside it),
     /// one for each pixel.
@@ -81,19 +81,6 @@ struct UnprojectArgs {
     #[command(flatten)]
     write: WriteOptions,
 }
-
-/// `--frame`.
-const FRAMES: [Named<PointAxes>; 2] = [
-    ("world", PointAxes::World, "East, north, up of the camera"),
-    ("camera", PointAxes::Camera, "(u / r, v / r, h): right of the camera, behind it, up"),
-];
-
-/// `--interpolation`.
-const INTERPOLATIONS: [Named<Reading>; 3] = [
-    ("nearest", Reading::Nearest, "The nearest cell"),
-    ("bilinear", Reading::Bilinear, "Between four cells"),
-    ("cubic", Reading::Cubic, "Between sixteen cells"),
-];
 
 /// How maps are made.
 #[derive(Debug, clap::Args)]
@@ -126,7 +113,7 @@ struct MakeArgs {
     #[arg(long, value_name = "CRS", default_value = "local")]
     crs: MapChoice,
     /// Interpolation between the cells of a raster.
-    #[arg(long, value_parser = named(&INTERPOLATIONS), default_value = "bilinear")]
+    #[arg(long, value_parser = named(&Reading::CHOICES), default_value = "bilinear")]
     interpolation: Reading,
     /// Coordinate system of SOURCE, if the file names none or a wrong one: EPSG:n.
     #[arg(long, value_name = "CRS")]

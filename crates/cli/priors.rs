@@ -11,7 +11,7 @@ use jobs::priors::{LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, P
 
 use crate::corrections::code_of;
 use crate::error::with_hint;
-use crate::options::{Named, named};
+use crate::options::named;
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
 
@@ -63,10 +63,10 @@ pub(crate) struct Args {
     corrections: Option<PathBuf>,
 
     /// What is to be trained: only the buildings, or the whole scene with priors on them.
-    #[arg(long, value_parser = named(&MODES), default_value = "building-only")]
+    #[arg(long, value_parser = named(&PriorsMode::CHOICES), default_value = "building-only")]
     mode: PriorsMode,
     /// The trainer that the dataset is for; 2DGS ignores the principal point, gsplat uses it.
-    #[arg(long, value_parser = named(&TRAINERS), default_value = "2dgs")]
+    #[arg(long, value_parser = named(&PriorsTrainer::CHOICES), default_value = "2dgs")]
     trainer: PriorsTrainer,
     /// Crop cameras whose principal point is not in the middle; crops.json says how to crop the
     /// images.
@@ -97,7 +97,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "METRES", default_value_t = 2.0)]
     max_spacing: f64,
     /// How points keep a distance from each other.
-    #[arg(long, value_parser = named(&SPACINGS), default_value = "stratified")]
+    #[arg(long, value_parser = named(&Spacing::CHOICES), default_value = "stratified")]
     spacing: Spacing,
     /// Weight of a class of surfaces, such as RoofSurface=2; 0 leaves it out.
     #[arg(long, value_name = "CLASS=WEIGHT")]
@@ -126,10 +126,10 @@ pub(crate) struct Args {
     max_observations: usize,
 
     /// What depth means.
-    #[arg(long, value_parser = named(&DEPTHS), default_value = "z")]
+    #[arg(long, value_parser = named(&DepthKind::CHOICES), default_value = "z")]
     depth: DepthKind,
     /// The axes of normals.
-    #[arg(long, value_parser = named(&NORMALS), default_value = "world")]
+    #[arg(long, value_parser = named(&NormalFrame::CHOICES), default_value = "world")]
     normals: NormalFrame,
     /// Write more forms of the points: the COLMAP model as text, points3D.ply beside sparse, and
     /// initial splats for 2DGS and 3DGS.
@@ -145,35 +145,6 @@ pub(crate) struct Args {
     #[command(flatten)]
     run: RunOptions,
 }
-
-/// What is to be trained.
-const MODES: [Named<PriorsMode>; 2] = [
-    ("building-only", PriorsMode::BuildingOnly, "Everything masked to buildings"),
-    ("building-enhanced", PriorsMode::BuildingEnhanced, "The whole scene, with priors on buildings"),
-];
-
-/// The program that reads the dataset.
-const TRAINERS: [Named<PriorsTrainer>; 2] = [
-    ("2dgs", PriorsTrainer::TwoDgs, "2DGS and the trainers made from it"),
-    ("gsplat", PriorsTrainer::Gsplat, "gsplat, nerfstudio"),
-];
-
-/// How points keep a distance from each other.
-const SPACINGS: [Named<Spacing>; 3] = [
-    ("random", Spacing::Random, "Independent points"),
-    ("stratified", Spacing::Stratified, "Even shares, low discrepancy"),
-    ("poisson", Spacing::PoissonDisk, "A least distance"),
-];
-
-/// What depth means.
-const DEPTHS: [Named<DepthKind>; 2] =
-    [("z", DepthKind::ZDepth, "Along the axis of the camera"), ("ray", DepthKind::RayLength, "Along the ray")];
-
-/// The axes of normals.
-const NORMALS: [Named<NormalFrame>; 2] = [
-    ("world", NormalFrame::World, "The axes of the cameras' frame"),
-    ("camera", NormalFrame::Camera, "The axes of each camera"),
-];
 
 /// Runs `skysweep priors`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {

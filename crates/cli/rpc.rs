@@ -16,7 +16,7 @@ use jobs::rpc::{
 };
 
 use crate::error::with_hint;
-use crate::options::{Named, named};
+use crate::options::named;
 use crate::progress::Log;
 use crate::{Outcome, print};
 
@@ -93,18 +93,12 @@ pub(crate) struct ConvertArgs {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Format to write [default: by the ending of OUT: .txt, .rpb or .json].
-    #[arg(long, value_parser = named(&FORMATS))]
+    #[arg(long, value_parser = named(&RpcFormat::CHOICES))]
     format: Option<RpcFormat>,
     /// Replace OUT where it exists.
     #[arg(long)]
     overwrite: bool,
 }
-
-const FORMATS: [Named<RpcFormat>; 3] = [
-    ("text", RpcFormat::Text, "`KEY: value` lines, as _RPC.TXT"),
-    ("rpb", RpcFormat::Rpb, "DigitalGlobe's RPB"),
-    ("json", RpcFormat::Json, "JSON with rpcm's names"),
-];
 
 /// Runs `skysweep rpc`.
 pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {

@@ -19,6 +19,20 @@ pub enum AlignmentMethod {
     NuthKaab,
 }
 
+impl AlignmentMethod {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 4] = [
+        ("none", Self::None, "Nothing is removed"),
+        ("z", Self::Z, "The median of the differences"),
+        ("xyz", Self::Xyz, "The translation with the least NMAD, then the median of the differences"),
+        (
+            "nuth-kaab",
+            Self::NuthKaab,
+            "The translation that follows from slopes and aspects (Nuth and Kääb 2011), then the median of the differences",
+        ),
+    ];
+}
+
 /// Translation that was added to the test surface, metres. x and y are along the axes of the
 /// reference's map, z is up.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]

@@ -24,6 +24,15 @@ pub enum Reading {
 }
 
 impl Reading {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+        ("nearest", Self::Nearest, "The nearest cell"),
+        ("bilinear", Self::Bilinear, "Between four cells"),
+        ("cubic", Self::Cubic, "Between sixteen cells"),
+    ];
+}
+
+impl Reading {
     /// Returns the height at a (column, row) of a grid; NaN if there is none.
     #[inline]
     pub fn at(self, grid: &Grid<f32>, column: f64, row: f64) -> f32 {

@@ -24,6 +24,12 @@ pub enum DepthKind {
     RayLength,
 }
 
+impl DepthKind {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 2] =
+        [("z", Self::ZDepth, "Along the axis of the camera"), ("ray", Self::RayLength, "Along the ray")];
+}
+
 /// Axes of the normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum NormalFrame {
@@ -33,6 +39,12 @@ pub enum NormalFrame {
     /// Axes of the camera: right, down, forward. Normals that face the camera have a negative last
     /// component near the middle of the image.
     Camera,
+}
+
+impl NormalFrame {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 2] =
+        [("world", Self::World, "The axes of the cameras' frame"), ("camera", Self::Camera, "The axes of each camera")];
 }
 
 /// Options for the maps.

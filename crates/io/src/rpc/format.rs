@@ -38,6 +38,15 @@ pub enum RpcFormat {
     GdalMetadata,
 }
 
+impl RpcFormat {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+        ("text", Self::Text, "`KEY: value` lines, as _RPC.TXT"),
+        ("rpb", Self::Rpb, "DigitalGlobe's RPB"),
+        ("json", Self::Json, "JSON with rpcm's names"),
+    ];
+}
+
 impl fmt::Display for RpcFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

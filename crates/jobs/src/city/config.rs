@@ -66,6 +66,17 @@ pub enum CityOutputFormat {
     Cityjson,
 }
 
+impl CityOutputFormat {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 5] = [
+        ("obj", Self::Obj, "Wavefront OBJ, whole coordinates"),
+        ("ply", Self::Ply, "Binary PLY, f32 from an origin that the header names"),
+        ("glb", Self::Glb, "Binary glTF, f32 from an origin that the extras name"),
+        ("geojson", Self::Geojson, "Footprints with heights in longitude and latitude"),
+        ("cityjson", Self::Cityjson, "CityJSON 2.0 with all objects and levels"),
+    ];
+}
+
 impl CityInput {
     /// Buildings of `file` at their default level of detail, without an account.
     pub fn new(file: PathBuf) -> Self {

@@ -32,6 +32,15 @@ pub enum Preset {
     Accurate,
 }
 
+impl Preset {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+        ("fast", Self::Fast, "half the resolution in matching and in the DSM, two sources per view"),
+        ("balanced", Self::Balanced, "full resolution, up to four sources per view"),
+        ("accurate", Self::Accurate, "full resolution, up to eight sources per view, wider search"),
+    ];
+}
+
 /// Choice of the voids that are closed from the heights around them. Closed cells are always
 /// marked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -46,6 +55,15 @@ pub enum Fill {
     /// All voids within reach of known heights, whatever caused them: water, saturated roofs, the
     /// border of the area that two views see.
     All,
+}
+
+impl Fill {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+        ("none", Self::None, "no void: every height was observed"),
+        ("justified", Self::Justified, "narrow voids, voids behind buildings, voids between known heights on texture"),
+        ("all", Self::All, "all within reach of known heights"),
+    ];
 }
 
 /// Configuration of a DSM run. A field that is `None` is chosen from the scene.

@@ -26,6 +26,15 @@ pub enum MapKind {
     Mask,
 }
 
+impl MapKind {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+        ("depth", Self::Depth, "Depths, one number a pixel; 0, NaN and infinity are no depth"),
+        ("normals", Self::Normals, "Normals, three numbers a pixel; zeros are no normal"),
+        ("mask", Self::Mask, "Masks; every value but 0 is set"),
+    ];
+}
+
 /// A comparison of two maps of one camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

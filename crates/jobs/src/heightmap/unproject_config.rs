@@ -18,6 +18,14 @@ pub enum PointAxes {
     Camera,
 }
 
+impl PointAxes {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 2] = [
+        ("world", Self::World, "East, north, up of the camera"),
+        ("camera", Self::Camera, "(u / r, v / r, h): right of the camera, behind it, up"),
+    ];
+}
+
 /// A height map to be turned back into points or splats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

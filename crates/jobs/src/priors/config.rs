@@ -85,6 +85,14 @@ pub enum PriorsMode {
     BuildingEnhanced,
 }
 
+impl PriorsMode {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 2] = [
+        ("building-only", Self::BuildingOnly, "Everything masked to buildings"),
+        ("building-enhanced", Self::BuildingEnhanced, "The whole scene, with priors on buildings"),
+    ];
+}
+
 /// The program that reads the dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PriorsTrainer {
@@ -94,6 +102,12 @@ pub enum PriorsTrainer {
     /// gsplat and nerfstudio, which use the principal point.
     #[serde(rename = "gsplat")]
     Gsplat,
+}
+
+impl PriorsTrainer {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 2] =
+        [("2dgs", Self::TwoDgs, "2DGS and the trainers made from it"), ("gsplat", Self::Gsplat, "gsplat, nerfstudio")];
 }
 
 /// Weight of a surface class in the sampling; 0 leaves the class out.

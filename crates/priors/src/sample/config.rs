@@ -40,6 +40,15 @@ pub enum Spacing {
     PoissonDisk,
 }
 
+impl Spacing {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+        ("random", Self::Random, "Independent points"),
+        ("stratified", Self::Stratified, "Even shares, low discrepancy"),
+        ("poisson", Self::PoissonDisk, "A least distance"),
+    ];
+}
+
 /// Options for sampling a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleConfig {

@@ -33,6 +33,12 @@ pub enum ColmapEncoding {
     Text,
 }
 
+impl ColmapEncoding {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 2] =
+        [("bin", Self::Binary, "COLMAP's binary files"), ("txt", Self::Text, "COLMAP's text files")];
+}
+
 /// Writes a model with its points into an existing folder.
 ///
 /// # Errors
