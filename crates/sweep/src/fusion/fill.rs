@@ -111,8 +111,8 @@ const KNOWN_MIN: usize = 4;
 const STOREY_M: f32 = 3.0;
 /// Number of heights among which a lower surface is looked for: those at the far end of a street.
 const CANDIDATES: usize = 64;
-/// Part of the border of a void that continues a roof in it. A blank patch over a roof and the ground
-/// beside it is matched as a whole, at a height between them, and has less.
+/// Part of the border of a void that continues a roof in it. A blank patch over a roof and the
+/// ground beside it is matched as a whole, at a height between them, and has less.
 const RIM_PART: f32 = 0.75;
 /// Number of heights that are all around a cell at the border of its void, and the part of them
 /// that a surface must have: fewer may be outliers.
