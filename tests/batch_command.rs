@@ -234,6 +234,10 @@ fn batch_files_are_checked_before_anything_is_done() {
         (scene.replace("output = 'out'\n", ""), "no folder for its results"),
         (scene.replace("'a'\n", "'../a'\n"), "cannot be the name of a folder"),
         (format!("{scene}[[scene]]\nname = 'a'\nimages = []\n"), "two scenes have the name"),
+        (
+            format!("{scene}bounds = [0.0, 0.0, 9.0, 9.0]\narea = {{ file = 'a.geojson' }}\n"),
+            "has `bounds` and `area`, which both say where it is",
+        ),
         (format!("{scene}tasks = ['dem']\n"), "known are dsm, ortho, eval, heightmap, priors"),
         (format!("{scene}dsm.gsd = 1\n"), "unknown key `gsd`; did you mean `gsd_m`?"),
         (format!("{scene}tasks = ['eval']\n"), "`reference` is missing"),

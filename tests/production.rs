@@ -180,6 +180,12 @@ fn changed_inputs_and_settings_are_refused_or_computed_again() {
     }
     run("plan", &[&["left.tif", "right.tif", "-o", "run"][..], &SMALL].concat(), folder.path(), 0);
     run("run", &["run", "--chunks", "0", "-q"], folder.path(), 0);
+    // A file that belongs to an image and was not there before.
+    let rpc = folder.path().join("left_RPC.TXT");
+    std::fs::write(&rpc, "LINE_OFF: 1\n").unwrap();
+    let refused = run("run", &["run", "-q"], folder.path(), 2).1;
+    assert!(refused.contains("was not there when the plan was made") && refused.contains("left_RPC.TXT"), "{refused}");
+    std::fs::remove_file(rpc).unwrap();
     // Another content under the same name.
     std::fs::copy(sample("view_2.tif"), folder.path().join("right.tif")).unwrap();
     let refused = run("run", &["run", "-q"], folder.path(), 2).1;

@@ -189,9 +189,10 @@ pub(crate) fn production_hinted(error: ProductionError) -> anyhow::Error {
     let hint = match &error {
         ProductionError::Dsm(error) => hint(error),
         ProductionError::NoPlan { .. } => Some("skysweep plan IMAGES… -o RUN makes one"),
-        ProductionError::ConfigChanged { .. } | ProductionError::InputChanged { .. } => {
-            Some("skysweep run RUN --resume plans and computes again")
-        }
+        ProductionError::OtherVersion { .. }
+        | ProductionError::ConfigChanged { .. }
+        | ProductionError::InputChanged { .. }
+        | ProductionError::InputAdded { .. } => Some("skysweep run RUN --resume plans and computes again"),
         ProductionError::ChunksMissing { .. } => Some("skysweep run RUN computes them, --partial leaves them void"),
         _ => None,
     };

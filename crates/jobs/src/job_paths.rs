@@ -39,7 +39,8 @@ pub(crate) fn relative(path: &Path, folder: &Path) -> PathBuf {
     if out.as_os_str().is_empty() { PathBuf::from(".") } else { out }
 }
 
-fn is_address(path: &Path) -> bool {
+/// Whether a name is an address or a place inside an archive, and no file of this machine.
+pub(crate) fn is_address(path: &Path) -> bool {
     let name = path.to_string_lossy();
     name.starts_with("/vsi") || name.contains("://")
 }

@@ -173,6 +173,9 @@ impl BatchConfig {
             if name.is_empty() || name.starts_with(['.', ' ']) || !name.chars().all(is_plain) {
                 return Err(BatchError::SceneName { name });
             }
+            if scene.bounds.is_some() && scene.area.is_some() {
+                return Err(BatchError::TwoAreas { name });
+            }
             if self.scenes[..i].iter().any(|other| other.name == name) {
                 return Err(BatchError::SameName { name });
             }
@@ -185,7 +188,8 @@ impl BatchConfig {
 ///
 /// # Errors
 /// [`BatchError::Job`] also for unknown keys; [`BatchError::NoScene`], [`BatchError::NoOutput`],
-/// [`BatchError::SceneName`], [`BatchError::SameName`], [`BatchError::Limit`]. Tasks and their
+/// [`BatchError::SceneName`], [`BatchError::SameName`], [`BatchError::TwoAreas`],
+/// [`BatchError::Limit`]. Tasks and their
 /// settings are checked when the batch begins.
 pub fn read_batch(path: &Path) -> Result<BatchConfig, BatchError> {
     let text = read_text(path).map_err(job_file::JobFileError::from)?;

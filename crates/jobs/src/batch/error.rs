@@ -39,6 +39,12 @@ pub enum BatchError {
         /// The name.
         name: String,
     },
+    /// A scene has bounds and an area.
+    #[error("the scene {name:?} has `bounds` and `area`, which both say where it is; give one of them")]
+    TwoAreas {
+        /// The name.
+        name: String,
+    },
     /// A task that does not exist.
     #[error("the scene {scene:?} asks for the task `{task}`, which is not known; known are {known}")]
     UnknownTask {

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::batch::task::TaskJob;
 use crate::error_text::with_causes;
 use crate::files::{TEXT_LIMIT, write_json};
-use crate::production::{InputFile, check_inputs, inputs_of};
+use crate::production::{InputFile, added_input, check_inputs, files_of, inputs_of};
 
 /// The record of a task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,6 +49,7 @@ impl TaskRecord {
         self.is_done
             && key_of(job).is_ok_and(|key| key == self.key)
             && check_inputs(&self.inputs).is_ok()
+            && files_of_images(job).is_ok_and(|files| added_input(&files, &self.inputs).is_none())
             && job.product().exists()
     }
 }
@@ -69,11 +70,22 @@ fn inputs_of_job(job: &TaskJob) -> Result<Vec<InputFile>, String> {
     if let TaskJob::Dsm(config) = job {
         return inputs_of(config).map_err(|e| with_causes(&e));
     }
-    let mut files = BTreeSet::new();
+    let mut files = files_of_images(job)?;
     collect(&serde_json::to_value(job).map_err(|e| e.to_string())?, &mut files);
     let product = job.product();
     let one = |path: &PathBuf| InputFile::of(path).map_err(|e| with_causes(&e));
     files.iter().filter(|path| !path.starts_with(&product)).map(one).collect()
+}
+
+/// Returns the files that belong to the images of a task, such as RPCs beside them.
+fn files_of_images(job: &TaskJob) -> Result<BTreeSet<PathBuf>, String> {
+    let images = match job {
+        TaskJob::Dsm(config) => return files_of(config).map_err(|e| with_causes(&e)),
+        TaskJob::Ortho(config) => config.images.as_slice(),
+        TaskJob::Priors(config) => config.cameras.as_slice(),
+        TaskJob::Eval(_) | TaskJob::HeightMap(_) => &[],
+    };
+    Ok(images.iter().filter(|path| path.is_file()).flat_map(|path| io::rpc::side_files(path)).collect())
 }
 
 /// Collects the files that the texts of a value name. A folder of a run stands for its surface

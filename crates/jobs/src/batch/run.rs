@@ -23,7 +23,9 @@ const REPORT_PAGE: &str = "batch_report.html";
 /// Memory of the surface models that are computed at a time where none is given, megabytes.
 const MEMORY_MB: u64 = 4000;
 /// Beginnings of the names of files that killed runs leave.
-const LEFT_OVER: [&str; 3] = [".skysweep-", ".claim-", "result.partial"];
+const LEFT_OVER: [&str; 2] = [".skysweep-", ".claim-"];
+/// Name of a result of a chunk that a killed run leaves.
+const PARTIAL_RESULT: &str = "result.partial";
 
 /// Runs a batch. What an earlier run of it completed is left alone.
 ///
@@ -112,7 +114,7 @@ fn remove_left_over(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
         let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-        if LEFT_OVER.iter().any(|beginning| name.starts_with(beginning)) {
+        if name == PARTIAL_RESULT || LEFT_OVER.iter().any(|beginning| name.starts_with(beginning)) {
             let removed = if is_folder { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
             removed.map_err(|source| FileError::Remove { path, source })?;
         } else if is_folder {
@@ -122,8 +124,16 @@ fn remove_left_over(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     Ok(folders)
 }
 
-/// Removes the files that killed runs left in a folder and in those below it.
+/// Removes the files that killed runs left in the folder of a scene and in those below it. A folder
+/// in which another run works is left alone.
 fn remove_left_over_below(folder: &Path) -> Result<(), FileError> {
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    let _taken = match OutputFolder::take(folder) {
+        Err(FileError::InUse { .. }) => return Ok(()),
+        other => other?,
+    };
     let mut folders = vec![folder.to_owned()];
     while let Some(folder) = folders.pop() {
         folders.extend(remove_left_over(&folder)?);
@@ -134,6 +144,22 @@ fn remove_left_over_below(folder: &Path) -> Result<(), FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_what_killed_runs_left_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("scene");
+        let names = ["chunks/0000/result.partial", "chunks/.claim-1", "result.partial.txt"];
+        for name in names {
+            std::fs::create_dir_all(scene.join(name)).unwrap();
+        }
+        let share = OutputFolder::share(&scene).unwrap();
+        remove_left_over_below(&scene).unwrap();
+        assert!(names.iter().all(|name| scene.join(name).exists()), "another run works here");
+        drop(share);
+        remove_left_over_below(&scene).unwrap();
+        assert_eq!(names.map(|name| scene.join(name).exists()), [false, false, true]);
+    }
 
     #[test]
     fn another_scene_does_not_change_the_memory_of_the_others() {

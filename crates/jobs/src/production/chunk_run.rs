@@ -91,7 +91,8 @@ impl ChunkRunReport {
 ///
 /// # Errors
 /// [`ProductionError::NoPlan`], [`ProductionError::Plan`]; [`ProductionError::OtherVersion`],
-/// [`ProductionError::ConfigChanged`], [`ProductionError::InputChanged`] unless the run is resumed;
+/// [`ProductionError::ConfigChanged`], [`ProductionError::InputChanged`],
+/// [`ProductionError::InputAdded`] unless the run is resumed;
 /// [`ProductionError::File`], [`ProductionError::Threads`]; [`ProductionError::Dsm`] for a chunk
 /// that the plan does not have, for inputs that change meanwhile, and when cancelled. A chunk that
 /// fails is no error.

@@ -126,7 +126,7 @@ fn is_alive(claim: &Path, worker: &ChunkWorker) -> bool {
     // Those who ask share their lock, so that they do not take each other for the owner.
     match file.try_lock_shared() {
         Err(TryLockError::WouldBlock) => true,
-        Ok(()) if worker.host == ChunkWorker::here().host => false,
+        Ok(()) if !worker.host.is_empty() && worker.host == ChunkWorker::here().host => false,
         // Locks may not reach from one machine to another.
         _ => beats,
     }
@@ -199,6 +199,9 @@ mod tests {
         fs::write(&asking, "").unwrap();
         drop(ours(Claim::take(&folder, "p", NEVER).unwrap()));
         assert!(asking.exists());
+        // A machine without a name may be any machine.
+        left("", 5);
+        assert!(matches!(Claim::take(&folder, "p", NEVER).unwrap(), Claimed::Theirs));
         left("another machine", 5);
         assert!(matches!(Claim::take(&folder, "p", NEVER).unwrap(), Claimed::Theirs));
         left("another machine", 90);

@@ -62,6 +62,15 @@ pub enum ProductionError {
         /// The input.
         path: PathBuf,
     },
+    /// A file has appeared beside an image since the plan was made.
+    #[error(
+        "a file that belongs to an image was not there when the plan was made; remove it, or resume the run to plan \
+         and compute again: {}", path.display()
+    )]
+    InputAdded {
+        /// The file.
+        path: PathBuf,
+    },
     /// Chunks have no result yet.
     #[error(
         "{} of {count} chunks have no result ({}); compute them, or allow a partial result, which is void there",
@@ -89,7 +98,13 @@ impl ProductionError {
 
     /// Returns whether a part of what the plan rests on has changed, so that it must be made again.
     pub(crate) fn is_change(&self) -> bool {
-        matches!(self, Self::OtherVersion { .. } | Self::ConfigChanged { .. } | Self::InputChanged { .. })
+        matches!(
+            self,
+            Self::OtherVersion { .. }
+                | Self::ConfigChanged { .. }
+                | Self::InputChanged { .. }
+                | Self::InputAdded { .. }
+        )
     }
 }
 

@@ -60,6 +60,15 @@ impl InputFile {
 /// # Errors
 /// [`ProductionError::File`], [`ProductionError::Dsm`].
 pub(crate) fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, ProductionError> {
+    let files: Vec<PathBuf> = files_of(config)?.into_iter().collect();
+    Ok(files.par_iter().map(|path| InputFile::of(path)).collect::<Result<_, _>>()?)
+}
+
+/// Returns the names of the files that [`inputs_of`] reads.
+///
+/// # Errors
+/// [`ProductionError::Dsm`].
+pub(crate) fn files_of(config: &DsmConfig) -> Result<BTreeSet<PathBuf>, ProductionError> {
     let mut files: BTreeSet<PathBuf> = config.side_inputs().cloned().collect();
     for image in &config.images {
         let source = ImageSource::open(image).map_err(crate::dsm::DsmError::from)?;
@@ -67,8 +76,16 @@ pub(crate) fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, Production
         files.extend(io::rpc::side_files(image));
         files.insert(image.clone());
     }
-    let files: Vec<PathBuf> = files.into_iter().filter(|path| path.is_file()).collect();
-    Ok(files.par_iter().map(|path| InputFile::of(path)).collect::<Result<_, _>>()?)
+    files.retain(|path| path.is_file());
+    Ok(files)
+}
+
+/// Returns a file that is not among the inputs, if there is one.
+pub(crate) fn added<'a>(files: &'a BTreeSet<PathBuf>, inputs: &[InputFile]) -> Option<&'a PathBuf> {
+    let is_same = |input: &InputFile, path: &Path| {
+        input.path == path || input.path.canonicalize().ok().zip(path.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+    };
+    files.iter().find(|path| !inputs.iter().any(|input| is_same(input, path)))
 }
 
 /// Compares files with what they were when they were planned.

@@ -81,14 +81,11 @@ impl PlanFile {
         if let Some(planned) = version_of(&json).filter(|planned| planned != here) {
             return Err(ProductionError::OtherVersion { path, planned, here: here.to_owned() });
         }
-        let mut file: Self = serde_json::from_slice(&json).map_err(|e| failed(e.to_string()))?;
+        let file: Self = serde_json::from_slice(&json).map_err(|e| failed(e.to_string()))?;
         if file.identity()? != file.id {
             return Err(failed("it is not as it was written".to_owned()));
         }
-        file.map_paths(|path| resolved(path, folder));
-        // As the caller names it, so that messages and reports do.
-        folder.clone_into(&mut file.plan.config.output);
-        Ok(file)
+        Ok(file.located(folder))
     }
 
     /// Reads the plan in the folder of a run, and checks that the configuration there is still the
@@ -110,12 +107,25 @@ impl PlanFile {
         same(&self.plan.config, config, &config.output)
     }
 
-    /// Checks that the inputs have the content that was planned.
+    /// Returns the plan with the paths that its folder makes of the relative ones.
+    pub(super) fn located(mut self, folder: &Path) -> Self {
+        self.map_paths(|path| resolved(path, folder));
+        // As the caller names it, so that messages and reports do.
+        folder.clone_into(&mut self.plan.config.output);
+        self
+    }
+
+    /// Checks that the inputs have the content that was planned, and that no file was added to the
+    /// images, such as another RPC.
     ///
     /// # Errors
-    /// [`ProductionError::InputChanged`], [`ProductionError::File`].
+    /// [`ProductionError::InputChanged`], [`ProductionError::InputAdded`],
+    /// [`ProductionError::File`], [`ProductionError::Dsm`].
     pub(super) fn check_inputs(&self) -> Result<(), ProductionError> {
-        input_files::check(&self.inputs)
+        input_files::check(&self.inputs)?;
+        let files = input_files::files_of(&self.plan.config)?;
+        let added = input_files::added(&files, &self.inputs);
+        added.map_or(Ok(()), |path| Err(ProductionError::InputAdded { path: path.clone() }))
     }
 }
 

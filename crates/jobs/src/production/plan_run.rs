@@ -31,6 +31,10 @@ struct PointingFile<'a> {
 /// [`ProductionError::Dsm`], [`ProductionError::File`], [`ProductionError::Threads`].
 pub fn make_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
     config.validate()?;
+    Ok(stored_plan(config, progress)?.located(&config.output))
+}
+
+fn stored_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
     threads::install(config.threads, || {
         // Hashed first: a file that changes while it is read differs from its hash afterwards.
         let inputs = inputs_of(config)?;
@@ -60,9 +64,9 @@ pub fn plan_run(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile,
         let results: Vec<&str> = FILES.into_iter().filter(|name| *name != USED_CONFIG).collect();
         refuse_results(folder.path(), &results)?;
     }
-    let file = make_plan(config, progress)?;
+    let file = stored_plan(config, progress)?;
     replace(&folder, config, &file)?;
-    Ok(file)
+    Ok(file.located(&config.output))
 }
 
 /// Writes a plan, and removes the chunks of others.
@@ -109,6 +113,6 @@ pub(super) fn plan_again(
     let mut config = crate::job_file::read_dsm_job(&folder.join(USED_CONFIG))?;
     folder.clone_into(&mut config.output);
     config.validate()?;
-    let file = make_plan(&DsmConfig { threads: threads.or(config.threads), ..config.clone() }, progress)?;
+    let file = stored_plan(&DsmConfig { threads: threads.or(config.threads), ..config.clone() }, progress)?;
     replace(&taken, &config, &file)
 }
