@@ -74,8 +74,8 @@ const GROUPS: [(&str, &[&str]); 5] = [
 /// GDAL's options and ours.
 const OF_GDAL: [(&str, &str); 4] = [("-t_srs", "crs"), ("-te", "bounds"), ("-tr", "gsd"), ("-overwrite", "overwrite")];
 
-/// A value of an option with its name and, for the help, its meaning: an entry of the `CHOICES` of an
-/// enum.
+/// A value of an option with its name and, for the help, its meaning. The `CHOICES` of enums are
+/// such values.
 pub(crate) type Named<T> = (&'static str, T, &'static str);
 
 /// Parses the values of an option by their names.

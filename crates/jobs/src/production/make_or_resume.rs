@@ -39,8 +39,8 @@ pub(crate) fn make_or_resume(config: &DsmConfig, progress: &dyn Progress) -> Res
     Ok(report)
 }
 
-/// Removes the results of the chunks. They leave their name at once, so that a killed process leaves
-/// none that looks whole, and only while nobody works on them.
+/// Removes the results of the chunks, unless somebody works on them. They leave their name at once,
+/// so that a killed process leaves none that looks whole.
 fn remove_chunks(config: &DsmConfig) -> Result<(), FileError> {
     let path = config.output.join(CHUNKS);
     let folder = match OutputFolder::take(&config.output) {
