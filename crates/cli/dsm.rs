@@ -58,6 +58,15 @@ pub(crate) struct SceneArgs {
     /// Coarse elevation model from which the heights to search are taken.
     #[arg(long, value_name = "FILE")]
     dem: Option<PathBuf>,
+    /// Elevation or surface model that the scene is moved onto, in its pointing.
+    #[arg(long, value_name = "FILE", conflicts_with = "no_pointing")]
+    reference_dem: Option<PathBuf>,
+    /// Tilt the heights onto the reference elevation model, too.
+    #[arg(long)]
+    reference_plane: bool,
+    /// What the heights of --dem and --reference-dem are above [default: what the files name].
+    #[arg(long, value_name = "DATUM")]
+    dem_vertical: Option<VerticalDatum>,
     /// City model (CityJSON, CityGML) whose roofs are expected: they are searched and favoured, but
     /// the images decide.
     #[arg(long, value_name = "MODEL")]
@@ -140,6 +149,9 @@ impl SceneArgs {
             config.height_range_m = self.height_range.as_ref().and_then(range);
             config.dem.clone_from(&self.dem);
         }
+        config.reference_dem = self.reference_dem.clone().or(config.reference_dem);
+        config.reference_plane |= self.reference_plane;
+        config.dem_vertical = self.dem_vertical.or(config.dem_vertical);
         config.prior = self.prior.clone().or(config.prior);
         config.control = self.control.clone().or(config.control);
         config.corrections = self.corrections.clone().or(config.corrections);
@@ -215,6 +227,7 @@ fn hint(error: &DsmError) -> Option<&'static str> {
             DsmSetting::Bounds => "the grid is set by --bounds and --gsd",
             DsmSetting::HeightRange => "the heights are set by --height-range",
             DsmSetting::Dem => "the elevation model is set by --dem",
+            DsmSetting::ReferenceDem => "the reference is set by --reference-dem, its datum by --dem-vertical",
             DsmSetting::Pairs => "the pairs are set by --pairs",
             DsmSetting::References => "the images to compute heights for are set by --reference",
             DsmSetting::Threads => "the number of threads is set by --threads",

@@ -75,7 +75,7 @@ impl TaskKind {
     /// Settings that are paths.
     const fn paths(self) -> &'static [&'static str] {
         match self {
-            Self::Dsm => &["dem", "prior", "control", "corrections"],
+            Self::Dsm => &["dem", "reference_dem", "prior", "control", "corrections"],
             Self::Ortho => &["report"],
             Self::Eval => &["reference", "classes", "mask", "terrain", "confidence", "objects"],
             Self::HeightMap => &["terrain", "raster", "list", "camera_file"],

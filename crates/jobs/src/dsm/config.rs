@@ -98,6 +98,14 @@ pub struct DsmConfig {
     pub height_range_m: Option<HeightRange>,
     /// Coarse elevation model from which the height range is taken.
     pub dem: Option<PathBuf>,
+    /// Elevation or surface model to which the pointing is co-registered.
+    pub reference_dem: Option<PathBuf>,
+    /// Whether the heights are also tilted onto the reference by a plane.
+    #[serde(default)]
+    pub reference_plane: bool,
+    /// What the heights of `dem` and `reference_dem` are above; the datum that a file names when
+    /// `None`.
+    pub dem_vertical: Option<VerticalDatum>,
     /// City model whose roofs are expected.
     pub prior: Option<PathBuf>,
     /// Ground control points and check points with their places in the images (CSV, GeoJSON).
@@ -158,6 +166,9 @@ impl DsmConfig {
             bounds: None,
             height_range_m: None,
             dem: None,
+            reference_dem: None,
+            reference_plane: false,
+            dem_vertical: None,
             prior: None,
             control: None,
             corrections: None,
@@ -178,7 +189,7 @@ impl DsmConfig {
 
     /// Returns the inputs beside the images.
     pub(crate) fn side_inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        [&self.dem, &self.prior, &self.control, &self.corrections].into_iter().flatten()
+        [&self.dem, &self.reference_dem, &self.prior, &self.control, &self.corrections].into_iter().flatten()
     }
 
     /// Returns the configuration with the defaults for what does not change the result: threads,
@@ -190,8 +201,8 @@ impl DsmConfig {
 
     /// Replaces every path by what `change` makes of it.
     pub(crate) fn map_paths(&mut self, change: impl Fn(&Path) -> PathBuf) {
-        let others = [&mut self.dem, &mut self.prior, &mut self.control, &mut self.corrections].into_iter().flatten();
-        for path in self.images.iter_mut().chain([&mut self.output]).chain(others) {
+        let sides = [&mut self.dem, &mut self.reference_dem, &mut self.prior, &mut self.control, &mut self.corrections];
+        for path in self.images.iter_mut().chain([&mut self.output]).chain(sides.into_iter().flatten()) {
             *path = change(path);
         }
     }
@@ -216,6 +227,14 @@ impl DsmConfig {
         }
         if self.output.as_os_str().is_empty() {
             return Err(DsmError::value(DsmSetting::Output, "missing", "a folder for the results"));
+        }
+        if self.reference_dem.is_some() && !self.pointing {
+            let found = "given, although the pointing is not to be corrected";
+            return Err(DsmError::value(
+                DsmSetting::ReferenceDem,
+                found,
+                "a correction of the pointing, or no reference",
+            ));
         }
         self.validate_ground()?;
         self.validate_division()?;

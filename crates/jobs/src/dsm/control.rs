@@ -100,14 +100,23 @@ impl GroundControl {
                 odd.residual, odd.name
             ));
         }
-        let checks: Vec<CheckPointReport> = self.checks.iter().filter_map(|check| check.measured(&cameras)).collect();
+        let mut report = ControlReport { control, checks: Vec::new(), unmeasured: 0, ce90_m: None, le90_m: None };
+        self.measure_again(&mut report, &cameras, notes);
+        Some(report)
+    }
+
+    /// Compares the check points with what other cameras see.
+    pub(crate) fn measure_again(&self, report: &mut ControlReport, cameras: &[RpcCamera], notes: &mut Notes<'_>) {
+        let checks: Vec<CheckPointReport> = self.checks.iter().filter_map(|check| check.measured(cameras)).collect();
         let mut horizontal: Vec<f64> = checks.iter().map(|c| c.error_m[0].hypot(c.error_m[1])).collect();
         let mut vertical: Vec<f64> = checks.iter().map(|c| c.error_m[2].abs()).collect();
-        let (ce90_m, le90_m) = (ninetieth(&mut horizontal), ninetieth(&mut vertical));
-        let points = format!("{} control points, {} check points", control.len(), checks.len());
+        (report.ce90_m, report.le90_m) = (ninetieth(&mut horizontal), ninetieth(&mut vertical));
+        let points = format!("{} control points, {} check points", report.control.len(), checks.len());
         let shown = |m: Option<f64>| m.map_or("unknown".to_owned(), |m| format!("{m:.2} m"));
-        notes.choose("control", points, format!("CE90 {}, LE90 {} at the check points", shown(ce90_m), shown(le90_m)));
-        Some(ControlReport { control, unmeasured: self.checks.len() - checks.len(), checks, ce90_m, le90_m })
+        let errors = format!("CE90 {}, LE90 {} at the check points", shown(report.ce90_m), shown(report.le90_m));
+        notes.choose("control", points, errors);
+        report.unmeasured = self.checks.len() - checks.len();
+        report.checks = checks;
     }
 }
 

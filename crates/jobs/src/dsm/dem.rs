@@ -12,20 +12,24 @@ use crate::dsm::view_geometry::ViewGeometry;
 /// Returns the least and greatest height of an elevation model over the ground that the images
 /// share.
 ///
-/// The vertical datum is that of the file. A file without one is taken as EGM96, as SRTM and most
-/// others are.
+/// The vertical datum is `stated`, or that of the file. A file without one is taken as EGM96, as
+/// SRTM and most others are.
 ///
 /// # Errors
 /// [`DsmError::Value`] for a file without CRS or without heights under the scene,
 /// [`DsmError::Image`], [`DsmError::Crs`].
-pub(crate) fn dem_heights(path: &Path, geometry: &ViewGeometry) -> Result<HeightRange, DsmError> {
+pub(crate) fn dem_heights(
+    path: &Path,
+    stated: Option<VerticalDatum>,
+    geometry: &ViewGeometry,
+) -> Result<HeightRange, DsmError> {
     let dem = io::raster::read_dem(path)?;
     let no_crs = || {
         let found = format!("a file without coordinate reference system: {}", path.display());
         DsmError::value(DsmSetting::Dem, found, "a georeferenced elevation model")
     };
     let projection = MapProjection::from_definition(dem.crs_wkt.as_deref().ok_or_else(no_crs)?)?;
-    let converter = HeightConverter::new(dem.vertical.unwrap_or(VerticalDatum::Egm96))?;
+    let converter = HeightConverter::new(stated.or(dem.vertical).unwrap_or(VerticalDatum::Egm96))?;
     let hull = shared_ground(&geometry.outlines).ok_or(DsmError::NoOverlap { share_percent: 0.0 })?;
     // The rectangle of cells over the scene, in columns and rows.
     let mut cells = MapBounds::EMPTY;

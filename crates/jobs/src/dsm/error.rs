@@ -27,6 +27,8 @@ pub enum DsmSetting {
     HeightRange,
     /// `dem`.
     Dem,
+    /// `reference_dem`.
+    ReferenceDem,
     /// `control`.
     Control,
     /// `pairs`.
@@ -50,6 +52,7 @@ impl fmt::Display for DsmSetting {
             Self::Bounds => "the bounds",
             Self::HeightRange => "the height range",
             Self::Dem => "the elevation model",
+            Self::ReferenceDem => "the reference elevation model",
             Self::Control => "the file of ground points",
             Self::Pairs => "the list of image pairs",
             Self::References => "the list of reference images",
@@ -101,6 +104,17 @@ pub enum DsmError {
         path: PathBuf,
         /// Cause.
         source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The scene cannot be co-registered to its reference.
+    #[error(
+        "the scene cannot be co-registered to its reference elevation model: {reason}; give another reference, or leave \
+         it out: {}", path.display()
+    )]
+    Reference {
+        /// The reference.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
     },
     /// The ground points cannot be used.
     #[error(transparent)]

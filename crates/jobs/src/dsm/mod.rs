@@ -6,6 +6,7 @@
 //! - [`open`] gives [`Opened`]: images, RPCs, sizes.
 //! - [`point()`](point()) gives [`Pointed`]: corrected cameras, tie points, residuals, noise and
 //!   contrast of the images.
+//! - [`register`] moves the cameras onto a reference elevation model, where one is given.
 //! - [`plan()`](plan()) gives [`Plan`]: grid, chunks with their windows, sources, height ranges and
 //!   levels, choices with reasons.
 //! - [`run_chunk`] gives [`ChunkResult`]: rasters and counts of one chunk.
@@ -74,12 +75,15 @@ mod open;
 mod order;
 mod output;
 mod plan;
+mod plane_fit;
 mod point;
 mod prior_findings;
 mod prior_verdict;
 mod prior_view;
 mod probe;
 mod rasters;
+mod reference_dem;
+mod register;
 mod report;
 mod report_text;
 mod run;
@@ -112,9 +116,11 @@ pub use plan::{Plan, PlanReport, plan};
 pub use point::{Pointed, point};
 pub use prior_findings::{BuildingFinding, PriorFindings, ViewVotes};
 pub use rasters::ChunkRasters;
+pub use register::register;
 pub use report::{
     CheckPointReport, ChunksReport, ControlPointReport, ControlReport, CorrectionOrder, DsmReport, FailedChunk,
-    ImagePointing, ImageReport, LeftOut, PairReport, PointingReport, PriorReport, StageTime, SurfaceReport,
+    ImagePointing, ImageReport, LeftOut, PairReport, PointingReport, PriorReport, ReferenceReport, StageTime,
+    SurfaceReport,
 };
 pub use run::run;
 pub use session::Session;

@@ -107,6 +107,10 @@ impl Plan {
 /// [`DsmError::Sweep`]; [`DsmError::Cancelled`].
 pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) -> Result<Plan, DsmError> {
     session.progress.check_cancelled()?;
+    if config.reference_dem.is_some() && pointed.pointing.reference.is_none() {
+        let found = "given, but the cameras were not moved onto it";
+        return Err(DsmError::value(DsmSetting::ReferenceDem, found, "cameras from the stage that co-registers"));
+    }
     let tuning = config.preset.tuning();
     let mut notes = Notes::resume(&pointed.choices, &pointed.warnings, session.progress);
     let images = &pointed.images;

@@ -102,7 +102,8 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     }
     let pairs = choose_pairs(config, &images, &useful, &geometry, &mut notes)?;
     session.lap("pointing");
-    let dem_heights = config.dem.as_deref().map(|path| dem_heights(path, &geometry)).transpose()?;
+    let dem_heights =
+        config.dem.as_deref().map(|path| dem_heights(path, config.dem_vertical, &geometry)).transpose()?;
     Ok(Pointed {
         images,
         characters,

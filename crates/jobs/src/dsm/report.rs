@@ -105,6 +105,34 @@ pub struct PointingReport {
     /// Control points and check points; absent without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub control: Option<ControlReport>,
+    /// Co-registration to a reference; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ReferenceReport>,
+}
+
+/// How the scene was moved onto a reference elevation model. The corrections that were applied to
+/// the images hold it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ReferenceReport {
+    /// The reference.
+    pub path: PathBuf,
+    /// Shift east, north and up that the surface was given, metres.
+    pub shift_m: [f64; 3],
+    /// Tilt that the heights were given, metres per kilometre east and north; `None` unless asked
+    /// for.
+    pub plane_m_per_km: Option<[f64; 2]>,
+    /// Number of cells of the trial surface that were compared.
+    pub cells: usize,
+    /// NMAD of the differences before the shift, metres.
+    #[serde(with = "null_is_nan")]
+    pub nmad_before_m: f64,
+    /// NMAD of the differences after the shift, metres.
+    #[serde(with = "null_is_nan")]
+    pub nmad_after_m: f64,
+    /// Length of the second and last shift, metres, which tells how well the first one was
+    /// followed.
+    pub last_shift_m: f64,
 }
 
 /// What ground points with known positions show of the pointing.
@@ -210,6 +238,7 @@ impl PointingReport {
             rms_px: found.rms_px,
             images,
             control: None,
+            reference: None,
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::dsm::open::open;
 use crate::dsm::output::DsmFolder;
 use crate::dsm::plan::{Plan, plan};
 use crate::dsm::point::point;
+use crate::dsm::register::register;
 use crate::dsm::report::DsmReport;
 use crate::dsm::session::Session;
 use crate::threads;
@@ -46,7 +47,7 @@ pub fn run(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, Dsm
     threads::install(config.threads, || {
         let mut session = Session::new(progress);
         let opened = open(config)?;
-        let pointed = point(config, &opened, &mut session)?;
+        let pointed = register(config, point(config, &opened, &mut session)?, &mut session)?;
         let plan = plan(config, &pointed, &mut session)?;
         drop((opened, pointed));
         Ok(sweep_and_merge(&plan, folder, &inputs, &mut session)?.report)

@@ -6,7 +6,8 @@ use numeric::Progress;
 use serde::Serialize;
 
 use crate::dsm::{
-    DsmConfig, DsmError, FILES, Plan, PlanReport, Session, USED_CONFIG, open, plan, point, refuse_results, write_config,
+    DsmConfig, DsmError, FILES, Plan, PlanReport, Session, USED_CONFIG, open, plan, point, refuse_results, register,
+    write_config,
 };
 use crate::files::write_json;
 use crate::job_paths::resolved;
@@ -44,7 +45,7 @@ fn stored_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, 
 }
 
 fn chain(config: &DsmConfig, session: &mut Session<'_>) -> Result<Plan, DsmError> {
-    let pointed = point(config, &open(config)?, session)?;
+    let pointed = register(config, point(config, &open(config)?, session)?, session)?;
     plan(config, &pointed, session)
 }
 

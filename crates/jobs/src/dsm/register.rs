@@ -1,0 +1,375 @@
+//! Stage between the pointing and the plan: co-registration to a reference elevation model.
+//!
+//! A trial DSM of half the resolution is made with the pointing found so far and aligned with the
+//! reference as `eval` aligns surfaces: the horizontal shift with the least NMAD, and the median of
+//! the differences. All cameras are moved by that shift. A second trial DSM of the run's own preset
+//! then measures what is left, because edges are found to a fraction of a pixel only, and the
+//! cameras are moved by that.
+//!
+//! A shift without evidence is an error: a reference beside the scene, surfaces that differ too
+//! much, ground without relief, or a shift that the method of Nuth and Kääb (2011) does not
+//! confirm.
+
+use std::path::Path;
+
+use camera::{ImageCorrection, ImagePoint, RpcCamera};
+use crs::MapProjection;
+use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, Shift, evaluate};
+use geodesy::LonLatHeight;
+
+use raster::{Grid, reduce};
+
+use crate::dsm::chunk::{ChunkContent, run_chunk};
+use crate::dsm::config::{DsmConfig, Fill, Preset};
+use crate::dsm::control::GroundControl;
+use crate::dsm::error::{DsmError, DsmSetting};
+use crate::dsm::grid::{DsmGrid, choose_grid};
+use crate::dsm::images::SceneImage;
+use crate::dsm::notes::Notes;
+use crate::dsm::plan::plan;
+use crate::dsm::plane_fit::FittedPlane;
+use crate::dsm::point::Pointed;
+use crate::dsm::reference_dem::reference_on;
+use crate::dsm::report::ReferenceReport;
+use crate::dsm::session::{Muted, Session};
+use crate::dsm::values::HeightRange;
+use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
+
+/// Largest horizontal shift that is searched for, metres. Providers state errors of up to 10 m.
+const SEARCH_M: f64 = 25.0;
+/// Most cells of the trial DSM. A larger scene gets larger cells.
+const CELLS_MAX: f64 = 16e6;
+/// Most chunks of a large scene that are swept for the trial DSM; evenly spread.
+const CHUNKS_MAX: usize = 16;
+/// Least number of cells that both surfaces have.
+const COMMON_MIN: usize = 1000;
+/// Least share of the trial DSM's observed cells that the reference has too.
+const COMMON_SHARE_MIN: f64 = 0.2;
+/// Greatest NMAD of the differences after the alignment, metres. Global elevation models of 30 m
+/// stay below it in mountains.
+const NMAD_MAX_M: f64 = 8.0;
+/// Greatest difference between the shifts that two methods find, cells of the coarser surface and
+/// metres on top of them.
+const AGREEMENT_CELLS: f64 = 0.5;
+const AGREEMENT_M: f64 = 0.5;
+/// Rounds of the fit of the plane, each of which leaves out what is further off than
+/// [`PLANE_NMADS`].
+const PLANE_ROUNDS: usize = 4;
+const PLANE_NMADS: f64 = 3.0;
+/// Places per side of an image at which the old and the new camera are compared.
+const CAMERA_STEPS: usize = 6;
+
+/// Moves the cameras so that the surface agrees with the reference elevation model of the
+/// configuration. Without one it returns `pointed` unchanged.
+///
+/// # Errors
+/// [`DsmError::Reference`] where the evidence for a shift is too weak, [`DsmError::Value`] for a
+/// reference that cannot be used or control points beside it, and the errors of [`plan()`] and
+/// [`run_chunk`].
+pub fn register(config: &DsmConfig, mut pointed: Pointed, session: &mut Session<'_>) -> Result<Pointed, DsmError> {
+    let Some(path) = config.reference_dem.as_deref() else { return Ok(pointed) };
+    if pointed.pointing.control.as_ref().is_some_and(|control| !control.control.is_empty()) {
+        let found = "given beside control points, which place the scene too";
+        return Err(DsmError::value(DsmSetting::ReferenceDem, found, "one of the two; check points may be given"));
+    }
+    session.progress.begin("co-registering", 2);
+    let first = Round::of(config, Preset::Fast, &pointed, session)?;
+    first.check(path)?;
+    first.apply(config, &mut pointed)?;
+    session.progress.step();
+    let second = Round::of(config, config.preset, &pointed, session)?;
+    second.check(path)?;
+    let remaining_m = second.length_m();
+    if remaining_m > first.tolerance_m() {
+        return Err(weak(
+            path,
+            format!(
+                "the surface is still {remaining_m:.2} m off after the cameras were moved by {:.2} m",
+                first.length_m()
+            ),
+        ));
+    }
+    second.apply(config, &mut pointed)?;
+    session.progress.step();
+    let mut notes = Notes::resume(&pointed.choices, &pointed.warnings, session.progress);
+    let report = ReferenceReport {
+        path: path.to_owned(),
+        shift_m: std::array::from_fn(|axis| first.shift_m()[axis] + second.shift_m()[axis]),
+        plane_m_per_km: config
+            .reference_plane
+            .then(|| [0, 1].map(|i| 1e3 * (first.plane.slope[i] + second.plane.slope[i]))),
+        cells: second.common,
+        nmad_before_m: first.nmad_m.0,
+        nmad_after_m: second.nmad_m.1,
+        last_shift_m: remaining_m,
+    };
+    let [dx, dy, dz] = report.shift_m;
+    notes.choose(
+        "reference",
+        format!("surface moved by {dx:.2} m east, {dy:.2} m north, {dz:.2} m up"),
+        format!("NMAD against the reference {:.2} m before, {:.2} m after", report.nmad_before_m, report.nmad_after_m),
+    );
+    if let (Some(control), Some(points)) = (&mut pointed.pointing.control, &config.control) {
+        let cameras: Vec<RpcCamera> = pointed.images.iter().map(|image| image.camera.clone()).collect();
+        GroundControl::read(Some(points), &pointed.images)?.measure_again(control, &cameras, &mut notes);
+    }
+    pointed.pointing.reference = Some(report);
+    (pointed.choices, pointed.warnings) = (notes.choices, notes.warnings);
+    session.lap("co-registration");
+    Ok(pointed)
+}
+
+fn weak(path: &Path, reason: String) -> DsmError {
+    DsmError::Reference { path: path.to_owned(), reason }
+}
+
+/// A trial DSM compared with the reference.
+struct Round {
+    grid: DsmGrid,
+    heights: HeightRange,
+    /// Shift of the surface on the map of the grid.
+    shift: Shift,
+    /// What is added to the vertical shift, over the map.
+    plane: FittedPlane,
+    /// Shift that the other method found.
+    other: Shift,
+    /// Whether the shift lies at the edge of the search.
+    is_at_edge: bool,
+    /// Number of cells that both surfaces have.
+    common: usize,
+    /// NMAD of the differences before and after, metres.
+    nmad_m: (f64, f64),
+    /// Cell of the coarser surface, metres.
+    cell_m: f64,
+}
+
+impl Round {
+    fn of(config: &DsmConfig, preset: Preset, pointed: &Pointed, session: &mut Session<'_>) -> Result<Self, DsmError> {
+        let Some(path) = config.reference_dem.as_deref() else {
+            return Err(DsmError::value(DsmSetting::ReferenceDem, "missing", "a file"));
+        };
+        let trial = trial_surface(config, preset, pointed, session)?;
+        let mut grid = trial.grid;
+        let mut surface = trial.surface;
+        let mut reference = reference_on(path, config.dem_vertical, &grid)?;
+        // A coarse reference is compared with the mean heights of cells like its own.
+        while 2.0 * grid.gsd_m <= reference.cell_m && grid.size.0.min(grid.size.1) > 64 {
+            surface = reduce(&surface);
+            let c = grid.geotransform.0;
+            let doubled = [c[0], 2.0 * c[1], 2.0 * c[2], c[3], 2.0 * c[4], 2.0 * c[5]];
+            grid.geotransform = raster::GeoTransform(doubled);
+            (grid.size, grid.gsd_m) = ((surface.width(), surface.height()), 2.0 * grid.gsd_m);
+            reference = reference_on(path, config.dem_vertical, &grid)?;
+        }
+        let common = surface.data().iter().zip(reference.heights.data());
+        let common = common.filter(|(a, b)| a.is_finite() && b.is_finite()).count();
+        let observed = surface.data().iter().filter(|height| height.is_finite()).count();
+        let share = common as f64 / observed.max(1) as f64;
+        if common < COMMON_MIN || share < COMMON_SHARE_MIN {
+            return Err(weak(
+                path,
+                format!(
+                    "it has heights at {common} cells of {} m, {:.0} % of those that the images show; needed are {COMMON_MIN} \
+                 cells and {:.0} %",
+                    grid.gsd_m,
+                    100.0 * share,
+                    100.0 * COMMON_SHARE_MIN
+                ),
+            ));
+        }
+        let aligned = |method| align(&surface, &reference.heights, &grid, method);
+        let failed = |error: eval::EvalError| weak(path, error.to_string());
+        let by_slopes = aligned(AlignmentMethod::NuthKaab).map_err(failed)?;
+        let by_search = aligned(AlignmentMethod::Xyz).map_err(failed)?;
+        let plane = if config.reference_plane { plane_of(&by_search, &grid) } else { None };
+        let nmad = by_slopes.nuth_kaab.map_or((f64::NAN, f64::NAN), |found| (found.nmad_before_m, found.nmad_after_m));
+        Ok(Self {
+            heights: trial.heights,
+            shift: by_search.shift,
+            other: by_slopes.shift,
+            is_at_edge: by_search.search.is_some_and(|search| search.at_edge),
+            plane: plane.unwrap_or(FittedPlane { centre: [0.0; 2], offset: 0.0, slope: [0.0; 2] }),
+            common,
+            nmad_m: nmad,
+            cell_m: reference.cell_m.max(grid.gsd_m),
+            grid,
+        })
+    }
+
+    /// Refuses a shift without evidence.
+    fn check(&self, path: &Path) -> Result<(), DsmError> {
+        let apart = (self.shift.dx_m - self.other.dx_m).hypot(self.shift.dy_m - self.other.dy_m);
+        let reason = if self.is_at_edge {
+            format!("the shift seems to be larger than the {SEARCH_M} m that are searched")
+        } else if self.nmad_m.1.is_nan() || self.nmad_m.1 > NMAD_MAX_M {
+            format!(
+                "the surfaces differ by {:.1} m (NMAD) after the alignment, at most {NMAD_MAX_M} m are trusted",
+                self.nmad_m.1
+            )
+        } else if apart > self.tolerance_m() {
+            format!("two methods find shifts that are {apart:.1} m apart, so the relief does not tell the shift")
+        } else {
+            return Ok(());
+        };
+        Err(weak(path, reason))
+    }
+
+    fn tolerance_m(&self) -> f64 {
+        AGREEMENT_M + AGREEMENT_CELLS * self.cell_m
+    }
+
+    fn shift_m(&self) -> [f64; 3] {
+        [self.shift.dx_m, self.shift.dy_m, self.shift.dz_m + self.plane.offset]
+    }
+
+    fn length_m(&self) -> f64 {
+        self.shift_m().iter().map(|m| m * m).sum::<f64>().sqrt()
+    }
+
+    /// Moves the cameras, and the heights that the tie points showed with them.
+    fn apply(&self, config: &DsmConfig, pointed: &mut Pointed) -> Result<(), DsmError> {
+        let projection = self.grid.projection()?;
+        for image in &mut pointed.images {
+            let moved = self.moved(image, &projection);
+            image.camera.correction = moved.ok_or_else(|| {
+                let reason = format!("the camera cannot be moved: {}", image.path.display());
+                weak(config.reference_dem.as_deref().unwrap_or(Path::new("")), reason)
+            })?;
+        }
+        let dz = self.shift_m()[2];
+        pointed.tie_heights = pointed.tie_heights.map(|range| range.grown(-dz, dz));
+        Ok(())
+    }
+
+    /// Returns the correction with which a camera sees the moved ground where it saw the ground
+    /// before.
+    fn moved(&self, image: &SceneImage, projection: &MapProjection) -> Option<ImageCorrection> {
+        let plain = RpcCamera::new(image.camera.rpc.clone());
+        let mut seen: Vec<(ImagePoint, ImagePoint)> = Vec::new();
+        for height_m in [self.heights.low_m, self.heights.high_m] {
+            for step in 0..CAMERA_STEPS * CAMERA_STEPS {
+                let share = |i: usize, size: usize| (i as f64 + 0.5) / CAMERA_STEPS as f64 * size as f64;
+                let at =
+                    ImagePoint::new(share(step % CAMERA_STEPS, image.size.0), share(step / CAMERA_STEPS, image.size.1));
+                let ground = image.camera.localize(at, height_m).ok()?;
+                seen.push((plain.project(self.moved_ground(ground, projection)?).ok()?, at));
+            }
+        }
+        let fit = |value: fn(ImagePoint, ImagePoint) -> f64| {
+            FittedPlane::fit(seen.iter().map(|&(from, to)| ([from.sample, from.line], value(from, to))))
+        };
+        let sample = fit(|from, to| to.sample - from.sample)?;
+        let line = fit(|from, to| to.line - from.line)?;
+        Some(ImageCorrection {
+            translation_px: [sample.offset, line.offset],
+            linear: [sample.slope, line.slope],
+            centre: ImagePoint::new(sample.centre[0], sample.centre[1]),
+        })
+    }
+
+    fn moved_ground(&self, ground: LonLatHeight, projection: &MapProjection) -> Option<LonLatHeight> {
+        let map = projection.map_from_lonlat(ground.lon_deg, ground.lat_deg).ok()?;
+        let (lon, lat) = projection.lonlat_from_map(map.x + self.shift.dx_m, map.y + self.shift.dy_m).ok()?;
+        let up = self.shift.dz_m + self.plane.at([map.x, map.y]);
+        Some(LonLatHeight::new(lon, lat, ground.height_m + up))
+    }
+}
+
+/// A DSM of the whole scene that is made to be compared.
+struct TrialSurface {
+    grid: DsmGrid,
+    /// Observed heights above the ellipsoid, metres; NaN elsewhere.
+    surface: Grid<f32>,
+    /// Heights that were searched.
+    heights: HeightRange,
+}
+
+/// Makes a DSM of the whole scene with the pointing found so far. It has a large scene's chunks only
+/// in part.
+fn trial_surface(
+    config: &DsmConfig,
+    preset: Preset,
+    pointed: &Pointed,
+    session: &mut Session<'_>,
+) -> Result<TrialSurface, DsmError> {
+    let muted = Muted(session.progress);
+    let mut own = Session::new(&muted);
+    own.views = session.views.take();
+    // The whole scene, so that runs with other bounds and cells find the same pointing.
+    let mut trial = DsmConfig {
+        preset,
+        fill: Fill::None,
+        gsd_m: None,
+        bounds: None,
+        crs_epsg: None,
+        vertical: crs::VerticalDatum::Ellipsoid,
+        prior: None,
+        references: None,
+        reference_dem: None,
+        ..config.clone()
+    };
+    trial.gsd_m = Some(trial_cell_m(&trial, pointed)?);
+    let planned = plan(&trial, pointed, &mut own)?;
+    let mut surface = Grid::filled(planned.grid.size.0, planned.grid.size.1, f32::NAN);
+    let step = planned.chunks.len().div_ceil(CHUNKS_MAX).max(1);
+    for index in (0..planned.chunks.len()).step_by(step) {
+        let result = run_chunk(&planned, index, &mut own)?;
+        let ChunkContent::Surface(found) = result.content else { continue };
+        let (core, rasters) = (result.core, &found.rasters);
+        for row in 0..core.height {
+            for column in 0..core.width {
+                if rasters.filled[(column, row)] == 0 {
+                    let height = rasters.origin_m + f64::from(rasters.height_m[(column, row)]);
+                    surface[(core.x as usize + column, core.y as usize + row)] = height as f32;
+                }
+            }
+        }
+    }
+    Ok(TrialSurface { grid: planned.grid, surface, heights: planned.height_range })
+}
+
+/// Returns the cell of the trial DSM, metres: a pixel, so that the places of roofs do not depend on
+/// the phase of the grid, or more for a large scene.
+fn trial_cell_m(trial: &DsmConfig, pointed: &Pointed) -> Result<f64, DsmError> {
+    let images = &pointed.images;
+    let offsets = || images.iter().map(|image| image.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
+    let height_m = pointed.tie_heights.map_or_else(offsets, HeightRange::middle_m);
+    let geometry = ViewGeometry::at(images, height_m)?;
+    let pixels = images.iter().filter_map(|image| ground_sampling_m(image, geometry.centre));
+    let pixel_m = pixels.fold(0.0, f64::max);
+    let grid = choose_grid(&DsmConfig { gsd_m: Some(pixel_m), ..trial.clone() }, &geometry, pixel_m)?;
+    let cells = grid.size.0 as f64 * grid.size.1 as f64;
+    Ok(pixel_m * (cells / CELLS_MAX).sqrt().max(1.0))
+}
+
+fn align(
+    surface: &Grid<f32>,
+    reference: &Grid<f32>,
+    grid: &DsmGrid,
+    alignment: AlignmentMethod,
+) -> Result<Evaluation, eval::EvalError> {
+    let cells = CellMap::identity();
+    let metres = MetresFromCells::new(&grid.geotransform, (1.0, 1.0));
+    let config = EvalConfig { alignment, search_m: SEARCH_M, ..EvalConfig::default() };
+    evaluate(&EvalInput::new(surface, reference, &cells, metres), &config)
+}
+
+/// Returns what must be added to the heights beyond the shift: a robust plane through the remaining
+/// differences.
+fn plane_of(aligned: &Evaluation, grid: &DsmGrid) -> Option<FittedPlane> {
+    let width = aligned.errors.width();
+    let place = |i: usize| {
+        let (x, y) = grid.geotransform.map_from_cell((i % width) as f64, (i / width) as f64);
+        [x, y]
+    };
+    let errors = aligned.errors.data().iter().enumerate().filter(|(_, error)| error.is_finite());
+    let samples: Vec<([f64; 2], f64)> = errors.map(|(i, error)| (place(i), -f64::from(*error))).collect();
+    let mut plane = FittedPlane { centre: [0.0; 2], offset: 0.0, slope: [0.0; 2] };
+    for _ in 0..PLANE_ROUNDS {
+        let off = |(at, value): &([f64; 2], f64)| value - plane.at(*at);
+        let limit = PLANE_NMADS * numeric::upper_nmad(&mut samples.iter().map(off).collect::<Vec<f64>>())?;
+        let near: Vec<_> = samples.iter().filter(|sample| off(sample).abs() <= limit).copied().collect();
+        plane = FittedPlane::fit(near.into_iter())?;
+    }
+    Some(plane)
+}
