@@ -1,5 +1,5 @@
-//! Co-registration to a reference elevation model: the surface follows the reference to a decimetre,
-//! and weak evidence is refused.
+//! Co-registration to a reference elevation model: the surface follows the reference to a
+//! decimetre, and weak evidence is refused.
 
 mod common;
 

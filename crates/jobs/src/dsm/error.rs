@@ -107,8 +107,9 @@ pub enum DsmError {
     },
     /// The scene cannot be co-registered to its reference.
     #[error(
-        "the scene cannot be co-registered to its reference elevation model: {reason}; give another reference, or leave \
-         it out: {}", path.display()
+        "the scene cannot be co-registered to its reference elevation model: {reason}; \
+         give another reference, or leave it out: {}",
+        path.display()
     )]
     Reference {
         /// The reference.

@@ -169,8 +169,8 @@ impl Round {
             return Err(weak(
                 path,
                 format!(
-                    "it has heights at {common} cells of {} m, {:.0} % of those that the images show; needed are {COMMON_MIN} \
-                 cells and {:.0} %",
+                    "it has heights at {common} cells of {} m, {:.0} % of those that the images show; \
+                     needed are {COMMON_MIN} cells and {:.0} %",
                     grid.gsd_m,
                     100.0 * share,
                     100.0 * COMMON_SHARE_MIN
@@ -284,8 +284,8 @@ struct TrialSurface {
     heights: HeightRange,
 }
 
-/// Makes a DSM of the whole scene with the pointing found so far. It has a large scene's chunks only
-/// in part.
+/// Makes a DSM of the whole scene with the pointing found so far. It has a large scene's chunks
+/// only in part.
 fn trial_surface(
     config: &DsmConfig,
     preset: Preset,
