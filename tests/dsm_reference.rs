@@ -55,10 +55,9 @@ fn the_surface_follows_the_reference_to_a_decimetre() {
         let found = report.pointing.reference.clone().unwrap();
         (found, left(&output, &reference))
     });
-    for axis in 0..3 {
-        assert!(moved.1[axis].abs() < 0.1, "axis {axis}: {moved:?}");
-        let followed = moved.0.shift_m[axis] - here.0.shift_m[axis];
-        assert!((followed - SHIFT[axis]).abs() < 0.1, "axis {axis}: {followed}");
+    assert!(moved.1.iter().all(|left_m| left_m.abs() < 0.1), "{moved:?}");
+    for ((moved_m, here_m), shift_m) in moved.0.shift_m.iter().zip(here.0.shift_m).zip(SHIFT) {
+        assert!((moved_m - here_m - shift_m).abs() < 0.1, "{moved_m} - {here_m}, expected {shift_m}");
     }
 }
 
@@ -77,5 +76,6 @@ fn weak_evidence_is_refused() {
     let flat = truth.heights.map(|_| 210.0);
     assert!(matches!(refused("flat", &flat, [0.0; 3], "flat"), DsmError::Reference { .. }));
     assert!(matches!(refused("beside", &truth.heights, [5e4, 0.0, 0.0], "under the scene"), DsmError::Value { .. }));
+    refused("datum", &truth.heights, [0.0, 0.0, 40.0], "check what its heights are above");
     refused("corner", &truth.heights, [190.0, 190.0, 0.0], "cells");
 }

@@ -58,7 +58,7 @@ pub(crate) struct SceneArgs {
     /// Coarse elevation model from which the heights to search are taken.
     #[arg(long, value_name = "FILE")]
     dem: Option<PathBuf>,
-    /// Elevation or surface model that the scene is moved onto, in its pointing.
+    /// Surface model that the scene is moved onto, in its pointing.
     #[arg(long, value_name = "FILE", conflicts_with = "no_pointing")]
     reference_dem: Option<PathBuf>,
     /// Tilt the heights onto the reference elevation model, too.

@@ -98,7 +98,7 @@ pub struct DsmConfig {
     pub height_range_m: Option<HeightRange>,
     /// Coarse elevation model from which the height range is taken.
     pub dem: Option<PathBuf>,
-    /// Elevation or surface model to which the pointing is co-registered.
+    /// Surface model to which the pointing is co-registered.
     pub reference_dem: Option<PathBuf>,
     /// Whether the heights are also tilted onto the reference by a plane.
     #[serde(default)]
@@ -235,6 +235,10 @@ impl DsmConfig {
                 found,
                 "a correction of the pointing, or no reference",
             ));
+        }
+        if self.reference_plane && self.reference_dem.is_none() {
+            let found = "missing, although the heights are to be tilted onto it";
+            return Err(DsmError::value(DsmSetting::ReferenceDem, found, "a surface model, or no tilt"));
         }
         self.validate_ground()?;
         self.validate_division()?;

@@ -10,23 +10,24 @@
 //! much, ground without relief, or a shift that the method of Nuth and Kääb (2011) does not
 //! confirm.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use camera::{ImageCorrection, ImagePoint, RpcCamera};
 use crs::MapProjection;
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, Shift, evaluate};
 use geodesy::LonLatHeight;
-
 use raster::{Grid, reduce};
 
 use crate::dsm::chunk::{ChunkContent, run_chunk};
+use crate::dsm::chunk_plan::ChunkWork;
 use crate::dsm::config::{DsmConfig, Fill, Preset};
 use crate::dsm::control::GroundControl;
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::grid::{DsmGrid, choose_grid};
 use crate::dsm::images::SceneImage;
 use crate::dsm::notes::Notes;
-use crate::dsm::plan::plan;
+use crate::dsm::plan::{Plan, plan};
 use crate::dsm::plane_fit::FittedPlane;
 use crate::dsm::point::Pointed;
 use crate::dsm::reference_dem::reference_on;
@@ -35,12 +36,20 @@ use crate::dsm::session::{Muted, Session};
 use crate::dsm::values::HeightRange;
 use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
 
-/// Largest horizontal shift that is searched for, metres. Providers state errors of up to 10 m.
+/// Largest horizontal shift that is searched for, and largest vertical shift that is believed,
+/// metres. Providers state errors of up to 10 m; a larger difference of heights is one of datums or
+/// units.
 const SEARCH_M: f64 = 25.0;
 /// Most cells of the trial DSM. A larger scene gets larger cells.
 const CELLS_MAX: f64 = 16e6;
-/// Most chunks of a large scene that are swept for the trial DSM; evenly spread.
+/// Most chunks of a large scene that are swept for the trial DSM.
 const CHUNKS_MAX: usize = 16;
+/// Multiples of the golden ratio, modulo one, are spread evenly however many there are. So are the
+/// chunks at these parts of their list, over its rows and over the columns.
+const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
+/// Least part of the scene's width and height that the common cells must span for a plane: beyond
+/// them it is extrapolated.
+const PLANE_SPAN_MIN: f64 = 0.6;
 /// Least number of cells that both surfaces have.
 const COMMON_MIN: usize = 1000;
 /// Least share of the trial DSM's observed cells that the reference has too.
@@ -50,12 +59,14 @@ const COMMON_SHARE_MIN: f64 = 0.2;
 const NMAD_MAX_M: f64 = 8.0;
 /// Greatest difference between the shifts that two methods find, cells of the coarser surface and
 /// metres on top of them.
-const AGREEMENT_CELLS: f64 = 0.5;
+const AGREEMENT_CELLS: f64 = 0.2;
 const AGREEMENT_M: f64 = 0.5;
 /// Rounds of the fit of the plane, each of which leaves out what is further off than
 /// [`PLANE_NMADS`].
 const PLANE_ROUNDS: usize = 4;
 const PLANE_NMADS: f64 = 3.0;
+/// A plane that changes nothing.
+const LEVEL: FittedPlane = FittedPlane { centre: [0.0; 2], offset: 0.0, slope: [0.0; 2] };
 /// Places per side of an image at which the old and the new camera are compared.
 const CAMERA_STEPS: usize = 6;
 
@@ -71,6 +82,9 @@ pub fn register(config: &DsmConfig, mut pointed: Pointed, session: &mut Session<
     if pointed.pointing.control.as_ref().is_some_and(|control| !control.control.is_empty()) {
         let found = "given beside control points, which place the scene too";
         return Err(DsmError::value(DsmSetting::ReferenceDem, found, "one of the two; check points may be given"));
+    }
+    if !pointed.pointing.applied {
+        return Err(weak(path, "the images have too few tie points to agree with each other".to_owned()));
     }
     session.progress.begin("co-registering", 2);
     let first = Round::of(config, Preset::Fast, &pointed, session)?;
@@ -181,14 +195,19 @@ impl Round {
         let failed = |error: eval::EvalError| weak(path, error.to_string());
         let by_slopes = aligned(AlignmentMethod::NuthKaab).map_err(failed)?;
         let by_search = aligned(AlignmentMethod::Xyz).map_err(failed)?;
-        let plane = if config.reference_plane { plane_of(&by_search, &grid) } else { None };
+        let plane = match config.reference_plane {
+            true => {
+                known_plane(&by_search, &grid, (&surface, &reference.heights)).map_err(|reason| weak(path, reason))?
+            }
+            false => LEVEL,
+        };
         let nmad = by_slopes.nuth_kaab.map_or((f64::NAN, f64::NAN), |found| (found.nmad_before_m, found.nmad_after_m));
         Ok(Self {
             heights: trial.heights,
             shift: by_search.shift,
             other: by_slopes.shift,
             is_at_edge: by_search.search.is_some_and(|search| search.at_edge),
-            plane: plane.unwrap_or(FittedPlane { centre: [0.0; 2], offset: 0.0, slope: [0.0; 2] }),
+            plane,
             common,
             nmad_m: nmad,
             cell_m: reference.cell_m.max(grid.gsd_m),
@@ -205,6 +224,12 @@ impl Round {
             format!(
                 "the surfaces differ by {:.1} m (NMAD) after the alignment, at most {NMAD_MAX_M} m are trusted",
                 self.nmad_m.1
+            )
+        } else if self.shift_m()[2].abs() > SEARCH_M {
+            format!(
+                "the scene would be moved by {:.1} m in height, more than {SEARCH_M} m; check what its heights are above, \
+                 and that they are in metres",
+                self.shift_m()[2]
             )
         } else if apart > self.tolerance_m() {
             format!("two methods find shifts that are {apart:.1} m apart, so the relief does not tell the shift")
@@ -237,7 +262,13 @@ impl Round {
             })?;
         }
         let dz = self.shift_m()[2];
-        pointed.tie_heights = pointed.tie_heights.map(|range| range.grown(-dz, dz));
+        let (width, height) = (self.grid.size.0 as f64, self.grid.size.1 as f64);
+        let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)].map(|(column, row)| {
+            let (x, y) = self.grid.geotransform.map_from_cell(column, row);
+            (self.plane.at([x, y]) - self.plane.offset).abs()
+        });
+        let tilt = corners.into_iter().fold(0.0, f64::max);
+        pointed.tie_heights = pointed.tie_heights.map(|range| range.grown(tilt - dz, tilt + dz));
         Ok(())
     }
 
@@ -306,14 +337,25 @@ fn trial_surface(
         prior: None,
         references: None,
         reference_dem: None,
+        reference_plane: false,
+        chunk: None,
         ..config.clone()
     };
+    // Heights that are given hold for the scene where the reference puts it, not where it is.
+    let mut pointed = pointed.clone();
+    if pointed.tie_heights.is_some() {
+        (trial.height_range_m, trial.dem, trial.dem_vertical, pointed.dem_heights) = (None, None, None, None);
+    }
+    let pointed = &pointed;
     trial.gsd_m = Some(trial_cell_m(&trial, pointed)?);
     let planned = plan(&trial, pointed, &mut own)?;
     let mut surface = Grid::filled(planned.grid.size.0, planned.grid.size.1, f32::NAN);
-    let step = planned.chunks.len().div_ceil(CHUNKS_MAX).max(1);
-    for index in (0..planned.chunks.len()).step_by(step) {
-        let result = run_chunk(&planned, index, &mut own)?;
+    for index in spread_chunks(&planned) {
+        let result = match run_chunk(&planned, index, &mut own) {
+            // A part of a large scene that cannot be computed is left out of the product, too.
+            Err(error) if planned.chunk_side.is_some() && !matches!(error, DsmError::Cancelled) => continue,
+            result => result?,
+        };
         let ChunkContent::Surface(found) = result.content else { continue };
         let (core, rasters) = (result.core, &found.rasters);
         for row in 0..core.height {
@@ -326,6 +368,17 @@ fn trial_surface(
         }
     }
     Ok(TrialSurface { grid: planned.grid, surface, heights: planned.height_range })
+}
+
+/// Returns the chunks that are swept for a trial DSM: all, or some from all over the scene.
+fn spread_chunks(plan: &Plan) -> BTreeSet<usize> {
+    let is_swept = |index: &usize| matches!(plan.chunks[*index].work, ChunkWork::Sweep(_));
+    let swept: Vec<usize> = (0..plan.chunks.len()).filter(is_swept).collect();
+    if swept.len() <= CHUNKS_MAX {
+        return swept.into_iter().collect();
+    }
+    let at = |i: usize| swept[((i as f64 * GOLDEN_RATIO).fract() * swept.len() as f64) as usize];
+    (0..CHUNKS_MAX).map(at).collect()
 }
 
 /// Returns the cell of the trial DSM, metres: a pixel, so that the places of roofs do not depend on
@@ -354,6 +407,34 @@ fn align(
     evaluate(&EvalInput::new(surface, reference, &cells, metres), &config)
 }
 
+/// Returns the columns and rows that the cells of a surface span, those that `is_used`.
+fn spanned(surface: &Grid<f32>, is_used: impl Fn(usize) -> bool) -> [usize; 2] {
+    let width = surface.width();
+    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+    for (i, _) in surface.data().iter().enumerate().filter(|(i, height)| height.is_finite() && is_used(*i)) {
+        for (axis, at) in [i % width, i / width].into_iter().enumerate() {
+            (low[axis], high[axis]) = (low[axis].min(at), high[axis].max(at + 1));
+        }
+    }
+    [0, 1].map(|axis: usize| high[axis].saturating_sub(low[axis]))
+}
+
+/// Returns [`plane_of`], or why the reference shows no plane over the whole surface.
+fn known_plane(
+    aligned: &Evaluation,
+    grid: &DsmGrid,
+    (surface, reference): (&Grid<f32>, &Grid<f32>),
+) -> Result<FittedPlane, String> {
+    let (whole, common) = (spanned(surface, |_| true), spanned(surface, |i| reference.data()[i].is_finite()));
+    let shares = [0, 1].map(|axis| common[axis] as f64 / whole[axis].max(1) as f64);
+    let is_wide = shares.iter().all(|share| *share >= PLANE_SPAN_MIN);
+    plane_of(aligned, grid).filter(|_| is_wide).ok_or_else(|| {
+        let [width, height] = shares.map(|share| 100.0 * share);
+        let least = 100.0 * PLANE_SPAN_MIN;
+        format!("for a plane it spans too little of the scene, {width:.0} % by {height:.0} %; needed are {least:.0} %")
+    })
+}
+
 /// Returns what must be added to the heights beyond the shift: a robust plane through the remaining
 /// differences.
 fn plane_of(aligned: &Evaluation, grid: &DsmGrid) -> Option<FittedPlane> {
@@ -364,7 +445,7 @@ fn plane_of(aligned: &Evaluation, grid: &DsmGrid) -> Option<FittedPlane> {
     };
     let errors = aligned.errors.data().iter().enumerate().filter(|(_, error)| error.is_finite());
     let samples: Vec<([f64; 2], f64)> = errors.map(|(i, error)| (place(i), -f64::from(*error))).collect();
-    let mut plane = FittedPlane { centre: [0.0; 2], offset: 0.0, slope: [0.0; 2] };
+    let mut plane = LEVEL;
     for _ in 0..PLANE_ROUNDS {
         let off = |(at, value): &([f64; 2], f64)| value - plane.at(*at);
         let limit = PLANE_NMADS * numeric::upper_nmad(&mut samples.iter().map(off).collect::<Vec<f64>>())?;

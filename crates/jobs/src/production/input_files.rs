@@ -76,6 +76,9 @@ pub(crate) fn files_of(config: &DsmConfig) -> Result<BTreeSet<PathBuf>, Producti
         files.extend(io::rpc::side_files(image));
         files.insert(image.clone());
     }
+    for model in [&config.dem, &config.reference_dem].into_iter().flatten() {
+        files.extend(ImageSource::open(model).map_err(crate::dsm::DsmError::from)?.files());
+    }
     files.retain(|path| path.is_file());
     Ok(files)
 }

@@ -60,7 +60,8 @@ impl PlanFile {
         self.plan.config.map_paths(&change);
         let images = self.plan.images.iter_mut().map(|image| &mut image.path);
         let reported = self.plan.report.images.iter_mut().map(|image| &mut image.path);
-        for path in images.chain(reported).chain(self.inputs.iter_mut().map(|input| &mut input.path)) {
+        let reference = self.plan.report.pointing.reference.iter_mut().map(|reference| &mut reference.path);
+        for path in images.chain(reported).chain(reference).chain(self.inputs.iter_mut().map(|input| &mut input.path)) {
             *path = change(path);
         }
     }

@@ -5,7 +5,7 @@
 //! CityJSON cannot hold (georeferenced textures, projections, back sides, images other than PNG and
 //! JPEG) is counted.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value, json};
 
@@ -80,21 +80,26 @@ struct OpenData {
 }
 
 impl Appearances {
-    /// Returns each surface data with the theme it is used in.
+    /// Returns each surface data with the themes it is used in. A repeated use changes nothing and
+    /// is left out.
     pub(super) fn uses(&self) -> impl Iterator<Item = (u32, &SurfaceData)> {
-        self.uses.iter().filter_map(|(theme, used)| {
-            let number = match used {
-                Use::Data(number) => *number,
-                Use::Link(link) => *self.named.get(link.strip_prefix('#')?)?,
-            };
-            Some((*theme, &self.data[number]))
-        })
+        let mut seen = BTreeSet::new();
+        let found = self.uses.iter().filter_map(|(theme, used)| Some((*theme, self.number(used)?)));
+        found.filter(move |used| seen.insert(*used)).map(|(theme, number)| (theme, &self.data[number]))
+    }
+
+    /// Returns the number of the surface data that is used.
+    fn number(&self, used: &Use) -> Option<usize> {
+        match used {
+            Use::Data(number) => Some(*number),
+            Use::Link(link) => self.named.get(link.strip_prefix('#')?).copied(),
+        }
     }
 
     /// Returns what is not carried, with the links to surface data that lead nowhere.
     pub(super) fn left_out(&self) -> BTreeMap<&'static str, usize> {
         let mut all = self.left_out.clone();
-        let lost = self.uses.len() - self.uses().count();
+        let lost = self.uses.iter().filter(|(_, used)| self.number(used).is_none()).count();
         all.extend((lost > 0).then_some(("links to materials and textures that are not there", lost)));
         all
     }
