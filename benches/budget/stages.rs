@@ -135,7 +135,7 @@ impl<'a> Scene<'a> {
         let mut placed = Vec::new();
         for own in &all {
             let others: Vec<Heights<'_>> = all.iter().filter(|o| o.index != own.index).copied().collect();
-            let counts = count_agreeing(*own, &others, 0, &ConsistencyConfig::default())?;
+            let counts = count_agreeing(*own, &others, 0, &ConsistencyConfig::default())?.agreeing;
             let keep = counts.map(|n| !checked || *n > 0);
             placed.push(place_view(*own, 0, &keep, &own.view.blank(0), (2.0 * self.step_m) as f32, &frame)?);
         }

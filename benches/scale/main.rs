@@ -15,20 +15,29 @@
 
 #[path = "../common/machine.rs"]
 mod machine;
+#[path = "../common/mosaic.rs"]
+mod mosaic;
 #[path = "../common/places.rs"]
 mod places;
+#[path = "../common/timed.rs"]
+mod timed;
+#[path = "../common/town.rs"]
 mod town;
+#[path = "../common/town_errors.rs"]
+mod town_errors;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context, ensure};
-use io::raster::{Band, BandData, ImageSource, read_dem_window, write_image_with_rpc};
-use raster::Window;
-use serde_json::Value;
-use town::{LOOKS, PERIOD};
+use timed::Timed;
+use town::{Frame, Look};
 
+/// Pixel and cell, metres.
+const GSD_M: f64 = 0.5;
+/// Slants of the two views. Their directions differ by 27°, as in a forward and a backward view of
+/// one pass.
+const SLANTS: [[f64; 2]; 2] = [[0.12, 0.22], [0.05, -0.26]];
 /// The error is measured at every n-th cell of every n-th row.
 const EVERY: usize = 3;
 
@@ -37,10 +46,9 @@ fn main() -> anyhow::Result<()> {
     let temporary = tempfile::tempdir()?;
     let folder = arguments.folder.as_deref().unwrap_or(temporary.path());
     std::fs::create_dir_all(folder)?;
-    let tiles = render(folder)?;
     let mut rows = Vec::new();
     for &side in &arguments.sides {
-        let images = mosaics(folder, &tiles, side)?;
+        let images = images(folder, side)?;
         let row = measure(folder, &images, side, &arguments)?;
         println!("{}", line(&row));
         rows.push(row);
@@ -90,50 +98,14 @@ fn arguments() -> anyhow::Result<Arguments> {
     Ok(found)
 }
 
-/// Renders the tile of each view. Returns the paths.
-fn render(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let mut out = Vec::new();
-    for (view, look) in (0..).zip(LOOKS) {
-        let rpc = town::rpc(look, PERIOD);
-        // The RPC must give the position that the rendering formula gives.
-        let [x, y, z] = [100.0, -200.0, 30.0];
-        let p = town::project(&rpc, [x, y, z])?;
-        let expected = [(x + look[0] * z) / town::GSD_M, (look[1] * z - y) / town::GSD_M];
-        ensure!((p.sample - expected[0]).hypot(p.line - expected[1]) < 1e-6, "the RPC does not fit the tile: {p:?}");
-        let path = folder.join(format!("tile_{view}.tif"));
-        let pixels = town::tile(look, view);
-        let bands = [Band { description: "pan", data: BandData::U16(&pixels) }];
-        write_image_with_rpc(&path, &bands, &rpc, None, true)?;
-        out.push(path);
-    }
-    Ok(out)
-}
-
-/// Writes the images of a side as mosaics of the tiles, each with its RPC beside it.
-fn mosaics(folder: &Path, tiles: &[PathBuf], side: usize) -> anyhow::Result<Vec<PathBuf>> {
-    let mut out = Vec::new();
-    for ((view, tile), look) in (0..).zip(tiles).zip(LOOKS) {
-        let path = folder.join(format!("view_{view}_{side}.vrt"));
-        let mut xml = format!("<VRTDataset rasterXSize=\"{side}\" rasterYSize=\"{side}\">\n");
-        xml += "<VRTRasterBand dataType=\"UInt16\" band=\"1\">\n";
-        let starts = || (0..side).step_by(PERIOD);
-        for (x, y) in starts().flat_map(|y| starts().map(move |x| (x, y))) {
-            let (w, h) = (PERIOD.min(side - x), PERIOD.min(side - y));
-            writeln!(
-                xml,
-                "<SimpleSource><SourceFilename>{}</SourceFilename><SourceBand>1</SourceBand>\
-                 <SourceProperties RasterXSize=\"{PERIOD}\" RasterYSize=\"{PERIOD}\" DataType=\"UInt16\" \
-                 BlockXSize=\"256\" BlockYSize=\"256\"/><SrcRect xOff=\"0\" yOff=\"0\" xSize=\"{w}\" ySize=\"{h}\"/>\
-                 <DstRect xOff=\"{x}\" yOff=\"{y}\" xSize=\"{w}\" ySize=\"{h}\"/></SimpleSource>",
-                tile.display()
-            )?;
-        }
-        std::fs::write(&path, xml + "</VRTRasterBand>\n</VRTDataset>\n")?;
-        let sidecar = folder.join(format!("view_{view}_{side}_RPC.TXT"));
-        io::rpc::write(&sidecar, &town::rpc(look, side), io::rpc::RpcFormat::Text, true)?;
-        out.push(path);
-    }
-    Ok(out)
+/// Writes the two images of a side.
+fn images(folder: &Path, side: usize) -> anyhow::Result<Vec<PathBuf>> {
+    let image = |(view, slant): (u64, [f64; 2])| {
+        let look = Look { slant, gsd_m: GSD_M, passing: (0.0, 0), noise: view };
+        let tile = mosaic::tile(folder, &format!("tile_{view}.tif"), &look)?;
+        mosaic::image(folder, &format!("view_{view}_{side}"), &tile, &look, &Frame::square(side))
+    };
+    (0..).zip(SLANTS).map(image).collect()
 }
 
 /// Cost and accuracy of one run.
@@ -152,7 +124,7 @@ struct Row {
 impl Row {
     /// Megapixels of both images together.
     fn megapixels(&self) -> f64 {
-        LOOKS.len() as f64 * (self.side * self.side) as f64 / 1e6
+        SLANTS.len() as f64 * (self.side * self.side) as f64 / 1e6
     }
 
     /// User and system seconds per megapixel.
@@ -163,22 +135,8 @@ impl Row {
 
 fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments) -> anyhow::Result<Row> {
     let out = folder.join("out");
-    // The standard library cannot measure the processor time of a child; bash can.
-    let output = Command::new("bash")
-        .args(["-c", "TIMEFORMAT='times %U %S %R'; time \"$@\"", "bash"])
-        .arg(places::skysweep())
-        .args(["dsm", "--overwrite", "--json", "-q"])
-        .args(["--progress", "none", "--gsd", &town::GSD_M.to_string(), "--preset", &arguments.preset])
-        .args(["--memory", &arguments.memory_mb.to_string(), "-o"])
-        .arg(&out)
-        .args(images)
-        .output()?;
-    let errors = String::from_utf8_lossy(&output.stderr);
-    ensure!(output.status.success(), "skysweep dsm on {side} pixels: {errors}");
-    let report: Value = serde_json::from_slice(&output.stdout)?;
-    let times = errors.lines().find_map(|l| l.strip_prefix("times ")).context("bash printed no times")?;
-    let seconds: Vec<f64> = times.split(' ').map(str::parse).collect::<Result<_, _>>()?;
-    let [user_s, system_s, wall_s] = seconds[..] else { anyhow::bail!("bash printed other times: {times}") };
+    let options = ["--gsd", &GSD_M.to_string(), "--preset", &arguments.preset];
+    let Timed { report, user_s, system_s, wall_s } = timed::dsm(images, &out, arguments.memory_mb, &options)?;
     let (mae_m, right) = errors_of(&out.join("dsm/dsm.tif"), side)?;
     let chunk = |name: &str| report["chunks"][name].as_u64();
     let chunks = match (chunk("done"), chunk("side")) {
@@ -192,28 +150,14 @@ fn measure(folder: &Path, images: &[PathBuf], side: usize, arguments: &Arguments
 /// Returns the mean absolute error of the cells with a height, metres, and the share of all cells
 /// that are right to a metre, percent.
 fn errors_of(dsm: &Path, side: usize) -> anyhow::Result<(f64, f64)> {
-    let info = ImageSource::open(dsm)?.info().clone();
     let (mut sum, mut known, mut right, mut all) = (0.0, 0u64, 0u64, 0u64);
-    for top in (0..info.height).step_by(512) {
-        let strip = Window { x: 0, y: top as i64, width: info.width, height: 512.min(info.height - top) };
-        let dem = read_dem_window(dsm, strip)?;
-        let projection = crs::MapProjection::from_epsg(dem.horizontal_epsg.context("the DSM has no CRS")?)?;
-        for row in (0..dem.heights.height()).step_by(EVERY) {
-            let columns: Vec<usize> = (0..dem.heights.width()).step_by(EVERY).collect();
-            let places = columns.iter().map(|&c| dem.geotransform.map_from_cell(c as f64, row as f64));
-            let (mut lon, mut lat): (Vec<f64>, Vec<f64>) = places.unzip();
-            projection.lonlat_from_map_slices(&mut lon, &mut lat)?;
-            for ((&c, lon), lat) in columns.iter().zip(lon).zip(lat) {
-                let Some(truth) = town::truth(lon, lat, side) else { continue };
-                all += 1;
-                let error = (f64::from(dem.heights[(c, row)]) - truth).abs();
-                if error.is_finite() {
-                    (sum, known) = (sum + error, known + 1);
-                    right += u64::from(error < 1.0);
-                }
-            }
+    town_errors::each(dsm, [side as f64 * GSD_M; 2], EVERY, |_, error| {
+        all += 1;
+        if error.is_finite() {
+            (sum, known) = (sum + error.abs(), known + 1);
+            right += u64::from(error.abs() < 1.0);
         }
-    }
+    })?;
     ensure!(known > 0, "the DSM has no height");
     Ok((sum / known as f64, 100.0 * right as f64 / all as f64))
 }
@@ -260,15 +204,14 @@ fn markdown(rows: &[Row], arguments: &Arguments) -> String {
         "# Large scenes\n\n\
          Written by `cargo bench --bench scale -- {}` on {}. A pair of SIDE × SIDE pixels at {} m, preset \
          {}, `--memory {}`; the images are mosaics of one rendered tile per view (a town that repeats itself every \
-         {PERIOD} \
-         pixels; see `benches/scale/town.rs`), the truth is the town's own height function, nothing is aligned. \
+         2048 pixels; see `benches/common/town.rs`), the truth is the town's own height function, nothing is aligned. \
          CPU is user and system time of the command, megapixels are those of both images, peak is the largest \
          resident memory; sides that were run several times have the means of their times.\n\n\
          | side px | Mpx | chunks | user s | system s | CPU s/Mpx | wall s | peak MB | MAE m | < 1 m % \
          |\n|--:|--:|:--|--:|--:|--:|--:|--:|--:|--:|\n",
         arguments.asked,
         machine::machine(),
-        town::GSD_M,
+        GSD_M,
         arguments.preset,
         arguments.memory_mb
     );

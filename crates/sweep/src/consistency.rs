@@ -44,7 +44,23 @@ pub struct Heights<'a> {
     pub map: &'a HeightMap,
 }
 
-/// Counts the sources that agree with the height of each pixel of the reference.
+/// Numbers of sources by pixel of a reference. Pixels without a height have none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SourceCounts {
+    /// Sources whose height is that of the reference.
+    pub agreeing: Grid<u8>,
+    /// Sources whose images show the place, whether or not they have a height there.
+    pub showing: Grid<u8>,
+}
+
+impl SourceCounts {
+    fn none((width, height): (usize, usize)) -> Self {
+        Self { agreeing: Grid::filled(width, height, 0), showing: Grid::filled(width, height, 0) }
+    }
+}
+
+/// Counts the sources that agree with the height of each pixel of the reference, and those that
+/// show its place.
 ///
 /// # Errors
 /// Returns [`SweepError::Camera`] if a camera fails inside the scene.
@@ -53,23 +69,24 @@ pub fn count_agreeing(
     sources: &[Heights<'_>],
     level: u32,
     config: &ConsistencyConfig,
-) -> Result<Grid<u8>, SweepError> {
+) -> Result<SourceCounts, SweepError> {
     let map = reference.map;
     let (width, height) = (map.height_m.width(), map.height_m.height());
     let windows = tiles(Window::whole(width, height), config.tile);
-    let parts: Vec<Grid<u8>> = windows
+    let parts: Vec<SourceCounts> = windows
         .par_iter()
         .map(|w| {
-            let mut counts = Grid::filled(w.width, w.height, 0);
+            let mut counts = SourceCounts::none((w.width, w.height));
             for s in sources {
                 count_in_tile(reference, *s, level, *w, config, &mut counts)?;
             }
             Ok(counts)
         })
         .collect::<Result<_, SweepError>>()?;
-    let mut out = Grid::filled(width, height, 0u8);
+    let mut out = SourceCounts::none((width, height));
     for (w, part) in windows.iter().zip(&parts) {
-        paste(&mut out, *w, part);
+        paste(&mut out.agreeing, *w, &part.agreeing);
+        paste(&mut out.showing, *w, &part.showing);
     }
     Ok(out)
 }
@@ -80,7 +97,7 @@ fn count_in_tile(
     level: u32,
     w: Window,
     config: &ConsistencyConfig,
-    counts: &mut Grid<u8>,
+    counts: &mut SourceCounts,
 ) -> Result<(), SweepError> {
     let Some(range) = height_span(reference.map, w) else { return Ok(()) };
     let exact = |p, h| source_column_row(&reference.view.camera, &source.view.camera, level, p, h);
@@ -104,9 +121,11 @@ fn count_in_tile(
             }
         }
         let at = pixels.right.iter().zip(&pixels.below);
-        for ((count, at), own) in counts.row_mut(y).iter_mut().zip(at).zip(own).filter(|(_, own)| !own.is_nan()) {
-            let agrees = agrees(&source.map.height_m, at, own + apart_m, tolerance_m);
-            *count = count.saturating_add(u8::from(agrees));
+        let counts = counts.agreeing.row_mut(y).iter_mut().zip(counts.showing.row_mut(y));
+        for (((agreeing, showing), at), own) in counts.zip(at).zip(own).filter(|(_, own)| !own.is_nan()) {
+            let (shows, agrees) = compare(&source.map.height_m, at, own + apart_m, tolerance_m);
+            *showing = showing.saturating_add(u8::from(shows));
+            *agreeing = agreeing.saturating_add(u8::from(agrees));
         }
     }
     Ok(())
@@ -152,21 +171,21 @@ fn parallax_per_metre(map: &LocalMap) -> f64 {
     (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
-/// Returns whether one of the four pixels around a position has a height within the tolerance of
-/// `wanted`. `right` and `below` name the last of them.
+/// Returns whether a position lies in the map, and whether one of the four pixels around it has a
+/// height within the tolerance of `wanted`. `right` and `below` name the last of them.
 #[inline(always)]
-fn agrees(map: &Grid<f32>, (right, below): (&i32, &i32), wanted: f32, tolerance_m: f32) -> bool {
+fn compare(map: &Grid<f32>, (right, below): (&i32, &i32), wanted: f32, tolerance_m: f32) -> (bool, bool) {
     // A negative index becomes a huge one.
     let (right, below) = (*right as u32 as usize, *below as u32 as usize);
     if right > map.width() || below > map.height() {
-        return false;
+        return (false, false);
     }
     let columns = right.saturating_sub(1)..(right + 1).min(map.width());
     let rows = below.saturating_sub(1)..(below + 1).min(map.height());
     let near = |h: f32| (h - wanted).abs() <= tolerance_m;
     if let (&[a, b], 2) = (&map.row(rows.start)[columns.clone()], rows.len()) {
         let [c, d] = [columns.start, columns.end - 1].map(|x| map.row(rows.end - 1)[x]);
-        return near(a) | near(b) | near(c) | near(d);
+        return (true, near(a) | near(b) | near(c) | near(d));
     }
-    rows.into_iter().any(|y| map.row(y)[columns.clone()].iter().any(|h| near(*h)))
+    (true, rows.into_iter().any(|y| map.row(y)[columns.clone()].iter().any(|h| near(*h))))
 }

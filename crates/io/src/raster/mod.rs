@@ -6,6 +6,7 @@
 //! are read, and addresses only after [`allow_remote`]; nothing that a file names on a network is
 //! fetched. A file appears under its final name when it is complete.
 
+mod acquired;
 mod band;
 mod colour;
 mod dem;

@@ -1,15 +1,17 @@
 //! The division of a large scene into chunks, each with the pixels that show it.
 //!
-//! Pointing, grid, height step and sources are those of the whole scene, and so are each image's
-//! noise and contrast. The windows of a chunk begin on whole pixels of all the levels used, and its
-//! hypotheses lie on the scene's lattice. Neighbouring chunks therefore have the same heights in
-//! their overlap, but for what the paths of the aggregation bring from further away.
+//! Pointing, grid and height step are those of the whole scene, and so are each image's noise and
+//! contrast. Each chunk chooses its own sources among the images that show it. The windows of a
+//! chunk begin on whole pixels of all the levels used, and its hypotheses lie on the scene's
+//! lattice. Neighbouring chunks therefore have the same heights in their overlap, but for what the
+//! paths of the aggregation bring from further away.
 //!
 //! The heights of a chunk are found by a coarse sweep of it over all heights that the scene may
 //! have (see `probe`), towers included: a chunk in a plain does not pay for the mountains beside
 //! it. A chunk that would still take more memory than the run has is divided into quarters.
 
 use crs::MapProjection;
+use geo::Polygon;
 use numeric::Progress;
 use raster::Window;
 use rayon::prelude::*;
@@ -20,6 +22,7 @@ use crate::dsm::character::ImageCharacter;
 use crate::dsm::chunk_side::{ENDS_ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
+use crate::dsm::footprints::shared_part;
 use crate::dsm::grid::DsmGrid;
 use crate::dsm::image_windows::GroundBox;
 use crate::dsm::images::{SceneImage, read_coarse_view};
@@ -28,8 +31,10 @@ use crate::dsm::memory;
 use crate::dsm::probe;
 use crate::dsm::scene_sweep::SceneSweep;
 use crate::dsm::session::Muted;
+use crate::dsm::sources::SourceCandidates;
 use crate::dsm::tuning::SweepTuning;
 use crate::dsm::values::HeightRange;
+use crate::dsm::view_geometry::ViewGeometry;
 use crate::error_text::with_causes;
 
 /// A part of an image less wide or high than this holds nothing to match, pixels.
@@ -100,7 +105,9 @@ pub(crate) struct ChunkPlanner<'a> {
     pub(crate) characters: &'a [ImageCharacter],
     pub(crate) grid: &'a DsmGrid,
     pub(crate) projection: &'a MapProjection,
-    pub(crate) sources: &'a [Vec<usize>],
+    pub(crate) candidates: SourceCandidates<'a>,
+    /// Geometry of the corrected cameras.
+    pub(crate) geometry: &'a ViewGeometry,
     /// Distance of two hypotheses at full resolution, metres.
     pub(crate) step_m: f64,
     /// Side of a pixel of the coarsest image on the ground, metres.
@@ -157,10 +164,9 @@ impl ChunkPlanner<'_> {
         let extent = with_rim(self.grid, core);
         let grid = self.grid.part(extent);
         let seen = self.seen(&grid)?;
-        let own = |(i, sources): (usize, &Vec<usize>)| -> Vec<usize> {
-            if seen[i] { sources.iter().copied().filter(|&s| seen[s]).collect() } else { Vec::new() }
-        };
-        let sources: Vec<Vec<usize>> = self.sources.iter().enumerate().map(own).collect();
+        let sources = self.sources(&grid, &seen)?;
+        let is_used = |i: usize| !sources[i].is_empty() || sources.iter().any(|s| s.contains(&i));
+        let seen: Vec<bool> = (0..seen.len()).map(is_used).collect();
         if sources.iter().all(Vec::is_empty) {
             return Ok(Planned::Work(ChunkWork::Unseen));
         }
@@ -196,6 +202,16 @@ impl ChunkPlanner<'_> {
             Ok(part.is_some_and(|w| w.width.min(w.height) >= PART_MIN))
         };
         self.images.iter().map(sees).collect()
+    }
+
+    /// Chooses the images that are used over the grid, and the sources of each.
+    fn sources(&self, grid: &DsmGrid, seen: &[bool]) -> Result<Vec<Vec<usize>>, DsmError> {
+        let ground = GroundBox::new(grid, self.projection, self.range)?.outline(&self.geometry.frame);
+        let part = |(seen, outline): (&bool, &Polygon<f64>)| {
+            if *seen { shared_part(outline, &ground) } else { None }
+        };
+        let parts: Vec<Option<Polygon<f64>>> = seen.iter().zip(&self.geometry.outlines).map(part).collect();
+        Ok(self.candidates.choose(&self.candidates.best_views(&ground, parts)))
     }
 
     /// Returns all heights that something in the scene may have: those given, or those of the tie

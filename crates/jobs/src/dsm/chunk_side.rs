@@ -49,8 +49,12 @@ pub(crate) fn choose_side(
         };
         let extent = grid.part(chunk.grown(rim(grid)));
         let ground = GroundBox::new(&extent, &projection, range)?;
-        let windows = images.iter().map(|image| ground.span_in(image, MARGIN_PX).map(aligned));
-        Ok::<u64, DsmError>(needed_mb(&windows.collect::<Result<Vec<_>, _>>()?, &extent))
+        let window = |image: &SceneImage| {
+            let span = ground.span_in(image, MARGIN_PX)?;
+            Ok(aligned(span).intersection(&image.whole()))
+        };
+        let windows = images.iter().map(window).collect::<Result<Vec<_>, DsmError>>()?;
+        Ok::<u64, DsmError>(needed_mb(&windows.into_iter().flatten().collect::<Vec<_>>(), &extent))
     };
     if let Some(side) = config.chunk {
         return memory::check(config, needed(side)?).map(|()| side);

@@ -1,7 +1,7 @@
 //! Footprints of images on the ground and the areas that they share.
 
 use camera::{CameraError, ImagePoint, RpcCamera};
-use geo::{Area, BooleanOps, ConvexHull, MultiPoint, Point, Polygon};
+use geo::{Area, BooleanOps, BoundingRect, ConvexHull, Intersects, MultiPoint, Point, Polygon};
 use geodesy::{EnuFrame, LonLatHeight};
 
 /// Returns the ground points on the outline of an image of `width` × `height` pixels at one height.
@@ -29,6 +29,13 @@ pub(crate) fn local_polygon(footprint: &[LonLatHeight], frame: &EnuFrame) -> Pol
         })
         .collect();
     points.convex_hull()
+}
+
+/// Returns the ground that two convex outlines share; `None` where they do not meet.
+pub(crate) fn shared_part(a: &Polygon<f64>, b: &Polygon<f64>) -> Option<Polygon<f64>> {
+    let meets = a.bounding_rect()?.intersects(&b.bounding_rect()?);
+    let parts = if meets { a.intersection(b).0 } else { Vec::new() };
+    parts.into_iter().max_by(|p, q| p.unsigned_area().total_cmp(&q.unsigned_area())).filter(|p| p.unsigned_area() > 0.0)
 }
 
 /// Returns the common area of two outlines as a share of the smaller one.

@@ -2,10 +2,12 @@
 
 use camera::ImagePoint;
 use crs::MapProjection;
-use geodesy::LonLatHeight;
+use geo::Polygon;
+use geodesy::{EnuFrame, LonLatHeight};
 use raster::Window;
 
 use crate::dsm::error::DsmError;
+use crate::dsm::footprints::local_polygon;
 use crate::dsm::grid::DsmGrid;
 use crate::dsm::images::SceneImage;
 use crate::dsm::values::HeightRange;
@@ -37,6 +39,13 @@ impl GroundBox {
             *corner = projection.lonlat_from_map(x, y)?;
         }
         Ok(Self { corners, range })
+    }
+
+    /// Returns the outline of the box at its middle height, in metres of a local frame.
+    pub(crate) fn outline(&self, frame: &EnuFrame) -> Polygon<f64> {
+        let height_m = self.range.middle_m();
+        let corners = self.corners.map(|(lon_deg, lat_deg)| LonLatHeight::new(lon_deg, lat_deg, height_m));
+        local_polygon(&corners, frame)
     }
 
     /// Returns the pixels that show the box, grown by `margin`. They may lie outside the image.

@@ -28,6 +28,8 @@ pub struct SceneImage {
     pub camera: RpcCamera,
     /// Width and height, pixels.
     pub size: (usize, usize),
+    /// When the image was taken, seconds of UTC since 1970; `None` where the file does not say.
+    pub acquired_s: Option<i64>,
     /// Factor of the grey values, a power of two: 1 unless a float image has a scale of its own,
     /// such as reflectances from 0 to 1. Noise and texture are then measured in numbers like those
     /// of sensors.

@@ -15,12 +15,13 @@ use crate::dsm::grid::{DsmGrid, choose_grid};
 use crate::dsm::images::{SceneImage, read_views};
 use crate::dsm::memory;
 use crate::dsm::order::as_given;
+use crate::dsm::partners::tie_pairs;
 use crate::dsm::session::Session;
 use crate::dsm::shared_heights::{SharedHeights, validity_range};
 use crate::dsm::tie_windows::match_in_windows;
 use crate::dsm::ties::{PairTies, TIES_MIN, match_pairs};
 use crate::dsm::values::{HeightRange, ImagePair};
-use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
+use crate::dsm::view_geometry::ViewGeometry;
 
 /// What is known before the pointing is corrected.
 pub(crate) struct FirstLook {
@@ -87,8 +88,10 @@ fn look_at(
     session: &mut Session<'_>,
 ) -> Result<FirstLook, DsmError> {
     let useful = geometry.useful_pairs()?;
-    let pairs = asked_pairs(config, images, &useful)?;
-    let gsd = images.iter().filter_map(|o| ground_sampling_m(o, geometry.centre)).fold(0.0, f64::max);
+    let asked = asked_pairs(config, images, &useful)?;
+    let pairs = if config.pairs.is_some() { asked } else { tie_pairs(images, &geometry, &asked) };
+    let gsds = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(image, i));
+    let gsd = gsds.fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, gsd)?;
     let progress = session.progress;
     let cameras = images.iter().map(|o| o.camera.clone()).collect();
@@ -99,7 +102,7 @@ fn look_at(
         // Ties come from all over the scene, so that runs with other bounds find the same pointing.
         let whole = DsmConfig { bounds: None, gsd_m: None, ..config.clone() };
         let (ties, characters) =
-            match_in_windows(images, &choose_grid(&whole, &geometry, gsd)?, &pairs, search, progress)?;
+            match_in_windows(images, &choose_grid(&whole, &geometry, gsd)?, &geometry, &pairs, search, progress)?;
         return Ok(FirstLook { geometry, useful, ties, cameras, sizes, characters, is_whole: false });
     }
     progress.begin("reading images", images.len());
@@ -107,7 +110,7 @@ fn look_at(
     session.lap("read");
     progress.check_cancelled()?;
     progress.begin("matching tie points", pairs.len());
-    let ties = match_pairs(&views, &pairs, search, &TieConfig::default(), &|| progress.step());
+    let ties = match_pairs(&views, &pairs, search, (&TieConfig::default(), TIES_MIN), &|| progress.step());
     let mut characters = vec![ImageCharacter::default(); images.len()];
     characters.iter_mut().zip(&views).for_each(|(character, view)| character.learn(view));
     session.views = Some(views);

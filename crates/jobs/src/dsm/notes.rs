@@ -2,6 +2,9 @@
 
 use numeric::{Choice, Progress};
 
+/// What concerns more images than this is counted, not listed.
+pub(crate) const LISTED_MAX: usize = 12;
+
 /// Choices and warnings made so far, with the watcher that is told of each.
 pub(crate) struct Notes<'a> {
     pub(crate) choices: Vec<Choice>,

@@ -57,6 +57,7 @@ fn open_one(path: &Path, number: usize) -> Result<SceneImage, DsmError> {
         rpc_format: file.format.to_string(),
         size: (source.info().width, source.info().height),
         camera: RpcCamera::new(file.rpc),
+        acquired_s: source.acquired_s(),
         gain: match source.info().sample {
             SampleType::F32 | SampleType::F64 => gain(&source)?,
             _ => 1.0,

@@ -21,11 +21,11 @@ use crate::dsm::probe;
 use crate::dsm::report::{ImageReport, PairReport, PointingReport};
 use crate::dsm::scene_sweep::SceneSweep;
 use crate::dsm::session::{Muted, Session};
-use crate::dsm::sources::{choose_sources, widest_parallax};
+use crate::dsm::sources::{SourceCandidates, choose_sources, widest_parallax};
 use crate::dsm::ties::PairTies;
 use crate::dsm::tuning::SweepTuning;
 use crate::dsm::values::{HeightRange, ImagePair};
-use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
+use crate::dsm::view_geometry::ViewGeometry;
 
 /// Third stage of a run: everything that is needed to compute the chunks and to merge them.
 ///
@@ -117,7 +117,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
     let (given, config) = (config, &in_order_of(config, images));
     let range = choose_heights(config, pointed, &mut notes)?;
     let geometry = ViewGeometry::at(images, middle_height_m(pointed.tie_heights, range))?;
-    let gsds_m: Vec<Option<f64>> = images.iter().map(|o| ground_sampling_m(o, geometry.centre)).collect();
+    let gsds_m: Vec<Option<f64>> = (0..images.len()).map(|i| geometry.ground_sampling_m(&images[i], i)).collect();
     let pixel_m = gsds_m.iter().flatten().copied().fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, pixel_m)?;
     note_grid(config, &grid, pixel_m, &mut notes);
@@ -131,6 +131,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
         pointed,
         grid: &grid,
         sources: &sources,
+        geometry: &geometry,
         tuning: &tuning,
         widest,
         step_m: height_step_m(widest, &tuning),
@@ -171,6 +172,7 @@ struct PlannedScene<'a> {
     pointed: &'a Pointed,
     grid: &'a DsmGrid,
     sources: &'a [Vec<usize>],
+    geometry: &'a ViewGeometry,
     tuning: &'a SweepTuning,
     /// Largest parallax of a pair, pixels per metre.
     widest: f64,
@@ -263,7 +265,8 @@ impl PlannedScene<'_> {
             characters: &self.pointed.characters,
             grid: self.grid,
             projection: &self.grid.projection()?,
-            sources: self.sources,
+            candidates: SourceCandidates::of(config, self.geometry, self.pointed, self.tuning),
+            geometry: self.geometry,
             step_m: self.step_m,
             pixel_m: self.pixel_m,
             range,
@@ -298,7 +301,7 @@ fn image_reports(
         rpc: image.rpc_format.clone(),
         size: image.size,
         gsd_m: gsds_m.get(i).copied().flatten(),
-        incidence_deg: image.camera.view_direction(geometry.centre).ok().map(|v| v.incidence_deg()),
+        incidence_deg: image.camera.view_direction(geometry.middle_of(i)).ok().map(|v| v.incidence_deg()),
         correction: corrections.get(i).copied(),
         applied_correction: image.camera.correction,
     };

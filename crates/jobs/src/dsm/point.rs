@@ -15,9 +15,10 @@ use crate::dsm::evidence::{PairHeight, off_along_sight, warn_of_domains};
 use crate::dsm::image_checks::{grossly_off, same_picture, unconnected};
 use crate::dsm::images::SceneImage;
 use crate::dsm::look::{FirstLook, asked_pairs, look, pair_names};
-use crate::dsm::notes::Notes;
+use crate::dsm::notes::{LISTED_MAX, Notes};
 use crate::dsm::open::Opened;
 use crate::dsm::order::{as_given, in_order_of};
+use crate::dsm::partners::ALL_MAX;
 use crate::dsm::report::{CorrectionOrder, PointingReport};
 use crate::dsm::session::Session;
 use crate::dsm::tie_quality::{by_image, warn_of_images};
@@ -100,7 +101,9 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     if is_applied {
         drop_unconnected(config, &mut useful, &ties, &mut notes);
     }
-    let pairs = choose_pairs(config, &images, &useful, &geometry, &mut notes)?;
+    let matched: Vec<ImagePair> = ties.iter().map(|t| t.pair.ordered()).collect();
+    let sought: Vec<ImagePair> = useful.iter().copied().filter(|pair| matched.contains(pair)).collect();
+    let pairs = choose_pairs(config, &images, &sought, &geometry, &mut notes)?;
     session.lap("pointing");
     let dem_heights =
         config.dem.as_deref().map(|path| dem_heights(path, config.dem_vertical, &geometry)).transpose()?;
@@ -252,9 +255,15 @@ fn choose_pairs(
         ));
     }
     let reason = match config.pairs {
-        Some(_) => "given".to_owned(),
-        None => "all that share ground at a useful angle, best angle first".to_owned(),
+        Some(_) => "given",
+        None if useful.len() <= ALL_MAX => "all that share ground at a useful angle, best angle first",
+        None => "the best over each part of every image, and those that connect the images",
     };
-    notes.choose("pairs", pair_names(&pairs, images), reason);
+    let text = if images.len() > LISTED_MAX {
+        format!("{} of {} images", pairs.len(), images.len())
+    } else {
+        pair_names(&pairs, images)
+    };
+    notes.choose("pairs", text, reason);
     Ok(pairs)
 }

@@ -142,7 +142,7 @@ fn sure_heights(
             let sees = |other: &&Heights<'_>| shows(&views[index], other, level, pixel, usual);
             is_asked(height_m)
                 && is_sure
-                && counts[at] >= needed
+                && counts.agreeing[at] >= needed
                 && (usual.contains(height_m) || others.iter().filter(sees).count() >= usize::from(needed))
         };
         sure.extend(patches(map, step_m, counts_for).into_iter().map(|height_m| ViewHeight { view: index, height_m }));

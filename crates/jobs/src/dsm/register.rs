@@ -34,7 +34,7 @@ use crate::dsm::reference_dem::reference_on;
 use crate::dsm::report::ReferenceReport;
 use crate::dsm::session::{Muted, Session};
 use crate::dsm::values::HeightRange;
-use crate::dsm::view_geometry::{ViewGeometry, ground_sampling_m};
+use crate::dsm::view_geometry::ViewGeometry;
 
 /// Largest horizontal shift that is searched for, and largest vertical shift that is believed,
 /// metres. Providers state errors of up to 10 m; a larger difference of heights is one of datums or
@@ -388,7 +388,7 @@ fn trial_cell_m(trial: &DsmConfig, pointed: &Pointed) -> Result<f64, DsmError> {
     let offsets = || images.iter().map(|image| image.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
     let height_m = pointed.tie_heights.map_or_else(offsets, HeightRange::middle_m);
     let geometry = ViewGeometry::at(images, height_m)?;
-    let pixels = images.iter().filter_map(|image| ground_sampling_m(image, geometry.centre));
+    let pixels = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(image, i));
     let pixel_m = pixels.fold(0.0, f64::max);
     let grid = choose_grid(&DsmConfig { gsd_m: Some(pixel_m), ..trial.clone() }, &geometry, pixel_m)?;
     let cells = grid.size.0 as f64 * grid.size.1 as f64;

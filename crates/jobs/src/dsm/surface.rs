@@ -23,6 +23,9 @@ use crate::dsm::values::{HeightRange, ImagePair};
 /// A facet steeper than this (rise over run) is a tear and not a surface: about 70°. Two hypotheses
 /// apart is not yet a tear.
 const TEAR_SLOPE: f64 = 2.75;
+/// Views whose heights a view is compared with, where there are more and those that it was matched
+/// with are no more. The time of the comparison would grow with the square of the number of views.
+const WITNESSES_MAX: usize = 12;
 /// Reach of the patch that the cost of a pixel sees, pixels.
 const PATCH_REACH: usize = 2;
 
@@ -117,7 +120,7 @@ pub(crate) fn make_surface(
     for own in &all {
         progress.check_cancelled()?;
         let blank = own.view.blank(sweep.levels.finest);
-        let mut keep = agreeing(*own, &all, useful, level)?;
+        let mut keep = agreeing(*own, &witnesses(*own, &all, useful, &sweep.sources), level)?;
         let mut shows_nothing = blank.clone();
         if let Some(asked) = config.height_range_m {
             drop_outside(&mut keep, own.map, asked);
@@ -187,19 +190,40 @@ fn same_surface_m(sweep: &SceneSweep, grid: &DsmGrid) -> f32 {
     (2.0 * sweep.step_at(sweep.levels.finest)).max(1.5 * grid.gsd_m) as f32
 }
 
-/// Marks the pixels with which enough other views agree: a third of the views that see the ground
+/// Returns the views whose heights a view is compared with: those that see the ground from another
+/// direction. Of many, those that it was matched with come first.
+fn witnesses<'a>(
+    own: Heights<'_>,
+    all: &[Heights<'a>],
+    useful: &[ImagePair],
+    sources: &[Vec<usize>],
+) -> Vec<Heights<'a>> {
+    let is_partner = |h: &Heights<'_>| useful.contains(&ImagePair::new(own.index, h.index).ordered());
+    let mut others: Vec<Heights<'a>> = all.iter().copied().filter(is_partner).collect();
+    if others.len() > WITNESSES_MAX {
+        let is_matched =
+            |h: &Heights<'_>| sources[own.index].contains(&h.index) || sources[h.index].contains(&own.index);
+        others.sort_by_key(|h| !is_matched(h));
+        others.truncate(WITNESSES_MAX.max(others.iter().filter(|h| is_matched(h)).count()));
+    }
+    others
+}
+
+/// Marks the pixels with which enough other views agree: a third of the views that show the place
 /// from another direction, and at least one. With a third, a chance agreement of two views among
 /// many does not put a height on the map. A single reference view has no other view to agree with,
 /// and keeps all its heights.
-fn agreeing(own: Heights<'_>, all: &[Heights<'_>], useful: &[ImagePair], level: u32) -> Result<Grid<bool>, DsmError> {
-    let partner = |h: &Heights<'_>| useful.contains(&ImagePair::new(own.index, h.index).ordered());
-    let others: Vec<Heights<'_>> = all.iter().copied().filter(partner).collect();
+fn agreeing(own: Heights<'_>, others: &[Heights<'_>], level: u32) -> Result<Grid<bool>, DsmError> {
     if others.is_empty() {
         return Ok(own.map.height_m.map(|h| !h.is_nan()));
     }
-    let counts = count_agreeing(own, &others, level, &ConsistencyConfig::default())?;
-    let needed = ((others.len() + 1) / 3).clamp(1, usize::from(u8::MAX)) as u8;
-    Ok(counts.map(|n| *n >= needed))
+    let counts = count_agreeing(own, others, level, &ConsistencyConfig::default())?;
+    let mut keep = counts.agreeing.map(|_| false);
+    let numbers = counts.agreeing.data().iter().zip(counts.showing.data());
+    for (keep, (agreeing, showing)) in keep.data_mut().iter_mut().zip(numbers) {
+        *keep = *agreeing >= (showing.saturating_add(1) / 3).max(1);
+    }
+    Ok(keep)
 }
 
 /// Drops the pixels whose best height lies outside the range that was asked for, and those whose

@@ -9,6 +9,7 @@
 
 use camera::ImagePoint;
 use crs::MapProjection;
+use geo::{Area, Polygon};
 use numeric::Progress;
 use raster::Window;
 use rayon::prelude::*;
@@ -16,12 +17,17 @@ use sweep::SweepView;
 use sweep::pointing::{Tie, TieConfig};
 
 use crate::dsm::character::ImageCharacter;
+use crate::dsm::chunk_side::cores;
 use crate::dsm::error::DsmError;
+use crate::dsm::evidence::is_beyond_chance;
+use crate::dsm::footprints::shared_part;
 use crate::dsm::grid::DsmGrid;
 use crate::dsm::image_windows::GroundBox;
 use crate::dsm::images::{SceneImage, read_view};
-use crate::dsm::ties::{PairTies, heights_seen, match_pairs};
+use crate::dsm::partners::ALL_MAX;
+use crate::dsm::ties::{PairTies, TIES_MIN, heights_seen, match_pairs};
 use crate::dsm::values::{HeightRange, ImagePair};
+use crate::dsm::view_geometry::ViewGeometry;
 
 /// Side of a window on the ground, cells of the grid.
 const SIDE: usize = 1024;
@@ -32,6 +38,18 @@ const PLACES: [f64; 3] = [12.0, 24.0, 48.0];
 const SEEN_MIN: usize = 8;
 /// Largest number of windows read.
 const WINDOWS_MAX: usize = 16;
+/// Side of a window where there are more pairs than [`ALL_MAX`], cells of the grid: dozens of
+/// images show it, and all are read at once.
+const SIDE_OF_BLOCK: usize = 512;
+/// Windows in which each of so many pairs is matched. Together they try as many corners as a pair
+/// that is read at once.
+const PLACES_PER_PAIR: usize = 5;
+/// Ties of a pair in one of these windows that are not there by chance. All its ties together are
+/// judged once more.
+const FEWEST: usize = 4;
+/// Multiples of the golden ratio, without their whole parts, are spread evenly however many there
+/// are.
+const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
 /// Pixels read around a window, for the wide search after a gross pointing error.
 const MARGIN: usize = 256;
 /// Corners tried per pair and window, at least. All windows together try as many as a scene of
@@ -43,6 +61,12 @@ const PART_MIN: usize = 128;
 /// metres.
 const FAR_M: f64 = 1500.0;
 
+/// A window of the grid and the pairs that are matched in it.
+struct Place {
+    window: Window,
+    pairs: Vec<ImagePair>,
+}
+
 /// Returns the ties of the pairs, given best first, over heights in `search`, and the characters of
 /// the images.
 ///
@@ -52,26 +76,36 @@ const FAR_M: f64 = 1500.0;
 pub(crate) fn match_in_windows(
     images: &[SceneImage],
     grid: &DsmGrid,
+    geometry: &ViewGeometry,
     pairs: &[ImagePair],
     search: HeightRange,
     progress: &dyn Progress,
 ) -> Result<(Vec<PairTies>, Vec<ImageCharacter>), DsmError> {
     let projection = grid.projection()?;
-    let places = places(images, grid, &projection, pairs, search)?;
     let all = TieConfig::default();
-    let config = TieConfig { points: POINTS.max(all.points / places.len().max(1)), ..all };
+    let (places, points, least) = if pairs.len() <= ALL_MAX {
+        let windows = places(images, grid, &projection, pairs, search)?;
+        let points = POINTS.max(all.points / windows.len().max(1));
+        (windows.into_iter().map(|window| Place { window, pairs: pairs.to_vec() }).collect(), points, TIES_MIN)
+    } else {
+        (places_of_pairs(grid, &projection, geometry, pairs)?, all.points / PLACES_PER_PAIR, FEWEST)
+    };
+    let config = TieConfig { points, ..all };
     let mut characters = vec![ImageCharacter::default(); images.len()];
     let mut out: Vec<PairTies> = pairs.iter().map(|&pair| PairTies { pair, ties: Vec::new() }).collect();
     let mut range = search;
     progress.begin("matching tie points", places.len());
     for place in places {
         progress.check_cancelled()?;
-        let windows = windows(images, &GroundBox::new(&grid.part(place), &projection, range)?)?;
+        let mut windows = windows(images, &GroundBox::new(&grid.part(place.window), &projection, range)?)?;
+        let is_matched = |i: usize| place.pairs.iter().any(|pair| pair.has(i));
+        windows.iter_mut().enumerate().filter(|(i, _)| !is_matched(*i)).for_each(|(_, window)| *window = None);
         let views = read_parts(images, &windows)?;
         let is_there = |i: usize| windows[i].is_some();
         (0..images.len()).filter(|&i| is_there(i)).for_each(|i| characters[i].learn(&views[i]));
-        let here: Vec<ImagePair> = pairs.iter().copied().filter(|p| is_there(p.first) && is_there(p.second)).collect();
-        let found = match_pairs(&views, &here, range, &config, &|| ());
+        let here: Vec<ImagePair> =
+            place.pairs.into_iter().filter(|p| is_there(p.first) && is_there(p.second)).collect();
+        let found = match_pairs(&views, &here, range, (&config, least), &|| ());
         if range == search
             && let Some(seen) = found.iter().find_map(|f| heights_seen(&views, f))
         {
@@ -83,6 +117,12 @@ pub(crate) fn match_in_windows(
             own.into_iter().for_each(|p| p.ties.extend(in_whole_images(pair, &windows)));
         }
         progress.step();
+    }
+    for pair in &mut out {
+        let cameras = (&images[pair.pair.first].camera, &images[pair.pair.second].camera);
+        if !is_beyond_chance(cameras, &pair.ties, range.middle_m(), TIES_MIN) {
+            pair.ties.clear();
+        }
     }
     Ok((out, characters))
 }
@@ -114,6 +154,44 @@ fn windows(images: &[SceneImage], place: &GroundBox) -> Result<Vec<Option<Window
         Ok(window.filter(|w| w.width.min(w.height) >= PART_MIN))
     };
     images.iter().map(one).collect()
+}
+
+/// Returns windows of the grid for a block of many images, with the pairs that are matched in each:
+/// every pair in [`PLACES_PER_PAIR`] of them where it shares enough ground.
+///
+/// The windows are tried in an order that jumps over the scene, so that those of a pair are spread
+/// over what it shares.
+fn places_of_pairs(
+    grid: &DsmGrid,
+    projection: &MapProjection,
+    geometry: &ViewGeometry,
+    pairs: &[ImagePair],
+) -> Result<Vec<Place>, DsmError> {
+    let mut windows = cores(grid.size, SIDE_OF_BLOCK);
+    let jump = |i: usize| (i as f64 * GOLDEN_RATIO).fract();
+    let mut order: Vec<usize> = (0..windows.len()).collect();
+    order.sort_by(|a, b| jump(*a).total_cmp(&jump(*b)));
+    windows = order.into_iter().map(|i| windows[i]).collect();
+    let height = HeightRange::at(geometry.centre.height_m);
+    let area_min = (PART_MIN as f64 * grid.gsd_m).powi(2);
+    let mut have = vec![0; pairs.len()];
+    let mut places = Vec::new();
+    for window in windows {
+        let ground = GroundBox::new(&grid.part(window), projection, height)?.outline(&geometry.frame);
+        let seen: Vec<Option<Polygon<f64>>> = geometry.outlines.iter().map(|o| shared_part(o, &ground)).collect();
+        let shared = |p: &ImagePair| shared_part(seen[p.first].as_ref()?, seen[p.second].as_ref()?);
+        let mut here = Vec::new();
+        for (pair, have) in pairs.iter().zip(&mut have).filter(|(_, have)| **have < PLACES_PER_PAIR) {
+            if shared(pair).is_some_and(|part| part.unsigned_area() >= area_min) {
+                *have += 1;
+                here.push(*pair);
+            }
+        }
+        if !here.is_empty() {
+            places.push(Place { window, pairs: here });
+        }
+    }
+    Ok(places)
 }
 
 /// Returns windows of the grid, evenly spread over the ground that some pair sees.

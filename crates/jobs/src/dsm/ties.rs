@@ -40,13 +40,13 @@ pub struct PairTies {
 /// each pair.
 ///
 /// A few points of the first pair with enough ties narrow the height range of the others, and all
-/// its points that of the other pairs. A pair with too few ties is searched again for a gross
-/// pointing error.
+/// its points that of the other pairs. A pair with fewer than `least` ties is searched again for a
+/// gross pointing error.
 pub(crate) fn match_pairs(
     views: &[SweepView],
     pairs: &[ImagePair],
     range: HeightRange,
-    config: &TieConfig,
+    (config, least): (&TieConfig, usize),
     done: &(dyn Fn() + Sync),
 ) -> Vec<PairTies> {
     let mut near = range;
@@ -68,18 +68,18 @@ pub(crate) fn match_pairs(
         }
         let cameras = (&views[pair.first].camera, &views[pair.second].camera);
         let true_ties = |found: PairTies| {
-            let is_true = is_beyond_chance(cameras, &found.ties, near.middle_m(), TIES_MIN);
+            let is_true = is_beyond_chance(cameras, &found.ties, near.middle_m(), least);
             if is_true { found } else { PairTies { pair, ties: Vec::new() } }
         };
         let mut found = true_ties(ties_of(near, config));
-        if found.ties.len() < TIES_MIN && near != range {
+        if found.ties.len() < least && near != range {
             // A pointing error along the line of sight gives the pair other heights.
             found = true_ties(ties_of(range, config));
         }
-        if found.ties.len() < TIES_MIN {
+        if found.ties.len() < least {
             found = verified(views, ties_of(near, &wide_search(config)));
         }
-        if found.ties.len() < TIES_MIN && near != range {
+        if found.ties.len() < least && near != range {
             found = verified(views, ties_of(range, &wide_search(config)));
         }
         let was = near;

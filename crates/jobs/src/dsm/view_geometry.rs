@@ -2,8 +2,11 @@
 //! parallax of all pairs.
 
 use camera::{CameraError, ImagePoint, RpcCamera};
-use geodesy::{EnuFrame, LonLatHeight};
+use geo::{BooleanOps, BoundingRect, Centroid, Contains, Point, Polygon};
+use geodesy::{EnuFrame, EnuPoint, LonLatHeight};
 use raster::Grid;
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{RTree, RTreeObject};
 use serde::{Deserialize, Serialize};
 use sweep::source_from_reference;
 
@@ -38,7 +41,7 @@ pub(crate) struct ViewGeometry {
     /// Local frame, with its origin at the first corner of the first image.
     pub(crate) frame: EnuFrame,
     /// Footprints of the images in that frame.
-    pub(crate) outlines: Vec<geo::Polygon<f64>>,
+    pub(crate) outlines: Vec<Polygon<f64>>,
     /// Geometry by pair; `None` for a pair that shares no ground.
     pairs: Grid<Option<PairGeometry>>,
 }
@@ -57,12 +60,13 @@ impl ViewGeometry {
             .map(|(i, image)| footprint(&image.camera, image.size, height_m).map_err(failed(i)))
             .collect::<Result<_, _>>()?;
         let frame = EnuFrame::new(prints[0][0]);
-        let outlines: Vec<geo::Polygon<f64>> = prints.iter().map(|p| local_polygon(p, &frame)).collect();
+        let outlines: Vec<Polygon<f64>> = prints.iter().map(|p| local_polygon(p, &frame)).collect();
         let n = images.len();
         let mut pairs = Grid::filled(n, n, None);
         let mut centre = None;
+        let neighbours = neighbours(&outlines);
         for i in 0..n {
-            for j in i + 1..n {
+            for &j in &neighbours[i] {
                 let share = overlap_share(&outlines[i], &outlines[j]);
                 let Some(middle) = middle_of_both(&outlines[i], &outlines[j]) else { continue };
                 let ground = LonLatHeight { height_m, ..frame.ground_from_enu(middle) };
@@ -81,6 +85,26 @@ impl ViewGeometry {
     /// Returns the geometry of a pair; `None` when the two share no ground.
     pub(crate) fn pair(&self, pair: ImagePair) -> Option<&PairGeometry> {
         self.pairs.get(pair.first, pair.second).and_then(Option::as_ref)
+    }
+
+    /// Returns the centre of the scene if an image shows it, and else the middle of the image.
+    ///
+    /// A camera far outside its image has no meaning, and in a block the centre may be far away.
+    pub(crate) fn middle_of(&self, image: usize) -> LonLatHeight {
+        let centre = self.frame.enu_from_ground(self.centre);
+        let outline = &self.outlines[image];
+        match outline.centroid() {
+            Some(own) if !outline.contains(&Point::new(centre.east, centre.north)) => {
+                let ground = self.frame.ground_from_enu(EnuPoint { east: own.x(), north: own.y(), up: 0.0 });
+                LonLatHeight { height_m: self.centre.height_m, ..ground }
+            }
+            _ => self.centre,
+        }
+    }
+
+    /// Returns the side of a pixel on the ground, metres; `None` where the camera has no ground.
+    pub(crate) fn ground_sampling_m(&self, image: &SceneImage, index: usize) -> Option<f64> {
+        image.camera.gsd(self.middle_of(index)).ok().map(|g| g.mean_m())
     }
 
     /// Returns the pairs that can give heights, the best angles first.
@@ -117,16 +141,26 @@ pub(crate) fn angle_merit(angle_deg: f64) -> f64 {
     (-((angle_deg - 15.0) / 15.0).powi(2)).exp()
 }
 
-/// Returns the side of a pixel on the ground, metres; `None` where the camera has no ground at
-/// `centre`.
-pub(crate) fn ground_sampling_m(image: &SceneImage, centre: LonLatHeight) -> Option<f64> {
-    image.camera.gsd(centre).ok().map(|g| g.mean_m())
+/// Returns for each outline the later ones whose bounding rectangles meet its own, in order.
+fn neighbours(outlines: &[Polygon<f64>]) -> Vec<Vec<usize>> {
+    let entry = |(i, outline): (usize, &Polygon<f64>)| {
+        let rect = outline.bounding_rect()?;
+        Some(GeomWithData::new(Rectangle::from_corners([rect.min().x, rect.min().y], [rect.max().x, rect.max().y]), i))
+    };
+    let entries: Vec<_> = outlines.iter().enumerate().filter_map(entry).collect();
+    let tree = RTree::bulk_load(entries.clone());
+    let mut out = vec![Vec::new(); outlines.len()];
+    for own in entries {
+        let meeting = tree.locate_in_envelope_intersecting(&own.geom().envelope()).map(|other| other.data);
+        out[own.data] = meeting.filter(|other| *other > own.data).collect();
+        out[own.data].sort_unstable();
+    }
+    out
 }
 
-fn middle_of_both(a: &geo::Polygon<f64>, b: &geo::Polygon<f64>) -> Option<geodesy::EnuPoint> {
-    use geo::{BooleanOps, Centroid};
+fn middle_of_both(a: &Polygon<f64>, b: &Polygon<f64>) -> Option<EnuPoint> {
     let middle = a.intersection(b).centroid()?;
-    Some(geodesy::EnuPoint { east: middle.x(), north: middle.y(), up: 0.0 })
+    Some(EnuPoint { east: middle.x(), north: middle.y(), up: 0.0 })
 }
 
 /// Computes the geometry of a pair of cameras at a ground point.

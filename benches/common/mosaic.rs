@@ -1,0 +1,63 @@
+//! Images of the town of any size, as GDAL mosaics (VRT) of one rendered tile per view: pixels are
+//! decoded window by window as from any file, and take hardly any disk space.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::ensure;
+use io::raster::{Band, BandData, write_image_with_rpc};
+
+use crate::town::{self, Frame, Look};
+
+/// Renders the tile of a view.
+pub(crate) fn tile(folder: &Path, name: &str, look: &Look) -> anyhow::Result<PathBuf> {
+    let rpc = town::rpc(look, &Frame::square(look.period()));
+    // The RPC must give the position that the rendering formula gives.
+    let ([x, y, z], [a, b]) = ([100.0, -200.0, 30.0], look.slant);
+    let p = town::project(&rpc, [x, y, z])?;
+    let expected = [(x + a * z) / look.gsd_m, (b * z - y) / look.gsd_m];
+    ensure!((p.sample - expected[0]).hypot(p.line - expected[1]) < 1e-6, "the RPC does not fit the tile: {p:?}");
+    let path = folder.join(name);
+    let pixels = town::tile(look);
+    let bands = [Band { description: "pan", data: BandData::U16(&pixels) }];
+    write_image_with_rpc(&path, &bands, &rpc, None, true)?;
+    Ok(path)
+}
+
+/// Writes an image as a mosaic of a view's tile, with its RPC beside it.
+pub(crate) fn image(folder: &Path, name: &str, tile: &Path, look: &Look, frame: &Frame) -> anyhow::Result<PathBuf> {
+    let (period, [columns, rows]) = (look.period(), frame.size);
+    let path = folder.join(format!("{name}.vrt"));
+    let mut xml = format!("<VRTDataset rasterXSize=\"{columns}\" rasterYSize=\"{rows}\">\n");
+    xml += "<VRTRasterBand dataType=\"UInt16\" band=\"1\">\n";
+    for (y, h, v) in pieces(frame.first[1], rows, period) {
+        for (x, w, u) in pieces(frame.first[0], columns, period) {
+            writeln!(
+                xml,
+                "<SimpleSource><SourceFilename>{}</SourceFilename><SourceBand>1</SourceBand>\
+                 <SourceProperties RasterXSize=\"{period}\" RasterYSize=\"{period}\" DataType=\"UInt16\" \
+                 BlockXSize=\"256\" BlockYSize=\"256\"/><SrcRect xOff=\"{u}\" yOff=\"{v}\" xSize=\"{w}\" ySize=\"{h}\"/>\
+                 <DstRect xOff=\"{x}\" yOff=\"{y}\" xSize=\"{w}\" ySize=\"{h}\"/></SimpleSource>",
+                tile.display()
+            )?;
+        }
+    }
+    std::fs::write(&path, xml + "</VRTRasterBand>\n</VRTDataset>\n")?;
+    let sidecar = folder.join(format!("{name}_RPC.TXT"));
+    io::rpc::write(&sidecar, &town::rpc(look, frame), io::rpc::RpcFormat::Text, true)?;
+    Ok(path)
+}
+
+/// Returns where the pieces of a side begin in the image, their lengths, and where they begin in
+/// the tile.
+fn pieces(first: usize, length: usize, period: usize) -> Vec<(usize, usize, usize)> {
+    let mut out = Vec::new();
+    let mut at = 0;
+    while at < length {
+        let start = (first + at) % period;
+        let piece = (period - start).min(length - at);
+        out.push((at, piece, start));
+        at += piece;
+    }
+    out
+}
