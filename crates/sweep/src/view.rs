@@ -2,7 +2,7 @@
 
 use camera::RpcCamera;
 use numeric::{order_statistic, upper_median};
-use raster::{Grid, Pyramid};
+use raster::{Grid, Pyramid, Window};
 
 /// Variance of the rounding error of integer grey values.
 pub(crate) const QUANTISATION_VARIANCE: f32 = 1.0 / 12.0;
@@ -74,6 +74,24 @@ impl SweepView {
         levels.extend(Pyramid::new(image, LEVELS_MAX, SIDE_MIN).into_levels());
         let contrast = levels.iter().map(typical_difference).collect();
         Self { camera, levels, noise, contrast }
+    }
+
+    /// Sets the pixels of a level that lie outside a window of level 0 to NaN, so that no height is
+    /// searched for there.
+    pub fn void_outside(&mut self, level: usize, inside: Window) {
+        let image = &mut self.levels[level];
+        let cut = |at: i64, size: usize| (at.max(0) as usize >> level).min(size);
+        let columns = cut(inside.x, image.width())..cut(inside.x + inside.width as i64, image.width());
+        let rows = cut(inside.y, image.height())..cut(inside.y + inside.height as i64, image.height());
+        for y in 0..image.height() {
+            let row = image.row_mut(y);
+            if rows.contains(&y) {
+                row[..columns.start].fill(f32::NAN);
+                row[columns.end..].fill(f32::NAN);
+            } else {
+                row.fill(f32::NAN);
+            }
+        }
     }
 
     /// Returns a view that does not see the scene: every level is empty.
@@ -198,6 +216,16 @@ mod tests {
                 .blank(0);
         let expected = |i: usize| (3..5).contains(&(i % 9)) && (1..4).contains(&(i / 9));
         assert!((0..72).all(|i| blank.data()[i] == expected(i)), "{blank:?}");
+    }
+
+    #[test]
+    fn pixels_outside_a_window_are_voids_of_one_level() {
+        let image = Grid::filled(64, 64, 7.0);
+        let mut view = SweepView::new(crate::testing::camera::leaning_camera(64, [0.0; 2]), image);
+        view.void_outside(1, Window { x: -8, y: 20, width: 28, height: 100 });
+        let known = |level: usize| view.levels[level].data().iter().filter(|v| !v.is_nan()).count();
+        assert_eq!((known(0), known(1)), (64 * 64, 10 * 22));
+        assert!(!view.levels[1][(9, 10)].is_nan() && view.levels[1][(10, 10)].is_nan());
     }
 
     /// One pixel of 1e10 would shift the mean of its tile so far that no other value is left in it.

@@ -2,9 +2,12 @@
 
 use numeric::Progress;
 use raster::Window;
+use sweep::SweepView;
 
 use crate::dsm::chunk_plan::{ChunkSweep, ChunkWork, read_chunk_views};
+use crate::dsm::chunk_side::MARGIN_PX;
 use crate::dsm::error::DsmError;
+use crate::dsm::image_windows::GroundBox;
 use crate::dsm::images::read_view;
 use crate::dsm::plan::Plan;
 use crate::dsm::prior_findings::PriorFindings;
@@ -73,6 +76,19 @@ pub fn run_chunk(plan: &Plan, index: usize, session: &mut Session<'_>) -> Result
     Ok(ChunkResult { core: chunk.core, content })
 }
 
+/// Sets the pixels of the finest level to NaN that were read only because windows begin on the
+/// tiles of the sweep, and with them half of the time of a small chunk.
+fn void_surplus(plan: &Plan, work: &ChunkSweep, views: &mut [SweepView]) -> Result<(), DsmError> {
+    let ground = GroundBox::new(&plan.grid.part(work.extent), &plan.grid.projection()?, work.height_range)?;
+    for ((image, window), view) in plan.images.iter().zip(&work.windows).zip(views) {
+        let Some(window) = window.filter(|window| *window != image.whole()) else { continue };
+        let needed = ground.span_in(image, MARGIN_PX)?;
+        let inside = Window { x: needed.x - window.x, y: needed.y - window.y, ..needed };
+        view.void_outside(work.levels.finest, inside);
+    }
+    Ok(())
+}
+
 fn sweep_chunk(
     plan: &Plan,
     core: Window,
@@ -87,7 +103,11 @@ fn sweep_chunk(
     let progress: &dyn Progress = if is_whole { watcher } else { &muted };
     let views = match session.views.take().filter(|_| is_whole) {
         Some(views) => views,
-        None => read_chunk_views(&plan.images, &plan.characters, &work.windows, read_view)?,
+        None => {
+            let mut views = read_chunk_views(&plan.images, &plan.characters, &work.windows, read_view)?;
+            void_surplus(plan, work, &mut views)?;
+            views
+        }
     };
     let mut sweep = SceneSweep {
         range: work.height_range,
