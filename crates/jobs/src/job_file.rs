@@ -2,8 +2,9 @@
 //!
 //! Keys have the names of the fields of the configuration. Paths are relative to the file. A key
 //! that no job has is an error that names the nearest known one. The `used_config.toml` of a run is
-//! a job file.
+//! a job file. `${NAME}` in a path stands for the environment variable.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -11,6 +12,7 @@ use serde::de::DeserializeOwned;
 use crate::dsm::DsmConfig;
 use crate::files::{FileError, read_text};
 use crate::job_paths::resolved;
+use crate::path_variables::expanded;
 
 /// A commented job file for a surface model, with every key and its default.
 pub const DSM_TEMPLATE: &str = include_str!("job_file/dsm.toml");
@@ -50,6 +52,14 @@ pub enum JobFileError {
         /// The text found and the text expected.
         what: String,
     },
+    /// A path with an environment variable that is not set.
+    #[error("{what}: {}", path.display())]
+    Variable {
+        /// The file.
+        path: PathBuf,
+        /// The variable and the path that names it.
+        what: String,
+    },
 }
 
 /// Reads the configuration of a surface model from a job file.
@@ -61,8 +71,18 @@ pub enum JobFileError {
 pub fn read_dsm_job(path: &Path) -> Result<DsmConfig, JobFileError> {
     let mut config: DsmConfig = parse(&read_text(path)?, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    config.map_paths(|path| resolved(path, folder));
-    Ok(config)
+    let unset = RefCell::new(None);
+    config.map_paths(|path| match expanded(path) {
+        Ok(path) => resolved(&path, folder),
+        Err(what) => {
+            unset.borrow_mut().get_or_insert(what);
+            path.to_owned()
+        }
+    });
+    match unset.into_inner() {
+        Some(what) => Err(JobFileError::Variable { path: path.to_owned(), what }),
+        None => Ok(config),
+    }
 }
 
 /// Whether a path has the ending of job files.
@@ -142,6 +162,12 @@ mod tests {
         let config = job("images = ['a.tif', '/far/b.tif']\noutput = 'out'\ngsd_m = 0.5\n").unwrap();
         assert_eq!(config.images, [Path::new("a.tif"), Path::new("/far/b.tif")]);
         assert_eq!((config.output.as_path(), config.gsd_m), (Path::new("out"), Some(0.5)));
+    }
+
+    #[test]
+    fn a_variable_that_is_not_set_is_an_error() {
+        let text = job("images = ['${SKYSWEEP_NO_SUCH}/a.tif']").unwrap_err().to_string();
+        assert!(text.contains("`SKYSWEEP_NO_SUCH`") && text.contains("not set"), "{text}");
     }
 
     #[test]

@@ -20,6 +20,7 @@ mod job_paths;
 pub mod map_surface;
 pub mod ortho;
 mod output_folder;
+mod path_variables;
 pub mod placed_model;
 pub mod priors;
 pub mod production;

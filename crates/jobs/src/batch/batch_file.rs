@@ -11,6 +11,7 @@ use crate::dsm::MapBounds;
 use crate::files::read_text;
 use crate::job_file;
 use crate::job_paths::resolved;
+use crate::path_variables::expanded;
 
 /// A batch: scenes and what is to be made of them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -196,9 +197,16 @@ pub fn read_batch(path: &Path) -> Result<BatchConfig, BatchError> {
     let mut batch: BatchConfig = job_file::parse(&text, path)?;
     batch.validate(path)?;
     path.parent().unwrap_or(Path::new("")).clone_into(&mut batch.folder);
-    batch.output = resolved(&batch.output, &batch.folder);
-    for area in batch.scenes.iter_mut().filter_map(|scene| scene.area.as_mut()) {
-        area.file = resolved(&area.file, &batch.folder);
+    let with_variables =
+        |named: &Path| expanded(named).map_err(|what| job_file::JobFileError::Variable { path: path.to_owned(), what });
+    batch.output = resolved(&with_variables(&batch.output)?, &batch.folder);
+    for scene in &mut batch.scenes {
+        for image in &mut scene.images {
+            *image = with_variables(Path::new(image))?.to_string_lossy().into_owned();
+        }
+        if let Some(area) = &mut scene.area {
+            area.file = resolved(&with_variables(&area.file)?, &batch.folder);
+        }
     }
     Ok(batch)
 }

@@ -16,6 +16,7 @@ use crate::heightmap::HeightMapConfig;
 use crate::job_file::{JobFileError, defect};
 use crate::job_paths::resolved;
 use crate::ortho::OrthoConfig;
+use crate::path_variables::expanded;
 use crate::priors::PriorsConfig;
 use crate::production::{PLAN, POINTING, make_or_resume};
 
@@ -133,7 +134,7 @@ impl TaskJob {
         if let Some(key) = kind.needed().iter().find(|key| !given.contains_key(**key)) {
             return Err(format!("`{key}` is missing"));
         }
-        resolve_paths(&mut given, kind.paths(), scene.base);
+        resolve_paths(&mut given, kind.paths(), scene.base)?;
         let (images, folder) = (scene.images.clone(), scene.folder.clone());
         Ok(match kind {
             TaskKind::Dsm => {
@@ -312,14 +313,18 @@ fn lay_over(table: &mut Table, over: &Table) {
 }
 
 /// Makes the paths of a table relative to the folder of the file absolute.
-fn resolve_paths(table: &mut Table, paths: &[&str], folder: &Path) {
+///
+/// # Errors
+/// A text that names an environment variable that is not set.
+fn resolve_paths(table: &mut Table, paths: &[&str], folder: &Path) -> Result<(), String> {
     for (key, value) in table.iter_mut() {
         match value {
             Value::String(text) if paths.contains(&key.as_str()) => {
-                *text = resolved(Path::new(text.as_str()), folder).to_string_lossy().into_owned();
+                *text = resolved(&expanded(Path::new(text.as_str()))?, folder).to_string_lossy().into_owned();
             }
-            Value::Table(inner) => resolve_paths(inner, paths, folder),
+            Value::Table(inner) => resolve_paths(inner, paths, folder)?,
             _ => {}
         }
     }
+    Ok(())
 }
