@@ -40,47 +40,78 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// 5,000 instances of a template of 20,000 triangles in about a megabyte.
-#[test]
-fn instances_of_a_large_template_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("bomb.city.json");
-    let triangles = vec!["[[0,1,2]]"; 20_000].join(",");
+/// A CityJSON file of 5,000 instances of a template.
+fn instances(boundaries: &str, semantics: &str) -> String {
     let matrix = "[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]";
     let instance = format!(
         "{{\"type\":\"GeometryInstance\",\"template\":0,\"boundaries\":[0],\"transformationMatrix\":{matrix}}}"
     );
     let objects: Vec<String> =
         (0..5000).map(|i| format!("\"t{i}\":{{\"type\":\"Building\",\"geometry\":[{instance}]}}")).collect();
-    let content = format!(
+    format!(
         "{{\"type\":\"CityJSON\",\"version\":\"2.0\",\"transform\":{{\"scale\":[1,1,1],\"translate\":[0,0,0]}},\
          \"metadata\":{{\"referenceSystem\":\"https://www.opengis.net/def/crs/EPSG/0/7415\"}},\
          \"geometry-templates\":{{\"vertices-templates\":[[0,0,0],[1,0,0],[0,1,0]],\
-         \"templates\":[{{\"type\":\"MultiSurface\",\"lod\":\"2\",\"boundaries\":[{triangles}]}}]}},\
-         \"CityObjects\":{{{}}},\"vertices\":[[0,0,0]]}}",
+         \"templates\":[{{\"type\":\"MultiSurface\",\"lod\":\"2\",\"boundaries\":[{boundaries}],\
+         \"semantics\":{semantics}}}]}},\"CityObjects\":{{{}}},\"vertices\":[[0,0,0]]}}",
         objects.join(",")
-    );
+    )
+}
+
+/// A CityGML file of a building with `surfaces`, and other buildings.
+fn gml(surfaces: &str, others: &str) -> String {
+    format!(
+        "<CityModel xmlns=\"http://www.opengis.net/citygml/2.0\" xmlns:gml=\"http://www.opengis.net/gml\" \
+         xmlns:bldg=\"http://www.opengis.net/citygml/building/2.0\" xmlns:xlink=\"http://www.w3.org/1999/xlink\">\
+         <cityObjectMember><bldg:Building gml:id=\"b\">{surfaces}</bldg:Building></cityObjectMember>{others}</CityModel>"
+    )
+}
+
+fn gml_set(corners: &str, links: &str) -> String {
+    format!(
+        "<bldg:lod2MultiSurface><gml:MultiSurface><gml:surfaceMember><gml:Polygon gml:id=\"p\"><gml:exterior>\
+         <gml:LinearRing><gml:posList srsDimension=\"3\">{corners}0 0 0</gml:posList></gml:LinearRing></gml:exterior>\
+         </gml:Polygon></gml:surfaceMember>{links}</gml:MultiSurface></bldg:lod2MultiSurface>"
+    )
+}
+
+/// Writes a small city model that repeats itself beyond measure, and expects its refusal.
+#[track_caller]
+fn is_refused_as_bomb(content: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (folder.path().join("bomb"), folder.path().join("out.city.json"));
     std::fs::write(&file, content).unwrap();
-    refused(&["city", "info", text(&file)], "repeats by reference");
+    refused(&["city", "convert", text(&file), "-o", text(&out)], "repeats by reference");
+    assert!(!out.exists());
+}
+
+/// 5,000 instances of a template of 20,000 triangles in about a megabyte.
+#[test]
+fn instances_of_a_large_template_are_refused() {
+    is_refused_as_bomb(&instances(&vec!["[[0,1,2]]"; 20_000].join(","), "null"));
 }
 
 /// 20,000 links to one polygon of 10,000 corners.
 #[test]
 fn links_to_a_large_polygon_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("bomb.gml");
     let corners: String = (0..10_000).map(|i| format!("{i} {} 0 ", i % 7)).collect();
-    let link = "<gml:surfaceMember xlink:href=\"#p\"/>".repeat(20_000);
-    let content = format!(
-        "<CityModel xmlns=\"http://www.opengis.net/citygml/2.0\" xmlns:gml=\"http://www.opengis.net/gml\" \
-         xmlns:bldg=\"http://www.opengis.net/citygml/building/2.0\" xmlns:xlink=\"http://www.w3.org/1999/xlink\">\
-         <cityObjectMember><bldg:Building gml:id=\"b\"><bldg:lod2MultiSurface><gml:MultiSurface>\
-         <gml:surfaceMember><gml:Polygon gml:id=\"p\"><gml:exterior><gml:LinearRing><gml:posList srsDimension=\"3\">\
-         {corners}0 0 0</gml:posList></gml:LinearRing></gml:exterior></gml:Polygon></gml:surfaceMember>{link}\
-         </gml:MultiSurface></bldg:lod2MultiSurface></bldg:Building></cityObjectMember></CityModel>"
+    is_refused_as_bomb(&gml(&gml_set(&corners, &"<gml:surfaceMember xlink:href=\"#p\"/>".repeat(20_000)), ""));
+}
+
+/// 5,000 instances of, and links to, a surface with a megabyte of attributes.
+#[test]
+fn surfaces_with_large_attributes_are_refused_when_they_multiply() {
+    let note = "x".repeat(1_000_000);
+    let semantics = format!("{{\"surfaces\":[{{\"type\":\"RoofSurface\",\"note\":\"{note}\"}}],\"values\":[0]}}");
+    is_refused_as_bomb(&instances("[[0,1,2]]", &semantics));
+    let notes = format!("<bldg:note>{}</bldg:note>", "x".repeat(50_000)).repeat(20);
+    let roof = format!(
+        "<bldg:boundedBy><bldg:RoofSurface>{notes}{}</bldg:RoofSurface></bldg:boundedBy>",
+        gml_set("0 0 0 4 0 0 0 4 0 ", "")
     );
-    std::fs::write(&file, content).unwrap();
-    refused(&["city", "info", text(&file)], "repeats by reference");
+    let other = "<cityObjectMember><bldg:Building><bldg:lod2MultiSurface><gml:MultiSurface><gml:surfaceMember \
+                 xlink:href=\"#p\"/></gml:MultiSurface></bldg:lod2MultiSurface></bldg:Building></cityObjectMember>";
+    is_refused_as_bomb(&gml(&roof, &other.repeat(5000)));
 }
 
 #[test]

@@ -188,6 +188,24 @@ fn buildings_with_wrong_heights_are_refuted_one_by_one_and_cost_nothing() {
     }
 }
 
+/// A model beside its place in the images is moved there, or its buildings are left out.
+#[test]
+fn a_model_that_is_ten_metres_off_costs_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read(town("truth/buildings.city.json")).unwrap();
+    let mut model: Value = serde_json::from_slice(&text).unwrap();
+    let west = &mut model["transform"]["translate"][0];
+    *west = json!(west.as_f64().unwrap() - 10.0);
+    let path = folder.path().join("shifted.city.json");
+    std::fs::write(&path, serde_json::to_vec(&model).unwrap()).unwrap();
+    let before = evaluation(&surface(folder.path(), "without", None));
+    let after = evaluation(&surface(folder.path(), "with", Some(&path)));
+    for path in ["/metrics/mae".to_owned(), format!("/classes/{ROOF}/mae")] {
+        let (without, with) = (mae(&before, &path), mae(&after, &path));
+        assert!(with < 1.02 * without, "{path}: {without} m without, {with} m with the shifted model");
+    }
+}
+
 #[test]
 fn a_prior_that_is_none_is_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -99,6 +99,18 @@ fn meshes_and_clouds_in_any_combination() {
     skysweep(&[], &high, &low).success().stdout(contains("accuracy").and(contains("M3C2")).and(contains("VOC")));
 }
 
+/// Normals of a handful of points differ between programs and between clouds.
+#[test]
+fn sparse_normals_are_told() {
+    let folder = TempDir::new().unwrap();
+    let cloud = las(&folder, "cloud.las", &roof_points(0.3));
+    let notes =
+        |normal_scale: &str| json(&["--normal-scale", normal_scale], &cloud, &cloud)["protocol"]["notes"].to_string();
+    let (sparse, dense) = (notes("0.3"), notes("3"));
+    assert!(sparse.contains("M3C2: the normals rest on"), "{sparse}");
+    assert!(!dense.contains("M3C2"), "{dense}");
+}
+
 #[test]
 fn the_origin_of_a_ply_is_added_and_systems_are_brought_together() {
     let folder = TempDir::new().unwrap();

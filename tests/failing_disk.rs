@@ -105,6 +105,24 @@ fn height_maps_are_whole() {
 }
 
 #[test]
+fn clouds_splats_and_city_models_are_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let (dsm, map) = (path("truth/dsm.tif"), folder.path().join("map.tif"));
+    let place = ["--center", "5.4", "43.53", "--size", "200", "-q", "--progress", "none"];
+    let mut command = common::skysweep();
+    command.args(["heightmap", dsm.as_str(), "-o"]).arg(&map).args(place).assert().code(0);
+    let quiet = ["-q", "--progress", "none"];
+    for cloud in ["points.las", "points.ply"] {
+        check(&[&["heightmap", "unproject", map.to_str().unwrap(), "-o", cloud], &quiet[..]].concat(), &[]);
+    }
+    check(&[&["splats", dsm.as_str(), path("view_1.tif").as_str(), "-o", "s.ply"], &quiet[..]].concat(), &[]);
+    let town = path("truth/buildings.city.json");
+    for model in ["town.city.json", "town.obj", "town.glb", "town.geojson"] {
+        check(&[&["city", "convert", town.as_str(), "-o", model], &quiet[..]].concat(), &[]);
+    }
+}
+
+#[test]
 fn error_maps_are_whole() {
     let (dsm, dtm) = (path("truth/dsm.tif"), path("truth/dtm.tif"));
     check(&["eval", &dsm, &dtm, "--error-map", "error.tif", "--html", "page.html", "-q"], &[]);

@@ -212,6 +212,30 @@ fn what_the_file_says_of_itself_is_what_was_asked_for_and_found() {
     assert!(path.with_extension("png").is_file());
 }
 
+/// Viewers read a large map by its tiles and overviews.
+#[test]
+fn large_maps_are_tiled_and_have_overviews() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = map(&folder, &town("dsm.tif"), &["--size", "1200", "--resolution", "4"]);
+    let bytes = std::fs::read(&path).unwrap();
+    let number = |at: usize, size: usize| bytes[at..at + size].iter().rev().fold(0, |n, b| 256 * n + usize::from(*b));
+    assert_eq!(&bytes[..4], b"II*\0", "a little-endian TIFF");
+    // Each image is a list of entries of 12 bytes, and the place of the next one.
+    let (mut at, mut widths) = (number(4, 4), Vec::new());
+    while at != 0 {
+        let entries = number(at, 2);
+        let value = |tag: usize| {
+            let of_tag = (0..entries).map(|i| at + 2 + 12 * i).find(|&entry| number(entry, 2) == tag)?;
+            Some(number(of_tag + 8, if number(of_tag + 2, 2) == 3 { 2 } else { 4 }))
+        };
+        let (width, tile) = (value(256).unwrap(), value(322).expect("a tile width"));
+        assert!(tile.is_power_of_two() && tile <= 512, "{tile}");
+        widths.push(width);
+        at = number(at + 2 + 12 * entries, 4);
+    }
+    assert!(widths.contains(&1200) && widths.contains(&600), "{widths:?}");
+}
+
 #[test]
 fn a_normalised_map_times_its_scale_is_the_metric_map() {
     let folder = tempfile::tempdir().unwrap();

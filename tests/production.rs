@@ -96,6 +96,28 @@ fn plan_run_and_merge_give_the_bytes_of_one_run() {
     assert!(products(&folder.path().join("run")) == *EXPECTED);
 }
 
+/// A plan holds the cameras as a reference has placed them.
+#[test]
+fn a_planned_run_with_a_reference_gives_the_bytes_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let reference = sample("truth/dsm.tif");
+    let settings = [&SMALL[..], &["--reference-dem", reference.to_str().unwrap()]].concat();
+    for (command, name) in [("dsm", "once"), ("plan", "run")] {
+        let mut started = skysweep();
+        started.current_dir(folder.path()).arg(command).args(views()).args(["-o", name]).args(&settings);
+        started.assert().code(0);
+    }
+    run("run", &["run", "--chunks", "1/2", "-q"], folder.path(), 0);
+    run("run", &["run", "--chunks", "2/2", "-q"], folder.path(), 0);
+    run("merge", &["run", "-q"], folder.path(), 0);
+    assert!(products(&folder.path().join("run")) == products(&folder.path().join("once")));
+    let shift = |name: &str| {
+        let text = std::fs::read(folder.path().join(name).join("report/report.json")).unwrap();
+        serde_json::from_slice::<Value>(&text).unwrap()["pointing"]["reference"]["shift_m"].clone()
+    };
+    assert!(shift("run").is_array() && shift("run") == shift("once"), "{} {}", shift("run"), shift("once"));
+}
+
 #[test]
 fn a_scene_in_one_chunk_has_the_same_bytes_too() {
     let folder = tempfile::tempdir().unwrap();
@@ -246,6 +268,8 @@ fn missing_and_failed_chunks_are_void_counted_and_named() {
     let report: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(report["chunks"]["failed"][0]["reason"], "not computed", "{report}");
     assert!(told.contains("chunks that could not be computed"), "{told}");
+    let quiet = run("merge", &["run", "--partial", "--overwrite", "-q"], folder.path(), 1).1;
+    assert!(quiet.starts_with("error: ") && quiet.contains("chunk"), "{quiet}");
     assert!(run("run", &["run", "--chunks", "4"], folder.path(), 2).1.contains("none with number 4"));
     assert!(run("run", &["run", "--chunks", "3/2"], folder.path(), 2).1.contains("such as 2/5"));
     assert!(run("run", &["."], folder.path(), 2).1.contains("the folder has no plan"));

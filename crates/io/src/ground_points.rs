@@ -13,7 +13,10 @@
 //!   each axis;
 //! - `pixel_px`: standard deviation of a place along each axis, pixels [0.5];
 //! - `role`: `control`, or `check` for a point that only measures the result;
-//! - in CSV the place: `image`, `sample`, `line`, where the centre of the upper-left pixel is 0, 0.
+//! - in CSV the place: `image`, `sample`, `line`, where the centre of the upper-left pixel is 0, 0;
+//! - `chip`: a small picture of the point's surroundings, which is searched for in the images that
+//!   have no place. Its name is relative to the folder of the file. `chip_sample` and `chip_line`
+//!   are the place of the point in it [its centre]. A point with a chip needs no places.
 //!
 //! Other columns are ignored. A row that cannot be used is an error that names it.
 
@@ -59,6 +62,17 @@ pub struct GroundPoint {
     pub is_check: bool,
     /// Its places in images.
     pub seen: Vec<ImagePlace>,
+    /// A picture of its surroundings.
+    pub chip: Option<ImageChip>,
+}
+
+/// A small picture of the surroundings of a ground point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageChip {
+    /// The picture.
+    pub path: PathBuf,
+    /// Place of the point in it; its centre when `None`.
+    pub place: Option<ImagePoint>,
 }
 
 /// A place in an image.
@@ -112,7 +126,15 @@ pub fn read_ground_points(path: &Path) -> Result<Vec<GroundPoint>, GroundPointsE
     let unreadable = |source| GroundPointsError::Unreadable { path: path.to_owned(), source };
     let bytes = read_regular(path, SIZE_LIMIT).map_err(unreadable)?;
     let invalid = |what| GroundPointsError::Invalid { path: path.to_owned(), what };
-    parse(&String::from_utf8_lossy(&bytes)).map_err(invalid)
+    let mut points = parse(&String::from_utf8_lossy(&bytes)).map_err(invalid)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for chip in points.iter_mut().filter_map(|point| point.chip.as_mut()) {
+        chip.path = folder.join(&chip.path);
+        if !chip.path.is_file() {
+            return Err(invalid(format!("a chip is not a file: {}", chip.path.display())));
+        }
+    }
+    Ok(points)
 }
 
 fn parse(text: &str) -> Result<Vec<GroundPoint>, String> {
@@ -129,7 +151,10 @@ fn parse(text: &str) -> Result<Vec<GroundPoint>, String> {
         };
         let known = &mut points[number];
         if (GroundPoint { seen: Vec::new(), ..known.clone() }) != (GroundPoint { seen: Vec::new(), ..point.clone() }) {
-            return Err(format!("{}: the point {} has two positions, accuracies or roles", row.label, point.name));
+            return Err(format!(
+                "{}: the point {} has two positions, accuracies, roles or chips",
+                row.label, point.name
+            ));
         }
         known.seen.extend(point.seen);
     }
@@ -222,7 +247,18 @@ impl Row {
             pixel_px: self.deviation(&["pixel_px"])?.unwrap_or(PIXEL_PX),
             is_check,
             seen: self.seen.clone(),
+            chip: self.chip()?,
         })
+    }
+
+    fn chip(&self) -> Result<Option<ImageChip>, String> {
+        let Some(path) = self.text(&["chip"]) else { return Ok(None) };
+        let place = match (self.number(&["chip_sample"])?, self.number(&["chip_line"])?) {
+            (Some(sample), Some(line)) => Some(ImagePoint::new(sample, line)),
+            (None, None) => None,
+            _ => return Err(format!("{}: chip_sample and chip_line are given one without the other", self.label)),
+        };
+        Ok(Some(ImageChip { path: PathBuf::from(path), place }))
     }
 }
 
@@ -232,8 +268,11 @@ fn from_csv(text: &str) -> Result<Vec<Row>, String> {
     let row = |(number, record): (usize, Vec<String>)| {
         let fields = header.iter().cloned().zip(record).collect();
         let mut row = Row { label: format!("row {number}"), fields, seen: Vec::new() };
-        let image = row.text(&["image", "file", "filename"]).map(str::to_owned);
-        let image = image.ok_or_else(|| format!("{}: image is missing", row.label))?;
+        let image = match row.text(&["image", "file", "filename"]) {
+            Some(image) => image.to_owned(),
+            None if row.text(&["chip"]).is_some() => return Ok(row),
+            None => return Err(format!("{}: image is missing, or chip", row.label)),
+        };
         let place = ImagePoint::new(row.needed(&["sample", "column", "col"])?, row.needed(&["line", "row"])?);
         row.seen.push(ImagePlace { image, place });
         Ok(row)
@@ -324,12 +363,37 @@ mod tests {
             ("a,1,95,3,0.1,b,5,6", "not on the Earth"),
             ("a,1,2,nan,0.1,b,5,6", "height is \"nan\""),
             ("a,1,2,3,0.1,b,5,6\na,1,2,4,0.1,c,5,6", "row 2: the point a has two positions"),
+            ("a,1,2,3,0.1,b,5", "row 1: line is missing"),
         ] {
             let error = parse(&format!("{header}\n{rows}\n")).unwrap_err();
             assert!(error.contains(expected), "{rows:?}: {error}");
         }
         let error = parse("name,x,y,height,accuracy_m,image,sample,line\na,1,2,3,1,b,5,6\n").unwrap_err();
         assert!(error.contains("without crs"), "{error}");
+    }
+
+    #[test]
+    fn chips_stand_for_places() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.tif"), "picture").unwrap();
+        let read = |name: &str, text: &str| {
+            std::fs::write(folder.path().join(name), text).unwrap();
+            read_ground_points(&folder.path().join(name)).map_err(|error| error.to_string())
+        };
+        let header = "name,lon,lat,height,accuracy_m,image,sample,line,chip,chip_sample,chip_line\n";
+        let row = |row: &str| read("points.csv", &format!("{header}{row}\n"));
+        let points = row("p,1,2,3,0.1,,,,a.tif,20,21.5\nq,1,2,3,0.1,left.tif,5,6,a.tif,,").unwrap();
+        let path = folder.path().join("a.tif");
+        assert_eq!(points[0].chip, Some(ImageChip { path: path.clone(), place: Some(ImagePoint::new(20.0, 21.5)) }));
+        assert_eq!((points[1].chip.clone(), points[1].seen.len()), (Some(ImageChip { path, place: None }), 1));
+        let json = r#"{"features": [{"id": "p", "geometry": {"coordinates": [1, 2, 3]}, "properties":
+            {"accuracy_m": 0.1, "chip": "a.tif", "chip_sample": 20, "chip_line": 21.5}}]}"#;
+        assert_eq!(read("points.json", json).unwrap(), points[..1]);
+        assert!(row("p,1,2,3,0.1,,,,a.tif,20,").unwrap_err().contains("one without the other"));
+        for name in ["none.tif", "/vsicurl/http://example.org/a.tif", "http://example.org/a.tif", "."] {
+            let refused = row(&format!("p,1,2,3,0.1,,,,{name},,")).unwrap_err();
+            assert!(refused.contains("a chip is not a file"), "{refused}");
+        }
     }
 
     proptest! {

@@ -282,3 +282,116 @@ fn attributes_of_surfaces_are_kept() {
     assert_eq!(*of(1), serde_json::json!({ "type": "RoofSurface", "slope": 12.0, "panel": { "kind": "solar" } }));
     assert_eq!((of(2), of(3)), (of(0), &serde_json::json!({ "type": "WallSurface" })));
 }
+
+/// A CityGML document of one building.
+fn city_gml(building: &str) -> String {
+    format!(
+        "<core:CityModel xmlns:core=\"http://www.opengis.net/citygml/2.0\" xmlns:gml=\"http://www.opengis.net/gml\" \
+         xmlns:bldg=\"http://www.opengis.net/citygml/building/2.0\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" \
+         xmlns:gen=\"http://www.opengis.net/citygml/generics/2.0\"><gml:boundedBy><gml:Envelope \
+         srsName=\"EPSG:25832\"/></gml:boundedBy><core:cityObjectMember><bldg:Building gml:id=\"b\">{building}\
+         </bldg:Building></core:cityObjectMember></core:CityModel>"
+    )
+}
+
+fn gml_polygon(id: &str, corners: &str) -> String {
+    format!(
+        "<gml:surfaceMember><gml:Polygon gml:id=\"{id}\"><gml:exterior><gml:LinearRing><gml:posList>{corners}\
+         </gml:posList></gml:LinearRing></gml:exterior></gml:Polygon></gml:surfaceMember>"
+    )
+}
+
+/// The surfaces of a solid have the attributes of the boundary surfaces that it links to, or that
+/// link to it. What the description of a surface cannot hold is counted.
+#[test]
+fn attributes_of_surfaces_go_from_citygml_to_cityjson() {
+    let set = |polygons: &str| {
+        format!("<bldg:lod2MultiSurface><gml:MultiSurface>{polygons}</gml:MultiSurface></bldg:lod2MultiSurface>")
+    };
+    let roof =
+        set(&[gml_polygon("r", "0 0 3 4 0 3 0 4 3 0 0 3"), gml_polygon("s", "4 0 3 4 4 3 0 4 3 4 0 3")].concat());
+    let door = set(&gml_polygon("d", "1 0 0 2 0 0 2 0 2 1 0 0"));
+    let building = format!(
+        "<bldg:lod2Solid><gml:Solid><gml:exterior><gml:CompositeSurface><gml:surfaceMember xlink:href=\"#r\"/>{own}\
+         </gml:CompositeSurface></gml:exterior></gml:Solid></bldg:lod2Solid>\
+         <bldg:boundedBy><bldg:RoofSurface><gml:name>gable</gml:name>{roof}<gen:doubleAttribute name=\"slope\">\
+         <gen:value>31.5</gen:value></gen:doubleAttribute><gen:stringAttribute name=\"type\"><gen:value>x</gen:value>\
+         </gen:stringAttribute></bldg:RoofSurface></bldg:boundedBy>\
+         <bldg:boundedBy><bldg:WallSurface><gml:description>north</gml:description>{linked}<bldg:opening><bldg:Door>\
+         <gml:name>entry</gml:name>{door}<bldg:address><core:Address><core:xalAddress><LocalityName>Ulm</LocalityName>\
+         </core:xalAddress></core:Address></bldg:address></bldg:Door></bldg:opening></bldg:WallSurface></bldg:boundedBy>\
+         <bldg:boundedBy><bldg:GroundSurface><gml:name>nowhere</gml:name></bldg:GroundSurface></bldg:boundedBy>\
+         <bldg:boundedBy><bldg:Gutter><gml:name>zinc</gml:name></bldg:Gutter></bldg:boundedBy>",
+        own = gml_polygon("w", "0 0 0 4 0 0 0 0 3 0 0 0"),
+        linked = set("<gml:surfaceMember xlink:href=\"#w\"/>"),
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let (source, target) = (folder.path().join("a.gml"), folder.path().join("b.city.json"));
+    std::fs::write(&source, city_gml(&building)).unwrap();
+    let model = read(&source).unwrap().model;
+    // The type is a member of its own; the ground has no polygon, and the gutter no class.
+    assert_eq!(model.left_out.clone().into_iter().collect::<Vec<_>>(), [("attributes of surfaces".to_owned(), 3)]);
+    assert!(model.objects[0].attributes.is_empty() && model.objects[0].addresses.is_empty());
+    write_cityjson(&target, &model, &CityJsonOptions::default()).unwrap();
+    let written: serde_json::Value = serde_json::from_slice(&std::fs::read(&target).unwrap()).unwrap();
+    let shapes = &written["CityObjects"]["b"]["geometry"];
+    let roof = serde_json::json!({ "type": "RoofSurface", "name": "gable", "slope": 31.5 });
+    let wall = serde_json::json!({ "type": "WallSurface", "description": "north" });
+    let door = serde_json::json!({ "type": "Door", "name": "entry", "address": { "LocalityName": "Ulm" } });
+    assert_eq!(shapes[0]["semantics"], serde_json::json!({ "surfaces": [roof, wall], "values": [[0, 1]] }));
+    assert_eq!(shapes[1]["semantics"], serde_json::json!({ "surfaces": [roof, door], "values": [0, 1] }));
+}
+
+/// The surfaces of real files keep all of their attributes. The numbers were counted with lxml.
+#[test]
+fn real_citygml_keeps_the_attributes_of_surfaces() {
+    let Some(folder) = real_data() else { return };
+    for (name, attributes) in
+        [("val3dity/gml/DenHaag_1BwBP.gml", 14), ("berlin/data/examples/gml_data/20240216_PartialMierendorff.gml", 167)]
+    {
+        let model = read(&folder.join(name)).unwrap().model;
+        assert!(!model.left_out.contains_key("attributes of surfaces"), "{name}: {:?}", model.left_out);
+        let shared: std::collections::HashMap<_, _> = model
+            .surfaces()
+            .filter_map(|s| s.attributes.as_ref())
+            .map(|a| (std::sync::Arc::as_ptr(a), a.len()))
+            .collect();
+        assert_eq!(shared.values().sum::<usize>(), attributes, "{name}");
+    }
+}
+
+/// An appearance or attributes of the wrong type cost only themselves.
+#[test]
+fn malformed_appearances_and_attributes_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.city.json");
+    let house = |appearance: &str, attributes: &str, material: &str, texture: &str| {
+        format!(
+            "{{\"type\":\"CityJSON\",\"version\":\"2.0\",\"appearance\":{appearance},\"CityObjects\":{{\"house\":{{\
+             \"type\":\"Building\",\"attributes\":{attributes},\"geometry\":[{{\"type\":\"MultiSurface\",\"lod\":\"2\",\
+             \"boundaries\":[[[0,1,2]]],\"material\":{material},\"texture\":{texture}}}]}}}},\
+             \"vertices\":[[0,0,0],[4,0,0],[0,4,0]]}}"
+        )
+    };
+    let good = "{\"materials\":[{\"name\":\"m\"}],\"textures\":[{\"type\":\"PNG\",\"image\":\"a.png\"}],\
+                \"vertices-texture\":[[0,0],[1,0],[0,1]]}";
+    let one_bad = "{\"materials\":[7,{\"name\":\"m\"}],\"textures\":[\"a.png\"],\"vertices-texture\":[[0],[1,0],{}],\
+                   \"default-theme-material\":[]}";
+    let (paint, cover) = ("{\"t\":{\"value\":0}}", "{\"t\":{\"values\":[[[0,0,1,2]]]}}");
+    let (appearances, attributes) = ("malformed materials and textures", "malformed attributes of objects");
+    let references = "invalid references to materials and textures";
+    for (text, expected) in [
+        (house(good, "{}", paint, cover), vec![]),
+        (house("null", "null", "null", "null"), vec![]),
+        (house("\"red\"", "7", "null", "null"), vec![(attributes, 1), (appearances, 1)]),
+        (house(good, "{}", "[]", "{\"t\":\"x\"}"), vec![(appearances, 2)]),
+        (house(one_bad, "{}", paint, cover), vec![(references, 2), (appearances, 5)]),
+        (house("{\"materials\":{},\"vertices-texture\":1}", "{}", "null", "null"), vec![(appearances, 2)]),
+    ] {
+        std::fs::write(&path, &text).unwrap();
+        let model = read(&path).unwrap_or_else(|error| panic!("{error}: {text}")).model;
+        assert_eq!(model.surfaces().count(), 1, "{text}");
+        let found: Vec<(&str, usize)> = model.left_out.iter().map(|(what, count)| (what.as_str(), *count)).collect();
+        assert_eq!(found, expected, "{text}");
+    }
+}

@@ -166,6 +166,144 @@ fn a_later_run_starts_from_saved_pointing() {
     assert!(matches!(refused, Err(DsmError::Corrections(_))));
 }
 
+/// A ground point on level, open ground of the town, with the relief around it.
+struct OpenPlace {
+    ground: LonLatHeight,
+    relief_m: f64,
+}
+
+/// Finds the most level places of the true surface, one in each field of a lattice.
+fn open_places(count: usize) -> Vec<OpenPlace> {
+    const AROUND: usize = 30;
+    let truth = io::raster::read_dem(town("truth/dsm.tif")).unwrap();
+    let projection = crs::MapProjection::from_epsg(truth.horizontal_epsg.unwrap()).unwrap();
+    let (width, height) = (truth.heights.width(), truth.heights.height());
+    // Greatest distance of the surroundings from the plane that fits them best.
+    let relief = |column: usize, row: usize| {
+        let reach = -(AROUND as isize)..=AROUND as isize;
+        let cells = reach.clone().flat_map(|y| reach.clone().map(move |x| [x, y]));
+        let height =
+            |[x, y]: [isize; 2]| f64::from(truth.heights[(column.wrapping_add_signed(x), row.wrapping_add_signed(y))]);
+        let sums = cells.clone().map(|at| (height(at), at.map(|v| v as f64), 1.0));
+        let [n, sum, along_x, along_y, square] =
+            sums.fold([0.0; 5], |s, (h, [x, y], one)| [s[0] + one, s[1] + h, s[2] + x * h, s[3] + y * h, s[4] + x * x]);
+        let plane = |[x, y]: [isize; 2]| sum / n + along_x / square * x as f64 + along_y / square * y as f64;
+        cells.map(|at| (height(at) - plane(at)).abs()).fold(0.0, f64::max)
+    };
+    const FIELDS: usize = 5;
+    let part = |i: usize, size: usize| {
+        let side = (size - 4 * AROUND) / FIELDS;
+        (2 * AROUND + i * side..2 * AROUND + (i + 1) * side).step_by(4)
+    };
+    let mut found: Vec<OpenPlace> = (0..FIELDS * FIELDS)
+        .map(|field| {
+            let cells = part(field / FIELDS, height)
+                .flat_map(|row| part(field % FIELDS, width).map(move |column| (column, row)));
+            let level = |&(column, row): &(usize, usize)| relief(column, row);
+            let (column, row) = cells.min_by(|a, b| level(a).total_cmp(&level(b))).unwrap();
+            let (x, y) = truth.geotransform.map_from_cell(column as f64, row as f64);
+            let (lon, lat) = projection.lonlat_from_map(x, y).unwrap();
+            let ground = LonLatHeight::new(lon, lat, f64::from(truth.heights[(column, row)]));
+            OpenPlace { ground, relief_m: relief(column, row) }
+        })
+        .collect();
+    found.sort_by(|a, b| a.relief_m.total_cmp(&b.relief_m));
+    found.truncate(count);
+    found
+}
+
+/// Cuts a chip of 35 × 35 pixels out of the second view, with its RPC or without. Returns the place
+/// of the point in it.
+fn cut_chip(path: &Path, view: &View, ground: LonLatHeight, with_rpc: bool) -> ImagePoint {
+    use io::raster::{Band, BandData, ImageSource, write_image_with_rpc};
+    let at = view.shows(ground);
+    let corner = [at.sample, at.line].map(|v| v.round() - 17.0);
+    let window = raster::Window { x: corner[0] as i64, y: corner[1] as i64, width: 35, height: 35 };
+    let pixels = ImageSource::open(town(&view.name)).unwrap().read_samples(1, window).unwrap().map(|v| *v as u16);
+    let bands = [Band { data: BandData::U16(&pixels), description: "grey" }];
+    let origin = ImagePoint::new(corner[0], corner[1]);
+    if with_rpc {
+        write_image_with_rpc(path, &bands, &view.delivered.rpc.cropped(origin), None, true).unwrap();
+    } else {
+        io::raster::write_map(path, &bands, None, &[], true).unwrap();
+    }
+    ImagePoint::new(at.sample - corner[0], at.line - corner[1])
+}
+
+/// Chips from one view are found in the others in spite of the pointing errors, and place the town
+/// as measured places do.
+#[test]
+fn chips_are_found_in_the_other_views() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("points.csv");
+    let views = View::all();
+    let mut config = config(folder.path());
+    config.control = Some(path.clone());
+    let places = open_places(6);
+    let mut text =
+        "name,lon,lat,height,accuracy_m,pixel_px,role,image,sample,line,chip,chip_sample,chip_line\n".to_owned();
+    for (i, OpenPlace { ground, .. }) in places.iter().enumerate() {
+        let chip = cut_chip(&folder.path().join(format!("{i}.tif")), &views[1], *ground, true);
+        let role = if i % 2 == 0 { "control" } else { "check" };
+        let (LonLatHeight { lon_deg, lat_deg, height_m }, ImagePoint { sample, line }) = (*ground, chip);
+        let row = format!("p{i},{lon_deg},{lat_deg},{height_m},0.1,0.2,{role},,,,{i}.tif,{sample},{line}");
+        writeln!(text, "{row}").unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    let found = pointed(&config);
+    let report = found.pointing.control.unwrap();
+    assert_eq!((report.control.len(), report.checks.len(), report.chips.len()), (3, 3, 3 * places.len()));
+    let mut worst = 0.0f64;
+    for chip in &report.chips {
+        let number: usize = chip.name[1..].parse().unwrap();
+        let view = views.iter().find(|view| view.name == chip.image).unwrap();
+        let (at, true_at) = (chip.place.unwrap_or_else(|| panic!("{chip:?}")), view.shows(places[number].ground));
+        worst = worst.max((at.sample - true_at.sample).hypot(at.line - true_at.line));
+    }
+    assert!(worst < 0.1, "{worst} px: {:?}", report.chips);
+    let (ce90, le90) = (report.ce90_m.unwrap(), report.le90_m.unwrap());
+    assert!(ce90 < 0.5 && le90 < 0.5, "CE90 {ce90} m, LE90 {le90} m");
+}
+
+/// A chip is found in the image it comes from also without an RPC; what is not found is named.
+#[test]
+fn chips_that_are_not_found_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("points.csv");
+    let views = View::all();
+    let places = open_places(2);
+    let (here, there) = (places[0].ground, places[1].ground);
+    let chip = cut_chip(&folder.path().join("a.tif"), &views[1], here, false);
+    let mut config = config(folder.path());
+    config.control = Some(path.clone());
+    let write = |ground: LonLatHeight, at: ImagePoint| {
+        let LonLatHeight { lon_deg, lat_deg, height_m } = ground;
+        let (place, ImagePoint { sample, line }) = (views[0].shows(ground), at);
+        let text = format!(
+            "name,lon,lat,height,accuracy_m,image,sample,line,chip,chip_sample,chip_line\n\
+             a,{lon_deg},{lat_deg},{height_m},0.1,view_1.tif,{},{},a.tif,{sample},{line}\n",
+            place.sample, place.line
+        );
+        std::fs::write(&path, text).unwrap();
+    };
+    write(here, chip);
+    let report = pointed(&config).pointing.control.unwrap();
+    let own = report.chips.iter().find(|chip| chip.image == "view_2.tif").unwrap();
+    assert!(own.score.unwrap() > 0.95 && report.chips.iter().all(|chip| chip.image != "view_1.tif"), "{report:?}");
+    // The chip of another place.
+    write(there, chip);
+    let found = pointed(&config);
+    let report = found.pointing.control.unwrap();
+    assert!(report.chips.iter().all(|chip| chip.place.is_none() && chip.reason.is_some()), "{:?}", report.chips);
+    let named =
+        found.warnings.iter().filter(|text| text.contains("the chip of the ground point a is not found in 2 of 2"));
+    assert_eq!(named.count(), 1, "{:?}", found.warnings);
+    // A place outside of the chip.
+    write(here, ImagePoint::new(35.5, 3.0));
+    let refused = point(&config, &open(&config).unwrap(), &mut Session::new(&Silent)).unwrap_err();
+    assert!(refused.to_string().contains("inside of the 35 x 35 pixels of the chip"), "{refused}");
+}
+
 #[test]
 fn points_outside_of_the_images_are_refused() {
     let folder = tempfile::tempdir().unwrap();

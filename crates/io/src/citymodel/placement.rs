@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 use city::ModelPoint;
+use serde_json::{Map, Value};
 
 use super::CityFault;
 use super::builder::Builder;
@@ -15,6 +16,8 @@ const EXPANDED_MAX: usize = 40_000_000;
 const SURFACE_SIZE: usize = 16;
 const RING_SIZE: usize = 8;
 const VERTEX_SIZE: usize = 8;
+/// Size of a value of an attribute without its text.
+const VALUE_SIZE: usize = 8;
 
 /// Placement of a shape: a 4 × 4 matrix in row order, then a shift by a point of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +46,22 @@ pub(super) struct Expansion {
 /// Returns the size of a surface with `rings` rings of `corners` corners in all.
 pub(super) fn surface_size(rings: usize, corners: usize) -> usize {
     SURFACE_SIZE + rings.saturating_mul(RING_SIZE).saturating_add(corners)
+}
+
+/// Returns the size of the attributes of a surface. Each description of a surface that is written
+/// repeats them.
+pub(super) fn attributes_size(attributes: &Map<String, Value>) -> usize {
+    let member = |(name, value): (&String, &Value)| (name.len() / 4).saturating_add(value_size(value));
+    attributes.iter().map(member).fold(VALUE_SIZE, usize::saturating_add)
+}
+
+fn value_size(value: &Value) -> usize {
+    match value {
+        Value::Object(members) => attributes_size(members),
+        Value::Array(list) => list.iter().map(value_size).fold(VALUE_SIZE, usize::saturating_add),
+        Value::String(text) => VALUE_SIZE + text.len() / 4,
+        _ => VALUE_SIZE,
+    }
 }
 
 impl Expansion {

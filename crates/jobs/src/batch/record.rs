@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::batch::task::TaskJob;
+use crate::dsm::files_of;
 use crate::error_text::with_causes;
 use crate::files::{TEXT_LIMIT, write_json};
-use crate::production::{InputFile, added_input, check_inputs, files_of, inputs_of};
+use crate::production::{InputFile, added_input, check_inputs, inputs_of};
 
 /// The record of a task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

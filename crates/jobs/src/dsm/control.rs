@@ -15,10 +15,11 @@ use io::ground_points::{GroundPoint, ImagePlace, read_ground_points};
 use numeric::order_statistic;
 use sweep::pointing::{Adjustment, ControlPoint, Track, ground_of};
 
+use crate::dsm::chips::find_places;
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::images::SceneImage;
 use crate::dsm::notes::Notes;
-use crate::dsm::report::{CheckPointReport, ControlPointReport, ControlReport};
+use crate::dsm::report::{CheckPointReport, ChipReport, ControlPointReport, ControlReport};
 
 /// A control point this many of its standard deviations from where the images see it is named.
 const ODD: f64 = 4.0;
@@ -30,6 +31,8 @@ pub(crate) struct GroundControl {
     /// Points that take part in the adjustment.
     pub(crate) control: Vec<ControlPoint>,
     checks: Vec<Check>,
+    /// Searches for image chips.
+    chips: Vec<ChipReport>,
 }
 
 /// A point that only measures.
@@ -41,20 +44,25 @@ struct Check {
 }
 
 impl GroundControl {
-    /// Reads the ground points that images of the run show. Without a file there are none.
+    /// Reads the ground points that images of the run show, and finds their chips in the images.
+    /// Without a file there are none.
     ///
     /// # Errors
     /// [`DsmError::Control`] for a file that cannot be used, [`DsmError::Value`] when no image of
     /// the run shows a point, or a place lies outside its image; [`DsmError::Crs`].
-    pub(crate) fn read(path: Option<&Path>, images: &[SceneImage]) -> Result<Self, DsmError> {
+    pub(crate) fn read(path: Option<&Path>, images: &[SceneImage], notes: &mut Notes<'_>) -> Result<Self, DsmError> {
         let Some(path) = path else { return Ok(Self::default()) };
         let mut out = Self::default();
         for point in read_ground_points(path)? {
-            let seen = places(&point, images)?;
-            if seen.is_empty() {
+            let mut seen = places(&point, images)?;
+            if seen.is_empty() && point.chip.is_none() {
                 continue;
             }
             let ground = position(&point)?;
+            out.chips.extend(find_places(&point, ground, images, &mut seen, notes)?);
+            if seen.is_empty() {
+                continue;
+            }
             if point.is_check {
                 out.checks.push(Check { name: point.name, ground, seen });
                 continue;
@@ -65,7 +73,7 @@ impl GroundControl {
         }
         if out.control.is_empty() && out.checks.is_empty() {
             let found = format!("a file without a place in an image of the run: {}", path.display());
-            let expected = "places whose images have the names of the run's";
+            let expected = "places whose images have the names of the run's, or chips that are found in them";
             return Err(DsmError::value(DsmSetting::Control, found, expected));
         }
         Ok(out)
@@ -100,7 +108,9 @@ impl GroundControl {
                 odd.residual, odd.name
             ));
         }
-        let mut report = ControlReport { control, checks: Vec::new(), unmeasured: 0, ce90_m: None, le90_m: None };
+        let chips = self.chips.clone();
+        let mut report =
+            ControlReport { control, checks: Vec::new(), chips, unmeasured: 0, ce90_m: None, le90_m: None };
         self.measure_again(&mut report, &cameras, notes);
         Some(report)
     }

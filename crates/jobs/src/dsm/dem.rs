@@ -6,6 +6,7 @@ use crs::{HeightConverter, MapProjection, VerticalDatum};
 
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::footprints::shared_ground;
+use crate::dsm::notes::Notes;
 use crate::dsm::values::{HeightRange, MapBounds};
 use crate::dsm::view_geometry::ViewGeometry;
 
@@ -22,8 +23,10 @@ pub(crate) fn dem_heights(
     path: &Path,
     stated: Option<VerticalDatum>,
     geometry: &ViewGeometry,
+    notes: &mut Notes<'_>,
 ) -> Result<HeightRange, DsmError> {
     let dem = io::raster::read_dem(path)?;
+    warn_of_datum(path, stated, dem.vertical, notes);
     let no_crs = || {
         let found = format!("a file without coordinate reference system: {}", path.display());
         DsmError::value(DsmSetting::Dem, found, "a georeferenced elevation model")
@@ -60,4 +63,22 @@ pub(crate) fn dem_heights(
     let centre = geometry.centre;
     let up = |v: f64| converter.ellipsoid_from_datum(centre.lon_deg, centre.lat_deg, v);
     Ok(HeightRange::new(up(lo)?, up(hi)?))
+}
+
+/// Warns when the datum that is given for an elevation model is not the one that its file names.
+pub(crate) fn warn_of_datum(
+    path: &Path,
+    stated: Option<VerticalDatum>,
+    named: Option<VerticalDatum>,
+    notes: &mut Notes<'_>,
+) {
+    if let (Some(stated), Some(named)) = (stated, named)
+        && stated != named
+    {
+        notes.warn(format!(
+            "the heights of an elevation model are taken as above {stated}, as given, but the file names {named}; check \
+             which is right: {}",
+            path.display()
+        ));
+    }
 }

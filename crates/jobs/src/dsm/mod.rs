@@ -47,6 +47,7 @@
 //! ```
 
 mod character;
+mod chips;
 mod chunk;
 mod chunk_files;
 mod chunk_plan;
@@ -108,7 +109,7 @@ pub use config::{DsmConfig, Fill, Preset};
 pub use error::{DsmError, DsmSetting};
 pub use grid::DsmGrid;
 pub use images::SceneImage;
-pub(crate) use input_stamps::InputStamps;
+pub(crate) use input_stamps::{InputStamps, files_of};
 pub use levels::SweepLevels;
 pub(crate) use merge::Merger;
 pub use merge::{Product, merge};
@@ -120,9 +121,9 @@ pub use prior_findings::{BuildingFinding, PriorFindings, ViewVotes};
 pub use rasters::ChunkRasters;
 pub use register::register;
 pub use report::{
-    CheckPointReport, ChunksReport, ControlPointReport, ControlReport, CorrectionOrder, DsmReport, FailedChunk,
-    ImagePointing, ImageReport, LeftOut, PairReport, PointingReport, PriorReport, ReferenceReport, StageTime,
-    SurfaceReport,
+    CheckPointReport, ChipReport, ChunksReport, ControlPointReport, ControlReport, CorrectionOrder, DsmReport,
+    FailedChunk, ImagePointing, ImageReport, LeftOut, PairReport, PointingReport, PriorReport, ReferenceReport,
+    StageTime, SurfaceReport,
 };
 pub use run::run;
 pub use session::Session;

@@ -83,11 +83,11 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     }
     let looked = look(config, &images, session)?;
     check_pictures(&images, &looked)?;
-    let points = GroundControl::read(config.control.as_deref(), &images)?;
+    let mut notes = Notes::new(session.progress);
+    let points = GroundControl::read(config.control.as_deref(), &images, &mut notes)?;
     let (tracks, contradictory) = join_pairs(&looked.ties);
     let observations = Observations { tracks: &tracks, control: &points.control };
     let found = adjust_to_control(&looked.cameras, &looked.sizes, observations, &AdjustConfig::default());
-    let mut notes = Notes::new(session.progress);
     let is_applied = is_applied(config, &found, &mut notes);
     warn_of_sights(&images, &looked, &found, &mut notes);
     let by_image = by_image(&images, &looked, &found, &tracks);
@@ -106,7 +106,7 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     let pairs = choose_pairs(config, &images, &sought, &geometry, &mut notes)?;
     session.lap("pointing");
     let dem_heights =
-        config.dem.as_deref().map(|path| dem_heights(path, config.dem_vertical, &geometry)).transpose()?;
+        config.dem.as_deref().map(|path| dem_heights(path, config.dem_vertical, &geometry, &mut notes)).transpose()?;
     Ok(Pointed {
         images,
         characters,

@@ -14,15 +14,17 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use camera::{ImageCorrection, ImagePoint, RpcCamera};
-use crs::MapProjection;
+use crs::{MapProjection, VerticalDatum};
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, Shift, evaluate};
 use geodesy::LonLatHeight;
+use numeric::{Silent, nearest_quantile};
 use raster::{Grid, reduce};
 
 use crate::dsm::chunk::{ChunkContent, run_chunk};
 use crate::dsm::chunk_plan::ChunkWork;
 use crate::dsm::config::{DsmConfig, Fill, Preset};
 use crate::dsm::control::GroundControl;
+use crate::dsm::dem::warn_of_datum;
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::grid::{DsmGrid, choose_grid};
 use crate::dsm::images::SceneImage;
@@ -65,6 +67,14 @@ const AGREEMENT_M: f64 = 0.5;
 /// [`PLANE_NMADS`].
 const PLANE_ROUNDS: usize = 4;
 const PLANE_NMADS: f64 = 3.0;
+/// A reference is taken for the bare ground when a twentieth of the cells stand this far above it,
+/// metres, and that many times as far as the twentieth below it. Buildings and trees are higher than
+/// that; errors of surfaces, and trees and houses that only one of both has, reach to both sides.
+/// Chosen on the sample town.
+const STANDING_MIN_M: f64 = 3.0;
+const ONE_SIDED: f64 = 3.0;
+/// Share of the cells beyond the reach of a surface, at either end.
+const BEYOND: f64 = 0.05;
 /// A plane that changes nothing.
 const LEVEL: FittedPlane = FittedPlane { centre: [0.0; 2], offset: 0.0, slope: [0.0; 2] };
 /// Places per side of an image at which the old and the new camera are compared.
@@ -86,8 +96,10 @@ pub fn register(config: &DsmConfig, mut pointed: Pointed, session: &mut Session<
     if !pointed.pointing.applied {
         return Err(weak(path, "the images have too few tie points to agree with each other".to_owned()));
     }
+    let mut notes = Notes::resume(&pointed.choices, &pointed.warnings, session.progress);
     session.progress.begin("co-registering", 2);
     let first = Round::of(config, Preset::Fast, &pointed, session)?;
+    warn_of_datum(path, config.dem_vertical, first.named, &mut notes);
     first.check(path)?;
     first.apply(config, &mut pointed)?;
     session.progress.step();
@@ -105,7 +117,7 @@ pub fn register(config: &DsmConfig, mut pointed: Pointed, session: &mut Session<
     }
     second.apply(config, &mut pointed)?;
     session.progress.step();
-    let mut notes = Notes::resume(&pointed.choices, &pointed.warnings, session.progress);
+    second.warn_of_bare_ground(path, &mut notes);
     let report = ReferenceReport {
         path: path.to_owned(),
         shift_m: std::array::from_fn(|axis| first.shift_m()[axis] + second.shift_m()[axis]),
@@ -125,7 +137,8 @@ pub fn register(config: &DsmConfig, mut pointed: Pointed, session: &mut Session<
     );
     if let (Some(control), Some(points)) = (&mut pointed.pointing.control, &config.control) {
         let cameras: Vec<RpcCamera> = pointed.images.iter().map(|image| image.camera.clone()).collect();
-        GroundControl::read(Some(points), &pointed.images)?.measure_again(control, &cameras, &mut notes);
+        GroundControl::read(Some(points), &pointed.images, &mut Notes::new(&Silent))?
+            .measure_again(control, &cameras, &mut notes);
     }
     pointed.pointing.reference = Some(report);
     (pointed.choices, pointed.warnings) = (notes.choices, notes.warnings);
@@ -155,6 +168,10 @@ struct Round {
     nmad_m: (f64, f64),
     /// Cell of the coarser surface, metres.
     cell_m: f64,
+    /// How far the surface reaches below and above the reference, metres.
+    reach_m: [f64; 2],
+    /// The datum that the reference names.
+    named: Option<VerticalDatum>,
 }
 
 impl Round {
@@ -211,6 +228,8 @@ impl Round {
             common,
             nmad_m: nmad,
             cell_m: reference.cell_m.max(grid.gsd_m),
+            reach_m: reach_m(&by_search.errors),
+            named: reference.named,
             grid,
         })
     }
@@ -237,6 +256,19 @@ impl Round {
             return Ok(());
         };
         Err(weak(path, reason))
+    }
+
+    /// Warns of a reference that the surface stands above, but hardly reaches below.
+    fn warn_of_bare_ground(&self, path: &Path, notes: &mut Notes<'_>) {
+        let [below_m, above_m] = self.reach_m;
+        if above_m > STANDING_MIN_M && above_m > ONE_SIDED * below_m {
+            notes.warn(format!(
+                "the reference looks like a model of the bare ground: a twentieth of the scene stands {above_m:.1} m or \
+                 more above it, and hardly anything lies below; roofs and trees pull the scene down then, use a surface \
+                 model: {}",
+                path.display()
+            ));
+        }
     }
 
     fn tolerance_m(&self) -> f64 {
@@ -333,7 +365,7 @@ fn trial_surface(
         gsd_m: None,
         bounds: None,
         crs_epsg: None,
-        vertical: crs::VerticalDatum::Ellipsoid,
+        vertical: VerticalDatum::Ellipsoid,
         prior: None,
         references: None,
         reference_dem: None,
@@ -405,6 +437,15 @@ fn align(
     let metres = MetresFromCells::new(&grid.geotransform, (1.0, 1.0));
     let config = EvalConfig { alignment, search_m: SEARCH_M, ..EvalConfig::default() };
     evaluate(&EvalInput::new(surface, reference, &cells, metres), &config)
+}
+
+/// Returns how far the errors reach below and above their median, without [`BEYOND`] at either end.
+fn reach_m(errors: &Grid<f32>) -> [f64; 2] {
+    let mut errors: Vec<f64> =
+        errors.data().iter().filter(|error| error.is_finite()).map(|error| f64::from(*error)).collect();
+    let mut at = |share| nearest_quantile(&mut errors, share).unwrap_or(0.0);
+    let (low, middle, high) = (at(BEYOND), at(0.5), at(1.0 - BEYOND));
+    [middle - low, high - middle]
 }
 
 /// Returns the columns and rows that the cells of a surface span, those that `is_used`.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use camera::ImageCorrection;
+use camera::{ImageCorrection, ImagePoint};
 use numeric::Choice;
 use serde::{Deserialize, Serialize};
 use sweep::pointing::{Adjustment, ModelOrder};
@@ -135,6 +135,22 @@ pub struct ReferenceReport {
     pub last_shift_m: f64,
 }
 
+/// What became of the search for the chip of a ground point in an image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ChipReport {
+    /// Name of the point.
+    pub name: String,
+    /// Name of the image's file.
+    pub image: String,
+    /// Place at which it was found.
+    pub place: Option<ImagePoint>,
+    /// Correlation there.
+    pub score: Option<f64>,
+    /// Why it was not found.
+    pub reason: Option<String>,
+}
+
 /// What ground points with known positions show of the pointing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -143,6 +159,8 @@ pub struct ControlReport {
     pub control: Vec<ControlPointReport>,
     /// Points that only measure.
     pub checks: Vec<CheckPointReport>,
+    /// Searches for image chips.
+    pub chips: Vec<ChipReport>,
     /// Number of check points that fewer than two images show.
     pub unmeasured: usize,
     /// Horizontal error that nine of ten check points do not exceed, metres; `None` without check

@@ -8,11 +8,10 @@ use std::collections::BTreeSet;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
-use io::raster::ImageSource;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::dsm::DsmConfig;
+use crate::dsm::{DsmConfig, files_of};
 use crate::files::FileError;
 use crate::production::content_hash;
 use crate::production::error::ProductionError;
@@ -62,25 +61,6 @@ impl InputFile {
 pub(crate) fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, ProductionError> {
     let files: Vec<PathBuf> = files_of(config)?.into_iter().collect();
     Ok(files.par_iter().map(|path| InputFile::of(path)).collect::<Result<_, _>>()?)
-}
-
-/// Returns the names of the files that [`inputs_of`] reads.
-///
-/// # Errors
-/// [`ProductionError::Dsm`].
-pub(crate) fn files_of(config: &DsmConfig) -> Result<BTreeSet<PathBuf>, ProductionError> {
-    let mut files: BTreeSet<PathBuf> = config.side_inputs().cloned().collect();
-    for image in &config.images {
-        let source = ImageSource::open(image).map_err(crate::dsm::DsmError::from)?;
-        files.extend(source.files());
-        files.extend(io::rpc::side_files(image));
-        files.insert(image.clone());
-    }
-    for model in [&config.dem, &config.reference_dem].into_iter().flatten() {
-        files.extend(ImageSource::open(model).map_err(crate::dsm::DsmError::from)?.files());
-    }
-    files.retain(|path| path.is_file());
-    Ok(files)
 }
 
 /// Returns a file that is not among the inputs, if there is one.

@@ -32,7 +32,7 @@ pub(crate) use content_hash::of_value as hash_of;
 pub use error::ProductionError;
 pub use estimate::{ChunkEstimate, PlanEstimate};
 pub use input_files::InputFile;
-pub(crate) use input_files::{added as added_input, check as check_inputs, files_of, inputs_of};
+pub(crate) use input_files::{added as added_input, check as check_inputs, inputs_of};
 pub(crate) use make_or_resume::make_or_resume;
 pub use merge_run::{MergeConfig, merge_run};
 pub use plan_file::PlanFile;

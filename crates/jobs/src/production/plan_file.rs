@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::dsm::{DsmConfig, Plan, USED_CONFIG};
+use crate::dsm::{DsmConfig, Plan, USED_CONFIG, files_of};
 use crate::files::TEXT_LIMIT;
 use crate::job_file::read_dsm_job;
 use crate::job_paths::{relative, resolved};
@@ -124,7 +124,7 @@ impl PlanFile {
     /// [`ProductionError::File`], [`ProductionError::Dsm`].
     pub(super) fn check_inputs(&self) -> Result<(), ProductionError> {
         input_files::check(&self.inputs)?;
-        let files = input_files::files_of(&self.plan.config)?;
+        let files = files_of(&self.plan.config)?;
         let added = input_files::added(&files, &self.inputs);
         added.map_or(Ok(()), |path| Err(ProductionError::InputAdded { path: path.clone() }))
     }

@@ -7,6 +7,8 @@ mod adjust;
 #[cfg(test)]
 mod adjust_tests;
 mod block_system;
+mod chip;
+mod chip_fit;
 mod coarse;
 mod control;
 mod interest;
@@ -20,6 +22,8 @@ mod ties;
 mod tracks;
 
 pub use adjust::{AdjustConfig, Adjustment, Observations, adjust, adjust_to_control};
+pub use chip::{ChipConfig, ChipMiss, ChipPlace, find_chip};
+pub use chip_fit::{Chip, ChipSearch};
 pub use control::ControlPoint;
 pub use intersect::{Track, ground_of};
 pub use model::ModelOrder;

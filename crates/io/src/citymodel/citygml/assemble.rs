@@ -7,6 +7,7 @@ use std::sync::Arc;
 use city::{DefectCode, Geometry, GeometryKind, Lod, ModelPoint, SurfaceClass, SurfacePolygon};
 
 use super::appearance::Appearances;
+use super::boundary::SurfaceAttributes;
 use super::implicit::Implicit;
 use super::links::{Group, Links, Named, Resolved};
 use super::paint::{Polygon, Rings, paint};
@@ -22,15 +23,18 @@ pub(super) struct Found {
     pub(super) named: HashMap<String, Named>,
     pub(super) rings: Rings,
     pub(super) appearances: Appearances,
+    pub(super) surfaces: SurfaceAttributes,
 }
 
 /// Adds the geometries of all groups to their objects.
 pub(super) fn assemble(builder: &mut Builder, found: Found) -> Result<(), CityFault> {
-    let Found { groups, mut polygons, named, rings, appearances } = found;
+    let Found { groups, mut polygons, named, rings, appearances, surfaces } = found;
     let groups = &groups[..];
     let mut links = Links::new(groups, &named);
     paint(builder, &mut polygons, &appearances, &rings, &mut links)?;
-    let resolved = resolve(builder, groups, &mut polygons, &mut links)?;
+    let resolved = resolve(builder, groups, &mut polygons, &mut links, &surfaces)?;
+    let usable = polygons.iter_mut().filter(|polygon| !polygon.rings.is_empty());
+    surfaces.give(builder, usable.map(|polygon| (polygon.boundary, &mut polygon.attributes)));
     let in_solids: HashSet<(usize, Lod, usize)> = groups
         .iter()
         .zip(&resolved)
@@ -69,14 +73,17 @@ pub(super) fn assemble(builder: &mut Builder, found: Found) -> Result<(), CityFa
     Ok(())
 }
 
-/// Follows the links of all groups, and gives unclassified polygons the class of their members.
+/// Follows the links of all groups, and gives unclassified polygons the boundary surface of their
+/// members.
 fn resolve<'a>(
     builder: &mut Builder,
     groups: &'a [Group],
     polygons: &mut [Polygon],
     links: &mut Links<'a>,
+    surfaces: &SurfaceAttributes,
 ) -> Result<Vec<Vec<Resolved>>, CityFault> {
-    let sizes: Vec<usize> = polygons.iter().map(Polygon::size).collect();
+    let sizes: Vec<usize> =
+        polygons.iter().map(|polygon| polygon.size().saturating_add(surfaces.size(polygon.boundary))).collect();
     // A polygon that its own element uses and that a solid links to is in the model twice.
     let own = sizes.iter().sum::<usize>().saturating_mul(4);
     let mut expansion = Expansion::default();
@@ -89,14 +96,18 @@ fn resolve<'a>(
                 builder.dropped(DefectCode::UnresolvedReference, group.object, format!("line {}", member.line), detail);
             }
         }
-        let size = found.iter().map(|member| sizes[member.polygon]).fold(0, usize::saturating_add);
+        let size = found.iter().map(|member| match polygons[member.polygon].boundary.class {
+            SurfaceClass::Unclassified => sizes[member.polygon].saturating_add(surfaces.size(member.boundary)),
+            _ => sizes[member.polygon],
+        });
+        let size = size.fold(0, usize::saturating_add);
         expansion.add(size, own, &format!("line {}", group.line))?;
         // A boundary surface also classifies a polygon that belongs to a solid and that it only
         // links to.
         for member in &found {
             let polygon = &mut polygons[member.polygon];
-            if polygon.class == SurfaceClass::Unclassified {
-                polygon.class = member.class;
+            if polygon.boundary.class == SurfaceClass::Unclassified {
+                polygon.boundary = member.boundary;
             }
         }
         resolved.push(found);
@@ -160,10 +171,10 @@ fn surface(polygon: &Polygon, member: &Resolved) -> Option<SurfacePolygon> {
     let appearance = appearance.map(|found| if member.turned { Arc::new(found.reversed()) } else { found.clone() });
     (!rings.is_empty()).then_some(SurfacePolygon {
         rings,
-        class: polygon.class,
+        class: polygon.boundary.class,
         solid: member.solid,
         shell: member.shell,
-        attributes: None,
+        attributes: polygon.attributes.clone(),
         appearance,
     })
 }

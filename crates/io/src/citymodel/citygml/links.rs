@@ -3,8 +3,9 @@
 
 use std::collections::HashMap;
 
-use city::{GeometryKind, Lod, SurfaceClass};
+use city::{GeometryKind, Lod};
 
+use super::boundary::Boundary;
 use super::implicit::Implicit;
 use crate::citymodel::error::CityFault;
 
@@ -35,7 +36,7 @@ pub(super) struct Member {
     pub(super) solid: u32,
     pub(super) shell: u32,
     pub(super) turned: bool,
-    pub(super) class: SurfaceClass,
+    pub(super) boundary: Boundary,
     pub(super) line: usize,
 }
 
@@ -64,7 +65,7 @@ pub(super) struct Resolved {
     pub(super) solid: u32,
     pub(super) shell: u32,
     pub(super) turned: bool,
-    pub(super) class: SurfaceClass,
+    pub(super) boundary: Boundary,
 }
 
 /// Follows links, and counts them.
@@ -103,7 +104,7 @@ impl<'a> Links<'a> {
         depth: usize,
         found: &mut Vec<Resolved>,
     ) -> Result<Result<(), &'a str>, CityFault> {
-        let Member { solid, shell, turned, class, .. } = *member;
+        let Member { solid, shell, turned, boundary, .. } = *member;
         self.followed += 1;
         if self.followed > FOLLOWED_MAX {
             let what = format!(
@@ -113,7 +114,7 @@ impl<'a> Links<'a> {
         }
         let link = match &member.target {
             Target::Polygon(polygon) => {
-                found.push(Resolved { polygon: *polygon, solid, shell, turned, class });
+                found.push(Resolved { polygon: *polygon, solid, shell, turned, boundary });
                 return Ok(Ok(()));
             }
             Target::Link(link) => link.as_str(),
@@ -121,7 +122,7 @@ impl<'a> Links<'a> {
         let target = link.strip_prefix('#').and_then(|id| self.named.get(id));
         match target {
             Some(&Named::Polygon(polygon)) => {
-                found.push(Resolved { polygon, solid, shell, turned, class });
+                found.push(Resolved { polygon, solid, shell, turned, boundary });
                 Ok(Ok(()))
             }
             Some(&Named::Members { group, first, last }) if depth < LINK_DEPTH_MAX => {
@@ -132,7 +133,7 @@ impl<'a> Links<'a> {
                     }
                 }
                 for below in &mut found[start..] {
-                    *below = Resolved { solid, shell, turned: below.turned ^ turned, class, ..*below };
+                    *below = Resolved { solid, shell, turned: below.turned ^ turned, boundary, ..*below };
                 }
                 Ok(Ok(()))
             }

@@ -10,8 +10,10 @@
 mod appearance;
 mod assemble;
 mod attributes;
+mod boundary;
 mod implicit;
 mod links;
+mod open_polygon;
 mod paint;
 mod properties;
 mod walker;

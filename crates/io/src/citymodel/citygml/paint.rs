@@ -6,9 +6,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use city::{RingTexture, SurfaceAppearance, SurfaceClass};
+use city::{RingTexture, SurfaceAppearance};
 
 use super::appearance::{Appearances, RingCoordinates, SurfaceData};
+use super::boundary::{Boundary, SharedAttributes};
 use super::links::Links;
 use crate::citymodel::builder::Builder;
 use crate::citymodel::error::CityFault;
@@ -21,7 +22,10 @@ pub(super) type Rings = HashMap<String, (usize, usize)>;
 #[derive(Debug)]
 pub(super) struct Polygon {
     pub(super) rings: Vec<Vec<u32>>,
-    pub(super) class: SurfaceClass,
+    /// Boundary surface that it belongs to.
+    pub(super) boundary: Boundary,
+    /// Attributes of that surface.
+    pub(super) attributes: Option<SharedAttributes>,
     pub(super) appearance: Option<Arc<SurfaceAppearance>>,
 }
 

@@ -1,11 +1,11 @@
-//! The attributes, generic attributes and addresses of a CityGML object, as CityJSON holds them.
+//! The attributes, generic attributes and addresses of CityGML's objects and boundary surfaces, as
+//! CityJSON holds them.
 //!
-//! A property of an object that holds no geometry and no other object is read as a small tree. An
+//! A property that holds no geometry and no other object is read as a small tree. An
 //! element with text becomes text, or a number where CityGML defines one; an element with elements
 //! becomes a JSON object; repeated names become an array. Generic attributes get their own names,
 //! and an address the names that CityJSON's specification shows.
 
-use city::CityObject;
 use serde_json::{Map, Number, Value};
 
 use super::attributes::Attributes;
@@ -41,6 +41,17 @@ struct Element {
 pub(super) struct Property {
     open: Vec<Element>,
     elements: usize,
+}
+
+/// What a property holds.
+#[derive(Debug)]
+pub(super) enum Ended {
+    /// An attribute; its value is `None` when it is empty.
+    Attribute(String, Option<Value>),
+    /// The parts of an address.
+    Address(Value),
+    /// Nothing.
+    Nothing,
 }
 
 impl Element {
@@ -97,7 +108,7 @@ impl Element {
 }
 
 impl Property {
-    /// Begins a property of an object.
+    /// Begins a property.
     pub(super) fn new(name: &str, attributes: &Attributes) -> Self {
         Self { open: vec![Element::new(name, attributes)], elements: 1 }
     }
@@ -115,28 +126,22 @@ impl Property {
         }
     }
 
-    /// Ends the open element, and returns whether it was the property itself, which is then added
-    /// to its object.
-    pub(super) fn end(&mut self, object: &mut CityObject) -> bool {
-        let Some(ended) = self.open.pop() else { return true };
+    /// Ends the open element. Returns what the property holds when that was the property itself.
+    pub(super) fn end(&mut self) -> Option<Ended> {
+        let Some(ended) = self.open.pop() else { return Some(Ended::Nothing) };
         if let Some(above) = self.open.last_mut() {
             if self.elements <= ELEMENTS_MAX {
                 above.below.push(ended);
             }
-            return false;
+            return None;
         }
         if ended.name == "address" {
             let mut parts = Map::new();
             ended.address(&mut parts);
-            if !parts.is_empty() {
-                object.addresses.push(Value::Object(parts));
-            }
-        } else if let Some((name, value)) = ended.generic() {
-            add(&mut object.attributes, &name, value);
-        } else {
-            add(&mut object.attributes, &ended.name, ended.value());
+            return Some(if parts.is_empty() { Ended::Nothing } else { Ended::Address(Value::Object(parts)) });
         }
-        true
+        let (name, value) = ended.generic().unwrap_or_else(|| (ended.name.clone(), ended.value()));
+        Some(Ended::Attribute(name, value))
     }
 }
 
@@ -148,7 +153,7 @@ fn typed(text: &str, is_number: bool) -> Value {
 }
 
 /// Adds a value under a name; a name that exists already gets an array.
-fn add(map: &mut Map<String, Value>, name: &str, value: Option<Value>) {
+pub(super) fn add(map: &mut Map<String, Value>, name: &str, value: Option<Value>) {
     let Some(value) = value else { return };
     match map.get_mut(name) {
         None => drop(map.insert(name.to_owned(), value)),

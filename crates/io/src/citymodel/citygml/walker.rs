@@ -5,10 +5,12 @@ use city::{CityModel, Defect, DefectCode, GeometryKind, Lod, ModelPoint, ObjectK
 use super::appearance::OpenAppearance;
 use super::assemble::{Found, assemble};
 use super::attributes::Attributes;
+use super::boundary::Boundary;
 use super::implicit::{Field, Implicit};
 use super::links::{Group, Member, Named, Target};
+use super::open_polygon::OpenPolygon;
 use super::paint::Polygon;
-use super::properties::Property;
+use super::properties::{Ended, Property, add};
 use crate::citymodel::builder::Builder;
 use crate::citymodel::crs_name::crs_reference;
 use crate::citymodel::error::CityFault;
@@ -54,13 +56,13 @@ pub(super) struct Walker {
     stack: Vec<Frame>,
     /// Object that the walk is in.
     object: Option<usize>,
-    /// Class of the boundary surface that the walk is in.
-    class: SurfaceClass,
+    /// Boundary surface that the walk is in.
+    boundary: Boundary,
     srs_name: Option<String>,
     found: Found,
     /// State within a geometry property, while the walk is in one.
     geometry: Option<Progress>,
-    /// Attribute or address of the object, while the walk is in one.
+    /// Attribute or address of the object or the boundary surface, while the walk is in one.
     property: Option<Property>,
     /// Appearance that the walk is in.
     appearance: Option<OpenAppearance>,
@@ -87,8 +89,8 @@ enum Mark {
     Object {
         before: Option<usize>,
     },
-    Class {
-        before: SurfaceClass,
+    Boundary {
+        before: Boundary,
     },
     Geometry,
     /// Surfaces that a link can lead to as a whole, from this member on.
@@ -118,22 +120,6 @@ struct Progress {
     turned: bool,
     polygon: Option<OpenPolygon>,
     implicit: Option<Implicit>,
-}
-
-/// A polygon that the walk is in.
-#[derive(Debug)]
-struct OpenPolygon {
-    /// Complete rings.
-    rings: Vec<Vec<u32>>,
-    /// Identifiers of the rings, with their numbers.
-    ids: Vec<(String, usize)>,
-    /// Coordinates of the open ring.
-    ring: Option<Vec<f64>>,
-    /// First defect that makes the polygon unusable.
-    problem: Option<(DefectCode, String)>,
-    /// Number of rings that are not closed.
-    unclosed: usize,
-    line: usize,
 }
 
 impl Walker {
@@ -185,13 +171,13 @@ impl Walker {
             return Mark::Object { before: self.object.replace(object) };
         }
         if SURFACE_PROPERTIES.contains(&self.parent()) && name != "Envelope" && name != "Null" {
-            let before = std::mem::replace(&mut self.class, SurfaceClass::from_name(name));
-            return Mark::Class { before };
+            let boundary = self.found.surfaces.boundary(SurfaceClass::from_name(name));
+            return Mark::Boundary { before: std::mem::replace(&mut self.boundary, boundary) };
         }
         match (self.object, lod_of_property(name)) {
             (Some(object), Some(lod)) => {
                 let kind = GeometryKind::MultiSurface;
-                let in_boundary = self.class != SurfaceClass::Unclassified;
+                let in_boundary = self.boundary.class != SurfaceClass::Unclassified;
                 self.found.groups.push(Group {
                     object,
                     lod,
@@ -217,19 +203,13 @@ impl Walker {
         }
     }
 
-    /// Returns whether an element is an attribute or an address of the object that it is a child
-    /// of. Attributes of surfaces are counted, because the model does not hold them.
-    fn is_attribute(&mut self, name: &str) -> bool {
-        let in_object = self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Object { .. }));
-        if name.starts_with("appearance") {
-            return false;
-        }
+    /// Returns whether an element is an attribute or an address of the object or the boundary
+    /// surface that it is a child of.
+    fn is_attribute(&self, name: &str) -> bool {
         let holds_more = OBJECT_PROPERTIES.contains(&name) || SURFACE_PROPERTIES.contains(&name);
-        let in_surface = self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Class { .. }));
-        if in_surface && !holds_more && !name.starts_with("lod") && name != "boundedBy" {
-            self.builder.left_out("attributes of surfaces", 1);
-        }
-        in_object && !holds_more && !name.starts_with("lod")
+        let of_owner =
+            self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Object { .. } | Mark::Boundary { .. }));
+        of_owner && !holds_more && !name.starts_with("lod") && !name.starts_with("appearance")
     }
 
     /// Begins an element within a geometry property.
@@ -275,8 +255,7 @@ impl Walker {
                 Mark::Orientable { before }
             }
             "Polygon" | "Triangle" | "Rectangle" | "PolygonPatch" if !in_polygon => {
-                let (rings, ids, ring) = (Vec::new(), Vec::new(), None);
-                progress.polygon = Some(OpenPolygon { rings, ids, ring, problem: None, unclosed: 0, line });
+                progress.polygon = Some(OpenPolygon::new(line));
                 Mark::Polygon
             }
             "LinearRing" => match &mut progress.polygon {
@@ -325,7 +304,7 @@ impl Walker {
             Mark::Property => self.end_property(),
             Mark::Appearance => self.end_appearance(),
             Mark::Object { before } => self.object = before,
-            Mark::Class { before } => self.class = before,
+            Mark::Boundary { before } => self.boundary = before,
             Mark::Geometry => self.end_geometry(),
             Mark::Members { first } => self.name_members(frame.id, first),
             Mark::Orientable { before } => {
@@ -351,9 +330,18 @@ impl Walker {
 
     /// Ends an element of an attribute or an address.
     fn end_property(&mut self) {
-        let (Some(property), Some(object)) = (&mut self.property, self.object) else { return };
-        if property.end(self.builder.object_mut(object)) {
-            self.property = None;
+        let Some(ended) = self.property.as_mut().and_then(Property::end) else { return };
+        self.property = None;
+        let in_boundary = self.stack.last().is_some_and(|frame| matches!(frame.mark, Mark::Boundary { .. }));
+        if in_boundary {
+            self.found.surfaces.add(self.boundary, ended);
+        } else if let Some(object) = self.object {
+            let object = self.builder.object_mut(object);
+            match ended {
+                Ended::Attribute(name, value) => add(&mut object.attributes, &name, value),
+                Ended::Address(parts) => object.addresses.push(parts),
+                Ended::Nothing => {}
+            }
         }
     }
 
@@ -368,9 +356,9 @@ impl Walker {
     /// Adds a member to the open geometry.
     fn member(&mut self, target: Target, line: usize) {
         if let (Some(progress), Some(group)) = (&self.geometry, self.found.groups.last_mut()) {
-            let (shell, turned, class) = (progress.shell, progress.turned, self.class);
+            let (shell, turned, boundary) = (progress.shell, progress.turned, self.boundary);
             let solid = progress.solids.saturating_sub(1);
-            group.members.push(Member { target, solid, shell, turned, class, line });
+            group.members.push(Member { target, solid, shell, turned, boundary, line });
         }
     }
 
@@ -402,25 +390,8 @@ impl Walker {
 
     /// Adds the numbers of `pos`, `posList` or `coordinates` to the open ring.
     fn positions(&mut self, text: &str, element: &str, dimension: usize) {
-        let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.as_mut()) else { return };
-        let Some(ring) = &mut polygon.ring else { return };
-        if dimension != 3 {
-            let detail = format!("coordinates have {dimension} dimensions, expected 3");
-            polygon.problem.get_or_insert((DefectCode::NotSupported, detail));
-            return;
-        }
-        // GML 2 separates the numbers of a tuple with commas.
-        let commas = element == "coordinates";
-        let words = text.split(|c: char| c.is_whitespace() || (commas && c == ',')).filter(|word| !word.is_empty());
-        for word in words {
-            match word.parse::<f64>() {
-                Ok(number) => ring.push(number),
-                Err(_) => {
-                    let word: String = word.chars().take(20).collect();
-                    polygon.problem.get_or_insert((DefectCode::CoordinateOutOfRange, format!("{word:?}")));
-                    return;
-                }
-            }
+        if let Some(polygon) = self.geometry.as_mut().and_then(|g| g.polygon.as_mut()) {
+            polygon.take_positions(text, element, dimension);
         }
     }
 
@@ -481,7 +452,7 @@ impl Walker {
         }
         let rings = if usable { polygon.rings } else { Vec::new() };
         let number = self.found.polygons.len();
-        self.found.polygons.push(Polygon { rings, class: self.class, appearance: None });
+        self.found.polygons.push(Polygon { rings, boundary: self.boundary, attributes: None, appearance: None });
         for (id, ring) in polygon.ids.into_iter().filter(|_| usable) {
             self.found.rings.entry(id).or_insert((number, ring));
         }

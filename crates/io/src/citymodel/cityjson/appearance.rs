@@ -8,39 +8,50 @@
 use std::sync::Arc;
 
 use city::{RingTexture, SurfaceAppearance};
-use serde_json::{Map, Value};
 
-use super::schema::{Looks, Nested, Pairs, Shape, ThemeValues};
+use super::schema::{Lenient, Looks, Nested, Pairs, Shape, ThemeValues};
 use crate::citymodel::builder::Builder;
 use crate::citymodel::palette::THEMES_MAX;
+
+/// What the count of appearances of the wrong type is called.
+const MALFORMED: &str = "malformed materials and textures";
 
 /// Numbers in the model of the materials, textures and texture coordinates of a document.
 #[derive(Debug, Default)]
 pub(super) struct Numbers {
-    /// `None` for an element that is not an object.
+    /// `None` for an element of the wrong type.
     materials: Vec<Option<u32>>,
     textures: Vec<Option<u32>>,
-    vertices: Vec<u32>,
+    vertices: Vec<Option<u32>>,
 }
 
 impl Numbers {
-    /// Adds the appearance of a document to the model.
-    pub(super) fn register(builder: &mut Builder, looks: Looks) -> Self {
+    /// Adds the appearance of a document to the model, and counts what has the wrong type.
+    pub(super) fn register(builder: &mut Builder, looks: Lenient<Looks>) -> Self {
+        let mut malformed = 0;
+        let looks = looks.counted(&mut malformed).unwrap_or_default();
         let palette = &mut builder.palette;
-        palette.set_defaults(looks.default_material, looks.default_texture);
-        Self {
-            materials: looks.materials.into_iter().map(|value| Some(palette.material(members(value)?))).collect(),
-            textures: looks.textures.into_iter().map(|value| Some(palette.texture(members(value)?))).collect(),
-            vertices: looks.vertices.into_iter().map(|vertex| palette.vertex(vertex)).collect(),
-        }
+        let default_material = looks.default_material.counted(&mut malformed);
+        palette.set_defaults(default_material, looks.default_texture.counted(&mut malformed));
+        let numbers = Self {
+            materials: numbered(looks.materials, &mut malformed, |material| palette.material(material)),
+            textures: numbered(looks.textures, &mut malformed, |texture| palette.texture(texture)),
+            vertices: numbered(looks.vertices, &mut malformed, |vertex| palette.vertex(vertex)),
+        };
+        builder.left_out(MALFORMED, malformed);
+        numbers
     }
 }
 
-fn members(value: Value) -> Option<Map<String, Value>> {
-    match value {
-        Value::Object(members) => Some(members),
-        _ => None,
-    }
+/// Numbers the elements of a list; `None` stands for an element of the wrong type, which is
+/// counted.
+fn numbered<T>(
+    list: Lenient<Vec<Lenient<T>>>,
+    malformed: &mut usize,
+    mut number: impl FnMut(T) -> u32,
+) -> Vec<Option<u32>> {
+    let list = list.counted(malformed).unwrap_or_default();
+    list.into_iter().map(|element| element.counted(malformed).map(&mut number)).collect()
 }
 
 /// The themes of a geometry with their references.
@@ -53,15 +64,21 @@ pub(super) struct Themes<'a> {
 impl<'a> Themes<'a> {
     /// Numbers the themes of a shape. Themes beyond the limit are counted.
     pub(super) fn of(builder: &mut Builder, shape: &'a Shape, numbers: &'a Numbers) -> Self {
-        let mut numbered = |themes: &'a Option<Pairs<ThemeValues>>| {
-            let all = themes.as_ref().map_or(&[][..], |themes| &themes.0);
+        let mut malformed = 0;
+        let mut numbered = |themes: &'a Lenient<Pairs<Lenient<ThemeValues>>>| {
+            let all = themes.as_ref().counted(&mut malformed).map_or(&[][..], |themes| &themes.0);
+            let all: Vec<(&String, &ThemeValues)> = all
+                .iter()
+                .filter_map(|(name, values)| Some((name, values.as_ref().counted(&mut malformed)?)))
+                .collect();
             let first = all.iter().take(THEMES_MAX);
             let found: Vec<_> =
-                first.filter_map(|(name, values)| Some((builder.palette.theme(name)?, values))).collect();
+                first.filter_map(|&(name, values)| Some((builder.palette.theme(name)?, values))).collect();
             builder.left_out("themes", all.len() - found.len());
             found
         };
         let (materials, textures) = (numbered(&shape.material), numbered(&shape.texture));
+        builder.left_out(MALFORMED, malformed);
         Self { numbers, materials, textures }
     }
 
@@ -102,7 +119,7 @@ impl<'a> Themes<'a> {
         };
         let Some(&Some(texture)) = element(&self.numbers.textures, texture) else { return Err(()) };
         let vertices: Option<Vec<u32>> =
-            vertices.iter().map(|vertex| element(&self.numbers.vertices, vertex).copied()).collect();
+            vertices.iter().map(|vertex| element(&self.numbers.vertices, vertex).copied().flatten()).collect();
         let vertices = vertices.filter(|vertices| vertices.len() == corners).ok_or(())?;
         Ok(Some(RingTexture { texture, vertices }))
     }

@@ -1,9 +1,10 @@
 //! Reads CityJSON 1.0, 1.1 and 2.0 and CityJSON text sequences (CityJSONSeq), and writes CityJSON
 //! 2.0.
 //!
-//! A text that is not JSON, or has members of the wrong type, is refused with its line and column.
-//! Any other defect costs only the surface that has it. Attributes, addresses and appearances are
-//! kept; what refers to nothing is counted. Extensions are skipped.
+//! A text that is not JSON, or whose geometry has members of the wrong type, is refused with its
+//! line and column. Any other defect costs only the surface that has it. Attributes, addresses and
+//! appearances are kept; what refers to nothing or has the wrong type is counted. Extensions are
+//! skipped.
 
 mod appearance;
 mod geometry;
@@ -23,7 +24,7 @@ use appearance::Numbers;
 use schema::{Document, Object, Pairs, Transform};
 use template::Library;
 
-use write::is_written;
+pub(super) use write::is_written;
 pub use write::{CityJsonOptions, write_cityjson};
 
 /// Versions that are read. A patch number may follow.
@@ -45,7 +46,7 @@ pub(super) fn parse(text: &[u8]) -> Result<Parsed, CityFault> {
         crs.vertical_epsg = crs.vertical_epsg.or(crs_reference(vertical).epsg);
     }
     reader.builder.set_crs(crs);
-    let numbers = Numbers::register(&mut reader.builder, first.appearance.unwrap_or_default());
+    let numbers = Numbers::register(&mut reader.builder, first.appearance);
     let library = Library { templates: first.templates.as_ref(), numbers: &numbers };
     reader.document(first.vertices, first.objects, library, &numbers)?;
     let mut features = 0;
@@ -112,7 +113,7 @@ impl Reader {
             let what = "the first line of the sequence has no transform, so its features have no coordinates";
             return Err(CityFault::invalid(what, "line 1"));
         }
-        let numbers = Numbers::register(&mut self.builder, feature.appearance.unwrap_or_default());
+        let numbers = Numbers::register(&mut self.builder, feature.appearance);
         self.document(feature.vertices, feature.objects, library, &numbers)
     }
 
@@ -136,7 +137,10 @@ impl Reader {
         for (id, object) in objects.into_iter().flat_map(|pairs| pairs.0) {
             let kind = object.kind.unwrap_or_else(|| "Unknown".to_owned());
             let index = self.builder.object(id, ObjectKind::new(kind));
-            let (attributes, addresses) = (object.attributes.unwrap_or_default(), addresses(object.address));
+            let mut malformed = 0;
+            let attributes = object.attributes.counted(&mut malformed).unwrap_or_default();
+            self.builder.left_out("malformed attributes of objects", malformed);
+            let addresses = addresses(object.address);
             let made = self.builder.object_mut(index);
             (made.attributes, made.addresses) = (attributes, addresses);
             self.count_left_out(object.geometry.iter().flatten());

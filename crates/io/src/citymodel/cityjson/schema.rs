@@ -4,9 +4,10 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
+use serde_json::value::RawValue;
 use serde_json::{Map, Value};
 
-use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 /// Name of [`Document::vertical`] in the file.
 pub(super) const VERTICAL: &str = "+verticalReferenceSystem";
@@ -28,22 +29,23 @@ pub(super) struct Document {
     pub(super) vertices: Vec<[f64; 3]>,
     #[serde(rename = "geometry-templates")]
     pub(super) templates: Option<Templates>,
-    pub(super) appearance: Option<Looks>,
+    #[serde(default)]
+    pub(super) appearance: Lenient<Looks>,
 }
 
 /// The materials and textures of a document.
 #[derive(Debug, Default, serde::Deserialize)]
 pub(super) struct Looks {
     #[serde(default)]
-    pub(super) materials: Vec<Value>,
+    pub(super) materials: Lenient<Vec<Lenient<Map<String, Value>>>>,
     #[serde(default)]
-    pub(super) textures: Vec<Value>,
+    pub(super) textures: Lenient<Vec<Lenient<Map<String, Value>>>>,
     #[serde(default, rename = "vertices-texture")]
-    pub(super) vertices: Vec<[f64; 2]>,
-    #[serde(rename = "default-theme-material")]
-    pub(super) default_material: Option<String>,
-    #[serde(rename = "default-theme-texture")]
-    pub(super) default_texture: Option<String>,
+    pub(super) vertices: Lenient<Vec<Lenient<[f64; 2]>>>,
+    #[serde(default, rename = "default-theme-material")]
+    pub(super) default_material: Lenient<String>,
+    #[serde(default, rename = "default-theme-texture")]
+    pub(super) default_texture: Lenient<String>,
 }
 
 #[derive(Debug, Clone, Copy, serde::Deserialize)]
@@ -63,7 +65,8 @@ pub(super) struct Object {
     #[serde(rename = "type")]
     pub(super) kind: Option<String>,
     pub(super) parents: Option<Vec<String>>,
-    pub(super) attributes: Option<Map<String, Value>>,
+    #[serde(default)]
+    pub(super) attributes: Lenient<Map<String, Value>>,
     /// A list since version 1.1, one address before.
     pub(super) address: Option<Value>,
     pub(super) geometry: Option<Vec<Shape>>,
@@ -80,9 +83,11 @@ pub(super) struct Shape {
     pub(super) semantics: Option<Semantics>,
     pub(super) template: Option<u64>,
     /// Materials by theme.
-    pub(super) material: Option<Pairs<ThemeValues>>,
+    #[serde(default)]
+    pub(super) material: Lenient<Pairs<Lenient<ThemeValues>>>,
     /// Textures by theme.
-    pub(super) texture: Option<Pairs<ThemeValues>>,
+    #[serde(default)]
+    pub(super) texture: Lenient<Pairs<Lenient<ThemeValues>>>,
     #[serde(rename = "transformationMatrix")]
     pub(super) matrix: Option<Vec<f64>>,
 }
@@ -146,6 +151,44 @@ impl fmt::Display for LodText {
             Self::Text(text) => f.write_str(text),
             Self::Number(number) => write!(f, "{number}"),
         }
+    }
+}
+
+/// A member that the geometry does not need. A value of the wrong type costs only itself.
+#[derive(Debug, Default)]
+pub(super) enum Lenient<T> {
+    /// `null`, or a missing member.
+    #[default]
+    Missing,
+    Good(T),
+    /// A value of the wrong type.
+    Malformed,
+}
+
+impl<T> Lenient<T> {
+    /// Returns the value, and adds one to `malformed` for a value of the wrong type.
+    pub(super) fn counted(self, malformed: &mut usize) -> Option<T> {
+        *malformed += usize::from(matches!(self, Self::Malformed));
+        match self {
+            Self::Good(value) => Some(value),
+            Self::Missing | Self::Malformed => None,
+        }
+    }
+
+    pub(super) fn as_ref(&self) -> Lenient<&T> {
+        match self {
+            Self::Missing => Lenient::Missing,
+            Self::Good(value) => Lenient::Good(value),
+            Self::Malformed => Lenient::Malformed,
+        }
+    }
+}
+
+impl<'de, T: DeserializeOwned> Deserialize<'de> for Lenient<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let raw = Box::<RawValue>::deserialize(deserializer)?;
+        Ok(serde_json::from_str::<Option<T>>(raw.get())
+            .map_or(Self::Malformed, |value| value.map_or(Self::Missing, Self::Good)))
     }
 }
 

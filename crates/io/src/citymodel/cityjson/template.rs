@@ -7,10 +7,10 @@ use city::DefectCode;
 
 use super::appearance::Numbers;
 use super::geometry::{Place, add};
-use super::schema::{Nested, Shape, Templates};
+use super::schema::{Lenient, Nested, Pairs, Shape, Templates};
 use crate::citymodel::builder::Builder;
 use crate::citymodel::error::CityFault;
-use crate::citymodel::placement::{Instances, Placement, surface_size};
+use crate::citymodel::placement::{Instances, Placement, attributes_size, surface_size};
 
 /// The templates of a file, and the appearance that they refer to.
 #[derive(Clone, Copy)]
@@ -49,7 +49,8 @@ pub(super) fn add_instance(
     }
     let placement = Placement { matrix, origin: builder.position(anchor) };
     let used = used_vertices(shape, positions.len());
-    instances.expansion.add(size(&shape.boundaries).saturating_add(appearance_size(shape)), 0, &at)?;
+    let sizes = [size(&shape.boundaries), appearance_size(shape), semantics_size(shape)];
+    instances.expansion.add(sizes.into_iter().fold(0, usize::saturating_add), 0, &at)?;
     let index_of =
         instances.place(builder, &placement, used.into_iter().map(|index| (index as u64, positions[index])), &at)?;
     add(builder, shape, library.numbers, |index| index_of.get(&index).copied(), place);
@@ -89,9 +90,21 @@ fn size(boundaries: &Nested) -> usize {
 /// Returns the size of the materials and textures of a shape. A material of all surfaces costs
 /// each of them an entry.
 fn appearance_size(shape: &Shape) -> usize {
-    let themes = || [&shape.material, &shape.texture].into_iter().flatten().flat_map(|themes| &themes.0);
-    let values: usize = themes().map(|(_, theme)| size(&theme.values)).fold(0, usize::saturating_add);
-    values.saturating_add(themes().count().saturating_mul(size(&shape.boundaries)))
+    let mut total = 0usize;
+    for themes in [&shape.material, &shape.texture] {
+        let Lenient::Good(Pairs(themes)) = themes else { continue };
+        for (_, theme) in themes {
+            let Lenient::Good(theme) = theme else { continue };
+            total = total.saturating_add(size(&theme.values)).saturating_add(size(&shape.boundaries));
+        }
+    }
+    total
+}
+
+/// Returns the size of the attributes of the surfaces of a shape.
+fn semantics_size(shape: &Shape) -> usize {
+    let surfaces = shape.semantics.iter().flat_map(|semantics| &semantics.surfaces);
+    surfaces.map(|surface| attributes_size(&surface.attributes)).fold(0, usize::saturating_add)
 }
 
 /// Returns the vertices that a shape uses, ascending. [`add`] reports indices that do not exist.

@@ -247,7 +247,7 @@ impl Described {
 }
 
 /// Whether CityJSON has a name for a class; surfaces of others are written without a description.
-pub(super) fn is_written(class: SurfaceClass) -> bool {
+pub(in crate::citymodel) fn is_written(class: SurfaceClass) -> bool {
     !matches!(class, SurfaceClass::Unclassified | SurfaceClass::Other)
 }
 
