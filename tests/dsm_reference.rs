@@ -85,7 +85,8 @@ fn weak_evidence_is_refused() {
 }
 
 /// A datum that is given overrules the one that the file names, with a warning. Heights above a
-/// geoid are brought to the ellipsoid. A reference that is tilted tilts the surface, where asked to.
+/// geoid are brought to the ellipsoid. A reference that is tilted tilts the surface, where asked
+/// to.
 #[test]
 fn datums_and_planes_are_followed() {
     let folder = tempfile::tempdir().unwrap();

@@ -48,9 +48,9 @@ impl InputStamps {
     }
 }
 
-/// Returns the files that a run reads: those of its configuration, the members of mosaics (VRT), the
-/// files beside images that may hold their RPCs, and the chips of ground points. Addresses are not
-/// among them.
+/// Returns the files that a run reads: those of its configuration, the members of mosaics (VRT),
+/// the files beside images that may hold their RPCs, and the chips of ground points. Addresses are
+/// not among them.
 ///
 /// # Errors
 /// [`DsmError::Image`] for a raster that cannot be opened, [`DsmError::Control`].

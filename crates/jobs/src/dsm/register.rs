@@ -68,9 +68,9 @@ const AGREEMENT_M: f64 = 0.5;
 const PLANE_ROUNDS: usize = 4;
 const PLANE_NMADS: f64 = 3.0;
 /// A reference is taken for the bare ground when a twentieth of the cells stand this far above it,
-/// metres, and that many times as far as the twentieth below it. Buildings and trees are higher than
-/// that; errors of surfaces, and trees and houses that only one of both has, reach to both sides.
-/// Chosen on the sample town.
+/// metres, and that many times as far as the twentieth below it. Buildings and trees are higher
+/// than that; errors of surfaces, and trees and houses that only one of both has, reach to both
+/// sides. Chosen on the sample town.
 const STANDING_MIN_M: f64 = 3.0;
 const ONE_SIDED: f64 = 3.0;
 /// Share of the cells beyond the reach of a surface, at either end.

@@ -1,8 +1,8 @@
 //! Least-squares matching of a chip (Gruen 1985).
 //!
 //! With chip values `g(i, j)` around its point and image values `f`, the place `t`, the affine map
-//! `A` and the grey values' gain and offset minimise Σ (gain · g(i, j) + offset − f(t + J A (i, j)))²,
-//! where `J` is the map from the chip to the image that is known beforehand.
+//! `A` and the grey values' gain and offset minimise Σ (gain · g(i, j) + offset − f(t + J A (i,
+//! j)))², where `J` is the map from the chip to the image that is known beforehand.
 
 use nalgebra::{SMatrix, SVector};
 use raster::{Grid, bicubic, bicubic_along};
