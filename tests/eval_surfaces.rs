@@ -106,7 +106,7 @@ fn sparse_normals_are_told() {
     let cloud = las(&folder, "cloud.las", &roof_points(0.3));
     let notes =
         |normal_scale: &str| json(&["--normal-scale", normal_scale], &cloud, &cloud)["protocol"]["notes"].to_string();
-    let (sparse, dense) = (notes("0.3"), notes("3"));
+    let (sparse, dense) = (notes("0.6"), notes("3"));
     assert!(sparse.contains("M3C2: the normals rest on"), "{sparse}");
     assert!(!dense.contains("M3C2"), "{dense}");
 }

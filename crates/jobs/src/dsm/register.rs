@@ -208,16 +208,19 @@ impl Round {
                 ),
             ));
         }
-        let aligned = |method| align(&surface, &reference.heights, &grid, method);
-        let failed = |error: eval::EvalError| weak(path, error.to_string());
-        let by_slopes = aligned(AlignmentMethod::NuthKaab).map_err(failed)?;
-        let by_search = aligned(AlignmentMethod::Xyz).map_err(failed)?;
-        let plane = match config.reference_plane {
-            true => {
-                known_plane(&by_search, &grid, (&surface, &reference.heights)).map_err(|reason| weak(path, reason))?
-            }
-            false => LEVEL,
+        let aligned = |surface: &Grid<f32>, method| {
+            let found = align(surface, &reference.heights, &grid, method);
+            found.map_err(|error| weak(path, error.to_string()))
         };
+        let (mut by_search, mut plane) = (aligned(&surface, AlignmentMethod::Xyz)?, LEVEL);
+        if config.reference_plane {
+            let found = known_plane(&by_search, &grid, (&surface, &reference.heights));
+            plane = found.map_err(|reason| weak(path, reason))?;
+            // A tilt looks like a shift where slopes face one way.
+            add_plane(&mut surface, &plane, &grid);
+            by_search = aligned(&surface, AlignmentMethod::Xyz)?;
+        }
+        let by_slopes = aligned(&surface, AlignmentMethod::NuthKaab)?;
         let nmad = by_slopes.nuth_kaab.map_or((f64::NAN, f64::NAN), |found| (found.nmad_before_m, found.nmad_after_m));
         Ok(Self {
             heights: trial.heights,
@@ -474,6 +477,16 @@ fn known_plane(
         let least = 100.0 * PLANE_SPAN_MIN;
         format!("for a plane it spans too little of the scene, {width:.0} % by {height:.0} %; needed are {least:.0} %")
     })
+}
+
+/// Adds the heights of a plane to a surface.
+fn add_plane(surface: &mut Grid<f32>, plane: &FittedPlane, grid: &DsmGrid) {
+    for row in 0..surface.height() {
+        for (column, height) in surface.row_mut(row).iter_mut().enumerate() {
+            let (x, y) = grid.geotransform.map_from_cell(column as f64, row as f64);
+            *height += plane.at([x, y]) as f32;
+        }
+    }
 }
 
 /// Returns what must be added to the heights beyond the shift: a robust plane through the remaining
