@@ -106,7 +106,8 @@ fn sparse_normals_are_told() {
     let cloud = las(&folder, "cloud.las", &roof_points(0.3));
     let notes =
         |normal_scale: &str| json(&["--normal-scale", normal_scale], &cloud, &cloud)["protocol"]["notes"].to_string();
-    let (sparse, dense) = (notes("0.6"), notes("3"));
+    let (alone, sparse, dense) = (notes("0.3"), notes("0.6"), notes("3"));
+    assert!(alone.contains("M3C2: no distances"), "{alone}");
     assert!(sparse.contains("M3C2: the normals rest on"), "{sparse}");
     assert!(!dense.contains("M3C2"), "{dense}");
 }

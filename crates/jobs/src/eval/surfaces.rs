@@ -101,12 +101,19 @@ fn evaluate(config: &SurfaceEvalConfig, progress: &dyn Progress) -> Result<Surfa
     progress.check_cancelled()?;
     let [test_format, reference_format] = inputs.formats;
     let mut notes = inputs.notes;
-    if let Some(m3c2) = result.m3c2.filter(|m3c2| m3c2.points_per_normal < POINTS_PER_NORMAL) {
-        notes.push(format!(
+    let scale = settings.normal_scale_m;
+    match result.m3c2 {
+        Some(m3c2) if m3c2.points_per_normal < POINTS_PER_NORMAL => notes.push(format!(
             "M3C2: the normals rest on {} points each (median), so the distances along them are uncertain by several \
-             percent; a larger scale of the normals, {} m now, or a denser reference gives more",
-            m3c2.points_per_normal, settings.normal_scale_m
-        ));
+             percent; a larger scale of the normals, {scale} m now, or a denser reference gives more",
+            m3c2.points_per_normal
+        )),
+        Some(_) => {}
+        None => notes.push(format!(
+            "M3C2: no distances, because no point has both a normal (scale {scale} m) and points of both surfaces in \
+             its cylinder ({} m across, {} m long to each side); give larger sizes",
+            settings.cylinder_m, settings.cylinder_reach_m
+        )),
     }
     let protocol = SurfaceProtocol {
         test: config.test.display().to_string(),
