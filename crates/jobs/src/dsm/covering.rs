@@ -28,8 +28,7 @@ impl Places {
     }
 
     /// Chooses partners from candidates with their outlines, the best ones first. The best `usual`
-    /// ones that see any place are taken. Further ones are taken where places have fewer than
-    /// `usual`.
+    /// ones are taken. Further ones are taken where places have fewer than `usual`.
     pub(crate) fn choose<'a>(
         &self,
         candidates: impl IntoIterator<Item = (usize, &'a Polygon<f64>)>,
@@ -57,13 +56,18 @@ mod tests {
     use super::*;
     use geo::Rect;
 
-    fn outline(west: f64, east: f64) -> Polygon<f64> {
-        Rect::new((west, 0.0), (east, 100.0)).to_polygon()
+    fn choice(outlines: &[Polygon<f64>], usual: usize) -> Vec<usize> {
+        let image = Rect::new((0.0, 0.0), (100.0, 100.0)).to_polygon();
+        Places::over(&image).choose(outlines.iter().enumerate(), usual)
     }
 
-    fn chosen(candidates: &[(f64, f64)], usual: usize) -> Vec<usize> {
-        let outlines: Vec<_> = candidates.iter().map(|(west, east)| outline(*west, *east)).collect();
-        Places::over(&outline(0.0, 100.0)).choose(outlines.iter().enumerate(), usual)
+    /// Returns outlines of the given extents in x and the same extent in y.
+    fn strips(extents: impl IntoIterator<Item = (f64, f64)>, north: f64) -> Vec<Polygon<f64>> {
+        extents.into_iter().map(|(west, east)| Rect::new((west, 0.0), (east, north)).to_polygon()).collect()
+    }
+
+    fn chosen(extents: &[(f64, f64)], usual: usize) -> Vec<usize> {
+        choice(&strips(extents.iter().copied(), 100.0), usual)
     }
 
     #[test]
@@ -76,8 +80,8 @@ mod tests {
     fn each_part_gets_its_partners() {
         let halves = [(0.0, 50.0), (0.0, 50.0), (0.0, 50.0), (50.0, 100.0), (50.0, 100.0), (50.0, 100.0)];
         assert_eq!(chosen(&halves, 2), [0, 1, 3, 4]);
-        let narrow: Vec<(f64, f64)> = (0..20).map(|i| (5.0 * f64::from(i), 5.0 * f64::from(i) + 5.0)).collect();
-        assert_eq!(chosen(&narrow, 2).len(), 2, "a twentieth of the ground is not worth a partner");
+        let twentieths = strips((0..10).map(|i| (10.0 * f64::from(i), 10.0 * f64::from(i) + 10.0)), 50.0);
+        assert_eq!(choice(&twentieths, 2), [0, 1], "a twentieth of the ground is not worth a partner");
         let tenths: Vec<(f64, f64)> = (0..10).map(|i| (10.0 * f64::from(i), 10.0 * f64::from(i) + 10.0)).collect();
         assert_eq!(chosen(&tenths, 2), [0, 1, 2, 3], "never more than twice the usual number");
     }
