@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crs::{CrsRequest, VerticalDatum};
+use io::raster::BandChoice;
 use jobs::dsm::{
-    DsmConfig, DsmError, DsmReport, DsmSetting, Fill, HeightRange, ImagePair, MapBounds, Preset, SweepError,
+    DsmConfig, DsmError, DsmReport, DsmSetting, Fill, HeightRange, ImagePair, LayerArea, MapBounds, Preset, SweepError,
 };
 use jobs::job_file::{is_job_file, read_dsm_job};
 use jobs::production::{ProductionError, make_plan};
@@ -52,6 +53,19 @@ pub(crate) struct SceneArgs {
     /// Area of the DSM in its CRS [default: the ground that at least two images see].
     #[arg(long, num_args = 4, value_names = ["X_MIN", "Y_MIN", "X_MAX", "Y_MAX"], allow_negative_numbers = true)]
     bounds: Option<Vec<f64>>,
+    /// Polygons in which the DSM lies (GeoPackage, GeoJSON); cells outside are void.
+    #[arg(long, value_name = "FILE", conflicts_with = "bounds")]
+    area: Option<PathBuf>,
+    /// Ground without heights, such as water: polygons, or a georeferenced raster where it is not 0.
+    #[arg(long = "mask", value_name = "FILE")]
+    masks: Vec<PathBuf>,
+    /// Pixels that are not matched, such as clouds: polygons on the ground, or a raster in the frame
+    /// of an image; its name begins with that of its image (left_clouds.tif for left.tif).
+    #[arg(long = "image-mask", value_name = "FILE")]
+    image_masks: Vec<PathBuf>,
+    /// Band to match, by number or name [default: the luma of all bands].
+    #[arg(long, value_name = "BAND")]
+    band: Option<BandChoice>,
     /// Heights to search, metres above the ellipsoid [default: from tie points].
     #[arg(long, num_args = 2, value_names = ["LO", "HI"], allow_negative_numbers = true, conflicts_with = "dem")]
     height_range: Option<Vec<f64>>,
@@ -145,6 +159,13 @@ impl SceneArgs {
         config.vertical = self.vertical.unwrap_or(config.vertical);
         config.force_crs |= self.force;
         config.bounds = self.bounds.as_ref().and_then(bounds).or(config.bounds);
+        config.area = self.area.clone().map(LayerArea::new).or(config.area);
+        for (given, own) in [(&self.masks, &mut config.masks), (&self.image_masks, &mut config.image_masks)] {
+            if !given.is_empty() {
+                own.clone_from(given);
+            }
+        }
+        config.band = self.band.clone().or(config.band);
         if self.height_range.is_some() || self.dem.is_some() {
             config.height_range_m = self.height_range.as_ref().and_then(range);
             config.dem.clone_from(&self.dem);
@@ -228,6 +249,8 @@ fn hint(error: &DsmError) -> Option<&'static str> {
             DsmSetting::HeightRange => "the heights are set by --height-range",
             DsmSetting::Dem => "the elevation model is set by --dem",
             DsmSetting::ReferenceDem => "the reference is set by --reference-dem, its datum by --dem-vertical",
+            DsmSetting::Masks => "masks on the ground are set by --mask, masks of single images by --image-mask",
+            DsmSetting::ImageMasks => "masks of single images are set by --image-mask",
             DsmSetting::Pairs => "the pairs are set by --pairs",
             DsmSetting::References => "the images to compute heights for are set by --reference",
             DsmSetting::Threads => "the number of threads is set by --threads",

@@ -1,12 +1,13 @@
-//! Reading areas by name: the polygons of a GeoPackage or a GeoJSON file.
+//! Reading areas: the polygons of a GeoPackage or a GeoJSON file.
 //!
 //! A GeoJSON file is in longitude and latitude (RFC 7946) unless it names another system in the way
-//! of older files. Of each area the corners of its polygons are kept, holes included.
+//! of older files.
 
 use std::path::{Path, PathBuf};
 
-use gdal::vector::{Geometry, LayerAccess};
+use gdal::vector::LayerAccess;
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
+use geo::{Coord, CoordsIter, LineString, MultiPolygon, Polygon};
 use serde_json::Value;
 
 use crate::raster::{prepare_gdal, register_geopackage, with_gdal};
@@ -19,14 +20,14 @@ const CORNERS_MAX: usize = 10_000_000;
 /// System of GeoJSON files that name none.
 const LONGITUDE_LATITUDE: &str = "EPSG:4326";
 
-/// The corners of an area, in its coordinate reference system.
+/// Polygons in a coordinate reference system.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct AreaCorners {
+pub struct Area {
     /// Definition of the system, for PROJ.
     pub crs: String,
-    /// Easting and northing, or longitude and latitude.
-    pub corners: Vec<(f64, f64)>,
+    /// Polygons, whose corners are easting and northing, or longitude and latitude.
+    pub polygons: MultiPolygon<f64>,
 }
 
 /// Place of an area in a file.
@@ -36,8 +37,13 @@ pub struct AreaName<'a> {
     pub layer: Option<&'a str>,
     /// Field that holds names.
     pub field: &'a str,
-    /// Name of the area.
-    pub name: &'a str,
+    /// Name of the area; all polygons of the layer when `None`.
+    pub name: Option<&'a str>,
+}
+
+impl AreaName<'_> {
+    /// All polygons of the only layer.
+    pub const ALL: Self = Self { layer: None, field: "", name: None };
 }
 
 /// An area that cannot be read.
@@ -51,85 +57,103 @@ pub struct AreaError {
     pub what: String,
 }
 
-/// Reads the area of a name from a GeoPackage (`.gpkg`) or a GeoJSON file.
+/// Reads the area of a name, or all areas, from a GeoPackage (`.gpkg`) or a GeoJSON file.
 ///
 /// ```
 /// # let folder = tempfile::tempdir()?;
+/// use io::areas::AreaName;
+///
 /// let path = folder.path().join("areas.geojson");
 /// std::fs::write(&path, r#"{"type": "FeatureCollection", "features": [{"type": "Feature",
 ///     "properties": {"name": "north"}, "geometry": {"type": "Polygon",
 ///     "coordinates": [[[5.0, 43.0], [5.1, 43.0], [5.1, 43.2], [5.0, 43.0]]]}}]}"#)?;
-/// let area = io::areas::read(&path, io::areas::AreaName { layer: None, field: "name", name: "north" })?;
-/// assert_eq!((area.crs.as_str(), area.corners[2]), ("EPSG:4326", (5.1, 43.2)));
+/// let area = io::areas::read(&path, AreaName { layer: None, field: "name", name: Some("north") })?;
+/// assert_eq!((area.crs.as_str(), area.polygons.0[0].exterior().0[2].x), ("EPSG:4326", 5.1));
+/// assert_eq!(area, io::areas::read(&path, AreaName::ALL)?);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
 /// [`AreaError`] for a file that cannot be read, for a name that no polygon or more than one
 /// feature has, and for a layer without a reference system.
-pub fn read(path: &Path, wanted: AreaName<'_>) -> Result<AreaCorners, AreaError> {
+pub fn read(path: &Path, wanted: AreaName<'_>) -> Result<Area, AreaError> {
     let is_package = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gpkg"));
     let read = if is_package { geopackage(path, wanted) } else { geojson(path, wanted) };
     let checked = read.and_then(|area| {
-        let is_finite = area.corners.iter().all(|(x, y)| x.is_finite() && y.is_finite());
-        match area.corners.len() {
-            0..3 => Err(format!("{:?} has no polygon", wanted.name)),
+        let what = wanted.name.map_or_else(|| "the layer".to_owned(), |name| format!("{name:?}"));
+        let is_finite = area.polygons.coords_iter().all(|c| c.x.is_finite() && c.y.is_finite());
+        match area.polygons.coords_count() {
+            0..3 => Err(format!("{what} has no polygon")),
             3..=CORNERS_MAX if is_finite => Ok(area),
-            _ => Err(format!("{:?} has corners that are no numbers, or too many", wanted.name)),
+            _ => Err(format!("{what} has corners that are no numbers, or too many")),
         }
     });
     checked.map_err(|what| AreaError { path: path.to_owned(), what })
 }
 
-/// Returns the only one of the features of a name, or why there is none.
-fn only<T>(mut found: Vec<T>, wanted: AreaName<'_>, names: &[String]) -> Result<T, String> {
+/// A feature with its polygons.
+struct Feature {
+    name: Option<String>,
+    polygons: Vec<Polygon<f64>>,
+}
+
+/// Returns the polygons of the only feature of a name, or those of all features.
+fn chosen(features: Vec<Feature>, wanted: AreaName<'_>) -> Result<MultiPolygon<f64>, String> {
     const SHOWN: usize = 8;
-    let AreaName { field, name, .. } = wanted;
+    let AreaName { field, name: Some(name), .. } = wanted else {
+        return Ok(features.into_iter().flat_map(|feature| feature.polygons).collect());
+    };
+    let (mut found, others): (Vec<Feature>, Vec<Feature>) =
+        features.into_iter().partition(|feature| feature.name.as_deref() == Some(name));
     match (found.pop(), found.is_empty()) {
-        (Some(one), true) => Ok(one),
+        (Some(one), true) => Ok(MultiPolygon(one.polygons)),
         (Some(_), false) => Err(format!("{} features have the {field} {name:?}, expected one", found.len() + 1)),
         (None, _) => {
-            let known: Vec<&str> = names.iter().take(SHOWN).map(String::as_str).collect();
+            let known: Vec<String> = others.into_iter().filter_map(|feature| feature.name).take(SHOWN).collect();
             Err(format!("no feature has the {field} {name:?}; there are {}", known.join(", ")))
         }
     }
 }
 
-fn geojson(path: &Path, wanted: AreaName<'_>) -> Result<AreaCorners, String> {
+fn geojson(path: &Path, wanted: AreaName<'_>) -> Result<Area, String> {
     let bytes = read_regular(path, SIZE_LIMIT).map_err(|e| e.to_string())?;
     let json: Value = serde_json::from_slice(&bytes).map_err(|e| e.to_string())?;
     let features = json["features"].as_array().ok_or("it is no collection of GeoJSON features")?;
-    let name_of = |feature: &Value| match &feature["properties"][wanted.field] {
-        Value::String(text) => Some(text.clone()),
-        Value::Number(number) => Some(number.to_string()),
-        _ => None,
+    let feature = |feature: &Value| {
+        let geometry = &feature["geometry"];
+        let parts = match geometry["type"].as_str() {
+            Some("Polygon") => vec![&geometry["coordinates"]],
+            Some("MultiPolygon") => geometry["coordinates"].as_array().into_iter().flatten().collect(),
+            _ => Vec::new(),
+        };
+        let name = match &feature["properties"][wanted.field] {
+            Value::String(text) => Some(text.clone()),
+            Value::Number(number) => Some(number.to_string()),
+            _ => None,
+        };
+        Feature { name, polygons: parts.into_iter().filter_map(polygon).collect() }
     };
-    let names: Vec<String> = features.iter().filter_map(name_of).collect();
-    let found = features.iter().filter(|feature| name_of(feature).as_deref() == Some(wanted.name)).collect();
-    let geometry = &only(found, wanted, &names)?["geometry"];
-    let mut corners = Vec::new();
-    if matches!(geometry["type"].as_str(), Some("Polygon" | "MultiPolygon")) {
-        positions(&geometry["coordinates"], &mut corners);
-    }
+    let polygons = chosen(features.iter().map(feature).collect(), wanted)?;
     // "urn:ogc:def:crs:EPSG::32631", "EPSG:32631"; "urn:ogc:def:crs:OGC:1.3:CRS84".
     let named = json["crs"]["properties"]["name"].as_str().filter(|name| name.contains("EPSG"));
     let code = named.and_then(|name| name.rsplit(':').next());
     let crs = code.map_or_else(|| LONGITUDE_LATITUDE.to_owned(), |code| format!("EPSG:{code}"));
-    Ok(AreaCorners { crs, corners })
+    Ok(Area { crs, polygons })
 }
 
-/// Collects the positions of nested arrays of coordinates. JSON is at most 128 arrays deep.
-fn positions(coordinates: &Value, corners: &mut Vec<(f64, f64)>) {
-    let Some(all) = coordinates.as_array() else { return };
-    match all.as_slice() {
-        [Value::Number(x), Value::Number(y), ..] => {
-            corners.push((x.as_f64().unwrap_or(f64::NAN), y.as_f64().unwrap_or(f64::NAN)));
-        }
-        inner => inner.iter().for_each(|inner| positions(inner, corners)),
-    }
+/// Makes a polygon of an array of rings, the outer one first.
+fn polygon(rings: &Value) -> Option<Polygon<f64>> {
+    let number = |value: Option<&Value>| value.and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let corner = |position: &Value| {
+        let position = position.as_array().map_or(&[][..], Vec::as_slice);
+        Coord { x: number(position.first()), y: number(position.get(1)) }
+    };
+    let ring = |ring: &Value| Some(LineString(ring.as_array()?.iter().map(corner).collect()));
+    let mut rings = rings.as_array()?.iter().filter_map(ring);
+    Some(Polygon::new(rings.next()?, rings.collect()))
 }
 
-fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<AreaCorners, String> {
+fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<Area, String> {
     if !path.metadata().map_err(|e| e.to_string())?.is_file() {
         return Err("it is not a regular file".to_owned());
     }
@@ -150,45 +174,43 @@ fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<AreaCorners, String> 
         }
     };
     let crs = layer.spatial_ref().and_then(|system| system.to_wkt().ok()).ok_or("the layer has no reference system")?;
-    let (mut names, mut found) = (Vec::new(), Vec::new());
+    let mut features = Vec::new();
     for feature in layer.features() {
-        let field =
-            feature.field_index(wanted.field).map_err(|_| format!("the layer has no field {}", wanted.field))?;
-        let Ok(Some(name)) = feature.field_as_string(field) else { continue };
-        if name == wanted.name {
-            let mut corners = Vec::new();
-            if let Some(geometry) = feature.geometry() {
-                corners_of(geometry, &mut corners);
+        let name = match wanted.name {
+            None => None,
+            Some(_) => {
+                let field = feature
+                    .field_index(wanted.field)
+                    .map_err(|_| format!("the layer has no field {}", wanted.field))?;
+                feature.field_as_string(field).ok().flatten()
             }
-            found.push(corners);
-        }
-        names.push(name);
+        };
+        let is_wanted = wanted.name.is_none() || wanted.name == name.as_deref();
+        let polygons = match feature.geometry().filter(|_| is_wanted) {
+            None => Vec::new(),
+            Some(geometry) => match with_gdal(|| geometry.to_geo())? {
+                geo::Geometry::Polygon(polygon) => vec![polygon],
+                geo::Geometry::MultiPolygon(polygons) => polygons.0,
+                _ => Vec::new(),
+            },
+        };
+        features.push(Feature { name, polygons });
     }
-    Ok(AreaCorners { crs, corners: only(found, wanted, &names)? })
-}
-
-/// Collects the corners of a geometry and of its parts.
-fn corners_of(geometry: &Geometry, corners: &mut Vec<(f64, f64)>) {
-    let mut points = Vec::new();
-    geometry.get_points(&mut points);
-    corners.extend(points.into_iter().map(|(x, y, _)| (x, y)));
-    for part in 0..geometry.geometry_count() {
-        corners_of(&geometry.get_geometry(part), corners);
-    }
+    Ok(Area { crs, polygons: chosen(features, wanted)? })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use gdal::spatial_ref::SpatialRef;
-    use gdal::vector::{FieldDefn, LayerOptions, OGRFieldType, OGRwkbGeometryType};
+    use gdal::vector::{FieldDefn, Geometry, LayerOptions, OGRFieldType, OGRwkbGeometryType};
 
     fn named<'a>(layer: Option<&'a str>, name: &'a str) -> AreaName<'a> {
-        AreaName { layer, field: "name", name }
+        AreaName { layer, field: "name", name: Some(name) }
     }
 
     #[test]
-    fn geopackages_give_their_corners_and_their_map() {
+    fn geopackages_give_their_polygons_and_their_map() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("areas.gpkg");
         prepare_gdal();
@@ -208,7 +230,9 @@ mod tests {
         drop(dataset);
         let area = read(&path, named(Some("blocks"), "north")).unwrap();
         assert!(area.crs.contains("UTM zone 31N"), "{}", area.crs);
-        assert!(area.corners.contains(&(693_500.0, 4_822_400.0)), "{:?}", area.corners);
+        assert!(area.polygons.coords_iter().any(|c| (c.x, c.y) == (693_500.0, 4_822_400.0)), "{:?}", area.polygons);
+        let all = AreaName { layer: Some("others"), ..AreaName::ALL };
+        assert_eq!(read(&path, all).unwrap().polygons, area.polygons);
         let told = read(&path, named(None, "north")).unwrap_err().to_string();
         assert!(told.contains("2 layers, name one of blocks, others"), "{told}");
         let told = read(&path, named(Some("blocks"), "south")).unwrap_err().to_string();

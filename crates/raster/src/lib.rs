@@ -1,4 +1,4 @@
-//! Rasters in memory: grids, geotransforms, windows, masks, pyramids and resampling.
+//! Rasters in memory: grids, geotransforms, windows, masks, polygons, pyramids and resampling.
 //!
 //! All functions use one pixel convention: the centre of the upper-left pixel is at (0, 0). GDAL's
 //! corner convention (centre at 0.5, 0.5) appears in [`GeoTransform`] and in the readers only.
@@ -7,6 +7,7 @@ mod gaussian;
 mod geotransform;
 mod grid;
 mod mask;
+mod polygon;
 mod pyramid;
 mod relief;
 mod resample;
@@ -16,6 +17,7 @@ pub use gaussian::gaussian;
 pub use geotransform::GeoTransform;
 pub use grid::Grid;
 pub use mask::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, Flags, is_missing};
+pub use polygon::mark_inside;
 pub use pyramid::{Pyramid, level_from_level0, level0_from_level, reduce};
 pub use relief::{Light, coloured_relief, height_percentiles, hillshade};
 pub use resample::{Interpolation, bicubic, bicubic_along, bilinear, cubic_weights, resample, sample};

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::luma_rule::BandChoice;
 use crate::atomic::SaveError;
 
 /// A raster file that cannot be read or written. The text ends with the path, and `reason` is
@@ -62,6 +63,16 @@ pub enum RasterError {
         found: String,
         /// The property required.
         expected: &'static str,
+    },
+    /// The image does not have the band that is asked for.
+    #[error("the image has no band {wanted}; its bands are {bands}: {}", path.display())]
+    NoBand {
+        /// The file.
+        path: PathBuf,
+        /// The band.
+        wanted: BandChoice,
+        /// Numbers and names of the bands that the image has.
+        bands: String,
     },
     /// A value that looks like no-data is not declared as such. As a height it would spoil every
     /// result.

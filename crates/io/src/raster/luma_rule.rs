@@ -1,8 +1,73 @@
-//! Which bands of an image make its luma: Rec. 601, `0.299 R + 0.587 G + 0.114 B`, on the stored
-//! samples.
+//! Which bands of an image make its luma: one that is asked for, or Rec. 601,
+//! `0.299 R + 0.587 G + 0.114 B`, on the stored samples.
 
-use gdal::Dataset;
+use std::fmt;
+use std::str::FromStr;
+
 use gdal::raster::ColorInterpretation;
+use gdal::{Dataset, Metadata};
+use serde::{Deserialize, Serialize};
+
+/// A band of an image, as people name it.
+///
+/// ```
+/// use io::raster::BandChoice;
+///
+/// assert_eq!("2".parse(), Ok(BandChoice::Number(2)));
+/// assert_eq!("nir".parse(), Ok(BandChoice::Name("nir".to_owned())));
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum BandChoice {
+    /// Position, counted from 1.
+    Number(usize),
+    /// The band's description or its colour, in upper or lower case.
+    Name(String),
+}
+
+impl FromStr for BandChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let text = text.trim();
+        Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Number))
+    }
+}
+
+impl fmt::Display for BandChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Name(name) => write!(f, "{name:?}"),
+        }
+    }
+}
+
+impl BandChoice {
+    /// Returns the position of the band among the names of the bands, counted from 1.
+    pub(super) fn position(&self, bands: &[Vec<String>]) -> Option<usize> {
+        match self {
+            Self::Number(number) => (1..=bands.len()).contains(number).then_some(*number),
+            Self::Name(name) => {
+                let named = |names: &Vec<String>| names.iter().any(|own| own.eq_ignore_ascii_case(name));
+                bands.iter().position(named).map(|i| i + 1)
+            }
+        }
+    }
+}
+
+/// Returns the names that the bands of a file have: descriptions and colours.
+pub(super) fn band_names(dataset: &Dataset) -> Vec<Vec<String>> {
+    let names = |i| {
+        let Ok(band) = dataset.rasterband(i) else { return Vec::new() };
+        let colour = match band.color_interpretation() {
+            ColorInterpretation::Undefined => None,
+            colour => Some(colour.name()),
+        };
+        [band.description().ok(), colour].into_iter().flatten().filter(|name| !name.is_empty()).collect()
+    };
+    (1..=dataset.raster_count()).map(names).collect()
+}
 
 /// The bands, counted from 1, that make one grey value.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,6 +118,14 @@ impl LumaRule {
 mod tests {
     use super::*;
     use ColorInterpretation as C;
+
+    #[test]
+    fn bands_have_numbers_and_names() {
+        let bands = [vec!["PAN".to_owned(), "Gray".to_owned()], vec![], vec!["Near infrared".to_owned()]];
+        let position = |choice: &str| choice.parse::<BandChoice>().unwrap().position(&bands);
+        assert_eq!(["pan", "gray", "near INFRARED", "2"].map(position), [Some(1), Some(1), Some(3), Some(2)]);
+        assert_eq!(["0", "4", "nir", ""].map(position), [None; 4]);
+    }
 
     #[test]
     fn bands_become_luma_by_colour_then_by_number() {

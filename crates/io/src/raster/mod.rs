@@ -32,7 +32,7 @@ pub use error::RasterError;
 pub use gdal_setup::allow_remote;
 pub use geotiff::{CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
 pub use luma::LumaTile;
-pub use luma_rule::LumaRule;
+pub use luma_rule::{BandChoice, LumaRule};
 pub use png::{write_png_gray, write_png_rgb};
 pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};

@@ -12,7 +12,7 @@ use raster::{GeoTransform, Grid, Window};
 use super::error::RasterError;
 use super::gdal_access::files_of;
 use super::gdal_setup::{open_dataset, with_gdal};
-use super::luma_rule::LumaRule;
+use super::luma_rule::{BandChoice, LumaRule, band_names};
 
 /// Type of the stored samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,7 +96,22 @@ impl ImageSource {
         Ok(Self { path, dataset, info })
     }
 
-    /// Opens the same file again, for another thread.
+    /// Returns the image with one band as its luma and as its colour.
+    ///
+    /// # Errors
+    /// [`RasterError::NoBand`] with the bands that the image has.
+    pub fn with_band(mut self, choice: &BandChoice) -> Result<Self, RasterError> {
+        let names = band_names(&self.dataset);
+        let Some(position) = choice.position(&names) else {
+            let bands = names.iter().enumerate().map(|(i, names)| format!("{} {}", i + 1, names.join(", ")));
+            let bands: Vec<String> = bands.map(|band| band.trim_end().to_owned()).collect();
+            return Err(RasterError::NoBand { path: self.path, wanted: choice.clone(), bands: bands.join("; ") });
+        };
+        self.info.luma = LumaRule::Single(position);
+        Ok(self)
+    }
+
+    /// Opens the same file again, for another thread, with the luma of the file.
     ///
     /// # Errors
     /// As [`Self::open`].

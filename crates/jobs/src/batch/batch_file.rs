@@ -7,7 +7,7 @@ use toml::Table;
 
 use crate::batch::error::BatchError;
 use crate::batch::task::{TaskKind, TaskSettings};
-use crate::dsm::MapBounds;
+use crate::dsm::{LayerArea, MapBounds};
 use crate::files::read_text;
 use crate::job_file;
 use crate::job_paths::resolved;
@@ -83,8 +83,9 @@ pub struct BatchScene {
     pub images: Vec<String>,
     /// Area of the surface model, in its CRS.
     pub bounds: Option<MapBounds>,
-    /// Area of the surface model: a polygon of a layer, in place of bounds.
-    pub area: Option<SceneArea>,
+    /// Area of the surface model: a polygon of a layer, in place of bounds. Its name is the scene's
+    /// unless it is given.
+    pub area: Option<LayerArea>,
     /// What is to be made; the defaults' when `None`.
     pub tasks: Option<Vec<String>>,
     /// Settings of the surface model that differ from the defaults.
@@ -102,26 +103,6 @@ pub struct BatchScene {
     /// Settings of the priors that differ from the defaults.
     #[serde(default)]
     pub priors: Table,
-}
-
-/// A polygon of a layer.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct SceneArea {
-    /// GeoPackage or GeoJSON.
-    pub file: PathBuf,
-    /// Layer; the only one when `None`.
-    pub layer: Option<String>,
-    /// Field that holds the names of the polygons.
-    #[serde(default = "name_field")]
-    pub field: String,
-    /// Name of the polygon; the scene's when `None`.
-    pub name: Option<String>,
-}
-
-fn name_field() -> String {
-    "name".to_owned()
 }
 
 impl BatchConfig {

@@ -4,7 +4,6 @@
 //! cannot be computed does not stop the others. A batch that is killed goes on where it was: a task
 //! whose settings, inputs and product are as they were is left alone.
 
-mod area;
 mod batch_file;
 mod batch_report;
 mod error;
@@ -15,7 +14,7 @@ mod task;
 mod task_log;
 mod tasks_of_scene;
 
-pub use batch_file::{BatchConfig, BatchDefaults, BatchLimits, BatchScene, SceneArea, read_batch};
+pub use batch_file::{BatchConfig, BatchDefaults, BatchLimits, BatchScene, read_batch};
 pub use batch_report::{BatchReport, SceneReport, TaskReport, TaskState};
 pub use error::BatchError;
 pub use run::run;

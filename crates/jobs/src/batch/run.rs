@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use numeric::Progress;
 
-use crate::batch::area::set_area;
 use crate::batch::batch_file::{BatchConfig, BatchScene};
 use crate::batch::batch_report::{BatchReport, SceneReport};
 use crate::batch::error::BatchError;
@@ -85,21 +84,18 @@ fn prepare(batch: &BatchConfig, scene: &BatchScene) -> Result<SceneJobs, BatchEr
         folder: folder.clone(),
         has_surface: tasks.contains(&TaskKind::Dsm),
         bounds: scene.bounds,
+        area: scene.area.clone().map(|area| area.or_named(&scene.name)),
     };
-    let mut fault = images.as_ref().err().cloned();
     let mut jobs = Vec::with_capacity(tasks.len());
     for &task in &tasks {
-        let mut job = TaskJob::new(task, batch.settings(scene, task), &place).map_err(|what| BatchError::Settings {
+        let job = TaskJob::new(task, batch.settings(scene, task), &place).map_err(|what| BatchError::Settings {
             scene: scene.name.clone(),
             task: task.name().to_owned(),
             what,
         })?;
-        if let (TaskJob::Dsm(config), Some(area)) = (&mut job, &scene.area) {
-            fault = fault.or(set_area(config, area, &scene.name).err());
-        }
         jobs.push(job.limited(memory_mb(batch)));
     }
-    Ok(SceneJobs { name: scene.name.clone(), folder, tasks, jobs: fault.map_or(Ok(jobs), Err) })
+    Ok(SceneJobs { name: scene.name.clone(), folder, tasks, jobs: images.map(|_| jobs) })
 }
 
 /// Returns the memory that one surface model may take, megabytes.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use crate::camera_stand::{StandConfig, StandSource};
-use crate::dsm::{DsmConfig, FILES, MapBounds, USED_CONFIG};
+use crate::dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
 use crate::error_text::with_causes;
 use crate::eval::GridEvalConfig;
 use crate::heightmap::HeightMapConfig;
@@ -55,7 +55,7 @@ impl TaskKind {
     /// Settings that the batch itself makes.
     const fn made(self) -> &'static [&'static str] {
         match self {
-            Self::Dsm => &["images", "output", "threads", "overwrite", "bounds"],
+            Self::Dsm => &["images", "output", "threads", "overwrite", "bounds", "area"],
             Self::Ortho => &["images", "surface", "output", "threads", "overwrite"],
             Self::Eval => &["test", "target", "page", "error_map", "threads", "overwrite"],
             Self::HeightMap => &["source", "output", "threads", "overwrite"],
@@ -76,7 +76,7 @@ impl TaskKind {
     /// Settings that are paths.
     const fn paths(self) -> &'static [&'static str] {
         match self {
-            Self::Dsm => &["dem", "reference_dem", "prior", "control", "corrections"],
+            Self::Dsm => &["dem", "reference_dem", "prior", "control", "corrections", "masks", "image_masks"],
             Self::Ortho => &["report"],
             Self::Eval => &["reference", "classes", "mask", "terrain", "confidence", "objects"],
             Self::HeightMap => &["terrain", "raster", "list", "camera_file"],
@@ -107,6 +107,8 @@ pub(super) struct TaskScene<'a> {
     pub(super) has_surface: bool,
     /// Area of the surface model.
     pub(super) bounds: Option<MapBounds>,
+    /// Polygons in which the surface model lies.
+    pub(super) area: Option<LayerArea>,
 }
 
 /// The job of a task, ready to run.
@@ -140,6 +142,7 @@ impl TaskJob {
             TaskKind::Dsm => {
                 let mut base = DsmConfig::new(images, folder);
                 base.bounds = scene.bounds;
+                base.area.clone_from(&scene.area);
                 Self::Dsm(Box::new(with(&base, &given)?))
             }
             TaskKind::Ortho => {
@@ -318,12 +321,19 @@ fn lay_over(table: &mut Table, over: &Table) {
 /// A text that names an environment variable that is not set.
 fn resolve_paths(table: &mut Table, paths: &[&str], folder: &Path) -> Result<(), String> {
     for (key, value) in table.iter_mut() {
-        match value {
-            Value::String(text) if paths.contains(&key.as_str()) => {
+        let named = match value {
+            Value::Table(inner) => {
+                resolve_paths(inner, paths, folder)?;
+                continue;
+            }
+            _ if !paths.contains(&key.as_str()) => continue,
+            Value::Array(several) => several.as_mut_slice(),
+            single => std::slice::from_mut(single),
+        };
+        for value in named {
+            if let Value::String(text) = value {
                 *text = resolved(&expanded(Path::new(text.as_str()))?, folder).to_string_lossy().into_owned();
             }
-            Value::Table(inner) => resolve_paths(inner, paths, folder)?,
-            _ => {}
         }
     }
     Ok(())

@@ -16,7 +16,8 @@ use raster::{GeoTransform, Grid, Window};
 use sweep::pointing::{AdjustConfig, Chip, ChipConfig, ChipPlace, ChipSearch, Track, find_chip};
 
 use crate::dsm::error::{DsmError, DsmSetting};
-use crate::dsm::images::{SceneImage, read_view};
+use crate::dsm::image_pixels::read_view;
+use crate::dsm::images::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::report::ChipReport;
 

@@ -7,8 +7,9 @@ use sweep::SweepView;
 use crate::dsm::chunk_plan::{ChunkSweep, ChunkWork, read_chunk_views};
 use crate::dsm::chunk_side::MARGIN_PX;
 use crate::dsm::error::DsmError;
+use crate::dsm::ground_mask::GroundMask;
+use crate::dsm::image_pixels::read_view;
 use crate::dsm::image_windows::GroundBox;
-use crate::dsm::images::read_view;
 use crate::dsm::plan::Plan;
 use crate::dsm::prior_findings::PriorFindings;
 use crate::dsm::rasters::ChunkRasters;
@@ -59,6 +60,15 @@ pub struct ChunkSurface {
     pub findings: PriorFindings,
 }
 
+impl ChunkSurface {
+    /// Makes the surface of a chunk of which no cell gets a height.
+    fn masked(core: Window, height_range: HeightRange) -> Self {
+        let rasters = ChunkRasters::masked((core.width, core.height));
+        let counts = SurfaceCounts::of(&rasters);
+        Self { rasters, counts, hypotheses: 0, height_range, findings: PriorFindings::default() }
+    }
+}
+
 /// Computes the chunk with number `index` (counted from 0) of a plan.
 ///
 /// # Errors
@@ -95,6 +105,12 @@ fn sweep_chunk(
     work: &ChunkSweep,
     session: &mut Session<'_>,
 ) -> Result<ChunkSurface, DsmError> {
+    let grid = plan.grid.part(work.extent);
+    let core = Window { x: core.x - work.extent.x, y: core.y - work.extent.y, ..core };
+    let mask = GroundMask::on(&plan.config, &grid)?;
+    if mask.as_ref().is_some_and(|mask| mask.excludes_all(core)) {
+        return Ok(ChunkSurface::masked(core, work.height_range));
+    }
     // A scene that is computed at once shows its own stages. A chunk of several is one step of the
     // caller's stage.
     let is_whole = plan.chunk_side.is_none();
@@ -130,7 +146,6 @@ fn sweep_chunk(
     if is_whole {
         session.lap("sweep");
     }
-    let grid = plan.grid.part(work.extent);
     let input = SurfaceInput {
         config: &plan.config,
         sweep: &sweep,
@@ -138,7 +153,8 @@ fn sweep_chunk(
         grid: &grid,
         pixel_m: plan.pixel_m,
         camera_m: plan.camera_deviation_m(),
-        core: Window { x: core.x - work.extent.x, y: core.y - work.extent.y, ..core },
+        core,
+        mask: mask.as_ref(),
     };
     progress.begin("fusing", 1 + work.sources.iter().filter(|s| !s.is_empty()).count());
     let (rasters, counts) = make_surface(input, views, heights, progress)?;

@@ -49,15 +49,6 @@ const FILL_SIGMA_SLOPE: f64 = 0.1;
 /// the usual threshold of completeness.
 const RIGHT_M: f64 = 1.0;
 
-/// Number of cells after each step of the clean-up.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Cleaned {
-    /// Cells with an observed height.
-    pub(crate) observed: usize,
-    /// Cells removed as speckle.
-    pub(crate) speckle_removed: usize,
-}
-
 /// Width of the ground around a cell that decides its content, metres: speckle is
 /// judged, then voids are filled from this far. What hides a void stands nearer, unless it is a
 /// tower of more than 100 m: in a chunk the void then counts as seen at the far end of its shadow.
@@ -84,13 +75,14 @@ pub(crate) struct Lengths {
     pub(crate) camera_m: f64,
 }
 
-/// Cleans a surface; returns the source of each cell and the counts of `core`.
+/// Cleans a surface; returns the source of each cell and the number of cells of `core` that were
+/// removed as speckle.
 pub(crate) fn clean_up(
     fused: &mut FusedSurface,
     voids: Voids<'_>,
     lengths: Lengths,
     core: Window,
-) -> (Grid<CellSource>, Cleaned) {
+) -> (Grid<CellSource>, usize) {
     let Lengths { gsd_m, step_m, camera_m } = lengths;
     let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
     let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells, camera_m };
@@ -114,7 +106,7 @@ pub(crate) fn clean_up(
     }
     let is_observed = |i: usize| !filled.source.data()[i].is_filled();
     fused.confidence = calibrate(&fused.height_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
-    (filled.source, Cleaned { observed, speckle_removed: before - observed })
+    (filled.source, before - observed)
 }
 
 /// Takes the heights that no view has seen out of a surface.

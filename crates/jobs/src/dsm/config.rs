@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crs::VerticalDatum;
+use io::areas::AreaName;
+use io::raster::BandChoice;
 use serde::{Deserialize, Serialize};
 
 use crate::dsm::error::{DsmError, DsmSetting};
@@ -66,6 +68,43 @@ impl Fill {
     ];
 }
 
+/// Polygons of a layer.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct LayerArea {
+    /// GeoPackage or GeoJSON.
+    pub file: PathBuf,
+    /// Layer; the only one when `None`.
+    pub layer: Option<String>,
+    /// Field that holds the names of the polygons.
+    #[serde(default = "name_field")]
+    pub field: String,
+    /// Name of the polygon; all polygons when `None`, and in a batch that of the scene.
+    pub name: Option<String>,
+}
+
+fn name_field() -> String {
+    "name".to_owned()
+}
+
+impl LayerArea {
+    /// Makes the area of all polygons of a file with one layer.
+    pub fn new(file: PathBuf) -> Self {
+        Self { file, layer: None, field: name_field(), name: None }
+    }
+
+    /// Returns the area with a name, unless it has one.
+    pub(crate) fn or_named(self, name: &str) -> Self {
+        Self { name: self.name.or_else(|| Some(name.to_owned())), ..self }
+    }
+
+    /// Returns its place in the file.
+    pub(crate) fn wanted(&self) -> AreaName<'_> {
+        AreaName { layer: self.layer.as_deref(), field: &self.field, name: self.name.as_deref() }
+    }
+}
+
 /// Configuration of a DSM run. A field that is `None` is chosen from the scene.
 ///
 /// ```
@@ -94,6 +133,19 @@ pub struct DsmConfig {
     pub crs_epsg: Option<u32>,
     /// Area of the DSM, in its CRS.
     pub bounds: Option<MapBounds>,
+    /// Polygons in which the DSM lies. Cells outside are void, and without `bounds` the grid is the
+    /// rectangle around them.
+    pub area: Option<LayerArea>,
+    /// Ground without heights, such as water: polygons (GeoJSON, GeoPackage), and georeferenced
+    /// rasters where they are neither 0 nor without data.
+    #[serde(default)]
+    pub masks: Vec<PathBuf>,
+    /// Pixels that are not matched, such as clouds: polygons on the ground, and rasters in the
+    /// frame of an image. The name of each begins with that of its image.
+    #[serde(default)]
+    pub image_masks: Vec<PathBuf>,
+    /// Band to match; the luma of all bands when `None`.
+    pub band: Option<BandChoice>,
     /// Heights to search, metres above the ellipsoid.
     pub height_range_m: Option<HeightRange>,
     /// Coarse elevation model from which the height range is taken.
@@ -164,6 +216,10 @@ impl DsmConfig {
             gsd_m: None,
             crs_epsg: None,
             bounds: None,
+            area: None,
+            masks: Vec::new(),
+            image_masks: Vec::new(),
+            band: None,
             height_range_m: None,
             dem: None,
             reference_dem: None,
@@ -189,7 +245,9 @@ impl DsmConfig {
 
     /// Returns the inputs beside the images.
     pub(crate) fn side_inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        [&self.dem, &self.reference_dem, &self.prior, &self.control, &self.corrections].into_iter().flatten()
+        let single = [&self.dem, &self.reference_dem, &self.prior, &self.control, &self.corrections];
+        let area = self.area.iter().map(|area| &area.file);
+        single.into_iter().flatten().chain(area).chain(&self.masks).chain(&self.image_masks)
     }
 
     /// Returns the configuration with the defaults for what does not change the result: threads,
@@ -201,8 +259,11 @@ impl DsmConfig {
 
     /// Replaces every path by what `change` makes of it.
     pub(crate) fn map_paths(&mut self, change: impl Fn(&Path) -> PathBuf) {
-        let sides = [&mut self.dem, &mut self.reference_dem, &mut self.prior, &mut self.control, &mut self.corrections];
-        for path in self.images.iter_mut().chain([&mut self.output]).chain(sides.into_iter().flatten()) {
+        let single =
+            [&mut self.dem, &mut self.reference_dem, &mut self.prior, &mut self.control, &mut self.corrections];
+        let area = self.area.iter_mut().map(|area| &mut area.file);
+        let sides = single.into_iter().flatten().chain(area).chain(&mut self.masks).chain(&mut self.image_masks);
+        for path in self.images.iter_mut().chain([&mut self.output]).chain(sides) {
             *path = change(path);
         }
     }

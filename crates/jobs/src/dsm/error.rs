@@ -29,6 +29,10 @@ pub enum DsmSetting {
     Dem,
     /// `reference_dem`.
     ReferenceDem,
+    /// `masks`.
+    Masks,
+    /// `image_masks`.
+    ImageMasks,
     /// `control`.
     Control,
     /// `pairs`.
@@ -53,6 +57,8 @@ impl fmt::Display for DsmSetting {
             Self::HeightRange => "the height range",
             Self::Dem => "the elevation model",
             Self::ReferenceDem => "the reference elevation model",
+            Self::Masks => "the mask",
+            Self::ImageMasks => "the mask of an image",
             Self::Control => "the file of ground points",
             Self::Pairs => "the list of image pairs",
             Self::References => "the list of reference images",
@@ -117,6 +123,9 @@ pub enum DsmError {
         /// What is wrong.
         reason: String,
     },
+    /// The polygons of an area or of a mask cannot be used.
+    #[error(transparent)]
+    Area(#[from] io::areas::AreaError),
     /// The ground points cannot be used.
     #[error(transparent)]
     Control(#[from] io::ground_points::GroundPointsError),

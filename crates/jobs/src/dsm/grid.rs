@@ -1,14 +1,16 @@
 //! The grid of the DSM: CRS, cell size and extent.
 
 use crs::{AreaOfUse, CrsError, HeightConverter, MapProjection};
+use geo::CoordsIter;
 use geodesy::utm_epsg;
 use raster::{GeoTransform, Window};
 use report::plain_number;
 use serde::{Deserialize, Serialize};
 
-use crate::dsm::config::{DsmConfig, Preset};
+use crate::dsm::config::{DsmConfig, LayerArea, Preset};
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::footprints::shared_ground;
+use crate::dsm::ground_polygons::read_polygons;
 use crate::dsm::notes::Notes;
 use crate::dsm::values::MapBounds;
 use crate::dsm::view_geometry::ViewGeometry;
@@ -98,12 +100,26 @@ pub(crate) fn choose_grid(
     HeightConverter::new(config.vertical)?;
     let gsd_m = config.gsd_m.unwrap_or_else(|| rounded_gsd_m(coarsest_gsd_m * config.preset.pixels_per_cell()));
     let covered = covered_bounds(geometry, &projection)?;
-    let bounds = config.bounds.unwrap_or(covered);
+    let bounds = match (config.bounds, &config.area) {
+        (Some(bounds), _) => bounds,
+        (None, Some(area)) => bounds_of_area(area, &projection)?,
+        (None, None) => covered,
+    };
     if !bounds.meets(covered) {
         return Err(DsmError::BoundsMissScene { bounds, covered, epsg });
     }
     let (geotransform, size) = snapped(bounds, gsd_m)?;
     Ok(DsmGrid { epsg, geotransform, size, gsd_m })
+}
+
+/// Returns the map rectangle around the polygons of an area.
+fn bounds_of_area(area: &LayerArea, projection: &MapProjection) -> Result<MapBounds, DsmError> {
+    let mut bounds = MapBounds::EMPTY;
+    for corner in read_polygons(&area.file, area.wanted(), None)?.exterior_coords_iter() {
+        let at = projection.map_from_lonlat(corner.x, corner.y)?;
+        bounds = bounds.including(at.x, at.y);
+    }
+    Ok(bounds)
 }
 
 /// A CRS that is used outside its area of use.
@@ -148,7 +164,13 @@ pub(crate) fn note_grid(config: &DsmConfig, grid: &DsmGrid, coarsest_gsd_m: f64,
     };
     let coarsest = format!("{matched} {coarsest_gsd_m:.3} m, rounded to 5 cm");
     notes.choose("gsd", format!("{} m", grid.gsd_m), given(config.gsd_m.is_some(), coarsest));
-    let seen = given(config.bounds.is_some(), "the ground that at least two images see".to_owned());
+    let seen = given(
+        config.bounds.is_some(),
+        match config.area {
+            Some(_) => "the rectangle around the area's polygons".to_owned(),
+            None => "the ground that at least two images see".to_owned(),
+        },
+    );
     let bounds = grid.bounds().to_array().map(plain_number).join(", ");
     notes.choose("bounds", format!("[{bounds}], {} × {} cells", grid.size.0, grid.size.1), seen);
 }

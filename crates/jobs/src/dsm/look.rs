@@ -12,7 +12,8 @@ use crate::dsm::chunk_side::choose_side;
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::grid::{DsmGrid, choose_grid};
-use crate::dsm::images::{SceneImage, read_views};
+use crate::dsm::image_pixels::read_views;
+use crate::dsm::images::SceneImage;
 use crate::dsm::memory;
 use crate::dsm::order::as_given;
 use crate::dsm::partners::tie_pairs;
@@ -96,11 +97,11 @@ fn look_at(
     let progress = session.progress;
     let cameras = images.iter().map(|o| o.camera.clone()).collect();
     let sizes = images.iter().map(|o| o.size).collect();
-    if config.bounds.is_some() || !fits(config, images, &grid) {
+    if config.bounds.is_some() || config.area.is_some() || !fits(config, images, &grid) {
         // A limit too small for the smallest chunk is refused before anything is read.
         choose_side(config, images, &grid, HeightRange::at(geometry.centre.height_m))?;
         // Ties come from all over the scene, so that runs with other bounds find the same pointing.
-        let whole = DsmConfig { bounds: None, gsd_m: None, ..config.clone() };
+        let whole = DsmConfig { bounds: None, area: None, gsd_m: None, ..config.clone() };
         let (ties, characters) =
             match_in_windows(images, &choose_grid(&whole, &geometry, gsd)?, &geometry, &pairs, search, progress)?;
         return Ok(FirstLook { geometry, useful, ties, cameras, sizes, characters, is_whole: false });

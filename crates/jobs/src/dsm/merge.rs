@@ -200,7 +200,7 @@ pub fn merge(
 
 /// Warns when hardly any cell has an observed height.
 fn warn_of_share(size: (usize, usize), counts: &SurfaceCounts, notes: &mut Notes<'_>) {
-    let share = counts.observed as f64 / (size.0 * size.1).max(1) as f64;
+    let share = counts.observed as f64 / (size.0 * size.1).saturating_sub(counts.masked).max(1) as f64;
     if share < OBSERVED_WEAK {
         notes.warn(format!(
             "only {:.1} % of the cells have an observed height: the images may not show the same ground, or its heights \
@@ -218,6 +218,7 @@ fn surface_report(plan: &Plan, counts: &SurfaceCounts) -> SurfaceReport {
         observed: counts.observed,
         filled: counts.filled,
         void: counts.void,
+        masked: counts.masked,
         speckle_removed: counts.speckle_removed,
         kept_by_view: views.into_iter().map(|(_, view)| view.kept as f64 / view.all as f64).collect(),
     }

@@ -1,17 +1,20 @@
 //! First stage of a run: the images by their headers and RPCs.
 
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use camera::RpcCamera;
 use serde::{Deserialize, Serialize};
 
-use io::raster::{ImageSource, SampleType};
+use io::raster::{BandChoice, ImageSource, LumaRule, SampleType};
 use numeric::order_statistic;
 use raster::Window;
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
+use crate::dsm::ground_mask::GroundMask;
+use crate::dsm::image_mask::masks_of_images;
+use crate::dsm::image_pixels::open_source;
 use crate::dsm::images::SceneImage;
 use crate::dsm::order::sort_by_content;
 
@@ -33,9 +36,13 @@ pub struct Opened {
 ///
 /// # Errors
 /// [`DsmError::Image`] for a file that is no image, [`DsmError::Rpc`] for an image without a usable
-/// RPC, [`DsmError::SameImage`] for two images with the same camera.
+/// RPC, [`DsmError::SameImage`] for two images with the same camera, [`DsmError::Value`] for a mask
+/// of none of the images.
 pub fn open(config: &DsmConfig) -> Result<Opened, DsmError> {
-    let opened = config.images.iter().enumerate().map(|(number, path)| open_one(path, number));
+    GroundMask::check(config)?;
+    let masks = masks_of_images(&config.image_masks, &config.images)?;
+    let opened = config.images.iter().zip(masks).enumerate();
+    let opened = opened.map(|(number, (path, masks))| open_one(path, number, config.band.as_ref(), masks));
     let mut images = opened.collect::<Result<Vec<_>, _>>()?;
     // A copy has another name and the same camera, which no two images share.
     let is_copy = |(i, image): &(usize, &SceneImage)| {
@@ -48,8 +55,13 @@ pub fn open(config: &DsmConfig) -> Result<Opened, DsmError> {
     Ok(Opened { images })
 }
 
-fn open_one(path: &Path, number: usize) -> Result<SceneImage, DsmError> {
-    let source = io::raster::ImageSource::open(path)?;
+fn open_one(
+    path: &Path,
+    number: usize,
+    band: Option<&BandChoice>,
+    masks: Vec<PathBuf>,
+) -> Result<SceneImage, DsmError> {
+    let source = open_source(path, band)?;
     let file = io::rpc::read_for_image(path)?;
     Ok(SceneImage {
         path: path.to_owned(),
@@ -62,6 +74,11 @@ fn open_one(path: &Path, number: usize) -> Result<SceneImage, DsmError> {
             SampleType::F32 | SampleType::F64 => gain(&source)?,
             _ => 1.0,
         },
+        band: match &source.info().luma {
+            LumaRule::Single(position) => band.map(|_| *position),
+            _ => None,
+        },
+        masks,
     })
 }
 

@@ -13,6 +13,7 @@ use crate::dsm::dem::dem_heights;
 use crate::dsm::error::DsmError;
 use crate::dsm::evidence::{PairHeight, off_along_sight, warn_of_domains};
 use crate::dsm::image_checks::{grossly_off, same_picture, unconnected};
+use crate::dsm::image_mask::note_masks;
 use crate::dsm::images::SceneImage;
 use crate::dsm::look::{FirstLook, asked_pairs, look, pair_names};
 use crate::dsm::notes::{LISTED_MAX, Notes};
@@ -81,9 +82,10 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
             image.camera.correction = earlier.for_image(&image.path, session.progress);
         }
     }
+    let mut notes = Notes::new(session.progress);
+    note_masks(&images, &mut notes)?;
     let looked = look(config, &images, session)?;
     check_pictures(&images, &looked)?;
-    let mut notes = Notes::new(session.progress);
     let points = GroundControl::read(config.control.as_deref(), &images, &mut notes)?;
     let (tracks, contradictory) = join_pairs(&looked.ties);
     let observations = Observations { tracks: &tracks, control: &points.control };

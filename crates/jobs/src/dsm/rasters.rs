@@ -3,6 +3,8 @@
 use raster::{Grid, Window};
 use sweep::fusion::{CellSource, FusedSurface};
 
+/// Value of `filled` in a cell with an observed height.
+pub(crate) const OBSERVED: u8 = 0;
 /// Value of `filled` in a cell that was filled.
 pub(crate) const FILLED: u8 = 1;
 /// Value of `filled` in a cell without a height.
@@ -34,7 +36,7 @@ impl ChunkRasters {
     /// height comes from.
     pub(crate) fn new(fused: FusedSurface, source: &Grid<CellSource>, origin_m: f64) -> Self {
         let mark = |source: &CellSource| match source {
-            CellSource::Observed => 0,
+            CellSource::Observed => OBSERVED,
             source if source.is_filled() => FILLED,
             _ => VOID,
         };
@@ -53,6 +55,20 @@ impl ChunkRasters {
             grid.data_mut().iter_mut().for_each(|v| *v = shortened(*v));
         }
         Self { origin_m, height_m, sigma_m, views, confidence, filled: marks, source: source.map(|s| s.code()) }
+    }
+
+    /// Makes the rasters of cells that all get no height.
+    pub(crate) fn masked(size: (usize, usize)) -> Self {
+        let void = Grid::filled(size.0, size.1, f32::NAN);
+        Self {
+            origin_m: 0.0,
+            height_m: void.clone(),
+            sigma_m: void.clone(),
+            views: Grid::filled(size.0, size.1, 0),
+            confidence: void,
+            filled: Grid::filled(size.0, size.1, VOID),
+            source: Grid::filled(size.0, size.1, CellSource::Masked.code()),
+        }
     }
 
     /// Returns the cells of a window inside.

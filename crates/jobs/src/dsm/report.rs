@@ -273,6 +273,9 @@ pub struct SurfaceReport {
     pub filled: usize,
     /// Number of cells without a height.
     pub void: usize,
+    /// Number of those of them that lie under a mask or outside the area.
+    #[serde(default)]
+    pub masked: usize,
     /// Number of cells removed as speckle.
     pub speckle_removed: usize,
     /// Share of each view's pixels with which another view agrees.

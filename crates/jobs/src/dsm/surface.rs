@@ -8,7 +8,7 @@ use numeric::Progress;
 use raster::{Grid, Window};
 use serde::{Deserialize, Serialize};
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::fusion::{FusionConfig, GridFrame, PlacedView, fuse_views, mark_cells, place_view};
+use sweep::fusion::{CellSource, FusionConfig, GridFrame, PlacedView, fuse_views, mark_cells, place_view};
 use sweep::{HeightMap, SweepView};
 
 use crate::dsm::clean_up::{Lengths, Voids, clean_up};
@@ -16,7 +16,8 @@ use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::grid::DsmGrid;
 use crate::dsm::grid_sight::{ViewPixels, grid_sights};
-use crate::dsm::rasters::{ChunkRasters, FILLED};
+use crate::dsm::ground_mask::GroundMask;
+use crate::dsm::rasters::{ChunkRasters, FILLED, OBSERVED, VOID};
 use crate::dsm::scene_sweep::{SceneHeights, SceneSweep};
 use crate::dsm::values::{HeightRange, ImagePair};
 
@@ -44,6 +45,8 @@ pub(crate) struct SurfaceInput<'a> {
     pub(crate) camera_m: f64,
     /// Cells of the grid that are kept.
     pub(crate) core: Window,
+    /// Cells of the grid that get no height.
+    pub(crate) mask: Option<&'a GroundMask>,
 }
 
 /// Counts of cells and pixels.
@@ -57,6 +60,9 @@ pub struct SurfaceCounts {
     pub filled: usize,
     /// Cells without a height.
     pub void: usize,
+    /// Those of them that lie under a mask or outside the area.
+    #[serde(default)]
+    pub masked: usize,
     /// Cells removed as speckle.
     pub speckle_removed: usize,
     /// Pixels by view; no pixels for a view without heights of its own.
@@ -75,11 +81,25 @@ pub struct KeptPixels {
 }
 
 impl SurfaceCounts {
+    /// Counts the cells of rasters.
+    pub(crate) fn of(rasters: &ChunkRasters) -> Self {
+        let count = |grid: &Grid<u8>, value: u8| grid.data().iter().filter(|v| **v == value).count();
+        Self {
+            observed: count(&rasters.filled, OBSERVED),
+            filled: count(&rasters.filled, FILLED),
+            void: count(&rasters.filled, VOID),
+            masked: count(&rasters.source, CellSource::Masked.code()),
+            speckle_removed: 0,
+            views: Vec::new(),
+        }
+    }
+
     /// Adds the counts of another part of the same scene.
     pub(crate) fn add(&mut self, other: &Self) {
         self.observed += other.observed;
         self.filled += other.filled;
         self.void += other.void;
+        self.masked += other.masked;
         self.speckle_removed += other.speckle_removed;
         self.views.resize(self.views.len().max(other.views.len()), KeptPixels::default());
         for (own, theirs) in self.views.iter_mut().zip(&other.views) {
@@ -151,7 +171,7 @@ fn fuse(
     pixels: &[ViewPixels],
     origin_m: f64,
 ) -> Result<(ChunkRasters, SurfaceCounts), DsmError> {
-    let SurfaceInput { config, sweep, grid, core, .. } = input;
+    let SurfaceInput { config, sweep, grid, core, mask, .. } = input;
     // Heights and their places are as coarse as the level that they come from.
     let coarser = f64::from(1u32 << sweep.levels.finest);
     let step_m = sweep.step_at(sweep.levels.finest);
@@ -162,19 +182,24 @@ fn fuse(
     };
     let mut fused = fuse_views(&placed, grid.size, &fusion);
     drop(placed);
+    if let Some(mask) = mask {
+        // They are not trusted, and must not fill what is beside them.
+        let heights = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data_mut()).zip(mask.masked.data());
+        heights.filter(|(_, masked)| **masked).for_each(|(cell, _)| (*cell.0, *cell.1) = (f32::NAN, 0.0));
+    }
     let sights = grid_sights(pixels, grid, &fused.height_m, origin_m)?;
     let lengths = Lengths { gsd_m: grid.gsd_m, step_m, camera_m: input.camera_m };
     let voids = Voids { blind, sights: &sights, fill: config.fill };
-    let (source, cleaned) = clean_up(&mut fused, voids, lengths, core);
+    let (mut source, speckle_removed) = clean_up(&mut fused, voids, lengths, core);
+    if let Some(mask) = mask {
+        for cell in (0..source.data().len()).filter(|cell| mask.excludes(*cell)) {
+            fused.height_m.data_mut()[cell] = f32::NAN;
+            fused.confidence.data_mut()[cell] = f32::NAN;
+            source.data_mut()[cell] = CellSource::Masked;
+        }
+    }
     let rasters = ChunkRasters::new(fused, &source, origin_m).cropped(core);
-    let filled = rasters.filled.data().iter().filter(|f| **f == FILLED).count();
-    let counts = SurfaceCounts {
-        observed: cleaned.observed,
-        filled,
-        void: core.width * core.height - cleaned.observed - filled,
-        speckle_removed: cleaned.speckle_removed,
-        views: Vec::new(),
-    };
+    let counts = SurfaceCounts { speckle_removed, ..SurfaceCounts::of(&rasters) };
     Ok((rasters, counts))
 }
 

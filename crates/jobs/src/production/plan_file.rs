@@ -58,7 +58,8 @@ impl PlanFile {
 
     fn map_paths(&mut self, change: impl Fn(&Path) -> PathBuf) {
         self.plan.config.map_paths(&change);
-        let images = self.plan.images.iter_mut().map(|image| &mut image.path);
+        let images =
+            self.plan.images.iter_mut().flat_map(|image| std::iter::once(&mut image.path).chain(&mut image.masks));
         let reported = self.plan.report.images.iter_mut().map(|image| &mut image.path);
         let reference = self.plan.report.pointing.reference.iter_mut().map(|reference| &mut reference.path);
         for path in images.chain(reported).chain(reference).chain(self.inputs.iter_mut().map(|input| &mut input.path)) {

@@ -47,6 +47,8 @@ pub enum CellSource {
     Blank = 11,
     /// Void: hidden from all but one view. No ground is known near, or nothing was to be filled.
     Hidden = 12,
+    /// Void: under a mask, or outside the area that was asked for.
+    Masked = 13,
 }
 
 impl CellSource {
