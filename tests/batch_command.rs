@@ -4,11 +4,12 @@
 mod common;
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{sample, skysweep};
+use common::{band, sample, skysweep};
 use numeric::RandomByIndex;
 use serde_json::Value;
 
@@ -27,12 +28,17 @@ const PRODUCTS: [&str; 11] = [
     "chunks/heightmap.tif",
 ];
 
-/// A batch file whose results go to `night`: two scenes that can be computed and three that
-/// cannot.
+/// Code of masked cells in `dsm/source.tif`.
+const MASKED: f32 = 13.0;
+/// Side of the small scenes, metres.
+const PART_M: f64 = 100.0;
+
+/// A batch file whose results go to `night`: nine scenes that can be computed and three that
+/// cannot. The variable `TOWN` names the folder of the images.
 fn batch_file(folder: &Path) -> PathBuf {
     let town = sample("");
     let file = folder.join("batch.toml");
-    let text = format!(
+    let mut text = format!(
         "output = 'night'\n\
          [limits]\nparallel = 2\nthreads = 2\n\
          [defaults]\ntasks = ['dsm']\ndsm = {{ gsd_m = 2.0, preset = 'fast' }}\n\
@@ -46,17 +52,35 @@ fn batch_file(folder: &Path) -> PathBuf {
          dsm.chunk = 128\nheightmap.stand = {{ source = {{ position = {{ lon_deg = 5.4, lat_deg = 43.53 }} }} }}\n",
         town = town.display()
     );
+    for part in 0..7 {
+        let (x, y) = (693_760.0 + 110.0 * f64::from(part % 3), 4_822_280.0 + 120.0 * f64::from(part / 3));
+        write!(
+            text,
+            "[[scene]]\nname = 'part {part}'\nimages = ['${{TOWN}}/view_[123].tif']\n\
+             bounds = [{x:.1}, {y:.1}, {:.1}, {:.1}]\ndsm.masks = ['water.geojson']\n",
+            x + PART_M,
+            y + PART_M
+        )
+        .unwrap();
+    }
     std::fs::write(&file, text).unwrap();
     file
 }
 
-/// Writes the images that cannot be used, and the area of a scene.
-fn inputs(folder: &Path) {
-    let polygon = "[[[5.398,43.528],[5.402,43.528],[5.402,43.531],[5.398,43.531],[5.398,43.528]]]";
+/// Writes a rectangle of longitudes and latitudes as GeoJSON.
+fn write_area(path: &Path, [west, south, east, north]: [f64; 4]) {
+    let polygon = format!("[[[{west},{south}],[{east},{south}],[{east},{north}],[{west},{north}],[{west},{south}]]]");
     let geometry = format!("{{\"type\":\"Polygon\",\"coordinates\":{polygon}}}");
     let feature = format!("{{\"type\":\"Feature\",\"properties\":{{\"name\":\"middle\"}},\"geometry\":{geometry}}}");
-    let areas = format!("{{\"type\":\"FeatureCollection\",\"features\":[{feature}]}}");
-    std::fs::write(folder.join("areas.geojson"), areas).unwrap();
+    std::fs::write(path, format!("{{\"type\":\"FeatureCollection\",\"features\":[{feature}]}}")).unwrap();
+}
+
+/// Writes the images that cannot be used, the area of a scene, and the water of others.
+fn inputs(folder: &Path) {
+    write_area(&folder.join("areas.geojson"), [5.398, 43.528, 5.402, 43.531]);
+    let map = crs::MapProjection::from_epsg(32631).unwrap();
+    let (west, south) = map.lonlat_from_map(693_900.0, 4_822_430.0).unwrap();
+    write_area(&folder.join("water.geojson"), [west, south, west + 4e-4, south + 3e-4]);
     io::raster::write_png_gray(folder.join("plain.png"), &raster::Grid::filled(64, 64, 7), false).unwrap();
     let bytes = std::fs::read(sample("view_2.tif")).unwrap();
     std::fs::write(folder.join("corrupt.tif"), &bytes[..bytes.len() / 2]).unwrap();
@@ -70,7 +94,7 @@ fn inputs(folder: &Path) {
 /// Runs a batch to its end and returns its report.
 #[track_caller]
 fn run(file: &Path, code: i32) -> Value {
-    let assert = skysweep().arg("batch").arg(file).args(["-q", "--json"]).assert().code(code);
+    let assert = skysweep().env("TOWN", sample("")).arg("batch").arg(file).args(["-q", "--json"]).assert().code(code);
     serde_json::from_slice(&assert.get_output().stdout).unwrap()
 }
 
@@ -139,6 +163,13 @@ fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
         ("apart", "dsm", "failed", "share no ground"),
         ("chunks", "dsm", "done", ""),
         ("chunks", "heightmap", "done", ""),
+        ("part 0", "dsm", "done", ""),
+        ("part 1", "dsm", "done", ""),
+        ("part 2", "dsm", "done", ""),
+        ("part 3", "dsm", "done", ""),
+        ("part 4", "dsm", "done", ""),
+        ("part 5", "dsm", "done", ""),
+        ("part 6", "dsm", "done", ""),
     ];
     let check = |report: &Value| {
         let states = states(report);
@@ -157,6 +188,9 @@ fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
     let expected_bytes = products(&night);
     assert!(PRODUCTS.iter().all(|name| night.join(name).is_file()));
     assert!(night.join("both/eval/report.html").is_file() && night.join("both/tasks/dsm.jsonl").is_file());
+    let source = band(&night.join("part 4/dsm/source.tif"), 1);
+    let masked = source.data().iter().filter(|code| **code == MASKED).count();
+    assert!((50..400).contains(&masked), "{masked} cells of 2 m under a mask of 32 × 33 m");
     let page = std::fs::read_to_string(night.join("batch_report.html")).unwrap();
     assert!(page.contains("share no ground"), "{page}");
     // The corner of the area. A polygon of longitudes and latitudes is not level on the map.
@@ -166,16 +200,23 @@ fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
     assert!((x - corner.x).abs() < 15.0 && (y - corner.y).abs() < 15.0, "{x} {y} {corner:?}");
     // Once more: what is complete is left alone.
     let again = run(&file, 1);
-    assert_eq!(states(&again).iter().filter(|state| state.2 == "done_before").count(), 6, "{again}");
+    assert_eq!(states(&again).iter().filter(|state| state.2 == "done_before").count(), 13, "{again}");
 
     std::fs::remove_dir_all(&night).unwrap();
     let moments = RandomByIndex::new(18, 1);
-    for kill in 0..8 {
+    for kill in 0..10 {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin("skysweep"));
-        let mut batch =
-            command.arg("batch").arg(&file).arg("-q").stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+        let mut batch = command
+            .env("TOWN", sample(""))
+            .arg("batch")
+            .arg(&file)
+            .arg("-q")
+            .stderr(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
         // The result does not depend on the moment.
-        std::thread::sleep(Duration::from_millis(20 + (900.0 * moments.uniform(kill)) as u64));
+        std::thread::sleep(Duration::from_millis(20 + (1500.0 * moments.uniform(kill)) as u64));
         // It may have ended by itself.
         let _ = batch.kill();
         batch.wait().unwrap();

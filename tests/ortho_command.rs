@@ -168,3 +168,46 @@ fn colours_keep_their_names() {
     let bytes = std::fs::read(&out).unwrap();
     assert!(bytes.windows(10).any(|entry| entry == [6, 1, 3, 0, 1, 0, 0, 0, 2, 0]), "no RGB in the TIFF");
 }
+
+/// The surface is made from panchromatic images, and the colours come from the multispectral image
+/// of the same pass, which the run did not use.
+#[test]
+fn a_multispectral_image_follows_the_panchromatic_one_of_its_pass() {
+    use camera::ImagePoint;
+    use io::raster::{Band, BandData, ImageSource, write_image_with_rpc};
+    let folder = tempfile::tempdir().unwrap();
+    let (run, coarse) = (folder.path().join("run"), folder.path().join("multispectral.tif"));
+    let mut command = skysweep();
+    command.arg("dsm").args([1, 2, 3].map(|i| sample(&format!("view_{i}.tif")))).arg("-o").arg(&run);
+    command.args(["--preset", "fast", "--gsd", "1", "--progress", "none", "-q"]).assert().code(0);
+    // A quarter of the resolution, from another corner, with the pointing error of its pass.
+    let pan = ImageSource::open(sample("view_1.tif")).unwrap();
+    let window = raster::Window { x: 8, y: 16, width: 720, height: 720 };
+    let mut samples = pan.read_samples(1, window).unwrap();
+    (0..2).for_each(|_| samples = raster::reduce(&samples));
+    let rpc = io::rpc::read_for_image(&sample("view_1.tif")).unwrap().rpc;
+    let rpc = rpc.cropped(ImagePoint::new(8.0, 16.0)).rescaled(0.25);
+    let samples = samples.map(|v| v.round() as u16);
+    let bands = ["blue", "green", "red", "nir"].map(|description| Band { description, data: BandData::U16(&samples) });
+    write_image_with_rpc(&coarse, &bands, &rpc, Some(0.0), false).unwrap();
+    let ortho = |image: &Path, name: &str, corrections: &[&str]| {
+        let out = folder.path().join(name);
+        let mut command = skysweep();
+        command.arg("ortho").arg(image).arg("--dsm").arg(&run).arg("-o").arg(&out).args(["--gsd", "2"]);
+        command.args(corrections).args(["--progress", "none", "--json"]);
+        let text = String::from_utf8(command.assert().code(0).get_output().stdout.clone()).unwrap();
+        (band(&out, 1), serde_json::from_str::<Value>(&text).unwrap())
+    };
+    let (fine, _) = ortho(&sample("view_1.tif"), "fine.tif", &[]);
+    let (followed, report) = ortho(&coarse, "followed.tif", &[]);
+    assert_eq!(report["images"][0]["corrected"], true, "{report}");
+    let (alone, _) = ortho(&coarse, "alone.tif", &["--corrections", "none"]);
+    let difference = |other: &Grid<f32>| {
+        let both = fine.data().iter().zip(other.data()).filter(|(a, b)| **a > 0.0 && **b > 0.0);
+        let squares: Vec<f32> = both.map(|(a, b)| (a - b).powi(2)).collect();
+        assert!(squares.len() > 10_000, "{}", squares.len());
+        (squares.iter().sum::<f32>() / squares.len() as f32).sqrt()
+    };
+    let (with, without) = (difference(&followed), difference(&alone));
+    assert!(with < 0.9 * without, "{with} {without}");
+}

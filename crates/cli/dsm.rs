@@ -56,11 +56,12 @@ pub(crate) struct SceneArgs {
     /// Polygons in which the DSM lies (GeoPackage, GeoJSON); cells outside are void.
     #[arg(long, value_name = "FILE", conflicts_with = "bounds")]
     area: Option<PathBuf>,
-    /// Ground without heights, such as water: polygons, or a georeferenced raster where it is not 0.
+    /// Ground without heights, such as water: polygons, or a georeferenced raster that is not 0
+    /// there.
     #[arg(long = "mask", value_name = "FILE")]
     masks: Vec<PathBuf>,
-    /// Pixels that are not matched, such as clouds: polygons on the ground, or a raster in the frame
-    /// of an image; its name begins with that of its image (left_clouds.tif for left.tif).
+    /// Pixels that are not matched, such as clouds: polygons on the ground, or a raster in the
+    /// frame of an image; its name begins with that of its image (left_clouds.tif for left.tif).
     #[arg(long = "image-mask", value_name = "FILE")]
     image_masks: Vec<PathBuf>,
     /// Band to match, by number or name [default: the luma of all bands].

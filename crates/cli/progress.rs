@@ -1,11 +1,12 @@
 //! Progress on stderr: bars for people, JSON lines for programs.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use jobs::event_lines::EventLines;
 use numeric::{Choice, Progress};
 
@@ -93,21 +94,26 @@ struct Watcher {
     quiet: bool,
     /// Whether stages and their times are printed as lines.
     verbose: bool,
+    /// The bar, and above it a line for each part that is at work.
+    table: MultiProgress,
     bar: ProgressBar,
+    parts: Mutex<BTreeMap<String, ProgressBar>>,
     stage: Mutex<(String, Instant)>,
 }
 
 impl Watcher {
     fn new(style: ProgressStyle, global: Global) -> Self {
         let quiet = global.is_quiet();
-        let bar = ProgressBar::new(0);
         // At -vv the lines of files would tear the bar.
         let shown = style == ProgressStyle::Bar && !quiet && global.verbose < 2;
-        bar.set_draw_target(if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() });
+        let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let table = MultiProgress::with_draw_target(target);
+        let bar = table.add(ProgressBar::new(0));
         if let Ok(look) = BarStyle::with_template("{msg:22} {bar:30} {percent:>3} % {eta:>4} left") {
             bar.set_style(look);
         }
-        Self { quiet, verbose: global.verbose > 0, bar, stage: Mutex::new((String::new(), Instant::now())) }
+        let stage = Mutex::new((String::new(), Instant::now()));
+        Self { quiet, verbose: global.verbose > 0, table, bar, parts: Mutex::default(), stage }
     }
 
     /// Prints how long the stage took that ends.
@@ -120,7 +126,7 @@ impl Watcher {
     }
 
     fn say(&self, text: &str) {
-        self.bar.suspend(|| say(text));
+        self.table.suspend(|| say(text));
     }
 }
 
@@ -146,6 +152,18 @@ impl Progress for Watcher {
             self.bar.inc_length(1);
         }
         self.bar.inc(1);
+    }
+
+    fn part(&self, name: &str, state: Option<&str>) {
+        let Ok(mut parts) = self.parts.lock() else { return };
+        let look = BarStyle::with_template("{prefix:20} {msg}").unwrap_or_else(|_| BarStyle::default_spinner());
+        let new = || {
+            self.table.insert_before(&self.bar, ProgressBar::no_length().with_style(look).with_prefix(name.to_owned()))
+        };
+        match state {
+            Some(state) => parts.entry(name.to_owned()).or_insert_with(new).set_message(state.to_owned()),
+            None => parts.remove(name).iter().for_each(ProgressBar::finish_and_clear),
+        }
     }
 
     fn choice(&self, choice: &Choice) {

@@ -76,6 +76,29 @@ impl ImageCorrection {
         }
     }
 
+    /// Returns the correction that takes this one back. `None` if the linear part is singular.
+    ///
+    /// ```
+    /// use camera::{ImageCorrection, ImagePoint};
+    ///
+    /// let correction = ImageCorrection { linear: [[0.25, 0.5], [0.0, -0.5]], ..ImageCorrection::translation(2.0, -1.0) };
+    /// let (p, back) = (ImagePoint::new(10.0, 20.0), correction.inverse().unwrap());
+    /// assert_eq!(back.apply(correction.apply(p)), p);
+    /// ```
+    #[must_use]
+    pub fn inverse(&self) -> Option<Self> {
+        let centre = self.apply(self.centre);
+        let at = |sample: f64, line: f64| self.invert(ImagePoint::new(centre.sample + sample, centre.line + line));
+        let (own, right, down) = (at(0.0, 0.0)?, at(1.0, 0.0)?, at(0.0, 1.0)?);
+        let step = |to: ImagePoint| [to.sample - own.sample, to.line - own.line];
+        let ([a, c], [b, d]) = (step(right), step(down));
+        Some(Self {
+            translation_px: [own.sample - centre.sample, own.line - centre.line],
+            linear: [[a - 1.0, b], [c, d - 1.0]],
+            centre,
+        })
+    }
+
     /// Returns the same correction in the coordinates of the image cut at `origin`.
     #[must_use]
     pub fn cropped(&self, origin: ImagePoint) -> Self {

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use camera::{ImageCorrection, RpcCamera};
+use camera::{ImageCorrection, Rpc, RpcCamera};
 use io::rpc::RpcReadError;
 use serde::{Deserialize, Serialize};
 
 use numeric::Progress;
 
 use crate::files::{self, FileError};
+use crate::same_view::carried;
 
 /// Where the pointing corrections of the images come from.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -116,13 +117,35 @@ impl Corrections {
         files::write_json(path, &RunReport { images: self.images.iter().map(image).collect() }, overwrite)
     }
 
-    /// Reads the RPC inside or beside an image, and adds the correction of the image.
+    /// Reads the RPC inside or beside an image, and adds the correction of the image, or of another
+    /// one that was taken from the same place.
     ///
     /// # Errors
     /// [`RpcReadError`] if the image has no usable RPC.
     pub(crate) fn camera(&self, path: &Path, progress: &dyn Progress) -> Result<RpcCamera, RpcReadError> {
         let rpc = io::rpc::read_for_image(path)?.rpc;
-        Ok(RpcCamera { rpc, correction: self.for_image(path, progress) })
+        let correction = match self.find(path) {
+            Some(correction) => correction,
+            None => self.of_same_view(path, &rpc, progress).unwrap_or_else(|| self.for_image(path, progress)),
+        };
+        Ok(RpcCamera { rpc, correction })
+    }
+
+    /// Returns the correction that the run found for another image of the same pass, with a
+    /// warning.
+    fn of_same_view(&self, path: &Path, rpc: &Rpc, progress: &dyn Progress) -> Option<ImageCorrection> {
+        let found = self.images.iter().filter_map(|(other, correction)| {
+            let of = io::rpc::read_for_image(other).ok()?.rpc;
+            carried(correction, &of, rpc).map(|(correction, residual_px)| (other, correction, residual_px))
+        });
+        let best = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
+        progress.warn(&format!(
+            "the run that the corrections come from did not use this image, so it takes the correction of {}, which \
+             was taken from the same place: {}",
+            best.0.display(),
+            path.display()
+        ));
+        Some(best.1)
     }
 
     /// Returns the correction of an image, or the identity (with a warning) if the run did not use

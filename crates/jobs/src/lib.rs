@@ -27,6 +27,7 @@ pub mod production;
 pub mod remote;
 pub mod rpc;
 mod run_folder;
+mod same_view;
 pub mod simulate;
 pub mod splats;
 pub mod split;

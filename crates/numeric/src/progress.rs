@@ -22,6 +22,10 @@ pub trait Progress: Sync {
     /// Reports a problem that does not stop the job.
     fn warn(&self, text: &str);
 
+    /// Reports what a part of the job does that runs beside others, such as a scene of a batch;
+    /// `None` when it has ended. Watchers that show one stage at a time ignore it.
+    fn part(&self, _name: &str, _state: Option<&str>) {}
+
     /// Returns whether the job should stop at its next step.
     fn is_cancelled(&self) -> bool {
         false

@@ -25,8 +25,9 @@ pub fn mark_inside(rings: &[Vec<(f64, f64)>], cells: &mut Grid<bool>) {
                 continue;
             }
             // Half-open: a row through a corner crosses one of the two edges there.
-            for row in first_at(y0.min(y1), height)..first_at(y0.max(y1), height) {
-                crossings[row].push(x0 + (row as f64 - y0) / (y1 - y0) * (x1 - x0));
+            let rows = first_at(y0.min(y1), height)..first_at(y0.max(y1), height);
+            for (row, crossings) in rows.clone().zip(&mut crossings[rows]) {
+                crossings.push(x0 + (row as f64 - y0) / (y1 - y0) * (x1 - x0));
             }
         }
     }

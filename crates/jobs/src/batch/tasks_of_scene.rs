@@ -98,7 +98,7 @@ impl SceneJobs {
         if record.as_ref().is_some_and(|record| record.is_current(job)) {
             return Ended { state: TaskState::DoneBefore, reason: None, attempts: 0 };
         }
-        let log = match task_log::open(&folder.join(format!("{name}.jsonl")), limits.progress) {
+        let log = match task_log::open(&folder, (&self.name, name), limits.progress) {
             Ok(log) => log,
             Err(error) => return Ended::failed(format!("cannot write the log: {error}")),
         };

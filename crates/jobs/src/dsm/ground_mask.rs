@@ -61,7 +61,10 @@ impl GroundMask {
                 false => drop(MaskRaster::open(path)?),
             }
         }
-        config.area.iter().try_for_each(|area| Ok(drop(io::areas::read(&area.file, area.wanted())?)))
+        if let Some(area) = &config.area {
+            io::areas::read(&area.file, area.wanted())?;
+        }
+        Ok(())
     }
 
     /// Returns whether no cell of a window gets a height.
