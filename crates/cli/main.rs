@@ -10,6 +10,7 @@ mod city;
 mod completions;
 mod corrections;
 mod dsm;
+mod dtm;
 mod error;
 mod eval;
 mod global;
@@ -57,6 +58,8 @@ enum Command {
     Completions(completions::CompletionArgs),
     /// Make a surface model from satellite images.
     Dsm(Box<dsm::Args>),
+    /// Find the bare ground under a surface model, and heights above it.
+    Dtm(dtm::Args),
     /// Measure how far a surface model is from a reference.
     Eval(Box<eval::Args>),
     /// Make depths, normals and masks of what cameras and panoramas on the ground see.
@@ -117,6 +120,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::City(command) => city::run(command, cli.global),
         Command::Completions(args) => completions::completions(args, &mut options::grouped(Cli::command())),
         Command::Dsm(args) => dsm::run(args, cli.global),
+        Command::Dtm(args) => dtm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
         Command::Groundview(args) => groundview::run(args, cli.global),
         Command::Heightmap(args) => heightmap::run(args, cli.global),

@@ -10,6 +10,7 @@
 //! | module | makes |
 //! |---|---|
 //! | [`jobs::dsm`] | a digital surface model (DSM) from satellite images with RPCs |
+//! | [`jobs::dtm`] | the bare ground under a surface model, and heights above it |
 //! | [`jobs::eval`] | errors of a surface model against a reference |
 //! | [`jobs::ortho`] | true orthophotos, with hidden cells marked |
 //! | [`jobs::heightmap`] | bird's-eye height maps around a camera |
@@ -28,7 +29,7 @@
 //! - Surfaces: [`raster`] (grids), [`city`] (city models), [`gaussian`] (splats), [`bvh`] (ray
 //!   casting), [`occlusion`].
 //! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`],
-//!   [`ortho`], [`splats`], [`simulate`].
+//!   [`ortho`], [`splats`], [`terrain`], [`simulate`].
 //! - Files: [`io`] reads and writes every format, [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
 //!
@@ -66,3 +67,4 @@ pub use report;
 pub use simulate;
 pub use splats;
 pub use sweep;
+pub use terrain;

@@ -17,7 +17,7 @@ use cargo_metadata::{Metadata, MetadataCommand, Package};
 
 /// The floor of every crate, those to come included, so that a new crate lands where the design has
 /// it.
-const FLOORS: [(&str, u8); 24] = [
+const FLOORS: [(&str, u8); 25] = [
     ("skysweep-numeric", 0),
     ("skysweep-testing", 0),
     ("skysweep-geodesy", 1),
@@ -33,6 +33,7 @@ const FLOORS: [(&str, u8); 24] = [
     ("skysweep-simulate", 4),
     ("skysweep-priors", 4),
     ("skysweep-heightmap", 4),
+    ("skysweep-terrain", 4),
     ("skysweep-groundview", 4),
     ("skysweep-ortho", 4),
     ("skysweep-splats", 4),

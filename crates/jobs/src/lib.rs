@@ -8,6 +8,7 @@ pub mod city;
 pub mod city_files;
 pub mod corrections;
 pub mod dsm;
+pub mod dtm;
 pub mod error;
 mod error_text;
 pub mod eval;

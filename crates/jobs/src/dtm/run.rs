@@ -1,0 +1,139 @@
+//! Runs the DTM job.
+
+use crs::{Crs, MapProjection, VerticalDatum};
+use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
+use numeric::Progress;
+use raster::Grid;
+use terrain::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground};
+
+use super::config::DtmConfig;
+use super::error::DtmError;
+use super::report::DtmReport;
+use crate::files::{self, FileError};
+use crate::output_folder::OutputFolder;
+use crate::run_folder::surface_file;
+use crate::threads;
+
+/// Names of the files in the output folder.
+const DTM: &str = "dtm.tif";
+const ABOVE: &str = "height_above_ground.tif";
+const STATES: &str = "ground.tif";
+const REPORT: &str = "dtm.json";
+/// Largest difference of the sides of a cell, as a share.
+const SQUARE_TOLERANCE: f64 = 0.01;
+
+/// Makes a terrain model, the heights above it and a mask, and writes them with a report.
+///
+/// # Errors
+/// [`DtmError`]: a surface that cannot be read or is not on a map in metres, outputs that exist.
+///
+/// ```
+/// use jobs::dtm::{DtmConfig, run};
+/// use numeric::Silent;
+///
+/// let town = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town");
+/// let folder = tempfile::tempdir()?;
+/// let config = DtmConfig::new(format!("{town}/truth/dsm.tif").into(), folder.path().join("dtm"));
+/// let report = run(&config, &Silent)?;
+/// assert!(report.cells_ground > report.cells_under_objects && report.cells_unknown == 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, DtmError> {
+    config.validate()?;
+    for name in [DTM, ABOVE, STATES, REPORT] {
+        files::refuse_existing(&config.output.join(name), config.overwrite)?;
+    }
+    threads::install(config.threads, || {
+        let (surface, cell_m, crs) = read(config)?;
+        let folder = OutputFolder::take(&config.output)?;
+        let terrain = bare_ground(&surface.heights, cell_m, &config.terrain, progress)?;
+        progress.check_cancelled()?;
+        let (above, cells_below_ground) = heights_above(&surface.heights, &terrain.heights);
+        let report = DtmReport { cells_below_ground, ..report(config, &surface, &terrain, cell_m, crs) };
+        write(config, &folder, &surface, &terrain, &above, crs, &report)?;
+        Ok(report)
+    })?
+}
+
+/// Reads the surface with the side of its cells and its CRS.
+fn read(config: &DtmConfig) -> Result<(Dem, f64, Crs), DtmError> {
+    let path = surface_file(&config.surface);
+    let surface = read_dem(&path)?;
+    let horizontal = surface.horizontal_epsg.ok_or_else(|| DtmError::NoEpsg { path: path.clone() })?;
+    let projection = MapProjection::from_epsg(horizontal)?;
+    let metres = projection.metres_per_unit().ok_or_else(|| DtmError::InDegrees { path: path.clone() })?;
+    let (width, height) = surface.geotransform.cell_size();
+    let (width_m, height_m) = (width * metres, height * metres);
+    if (width_m - height_m).abs() > SQUARE_TOLERANCE * width_m.max(height_m) {
+        return Err(DtmError::NotSquare { path, width_m, height_m });
+    }
+    if !surface.heights.data().iter().any(|h| h.is_finite()) {
+        return Err(DtmError::NoHeights { path });
+    }
+    let vertical = config.surface_vertical.or(surface.vertical).unwrap_or(VerticalDatum::Ellipsoid);
+    Ok((surface, (width_m * height_m).sqrt(), Crs { horizontal, vertical }))
+}
+
+/// Returns the heights of the surface above the ground, not below 0, and the number of cells that
+/// were.
+fn heights_above(surface: &Grid<f32>, ground: &Grid<f32>) -> (Grid<f32>, usize) {
+    let mut above = surface.clone();
+    let mut below = 0;
+    for (cell, ground) in above.data_mut().iter_mut().zip(ground.data()) {
+        *cell -= ground;
+        if *cell < 0.0 {
+            below += 1;
+            *cell = 0.0;
+        }
+    }
+    (above, below)
+}
+
+fn report(config: &DtmConfig, surface: &Dem, terrain: &BareGround, cell_m: f64, crs: Crs) -> DtmReport {
+    let count = |state: u8| terrain.states.data().iter().filter(|&&s| s == state).count();
+    DtmReport {
+        surface: surface.path.clone(),
+        dtm: config.output.join(DTM),
+        height_above_ground: config.output.join(ABOVE),
+        ground: config.output.join(STATES),
+        crs: crs.to_string(),
+        size: (surface.heights.width(), surface.heights.height()),
+        cell_m,
+        cells_ground: count(GROUND),
+        cells_under_objects: count(UNDER_OBJECT),
+        cells_void_filled: count(VOID_FILLED),
+        cells_unknown: count(UNKNOWN),
+        cells_below_ground: 0,
+        parameters: config.terrain,
+    }
+}
+
+/// Makes all files in a work folder and moves them to their names.
+fn write(
+    config: &DtmConfig,
+    folder: &OutputFolder,
+    surface: &Dem,
+    terrain: &BareGround,
+    above: &Grid<f32>,
+    crs: Crs,
+    report: &DtmReport,
+) -> Result<(), DtmError> {
+    let work = folder.work_folder()?;
+    let threads = threads::count(config.threads);
+    let put = |name: &str, description: &str, data: BandData<'_>, crs: Crs, holds_heights: bool| {
+        let bands = [Band { description, data }];
+        let raster = CogRaster { threads, holds_heights, ..CogRaster::new(&bands, surface.geotransform, crs) };
+        write_cog(work.path().join(name), &raster, false).map_err(FileError::from)
+    };
+    let plain = Crs::ellipsoidal(crs.horizontal);
+    put(DTM, "ground_height_m", BandData::F32(&terrain.heights), crs, true)?;
+    put(ABOVE, "height_above_ground_m", BandData::F32(above), plain, false)?;
+    let states = "0_unknown_1_ground_2_under_object_3_void_filled";
+    put(STATES, states, BandData::U8(&terrain.states), plain, false)?;
+    files::write_json(&work.path().join(REPORT), report, false)?;
+    for name in [DTM, ABOVE, STATES, REPORT] {
+        folder.remove(name)?;
+        folder.publish(work.path(), name)?;
+    }
+    Ok(())
+}

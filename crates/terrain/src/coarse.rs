@@ -1,0 +1,80 @@
+//! Cells of about a metre on which objects are searched, and simple filters on them.
+
+use raster::Grid;
+
+/// Returns the lower median of the known heights of blocks of `side × side` cells.
+pub(crate) fn blocks(fine: &Grid<f32>, side: usize) -> Grid<f32> {
+    if side == 1 {
+        return fine.map(|&h| if h.is_finite() { h } else { f32::NAN });
+    }
+    let (width, height) = (fine.width().div_ceil(side), fine.height().div_ceil(side));
+    let mut coarse = Grid::filled(width, height, f32::NAN);
+    let mut values = Vec::with_capacity(side * side);
+    for row in 0..height {
+        for column in 0..width {
+            values.clear();
+            for y in row * side..((row + 1) * side).min(fine.height()) {
+                let cells = &fine.row(y)[column * side..((column + 1) * side).min(fine.width())];
+                values.extend(cells.iter().filter(|h| h.is_finite()));
+            }
+            values.sort_unstable_by(f32::total_cmp);
+            if let Some(last) = values.len().checked_sub(1) {
+                coarse[(column, row)] = values[last / 2];
+            }
+        }
+    }
+    coarse
+}
+
+/// Interpolates a raster of blocks at a cell of the raster that it was made of.
+pub(crate) fn at_cell(coarse: &Grid<f32>, side: usize, column: usize, row: usize) -> f32 {
+    let place = |at: usize, count: usize| {
+        let position = ((at as f32 + 0.5) / side as f32 - 0.5).clamp(0.0, (count - 1) as f32);
+        let low = position as usize;
+        (low, (low + 1).min(count - 1), position - low as f32)
+    };
+    let (x, x_next, fx) = place(column, coarse.width());
+    let (y, y_next, fy) = place(row, coarse.height());
+    let line = |y: usize| coarse[(x, y)] + fx * (coarse[(x_next, y)] - coarse[(x, y)]);
+    line(y) + fy * (line(y_next) - line(y))
+}
+
+/// Returns the means over windows of `2·radius + 1` cells, cut at the borders.
+pub(crate) fn blurred(grid: &Grid<f32>, radius: usize) -> Grid<f32> {
+    let (width, height) = (grid.width(), grid.height());
+    let mut along_rows = grid.clone();
+    for row in 0..height {
+        running_mean(grid.row(row), radius, |column, mean| along_rows[(column, row)] = mean);
+    }
+    let mut out = along_rows.clone();
+    let mut line = vec![0.0; height];
+    for column in 0..width {
+        (0..height).for_each(|row| line[row] = along_rows[(column, row)]);
+        running_mean(&line, radius, |row, mean| out[(column, row)] = mean);
+    }
+    out
+}
+
+fn running_mean(line: &[f32], radius: usize, mut put: impl FnMut(usize, f32)) {
+    let mut sum = 0.0_f64;
+    let (mut start, mut end) = (0, 0);
+    for at in 0..line.len() {
+        while end < (at + radius + 1).min(line.len()) {
+            sum += f64::from(line[end]);
+            end += 1;
+        }
+        while start + radius < at {
+            sum -= f64::from(line[start]);
+            start += 1;
+        }
+        put(at, (sum / (end - start) as f64) as f32);
+    }
+}
+
+/// Widens a mask by squares of `2·radius + 1` cells.
+pub(crate) fn widened(mask: &Grid<bool>, radius: usize) -> Grid<bool> {
+    let shares = blurred(&mask.map(|&set| if set { 1.0 } else { 0.0 }), radius);
+    // The smallest share of one cell in the largest window is far above the rounding.
+    let least = 0.5 / ((2 * radius + 1) as f32).powi(2);
+    shares.map(|&share| share > least)
+}

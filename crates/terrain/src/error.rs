@@ -1,0 +1,28 @@
+//! Reasons why the ground cannot be found.
+
+use numeric::Cancelled;
+
+/// A ground that cannot be found.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TerrainError {
+    /// The cells have no usable size.
+    #[error("the cells measure {found} m, expected a positive number of metres")]
+    CellSize {
+        /// Size that was given.
+        found: f64,
+    },
+    /// A parameter of the method is outside of its range.
+    #[error("{name} is {found}, expected {expected}")]
+    Parameter {
+        /// Name in words.
+        name: &'static str,
+        /// Value that was given.
+        found: f64,
+        /// Values that are accepted.
+        expected: &'static str,
+    },
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}

@@ -1,0 +1,136 @@
+//! From a surface to the ground under it.
+
+use numeric::Progress;
+use raster::Grid;
+
+use crate::coarse::{at_cell, blocks, blurred, widened};
+use crate::config::GroundConfig;
+use crate::error::TerrainError;
+use crate::membrane::filled;
+use crate::objects::{objects, radii, without_pits};
+
+/// State of a cell without a height of the ground: too far from any ground.
+pub const UNKNOWN: u8 = 0;
+/// State of a cell that shows the ground itself.
+pub const GROUND: u8 = 1;
+/// State of a cell whose ground was interpolated under an object.
+pub const UNDER_OBJECT: u8 = 2;
+/// State of a cell whose ground was interpolated in a void of the surface.
+pub const VOID_FILLED: u8 = 3;
+
+/// Side of the cells on which objects are searched, metres. Smaller ones add time and noise only.
+const WORK_CELL_M: f64 = 1.0;
+/// Half-width of the mean that makes the trend, metres: about a city block, so that no house is in
+/// the trend.
+const TREND_HALF_WIDTH_M: f64 = 30.0;
+/// Width of the ring around objects in which ramps and low walls are looked for, metres.
+const RING_M: f64 = 3.0;
+/// Height above the ground around it up to which a cell of the ring is ground, metres: the noise of
+/// satellite surfaces.
+const RING_RISE_M: f32 = 0.5;
+/// Height above the ground of the coarse cells up to which a cell is ground, metres.
+const CELL_RISE_M: f32 = 0.7;
+
+/// The ground under a surface.
+#[derive(Debug, Clone)]
+pub struct BareGround {
+    /// Heights of the ground, metres, in the datum of the surface. NaN where it is not known.
+    pub heights: Grid<f32>,
+    /// [`GROUND`], [`UNDER_OBJECT`], [`VOID_FILLED`] or [`UNKNOWN`].
+    pub states: Grid<u8>,
+}
+
+/// Finds the ground under a surface with square cells of `cell_m` metres. Cells that are farther
+/// from any ground than the widest object stay unknown.
+///
+/// # Errors
+/// [`TerrainError::CellSize`], [`TerrainError::Parameter`] for values outside of their range,
+/// [`TerrainError::Cancelled`].
+///
+/// ```
+/// use numeric::Silent;
+/// use raster::Grid;
+/// use terrain::{GroundConfig, UNDER_OBJECT, bare_ground};
+///
+/// let mut surface = Grid::filled(80, 60, 20.0);
+/// (30..42).for_each(|row| surface.row_mut(row)[30..50].fill(26.0));
+/// let ground = bare_ground(&surface, 1.0, &GroundConfig::default(), &Silent)?;
+/// assert_eq!(ground.states[(40, 36)], UNDER_OBJECT);
+/// assert!((ground.heights[(40, 36)] - 20.0).abs() < 0.01);
+/// # Ok::<(), terrain::TerrainError>(())
+/// ```
+pub fn bare_ground(
+    surface: &Grid<f32>,
+    cell_m: f64,
+    config: &GroundConfig,
+    progress: &dyn Progress,
+) -> Result<BareGround, TerrainError> {
+    config.validate()?;
+    if !(cell_m > 0.0 && cell_m.is_finite()) {
+        return Err(TerrainError::CellSize { found: cell_m });
+    }
+    let side = ((WORK_CELL_M / cell_m).round() as usize).max(1);
+    let work_m = cell_m * side as f64;
+    progress.begin("ground", 2 * radii(config.widest_object_m / work_m).len());
+    let surface_m = without_pits(&blocks(surface, side), work_m);
+    let first = objects(&surface_m, work_m, config, progress)?;
+    let radius = (TREND_HALF_WIDTH_M / work_m).round() as usize;
+    let trend = blurred(&blurred(&filled(&masked(&surface_m, &first)), radius), radius);
+    let relative = Grid::from_vec(
+        surface_m.width(),
+        surface_m.height(),
+        surface_m.data().iter().zip(trend.data()).map(|(height, trend)| height - trend).collect(),
+    )
+    .expect("the trend has the cells of the surface");
+    let second = objects(&relative, work_m, config, progress)?;
+    let ground = without_ramps(&surface_m, &second, work_m);
+    Ok(at_cells(surface, &ground, side, config.widest_object_m / work_m))
+}
+
+/// A surface with objects as voids.
+fn masked(surface: &Grid<f32>, objects: &Grid<bool>) -> Grid<f32> {
+    let cells = surface.data().iter().zip(objects.data()).map(|(&h, &is_object)| if is_object { f32::NAN } else { h });
+    Grid::from_vec(surface.width(), surface.height(), cells.collect()).expect("one flag per cell")
+}
+
+/// Returns the heights of the ground, NaN at objects and at the ramps that lead up to them. A cell
+/// near an object is ground if it does not rise above the ground further away.
+fn without_ramps(surface: &Grid<f32>, objects: &Grid<bool>, cell_m: f64) -> Grid<f32> {
+    let ring = ((RING_M / cell_m).round() as usize).max(1);
+    let around = masked(surface, &widened(objects, ring));
+    let expected = filled(&around);
+    let mut ground = masked(surface, objects);
+    for (cell, expected) in ground.data_mut().iter_mut().zip(expected.data()) {
+        // Without any ground further away nothing can be compared.
+        if *cell - expected > RING_RISE_M {
+            *cell = f32::NAN;
+        }
+    }
+    ground
+}
+
+/// Carries the ground of coarse cells to the cells of the surface.
+fn at_cells(surface: &Grid<f32>, ground: &Grid<f32>, side: usize, reach: f64) -> BareGround {
+    let (width, height) = (surface.width(), surface.height());
+    let coarse = filled(ground);
+    let is_near = widened(&ground.map(|h| !h.is_nan()), reach.round() as usize);
+    let mut heights = Grid::filled(width, height, f32::NAN);
+    let mut states = Grid::filled(width, height, UNKNOWN);
+    for row in 0..height {
+        for column in 0..width {
+            let (own, block) = (surface[(column, row)], (column / side, row / side));
+            let below = at_cell(&coarse, side, column, row);
+            let is_ground = !ground[block].is_nan() && (own - below).abs() <= CELL_RISE_M;
+            if !is_near[block] {
+                continue;
+            }
+            heights[(column, row)] = if is_ground { own } else { below };
+            states[(column, row)] = match (is_ground, own.is_nan()) {
+                (true, _) => GROUND,
+                (false, true) => VOID_FILLED,
+                (false, false) => UNDER_OBJECT,
+            };
+        }
+    }
+    BareGround { heights, states }
+}

@@ -1,0 +1,29 @@
+//! The bare ground under the buildings and trees of a surface model.
+//!
+//! The method has three parts, all in metres and slopes:
+//!
+//! 1. **Objects** are found by morphological openings with growing windows, as in the progressive
+//!    filter of Zhang et al. (2003, <https://doi.org/10.1109/TGRS.2003.810682>). What an opening
+//!    removes is only a candidate. A candidate is an object if the surface drops along most of its
+//!    border by about as much as the candidate stands above the opened surface. A hilltop or a
+//!    terrace that an opening cuts off has no such border, and stays.
+//! 2. The search is done twice. The second time the surface is taken relative to a smooth trend of
+//!    the first result, so that slopes do not hide low halls.
+//! 3. The ground under objects and voids is a **membrane** (the solution of Laplace's equation)
+//!    through the ground around them.
+//!
+//! Heights are in metres above any datum, NaN is a void. The work is done on cells of about a metre
+//! and takes memory in proportion to the cells.
+
+mod coarse;
+mod config;
+mod error;
+mod ground;
+mod membrane;
+mod objects;
+mod opening;
+mod regions;
+
+pub use config::GroundConfig;
+pub use error::TerrainError;
+pub use ground::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground};

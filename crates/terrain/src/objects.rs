@@ -1,0 +1,131 @@
+//! Finds the objects of a surface by openings with growing windows, and keeps those that the
+//! surface drops away from on most of their border.
+
+use numeric::{Cancelled, Progress};
+use raster::Grid;
+
+use crate::config::GroundConfig;
+use crate::opening::{closed, opened};
+use crate::regions::{Regions, quantile};
+
+/// Growth of the half-width from one window to the next.
+const GROWTH: f64 = 1.33;
+/// Share of the height of a candidate that the surface must drop along its border.
+const DROP_SHARE: f32 = 0.45;
+/// Share of the border of an object along which the surface need not drop: slopes, and houses and
+/// trees that adjoin.
+const FREE_SHARE: f64 = 0.35;
+/// The same for a smooth part of an object: the other parts around it may all be higher.
+const FREE_SHARE_OF_PARTS: f64 = 0.8;
+/// Largest height from one cell to the next within a smooth part, metres: a slope of 45° and noise.
+const STEP_M: f32 = 1.5;
+/// Half-width of the window that finds outliers below the ground, metres.
+const PIT_HALF_WIDTH_M: f64 = 3.0;
+/// Depth of an outlier below its surroundings, metres.
+const PIT_DEPTH_M: f32 = 1.5;
+/// Largest outlier, square metres. Larger pits are yards and shafts.
+const PIT_AREA_M2: f64 = 25.0;
+
+/// Turns small pits into voids.
+pub(crate) fn without_pits(surface: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    let radius = (PIT_HALF_WIDTH_M / cell_m).round() as usize;
+    let mut out = surface.clone();
+    if radius == 0 {
+        return out;
+    }
+    let regions = Regions::of(&above(&closed(surface, radius), surface, PIT_DEPTH_M));
+    for region in 0..regions.len() {
+        let cells = regions.cells(region);
+        if cells.len() as f64 * cell_m * cell_m <= PIT_AREA_M2 {
+            cells.iter().for_each(|&cell| out.data_mut()[cell as usize] = f32::NAN);
+        }
+    }
+    out
+}
+
+/// Returns the cells of objects.
+///
+/// # Errors
+/// [`Cancelled`].
+pub(crate) fn objects(
+    surface: &Grid<f32>,
+    cell_m: f64,
+    config: &GroundConfig,
+    progress: &dyn Progress,
+) -> Result<Grid<bool>, Cancelled> {
+    let mut left = surface.clone();
+    let mut found = Grid::filled(surface.width(), surface.height(), false);
+    for radius in radii(config.widest_object_m / cell_m) {
+        progress.check_cancelled()?;
+        let low = opened(&left, radius);
+        let candidates = above(&left, &low, config.threshold_m(radius as f64 * cell_m));
+        judge(&Candidates { left: &left, low: &low, cells: &candidates, cell_m }, &mut found);
+        for ((cell, &low), &is_object) in left.data_mut().iter_mut().zip(low.data()).zip(found.data()) {
+            if is_object {
+                *cell = cell.min(low);
+            }
+        }
+        progress.step();
+    }
+    Ok(found)
+}
+
+/// What an opening removes.
+struct Candidates<'a> {
+    /// The surface, without the objects that are known.
+    left: &'a Grid<f32>,
+    /// The opened surface.
+    low: &'a Grid<f32>,
+    /// The cells that stand out.
+    cells: &'a Grid<bool>,
+    cell_m: f64,
+}
+
+/// Marks the objects among the candidates. Candidates that touch are judged together: trees and
+/// houses hide the borders of each other. Smooth parts of an object that lie lower than everything
+/// around them are ground that an opening has cut off, such as a clearing on a ridge. Smooth parts
+/// of what is no object as a whole may be objects of their own.
+fn judge(candidates: &Candidates<'_>, found: &mut Grid<bool>) {
+    let step_m = STEP_M.max(candidates.cell_m as f32);
+    let wholes = Regions::of(candidates.cells);
+    let parts = Regions::smooth(candidates.cells, candidates.left, step_m);
+    let is_whole: Vec<bool> = (0..wholes.len()).map(|whole| candidates.drops(&wholes, whole, FREE_SHARE)).collect();
+    for part in 0..parts.len() {
+        let cells = parts.cells(part);
+        let free_share = if is_whole[wholes.at(cells[0])] { FREE_SHARE_OF_PARTS } else { FREE_SHARE };
+        if candidates.drops(&parts, part, free_share) {
+            cells.iter().for_each(|&cell| found.data_mut()[cell as usize] = true);
+        }
+    }
+}
+
+impl Candidates<'_> {
+    /// Whether the surface drops by the height of a region along its border, except for a share.
+    fn drops(&self, regions: &Regions, region: usize, free_share: f64) -> bool {
+        let cells = regions.cells(region).iter().map(|&cell| cell as usize);
+        let mut heights: Vec<f32> = cells.map(|cell| self.left.data()[cell] - self.low.data()[cell]).collect();
+        let height = quantile(&mut heights, 0.5).unwrap_or(0.0);
+        // A candidate that is known only from voids around it cannot be told from ground.
+        let drop = quantile(&mut regions.drops_m(region, self.left, self.cell_m), free_share);
+        drop.is_some_and(|drop| drop >= DROP_SHARE * height)
+    }
+}
+
+/// Half-widths of the windows, cells, for the widest object in cells.
+pub(crate) fn radii(widest: f64) -> Vec<usize> {
+    let mut radii = Vec::new();
+    let mut half = 1.0;
+    let last = (widest / 2.0).max(1.0).ceil();
+    while half < last {
+        radii.push(half.round() as usize);
+        half = (half * GROWTH).max(half + 1.0);
+    }
+    radii.push(last as usize);
+    radii
+}
+
+/// Cells at which one surface stands above another by more than `threshold_m`.
+fn above(upper: &Grid<f32>, lower: &Grid<f32>, threshold_m: f32) -> Grid<bool> {
+    let cells = upper.data().iter().zip(lower.data()).map(|(upper, lower)| upper - lower > threshold_m);
+    Grid::from_vec(upper.width(), upper.height(), cells.collect()).expect("both surfaces have the same cells")
+}

@@ -1,0 +1,112 @@
+//! Connected regions of a mask, and how far the surface drops along their borders.
+
+use raster::Grid;
+
+/// Distance outside of a region within which the surface must have dropped, metres. Walls in
+/// satellite models are ramps of two to three metres.
+const OUTSIDE_M: f64 = 4.0;
+/// Distance inside of a region within which the surface must have reached its height, metres.
+const INSIDE_M: f64 = 2.0;
+/// No number of a region.
+const NONE: u32 = 0;
+
+/// The regions of a mask, one after the other.
+pub(crate) struct Regions {
+    /// Number of the region of each cell, from 1; 0 is none.
+    numbers: Grid<u32>,
+    /// Cells of all regions, region by region.
+    cells: Vec<u32>,
+    /// End of each region in `cells`.
+    ends: Vec<usize>,
+}
+
+impl Regions {
+    /// Finds the regions of a mask; cells that touch at a corner are connected.
+    pub(crate) fn of(mask: &Grid<bool>) -> Self {
+        Self::joined(mask, |_, _| true)
+    }
+
+    /// Finds the regions of a mask within which the surface has no steps above `step_m`.
+    pub(crate) fn smooth(mask: &Grid<bool>, surface: &Grid<f32>, step_m: f32) -> Self {
+        Self::joined(mask, |from, to| (surface.data()[from] - surface.data()[to]).abs() <= step_m)
+    }
+
+    fn joined(mask: &Grid<bool>, is_joined: impl Fn(usize, usize) -> bool) -> Self {
+        let (width, height) = (mask.width(), mask.height());
+        let mut numbers = Grid::filled(width, height, NONE);
+        let (mut cells, mut ends) = (Vec::new(), Vec::new());
+        for seed in 0..mask.data().len() {
+            if !mask.data()[seed] || numbers.data()[seed] != NONE {
+                continue;
+            }
+            let number = ends.len() as u32 + 1;
+            let mut next = cells.len();
+            numbers.data_mut()[seed] = number;
+            cells.push(seed as u32);
+            while let Some(&cell) = cells.get(next) {
+                next += 1;
+                let (column, row) = (cell as usize % width, cell as usize / width);
+                for y in row.saturating_sub(1)..(row + 2).min(height) {
+                    for x in column.saturating_sub(1)..(column + 2).min(width) {
+                        if mask[(x, y)] && numbers[(x, y)] == NONE && is_joined(cell as usize, y * width + x) {
+                            numbers[(x, y)] = number;
+                            cells.push((y * width + x) as u32);
+                        }
+                    }
+                }
+            }
+            ends.push(cells.len());
+        }
+        Self { numbers, cells, ends }
+    }
+
+    /// The number of regions.
+    pub(crate) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The cells of a region, as indices into the raster.
+    pub(crate) fn cells(&self, region: usize) -> &[u32] {
+        let start = if region == 0 { 0 } else { self.ends[region - 1] };
+        &self.cells[start..self.ends[region]]
+    }
+
+    /// The region that holds a cell of the mask.
+    pub(crate) fn at(&self, cell: u32) -> usize {
+        self.numbers.data()[cell as usize] as usize - 1
+    }
+
+    /// Heights by which the surface drops along the border of a region, metres. Empty for a region
+    /// whose whole border lies at voids or at the border of the raster.
+    pub(crate) fn drops_m(&self, region: usize, surface: &Grid<f32>, cell_m: f64) -> Vec<f32> {
+        let steps = |metres: f64| ((metres / cell_m).round() as i64).max(1);
+        let (outside, inside) = (steps(OUTSIDE_M), steps(INSIDE_M));
+        let (number, width) = (region as u32 + 1, surface.width());
+        let at = |x: i64, y: i64| {
+            (x >= 0 && y >= 0).then_some(())?;
+            let place = (x as usize, y as usize);
+            Some((*self.numbers.get(place.0, place.1)? == number, surface[place]))
+        };
+        let mut drops = Vec::new();
+        for &cell in self.cells(region) {
+            let (x, y) = ((cell as usize % width) as i64, (cell as usize / width) as i64);
+            for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+                let out = (1..=outside).map_while(|k| at(x + k * dx, y + k * dy).filter(|(is_own, _)| !is_own));
+                let low = out.map(|(_, height)| height).fold(f32::NAN, f32::min);
+                if low.is_nan() {
+                    continue;
+                }
+                let own = (0..=inside).map_while(|k| at(x - k * dx, y - k * dy).filter(|(is_own, _)| *is_own));
+                drops.push(own.map(|(_, height)| height).fold(f32::NAN, f32::max) - low);
+            }
+        }
+        drops
+    }
+}
+
+/// Returns a quantile of numbers without NaN, and disorders them.
+pub(crate) fn quantile(values: &mut [f32], share: f64) -> Option<f32> {
+    let last = values.len().checked_sub(1)?;
+    let at = (last as f64 * share).round() as usize;
+    Some(*values.select_nth_unstable_by(at, f32::total_cmp).1)
+}

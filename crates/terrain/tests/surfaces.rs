@@ -1,0 +1,152 @@
+//! The search for the ground on synthetic surfaces with a known answer.
+
+use numeric::{Silent, SplitMix64};
+use raster::Grid;
+use terrain::{BareGround, GROUND, GroundConfig, TerrainError, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground};
+
+/// Side of the cells of most surfaces, metres.
+const CELL_M: f64 = 1.0;
+
+/// A surface of `side × side` cells from its height at (column, row).
+fn surface(side: usize, height: impl Fn(f32, f32) -> f32) -> Grid<f32> {
+    let cells = (0..side * side).map(|at| height((at % side) as f32, (at / side) as f32));
+    Grid::from_vec(side, side, cells.collect()).unwrap()
+}
+
+fn ground(surface: &Grid<f32>) -> BareGround {
+    bare_ground(surface, CELL_M, &GroundConfig::default(), &Silent).unwrap()
+}
+
+/// The root mean square error against the true ground.
+fn rmse(found: &BareGround, truth: &Grid<f32>) -> f64 {
+    let squares = found.heights.data().iter().zip(truth.data()).map(|(a, b)| f64::from(a - b).powi(2));
+    (squares.sum::<f64>() / truth.data().len() as f64).sqrt()
+}
+
+/// The share of the cells of a mask with a state.
+fn share(found: &BareGround, state: u8, within: impl Fn(f32, f32) -> bool) -> f64 {
+    let side = found.states.width();
+    let cells: Vec<bool> = (0..found.states.data().len())
+        .filter(|at| within((at % side) as f32, (at / side) as f32))
+        .map(|at| found.states.data()[at] == state)
+        .collect();
+    cells.iter().filter(|hit| **hit).count() as f64 / cells.len() as f64
+}
+
+/// Noise of about normal distribution, by position.
+fn noise(x: f32, y: f32, sigma: f32) -> f32 {
+    sigma * SplitMix64::new(((y as u64) << 32) | x as u64).normal() as f32
+}
+
+fn in_box(x: f32, y: f32) -> bool {
+    (60.0..80.0).contains(&x) && (50.0..85.0).contains(&y)
+}
+
+#[test]
+fn a_box_on_flat_ground_is_removed() {
+    let found = ground(&surface(150, |x, y| if in_box(x, y) { 15.0 } else { 8.0 }));
+    assert_eq!(share(&found, UNDER_OBJECT, in_box), 1.0);
+    assert_eq!(share(&found, GROUND, |x, y| !in_box(x, y)), 1.0);
+    assert!(found.heights.data().iter().all(|h| (h - 8.0).abs() < 1e-3));
+}
+
+#[test]
+fn a_box_on_a_slope_is_removed_and_the_slope_stays() {
+    for slope in [0.05, 0.2] {
+        let truth = surface(200, |x, _| slope * x);
+        let found = ground(&surface(200, |x, y| slope * x + if in_box(x, y) { 7.0 } else { 0.0 }));
+        assert!(share(&found, UNDER_OBJECT, in_box) > 0.98, "{slope}");
+        let error = rmse(&found, &truth);
+        assert!(error < 0.3, "slope {slope}: {error}");
+    }
+}
+
+#[test]
+fn a_steep_hill_stays() {
+    let hill = surface(300, |x, y| 60.0 * (-((x - 150.0).powi(2) + (y - 150.0).powi(2)) / 5000.0).exp());
+    let found = ground(&hill);
+    assert!(share(&found, GROUND, |_, _| true) > 0.97);
+    assert!(rmse(&found, &hill) < 0.3);
+}
+
+#[test]
+fn a_quay_and_a_terrace_stay() {
+    // A quay along a bent line, and a terrace that only one side of the raster shows whole.
+    let quay = surface(250, |x, y| if x + 20.0 * (y / 40.0).sin() > 120.0 { 4.0 } else { 0.0 });
+    let terrace = surface(250, |x, y| if x > 150.0 && y > 120.0 { 6.0 } else { 0.0 });
+    for steps in [quay, terrace] {
+        let found = ground(&steps);
+        assert!(rmse(&found, &steps) < 0.2, "{}", rmse(&found, &steps));
+        assert!(share(&found, GROUND, |_, _| true) > 0.95);
+    }
+}
+
+#[test]
+fn a_large_low_hall_is_removed() {
+    let within = |x: f32, y: f32| (100.0..220.0).contains(&x) && (90.0..210.0).contains(&y);
+    let truth = surface(320, |x, y| 0.03 * x + 0.02 * y);
+    let found = ground(&surface(320, |x, y| 0.03 * x + 0.02 * y + if within(x, y) { 6.0 } else { 0.0 }));
+    assert!(share(&found, UNDER_OBJECT, within) > 0.99);
+    assert!(rmse(&found, &truth) < 0.3);
+}
+
+#[test]
+fn noise_and_outliers_below_the_ground_do_no_harm() {
+    let truth = surface(200, |x, y| 0.1 * x - 0.05 * y);
+    let noisy = surface(200, |x, y| {
+        let deep = if (x as usize * 31 + y as usize * 17) % 1999 < 3 { -6.0 } else { 0.0 };
+        0.1 * x - 0.05 * y + if in_box(x, y) { 5.0 } else { 0.0 } + noise(x, y, 0.4) + deep
+    });
+    let found = ground(&noisy);
+    assert!(share(&found, UNDER_OBJECT, in_box) > 0.97);
+    assert!(rmse(&found, &truth) < 0.5, "{}", rmse(&found, &truth));
+}
+
+#[test]
+fn voids_are_filled_near_ground_only() {
+    let hole = |x: f32, y: f32| (30.0..60.0).contains(&x) && (40.0..90.0).contains(&y);
+    let plane = surface(150, |x, y| 0.1 * x + 0.1 * y);
+    let found = ground(&surface(150, |x, y| if hole(x, y) { f32::NAN } else { 0.1 * x + 0.1 * y }));
+    assert_eq!(share(&found, VOID_FILLED, hole), 1.0);
+    assert!(rmse(&found, &plane) < 0.1);
+    // Ground in one corner tells nothing of cells half a kilometre away.
+    let far = ground(&surface(500, |x, y| if x < 20.0 && y < 20.0 { 3.0 } else { f32::NAN }));
+    assert_eq!(share(&far, UNKNOWN, |x, _| x > 200.0), 1.0);
+    assert!(far.heights[(400, 400)].is_nan() && !far.heights[(100, 100)].is_nan());
+}
+
+#[test]
+fn empty_and_tiny_surfaces_are_taken() {
+    let empty = ground(&surface(40, |_, _| f32::NAN));
+    assert_eq!(share(&empty, UNKNOWN, |_, _| true), 1.0);
+    assert!(empty.heights.data().iter().all(|h| h.is_nan()));
+    let one = ground(&surface(1, |_, _| 12.0));
+    assert_eq!((one.heights[(0, 0)], one.states[(0, 0)]), (12.0, GROUND));
+    let infinite = ground(&surface(30, |x, _| if x == 3.0 { f32::INFINITY } else { 1.0 }));
+    assert!(infinite.heights.data().iter().all(|h| (h - 1.0).abs() < 1e-3));
+    assert!(ground(&Grid::filled(0, 0, 0.0)).heights.data().is_empty());
+}
+
+#[test]
+fn fine_and_coarse_cells_give_the_same_ground() {
+    for (cell_m, side) in [(0.3, 400), (0.5, 300), (2.0, 150), (10.0, 60)] {
+        let house = |x: f32, y: f32| (x * cell_m as f32 - 60.0).abs() < 11.0 && (y * cell_m as f32 - 60.0).abs() < 15.0;
+        let cells = surface(side, |x, y| if house(x, y) { 12.0 } else { 4.0 });
+        let found = bare_ground(&cells, cell_m, &GroundConfig::default(), &Silent).unwrap();
+        let worst = found.heights.data().iter().map(|h| (h - 4.0).abs()).fold(0.0, f32::max);
+        assert!(worst < 0.01, "{cell_m} m: {worst}");
+    }
+}
+
+#[test]
+fn values_outside_of_their_range_are_refused() {
+    let flat = Grid::filled(4, 4, 1.0);
+    for cell_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = bare_ground(&flat, cell_m, &GroundConfig::default(), &Silent).unwrap_err();
+        assert!(matches!(error, TerrainError::CellSize { .. }), "{error}");
+    }
+    let mut config = GroundConfig::default();
+    config.slope = f64::NAN;
+    let error = bare_ground(&flat, 1.0, &config, &Silent).unwrap_err();
+    assert!(error.to_string().contains("slope"), "{error}");
+}
