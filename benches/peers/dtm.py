@@ -214,7 +214,7 @@ def table(report):
     names = [OURS, *PEERS]
     cell = lambda entry, key, scale: f"{scale * entry[key]:.2f}" if key in entry else "failed"
     lines = ["# Terrain models", "", "Made by `benches/peers/dtm.py`. Lower is better.", "",
-             f"Programs: skysweep dtm with its defaults; whitebox-workflows (181 cells, 20 degrees), dsm2dtm (radius 60 m), "
+             "Programs: skysweep dtm with its defaults; whitebox-workflows (181 cells, 20 degrees), dsm2dtm (radius 60 m), "
              "CSF (cloth 1 m, rigidness 2), bulldozer-dtm with its defaults.", ""]
     for title, key in [("RMSE under buildings and trees, metres", "rmse_under_objects_m"),
                        ("RMSE of all cells, metres", "rmse_m")]:
@@ -241,7 +241,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--skysweep", default=str(ROOT / "target/release/skysweep"))
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "target/dtm-peers")
-    parser.add_argument("--only", choices=["ours"], help="run skysweep alone and print the figures")
+    parser.add_argument("--only", choices=["ours"], help="run skysweep alone; the figures of the others stay")
     parser.add_argument("--peer", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.peer:
@@ -250,23 +250,23 @@ def main():
     python = environment(options.work)
     if pathlib.Path(sys.executable).resolve() != python.resolve() or sys.prefix == sys.base_prefix:
         os.execv(python, [str(python), __file__, *sys.argv[1:]])
+    place = ROOT / "benches/results"
+    before = json.loads((place / "dtm.json").read_text()) if options.only else {"simulated": {}, "lidar": {}}
     report = {"simulated": {}}
     for name, surface, truth in scenes(options.skysweep, options.work):
         results = run_all(options.skysweep, surface, options.work / "made" / name.replace(", ", "_"), options.only)
         judged_scene(results, surface, truth)
-        report["simulated"][name] = without_files(results)
+        report["simulated"][name] = before["simulated"].get(name, {}) | without_files(results)
         print(name, json.dumps(report["simulated"][name]), flush=True)
     data = pathlib.Path(os.environ.get("SKYSWEEP_DATA", ROOT.parent / "shared/data")) / "stereo/jax_068/truth"
     if (data / "JAX_068_DSM_georef.tif").exists():
         surface = data / "JAX_068_DSM_georef.tif"
         results = run_all(options.skysweep, surface, options.work / "made/jax_068", options.only)
         judged_lidar(results, surface, data / "JAX_068_CLS.tif")
-        report["lidar"] = without_files(results)
+        report["lidar"] = before.get("lidar", {}) | without_files(results)
         print("jax_068", json.dumps(report["lidar"]), flush=True)
-    if not options.only:
-        place = ROOT / "benches/results"
-        (place / "dtm.json").write_text(json.dumps(report, indent=1) + "\n")
-        (place / "dtm.md").write_text(table(report))
+    (place / "dtm.json").write_text(json.dumps(report, indent=1) + "\n")
+    (place / "dtm.md").write_text(table(report))
 
 
 if __name__ == "__main__":

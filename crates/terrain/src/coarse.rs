@@ -29,8 +29,9 @@ pub(crate) fn blocks(fine: &Grid<f32>, side: usize) -> Grid<f32> {
 /// Interpolates a raster of blocks at a cell of the raster that it was made of.
 pub(crate) fn at_cell(coarse: &Grid<f32>, side: usize, column: usize, row: usize) -> f32 {
     let place = |at: usize, count: usize| {
-        let position = ((at as f32 + 0.5) / side as f32 - 0.5).clamp(0.0, (count - 1) as f32);
-        let low = position as usize;
+        // Half a block beyond the outer centres the slope goes on.
+        let position = (at as f32 + 0.5) / side as f32 - 0.5;
+        let low = (position.max(0.0) as usize).min(count.saturating_sub(2));
         (low, (low + 1).min(count - 1), position - low as f32)
     };
     let (x, x_next, fx) = place(column, coarse.width());
@@ -40,7 +41,7 @@ pub(crate) fn at_cell(coarse: &Grid<f32>, side: usize, column: usize, row: usize
 }
 
 /// Returns the means over windows of `2·radius + 1` cells, cut at the borders.
-pub(crate) fn blurred(grid: &Grid<f32>, radius: usize) -> Grid<f32> {
+fn blurred(grid: &Grid<f32>, radius: usize) -> Grid<f32> {
     let (width, height) = (grid.width(), grid.height());
     let mut along_rows = grid.clone();
     for row in 0..height {

@@ -3,11 +3,12 @@
 use numeric::Progress;
 use raster::Grid;
 
-use crate::coarse::{at_cell, blocks, blurred, widened};
+use crate::coarse::{at_cell, blocks, widened};
 use crate::config::GroundConfig;
 use crate::error::TerrainError;
 use crate::membrane::filled;
 use crate::objects::{objects, radii, without_pits};
+use crate::trend::{TrendConfig, trend};
 
 /// State of a cell without a height of the ground: too far from any ground.
 pub const UNKNOWN: u8 = 0;
@@ -20,9 +21,11 @@ pub const VOID_FILLED: u8 = 3;
 
 /// Side of the cells on which objects are searched, metres. Smaller ones add time and noise only.
 const WORK_CELL_M: f64 = 1.0;
-/// Half-width of the mean that makes the trend, metres: about a city block, so that no house is in
-/// the trend.
-const TREND_HALF_WIDTH_M: f64 = 30.0;
+/// Trend before any object is known: planes wider than a city block, on the lower part of the
+/// surface.
+const FIRST_TREND: TrendConfig = TrendConfig { half_width_m: 100.0, quantile: 0.1, is_lower: true };
+/// Trend of the ground between the objects of the first search.
+const SECOND_TREND: TrendConfig = TrendConfig { half_width_m: 40.0, quantile: 0.5, is_lower: false };
 /// Width of the ring around objects in which ramps and low walls are looked for, metres.
 const RING_M: f64 = 3.0;
 /// Height above the ground around it up to which a cell of the ring is ground, metres: the noise of
@@ -73,18 +76,23 @@ pub fn bare_ground(
     let work_m = cell_m * side as f64;
     progress.begin("ground", 2 * radii(config.widest_object_m / work_m).len());
     let surface_m = without_pits(&blocks(surface, side), work_m);
-    let first = objects(&surface_m, work_m, config, progress)?;
-    let radius = (TREND_HALF_WIDTH_M / work_m).round() as usize;
-    let trend = blurred(&blurred(&filled(&masked(&surface_m, &first)), radius), radius);
-    let relative = Grid::from_vec(
-        surface_m.width(),
-        surface_m.height(),
-        surface_m.data().iter().zip(trend.data()).map(|(height, trend)| height - trend).collect(),
-    )
-    .expect("the trend has the cells of the surface");
-    let second = objects(&relative, work_m, config, progress)?;
-    let ground = without_ramps(&surface_m, &second, work_m);
+    // Without any height the raster stays unknown, and has no trend.
+    let mut found = Grid::filled(surface_m.width(), surface_m.height(), false);
+    if surface_m.data().iter().any(|h| !h.is_nan()) {
+        let first = relative(&surface_m, &trend(&surface_m, work_m, &FIRST_TREND));
+        found = objects(&first, work_m, config, progress)?;
+        let known = filled(&masked(&surface_m, &found));
+        let second = relative(&surface_m, &trend(&known, work_m, &SECOND_TREND));
+        found = objects(&second, work_m, config, progress)?;
+    }
+    let ground = without_ramps(&surface_m, &found, work_m);
     Ok(at_cells(surface, &ground, side, config.widest_object_m / work_m))
+}
+
+/// A surface above its trend.
+fn relative(surface: &Grid<f32>, trend: &Grid<f32>) -> Grid<f32> {
+    let cells = surface.data().iter().zip(trend.data()).map(|(height, trend)| height - trend);
+    Grid::from_vec(surface.width(), surface.height(), cells.collect()).expect("the trend has the cells of the surface")
 }
 
 /// A surface with objects as voids.
@@ -99,10 +107,11 @@ fn without_ramps(surface: &Grid<f32>, objects: &Grid<bool>, cell_m: f64) -> Grid
     let ring = ((RING_M / cell_m).round() as usize).max(1);
     let around = masked(surface, &widened(objects, ring));
     let expected = filled(&around);
+    // In a clearing without any ground further away nothing can be compared.
+    let is_near = widened(&around.map(|h| !h.is_nan()), 2 * ring);
     let mut ground = masked(surface, objects);
-    for (cell, expected) in ground.data_mut().iter_mut().zip(expected.data()) {
-        // Without any ground further away nothing can be compared.
-        if *cell - expected > RING_RISE_M {
+    for ((cell, expected), is_near) in ground.data_mut().iter_mut().zip(expected.data()).zip(is_near.data()) {
+        if *is_near && *cell - expected > RING_RISE_M {
             *cell = f32::NAN;
         }
     }

@@ -52,7 +52,7 @@ fn a_box_on_flat_ground_is_removed() {
 
 #[test]
 fn a_box_on_a_slope_is_removed_and_the_slope_stays() {
-    for slope in [0.05, 0.2] {
+    for slope in [0.05, 0.2, 0.4] {
         let truth = surface(200, |x, _| slope * x);
         let found = ground(&surface(200, |x, y| slope * x + if in_box(x, y) { 7.0 } else { 0.0 }));
         assert!(share(&found, UNDER_OBJECT, in_box) > 0.98, "{slope}");

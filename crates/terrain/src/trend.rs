@@ -1,0 +1,124 @@
+//! The trend of a surface: planes fitted to the surroundings of each place, so that a slope goes on
+//! up to the border of the raster.
+
+use raster::Grid;
+use rayon::prelude::*;
+
+use crate::coarse::at_cell;
+use crate::regions::quantile;
+
+/// Side of the blocks that the planes are fitted to, metres.
+const BLOCK_M: f64 = 10.0;
+/// Rounds of a fit that turns away from what stands above it.
+const ROUNDS: usize = 6;
+/// Height above a plane at which the weight of a block has halved, metres.
+const HALF_WEIGHT_M: f64 = 1.0;
+
+/// What a plane follows.
+pub(crate) struct TrendConfig {
+    /// Half-width of the surroundings, metres.
+    pub(crate) half_width_m: f64,
+    /// Order statistic of the heights of a block that the planes follow, from 0 (lowest) to 1.
+    pub(crate) quantile: f64,
+    /// Whether blocks above the plane count less.
+    pub(crate) is_lower: bool,
+}
+
+/// Returns the trend of a surface, which must have a height somewhere.
+pub(crate) fn trend(surface: &Grid<f32>, cell_m: f64, config: &TrendConfig) -> Grid<f32> {
+    let side = ((BLOCK_M / cell_m).round() as usize).max(1);
+    let radius = (config.half_width_m / (cell_m * side as f64)).round().max(1.0) as usize;
+    let blocks = block_quantiles(surface, side, config.quantile);
+    let mut planes = blocks.clone();
+    let width = planes.width();
+    planes.data_mut().par_iter_mut().enumerate().for_each(|(at, height)| {
+        *height = plane_at(&blocks, (at % width, at / width), radius, config.is_lower);
+    });
+    let planes = crate::membrane::filled(&planes);
+    let mut out = surface.clone();
+    let width = out.width();
+    out.data_mut().par_iter_mut().enumerate().for_each(|(at, height)| {
+        *height = at_cell(&planes, side, at % width, at / width);
+    });
+    out
+}
+
+/// Returns a quantile of the heights of blocks of `side × side` cells.
+fn block_quantiles(surface: &Grid<f32>, side: usize, share: f64) -> Grid<f32> {
+    let (width, height) = (surface.width().div_ceil(side), surface.height().div_ceil(side));
+    let mut blocks = Grid::filled(width, height, f32::NAN);
+    let mut values = Vec::with_capacity(side * side);
+    for row in 0..height {
+        for column in 0..width {
+            values.clear();
+            for y in row * side..((row + 1) * side).min(surface.height()) {
+                let cells = &surface.row(y)[column * side..((column + 1) * side).min(surface.width())];
+                values.extend(cells.iter().filter(|h| !h.is_nan()));
+            }
+            blocks[(column, row)] = quantile(&mut values, share).unwrap_or(f32::NAN);
+        }
+    }
+    blocks
+}
+
+/// Fits a plane around a block and returns its height there, NaN without blocks to fit it to.
+fn plane_at(blocks: &Grid<f32>, (column, row): (usize, usize), radius: usize, is_lower: bool) -> f32 {
+    let mut points = Vec::with_capacity((2 * radius + 1).pow(2));
+    for y in row.saturating_sub(radius)..(row + radius + 1).min(blocks.height()) {
+        for x in column.saturating_sub(radius)..(column + radius + 1).min(blocks.width()) {
+            if !blocks[(x, y)].is_nan() {
+                points.push([x as f64 - column as f64, y as f64 - row as f64, f64::from(blocks[(x, y)])]);
+            }
+        }
+    }
+    let Some(base) = points.first().map(|point| point[2]) else { return f32::NAN };
+    let mut plane = [0.0; 3];
+    for round in 0..if is_lower { ROUNDS } else { 1 } {
+        let weight = |&[x, y, z]: &[f64; 3]| {
+            let above = z - base - (plane[0] + plane[1] * x + plane[2] * y);
+            if round == 0 || above <= 0.0 { 1.0 } else { 1.0 / (1.0 + (above / HALF_WEIGHT_M).powi(2)) }
+        };
+        plane = fitted(points.iter().map(|point| (*point, weight(point))), base);
+    }
+    (base + plane[0]) as f32
+}
+
+/// Fits a plane `a + b·x + c·y` to weighted points by least squares. A little damping of the slopes
+/// decides where the points lie on a line.
+fn fitted(points: impl Iterator<Item = ([f64; 3], f64)>, base: f64) -> [f64; 3] {
+    let (mut n, mut sx, mut sy, mut sz) = (0.0, 0.0, 0.0, 0.0);
+    let (mut xx, mut xy, mut yy, mut xz, mut yz) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for ([x, y, z], weight) in points {
+        let z = z - base;
+        n += weight;
+        sx += weight * x;
+        sy += weight * y;
+        sz += weight * z;
+        xx += weight * x * x;
+        xy += weight * x * y;
+        yy += weight * y * y;
+        xz += weight * x * z;
+        yz += weight * y * z;
+    }
+    let damping = 1e-3 * n;
+    let (xx, yy, xy) = (xx - sx * sx / n + damping, yy - sy * sy / n + damping, xy - sx * sy / n);
+    let (xz, yz) = (xz - sx * sz / n, yz - sy * sz / n);
+    let determinant = xx * yy - xy * xy;
+    let (b, c) = ((xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant);
+    [(sz - b * sx - c * sy) / n, b, c]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plane_is_its_own_trend_up_to_the_border() {
+        let cells = (0..40_000).map(|at| 0.4 * (at % 200) as f32 - 0.3 * (at / 200) as f32);
+        let plane = Grid::from_vec(200, 200, cells.collect()).unwrap();
+        let config = TrendConfig { half_width_m: 60.0, quantile: 0.5, is_lower: true };
+        let found = trend(&plane, 1.0, &config);
+        let worst = found.data().iter().zip(plane.data()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst < 0.7, "{worst}");
+    }
+}
