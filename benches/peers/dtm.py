@@ -25,6 +25,8 @@ PEERS = ["whitebox-workflows", "dsm2dtm", "CSF", "bulldozer-dtm"]
 # A cell of a building counts as kept when its ground is this close to its surface.
 KEPT_M = 0.5
 BUILDING, GROUND = 6, 2
+# What lies beyond is the sign of a void that a program does not declare.
+HEIGHT_MAX_M = 1e5
 
 
 def environment(folder):
@@ -122,6 +124,7 @@ def on_grid(path, like):
     with rasterio.open(path) as file:
         reproject(rasterio.band(file, 1), out, src_nodata=file.nodata, dst_nodata=np.nan, dst_crs=like["crs"],
                   dst_transform=like["transform"], resampling=Resampling.bilinear)
+    out[np.abs(out) > HEIGHT_MAX_M] = np.nan
     return out
 
 
@@ -212,7 +215,7 @@ def run_all(program, surface, folder, only):
 def table(report):
     """The results as Markdown."""
     names = [OURS, *PEERS]
-    cell = lambda entry, key, scale: f"{scale * entry[key]:.2f}" if key in entry else "failed"
+    cell = lambda entry, key, scale: f"{scale * entry[key]:.2f}" if key in entry else "failed" if entry else "not run"
     lines = ["# Terrain models", "", "Made by `benches/peers/dtm.py`. Lower is better.", "",
              "Programs: skysweep dtm with its defaults; whitebox-workflows (181 cells, 20 degrees), dsm2dtm (radius 60 m), "
              "CSF (cloth 1 m, rigidness 2), bulldozer-dtm with its defaults.", ""]

@@ -21,16 +21,16 @@ pub const VOID_FILLED: u8 = 3;
 
 /// Side of the cells on which objects are searched, metres. Smaller ones add time and noise only.
 const WORK_CELL_M: f64 = 1.0;
-/// Trend before any object is known: planes wider than a city block, on the lower part of the
+/// Trend before any object is known: planes as wide as a city block, on the lower part of the
 /// surface.
-const FIRST_TREND: TrendConfig = TrendConfig { half_width_m: 100.0, quantile: 0.1, is_lower: true };
+const FIRST_TREND: TrendConfig = TrendConfig { half_width_m: 50.0, quantile: 0.1, is_lower: true };
 /// Trend of the ground between the objects of the first search.
 const SECOND_TREND: TrendConfig = TrendConfig { half_width_m: 40.0, quantile: 0.5, is_lower: false };
 /// Width of the ring around objects in which ramps and low walls are looked for, metres.
 const RING_M: f64 = 3.0;
 /// Height above the ground around it up to which a cell of the ring is ground, metres: the noise of
 /// satellite surfaces.
-const RING_RISE_M: f32 = 0.5;
+const RING_RISE_M: f32 = 0.6;
 /// Height above the ground of the coarse cells up to which a cell is ground, metres.
 const CELL_RISE_M: f32 = 0.7;
 
