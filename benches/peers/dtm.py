@@ -165,7 +165,10 @@ def judged_scene(results, surface, truth_folder):
     objects = top - ground[0] > KEPT_M
     for name, entry in results.items():
         if "file" in entry:
-            entry.update(errors(entry["file"], shift, ground, objects, valid))
+            found = errors(entry["file"], shift, ground, objects, valid)
+            # A program that cannot read the file well gives a raster of voids.
+            lost = {"failed": f"{100 * found['share_missing']:.0f} % of the cells have no height"}
+            entry.update(found if found["share_missing"] < 0.5 else lost)
 
 
 def reached(made):
@@ -218,7 +221,8 @@ def table(report):
     cell = lambda entry, key, scale: f"{scale * entry[key]:.2f}" if key in entry else "failed" if entry else "not run"
     lines = ["# Terrain models", "", "Made by `benches/peers/dtm.py`. Lower is better.", "",
              "Programs: skysweep dtm with its defaults; whitebox-workflows (181 cells, 20 degrees), dsm2dtm (radius 60 m), "
-             "CSF (cloth 1 m, rigidness 2), bulldozer-dtm with its defaults.", ""]
+             "CSF (cloth 1 m, rigidness 2), bulldozer-dtm with its defaults.", "",
+             "`failed`: the program gave no result, or one without heights in most cells; dtm.json names the reason.", ""]
     for title, key in [("RMSE under buildings and trees, metres", "rmse_under_objects_m"),
                        ("RMSE of all cells, metres", "rmse_m")]:
         lines += [f"## {title}", "", "| surface | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
