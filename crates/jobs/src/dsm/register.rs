@@ -367,6 +367,7 @@ fn trial_surface(
         fill: Fill::None,
         gsd_m: None,
         bounds: None,
+        area: None,
         crs_epsg: None,
         vertical: VerticalDatum::Ellipsoid,
         prior: None,
