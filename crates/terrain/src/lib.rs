@@ -7,9 +7,9 @@
 //!    removes is only a candidate. A candidate is an object if the surface drops along most of its
 //!    border by about as much as the candidate stands above the opened surface. A hilltop or a
 //!    terrace that an opening cuts off has no such border, and stays.
-//! 2. The search is done twice, on the surface relative to its trend, so that slopes do not hide low
-//!    halls. The first trend follows the lower part of the surface, the second the ground that the
-//!    first search left.
+//! 2. The search is done twice, on the surface relative to its trend, so that slopes do not hide
+//!    low halls. The first trend follows the lower part of the surface, the second the ground that
+//!    the first search left.
 //! 3. The ground under objects and voids is a **membrane** (the solution of Laplace's equation)
 //!    through the ground around them.
 //!

@@ -5,8 +5,8 @@
 //!
 //! - `dtm.tif`: heights of the ground, metres; no-data where no ground is near.
 //! - `height_above_ground.tif`: surface minus ground, metres. It is never below 0: where the
-//!   surface lies below the interpolated ground (noise, outliers), the height is 0. No-data where the
-//!   surface or the ground is unknown.
+//!   surface lies below the interpolated ground (noise, outliers), the height is 0. No-data where
+//!   the surface or the ground is unknown.
 //! - `ground.tif`: 0 unknown, 1 ground as observed, 2 interpolated under an object, 3 interpolated
 //!   in a void of the surface.
 //! - `dtm.json`: the report.
