@@ -193,9 +193,21 @@ def judged_lidar(results, surface, classes):
         entry["buildings_kept"] = float(np.nanmean(difference[kinds == BUILDING] < KEPT_M))
 
 
+def write_plain(surface, out):
+    """Writes a surface as a TIFF without compression and tiles, which every program reads."""
+    import numpy as np
+    import rasterio
+    heights, profile = read(surface)
+    place = {key: profile[key] for key in ["crs", "transform", "width", "height"]}
+    with rasterio.open(out, "w", driver="GTiff", dtype="float32", nodata=-32768.0, count=1, **place) as file:
+        file.write(np.where(np.isfinite(heights), heights, -32768.0).astype("float32"), 1)
+
+
 def run_all(program, surface, folder, only):
     """Runs every program on a surface, in processes of their own."""
     folder.mkdir(parents=True, exist_ok=True)
+    plain = folder / "surface.tif"
+    write_plain(surface, plain)
     results = {}
     for name in [OURS, *PEERS]:
         if only == "ours" and name != OURS:
@@ -206,7 +218,7 @@ def run_all(program, surface, folder, only):
             command = [program, "dtm", surface, "-o", folder / "ours", "--overwrite", "--progress", "none", "-q"]
             out = folder / "ours/dtm.tif"
         else:
-            command = [sys.executable, __file__, "--peer", name, surface, out]
+            command = [sys.executable, __file__, "--peer", name, plain, out]
         done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         if done.returncode == 0 and out.exists():
             results[name] = {"file": str(out), "seconds": round(time.monotonic() - start, 2)}

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::TerrainError;
 
-/// Parameters of the search for the ground. None was fitted to a scene.
+/// Parameters of the search for the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[non_exhaustive]

@@ -5,6 +5,7 @@ use numeric::{Cancelled, Progress};
 use raster::Grid;
 
 use crate::config::GroundConfig;
+use crate::membrane::filled;
 use crate::opening::{closed, opened};
 use crate::regions::{Regions, quantile};
 
@@ -19,6 +20,9 @@ const FREE_SHARE: f64 = 0.35;
 const FREE_SHARE_OF_PARTS: f64 = 0.8;
 /// Largest height from one cell to the next within a smooth part, metres: a slope of 45° and noise.
 const STEP_M: f32 = 1.5;
+/// Smallest clearing, square metres. Smaller parts of an object are steps of roofs and gaps between
+/// crowns that do not reach down to the ground.
+const CLEARING_MIN_M2: f64 = 25.0;
 /// Half-width of the window that finds outliers below the ground, metres.
 const PIT_HALF_WIDTH_M: f64 = 3.0;
 /// Depth of an outlier below its surroundings, metres.
@@ -59,15 +63,28 @@ pub(crate) fn objects(
         progress.check_cancelled()?;
         let low = opened(&left, radius);
         let candidates = above(&left, &low, config.threshold_m(radius as f64 * cell_m));
-        judge(&Candidates { left: &left, low: &low, cells: &candidates, cell_m }, &mut found);
-        for ((cell, &low), &is_object) in left.data_mut().iter_mut().zip(low.data()).zip(found.data()) {
-            if is_object {
-                *cell = cell.min(low);
-            }
-        }
+        let doubtful = judge(&Candidates { left: &left, low: &low, cells: &candidates, cell_m }, &mut found);
+        left = without(surface, &found, &doubtful);
         progress.step();
     }
     Ok(found)
+}
+
+/// Returns a surface with the ground around them in the place of objects; doubtful cells are not
+/// taken for ground. The opened surface would be too low on ridges, whose ground then stands out as
+/// objects do.
+fn without(surface: &Grid<f32>, objects: &Grid<bool>, doubtful: &Grid<bool>) -> Grid<f32> {
+    let mut out = surface.clone();
+    let unusable = objects.data().iter().zip(doubtful.data()).map(|(object, doubtful)| *object || *doubtful);
+    out.data_mut().iter_mut().zip(unusable).filter(|(_, is)| *is).for_each(|(cell, _)| *cell = f32::NAN);
+    let ground = filled(&out);
+    out.clone_from(surface);
+    for ((cell, &ground), &is_object) in out.data_mut().iter_mut().zip(ground.data()).zip(objects.data()) {
+        if is_object {
+            *cell = ground;
+        }
+    }
+    out
 }
 
 /// What an opening removes.
@@ -85,18 +102,27 @@ struct Candidates<'a> {
 /// houses hide the borders of each other. Smooth parts of an object that lie lower than everything
 /// around them are ground that an opening has cut off, such as a clearing on a ridge. Smooth parts
 /// of what is no object as a whole may be objects of their own.
-fn judge(candidates: &Candidates<'_>, found: &mut Grid<bool>) {
+///
+/// Returns the parts that are no objects, although the surface drops along some of their border:
+/// houses whose neighbours are larger.
+fn judge(candidates: &Candidates<'_>, found: &mut Grid<bool>) -> Grid<bool> {
+    let mut doubtful = candidates.cells.map(|_| false);
     let step_m = STEP_M.max(candidates.cell_m as f32);
     let wholes = Regions::of(candidates.cells);
     let parts = Regions::smooth(candidates.cells, candidates.left, step_m);
     let is_whole: Vec<bool> = (0..wholes.len()).map(|whole| candidates.drops(&wholes, whole, FREE_SHARE)).collect();
     for part in 0..parts.len() {
         let cells = parts.cells(part);
-        let free_share = if is_whole[wholes.at(cells[0])] { FREE_SHARE_OF_PARTS } else { FREE_SHARE };
-        if candidates.drops(&parts, part, free_share) {
-            cells.iter().for_each(|&cell| found.data_mut()[cell as usize] = true);
+        let is_of_object = is_whole[wholes.at(cells[0])];
+        let is_small = cells.len() as f64 * candidates.cell_m.powi(2) < CLEARING_MIN_M2;
+        if !(is_of_object && is_small || candidates.drops(&parts, part, FREE_SHARE_OF_PARTS)) {
+            continue;
         }
+        let is_object = is_of_object || candidates.drops(&parts, part, FREE_SHARE);
+        let marks = if is_object { &mut *found } else { &mut doubtful };
+        cells.iter().for_each(|&cell| marks.data_mut()[cell as usize] = true);
     }
+    doubtful
 }
 
 impl Candidates<'_> {

@@ -69,6 +69,25 @@ fn a_steep_hill_stays() {
     assert!(rmse(&found, &hill) < 0.3);
 }
 
+/// A ridge whose ground shows in the gaps and clearings of a forest. An opening cuts the crest off
+/// together with the trees on it.
+#[test]
+fn a_ridge_under_a_forest_stays() {
+    let ridge = surface(300, |x, y| 60.0 - 0.5 * (x - 150.0).abs() + 5.0 * (y / 40.0).sin());
+    let is_tree = |x: f32, y: f32| {
+        let is_clearing = ((x / 45.0) as u32 + 2 * (y / 45.0) as u32).is_multiple_of(5);
+        !is_clearing && x % 15.0 < 11.0 && y % 15.0 < 11.0
+    };
+    let forest = surface(300, |x, y| ridge[(x as usize, y as usize)] + if is_tree(x, y) { 12.0 } else { 0.0 });
+    let found = ground(&forest);
+    assert!(share(&found, UNDER_OBJECT, is_tree) > 0.97);
+    let error_at = |at: usize| (found.heights.data()[at] - ridge.data()[at]).abs();
+    let is_flank = |at: &usize| (at % 300).abs_diff(150) > 30;
+    assert!((0..90_000).filter(is_flank).all(|at| error_at(at) < 2.5));
+    // A crest as sharp as this is cut.
+    assert!(rmse(&found, &ridge) < 4.0);
+}
+
 #[test]
 fn a_quay_and_a_terrace_stay() {
     // A quay along a bent line, and a terrace that only one side of the raster shows whole.
