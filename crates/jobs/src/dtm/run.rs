@@ -44,7 +44,7 @@ pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, Dtm
         files::refuse_existing(&config.output.join(name), config.overwrite)?;
     }
     threads::install(config.threads, || {
-        let (surface, cell_m, crs) = read(config)?;
+        let (surface, cell_m, crs) = read(config, progress)?;
         let folder = OutputFolder::take(&config.output)?;
         let terrain = bare_ground(&surface.heights, cell_m, &config.terrain, progress)?;
         progress.check_cancelled()?;
@@ -56,7 +56,7 @@ pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, Dtm
 }
 
 /// Reads the surface with the side of its cells and its CRS.
-fn read(config: &DtmConfig) -> Result<(Dem, f64, Crs), DtmError> {
+fn read(config: &DtmConfig, progress: &dyn Progress) -> Result<(Dem, f64, Crs), DtmError> {
     let path = surface_file(&config.surface);
     let surface = read_dem(&path)?;
     let horizontal = surface.horizontal_epsg.ok_or_else(|| DtmError::NoEpsg { path: path.clone() })?;
@@ -70,7 +70,11 @@ fn read(config: &DtmConfig) -> Result<(Dem, f64, Crs), DtmError> {
     if !surface.heights.data().iter().any(|h| h.is_finite()) {
         return Err(DtmError::NoHeights { path });
     }
-    let vertical = config.surface_vertical.or(surface.vertical).unwrap_or(VerticalDatum::Ellipsoid);
+    let vertical = config.surface_vertical.or(surface.vertical).unwrap_or_else(|| {
+        let what = "the file does not name the vertical datum of its heights, so the results name none";
+        progress.warn(&format!("{what}: {}", surface.path.display()));
+        VerticalDatum::Ellipsoid
+    });
     Ok((surface, (width_m * height_m).sqrt(), Crs { horizontal, vertical }))
 }
 
