@@ -56,7 +56,7 @@ demo: setup ## a surface model of the sample town, its accuracy and its picture,
 	echo
 	echo "surface model  $(DEMO)/dsm/dsm.tif"
 	echo "picture        $(DEMO)/dsm/relief.png"
-	echo "report         $(DEMO)/report/report.json"
+	echo "report         $(DEMO)/report/report.html"
 
 test: check ## unit, property, integration and documentation tests
 	@cargo test --workspace

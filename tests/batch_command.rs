@@ -120,7 +120,8 @@ fn products(output: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             // A height map names the state of its source's file.
             let has_times = name.contains("report.") || name == "plan.json" || name == "heightmap.tif";
-            if path.is_dir() && name != "tasks" {
+            // Logs, and items of STAC, tell the time.
+            if path.is_dir() && name != "tasks" && name != "stac" {
                 folders.push(path);
             } else if path.is_file() && !has_times {
                 let inside = path.strip_prefix(output).unwrap().to_owned();

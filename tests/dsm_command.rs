@@ -68,7 +68,11 @@ fn the_town_is_found_where_it_is() {
         "dsm/filled.tif",
         "dsm/hillshade.png",
         "dsm/relief.png",
+        "dsm/relief.pgw",
+        "dsm/thumbnail.png",
+        "dsm/source.qml",
         "used_config.toml",
+        "stac/collection.json",
     ] {
         assert!(out.join(file).is_file(), "{file} is missing");
     }
@@ -76,6 +80,17 @@ fn the_town_is_found_where_it_is() {
     assert_eq!(report["pointing"]["order"], "translation", "the town's pointing errors are shifts");
     let after = report["pointing"]["rms_px"].as_f64().unwrap();
     assert!(after < 0.2, "pointing residuals of {after} px are left");
+    let page = std::fs::read_to_string(out.join("report/report.html")).unwrap();
+    for part in ["id=\"layer4\"", "id=\"hatched\"", "Residuals by image", "height range", "view_1.tif"] {
+        assert!(page.contains(part), "{part} is not on the page");
+    }
+    assert!(!page.contains("<script") && !page.contains("http://") && !page.contains("https://"));
+    let item: Value = serde_json::from_slice(&std::fs::read(out.join("stac/item.json")).unwrap()).unwrap();
+    let assets = item["assets"].as_object().unwrap();
+    assert!(assets.len() >= 8, "{assets:?}");
+    for (name, asset) in assets {
+        assert!(out.join("stac").join(asset["href"].as_str().unwrap()).is_file(), "the asset {name} is missing");
+    }
     let evaluation = skysweep()
         .arg("eval")
         .arg(out.join("dsm/dsm.tif"))

@@ -27,11 +27,13 @@ fn manual_pages_describe_a_command_and_its_subcommands() {
 }
 
 /// Commands with options, as words of the command line.
-const COMMANDS: [&[&str]; 25] = [
+const COMMANDS: [&[&str]; 30] = [
     &["align"],
     &["batch"],
     &["city", "info"],
     &["city", "convert"],
+    &["classes"],
+    &["diff"],
     &["dsm"],
     &["eval"],
     &["groundview"],
@@ -42,6 +44,7 @@ const COMMANDS: [&[&str]; 25] = [
     &["ortho"],
     &["plan"],
     &["priors"],
+    &["products"],
     &["rpc", "info"],
     &["rpc", "project"],
     &["rpc", "localize"],
@@ -50,8 +53,10 @@ const COMMANDS: [&[&str]; 25] = [
     &["simulate"],
     &["splats"],
     &["splats", "render"],
+    &["train"],
     &["split"],
     &["template"],
+    &["view"],
     &["completions"],
 ];
 

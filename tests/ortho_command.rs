@@ -117,6 +117,43 @@ fn a_mosaic_fills_what_one_view_hides() {
     assert!(used(2.0) > 50_000 && used(1.0) + used(3.0) > 300, "{} {} {}", used(1.0), used(2.0), used(3.0));
 }
 
+/// Feathering changes a mosaic beside its seams only, and the median differs from the steepest view
+/// by noise.
+#[test]
+fn mosaics_are_feathered_or_medians_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let mosaic = |rule: &str| {
+        let out = folder.path().join(format!("{rule}.tif"));
+        let mut command = skysweep();
+        command.arg("ortho").args(["view_1.tif", "view_2.tif", "view_3.tif"].map(sample)).arg("--dsm");
+        command.arg(sample("truth/dsm.tif")).arg("-o").arg(&out).args(["--gsd", "1", "--mosaic", rule, "-q"]);
+        command.assert().code(0);
+        (band(&out, 1), band(&folder.path().join(format!("{rule}_mask.tif")), 2))
+    };
+    let ((best, views), (feather, _), (median, _)) = (mosaic("best"), mosaic("feather"), mosaic("median"));
+    // Two box filters of 17 cells reach 16 cells to each side.
+    let near_seam = |x: usize, y: usize| {
+        let (columns, rows) = (x.saturating_sub(16)..(x + 17).min(320), y.saturating_sub(16)..(y + 17).min(320));
+        rows.into_iter().any(|r| columns.clone().any(|c| views[(c, r)] != views[(x, y)] && views[(c, r)] > 0.0))
+    };
+    let (mut changed, mut far) = (0, 0);
+    for (x, y) in (0..320).flat_map(|y| (0..320).map(move |x| (x, y))).filter(|at| best[*at].is_finite()) {
+        let is_near = near_seam(x, y);
+        far += usize::from(!is_near);
+        changed += usize::from(feather[(x, y)] != best[(x, y)]);
+        assert!(is_near || feather[(x, y)] == best[(x, y)], "a cell far from seams changed: {x} {y}");
+    }
+    assert!(changed > 1000 && far > 1000, "{changed} cells changed, {far} lie far from seams");
+    let mut differences: Vec<f32> =
+        best.data().iter().zip(median.data()).map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
+    differences.sort_unstable_by(f32::total_cmp);
+    let middle = differences[differences.len() / 2];
+    assert!(middle > 0.0 && middle < 30.0, "the median difference is {middle}");
+    for rule in ["best", "feather", "median"] {
+        assert!(folder.path().join(format!("{rule}_report.html")).is_file());
+    }
+}
+
 #[test]
 fn what_makes_no_ortho_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -163,7 +200,15 @@ fn colours_keep_their_names() {
     command.arg("ortho").arg(&image).arg("--dsm").arg(sample("truth/dsm.tif")).arg("-o").arg(&out);
     command.args(["--gsd", "2", "--progress", "none", "-q"]).assert().code(0);
     let written = io::raster::ImageSource::open(&out).unwrap();
-    assert_eq!(written.info().luma, LumaRule::Rgb([1, 2, 3]));
+    assert_eq!((written.info().luma.clone(), written.info().bands), (LumaRule::Rgb([1, 2, 3]), 4));
+    let [red, alpha] = [1, 4].map(|number| written.read_samples(number, written.window()).unwrap());
+    let right = |(red, alpha): (&f32, &f32)| {
+        let has_colour = red.is_finite() && *red > 0.0;
+        *alpha == if has_colour { 65_535.0 } else { 0.0 }
+    };
+    assert!(red.data().iter().zip(alpha.data()).all(right), "the alpha band marks what has a colour");
+    let shown = alpha.data().iter().filter(|a| **a > 0.0).count();
+    assert!(shown > 20_000 && shown < alpha.data().len(), "{shown} cells are shown");
     // The bytes of a TIFF whose photometric interpretation is RGB (tag 262, value 2).
     let bytes = std::fs::read(&out).unwrap();
     assert!(bytes.windows(10).any(|entry| entry == [6, 1, 3, 0, 1, 0, 0, 0, 2, 0]), "no RGB in the TIFF");

@@ -16,7 +16,7 @@ use serde_json::Value;
 /// Settings of a scene of four chunks that takes a second.
 const SMALL: [&str; 7] = ["--gsd", "2", "--preset", "fast", "--chunk", "128", "-q"];
 /// Files of a run that have the same bytes however it is computed.
-const PRODUCTS: [&str; 9] = [
+const PRODUCTS: [&str; 13] = [
     "dsm/dsm.tif",
     "dsm/sigma.tif",
     "dsm/views.tif",
@@ -25,6 +25,10 @@ const PRODUCTS: [&str; 9] = [
     "dsm/confidence.tif",
     "dsm/hillshade.png",
     "dsm/relief.png",
+    "dsm/relief.pgw",
+    "dsm/thumbnail.png",
+    "dsm/dsm.qml",
+    "dsm/source.qml",
     "used_config.toml",
 ];
 

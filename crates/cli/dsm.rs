@@ -9,6 +9,7 @@ use jobs::dsm::{
 };
 use jobs::job_file::{is_job_file, read_dsm_job};
 use jobs::production::{ProductionError, make_plan};
+use jobs::products::ProductKind;
 
 use crate::error::{OVERWRITE, with_hint};
 use crate::options::named;
@@ -112,6 +113,9 @@ pub(crate) struct SceneArgs {
     /// Use the RPCs as they are, without a correction of their pointing.
     #[arg(long)]
     no_pointing: bool,
+    /// What to make beside the DSM, in products [default: nothing].
+    #[arg(long, value_name = "PRODUCT,…", value_delimiter = ',', value_parser = named(&ProductKind::CHOICES))]
+    products: Option<Vec<ProductKind>>,
     /// Worker threads [default: all cores].
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -182,6 +186,7 @@ impl SceneArgs {
         config.pairs = self.pairs.clone().or(config.pairs);
         config.references = self.reference.clone().or(config.references);
         config.pointing &= !self.no_pointing;
+        config.products = self.products.clone().unwrap_or(config.products);
         config.threads = self.threads.or(config.threads);
         config.memory_mb = self.memory.or(config.memory_mb);
         config.chunk = self.chunk.or(config.chunk);

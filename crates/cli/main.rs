@@ -7,8 +7,10 @@
 mod align;
 mod batch;
 mod city;
+mod classes;
 mod completions;
 mod corrections;
+mod diff;
 mod dsm;
 mod dtm;
 mod error;
@@ -22,12 +24,15 @@ mod ortho;
 mod print;
 mod priors;
 mod production;
+mod products;
 mod progress;
 mod rpc;
 mod simulate;
 mod splats;
 mod split;
 mod stand;
+mod train;
+mod view;
 
 use std::process::ExitCode;
 
@@ -54,8 +59,12 @@ enum Command {
     /// Show and convert city models.
     #[command(subcommand)]
     City(city::Command),
+    /// Find ground, buildings and vegetation of a surface model.
+    Classes(classes::Args),
     /// Print a completion script for a shell.
     Completions(completions::CompletionArgs),
+    /// Find what changed between two surface models, with volumes.
+    Diff(Box<diff::Args>),
     /// Make a surface model from satellite images.
     Dsm(Box<dsm::Args>),
     /// Find the bare ground under a surface model, and heights above it.
@@ -76,6 +85,8 @@ enum Command {
     Plan(Box<production::PlanArgs>),
     /// Make depth, normal and mask priors of a city model for the cameras of a scene.
     Priors(Box<priors::Args>),
+    /// Make point clouds, terrain and other products of a surface model.
+    Products(products::Args),
     /// Show, use and convert RPC camera models.
     #[command(subcommand)]
     Rpc(rpc::Command),
@@ -85,10 +96,14 @@ enum Command {
     Simulate(simulate::Args),
     /// Make Gaussian splats of a surface model and its images.
     Splats(Box<splats::Args>),
+    /// Train flat Gaussian splats on the images of a dataset, with building priors.
+    Train(Box<train::Args>),
     /// Choose context and target views of a COLMAP model by their overlap.
     Split(split::Args),
     /// Print a commented job file.
     Template(production::TemplateArgs),
+    /// Show a run or rasters in the browser: layers, profiles, 3D.
+    View(view::Args),
 }
 
 fn main() -> ExitCode {
@@ -118,7 +133,9 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Align(args) => align::run(args, cli.global),
         Command::Batch(args) => batch::run(args, cli.global),
         Command::City(command) => city::run(command, cli.global),
+        Command::Classes(args) => classes::run(args, cli.global),
         Command::Completions(args) => completions::completions(args, &mut options::grouped(Cli::command())),
+        Command::Diff(args) => diff::run(args, cli.global),
         Command::Dsm(args) => dsm::run(args, cli.global),
         Command::Dtm(args) => dtm::run(args, cli.global),
         Command::Eval(args) => eval::run(args, cli.global),
@@ -129,11 +146,14 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Man(args) => completions::man(args, options::grouped(Cli::command())),
         Command::Plan(args) => production::plan(args, cli.global),
         Command::Priors(args) => priors::run(args, cli.global),
+        Command::Products(args) => products::run(args, cli.global),
         Command::Rpc(command) => rpc::run(command),
         Command::Run(args) => production::run(args, cli.global),
         Command::Simulate(args) => simulate::run(args, cli.global),
         Command::Splats(args) => splats::run(args, cli.global),
+        Command::Train(args) => train::run(args, cli.global),
         Command::Split(args) => split::run(args, cli.global),
         Command::Template(args) => production::template(args),
+        Command::View(args) => view::run(args, cli.global),
     }
 }

@@ -6,9 +6,11 @@ use std::path::PathBuf;
 use crs::VerticalDatum;
 use jobs::error::JobError;
 use jobs::ortho::{OrthoConfig, OrthoError};
+use ortho::MosaicRule;
 
 use crate::corrections::corrections_of;
 use crate::error::with_hint;
+use crate::options::named;
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
 
@@ -48,6 +50,10 @@ pub(crate) struct Args {
     /// Leave the images' grey values as they are.
     #[arg(long)]
     no_balance: bool,
+    /// How the values of several images become one: those of the steepest image, the same with
+    /// feathered seams, or the median.
+    #[arg(long, value_parser = named(&MosaicRule::CHOICES), default_value = "best")]
+    mosaic: MosaicRule,
     /// Fill cells that are hidden in every image with what hides them, instead of no-data.
     #[arg(long)]
     keep_hidden: bool,
@@ -73,6 +79,7 @@ impl Args {
         config.surface_vertical = self.dsm_vertical;
         config.tolerance_m = self.tolerance;
         config.balance = !self.no_balance;
+        config.mosaic = self.mosaic;
         config.keep_hidden = self.keep_hidden;
         config.threads = self.run.threads;
         config.overwrite = self.run.overwrite;

@@ -11,12 +11,14 @@
 //! |---|---|
 //! | [`jobs::dsm`] | a digital surface model (DSM) from satellite images with RPCs |
 //! | [`jobs::dtm`] | the bare ground under a surface model, and heights above it |
+//! | [`jobs::products`] | point clouds and what else people open beside a surface model |
 //! | [`jobs::eval`] | errors of a surface model against a reference |
 //! | [`jobs::ortho`] | true orthophotos, with hidden cells marked |
 //! | [`jobs::heightmap`] | bird's-eye height maps around a camera |
 //! | [`jobs::groundview`] | depths, normals and sky of cameras on the ground |
 //! | [`jobs::priors`] | depth, normal and mask maps of a city model for the cameras of a scene |
 //! | [`jobs::splats`] | Gaussian splats of a surface model and its images |
+//! | [`jobs::train`] | splats that learn from the images of a dataset, with building priors |
 //! | [`jobs::align`], [`jobs::split`] | COLMAP models brought to the world, context and target views |
 //! | [`jobs::city`], [`jobs::rpc`] | what city models and RPC files hold, and conversions of both |
 //! | [`jobs::simulate`] | scenes with exact truth, seen through RPC cameras |
@@ -29,7 +31,8 @@
 //! - Surfaces: [`raster`] (grids), [`city`] (city models), [`gaussian`] (splats), [`bvh`] (ray
 //!   casting), [`occlusion`].
 //! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`],
-//!   [`ortho`], [`splats`], [`terrain`], [`simulate`].
+//!   [`ortho`], [`splats`], [`terrain`], [`train`], [`change`],
+//!   [`classes`], [`simulate`].
 //! - Files: [`io`] reads and writes every format, [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
 //!
@@ -48,7 +51,9 @@
 
 pub use bvh;
 pub use camera;
+pub use change;
 pub use city;
+pub use classes;
 pub use colmap;
 pub use crs;
 pub use eval;
@@ -68,3 +73,4 @@ pub use simulate;
 pub use splats;
 pub use sweep;
 pub use terrain;
+pub use train;

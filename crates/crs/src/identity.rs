@@ -39,6 +39,28 @@ impl VerticalDatum {
         }
     }
 
+    /// Returns how many metres a unit of the vertical CRS has: 1 for most, 0.3048 for feet.
+    ///
+    /// ```
+    /// use crs::VerticalDatum;
+    ///
+    /// assert_eq!(VerticalDatum::Egm96.metres_per_unit()?, 1.0);
+    /// let navd88_in_us_feet = VerticalDatum::Epsg(6360);
+    /// assert!((navd88_in_us_feet.metres_per_unit()? - 1200.0 / 3937.0).abs() < 1e-12);
+    /// # Ok::<(), crs::CrsError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`CrsError::NoTransformation`] for a code that PROJ does not know.
+    pub fn metres_per_unit(&self) -> Result<f64, CrsError> {
+        match *self {
+            Self::Ellipsoid | Self::Egm96 | Self::Egm2008 => Ok(1.0),
+            Self::Epsg(code) => {
+                proj_handle::metres_per_vertical_unit(code).map_err(|reason| unknown(&format!("EPSG:{code}"), reason))
+            }
+        }
+    }
+
     /// Returns the datum of the vertical CRS with this EPSG code.
     pub fn from_epsg(code: u32) -> Self {
         match code {
@@ -112,6 +134,16 @@ impl Crs {
     /// [`CrsError::NoTransformation`] when PROJ does not know a code.
     pub fn wkt(&self) -> Result<String, CrsError> {
         proj_handle::wkt(&self.to_string(), self.vertical == VerticalDatum::Ellipsoid)
+            .map_err(|reason| unknown(self, reason))
+    }
+
+    /// Returns the WKT1 of a compound CRS, as LAS 1.4 asks for it. Ellipsoidal heights are the
+    /// vertical part `Ellipsoid (metre)`, which PROJ reads back as a three-dimensional CRS.
+    ///
+    /// # Errors
+    /// [`CrsError::NoTransformation`] when PROJ does not know a code.
+    pub fn wkt1(&self) -> Result<String, CrsError> {
+        proj_handle::wkt1(&self.to_string(), self.vertical == VerticalDatum::Ellipsoid)
             .map_err(|reason| unknown(self, reason))
     }
 
@@ -258,8 +290,10 @@ mod tests {
         for vertical in [VerticalDatum::Ellipsoid, VerticalDatum::Egm96, VerticalDatum::Egm2008] {
             for horizontal in [32617, 5041, 4326] {
                 let crs = Crs { horizontal, vertical };
-                let found = CrsIdentity::of(&crs.wkt().unwrap()).unwrap();
-                assert_eq!((found.horizontal, found.vertical), (Some(horizontal), Some(vertical)), "{crs}");
+                for wkt in [crs.wkt().unwrap(), crs.wkt1().unwrap()] {
+                    let found = CrsIdentity::of(&wkt).unwrap();
+                    assert_eq!((found.horizontal, found.vertical), (Some(horizontal), Some(vertical)), "{wkt}");
+                }
             }
         }
         let flat = CrsIdentity::of("EPSG:32617").unwrap();

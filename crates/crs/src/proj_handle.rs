@@ -15,13 +15,13 @@ use proj_sys::{
     PJ, PJ_CONTEXT, PJ_DIRECTION, PJ_DIRECTION_PJ_FWD, PJ_DIRECTION_PJ_INV, PJ_LOG_LEVEL_PJ_LOG_NONE,
     PJ_TYPE_PJ_TYPE_BOUND_CRS, PJ_TYPE_PJ_TYPE_COMPOUND_CRS, PJ_TYPE_PJ_TYPE_GEOCENTRIC_CRS,
     PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS, PJ_TYPE_PJ_TYPE_PROJECTED_CRS,
-    PJ_TYPE_PJ_TYPE_VERTICAL_CRS, PJ_WKT_TYPE_PJ_WKT2_2019, proj_as_wkt, proj_context_create, proj_context_destroy,
-    proj_context_errno, proj_context_errno_string, proj_context_set_enable_network, proj_create,
-    proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D, proj_crs_get_coordinate_system, proj_crs_get_sub_crs,
-    proj_crs_promote_to_3D, proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_area_of_use,
-    proj_get_id_auth_name, proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify,
-    proj_int_list_destroy, proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_func, proj_log_level,
-    proj_normalize_for_visualization, proj_trans_generic,
+    PJ_TYPE_PJ_TYPE_VERTICAL_CRS, PJ_WKT_TYPE, PJ_WKT_TYPE_PJ_WKT1_GDAL, PJ_WKT_TYPE_PJ_WKT2_2019, proj_as_wkt,
+    proj_context_create, proj_context_destroy, proj_context_errno, proj_context_errno_string,
+    proj_context_set_enable_network, proj_create, proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D,
+    proj_crs_get_coordinate_system, proj_crs_get_sub_crs, proj_crs_promote_to_3D, proj_cs_get_axis_count,
+    proj_cs_get_axis_info, proj_destroy, proj_get_area_of_use, proj_get_id_auth_name, proj_get_id_code, proj_get_name,
+    proj_get_source_crs, proj_get_type, proj_identify, proj_int_list_destroy, proj_list_destroy, proj_list_get,
+    proj_list_get_count, proj_log_func, proj_log_level, proj_normalize_for_visualization, proj_trans_generic,
 };
 
 /// The definition of a transformation.
@@ -106,6 +106,19 @@ impl Context {
             }
             self.own(proj_crs_demote_to_2D(self.0, ptr::null(), crs.0))
         }
+    }
+
+    /// Returns how many metres (or radians) a unit of the first axis of a CRS has.
+    fn unit_of_first_axis(&self, crs: &Object) -> Result<f64, String> {
+        let mut factor = 0.0;
+        // SAFETY: objects belong to the context and are alive; the one output pointer is valid, the
+        // others may be null.
+        let found = unsafe {
+            let axes = self.own(proj_crs_get_coordinate_system(self.0, crs.0))?;
+            let null = ptr::null_mut();
+            proj_cs_get_axis_info(self.0, axes.0, 0, null, null, null, &mut factor, null, null, null)
+        };
+        if found == 0 { Err(self.reason()) } else { Ok(factor) }
     }
 
     /// Returns the EPSG code of a CRS: its own, else the code that PROJ recognises with at least 90
@@ -335,15 +348,27 @@ pub(crate) fn codes(definition: &str) -> Result<Codes, String> {
 
 /// Returns the WKT2:2019 of a CRS. With `promote`, an ellipsoidal height axis is added.
 pub(crate) fn wkt(definition: &str, promote: bool) -> Result<String, String> {
+    written(definition, promote, PJ_WKT_TYPE_PJ_WKT2_2019, &[])
+}
+
+/// Returns the WKT1 of a CRS. With `promote`, an ellipsoidal height axis is added, which WKT1 names
+/// as the vertical part of a compound CRS.
+pub(crate) fn wkt1(definition: &str, promote: bool) -> Result<String, String> {
+    let options = [c"MULTILINE=NO", c"ALLOW_ELLIPSOIDAL_HEIGHT_AS_VERTICAL_CRS=YES"];
+    written(definition, promote, PJ_WKT_TYPE_PJ_WKT1_GDAL, &options)
+}
+
+fn written(definition: &str, promote: bool, form: PJ_WKT_TYPE, options: &[&CStr]) -> Result<String, String> {
     let context = Context::new();
     let mut crs = context.create(definition)?;
-    // SAFETY: all objects belong to this context and are alive; the text belongs to `crs` and is
-    // copied at once.
+    let options: Vec<*const c_char> = options.iter().map(|text| text.as_ptr()).chain([ptr::null()]).collect();
+    // SAFETY: all objects belong to this context and are alive; the list of options ends with null
+    // and its texts outlive the call; the text belongs to `crs` and is copied at once.
     unsafe {
         if promote {
             crs = context.own(proj_crs_promote_to_3D(context.0, ptr::null(), crs.0))?;
         }
-        let text = proj_as_wkt(context.0, crs.0, PJ_WKT_TYPE_PJ_WKT2_2019, ptr::null());
+        let text = proj_as_wkt(context.0, crs.0, form, options.as_ptr());
         text_of(text).ok_or_else(|| context.reason())
     }
 }
@@ -430,22 +455,20 @@ pub(crate) fn named_kind(definition: &str) -> Result<NamedKind, String> {
     Ok(NamedKind { kind, name })
 }
 
+/// Returns how many metres a unit of a vertical CRS has.
+pub(crate) fn metres_per_vertical_unit(code: u32) -> Result<f64, String> {
+    let context = Context::new();
+    let crs = context.create(&format!("EPSG:{code}"))?;
+    context.unit_of_first_axis(&crs)
+}
+
 /// Returns the metres per unit of a CRS's horizontal axes; `None` when the units are angles.
 pub(crate) fn metres_per_unit(definition: &str) -> Result<Option<f64>, String> {
     let context = Context::new();
     let crs = context.horizontal(definition)?;
-    let mut factor = 0.0;
-    // SAFETY: objects belong to the context and are alive; the one output pointer is valid, the
-    // others may be null.
-    let (kind, found) = unsafe {
-        let axes = context.own(proj_crs_get_coordinate_system(context.0, crs.0))?;
-        let null = ptr::null_mut();
-        let found = proj_cs_get_axis_info(context.0, axes.0, 0, null, null, null, &mut factor, null, null, null);
-        (proj_get_type(crs.0), found)
-    };
-    if found == 0 {
-        return Err(context.reason());
-    }
+    let factor = context.unit_of_first_axis(&crs)?;
+    // SAFETY: the object belongs to the context and is alive.
+    let kind = unsafe { proj_get_type(crs.0) };
     let angular = kind == PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS || kind == PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS;
     Ok((!angular).then_some(factor))
 }

@@ -147,6 +147,31 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Positions on maps in US survey feet, in international feet and in degrees come back to a
+    /// millimetre.
+    #[test]
+    fn feet_and_degrees_round_trip_within_a_millimetre() {
+        for (code, lon, lat, unit) in [
+            (2236, -81.66, 30.34, Some(1200.0 / 3937.0)),
+            (2222, -112.0, 33.4, Some(0.3048)),
+            (4326, -81.66, 30.34, None),
+            (4269, -81.66, 30.34, None),
+        ] {
+            let projection = MapProjection::from_epsg(code).unwrap();
+            match (projection.metres_per_unit(), unit) {
+                (Some(found), Some(wanted)) => assert!((found - wanted).abs() < 1e-12, "EPSG:{code}: {found}"),
+                (found, wanted) => assert_eq!(found, wanted, "EPSG:{code}"),
+            }
+            for k in 0..100 {
+                let (lon, lat) = (lon + 0.01 * f64::from(k % 10), lat + 0.01 * f64::from(k / 10));
+                let map = projection.map_from_lonlat(lon, lat).unwrap();
+                let (back_lon, back_lat) = projection.lonlat_from_map(map.x, map.y).unwrap();
+                let error_m = 111_320.0 * (back_lon - lon).abs().max((back_lat - lat).abs());
+                assert!(error_m < 1e-3, "EPSG:{code}: {error_m} m");
+            }
+        }
+    }
+
     #[test]
     fn round_trips_in_utm_ups_and_degrees() {
         for (code, lon, lat) in [

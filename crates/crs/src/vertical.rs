@@ -4,7 +4,8 @@
 //! H = h − N(λ, φ): the orthometric height is the ellipsoidal height minus the geoid's undulation.
 //! EGM96 and EGM2008 are interpolated bilinearly in PROJ's grids (`vgridshift`). Other vertical
 //! CRSs use PROJ's database without ballpark transformations. A missing grid is an error when the
-//! converter is made; a height is never returned unchanged instead. A point outside the grid is an
+//! converter is made; a height is never returned unchanged instead. Heights are in metres on both
+//! sides, also where the unit of the vertical CRS is a foot. A point outside the grid is an
 //! error for a single point, and NaN with a count for slices.
 
 use std::path::Path;
@@ -38,6 +39,8 @@ pub struct HeightConverter {
     datum: VerticalDatum,
     /// The forward direction subtracts the undulation. `None` for the ellipsoid.
     pool: Option<Pool>,
+    /// Metres per unit of the heights on the side of the datum, as `pool` gives and takes them.
+    metres_per_unit: f64,
 }
 
 impl HeightConverter {
@@ -58,13 +61,14 @@ impl HeightConverter {
     /// [`CrsError::NoTransformation`] when PROJ has no transformation from the ellipsoid to the
     /// EPSG code.
     pub fn new(datum: VerticalDatum) -> Result<Self, CrsError> {
+        let metres_per_unit = datum.metres_per_unit().unwrap_or(1.0);
         let pool = match datum {
             VerticalDatum::Ellipsoid => None,
             VerticalDatum::Egm96 => Some(first_grid(datum, &EGM96_GRIDS)?),
             VerticalDatum::Egm2008 => Some(first_grid(datum, &EGM2008_GRIDS)?),
             VerticalDatum::Epsg(code) => Some(through_database(code)?),
         };
-        Ok(Self { datum, pool })
+        Ok(Self { datum, pool, metres_per_unit })
     }
 
     /// Makes the converter of a datum with a given geoid grid (GTX or GeoTIFF).
@@ -80,7 +84,7 @@ impl HeightConverter {
             ));
         }
         let pool = Pool::new(Recipe::Pipeline(grid_pipeline(name))).map_err(unusable)?;
-        Ok(Self { datum, pool: Some(pool) })
+        Ok(Self { datum, pool: Some(pool), metres_per_unit: 1.0 })
     }
 
     /// The vertical datum of the converter.
@@ -151,8 +155,21 @@ impl HeightConverter {
             return Ok(height.iter().filter(|h| !h.is_finite()).count());
         };
         let (mut x, mut y) = (lon.to_vec(), lat.to_vec());
-        pool.apply(direction, &mut x, &mut y, height)
-            .map_err(|reason| no_transformation(&self.datum.to_string(), reason))
+        let scale = |heights: &mut [f64], factor: f64| {
+            if factor != 1.0 {
+                heights.iter_mut().for_each(|h| *h *= factor);
+            }
+        };
+        if direction == Direction::Inverse {
+            scale(height, 1.0 / self.metres_per_unit);
+        }
+        let failed = pool
+            .apply(direction, &mut x, &mut y, height)
+            .map_err(|reason| no_transformation(&self.datum.to_string(), reason))?;
+        if direction == Direction::Forward {
+            scale(height, self.metres_per_unit);
+        }
+        Ok(failed)
     }
 }
 

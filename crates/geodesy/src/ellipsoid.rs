@@ -43,6 +43,18 @@ pub fn prime_vertical_radius_m(lat_deg: f64) -> f64 {
     WGS84_A / (1.0 - WGS84_E2 * s * s).sqrt()
 }
 
+/// Returns the lengths of a degree of longitude and of a degree of latitude on the ellipsoid,
+/// metres.
+///
+/// ```
+/// let (east, north) = geodesy::metres_per_degree(0.0);
+/// assert!((east - 111_319.49).abs() < 0.01 && (north - 110_574.28).abs() < 0.01);
+/// ```
+pub fn metres_per_degree(lat_deg: f64) -> (f64, f64) {
+    let east = prime_vertical_radius_m(lat_deg) * lat_deg.to_radians().cos();
+    (east * 1.0_f64.to_radians(), meridian_radius_m(lat_deg) * 1.0_f64.to_radians())
+}
+
 /// Returns the Earth-centred position of a geodetic position.
 ///
 /// ```

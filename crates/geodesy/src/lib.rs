@@ -13,7 +13,7 @@ mod utm;
 
 pub use ellipsoid::{
     EcefPoint, WGS84_A, WGS84_B, WGS84_E2, WGS84_F, ecef_from_ground, ground_from_ecef, lon_near, meridian_radius_m,
-    prime_vertical_radius_m, wrap_lon,
+    metres_per_degree, prime_vertical_radius_m, wrap_lon,
 };
 pub use enu::{EnuFrame, EnuPoint};
 pub use error::GeodesyError;

@@ -1,4 +1,4 @@
-//! Reading areas: the polygons of a GeoPackage or a GeoJSON file.
+//! Areas: the polygons of a GeoPackage or a GeoJSON file, and writing polygons as GeoJSON.
 //!
 //! A GeoJSON file is in longitude and latitude (RFC 7946) unless it names another system in the way
 //! of older files.
@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use gdal::vector::LayerAccess;
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
 use geo::{Coord, CoordsIter, LineString, MultiPolygon, Polygon};
-use serde_json::Value;
+use serde_json::{Value, json};
 
+use crate::atomic::{SaveError, write_stream};
 use crate::raster::{prepare_gdal, register_geopackage, with_gdal};
 use crate::regular::read_regular;
 
@@ -77,8 +78,7 @@ pub struct AreaError {
 /// [`AreaError`] for a file that cannot be read, for a name that no polygon or more than one
 /// feature has, and for a layer without a reference system.
 pub fn read(path: &Path, wanted: AreaName<'_>) -> Result<Area, AreaError> {
-    let is_package = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gpkg"));
-    let read = if is_package { geopackage(path, wanted) } else { geojson(path, wanted) };
+    let read = layer(path, wanted).and_then(|(crs, features)| Ok(Area { crs, polygons: chosen(features, wanted)? }));
     let checked = read.and_then(|area| {
         let what = wanted.name.map_or_else(|| "the layer".to_owned(), |name| format!("{name:?}"));
         let is_finite = area.polygons.coords_iter().all(|c| c.x.is_finite() && c.y.is_finite());
@@ -91,10 +91,80 @@ pub fn read(path: &Path, wanted: AreaName<'_>) -> Result<Area, AreaError> {
     checked.map_err(|what| AreaError { path: path.to_owned(), what })
 }
 
+/// Areas of a layer, one for each feature with polygons.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct NamedAreas {
+    /// Definition of the system, for PROJ.
+    pub crs: String,
+    /// Names, where the features have them, and polygons.
+    pub areas: Vec<(Option<String>, MultiPolygon<f64>)>,
+}
+
+/// Reads all features with polygons of a layer. `layer` names the layer of a GeoPackage with
+/// several, `field` the field that holds the names, if any.
+///
+/// # Errors
+/// [`AreaError`] for a file that cannot be read, for one without polygons, and for a layer without
+/// a reference system.
+pub fn read_features(path: &Path, layer_name: Option<&str>, field: Option<&str>) -> Result<NamedAreas, AreaError> {
+    let wanted = AreaName { layer: layer_name, field: field.unwrap_or_default(), name: None };
+    let failed = |what: String| AreaError { path: path.to_owned(), what };
+    let (crs, features) = layer(path, wanted).map_err(failed)?;
+    let areas: Vec<_> = features
+        .into_iter()
+        .filter(|feature| !feature.polygons.is_empty())
+        .map(|feature| (feature.name, MultiPolygon(feature.polygons)))
+        .collect();
+    let corners = || areas.iter().flat_map(|(_, polygons)| polygons.coords_iter());
+    match corners().count() {
+        0 => Err(failed("the layer has no polygon".to_owned())),
+        1..=CORNERS_MAX if corners().all(|c| c.x.is_finite() && c.y.is_finite()) => Ok(NamedAreas { crs, areas }),
+        _ => Err(failed("the layer has corners that are no numbers, or too many".to_owned())),
+    }
+}
+
+/// A polygon with properties to write.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AreaFeature {
+    /// Polygons in longitude and latitude.
+    pub polygons: MultiPolygon<f64>,
+    /// Properties by name.
+    pub properties: serde_json::Map<String, Value>,
+}
+
+/// Writes polygons with their properties as GeoJSON (RFC 7946).
+///
+/// # Errors
+/// [`SaveError::Exists`] when the file exists and `overwrite` is false; [`SaveError::Unwritable`].
+pub fn write(path: &Path, features: &[AreaFeature], overwrite: bool) -> Result<(), SaveError> {
+    // A hundred-millionth of a degree is a millimetre.
+    let position = |c: &Coord<f64>| [(c.x * 1e8).round() / 1e8, (c.y * 1e8).round() / 1e8];
+    let ring = |ring: &LineString<f64>| ring.0.iter().map(position).collect::<Vec<_>>();
+    let rings = |p: &Polygon<f64>| std::iter::once(p.exterior()).chain(p.interiors()).map(ring).collect::<Vec<_>>();
+    write_stream(path, overwrite, |out| {
+        out.write_all(b"{\"type\":\"FeatureCollection\",\"features\":[")?;
+        for (number, feature) in features.iter().enumerate() {
+            out.write_all(if number == 0 { b"\n" } else { b",\n" })?;
+            let coordinates: Vec<_> = feature.polygons.iter().map(rings).collect();
+            let geometry = json!({"type": "MultiPolygon", "coordinates": coordinates});
+            let feature = json!({"type": "Feature", "properties": feature.properties, "geometry": geometry});
+            serde_json::to_writer(&mut *out, &feature)?;
+        }
+        out.write_all(b"\n]}\n")
+    })
+}
+
 /// A feature with its polygons.
 struct Feature {
     name: Option<String>,
     polygons: Vec<Polygon<f64>>,
+}
+
+/// Reads the reference system and the features of a layer.
+fn layer(path: &Path, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), String> {
+    let is_package = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gpkg"));
+    if is_package { geopackage(path, wanted) } else { geojson(path, wanted) }
 }
 
 /// Returns the polygons of the only feature of a name, or those of all features.
@@ -115,7 +185,7 @@ fn chosen(features: Vec<Feature>, wanted: AreaName<'_>) -> Result<MultiPolygon<f
     }
 }
 
-fn geojson(path: &Path, wanted: AreaName<'_>) -> Result<Area, String> {
+fn geojson(path: &Path, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), String> {
     let bytes = read_regular(path, SIZE_LIMIT).map_err(|e| e.to_string())?;
     let json: Value = serde_json::from_slice(&bytes).map_err(|e| e.to_string())?;
     let features = json["features"].as_array().ok_or("it is no collection of GeoJSON features")?;
@@ -133,12 +203,12 @@ fn geojson(path: &Path, wanted: AreaName<'_>) -> Result<Area, String> {
         };
         Feature { name, polygons: parts.into_iter().filter_map(polygon).collect() }
     };
-    let polygons = chosen(features.iter().map(feature).collect(), wanted)?;
+    let features = features.iter().map(feature).collect();
     // "urn:ogc:def:crs:EPSG::32631", "EPSG:32631"; "urn:ogc:def:crs:OGC:1.3:CRS84".
     let named = json["crs"]["properties"]["name"].as_str().filter(|name| name.contains("EPSG"));
     let code = named.and_then(|name| name.rsplit(':').next());
     let crs = code.map_or_else(|| LONGITUDE_LATITUDE.to_owned(), |code| format!("EPSG:{code}"));
-    Ok(Area { crs, polygons })
+    Ok((crs, features))
 }
 
 /// Makes a polygon of an array of rings, the outer one first.
@@ -153,7 +223,7 @@ fn polygon(rings: &Value) -> Option<Polygon<f64>> {
     Some(Polygon::new(rings.next()?, rings.collect()))
 }
 
-fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<Area, String> {
+fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), String> {
     if !path.metadata().map_err(|e| e.to_string())?.is_file() {
         return Err("it is not a regular file".to_owned());
     }
@@ -176,9 +246,9 @@ fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<Area, String> {
     let crs = layer.spatial_ref().and_then(|system| system.to_wkt().ok()).ok_or("the layer has no reference system")?;
     let mut features = Vec::new();
     for feature in layer.features() {
-        let name = match wanted.name {
-            None => None,
-            Some(_) => {
+        let name = match wanted.field {
+            "" => None,
+            _ => {
                 let field = feature
                     .field_index(wanted.field)
                     .map_err(|_| format!("the layer has no field {}", wanted.field))?;
@@ -196,7 +266,7 @@ fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<Area, String> {
         };
         features.push(Feature { name, polygons });
     }
-    Ok(Area { crs, polygons: chosen(features, wanted)? })
+    Ok((crs, features))
 }
 
 #[cfg(test)]
@@ -259,5 +329,29 @@ mod tests {
         let crs = r#""crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::2154"}}"#;
         std::fs::write(&path, format!("{{{crs}, \"features\": [{polygon}]}}")).unwrap();
         assert_eq!(read(&path, named(None, "a")).unwrap().crs, "EPSG:2154");
+    }
+
+    #[test]
+    fn features_are_read_with_their_names_as_they_were_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.geojson");
+        let ring = |x: f64| LineString::from(vec![(x, 43.0), (x + 0.5, 43.0), (x + 0.5, 43.5), (x, 43.0)]);
+        let feature = |name: &str, x: f64| AreaFeature {
+            polygons: MultiPolygon(vec![Polygon::new(ring(x), Vec::new())]),
+            properties: serde_json::Map::from_iter([
+                ("name".to_owned(), json!(name)),
+                ("volume_m3".to_owned(), json!(2.5)),
+            ]),
+        };
+        let features = [feature("north", 5.0), feature("south", 6.25)];
+        write(&path, &features, false).unwrap();
+        assert!(matches!(write(&path, &features, false), Err(SaveError::Exists { .. })));
+        let found = read_features(&path, None, Some("name")).unwrap();
+        assert_eq!(found.crs, "EPSG:4326");
+        for ((name, polygons), feature) in found.areas.iter().zip(&features) {
+            assert_eq!((name.as_deref(), polygons), (feature.properties["name"].as_str(), &feature.polygons));
+        }
+        write(&path, &[], true).unwrap();
+        assert!(read_features(&path, None, None).unwrap_err().to_string().contains("no polygon"));
     }
 }

@@ -11,6 +11,7 @@ pub mod camera_file;
 pub mod citymodel;
 pub mod colmap;
 pub mod control;
+mod gltf;
 pub mod ground_points;
 mod lines;
 pub mod maps;
@@ -24,6 +25,7 @@ pub mod rpc;
 pub mod similarity;
 pub mod splat_ply;
 pub mod surfaces;
+pub mod textured_mesh;
 pub mod transforms;
 
 pub use atomic::{SaveError, write_bytes};

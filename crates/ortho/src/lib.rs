@@ -2,11 +2,13 @@
 //!
 //! The crate `occlusion` finds the cells that the surface hides from an image. Of several images
 //! that see a cell, [`best_view`] picks the one that looks down most steeply. [`balance`] brings
-//! the grey values of the images together.
+//! the grey values of the images together, and [`MosaicRule`] says how they become one.
 
 mod balance;
+mod blend;
 
 pub use balance::{Balance, BalanceError, Pair, balance};
+pub use blend::{MosaicRule, feather_weight, median_value};
 
 /// How an image sees a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -96,7 +96,7 @@ pub fn coloured_relief(heights: &Grid<f32>, shade: &Grid<u8>, low_m: f32, high_m
     for (pixel, (&height, &shade)) in picture.data_mut().iter_mut().zip(cells) {
         if height.is_finite() {
             let light = 1.0 - SHADE_SHARE + SHADE_SHARE * f32::from(shade) / flat;
-            *pixel = colour((height - low_m) / span).map(|c| (c * light).clamp(0.0, 255.0).round() as u8);
+            *pixel = ramp((height - low_m) / span).map(|c| (c * light).clamp(0.0, 255.0).round() as u8);
         }
     }
     picture
@@ -115,8 +115,14 @@ pub fn height_percentiles(heights: &Grid<f32>, low: f64, high: f64) -> Option<(f
     Some((at(low)?, at(high)?))
 }
 
+/// Returns the colour of flat ground in [`coloured_relief`] at a fraction of the range of heights,
+/// clamped to [0, 1].
+pub fn relief_colour(fraction: f32) -> [u8; 3] {
+    ramp(fraction).map(|c| c.round() as u8)
+}
+
 /// Returns the ramp's colour at a fraction, clamped to [0, 1].
-fn colour(fraction: f32) -> [f32; 3] {
+fn ramp(fraction: f32) -> [f32; 3] {
     let position = fraction.clamp(0.0, 1.0) * (RAMP.len() - 1) as f32;
     let below = (position as usize).min(RAMP.len() - 2);
     let t = position - below as f32;

@@ -5,7 +5,10 @@
 //! [`Chart`] draws plots as SVG, inside a page or as files of their own. A [`PriorsReport`]
 //! presents the priors of a city model, a [`SatellitePriorsReport`] those of satellite images.
 //! [`depth_preview`], [`height_preview`] and [`normal_preview`] are their pictures. A [`BatchPage`]
-//! lists what became of a batch.
+//! lists what became of a batch. A [`JobPage`] shows the maps of a job as layers, and a [`Legend`]
+//! the meaning of their colours, also as a style of QGIS.
+//!
+//! A [`MapStyle`] draws a raster for the viewer, with its legend.
 //!
 //! This crate touches no file. Everything is returned as text or bytes, the same for the same
 //! input.
@@ -15,6 +18,9 @@ mod batch;
 mod class;
 mod escape;
 mod evaluation;
+mod job;
+mod legend;
+mod map_style;
 mod page;
 mod palette;
 mod parts;
@@ -30,9 +36,12 @@ pub use batch::{BatchPage, BatchRow};
 pub use class::class_title;
 pub use escape::escape;
 pub use evaluation::EvaluationReport;
+pub use job::{JobPage, JobTable, MapLayer};
+pub use legend::{Legend, LightEnd};
+pub use map_style::{MapClass, MapLegend, MapStyle, RampColours};
 pub use palette::{MISSING, OUTSIDE, diverging};
 pub use parts::ViewPictures;
-pub use picture::{PictureError, error_picture, png};
+pub use picture::{PictureError, error_picture, png, png_with_alpha};
 pub use preview::{depth_preview, height_preview, mask_preview, normal_preview, side_by_side};
 pub use priors::{ErrorRow, PriorsReport, ViewRow};
 pub use protocol::Protocol;

@@ -34,9 +34,22 @@ fill:var(--soft)}\
 min-width:min(100%,420px)}\
 th,td{text-align:right;padding:.28rem .8rem;border-bottom:1px solid var(--line);white-space:nowrap}\
 th:first-child{text-align:left;font-weight:500}\
+.words{text-align:left;white-space:normal}\
 thead th{color:var(--soft);font-weight:600;border-bottom:2px solid var(--line)}tbody tr:hover{background:var(--panel)}\
 .notes{background:var(--panel);border-left:4px solid var(--b);border-radius:0 8px 8px 0;padding:.6rem 1.1rem;\
 margin-top:1.4rem}.notes ul{margin:.2rem 0;padding-left:1.1rem}\
+.layers{margin:.4rem 0}.layers>input{position:absolute;opacity:0}.layers>label{display:inline-block;margin:0 .4rem \
+.5rem 0;padding:.25rem .7rem;border:1px solid var(--line);border-radius:999px;cursor:pointer;font-size:.9rem;\
+background:var(--panel)}\
+.layers>input:checked+label{background:var(--a);color:var(--paper);border-color:var(--a)}\
+#hatched:focus-visible+label{outline:2px solid var(--b)}.stack{position:relative;max-width:1000px}\
+.stack figure{display:none}.stack figure img{image-rendering:pixelated}\
+.hatching{position:absolute;left:0;top:0;width:100%;pointer-events:none;image-rendering:pixelated;\
+padding:1px}\
+#hatched:not(:checked)~.stack .hatching{display:none}\
+.legend{display:flex;flex-wrap:wrap;gap:.3rem .9rem;align-items:center;margin-top:.5rem;font-size:.86rem;\
+color:var(--soft)}\
+.ramp{flex:1;min-width:120px;max-width:420px;height:12px;border-radius:3px}\
 footer{margin-top:3rem;color:var(--soft);font-size:.88rem;border-top:1px solid var(--line);padding-top:.8rem}\
 @media(max-width:520px){.plots{grid-template-columns:1fr}dl{grid-template-columns:1fr}}\
 @media print{:root{--paper:#fff;--panel:#fff;--ink:#000;--soft:#444;--line:#bbb;--a:#2667a8;--b:#c8551b}\

@@ -47,19 +47,34 @@ pub(crate) fn figures(pictures: &[ViewPictures]) -> Result<String, PictureError>
     Ok(if figures.is_empty() { figures } else { format!("<h2>Views</h2><div class=\"pictures\">{figures}</div>") })
 }
 
+/// Returns a table under a heading. Columns of words are set from the left and may wrap; others
+/// hold numbers, which stand under each other at the right.
 pub(crate) fn table(title: &str, heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
-    let heads: String = heads.iter().map(|head| format!("<th scope=\"col\">{}</th>", escape(head))).collect();
-    let row = |cells: Vec<String>| {
+    let rows: Vec<Vec<String>> = rows.collect();
+    let class = |column: usize| {
+        let words = rows.iter().filter_map(|row| row.get(column)).any(|cell| is_words(cell));
+        if words { " class=\"words\"" } else { "" }
+    };
+    let classes: Vec<&str> = (0..heads.len()).map(class).collect();
+    let head = |(head, class): (&&str, &&str)| format!("<th scope=\"col\"{class}>{}</th>", escape(head));
+    let heads: String = heads.iter().zip(&classes).map(head).collect();
+    let row = |cells: &Vec<String>| {
         let mut cells = cells.iter().map(|cell| escape(cell));
         let first = cells.next().unwrap_or_default();
-        let rest: String = cells.map(|cell| format!("<td>{}</td>", typeset(&cell))).collect();
+        let cell = |(cell, class): (String, &&str)| format!("<td{class}>{}</td>", typeset(&cell));
+        let rest: String = cells.zip(classes.iter().skip(1)).map(cell).collect();
         format!("<tr><th scope=\"row\">{first}</th>{rest}</tr>")
     };
-    let rows: String = rows.map(row).collect();
+    let rows: String = rows.iter().map(row).collect();
     format!(
         "<h2>{}</h2><div class=\"wide\"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>",
         escape(title)
     )
+}
+
+/// Returns whether a cell holds words rather than a number with its unit.
+fn is_words(cell: &str) -> bool {
+    cell.split(' ').filter(|word| word.chars().filter(|c| c.is_alphabetic()).count() > 2).count() > 1
 }
 
 pub(crate) fn last_part(path: &str) -> &str {

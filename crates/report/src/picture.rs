@@ -38,12 +38,22 @@ pub struct PictureError {
 /// # Errors
 /// [`PictureError`] if the picture has no pixels or is larger than PNG allows.
 pub fn png(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, PictureError> {
-    let (width, height) = (picture.width(), picture.height());
+    encoded(picture.data().as_flattened(), (picture.width(), picture.height()), ExtendedColorType::Rgb8)
+}
+
+/// Encodes a picture (red, green, blue, opacity) as PNG.
+///
+/// # Errors
+/// As [`png`].
+pub fn png_with_alpha(picture: &Grid<[u8; 4]>) -> Result<Vec<u8>, PictureError> {
+    encoded(picture.data().as_flattened(), (picture.width(), picture.height()), ExtendedColorType::Rgba8)
+}
+
+fn encoded(pixels: &[u8], (width, height): (usize, usize), colour: ExtendedColorType) -> Result<Vec<u8>, PictureError> {
     let failed = |reason: String| PictureError { width, height, reason };
     let side = |side: usize| u32::try_from(side).ok().filter(|&s| s > 0).ok_or_else(|| failed("its size".to_owned()));
     let (columns, rows) = (side(width)?, side(height)?);
     let mut bytes = Cursor::new(Vec::new());
-    let (pixels, colour) = (picture.data().as_flattened(), ExtendedColorType::Rgb8);
     image::write_buffer_with_format(&mut bytes, pixels, columns, rows, colour, ImageFormat::Png)
         .map_err(|error| failed(error.to_string()))?;
     Ok(bytes.into_inner())
@@ -52,6 +62,13 @@ pub fn png(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, PictureError> {
 /// Returns a picture as a data URI.
 pub(crate) fn data_uri(picture: &Grid<[u8; 3]>) -> Result<String, PictureError> {
     Ok(format!("data:image/png;base64,{}", base64::encode(&png(picture)?)))
+}
+
+/// Returns a picture of grey values with opacities as a data URI.
+pub(crate) fn grey_alpha_uri(picture: &Grid<[u8; 2]>) -> Result<String, PictureError> {
+    let size = (picture.width(), picture.height());
+    let bytes = encoded(picture.data().as_flattened(), size, ExtendedColorType::La8)?;
+    Ok(format!("data:image/png;base64,{}", base64::encode(&bytes)))
 }
 
 /// Colours the errors with a diverging palette over ±`range_m`. Cells without an error are voids of

@@ -105,7 +105,8 @@ fn thinned<T: Copy>(map: &Grid<T>) -> Grid<T> {
     Grid::from_vec(width, height, data).unwrap_or_else(|| map.clone())
 }
 
-fn near_to_far(part: f64) -> [u8; 3] {
+/// Returns the colour of a part of the range, 0 the light end and 1 the dark end.
+pub(crate) fn near_to_far(part: f64) -> [u8; 3] {
     let position = part.clamp(0.0, 1.0) * (NEAR_TO_FAR.len() - 1) as f64;
     let below = (position as usize).min(NEAR_TO_FAR.len() - 2);
     let t = position - below as f64;

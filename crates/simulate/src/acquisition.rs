@@ -78,7 +78,7 @@ pub(crate) fn camera(
 /// drift along its lines.
 pub(crate) fn pointing(config: &SimulationConfig, index: usize, (width, height): (usize, usize)) -> ImageCorrection {
     let a = &config.acquisition;
-    let mut stream = SplitMix64::new(derived(config.seed, 1000 + index as u64));
+    let mut stream = SplitMix64::new(derived(config.campaign_seed(), 1000 + index as u64));
     let [shortest, longest] = a.pointing_error_px;
     let length = stream.uniform_in(shortest, longest);
     let mut vector = |length: f64| {

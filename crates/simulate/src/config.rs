@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::random::derived;
 use crate::seasons::SeasonsConfig;
 use crate::sun::Sun;
 
@@ -27,6 +28,10 @@ pub struct SimulationConfig {
     pub lat_deg: f64,
     /// Mean height of the ground above the ellipsoid, metres.
     pub ground_height_m: f64,
+    /// Numbers of the buildings that do not stand, from 1 as in the truth's `buildings.tif`. All
+    /// else stays as it was with them, which makes a second date of the same scene.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub absent_buildings: Vec<u32>,
     /// Bare ground.
     pub terrain: TerrainConfig,
     /// Streets and buildings.
@@ -124,6 +129,22 @@ pub struct QuarterWeights {
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(weight: &f64) -> bool {
     *weight == 0.0
+}
+
+/// Whether a campaign is missing from a parameter file that states only what is used.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_first(campaign: &u64) -> bool {
+    *campaign == 0
+}
+
+impl SimulationConfig {
+    /// Returns the seed of what differs from campaign to campaign.
+    pub(crate) fn campaign_seed(&self) -> u64 {
+        match self.acquisition.campaign {
+            0 => self.seed,
+            campaign => derived(self.seed ^ 0xca3, campaign),
+        }
+    }
 }
 
 /// Trees: opaque crowns on free ground.
@@ -230,6 +251,10 @@ pub struct AcquisitionConfig {
     pub pointing_error_px: [f64; 2],
     /// Change of the pointing error from the first to the last line, pixels.
     pub pointing_drift_px: f64,
+    /// Number of the campaign. Another number gives the same scene other light, vehicles, pointing
+    /// errors and noise.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub campaign: u64,
     /// Number of dates. Views are distributed over them in order. Each date has its own light,
     /// vehicles and radiometry.
     pub dates: usize,

@@ -1,6 +1,7 @@
 //! A date of acquisition with its light and radiometry.
 //!
-//! The first date is as configured. The others differ from it within the configured spreads.
+//! The first date of the first campaign is as configured. The others differ from it within the
+//! configured spreads.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,10 +33,10 @@ impl Date {
     /// Makes the date of an index.
     pub(crate) fn new(config: &SimulationConfig, index: usize) -> Self {
         let a = &config.acquisition;
-        if index == 0 {
+        if index == 0 && a.campaign == 0 {
             return Self { index, sun: a.sun, gain: 1.0, offset: 0.0, gamma: 1.0, season: None };
         }
-        let mut stream = SplitMix64::new(derived(config.seed, 3000 + index as u64));
+        let mut stream = SplitMix64::new(derived(config.campaign_seed(), 3000 + index as u64));
         let mut differing = |spread: f64| stream.uniform_in(-spread, spread);
         let [elevation, azimuth] = a.sun_spread_deg;
         let elevation_deg = (a.sun.elevation_deg + differing(elevation)).clamp(Sun::LOWEST_DEG, 90.0);

@@ -16,11 +16,11 @@ use crate::building::Building;
 use crate::frame::SceneFrame;
 use crate::prism::{BuildingBlock, Roof};
 
-/// Makes the model of buildings.
-pub(crate) fn model(buildings: &[Building], frame: &SceneFrame) -> CityModel {
+/// Makes the model of buildings, without those whose numbers are `absent`.
+pub(crate) fn model(buildings: &[Building], absent: &[u32], frame: &SceneFrame) -> CityModel {
     let mut model = CityModel::new(CrsReference::from_epsg(frame.epsg(), None));
     let mut pool = VertexPool::new();
-    for (number, building) in (1..).zip(buildings) {
+    for (number, building) in (1..).zip(buildings).filter(|(number, _)| !absent.contains(number)) {
         let id = format!("building-{number}");
         let parent = model.objects.len();
         model.objects.push(CityObject::new(&id, ObjectKind::BUILDING));
@@ -129,7 +129,7 @@ mod tests {
         for preset in ["town", "dense-city", "high-rise", "repetitive-roofs"] {
             let config = SimulationConfig::preset(preset).unwrap();
             let frame = SceneFrame::new(config.lon_deg, config.lat_deg, config.gsd_m).unwrap();
-            let model = model(Scene::new(&config, 150.0).buildings(), &frame);
+            let model = model(Scene::new(&config, 150.0).buildings(), &[], &frame);
             model.validate().unwrap();
             let solids: Vec<&Geometry> = model.objects.iter().flat_map(|o| &o.geometries).collect();
             assert!(solids.len() > 15, "{preset}: {}", solids.len());
@@ -164,7 +164,7 @@ mod tests {
         let config = SimulationConfig::default();
         let frame = SceneFrame::new(config.lon_deg, config.lat_deg, config.gsd_m).unwrap();
         let scene = Scene::new(&config, 150.0);
-        let model = model(scene.buildings(), &frame);
+        let model = model(scene.buildings(), &[], &frame);
         let [east, north] = frame.origin_m();
         let mut compared = 0;
         for surface in model.surfaces().filter(|s| s.class == SurfaceClass::Roof) {

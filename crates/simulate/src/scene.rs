@@ -141,6 +141,21 @@ impl Scene {
             paint: derived(config.seed ^ 0x7ee, index),
             number: TREE_NUMBER,
         }));
+        scene.without(&config.absent_buildings)
+    }
+
+    /// Returns this scene without some of its buildings, given by their numbers. Trees keep their
+    /// places, and the other buildings their numbers.
+    fn without(self, absent: &[u32]) -> Self {
+        if absent.is_empty() {
+            return self;
+        }
+        let Self { terrain, streets, buildings, solids, reach_m, .. } = self;
+        let buckets = Buckets::new(reach_m, |low, high| terrain.top(low, high), &[]);
+        let height_range_m = terrain.height_range_m();
+        let mut scene = Self { terrain, streets, buildings, solids: Vec::new(), buckets, height_range_m, reach_m };
+        let stands = |solid: &Solid| u32::try_from(solid.number).map_or(true, |number| !absent.contains(&number));
+        scene.add(solids.into_iter().filter(stands));
         scene
     }
 
@@ -164,7 +179,7 @@ impl Scene {
 
     /// Returns this scene with the vehicles of a date.
     pub(crate) fn on_date(&self, config: &SimulationConfig, date: usize) -> Self {
-        let seed = derived(config.seed, 5000 + date as u64);
+        let seed = derived(config.campaign_seed(), 5000 + date as u64);
         let vehicles = planting::vehicles(&config.vehicles, &self.streets, &self.terrain, seed, self.reach_m);
         let mut scene = self.clone();
         scene.add((0u64..).zip(vehicles).map(|(k, block)| Solid::block(block, Material::Vehicle, derived(seed, k))));
@@ -403,6 +418,27 @@ mod tests {
             // side is lit.
             assert!(wrong * 200 < 900, "{preset}: {wrong} of {counts:?} differ");
         }
+    }
+
+    #[test]
+    fn an_absent_building_leaves_all_else_in_place() {
+        let config = SimulationConfig::default();
+        let full = Scene::new(&config, 150.0);
+        let places = || (0..22_500).map(|k| (f64::from(k % 150) * 2.0 - 150.0, f64::from(k / 150) * 2.0 - 150.0));
+        let gone = places().map(|(x, y)| full.object_number(x, y)).find(|number| *number > 0).unwrap();
+        let without = Scene::new(&SimulationConfig { absent_buildings: vec![gone as u32], ..config }, 150.0);
+        assert_eq!(full.tree_count(), without.tree_count());
+        let mut lower = 0;
+        for (x, y) in places() {
+            let (before, after) = (full.surface(x, y).0, without.surface(x, y).0);
+            if full.object_number(x, y) == gone {
+                assert!(after < before && without.object_number(x, y) != gone);
+                lower += 1;
+            } else {
+                assert_eq!((before, full.object_number(x, y)), (after, without.object_number(x, y)));
+            }
+        }
+        assert!(lower > 0);
     }
 
     #[test]

@@ -196,8 +196,10 @@ fn view(
     let spread = PointSpread::new(&SensorConfig { mtf_at_nyquist, ..config.sensor });
     let radiance = LitScene::new(scene, texture, &date.sun).image(&sight, &spread, size, progress);
     let sensor = Sensor::new(&config.sensor, &date);
-    let opacity = clouds::opacity(&config.clouds, derived(config.seed, 4000 + index as u64), config.gsd_m, size);
-    let image = digital(&radiance, opacity.as_ref(), &sensor, config, derived(config.seed, 2000 + index as u64));
+    let opacity =
+        clouds::opacity(&config.clouds, derived(config.campaign_seed(), 4000 + index as u64), config.gsd_m, size);
+    let image =
+        digital(&radiance, opacity.as_ref(), &sensor, config, derived(config.campaign_seed(), 2000 + index as u64));
     let pointing = acquisition::pointing(config, index, size);
     let rpc = RpcCamera { rpc: fitted.rpc.clone(), correction: pointing }.folded()?.rpc;
     let record = ViewRecord {

@@ -118,7 +118,7 @@ impl Truth {
             objects: cells.grid(|[x, y]| scene.object_number(x, y)),
             visibility: (0..views.len()).map(|k| seen_by.map(|bits| (bits >> k & 1) as u8)).collect(),
             ortho: cells.grid(|at| reflectance_from_above(scene, &texture, at, cells.cell_m)),
-            buildings: lod2::model(scene.buildings(), frame),
+            buildings: lod2::model(scene.buildings(), &config.absent_buildings, frame),
             geotransform: GeoTransform::north_up(x - cells.half_m, y + cells.half_m, cells.cell_m),
             epsg: frame.epsg(),
         })

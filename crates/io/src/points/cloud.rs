@@ -11,7 +11,7 @@ use raster::{GeoTransform, Grid};
 
 use super::crs::{Stated, stated};
 use super::{PointsError, preflight};
-use crate::raster::Dem;
+use crate::raster::{Dem, Provenance};
 use crate::regular;
 
 /// Largest number of points in a batch.
@@ -197,6 +197,7 @@ impl PointCloud {
             horizontal_epsg: self.stated.horizontal_epsg,
             vertical: self.stated.vertical,
             no_data: None,
+            provenance: Provenance::default(),
         };
         Ok(GriddedPoints { dem, classes, points, left_out })
     }

@@ -10,11 +10,18 @@
 //! error. So is a panic of the decoder on damaged compressed points.
 
 mod cloud;
+mod cloud_file;
 mod crs;
 mod error;
 mod export;
+mod las_header;
 mod preflight;
+mod surface_cloud;
+#[cfg(test)]
+mod surface_cloud_tests;
 
 pub use cloud::{CellLattice, GriddedPoints, PointCloud, PointCounts, SurfacePoint, is_point_cloud};
+pub use cloud_file::{CloudFormat, write_cloud};
 pub use error::PointsError;
 pub use export::write_las;
+pub use surface_cloud::{CloudExtent, SurfaceCloud};

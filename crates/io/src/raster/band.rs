@@ -31,7 +31,8 @@ pub enum BandData<'a> {
 /// One band to write.
 #[derive(Debug, Clone, Copy)]
 pub struct Band<'a> {
-    /// Name of the band with its unit, such as `height_m`.
+    /// Name of the band with its unit, such as `height_m`. The endings `_m`, `_ft`, `_ft_us`,
+    /// `_deg` and `_px` also become the unit of the band in GDAL's sense.
     pub description: &'a str,
     /// The cells. All bands of a file have the same type and size.
     pub data: BandData<'a>,

@@ -1,9 +1,10 @@
 //! Reading surface and terrain models, whole or by window: heights, their grid and their vertical
 //! datum.
 //!
-//! Heights are not converted. The vertical datum is what the file states in its CRS, else in the
-//! metadata item `VERTICAL_DATUM`. GDAL moves the georeference of "pixel is point" files by half a
-//! pixel, so the grid's positions are right for "pixel is area" and "pixel is point".
+//! Heights are brought to metres and not converted to another datum. The vertical datum is what the
+//! file states in its CRS, else in the metadata item `VERTICAL_DATUM`. GDAL moves the georeference
+//! of "pixel is point" files by half a pixel, so the grid's positions are right for "pixel is area"
+//! and "pixel is point".
 
 use std::path::{Path, PathBuf};
 
@@ -14,6 +15,7 @@ use raster::{GeoTransform, Grid, Window};
 use super::error::RasterError;
 use super::gdal_setup::{open_dataset, with_gdal};
 use super::geotiff::VERTICAL_DATUM;
+use super::labels::Provenance;
 use super::source::read_as;
 use super::undeclared::undeclared_no_data;
 
@@ -25,7 +27,8 @@ const CELLS_MAX: usize = 1 << 30;
 pub struct Dem {
     /// The file.
     pub path: PathBuf,
-    /// Heights, metres, with the band's scale and offset applied. NaN is no-data.
+    /// Heights, metres also where the vertical CRS of the file is in feet, with the band's scale
+    /// and offset applied. NaN is no-data.
     pub heights: Grid<f32>,
     /// Position of the grid (of the window that was read), in units of the CRS.
     pub geotransform: GeoTransform,
@@ -37,6 +40,8 @@ pub struct Dem {
     pub vertical: Option<VerticalDatum>,
     /// No-data value of the file, if declared.
     pub no_data: Option<f64>,
+    /// Images that it was made of, if the file names them.
+    pub provenance: Provenance,
 }
 
 /// Reads the first band of a raster as heights.
@@ -83,15 +88,22 @@ fn read(path: &Path, dataset: &Dataset, window: Window) -> Result<Dem, RasterErr
     let crs_wkt = Some(dataset.projection()).filter(|wkt| !wkt.is_empty());
     let identity = crs_wkt.as_deref().map(CrsIdentity::of).transpose();
     let identity = identity.map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
-    let (heights, no_data) = heights(path, dataset, inside)?;
+    let (mut heights, no_data) = heights(path, dataset, inside)?;
+    let vertical = identity.as_ref().and_then(|i| i.vertical).or_else(|| stated_datum(dataset));
+    // A datum that PROJ does not know is an error where its heights are converted.
+    let metres = vertical.map_or(1.0, |datum| datum.metres_per_unit().unwrap_or(1.0));
+    if metres != 1.0 {
+        heights.data_mut().iter_mut().for_each(|h| *h = (f64::from(*h) * metres) as f32);
+    }
     Ok(Dem {
         path: path.to_owned(),
         heights,
         geotransform: GeoTransform(geotransform).shifted(inside.x as f64, inside.y as f64),
         crs_wkt,
         horizontal_epsg: identity.as_ref().and_then(|i| i.horizontal),
-        vertical: identity.and_then(|i| i.vertical).or_else(|| stated_datum(dataset)),
+        vertical,
         no_data,
+        provenance: Provenance::of(dataset),
     })
 }
 

@@ -22,7 +22,9 @@ use raster::{GeoTransform, NO_DATA};
 use super::band::{Band, in_memory};
 use super::error::RasterError;
 use super::gdal_setup::{left_over_messages, with_gdal};
+use super::labels::{Provenance, label};
 use super::verify::verify;
+use super::vertical_unit::to_vertical_unit;
 use crate::atomic::write_path;
 
 /// Metadata item that names the vertical datum.
@@ -48,8 +50,11 @@ pub struct CogPlace<'a> {
     /// Horizontal CRS and vertical datum.
     pub crs: Crs,
     /// Whether the cells are heights. The vertical datum is written for heights only: it would give
-    /// counts and shares the unit metre.
+    /// counts and shares the unit metre. Heights are given in metres, and written in the unit of
+    /// the vertical CRS.
     pub holds_heights: bool,
+    /// Images that the raster was made of, where they are known.
+    pub provenance: Option<&'a Provenance>,
     /// Further items of the default metadata domain, as key and value.
     pub metadata: &'a [(&'a str, &'a str)],
     /// Number of threads that compress.
@@ -69,10 +74,14 @@ pub struct CogRaster<'a> {
     pub holds_heights: bool,
     /// Bands that show red, green and blue, counted from 1, where the raster is a colour picture.
     pub colours: Option<[usize; 3]>,
+    /// Band, counted from 1, whose cells are 0 where the others have no value.
+    pub alpha: Option<usize>,
     /// No-data value, which replaces NaN. `None` declares none, which suits integer bands only.
     pub no_data: Option<f64>,
     /// Resampling of overviews.
     pub overviews: Sampling,
+    /// Images that the raster was made of, as in [`CogPlace`].
+    pub provenance: Option<&'a Provenance>,
     /// Further items of the default metadata domain, as key and value. GDAL sets `AREA_OR_POINT`.
     pub metadata: &'a [(&'a str, &'a str)],
     /// Number of threads that compress.
@@ -93,8 +102,10 @@ impl<'a> CogRaster<'a> {
             crs,
             holds_heights: true,
             colours: None,
+            alpha: None,
             no_data,
             overviews,
+            provenance: None,
             metadata: &[],
             threads: 1,
         }
@@ -131,26 +142,29 @@ pub fn write_cog(path: impl AsRef<Path>, raster: &CogRaster<'_>, overwrite: bool
     raster.crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
     write_path(path, overwrite, |made| {
         let mut memory = in_memory(path, raster.bands, raster.no_data)?;
+        if raster.holds_heights {
+            to_vertical_unit(&memory, raster.crs.vertical).map_err(|reason| RasterError::unwritable(path, reason))?;
+        }
+        // Overviews leave out what the alpha band marks, so it is named first.
+        set_colours(&memory, raster).map_err(|reason| RasterError::unwritable(path, reason))?;
         // The COG driver would build missing overviews in a temporary file.
         let factors = overview_factors(memory.raster_size(), BLOCK);
         with_gdal(|| memory.build_overviews(resampling(raster.overviews), &factors, &[]))
             .map_err(|reason| RasterError::unwritable(path, reason))?;
-        set_colours(&memory, raster.colours).map_err(|reason| RasterError::unwritable(path, reason))?;
-        let CogRaster { geotransform, crs, holds_heights, metadata, threads, .. } = *raster;
-        let place = CogPlace { geotransform, crs, holds_heights, metadata, threads };
+        let CogRaster { geotransform, crs, holds_heights, provenance, metadata, threads, .. } = *raster;
+        let place = CogPlace { geotransform, crs, holds_heights, provenance, metadata, threads };
         finish_cog(&mut memory, place, raster.overviews, made).map_err(|reason| RasterError::unwritable(path, reason))
     })
 }
 
-/// Names the colours of the bands, counted from 1, that show red, green and blue.
-fn set_colours(dataset: &Dataset, colours: Option<[usize; 3]>) -> Result<(), String> {
-    let Some(bands) = colours.filter(|bands| bands.iter().all(|band| (1..=dataset.raster_count()).contains(band)))
-    else {
-        return Ok(());
-    };
-    let names = [ColorInterpretation::RedBand, ColorInterpretation::GreenBand, ColorInterpretation::BlueBand];
+/// Names the bands that show red, green, blue and opacity.
+fn set_colours(dataset: &Dataset, raster: &CogRaster<'_>) -> Result<(), String> {
+    use ColorInterpretation::{AlphaBand, BlueBand, GreenBand, RedBand};
+    let colours = raster.colours.into_iter().flat_map(|bands| bands.into_iter().zip([RedBand, GreenBand, BlueBand]));
+    let named = colours.chain(raster.alpha.map(|band| (band, AlphaBand)));
+    let known = named.filter(|(band, _)| (1..=dataset.raster_count()).contains(band));
     with_gdal(|| {
-        bands.iter().zip(names).try_for_each(|(&band, name)| dataset.rasterband(band)?.set_color_interpretation(name))
+        known.into_iter().try_for_each(|(band, name)| dataset.rasterband(band)?.set_color_interpretation(name))
     })
 }
 
@@ -195,11 +209,15 @@ pub(super) fn finish_cog(
         if place.holds_heights {
             dataset.set_metadata_item(VERTICAL_DATUM, &place.crs.vertical.to_string(), "")?;
         }
+        for (key, value) in place.provenance.map(Provenance::items).unwrap_or_default() {
+            dataset.set_metadata_item(key, &value, "")?;
+        }
         for (key, value) in place.metadata {
             dataset.set_metadata_item(key, value, "")?;
         }
         Ok(())
     })?;
+    label(dataset)?;
     copy(dataset, "COG", made, &options)
 }
 
@@ -215,7 +233,8 @@ pub fn write_image_with_rpc(
     no_data: Option<f64>,
     overwrite: bool,
 ) -> Result<(), RasterError> {
-    write_in_pixels(path.as_ref(), bands, no_data, ItemsOfDomain { domain: "RPC", items: &rpc_items(rpc) }, overwrite)
+    let items = rpc_items(rpc);
+    write_in_pixels(path.as_ref(), bands, no_data, ItemsOfDomain { domain: "RPC", items: &items }, false, overwrite)
 }
 
 /// Writes a map in the pixels of an image: tiled, deflate, no georeference. NaN becomes `no_data`.
@@ -229,7 +248,7 @@ pub fn write_map(
     metadata: &[(&str, &str)],
     overwrite: bool,
 ) -> Result<(), RasterError> {
-    write_in_pixels(path.as_ref(), bands, no_data, ItemsOfDomain { domain: "", items: metadata }, overwrite)
+    write_in_pixels(path.as_ref(), bands, no_data, ItemsOfDomain { domain: "", items: metadata }, true, overwrite)
 }
 
 /// Metadata items of one of GDAL's domains.
@@ -238,12 +257,14 @@ struct ItemsOfDomain<'a, T> {
     items: &'a [(&'a str, T)],
 }
 
-/// Writes a file in the pixels of an image: tiled, deflate, no georeference.
+/// Writes a file in the pixels of an image: tiled, deflate, no georeference. Results are labelled;
+/// images are not, because their statistics would be those of a sensor.
 fn write_in_pixels<T: AsRef<str>>(
     path: &Path,
     bands: &[Band<'_>],
     no_data: Option<f64>,
     metadata: ItemsOfDomain<'_, T>,
+    labelled: bool,
     overwrite: bool,
 ) -> Result<(), RasterError> {
     write_path(path, overwrite, |made| {
@@ -255,6 +276,7 @@ fn write_in_pixels<T: AsRef<str>>(
             }
             Ok(())
         })
+        .and_then(|()| if labelled { label(&mut memory) } else { Ok(()) })
         .and_then(|()| copy(&memory, "GTiff", made, &options))
         .map_err(|reason| RasterError::unwritable(path, reason))
     })

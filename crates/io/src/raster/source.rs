@@ -173,6 +173,11 @@ impl ImageSource {
         Ok(samples.window(Window { x, y, ..window }, f32::NAN))
     }
 
+    /// The open dataset.
+    pub(super) fn dataset(&self) -> &Dataset {
+        &self.dataset
+    }
+
     /// Reads the stored values of one band, counted from 1, over a window inside the image.
     pub(crate) fn read_band(&self, band: usize, inside: Window) -> Result<Grid<f32>, RasterError> {
         read_as(&self.path, &self.dataset, band, inside)

@@ -16,6 +16,7 @@ use super::error::RasterError;
 use super::gdal_setup::{left_over_messages, with_gdal};
 use super::geotiff::{CogPlace, Sampling, finish_cog};
 use super::source::read_as;
+use super::vertical_unit::to_vertical_unit;
 use crate::atomic::write_path;
 
 /// Side length of a spool's tiles, cells.
@@ -154,7 +155,10 @@ impl RasterSpool {
         self.flush()?;
         let sampling = if self.is_float { Sampling::Average } else { Sampling::Nearest };
         write_path(path, overwrite, |made| {
-            finish_cog(&mut self.dataset, place, sampling, made).map_err(|reason| RasterError::unwritable(path, reason))
+            let in_unit =
+                if place.holds_heights { to_vertical_unit(&self.dataset, place.crs.vertical) } else { Ok(()) };
+            let finished = in_unit.and_then(|()| finish_cog(&mut self.dataset, place, sampling, made));
+            finished.map_err(|reason| RasterError::unwritable(path, reason))
         })?;
         let spool = self.path.clone();
         drop(self);
@@ -222,9 +226,8 @@ mod tests {
         assert!(spool.put((0, 0), BandData::U8(&Grid::filled(2, 2, 1))).is_err());
         assert!(spool.put((699, 0), BandData::F32(&Grid::filled(2, 2, 1.0))).is_err());
         let (a, b) = (folder.path().join("a.tif"), folder.path().join("b.tif"));
-        spool
-            .into_cog(&a, CogPlace { geotransform, crs, holds_heights: true, metadata: &[], threads: 1 }, false)
-            .unwrap();
+        let place = CogPlace { geotransform, crs, holds_heights: true, provenance: None, metadata: &[], threads: 1 };
+        spool.into_cog(&a, place, false).unwrap();
         assert!(!folder.path().join("s.tif").exists());
         let bands = [Band { description: "height_m", data: BandData::F32(&whole) }];
         write_cog(&b, &CogRaster::new(&bands, geotransform, crs), false).unwrap();

@@ -21,8 +21,8 @@ pub use config::AlignJobConfig;
 pub use error::AlignJobError;
 pub use output::SimilarityParts;
 
-use crate::files;
 use crate::output_folder::OutputFolder;
+use crate::report_page;
 use numeric::Progress;
 use output::{ModelWithPoints, ModelWriter};
 use world::{KnownPositions, World};
@@ -99,7 +99,7 @@ pub struct AlignResidual {
 pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobReport, AlignJobError> {
     config.validate()?;
     let report_path = config.output.join(REPORT);
-    files::refuse_existing(&report_path, config.overwrite)?;
+    report_page::refuse_existing(&report_path, config.overwrite)?;
     let folder = OutputFolder::take(&config.output)?;
     progress.begin("alignment", 3);
     let model = read_model(&config.model, progress)?;
@@ -120,7 +120,8 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
         ModelWriter { model: &model, origin: &world.origin, encoding: config.encoding, overwrite: config.overwrite };
     writer.write(&config.output, &alignment.world_from_model)?;
     write_under_noise(config, &known, &alignment, &search, &writer, progress)?;
-    files::write_json(&report_path, &report, config.overwrite)?;
+    let lead = "A camera model moved to the world by pairs of points.";
+    report_page::write(&report_path, ("Alignment", lead), &report, Vec::new(), config.overwrite)?;
     progress.step();
     warn_of(&report, progress);
     Ok(report)

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::values::{HeightRange, ImagePair, MapBounds};
+use crate::products::ProductKind;
 
 /// Heights of the Earth's surface above the ellipsoid: the shore of the Dead Sea and Everest,
 /// rounded outward.
@@ -183,6 +184,9 @@ pub struct DsmConfig {
     /// Whether the pointing of the RPCs is corrected.
     #[serde(default = "yes")]
     pub pointing: bool,
+    /// What is made of the DSM beside it, as [`crate::products`] does.
+    #[serde(default)]
+    pub products: Vec<ProductKind>,
     /// Number of worker threads; all cores when `None`.
     pub threads: Option<usize>,
     /// Memory limit, megabytes; 4000 when `None`. A scene that takes more is computed by chunks.
@@ -235,6 +239,7 @@ impl DsmConfig {
             pairs: None,
             references: None,
             pointing: true,
+            products: Vec::new(),
             threads: None,
             memory_mb: None,
             chunk: None,
@@ -250,11 +255,12 @@ impl DsmConfig {
         single.into_iter().flatten().chain(area).chain(&self.masks).chain(&self.image_masks)
     }
 
-    /// Returns the configuration with the defaults for what does not change the result: threads,
-    /// tiles, and whether files may be replaced.
+    /// Returns the configuration with the defaults for what does not change the DSM: products,
+    /// threads, tiles, and whether files may be replaced.
     pub(crate) fn deciding(&self) -> Self {
         let plain = Self::new(Vec::new(), PathBuf::new());
-        Self { threads: plain.threads, tile: plain.tile, overwrite: plain.overwrite, ..self.clone() }
+        let Self { products, threads, tile, overwrite, .. } = plain;
+        Self { products, threads, tile, overwrite, ..self.clone() }
     }
 
     /// Replaces every path by what `change` makes of it.

@@ -286,6 +286,9 @@ pub enum DsmError {
     /// A file of the output cannot be written.
     #[error(transparent)]
     File(FileError),
+    /// The DSM is complete, but a product of it could not be made.
+    #[error("the surface model is complete, but a product of it could not be made")]
+    Products(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// A stored result of a chunk cannot be read.
     #[error("cannot read the result of a chunk ({reason}): {}", path.display())]
     ChunkFile {

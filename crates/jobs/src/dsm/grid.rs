@@ -2,7 +2,7 @@
 
 use crs::{AreaOfUse, CrsError, HeightConverter, MapProjection};
 use geo::CoordsIter;
-use geodesy::utm_epsg;
+use geodesy::{metres_per_degree, utm_epsg};
 use raster::{GeoTransform, Window};
 use report::plain_number;
 use serde::{Deserialize, Serialize};
@@ -26,13 +26,13 @@ const CELLS_MAX: f64 = 4e9;
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct DsmGrid {
-    /// EPSG code of the horizontal CRS, whose units are metres.
+    /// EPSG code of the horizontal CRS.
     pub epsg: u32,
     /// Placement of the cells on the map.
     pub geotransform: GeoTransform,
     /// Columns and rows.
     pub size: (usize, usize),
-    /// Side of a cell, metres.
+    /// Side of a cell on the ground, metres, whatever the unit of the CRS.
     pub gsd_m: f64,
 }
 
@@ -86,10 +86,6 @@ pub(crate) fn choose_grid(
         None => utm_epsg(centre.lon_deg, centre.lat_deg).map_err(CrsError::from)?,
     };
     let projection = MapProjection::from_epsg(epsg)?;
-    if projection.metres_per_unit() != Some(1.0) {
-        let found = format!("EPSG:{epsg}, whose units are not metres");
-        return Err(DsmError::value(DsmSetting::Crs, found, "a projected CRS in metres; a cell has one size"));
-    }
     if !config.force_crs
         && let Some(area) =
             outside_area(epsg, (centre.lon_deg, centre.lat_deg))?.filter(|area| area.distance_deg > FAR_OUTSIDE_DEG)
@@ -108,7 +104,7 @@ pub(crate) fn choose_grid(
     if !bounds.meets(covered) {
         return Err(DsmError::BoundsMissScene { bounds, covered, epsg });
     }
-    let (geotransform, size) = snapped(bounds, gsd_m)?;
+    let (geotransform, size) = snapped(bounds, cell_of(&projection, gsd_m, centre.lat_deg))?;
     Ok(DsmGrid { epsg, geotransform, size, gsd_m })
 }
 
@@ -163,7 +159,13 @@ pub(crate) fn note_grid(config: &DsmConfig, grid: &DsmGrid, coarsest_gsd_m: f64,
         Preset::Balanced | Preset::Accurate => "the coarsest image's",
     };
     let coarsest = format!("{matched} {coarsest_gsd_m:.3} m, rounded to 5 cm");
-    notes.choose("gsd", format!("{} m", grid.gsd_m), given(config.gsd_m.is_some(), coarsest));
+    let cell = grid.geotransform.0;
+    let in_units = match grid.projection().ok().and_then(|projection| projection.metres_per_unit()) {
+        Some(1.0) => String::new(),
+        Some(_) => format!(", {:.4} units of the map", cell[1]),
+        None => format!(", {:.8}° × {:.8}°", cell[1], -cell[5]),
+    };
+    notes.choose("gsd", format!("{} m{in_units}", grid.gsd_m), given(config.gsd_m.is_some(), coarsest));
     let seen = given(
         config.bounds.is_some(),
         match config.area {
@@ -192,20 +194,32 @@ fn covered_bounds(geometry: &ViewGeometry, projection: &MapProjection) -> Result
     Ok(bounds)
 }
 
-/// Returns a north-up grid on whole multiples of the cell size that holds the bounds: its
-/// geotransform, columns and rows.
-fn snapped(b: MapBounds, gsd_m: f64) -> Result<(GeoTransform, (usize, usize)), DsmError> {
-    let down = |v: f64| (v / gsd_m).floor() * gsd_m;
+/// Returns the width and height of a cell of `gsd_m` in units of the CRS. A cell in degrees is
+/// square on the ground at this latitude and has whole 1e-8 degrees, about a millimetre.
+fn cell_of(projection: &MapProjection, gsd_m: f64, lat_deg: f64) -> (f64, f64) {
+    if let Some(metres) = projection.metres_per_unit() {
+        return (gsd_m / metres, gsd_m / metres);
+    }
+    let whole = |degrees: f64| (degrees * 1e8).round().max(1.0) / 1e8;
+    let (across, along) = metres_per_degree(lat_deg);
+    (whole(gsd_m / across), whole(gsd_m / along))
+}
+
+/// Returns a north-up grid on whole multiples of the cell's width and height that holds the bounds:
+/// its geotransform, columns and rows.
+fn snapped(b: MapBounds, (width, height): (f64, f64)) -> Result<(GeoTransform, (usize, usize)), DsmError> {
     // Slightly inside, so that bounds on the lattice do not gain a cell by rounding.
-    let up = |v: f64| ((v / gsd_m) - 1e-6).ceil() * gsd_m;
-    let (x0, y1) = (down(b.x_min + 1e-6 * gsd_m), up(b.y_max));
-    let (columns, rows) = (((up(b.x_max) - x0) / gsd_m).round(), ((y1 - down(b.y_min + 1e-6 * gsd_m)) / gsd_m).round());
+    let down = |v: f64, side: f64| ((v + 1e-6 * side) / side).floor() * side;
+    let up = |v: f64, side: f64| ((v / side) - 1e-6).ceil() * side;
+    let (x0, y1) = (down(b.x_min, width), up(b.y_max, height));
+    let columns = ((up(b.x_max, width) - x0) / width).round();
+    let rows = ((y1 - down(b.y_min, height)) / height).round();
     if !(columns >= 1.0 && rows >= 1.0 && columns * rows <= CELLS_MAX) {
         return Err(DsmError::value(
             DsmSetting::Bounds,
-            format!("a grid of {columns:.0} × {rows:.0} cells of {gsd_m} m"),
+            format!("a grid of {columns:.0} × {rows:.0} cells of {width} × {height} map units"),
             format!("1 to {CELLS_MAX:.0} cells; bounds are x_min y_min x_max y_max in the DSM's CRS"),
         ));
     }
-    Ok((GeoTransform::north_up(x0, y1, gsd_m), (columns as usize, rows as usize)))
+    Ok((GeoTransform([x0, width, 0.0, y1, 0.0, -height]), (columns as usize, rows as usize)))
 }

@@ -8,43 +8,57 @@
 use std::path::{Path, PathBuf};
 
 use crs::{Crs, HeightConverter, VerticalDatum};
-use io::raster::{Band, BandData, CogPlace, CogRaster, RasterSpool, SpoolBand, write_cog};
+use io::raster::{Band, BandData, CogPlace, CogRaster, Provenance, RasterSpool, SpoolBand, write_cog};
 use raster::{Grid, NO_DATA, Window};
 use tempfile::TempDir;
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::grid::DsmGrid;
+use crate::dsm::page;
+use crate::dsm::pictures::{Layer, ReadLayer, RunMaps, write_pictures};
 use crate::dsm::rasters::{ChunkRasters, VOID};
-use crate::dsm::report::DsmReport;
+use crate::dsm::report::{DsmReport, ImageReport};
 use crate::eval::remove_evaluation;
 use crate::files::{FileError, create_folder, write_json};
 use crate::job_paths::relative;
 use crate::output_folder::OutputFolder;
+use crate::products::remove_products;
+use crate::stac::{AssetKind, StacAsset, StacRasters, item_and_collection};
 
 /// Files of a run, relative to its folder. The report is the last to appear: a folder with a report
 /// is complete.
-pub(crate) const FILES: [&str; 10] = [
+pub(crate) const FILES: [&str; 22] = [
     "dsm/dsm.tif",
     "dsm/sigma.tif",
     "dsm/views.tif",
     "dsm/filled.tif",
     "dsm/source.tif",
     "dsm/confidence.tif",
+    "dsm/dsm.qml",
+    "dsm/sigma.qml",
+    "dsm/views.qml",
+    "dsm/filled.qml",
+    "dsm/source.qml",
+    "dsm/confidence.qml",
     "dsm/hillshade.png",
+    "dsm/hillshade.pgw",
     "dsm/relief.png",
+    "dsm/relief.pgw",
+    "dsm/thumbnail.png",
+    "stac/item.json",
+    "stac/collection.json",
     USED_CONFIG,
+    "report/report.html",
     "report/report.json",
 ];
 /// Configuration of the run, as a job file.
 pub(crate) const USED_CONFIG: &str = "used_config.toml";
-/// Largest width and height of the pictures of a large scene, pixels.
-const PICTURE_SIDE: usize = 4096;
 
 /// The only raster of heights.
 const HEIGHTS: &str = "dsm.tif";
 
-/// Names and contents of the rasters, in the order of [`bands`].
+/// Names and contents of the rasters, in the order of [`bands`] and of [`Layer`].
 const BANDS: [(&str, SpoolBand<'static>); 6] = [
     (HEIGHTS, SpoolBand { description: "height_m", is_float: true, no_data: NO_DATA as f64 }),
     ("sigma.tif", SpoolBand { description: "height_standard_deviation_m", is_float: true, no_data: NO_DATA as f64 }),
@@ -98,7 +112,7 @@ impl DsmFolder {
     /// [`DsmError::Output`].
     pub(crate) fn inside(folder: OutputFolder) -> Result<Self, DsmError> {
         let work = folder.work_folder()?;
-        for name in ["dsm", "report", "spool"] {
+        for name in ["dsm", "report", "spool", "stac"] {
             create_folder(&work.path().join(name))?;
         }
         Ok(Self { work, folder })
@@ -118,6 +132,7 @@ impl DsmFolder {
             self.folder.remove(report)?;
         }
         remove_evaluation(&self.folder)?;
+        remove_products(&self.folder)?;
         Ok(FILES.iter().try_for_each(|name| self.folder.publish(self.work.path(), name))?)
     }
 }
@@ -154,9 +169,91 @@ pub(crate) fn write_whole(
     rasters: &ChunkRasters,
     report: &DsmReport,
 ) -> Result<(), DsmError> {
-    write_rasters(&folder.dsm(), config.vertical, grid, rasters)?;
+    let heights = absolute_heights(grid, config.vertical, rasters)?;
+    let parts = bands(rasters, &heights);
+    // What a raster gives for its no-data value must not depend on where it is read.
+    let read = |layer: Layer, window: Window| Ok(cells_of(&parts[layer as usize], no_data_of(layer), window));
+    let (looks, written) = rayon::join(
+        || write_looks(folder, config, grid, report, &read),
+        || write_rasters(&folder.dsm(), config.vertical, grid, &parts, &provenance(report)),
+    );
+    looks.and(written)?;
     write_texts(folder, config, report)?;
     folder.publish()
+}
+
+/// Returns a window of a raster in memory as floats; NaN is no-data.
+fn cells_of(data: &BandData<'_>, no_data: f32, window: Window) -> Grid<f32> {
+    match data {
+        BandData::F32(cells) => cells.window(window, f32::NAN),
+        BandData::U8(cells) => {
+            let value = |v: &u8| if f32::from(*v) == no_data { f32::NAN } else { f32::from(*v) };
+            cells.window(window, no_data as u8).map(value)
+        }
+        _ => Grid::filled(window.width, window.height, f32::NAN),
+    }
+}
+
+/// Returns the no-data value of a raster.
+fn no_data_of(layer: Layer) -> f32 {
+    BANDS[layer as usize].1.no_data as f32
+}
+
+/// Writes what people look at: pictures, styles, the page and the STAC item.
+fn write_looks(
+    folder: &DsmFolder,
+    config: &DsmConfig,
+    grid: &DsmGrid,
+    report: &DsmReport,
+    read: ReadLayer<'_>,
+) -> Result<(), DsmError> {
+    let (dsm, root) = (folder.dsm(), folder.work.path());
+    write_pictures(&dsm, grid, read)?;
+    let maps = RunMaps::read(grid, read)?;
+    maps.write_styles(&dsm)?;
+    let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
+    let page = page::html(config, report, (&crs, grid.gsd_m), &maps)
+        .map_err(|e| DsmError::Output { path: root.join("report/report.html"), source: std::io::Error::other(e) })?;
+    io::write_bytes(root.join("report/report.html"), page.as_bytes(), false).map_err(FileError::from)?;
+    let (item, collection) = item_and_collection(&stac_rasters(config, grid, report, &crs))?;
+    write_json(&root.join("stac/item.json"), &item, false)?;
+    Ok(write_json(&root.join("stac/collection.json"), &collection, false)?)
+}
+
+/// Returns the files of a run as an item of STAC.
+fn stac_rasters<'a>(config: &DsmConfig, grid: &DsmGrid, report: &DsmReport, crs: &Crs) -> StacRasters<'a> {
+    let mut assets: Vec<StacAsset<'a>> = Vec::new();
+    for (name, band) in BANDS {
+        let stem = name.trim_end_matches(".tif");
+        let unit = if band.description.ends_with("_m") { "m" } else { "" };
+        let data_type = if band.is_float { "float32" } else { "uint8" };
+        assets.push(StacAsset {
+            name: stem,
+            path: format!("../dsm/{name}"),
+            title: band.description.replace('_', " "),
+            role: if name == HEIGHTS { "data" } else { "metadata" },
+            kind: AssetKind::Cog { band: band.description, data_type, no_data: band.no_data, unit },
+        });
+    }
+    let other = |name, path: &str, title: &str, role, kind| StacAsset {
+        name,
+        path: path.to_owned(),
+        title: title.to_owned(),
+        role,
+        kind: AssetKind::Other(kind),
+    };
+    assets.push(other("thumbnail", "../dsm/thumbnail.png", "thumbnail", "thumbnail", "image/png"));
+    assets.push(other("report", "../report/report.html", "report", "metadata", "text/html"));
+    StacRasters {
+        id: config.output.file_name().map_or_else(|| "dsm".to_owned(), |name| name.to_string_lossy().into_owned()),
+        description: format!("Digital surface model from {} images, {crs}.", report.images.len()),
+        epsg: grid.epsg,
+        geotransform: grid.geotransform,
+        size: grid.size,
+        gsd_m: grid.gsd_m,
+        acquired: provenance(report).acquired,
+        assets,
+    }
 }
 
 /// The rasters of a large scene, which grow on the disk chunk by chunk. Dropping it before
@@ -202,17 +299,16 @@ impl<'a> ChunkedOutput<'a> {
     /// [`DsmError::Output`], [`DsmError::Image`].
     pub(crate) fn finish(self, report: &DsmReport) -> Result<(), DsmError> {
         let Self { config, grid, spools, folder } = self;
-        if let Some(heights) = spools.first() {
-            let factor = grid.size.0.max(grid.size.1).div_ceil(PICTURE_SIDE);
-            let reduced = reduced(heights, factor)?;
-            write_pictures(&folder.dsm(), &reduced, grid.gsd_m * factor as f64)?;
-        }
+        let read = |layer: Layer, window: Window| Ok(spools[layer as usize].read(window)?);
+        write_looks(&folder, config, grid, report, &read)?;
         let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
         let geotransform = grid.geotransform;
+        let provenance = provenance(report);
         for ((name, _), spool) in BANDS.iter().zip(spools) {
             let holds_heights = *name == HEIGHTS;
+            let threads = rayon::current_num_threads();
             let place =
-                CogPlace { geotransform, crs, holds_heights, metadata: &[], threads: rayon::current_num_threads() };
+                CogPlace { geotransform, crs, holds_heights, provenance: Some(&provenance), metadata: &[], threads };
             spool.into_cog(folder.dsm().join(name), place, false)?;
         }
         write_texts(&folder, config, report)?;
@@ -220,27 +316,13 @@ impl<'a> ChunkedOutput<'a> {
     }
 }
 
-/// Returns the means of the known cells of squares of side `factor`, NaN where none is known.
-fn reduced(spool: &RasterSpool, factor: usize) -> Result<Grid<f32>, DsmError> {
-    let (width, height) = spool.size();
-    let mut out = Grid::filled(width.div_ceil(factor), height.div_ceil(factor), f32::NAN);
-    for y in 0..out.height() {
-        let top = y * factor;
-        let strip = Window { x: 0, y: top as i64, width, height: factor.min(height - top) };
-        let cells = spool.read(strip)?;
-        let mut sums = vec![(0.0f64, 0u32); out.width()];
-        for row in 0..cells.height() {
-            for (x, h) in cells.row(row).iter().enumerate().filter(|(_, h)| !h.is_nan()) {
-                let (sum, n) = &mut sums[x / factor];
-                *sum += f64::from(*h);
-                *n += 1;
-            }
-        }
-        for (cell, (sum, n)) in out.row_mut(y).iter_mut().zip(sums).filter(|(_, (_, n))| *n > 0) {
-            *cell = (sum / f64::from(n)) as f32;
-        }
+/// Returns the images of a run and their times.
+fn provenance(report: &DsmReport) -> Provenance {
+    let name = |image: &ImageReport| image.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Provenance {
+        sources: report.images.iter().map(name).collect(),
+        acquired: report.images.iter().filter_map(|image| image.acquired.clone()).collect(),
     }
-    Ok(out)
 }
 
 fn write_texts(folder: &DsmFolder, config: &DsmConfig, report: &DsmReport) -> Result<(), DsmError> {
@@ -249,30 +331,19 @@ fn write_texts(folder: &DsmFolder, config: &DsmConfig, report: &DsmReport) -> Re
     write_config(&root.join(USED_CONFIG), config, folder.folder.path())
 }
 
-/// Writes hillshade and coloured relief of heights in cells of `cell_m`.
-fn write_pictures(folder: &Path, heights: &Grid<f32>, cell_m: f64) -> Result<(), DsmError> {
-    let shade = raster::hillshade(heights, (cell_m, cell_m), raster::Light::default());
-    io::raster::write_png_gray(folder.join("hillshade.png"), &shade, false)?;
-    // Without the extreme hundredths, so that one mast does not take the colours from the rest.
-    let (low, high) = raster::height_percentiles(heights, 1.0, 99.0).unwrap_or((0.0, 1.0));
-    let relief = raster::coloured_relief(heights, &shade, low, high);
-    Ok(io::raster::write_png_rgb(folder.join("relief.png"), &relief, false)?)
-}
-
 fn write_rasters(
     folder: &Path,
     vertical: VerticalDatum,
     grid: &DsmGrid,
-    rasters: &ChunkRasters,
+    parts: &[BandData<'_>],
+    provenance: &Provenance,
 ) -> Result<(), DsmError> {
     let crs = Crs { horizontal: grid.epsg, vertical };
-    let heights = absolute_heights(grid, vertical, rasters)?;
-    write_pictures(folder, &heights, grid.gsd_m)?;
-    for ((name, band), data) in BANDS.iter().zip(bands(rasters, &heights)) {
-        let bands = [Band { description: band.description, data }];
+    for ((name, band), data) in BANDS.iter().zip(parts) {
+        let bands = [Band { description: band.description, data: *data }];
         let holds_heights = *name == HEIGHTS;
-        let raster =
-            CogRaster { no_data: Some(band.no_data), holds_heights, ..CogRaster::new(&bands, grid.geotransform, crs) };
+        let plain = CogRaster::new(&bands, grid.geotransform, crs);
+        let raster = CogRaster { no_data: Some(band.no_data), holds_heights, provenance: Some(provenance), ..plain };
         write_cog(folder.join(name), &raster, false)?;
     }
     Ok(())

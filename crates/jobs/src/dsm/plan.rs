@@ -1,6 +1,7 @@
 //! Third stage of a run: the plan, with everything that is needed to compute a chunk.
 
 use camera::ImageCorrection;
+use io::raster::iso_time;
 use numeric::Choice;
 use serde::{Deserialize, Serialize};
 
@@ -301,6 +302,7 @@ fn image_reports(
         path: image.path.clone(),
         rpc: image.rpc_format.clone(),
         size: image.size,
+        acquired: image.acquired_s.and_then(iso_time),
         gsd_m: gsds_m.get(i).copied().flatten(),
         incidence_deg: image.camera.view_direction(geometry.middle_of(i)).ok().map(|v| v.incidence_deg()),
         correction: corrections.get(i).copied(),

@@ -54,6 +54,9 @@ pub struct ImageReport {
     pub rpc: String,
     /// Columns and rows.
     pub size: (usize, usize),
+    /// When the image was taken, in the form of ISO 8601; `None` where the file does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acquired: Option<String>,
     /// Side of a pixel on the ground at the centre of the scene, metres.
     pub gsd_m: Option<f64>,
     /// Angle of the line of sight to the vertical, degrees.

@@ -26,7 +26,7 @@ impl DsmReport {
             share(s.filled),
             share(s.void),
             output.join("dsm/relief.png").display(),
-            output.join("report/report.json").display(),
+            output.join("report/report.html").display(),
         )
     }
 }

@@ -14,12 +14,14 @@ use crate::dsm::point::point;
 use crate::dsm::register::register;
 use crate::dsm::report::DsmReport;
 use crate::dsm::session::Session;
+use crate::products;
 use crate::threads;
 
 /// Makes a DSM and writes its files into the output folder.
 ///
 /// A scene that does not fit the memory is computed by chunks. A chunk that fails then stays void
-/// and is named in the report, and the others go on.
+/// and is named in the report, and the others go on. The products that the configuration names are
+/// made last, of the files of the DSM.
 ///
 /// # Errors
 /// See [`DsmError`]; nothing is left half-written.
@@ -50,7 +52,9 @@ pub fn run(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, Dsm
         let pointed = register(config, point(config, &opened, &mut session)?, &mut session)?;
         let plan = plan(config, &pointed, &mut session)?;
         drop((opened, pointed));
-        Ok(sweep_and_merge(&plan, folder, &inputs, &mut session)?.report)
+        let report = sweep_and_merge(&plan, folder, &inputs, &mut session)?.report;
+        products::beside(&config.output, &config.products, config.overwrite, progress)?;
+        Ok(report)
     })?
 }
 

@@ -19,4 +19,5 @@ mod run;
 pub use config::DtmConfig;
 pub use error::DtmError;
 pub use report::DtmReport;
+pub(crate) use run::read_surface;
 pub use run::run;

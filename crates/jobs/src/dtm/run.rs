@@ -4,6 +4,7 @@ use crs::{Crs, MapProjection, VerticalDatum};
 use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
+use report::{Legend, LightEnd, MapLayer};
 use terrain::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground};
 
 use super::config::DtmConfig;
@@ -11,6 +12,7 @@ use super::error::DtmError;
 use super::report::DtmReport;
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
+use crate::report_page;
 use crate::run_folder::surface_file;
 use crate::threads;
 
@@ -19,6 +21,7 @@ const DTM: &str = "dtm.tif";
 const ABOVE: &str = "height_above_ground.tif";
 const STATES: &str = "ground.tif";
 const REPORT: &str = "dtm.json";
+const PAGE: &str = "dtm.html";
 /// Largest difference of the sides of a cell, as a share.
 const SQUARE_TOLERANCE: f64 = 0.01;
 
@@ -40,11 +43,11 @@ const SQUARE_TOLERANCE: f64 = 0.01;
 /// ```
 pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, DtmError> {
     config.validate()?;
-    for name in [DTM, ABOVE, STATES, REPORT] {
+    for name in [DTM, ABOVE, STATES, PAGE, REPORT] {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;
     }
     threads::install(config.threads, || {
-        let (surface, cell_m, crs) = read(config, progress)?;
+        let (surface, cell_m, crs) = read_surface(config, progress)?;
         let folder = OutputFolder::take(&config.output)?;
         let terrain = bare_ground(&surface.heights, cell_m, &config.terrain, progress)?;
         progress.check_cancelled()?;
@@ -56,7 +59,7 @@ pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, Dtm
 }
 
 /// Reads the surface with the side of its cells and its CRS.
-fn read(config: &DtmConfig, progress: &dyn Progress) -> Result<(Dem, f64, Crs), DtmError> {
+pub(crate) fn read_surface(config: &DtmConfig, progress: &dyn Progress) -> Result<(Dem, f64, Crs), DtmError> {
     let path = surface_file(&config.surface);
     let surface = read_dem(&path)?;
     let horizontal = surface.horizontal_epsg.ok_or_else(|| DtmError::NoEpsg { path: path.clone() })?;
@@ -126,7 +129,8 @@ fn write(
     let threads = threads::count(config.threads);
     let put = |name: &str, description: &str, data: BandData<'_>, crs: Crs, holds_heights: bool| {
         let bands = [Band { description, data }];
-        let raster = CogRaster { threads, holds_heights, ..CogRaster::new(&bands, surface.geotransform, crs) };
+        let plain = CogRaster::new(&bands, surface.geotransform, crs);
+        let raster = CogRaster { threads, holds_heights, provenance: Some(&surface.provenance), ..plain };
         write_cog(work.path().join(name), &raster, false).map_err(FileError::from)
     };
     let plain = Crs::ellipsoidal(crs.horizontal);
@@ -134,10 +138,30 @@ fn write(
     put(ABOVE, "height_above_ground_m", BandData::F32(above), plain, false)?;
     let states = "0_unknown_1_ground_2_under_object_3_void_filled";
     put(STATES, states, BandData::U8(&terrain.states), plain, false)?;
-    files::write_json(&work.path().join(REPORT), report, false)?;
-    for name in [DTM, ABOVE, STATES, REPORT] {
+    let lead = format!("{} cells of {:.2} m.", terrain.states.data().len(), report.cell_m);
+    let layers = layers(terrain, above, report.cell_m);
+    report_page::write(&work.path().join(REPORT), ("Terrain model", &lead), report, layers, false)?;
+    for name in [DTM, ABOVE, STATES, PAGE, REPORT] {
         folder.remove(name)?;
         folder.publish(work.path(), name)?;
     }
     Ok(())
+}
+
+/// Returns the maps of the page.
+fn layers(terrain: &BareGround, above: &Grid<f32>, cell_m: f64) -> Vec<MapLayer> {
+    let states = Legend::Codes(vec![
+        (GROUND, [86, 160, 96], "ground as observed"),
+        (UNDER_OBJECT, [240, 200, 80], "interpolated under an object"),
+        (VOID_FILLED, [86, 140, 200], "interpolated in a void"),
+        (UNKNOWN, [72, 72, 76], "unknown"),
+    ]);
+    let (_, highest) = report_page::shown_range(above);
+    let ramp = Legend::sequential(0.0, f64::from(highest), LightEnd::Low, "m");
+    let of_states = terrain.states.map(|state| f32::from(*state));
+    vec![
+        report_page::relief_layer("Ground", "Heights of the ground, shaded.", &terrain.heights, cell_m),
+        report_page::legend_layer("Above ground", "Height of the surface above the ground.", above, ramp),
+        report_page::legend_layer("States", "Where the ground was observed.", &of_states, states),
+    ]
 }

@@ -27,30 +27,30 @@ const SPARSE: f64 = 0.7;
 const UNCLASSIFIED: [i32; 2] = [0, 1];
 
 /// Inputs of a comparison of height grids.
-pub(super) struct GridInputs {
-    pub(super) test: Dem,
-    pub(super) reference: Dem,
-    pub(super) test_from_reference: CellMap,
-    pub(super) metres_from_cells: MetresFromCells,
+pub(crate) struct GridInputs {
+    pub(crate) test: Dem,
+    pub(crate) reference: Dem,
+    pub(crate) test_from_reference: CellMap,
+    pub(crate) metres_from_cells: MetresFromCells,
     /// Classes on the reference grid, with their origin in words.
-    pub(super) classes: Option<(ClassGrid, String)>,
+    pub(crate) classes: Option<(ClassGrid, String)>,
     /// Cells that count, on the reference grid.
-    pub(super) mask: Option<Grid<bool>>,
+    pub(crate) mask: Option<Grid<bool>>,
     /// Terrain heights on the reference grid, above the datum of the reference.
-    pub(super) terrain: Option<Grid<f32>>,
+    pub(crate) terrain: Option<Grid<f32>>,
     /// Numbers of the buildings and trees on the reference grid.
-    pub(super) objects: Option<Grid<Option<i32>>>,
+    pub(crate) objects: Option<Grid<Option<i32>>>,
     /// Origin, standard deviation and confidence of the heights, on the grid of the test.
-    pub(super) layers: TestLayers,
+    pub(crate) layers: TestLayers,
     /// Vertical datum of both surfaces, in words.
-    pub(super) vertical: String,
+    pub(crate) vertical: String,
     /// Choices and doubts that a reader must know.
-    pub(super) notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 impl GridInputs {
     /// Reads all inputs of a configuration.
-    pub(super) fn read(config: &GridEvalConfig) -> Result<Self, EvalJobError> {
+    pub(crate) fn read(config: &GridEvalConfig) -> Result<Self, EvalJobError> {
         let mut notes = Vec::new();
         let mut test = read_dem(&config.test)?;
         let (reference, point_classes) = reference(config, &test, &mut notes)?;

@@ -22,17 +22,17 @@ const CONFIDENCE: &str = "confidence.tif";
 
 /// Layers on the grid of the test.
 #[derive(Default)]
-pub(super) struct TestLayers {
-    pub(super) origins: Option<Grid<CellOrigin>>,
-    pub(super) sigma_m: Option<Grid<f32>>,
-    pub(super) confidence: Option<Grid<f32>>,
+pub(crate) struct TestLayers {
+    pub(crate) origins: Option<Grid<CellOrigin>>,
+    pub(crate) sigma_m: Option<Grid<f32>>,
+    pub(crate) confidence: Option<Grid<f32>>,
     /// The files that were read.
-    pub(super) names: Vec<String>,
+    pub(crate) names: Vec<String>,
 }
 
 impl TestLayers {
     /// Reads the layers of a test.
-    pub(super) fn read(config: &GridEvalConfig, test: &Dem, notes: &mut Vec<String>) -> Result<Self, EvalJobError> {
+    pub(crate) fn read(config: &GridEvalConfig, test: &Dem, notes: &mut Vec<String>) -> Result<Self, EvalJobError> {
         let mut layers = Self::default();
         layers.confidence = match &config.confidence {
             Some(path) => {

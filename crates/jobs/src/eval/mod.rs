@@ -11,12 +11,12 @@
 
 mod error;
 mod grid_config;
-mod grid_inputs;
-mod grid_layers;
+pub(crate) mod grid_inputs;
+pub(crate) mod grid_layers;
 mod grid_output;
 mod grids;
 mod maps;
-mod on_reference;
+pub(crate) mod on_reference;
 mod report_folder;
 mod requirements;
 mod surface_config;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crs::{CrsIdentity, MapProjection};
 use eval::{CellMap, bilinear, nearest};
-use geodesy::{meridian_radius_m, prime_vertical_radius_m};
+use geodesy::metres_per_degree;
 use io::raster::{Dem, ImageSource};
 use raster::{GeoTransform, Grid};
 
@@ -15,7 +15,7 @@ use crate::error::FileCrsError;
 const CELLS_MAX: usize = 1 << 30;
 
 /// Returns the coordinate reference system of a file as PROJ takes it.
-pub(super) fn definition(dem: &Dem) -> Option<String> {
+pub(crate) fn definition(dem: &Dem) -> Option<String> {
     dem.horizontal_epsg.map(|code| format!("EPSG:{code}")).or_else(|| dem.crs_wkt.clone())
 }
 
@@ -39,9 +39,7 @@ pub(super) fn metres_per_unit_at(
     if let Some(metres) = FileCrsError::projection(path, definition)?.metres_per_unit() {
         return Ok((metres, metres));
     }
-    let per_degree = 1.0_f64.to_radians();
-    let east = prime_vertical_radius_m(lat_deg) * lat_deg.to_radians().cos();
-    Ok((east * per_degree, meridian_radius_m(lat_deg) * per_degree))
+    Ok(metres_per_degree(lat_deg))
 }
 
 /// Returns the map from the cells of the reference to the cells of another grid.
@@ -69,7 +67,7 @@ pub(super) fn cell_map(
 }
 
 /// Reads another surface at the cells of the reference, bilinearly.
-pub(super) fn surface_on_reference(other: &Dem, reference: &Dem) -> Result<Grid<f32>, EvalJobError> {
+pub(crate) fn surface_on_reference(other: &Dem, reference: &Dem) -> Result<Grid<f32>, EvalJobError> {
     let map = cell_map(reference, &other.geotransform, definition(other), 0)?;
     let mut on_reference = Grid::filled(reference.heights.width(), reference.heights.height(), f32::NAN);
     for row in 0..on_reference.height() {

@@ -16,6 +16,7 @@ use super::view_files::{points_of, view_row, write_maps};
 use super::view_surface::{SurfaceKind, ViewSurface};
 use crate::error_text::with_causes;
 use crate::files::{self, FileError};
+use crate::report_page;
 
 /// A picture of a panorama, with its file.
 type OpenPicture = (PathBuf, Grid<[f32; 3]>);
@@ -132,7 +133,8 @@ impl Made {
             cells_seen,
             folder: folder.clone(),
         };
-        files::write_json(&folder.join(REPORT), &report, overwrite)?;
+        let lead = "Depths, normals and masks of what cameras on the ground see.";
+        report_page::write(&folder.join(REPORT), ("Ground views", lead), &report, Vec::new(), overwrite)?;
         Ok(report)
     }
 }

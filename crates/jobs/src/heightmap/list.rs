@@ -19,8 +19,8 @@ use super::source_map::Laid;
 use super::tags::HeightMapTags;
 use crate::camera_stand::CameraStand;
 use crate::error_text::with_causes;
-use crate::files;
 use crate::output_folder::OutputFolder;
+use crate::report_page;
 
 const REPORT: &str = "report.json";
 
@@ -34,7 +34,8 @@ pub(super) fn run(
     let rows = read_positions(positions)?;
     let maker = Maker::open(config, progress)?;
     let report = Run { config, maker: &maker, begun: Instant::now() }.all(&rows, progress)?;
-    files::write_json(&report.written, &report, true)?;
+    let lead = "Height maps seen from above, one for each position of a list.";
+    report_page::write(&report.written, ("Height maps", lead), &report, Vec::new(), true)?;
     Ok(report)
 }
 

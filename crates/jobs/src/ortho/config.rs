@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crs::VerticalDatum;
+use ortho::MosaicRule;
 use serde::{Deserialize, Serialize};
 
 use super::error::OrthoError;
@@ -37,6 +38,8 @@ pub struct OrthoConfig {
     pub tolerance_m: f64,
     /// Whether the grey values of several images are brought together.
     pub balance: bool,
+    /// How the values of several images become one.
+    pub mosaic: MosaicRule,
     /// Whether cells that are hidden in every image take the value of what hides them. Otherwise
     /// they are no-data.
     pub keep_hidden: bool,
@@ -59,6 +62,7 @@ impl OrthoConfig {
             surface_vertical: None,
             tolerance_m: 0.05,
             balance: true,
+            mosaic: MosaicRule::Best,
             keep_hidden: false,
             threads: None,
             overwrite: false,
@@ -86,6 +90,12 @@ impl OrthoConfig {
     pub(crate) fn mask(&self) -> PathBuf {
         let stem = self.output.file_stem().unwrap_or_default().to_string_lossy();
         self.output.with_file_name(format!("{stem}_mask.tif"))
+    }
+
+    /// Returns the file of the report.
+    pub(crate) fn report(&self) -> PathBuf {
+        let stem = self.output.file_stem().unwrap_or_default().to_string_lossy();
+        self.output.with_file_name(format!("{stem}_report.json"))
     }
 
     /// Returns the file of the surface model.

@@ -4,7 +4,7 @@ use geodesy::LonLatHeight;
 use io::raster::Dem;
 use numeric::Progress;
 use occlusion::OcclusionSurface;
-use ortho::{Balance, Pair, Sight, balance, best_view};
+use ortho::{Balance, MosaicRule, Pair, Sight, balance, best_view, feather_weight, median_value};
 use raster::Grid;
 use rayon::prelude::*;
 
@@ -18,6 +18,10 @@ use super::view::{Cell, Seen, look};
 const BLOCK: usize = 512;
 /// Number of cells, spread over the ortho, whose grey values are compared.
 const COMPARED: usize = 60_000;
+/// Half the width of a feathered seam, cells. Differences of grey values that the balance leaves
+/// are soft shadows of the seam over a few cells; over many, the images would be mixed where they
+/// do not match to the pixel.
+const FEATHER_CELLS: usize = 16;
 
 /// An ortho.
 pub(super) struct Ortho {
@@ -55,9 +59,13 @@ pub(super) fn make(inputs: &OrthoInputs, config: &OrthoConfig, progress: &dyn Pr
     progress.begin("ortho", blocks.len());
     for block in blocks {
         progress.check_cancelled()?;
-        let cells = work.cells(&block, 1);
+        // Seams are blended with what lies around them, beyond the block.
+        let margin = if config.mosaic == MosaicRule::Feather { FEATHER_CELLS } else { 0 };
+        let wide = block.grown(margin, (width, height));
+        let cells = work.cells(&wide, 1);
         let seen = work.look(&cells)?;
-        ortho.take(&block, &cells, &seen, config.keep_hidden);
+        let part = LookedAt { block: &wide, cells: &cells, seen: &seen };
+        ortho.take(&block, &part, config);
         progress.step();
     }
     Ok(ortho)
@@ -69,6 +77,46 @@ struct Block {
     top: usize,
     width: usize,
     height: usize,
+}
+
+impl Block {
+    /// Returns the block with `margin` more cells on each side, inside a raster of `size`.
+    fn grown(&self, margin: usize, size: (usize, usize)) -> Self {
+        let (left, top) = (self.left.saturating_sub(margin), self.top.saturating_sub(margin));
+        let right = (self.left + self.width + margin).min(size.0);
+        let foot = (self.top + self.height + margin).min(size.1);
+        Self { left, top, width: right - left, height: foot - top }
+    }
+
+    /// Returns the number of a cell of the ortho among those of the block.
+    const fn index(&self, (column, row): (usize, usize)) -> usize {
+        (row - self.top) * self.width + column - self.left
+    }
+}
+
+/// A block as all images see it.
+struct LookedAt<'a> {
+    block: &'a Block,
+    cells: &'a [Option<Cell>],
+    seen: &'a [Seen],
+}
+
+impl LookedAt<'_> {
+    /// Returns the weights of all images in the cells of the block.
+    fn feather_weights(&self) -> Vec<Grid<f32>> {
+        let count = self.cells.len();
+        let best: Vec<Option<usize>> = (0..count).map(|k| best_view(self.seen.iter().map(|s| s.sights[k]))).collect();
+        let grid = |of: &dyn Fn(usize) -> bool| {
+            let cells = (0..count).map(of).collect();
+            Grid::from_vec(self.block.width, self.block.height, cells).unwrap_or_else(|| Grid::filled(0, 0, false))
+        };
+        let weight = |(view, seen): (usize, &Seen)| {
+            let gives = grid(&|k| best[k] == Some(view));
+            let sees = grid(&|k| matches!(seen.sights[k], Sight::Seen { .. }));
+            feather_weight(&gives, &sees, FEATHER_CELLS)
+        };
+        self.seen.par_iter().enumerate().map(|(view, seen)| weight((view, seen))).collect()
+    }
 }
 
 /// What every block needs.
@@ -178,29 +226,53 @@ fn compare(pair: &mut Pair, band: usize, seen: &[Seen]) {
 }
 
 impl Ortho {
-    /// Fills the cells of a block from the images.
-    fn take(&mut self, block: &Block, cells: &[Option<Cell>], seen: &[Seen], keep_hidden: bool) {
-        for (counts, seen) in self.counts.iter_mut().zip(seen) {
-            counts.seen += seen.sights.iter().filter(|s| matches!(s, Sight::Seen { .. })).count();
-            counts.hidden += seen.sights.iter().filter(|s| matches!(s, Sight::Hidden)).count();
-        }
-        for (k, cell) in cells.iter().enumerate() {
-            let at = (block.left + k % block.width, block.top + k / block.width);
-            if cell.is_none() {
-                continue;
-            }
-            let hidden = seen.iter().position(|s| s.sights[k] == Sight::Hidden);
-            let best = best_view(seen.iter().map(|s| s.sights[k]));
-            self.state[at] = match (best, hidden) {
-                (Some(_), _) => SEEN,
-                (None, Some(_)) => HIDDEN,
-                (None, None) => OUTSIDE,
-            };
-            let Some(view) = best.or(hidden.filter(|_| keep_hidden)) else { continue };
-            self.view[at] = (view + 1) as u8;
-            self.counts[view].used += usize::from(best.is_some());
-            for (band, grid) in self.bands.iter_mut().enumerate() {
-                grid[at] = self.balances[view][band].apply(seen[view].values[band][k]);
+    /// Fills the cells of a block from the images. `part` holds the block, and what lies around it
+    /// as far as it counts.
+    fn take(&mut self, block: &Block, part: &LookedAt<'_>, config: &OrthoConfig) {
+        let seen = part.seen;
+        let weights = if config.mosaic == MosaicRule::Feather { part.feather_weights() } else { Vec::new() };
+        let mut values = Vec::with_capacity(seen.len());
+        for row in block.top..block.top + block.height {
+            for column in block.left..block.left + block.width {
+                let at = (column, row);
+                let k = part.block.index(at);
+                for (counts, seen) in self.counts.iter_mut().zip(seen) {
+                    counts.seen += usize::from(matches!(seen.sights[k], Sight::Seen { .. }));
+                    counts.hidden += usize::from(seen.sights[k] == Sight::Hidden);
+                }
+                if part.cells[k].is_none() {
+                    continue;
+                }
+                let hidden = seen.iter().position(|s| s.sights[k] == Sight::Hidden);
+                let best = best_view(seen.iter().map(|s| s.sights[k]));
+                self.state[at] = match (best, hidden) {
+                    (Some(_), _) => SEEN,
+                    (None, Some(_)) => HIDDEN,
+                    (None, None) => OUTSIDE,
+                };
+                let Some(view) = best.or(hidden.filter(|_| config.keep_hidden)) else { continue };
+                self.view[at] = (view + 1) as u8;
+                self.counts[view].used += usize::from(best.is_some());
+                for (band, grid) in self.bands.iter_mut().enumerate() {
+                    let value = |view: usize| self.balances[view][band].apply(seen[view].values[band][k]);
+                    let is_seen = |view: &usize| matches!(seen[*view].sights[k], Sight::Seen { .. });
+                    grid[at] = match config.mosaic {
+                        _ if best.is_none() => value(view),
+                        MosaicRule::Best => value(view),
+                        MosaicRule::Feather => {
+                            let weighted = (0..seen.len()).filter(is_seen).map(|view| (weights[view].data()[k], view));
+                            let (sum, total) = weighted.fold((0.0, 0.0), |(sum, total), (weight, view)| {
+                                (sum + weight * value(view), total + weight)
+                            });
+                            sum / total
+                        }
+                        MosaicRule::Median => {
+                            values.clear();
+                            values.extend((0..seen.len()).filter(is_seen).map(value));
+                            median_value(&mut values)
+                        }
+                    };
+                }
             }
         }
     }

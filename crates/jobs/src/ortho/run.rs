@@ -8,7 +8,7 @@ use super::inputs::OrthoInputs;
 use super::output::OrthoReport;
 use super::states::{HIDDEN, SEEN, VOID};
 use super::{mosaic, output};
-use crate::{files, threads};
+use crate::{files, report_page, threads};
 
 /// Makes an ortho and writes it with its mask.
 ///
@@ -34,6 +34,7 @@ pub fn run(config: &OrthoConfig, progress: &dyn Progress) -> Result<OrthoReport,
     config.validate()?;
     files::check_raster_destination(&config.output, config.overwrite)?;
     files::check_raster_destination(&config.mask(), config.overwrite)?;
+    report_page::refuse_existing(&config.report(), config.overwrite)?;
     threads::install(config.threads, || {
         let inputs = OrthoInputs::open(config, progress)?;
         let made = mosaic::make(&inputs, config, progress)?;

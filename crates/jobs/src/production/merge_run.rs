@@ -9,6 +9,7 @@ use crate::output_folder::OutputFolder;
 use crate::production::chunk_folder::{ChunkFolder, ChunkState};
 use crate::production::error::ProductionError;
 use crate::production::plan_file::PlanFile;
+use crate::products;
 use crate::threads;
 
 /// Reason of a chunk that was not computed before a partial merge.
@@ -53,7 +54,12 @@ pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Produc
         refuse_results(&config.folder, &products)?;
     }
     let states = states(config, &file)?;
-    threads::install(config.threads, || merge(&file, &states, DsmFolder::inside(folder)?, progress))?
+    threads::install(config.threads, || {
+        let product = merge(&file, &states, DsmFolder::inside(folder)?, progress)?;
+        let products = &file.plan.config.products;
+        products::beside(&config.folder, products, config.overwrite, progress).map_err(DsmError::from)?;
+        Ok(product)
+    })?
 }
 
 /// Returns the states of all chunks: `None` for one without a result.

@@ -27,6 +27,7 @@ use crate::corrections::{CorrectionSource, Corrections};
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
 use crate::placed_model;
+use crate::report_page;
 use crate::threads::install;
 
 const REPORT: &str = "report.json";
@@ -145,7 +146,7 @@ impl SplatRenderConfig {
 /// ```
 pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<SplatRenderReport, SplatsJobError> {
     let report_path = config.output.join(REPORT);
-    files::refuse_existing(&report_path, config.overwrite)?;
+    report_page::refuse_existing(&report_path, config.overwrite)?;
     config.validate()?;
     let folder = OutputFolder::take(&config.output)?;
     let file = io::splat_ply::read(&config.splats)?;
@@ -157,7 +158,8 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
     let session = RenderSession { config, file: &file, origin, taken: HashSet::new(), views: Vec::new() };
     let views = install(config.threads, || session.run(progress))??;
     let report = SplatRenderReport { splats: file.splats.len(), views };
-    files::write_json(&report_path, &report, config.overwrite)?;
+    let lead = "Gaussian splats seen by the cameras of images.";
+    report_page::write(&report_path, ("Rendered splats", lead), &report, Vec::new(), config.overwrite)?;
     Ok(report)
 }
 

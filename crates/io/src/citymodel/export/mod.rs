@@ -49,8 +49,8 @@ pub fn write_mesh(
         MeshFormat::Obj => write_stream(path, overwrite, |out| obj::write(out, &export)),
         MeshFormat::Ply => write_stream(path, overwrite, |out| ply::write(out, &export)),
         MeshFormat::Glb => {
-            let (json, binary) = glb::encode(&export).map_err(too_large)?;
-            write_stream(path, overwrite, |out| glb::write(out, &json, &binary))
+            let glb = glb::encode(&export).map_err(too_large)?;
+            write_stream(path, overwrite, |out| glb.write(out))
         }
     };
     Ok(written?)

@@ -1,0 +1,112 @@
+//! The classes of cells from heights.
+
+use raster::Grid;
+
+use crate::config::ClassifyConfig;
+use crate::error::ClassifyError;
+use crate::regions::{grow, without_small};
+use crate::roughness::least_residual;
+
+/// A cell without a height or without ground.
+pub const UNKNOWN: u8 = 0;
+/// Bare ground.
+pub const GROUND: u8 = 2;
+/// Vegetation higher than the least height.
+pub const VEGETATION: u8 = 5;
+/// A building.
+pub const BUILDING: u8 = 6;
+
+/// A surface and its height above the ground, on one grid of square cells.
+#[derive(Debug, Clone, Copy)]
+pub struct ClassifyInput<'a> {
+    /// Heights of the surface, metres; NaN is a void.
+    pub surface: &'a Grid<f32>,
+    /// Height of the surface above the ground, metres; NaN where either is unknown.
+    pub above_ground: &'a Grid<f32>,
+    /// Vegetation index (NDVI) of each cell, −1 to 1; NaN where none is known.
+    pub index: Option<&'a Grid<f32>>,
+    /// Side of a cell, metres.
+    pub cell_m: f64,
+}
+
+/// Classes of cells.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Classes {
+    /// Class of each cell.
+    pub classes: Grid<u8>,
+    /// Least residual of a plane around each cell, metres; infinite away from what stands.
+    pub roughness: Grid<f32>,
+}
+
+/// Finds the class of each cell.
+///
+/// ```
+/// use classes::{BUILDING, ClassifyConfig, ClassifyInput, GROUND, classify};
+/// use raster::Grid;
+///
+/// let mut surface = Grid::filled(60, 60, 0.0f32);
+/// for row in 20..40 {
+///     surface.row_mut(row)[15..45].fill(5.0);
+/// }
+/// let input = ClassifyInput { surface: &surface, above_ground: &surface, index: None, cell_m: 0.5 };
+/// let found = classify(&input, &ClassifyConfig::default())?;
+/// assert_eq!((found.classes[(30, 30)], found.classes[(5, 5)]), (BUILDING, GROUND));
+/// # Ok::<(), classes::ClassifyError>(())
+/// ```
+///
+/// # Errors
+/// [`ClassifyError::Parameter`] for a parameter outside of its range, [`ClassifyError::Size`] for
+/// rasters of different sizes.
+pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Classes, ClassifyError> {
+    config.validate()?;
+    check(input)?;
+    let least_m = config.least_height_m as f32;
+    let stands = input.above_ground.map(|h| *h > least_m);
+    let reach = ((config.window_m / input.cell_m - 1.0) / 2.0).round().max(1.0) as usize;
+    let roughness = least_residual(input.surface, &stands, reach);
+    let limit_m = config.roughness_m as f32;
+    let is_green = |at: usize| input.index.is_some_and(|index| f64::from(index.data()[at]) >= config.least_index);
+    let cells = |area_m2: f64| (area_m2 / (input.cell_m * input.cell_m)).ceil() as usize;
+    let mut buildings = roughness.map(|r| *r < limit_m);
+    buildings.data_mut().iter_mut().enumerate().for_each(|(at, smooth)| *smooth = *smooth && !is_green(at));
+    without_small(&mut buildings, cells(config.least_building_m2));
+    let mut free = stands.clone();
+    free.data_mut().iter_mut().enumerate().for_each(|(at, free)| *free = *free && !is_green(at));
+    grow(&mut buildings, &free, (config.ramp_m / input.cell_m).round() as usize);
+    let mut vegetation = stands.clone();
+    let cleared = vegetation.data_mut().iter_mut().zip(buildings.data());
+    cleared.filter(|(_, building)| **building).for_each(|(plant, _)| *plant = false);
+    without_small(&mut vegetation, cells(config.least_vegetation_m2));
+    let mut left = stands;
+    let taken = left.data_mut().iter_mut().zip(vegetation.data());
+    taken.filter(|(_, plant)| **plant).for_each(|(left, _)| *left = false);
+    // Scraps that touch a building are parts of it; others are too small for anything.
+    grow(&mut buildings, &left, 1);
+    let mut classes = Grid::filled(left.width(), left.height(), UNKNOWN);
+    for (at, class) in classes.data_mut().iter_mut().enumerate() {
+        *class = match input.above_ground.data()[at] {
+            h if !h.is_finite() => UNKNOWN,
+            _ if buildings.data()[at] => BUILDING,
+            _ if vegetation.data()[at] => VEGETATION,
+            _ => GROUND,
+        };
+    }
+    Ok(Classes { classes, roughness })
+}
+
+fn check(input: &ClassifyInput<'_>) -> Result<(), ClassifyError> {
+    let expected = (input.surface.width(), input.surface.height());
+    let fits = |what, found: Option<(usize, usize)>| match found {
+        Some(found) if found != expected => Err(ClassifyError::Size { what, found, expected }),
+        _ => Ok(()),
+    };
+    let above = input.above_ground;
+    fits("the raster of heights above ground", Some((above.width(), above.height())))?;
+    fits("the vegetation index", input.index.map(|grid| (grid.width(), grid.height())))?;
+    if !(input.cell_m.is_finite() && input.cell_m > 0.0) {
+        let (name, expected) = ("the side of a cell", "a positive number of metres");
+        return Err(ClassifyError::Parameter { name, found: input.cell_m, expected });
+    }
+    Ok(())
+}

@@ -1,0 +1,61 @@
+//! Parameters of the classes, in metres.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::ClassifyError;
+
+/// Parameters of the classes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
+pub struct ClassifyConfig {
+    /// Least height above the ground of buildings and vegetation, metres. Cars are below it.
+    pub least_height_m: f64,
+    /// Side of the windows in which planes are fitted, metres. It must be narrower than half a
+    /// house and wider than a few branches.
+    pub window_m: f64,
+    /// Residual of a plane up to which a surface without noise is smooth, metres.
+    pub roughness_m: f64,
+    /// Smallest area of a building, square metres.
+    pub least_building_m2: f64,
+    /// Smallest area of vegetation, square metres.
+    pub least_vegetation_m2: f64,
+    /// Width of the ramps at walls, metres.
+    pub ramp_m: f64,
+    /// Least vegetation index of vegetation, where one is given.
+    pub least_index: f64,
+}
+
+impl Default for ClassifyConfig {
+    fn default() -> Self {
+        Self {
+            least_height_m: 2.0,
+            window_m: 3.5,
+            roughness_m: 0.2,
+            least_building_m2: 15.0,
+            least_vegetation_m2: 4.0,
+            ramp_m: 1.5,
+            least_index: 0.3,
+        }
+    }
+}
+
+impl ClassifyConfig {
+    /// Checks the ranges of the parameters.
+    ///
+    /// # Errors
+    /// [`ClassifyError::Parameter`] for the first that is outside of its range.
+    pub fn validate(&self) -> Result<(), ClassifyError> {
+        let within = |name, found: f64, low: f64, high: f64, expected| {
+            let is_good = found >= low && found <= high;
+            if is_good { Ok(()) } else { Err(ClassifyError::Parameter { name, found, expected }) }
+        };
+        within("the least height of objects", self.least_height_m, 0.1, 50.0, "0.1 to 50 m")?;
+        within("the side of the windows", self.window_m, 0.1, 50.0, "0.1 to 50 m")?;
+        within("the roughness", self.roughness_m, 0.0, 10.0, "0 to 10 m")?;
+        within("the least area of a building", self.least_building_m2, 0.0, 1e6, "0 to 1000000 m²")?;
+        within("the least area of vegetation", self.least_vegetation_m2, 0.0, 1e6, "0 to 1000000 m²")?;
+        within("the width of ramps", self.ramp_m, 0.0, 20.0, "0 to 20 m")?;
+        within("the least vegetation index", self.least_index, -1.0, 1.0, "-1 to 1")
+    }
+}

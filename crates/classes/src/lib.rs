@@ -1,0 +1,26 @@
+//! Classes of the cells of a surface model: ground, building, vegetation.
+//!
+//! What stands above the ground is a building where it is made of planes, and vegetation where it
+//! is rough:
+//!
+//! 1. A cell **stands** if the surface is more than the least height above the ground.
+//! 2. The **roughness** of a cell is the least residual of a plane in any window that holds the
+//!    cell and whose cells all stand. A roof is smooth up to its edge and its ridge, because one of
+//!    the windows lies on one plane; a crown is rough in all of them.
+//! 3. Smooth cells that touch and cover the area of a shed are **buildings**. Rough cells within a
+//!    wall's ramp of them belong to them.
+//! 4. What else stands is **vegetation** if it is wide enough for a shrub, and belongs to its
+//!    surroundings otherwise.
+//!
+//! A map of vegetation, such as an index of near-infrared light, overrules the roughness where it
+//! is given. Heights are in metres, NaN is a void. Values are the ASPRS LAS classes.
+
+mod classify;
+mod config;
+mod error;
+mod regions;
+mod roughness;
+
+pub use classify::{BUILDING, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
+pub use config::ClassifyConfig;
+pub use error::ClassifyError;

@@ -1,0 +1,94 @@
+//! How far a surface is from a plane around each cell.
+//!
+//! The plane of a window is the least-squares plane; on a full square window its coefficients are
+//! sums over the window. Windows with voids or with cells that do not count have none.
+
+use raster::Grid;
+
+/// Returns, for each cell, the least root-mean-square residual of the planes of all windows of
+/// (2 `reach` + 1)² cells that hold the cell, metres. Only windows whose cells all `count` are
+/// looked at; cells in none of them are infinitely rough.
+pub(crate) fn least_residual(surface: &Grid<f32>, counts: &Grid<bool>, reach: usize) -> Grid<f32> {
+    let (width, height) = (surface.width(), surface.height());
+    let mut residuals = Grid::filled(width, height, f32::INFINITY);
+    for row in reach..height.saturating_sub(reach) {
+        for column in reach..width.saturating_sub(reach) {
+            if counts[(column, row)] {
+                residuals[(column, row)] = residual(surface, counts, reach, (column, row));
+            }
+        }
+    }
+    spread_least(&residuals, reach)
+}
+
+/// Returns the root-mean-square residual of the plane around a cell; infinite where a cell of the
+/// window does not count.
+fn residual(surface: &Grid<f32>, counts: &Grid<bool>, reach: usize, (column, row): (usize, usize)) -> f32 {
+    let middle = f64::from(surface[(column, row)]);
+    let (mut sum, mut along, mut across, mut squares, mut of_steps) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for y in row - reach..=row + reach {
+        for x in column - reach..=column + reach {
+            if !counts[(x, y)] {
+                return f32::INFINITY;
+            }
+            let h = f64::from(surface[(x, y)]) - middle;
+            let (dx, dy) = (x as f64 - column as f64, y as f64 - row as f64);
+            sum += h;
+            along += h * dx;
+            across += h * dy;
+            squares += h * h;
+            of_steps += dx * dx;
+        }
+    }
+    let count = ((2 * reach + 1) * (2 * reach + 1)) as f64;
+    let explained = sum * sum / count + (along * along + across * across) / of_steps.max(1.0);
+    ((squares - explained).max(0.0) / count).sqrt() as f32
+}
+
+/// Returns the least value within `reach` cells along both axes.
+fn spread_least(values: &Grid<f32>, reach: usize) -> Grid<f32> {
+    let (width, height) = (values.width(), values.height());
+    let mut along = Grid::filled(width, height, f32::INFINITY);
+    for row in 0..height {
+        let source = values.row(row);
+        for (column, least) in along.row_mut(row).iter_mut().enumerate() {
+            let window = &source[column.saturating_sub(reach)..(column + reach + 1).min(width)];
+            *least = window.iter().copied().fold(f32::INFINITY, f32::min);
+        }
+    }
+    let mut found = Grid::filled(width, height, f32::INFINITY);
+    for row in 0..height {
+        for near in row.saturating_sub(reach)..(row + reach + 1).min(height) {
+            for (least, value) in found.row_mut(row).iter_mut().zip(along.row(near)) {
+                *least = least.min(*value);
+            }
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gable_is_smooth_up_to_its_ridge_and_a_dome_is_not() {
+        let shape = |of: fn(f32, f32) -> f32| {
+            Grid::from_vec(24, 24, (0..576).map(|i| of((i % 24) as f32, (i / 24) as f32)).collect()).unwrap()
+        };
+        let all = Grid::filled(24, 24, true);
+        let gable = least_residual(&shape(|x, y| 9.0 - 0.4 * (x - 11.5).abs() + 0.1 * y), &all, 3);
+        assert!(gable.data().iter().all(|r| *r < 1e-3));
+        let dome = least_residual(&shape(|x, y| 5.0 - 0.05 * ((x - 12.0).powi(2) + (y - 12.0).powi(2))), &all, 3);
+        assert!(dome.data().iter().all(|r| *r > 0.2));
+    }
+
+    #[test]
+    fn windows_with_cells_that_do_not_count_have_no_plane() {
+        let (surface, mut counts) = (Grid::filled(15, 15, 1.0f32), Grid::filled(15, 15, true));
+        counts[(7, 7)] = false;
+        let found = least_residual(&surface, &counts, 3);
+        assert!(found[(7, 7)].is_infinite() || found[(7, 7)] == 0.0);
+        assert_eq!(found[(0, 0)], 0.0);
+    }
+}

@@ -1,0 +1,85 @@
+//! A scene of houses and trees with noise: their classes, a vegetation index, and what is refused.
+
+use classes::{BUILDING, ClassifyConfig, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
+use numeric::SplitMix64;
+use raster::{Grid, gaussian};
+
+const SIDE: usize = 300;
+const CELL_M: f64 = 0.5;
+
+/// Heights above ground and the exact classes: gabled houses, and crowns with branches.
+fn scene(seed: u64) -> (Grid<f32>, Grid<u8>) {
+    let (mut heights, mut classes) = (Grid::filled(SIDE, SIDE, 0.0f32), Grid::filled(SIDE, SIDE, GROUND));
+    let mut stream = SplitMix64::new(seed);
+    for k in 0..25 {
+        let (left, top) = (15 + k % 5 * 56, 15 + k / 5 * 56);
+        let (width, depth) = (18 + stream.below(10), 16 + stream.below(8));
+        for y in 0..depth {
+            for x in 0..width {
+                let across = (y as f32 - depth as f32 / 2.0).abs();
+                heights[(left + x, top + y)] = 8.0 - 0.25 * across;
+                classes[(left + x, top + y)] = BUILDING;
+            }
+        }
+        let (cx, cy, radius) = (left as f32 + 42.0, top as f32 + 42.0, 6.0 + 4.0 * stream.uniform() as f32);
+        for at in 0..SIDE * SIDE {
+            let far = ((at % SIDE) as f32 - cx).hypot((at / SIDE) as f32 - cy) / radius;
+            if far < 1.0 {
+                heights.data_mut()[at] = 3.0 + 4.0 * (1.0 - far * far).sqrt() + 0.5 * stream.normal() as f32;
+                classes.data_mut()[at] = VEGETATION;
+            }
+        }
+    }
+    let noise: Vec<f32> = (0..SIDE * SIDE).map(|_| stream.normal() as f32).collect();
+    let noise = gaussian(&Grid::from_vec(SIDE, SIDE, noise).unwrap(), 1.0);
+    heights.data_mut().iter_mut().zip(noise.data()).for_each(|(h, z)| *h += 0.2 * z);
+    (heights, classes)
+}
+
+/// Intersection over union of a class.
+fn iou(found: &Grid<u8>, truth: &Grid<u8>, class: u8) -> f64 {
+    let count = |is: fn(bool, bool) -> bool| {
+        let cells = found.data().iter().zip(truth.data());
+        cells.filter(|(found, truth)| is(**found == class, **truth == class)).count() as f64
+    };
+    count(|a, b| a && b) / count(|a, b| a || b)
+}
+
+#[test]
+fn houses_and_trees_are_told_apart() {
+    for seed in 0..4 {
+        let (heights, truth) = scene(seed);
+        let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cell_m: CELL_M };
+        let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
+        let (buildings, plants) = (iou(&found, &truth, BUILDING), iou(&found, &truth, VEGETATION));
+        assert!(buildings > 0.95 && plants > 0.9, "seed {seed}: {buildings:.3}, {plants:.3}");
+    }
+}
+
+#[test]
+fn a_vegetation_index_overrules_the_roughness() {
+    let (mut heights, mut index) = (Grid::filled(60, 60, 0.0f32), Grid::filled(60, 60, 0.0f32));
+    for row in 10..40 {
+        heights.row_mut(row)[10..50].fill(3.0);
+        index.row_mut(row)[30..50].fill(0.6);
+    }
+    heights[(0, 0)] = f32::NAN;
+    let input = ClassifyInput { surface: &heights, above_ground: &heights, index: Some(&index), cell_m: 0.5 };
+    let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
+    assert_eq!([found[(20, 20)], found[(40, 20)]], [BUILDING, VEGETATION]);
+    assert_eq!([found[(0, 0)], found[(55, 55)]], [UNKNOWN, GROUND]);
+}
+
+#[test]
+fn unusable_input_is_refused() {
+    let (heights, other) = (Grid::filled(5, 5, 1.0f32), Grid::filled(4, 5, 1.0f32));
+    let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cell_m: 0.5 };
+    let told = |input: &ClassifyInput<'_>, config: &ClassifyConfig| classify(input, config).unwrap_err().to_string();
+    let usual = ClassifyConfig::default();
+    assert!(told(&ClassifyInput { above_ground: &other, ..input }, &usual).contains("heights above ground"));
+    assert!(told(&ClassifyInput { index: Some(&other), ..input }, &usual).contains("(4, 5)"));
+    assert!(told(&ClassifyInput { cell_m: f64::NAN, ..input }, &usual).contains("side of a cell"));
+    let mut wrong = usual;
+    wrong.roughness_m = -1.0;
+    assert!(told(&input, &wrong).contains("roughness"));
+}

@@ -1,0 +1,136 @@
+//! Contour lines of heights as GeoPackage, by GDAL's contour algorithm.
+
+#![allow(unsafe_code)]
+
+use std::path::Path;
+use std::ptr::null_mut;
+
+use crs::Crs;
+use gdal::DriverManager;
+use gdal::cpl::CslStringList;
+use gdal::errors::GdalError;
+use gdal::spatial_ref::SpatialRef;
+use gdal::vector::{LayerAccess, LayerOptions, OGRFieldType};
+use raster::{GeoTransform, Grid, NO_DATA};
+
+use super::band::{Band, BandData, in_memory};
+use super::error::RasterError;
+use super::gdal_access::register_geopackage;
+use super::gdal_setup::with_gdal;
+use crate::atomic::write_path;
+
+/// Name of the layer.
+const LAYER: &str = "contours";
+/// Field of the heights.
+const ELEVATION: &str = "elevation";
+
+/// Heights whose contour lines are written.
+#[derive(Debug, Clone, Copy)]
+pub struct ContourSurface<'a> {
+    /// Heights; NaN is no-data.
+    pub heights: &'a Grid<f32>,
+    /// Position of the grid.
+    pub geotransform: GeoTransform,
+    /// Reference system with the datum of the heights.
+    pub crs: Crs,
+    /// Step between the lines, which lie at its multiples, in the unit of the heights.
+    pub interval: f64,
+}
+
+/// Writes contour lines: the layer `contours` with the field `elevation`, lines with heights.
+/// Returns the number of lines.
+///
+/// # Errors
+/// [`RasterError::NotWritten`] when the file exists and `overwrite` is false, and when GDAL refuses
+/// or lacks GeoPackages; [`RasterError::Crs`] for a code that PROJ does not know.
+pub fn write_contours(path: &Path, surface: &ContourSurface<'_>, overwrite: bool) -> Result<u64, RasterError> {
+    surface.crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
+    let mut lines = 0;
+    write_path(path, overwrite, |made| {
+        let bands = [Band { description: "height", data: BandData::F32(surface.heights) }];
+        let mut memory = in_memory(path, &bands, Some(f64::from(NO_DATA)))?;
+        lines = with_gdal(|| {
+            memory.set_geo_transform(&surface.geotransform.0)?;
+            draw(&memory, surface, made)
+        })
+        .map_err(|reason| RasterError::unwritable(path, reason))?;
+        Ok::<(), RasterError>(())
+    })?;
+    Ok(lines)
+}
+
+fn draw(memory: &gdal::Dataset, surface: &ContourSurface<'_>, made: &Path) -> Result<u64, GdalError> {
+    register_geopackage();
+    let driver = DriverManager::get_driver_by_name("GPKG")?;
+    let mut file = driver.create_vector_only(made)?;
+    let place = SpatialRef::from_definition(&surface.crs.to_string())?;
+    let ty = gdal_sys::OGRwkbGeometryType::wkbLineString25D;
+    let layer = file.create_layer(LayerOptions { name: LAYER, srs: Some(&place), ty, options: None })?;
+    layer.create_defn_fields(&[("id", OGRFieldType::OFTInteger), (ELEVATION, OGRFieldType::OFTReal)])?;
+    let mut options = CslStringList::new();
+    options.set_name_value("LEVEL_INTERVAL", &surface.interval.to_string())?;
+    options.set_name_value("NODATA", &NO_DATA.to_string())?;
+    options.set_name_value("ID_FIELD", "0")?;
+    options.set_name_value("ELEV_FIELD", "1")?;
+    let band = memory.rasterband(1)?;
+    // One transaction: the file would be synchronised to the disk for each line.
+    // SAFETY: the layer is open and borrowed during the call.
+    unsafe { gdal_sys::OGR_L_StartTransaction(layer.c_layer()) };
+    // SAFETY: the band, the layer and the list of options are alive and borrowed during the call;
+    // without a progress function its argument is not used.
+    let result = unsafe {
+        gdal_sys::GDALContourGenerateEx(band.c_rasterband(), layer.c_layer().cast(), options.as_ptr(), None, null_mut())
+    };
+    // SAFETY: as for the start of the transaction.
+    unsafe { gdal_sys::OGR_L_CommitTransaction(layer.c_layer()) };
+    if result != gdal_sys::CPLErr::CE_None {
+        return Err(GdalError::BadArgument("no contour lines can be drawn".to_owned()));
+    }
+    let lines = layer.feature_count();
+    file.close()?;
+    Ok(lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crs::VerticalDatum;
+
+    #[test]
+    fn lines_of_a_cone_are_circles_at_their_heights() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("contours.gpkg");
+        let cells = (0..101 * 101).map(|i| 50.25 - ((i % 101) as f32 - 50.0).hypot((i / 101) as f32 - 50.0));
+        let heights = Grid::from_vec(101, 101, cells.collect()).unwrap();
+        let geotransform = GeoTransform::north_up(500_000.0, 4_000_000.0, 1.0);
+        let crs = Crs { horizontal: 32631, vertical: VerticalDatum::Egm96 };
+        let surface = ContourSurface { heights: &heights, geotransform, crs, interval: 10.0 };
+        let lines = write_contours(&path, &surface, false).unwrap();
+        let file = gdal::Dataset::open_ex(
+            &path,
+            gdal::DatasetOptions { open_flags: gdal::GdalOpenFlags::GDAL_OF_VECTOR, ..Default::default() },
+        )
+        .unwrap();
+        let mut layer = file.layer(0).unwrap();
+        let found = crs::CrsIdentity::of(&layer.spatial_ref().unwrap().to_wkt().unwrap()).unwrap();
+        assert_eq!((found.horizontal, found.vertical), (Some(32631), Some(VerticalDatum::Egm96)));
+        assert_eq!((layer.name().as_str(), layer.feature_count()), (LAYER, lines));
+        let mut levels = Vec::new();
+        for feature in layer.features() {
+            let field = feature.field_index(ELEVATION).unwrap();
+            let level = feature.field_as_double(field).unwrap().unwrap();
+            levels.push(level);
+            let mut points = Vec::new();
+            feature.geometry().unwrap().get_points(&mut points);
+            for (x, y, z) in points {
+                assert_eq!(z, level);
+                let radius = (x - 500_050.5f64).hypot(y - 3_999_949.5);
+                // GDAL prolongs lines to the outer side of the cells at the border.
+                assert!((radius - (50.25 - level)).abs() < 0.5, "{level} {radius}");
+            }
+        }
+        levels.sort_by(f64::total_cmp);
+        levels.dedup();
+        assert!(levels.ends_with(&[10.0, 20.0, 30.0, 40.0, 50.0]), "{levels:?}");
+    }
+}

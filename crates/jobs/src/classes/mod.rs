@@ -1,0 +1,19 @@
+//! The classes job: ground, buildings and vegetation of a surface model.
+//!
+//! The ground is found first, as in the DTM job. Written into one folder, on the grid of the
+//! surface:
+//!
+//! - `classes.tif`: ASPRS LAS classes: 0 unknown, 2 ground, 5 vegetation, 6 building.
+//! - `roughness.tif`: residual of the best plane around each cell that stands, metres; no-data
+//!   elsewhere.
+//! - `classes.json`: the report.
+
+mod config;
+mod error;
+mod report;
+mod run;
+
+pub use config::ClassesConfig;
+pub use error::ClassesError;
+pub use report::ClassesReport;
+pub use run::run;

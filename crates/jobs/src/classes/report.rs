@@ -1,0 +1,51 @@
+//! The report of a class raster.
+
+use std::path::PathBuf;
+
+use classes::ClassifyConfig;
+use serde::Serialize;
+use terrain::GroundConfig;
+
+/// A finished class raster.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct ClassesReport {
+    /// File of the surface model.
+    pub surface: PathBuf,
+    /// File of the classes.
+    pub classes: PathBuf,
+    /// Columns and rows.
+    pub size: (usize, usize),
+    /// Side of a cell, metres.
+    pub cell_m: f64,
+    /// Cells of bare ground.
+    pub cells_ground: usize,
+    /// Cells of buildings.
+    pub cells_building: usize,
+    /// Cells of vegetation.
+    pub cells_vegetation: usize,
+    /// Cells without a height or without ground.
+    pub cells_unknown: usize,
+    /// Whether a vegetation index took part.
+    pub has_vegetation_index: bool,
+    /// Parameters of the search for the ground.
+    pub terrain: GroundConfig,
+    /// Parameters of the classes.
+    pub parameters: ClassifyConfig,
+}
+
+impl ClassesReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
+        let cells = self.size.0 * self.size.1;
+        let share = |n: usize| 100.0 * n as f64 / cells.max(1) as f64;
+        format!(
+            "classes {}\ncells   {cells} ({:.1} % ground, {:.1} % building, {:.1} % vegetation, {:.1} % unknown)\n",
+            self.classes.display(),
+            share(self.cells_ground),
+            share(self.cells_building),
+            share(self.cells_vegetation),
+            share(self.cells_unknown),
+        )
+    }
+}

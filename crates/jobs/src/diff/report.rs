@@ -1,0 +1,130 @@
+//! The report of a change.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use change::{ChangeConfig, ChangeRegion, ErrorCorrelation, Volume};
+use eval::Shift;
+use serde::Serialize;
+
+/// Most regions that the text lists.
+const LISTED: usize = 12;
+
+/// A region of change with its number.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct DiffRegion {
+    /// Its number in `regions.tif`.
+    pub number: usize,
+    /// Middle of its cells on the map of the first surface.
+    pub centre: [f64; 2],
+    /// Area, change, volume and significance.
+    #[serde(flatten)]
+    pub found: ChangeRegion,
+}
+
+/// Volumes within a polygon of the given layer.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct AreaVolume {
+    /// Name of the polygon, or its number from 1.
+    pub name: String,
+    /// The volumes.
+    #[serde(flatten)]
+    pub volume: Volume,
+}
+
+/// A finished change.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct DiffReport {
+    /// Surface of the first date.
+    pub before: PathBuf,
+    /// Surface of the second date.
+    pub after: PathBuf,
+    /// Folder of the results.
+    pub output: PathBuf,
+    /// CRS of the rasters, and the vertical datum of both surfaces.
+    pub crs: String,
+    /// Vertical datum in words.
+    pub vertical: String,
+    /// Columns and rows.
+    pub size: (usize, usize),
+    /// Side of a cell, metres.
+    pub cell_m: f64,
+    /// Shift that was added to the second surface, metres.
+    pub shift: Shift,
+    /// Factor that the stated deviations needed to explain the differences of unchanged ground.
+    pub sigma_factor: f64,
+    /// Median level of detection of a cell at the confidence, metres.
+    pub detection_m: f64,
+    /// Deviation of an offset of all heights, metres. It is part of all regional deviations.
+    pub offset_sigma_m: f64,
+    /// Correlation of the errors of two cells by their distance.
+    pub correlation: ErrorCorrelation,
+    /// Cells observed on both dates.
+    pub observed_cells: usize,
+    /// Cells with a height on both dates of which one was filled.
+    pub filled_cells: usize,
+    /// Candidates that were tested.
+    pub tested: usize,
+    /// The regions of significant change.
+    pub regions: Vec<DiffRegion>,
+    /// Volumes over all cells.
+    pub total: Volume,
+    /// Volumes within the given polygons.
+    pub areas: Vec<AreaVolume>,
+    /// Parameters of the search.
+    pub parameters: ChangeConfig,
+    /// Choices and doubts that a reader must know.
+    pub notes: Vec<String>,
+}
+
+impl DiffReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
+        let shift = &self.shift;
+        let mut text = format!(
+            "change  {}\n\
+             shift   {:+.2} m east, {:+.2} m north, {:+.2} m up\n\
+             level   {:.2} m for a cell (deviations × {:.2})\n\
+             regions {} of {} candidates\ngain    {:.0} ± {:.0} m³\nloss    {:.0} ± {:.0} m³\n",
+            self.output.display(),
+            shift.dx_m,
+            shift.dy_m,
+            shift.dz_m,
+            self.detection_m,
+            self.sigma_factor,
+            self.regions.len(),
+            self.tested,
+            self.total.gain_m3,
+            self.total.gain_sigma_m3,
+            self.total.loss_m3,
+            self.total.loss_sigma_m3,
+        );
+        // Writing to a string does not fail.
+        for region in self.regions.iter().take(LISTED) {
+            let (n, found) = (region.number, &region.found);
+            let _ = writeln!(
+                text,
+                "  {n:<4}  {:.0} m², {:+.2} ± {:.2} m, {:+.0} ± {:.0} m³",
+                found.area_m2, found.mean_m, found.mean_sigma_m, found.volume_m3, found.volume_sigma_m3
+            );
+        }
+        if self.regions.len() > LISTED {
+            let _ = writeln!(text, "  and {} more in changes.geojson", self.regions.len() - LISTED);
+        }
+        for area in &self.areas {
+            let v = &area.volume;
+            let _ = writeln!(
+                text,
+                "area    {}: gain {:.0} ± {:.0} m³, loss {:.0} ± {:.0} m³, net {:+.0} ± {:.0} m³",
+                area.name, v.gain_m3, v.gain_sigma_m3, v.loss_m3, v.loss_sigma_m3, v.net_m3, v.net_sigma_m3
+            );
+        }
+        for note in &self.notes {
+            let _ = writeln!(text, "note    {note}");
+        }
+        text
+    }
+}

@@ -1,0 +1,159 @@
+//! Runs the products job.
+
+use std::path::{Path, PathBuf};
+
+use numeric::{Choice, Progress};
+
+use super::cloud;
+use super::colour::colours;
+use super::config::{FOLDER, ProductsConfig};
+use super::contours;
+use super::error::ProductsError;
+use super::mesh;
+use super::mesh_tiles::{TILES, TILESET};
+use super::product::ProductKind;
+use super::report::ProductsReport;
+use super::scene::SurfaceOfRun;
+use crate::dtm::{self, DtmConfig, DtmReport};
+use crate::files::{self, FileError};
+use crate::job_file::read_dsm_job;
+use crate::ortho::{self, OrthoConfig};
+use crate::output_folder::OutputFolder;
+use crate::threads;
+
+/// Names in the folder of the products.
+const ORTHO: &str = "ortho.tif";
+const ORTHO_MASK: &str = "ortho_mask.tif";
+const ORTHO_REPORTS: [&str; 2] = ["ortho_report.html", "ortho_report.json"];
+const DTM: &str = "dtm";
+const DTM_STATES: &str = "dtm/ground.tif";
+const DTM_HEIGHTS: &str = "dtm/dtm.tif";
+const REPORT: &str = "products.json";
+/// Settings of a run, which name its images.
+const SETTINGS: &str = "used_config.toml";
+
+/// Makes products of the folder of a run, and a report beside them.
+///
+/// # Errors
+/// [`ProductsError`]: a folder that is no run, images that cannot be found, outputs that exist.
+pub fn run(config: &ProductsConfig, progress: &dyn Progress) -> Result<ProductsReport, ProductsError> {
+    config.validate()?;
+    let output = config.folder();
+    let names = config.products.iter().flat_map(|product| match product {
+        ProductKind::Cloud => cloud::FILES.map(|(name, _)| name).to_vec(),
+        ProductKind::Dtm => vec![DTM_STATES],
+        ProductKind::Contours => vec![contours::FILE],
+        ProductKind::Mesh => vec![mesh::GLB, TILESET, TILES],
+    });
+    names.into_iter().try_for_each(|name| files::refuse_existing(&output.join(name), config.overwrite))?;
+    threads::install(config.threads, || make(config, &output, progress))?
+}
+
+fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Result<ProductsReport, ProductsError> {
+    let surface = SurfaceOfRun::open(&config.run, progress)?;
+    let only_points = config.products.iter().all(|product| *product == ProductKind::Cloud);
+    if !only_points && surface.projection.metres_per_unit().is_none() {
+        return Err(ProductsError::InDegrees { path: surface.dem.path });
+    }
+    let folder = OutputFolder::take(output)?;
+    let has_ground = output.join(DTM_HEIGHTS).is_file();
+    let needs_ground = config.wants(ProductKind::Contours) && !has_ground;
+    let wants_ground = config.wants(ProductKind::Dtm) || needs_ground;
+    let dtm = wants_ground.then(|| terrain(config, output, progress)).transpose()?;
+    let mut report = ProductsReport {
+        surface: surface.dem.path.clone(),
+        folder: output.to_owned(),
+        ortho: None,
+        colour: None,
+        dtm,
+        contours: None,
+        mesh: None,
+        cloud: None,
+    };
+    if config.wants(ProductKind::Contours) {
+        let (dtm, interval_m) = (output.join(DTM_HEIGHTS), config.contour_interval_m);
+        report.contours = Some(contours::make(&surface, &dtm, interval_m, &folder, progress)?);
+    }
+    if config.wants(ProductKind::Cloud) || config.wants(ProductKind::Mesh) {
+        let ortho = ortho_file(config, output, progress)?;
+        let (colours, colour) = colours(&surface, &ortho)?;
+        (report.ortho, report.colour) = (Some(ortho), Some(colour));
+        if config.wants(ProductKind::Mesh) {
+            let fitting = || surface.layer("sigma.tif").map(|sigma| mesh::fitting_tolerance(&sigma, surface.cell_m()));
+            let tolerance_m = config.mesh_tolerance_m.map_or_else(fitting, Ok)?;
+            report.mesh = Some(mesh::make(&surface, &colours, tolerance_m, &folder, progress)?);
+        }
+        if config.wants(ProductKind::Cloud) {
+            let states = Some(output.join(DTM_STATES)).filter(|states| states.is_file());
+            report.cloud = Some(cloud::make(&surface, &colours, states.as_deref(), config.filled, &folder, progress)?);
+        }
+    }
+    files::write_json(&output.join(REPORT), &report, true)?;
+    Ok(report)
+}
+
+/// Makes products of a run that has just ended in its folder.
+pub(crate) fn beside(
+    run_folder: &Path,
+    products: &[ProductKind],
+    overwrite: bool,
+    progress: &dyn Progress,
+) -> Result<(), ProductsError> {
+    if products.is_empty() {
+        return Ok(());
+    }
+    let mut config = ProductsConfig::new(run_folder.to_owned());
+    (config.products, config.overwrite) = (products.to_vec(), overwrite);
+    let report = run(&config, progress)?;
+    let value = report.folder.display().to_string();
+    progress.choice(&Choice { name: "products".to_owned(), value, reason: "they were asked for".to_owned() });
+    Ok(())
+}
+
+/// Removes the products of a surface model that is replaced. Folders without a report of ours stay.
+pub(crate) fn remove_products(run_folder: &OutputFolder) -> Result<(), FileError> {
+    let folder = run_folder.path().join(FOLDER);
+    if folder.is_symlink() || !folder.join(REPORT).is_file() {
+        return Ok(());
+    }
+    // The report marks the folder, so it goes last.
+    let names = cloud::FILES.map(|(name, _)| name).into_iter().chain(ORTHO_REPORTS).chain([
+        contours::FILE,
+        mesh::GLB,
+        TILESET,
+        TILES,
+        DTM,
+        ORTHO,
+        ORTHO_MASK,
+        REPORT,
+    ]);
+    for name in names {
+        run_folder.remove(&format!("{FOLDER}/{name}"))?;
+    }
+    // Stays when it holds anything else.
+    let _ = std::fs::remove_dir(&folder);
+    Ok(())
+}
+
+/// Makes the terrain model.
+fn terrain(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Result<DtmReport, ProductsError> {
+    let mut of = DtmConfig::new(config.run.clone(), output.join(DTM));
+    of.overwrite = config.overwrite;
+    Ok(dtm::run(&of, progress)?)
+}
+
+/// Returns the ortho that was given or that an earlier call made, or makes one.
+fn ortho_file(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Result<PathBuf, ProductsError> {
+    if let Some(ortho) = &config.ortho {
+        return Ok(ortho.clone());
+    }
+    let made = output.join(ORTHO);
+    if made.is_file() && !config.overwrite {
+        return Ok(made);
+    }
+    let settings = read_dsm_job(&config.run.join(SETTINGS)).map_err(|error| ProductsError::Images(Box::new(error)))?;
+    let mut of = OrthoConfig::new(settings.images, config.run.clone(), made.clone());
+    of.overwrite = config.overwrite;
+    ortho::run(&of, progress)?;
+    Ok(made)
+}

@@ -1,0 +1,179 @@
+//! Reads the cameras, images, prior maps, points and schedule of a dataset.
+
+use std::path::{Path, PathBuf};
+
+use ::train::{PinholeView, TrainingView};
+use camera::Lens;
+use io::colmap::{ColmapPoint, ColmapView, read_with_points};
+use io::npy::{self, NpyArray, NpyData};
+use io::raster::ImageSource;
+use numeric::Progress;
+use priors::Schedule;
+use serde_json::Value;
+
+use super::config::{TrainConfig, TrainPriors};
+use super::error::TrainError;
+use crate::files;
+
+/// A dataset in memory.
+#[derive(Debug)]
+pub(super) struct TrainData {
+    /// File names of the views.
+    pub(super) names: Vec<String>,
+    pub(super) views: Vec<TrainingView<PinholeView>>,
+    /// Number of the view of each camera of the model; `None` where it has no image.
+    pub(super) view_of: Vec<Option<usize>>,
+    pub(super) points: Vec<ColmapPoint>,
+    pub(super) schedule: Schedule,
+    /// Whether only what is masked is modelled.
+    pub(super) masked: bool,
+    /// Folder of the model.
+    pub(super) sparse: PathBuf,
+}
+
+impl TrainData {
+    pub(super) fn read(config: &TrainConfig, progress: &dyn Progress) -> Result<Self, TrainError> {
+        let folder = &config.dataset;
+        let sparse = [folder.join("sparse/0"), folder.join("sparse"), folder.clone()];
+        let has_cameras = |f: &&PathBuf| ["cameras.bin", "cameras.txt"].iter().any(|n| f.join(n).is_file());
+        let sparse = sparse.iter().find(has_cameras).unwrap_or(&sparse[0]).clone();
+        let (model, points) = read_with_points(&sparse)?;
+        let (schedule, masked) = schedule(folder)?;
+        check_conventions(folder)?;
+        let images = config.images.clone().unwrap_or_else(|| folder.join("images"));
+        let mut data =
+            Self { names: Vec::new(), views: Vec::new(), view_of: Vec::new(), points, schedule, masked, sparse };
+        progress.begin("images", model.views.len());
+        for view in &model.views {
+            progress.check_cancelled()?;
+            let path = images.join(&view.name);
+            if path.is_file() {
+                data.view_of.push(Some(data.views.len()));
+                data.views.push(read_view(config, view, &model.lenses[view.lens], &path, masked)?);
+                data.names.push(view.name.clone());
+            } else {
+                data.view_of.push(None);
+            }
+            progress.step();
+        }
+        if data.views.is_empty() {
+            return Err(TrainError::NoImages { cameras: model.views.len(), folder: images });
+        }
+        let missing = model.views.len() - data.views.len();
+        if missing > 0 {
+            progress.warn(&format!("{missing} of {} cameras have no image and are left out", model.views.len()));
+        }
+        Ok(data)
+    }
+}
+
+fn read_view(
+    config: &TrainConfig,
+    view: &ColmapView,
+    lens: &Lens,
+    path: &Path,
+    masked: bool,
+) -> Result<TrainingView<PinholeView>, TrainError> {
+    if !lens.model().is_pinhole() {
+        return Err(TrainError::Lens { name: view.name.clone(), model: lens.model().name() });
+    }
+    let full = [lens.width(), lens.height()];
+    let size = full.map(|s| s / config.shrink);
+    let k = config.shrink as f64;
+    let principal = [lens.principal_point().sample, lens.principal_point().line];
+    let camera = PinholeView {
+        rotation: view.pose.rotation,
+        centre: view.pose.centre,
+        focal_px: lens.focal_px().map(|f| f / k),
+        principal_px: principal.map(|p| (p + 0.5) / k - 0.5),
+        size,
+    };
+    let source = ImageSource::open(path)?;
+    let pixels = source.read_colour(source.window())?;
+    let found = [pixels.width(), pixels.height()];
+    if found != full {
+        return Err(TrainError::Size { what: "the image", path: path.to_owned(), found, expected: full });
+    }
+    let brightest = pixels.data().iter().flatten().copied().fold(0.0f32, f32::max);
+    let white = if brightest > 255.0 { 65_535.0 } else { 255.0 };
+    let colour = [0, 1, 2].map(|c| shrunk(size, config.shrink, |x, y| pixels[(x, y)][c] / white));
+    let stem = Path::new(&view.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let map = |kind: &str, channels: usize| -> Result<Option<Vec<f32>>, TrainError> {
+        let path = config.dataset.join(kind).join(format!("{stem}.npy"));
+        if path.is_file() { Ok(Some(numbers(&path, full, channels)?)) } else { Ok(None) }
+    };
+    let at = |x: usize, y: usize| y * full[0] + x;
+    let half = config.shrink / 2;
+    let nearest = |of: &dyn Fn(usize) -> f32| -> Vec<f32> {
+        let pixel = |i: usize| of(at(i % size[0] * config.shrink + half, i / size[0] * config.shrink + half));
+        (0..size[0] * size[1]).map(pixel).collect()
+    };
+    let finite = |v: f32| if v.is_finite() && v != 0.0 { v } else { f32::NAN };
+    let wants = |kind| config.priors == TrainPriors::Both || config.priors == kind;
+    let depth = if wants(TrainPriors::Depth) { map("raw_depth", 1)? } else { None };
+    let normal = if wants(TrainPriors::Normal) { map("raw_normal", 3)? } else { None };
+    let mask = if masked { map("raw_mask", 1)? } else { None };
+    Ok(TrainingView {
+        camera,
+        colour,
+        mask: mask.map(|mask| nearest(&|i| mask[i]).into_iter().map(|v| v > 0.0).collect()),
+        prior_depth_m: depth.map(|depth| nearest(&|i| finite(depth[i]))),
+        prior_normal: normal.map(|normal| {
+            // A normal of zeros stands for none.
+            let known = |i: usize| normal[3 * i..3 * i + 3].iter().any(|c| *c != 0.0);
+            [0, 1, 2].map(|c| nearest(&|i| if known(i) { normal[3 * i + c] } else { f32::NAN }))
+        }),
+    })
+}
+
+/// Returns the means of squares of pixels.
+fn shrunk(size: [usize; 2], by: usize, value: impl Fn(usize, usize) -> f32) -> Vec<f32> {
+    let mean = |i: usize| {
+        let (x, y) = (i % size[0] * by, i / size[0] * by);
+        let sum: f32 = (0..by * by).map(|k| value(x + k % by, y + k / by)).sum();
+        sum / (by * by) as f32
+    };
+    (0..size[0] * size[1]).map(mean).collect()
+}
+
+fn numbers(path: &Path, size: [usize; 2], channels: usize) -> Result<Vec<f32>, TrainError> {
+    let NpyArray { shape, data } = npy::read(path)?;
+    let expected: &[usize] = if channels == 1 { &[size[1], size[0]] } else { &[size[1], size[0], channels] };
+    if shape != expected {
+        let what = format!("the array has the shape {shape:?}, expected {expected:?}");
+        return Err(TrainError::Dataset { path: path.to_owned(), what });
+    }
+    Ok(match data {
+        NpyData::F32(values) => values,
+        other => other.to_f64().into_iter().map(|v| v as f32).collect(),
+    })
+}
+
+/// Reads the schedule, and whether only buildings are trained. A dataset without one has no mask.
+fn schedule(folder: &Path) -> Result<(Schedule, bool), TrainError> {
+    let path = folder.join("schedule.json");
+    if !path.is_file() {
+        return Ok((Schedule::default(), false));
+    }
+    let invalid = |what: String| TrainError::Dataset { path: path.clone(), what };
+    let value: Value = serde_json::from_str(&files::read_text(&path)?).map_err(|e| invalid(e.to_string()))?;
+    let factors = serde_json::from_value(value["factors"].clone())
+        .map_err(|error| invalid(format!("the factors are not those of a schedule ({error})")))?;
+    Ok((factors, value["mode"] == "building-only"))
+}
+
+/// Checks that depths and normals are meant as the rasteriser means them.
+fn check_conventions(folder: &Path) -> Result<(), TrainError> {
+    let path = folder.join("report.json");
+    if !path.is_file() {
+        return Ok(());
+    }
+    let invalid = |what: String| TrainError::Dataset { path: path.clone(), what };
+    let value: Value = serde_json::from_str(&files::read_text(&path)?).map_err(|e| invalid(e.to_string()))?;
+    for (key, expected) in [("depth", "along the optical axis"), ("normals", "in the axes of the world")] {
+        if let Some(found) = value["settings"][key].as_str().filter(|found| *found != expected) {
+            return Err(invalid(format!("the {key} of the maps: {found}, expected {expected}: make the priors anew")));
+        }
+    }
+    Ok(())
+}

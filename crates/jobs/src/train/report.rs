@@ -1,0 +1,94 @@
+//! The report of a training.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::config::TrainConfig;
+
+/// A finished training.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct TrainReport {
+    /// The settings.
+    pub settings: TrainConfig,
+    /// The splats.
+    pub splats: PathBuf,
+    /// Number of splats at the beginning.
+    pub splats_before: usize,
+    /// Number of splats at the end.
+    pub splats_after: usize,
+    /// Whether only what the masks show is modelled.
+    pub masked: bool,
+    /// Factor of the prior depths, as learned.
+    pub depth_scale: f32,
+    /// Seconds of the iterations of this run.
+    pub seconds: f64,
+    /// Quality of the views before and after.
+    pub views: Vec<TrainedViewRow>,
+    /// Mean loss of the iterations before each point.
+    pub losses: Vec<LossPoint>,
+}
+
+/// Quality of a view.
+#[derive(Debug, Clone, Serialize)]
+pub struct TrainedViewRow {
+    /// File name of the image.
+    pub name: String,
+    /// Whether the view was kept from the training.
+    pub held_out: bool,
+    /// Signal-to-noise ratio before the training, dB.
+    pub psnr_before_db: Option<f64>,
+    /// Signal-to-noise ratio, dB.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity.
+    pub ssim: Option<f64>,
+}
+
+/// Mean terms of the loss over some iterations, without their weights.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct LossPoint {
+    /// Last iteration, counted from 1.
+    pub iteration: u32,
+    /// Number of splats.
+    pub splats: usize,
+    /// Sum with the weights.
+    pub total: f64,
+    /// Colour.
+    pub colour: f64,
+    /// Depths against the prior.
+    pub prior_depth: f64,
+    /// Normals against the prior.
+    pub prior_normal: f64,
+}
+
+impl TrainReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
+        let mean = |held_out: bool, of: fn(&TrainedViewRow) -> Option<f64>| {
+            let values: Vec<f64> = self.views.iter().filter(|v| v.held_out == held_out).filter_map(of).collect();
+            if values.is_empty() {
+                "none".to_owned()
+            } else {
+                format!("{:.2}", values.iter().sum::<f64>() / values.len() as f64)
+            }
+        };
+        let line = |held_out: bool| {
+            format!(
+                "{} dB (before {} dB), SSIM {}",
+                mean(held_out, |v| v.psnr_db),
+                mean(held_out, |v| v.psnr_before_db),
+                mean(held_out, |v| v.ssim)
+            )
+        };
+        format!(
+            "splats    {} ({}, before {})\ntrained   {}\nheld out  {}\ntime      {:.0} s\n",
+            self.splats.display(),
+            self.splats_after,
+            self.splats_before,
+            line(false),
+            line(true),
+            self.seconds,
+        )
+    }
+}

@@ -1,0 +1,34 @@
+//! The view job: an interactive viewer of a run, or of rasters, for the browser of this computer.
+//!
+//! [`ViewServer::open`] finds the layers and takes a port, [`ViewServer::serve`] answers until it
+//! is cancelled or its time is over. The server is read-only and meant for one person:
+//!
+//! - It listens on 127.0.0.1 only. Its address holds a random token of 128 bits, without which
+//!   nothing is answered. The header `Host` must name this computer, so that the page of a foreign
+//!   site cannot reach it under a name of its own (DNS rebinding).
+//! - GET and HEAD are answered, nothing else. Nothing of a request becomes the name of a file:
+//!   layers have numbers.
+//! - A request, its time and the work that it asks for are bounded, and so is the number of
+//!   requests that are answered at once.
+//! - The page consists of the files in `page/`, which are part of the program. It may talk to this
+//!   server only (Content-Security-Policy).
+//!
+//! HTTP heads are parsed by `httparse`. The small servers that were looked at keep heads of any
+//! length in memory and wait for them without end, so the socket is read here.
+
+mod answers;
+mod config;
+mod error;
+mod files;
+mod http;
+mod query;
+mod rasters;
+mod report;
+mod scene;
+mod server;
+mod styles;
+
+pub use config::ViewConfig;
+pub use error::ViewError;
+pub use report::ViewerReport;
+pub use server::ViewServer;

@@ -1,0 +1,157 @@
+//! The server: threads that accept connections, check requests and answer them.
+
+use std::fmt::Write;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use numeric::{CancelFlag, Progress};
+
+use super::answers::Answers;
+use super::config::ViewConfig;
+use super::error::ViewError;
+use super::http::{Answer, Refusal, Request, receive, send};
+use super::report::ViewerReport;
+use super::scene::Scene;
+
+/// Connections that are served at once. A browser opens six, and some that it leaves idle.
+const WORKERS: usize = 12;
+/// Bytes of the token.
+const TOKEN_BYTES: usize = 16;
+/// Time between two looks whether the viewer ends.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// A viewer that listens and is not served yet.
+pub struct ViewServer {
+    scene: Scene,
+    listener: TcpListener,
+    address: SocketAddr,
+    token: String,
+    seconds: Option<f64>,
+}
+
+/// Requests by what became of them.
+#[derive(Default)]
+struct Counts {
+    answered: AtomicU64,
+    refused: AtomicU64,
+    failed: AtomicU64,
+}
+
+impl ViewServer {
+    /// Finds the layers, and listens on 127.0.0.1. Warnings say what is left out.
+    ///
+    /// # Errors
+    /// [`ViewError`]: a setting out of range, rasters that cannot be read, a port that is taken.
+    pub fn open(config: &ViewConfig, progress: &dyn Progress) -> Result<Self, ViewError> {
+        config.validate()?;
+        let scene = Scene::open(config, progress)?;
+        let mut bytes = [0u8; TOKEN_BYTES];
+        getrandom::fill(&mut bytes).map_err(|error| ViewError::Token { reason: error.to_string() })?;
+        let token = bytes.iter().fold(String::new(), |mut token, byte| {
+            // Writing into a text cannot fail.
+            let _ = write!(token, "{byte:02x}");
+            token
+        });
+        let port = config.port.unwrap_or(0);
+        let taken = |source| ViewError::Port { port, source };
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(taken)?;
+        let address = listener.local_addr().map_err(taken)?;
+        Ok(Self { scene, listener, address, token, seconds: config.seconds })
+    }
+
+    /// Returns the address of the page, with the token.
+    pub fn url(&self) -> String {
+        format!("http://{}/{}/", self.address, self.token)
+    }
+
+    /// Opens the page in the browser that the system prefers. The address, and with it the token,
+    /// is an argument of that program, which other users of this computer may be able to see.
+    ///
+    /// # Errors
+    /// [`ViewError::Browser`] when there is no such program.
+    pub fn open_browser(&self) -> Result<(), ViewError> {
+        let program = match std::env::consts::OS {
+            "macos" => "open",
+            "windows" => "explorer",
+            _ => "xdg-open",
+        };
+        let mut command = Command::new(program);
+        command.arg(self.url()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command.spawn().map(drop).map_err(ViewError::Browser)
+    }
+
+    /// Answers requests until the job is cancelled or the time of the configuration is over.
+    ///
+    /// # Errors
+    /// [`ViewError::Thread`] when the system starts no threads.
+    pub fn serve(&self, progress: &dyn Progress) -> Result<ViewerReport, ViewError> {
+        let start = Instant::now();
+        let (stop, counts) = (CancelFlag::new(), Counts::default());
+        let started = std::thread::scope(|scope| {
+            let work = || self.work(&stop, &counts);
+            let spawn = |_| std::thread::Builder::new().name("view".to_owned()).spawn_scoped(scope, work);
+            let started = (0..WORKERS).try_for_each(|i| spawn(i).map(drop));
+            let is_over = || self.seconds.is_some_and(|seconds| start.elapsed().as_secs_f64() >= seconds);
+            while started.is_ok() && !progress.is_cancelled() && !is_over() {
+                std::thread::sleep(PAUSE);
+            }
+            stop.cancel();
+            // Each thread that waits for a connection gets one, and then sees the flag.
+            (0..WORKERS).for_each(|_| drop(TcpStream::connect_timeout(&self.address, PAUSE)));
+            started
+        });
+        started.map_err(ViewError::Thread)?;
+        let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        Ok(ViewerReport {
+            layers: self.scene.layers.iter().map(|layer| layer.title.clone()).collect(),
+            answered: count(&counts.answered),
+            refused: count(&counts.refused),
+            failed: count(&counts.failed),
+            seconds: start.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// Answers one connection after the other until the flag is set.
+    fn work(&self, stop: &CancelFlag, counts: &Counts) {
+        let mut answers = Answers::new(&self.scene);
+        while !stop.is_cancelled() {
+            let Ok((mut stream, _)) = self.listener.accept() else {
+                // Too many open files, for example.
+                std::thread::sleep(PAUSE);
+                continue;
+            };
+            let request = receive(&mut stream, &|| stop.is_cancelled());
+            let is_head = request.as_ref().is_ok_and(|request| request.is_head);
+            let answer = request.and_then(|request| self.answer(&request, &mut answers));
+            let counter = match &answer {
+                Err(Refusal::Gone) => continue,
+                Ok(_) => &counts.answered,
+                Err(Refusal::Failed(_)) => &counts.failed,
+                Err(_) => &counts.refused,
+            };
+            counter.fetch_add(1, Ordering::Relaxed);
+            send(&mut stream, is_head, &answer);
+        }
+    }
+
+    /// Checks the host and the token of a request, and answers it.
+    fn answer(&self, request: &Request, answers: &mut Answers<'_>) -> Result<Answer, Refusal> {
+        let port = self.address.port();
+        if ![format!("127.0.0.1:{port}"), format!("localhost:{port}")].contains(&request.host) {
+            return Err(Refusal::ForeignHost);
+        }
+        let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
+        let (token, path) = path.strip_prefix('/').and_then(|path| path.split_once('/')).ok_or(Refusal::NotFound)?;
+        if !is_same(token, &self.token) {
+            return Err(Refusal::NotFound);
+        }
+        answers.answer(path, query)
+    }
+}
+
+/// Compares two texts in a time that does not tell where they differ.
+fn is_same(a: &str, b: &str) -> bool {
+    a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
+}

@@ -1,0 +1,311 @@
+//! The loss of a drawing against a view, and its gradient by the images.
+//!
+//! All terms are means over pixels, so that images of any size count alike:
+//! L = L_colour + λ L_mask + λ L_distortion + λ L_consistency + λ L_depth + λ L_normal. The terms
+//! with priors are those of GS4Buildings: |M|⁻¹ Σ |D̂ − s D| with a learned scale s, and
+//! |M|⁻¹ Σ (1 − ⟨N̂, N⟩).
+
+use crate::config::LossWeights;
+use crate::image::SurfelImages;
+use crate::view::SurfelCamera;
+
+/// Coverage below which a pixel has no depth to compare.
+const LEAST_COVERAGE: f32 = 0.1;
+
+/// What a view shows, by rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrainingView<C> {
+    /// The camera.
+    pub camera: C,
+    /// Red, green, blue; 0 to 1. NaN where the image has no data.
+    pub colour: [Vec<f32>; 3],
+    /// Whether a pixel belongs to what is modelled. Elsewhere the model has to be empty. All pixels
+    /// belong to it when `None`.
+    pub mask: Option<Vec<bool>>,
+    /// Depths of a prior model, metres; NaN where it has none.
+    pub prior_depth_m: Option<Vec<f32>>,
+    /// Unit normals of a prior model in the local frame; NaN where it has none.
+    pub prior_normal: Option<[Vec<f32>; 3]>,
+}
+
+/// What belongs to an image rather than to the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewAppearance {
+    /// Factors of red, green and blue.
+    pub gain: [f32; 3],
+    /// What is added to red, green and blue where the model covers the image.
+    pub offset: [f32; 3],
+}
+
+impl ViewAppearance {
+    /// Colours as they are.
+    pub const PLAIN: Self = Self { gain: [1.0; 3], offset: [0.0; 3] };
+}
+
+/// The terms of a loss without their weights.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LossTerms {
+    /// Colour.
+    pub colour: f64,
+    /// Mean squared difference of colours, for the signal-to-noise ratio.
+    pub squared: f64,
+    /// Coverage against the mask.
+    pub mask: f64,
+    /// Spread of the depths of a ray.
+    pub distortion: f64,
+    /// Normals of splats against those of depths.
+    pub consistency: f64,
+    /// Depths against the prior.
+    pub prior_depth: f64,
+    /// Normals against the prior.
+    pub prior_normal: f64,
+    /// Sum with the weights.
+    pub total: f64,
+}
+
+/// Gradient of a loss by what is learned of a view.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ViewSlopes {
+    /// By gain (red, green, blue) and offset.
+    pub appearance: [f32; 6],
+    /// By the depth scale.
+    pub depth_scale: f32,
+}
+
+/// Everything that a loss is computed from.
+pub(crate) struct LossInput<'a, C> {
+    pub(crate) images: &'a SurfelImages,
+    pub(crate) view: &'a TrainingView<C>,
+    pub(crate) weights: LossWeights,
+    pub(crate) appearance: ViewAppearance,
+    /// Factor of the prior depths.
+    pub(crate) depth_scale: f32,
+    /// Size of the scene, metres.
+    pub(crate) extent_m: f64,
+}
+
+impl<C: SurfelCamera> LossInput<'_, C> {
+    /// Computes the loss, and its gradient into `out`.
+    pub(crate) fn compute(&self, out: &mut SurfelImages) -> (LossTerms, ViewSlopes) {
+        out.resize(self.images.size);
+        for plane in out.planes_mut() {
+            plane.fill(0.0);
+        }
+        let (mut terms, mut slopes) = (LossTerms::default(), ViewSlopes::default());
+        self.colour(out, &mut terms, &mut slopes);
+        self.mask(out, &mut terms);
+        self.distortion(out, &mut terms);
+        self.consistency(out, &mut terms);
+        self.prior_depth(out, &mut terms, &mut slopes);
+        self.prior_normal(out, &mut terms);
+        let w = &self.weights;
+        terms.total = terms.colour
+            + w.mask * terms.mask
+            + w.distortion * terms.distortion
+            + w.consistency * terms.consistency
+            + w.prior_depth * terms.prior_depth
+            + w.prior_normal * terms.prior_normal;
+        (terms, slopes)
+    }
+
+    fn is_modelled(&self, pixel: usize) -> bool {
+        self.view.mask.as_ref().is_none_or(|mask| mask[pixel])
+    }
+
+    fn colour(&self, out: &mut SurfelImages, terms: &mut LossTerms, slopes: &mut ViewSlopes) {
+        let target = &self.view.colour;
+        let seen = |pixel: &usize| self.is_modelled(*pixel) && target.iter().all(|c| c[*pixel].is_finite());
+        let count = (0..self.images.coverage.len()).filter(seen).count().max(1) as f64 * 3.0;
+        let (absolute, squared) = (self.weights.absolute as f32, 1.0 - self.weights.absolute as f32);
+        let unit = (1.0 / count) as f32;
+        for (k, target) in target.iter().enumerate() {
+            let (gain, offset) = (self.appearance.gain[k], self.appearance.offset[k]);
+            let (mut sum, mut squares, mut by_gain, mut by_offset) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            for pixel in (0..self.images.coverage.len()).filter(seen) {
+                let (colour, coverage) = (self.images.colour[k][pixel], self.images.coverage[pixel]);
+                let error = gain * colour + offset * coverage - target[pixel];
+                sum += f64::from(absolute * error.abs() + squared * error * error);
+                squares += f64::from(error * error);
+                let slope = (absolute * sign(error) + 2.0 * squared * error) * unit;
+                out.colour[k][pixel] += slope * gain;
+                out.coverage[pixel] += slope * offset;
+                by_gain += f64::from(slope * colour);
+                by_offset += f64::from(slope * coverage);
+            }
+            terms.colour += sum / count;
+            terms.squared += squares / count;
+            slopes.appearance[k] = by_gain as f32;
+            slopes.appearance[3 + k] = by_offset as f32;
+        }
+    }
+
+    /// The coverage is to be that of the mask: 1 within, 0 elsewhere.
+    fn mask(&self, out: &mut SurfelImages, terms: &mut LossTerms) {
+        let Some(mask) = &self.view.mask else { return };
+        let unit = 1.0 / mask.len().max(1) as f64;
+        let slope = (2.0 * self.weights.mask * unit) as f32;
+        for (pixel, &modelled) in mask.iter().enumerate() {
+            let error = self.images.coverage[pixel] - if modelled { 1.0 } else { 0.0 };
+            terms.mask += f64::from(error * error) * unit;
+            out.coverage[pixel] += slope * error;
+        }
+    }
+
+    fn distortion(&self, out: &mut SurfelImages, terms: &mut LossTerms) {
+        let unit = 1.0 / (self.images.coverage.len().max(1) as f64 * self.extent_m * self.extent_m);
+        terms.distortion = self.images.distortion_m2.iter().map(|&d| f64::from(d)).sum::<f64>() * unit;
+        out.distortion_m2.fill((self.weights.distortion * unit) as f32);
+    }
+
+    /// The normals of the splats are turned to those of the drawn depths, which are held fixed.
+    fn consistency(&self, out: &mut SurfelImages, terms: &mut LossTerms) {
+        if self.weights.consistency == 0.0 {
+            return;
+        }
+        let [width, height] = self.images.size;
+        let unit = 1.0 / self.images.coverage.len().max(1) as f64;
+        for row in 0..height.saturating_sub(1) {
+            for column in 0..width.saturating_sub(1) {
+                let Some(normal) = self.normal_of_depth(column, row) else { continue };
+                let pixel = row * width + column;
+                let along: f32 = (0..3).map(|i| self.images.normal[i][pixel] * normal[i]).sum();
+                terms.consistency += f64::from(self.images.coverage[pixel] - along) * unit;
+                let slope = (self.weights.consistency * unit) as f32;
+                out.coverage[pixel] += slope;
+                (0..3).for_each(|i| out.normal[i][pixel] -= slope * normal[i]);
+            }
+        }
+    }
+
+    /// Returns the unit normal of the drawn depths at a pixel, turned to the camera.
+    fn normal_of_depth(&self, column: usize, row: usize) -> Option<[f32; 3]> {
+        let width = self.images.size[0];
+        let point = |column: usize, row: usize| {
+            let pixel = row * width + column;
+            let coverage = self.images.coverage[pixel];
+            let depth = f64::from(self.images.depth_m[pixel] / coverage);
+            let point = self.view.camera.point([column as f64, row as f64], depth);
+            point.filter(|_| coverage > 0.5)
+        };
+        let (here, right, below) = (point(column, row)?, point(column + 1, row)?, point(column, row + 1)?);
+        let (a, b) = ([0, 1, 2].map(|i| right[i] - here[i]), [0, 1, 2].map(|i| below[i] - here[i]));
+        // Columns run to the right and rows down, so that this points to the camera.
+        let n = [b[1] * a[2] - b[2] * a[1], b[2] * a[0] - b[0] * a[2], b[0] * a[1] - b[1] * a[0]];
+        let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
+        (length > 0.0).then(|| n.map(|c| (c / length) as f32))
+    }
+
+    fn prior_depth(&self, out: &mut SurfelImages, terms: &mut LossTerms, slopes: &mut ViewSlopes) {
+        let Some(prior) = self.view.prior_depth_m.as_ref().filter(|_| self.weights.prior_depth > 0.0) else { return };
+        let images = self.images;
+        let compared = |pixel: &usize| prior[*pixel].is_finite() && images.coverage[*pixel] > LEAST_COVERAGE;
+        let count = (0..prior.len()).filter(compared).count().max(1) as f64;
+        let unit = 1.0 / (count * self.extent_m);
+        for pixel in (0..prior.len()).filter(compared) {
+            let coverage = images.coverage[pixel];
+            let depth = images.depth_m[pixel] / coverage;
+            let error = depth - self.depth_scale * prior[pixel];
+            terms.prior_depth += f64::from(error.abs()) * unit;
+            let slope = sign(error) * (self.weights.prior_depth * unit) as f32;
+            out.depth_m[pixel] += slope / coverage;
+            out.coverage[pixel] -= slope * depth / coverage;
+            slopes.depth_scale -= slope * prior[pixel];
+        }
+    }
+
+    fn prior_normal(&self, out: &mut SurfelImages, terms: &mut LossTerms) {
+        let Some(prior) = self.view.prior_normal.as_ref().filter(|_| self.weights.prior_normal > 0.0) else { return };
+        let known = |pixel: &usize| prior.iter().all(|c| c[*pixel].is_finite());
+        let count = (0..prior[0].len()).filter(known).count().max(1) as f64;
+        let slope = (self.weights.prior_normal / count) as f32;
+        for pixel in (0..prior[0].len()).filter(known) {
+            let along: f32 = (0..3).map(|i| self.images.normal[i][pixel] * prior[i][pixel]).sum();
+            terms.prior_normal += f64::from(1.0 - along) / count;
+            (0..3).for_each(|i| out.normal[i][pixel] -= slope * prior[i][pixel]);
+        }
+    }
+}
+
+/// The slope of the absolute value, 0 at 0.
+fn sign(value: f32) -> f32 {
+    if value == 0.0 { 0.0 } else { value.signum() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::PinholeView;
+
+    const SIZE: [usize; 2] = [5, 4];
+
+    fn value(seed: usize, low: f32, high: f32) -> f32 {
+        low + (high - low) * ((seed * 7919 + 31) % 1009) as f32 / 1009.0
+    }
+
+    fn plane(seed: usize, low: f32, high: f32) -> Vec<f32> {
+        (0..20).map(|i| value(seed * 100 + i, low, high)).collect()
+    }
+
+    #[test]
+    fn gradients_are_differences_of_the_loss() {
+        let mut images = SurfelImages::zeros(SIZE);
+        for (k, p) in images.planes_mut().into_iter().enumerate() {
+            *p = plane(k, 0.3, 0.9);
+        }
+        let camera = PinholeView {
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            centre: [0.0; 3],
+            focal_px: [5.0; 2],
+            principal_px: [2.0; 2],
+            size: SIZE,
+        };
+        let mut prior_depth_m = plane(30, 0.5, 1.5);
+        prior_depth_m[3] = f32::NAN;
+        let view = TrainingView {
+            camera,
+            colour: [20, 21, 22].map(|k| plane(k, 0.0, 1.0)),
+            mask: Some((0..20).map(|i| i % 3 > 0).collect()),
+            prior_depth_m: Some(prior_depth_m),
+            prior_normal: Some([40, 41, 42].map(|k| plane(k, -1.0, 1.0))),
+        };
+        // The normals of the drawn depths are held fixed, so that they have no differences.
+        let weights = LossWeights { consistency: 0.0, ..LossWeights::default() };
+        let appearance = ViewAppearance { gain: [1.1, 0.9, 1.0], offset: [0.05, 0.0, -0.05] };
+        let loss = |images: &SurfelImages, appearance: ViewAppearance, depth_scale: f32| {
+            let mut out = SurfelImages::default();
+            let input = LossInput { images, view: &view, weights, appearance, depth_scale, extent_m: 2.0 };
+            let (terms, slopes) = input.compute(&mut out);
+            (terms.total, slopes, out)
+        };
+        let (_, slopes, by_images) = loss(&images, appearance, 1.02);
+        let step = 1e-3f32;
+        let close = |found: f32, ahead: f64, behind: f64, what: &str| {
+            let slope = (ahead - behind) / f64::from(2.0 * step);
+            assert!((slope - f64::from(found)).abs() < 2e-4, "{what}: {found} is not {slope}");
+        };
+        for k in 0..9 {
+            for pixel in 0..20 {
+                let moved = |by: f32| {
+                    let mut images = images.clone();
+                    images.planes_mut()[k][pixel] += by;
+                    loss(&images, appearance, 1.02).0
+                };
+                close(by_images.planes()[k][pixel], moved(step), moved(-step), &format!("image {k}, pixel {pixel}"));
+            }
+        }
+        for k in 0..6 {
+            let moved = |by: f32| {
+                let mut appearance = appearance;
+                if k < 3 {
+                    appearance.gain[k] += by
+                } else {
+                    appearance.offset[k - 3] += by
+                }
+                loss(&images, appearance, 1.02).0
+            };
+            close(slopes.appearance[k], moved(step), moved(-step), "appearance");
+        }
+        let moved = |by: f32| loss(&images, appearance, 1.02 + by).0;
+        close(slopes.depth_scale, moved(step), moved(-step), "depth scale");
+    }
+}

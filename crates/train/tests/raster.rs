@@ -1,0 +1,224 @@
+//! The rasteriser against a slow reference in f64, and its gradients against central differences.
+
+mod reference;
+
+use numeric::SplitMix64;
+use proptest::prelude::*;
+use reference::{Eye, Parameters, draw};
+use train::{
+    AffineView, Drawing, LocalView, PinholeView, Registers, Surfel, SurfelCamera, SurfelGradients, SurfelImages,
+};
+
+const SIZE: [usize; 2] = [37, 29];
+/// Step of the central differences.
+const STEP: f64 = 1e-6;
+
+/// A random scene before a camera at the origin that looks along the third axis.
+fn surfel() -> impl Strategy<Value = Surfel> {
+    let range = |low: f32, high: f32| (0..=10_000u32).prop_map(move |t| low + (high - low) * t as f32 / 10_000.0);
+    let around = range(-1.0, 1.0);
+    (
+        [range(-2.0, 2.0), range(-1.5, 1.5), range(4.0, 8.0)],
+        [around.clone(), around.clone(), around.clone(), around],
+        [range(-3.0, 0.0), range(-3.0, 0.0)],
+        range(-3.0, 6.0),
+        [range(0.0, 1.0), range(0.0, 1.0), range(0.0, 1.0)],
+    )
+        .prop_filter("the quaternion has a length", |(_, q, ..)| q.iter().map(|c| c * c).sum::<f32>() > 0.05)
+        .prop_map(|(position, rotation, log_scale, opacity_logit, colour)| Surfel {
+            position,
+            rotation,
+            log_scale,
+            opacity_logit,
+            colour,
+        })
+}
+
+fn pinhole() -> (PinholeView, Eye) {
+    let (rotation, centre) = ([[0.96, 0.0, -0.28], [0.0, 1.0, 0.0], [0.28, 0.0, 0.96]], [-1.0, 0.1, 0.2]);
+    let (focal, principal) = ([35.0, 33.0], [17.3, 14.2]);
+    let view = PinholeView { rotation, centre, focal_px: focal, principal_px: principal, size: SIZE };
+    (view, Eye::Pinhole { rotation, centre, focal, principal })
+}
+
+fn affine(surfels: &[Surfel]) -> (AffineView, Eye) {
+    let jacobian = [[6.5, 0.7, 1.9], [-0.5, 7.1, 0.8]];
+    let (pixel, axis) = ([6.0, 9.5], [-0.1, 0.2, 0.97]);
+    let along = |a: [f64; 3], p: [f64; 3]| a[0] * p[0] + a[1] * p[1] + a[2] * p[2];
+    // Anchors lie beside the centres, as they do after a while of training.
+    let anchors: Vec<[f64; 3]> = surfels.iter().map(|s| s.position.map(|c| f64::from(c) + 0.3)).collect();
+    let view = |p: &[f64; 3]| {
+        Some(LocalView {
+            pixel: [0, 1].map(|i| pixel[i] + along(jacobian[i], *p)),
+            jacobian,
+            depth_m: along(axis, *p),
+            depth_axis: axis,
+        })
+    };
+    let views = anchors.iter().map(view).collect();
+    (AffineView { size: SIZE, anchors, views }, Eye::Affine { pixel, jacobian, axis })
+}
+
+fn exact(surfels: &[Surfel]) -> Vec<Parameters> {
+    surfels.iter().map(|s| s.to_array().map(f64::from)).collect()
+}
+
+/// Values between −1 and 1 that look random.
+fn weight(plane: usize, place: usize) -> f32 {
+    ((plane * 7919 + place * 104_729 + 13) % 2003) as f32 / 1001.0 - 1.0
+}
+
+fn check_image<C: SurfelCamera>(surfels: &[Surfel], camera: &C, eye: &Eye) -> Result<(), TestCaseError> {
+    let found = Drawing::new(surfels, camera, Registers::Longest);
+    let truth = draw(&exact(surfels), eye, SIZE);
+    let sure = truth.unsure.iter().filter(|u| !**u).count();
+    // A surfel that is almost seen from the edge makes the whole image unsure.
+    prop_assume!(sure > SIZE[0] * SIZE[1] / 2);
+    for (number, (found, plane)) in found.images().planes().into_iter().zip(&truth.planes).enumerate() {
+        // Depths are metres at up to 10 m, so that they are compared relative to 10.
+        let unit = if number >= 7 { 10.0 } else { 1.0 };
+        for place in (0..found.len()).filter(|&p| !truth.unsure[p]) {
+            let error = (f64::from(found[place]) - plane[place]).abs() / unit;
+            prop_assert!(error < 1e-5, "image {number}, pixel {place}: {} is not {}", found[place], plane[place]);
+        }
+    }
+    Ok(())
+}
+
+fn check_gradients<C: SurfelCamera>(surfels: &[Surfel], camera: &C, eye: &Eye) -> Result<(), TestCaseError> {
+    let parameters = exact(surfels);
+    let unsure = draw(&parameters, eye, SIZE).unsure;
+    let mut by_images = SurfelImages::zeros(SIZE);
+    for (number, plane) in by_images.planes_mut().into_iter().enumerate() {
+        for (place, value) in plane.iter_mut().enumerate() {
+            *value = if unsure[place] { 0.0 } else { weight(number, place) };
+        }
+    }
+    let mut found = SurfelGradients::default();
+    Drawing::new(surfels, camera, Registers::Longest).gradients(surfels, camera, &by_images, &mut found);
+    // The slope of the loss, and the sum of its absolute parts: what rounding is relative to where
+    // the parts cancel.
+    let slope = |number: usize, parameter: usize| {
+        let moved = |by: f64| {
+            let mut moved = parameters.clone();
+            moved[number][parameter] += by;
+            draw(&moved, eye, SIZE).planes
+        };
+        let (ahead, behind, weights) = (moved(STEP), moved(-STEP), by_images.planes());
+        let parts = (0..9).flat_map(|k| (0..weights[k].len()).map(move |p| (k, p)));
+        parts.fold([0.0; 2], |[sum, size], (k, p)| {
+            let part = f64::from(weights[k][p]) * (ahead[k][p] - behind[k][p]) / (2.0 * STEP);
+            [sum + part, size + part.abs()]
+        })
+    };
+    for (number, found) in found.surfels.iter().enumerate() {
+        let truth: [[f64; 2]; 13] = std::array::from_fn(|parameter| slope(number, parameter));
+        for group in [0..3, 3..7, 7..9, 9..10, 10..13] {
+            let length = |v: &mut dyn Iterator<Item = f64>| v.map(|c| c * c).sum::<f64>().sqrt();
+            let (truth, found) = (&truth[group.clone()], &found.to_array()[group.clone()]);
+            let difference = length(&mut truth.iter().zip(found).map(|(t, f)| t[0] - f64::from(*f)));
+            let [slope, size] = [0, 1].map(|i| length(&mut truth.iter().map(|t| t[i])));
+            let error = difference / slope.max(0.1 * size).max(1e-6);
+            prop_assert!(error < 1e-4, "surfel {number}, {group:?}: {found:?} is not {truth:?} ({error:.1e})");
+        }
+    }
+    Ok(())
+}
+
+/// Images and gradients of a scene with a tile that is cut by the border.
+fn whole<C: SurfelCamera>(surfels: &[Surfel], camera: &C, registers: Registers, threads: usize) -> Vec<u32> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(|| {
+        let mut drawing = Drawing::new(surfels, camera, registers);
+        let mut by_images = SurfelImages::zeros(camera.size());
+        for (number, plane) in by_images.planes_mut().into_iter().enumerate() {
+            plane.iter_mut().enumerate().for_each(|(place, value)| *value = weight(number, place));
+        }
+        let mut gradients = SurfelGradients::default();
+        drawing.gradients(surfels, camera, &by_images, &mut gradients);
+        let planes = drawing.images().planes().into_iter().flatten().copied();
+        let slopes = gradients.surfels.iter().flat_map(|s| s.to_array()).chain(gradients.by_pixel.iter().copied());
+        planes.chain(slopes).map(f32::to_bits).collect()
+    })
+}
+
+#[test]
+fn threads_and_registers_change_no_bit() {
+    let mut random = SplitMix64::new(3);
+    let mut between = |low: f64, high: f64| random.uniform_in(low, high) as f32;
+    let surfels: Vec<Surfel> = (0..3000)
+        .map(|_| Surfel {
+            position: [between(-4.0, 4.0), between(-3.0, 3.0), between(3.0, 9.0)],
+            rotation: [1.0, between(-1.0, 1.0), between(-1.0, 1.0), between(-1.0, 1.0)],
+            log_scale: [between(-5.0, -1.0), between(-5.0, -1.0)],
+            opacity_logit: between(-3.0, 6.0),
+            colour: [0.0; 3].map(|_| between(0.0, 1.0)),
+        })
+        .collect();
+    let pinhole = PinholeView { focal_px: [150.0; 2], principal_px: [89.0, 61.0], size: [181, 125], ..pinhole().0 };
+    let (affine, _) = affine(&surfels);
+    let plain = [whole(&surfels, &pinhole, Registers::Plain, 1), whole(&surfels, &affine, Registers::Plain, 1)];
+    assert!(plain[0].iter().filter(|bits| **bits != 0).count() > 200_000);
+    for registers in [Registers::Plain, Registers::AtMost256, Registers::Longest] {
+        for threads in [1, 2, 5] {
+            assert!(whole(&surfels, &pinhole, registers, threads) == plain[0], "{registers:?}, {threads} threads");
+            assert!(whole(&surfels, &affine, registers, threads) == plain[1], "{registers:?}, {threads} threads");
+        }
+    }
+}
+
+#[test]
+fn a_surfel_beside_the_camera_covers_what_its_plane_covers() {
+    // The floor of a street, of which a part lies behind the camera.
+    let (camera, eye) = pinhole();
+    let camera = PinholeView { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], ..camera };
+    let Eye::Pinhole { centre, focal, principal, .. } = eye else { unreachable!("the camera is a pinhole") };
+    let eye = Eye::Pinhole { rotation: camera.rotation, centre, focal, principal };
+    let floor = Surfel {
+        position: [-1.0, 1.6, 1.5],
+        rotation: [0.5f32.sqrt(), 0.5f32.sqrt(), 0.0, 0.0],
+        log_scale: [0.7, 1.2],
+        opacity_logit: 3.0,
+        colour: [1.0, 0.5, 0.25],
+    };
+    check_image(&[floor], &camera, &eye).expect("the images agree");
+    let drawing = Drawing::new(&[floor], &camera, Registers::Longest);
+    let coverage = |row: usize| drawing.images().coverage[row * SIZE[0] + SIZE[0] / 2];
+    assert!(coverage(28) > 0.5 && coverage(5) == 0.0, "{} {}", coverage(28), coverage(5));
+}
+
+#[test]
+fn nothing_is_drawn_of_nothing() {
+    let (camera, _) = pinhole();
+    let empty = Drawing::new(&[], &camera, Registers::Longest);
+    assert!(empty.images().planes().iter().all(|plane| plane.iter().all(|v| *v == 0.0)));
+    let none = PinholeView { size: [0, 7], ..camera };
+    assert_eq!(Drawing::new(&[Surfel::default()], &none, Registers::Longest).pairs(), 0);
+    let broken = Surfel { position: [f32::NAN; 3], log_scale: [f32::INFINITY; 2], ..Surfel::default() };
+    let hidden = [broken, Surfel { position: [0.0, 0.0, f32::INFINITY], ..broken }, Surfel::default()];
+    let mut drawing = Drawing::new(&hidden, &camera, Registers::Longest);
+    assert_eq!(drawing.pairs(), 0);
+    let mut gradients = SurfelGradients::default();
+    drawing.gradients(&hidden, &camera, &SurfelImages::zeros(SIZE), &mut gradients);
+    assert_eq!(gradients.surfels, [Surfel::default(); 3]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn images_are_those_of_the_reference(surfels in prop::collection::vec(surfel(), 1..25)) {
+        let (camera, eye) = pinhole();
+        check_image(&surfels, &camera, &eye)?;
+        let (camera, eye) = affine(&surfels);
+        check_image(&surfels, &camera, &eye)?;
+    }
+
+    #[test]
+    fn gradients_are_central_differences(surfels in prop::collection::vec(surfel(), 1..9)) {
+        let (camera, eye) = pinhole();
+        check_gradients(&surfels, &camera, &eye)?;
+        let (camera, eye) = affine(&surfels);
+        check_gradients(&surfels, &camera, &eye)?;
+    }
+}

@@ -1,0 +1,126 @@
+//! `skysweep train` end to end: priors of the town and images of it become splats that show views
+//! which were not trained on; a training goes on from its checkpoint; and what is refused.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use common::{sample, skysweep};
+use io::raster::write_png_rgb;
+use predicates::prelude::*;
+use raster::Grid;
+use train::{Drawing, PinholeView, Registers, Surfel};
+
+/// A dataset of the town's priors with images: the points of the model under a pattern, drawn
+/// larger and by other cameras than any training knows. Made once.
+fn dataset() -> &'static Path {
+    static DATASET: OnceLock<PathBuf> = OnceLock::new();
+    DATASET.get_or_init(|| {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("train_dataset");
+        skysweep()
+            .arg("priors")
+            .arg(sample("truth/buildings.city.json"))
+            .arg("--cameras")
+            .arg(sample("cameras"))
+            .args(["--points", "12000", "--overwrite", "-o"])
+            .arg(&folder)
+            .assert()
+            .success();
+        draw_images(&folder);
+        folder
+    })
+}
+
+fn draw_images(folder: &Path) {
+    let (model, points) = io::colmap::read_with_points(&folder.join("sparse/0")).unwrap();
+    let surfel = |p: &io::colmap::ColmapPoint| {
+        let [x, y, z] = p.position;
+        let tone =
+            |k: f64| (0.5 + 0.35 * ((0.2 + 0.05 * k) * x + 0.1 * y).sin() * (0.15 * y + 0.3 * z + k).cos()) as f32;
+        // Upright discs that face a corner of the sky hide what lies behind them from all sides.
+        Surfel {
+            position: p.position.map(|c| c as f32),
+            rotation: [0.9, 0.3, 0.2, 0.1],
+            log_scale: [0.2, 0.2],
+            opacity_logit: 6.0,
+            colour: [tone(0.0), tone(1.0), tone(2.0)],
+        }
+    };
+    let surfels: Vec<Surfel> = points.iter().map(surfel).collect();
+    for view in &model.views {
+        let lens = &model.lenses[view.lens];
+        let camera = PinholeView {
+            rotation: view.pose.rotation,
+            centre: view.pose.centre,
+            focal_px: lens.focal_px(),
+            principal_px: [lens.principal_point().sample, lens.principal_point().line],
+            size: [lens.width(), lens.height()],
+        };
+        let drawing = Drawing::new(&surfels, &camera, Registers::Longest);
+        let mut picture = Grid::filled(lens.width(), lens.height(), [0u8; 3]);
+        for (pixel, value) in picture.data_mut().iter_mut().enumerate() {
+            *value = drawing.images().colour.each_ref().map(|plane| (255.0 * plane[pixel]).round() as u8);
+        }
+        let path = folder.join("images").join(&view.name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        write_png_rgb(path, &picture, true).unwrap();
+    }
+}
+
+fn train(output: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    let mut command = skysweep();
+    command.arg("train").arg(dataset()).arg("-o").arg(output).args(["--shrink", "4", "--budget", "8000"]);
+    command.args(arguments).assert()
+}
+
+fn report_of(folder: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(folder.join("report.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn views_that_were_not_trained_on_become_better() {
+    let out = tempfile::tempdir().unwrap();
+    let told = train(&out.path().join("a"), &["--iterations", "150", "--hold-out", "4"]).success();
+    told.stdout(predicate::str::contains("held out"));
+    let report = report_of(&out.path().join("a"));
+    let held: Vec<_> = report["views"].as_array().unwrap().iter().filter(|v| v["held_out"] == true).collect();
+    assert_eq!(held.len(), 3);
+    for view in held {
+        let [before, after] = ["psnr_before_db", "psnr_db"].map(|key| view[key].as_f64().unwrap());
+        assert!(after > before + 1.0, "{view}");
+    }
+    let splats = io::splat_ply::read(&out.path().join("a/splats.ply")).unwrap();
+    assert_eq!(splats.splats.len() as u64, report["splats_after"].as_u64().unwrap());
+    assert!(splats.splats.len() <= 8000 && !out.path().join("a/checkpoint.bin").exists());
+    assert_eq!(std::fs::read_dir(out.path().join("a/renders")).unwrap().count(), 3);
+    let losses = report["losses"].as_array().unwrap();
+    let colour = |i: usize| losses[i]["colour"].as_f64().unwrap();
+    assert!(colour(losses.len() - 1) < 0.8 * colour(0), "{losses:?}");
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let out = tempfile::tempdir().unwrap();
+    let splats = |name: &str, threads: &str| {
+        train(&out.path().join(name), &["--iterations", "20", "--threads", threads]).success();
+        std::fs::read(out.path().join(name).join("splats.ply")).unwrap()
+    };
+    assert!(splats("one", "1") == splats("two", "2"));
+}
+
+#[test]
+fn what_cannot_be_trained_is_refused() {
+    let out = tempfile::tempdir().unwrap();
+    let refused = |arguments: &[&str], what: &str| {
+        train(&out.path().join("x"), arguments).code(2).stderr(predicate::str::contains(what.to_owned()));
+    };
+    refused(&["--pictures", "nowhere"], "none of 12 cameras has an image");
+    refused(&["--iterations", "0"], "number of iterations is 0");
+    refused(&["--hold-out", "1"], "view to keep is 1");
+    std::fs::create_dir_all(out.path().join("x")).unwrap();
+    std::fs::write(out.path().join("x/checkpoint.bin"), b"other").unwrap();
+    refused(&["--resume"], "cannot go on from the checkpoint");
+    std::fs::write(out.path().join("x/splats.ply"), b"old").unwrap();
+    refused(&[], "exists already");
+}
