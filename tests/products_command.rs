@@ -27,10 +27,16 @@ fn report(folder: &Path) -> Value {
 fn the_cloud_has_the_observed_cells_of_the_run() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("run");
-    run_of_town(&folder, &["--products", "dtm,cloud"]);
+    run_of_town(&folder, &["--products", "dtm,cloud,classes"]);
     let made = report(&folder);
     let (heights, source) = (read_dem(folder.join("dsm/dsm.tif")).unwrap(), band(&folder.join("dsm/source.tif"), 1));
     let ground = band(&folder.join("products/dtm/ground.tif"), 1);
+    let classes = band(&folder.join("products/classes/classes.tif"), 1);
+    let buildings = classes.data().iter().filter(|class| **class == 6.0).count();
+    assert!(buildings > 0 && made["classes"]["cells_building"] == buildings);
+    let page = std::fs::read_to_string(folder.join("products/products.html")).unwrap();
+    assert!(page.contains("<h1>Products</h1>") && page.contains(&buildings.to_string()));
+    assert!(folder.join("products/classes/classes.html").is_file());
     let observed = source.data().iter().filter(|code| **code == 1.0).count();
     assert_eq!(made["cloud"]["points"], observed);
     let is_ground = |cell: &usize| source.data()[*cell] == 1.0 && ground.data()[*cell] == 1.0;

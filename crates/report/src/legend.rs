@@ -5,7 +5,7 @@ use std::fmt::Write;
 use raster::Grid;
 
 use crate::escape::escape;
-use crate::palette::{OUTSIDE, css};
+use crate::palette::{OUTSIDE, css, diverging};
 use crate::words::{plain_number, typeset};
 
 /// Number of colours that a ramp is written with.
@@ -45,6 +45,16 @@ impl Legend {
             let part = i as f64 / (STEPS - 1) as f64;
             let shown = if light == LightEnd::Low { part } else { 1.0 - part };
             (low + part * (high - low), crate::preview::near_to_far(shown))
+        };
+        Self::Ramp { stops: (0..STEPS).map(stop).collect(), unit }
+    }
+
+    /// Returns a ramp from −`range` to `range`, blue below zero and red above.
+    pub fn signed(range: f64, unit: &'static str) -> Self {
+        let range = if range > 0.0 { range } else { 1.0 };
+        let stop = |i: usize| {
+            let part = 2.0 * i as f64 / (STEPS - 1) as f64 - 1.0;
+            (part * range, diverging(part))
         };
         Self::Ramp { stops: (0..STEPS).map(stop).collect(), unit }
     }

@@ -59,6 +59,17 @@ impl Provenance {
         items
     }
 
+    /// Returns the images of both, each once.
+    pub fn with(&self, other: &Self) -> Self {
+        let both = |a: &[String], b: &[String]| {
+            let mut all = [a, b].concat();
+            all.sort_unstable();
+            all.dedup();
+            all
+        };
+        Self { sources: both(&self.sources, &other.sources), acquired: both(&self.acquired, &other.acquired) }
+    }
+
     /// Returns what a file says of the images that it was made of.
     pub(super) fn of(dataset: &Dataset) -> Self {
         let list = |name: &str| -> Vec<String> {

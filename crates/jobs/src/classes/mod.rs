@@ -6,7 +6,7 @@
 //! - `classes.tif`: ASPRS LAS classes: 0 unknown, 2 ground, 5 vegetation, 6 building.
 //! - `roughness.tif`: residual of the best plane around each cell that stands, metres; no-data
 //!   elsewhere.
-//! - `classes.json`: the report.
+//! - `classes.json` and `classes.html`: the report, and its page with maps.
 
 mod config;
 mod error;

@@ -4,6 +4,7 @@ use classes::{BUILDING, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, cla
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
+use report::{Legend, MapLayer};
 use terrain::bare_ground;
 
 use super::config::ClassesConfig;
@@ -14,12 +15,14 @@ use crate::eval::EvalJobError;
 use crate::eval::on_reference::surface_on_reference;
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
+use crate::report_page;
 use crate::threads;
 
 /// Names of the files in the output folder.
 const CLASSES: &str = "classes.tif";
 const ROUGHNESS: &str = "roughness.tif";
 const REPORT: &str = "classes.json";
+const PAGE: &str = "classes.html";
 
 /// Finds ground, buildings and vegetation of a surface model, and writes them with a report.
 ///
@@ -40,7 +43,7 @@ const REPORT: &str = "classes.json";
 /// ```
 pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesReport, ClassesError> {
     config.validate()?;
-    for name in [CLASSES, ROUGHNESS, REPORT] {
+    for name in [CLASSES, ROUGHNESS, PAGE, REPORT] {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;
     }
     threads::install(config.threads, || {
@@ -97,16 +100,36 @@ fn write(
     let threads = threads::count(config.threads);
     let put = |name: &str, description: &str, data: BandData<'_>| {
         let bands = [Band { description, data }];
-        let raster = CogRaster { threads, holds_heights: false, ..CogRaster::new(&bands, surface.geotransform, crs) };
+        let plain = CogRaster::new(&bands, surface.geotransform, crs);
+        let raster = CogRaster { threads, holds_heights: false, provenance: Some(&surface.provenance), ..plain };
         write_cog(work.path().join(name), &raster, false).map_err(FileError::from)
     };
     put(CLASSES, "class_2_ground_5_vegetation_6_building", BandData::U8(&found.classes))?;
     let roughness = found.roughness.map(|r| if r.is_finite() { *r } else { f32::NAN });
     put(ROUGHNESS, "roughness_m", BandData::F32(&roughness))?;
-    files::write_json(&work.path().join(REPORT), report, false)?;
-    for name in [CLASSES, ROUGHNESS, REPORT] {
+    let share = 100.0 * report.cells_building as f64 / found.classes.data().len().max(1) as f64;
+    let lead = format!("Buildings cover {share:.1} % of {} cells.", found.classes.data().len());
+    let layers = layers(surface, found, report.cell_m);
+    report_page::write(&work.path().join(REPORT), ("Classes", &lead), report, layers, false)?;
+    for name in [CLASSES, ROUGHNESS, PAGE, REPORT] {
         folder.remove(name)?;
         folder.publish(work.path(), name)?;
     }
     Ok(())
+}
+
+/// Returns the maps of the page.
+fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
+    let legend = Legend::Codes(vec![
+        (GROUND, [214, 200, 170], "ground"),
+        (BUILDING, [200, 80, 60], "building"),
+        (VEGETATION, [86, 150, 80], "vegetation"),
+        (UNKNOWN, [72, 72, 76], "unknown"),
+    ]);
+    let classes = found.classes.map(|class| f32::from(*class));
+    let caption = "What stands is a building where it consists of planes, and vegetation where it is rough.";
+    vec![
+        report_page::legend_layer("Classes", caption, &classes, legend),
+        report_page::relief_layer("Surface", "Heights of the surface, shaded.", &surface.heights, cell_m),
+    ]
 }

@@ -11,7 +11,7 @@
 //! - `regions.tif`: the number of the region of each cell, 0 for none.
 //! - `changes.geojson`: the regions as polygons with area, change, volume and their deviations.
 //! - `areas.geojson`: the volumes of each polygon of a given layer.
-//! - `diff.json`: the report.
+//! - `diff.json` and `diff.html`: the report, and its page with maps.
 
 mod aligned;
 mod config;

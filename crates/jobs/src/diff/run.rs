@@ -7,6 +7,8 @@ use crs::{Crs, MapProjection};
 use io::areas::{AreaFeature, NamedAreas};
 use io::raster::{Band, BandData, CogRaster, write_cog};
 use numeric::Progress;
+use raster::Grid;
+use report::{Legend, MapLayer};
 
 use super::aligned::Aligned;
 use super::config::DiffConfig;
@@ -15,6 +17,7 @@ use super::layers::{of_areas, of_regions};
 use super::report::{DiffRegion, DiffReport};
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
+use crate::report_page;
 use crate::threads;
 
 /// Names of the files in the output folder.
@@ -24,6 +27,9 @@ const REGIONS: &str = "regions.tif";
 const POLYGONS: &str = "changes.geojson";
 const AREAS: &str = "areas.geojson";
 const REPORT: &str = "diff.json";
+const PAGE: &str = "diff.html";
+/// Range of the page's map of significance, standard deviations.
+const SHOWN_SIGMAS: f64 = 5.0;
 
 /// Distance by which the walls of surfaces of this toolkit reach too far outwards, cells. It was
 /// measured on buildings of simulated towns (seeds 1 to 3), as in `benches/products/diff.py`.
@@ -51,7 +57,7 @@ const OVERREACH_SIGMA_CELLS: f64 = 0.4;
 /// ```
 pub fn run(config: &DiffConfig, progress: &dyn Progress) -> Result<DiffReport, DiffError> {
     config.validate()?;
-    for name in [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, REPORT] {
+    for name in [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, PAGE, REPORT] {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;
     }
     let layer = config
@@ -162,9 +168,12 @@ impl Written<'_> {
         report: &DiffReport,
     ) -> Result<(), DiffError> {
         let work = folder.work_folder()?;
-        let (threads, transform) = (threads::count(config.threads), self.aligned.inputs.reference.geotransform);
+        let threads = threads::count(config.threads);
+        let transform = self.aligned.inputs.reference.geotransform;
+        let provenance = self.aligned.inputs.reference.provenance.with(&self.aligned.inputs.test.provenance);
         let put = |name: &str, bands: &[Band<'_>]| {
-            let raster = CogRaster { threads, holds_heights: false, ..CogRaster::new(bands, transform, crs) };
+            let plain = CogRaster::new(bands, transform, crs);
+            let raster = CogRaster { threads, holds_heights: false, provenance: Some(&provenance), ..plain };
             write_cog(work.path().join(name), &raster, false).map_err(FileError::from)
         };
         let band = |description, data| Band { description, data };
@@ -178,13 +187,47 @@ impl Written<'_> {
         if let Some(areas) = self.areas {
             polygons(&work.path().join(AREAS), areas)?;
         }
-        files::write_json(&work.path().join(REPORT), report, false)?;
-        for name in [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, REPORT] {
+        let lead = match report.regions.len() {
+            0 => "No region changed significantly.".to_owned(),
+            1 => "One region changed significantly.".to_owned(),
+            count => format!("{count} regions changed significantly."),
+        };
+        report_page::write(&work.path().join(REPORT), ("Change", &lead), report, self.layers(), false)?;
+        for name in [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, PAGE, REPORT] {
             folder.remove(name)?;
             if name != AREAS || self.areas.is_some() {
                 folder.publish(work.path(), name)?;
             }
         }
         Ok(())
+    }
+
+    /// Returns the maps of the page.
+    fn layers(&self) -> Vec<MapLayer> {
+        let Change { difference, significance, numbers, .. } = self.change;
+        // Blue and red end at the largest change of a region; without one, at the shown deviations.
+        let of_regions = self.change.regions.iter().map(|region| region.mean_m.abs()).fold(0.0, f64::max);
+        let range = if of_regions > 0.0 { of_regions } else { SHOWN_SIGMAS * self.change.detection_m };
+        let only_regions: Vec<f32> = (difference.data().iter().zip(numbers.data()))
+            .map(|(change, number)| if *number > 0 { *change } else { f32::NAN })
+            .collect();
+        let in_regions = Grid::from_vec(difference.width(), difference.height(), only_regions);
+        let metres = || Legend::signed(range, "m");
+        let mut layers = vec![
+            report_page::legend_layer("Change", "Second surface minus first.", difference, metres()),
+            report_page::legend_layer(
+                "Significance",
+                "The change in standard deviations, where both dates were observed.",
+                significance,
+                Legend::signed(SHOWN_SIGMAS, "σ"),
+            ),
+        ];
+        layers.extend(in_regions.map(|map| {
+            report_page::legend_layer("Regions", "The change within regions of significant change.", &map, metres())
+        }));
+        let before = &self.aligned.inputs.reference.heights;
+        let caption = "Heights of the first surface, shaded.";
+        layers.push(report_page::relief_layer("First surface", caption, before, self.aligned.cell_m));
+        layers
     }
 }

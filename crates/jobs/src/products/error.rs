@@ -6,6 +6,7 @@ use crs::CrsError;
 use io::raster::RasterError;
 use numeric::Cancelled;
 
+use crate::classes::ClassesError;
 use crate::dsm::DsmError;
 use crate::dtm::DtmError;
 use crate::error::{JobError, SettingError, from_steps};
@@ -84,6 +85,9 @@ pub enum ProductsError {
     /// The terrain model cannot be made.
     #[error("cannot make the terrain model")]
     Dtm(#[source] Box<DtmError>),
+    /// The classes cannot be found.
+    #[error("cannot find the classes of the surface model")]
+    Classes(#[source] Box<ClassesError>),
     /// The coordinate reference system cannot be used.
     #[error(transparent)]
     Crs(#[from] CrsError),
@@ -108,6 +112,15 @@ impl From<OrthoError> for ProductsError {
         match error {
             OrthoError::Job(error @ JobError::Cancelled(_)) => Self::Job(error),
             other => Self::Ortho(Box::new(other)),
+        }
+    }
+}
+
+impl From<ClassesError> for ProductsError {
+    fn from(error: ClassesError) -> Self {
+        match error {
+            ClassesError::Job(error @ JobError::Cancelled(_)) => Self::Job(error),
+            other => Self::Classes(Box::new(other)),
         }
     }
 }

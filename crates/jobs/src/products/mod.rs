@@ -3,10 +3,11 @@
 //! - `cloud.laz` and `cloud.copc.laz`: a coloured point for each observed cell, with σ, confidence,
 //!   views and source as extra dimensions, and the class ground where there is a terrain model.
 //! - `dtm/`: the terrain model, as [`crate::dtm`] makes it.
+//! - `classes/`: ground, buildings and vegetation, as [`crate::classes`] finds them.
 //! - `contours.gpkg`: contour lines of the terrain model.
 //! - `mesh.glb`, `tileset.json` and `tiles/`: the textured surface as one mesh, and as 3D Tiles.
 //! - `ortho.tif`: the ortho that gives the colours, where none was given.
-//! - `products.json`: the report of the last call.
+//! - `products.json` and `products.html`: the report of the last call, and its page.
 //!
 //! What an earlier call made (the ortho, the terrain model) is used again.
 

@@ -11,6 +11,8 @@ pub enum ProductKind {
     Cloud,
     /// The bare ground, and heights above it.
     Dtm,
+    /// Ground, buildings and vegetation.
+    Classes,
     /// Contour lines of the ground.
     Contours,
     /// A textured mesh as GLB and 3D Tiles.
@@ -19,9 +21,10 @@ pub enum ProductKind {
 
 impl ProductKind {
     /// All values with the names that people give them, and their meanings.
-    pub const CHOICES: [(&'static str, Self, &'static str); 4] = [
+    pub const CHOICES: [(&'static str, Self, &'static str); 5] = [
         ("cloud", Self::Cloud, "coloured points as LAZ and COPC"),
         ("dtm", Self::Dtm, "the bare ground, and heights above it"),
+        ("classes", Self::Classes, "ground, buildings and vegetation"),
         ("contours", Self::Contours, "contour lines of the ground"),
         ("mesh", Self::Mesh, "a textured mesh as GLB and 3D Tiles"),
     ];

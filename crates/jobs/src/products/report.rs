@@ -8,6 +8,7 @@ use super::cloud::CloudReport;
 use super::colour::ColourReport;
 use super::contours::ContoursReport;
 use super::mesh::MeshReport;
+use crate::classes::ClassesReport;
 use crate::dtm::DtmReport;
 
 /// Products that were made.
@@ -24,6 +25,8 @@ pub struct ProductsReport {
     pub colour: Option<ColourReport>,
     /// The terrain model.
     pub dtm: Option<DtmReport>,
+    /// The classes.
+    pub classes: Option<ClassesReport>,
     /// The contour lines.
     pub contours: Option<ContoursReport>,
     /// The mesh.
@@ -44,6 +47,9 @@ impl ProductsReport {
         if let Some(dtm) = &self.dtm {
             line("ground", dtm.dtm.display().to_string());
             line("above", dtm.height_above_ground.display().to_string());
+        }
+        if let Some(classes) = &self.classes {
+            line("classes", classes.classes.display().to_string());
         }
         if let Some(cloud) = &self.cloud {
             let CloudReport { laz, copc, extent, .. } = cloud;

@@ -14,11 +14,13 @@ use super::mesh_tiles::{TILES, TILESET};
 use super::product::ProductKind;
 use super::report::ProductsReport;
 use super::scene::SurfaceOfRun;
+use crate::classes::{self, ClassesConfig};
 use crate::dtm::{self, DtmConfig, DtmReport};
 use crate::files::{self, FileError};
 use crate::job_file::read_dsm_job;
 use crate::ortho::{self, OrthoConfig};
 use crate::output_folder::OutputFolder;
+use crate::report_page;
 use crate::threads;
 
 /// Names in the folder of the products.
@@ -28,7 +30,10 @@ const ORTHO_REPORTS: [&str; 2] = ["ortho_report.html", "ortho_report.json"];
 const DTM: &str = "dtm";
 const DTM_STATES: &str = "dtm/ground.tif";
 const DTM_HEIGHTS: &str = "dtm/dtm.tif";
+const CLASSES: &str = "classes";
+const CLASS_CODES: &str = "classes/classes.tif";
 const REPORT: &str = "products.json";
+const PAGE: &str = "products.html";
 /// Settings of a run, which name its images.
 const SETTINGS: &str = "used_config.toml";
 
@@ -42,6 +47,7 @@ pub fn run(config: &ProductsConfig, progress: &dyn Progress) -> Result<ProductsR
     let names = config.products.iter().flat_map(|product| match product {
         ProductKind::Cloud => cloud::FILES.map(|(name, _)| name).to_vec(),
         ProductKind::Dtm => vec![DTM_STATES],
+        ProductKind::Classes => vec![CLASS_CODES],
         ProductKind::Contours => vec![contours::FILE],
         ProductKind::Mesh => vec![mesh::GLB, TILESET, TILES],
     });
@@ -66,10 +72,16 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
         ortho: None,
         colour: None,
         dtm,
+        classes: None,
         contours: None,
         mesh: None,
         cloud: None,
     };
+    if config.wants(ProductKind::Classes) {
+        let mut of = ClassesConfig::new(config.run.clone(), output.join(CLASSES));
+        of.overwrite = config.overwrite;
+        report.classes = Some(classes::run(&of, progress)?);
+    }
     if config.wants(ProductKind::Contours) {
         let (dtm, interval_m) = (output.join(DTM_HEIGHTS), config.contour_interval_m);
         report.contours = Some(contours::make(&surface, &dtm, interval_m, &folder, progress)?);
@@ -88,7 +100,8 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
             report.cloud = Some(cloud::make(&surface, &colours, states.as_deref(), config.filled, &folder, progress)?);
         }
     }
-    files::write_json(&output.join(REPORT), &report, true)?;
+    let lead = format!("Made of {}.", report.surface.display());
+    report_page::write(&output.join(REPORT), ("Products", &lead), &report, Vec::new(), true)?;
     Ok(report)
 }
 
@@ -123,8 +136,10 @@ pub(crate) fn remove_products(run_folder: &OutputFolder) -> Result<(), FileError
         TILESET,
         TILES,
         DTM,
+        CLASSES,
         ORTHO,
         ORTHO_MASK,
+        PAGE,
         REPORT,
     ]);
     for name in names {
