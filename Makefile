@@ -20,7 +20,7 @@ for tool in pkg-config c++; do command -v "$$tool" > /dev/null || MISSING="$$MIS
 for library in gdal proj sqlite3; do pkg-config --exists "$$library" 2> /dev/null || MISSING="$$MISSING $$library.pc"; done
 endef
 
-.PHONY: help setup check demo test fuzz lint readme bench bench-kernels
+.PHONY: help setup check demo test fuzz lint readme bench bench-kernels plugin test-qgis
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -69,6 +69,16 @@ lint: check ## format, clippy on every target (benches too), documentation; warn
 	@cargo fmt --all --check
 	cargo clippy --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+
+plugin: ## the plugin for QGIS, in out/skysweep_qgis.zip
+	@mkdir -p out
+	rm -f out/skysweep_qgis.zip
+	python3 -c 'import shutil; shutil.make_archive("out/skysweep_qgis", "zip", "qgis", "skysweep")'
+	echo "plugin         out/skysweep_qgis.zip"
+
+test-qgis: check ## the algorithms in an installed QGIS, without a window (not part of make test)
+	@cargo build --bin skysweep
+	qgis/tests/run_qgis.sh target/debug/skysweep
 
 readme: check ## bring the numbers of benches/results into README.md and docs
 	@SKYSWEEP_WRITE_NUMBERS=1 cargo test --quiet --test readme_numbers

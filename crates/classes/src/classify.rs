@@ -5,7 +5,7 @@ use raster::Grid;
 use crate::config::ClassifyConfig;
 use crate::error::ClassifyError;
 use crate::regions::{grow, without_small};
-use crate::roughness::least_residual;
+use crate::roughness::{least_residual, median_residual};
 
 /// A cell without a height or without ground.
 pub const UNKNOWN: u8 = 0;
@@ -27,6 +27,41 @@ pub struct ClassifyInput<'a> {
     pub index: Option<&'a Grid<f32>>,
     /// Side of a cell, metres.
     pub cell_m: f64,
+}
+
+/// Lengths that follow from the noise of a surface.
+///
+/// A crown differs from a plane, in a window of side w, by a residual that grows as w², because it
+/// is curved. So the windows shrink with the root of the residual that a roof may have, and the
+/// parts of roofs that a window fits on become smaller. What blurs a surface makes both its noise
+/// and its ramps.
+struct Scale {
+    window_m: f64,
+    roughness_m: f64,
+    ramp_m: f64,
+}
+
+impl Scale {
+    fn of(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Self {
+        let bare = input.above_ground.map(|above| above.abs() < BARE_M);
+        let reach = reach_of(config.window_m, input.cell_m);
+        let noise_m = median_residual(input.surface, &bare, reach, WINDOWS_MIN);
+        let of_noise = noise_m.map_or(config.roughness_m, |noise| config.ground_residuals * noise);
+        let roughness_m = of_noise.clamp(config.least_roughness_m, config.roughness_m);
+        let part = roughness_m / config.roughness_m;
+        let window_m = (part.sqrt() * config.window_m).max(config.least_window_m);
+        Self { window_m, roughness_m, ramp_m: part * config.ramp_m }
+    }
+}
+
+/// Height above the ground up to which a cell is bare, metres: above it are cars and hedges.
+const BARE_M: f32 = 0.3;
+/// Fewest windows on bare ground that tell the noise of a surface.
+const WINDOWS_MIN: usize = 100;
+
+/// Returns half the side of a window in cells, without the middle cell.
+fn reach_of(window_m: f64, cell_m: f64) -> usize {
+    ((window_m / cell_m - 1.0) / 2.0).round().max(1.0) as usize
 }
 
 /// Classes of cells.
@@ -63,9 +98,9 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     check(input)?;
     let least_m = config.least_height_m as f32;
     let stands = input.above_ground.map(|h| *h > least_m);
-    let reach = ((config.window_m / input.cell_m - 1.0) / 2.0).round().max(1.0) as usize;
-    let roughness = least_residual(input.surface, &stands, reach);
-    let limit_m = config.roughness_m as f32;
+    let scale = Scale::of(input, config);
+    let roughness = least_residual(input.surface, &stands, reach_of(scale.window_m, input.cell_m));
+    let limit_m = scale.roughness_m as f32;
     let is_green = |at: usize| input.index.is_some_and(|index| f64::from(index.data()[at]) >= config.least_index);
     let cells = |area_m2: f64| (area_m2 / (input.cell_m * input.cell_m)).ceil() as usize;
     let mut buildings = roughness.map(|r| *r < limit_m);
@@ -73,7 +108,7 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     without_small(&mut buildings, cells(config.least_building_m2));
     let mut free = stands.clone();
     free.data_mut().iter_mut().enumerate().for_each(|(at, free)| *free = *free && !is_green(at));
-    grow(&mut buildings, &free, (config.ramp_m / input.cell_m).round() as usize);
+    grow(&mut buildings, &free, (scale.ramp_m / input.cell_m).round().max(1.0) as usize);
     let mut vegetation = stands.clone();
     let cleared = vegetation.data_mut().iter_mut().zip(buildings.data());
     cleared.filter(|(_, building)| **building).for_each(|(plant, _)| *plant = false);

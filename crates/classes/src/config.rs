@@ -11,16 +11,24 @@ use crate::error::ClassifyError;
 pub struct ClassifyConfig {
     /// Least height above the ground of buildings and vegetation, metres. Cars are below it.
     pub least_height_m: f64,
-    /// Side of the windows in which planes are fitted, metres. It must be narrower than half a
-    /// house and wider than a few branches.
+    /// Side of the windows in which planes are fitted on a noisy surface, metres. It must be
+    /// narrower than half a house and wider than a few branches.
     pub window_m: f64,
-    /// Residual of a plane up to which a surface without noise is smooth, metres.
+    /// Side below which the windows do not shrink on a surface with little noise, metres.
+    pub least_window_m: f64,
+    /// Residual of a plane up to which a noisy surface is smooth, metres.
     pub roughness_m: f64,
+    /// Residual of a plane up to which an exact surface is smooth, metres: that of small parts of
+    /// roofs that are no planes.
+    pub least_roughness_m: f64,
+    /// Residual up to which a surface is smooth, in residuals of the bare ground; between the two
+    /// above.
+    pub ground_residuals: f64,
     /// Smallest area of a building, square metres.
     pub least_building_m2: f64,
     /// Smallest area of vegetation, square metres.
     pub least_vegetation_m2: f64,
-    /// Width of the ramps at walls, metres.
+    /// Width of the ramps at walls of a noisy surface, metres.
     pub ramp_m: f64,
     /// Least vegetation index of vegetation, where one is given.
     pub least_index: f64,
@@ -31,7 +39,10 @@ impl Default for ClassifyConfig {
         Self {
             least_height_m: 2.0,
             window_m: 3.5,
+            least_window_m: 2.5,
             roughness_m: 0.2,
+            least_roughness_m: 0.03,
+            ground_residuals: 8.0,
             least_building_m2: 15.0,
             least_vegetation_m2: 4.0,
             ramp_m: 1.5,
@@ -52,7 +63,16 @@ impl ClassifyConfig {
         };
         within("the least height of objects", self.least_height_m, 0.1, 50.0, "0.1 to 50 m")?;
         within("the side of the windows", self.window_m, 0.1, 50.0, "0.1 to 50 m")?;
-        within("the roughness", self.roughness_m, 0.0, 10.0, "0 to 10 m")?;
+        within(
+            "the least side of the windows",
+            self.least_window_m,
+            0.1,
+            self.window_m,
+            "0.1 m to the side of the windows",
+        )?;
+        within("the roughness", self.roughness_m, 1e-3, 10.0, "0.001 to 10 m")?;
+        within("the least roughness", self.least_roughness_m, 0.0, self.roughness_m, "0 m to the roughness")?;
+        within("the number of residuals of the ground", self.ground_residuals, 0.0, 1e3, "0 to 1000")?;
         within("the least area of a building", self.least_building_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the least area of vegetation", self.least_vegetation_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the width of ramps", self.ramp_m, 0.0, 20.0, "0 to 20 m")?;

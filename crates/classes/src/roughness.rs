@@ -21,6 +21,23 @@ pub(crate) fn least_residual(surface: &Grid<f32>, counts: &Grid<bool>, reach: us
     spread_least(&residuals, reach)
 }
 
+/// Returns the median of the residuals of windows whose cells all `count`, metres; `None` for fewer
+/// than `windows_min` windows. Windows that overlap by more than half tell nothing new, and are
+/// left out.
+pub(crate) fn median_residual(
+    surface: &Grid<f32>,
+    counts: &Grid<bool>,
+    reach: usize,
+    windows_min: usize,
+) -> Option<f64> {
+    let (width, height) = (surface.width(), surface.height());
+    let middles = |size: usize| (reach..size.saturating_sub(reach)).step_by(reach + 1);
+    let cells = middles(height).flat_map(|row| middles(width).map(move |column| (column, row)));
+    let found = cells.filter(|cell| counts[*cell]).map(|cell| residual(surface, counts, reach, cell));
+    let mut found: Vec<f32> = found.filter(|r| r.is_finite()).collect();
+    if found.len() < windows_min { None } else { numeric::upper_median(&mut found).map(f64::from) }
+}
+
 /// Returns the root-mean-square residual of the plane around a cell; infinite where a cell of the
 /// window does not count.
 fn residual(surface: &Grid<f32>, counts: &Grid<bool>, reach: usize, (column, row): (usize, usize)) -> f32 {
@@ -81,6 +98,16 @@ mod tests {
         assert!(gable.data().iter().all(|r| *r < 1e-3));
         let dome = least_residual(&shape(|x, y| 5.0 - 0.05 * ((x - 12.0).powi(2) + (y - 12.0).powi(2))), &all, 3);
         assert!(dome.data().iter().all(|r| *r > 0.2));
+    }
+
+    #[test]
+    fn the_median_residual_is_the_noise_of_level_ground() {
+        let noisy: Vec<f32> = (0..10_000).map(|i| if (i * 7919) % 2 == 0 { 0.1 } else { -0.1 }).collect();
+        let surface = Grid::from_vec(100, 100, noisy).unwrap();
+        let all = Grid::filled(100, 100, true);
+        let found = median_residual(&surface, &all, 3, 100).unwrap();
+        assert!((found - 0.1).abs() < 0.02, "{found}");
+        assert_eq!(median_residual(&surface, &all, 3, 1000), None, "too few windows");
     }
 
     #[test]

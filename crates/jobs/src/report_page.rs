@@ -60,6 +60,19 @@ pub(crate) fn legend_layer(name: &str, caption: &str, values: &Grid<f32>, legend
     MapLayer { name: name.to_owned(), picture, caption: caption.to_owned(), legend: Some(legend) }
 }
 
+/// Writes the legends of layers as the styles of QGIS, each under the name that is given with it.
+pub(crate) fn write_styles<'a>(
+    folder: &Path,
+    layers: impl IntoIterator<Item = (&'a str, &'a MapLayer)>,
+) -> Result<(), FileError> {
+    for (name, layer) in layers {
+        if let Some(legend) = &layer.legend {
+            io::write_bytes(folder.join(name), legend.qml().as_bytes(), false)?;
+        }
+    }
+    Ok(())
+}
+
 /// Returns the percentiles of a map between which its colours are spread.
 pub(crate) fn shown_range(values: &Grid<f32>) -> (f32, f32) {
     raster::height_percentiles(&thinned(values).0, PERCENTILES.0, PERCENTILES.1).unwrap_or((0.0, 1.0))

@@ -23,6 +23,9 @@ const CLASSES: &str = "classes.tif";
 const ROUGHNESS: &str = "roughness.tif";
 const REPORT: &str = "classes.json";
 const PAGE: &str = "classes.html";
+/// Style of QGIS for the classes, which are the first map of the page.
+const STYLE: &str = "classes.qml";
+const FILES: [&str; 5] = [CLASSES, ROUGHNESS, STYLE, PAGE, REPORT];
 
 /// Finds ground, buildings and vegetation of a surface model, and writes them with a report.
 ///
@@ -43,7 +46,7 @@ const PAGE: &str = "classes.html";
 /// ```
 pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesReport, ClassesError> {
     config.validate()?;
-    for name in [CLASSES, ROUGHNESS, PAGE, REPORT] {
+    for name in FILES {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;
     }
     threads::install(config.threads, || {
@@ -110,8 +113,9 @@ fn write(
     let share = 100.0 * report.cells_building as f64 / found.classes.data().len().max(1) as f64;
     let lead = format!("Buildings cover {share:.1} % of {} cells.", found.classes.data().len());
     let layers = layers(surface, found, report.cell_m);
+    report_page::write_styles(work.path(), [STYLE].into_iter().zip(&layers))?;
     report_page::write(&work.path().join(REPORT), ("Classes", &lead), report, layers, false)?;
-    for name in [CLASSES, ROUGHNESS, PAGE, REPORT] {
+    for name in FILES {
         folder.remove(name)?;
         folder.publish(work.path(), name)?;
     }

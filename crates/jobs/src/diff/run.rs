@@ -28,6 +28,9 @@ const POLYGONS: &str = "changes.geojson";
 const AREAS: &str = "areas.geojson";
 const REPORT: &str = "diff.json";
 const PAGE: &str = "diff.html";
+/// Styles of QGIS, in the order of the maps of the page.
+const STYLES: [&str; 2] = ["change.qml", "significance.qml"];
+const FILES: [&str; 9] = [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, STYLES[0], STYLES[1], PAGE, REPORT];
 /// Range of the page's map of significance, standard deviations.
 const SHOWN_SIGMAS: f64 = 5.0;
 
@@ -57,7 +60,7 @@ const OVERREACH_SIGMA_CELLS: f64 = 0.4;
 /// ```
 pub fn run(config: &DiffConfig, progress: &dyn Progress) -> Result<DiffReport, DiffError> {
     config.validate()?;
-    for name in [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, PAGE, REPORT] {
+    for name in FILES {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;
     }
     let layer = config
@@ -192,8 +195,10 @@ impl Written<'_> {
             1 => "One region changed significantly.".to_owned(),
             count => format!("{count} regions changed significantly."),
         };
-        report_page::write(&work.path().join(REPORT), ("Change", &lead), report, self.layers(), false)?;
-        for name in [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, PAGE, REPORT] {
+        let layers = self.layers();
+        report_page::write_styles(work.path(), STYLES.into_iter().zip(&layers))?;
+        report_page::write(&work.path().join(REPORT), ("Change", &lead), report, layers, false)?;
+        for name in FILES {
             folder.remove(name)?;
             if name != AREAS || self.areas.is_some() {
                 folder.publish(work.path(), name)?;

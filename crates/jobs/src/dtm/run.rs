@@ -22,6 +22,9 @@ const ABOVE: &str = "height_above_ground.tif";
 const STATES: &str = "ground.tif";
 const REPORT: &str = "dtm.json";
 const PAGE: &str = "dtm.html";
+/// Styles of QGIS, in the order of the maps of the page.
+const STYLES: [&str; 3] = ["dtm.qml", "height_above_ground.qml", "ground.qml"];
+const FILES: [&str; 8] = [DTM, ABOVE, STATES, STYLES[0], STYLES[1], STYLES[2], PAGE, REPORT];
 /// Largest difference of the sides of a cell, as a share.
 const SQUARE_TOLERANCE: f64 = 0.01;
 
@@ -43,7 +46,7 @@ const SQUARE_TOLERANCE: f64 = 0.01;
 /// ```
 pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, DtmError> {
     config.validate()?;
-    for name in [DTM, ABOVE, STATES, PAGE, REPORT] {
+    for name in FILES {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;
     }
     threads::install(config.threads, || {
@@ -140,8 +143,9 @@ fn write(
     put(STATES, states, BandData::U8(&terrain.states), plain, false)?;
     let lead = format!("{} cells of {:.2} m.", terrain.states.data().len(), report.cell_m);
     let layers = layers(terrain, above, report.cell_m);
+    report_page::write_styles(work.path(), STYLES.into_iter().zip(&layers))?;
     report_page::write(&work.path().join(REPORT), ("Terrain model", &lead), report, layers, false)?;
-    for name in [DTM, ABOVE, STATES, PAGE, REPORT] {
+    for name in FILES {
         folder.remove(name)?;
         folder.publish(work.path(), name)?;
     }
