@@ -27,9 +27,10 @@ fn manual_pages_describe_a_command_and_its_subcommands() {
 }
 
 /// Commands with options, as words of the command line.
-const COMMANDS: [&[&str]; 30] = [
+const COMMANDS: [&[&str]; 31] = [
     &["align"],
     &["batch"],
+    &["buildings"],
     &["city", "info"],
     &["city", "convert"],
     &["classes"],
@@ -109,7 +110,7 @@ fn one_option_has_one_meaning() {
     };
     assert_eq!(with("--vertical"), ["dsm", "plan"]);
     assert_eq!(with("--crs"), ["align", "dsm", "heightmap", "plan"]);
-    assert_eq!(with("--dsm-vertical"), ["ortho", "splats"]);
+    assert_eq!(with("--dsm-vertical"), ["buildings", "ortho", "splats"]);
     for (command, old) in [("splats", "--vertical"), ("groundview", "--vertical"), ("align", "--vertical")] {
         let told = Command::cargo_bin("skysweep").unwrap().args([command, old, "none"]).assert().code(2);
         let told = String::from_utf8_lossy(&told.get_output().stderr).into_owned();

@@ -18,6 +18,10 @@ pub(crate) struct Args {
     /// Vegetation index (NDVI, −1 to 1) on any grid, which overrules the roughness of the surface.
     #[arg(long, value_name = "FILE")]
     ndvi: Option<PathBuf>,
+    /// Building index (0 to 1, from skysweep buildings) on any grid, which decides where the
+    /// heights are weak.
+    #[arg(long, value_name = "FILE")]
+    index: Option<PathBuf>,
     #[command(flatten)]
     run: RunOptions,
 }
@@ -26,6 +30,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let mut config = ClassesConfig::new(args.surface.clone(), args.output.clone());
     config.vegetation_index.clone_from(&args.ndvi);
+    config.building_index.clone_from(&args.index);
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;

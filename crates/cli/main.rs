@@ -6,6 +6,7 @@
 
 mod align;
 mod batch;
+mod buildings;
 mod city;
 mod classes;
 mod completions;
@@ -56,6 +57,8 @@ enum Command {
     Align(Box<align::Args>),
     /// Do many scenes and tasks that a file names; what is done stays done.
     Batch(batch::Args),
+    /// Find buildings in one image: an index of 0 to 1.
+    Buildings(buildings::Args),
     /// Show and convert city models.
     #[command(subcommand)]
     City(city::Command),
@@ -132,6 +135,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Align(args) => align::run(args, cli.global),
         Command::Batch(args) => batch::run(args, cli.global),
+        Command::Buildings(args) => buildings::run(args, cli.global),
         Command::City(command) => city::run(command, cli.global),
         Command::Classes(args) => classes::run(args, cli.global),
         Command::Completions(args) => completions::completions(args, &mut options::grouped(Cli::command())),

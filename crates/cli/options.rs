@@ -37,6 +37,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "after_vertical",
             "sigma_m",
             "ndvi",
+            "index",
             "areas",
             "areas_layer",
             "areas_field",

@@ -13,6 +13,7 @@
 //! | [`jobs::dtm`] | the bare ground under a surface model, and heights above it |
 //! | [`jobs::products`] | point clouds and what else people open beside a surface model |
 //! | [`jobs::eval`] | errors of a surface model against a reference |
+//! | [`jobs::buildings`] | an index of buildings in one image |
 //! | [`jobs::ortho`] | true orthophotos, with hidden cells marked |
 //! | [`jobs::heightmap`] | bird's-eye height maps around a camera |
 //! | [`jobs::groundview`] | depths, normals and sky of cameras on the ground |
@@ -32,7 +33,7 @@
 //!   casting), [`occlusion`].
 //! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`],
 //!   [`ortho`], [`splats`], [`terrain`], [`train`], [`change`],
-//!   [`classes`], [`simulate`].
+//!   [`classes`], [`buildings`], [`simulate`].
 //! - Files: [`io`] reads and writes every format, [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
 //!
@@ -49,6 +50,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub use buildings;
 pub use bvh;
 pub use camera;
 pub use change;

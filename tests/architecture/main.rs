@@ -36,6 +36,7 @@ const FLOORS: [(&str, u8); 28] = [
     ("skysweep-terrain", 4),
     ("skysweep-change", 4),
     ("skysweep-classes", 4),
+    ("skysweep-buildings", 4),
     ("skysweep-groundview", 4),
     ("skysweep-ortho", 4),
     ("skysweep-splats", 4),

@@ -16,6 +16,15 @@ pub const VEGETATION: u8 = 5;
 /// A building.
 pub const BUILDING: u8 = 6;
 
+/// A building index, which decides where heights are weak.
+#[derive(Debug, Clone, Copy)]
+pub struct BuildingCue<'a> {
+    /// Index of each cell, 0 to 1; NaN where none is known.
+    pub index: &'a Grid<f32>,
+    /// Cells whose height was not observed or is uncertain. `None` if all are good.
+    pub weak: Option<&'a Grid<bool>>,
+}
+
 /// A surface and its height above the ground, on one grid of square cells.
 #[derive(Debug, Clone, Copy)]
 pub struct ClassifyInput<'a> {
@@ -25,6 +34,8 @@ pub struct ClassifyInput<'a> {
     pub above_ground: &'a Grid<f32>,
     /// Vegetation index (NDVI) of each cell, −1 to 1; NaN where none is known.
     pub index: Option<&'a Grid<f32>>,
+    /// What an image says about buildings.
+    pub cue: Option<BuildingCue<'a>>,
     /// Side of a cell, metres.
     pub cell_m: f64,
 }
@@ -84,7 +95,7 @@ pub struct Classes {
 /// for row in 20..40 {
 ///     surface.row_mut(row)[15..45].fill(5.0);
 /// }
-/// let input = ClassifyInput { surface: &surface, above_ground: &surface, index: None, cell_m: 0.5 };
+/// let input = ClassifyInput { surface: &surface, above_ground: &surface, index: None, cue: None, cell_m: 0.5 };
 /// let found = classify(&input, &ClassifyConfig::default())?;
 /// assert_eq!((found.classes[(30, 30)], found.classes[(5, 5)]), (BUILDING, GROUND));
 /// # Ok::<(), classes::ClassifyError>(())
@@ -105,6 +116,14 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     let cells = |area_m2: f64| (area_m2 / (input.cell_m * input.cell_m)).ceil() as usize;
     let mut buildings = roughness.map(|r| *r < limit_m);
     buildings.data_mut().iter_mut().enumerate().for_each(|(at, smooth)| *smooth = *smooth && !is_green(at));
+    let mut stands = stands;
+    if let Some(cue) = &input.cue {
+        let likely = likely_buildings(input, cue, &roughness, config);
+        for at in (0..likely.len()).filter(|at| likely[*at] && !is_green(*at)) {
+            buildings.data_mut()[at] = true;
+            stands.data_mut()[at] = true;
+        }
+    }
     without_small(&mut buildings, cells(config.least_building_m2));
     let mut free = stands.clone();
     free.data_mut().iter_mut().enumerate().for_each(|(at, free)| *free = *free && !is_green(at));
@@ -130,6 +149,27 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     Ok(Classes { classes, roughness })
 }
 
+/// Returns the cells whose heights are too weak to tell and that the building index says are
+/// buildings: their height is not known well, or it or the roughness lies near the threshold.
+fn likely_buildings(
+    input: &ClassifyInput<'_>,
+    cue: &BuildingCue<'_>,
+    roughness: &Grid<f32>,
+    config: &ClassifyConfig,
+) -> Vec<bool> {
+    let (least_m, limit_m) = (config.least_height_m, config.roughness_m);
+    let is_likely = |at: usize| {
+        let (above_m, rough_m) = (f64::from(input.above_ground.data()[at]), f64::from(roughness.data()[at]));
+        let is_weak = cue.weak.is_some_and(|weak| weak.data()[at]);
+        let is_low = above_m <= least_m && above_m > least_m / config.leniency;
+        let is_rough = above_m > least_m && rough_m >= limit_m && rough_m < config.leniency * limit_m;
+        f64::from(cue.index.data()[at]) >= config.least_building_index
+            && above_m.is_finite()
+            && (is_weak || is_low || is_rough)
+    };
+    (0..input.surface.data().len()).map(is_likely).collect()
+}
+
 fn check(input: &ClassifyInput<'_>) -> Result<(), ClassifyError> {
     let expected = (input.surface.width(), input.surface.height());
     let fits = |what, found: Option<(usize, usize)>| match found {
@@ -139,6 +179,9 @@ fn check(input: &ClassifyInput<'_>) -> Result<(), ClassifyError> {
     let above = input.above_ground;
     fits("the raster of heights above ground", Some((above.width(), above.height())))?;
     fits("the vegetation index", input.index.map(|grid| (grid.width(), grid.height())))?;
+    fits("the building index", input.cue.map(|cue| (cue.index.width(), cue.index.height())))?;
+    let weak = input.cue.and_then(|cue| cue.weak);
+    fits("the mask of weak heights", weak.map(|grid| (grid.width(), grid.height())))?;
     if !(input.cell_m.is_finite() && input.cell_m > 0.0) {
         let (name, expected) = ("the side of a cell", "a positive number of metres");
         return Err(ClassifyError::Parameter { name, found: input.cell_m, expected });

@@ -32,6 +32,11 @@ pub struct ClassifyConfig {
     pub ramp_m: f64,
     /// Least vegetation index of vegetation, where one is given.
     pub least_index: f64,
+    /// Least building index that counts as a building where the heights are weak.
+    pub least_building_index: f64,
+    /// Factor by which the height of a building may miss the least height, and its residual the
+    /// roughness, where the building index speaks for it.
+    pub leniency: f64,
 }
 
 impl Default for ClassifyConfig {
@@ -47,6 +52,8 @@ impl Default for ClassifyConfig {
             least_vegetation_m2: 4.0,
             ramp_m: 1.5,
             least_index: 0.3,
+            least_building_index: 0.5,
+            leniency: 2.0,
         }
     }
 }
@@ -76,6 +83,8 @@ impl ClassifyConfig {
         within("the least area of a building", self.least_building_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the least area of vegetation", self.least_vegetation_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the width of ramps", self.ramp_m, 0.0, 20.0, "0 to 20 m")?;
-        within("the least vegetation index", self.least_index, -1.0, 1.0, "-1 to 1")
+        within("the least vegetation index", self.least_index, -1.0, 1.0, "-1 to 1")?;
+        within("the least building index", self.least_building_index, 0.0, 1.0, "0 to 1")?;
+        within("the leniency", self.leniency, 1.0, 10.0, "1 to 10")
     }
 }

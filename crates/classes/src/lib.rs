@@ -13,7 +13,9 @@
 //!    surroundings otherwise.
 //!
 //! A map of vegetation, such as an index of near-infrared light, overrules the roughness where it
-//! is given. Heights are in metres, NaN is a void. Values are the ASPRS LAS classes.
+//! is given. A building index, made of an image, decides only where heights are weak: cells that
+//! were not observed, or whose height or roughness lies near its threshold. Heights are in metres,
+//! NaN is a void. Values are the ASPRS LAS classes.
 
 mod classify;
 mod config;
@@ -21,6 +23,6 @@ mod error;
 mod regions;
 mod roughness;
 
-pub use classify::{BUILDING, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
+pub use classify::{BUILDING, BuildingCue, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
 pub use config::ClassifyConfig;
 pub use error::ClassifyError;

@@ -1,6 +1,6 @@
 //! A scene of houses and trees with noise: their classes, a vegetation index, and what is refused.
 
-use classes::{BUILDING, ClassifyConfig, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
+use classes::{BUILDING, BuildingCue, ClassifyConfig, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
 use numeric::SplitMix64;
 use raster::{Grid, gaussian};
 
@@ -49,7 +49,7 @@ fn iou(found: &Grid<u8>, truth: &Grid<u8>, class: u8) -> f64 {
 fn houses_and_trees_are_told_apart() {
     for seed in 0..4 {
         let (heights, truth) = scene(seed);
-        let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cell_m: CELL_M };
+        let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cue: None, cell_m: CELL_M };
         let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
         let (buildings, plants) = (iou(&found, &truth, BUILDING), iou(&found, &truth, VEGETATION));
         assert!(buildings > 0.95 && plants > 0.9, "seed {seed}: {buildings:.3}, {plants:.3}");
@@ -64,21 +64,48 @@ fn a_vegetation_index_overrules_the_roughness() {
         index.row_mut(row)[30..50].fill(0.6);
     }
     heights[(0, 0)] = f32::NAN;
-    let input = ClassifyInput { surface: &heights, above_ground: &heights, index: Some(&index), cell_m: 0.5 };
+    let input =
+        ClassifyInput { surface: &heights, above_ground: &heights, index: Some(&index), cue: None, cell_m: 0.5 };
     let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
     assert_eq!([found[(20, 20)], found[(40, 20)]], [BUILDING, VEGETATION]);
     assert_eq!([found[(0, 0)], found[(55, 55)]], [UNKNOWN, GROUND]);
 }
 
 #[test]
+fn a_building_index_decides_where_heights_are_weak_and_only_there() {
+    let (mut heights, mut index) = (Grid::filled(120, 60, 0.0f32), Grid::filled(120, 60, 0.0f32));
+    let mut weak = Grid::filled(120, 60, false);
+    for row in 10..40 {
+        // A low shed, a hole where a house was not matched, and ground.
+        heights.row_mut(row)[10..30].fill(1.6);
+        heights.row_mut(row)[40..60].fill(0.3);
+        weak.row_mut(row)[40..60].fill(true);
+        index.row_mut(row)[10..90].fill(0.8);
+    }
+    let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cue: None, cell_m: 0.5 };
+    let classes = |input: &ClassifyInput<'_>| {
+        let found = classify(input, &ClassifyConfig::default()).unwrap().classes;
+        [(20, 20), (50, 20), (70, 20), (110, 20)].map(|at| found[at])
+    };
+    assert_eq!(classes(&input), [GROUND; 4]);
+    let with = |weak| ClassifyInput { cue: Some(BuildingCue { index: &index, weak }), ..input };
+    assert_eq!(classes(&with(None)), [BUILDING, GROUND, GROUND, GROUND]);
+    assert_eq!(classes(&with(Some(&weak))), [BUILDING, BUILDING, GROUND, GROUND]);
+}
+
+#[test]
 fn unusable_input_is_refused() {
     let (heights, other) = (Grid::filled(5, 5, 1.0f32), Grid::filled(4, 5, 1.0f32));
-    let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cell_m: 0.5 };
+    let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cue: None, cell_m: 0.5 };
     let told = |input: &ClassifyInput<'_>, config: &ClassifyConfig| classify(input, config).unwrap_err().to_string();
     let usual = ClassifyConfig::default();
     assert!(told(&ClassifyInput { above_ground: &other, ..input }, &usual).contains("heights above ground"));
     assert!(told(&ClassifyInput { index: Some(&other), ..input }, &usual).contains("(4, 5)"));
     assert!(told(&ClassifyInput { cell_m: f64::NAN, ..input }, &usual).contains("side of a cell"));
+    let cue = |index, weak| Some(BuildingCue { index, weak });
+    assert!(told(&ClassifyInput { cue: cue(&other, None), ..input }, &usual).contains("building index"));
+    let small = Grid::filled(4, 5, false);
+    assert!(told(&ClassifyInput { cue: cue(&heights, Some(&small)), ..input }, &usual).contains("weak heights"));
     let mut wrong = usual;
     wrong.roughness_m = -1.0;
     assert!(told(&input, &wrong).contains("roughness"));

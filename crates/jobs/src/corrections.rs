@@ -95,6 +95,11 @@ impl Corrections {
         }
     }
 
+    /// Returns the correction of one image.
+    pub(crate) fn of_image(image: PathBuf, correction: ImageCorrection) -> Self {
+        Self { images: vec![(image, correction)] }
+    }
+
     /// Returns the corrections of some images only, which are known by the paths given here.
     pub(crate) fn of_images(&self, images: &[PathBuf]) -> Self {
         let one = |path: &PathBuf| Some((path.canonicalize().unwrap_or_else(|_| path.clone()), self.find(path)?));

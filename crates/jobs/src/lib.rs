@@ -3,6 +3,7 @@
 pub mod align;
 mod as_text;
 pub mod batch;
+pub mod buildings;
 pub mod camera_stand;
 pub mod city;
 pub mod city_files;

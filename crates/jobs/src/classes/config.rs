@@ -20,6 +20,9 @@ pub struct ClassesConfig {
     /// Vegetation index (NDVI, −1 to 1) on any grid, which overrules the roughness.
     #[serde(default)]
     pub vegetation_index: Option<PathBuf>,
+    /// Building index (0 to 1) on any grid, which decides where the heights are weak.
+    #[serde(default)]
+    pub building_index: Option<PathBuf>,
     /// Parameters of the search for the ground.
     #[serde(default)]
     pub terrain: GroundConfig,
@@ -41,6 +44,7 @@ impl ClassesConfig {
             surface,
             output,
             vegetation_index: None,
+            building_index: None,
             terrain: GroundConfig::default(),
             classes: ClassifyConfig::default(),
             threads: None,

@@ -1,5 +1,7 @@
 //! Reasons why a class raster cannot be made.
 
+use std::path::PathBuf;
+
 use classes::ClassifyError;
 use numeric::Cancelled;
 use terrain::TerrainError;
@@ -20,6 +22,17 @@ pub enum ClassesError {
     /// The vegetation index cannot be read at the cells of the surface.
     #[error("cannot use the vegetation index")]
     Index(#[source] Box<EvalJobError>),
+    /// The building index cannot be read at the cells of the surface.
+    #[error("cannot use the building index")]
+    Cue(#[source] Box<EvalJobError>),
+    /// The building index holds a value that is none.
+    #[error("the building index holds {found}, expected 0 to 1: {}", path.display())]
+    CueRange {
+        /// The raster.
+        path: PathBuf,
+        /// A value that it holds.
+        found: f32,
+    },
     /// The search for the ground was given a value that it cannot use.
     #[error(transparent)]
     Terrain(TerrainError),

@@ -9,6 +9,7 @@
 //! - `classes.json` and `classes.html`: the report, and its page with maps.
 
 mod config;
+mod cue;
 mod error;
 mod report;
 mod run;

@@ -28,6 +28,10 @@ pub struct ClassesReport {
     pub cells_unknown: usize,
     /// Whether a vegetation index took part.
     pub has_vegetation_index: bool,
+    /// Whether a building index took part.
+    pub has_building_index: bool,
+    /// Cells whose height was not observed or is uncertain, where the building index decides.
+    pub cells_weak: usize,
     /// Parameters of the search for the ground.
     pub terrain: GroundConfig,
     /// Parameters of the classes.

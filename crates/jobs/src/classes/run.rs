@@ -1,6 +1,6 @@
 //! Runs the classes job.
 
-use classes::{BUILDING, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
+use classes::{BUILDING, BuildingCue, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
@@ -8,6 +8,7 @@ use report::{Legend, MapLayer};
 use terrain::bare_ground;
 
 use super::config::ClassesConfig;
+use super::cue::Cue;
 use super::error::ClassesError;
 use super::report::ClassesReport;
 use crate::dtm::{self, DtmConfig};
@@ -59,15 +60,26 @@ pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRep
             }
             None => None,
         };
+        let cue = match &config.building_index {
+            Some(path) => Some(Cue::read(path, &surface, &config.classes)?),
+            None => None,
+        };
         let folder = OutputFolder::take(&config.output)?;
         let ground = bare_ground(&surface.heights, cell_m, &config.terrain, progress)?;
         progress.check_cancelled()?;
         let mut above = surface.heights.clone();
         above.data_mut().iter_mut().zip(ground.heights.data()).for_each(|(cell, ground)| *cell -= ground);
-        let input = ClassifyInput { surface: &surface.heights, above_ground: &above, index: index.as_ref(), cell_m };
+        let input = ClassifyInput {
+            surface: &surface.heights,
+            above_ground: &above,
+            index: index.as_ref(),
+            cue: cue.as_ref().map(|cue| BuildingCue { index: &cue.index, weak: Some(&cue.weak) }),
+            cell_m,
+        };
         let found = classify(&input, &config.classes)?;
         progress.check_cancelled()?;
-        let report = report(config, &surface, &found, cell_m);
+        let cells_weak = cue.map_or(0, |cue| cue.weak.data().iter().filter(|weak| **weak).count());
+        let report = ClassesReport { cells_weak, ..report(config, &surface, &found, cell_m) };
         write(config, &folder, &surface, &found, Crs::ellipsoidal(crs.horizontal), &report)?;
         Ok(report)
     })?
@@ -85,6 +97,8 @@ fn report(config: &ClassesConfig, surface: &Dem, found: &Classes, cell_m: f64) -
         cells_vegetation: count(VEGETATION),
         cells_unknown: count(UNKNOWN),
         has_vegetation_index: config.vegetation_index.is_some(),
+        has_building_index: config.building_index.is_some(),
+        cells_weak: 0,
         terrain: config.terrain,
         parameters: config.classes,
     }

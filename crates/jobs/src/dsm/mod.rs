@@ -90,7 +90,7 @@ mod prior_findings;
 mod prior_verdict;
 mod prior_view;
 mod probe;
-mod rasters;
+pub(crate) mod rasters;
 mod reference_dem;
 mod register;
 mod report;

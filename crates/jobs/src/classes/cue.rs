@@ -1,0 +1,63 @@
+//! What a building index says at the cells of a surface, and where the heights are weak.
+
+use std::path::Path;
+
+use classes::ClassifyConfig;
+use io::raster::{Dem, ImageSource, read_dem};
+use raster::Grid;
+
+use super::error::ClassesError;
+use crate::dsm::rasters::OBSERVED;
+use crate::eval::EvalJobError;
+use crate::eval::on_reference::surface_on_reference;
+use crate::files::FileError;
+
+/// Rasters of a DSM run beside its surface model.
+const SIGMA: &str = "sigma.tif";
+const FILLED: &str = "filled.tif";
+
+/// A building index at the cells of a surface.
+pub(super) struct Cue {
+    pub(super) index: Grid<f32>,
+    /// Cells whose height was not observed, or whose standard deviation is half the least height of
+    /// a building or more.
+    pub(super) weak: Grid<bool>,
+}
+
+impl Cue {
+    /// Reads a building index, and the standard deviations and filled cells of the run that made
+    /// the surface, where they lie beside it.
+    pub(super) fn read(path: &Path, surface: &Dem, config: &ClassifyConfig) -> Result<Self, ClassesError> {
+        let unusable = |error: EvalJobError| ClassesError::Cue(error.into());
+        let raster = read_dem(path).map_err(|error| unusable(error.into()))?;
+        let outside = raster.heights.data().iter().find(|value| value.is_finite() && !(0.0..=1.0).contains(*value));
+        if let Some(&found) = outside {
+            return Err(ClassesError::CueRange { path: path.to_owned(), found });
+        }
+        let index = surface_on_reference(&raster, surface).map_err(unusable)?;
+        let mut weak = surface.heights.map(|_| false);
+        if let Some(sigma) = beside(surface, SIGMA)? {
+            let most_m = (0.5 * config.least_height_m) as f32;
+            weak.data_mut().iter_mut().zip(sigma.data()).for_each(|(weak, s)| *weak |= *s >= most_m);
+        }
+        if let Some(filled) = beside(surface, FILLED)? {
+            let observed = f32::from(OBSERVED);
+            weak.data_mut().iter_mut().zip(filled.data()).for_each(|(weak, state)| *weak |= *state != observed);
+        }
+        Ok(Self { index, weak })
+    }
+}
+
+/// Reads a raster beside a surface; `None` where there is none of its size.
+fn beside(surface: &Dem, name: &str) -> Result<Option<Grid<f32>>, ClassesError> {
+    let path = surface.path.with_file_name(name);
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let source = ImageSource::open(&path).map_err(FileError::write)?;
+    let size = (surface.heights.width(), surface.heights.height());
+    if (source.info().width, source.info().height) != size {
+        return Ok(None);
+    }
+    Ok(Some(source.read_samples(1, source.window()).map_err(FileError::write)?))
+}
