@@ -118,7 +118,7 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     buildings.data_mut().iter_mut().enumerate().for_each(|(at, smooth)| *smooth = *smooth && !is_green(at));
     let mut stands = stands;
     if let Some(cue) = &input.cue {
-        let likely = likely_buildings(input, cue, &roughness, config);
+        let likely = likely_buildings(input, cue, (&roughness, scale.roughness_m), config);
         for at in (0..likely.len()).filter(|at| likely[*at] && !is_green(*at)) {
             buildings.data_mut()[at] = true;
             stands.data_mut()[at] = true;
@@ -154,10 +154,10 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
 fn likely_buildings(
     input: &ClassifyInput<'_>,
     cue: &BuildingCue<'_>,
-    roughness: &Grid<f32>,
+    (roughness, limit_m): (&Grid<f32>, f64),
     config: &ClassifyConfig,
 ) -> Vec<bool> {
-    let (least_m, limit_m) = (config.least_height_m, config.roughness_m);
+    let least_m = config.least_height_m;
     let is_likely = |at: usize| {
         let (above_m, rough_m) = (f64::from(input.above_ground.data()[at]), f64::from(roughness.data()[at]));
         let is_weak = cue.weak.is_some_and(|weak| weak.data()[at]);
