@@ -4,7 +4,7 @@ use raster::Grid;
 
 use crate::config::ClassifyConfig;
 use crate::error::ClassifyError;
-use crate::regions::{grow, without_small};
+use crate::regions::{grow, take_enclosed, without_small};
 use crate::roughness::{least_residual, median_residual};
 
 /// A cell without a height or without ground.
@@ -70,6 +70,9 @@ const BARE_M: f32 = 0.3;
 /// Fewest windows on bare ground that tell the noise of a surface.
 const WINDOWS_MIN: usize = 100;
 
+/// Area of smooth cells that is no accident, in windows.
+const CHANCE_WINDOWS: f64 = 1.2;
+
 /// Returns half the side of a window in cells, without the middle cell.
 fn reach_of(window_m: f64, cell_m: f64) -> usize {
     ((window_m / cell_m - 1.0) / 2.0).round().max(1.0) as usize
@@ -124,10 +127,13 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
             stands.data_mut()[at] = true;
         }
     }
-    without_small(&mut buildings, cells(config.least_building_m2));
+    // A single window may be smooth by chance, and growing would make it large enough.
+    let chance_m2 = CHANCE_WINDOWS * scale.window_m * scale.window_m;
+    without_small(&mut buildings, cells(chance_m2.min(config.least_building_m2)));
     let mut free = stands.clone();
     free.data_mut().iter_mut().enumerate().for_each(|(at, free)| *free = *free && !is_green(at));
     grow(&mut buildings, &free, (scale.ramp_m / input.cell_m).round().max(1.0) as usize);
+    without_small(&mut buildings, cells(config.least_building_m2));
     let mut vegetation = stands.clone();
     let cleared = vegetation.data_mut().iter_mut().zip(buildings.data());
     cleared.filter(|(_, building)| **building).for_each(|(plant, _)| *plant = false);
@@ -137,6 +143,7 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     taken.filter(|(_, plant)| **plant).for_each(|(left, _)| *left = false);
     // Scraps that touch a building are parts of it; others are too small for anything.
     grow(&mut buildings, &left, 1);
+    take_enclosed(&mut vegetation, &mut buildings, is_green);
     let mut classes = Grid::filled(left.width(), left.height(), UNKNOWN);
     for (at, class) in classes.data_mut().iter_mut().enumerate() {
         *class = match input.above_ground.data()[at] {

@@ -2,10 +2,45 @@
 
 use raster::Grid;
 
-/// Removes the regions of fewer than `cells_min` cells from a mask. Cells that touch at sides or
-/// corners are connected.
+/// Removes the regions of fewer than `cells_min` cells from a mask.
 pub(crate) fn without_small(mask: &mut Grid<bool>, cells_min: usize) {
+    for region in regions_of(mask) {
+        if region.len() < cells_min {
+            region.into_iter().for_each(|at| mask.data_mut()[at] = false);
+        }
+    }
+}
+
+/// Gives the regions of `mask` to `other` whose border lies against `other` for more than half of
+/// its length: what stands on a roof belongs to the building, a tree beside it does not. Regions
+/// with a cell that `keeps` stay.
+pub(crate) fn take_enclosed(mask: &mut Grid<bool>, other: &mut Grid<bool>, keeps: impl Fn(usize) -> bool) {
+    let (width, height) = (mask.width(), mask.height());
+    for region in regions_of(mask) {
+        if region.iter().any(|at| keeps(*at)) {
+            continue;
+        }
+        let (mut border, mut against) = (0, 0);
+        for &at in &region {
+            for near in beside(width, height, at).filter(|near| !mask.data()[*near]) {
+                border += 1;
+                against += usize::from(other.data()[near]);
+            }
+        }
+        if 2 * against > border {
+            for at in region {
+                mask.data_mut()[at] = false;
+                other.data_mut()[at] = true;
+            }
+        }
+    }
+}
+
+/// Returns the regions of a mask as lists of cells. Cells that touch at sides or corners are
+/// connected.
+fn regions_of(mask: &Grid<bool>) -> Vec<Vec<usize>> {
     let mut is_seen = vec![false; mask.data().len()];
+    let mut regions = Vec::new();
     for seed in 0..is_seen.len() {
         if is_seen[seed] || !mask.data()[seed] {
             continue;
@@ -21,10 +56,9 @@ pub(crate) fn without_small(mask: &mut Grid<bool>, cells_min: usize) {
                 }
             }
         }
-        if cells.len() < cells_min {
-            cells.iter().for_each(|at| mask.data_mut()[*at] = false);
-        }
+        regions.push(cells);
     }
+    regions
 }
 
 /// Grows a mask by `steps` cells, as far as `within` allows.
@@ -50,4 +84,33 @@ fn around(width: usize, height: usize, at: usize) -> impl Iterator<Item = usize>
     let rows = row.saturating_sub(1)..(row + 2).min(height);
     rows.flat_map(move |y| (column.saturating_sub(1)..(column + 2).min(width)).map(move |x| y * width + x))
         .filter(move |near| *near != at)
+}
+
+/// Returns the cells that share a side with a cell.
+fn beside(width: usize, height: usize, at: usize) -> impl Iterator<Item = usize> {
+    let (column, row) = (at % width, at / width);
+    around(width, height, at).filter(move |near| near % width == column || near / width == row)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_on_a_roof_is_part_of_it_and_what_stands_beside_it_is_not() {
+        let mut roof = Grid::filled(20, 10, false);
+        (1..9).for_each(|row| roof.row_mut(row)[2..10].fill(true));
+        let mut rough = Grid::filled(20, 10, false);
+        (3..5).for_each(|row| {
+            roof.row_mut(row)[4..6].fill(false);
+            rough.row_mut(row)[4..6].fill(true);
+            rough.row_mut(row)[10..12].fill(true);
+        });
+        let (mut kept, mut whole) = (rough.clone(), roof.clone());
+        take_enclosed(&mut rough, &mut roof, |_| false);
+        assert!(roof[(4, 3)] && roof[(5, 4)] && !rough[(4, 3)]);
+        assert!(rough[(10, 3)] && rough[(11, 4)] && !roof[(10, 3)]);
+        take_enclosed(&mut kept, &mut whole, |at| at == 3 * 20 + 4);
+        assert!(kept[(4, 3)] && !whole[(4, 3)], "a green cell keeps its region");
+    }
 }
