@@ -15,6 +15,8 @@ pub const GROUND: u8 = 2;
 pub const VEGETATION: u8 = 5;
 /// A building.
 pub const BUILDING: u8 = 6;
+/// Water, which only a vegetation index tells from ground.
+pub const WATER: u8 = 9;
 
 /// A building index, which decides where heights are weak.
 #[derive(Debug, Clone, Copy)]
@@ -144,12 +146,21 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     // Scraps that touch a building are parts of it; others are too small for anything.
     grow(&mut buildings, &left, 1);
     take_enclosed(&mut vegetation, &mut buildings, is_green);
+    let mut water = left.map(|_| false);
+    if let Some(index) = input.index {
+        water.data_mut().iter_mut().enumerate().for_each(|(at, wet)| {
+            let is_object = buildings.data()[at] || vegetation.data()[at];
+            *wet = !is_object && f64::from(index.data()[at]) <= config.water_index;
+        });
+        without_small(&mut water, cells(config.least_water_m2));
+    }
     let mut classes = Grid::filled(left.width(), left.height(), UNKNOWN);
     for (at, class) in classes.data_mut().iter_mut().enumerate() {
         *class = match input.above_ground.data()[at] {
             h if !h.is_finite() => UNKNOWN,
             _ if buildings.data()[at] => BUILDING,
             _ if vegetation.data()[at] => VEGETATION,
+            _ if water.data()[at] => WATER,
             _ => GROUND,
         };
     }

@@ -32,6 +32,11 @@ pub struct ClassifyConfig {
     pub ramp_m: f64,
     /// Least vegetation index of vegetation, where one is given.
     pub least_index: f64,
+    /// Largest vegetation index of water, where one is given. Water swallows the near infrared;
+    /// asphalt and soil lie about 0.
+    pub water_index: f64,
+    /// Smallest area of water, square metres: below it lie shadows.
+    pub least_water_m2: f64,
     /// Least building index that counts as a building where the heights are weak.
     pub least_building_index: f64,
     /// Factor by which the height of a building may miss the least height, and its residual the
@@ -52,6 +57,8 @@ impl Default for ClassifyConfig {
             least_vegetation_m2: 4.0,
             ramp_m: 1.5,
             least_index: 0.3,
+            water_index: -0.1,
+            least_water_m2: 100.0,
             least_building_index: 0.5,
             leniency: 2.0,
         }
@@ -84,6 +91,9 @@ impl ClassifyConfig {
         within("the least area of vegetation", self.least_vegetation_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the width of ramps", self.ramp_m, 0.0, 20.0, "0 to 20 m")?;
         within("the least vegetation index", self.least_index, -1.0, 1.0, "-1 to 1")?;
+        let range = "-1 to that of vegetation";
+        within("the largest vegetation index of water", self.water_index, -1.0, self.least_index, range)?;
+        within("the least area of water", self.least_water_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the least building index", self.least_building_index, 0.0, 1.0, "0 to 1")?;
         within("the leniency", self.leniency, 1.0, 10.0, "1 to 10")
     }

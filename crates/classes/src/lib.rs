@@ -23,6 +23,6 @@ mod error;
 mod regions;
 mod roughness;
 
-pub use classify::{BUILDING, BuildingCue, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
+pub use classify::{BUILDING, BuildingCue, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, WATER, classify};
 pub use config::ClassifyConfig;
 pub use error::ClassifyError;

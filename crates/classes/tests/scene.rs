@@ -1,6 +1,6 @@
 //! A scene of houses and trees with noise: their classes, a vegetation index, and what is refused.
 
-use classes::{BUILDING, BuildingCue, ClassifyConfig, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
+use classes::{BUILDING, BuildingCue, ClassifyConfig, ClassifyInput, GROUND, UNKNOWN, VEGETATION, WATER, classify};
 use numeric::SplitMix64;
 use raster::{Grid, gaussian};
 
@@ -63,12 +63,18 @@ fn a_vegetation_index_overrules_the_roughness() {
         heights.row_mut(row)[10..50].fill(3.0);
         index.row_mut(row)[30..50].fill(0.6);
     }
+    // A pond, and a dark cell that may be a shadow.
+    for row in 45..58 {
+        index.row_mut(row)[5..45].fill(-0.4);
+    }
+    index[(55, 5)] = -0.4;
     heights[(0, 0)] = f32::NAN;
     let input =
         ClassifyInput { surface: &heights, above_ground: &heights, index: Some(&index), cue: None, cell_m: 0.5 };
     let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
     assert_eq!([found[(20, 20)], found[(40, 20)]], [BUILDING, VEGETATION]);
     assert_eq!([found[(0, 0)], found[(55, 55)]], [UNKNOWN, GROUND]);
+    assert_eq!([found[(10, 50)], found[(55, 5)]], [WATER, GROUND]);
 }
 
 #[test]

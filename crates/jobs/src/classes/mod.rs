@@ -3,7 +3,8 @@
 //! The ground is found first, as in the DTM job. Written into one folder, on the grid of the
 //! surface:
 //!
-//! - `classes.tif`: ASPRS LAS classes: 0 unknown, 2 ground, 5 vegetation, 6 building.
+//! - `classes.tif`: ASPRS LAS classes: 0 unknown, 2 ground, 5 vegetation, 6 building,
+//!   9 water.
 //! - `roughness.tif`: residual of the best plane around each cell that stands, metres; no-data
 //!   elsewhere.
 //! - `classes.json` and `classes.html`: the report, and its page with maps.

@@ -24,6 +24,8 @@ pub struct ClassesReport {
     pub cells_building: usize,
     /// Cells of vegetation.
     pub cells_vegetation: usize,
+    /// Cells of water; none without a vegetation index.
+    pub cells_water: usize,
     /// Cells without a height or without ground.
     pub cells_unknown: usize,
     /// Whether a vegetation index took part.
@@ -44,11 +46,13 @@ impl ClassesReport {
         let cells = self.size.0 * self.size.1;
         let share = |n: usize| 100.0 * n as f64 / cells.max(1) as f64;
         format!(
-            "classes {}\ncells   {cells} ({:.1} % ground, {:.1} % building, {:.1} % vegetation, {:.1} % unknown)\n",
+            "classes {}\ncells   {cells} ({:.1} % ground, {:.1} % building, {:.1} % vegetation, {:.1} % water, {:.1} % \
+             unknown)\n",
             self.classes.display(),
             share(self.cells_ground),
             share(self.cells_building),
             share(self.cells_vegetation),
+            share(self.cells_water),
             share(self.cells_unknown),
         )
     }

@@ -1,6 +1,6 @@
 //! Runs the classes job.
 
-use classes::{BUILDING, BuildingCue, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, classify};
+use classes::{BUILDING, BuildingCue, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, WATER, classify};
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
@@ -95,6 +95,7 @@ fn report(config: &ClassesConfig, surface: &Dem, found: &Classes, cell_m: f64) -
         cells_ground: count(GROUND),
         cells_building: count(BUILDING),
         cells_vegetation: count(VEGETATION),
+        cells_water: count(WATER),
         cells_unknown: count(UNKNOWN),
         has_vegetation_index: config.vegetation_index.is_some(),
         has_building_index: config.building_index.is_some(),
@@ -121,7 +122,7 @@ fn write(
         let raster = CogRaster { threads, holds_heights: false, provenance: Some(&surface.provenance), ..plain };
         write_cog(work.path().join(name), &raster, false).map_err(FileError::from)
     };
-    put(CLASSES, "class_2_ground_5_vegetation_6_building", BandData::U8(&found.classes))?;
+    put(CLASSES, "class_2_ground_5_vegetation_6_building_9_water", BandData::U8(&found.classes))?;
     let roughness = found.roughness.map(|r| if r.is_finite() { *r } else { f32::NAN });
     put(ROUGHNESS, "roughness_m", BandData::F32(&roughness))?;
     let share = 100.0 * report.cells_building as f64 / found.classes.data().len().max(1) as f64;
@@ -142,6 +143,7 @@ fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
         (GROUND, [214, 200, 170], "ground"),
         (BUILDING, [200, 80, 60], "building"),
         (VEGETATION, [86, 150, 80], "vegetation"),
+        (WATER, [86, 140, 200], "water"),
         (UNKNOWN, [72, 72, 76], "unknown"),
     ]);
     let classes = found.classes.map(|class| f32::from(*class));
