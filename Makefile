@@ -20,7 +20,7 @@ for tool in pkg-config c++; do command -v "$$tool" > /dev/null || MISSING="$$MIS
 for library in gdal proj sqlite3; do pkg-config --exists "$$library" 2> /dev/null || MISSING="$$MISSING $$library.pc"; done
 endef
 
-.PHONY: help setup check demo test fuzz lint readme bench bench-kernels plugin test-qgis
+.PHONY: help setup check demo test test-python fuzz lint readme stubs wheel bench bench-kernels plugin test-qgis
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -58,8 +58,13 @@ demo: setup ## a surface model of the sample town, its accuracy and its picture,
 	echo "picture        $(DEMO)/dsm/relief.png"
 	echo "report         $(DEMO)/report/report.html"
 
-test: check ## unit, property, integration and documentation tests
+test: check ## unit, property, integration and documentation tests, and those of the Python package
 	@cargo test --workspace
+	crates/python/tests/run.sh
+
+test-python: check ## the tests of the Python package alone, in target/python/venv
+	@cargo build --workspace
+	crates/python/tests/run.sh
 
 fuzz: check ## an hour of hostile input: 20,000 mutated files over all readers and 500 whole runs (SKYSWEEP_FUZZ_SEED chooses others)
 	@SKYSWEEP_FUZZ_INPUTS=20000 SKYSWEEP_FUZZ_RUNS=500 SKYSWEEP_FUZZ_SECONDS=3600 \
@@ -82,6 +87,14 @@ test-qgis: check ## the algorithms in an installed QGIS, without a window (not p
 
 readme: check ## bring the numbers of benches/results into README.md and docs
 	@SKYSWEEP_WRITE_NUMBERS=1 cargo test --quiet --test readme_numbers
+
+stubs: check ## write the Python functions of the jobs anew, of the configurations
+	@SKYSWEEP_WRITE_STUBS=1 cargo test --quiet -p skysweep-python --test signatures the_functions
+
+wheel: check ## the Python package as a wheel in out/wheels, which links the system's GDAL and PROJ
+	@python3 -m venv target/python/maturin
+	target/python/maturin/bin/pip install --quiet --disable-pip-version-check 'maturin>=1.7,<2'
+	target/python/maturin/bin/maturin build --release --out out/wheels
 
 bench: check ## speed against error: every preset on every scene; writes benches/results (about 15 minutes)
 	@cargo bench --bench scenes

@@ -107,6 +107,7 @@ mod ties;
 mod tuning;
 mod values;
 mod view_geometry;
+mod view_heights;
 
 pub use character::ImageCharacter;
 pub use chunk::{ChunkContent, ChunkResult, ChunkSurface, run_chunk};
@@ -139,5 +140,6 @@ pub use ties::PairTies;
 pub use tuning::SweepTuning;
 pub use values::{HeightRange, ImagePair, MapBounds};
 pub use view_geometry::PairGeometry;
+pub use view_heights::{ViewHeights, ViewImage, sweep_views};
 
 pub use sweep::SweepError;

@@ -1,0 +1,49 @@
+"""Arrays as the library takes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+def floats(name: str, values: ArrayLike) -> Floats:
+    """Numbers as an array of f64, without a copy where they are one. Void entries of masked arrays
+    become NaN."""
+    array = np.ma.asanyarray(values)
+    if array.dtype == bool or not (np.issubdtype(array.dtype, np.integer) or np.issubdtype(array.dtype, np.floating)):
+        raise InputError(f"{name} has the type {array.dtype}, expected real numbers")
+    if np.ma.isMaskedArray(values):
+        return np.ma.filled(array.astype(np.float64), np.nan)
+    return np.asarray(array.data, dtype=np.float64)
+
+
+def together(values: dict[str, ArrayLike]) -> tuple[list[Floats], tuple[int, ...]]:
+    """Arrays of any shapes that fit one another, flat and contiguous, with their common shape.
+
+    Arrays of one number stay so: nothing is repeated in memory for them.
+    """
+    arrays = {name: floats(name, value) for name, value in values.items()}
+    try:
+        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise InputError(f"the arrays have shapes that do not fit one another: {shapes}") from None
+    count = int(np.prod(shape, dtype=np.int64))
+
+    def flat(array: Floats) -> Floats:
+        if array.size == 1 and count > 0:
+            return array.reshape(1)
+        return np.ascontiguousarray(np.broadcast_to(array, shape)).reshape(-1)
+
+    return [flat(array) for array in arrays.values()], shape
+
+
+def shaped(values: Floats, shape: tuple[int, ...]) -> Any:
+    """An array of a shape; a number for the shape of none."""
+    return values.reshape(shape)[()]

@@ -1,0 +1,259 @@
+"""Calling jobs: settings to JSON, progress, reports."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import functools
+import inspect
+import json
+import logging
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Callable, TypeVar, Union, cast
+
+from . import _native
+from ._errors import CrsError, InputError
+
+__all__ = ["PathLike", "Progress", "Report", "Step", "job", "run"]
+
+_LOG = logging.getLogger("skysweep")
+
+#: Text, an `os.PathLike`, or an open rasterio dataset, of which the file is taken.
+PathLike = Any
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+class Report(dict):  # type: ignore[type-arg]
+    """The report of a job: a dictionary whose keys are attributes as well.
+
+    The keys are those of the command line's ``--json``. ``None`` stands for numbers that are not
+    known.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            known = ", ".join(map(str, self)) or "none"
+            raise AttributeError(f"the report has no {name!r}; it has {known}") from None
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *map(str, self)]
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where a job is. A progress function is called with it when a stage begins and as it goes on,
+    on the thread that called the job. An exception of the function stops the job, which leaves
+    nothing half-written, and is raised to the caller."""
+
+    #: Name of the stage.
+    stage: str
+    #: Steps of the stage that are done.
+    done: int
+    #: Steps of the stage.
+    total: int
+
+
+#: `None` shows nothing, `True` a bar (tqdm); a function is called with every `Step`.
+Progress = Union[None, bool, Callable[[Step], object]]
+
+
+class _Watcher:
+    """Receives what a job reports. Warnings, choices and parts go to the logger ``skysweep``."""
+
+    def __init__(self, show: Callable[[Step], object] | None) -> None:
+        self._show = show
+        self._step = Step("", 0, 0)
+
+    def begin(self, stage: str, total: int) -> None:
+        self._tell(Step(stage, 0, total))
+
+    def steps(self, count: int) -> None:
+        self._tell(Step(self._step.stage, self._step.done + count, self._step.total))
+
+    def _tell(self, step: Step) -> None:
+        self._step = step
+        if self._show is not None:
+            self._show(step)
+
+    def choice(self, name: str, value: str, reason: str) -> None:
+        _LOG.info("%s: %s (%s)", name, value, reason)
+
+    def warn(self, text: str) -> None:
+        _LOG.warning("%s", text)
+
+    def part(self, name: str, state: str | None) -> None:
+        _LOG.info("%s: %s", name, "done" if state is None else state)
+
+
+class _Bar:
+    """A bar of tqdm for each stage."""
+
+    def __init__(self) -> None:
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            raise InputError("progress=True needs the package tqdm; install it or give a function") from None
+        self._make: Any = tqdm
+        self._bar: Any = None
+
+    def __call__(self, step: Step) -> None:
+        if step.done == 0:
+            self.close()
+            self._bar = self._make(total=step.total, desc=step.stage)
+        elif self._bar is not None:
+            self._bar.update(step.done - self._bar.n)
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+@contextlib.contextmanager
+def watcher(progress: Progress) -> Iterator[_Watcher]:
+    """Makes the watcher for an argument `progress`."""
+    if progress is None or progress is False:
+        yield _Watcher(None)
+    elif progress is True:
+        bar = _Bar()
+        try:
+            yield _Watcher(bar)
+        finally:
+            bar.close()
+    elif callable(progress):
+        yield _Watcher(progress)
+    else:
+        raise TypeError(f"progress is {progress!r}, expected None, True or a function")
+
+
+def path_of(value: Any) -> str:
+    """The path that a value names: text, `os.PathLike`, or an open dataset of rasterio."""
+    if isinstance(value, (str, os.PathLike)):
+        path = os.fspath(value)
+        return os.fsdecode(path)
+    if hasattr(value, "profile") and isinstance(getattr(value, "name", None), str):
+        return str(value.name)
+    raise InputError(f"expected a path or an open dataset, found {type(value).__name__}")
+
+
+def epsg_of(value: Any) -> int:
+    """The EPSG code of a CRS: a number, `EPSG:32631`, or an object of pyproj or rasterio."""
+    code: Any = value
+    if hasattr(value, "to_epsg"):
+        code = value.to_epsg()
+        if code is None:
+            raise CrsError(f"the CRS has no EPSG code: {value}")
+    elif isinstance(value, str):
+        code = value.strip().upper().removeprefix("EPSG:")
+        if not code.isdigit():
+            raise CrsError(f"expected an EPSG code such as EPSG:32631, found {value!r}")
+    return int(code)
+
+
+class _Files:
+    """Files for objects in memory that a job takes as files; they live as long as the call."""
+
+    def __init__(self, stack: contextlib.ExitStack) -> None:
+        self._stack = stack
+        self._folder: str | None = None
+        self._count = 0
+
+    def path(self, ending: str) -> str:
+        if self._folder is None:
+            self._folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix="skysweep"))
+        self._count += 1
+        return os.path.join(self._folder, f"{self._count}{ending}")
+
+    def polygons(self, value: Any) -> str:
+        """Writes a GeoDataFrame, or a geometry in longitude and latitude, as GeoJSON."""
+        frame = value
+        if getattr(frame, "crs", None) is not None and hasattr(frame, "to_crs"):
+            frame = frame.to_crs(4326)
+        shape = _plain_json(frame.__geo_interface__)
+        if shape["type"] not in ("FeatureCollection", "Feature"):
+            shape = {"type": "Feature", "properties": {}, "geometry": shape}
+        if shape["type"] == "Feature":
+            shape = {"type": "FeatureCollection", "features": [shape]}
+        path = self.path(".geojson")
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(shape, file)
+        return path
+
+
+def _plain_json(value: Any) -> Any:
+    return json.loads(json.dumps(value, default=str))
+
+
+def _plain(name: str, value: Any, files: _Files) -> Any:
+    """A setting as JSON knows it. `name` is its place, for errors."""
+    if value is None or isinstance(value, (bool, int, str)):
+        return epsg_of(value) if name.endswith("_epsg") and isinstance(value, str) else value
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise InputError(f"{name} is {value}, expected a finite number")
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): _plain(str(key), item, files) for key, item in value.items()}
+    if name == "bounds" and hasattr(value, "bounds"):
+        return [float(edge) for edge in value.bounds]
+    if hasattr(value, "to_epsg"):
+        return epsg_of(value)
+    if isinstance(value, os.PathLike) or hasattr(value, "profile"):
+        return path_of(value)
+    if hasattr(value, "__geo_interface__"):
+        return files.polygons(value)
+    if hasattr(value, "dtype") and hasattr(value, "tolist"):
+        if getattr(value, "size", 1) > 1_000_000:
+            raise InputError(f"{name} has {value.size} values; settings are short")
+        return _plain(name, value.tolist(), files)
+    if isinstance(value, (list, tuple, set, frozenset, range)):
+        return [_plain(name, item, files) for item in value]
+    raise InputError(f"{name} is a {type(value).__name__}, which a setting cannot be")
+
+
+def _area(value: Any, files: _Files) -> Any:
+    """`area` takes a layer of a file; polygons in memory are written to one."""
+    if isinstance(value, Mapping) or value is None:
+        return value
+    if hasattr(value, "__geo_interface__"):
+        return {"file": files.polygons(value)}
+    return {"file": path_of(value)}
+
+
+def run(name: str, settings: Mapping[str, Any]) -> Any:
+    """Runs the job called `name`. Settings that are `None` have their defaults."""
+    given = {key: value for key, value in settings.items() if value is not None}
+    progress = given.pop("progress", None)
+    with contextlib.ExitStack() as stack:
+        files = _Files(stack)
+        if "area" in given:
+            given["area"] = _area(given["area"], files)
+        plain = {key: _plain(key, value, files) for key, value in given.items()}
+        watching = stack.enter_context(watcher(progress))
+        text = _native.run_job(name, json.dumps(plain, allow_nan=False), watching)
+    return json.loads(text, object_hook=Report)
+
+
+def job(function: _Function) -> _Function:
+    """Makes errors of wrong keywords name the keywords that there are."""
+    signature = inspect.signature(function)
+    known = list(signature.parameters)
+
+    @functools.wraps(function)
+    def call(*args: Any, **settings: Any) -> Any:
+        for name in settings:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, 1) or [k for k in known if k.startswith(name)]
+                hint = f"did you mean {near[0]!r}? " if near else ""
+                raise TypeError(
+                    f"{function.__name__}() has no keyword {name!r}; {hint}Known are {', '.join(known)}"
+                )
+        return function(*args, **settings)
+
+    return cast(_Function, call)

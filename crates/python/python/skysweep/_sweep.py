@@ -1,0 +1,91 @@
+"""The height sweep on arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native
+from ._arrays import floats
+from ._call import Progress, watcher
+from ._errors import InputError
+from ._rpc import Rpc
+
+__all__ = ["HeightSweep", "ViewHeights"]
+
+
+class ViewHeights(NamedTuple):
+    """Heights of a view. All arrays have the pixels of pyramid level `level`: (rows, columns)."""
+
+    #: Metres above the ellipsoid, f64; NaN where there is none.
+    height_m: NDArray[np.float64]
+    #: Standard deviations, metres, f32.
+    sigma_m: NDArray[np.float32]
+    #: Confidences, 0 to 1, f32.
+    confidence: NDArray[np.float32]
+    #: Number of other views that confirm the height, u8. Heights that no view confirms are often
+    #: wrong; a DSM run drops them.
+    agreeing: NDArray[np.uint8]
+    #: Times that the pixels of the view were halved; 0 is the full resolution.
+    level: int
+    #: Positions of the views that it was compared with, the best first.
+    sources: list[int]
+
+
+class HeightSweep:
+    """Heights of views in memory, by the sweep of a DSM run: no file is read or written.
+
+    Args:
+        views: Pairs of pixels (rows, columns) and their :class:`Rpc`, two or more. Pixels are grey
+            values as sensors count them (noise of a few counts); NaN where there is none. Other
+            types than f32 are converted.
+        height_range: Heights to search, metres above the ellipsoid, the lower first.
+        preset: ``fast`` (half the resolution, two sources per view), ``balanced`` or ``accurate``.
+
+    The cameras are taken as they are. Correct their pointing first (:meth:`Rpc.corrected`), or use
+    :func:`dsm`, which finds the corrections.
+
+    Raises:
+        InputError: A view is no grid of real numbers or too small, or a setting is out of range.
+    """
+
+    def __init__(
+        self,
+        views: Sequence[tuple[ArrayLike, Rpc]],
+        height_range: tuple[float, float],
+        *,
+        preset: str = "balanced",
+    ) -> None:
+        self._views: list[tuple[NDArray[np.float32], _native.RpcCore]] = []
+        for number, (pixels, rpc) in enumerate(views):
+            if not isinstance(rpc, Rpc):
+                raise InputError(f"the camera of view {number} is a {type(rpc).__name__}, expected a skysweep.Rpc")
+            array = floats(f"view {number}", pixels) if not _is_f32(pixels) else np.asarray(pixels)
+            if array.ndim != 2:
+                raise InputError(f"view {number} has the shape {array.shape}, expected rows and columns")
+            self._views.append((np.asarray(array, dtype=np.float32), rpc._core))
+        low, high = (float(height) for height in height_range)
+        if not (np.isfinite(low) and np.isfinite(high)):
+            raise InputError(f"the height range is {low} to {high}, expected finite heights")
+        self._range, self._preset = (low, high), preset
+
+    def run(self, progress: Progress = None) -> list[ViewHeights]:
+        """Computes the heights of every view.
+
+        Raises:
+            InputError: There are fewer than two views.
+            SkysweepError: The views share no ground, or look along the same line.
+        """
+        with watcher(progress) as watching:
+            found = _native.sweep_views(self._views, self._range, self._preset, watching)
+        return [
+            ViewHeights(height_m, sigma_m, confidence, agreeing, level, sources)
+            for level, sources, height_m, sigma_m, confidence, agreeing in found
+        ]
+
+
+def _is_f32(pixels: Any) -> bool:
+    return isinstance(pixels, np.ndarray) and not np.ma.isMaskedArray(pixels) and pixels.dtype == np.float32

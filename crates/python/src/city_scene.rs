@@ -1,0 +1,99 @@
+//! City models with ray casting.
+
+use std::path::PathBuf;
+
+use bvh::{Bvh, MISS, Ray};
+use city::{Lod, LodChoice, MeshConfig, Scope, TriangleMesh};
+use io::citymodel::CityFile;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+
+use crate::fault::Fault;
+use crate::raise;
+
+/// Triangles of a city model in a tree for rays.
+#[pyclass(frozen, module = "skysweep._native")]
+pub(crate) struct CityCore {
+    ids: Vec<String>,
+    mesh: TriangleMesh,
+    tree: Bvh,
+    epsg: (Option<u32>, Option<u32>),
+}
+
+fn opened(path: &PathBuf, lod: Option<&str>, all_objects: bool) -> Result<CityCore, Fault> {
+    let lod: Option<Lod> = lod.map(|text| text.parse().map_err(|e| Fault::input(&e))).transpose()?;
+    let CityFile { model, .. } = io::citymodel::read(path)?;
+    let config = MeshConfig {
+        lod: lod.map_or_else(LodChoice::default, LodChoice::Only),
+        scope: if all_objects { Scope::Everything } else { Scope::Buildings },
+    };
+    let mesh = TriangleMesh::from_model(&model, &config)?.mesh;
+    let tree = Bvh::new(&mesh.positions, &mesh.triangles)?;
+    let ids = model.objects.iter().map(|object| object.id.clone()).collect();
+    Ok(CityCore { ids, mesh, tree, epsg: (model.crs.epsg, model.crs.vertical_epsg) })
+}
+
+#[pymethods]
+impl CityCore {
+    /// Reads a model.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf, lod: Option<&str>, all_objects: bool) -> PyResult<Self> {
+        py.detach(|| opened(&path, lod, all_objects)).map_err(|fault| raise(py, &fault))
+    }
+
+    /// EPSG codes of the map and of the heights.
+    fn epsg(&self) -> (Option<u32>, Option<u32>) {
+        self.epsg
+    }
+
+    /// Identifiers of the objects in the order of the file.
+    fn ids(&self) -> Vec<String> {
+        self.ids.clone()
+    }
+
+    /// Corners (n, 3) on the map, metres; triangles (m, 3); object and name of the class of each
+    /// triangle.
+    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Triangles<'py>> {
+        let TriangleMesh { origin, positions, triangles, .. } = &self.mesh;
+        let origin = [origin.x, origin.y, origin.z];
+        let corners: Vec<f64> = positions.iter().flat_map(|p| [0, 1, 2].map(|i| origin[i] + p[i])).collect();
+        let indices: Vec<u32> = triangles.iter().flatten().copied().collect();
+        let surfaces = (0..triangles.len()).map(|triangle| self.mesh.surface(triangle));
+        let (objects, classes): (Vec<u32>, Vec<String>) =
+            surfaces.map(|surface| (surface.object, surface.class.to_string())).unzip();
+        Ok((
+            corners.into_pyarray(py).reshape([positions.len(), 3])?,
+            indices.into_pyarray(py).reshape([triangles.len(), 3])?,
+            objects.into_pyarray(py),
+            classes,
+        ))
+    }
+
+    /// Casts rays: the distance in lengths of the direction (infinite for none) and the triangle
+    /// (−1 for none) of each.
+    fn cast<'py>(
+        &self,
+        py: Python<'py>,
+        origins: PyReadonlyArray2<'py, f64>,
+        directions: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>)> {
+        let (origins, directions) = (origins.as_slice()?, directions.as_slice()?);
+        let local = [self.mesh.origin.x, self.mesh.origin.y, self.mesh.origin.z];
+        let (from, to) = (origins.as_chunks::<3>().0, directions.as_chunks::<3>().0);
+        let cast = |(origin, direction): (&[f64; 3], &[f64; 3])| {
+            let origin = [0, 1, 2].map(|i| origin[i] - local[i]);
+            match self.tree.closest_hit(&Ray { origin, direction: *direction, end: f64::INFINITY }) {
+                Some(hit) if hit.triangle != MISS => (hit.t, i64::from(hit.triangle)),
+                _ => (f64::INFINITY, -1),
+            }
+        };
+        let (distance, triangle): (Vec<f64>, Vec<i64>) =
+            py.detach(|| from.par_iter().zip(to.par_iter()).map(cast).unzip());
+        Ok((distance.into_pyarray(py), triangle.into_pyarray(py)))
+    }
+}
+
+/// Corners, triangles, and object and class of each triangle.
+type Triangles<'py> =
+    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u32>>, Vec<String>);

@@ -1,0 +1,265 @@
+//! Errors of jobs as Python sees them: a text with all causes, and the class of the exception.
+
+use std::error::Error;
+
+use camera::{CameraError, FitError, RpcError};
+use crs::CrsError;
+use io::raster::RasterError;
+use io::rpc::{RpcReadError, RpcWriteError};
+use jobs::align::AlignJobError;
+use jobs::batch::BatchError;
+use jobs::city::CityJobError;
+use jobs::classes::ClassesError;
+use jobs::diff::DiffError;
+use jobs::dsm::DsmError;
+use jobs::dtm::DtmError;
+use jobs::error::{FileCrsError, JobError};
+use jobs::eval::EvalJobError;
+use jobs::files::FileError;
+use jobs::groundview::GroundViewError;
+use jobs::heightmap::HeightMapJobError;
+use jobs::job_file::JobFileError;
+use jobs::ortho::OrthoError;
+use jobs::priors::PriorsJobError;
+use jobs::production::ProductionError;
+use jobs::products::ProductsError;
+use jobs::rpc::RpcJobError;
+use jobs::simulate::SimulateJobError;
+use jobs::splats::SplatsJobError;
+use jobs::split::SplitJobError;
+use jobs::train::TrainError;
+
+/// Class of an exception; the names are those of the classes in `skysweep`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FaultKind {
+    /// A setting or an array that cannot be used.
+    InputError,
+    /// A file cannot be read or written.
+    FileError,
+    /// An output exists and may not be replaced.
+    OutputExistsError,
+    /// A coordinate reference system or a vertical datum cannot be used.
+    CrsError,
+    /// The job was asked to stop.
+    CancelledError,
+    /// Another reason why there is no result.
+    SkysweepError,
+}
+
+/// An error on its way to Python.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    /// Class of the exception.
+    pub(crate) kind: FaultKind,
+    /// What happened, with all causes.
+    pub(crate) text: String,
+}
+
+impl Fault {
+    /// A setting that serde does not take.
+    pub(crate) fn setting(text: String) -> Self {
+        Self { kind: FaultKind::InputError, text }
+    }
+
+    /// A defect of the program or of the system.
+    pub(crate) fn internal(text: &str) -> Self {
+        Self { kind: FaultKind::SkysweepError, text: text.to_owned() }
+    }
+
+    /// A value that cannot be used.
+    pub(crate) fn input(error: &dyn Error) -> Self {
+        Self::setting(with_causes(error))
+    }
+}
+
+fn with_causes(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        // Some errors have the text of their cause within their own.
+        let own = error.to_string();
+        if !text.ends_with(&own) {
+            text = format!("{text}: {own}");
+        }
+        cause = error.source();
+    }
+    text
+}
+
+/// An error whose class is known.
+trait Judged: Error + 'static {
+    /// Returns the class by the error's own variant; `None` leaves it to the causes.
+    fn kind(&self) -> Option<FaultKind>;
+}
+
+impl<E: Judged> From<E> for Fault {
+    fn from(error: E) -> Self {
+        let kind = error.kind().or_else(|| kind_of_causes(&error)).unwrap_or(FaultKind::SkysweepError);
+        Self { kind, text: with_causes(&error) }
+    }
+}
+
+fn of_job(error: &JobError) -> Option<FaultKind> {
+    match error {
+        JobError::Setting(_) | JobError::Threads(_) => Some(FaultKind::InputError),
+        JobError::File(error) => of_file(error),
+        JobError::Cancelled(_) => Some(FaultKind::CancelledError),
+        _ => None,
+    }
+}
+
+fn of_file(error: &FileError) -> Option<FaultKind> {
+    match error {
+        FileError::Exists { .. } => Some(FaultKind::OutputExistsError),
+        FileError::NotUtf8 { .. } => Some(FaultKind::InputError),
+        _ => Some(FaultKind::FileError),
+    }
+}
+
+/// Looks for a known error among the causes, the error itself included.
+fn kind_of_causes(error: &(dyn Error + 'static)) -> Option<FaultKind> {
+    let mut cause = Some(error);
+    let mut last = None;
+    while let Some(error) = cause {
+        if error.is::<CrsError>() || error.is::<FileCrsError>() {
+            return Some(FaultKind::CrsError);
+        }
+        if error.is::<std::io::Error>() || error.is::<RasterError>() || error.is::<RpcReadError>() {
+            last = Some(FaultKind::FileError);
+        }
+        cause = error.source();
+    }
+    last
+}
+
+/// Judges errors that hold those of every job as `Job(JobError)`, and some variants of their own.
+macro_rules! judged {
+    ($($error:ident { $($variant:pat => $kind:expr),* $(,)? })+) => {$(
+        impl Judged for $error {
+            fn kind(&self) -> Option<FaultKind> {
+                match self {
+                    Self::Job(error) => of_job(error),
+                    $($variant => $kind,)*
+                    #[allow(unreachable_patterns, reason = "not every error has other variants")]
+                    _ => None,
+                }
+            }
+        }
+    )+};
+}
+
+judged! {
+    AlignJobError {}
+    CityJobError { Self::Read(_) => Some(FaultKind::FileError) }
+    ClassesError { Self::Index(error) => error.kind() }
+    DiffError { Self::Surfaces(error) => error.kind() }
+    DtmError {}
+    EvalJobError {
+        Self::Raster(_) | Self::Points(_) | Self::SurfaceFile(_) | Self::MapFile(_) => Some(FaultKind::FileError),
+        Self::FileCrs(_) | Self::Crs(_) => Some(FaultKind::CrsError),
+        Self::ForeignFile { .. } => Some(FaultKind::OutputExistsError),
+    }
+    GroundViewError {}
+    HeightMapJobError {}
+    OrthoError {}
+    PriorsJobError {}
+    ProductsError {}
+    SimulateJobError {
+        Self::Scene(_) | Self::Parameters { .. } => Some(FaultKind::InputError),
+        Self::NotEmpty { .. } => Some(FaultKind::OutputExistsError),
+    }
+    SplatsJobError {}
+    SplitJobError {}
+    TrainError {}
+}
+
+impl Judged for DsmError {
+    fn kind(&self) -> Option<FaultKind> {
+        match self {
+            Self::TooFewImages { .. }
+            | Self::Folder { .. }
+            | Self::SameImage { .. }
+            | Self::Value { .. }
+            | Self::BoundsMissScene { .. }
+            | Self::RangeMissesScene { .. }
+            | Self::NoSuchChunk { .. }
+            | Self::Memory { .. }
+            | Self::Threads(_) => Some(FaultKind::InputError),
+            Self::Exists { .. } => Some(FaultKind::OutputExistsError),
+            Self::Image(_) | Self::Rpc(_) | Self::Output { .. } | Self::InUse { .. } | Self::ChunkFile { .. } => {
+                Some(FaultKind::FileError)
+            }
+            Self::File(error) => of_file(error),
+            Self::Crs(_) => Some(FaultKind::CrsError),
+            Self::Cancelled => Some(FaultKind::CancelledError),
+            _ => None,
+        }
+    }
+}
+
+impl Judged for ProductionError {
+    fn kind(&self) -> Option<FaultKind> {
+        match self {
+            Self::Dsm(error) => error.kind(),
+            Self::File(error) => of_file(error),
+            Self::Job(error) => error.kind(),
+            Self::Threads(_) => Some(FaultKind::InputError),
+            Self::NoPlan { .. } | Self::Plan { .. } => Some(FaultKind::FileError),
+            _ => None,
+        }
+    }
+}
+
+impl Judged for JobFileError {
+    fn kind(&self) -> Option<FaultKind> {
+        match self {
+            Self::File(error) => of_file(error),
+            _ => Some(FaultKind::InputError),
+        }
+    }
+}
+
+impl Judged for BatchError {
+    fn kind(&self) -> Option<FaultKind> {
+        match self {
+            Self::Job(error) => error.kind(),
+            Self::Cancelled(_) => Some(FaultKind::CancelledError),
+            _ => Some(FaultKind::InputError),
+        }
+    }
+}
+
+impl Judged for RpcJobError {
+    fn kind(&self) -> Option<FaultKind> {
+        match self {
+            Self::Read(_) => Some(FaultKind::FileError),
+            Self::Cancelled(_) => Some(FaultKind::CancelledError),
+            _ => None,
+        }
+    }
+}
+
+/// Judges errors that are of one class, whatever their variant.
+macro_rules! judged_alike {
+    ($($error:ty => $kind:ident),+ $(,)?) => {$(
+        impl Judged for $error {
+            fn kind(&self) -> Option<FaultKind> {
+                Some(FaultKind::$kind)
+            }
+        }
+    )+};
+}
+
+judged_alike! {
+    RpcReadError => FileError,
+    RpcWriteError => FileError,
+    RasterError => FileError,
+    CrsError => CrsError,
+    CameraError => InputError,
+    RpcError => InputError,
+    FitError => InputError,
+    city::ModelError => InputError,
+    io::citymodel::CityError => FileError,
+    bvh::BvhError => InputError,
+    eval::EvalError => InputError,
+}

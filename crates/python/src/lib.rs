@@ -1,0 +1,61 @@
+//! The part of the Python package `skysweep` that is written in Rust.
+//!
+//! The package's Python sources (`python/skysweep`) check and describe arguments and call the
+//! functions here. Settings and reports cross as JSON, arrays as NumPy arrays without a copy where
+//! they are contiguous. Errors become the exceptions of `skysweep` with the same text.
+
+#![allow(unsafe_code, reason = "the macros of pyo3 make the functions that the interpreter calls")]
+
+mod catalogue;
+mod city_scene;
+mod fault;
+mod height_sweep;
+mod rasters;
+mod rpc_camera;
+mod watch;
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::fault::Fault;
+
+/// Makes the exception of an error.
+fn raise(py: Python<'_>, fault: &Fault) -> PyErr {
+    let class = || py.import("skysweep._errors")?.getattr(format!("{:?}", fault.kind))?.call1((fault.text.as_str(),));
+    match class() {
+        Ok(exception) => PyErr::from_value(exception),
+        Err(_) => PyRuntimeError::new_err(fault.text.clone()),
+    }
+}
+
+/// Runs the job called `name` with settings as JSON; returns its report as JSON.
+#[pyfunction]
+fn run_job(py: Python<'_>, name: &str, settings: &str, watcher: &Bound<'_, PyAny>) -> PyResult<String> {
+    let unknown = || raise(py, &Fault::setting(format!("there is no job called {name:?}")));
+    let entry = catalogue::job(name).ok_or_else(unknown)?;
+    let settings = match serde_json::from_str(settings) {
+        Ok(Value::Object(settings)) => settings,
+        _ => return Err(raise(py, &Fault::setting("settings are a JSON object".to_owned()))),
+    };
+    watch::watched(py, watcher, |progress| (entry.run)(settings, progress).map(|report| report.to_string()))
+}
+
+/// Lets rasters be read from addresses (`https://…`, `/vsis3/…`) that are given as inputs.
+#[pyfunction]
+fn allow_remote() {
+    jobs::remote::allow_remote();
+}
+
+#[pymodule(gil_used = false)]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    watch::note_process();
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_function(wrap_pyfunction!(run_job, module)?)?;
+    module.add_function(wrap_pyfunction!(allow_remote, module)?)?;
+    module.add_function(wrap_pyfunction!(height_sweep::sweep_views, module)?)?;
+    module.add_function(wrap_pyfunction!(rasters::write_grid, module)?)?;
+    module.add_function(wrap_pyfunction!(rasters::read_grid, module)?)?;
+    module.add_class::<rpc_camera::RpcCore>()?;
+    module.add_class::<city_scene::CityCore>()
+}

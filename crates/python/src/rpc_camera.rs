@@ -1,0 +1,201 @@
+//! RPC cameras on arrays of points.
+//!
+//! Arrays are flat, contiguous and f64; the Python side brings them there. A point without an image
+//! or ground position becomes NaN: it is a value, not an error.
+
+use std::path::PathBuf;
+
+use camera::{Correspondence, ImagePoint, Rpc, RpcCamera, RpcFit};
+use geodesy::LonLatHeight;
+use io::rpc::RpcFormat;
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+
+use crate::fault::Fault;
+use crate::raise;
+
+/// Points from which on the work is shared out over threads.
+const PARALLEL: usize = 1 << 15;
+
+/// Two columns of numbers.
+type Columns<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// An RPC with its correction.
+#[pyclass(frozen, module = "skysweep._native")]
+pub(crate) struct RpcCore {
+    pub(crate) camera: RpcCamera,
+}
+
+fn json_error(error: &serde_json::Error) -> Fault {
+    Fault::setting(error.to_string())
+}
+
+/// Applies `one` to all points; both results are NaN where it gives none.
+fn columns(count: usize, one: impl Fn(usize) -> Option<[f64; 2]> + Sync) -> (Vec<f64>, Vec<f64>) {
+    let (mut first, mut second) = (vec![f64::NAN; count], vec![f64::NAN; count]);
+    let fill = |start: usize, first: &mut [f64], second: &mut [f64]| {
+        for (i, (a, b)) in first.iter_mut().zip(second).enumerate() {
+            [*a, *b] = one(start + i).unwrap_or([f64::NAN; 2]);
+        }
+    };
+    if count < PARALLEL {
+        fill(0, &mut first, &mut second);
+    } else {
+        let parts = first.par_chunks_mut(PARALLEL).zip(second.par_chunks_mut(PARALLEL)).enumerate();
+        parts.for_each(|(part, (first, second))| fill(part * PARALLEL, first, second));
+    }
+    (first, second)
+}
+
+/// A number for each point, or one for all of them.
+fn at(values: &[f64], index: usize) -> f64 {
+    if let [only] = values { *only } else { values[index] }
+}
+
+#[pymethods]
+impl RpcCore {
+    /// Reads the RPC of a file: the camera, the name of its format, the file that held it, and
+    /// warnings.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Self, String, PathBuf, Vec<String>)> {
+        let file = py.detach(|| io::rpc::read(&path)).map_err(|e| raise(py, &e.into()))?;
+        let format = serde_json::to_value(file.format).map(|v| v.as_str().unwrap_or_default().to_owned());
+        let format = format.map_err(|e| raise(py, &json_error(&e)))?;
+        Ok((Self { camera: RpcCamera::new(file.rpc) }, format, file.source, file.warnings))
+    }
+
+    /// Makes a camera of its numbers as JSON: an RPC, and a correction.
+    #[staticmethod]
+    fn from_json(py: Python<'_>, rpc: &str, correction: Option<&str>) -> PyResult<Self> {
+        let failed = |e| raise(py, &json_error(&e));
+        let rpc: Rpc = serde_json::from_str(rpc).map_err(failed)?;
+        rpc.validate().map_err(|e| raise(py, &e.into()))?;
+        let mut camera = RpcCamera::new(rpc);
+        if let Some(correction) = correction {
+            camera.correction = serde_json::from_str(correction).map_err(failed)?;
+        }
+        Ok(Self { camera })
+    }
+
+    /// Fits a camera to points; also returns the root mean square and the largest residual, pixels.
+    #[staticmethod]
+    fn fit(
+        py: Python<'_>,
+        ground: [PyReadonlyArray1<'_, f64>; 3],
+        image: [PyReadonlyArray1<'_, f64>; 2],
+    ) -> PyResult<(Self, f64, f64)> {
+        let [lon, lat, height] = &ground;
+        let [sample, line] = &image;
+        let (lon, lat, height) = (lon.as_slice()?, lat.as_slice()?, height.as_slice()?);
+        let (sample, line) = (sample.as_slice()?, line.as_slice()?);
+        let points: Vec<Correspondence> = (0..sample.len())
+            .map(|i| Correspondence {
+                ground: LonLatHeight { lon_deg: at(lon, i), lat_deg: at(lat, i), height_m: at(height, i) },
+                image: ImagePoint::new(sample[i], at(line, i)),
+            })
+            .collect();
+        let fit = py.detach(|| RpcFit::to_correspondences(&points)).map_err(|e| raise(py, &e.into()))?;
+        Ok((Self { camera: RpcCamera::new(fit.rpc) }, fit.rms_px, fit.max_px))
+    }
+
+    /// The numbers of the RPC and of its correction as JSON.
+    fn to_json(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        let text = |value: serde_json::Result<String>| value.map_err(|e| raise(py, &json_error(&e)));
+        let RpcCamera { rpc, correction } = &self.camera;
+        Ok((text(serde_json::to_string(rpc))?, text(serde_json::to_string(correction))?))
+    }
+
+    /// Image positions of ground points.
+    fn project<'py>(
+        &self,
+        py: Python<'py>,
+        lon: PyReadonlyArray1<'py, f64>,
+        lat: PyReadonlyArray1<'py, f64>,
+        height: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Columns<'py>> {
+        let (lon, lat, height) = (lon.as_slice()?, lat.as_slice()?, height.as_slice()?);
+        let count = lon.len().max(lat.len()).max(height.len());
+        let count = if [lon, lat, height].iter().any(|values| values.is_empty()) { 0 } else { count };
+        let camera = &self.camera;
+        let (sample, line) = py.detach(|| match height {
+            // The polynomials of one height have half as many terms.
+            [height_m] => {
+                let plane = camera.rpc.plane(*height_m);
+                columns(count, |i| {
+                    let point = plane.project(at(lon, i), at(lat, i)).ok()?;
+                    let ImagePoint { sample, line } = camera.correction.apply(point);
+                    Some([sample, line])
+                })
+            }
+            _ => columns(count, |i| {
+                let ground = LonLatHeight { lon_deg: at(lon, i), lat_deg: at(lat, i), height_m: height[i] };
+                let ImagePoint { sample, line } = camera.project(ground).ok()?;
+                Some([sample, line])
+            }),
+        });
+        Ok((sample.into_pyarray(py), line.into_pyarray(py)))
+    }
+
+    /// Ground points that are seen at image positions, at given heights.
+    fn localize<'py>(
+        &self,
+        py: Python<'py>,
+        sample: PyReadonlyArray1<'py, f64>,
+        line: PyReadonlyArray1<'py, f64>,
+        height: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Columns<'py>> {
+        let (sample, line, height) = (sample.as_slice()?, line.as_slice()?, height.as_slice()?);
+        let count = sample.len().max(line.len()).max(height.len());
+        let count = if [sample, line, height].iter().any(|values| values.is_empty()) { 0 } else { count };
+        let camera = &self.camera;
+        let (lon, lat) = py.detach(|| {
+            columns(count, |i| {
+                let ground = camera.localize(ImagePoint::new(at(sample, i), at(line, i)), at(height, i)).ok()?;
+                Some([ground.lon_deg, ground.lat_deg])
+            })
+        });
+        Ok((lon.into_pyarray(py), lat.into_pyarray(py)))
+    }
+
+    /// Ground sampling distance along sample and line, metres, and the view direction (east, north,
+    /// up) at a ground point.
+    fn view(&self, py: Python<'_>, lon: f64, lat: f64, height: f64) -> PyResult<([f64; 2], [f64; 3])> {
+        let ground = LonLatHeight { lon_deg: lon, lat_deg: lat, height_m: height };
+        let gsd = self.camera.gsd(ground).map_err(|e| raise(py, &e.into()))?;
+        let view = self.camera.view_direction(ground).map_err(|e| raise(py, &e.into()))?;
+        Ok(([gsd.sample_m, gsd.line_m], [view.east, view.north, view.up]))
+    }
+
+    /// The camera of a crop whose upper-left pixel is (sample, line).
+    fn cropped(&self, sample: f64, line: f64) -> Self {
+        Self { camera: self.camera.cropped(ImagePoint::new(sample, line)) }
+    }
+
+    /// The camera of the image resampled by a factor.
+    fn rescaled(&self, factor: f64) -> Self {
+        Self { camera: self.camera.rescaled(factor) }
+    }
+
+    /// One RPC that includes the correction, with its largest residual, pixels.
+    fn folded(&self, py: Python<'_>) -> PyResult<(Self, f64)> {
+        let fit = self.camera.folded().map_err(|e| raise(py, &e.into()))?;
+        Ok((Self { camera: RpcCamera::new(fit.rpc) }, fit.max_px))
+    }
+
+    /// The text of an RPC file.
+    fn text(&self, py: Python<'_>, format: &str) -> PyResult<String> {
+        let format = format_of(py, format)?;
+        io::rpc::to_text(&self.camera.rpc, format).map_err(|e| raise(py, &e.into()))
+    }
+
+    /// Writes an RPC file.
+    fn write(&self, py: Python<'_>, path: PathBuf, format: &str, overwrite: bool) -> PyResult<()> {
+        let format = format_of(py, format)?;
+        io::rpc::write(&path, &self.camera.rpc, format, overwrite).map_err(|e| raise(py, &e.into()))
+    }
+}
+
+fn format_of(py: Python<'_>, name: &str) -> PyResult<RpcFormat> {
+    serde_json::from_value(name.into()).map_err(|e| raise(py, &json_error(&e)))
+}

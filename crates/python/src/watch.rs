@@ -1,0 +1,165 @@
+//! Runs work on a thread of its own while the caller's thread serves Python: signals, progress,
+//! warnings.
+//!
+//! The work never holds the interpreter lock. Its progress goes through a channel to the caller's
+//! thread, which alone calls into Python. So a callback may do anything, a slow one holds up no
+//! worker, and Ctrl-C is seen within [`POLL`]. A signal, or an exception of the callback, asks the
+//! work to stop; it is raised once the work has ended, which leaves nothing half-written.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::Duration;
+
+use numeric::{Choice, Progress};
+use pyo3::prelude::*;
+
+use crate::fault::Fault;
+use crate::raise;
+
+/// Time between two looks at signals and steps.
+const POLL: Duration = Duration::from_millis(50);
+/// Stack of the thread that works, bytes: that of a main thread.
+const STACK: usize = 8 << 20;
+
+/// What the work reports.
+enum Event {
+    /// A stage of so many steps begins.
+    Begin(String, usize),
+    Choice(Choice),
+    Warn(String),
+    Part(String, Option<String>),
+}
+
+/// Receives the progress of the work on any thread.
+struct Bridge {
+    events: Sender<Event>,
+    /// Steps done that Python has not been told of.
+    steps: AtomicUsize,
+    stop: AtomicBool,
+}
+
+impl Bridge {
+    fn send(&self, event: Event) {
+        // The receiver outlives the work.
+        let _ = self.events.send(event);
+    }
+}
+
+impl Progress for Bridge {
+    fn begin(&self, stage: &str, steps: usize) {
+        self.send(Event::Begin(stage.to_owned(), steps));
+    }
+
+    fn step(&self) {
+        self.steps.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn choice(&self, choice: &Choice) {
+        self.send(Event::Choice(choice.clone()));
+    }
+
+    fn warn(&self, text: &str) {
+        self.send(Event::Warn(text.to_owned()));
+    }
+
+    fn part(&self, name: &str, state: Option<&str>) {
+        self.send(Event::Part(name.to_owned(), state.map(str::to_owned)));
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Runs `work` and tells `watcher` of its progress.
+///
+/// `watcher` has the methods `begin(stage, steps)`, `steps(count)`, `choice(name, value, reason)`,
+/// `warn(text)` and `part(name, state)`.
+pub(crate) fn watched<T: Send>(
+    py: Python<'_>,
+    watcher: &Bound<'_, PyAny>,
+    work: impl FnOnce(&dyn Progress) -> Result<T, Fault> + Send,
+) -> PyResult<T> {
+    let (events, received) = channel();
+    let bridge = Bridge { events, steps: AtomicUsize::new(0), stop: AtomicBool::new(false) };
+    let received = Mutex::new(received);
+    std::thread::scope(|scope| {
+        let (ended, end) = channel::<()>();
+        let worker = std::thread::Builder::new().name("skysweep".to_owned()).stack_size(STACK);
+        let bridge = &bridge;
+        let handle = worker.spawn_scoped(scope, move || {
+            // Dropped when the work has ended, also by a panic.
+            let _ended = ended;
+            in_own_pool(|| work(bridge))
+        })?;
+        let end = Mutex::new(end);
+        let mut raised: PyResult<()> = Ok(());
+        loop {
+            let is_over = py.detach(|| waited(&end));
+            if raised.is_ok() {
+                raised = py.check_signals().and_then(|()| served(watcher, &received, bridge));
+                if raised.is_err() {
+                    bridge.stop.store(true, Ordering::Relaxed);
+                }
+            }
+            if is_over {
+                break;
+            }
+        }
+        let result = py.detach(|| handle.join());
+        raised?;
+        let failed = |_| Fault::internal("the job ended by a panic; please report what standard error says");
+        result.map_err(failed).and_then(|result| result).map_err(|fault| raise(py, &fault))
+    })
+}
+
+/// Waits for the end of the work, for [`POLL`] at most; returns whether it has ended.
+fn waited(end: &Mutex<Receiver<()>>) -> bool {
+    end.lock().is_ok_and(|end| end.recv_timeout(POLL) != Err(RecvTimeoutError::Timeout))
+}
+
+/// Tells the watcher what was reported since the last time.
+fn served(watcher: &Bound<'_, PyAny>, received: &Mutex<Receiver<Event>>, bridge: &Bridge) -> PyResult<()> {
+    let Ok(received) = received.lock() else { return Ok(()) };
+    let steps = || match bridge.steps.swap(0, Ordering::Relaxed) {
+        0 => Ok(()),
+        count => watcher.call_method1("steps", (count,)).map(|_| ()),
+    };
+    while let Ok(event) = received.try_recv() {
+        match event {
+            Event::Begin(stage, count) => {
+                steps()?;
+                watcher.call_method1("begin", (stage, count))?;
+            }
+            Event::Choice(Choice { name, value, reason }) => {
+                watcher.call_method1("choice", (name, value, reason))?;
+            }
+            Event::Warn(text) => {
+                watcher.call_method1("warn", (text,))?;
+            }
+            Event::Part(name, state) => {
+                watcher.call_method1("part", (name, state))?;
+            }
+        }
+    }
+    steps()
+}
+
+/// Process that loaded the library.
+static LOADED_BY: AtomicU32 = AtomicU32::new(0);
+
+/// Notes the process that loads the library.
+pub(crate) fn note_process() {
+    LOADED_BY.store(std::process::id(), Ordering::Relaxed);
+}
+
+/// Runs work on the usual pool of threads, or on a pool of its own in a forked process: the threads
+/// of the usual one stayed in the parent.
+fn in_own_pool<T: Send>(work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
+    if std::process::id() == LOADED_BY.load(Ordering::Relaxed) {
+        return work();
+    }
+    let pool = rayon::ThreadPoolBuilder::new().build();
+    pool.map_err(|e| Fault::internal(&format!("cannot start worker threads: {e}")))?.install(work)
+}
