@@ -89,67 +89,234 @@ fn town() -> SimulationConfig {
 
 /// The jobs in the order of the documentation.
 pub(crate) const JOBS: [JobEntry; 31] = [
-    job!("dsm", "Make a surface model from satellite images with RPCs.", DsmConfig, jobs::dsm::run,
-        ["images", "output"], DsmConfig::new(Vec::new(), nowhere())),
-    job!("plan_run", "Plan a surface model in parts into the run folder `output`.", DsmConfig, located_plan,
-        ["images", "output"], DsmConfig::new(Vec::new(), nowhere())),
-    job!("make_plan", "Plan a surface model in parts and write nothing.", DsmConfig, jobs::production::make_plan,
-        ["images", "output"], DsmConfig::new(Vec::new(), nowhere())),
-    job!("read_plan", "Read the plan of a run folder.", PlanSettings, stored_plan, ["folder"],
-        PlanSettings { folder: nowhere() }),
-    job!("run_chunks", "Compute chunks of a planned run.", ChunkSettings, chunks, ["folder"],
-        ChunkSettings { folder: nowhere(), chunks: None, resume: false, threads: None }),
-    job!("merge_run", "Make the surface model of the computed chunks of a planned run.", MergeSettings, merged,
-        ["folder"], MergeSettings { folder: nowhere(), partial: false, overwrite: false, threads: None }),
-    job!("batch", "Do the scenes and tasks that a batch file names.", BatchSettings, batch, ["file"],
-        BatchSettings { file: nowhere() }),
-    job!("dtm", "Find the bare ground under a surface model, and the heights above it.", DtmConfig, jobs::dtm::run,
-        ["surface", "output"], DtmConfig::new(nowhere(), nowhere())),
-    job!("classes", "Find ground, buildings and vegetation of a surface model.", ClassesConfig, jobs::classes::run,
-        ["surface", "output"], ClassesConfig::new(nowhere(), nowhere())),
-    job!("diff", "Find what changed between two surface models, with volumes.", DiffConfig, jobs::diff::run,
-        ["before", "after", "output"], DiffConfig::new(nowhere(), nowhere(), nowhere())),
-    job!("products", "Make point clouds, terrain and other products of a surface model.", ProductsConfig,
-        jobs::products::run, ["run"], ProductsConfig::new(nowhere())),
-    job!("ortho", "Lay satellite images on a surface model, hidden cells marked.", OrthoConfig, jobs::ortho::run,
-        ["images", "surface", "output"], OrthoConfig::new(Vec::new(), nowhere(), nowhere())),
-    job!("evaluate_grids", "Measure the errors of a surface model against a reference.", GridEvalConfig,
-        jobs::eval::compare_grids, ["test", "reference"], GridEvalConfig::new(nowhere(), nowhere())),
-    job!("evaluate_surfaces", "Measure how far meshes, city models or clouds are from one another.", SurfaceEvalConfig,
-        jobs::eval::evaluate_surfaces, ["test", "reference"], SurfaceEvalConfig::new(nowhere(), nowhere())),
-    job!("evaluate_maps", "Compare depths, normals or masks in the pixels of one camera.", MapEvalConfig,
-        jobs::eval::compare_maps, ["test", "reference"], MapEvalConfig::new(nowhere(), nowhere())),
-    job!("kind_of_evaluation", "Name the evaluation for two files: grids, surfaces or maps.", KindSettings, kind,
-        ["test", "reference"], KindSettings { test: nowhere(), reference: nowhere() }),
-    job!("heightmap", "Make height maps seen from above around a camera, turned to its heading.", HeightMapConfig,
-        jobs::heightmap::run, ["source", "output", "stand"], HeightMapConfig::new(nowhere(), nowhere(), stand())),
-    job!("unproject", "Turn a height map into points or splats.", UnprojectConfig, jobs::heightmap::unproject,
-        ["map", "output"], UnprojectConfig::new(nowhere(), nowhere())),
-    job!("groundview", "Make depths, normals and sky of cameras and panoramas on the ground.", GroundViewConfig,
-        jobs::groundview::run, ["surface", "output", "cameras"],
-        GroundViewConfig::new(nowhere(), nowhere(), GroundCameras::Model(nowhere()))),
-    job!("compose", "Lay a rendered ground layer over a satellite layer.", ComposeConfig, jobs::groundview::compose,
-        ["ground", "alpha", "satellite", "output"], ComposeConfig::new(nowhere(), nowhere(), nowhere(), nowhere())),
-    job!("priors", "Make depth, normal and mask priors of a city model for the cameras of a scene.", PriorsConfig,
-        jobs::priors::run, ["model", "cameras", "output"], PriorsConfig::new(nowhere(), Vec::new(), nowhere())),
-    job!("splats", "Make Gaussian splats of a surface model and its images.", SplatsConfig, jobs::splats::make,
-        ["dsm", "images", "output"], SplatsConfig::new(nowhere(), Vec::new(), nowhere())),
-    job!("render_splats", "Look at splats through satellite images and perspective cameras.", SplatRenderConfig,
-        jobs::splats::render, ["splats", "output"], SplatRenderConfig::new(nowhere(), nowhere())),
-    job!("train", "Train flat Gaussian splats on the images of a dataset, with building priors.", TrainConfig,
-        jobs::train::run, ["dataset", "output"], TrainConfig::new(nowhere(), nowhere())),
-    job!("align", "Bring a COLMAP model to the world by GPS or point pairs.", AlignJobConfig, jobs::align::run,
-        ["model", "positions", "output"], AlignJobConfig::new(nowhere(), nowhere(), nowhere())),
-    job!("split", "Choose context and target views of a COLMAP model by their overlap.", SplitJobConfig,
-        jobs::split::run, ["model"], SplitJobConfig::narrow(nowhere())),
+    job!(
+        "dsm",
+        "Make a surface model from satellite images with RPCs.",
+        DsmConfig,
+        jobs::dsm::run,
+        ["images", "output"],
+        DsmConfig::new(Vec::new(), nowhere())
+    ),
+    job!(
+        "plan_run",
+        "Plan a surface model in parts into the run folder `output`.",
+        DsmConfig,
+        located_plan,
+        ["images", "output"],
+        DsmConfig::new(Vec::new(), nowhere())
+    ),
+    job!(
+        "make_plan",
+        "Plan a surface model in parts and write nothing.",
+        DsmConfig,
+        jobs::production::make_plan,
+        ["images", "output"],
+        DsmConfig::new(Vec::new(), nowhere())
+    ),
+    job!(
+        "read_plan",
+        "Read the plan of a run folder.",
+        PlanSettings,
+        stored_plan,
+        ["folder"],
+        PlanSettings { folder: nowhere() }
+    ),
+    job!(
+        "run_chunks",
+        "Compute chunks of a planned run.",
+        ChunkSettings,
+        chunks,
+        ["folder"],
+        ChunkSettings { folder: nowhere(), chunks: None, resume: false, threads: None }
+    ),
+    job!(
+        "merge_run",
+        "Make the surface model of the computed chunks of a planned run.",
+        MergeSettings,
+        merged,
+        ["folder"],
+        MergeSettings { folder: nowhere(), partial: false, overwrite: false, threads: None }
+    ),
+    job!(
+        "batch",
+        "Do the scenes and tasks that a batch file names.",
+        BatchSettings,
+        batch,
+        ["file"],
+        BatchSettings { file: nowhere() }
+    ),
+    job!(
+        "dtm",
+        "Find the bare ground under a surface model, and the heights above it.",
+        DtmConfig,
+        jobs::dtm::run,
+        ["surface", "output"],
+        DtmConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "classes",
+        "Find ground, buildings and vegetation of a surface model.",
+        ClassesConfig,
+        jobs::classes::run,
+        ["surface", "output"],
+        ClassesConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "diff",
+        "Find what changed between two surface models, with volumes.",
+        DiffConfig,
+        jobs::diff::run,
+        ["before", "after", "output"],
+        DiffConfig::new(nowhere(), nowhere(), nowhere())
+    ),
+    job!(
+        "products",
+        "Make point clouds, terrain and other products of a surface model.",
+        ProductsConfig,
+        jobs::products::run,
+        ["run"],
+        ProductsConfig::new(nowhere())
+    ),
+    job!(
+        "ortho",
+        "Lay satellite images on a surface model, hidden cells marked.",
+        OrthoConfig,
+        jobs::ortho::run,
+        ["images", "surface", "output"],
+        OrthoConfig::new(Vec::new(), nowhere(), nowhere())
+    ),
+    job!(
+        "evaluate_grids",
+        "Measure the errors of a surface model against a reference.",
+        GridEvalConfig,
+        jobs::eval::compare_grids,
+        ["test", "reference"],
+        GridEvalConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "evaluate_surfaces",
+        "Measure how far meshes, city models or clouds are from one another.",
+        SurfaceEvalConfig,
+        jobs::eval::evaluate_surfaces,
+        ["test", "reference"],
+        SurfaceEvalConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "evaluate_maps",
+        "Compare depths, normals or masks in the pixels of one camera.",
+        MapEvalConfig,
+        jobs::eval::compare_maps,
+        ["test", "reference"],
+        MapEvalConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "kind_of_evaluation",
+        "Name the evaluation for two files: grids, surfaces or maps.",
+        KindSettings,
+        kind,
+        ["test", "reference"],
+        KindSettings { test: nowhere(), reference: nowhere() }
+    ),
+    job!(
+        "heightmap",
+        "Make height maps seen from above around a camera, turned to its heading.",
+        HeightMapConfig,
+        jobs::heightmap::run,
+        ["source", "output", "stand"],
+        HeightMapConfig::new(nowhere(), nowhere(), stand())
+    ),
+    job!(
+        "unproject",
+        "Turn a height map into points or splats.",
+        UnprojectConfig,
+        jobs::heightmap::unproject,
+        ["map", "output"],
+        UnprojectConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "groundview",
+        "Make depths, normals and sky of cameras and panoramas on the ground.",
+        GroundViewConfig,
+        jobs::groundview::run,
+        ["surface", "output", "cameras"],
+        GroundViewConfig::new(nowhere(), nowhere(), GroundCameras::Model(nowhere()))
+    ),
+    job!(
+        "compose",
+        "Lay a rendered ground layer over a satellite layer.",
+        ComposeConfig,
+        jobs::groundview::compose,
+        ["ground", "alpha", "satellite", "output"],
+        ComposeConfig::new(nowhere(), nowhere(), nowhere(), nowhere())
+    ),
+    job!(
+        "priors",
+        "Make depth, normal and mask priors of a city model for the cameras of a scene.",
+        PriorsConfig,
+        jobs::priors::run,
+        ["model", "cameras", "output"],
+        PriorsConfig::new(nowhere(), Vec::new(), nowhere())
+    ),
+    job!(
+        "splats",
+        "Make Gaussian splats of a surface model and its images.",
+        SplatsConfig,
+        jobs::splats::make,
+        ["dsm", "images", "output"],
+        SplatsConfig::new(nowhere(), Vec::new(), nowhere())
+    ),
+    job!(
+        "render_splats",
+        "Look at splats through satellite images and perspective cameras.",
+        SplatRenderConfig,
+        jobs::splats::render,
+        ["splats", "output"],
+        SplatRenderConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "train",
+        "Train flat Gaussian splats on the images of a dataset, with building priors.",
+        TrainConfig,
+        jobs::train::run,
+        ["dataset", "output"],
+        TrainConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "align",
+        "Bring a COLMAP model to the world by GPS or point pairs.",
+        AlignJobConfig,
+        jobs::align::run,
+        ["model", "positions", "output"],
+        AlignJobConfig::new(nowhere(), nowhere(), nowhere())
+    ),
+    job!(
+        "split",
+        "Choose context and target views of a COLMAP model by their overlap.",
+        SplitJobConfig,
+        jobs::split::run,
+        ["model"],
+        SplitJobConfig::narrow(nowhere())
+    ),
     job!("city_info", "Describe a city model and its defects.", CityInfoConfig, jobs::city::info, ["file"],
         CityInfoConfig::new(nowhere()), lifted "input"),
     job!("city_convert", "Write a city model as triangles, footprints or objects.", CityConvertConfig,
         jobs::city::convert, ["file", "output"], CityConvertConfig::new(nowhere(), nowhere()), lifted "input"),
-    job!("rpc_info", "Describe the RPC of a file.", RpcInfoConfig, jobs::rpc::info, ["file"],
-        RpcInfoConfig::new(nowhere())),
-    job!("rpc_convert", "Write the RPC of a file in another format.", RpcConvertConfig, jobs::rpc::convert,
-        ["file", "output"], RpcConvertConfig::new(nowhere(), nowhere())),
+    job!(
+        "rpc_info",
+        "Describe the RPC of a file.",
+        RpcInfoConfig,
+        jobs::rpc::info,
+        ["file"],
+        RpcInfoConfig::new(nowhere())
+    ),
+    job!(
+        "rpc_convert",
+        "Write the RPC of a file in another format.",
+        RpcConvertConfig,
+        jobs::rpc::convert,
+        ["file", "output"],
+        RpcConvertConfig::new(nowhere(), nowhere())
+    ),
     JobEntry {
         name: "simulate",
         summary: "Make a seeded scene seen through RPC cameras, with its exact surface. `scene` is a preset, \

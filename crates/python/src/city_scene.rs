@@ -95,5 +95,4 @@ impl CityCore {
 }
 
 /// Corners, triangles, and object and class of each triangle.
-type Triangles<'py> =
-    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u32>>, Vec<String>);
+type Triangles<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u32>>, Vec<String>);

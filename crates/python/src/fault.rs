@@ -78,7 +78,7 @@ fn with_causes(error: &dyn Error) -> String {
     while let Some(error) = cause {
         // Some errors have the text of their cause within their own.
         let own = error.to_string();
-        if !text.ends_with(&own) {
+        if !text.contains(&own) {
             text = format!("{text}: {own}");
         }
         cause = error.source();
@@ -95,7 +95,10 @@ trait Judged: Error + 'static {
 impl<E: Judged> From<E> for Fault {
     fn from(error: E) -> Self {
         let kind = error.kind().or_else(|| kind_of_causes(&error)).unwrap_or(FaultKind::SkysweepError);
-        Self { kind, text: with_causes(&error) }
+        let text = with_causes(&error);
+        // The writers of single files say it in their text alone.
+        let kind = if text.contains(io::atomic::OUTPUT_EXISTS) { FaultKind::OutputExistsError } else { kind };
+        Self { kind, text }
     }
 }
 
@@ -239,6 +242,12 @@ impl Judged for RpcJobError {
     }
 }
 
+impl Judged for RasterError {
+    fn kind(&self) -> Option<FaultKind> {
+        Some(if matches!(self, Self::Crs { .. }) { FaultKind::CrsError } else { FaultKind::FileError })
+    }
+}
+
 /// Judges errors that are of one class, whatever their variant.
 macro_rules! judged_alike {
     ($($error:ty => $kind:ident),+ $(,)?) => {$(
@@ -253,7 +262,6 @@ macro_rules! judged_alike {
 judged_alike! {
     RpcReadError => FileError,
     RpcWriteError => FileError,
-    RasterError => FileError,
     CrsError => CrsError,
     CameraError => InputError,
     RpcError => InputError,

@@ -7,7 +7,7 @@
 //! work to stop; it is raised once the work has ended, which leaves nothing half-written.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
@@ -26,6 +26,7 @@ const STACK: usize = 8 << 20;
 enum Event {
     /// A stage of so many steps begins.
     Begin(String, usize),
+    Step,
     Choice(Choice),
     Warn(String),
     Part(String, Option<String>),
@@ -34,8 +35,6 @@ enum Event {
 /// Receives the progress of the work on any thread.
 struct Bridge {
     events: Sender<Event>,
-    /// Steps done that Python has not been told of.
-    steps: AtomicUsize,
     stop: AtomicBool,
 }
 
@@ -52,7 +51,7 @@ impl Progress for Bridge {
     }
 
     fn step(&self) {
-        self.steps.fetch_add(1, Ordering::Relaxed);
+        self.send(Event::Step);
     }
 
     fn choice(&self, choice: &Choice) {
@@ -82,7 +81,7 @@ pub(crate) fn watched<T: Send>(
     work: impl FnOnce(&dyn Progress) -> Result<T, Fault> + Send,
 ) -> PyResult<T> {
     let (events, received) = channel();
-    let bridge = Bridge { events, steps: AtomicUsize::new(0), stop: AtomicBool::new(false) };
+    let bridge = Bridge { events, stop: AtomicBool::new(false) };
     let received = Mutex::new(received);
     std::thread::scope(|scope| {
         let (ended, end) = channel::<()>();
@@ -98,7 +97,7 @@ pub(crate) fn watched<T: Send>(
         loop {
             let is_over = py.detach(|| waited(&end));
             if raised.is_ok() {
-                raised = py.check_signals().and_then(|()| served(watcher, &received, bridge));
+                raised = py.check_signals().and_then(|()| served(watcher, &received));
                 if raised.is_err() {
                     bridge.stop.store(true, Ordering::Relaxed);
                 }
@@ -120,16 +119,19 @@ fn waited(end: &Mutex<Receiver<()>>) -> bool {
 }
 
 /// Tells the watcher what was reported since the last time.
-fn served(watcher: &Bound<'_, PyAny>, received: &Mutex<Receiver<Event>>, bridge: &Bridge) -> PyResult<()> {
+fn served(watcher: &Bound<'_, PyAny>, received: &Mutex<Receiver<Event>>) -> PyResult<()> {
     let Ok(received) = received.lock() else { return Ok(()) };
-    let steps = || match bridge.steps.swap(0, Ordering::Relaxed) {
+    // Steps that follow one another are told at once.
+    let mut steps = 0_usize;
+    let tell = |steps: &mut usize| match std::mem::take(steps) {
         0 => Ok(()),
         count => watcher.call_method1("steps", (count,)).map(|_| ()),
     };
     while let Ok(event) = received.try_recv() {
         match event {
+            Event::Step => steps += 1,
             Event::Begin(stage, count) => {
-                steps()?;
+                tell(&mut steps)?;
                 watcher.call_method1("begin", (stage, count))?;
             }
             Event::Choice(Choice { name, value, reason }) => {
@@ -143,7 +145,7 @@ fn served(watcher: &Bound<'_, PyAny>, received: &Mutex<Receiver<Event>>, bridge:
             }
         }
     }
-    steps()
+    tell(&mut steps)
 }
 
 /// Process that loaded the library.

@@ -25,6 +25,8 @@ use syn::{Attribute, Expr, Field, GenericArgument, Item, ItemEnum, ItemStruct, L
 
 /// Width of the text of docstrings, columns.
 const WIDTH: usize = 100;
+/// Names of fields that a class of Python cannot have.
+const KEYWORDS: [&str; 4] = ["class", "from", "in", "is"];
 
 fn crates() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -187,12 +189,8 @@ impl Writer<'_> {
         let of_variant = |v: &syn::Variant| {
             option(&v.attrs, "rename").unwrap_or_else(|| cased(&v.ident.to_string(), rule.as_deref()))
         };
-        let plain: Vec<String> = item
-            .variants
-            .iter()
-            .filter(|v| v.fields.is_empty())
-            .map(|v| format!("\"{}\"", of_variant(v)))
-            .collect();
+        let plain: Vec<String> =
+            item.variants.iter().filter(|v| v.fields.is_empty()).map(|v| format!("\"{}\"", of_variant(v))).collect();
         let mut parts = Vec::new();
         if !plain.is_empty() {
             parts.push(format!("Literal[{}]", plain.join(", ")));
@@ -208,6 +206,14 @@ impl Writer<'_> {
         let name = item.ident.to_string();
         if !self.named.contains_key(&name) {
             self.named.insert(name.clone(), String::new());
+            if fields_of(item).any(|field| KEYWORDS.contains(&key(field).as_str())) {
+                let entries = fields_of(item)
+                    .map(|field| format!("\"{}\": \"{}\"", key(field), self.python_type(&field.ty, &field.attrs)));
+                let entries = entries.collect::<Vec<_>>().join(", ");
+                let text = format!("{name} = TypedDict(\"{name}\", {{{entries}}}, total=False)\n");
+                self.named.insert(name.clone(), text);
+                return name;
+            }
             let mut text = format!("class {name}(TypedDict, total=False):\n");
             text += &docstring(&docs(&item.attrs), "    ");
             for field in fields_of(item) {
@@ -236,7 +242,11 @@ impl Writer<'_> {
         let (mut optional, mut arguments) = (Vec::new(), Vec::new());
         for name in entry.required {
             let field = fields.iter().find(|f| key(f) == *name).unwrap_or_else(|| panic!("{name} is no field"));
-            let ty = if *name == "scene" { "str | Mapping[str, Any]".to_owned() } else { self.python_type(&field.ty, &field.attrs) };
+            let ty = if *name == "scene" {
+                "str | Mapping[str, Any]".to_owned()
+            } else {
+                self.python_type(&field.ty, &field.attrs)
+            };
             required.push(format!("    {name}: {ty},\n"));
             arguments.push((*name, docs(&field.attrs)));
         }
@@ -255,18 +265,20 @@ impl Writer<'_> {
         }
         let mut text = format!("@job\ndef {}(\n{}    *,\n{}", entry.name, required.concat(), optional.concat());
         text += "    progress: Progress = None,\n) -> ";
-        text += if entry.name == "kind_of_evaluation" { "str" } else { "Report" };
+        let result = if entry.name == "kind_of_evaluation" { "str" } else { "Report" };
+        text += result;
         text += ":\n    \"\"\"";
         text += &wrapped(entry.summary, "    ", 3);
         text += "\n    Args:\n";
         for (name, doc) in arguments {
             text += &hanging(name, &doc);
         }
-        text += &hanging("progress", "`True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.");
+        text +=
+            &hanging("progress", "`True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.");
         text += "\n    Raises:\n";
         text += &hanging("TypeError", "A keyword that the job does not have; the text names those that it has.");
         text += &hanging("SkysweepError", "The job has no result; see its subclasses.");
-        let _ = writeln!(text, "    \"\"\"\n    return run(\"{}\", locals())", entry.name);
+        let _ = writeln!(text, "    \"\"\"\n    result: {result} = run(\"{}\", locals())\n    return result", entry.name);
         text
     }
 }
@@ -382,7 +394,10 @@ fn wrong_settings_are_named() {
     let (_, text) = refused("dsm", &[two.clone(), ("colour", 1.into())]);
     assert!(text.contains("unknown field `colour`"), "{text}");
     let (kind, text) = refused("dsm", &[two, ("output", "out".into()), ("gsd_m", Value::from(-1.0))]);
-    assert_eq!((kind, text.as_str()), (FaultKind::InputError, "the cell size is -1, expected a positive cell size in metres"));
+    assert_eq!(
+        (kind, text.as_str()),
+        (FaultKind::InputError, "the cell size is -1, expected a positive cell size in metres")
+    );
     let (_, text) = refused("classes", &[("surface", "a.tif".into()), ("terrain", serde_json::json!({"sloppy": 1}))]);
     assert!(text.contains("unknown field `sloppy`"), "{text}");
 }

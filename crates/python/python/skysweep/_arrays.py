@@ -15,11 +15,12 @@ Floats = NDArray[np.float64]
 def floats(name: str, values: ArrayLike) -> Floats:
     """Numbers as an array of f64, without a copy where they are one. Void entries of masked arrays
     become NaN."""
-    array = np.ma.asanyarray(values)
+    array: Any = np.ma.asanyarray(values)
     if array.dtype == bool or not (np.issubdtype(array.dtype, np.integer) or np.issubdtype(array.dtype, np.floating)):
         raise InputError(f"{name} has the type {array.dtype}, expected real numbers")
     if np.ma.isMaskedArray(values):
-        return np.ma.filled(array.astype(np.float64), np.nan)
+        masked: Floats = np.ma.filled(array.astype(np.float64), np.nan)
+        return masked
     return np.asarray(array.data, dtype=np.float64)
 
 

@@ -51,7 +51,7 @@ class CityModel:
     triangles: NDArray[np.uint32]
     #: Index of the object of each triangle (m).
     object_of: NDArray[np.uint32]
-    #: Name of the surface class of each triangle: ``roof``, ``wall``, ``ground``, …
+    #: Name of the surface class of each triangle: ``RoofSurface``, ``WallSurface``, …
     class_of: list[str]
 
     def __init__(self, path: Any, *, lod: str | None = None, all_objects: bool = False) -> None:
@@ -91,4 +91,5 @@ class CityModel:
         objects = np.full(triangle.shape, -1, dtype=np.int64)
         hit = triangle >= 0
         objects[hit] = self.object_of[triangle[hit]]
-        return Hits(*(array.reshape(shape[:-1]) for array in (distance, triangle, objects)))
+        whole = shape[:-1]
+        return Hits(distance.reshape(whole), triangle.reshape(whole), objects.reshape(whole))

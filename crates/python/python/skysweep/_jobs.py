@@ -177,14 +177,7 @@ class NoiseConfig(TypedDict, total=False):
     """Repetitions of each level."""
 
 
-class PriorsClassWeight(TypedDict, total=False):
-    """Weight of a surface class in the sampling; 0 leaves the class out."""
-
-    class: str
-    """The class."""
-
-    weight: float
-    """Points per area relative to a class of weight 1."""
+PriorsClassWeight = TypedDict("PriorsClassWeight", {"class": "str", "weight": "float"}, total=False)
 
 
 class StandConfig(TypedDict, total=False):
@@ -313,7 +306,8 @@ def dsm(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("dsm", locals())
+    result: Report = run("dsm", locals())
+    return result
 
 
 @job
@@ -400,7 +394,8 @@ def plan_run(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("plan_run", locals())
+    result: Report = run("plan_run", locals())
+    return result
 
 
 @job
@@ -487,7 +482,8 @@ def make_plan(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("make_plan", locals())
+    result: Report = run("make_plan", locals())
+    return result
 
 
 @job
@@ -506,7 +502,8 @@ def read_plan(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("read_plan", locals())
+    result: Report = run("read_plan", locals())
+    return result
 
 
 @job
@@ -533,7 +530,8 @@ def run_chunks(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("run_chunks", locals())
+    result: Report = run("run_chunks", locals())
+    return result
 
 
 @job
@@ -558,7 +556,8 @@ def merge_run(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("merge_run", locals())
+    result: Report = run("merge_run", locals())
+    return result
 
 
 @job
@@ -577,7 +576,8 @@ def batch(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("batch", locals())
+    result: Report = run("batch", locals())
+    return result
 
 
 @job
@@ -607,7 +607,8 @@ def dtm(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("dtm", locals())
+    result: Report = run("dtm", locals())
+    return result
 
 
 @job
@@ -639,7 +640,8 @@ def classes(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("classes", locals())
+    result: Report = run("classes", locals())
+    return result
 
 
 @job
@@ -694,7 +696,8 @@ def diff(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("diff", locals())
+    result: Report = run("diff", locals())
+    return result
 
 
 @job
@@ -733,7 +736,8 @@ def products(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("products", locals())
+    result: Report = run("products", locals())
+    return result
 
 
 @job
@@ -780,7 +784,8 @@ def ortho(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("ortho", locals())
+    result: Report = run("ortho", locals())
+    return result
 
 
 @job
@@ -845,7 +850,8 @@ def evaluate_grids(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("evaluate_grids", locals())
+    result: Report = run("evaluate_grids", locals())
+    return result
 
 
 @job
@@ -900,7 +906,8 @@ def evaluate_surfaces(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("evaluate_surfaces", locals())
+    result: Report = run("evaluate_surfaces", locals())
+    return result
 
 
 @job
@@ -927,7 +934,8 @@ def evaluate_maps(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("evaluate_maps", locals())
+    result: Report = run("evaluate_maps", locals())
+    return result
 
 
 @job
@@ -948,7 +956,8 @@ def kind_of_evaluation(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("kind_of_evaluation", locals())
+    result: str = run("kind_of_evaluation", locals())
+    return result
 
 
 @job
@@ -1002,7 +1011,8 @@ def heightmap(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("heightmap", locals())
+    result: Report = run("heightmap", locals())
+    return result
 
 
 @job
@@ -1037,7 +1047,8 @@ def unproject(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("unproject", locals())
+    result: Report = run("unproject", locals())
+    return result
 
 
 @job
@@ -1080,7 +1091,8 @@ def groundview(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("groundview", locals())
+    result: Report = run("groundview", locals())
+    return result
 
 
 @job
@@ -1108,7 +1120,8 @@ def compose(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("compose", locals())
+    result: Report = run("compose", locals())
+    return result
 
 
 @job
@@ -1185,7 +1198,8 @@ def priors(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("priors", locals())
+    result: Report = run("priors", locals())
+    return result
 
 
 @job
@@ -1237,7 +1251,8 @@ def splats(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("splats", locals())
+    result: Report = run("splats", locals())
+    return result
 
 
 @job
@@ -1274,7 +1289,8 @@ def render_splats(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("render_splats", locals())
+    result: Report = run("render_splats", locals())
+    return result
 
 
 @job
@@ -1320,7 +1336,8 @@ def train(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("train", locals())
+    result: Report = run("train", locals())
+    return result
 
 
 @job
@@ -1361,7 +1378,8 @@ def align(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("align", locals())
+    result: Report = run("align", locals())
+    return result
 
 
 @job
@@ -1393,7 +1411,8 @@ def split(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("split", locals())
+    result: Report = run("split", locals())
+    return result
 
 
 @job
@@ -1422,7 +1441,8 @@ def city_info(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("city_info", locals())
+    result: Report = run("city_info", locals())
+    return result
 
 
 @job
@@ -1455,7 +1475,8 @@ def city_convert(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("city_convert", locals())
+    result: Report = run("city_convert", locals())
+    return result
 
 
 @job
@@ -1474,7 +1495,8 @@ def rpc_info(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("rpc_info", locals())
+    result: Report = run("rpc_info", locals())
+    return result
 
 
 @job
@@ -1499,7 +1521,8 @@ def rpc_convert(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("rpc_convert", locals())
+    result: Report = run("rpc_convert", locals())
+    return result
 
 
 @job
@@ -1527,4 +1550,5 @@ def simulate(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    return run("simulate", locals())
+    result: Report = run("simulate", locals())
+    return result

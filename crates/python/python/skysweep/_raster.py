@@ -157,7 +157,7 @@ def evaluate(test: Any, reference: Any, *, cell_m: float | None = None, **settin
         **settings: Settings of the evaluation.
 
     Returns:
-        The report of the evaluation; of grids with ``evaluation.overall.errors``: ``mae``,
+        The report of the evaluation; of grids with ``metrics``: ``mae``,
         ``rmse``, ``nmad``, …, metres.
 
     Raises:
@@ -174,12 +174,12 @@ def evaluate(test: Any, reference: Any, *, cell_m: float | None = None, **settin
                 path = os.path.join(folder, f"{name}.tif")
                 _native.write_grid(path, grid, geotransform, (epsg, "ellipsoid"), False)
                 surfaces[name] = path
-        paths = {name: path_of(surface) for name, surface in surfaces.items()}
-        kind = _jobs.kind_of_evaluation(paths["test"], paths["reference"])
+        first, second = path_of(surfaces["test"]), path_of(surfaces["reference"])
+        kind = _jobs.kind_of_evaluation(first, second)
         if kind == "maps":
-            return _jobs.evaluate_maps(**paths, **settings)
+            return _jobs.evaluate_maps(first, second, **settings)
         if kind == "surfaces":
-            return _jobs.evaluate_surfaces(**paths, **settings)
+            return _jobs.evaluate_surfaces(first, second, **settings)
         if _is_in_memory(test):
             settings.setdefault("target", "nowhere")
-        return _jobs.evaluate_grids(**paths, **settings)
+        return _jobs.evaluate_grids(first, second, **settings)
