@@ -59,7 +59,10 @@ pub(crate) struct JobEntry {
 
 /// Makes the entry of a job that is a function from a configuration to a report.
 macro_rules! job {
-    ($name:literal, $summary:literal, $config:ident, $run:path, [$($required:literal),+], $base:expr $(, lifted $lifted:literal)?) => {
+    (
+        $name:literal, $summary:literal, $config:ident, $run:path, [$($required:literal),+], $base:expr
+        $(, lifted $lifted:literal)?
+    ) => {
         JobEntry {
             name: $name,
             summary: $summary,

@@ -278,7 +278,8 @@ impl Writer<'_> {
         text += "\n    Raises:\n";
         text += &hanging("TypeError", "A keyword that the job does not have; the text names those that it has.");
         text += &hanging("SkysweepError", "The job has no result; see its subclasses.");
-        let _ = writeln!(text, "    \"\"\"\n    result: {result} = run(\"{}\", locals())\n    return result", entry.name);
+        let _ =
+            writeln!(text, "    \"\"\"\n    result: {result} = run(\"{}\", locals())\n    return result", entry.name);
         text
     }
 }
