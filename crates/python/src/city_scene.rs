@@ -1,6 +1,6 @@
 //! City models with ray casting.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use bvh::{Bvh, MISS, Ray};
 use city::{Lod, LodChoice, MeshConfig, Scope, TriangleMesh};
@@ -21,7 +21,7 @@ pub(crate) struct CityCore {
     epsg: (Option<u32>, Option<u32>),
 }
 
-fn opened(path: &PathBuf, lod: Option<&str>, all_objects: bool) -> Result<CityCore, Fault> {
+fn opened(path: &Path, lod: Option<&str>, all_objects: bool) -> Result<CityCore, Fault> {
     let lod: Option<Lod> = lod.map(|text| text.parse().map_err(|e| Fault::input(&e))).transpose()?;
     let CityFile { model, .. } = io::citymodel::read(path)?;
     let config = MeshConfig {
@@ -77,7 +77,7 @@ impl CityCore {
         py: Python<'py>,
         origins: PyReadonlyArray2<'py, f64>,
         directions: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>)> {
+    ) -> PyResult<Hits<'py>> {
         let (origins, directions) = (origins.as_slice()?, directions.as_slice()?);
         let local = [self.mesh.origin.x, self.mesh.origin.y, self.mesh.origin.z];
         let (from, to) = (origins.as_chunks::<3>().0, directions.as_chunks::<3>().0);
@@ -93,6 +93,9 @@ impl CityCore {
         Ok((distance.into_pyarray(py), triangle.into_pyarray(py)))
     }
 }
+
+/// Distances and triangles of rays.
+type Hits<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>);
 
 /// Corners, triangles, and object and class of each triangle.
 type Triangles<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u32>>, Vec<String>);

@@ -29,21 +29,21 @@ use jobs::splats::SplatsJobError;
 use jobs::split::SplitJobError;
 use jobs::train::TrainError;
 
-/// Class of an exception; the names are those of the classes in `skysweep`.
+/// Class of an exception. The names are those of the classes in `skysweep` without `Error`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FaultKind {
     /// A setting or an array that cannot be used.
-    InputError,
+    Input,
     /// A file cannot be read or written.
-    FileError,
+    File,
     /// An output exists and may not be replaced.
-    OutputExistsError,
+    OutputExists,
     /// A coordinate reference system or a vertical datum cannot be used.
-    CrsError,
+    Crs,
     /// The job was asked to stop.
-    CancelledError,
+    Cancelled,
     /// Another reason why there is no result.
-    SkysweepError,
+    Skysweep,
 }
 
 /// An error on its way to Python.
@@ -58,12 +58,12 @@ pub(crate) struct Fault {
 impl Fault {
     /// A setting that serde does not take.
     pub(crate) fn setting(text: String) -> Self {
-        Self { kind: FaultKind::InputError, text }
+        Self { kind: FaultKind::Input, text }
     }
 
     /// A defect of the program or of the system.
     pub(crate) fn internal(text: &str) -> Self {
-        Self { kind: FaultKind::SkysweepError, text: text.to_owned() }
+        Self { kind: FaultKind::Skysweep, text: text.to_owned() }
     }
 
     /// A value that cannot be used.
@@ -94,28 +94,28 @@ trait Judged: Error + 'static {
 
 impl<E: Judged> From<E> for Fault {
     fn from(error: E) -> Self {
-        let kind = error.kind().or_else(|| kind_of_causes(&error)).unwrap_or(FaultKind::SkysweepError);
+        let kind = error.kind().or_else(|| kind_of_causes(&error)).unwrap_or(FaultKind::Skysweep);
         let text = with_causes(&error);
         // The writers of single files say it in their text alone.
-        let kind = if text.contains(io::atomic::OUTPUT_EXISTS) { FaultKind::OutputExistsError } else { kind };
+        let kind = if text.contains(io::atomic::OUTPUT_EXISTS) { FaultKind::OutputExists } else { kind };
         Self { kind, text }
     }
 }
 
 fn of_job(error: &JobError) -> Option<FaultKind> {
     match error {
-        JobError::Setting(_) | JobError::Threads(_) => Some(FaultKind::InputError),
+        JobError::Setting(_) | JobError::Threads(_) => Some(FaultKind::Input),
         JobError::File(error) => of_file(error),
-        JobError::Cancelled(_) => Some(FaultKind::CancelledError),
+        JobError::Cancelled(_) => Some(FaultKind::Cancelled),
         _ => None,
     }
 }
 
 fn of_file(error: &FileError) -> Option<FaultKind> {
     match error {
-        FileError::Exists { .. } => Some(FaultKind::OutputExistsError),
-        FileError::NotUtf8 { .. } => Some(FaultKind::InputError),
-        _ => Some(FaultKind::FileError),
+        FileError::Exists { .. } => Some(FaultKind::OutputExists),
+        FileError::NotUtf8 { .. } => Some(FaultKind::Input),
+        _ => Some(FaultKind::File),
     }
 }
 
@@ -125,10 +125,10 @@ fn kind_of_causes(error: &(dyn Error + 'static)) -> Option<FaultKind> {
     let mut last = None;
     while let Some(error) = cause {
         if error.is::<CrsError>() || error.is::<FileCrsError>() {
-            return Some(FaultKind::CrsError);
+            return Some(FaultKind::Crs);
         }
         if error.is::<std::io::Error>() || error.is::<RasterError>() || error.is::<RpcReadError>() {
-            last = Some(FaultKind::FileError);
+            last = Some(FaultKind::File);
         }
         cause = error.source();
     }
@@ -153,14 +153,14 @@ macro_rules! judged {
 
 judged! {
     AlignJobError {}
-    CityJobError { Self::Read(_) => Some(FaultKind::FileError) }
+    CityJobError { Self::Read(_) => Some(FaultKind::File) }
     ClassesError { Self::Index(error) => error.kind() }
     DiffError { Self::Surfaces(error) => error.kind() }
     DtmError {}
     EvalJobError {
-        Self::Raster(_) | Self::Points(_) | Self::SurfaceFile(_) | Self::MapFile(_) => Some(FaultKind::FileError),
-        Self::FileCrs(_) | Self::Crs(_) => Some(FaultKind::CrsError),
-        Self::ForeignFile { .. } => Some(FaultKind::OutputExistsError),
+        Self::Raster(_) | Self::Points(_) | Self::SurfaceFile(_) | Self::MapFile(_) => Some(FaultKind::File),
+        Self::FileCrs(_) | Self::Crs(_) => Some(FaultKind::Crs),
+        Self::ForeignFile { .. } => Some(FaultKind::OutputExists),
     }
     GroundViewError {}
     HeightMapJobError {}
@@ -168,8 +168,8 @@ judged! {
     PriorsJobError {}
     ProductsError {}
     SimulateJobError {
-        Self::Scene(_) | Self::Parameters { .. } => Some(FaultKind::InputError),
-        Self::NotEmpty { .. } => Some(FaultKind::OutputExistsError),
+        Self::Scene(_) | Self::Parameters { .. } => Some(FaultKind::Input),
+        Self::NotEmpty { .. } => Some(FaultKind::OutputExists),
     }
     SplatsJobError {}
     SplitJobError {}
@@ -187,14 +187,14 @@ impl Judged for DsmError {
             | Self::RangeMissesScene { .. }
             | Self::NoSuchChunk { .. }
             | Self::Memory { .. }
-            | Self::Threads(_) => Some(FaultKind::InputError),
-            Self::Exists { .. } => Some(FaultKind::OutputExistsError),
+            | Self::Threads(_) => Some(FaultKind::Input),
+            Self::Exists { .. } => Some(FaultKind::OutputExists),
             Self::Image(_) | Self::Rpc(_) | Self::Output { .. } | Self::InUse { .. } | Self::ChunkFile { .. } => {
-                Some(FaultKind::FileError)
+                Some(FaultKind::File)
             }
             Self::File(error) => of_file(error),
-            Self::Crs(_) => Some(FaultKind::CrsError),
-            Self::Cancelled => Some(FaultKind::CancelledError),
+            Self::Crs(_) => Some(FaultKind::Crs),
+            Self::Cancelled => Some(FaultKind::Cancelled),
             _ => None,
         }
     }
@@ -206,8 +206,8 @@ impl Judged for ProductionError {
             Self::Dsm(error) => error.kind(),
             Self::File(error) => of_file(error),
             Self::Job(error) => error.kind(),
-            Self::Threads(_) => Some(FaultKind::InputError),
-            Self::NoPlan { .. } | Self::Plan { .. } => Some(FaultKind::FileError),
+            Self::Threads(_) => Some(FaultKind::Input),
+            Self::NoPlan { .. } | Self::Plan { .. } => Some(FaultKind::File),
             _ => None,
         }
     }
@@ -217,7 +217,7 @@ impl Judged for JobFileError {
     fn kind(&self) -> Option<FaultKind> {
         match self {
             Self::File(error) => of_file(error),
-            _ => Some(FaultKind::InputError),
+            _ => Some(FaultKind::Input),
         }
     }
 }
@@ -226,8 +226,8 @@ impl Judged for BatchError {
     fn kind(&self) -> Option<FaultKind> {
         match self {
             Self::Job(error) => error.kind(),
-            Self::Cancelled(_) => Some(FaultKind::CancelledError),
-            _ => Some(FaultKind::InputError),
+            Self::Cancelled(_) => Some(FaultKind::Cancelled),
+            _ => Some(FaultKind::Input),
         }
     }
 }
@@ -235,8 +235,8 @@ impl Judged for BatchError {
 impl Judged for RpcJobError {
     fn kind(&self) -> Option<FaultKind> {
         match self {
-            Self::Read(_) => Some(FaultKind::FileError),
-            Self::Cancelled(_) => Some(FaultKind::CancelledError),
+            Self::Read(_) => Some(FaultKind::File),
+            Self::Cancelled(_) => Some(FaultKind::Cancelled),
             _ => None,
         }
     }
@@ -244,7 +244,7 @@ impl Judged for RpcJobError {
 
 impl Judged for RasterError {
     fn kind(&self) -> Option<FaultKind> {
-        Some(if matches!(self, Self::Crs { .. }) { FaultKind::CrsError } else { FaultKind::FileError })
+        Some(if matches!(self, Self::Crs { .. }) { FaultKind::Crs } else { FaultKind::File })
     }
 }
 
@@ -260,14 +260,14 @@ macro_rules! judged_alike {
 }
 
 judged_alike! {
-    RpcReadError => FileError,
-    RpcWriteError => FileError,
-    CrsError => CrsError,
-    CameraError => InputError,
-    RpcError => InputError,
-    FitError => InputError,
-    city::ModelError => InputError,
-    io::citymodel::CityError => FileError,
-    bvh::BvhError => InputError,
-    eval::EvalError => InputError,
+    RpcReadError => File,
+    RpcWriteError => File,
+    CrsError => Crs,
+    CameraError => Input,
+    RpcError => Input,
+    FitError => Input,
+    city::ModelError => Input,
+    io::citymodel::CityError => File,
+    bvh::BvhError => Input,
+    eval::EvalError => Input,
 }

@@ -22,7 +22,8 @@ use crate::fault::Fault;
 
 /// Makes the exception of an error.
 fn raise(py: Python<'_>, fault: &Fault) -> PyErr {
-    let class = || py.import("skysweep._errors")?.getattr(format!("{:?}", fault.kind))?.call1((fault.text.as_str(),));
+    let class =
+        || py.import("skysweep._errors")?.getattr(format!("{:?}Error", fault.kind))?.call1((fault.text.as_str(),));
     match class() {
         Ok(exception) => PyErr::from_value(exception),
         Err(_) => PyRuntimeError::new_err(fault.text.clone()),
