@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use camera_stand::{StandConfig, StandSource};
 use jobs::align::AlignJobConfig;
 use jobs::batch::read_batch;
+use jobs::buildings::BuildingMapConfig;
 use jobs::camera_stand;
 use jobs::city::{CityConvertConfig, CityInfoConfig};
 use jobs::classes::ClassesConfig;
@@ -91,7 +92,7 @@ fn town() -> SimulationConfig {
 }
 
 /// The jobs in the order of the documentation.
-pub(crate) const JOBS: [JobEntry; 31] = [
+pub(crate) const JOBS: [JobEntry; 32] = [
     job!(
         "dsm",
         "Make a surface model from satellite images with RPCs.",
@@ -163,6 +164,14 @@ pub(crate) const JOBS: [JobEntry; 31] = [
         jobs::classes::run,
         ["surface", "output"],
         ClassesConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "buildings",
+        "Make an index of buildings from one image, in its pixels or on a surface model.",
+        BuildingMapConfig,
+        jobs::buildings::run,
+        ["image", "output"],
+        BuildingMapConfig::new(nowhere(), nowhere())
     ),
     job!(
         "diff",
@@ -442,7 +451,7 @@ fn named_scene(scene: &str) -> Result<SimulationConfig, Fault> {
 
 /// Returns the job called `name`.
 pub(crate) fn job(name: &str) -> Option<&'static JobEntry> {
-    static ALL: [JobEntry; 31] = JOBS;
+    static ALL: [JobEntry; 32] = JOBS;
     ALL.iter().find(|entry| entry.name == name)
 }
 

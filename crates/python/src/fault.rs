@@ -8,6 +8,7 @@ use io::raster::RasterError;
 use io::rpc::{RpcReadError, RpcWriteError};
 use jobs::align::AlignJobError;
 use jobs::batch::BatchError;
+use jobs::buildings::BuildingMapError;
 use jobs::city::CityJobError;
 use jobs::classes::ClassesError;
 use jobs::diff::DiffError;
@@ -153,6 +154,7 @@ macro_rules! judged {
 
 judged! {
     AlignJobError {}
+    BuildingMapError {}
     CityJobError { Self::Read(_) => Some(FaultKind::File) }
     ClassesError { Self::Index(error) => error.kind() }
     DiffError { Self::Surfaces(error) => error.kind() }

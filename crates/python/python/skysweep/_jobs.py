@@ -21,6 +21,7 @@ __all__ = [
     "batch",
     "dtm",
     "classes",
+    "buildings",
     "diff",
     "products",
     "ortho",
@@ -44,6 +45,51 @@ __all__ = [
     "rpc_convert",
     "simulate",
 ]
+
+
+class BuildingIndexConfig(TypedDict, total=False):
+    """Parameters of the building index. Lengths are those of buildings and follow no scene."""
+
+    smoothing_m: float
+    """Standard deviation of the smoothing before gradients, metres; at least 0.8 pixels."""
+
+    least_side_m: float
+    """Shortest side of a building, metres."""
+
+    most_side_m: float
+    """Longest side of a building that is followed, metres."""
+
+    gap_m: float
+    """Longest part of a side that may show no edge, metres."""
+
+    least_area_m2: float
+    """Smallest area of a building, square metres."""
+
+    most_area_m2: float
+    """Largest area of a building, square metres."""
+
+    half_area_m2: float
+    """Area at which a shape counts half as much as a small one, square metres. What is between
+    streets is larger than most buildings."""
+
+    angle_spread_deg: float
+    """Standard deviation of the angles of buildings from a right angle, degrees."""
+
+    log_false_alarms: float
+    """Logarithm (base 10) of the number of branches that may be found in an image without any. A
+    few do no harm: they close no shape."""
+
+    tolerance_m: float
+    """How far a corner or a far side may lie from where a junction says, metres."""
+
+    shadow_m: float
+    """Width of the widest shadow, metres."""
+
+    blur_m: float
+    """Standard deviation of the smoothing of the index, metres."""
+
+    half_saliency: float
+    """Saliency at which the index is a half."""
 
 
 class ChangeConfig(TypedDict, total=False):
@@ -77,11 +123,22 @@ class ClassifyConfig(TypedDict, total=False):
     """Least height above the ground of buildings and vegetation, metres. Cars are below it."""
 
     window_m: float
-    """Side of the windows in which planes are fitted, metres. It must be narrower than half a
-    house and wider than a few branches."""
+    """Side of the windows in which planes are fitted on a noisy surface, metres. It must be
+    narrower than half a house and wider than a few branches."""
+
+    least_window_m: float
+    """Side below which the windows do not shrink on a surface with little noise, metres."""
 
     roughness_m: float
-    """Residual of a plane up to which a surface without noise is smooth, metres."""
+    """Residual of a plane up to which a noisy surface is smooth, metres."""
+
+    least_roughness_m: float
+    """Residual of a plane up to which an exact surface is smooth, metres: that of small parts of
+    roofs that are no planes."""
+
+    ground_residuals: float
+    """Residual up to which a surface is smooth, in residuals of the bare ground; between the two
+    above."""
 
     least_building_m2: float
     """Smallest area of a building, square metres."""
@@ -90,10 +147,17 @@ class ClassifyConfig(TypedDict, total=False):
     """Smallest area of vegetation, square metres."""
 
     ramp_m: float
-    """Width of the ramps at walls, metres."""
+    """Width of the ramps at walls of a noisy surface, metres."""
 
     least_index: float
     """Least vegetation index of vegetation, where one is given."""
+
+    least_building_index: float
+    """Least building index that counts as a building where the heights are weak."""
+
+    leniency: float
+    """Factor by which the height of a building may miss the least height, and its residual the
+    roughness, where the building index speaks for it."""
 
 
 class EvalRequirements(TypedDict, total=False):
@@ -249,7 +313,7 @@ def dsm(
     pairs: Sequence[Sequence[int]] | None = None,
     references: Sequence[int] | None = None,
     pointing: bool = True,
-    products: Sequence[Literal["cloud", "dtm", "contours", "mesh"]] = (),
+    products: Sequence[Literal["cloud", "dtm", "classes", "contours", "mesh"]] = (),
     threads: int | None = None,
     memory_mb: int | None = None,
     chunk: int | None = None,
@@ -337,7 +401,7 @@ def plan_run(
     pairs: Sequence[Sequence[int]] | None = None,
     references: Sequence[int] | None = None,
     pointing: bool = True,
-    products: Sequence[Literal["cloud", "dtm", "contours", "mesh"]] = (),
+    products: Sequence[Literal["cloud", "dtm", "classes", "contours", "mesh"]] = (),
     threads: int | None = None,
     memory_mb: int | None = None,
     chunk: int | None = None,
@@ -425,7 +489,7 @@ def make_plan(
     pairs: Sequence[Sequence[int]] | None = None,
     references: Sequence[int] | None = None,
     pointing: bool = True,
-    products: Sequence[Literal["cloud", "dtm", "contours", "mesh"]] = (),
+    products: Sequence[Literal["cloud", "dtm", "classes", "contours", "mesh"]] = (),
     threads: int | None = None,
     memory_mb: int | None = None,
     chunk: int | None = None,
@@ -617,6 +681,7 @@ def classes(
     output: PathLike,
     *,
     vegetation_index: PathLike | None = None,
+    building_index: PathLike | None = None,
     terrain: GroundConfig | None = None,
     classes: ClassifyConfig | None = None,
     threads: int | None = None,
@@ -630,6 +695,8 @@ def classes(
         output: Folder for the rasters and the report.
         vegetation_index: Vegetation index (NDVI, −1 to 1) on any grid, which overrules the
             roughness.
+        building_index: Building index (0 to 1) on any grid, which decides where the heights are
+            weak.
         terrain: Parameters of the search for the ground.
         classes: Parameters of the classes.
         threads: Worker threads. `None` uses all cores.
@@ -641,6 +708,45 @@ def classes(
         SkysweepError: The job has no result; see its subclasses.
     """
     result: Report = run("classes", locals())
+    return result
+
+
+@job
+def buildings(
+    image: PathLike,
+    output: PathLike,
+    *,
+    surface: PathLike | None = None,
+    surface_vertical: str | None = None,
+    corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
+    gsd_m: float | None = None,
+    index: BuildingIndexConfig | None = None,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress = None,
+) -> Report:
+    """Make an index of buildings from one image, in its pixels or on a surface model.
+
+    Args:
+        image: The image.
+        output: GeoTIFF to write; the report is written beside it.
+        surface: Surface model on a projected map, or the folder of a DSM run, on which the index is
+            laid. `None` leaves it in the pixels of the image.
+        surface_vertical: Vertical datum of the surface model, where the file names none or a wrong
+            one.
+        corrections: Where the pointing correction of the image comes from, on a surface model.
+        gsd_m: Ground sampling distance of the image, metres. `None` takes that of its RPC or its
+            map.
+        index: Parameters of the index.
+        threads: Worker threads. `None` uses all cores.
+        overwrite: Whether existing files may be replaced.
+        progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
+
+    Raises:
+        TypeError: A keyword that the job does not have; the text names those that it has.
+        SkysweepError: The job has no result; see its subclasses.
+    """
+    result: Report = run("buildings", locals())
     return result
 
 
@@ -705,7 +811,7 @@ def products(
     run: PathLike,
     *,
     output: PathLike | None = None,
-    products: Sequence[Literal["cloud", "dtm", "contours", "mesh"]] = ("cloud", "dtm", "contours", "mesh"),
+    products: Sequence[Literal["cloud", "dtm", "classes", "contours", "mesh"]] = ("cloud", "dtm", "contours", "mesh"),
     ortho: PathLike | None = None,
     filled: bool = False,
     contour_interval_m: float | None = None,
