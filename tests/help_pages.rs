@@ -42,6 +42,7 @@ const COMMANDS: [&[&str]; 31] = [
     &["heightmap"],
     &["heightmap", "unproject"],
     &["merge"],
+    &["mesh"],
     &["ortho"],
     &["plan"],
     &["priors"],

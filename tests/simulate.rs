@@ -67,13 +67,19 @@ fn overwriting_leaves_nothing_of_an_earlier_scene() {
     let told = simulate(&["--views", "4", "--flight", "3"][..]);
     assert!(told.contains("4 views") && told.contains(scene.to_str().unwrap()), "{told}");
     std::fs::write(scene.join("view_mine.tif"), b"mine").unwrap();
-    for name in ["view_4.tif", "truth/heights_3.tif", "cameras/sparse/0/images.txt"] {
+    for name in ["view_4.tif", "truth/heights_3.tif", "cameras/sparse/0/images.txt", "cameras/images/flight_03.png"] {
         assert!(scene.join(name).is_file(), "{name}");
     }
     simulate(&["--overwrite"]);
-    for name in
-        ["view_3.tif", "view_4.tif", "truth/heights_3.tif", "truth/heights_4.tif", "cameras/sparse/0/images.txt"]
-    {
+    for name in [
+        "view_3.tif",
+        "view_4.tif",
+        "truth/heights_3.tif",
+        "truth/heights_4.tif",
+        "truth/flight_surface.ply",
+        "cameras/sparse/0/images.txt",
+        "cameras/images/flight_03.png",
+    ] {
         assert!(!scene.join(name).exists(), "{name}");
     }
     assert!(FILES.iter().all(|name| scene.join(name).is_file()) && scene.join("view_mine.tif").is_file());
@@ -216,10 +222,11 @@ fn bad_requests_name_what_is_wrong_and_write_nothing() {
 }
 
 #[test]
-fn a_flight_looks_at_the_buildings_in_map_coordinates() {
+fn a_flight_sees_the_buildings_and_its_points_lie_on_them() {
     let folder = tempfile::tempdir().unwrap();
-    skysweep().args(SMALL).args(["--flight", "5", "-o"]).arg(folder.path()).assert().code(0);
-    let model = io::colmap::read(&folder.path().join("cameras/sparse/0")).unwrap();
+    let flight = ["--flight", "5", "--flight-arc", "120", "240", "-o"];
+    skysweep().args(SMALL).args(flight).arg(folder.path()).assert().code(0);
+    let (model, points) = io::colmap::read_with_points(&folder.path().join("cameras/sparse/0")).unwrap();
     assert_eq!((model.views.len(), model.views[4].name.as_str()), (5, "flight_05.png"));
     let record = json(&folder.path().join("scene.json"));
     let middle = [0, 1].map(|i| record["origin_m"][i].as_f64().unwrap());
@@ -228,5 +235,36 @@ fn a_flight_looks_at_the_buildings_in_map_coordinates() {
         let [x, y, z] = view.pose.camera_from_world([middle[0], middle[1], ground]);
         // The middle of the scene, at its ground, is near the middle of every image.
         assert!(z > 30.0 && (x / z).abs() < 0.1 && (y / z).abs() < 0.2, "{:?}", [x / z, y / z, z]);
+        assert!(view.pose.centre[1] < middle[1], "the arc is in the south");
+        let picture = io::raster::ImageSource::open(folder.path().join("cameras/images").join(&view.name)).unwrap();
+        let pixels = picture.read_colour(picture.window()).unwrap();
+        assert_eq!((pixels.width(), pixels.height()), (640, 480));
+        let values: Vec<f32> = pixels.data().iter().map(|p| p[0]).collect();
+        let spread = |share: usize| {
+            let mut sorted = values.clone();
+            sorted.sort_by(f32::total_cmp);
+            sorted[sorted.len() * share / 100]
+        };
+        assert!(spread(90) - spread(10) > 40.0, "{} {}", spread(10), spread(90));
     }
+    assert!(points.len() > 500, "{}", points.len());
+    // The points of a reconstruction lie near the exact surface.
+    let near = |name: &str| {
+        let truth = io::surfaces::read(folder.path().join("truth").join(name), &city::MeshConfig::default()).unwrap();
+        let distance = |p: &[f64; 3], q: &[f64; 3]| (0..3).map(|i| (p[i] - q[i]).powi(2)).sum::<f64>().sqrt();
+        let closest = |p: &[f64; 3]| truth.positions.iter().map(|q| distance(p, q)).fold(f64::INFINITY, f64::min);
+        let mut distances: Vec<f64> = points.iter().step_by(20).map(|p| closest(&p.position)).collect();
+        distances.sort_by(f64::total_cmp);
+        (distances[distances.len() / 2], distances[distances.len() * 9 / 10])
+    };
+    let (median, most) = near("flight_surface.ply");
+    assert!(median < 0.2 && most < 0.5, "{median} {most}");
+    assert!(near("flight_buildings.ply").1 > most, "buildings are a part of the surface");
+    skysweep()
+        .args(SMALL)
+        .args(["--flight", "2", "--flight-arc", "0", "400", "-o"])
+        .arg(folder.path().join("x"))
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("arc of the flight is 400"));
 }

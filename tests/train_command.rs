@@ -6,7 +6,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use common::{sample, skysweep};
+use common::{sample, simulated, skysweep};
 use io::raster::write_png_rgb;
 use predicates::prelude::*;
 use raster::Grid;
@@ -94,6 +94,8 @@ fn views_that_were_not_trained_on_become_better() {
     assert_eq!(splats.splats.len() as u64, report["splats_after"].as_u64().unwrap());
     assert!(splats.splats.len() <= 8000 && !out.path().join("a/checkpoint.bin").exists());
     assert_eq!(std::fs::read_dir(out.path().join("a/renders")).unwrap().count(), 3);
+    let page = std::fs::read_to_string(out.path().join("a/report.html")).unwrap();
+    assert!(page.contains("Loss by iteration") && page.contains("flight_04.png"), "no curve or view on the page");
     let losses = report["losses"].as_array().unwrap();
     let colour = |i: usize| losses[i]["colour"].as_f64().unwrap();
     assert!(colour(losses.len() - 1) < 0.8 * colour(0), "{losses:?}");
@@ -107,6 +109,61 @@ fn threads_change_no_byte() {
         std::fs::read(out.path().join(name).join("splats.ply")).unwrap()
     };
     assert!(splats("one", "1") == splats("two", "2"));
+}
+
+/// A small town in three images with exact RPCs, and splats of its true surface and two images.
+fn satellite() -> &'static (PathBuf, PathBuf) {
+    static SCENE: OnceLock<(PathBuf, PathBuf)> = OnceLock::new();
+    SCENE.get_or_init(|| {
+        let exact = ("pointing_error_px = [1.0, 3.0]", "pointing_error_px = [0.0, 0.0]");
+        let scene =
+            simulated("train_satellite", &[("size_m = 320.0", "size_m = 60.0"), ("gsd_m = 0.5", "gsd_m = 0.8"), exact]);
+        let splats = scene.join("splats.ply");
+        let mut command = skysweep();
+        command
+            .arg("splats")
+            .arg(scene.join("truth/dsm.tif"))
+            .args(["view_1.tif", "view_2.tif"].map(|v| scene.join(v)));
+        command.args(["--form", "2d", "--overwrite", "-o"]).arg(&splats).assert().success();
+        (scene, splats)
+    })
+}
+
+fn train_on_images(output: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    let (scene, splats) = satellite();
+    let mut command = skysweep();
+    command.arg("train").args(["view_1.tif", "view_2.tif"].map(|v| scene.join(v))).arg("--splats").arg(splats);
+    command.arg("--dsm").arg(scene.join("truth/dsm.tif")).arg("--judge").arg(scene.join("view_3.tif"));
+    command.args(["--iterations", "60"]).args(arguments).arg("-o").arg(output).assert()
+}
+
+#[test]
+fn splats_learn_from_satellite_images_and_keep_their_heights() {
+    let out = tempfile::tempdir().unwrap();
+    train_on_images(&out.path().join("two"), &["--threads", "2"]).success().stdout(predicate::str::contains("judged"));
+    let report = report_of(&out.path().join("two"));
+    assert!(report["camera_error_px"].as_f64().unwrap() < 0.01, "{report}");
+    let views = report["views"].as_array().unwrap();
+    assert_eq!(views.len(), 3);
+    for view in views {
+        let [before, after] = ["psnr_before_db", "psnr_db"].map(|key| view[key].as_f64().unwrap());
+        let gain = if view["held_out"] == true { 0.5 } else { 2.0 };
+        assert!(after > before + gain, "{view}");
+    }
+    let [before, after] = [0, 1].map(|i| report["height_change_m"][i].as_f64().unwrap());
+    assert!(after < 1.2 * before + 0.02, "{before} became {after} m");
+    for name in ["splats.ply", "splats.origin.json", "dsm.tif", "report.html", "renders/view_3.png"] {
+        assert!(out.path().join("two").join(name).is_file(), "{name}");
+    }
+    train_on_images(&out.path().join("one"), &["--threads", "1"]).success();
+    let bytes = |name: &str| std::fs::read(out.path().join(name).join("splats.ply")).unwrap();
+    assert!(bytes("one") == bytes("two"), "threads change the splats");
+    train_on_images(&out.path().join("x"), &["--resume"]).code(2).stderr(predicate::str::contains("--resume"));
+    let lone = out.path().join("lone.ply");
+    std::fs::copy(&satellite().1, &lone).unwrap();
+    let mut command = skysweep();
+    command.arg("train").arg(satellite().0.join("view_1.tif")).arg("--splats").arg(&lone).arg("-o");
+    command.arg(out.path().join("y")).assert().code(2).stderr(predicate::str::contains("no origin beside the splats"));
 }
 
 #[test]

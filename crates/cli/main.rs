@@ -20,6 +20,7 @@ mod global;
 mod groundview;
 mod heightmap;
 mod log;
+mod mesh;
 mod options;
 mod ortho;
 mod print;
@@ -80,6 +81,8 @@ enum Command {
     Heightmap(Box<heightmap::Args>),
     /// Make a surface model of the computed chunks of a planned run.
     Merge(production::MergeArgs),
+    /// Make a mesh of trained splats or of depth maps.
+    Mesh(Box<mesh::Args>),
     /// Lay satellite images on a surface model, hidden cells marked.
     Ortho(Box<ortho::Args>),
     /// Print the manual page of a command.
@@ -146,6 +149,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Groundview(args) => groundview::run(args, cli.global),
         Command::Heightmap(args) => heightmap::run(args, cli.global),
         Command::Merge(args) => production::merge(args, cli.global),
+        Command::Mesh(args) => mesh::run(args, cli.global),
         Command::Ortho(args) => ortho::run(args, cli.global),
         Command::Man(args) => completions::man(args, options::grouped(Cli::command())),
         Command::Plan(args) => production::plan(args, cli.global),

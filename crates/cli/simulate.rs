@@ -2,7 +2,7 @@
 //!
 //! Writes `view_1.tif` … (RPC in the file), the record `scene.json`, the parameters `scene.toml`,
 //! and in `truth/` the rasters, the heights of every image and the buildings at LoD2. With
-//! `--flight` also perspective cameras, in `cameras/sparse/0`.
+//! `--flight` also perspective cameras with their pictures, in `cameras`.
 
 use std::path::{Path, PathBuf};
 
@@ -40,10 +40,15 @@ pub(crate) struct Args {
     /// --dates says otherwise.
     #[arg(long)]
     seasons: bool,
-    /// Also write N perspective cameras around the scene (a COLMAP model in cameras/sparse/0, in
-    /// map coordinates), for skysweep priors and the trainers that it prepares.
+    /// Also write N perspective cameras around the scene with their pictures (a COLMAP dataset in
+    /// cameras, in map coordinates), for skysweep priors and train, and the exact surface that they
+    /// see.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     flight: u32,
+    /// See the scene from one side only: the cameras of the flight stand between two azimuths,
+    /// degrees clockwise from north.
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], allow_negative_numbers = true, requires = "flight")]
+    flight_arc: Vec<f64>,
     /// Folder for the images and the truth.
     #[arg(short, long, value_name = "DIR", required_unless_present_any = ["list", "template"])]
     output: Option<PathBuf>,
@@ -99,6 +104,7 @@ fn config(args: &Args) -> anyhow::Result<SimulationConfig> {
 fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let mut config = SimulateConfig::new(scene, output.to_owned());
     config.flight = args.flight;
+    config.flight_arc_deg = args.flight_arc.first_chunk().copied();
     config.overwrite = args.overwrite;
     let show = ShowOptions { progress: args.progress, json: false };
     let report = show.watch(global, output, |watcher| jobs::simulate::run(&config, watcher)).map_err(|error| {

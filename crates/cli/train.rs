@@ -1,9 +1,12 @@
-//! `skysweep train`: flat Gaussian splats learn from the images of a dataset, with building priors.
+//! `skysweep train`: flat Gaussian splats learn from the images of a dataset, with building priors,
+//! or from satellite images.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use jobs::train::{TrainConfig, TrainPriors};
+use anyhow::{bail, ensure};
+use jobs::train::{SatelliteTrainConfig, TrainConfig, TrainPriors};
 
+use crate::corrections::corrections_of;
 use crate::options::{Named, named};
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
@@ -12,13 +15,20 @@ use crate::{Global, Outcome};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: skysweep priors buildings.city.json --cameras flight -o dataset; \
                   skysweep train dataset --pictures flight/images -o trained. A training that is stopped \
-                  leaves a checkpoint, from which --resume goes on.")]
+                  leaves a checkpoint, from which --resume goes on. Satellite images: skysweep train \
+                  *.tif --splats town.ply --dsm dsm.tif -o trained")]
 pub(crate) struct Args {
-    /// Folder that skysweep priors wrote, or another folder with a COLMAP model in sparse/0.
-    dataset: PathBuf,
+    /// Folder that skysweep priors wrote, or another folder with a COLMAP model in sparse/0; or
+    /// satellite images with RPCs, with --splats.
+    #[arg(required = true, value_name = "DATASET|IMAGES")]
+    inputs: Vec<PathBuf>,
     /// Folder of the images, with the names that the cameras have [default: DATASET/images].
     #[arg(long, value_name = "FOLDER")]
     pictures: Option<PathBuf>,
+    /// Another COLMAP model of the same cameras, whose points are added, such as the reconstruction
+    /// that the cameras come from: what is not in the city model begins there.
+    #[arg(long, value_name = "FOLDER")]
+    points: Option<PathBuf>,
     /// Folder for splats.ply, report.json and the views that were not trained on.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -31,6 +41,23 @@ pub(crate) struct Args {
     /// Pixels of an image that become one, in each direction.
     #[arg(long, value_name = "N", default_value_t = 1)]
     shrink: usize,
+    /// Splats to begin with, as skysweep splats makes them of a surface model (satellite images).
+    #[arg(long, value_name = "PLY", help_heading = "Satellite images")]
+    splats: Option<PathBuf>,
+    /// Surface model that holds the heights of the splats; dsm.tif is written on its grid [default:
+    /// nothing but the images holds them].
+    #[arg(long, value_name = "FILE", requires = "splats", help_heading = "Satellite images")]
+    dsm: Option<PathBuf>,
+    /// Image that is not trained on and only judged; may be given several times.
+    #[arg(long, value_name = "IMAGE", requires = "splats", help_heading = "Satellite images")]
+    judge: Vec<PathBuf>,
+    /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default:
+    /// the corrections that the splats were made with].
+    #[arg(long, value_name = "report.json|none", requires = "splats", help_heading = "Satellite images")]
+    corrections: Option<PathBuf>,
+    /// Train also on pixels that one image does not share with the others, such as vehicles.
+    #[arg(long, requires = "splats", help_heading = "Satellite images")]
+    keep_transients: bool,
     /// Every N-th view is kept for the judgement and not trained on (0: none).
     #[arg(long, value_name = "N", default_value_t = 8)]
     hold_out: usize,
@@ -59,7 +86,12 @@ const PRIORS: [Named<TrainPriors>; 4] = [
 
 /// Runs `skysweep train`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let mut config = TrainConfig::new(args.dataset.clone(), args.output.clone());
+    if let Some(splats) = &args.splats {
+        return on_images(args, splats, global);
+    }
+    ensure!(args.inputs.len() == 1, "{} datasets, expected one; satellite images need --splats", args.inputs.len());
+    let mut config = TrainConfig::new(args.inputs[0].clone(), args.output.clone());
+    config.more_points.clone_from(&args.points);
     config.images.clone_from(&args.pictures);
     config.iterations = args.iterations;
     config.budget = args.budget;
@@ -73,6 +105,33 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.overwrite = args.run.overwrite;
     let show = args.run.show;
     let report = show.watch(global, &args.output, |watcher| jobs::train::run(&config, watcher))?;
+    show.print(global, &report, || report.text())?;
+    Ok(Outcome::Complete)
+}
+
+/// Trains on satellite images.
+fn on_images(args: &Args, splats: &Path, global: Global) -> anyhow::Result<Outcome> {
+    let given = [
+        ("--pictures", args.pictures.is_some()),
+        ("--points", args.points.is_some()),
+        ("--resume", args.resume),
+        ("--shrink", args.shrink != 1),
+    ];
+    if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
+        bail!("{option} is for datasets, and --splats for satellite images: leave one of them out");
+    }
+    let mut config = SatelliteTrainConfig::new(args.inputs.clone(), splats.to_owned(), args.output.clone());
+    config.judged.clone_from(&args.judge);
+    config.dsm.clone_from(&args.dsm);
+    config.corrections = corrections_of(args.corrections.as_deref());
+    config.iterations = args.iterations;
+    config.budget = args.budget;
+    config.transients = !args.keep_transients;
+    config.seed = args.seed;
+    config.threads = args.run.threads;
+    config.overwrite = args.run.overwrite;
+    let show = args.run.show;
+    let report = show.watch(global, &args.output, |watcher| jobs::train::run_on_images(&config, watcher))?;
     show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }

@@ -19,6 +19,7 @@
 //! | [`jobs::groundview`] | depths, normals and sky of cameras on the ground |
 //! | [`jobs::priors`] | depth, normal and mask maps of a city model for the cameras of a scene |
 //! | [`jobs::splats`] | Gaussian splats of a surface model and its images |
+//! | [`jobs::mesh`] | a mesh of trained splats or of depth maps |
 //! | [`jobs::train`] | splats that learn from the images of a dataset, with building priors |
 //! | [`jobs::align`], [`jobs::split`] | COLMAP models brought to the world, context and target views |
 //! | [`jobs::city`], [`jobs::rpc`] | what city models and RPC files hold, and conversions of both |
@@ -32,7 +33,7 @@
 //! - Surfaces: [`raster`] (grids), [`city`] (city models), [`gaussian`] (splats), [`bvh`] (ray
 //!   casting), [`occlusion`].
 //! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`],
-//!   [`ortho`], [`splats`], [`terrain`], [`train`], [`change`],
+//!   [`ortho`], [`splats`], [`terrain`], [`train`], [`tsdf`], [`change`],
 //!   [`classes`], [`buildings`], [`simulate`].
 //! - Files: [`io`] reads and writes every format, [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
@@ -76,3 +77,4 @@ pub use splats;
 pub use sweep;
 pub use terrain;
 pub use train;
+pub use tsdf;

@@ -41,6 +41,7 @@ const FLOORS: [(&str, u8); 29] = [
     ("skysweep-ortho", 4),
     ("skysweep-splats", 4),
     ("skysweep-colmap", 4),
+    ("skysweep-tsdf", 4),
     ("skysweep-train", 5),
     ("skysweep-io", 5),
     ("skysweep-report", 6),

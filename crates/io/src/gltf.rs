@@ -41,6 +41,15 @@ impl GlbBuffers {
         }))
     }
 
+    /// Adds linear colours, 0 to 1, and returns the index of their accessor.
+    pub(crate) fn colours(&mut self, colours: &[[f32; 3]]) -> usize {
+        let bytes = colours.as_flattened().iter().flat_map(|c| c.to_le_bytes());
+        let view = self.view(bytes, Some(ARRAY_BUFFER));
+        self.accessor(json!({
+            "bufferView": view, "componentType": FLOAT, "count": colours.len(), "type": "VEC3",
+        }))
+    }
+
     /// Adds corners and returns the index of their accessor.
     pub(crate) fn indices(&mut self, indices: &[u32]) -> usize {
         let view = self.view(indices.iter().flat_map(|i| i.to_le_bytes()), Some(ELEMENT_ARRAY_BUFFER));

@@ -10,6 +10,7 @@ pub mod atomic;
 pub mod camera_file;
 pub mod citymodel;
 pub mod colmap;
+pub mod coloured_mesh;
 pub mod control;
 mod gltf;
 pub mod ground_points;

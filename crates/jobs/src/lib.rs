@@ -22,6 +22,7 @@ pub mod heightmap;
 pub mod job_file;
 mod job_paths;
 pub mod map_surface;
+pub mod mesh;
 pub mod ortho;
 mod output_folder;
 mod path_variables;

@@ -32,7 +32,16 @@ pub(crate) fn write(
     overwrite: bool,
 ) -> Result<(), FileError> {
     let value = serde_json::to_value(report)?;
-    let page = JobPage { layers, ..JobPage::of_report(title, lead, &value) };
+    write_page(path, &JobPage { layers, ..JobPage::of_report(title, lead, &value) }, report, overwrite)
+}
+
+/// Writes a page, then its report.
+pub(crate) fn write_page(
+    path: &Path,
+    page: &JobPage,
+    report: &impl Serialize,
+    overwrite: bool,
+) -> Result<(), FileError> {
     let file = page_file(path);
     let html =
         page.html().map_err(|e| FileError::Unwritable { path: file.clone(), source: std::io::Error::other(e) })?;

@@ -2,21 +2,26 @@
 //!
 //! Writes `view_1.tif` … (with the RPC in the file), the record `scene.json`, the parameters
 //! `scene.toml`, and in `truth/` the rasters, the heights of every image and the buildings at LoD2.
-//! A flight adds perspective cameras in `cameras/sparse/0`, in map coordinates.
+//! A flight adds perspective cameras and the points of a reconstruction in `cameras/sparse/0`, in
+//! map coordinates, their pictures in `cameras/images`, and the exact surface that they see as
+//! clouds in `truth/`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::simulate::{SceneRecord, SimulateError, SimulatedView, Simulation, SimulationConfig};
-use camera::LensError;
+use ::simulate::{
+    ExactPoint, Flight, FlightPoint, SceneRecord, SimulateError, SimulatedView, Simulation, SimulationConfig,
+};
+use camera::{LensError, Pose};
 use crs::Crs;
 use io::citymodel::{CityJsonOptions, write_cityjson};
-use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapView};
-use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc};
+use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
+use io::ply::{PlyPoint, write_points};
+use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc, write_png_gray};
 use numeric::{Cancelled, Progress};
 use serde::{Deserialize, Serialize};
 
-use crate::error::{JobError, from_steps};
+use crate::error::{JobError, SettingError, from_steps};
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
 use crate::threads::{ThreadsError, install};
@@ -27,6 +32,12 @@ const RECORD: &str = "scene.json";
 const PARAMETERS: &str = "scene.toml";
 /// The folder of the perspective cameras.
 const FLIGHT: &str = "cameras/sparse/0";
+/// The folder of their pictures.
+const PICTURES: &str = "cameras/images";
+/// The clouds of what a flight sees: everything, and the buildings.
+const CLOUDS: [&str; 2] = ["truth/flight_surface.ply", "truth/flight_buildings.ply"];
+/// Edge of the cubes that hold one point of these clouds each, metres.
+const CLOUD_SPACING_M: f64 = 0.2;
 
 /// A scene to be simulated and the folder for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,6 +50,9 @@ pub struct SimulateConfig {
     pub output: PathBuf,
     /// Number of perspective cameras around the scene; none when 0.
     pub flight: u32,
+    /// Azimuths between which the perspective cameras stand, degrees clockwise from north; all
+    /// around when `None`.
+    pub flight_arc_deg: Option<[f64; 2]>,
     /// Worker threads; one per core when `None`.
     pub threads: Option<usize>,
     /// Whether the files of an earlier simulation may be replaced.
@@ -88,7 +102,7 @@ pub enum SimulateJobError {
     Job(#[from] JobError),
 }
 
-from_steps!(SimulateJobError: Job(FileError, ThreadsError, Cancelled));
+from_steps!(SimulateJobError: Job(FileError, ThreadsError, SettingError, Cancelled));
 
 impl SimulateReport {
     /// Returns the report as text, which ends in a line break.
@@ -102,14 +116,17 @@ impl SimulateReport {
 impl SimulateConfig {
     /// A simulation of `scene` without a flight, in a folder that is empty.
     pub fn new(scene: SimulationConfig, output: PathBuf) -> Self {
-        Self { scene, output, flight: 0, threads: None, overwrite: false }
+        Self { scene, output, flight: 0, flight_arc_deg: None, threads: None, overwrite: false }
     }
 
-    /// Checks the parameters of the scene.
+    /// Checks the parameters of the scene and the flight.
     ///
     /// # Errors
-    /// [`SimulateJobError::Scene`].
+    /// [`SimulateJobError::Scene`]; [`SimulateJobError::Job`] for an arc out of range.
     pub fn validate(&self) -> Result<(), SimulateJobError> {
+        if let Some(end) = self.flight_arc_deg.iter().flatten().find(|end| !(-360.0..=360.0).contains(*end)) {
+            return Err(SettingError::new("an end of the arc of the flight", *end, "-360 to 360").into());
+        }
         Ok(self.scene.validate()?)
     }
 }
@@ -153,7 +170,7 @@ pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateR
     remove_earlier(&folder, config.flight > 0)?;
     folder.subfolder("truth")?;
     let writer = SceneWriter { simulation: &simulation, folder: output, overwrite: config.overwrite };
-    install(config.threads, || writer.write(config.flight))??;
+    install(config.threads, || writer.write(config, progress))??;
     Ok(SimulateReport {
         scene: simulation.record(),
         views: simulation.views.len(),
@@ -180,8 +197,16 @@ fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileErr
             }
         }
     }
+    let pictures = fs::read_dir(folder.path().join(PICTURES)).into_iter().flatten().flatten();
+    for name in pictures.filter_map(|entry| entry.file_name().into_string().ok()) {
+        let number = name.strip_prefix("flight_").and_then(|name| name.strip_suffix(".png"));
+        if number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())) {
+            folder.remove(&format!("{PICTURES}/{name}"))?;
+        }
+    }
     let cameras = ["cameras.txt", "images.txt", "points3D.txt"].map(|name| format!("{FLIGHT}/{name}"));
-    cameras.iter().filter(|_| !has_flight).try_for_each(|name| folder.remove(name))
+    let of_flight = cameras.iter().map(String::as_str).chain(CLOUDS);
+    of_flight.filter(|_| !has_flight).try_for_each(|name| folder.remove(name))
 }
 
 /// A simulation and the folder that it is written to.
@@ -192,7 +217,7 @@ struct SceneWriter<'a> {
 }
 
 impl SceneWriter<'_> {
-    fn write(&self, flight: u32) -> Result<(), SimulateJobError> {
+    fn write(&self, config: &SimulateConfig, progress: &dyn Progress) -> Result<(), SimulateJobError> {
         for (number, view) in (1..).zip(&self.simulation.views) {
             self.write_view(number, view)?;
         }
@@ -212,8 +237,8 @@ impl SceneWriter<'_> {
         let options = CityJsonOptions { overwrite: self.overwrite, ..CityJsonOptions::default() };
         write_cityjson(&self.folder.join("truth/buildings.city.json"), &truth.buildings, &options)
             .map_err(FileError::write)?;
-        if flight > 0 {
-            self.write_flight(flight)?;
+        if config.flight > 0 {
+            self.write_flight(config, progress)?;
         }
         // The parameters and the record of an earlier simulation are replaced: the folder was
         // checked at the start.
@@ -239,13 +264,41 @@ impl SceneWriter<'_> {
         Ok(())
     }
 
-    fn write_flight(&self, count: u32) -> Result<(), SimulateJobError> {
-        let (lens, poses) = self.simulation.flight(count as usize)?;
-        let view = |(id, pose)| ColmapView { id, name: format!("flight_{id:02}.png"), lens: 0, pose };
-        let model = ColmapModel { lenses: vec![lens], views: (1..).zip(poses).map(view).collect() };
+    fn write_flight(&self, config: &SimulateConfig, progress: &dyn Progress) -> Result<(), SimulateJobError> {
+        let flight = self.simulation.flight(config.flight as usize, config.flight_arc_deg)?;
+        let view = |(id, pose): (u32, &Pose)| ColmapView { id, name: picture_name(id), lens: 0, pose: *pose };
+        let views = (1..).zip(&flight.poses).map(view).collect();
+        let model = ColmapModel { lenses: vec![flight.lens.clone()], views };
+        let points: Vec<ColmapPoint> = self.simulation.flight_points(&flight).into_iter().map(colmap_point).collect();
         let folder = self.folder.join(FLIGHT);
         files::create_folder(&folder)?;
-        colmap::write(&folder, &model, &[], ColmapEncoding::Text, self.overwrite).map_err(FileError::write)?;
+        colmap::write(&folder, &model, &points, ColmapEncoding::Text, self.overwrite).map_err(FileError::write)?;
+        files::create_folder(&self.folder.join(PICTURES))?;
+        progress.begin("flight", Simulation::flight_picture_steps(&flight.lens) * flight.poses.len());
+        for (id, pose) in (1..).zip(&flight.poses) {
+            progress.check_cancelled()?;
+            let picture = self.simulation.flight_picture(&flight.lens, pose, progress);
+            write_png_gray(self.folder.join(PICTURES).join(picture_name(id)), &picture, self.overwrite)
+                .map_err(FileError::write)?;
+        }
+        self.write_clouds(&flight)
+    }
+
+    fn write_clouds(&self, flight: &Flight) -> Result<(), SimulateJobError> {
+        let surface = self.simulation.flight_surface(flight, CLOUD_SPACING_M);
+        let origin = surface.first().map_or([0.0; 3], |point| point.position.map(f64::floor));
+        let [x, y, z] = origin;
+        let comments = [format!("origin {x} {y} {z}"), format!("crs EPSG:{}", self.simulation.truth.epsg)];
+        let point = |point: &ExactPoint| PlyPoint {
+            position: [0, 1, 2].map(|i| (point.position[i] - origin[i]) as f32),
+            normal: point.normal.map(|c| c as f32),
+            color: [128; 3],
+        };
+        let buildings: Vec<ExactPoint> = surface.iter().filter(|point| point.on_building).copied().collect();
+        for (name, points) in CLOUDS.iter().zip([&surface, &buildings]) {
+            write_points(self.folder.join(name), points.iter().map(point), &comments, self.overwrite)
+                .map_err(FileError::write)?;
+        }
         Ok(())
     }
 
@@ -255,5 +308,18 @@ impl SceneWriter<'_> {
         let crs = Crs::ellipsoidal(truth.epsg);
         let cog = CogRaster { holds_heights, ..CogRaster::new(bands, truth.geotransform, crs) };
         Ok(write_cog(self.folder.join("truth").join(name), &cog, self.overwrite)?)
+    }
+}
+
+fn picture_name(id: u32) -> String {
+    format!("flight_{id:02}.png")
+}
+
+fn colmap_point(point: FlightPoint) -> ColmapPoint {
+    ColmapPoint {
+        position: point.position,
+        color: [point.grey; 3],
+        error_px: point.error_px,
+        track: point.seen.iter().map(|&(view, pixel)| ColmapObservation { view: view as u32, pixel }).collect(),
     }
 }

@@ -70,6 +70,7 @@ pub use config::{
 };
 pub use date::Date;
 pub use error::SimulateError;
+pub use flight::{ExactPoint, Flight, FlightPoint};
 pub use frame::SceneFrame;
 pub use preset_names::PRESETS;
 pub use prism::{BuildingBlock, Roof};

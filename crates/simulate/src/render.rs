@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use raster::Grid;
 use rayon::prelude::*;
 
+use crate::SceneRay;
 use crate::scene::Scene;
 use crate::sensor::PointSpread;
 use crate::sight::SightLines;
@@ -24,6 +25,25 @@ const SKY: f64 = 0.3;
 pub(crate) const BAND: usize = 32;
 /// Radiance where a line of sight leaves the scene.
 const BEYOND: f64 = 0.1;
+
+/// The lines of sight of an image.
+pub(crate) trait Rays: Sync {
+    /// Returns the ray of an image position.
+    fn ray(&self, at: ImagePoint) -> SceneRay;
+
+    /// Returns the parameter at which a ray ends.
+    fn end(&self) -> f64;
+}
+
+impl Rays for SightLines {
+    fn ray(&self, at: ImagePoint) -> SceneRay {
+        self.ray(at)
+    }
+
+    fn end(&self) -> f64 {
+        1.0
+    }
+}
 
 /// A scene with its light.
 #[derive(Debug, Clone, Copy)]
@@ -42,21 +62,21 @@ impl<'a> LitScene<'a> {
     /// light.
     pub(crate) fn image(
         &self,
-        sight: &SightLines,
+        rays: &impl Rays,
         spread: &PointSpread,
         (width, height): (usize, usize),
         progress: &dyn Progress,
     ) -> Grid<f32> {
         let mut image = Grid::filled(width, height, 0f32);
         image.data_mut().par_chunks_mut(BAND * width).enumerate().for_each(|(band, rows)| {
-            self.band(sight, spread, width, band * BAND, rows);
+            self.band(rays, spread, width, band * BAND, rows);
             progress.step();
         });
         image
     }
 
     /// Renders the rows from `first` on.
-    fn band(&self, sight: &SightLines, spread: &PointSpread, width: usize, first: usize, rows: &mut [f32]) {
+    fn band(&self, rays: &impl Rays, spread: &PointSpread, width: usize, first: usize, rows: &mut [f32]) {
         let (n, taps) = (spread.subpixels, spread.weights.len());
         let at = |k: usize| (k as f64 - spread.reach as f64 + 0.5) / n as f64 - 0.5;
         let count = rows.len() / width;
@@ -66,7 +86,7 @@ impl<'a> LitScene<'a> {
         for (k, line) in lines.chunks_exact_mut(width).enumerate() {
             let y = first as f64 + at(k);
             for (i, sample) in samples.iter_mut().enumerate() {
-                *sample = self.radiance(sight, ImagePoint::new(at(i), y));
+                *sample = self.radiance(&rays.ray(ImagePoint::new(at(i), y)), rays.end());
             }
             for (column, value) in line.iter_mut().enumerate() {
                 *value = weighted(&samples[column * n..column * n + taps], &spread.weights);
@@ -80,9 +100,9 @@ impl<'a> LitScene<'a> {
         }
     }
 
-    /// Returns the radiance at an image position.
-    fn radiance(&self, sight: &SightLines, at: ImagePoint) -> f64 {
-        let Some(hit) = self.scene.first_hit(&sight.ray(at), 1.0) else { return BEYOND };
+    /// Returns the radiance that comes along a ray, which ends at a parameter.
+    pub(crate) fn radiance(&self, ray: &SceneRay, end: f64) -> f64 {
+        let Some(hit) = self.scene.first_hit(ray, end) else { return BEYOND };
         let facing = hit.normal.dot(&self.to_sun);
         let lit = facing > 0.0 && !self.scene.in_shadow(&hit.point, &hit.normal, &self.to_sun);
         let sunlight = if lit { facing } else { 0.0 };

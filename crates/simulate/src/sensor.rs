@@ -14,7 +14,7 @@ use crate::random::lattice;
 use numeric::SplitMix64;
 
 /// Modulation transfer of the pixel's box at the Nyquist frequency.
-const BOX_AT_NYQUIST: f64 = std::f64::consts::FRAC_2_PI;
+pub(crate) const BOX_AT_NYQUIST: f64 = std::f64::consts::FRAC_2_PI;
 /// Half width of the Gaussian, in units of its σ.
 const REACH_SIGMA: f64 = 3.5;
 

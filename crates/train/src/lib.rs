@@ -6,8 +6,7 @@
 //! * [`Drawing`]: images of colour, coverage, depth, normal and distortion, and the gradient of a
 //!   loss by all parameters.
 //! * [`Trainer`]: surfels learn from views, with the depths and normals of a prior model where
-//!   there
-//!   is one (GS4Buildings), within a budget of surfels.
+//!   there is one (GS4Buildings), within a budget of surfels.
 
 mod adam;
 mod arrange;
@@ -18,6 +17,7 @@ mod densify;
 mod footprint;
 mod forward;
 mod image;
+mod lattice;
 mod loss;
 mod order;
 mod raster;
@@ -31,6 +31,7 @@ mod view;
 pub use config::{DensifyConfig, LearningRates, LossWeights, TrainingConfig};
 pub use densify::DensifyCounts;
 pub use image::SurfelImages;
+pub use lattice::{LatticeBox, LatticeView};
 pub use loss::{LossTerms, TrainingView, ViewAppearance, ViewSlopes};
 pub use order::spatial_order;
 pub use raster::{Drawing, MAX_SIDE, SurfelGradients};

@@ -200,7 +200,7 @@ fn make_and_write(config: &SplatsConfig, progress: &dyn Progress) -> Result<Spla
 }
 
 /// Returns the file beside splats that holds the pointing corrections of their images.
-pub(super) fn pointing_path(splats: &Path) -> PathBuf {
+pub(crate) fn pointing_path(splats: &Path) -> PathBuf {
     splats.with_extension("pointing.json")
 }
 

@@ -10,6 +10,8 @@ mod make;
 mod render;
 mod text;
 
+pub(crate) use make::pointing_path;
+
 pub use error::SplatsJobError;
 pub use make::{SplatsConfig, SplatsImageReport, SplatsReport, make};
 pub use render::{SplatRenderConfig, SplatRenderReport, SplatRenderView, render};

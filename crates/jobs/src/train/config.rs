@@ -27,6 +27,9 @@ pub enum TrainPriors {
 pub struct TrainConfig {
     /// Dataset of the priors job, or another folder with a COLMAP model in `sparse/0`.
     pub dataset: PathBuf,
+    /// Another COLMAP model of the same cameras, whose points are added to those of the dataset,
+    /// such as the reconstruction that the cameras come from.
+    pub more_points: Option<PathBuf>,
     /// Folder of the images; `images` of the dataset when `None`.
     pub images: Option<PathBuf>,
     /// Folder for the results.
@@ -60,6 +63,7 @@ impl TrainConfig {
     pub fn new(dataset: PathBuf, output: PathBuf) -> Self {
         Self {
             dataset,
+            more_points: None,
             images: None,
             output,
             iterations: 3000,

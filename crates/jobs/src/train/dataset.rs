@@ -13,6 +13,7 @@ use serde_json::Value;
 
 use super::config::{TrainConfig, TrainPriors};
 use super::error::TrainError;
+use super::place::{DatasetPlace, more_points, pinhole, sparse_folder};
 use crate::files;
 
 /// A dataset in memory.
@@ -29,20 +30,26 @@ pub(super) struct TrainData {
     pub(super) masked: bool,
     /// Folder of the model.
     pub(super) sparse: PathBuf,
+    /// Place of the dataset, whose positions are counted from its origin.
+    pub(super) place: DatasetPlace,
 }
 
 impl TrainData {
     pub(super) fn read(config: &TrainConfig, progress: &dyn Progress) -> Result<Self, TrainError> {
         let folder = &config.dataset;
-        let sparse = [folder.join("sparse/0"), folder.join("sparse"), folder.clone()];
-        let has_cameras = |f: &&PathBuf| ["cameras.bin", "cameras.txt"].iter().any(|n| f.join(n).is_file());
-        let sparse = sparse.iter().find(has_cameras).unwrap_or(&sparse[0]).clone();
-        let (model, points) = read_with_points(&sparse)?;
+        let sparse = sparse_folder(folder);
+        let (mut model, mut points) = read_with_points(&sparse)?;
+        if let Some(other) = &config.more_points {
+            points.extend(more_points(&model, &sparse_folder(other))?);
+        }
+        let place = DatasetPlace::read(folder, &mut model)?;
+        let [x, y, z] = place.shift;
+        points.iter_mut().for_each(|p| p.position = [p.position[0] - x, p.position[1] - y, p.position[2] - z]);
         let (schedule, masked) = schedule(folder)?;
         check_conventions(folder)?;
         let images = config.images.clone().unwrap_or_else(|| folder.join("images"));
-        let mut data =
-            Self { names: Vec::new(), views: Vec::new(), view_of: Vec::new(), points, schedule, masked, sparse };
+        let (names, views, view_of) = (Vec::new(), Vec::new(), Vec::new());
+        let mut data = Self { names, views, view_of, points, schedule, masked, sparse, place };
         progress.begin("images", model.views.len());
         for view in &model.views {
             progress.check_cancelled()?;
@@ -74,20 +81,9 @@ fn read_view(
     path: &Path,
     masked: bool,
 ) -> Result<TrainingView<PinholeView>, TrainError> {
-    if !lens.model().is_pinhole() {
-        return Err(TrainError::Lens { name: view.name.clone(), model: lens.model().name() });
-    }
-    let full = [lens.width(), lens.height()];
-    let size = full.map(|s| s / config.shrink);
-    let k = config.shrink as f64;
-    let principal = [lens.principal_point().sample, lens.principal_point().line];
-    let camera = PinholeView {
-        rotation: view.pose.rotation,
-        centre: view.pose.centre,
-        focal_px: lens.focal_px().map(|f| f / k),
-        principal_px: principal.map(|p| (p + 0.5) / k - 0.5),
-        size,
-    };
+    let camera = pinhole(view, lens, config.shrink)
+        .ok_or_else(|| TrainError::Lens { name: view.name.clone(), model: lens.model().name() })?;
+    let (full, size) = ([lens.width(), lens.height()], camera.size);
     let source = ImageSource::open(path)?;
     let pixels = source.read_colour(source.window())?;
     let found = [pixels.width(), pixels.height()];

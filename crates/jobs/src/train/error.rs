@@ -3,14 +3,18 @@
 use std::path::PathBuf;
 
 use ::train::CheckpointDefect;
+use crs::CrsError;
 use io::colmap::ColmapError;
 use io::npy::NpyError;
 use io::raster::RasterError;
+use io::rpc::RpcReadError;
 use io::splat_ply::SplatPlyError;
 use numeric::Cancelled;
 
-use crate::error::{JobError, SettingError, from_steps};
+use crate::corrections::CorrectionsError;
+use crate::error::{ImageInputError, JobError, SettingError, from_steps};
 use crate::files::FileError;
+use crate::map_surface::MapSurfaceError;
 use crate::threads::ThreadsError;
 
 /// A training that gives no splats.
@@ -23,9 +27,15 @@ pub enum TrainError {
     /// A prior map cannot be read.
     #[error(transparent)]
     Map(#[from] NpyError),
-    /// An image cannot be read.
+    /// An image cannot be read, or not with its camera.
     #[error(transparent)]
-    Image(#[from] RasterError),
+    Image(#[from] ImageInputError),
+    /// The surface model cannot be used.
+    #[error(transparent)]
+    Surface(#[from] MapSurfaceError),
+    /// A coordinate reference system cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
     /// The splats cannot be written.
     #[error(transparent)]
     Ply(#[from] SplatPlyError),
@@ -96,4 +106,7 @@ pub enum TrainError {
     Job(#[from] JobError),
 }
 
-from_steps!(TrainError: Job(FileError, ThreadsError, SettingError, Cancelled));
+from_steps!(
+    TrainError: Job(FileError, ThreadsError, SettingError, Cancelled),
+    Image(RasterError, RpcReadError, CorrectionsError)
+);

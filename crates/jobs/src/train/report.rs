@@ -41,6 +41,8 @@ pub struct TrainedViewRow {
     pub psnr_before_db: Option<f64>,
     /// Signal-to-noise ratio, dB.
     pub psnr_db: Option<f64>,
+    /// Structural similarity before the training.
+    pub ssim_before: Option<f64>,
     /// Structural similarity.
     pub ssim: Option<f64>,
 }

@@ -1,0 +1,130 @@
+//! Where the cameras of a dataset stand, in a frame that numbers of 32 bits are precise in.
+
+use std::path::{Path, PathBuf};
+
+use ::train::PinholeView;
+use camera::Lens;
+use io::colmap::{ColmapModel, ColmapObservation, ColmapPoint, ColmapView, read_with_points};
+use io::splat_ply::LocalOrigin;
+use serde_json::Value;
+
+use super::error::TrainError;
+use crate::files;
+
+/// Coordinates beyond this are counted from an origin of their own, metres: numbers of 32 bits have
+/// steps of a millimetre there.
+const FAR_M: f64 = 1e4;
+/// Reference system of a dataset that does not name one.
+const UNKNOWN: &str = "frame of the dataset";
+/// Difference of the positions of a camera in two models of the same frame, metres.
+const SAME_M: f64 = 1e-3;
+
+/// Place of a dataset.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct DatasetPlace {
+    /// What was taken from the positions of the dataset, metres.
+    pub(crate) shift: [f64; 3],
+    /// The origin of the positions that are left.
+    pub(crate) origin: LocalOrigin,
+}
+
+impl DatasetPlace {
+    /// Returns whether the reference system of the positions is known.
+    pub(crate) fn is_on_a_map(&self) -> bool {
+        self.origin.crs != UNKNOWN
+    }
+
+    /// Reads where a dataset lies, as far as its origin says so, and moves the cameras of its model
+    /// near the origin where they are far from it.
+    pub(crate) fn read(folder: &Path, model: &mut ColmapModel) -> Result<Self, TrainError> {
+        let mut origin = origin(folder)?;
+        let far = |view: &ColmapView| view.pose.centre.iter().any(|c| c.abs() > FAR_M);
+        let shift = match model.views.iter().find(|view| far(view)) {
+            Some(view) => view.pose.centre.map(f64::floor),
+            None => [0.0; 3],
+        };
+        for view in &mut model.views {
+            (0..3).for_each(|i| view.pose.centre[i] -= shift[i]);
+        }
+        (0..3).for_each(|i| origin.origin[i] += shift[i]);
+        Ok(Self { shift, origin })
+    }
+}
+
+/// Returns the folder of the model of a dataset.
+pub(crate) fn sparse_folder(folder: &Path) -> PathBuf {
+    let folders = [folder.join("sparse/0"), folder.join("sparse"), folder.to_owned()];
+    let has_cameras = |f: &&PathBuf| ["cameras.bin", "cameras.txt"].iter().any(|n| f.join(n).is_file());
+    folders.iter().find(has_cameras).unwrap_or(&folders[0]).clone()
+}
+
+/// Returns the view of a pinhole camera whose image is smaller by a factor; `None` for other
+/// lenses.
+pub(crate) fn pinhole(view: &ColmapView, lens: &Lens, shrink: usize) -> Option<PinholeView> {
+    if !lens.model().is_pinhole() {
+        return None;
+    }
+    let k = shrink as f64;
+    let principal = [lens.principal_point().sample, lens.principal_point().line];
+    Some(PinholeView {
+        rotation: view.pose.rotation,
+        centre: view.pose.centre,
+        focal_px: lens.focal_px().map(|f| f / k),
+        principal_px: principal.map(|p| (p + 0.5) / k - 0.5),
+        size: [lens.width() / shrink, lens.height() / shrink],
+    })
+}
+
+/// Returns the points of another model of the same cameras, in the frame of the first. Frames may
+/// differ by a translation.
+pub(super) fn more_points(model: &ColmapModel, folder: &Path) -> Result<Vec<ColmapPoint>, TrainError> {
+    let (other, points) = read_with_points(folder)?;
+    let invalid = |what: String| TrainError::Dataset { path: folder.to_owned(), what };
+    let number_of = |view: &ColmapView| model.views.iter().position(|v| v.name == view.name);
+    let numbers: Vec<Option<usize>> = other.views.iter().map(number_of).collect();
+    let pairs: Vec<(&ColmapView, &ColmapView)> =
+        other.views.iter().zip(&numbers).filter_map(|(view, n)| Some((view, &model.views[(*n)?]))).collect();
+    let Some((first, same)) = pairs.first() else {
+        return Err(invalid("no camera of these points has the name of a camera of the dataset".to_owned()));
+    };
+    let shift = [0, 1, 2].map(|i| same.pose.centre[i] - first.pose.centre[i]);
+    let differs = |(a, b): &(&ColmapView, &ColmapView)| {
+        let turned = (0..9).any(|k| (a.pose.rotation[k / 3][k % 3] - b.pose.rotation[k / 3][k % 3]).abs() > 1e-6);
+        turned || (0..3).any(|i| (b.pose.centre[i] - a.pose.centre[i] - shift[i]).abs() > SAME_M)
+    };
+    if let Some((view, _)) = pairs.iter().find(|pair| differs(pair)) {
+        return Err(invalid(format!("the camera of {} has another pose than in the dataset", view.name)));
+    }
+    let moved = |point: ColmapPoint| {
+        let seen = |o: &ColmapObservation| {
+            let view = numbers.get(o.view as usize).copied().flatten()?;
+            Some(ColmapObservation { view: view as u32, ..*o })
+        };
+        ColmapPoint {
+            position: [0, 1, 2].map(|i| point.position[i] + shift[i]),
+            track: point.track.iter().filter_map(seen).collect(),
+            ..point
+        }
+    };
+    Ok(points.into_iter().map(moved).collect())
+}
+
+/// Returns where the positions of a dataset are counted from, as far as its origin says so.
+fn origin(dataset: &Path) -> Result<LocalOrigin, TrainError> {
+    let path = dataset.join("origin.json");
+    let unknown = LocalOrigin::new(UNKNOWN, "unknown", [0.0; 3]);
+    if !path.is_file() {
+        return Ok(unknown);
+    }
+    let invalid = |what: String| TrainError::Dataset { path: path.clone(), what };
+    let value: Value = serde_json::from_str(&files::read_text(&path)?).map_err(|e| invalid(e.to_string()))?;
+    let part = &value["model_from_dataset"];
+    let identity = serde_json::json!([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    let shift: Option<[f64; 3]> = serde_json::from_value(part["translation"].clone()).ok();
+    match (value["model_crs"].as_str(), shift) {
+        (Some(crs), Some(shift)) if part["scale"] == 1.0 && part["rotation"] == identity => {
+            Ok(LocalOrigin::new(crs, "unknown", shift))
+        }
+        _ => Ok(unknown),
+    }
+}

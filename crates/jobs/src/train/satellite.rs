@@ -1,0 +1,239 @@
+//! Training on satellite images: splats of a surface model learn from the images that see them.
+//!
+//! Each image is seen through its RPC with its correction, taken at the nodes of a lattice in space
+//! and checked against the exact RPC. Colours are those of the splats: a gain and an offset bring
+//! every image to them before the training, and are learned further on. A surface model holds the
+//! heights: it is one more view, from above, that has depths and no colours.
+
+use std::path::{Path, PathBuf};
+
+use ::splats::RpcSplatCamera;
+use ::train::{Drawing, LatticeBox, LatticeView, Registers, Surfel, SurfelImages, TrainingView};
+use camera::RpcCamera;
+use crs::MapProjection;
+use io::raster::ImageSource;
+use io::splat_ply::LocalOrigin;
+use numeric::Progress;
+use raster::{GeoTransform, Grid, Window};
+
+use super::error::TrainError;
+use crate::corrections::{CorrectionSource, Corrections};
+use crate::map_surface::MapSurface;
+use crate::splats::pointing_path;
+
+/// Distance of the nodes of a lattice, metres.
+const NODES_M: f64 = 32.0;
+/// Room around the splats, metres.
+const MARGIN_M: f64 = 20.0;
+/// Most splats at which the lattice is compared with the exact RPC.
+const CHECKED: usize = 5000;
+/// Largest difference from the exact RPC, pixels.
+const ERROR_MAX_PX: f64 = 0.02;
+/// Coverage above which a pixel belongs to the model.
+const COVERED: f32 = 0.5;
+
+/// Splats with their place on the map.
+#[derive(Debug, Clone)]
+pub(super) struct PlacedSurfels {
+    pub(super) surfels: Vec<Surfel>,
+    pub(super) origin: LocalOrigin,
+    projection: MapProjection,
+}
+
+/// An image as the splats are compared with it.
+#[derive(Debug, Clone)]
+pub(super) struct SatelliteImage {
+    pub(super) name: String,
+    pub(super) view: TrainingView<LatticeView>,
+    /// Largest difference of the camera from the exact RPC at splats, pixels.
+    pub(super) camera_error_px: f64,
+}
+
+/// Greatest opacity at the beginning. Opaque splats would not learn.
+const OPACITY_LOGIT_MAX: f32 = 3.0;
+
+impl PlacedSurfels {
+    /// Reads splats whose heights are above the ellipsoid.
+    pub(super) fn read(path: &Path) -> Result<Self, TrainError> {
+        let file = io::splat_ply::read(path)?;
+        let invalid = |what: String| TrainError::Dataset { path: path.to_owned(), what };
+        let origin = file.origin.ok_or_else(|| {
+            invalid(format!("no origin beside the splats: expected {}", io::splat_ply::origin_path(path).display()))
+        })?;
+        if origin.vertical != "ellipsoid" {
+            return Err(invalid(format!(
+                "the heights of the splats are above {}, expected the ellipsoid",
+                origin.vertical
+            )));
+        }
+        if file.splats.len() < 4 {
+            return Err(TrainError::NoPoints { count: file.splats.len(), path: path.to_owned() });
+        }
+        let projection = MapProjection::from_definition(&origin.crs).map_err(|e| invalid(e.to_string()))?;
+        let surfel = |splat: &gaussian::Splat| {
+            let surfel = Surfel::of_splat(splat);
+            Surfel { opacity_logit: surfel.opacity_logit.min(OPACITY_LOGIT_MAX), ..surfel }
+        };
+        Ok(Self { surfels: file.splats.iter().map(surfel).collect(), origin, projection })
+    }
+
+    /// Returns the box around the splats.
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for surfel in &self.surfels {
+            for i in 0..3 {
+                let at = f64::from(surfel.position[i]);
+                bounds[0][i] = bounds[0][i].min(at - MARGIN_M);
+                bounds[1][i] = bounds[1][i].max(at + MARGIN_M);
+            }
+        }
+        bounds
+    }
+
+    /// Reads the images that see the splats.
+    pub(super) fn images(
+        &self,
+        paths: &[PathBuf],
+        corrections: &Corrections,
+        progress: &dyn Progress,
+    ) -> Result<Vec<SatelliteImage>, TrainError> {
+        progress.begin("images", paths.len());
+        let one = |path: &PathBuf| {
+            progress.check_cancelled()?;
+            let image = self.image(path, &corrections.camera(path, progress)?)?;
+            progress.step();
+            Ok(image)
+        };
+        paths.iter().map(one).collect()
+    }
+
+    fn image(&self, path: &Path, camera: &RpcCamera) -> Result<SatelliteImage, TrainError> {
+        let invalid = |what: String| TrainError::Dataset { path: path.to_owned(), what };
+        let unseen = || invalid("the image does not see the splats".to_owned());
+        let source = ImageSource::open(path)?;
+        let whole = source.window();
+        let exact = RpcSplatCamera::new(camera, &self.projection, self.origin.origin, (whole.width, whole.height))?
+            .ok_or_else(unseen)?;
+        let every = self.surfels.len().div_ceil(CHECKED);
+        let sample: Vec<[f64; 3]> = self.surfels.iter().step_by(every).map(|s| s.position.map(f64::from)).collect();
+        let pixels = exact.pixels(sample.iter().copied())?;
+        let window = around(&pixels, whole).ok_or_else(unseen)?;
+        let start = [window.x as f64, window.y as f64];
+        let moved = |p: &[f64; 2]| [p[0] - start[0], p[1] - start[1]];
+        let [low, high] = self.bounds();
+        let lattice = LatticeBox::new(low, high, NODES_M);
+        let nodes = exact.pixels(lattice.nodes())?.iter().map(moved).collect();
+        let sight = exact.towards_sensor().map(|c| -c);
+        let camera = LatticeView::new(lattice, nodes, sight, [window.width, window.height]).ok_or_else(unseen)?;
+        let apart = |(p, pixel): (&[f64; 3], &[f64; 2])| {
+            let (found, exact) = (camera.pixel(*p), moved(pixel));
+            (found[0] - exact[0]).hypot(found[1] - exact[1])
+        };
+        let camera_error_px = sample.iter().zip(&pixels).map(apart).fold(0.0, f64::max);
+        if camera_error_px > ERROR_MAX_PX {
+            return Err(invalid(format!(
+                "the RPC bends by {camera_error_px:.3} px between places {NODES_M} m apart, expected less than \
+                 {ERROR_MAX_PX} px"
+            )));
+        }
+        let grid = source.read_colour(window)?;
+        let colour = [0, 1, 2].map(|c| grid.data().iter().map(|p| p[c]).collect());
+        let mut view = TrainingView { camera, colour, mask: None, prior_depth_m: None, prior_normal: None };
+        let drawing = Drawing::new(&self.surfels, &view.camera, Registers::Longest);
+        toned(&mut view, drawing.images());
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(SatelliteImage { name, view, camera_error_px })
+    }
+
+    /// Returns the view of a surface model from above.
+    pub(super) fn above(&self, surface: &MapSurface) -> Option<TrainingView<LatticeView>> {
+        let heights = &surface.dem.heights;
+        let camera = self.from_above(&surface.dem.geotransform, [heights.width(), heights.height()])?;
+        let depth = |z: &f32| (self.origin.origin[2] - f64::from(*z)) as f32;
+        let nothing = || vec![f32::NAN; heights.data().len()];
+        Some(TrainingView {
+            camera,
+            colour: [nothing(), nothing(), nothing()],
+            mask: None,
+            prior_depth_m: Some(heights.data().iter().map(depth).collect()),
+            prior_normal: None,
+        })
+    }
+
+    /// Returns the camera that sees the cells of a grid from above.
+    fn from_above(&self, grid: &GeoTransform, size: [usize; 2]) -> Option<LatticeView> {
+        let [low, high] = self.bounds();
+        let lattice = LatticeBox::new(low, high, f64::INFINITY);
+        let [x0, y0, _] = self.origin.origin;
+        let pixel =
+            |p: [f64; 3]| grid.cell_from_map(p[0] + x0, p[1] + y0).map_or([f64::NAN; 2], |(column, row)| [column, row]);
+        LatticeView::new(lattice, lattice.nodes().map(pixel).collect(), [0.0, 0.0, -1.0], size)
+    }
+
+    /// Returns the heights of splats at the cells of a grid, metres above the ellipsoid; NaN where
+    /// splats cover a cell by less than half.
+    pub(super) fn heights(&self, surfels: &[Surfel], surface: &MapSurface) -> Option<Grid<f32>> {
+        let (width, height) = (surface.dem.heights.width(), surface.dem.heights.height());
+        let camera = self.from_above(&surface.dem.geotransform, [width, height])?;
+        let drawing = Drawing::new(surfels, &camera, Registers::Longest);
+        let images = drawing.images();
+        let value = |cell: usize| {
+            let coverage = images.coverage[cell];
+            let depth = f64::from(images.depth_m[cell] / coverage);
+            if coverage > COVERED { (self.origin.origin[2] - depth) as f32 } else { f32::NAN }
+        };
+        Grid::from_vec(width, height, (0..width * height).map(value).collect())
+    }
+}
+
+/// Returns the corrections of the images: those that the splats were made with, unless another
+/// source is given.
+pub(super) fn corrections(splats: &Path, source: &CorrectionSource) -> Result<Corrections, TrainError> {
+    let beside = pointing_path(splats);
+    Ok(match source {
+        CorrectionSource::Report(path) => Corrections::read(path)?,
+        CorrectionSource::SurfaceRun if beside.is_file() => Corrections::read(&beside)?,
+        CorrectionSource::SurfaceRun | CorrectionSource::Uncorrected => Corrections::default(),
+    })
+}
+
+/// Returns the part of an image around pixels.
+fn around(pixels: &[[f64; 2]], whole: Window) -> Option<Window> {
+    let within = |i: usize, size: usize| {
+        let values = pixels.iter().map(|p| p[i]).filter(|v| v.is_finite());
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let from = (low - 8.0).floor().max(0.0);
+        let to = (high + 9.0).ceil().min(size as f64);
+        (to >= from + 16.0).then_some((from as usize, (to - from) as usize))
+    };
+    let ((x, width), (y, height)) = (within(0, whole.width)?, within(1, whole.height)?);
+    Some(Window { x: x as i64, y: y as i64, width, height })
+}
+
+/// Brings the colours of a view to those that splats show, by a gain and an offset for each
+/// channel. Pixels that splats do not cover have none.
+fn toned(view: &mut TrainingView<LatticeView>, images: &SurfelImages) {
+    for k in 0..3 {
+        let shown = |pixel: usize| images.colour[k][pixel] / images.coverage[pixel];
+        let counts = |pixel: usize| images.coverage[pixel] > COVERED;
+        let (gain, offset) = line(&view.colour[k], shown, counts);
+        for (pixel, value) in view.colour[k].iter_mut().enumerate() {
+            *value = if counts(pixel) { gain * *value + offset } else { f32::NAN };
+        }
+    }
+}
+
+/// Returns the gain and offset that bring values closest to others over the pixels that count
+/// (least squares).
+pub(super) fn line(values: &[f32], others: impl Fn(usize) -> f32, counts: impl Fn(usize) -> bool) -> (f32, f32) {
+    let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (pixel, value) in values.iter().enumerate().filter(|(pixel, value)| value.is_finite() && counts(*pixel)) {
+        let (p, r) = (f64::from(*value), f64::from(others(pixel)));
+        if r.is_finite() {
+            (n, x, y, xx, xy) = (n + 1.0, x + p, y + r, xx + p * p, xy + p * r);
+        }
+    }
+    let variance = n * xx - x * x;
+    let gain = if variance > 0.0 { (n * xy - x * y) / variance } else { 0.0 };
+    (gain as f32, if n > 0.0 { ((y - gain * x) / n) as f32 } else { 0.0 })
+}

@@ -1,0 +1,333 @@
+//! Runs a training on satellite images and writes its results.
+
+use std::path::{Path, PathBuf};
+
+use ::train::{
+    Drawing, LatticeView, Registers, Surfel, SurfelCamera, Trainer, TrainingConfig, TrainingState, TrainingView,
+};
+use crs::Crs;
+use io::raster::{Band, BandData, CogRaster, write_cog, write_png_rgb};
+use io::splat_ply::{self, SplatForm, SplatLayout};
+use numeric::Progress;
+use raster::Grid;
+use serde::{Deserialize, Serialize};
+use splats::{psnr_db, ssim};
+
+use super::error::TrainError;
+use super::iterate::{Iterations, extent_m};
+use super::page;
+use super::report::{LossPoint, TrainedViewRow};
+use super::satellite::{PlacedSurfels, SatelliteImage, corrections, line};
+use super::transients::find_transients;
+use crate::corrections::CorrectionSource;
+use crate::error::SettingError;
+use crate::files::{self, FileError};
+use crate::map_surface::{self, MapSurface};
+use crate::output_folder::OutputFolder;
+use crate::report_page;
+use crate::splats::pointing_path;
+use crate::threads;
+
+/// Names of the results.
+const SPLATS: &str = "splats.ply";
+const REPORT: &str = "report.json";
+const HEIGHTS: &str = "dsm.tif";
+const RENDERS: &str = "renders";
+/// Thickness of a splat in the file, metres. 2DGS has none.
+const THICKNESS_M: f32 = 1e-4;
+/// Steps of positions at the beginning and at the end, metres. The surface model is right within a
+/// cell or two, so that splats have no long way to go.
+const STEPS_M: [f64; 2] = [0.01, 0.001];
+/// Share of the training after which pixels that stay unexplained are left out.
+const TRANSIENTS_AT: f64 = 0.4;
+
+/// A training of splats on satellite images.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct SatelliteTrainConfig {
+    /// Images with RPCs to train on.
+    pub images: Vec<PathBuf>,
+    /// Images with RPCs that are only judged.
+    pub judged: Vec<PathBuf>,
+    /// The splats to begin with, as the splat job writes them.
+    pub splats: PathBuf,
+    /// Surface model that holds the heights; nothing but the images does when `None`.
+    pub dsm: Option<PathBuf>,
+    /// Source of the pointing corrections of the images.
+    pub corrections: CorrectionSource,
+    /// Folder for the results.
+    pub output: PathBuf,
+    /// Number of iterations; each draws one view.
+    pub iterations: u32,
+    /// Greatest number of splats. Fewer than there are means that none is split.
+    pub budget: usize,
+    /// Whether pixels that stay unexplained while other views agree are left out.
+    pub transients: bool,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Worker threads; one per core when `None`.
+    pub threads: Option<usize>,
+    /// Whether earlier results may be replaced.
+    pub overwrite: bool,
+}
+
+/// A finished training on satellite images.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct SatelliteTrainReport {
+    /// The settings.
+    pub settings: SatelliteTrainConfig,
+    /// The splats.
+    pub splats: PathBuf,
+    /// Number of splats at the beginning.
+    pub splats_before: usize,
+    /// Number of splats at the end.
+    pub splats_after: usize,
+    /// Largest difference of a camera from its exact RPC, pixels.
+    pub camera_error_px: f64,
+    /// Seconds of the iterations.
+    pub seconds: f64,
+    /// Mean absolute difference of the heights of the splats from the surface model, before and
+    /// after, metres.
+    pub height_change_m: Option<[f64; 2]>,
+    /// Share of the pixels of each trained image that were left out as transient.
+    pub transient_share: Vec<f64>,
+    /// Quality of the views before and after; judged images are those that were held out.
+    pub views: Vec<TrainedViewRow>,
+    /// Mean loss of the iterations before each point.
+    pub losses: Vec<LossPoint>,
+}
+
+impl SatelliteTrainConfig {
+    /// A training with the default settings.
+    pub fn new(images: Vec<PathBuf>, splats: PathBuf, output: PathBuf) -> Self {
+        Self {
+            images,
+            judged: Vec::new(),
+            splats,
+            dsm: None,
+            corrections: CorrectionSource::default(),
+            output,
+            iterations: 1500,
+            budget: 200_000,
+            transients: true,
+            seed: 1,
+            threads: None,
+            overwrite: false,
+        }
+    }
+
+    /// Checks the settings that can be judged without opening a file.
+    ///
+    /// # Errors
+    /// [`SettingError`] for a number outside of its range.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        if self.images.is_empty() {
+            return Err(SettingError::new("the number of images", 0, "1 or more"));
+        }
+        if self.budget > 20_000_000 {
+            return Err(SettingError::new("the budget of splats", self.budget, "up to 20,000,000"));
+        }
+        if self.iterations == 0 {
+            return Err(SettingError::new("the number of iterations", self.iterations, "1 or more"));
+        }
+        Ok(())
+    }
+}
+
+impl SatelliteTrainReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
+        let mut text =
+            format!("splats    {} ({}, before {})\n", self.splats.display(), self.splats_after, self.splats_before);
+        let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2}"));
+        for view in &self.views {
+            text += &format!(
+                "{}   {} dB (before {} dB), SSIM {} (before {})  {}\n",
+                if view.held_out { "judged " } else { "trained" },
+                number(view.psnr_db),
+                number(view.psnr_before_db),
+                number(view.ssim),
+                number(view.ssim_before),
+                view.name,
+            );
+        }
+        if let Some([before, after]) = self.height_change_m {
+            text += &format!("heights   {after:.3} m from the surface model (before {before:.3} m)\n");
+        }
+        text + &format!("time      {:.0} s\n", self.seconds)
+    }
+}
+
+/// Trains splats on satellite images.
+///
+/// # Errors
+/// [`TrainError`]: splats without an origin on a map, images that do not see them, outputs that
+/// exist.
+pub fn run_on_images(
+    config: &SatelliteTrainConfig,
+    progress: &dyn Progress,
+) -> Result<SatelliteTrainReport, TrainError> {
+    config.validate()?;
+    files::refuse_existing(&config.output.join(SPLATS), config.overwrite)?;
+    report_page::refuse_existing(&config.output.join(REPORT), config.overwrite)?;
+    threads::install(config.threads, || train(config, progress))?
+}
+
+fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<SatelliteTrainReport, TrainError> {
+    let placed = PlacedSurfels::read(&config.splats)?;
+    let found = corrections(&config.splats, &config.corrections)?;
+    let mut images = placed.images(&config.images, &found, progress)?;
+    let judged = placed.images(&config.judged, &found, progress)?;
+    let invalid = |path: &Path, what: &str| TrainError::Dataset { path: path.to_owned(), what: what.to_owned() };
+    let surface = config.dsm.as_ref().map(|path| map_surface::read(path, None, progress)).transpose()?;
+    let above = match (&surface, &config.dsm) {
+        (Some(surface), Some(path)) => {
+            Some(placed.above(surface).ok_or_else(|| invalid(path, "the grid of the surface model is not regular"))?)
+        }
+        _ => None,
+    };
+    let _folder = OutputFolder::take(&config.output)?;
+    let pictures: Vec<&SatelliteImage> = images.iter().chain(&judged).collect();
+    let before: Vec<Quality> = pictures.iter().map(|image| quality(&placed.surfels, &image.view).0).collect();
+    let all: Vec<SatelliteImage> = pictures.into_iter().cloned().collect();
+    let extent = extent_m(&placed.surfels);
+    let settings = settings(config, extent);
+    let views = |images: &[SatelliteImage]| -> Vec<TrainingView<LatticeView>> {
+        images.iter().map(|image| image.view.clone()).chain(above.clone()).collect()
+    };
+    let first = views(&images);
+    let mut run = Iterations::new(settings.iterations, 0, progress);
+    let mut trainer = Trainer::new(&first, extent, TrainingState::new(placed.surfels.clone(), first.len()), settings);
+    let changed = if config.transients { (TRANSIENTS_AT * f64::from(config.iterations)) as u32 } else { u32::MAX };
+    run.until(&mut trainer, changed, |_, _| Ok(()))?;
+    let mut state = trainer.into_state();
+    let mut transient_share = vec![0.0; images.len()];
+    if !run.is_done(&state) {
+        let masks = find_transients(&state, &first[..images.len()]);
+        for ((image, mask), share) in images.iter_mut().zip(&masks).zip(&mut transient_share) {
+            *share = mask.iter().filter(|m| **m).count() as f64 / mask.len().max(1) as f64;
+            for plane in &mut image.view.colour {
+                plane.iter_mut().zip(mask).filter(|(_, m)| **m).for_each(|(value, _)| *value = f32::NAN);
+            }
+        }
+        let second = views(&images);
+        let mut trainer = Trainer::new(&second, extent, state, settings);
+        run.until(&mut trainer, u32::MAX, |_, _| Ok(()))?;
+        state = trainer.into_state();
+    }
+    let (losses, seconds) = run.finish();
+    let splats: Vec<_> = state.surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect();
+    let path = config.output.join(SPLATS);
+    let layout = SplatLayout { form: SplatForm::Discs, ..SplatLayout::default() };
+    splat_ply::write(&path, &splats, &placed.origin, layout, config.overwrite)?;
+    let used: Vec<PathBuf> = config.images.iter().chain(&config.judged).cloned().collect();
+    found.of_images(&used).write(&pointing_path(&path), config.overwrite)?;
+    let height_change_m = match &surface {
+        Some(surface) => heights(config, &placed, [&placed.surfels, &state.surfels], surface)?,
+        None => None,
+    };
+    let (mut views, mut layers) = (Vec::new(), Vec::new());
+    for (number, (image, before)) in all.iter().zip(&before).enumerate() {
+        let (after, shown) = quality(&state.surfels, &image.view);
+        let held_out = number >= config.images.len();
+        if held_out {
+            let picture = page::beside(&truth(&image.view), &shown);
+            files::create_folder(&config.output.join(RENDERS))?;
+            let file = config.output.join(RENDERS).join(Path::new(&image.name).with_extension("png"));
+            write_png_rgb(file, &page::bytes(&shown), config.overwrite)?;
+            layers.push(page::layer(&image.name, picture));
+        }
+        views.push(TrainedViewRow {
+            name: image.name.clone(),
+            held_out,
+            psnr_before_db: before.0,
+            psnr_db: after.0,
+            ssim_before: before.1,
+            ssim: after.1,
+        });
+    }
+    let report = SatelliteTrainReport {
+        settings: config.clone(),
+        splats: path,
+        splats_before: placed.surfels.len(),
+        splats_after: splats.len(),
+        camera_error_px: all.iter().map(|image| image.camera_error_px).fold(0.0, f64::max),
+        seconds,
+        height_change_m,
+        transient_share,
+        views,
+        losses,
+    };
+    let lead = "Splats that learned from satellite images.";
+    page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, config.overwrite)?;
+    Ok(report)
+}
+
+fn settings(config: &SatelliteTrainConfig, extent_m: f64) -> TrainingConfig {
+    let mut settings = TrainingConfig::default();
+    settings.iterations = config.iterations;
+    settings.seed = config.seed;
+    settings.appearance = true;
+    settings.rates.position = STEPS_M.map(|step| step / extent_m);
+    // The surface model holds the heights from the first iteration to the last.
+    settings.schedule.depth.from_factor = 1.0;
+    settings.schedule.depth.to_factor = 1.0;
+    if let Some(densify) = &mut settings.densify {
+        densify.budget = config.budget;
+    }
+    settings
+}
+
+/// Signal-to-noise ratio (dB) and structural similarity of a view.
+type Quality = (Option<f64>, Option<f64>);
+
+fn truth(view: &TrainingView<LatticeView>) -> Grid<[f32; 3]> {
+    let [width, height] = view.camera.size();
+    let value = |pixel: usize| view.colour.each_ref().map(|plane| plane[pixel]);
+    Grid::from_vec(width, height, (0..width * height).map(value).collect()).expect("as many values as pixels")
+}
+
+/// Compares a view with what splats show, after a gain and an offset for each channel that bring
+/// the splats to the view. Returns what they show.
+fn quality(surfels: &[Surfel], view: &TrainingView<LatticeView>) -> (Quality, Grid<[f32; 3]>) {
+    let drawing = Drawing::new(surfels, &view.camera, Registers::Longest);
+    let images = drawing.images();
+    let picture = truth(view);
+    let counts = picture.map(|p| p.iter().all(|c| c.is_finite()));
+    let lines = [0, 1, 2].map(|k| line(&images.colour[k], |pixel| view.colour[k][pixel], |pixel| counts.data()[pixel]));
+    let mut shown = picture.clone();
+    for (pixel, value) in shown.data_mut().iter_mut().enumerate() {
+        *value = [0, 1, 2].map(|k| lines[k].0 * images.colour[k][pixel] + lines[k].1);
+    }
+    ((psnr_db(&shown, &picture, &counts), ssim(&shown, &picture, &counts)), shown)
+}
+
+/// Writes the heights of the splats on the grid of the surface model, and returns the mean absolute
+/// difference from it, before and after.
+fn heights(
+    config: &SatelliteTrainConfig,
+    placed: &PlacedSurfels,
+    splats: [&[Surfel]; 2],
+    surface: &MapSurface,
+) -> Result<Option<[f64; 2]>, TrainError> {
+    let [Some(before), Some(after)] = splats.map(|surfels| placed.heights(surfels, surface)) else { return Ok(None) };
+    let change = |found: &Grid<f32>| {
+        let pairs = found.data().iter().zip(surface.dem.heights.data());
+        let (sum, count) = pairs
+            .map(|(a, b)| f64::from((a - b).abs()))
+            .filter(|d| d.is_finite())
+            .fold((0.0, 0usize), |(sum, count), d| (sum + d, count + 1));
+        sum / count.max(1) as f64
+    };
+    if let Some(epsg) = surface.dem.horizontal_epsg {
+        let bands = [Band { description: "height_m", data: BandData::F32(&after) }];
+        let raster = CogRaster {
+            holds_heights: true,
+            ..CogRaster::new(&bands, surface.dem.geotransform, Crs::ellipsoidal(epsg))
+        };
+        write_cog(config.output.join(HEIGHTS), &raster, config.overwrite).map_err(FileError::from)?;
+    }
+    Ok(Some([change(&before), change(&after)]))
+}
