@@ -278,8 +278,11 @@ impl Writer<'_> {
         text += "\n    Raises:\n";
         text += &hanging("TypeError", "A keyword that the job does not have; the text names those that it has.");
         text += &hanging("SkysweepError", "The job has no result; see its subclasses.");
-        let _ =
-            writeln!(text, "    \"\"\"\n    result: {result} = run(\"{}\", locals())\n    return result", entry.name);
+        let _ = writeln!(
+            text,
+            "    \"\"\"\n    result: {result} = run_job(\"{}\", locals())\n    return result",
+            entry.name
+        );
         text
     }
 }
@@ -346,7 +349,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
-from ._call import PathLike, Progress, Report, job, run
+from ._call import PathLike, Progress, Report, job, run as run_job
 
 ";
 

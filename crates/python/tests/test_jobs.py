@@ -47,6 +47,12 @@ def test_a_chain_of_jobs(tmp_path: Path) -> None:
     assert model and (tmp_path / "map.tif").is_file()
 
 
+def test_products_of_a_run(tmp_path: Path) -> None:
+    skysweep.dsm(VIEWS, tmp_path / "run", **SMALL)
+    skysweep.products(tmp_path / "run", products=["dtm"])
+    assert (tmp_path / "run" / "products" / "dtm" / "dtm.tif").is_file()
+
+
 def test_a_scene_is_a_preset_or_parameters(tmp_path: Path) -> None:
     scene = {"size_m": 60.0, "gsd_m": 2.0, "views": 2}
     report = skysweep.simulate(scene, tmp_path / "scene")

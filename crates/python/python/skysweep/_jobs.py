@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
-from ._call import PathLike, Progress, Report, job, run
+from ._call import PathLike, Progress, Report, job, run as run_job
 
 __all__ = [
     "dsm",
@@ -151,6 +151,13 @@ class ClassifyConfig(TypedDict, total=False):
 
     least_index: float
     """Least vegetation index of vegetation, where one is given."""
+
+    water_index: float
+    """Largest vegetation index of water, where one is given. Water swallows the near infrared;
+    asphalt and soil lie about 0."""
+
+    least_water_m2: float
+    """Smallest area of water, square metres: below it lie shadows."""
 
     least_building_index: float
     """Least building index that counts as a building where the heights are weak."""
@@ -370,7 +377,7 @@ def dsm(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("dsm", locals())
+    result: Report = run_job("dsm", locals())
     return result
 
 
@@ -458,7 +465,7 @@ def plan_run(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("plan_run", locals())
+    result: Report = run_job("plan_run", locals())
     return result
 
 
@@ -546,7 +553,7 @@ def make_plan(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("make_plan", locals())
+    result: Report = run_job("make_plan", locals())
     return result
 
 
@@ -566,7 +573,7 @@ def read_plan(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("read_plan", locals())
+    result: Report = run_job("read_plan", locals())
     return result
 
 
@@ -594,7 +601,7 @@ def run_chunks(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("run_chunks", locals())
+    result: Report = run_job("run_chunks", locals())
     return result
 
 
@@ -620,7 +627,7 @@ def merge_run(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("merge_run", locals())
+    result: Report = run_job("merge_run", locals())
     return result
 
 
@@ -640,7 +647,7 @@ def batch(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("batch", locals())
+    result: Report = run_job("batch", locals())
     return result
 
 
@@ -671,7 +678,7 @@ def dtm(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("dtm", locals())
+    result: Report = run_job("dtm", locals())
     return result
 
 
@@ -707,7 +714,7 @@ def classes(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("classes", locals())
+    result: Report = run_job("classes", locals())
     return result
 
 
@@ -746,7 +753,7 @@ def buildings(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("buildings", locals())
+    result: Report = run_job("buildings", locals())
     return result
 
 
@@ -802,7 +809,7 @@ def diff(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("diff", locals())
+    result: Report = run_job("diff", locals())
     return result
 
 
@@ -811,7 +818,7 @@ def products(
     run: PathLike,
     *,
     output: PathLike | None = None,
-    products: Sequence[Literal["cloud", "dtm", "classes", "contours", "mesh"]] = ("cloud", "dtm", "contours", "mesh"),
+    products: Sequence[Literal["cloud", "dtm", "classes", "contours", "mesh"]] = ("cloud", "dtm", "classes", "contours", "mesh"),
     ortho: PathLike | None = None,
     filled: bool = False,
     contour_interval_m: float | None = None,
@@ -842,7 +849,7 @@ def products(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("products", locals())
+    result: Report = run_job("products", locals())
     return result
 
 
@@ -890,7 +897,7 @@ def ortho(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("ortho", locals())
+    result: Report = run_job("ortho", locals())
     return result
 
 
@@ -956,7 +963,7 @@ def evaluate_grids(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("evaluate_grids", locals())
+    result: Report = run_job("evaluate_grids", locals())
     return result
 
 
@@ -1012,7 +1019,7 @@ def evaluate_surfaces(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("evaluate_surfaces", locals())
+    result: Report = run_job("evaluate_surfaces", locals())
     return result
 
 
@@ -1040,7 +1047,7 @@ def evaluate_maps(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("evaluate_maps", locals())
+    result: Report = run_job("evaluate_maps", locals())
     return result
 
 
@@ -1062,7 +1069,7 @@ def kind_of_evaluation(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: str = run("kind_of_evaluation", locals())
+    result: str = run_job("kind_of_evaluation", locals())
     return result
 
 
@@ -1117,7 +1124,7 @@ def heightmap(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("heightmap", locals())
+    result: Report = run_job("heightmap", locals())
     return result
 
 
@@ -1153,7 +1160,7 @@ def unproject(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("unproject", locals())
+    result: Report = run_job("unproject", locals())
     return result
 
 
@@ -1197,7 +1204,7 @@ def groundview(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("groundview", locals())
+    result: Report = run_job("groundview", locals())
     return result
 
 
@@ -1226,7 +1233,7 @@ def compose(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("compose", locals())
+    result: Report = run_job("compose", locals())
     return result
 
 
@@ -1304,7 +1311,7 @@ def priors(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("priors", locals())
+    result: Report = run_job("priors", locals())
     return result
 
 
@@ -1357,7 +1364,7 @@ def splats(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("splats", locals())
+    result: Report = run_job("splats", locals())
     return result
 
 
@@ -1395,7 +1402,7 @@ def render_splats(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("render_splats", locals())
+    result: Report = run_job("render_splats", locals())
     return result
 
 
@@ -1442,7 +1449,7 @@ def train(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("train", locals())
+    result: Report = run_job("train", locals())
     return result
 
 
@@ -1484,7 +1491,7 @@ def align(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("align", locals())
+    result: Report = run_job("align", locals())
     return result
 
 
@@ -1517,7 +1524,7 @@ def split(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("split", locals())
+    result: Report = run_job("split", locals())
     return result
 
 
@@ -1547,7 +1554,7 @@ def city_info(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("city_info", locals())
+    result: Report = run_job("city_info", locals())
     return result
 
 
@@ -1581,7 +1588,7 @@ def city_convert(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("city_convert", locals())
+    result: Report = run_job("city_convert", locals())
     return result
 
 
@@ -1601,7 +1608,7 @@ def rpc_info(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("rpc_info", locals())
+    result: Report = run_job("rpc_info", locals())
     return result
 
 
@@ -1627,7 +1634,7 @@ def rpc_convert(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("rpc_convert", locals())
+    result: Report = run_job("rpc_convert", locals())
     return result
 
 
@@ -1656,5 +1663,5 @@ def simulate(
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
     """
-    result: Report = run("simulate", locals())
+    result: Report = run_job("simulate", locals())
     return result
