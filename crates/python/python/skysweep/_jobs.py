@@ -1411,6 +1411,7 @@ def train(
     dataset: PathLike,
     output: PathLike,
     *,
+    more_points: PathLike | None = None,
     images: PathLike | None = None,
     iterations: int = 3000,
     budget: int = 100000,
@@ -1430,6 +1431,8 @@ def train(
     Args:
         dataset: Dataset of the priors job, or another folder with a COLMAP model in `sparse/0`.
         output: Folder for the results.
+        more_points: Another COLMAP model of the same cameras, whose points are added to those of
+            the dataset, such as the reconstruction that the cameras come from.
         images: Folder of the images; `images` of the dataset when `None`.
         iterations: Number of iterations; each draws one view.
         budget: Greatest number of splats. The training begins with at most half of them.
@@ -1644,6 +1647,7 @@ def simulate(
     output: PathLike,
     *,
     flight: int = 0,
+    flight_arc_deg: Sequence[float] | None = None,
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
@@ -1655,6 +1659,8 @@ def simulate(
         scene: The scene, its cameras and its radiometry.
         output: Folder for the images and the truth.
         flight: Number of perspective cameras around the scene; none when 0.
+        flight_arc_deg: Azimuths between which the perspective cameras stand, degrees clockwise from
+            north; all around when `None`.
         threads: Worker threads; one per core when `None`.
         overwrite: Whether the files of an earlier simulation may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
