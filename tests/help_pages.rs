@@ -27,7 +27,7 @@ fn manual_pages_describe_a_command_and_its_subcommands() {
 }
 
 /// Commands with options, as words of the command line.
-const COMMANDS: [&[&str]; 32] = [
+const COMMANDS: [&[&str]; 33] = [
     &["align"],
     &["batch"],
     &["buildings"],
@@ -47,6 +47,7 @@ const COMMANDS: [&[&str]; 32] = [
     &["plan"],
     &["priors"],
     &["products"],
+    &["register"],
     &["rpc", "info"],
     &["rpc", "project"],
     &["rpc", "localize"],
@@ -111,7 +112,7 @@ fn one_option_has_one_meaning() {
     };
     assert_eq!(with("--vertical"), ["dsm", "plan"]);
     assert_eq!(with("--crs"), ["align", "dsm", "heightmap", "plan"]);
-    assert_eq!(with("--dsm-vertical"), ["buildings", "ortho", "splats"]);
+    assert_eq!(with("--dsm-vertical"), ["buildings", "ortho", "register", "splats"]);
     for (command, old) in [("splats", "--vertical"), ("groundview", "--vertical"), ("align", "--vertical")] {
         let told = Command::cargo_bin("skysweep").unwrap().args([command, old, "none"]).assert().code(2);
         let told = String::from_utf8_lossy(&told.get_output().stderr).into_owned();

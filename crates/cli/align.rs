@@ -41,6 +41,10 @@ pub(crate) struct Args {
     /// Largest residual of an inlier, metres [default: estimated from the residuals].
     #[arg(long, value_name = "METRES")]
     threshold: Option<f64>,
+    /// Do not take the tilt from the up direction of the cameras where the positions do not
+    /// determine it.
+    #[arg(long)]
+    no_gravity: bool,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = AlignConfig::default().seed)]
     seed: u64,
@@ -102,6 +106,7 @@ fn config(args: &Args) -> anyhow::Result<AlignJobConfig> {
     config.crs_epsg = code;
     config.vertical = args.positions_vertical;
     config.threshold_m = args.threshold;
+    config.use_gravity = !args.no_gravity;
     config.seed = args.seed;
     config.encoding = args.encoding;
     config.noise = args.noise.noise.then(|| NoiseConfig {

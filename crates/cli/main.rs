@@ -28,6 +28,7 @@ mod priors;
 mod production;
 mod products;
 mod progress;
+mod register;
 mod rpc;
 mod simulate;
 mod splats;
@@ -93,6 +94,8 @@ enum Command {
     Priors(Box<priors::Args>),
     /// Make point clouds, terrain and other products of a surface model.
     Products(products::Args),
+    /// Correct the pointing of a new image against an existing surface model or splats.
+    Register(Box<register::Args>),
     /// Show, use and convert RPC camera models.
     #[command(subcommand)]
     Rpc(rpc::Command),
@@ -155,6 +158,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Plan(args) => production::plan(args, cli.global),
         Command::Priors(args) => priors::run(args, cli.global),
         Command::Products(args) => products::run(args, cli.global),
+        Command::Register(args) => register::run(args, cli.global),
         Command::Rpc(command) => rpc::run(command),
         Command::Run(args) => production::run(args, cli.global),
         Command::Simulate(args) => simulate::run(args, cli.global),

@@ -92,9 +92,14 @@ pub(crate) struct ConvertArgs {
     /// File to write.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Format to write [default: by the ending of OUT: .txt, .rpb or .json].
+    /// Format to write [default: by the ending of OUT: .txt, .rpb, .json, or .tif for the image
+    /// again with the RPC in its tag].
     #[arg(long, value_parser = named(&RpcFormat::CHOICES))]
     format: Option<RpcFormat>,
+    /// Include the pointing correction of the image: the report of skysweep register or dsm, or the
+    /// folder of a run of skysweep dsm.
+    #[arg(long, value_name = "report.json|RUN")]
+    corrections: Option<PathBuf>,
     /// Replace OUT where it exists.
     #[arg(long)]
     overwrite: bool,
@@ -121,6 +126,7 @@ fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
     let mut config = RpcConvertConfig::new(args.file.clone(), args.output.clone());
     config.overwrite = args.overwrite;
     config.format = args.format;
+    config.corrections.clone_from(&args.corrections);
     let report = jobs::rpc::convert(&config, &Log).map_err(|error| {
         let hint = match &error {
             RpcJobError::UnknownEnding { .. } => Some("give --format text, rpb or json"),

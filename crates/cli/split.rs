@@ -11,8 +11,8 @@ use crate::{Global, Outcome};
 /// Arguments of `skysweep split`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Overlap is the intersection over union of the points of the model that two views see. Views are chosen \
-                        greedily, closest to the wanted overlap; with several contexts the largest overlap counts."
+    after_help = "Overlap is the intersection over union of the points of the model that two views see. Contexts \
+                        are chosen by their overlap with the first image, targets by their average overlap with the contexts."
 )]
 pub(crate) struct Args {
     /// Folder of a COLMAP model with its points.
@@ -28,13 +28,13 @@ pub(crate) struct Args {
     /// Number of contexts.
     #[arg(long, value_name = "N", default_value_t = 2)]
     contexts: usize,
-    /// Overlap of each context with those before [default: the preset's].
+    /// Overlap of each further context with the first one [default: the preset's].
     #[arg(long, value_name = "IOU")]
     context_iou: Option<f64>,
-    /// Overlaps of the targets with the contexts [default: the preset's].
+    /// Average overlaps of the targets with the contexts [default: the preset's].
     #[arg(long, value_name = "IOU", value_delimiter = ',')]
     target_ious: Option<Vec<f64>>,
-    /// Name of the first context [default: the one with the best split].
+    /// Name of the first context [default: the first by name of the images that see points].
     #[arg(long, value_name = "IMAGE")]
     first: Option<String>,
     #[command(flatten)]

@@ -26,6 +26,9 @@ pub enum CorrectionSource {
     Uncorrected,
 }
 
+/// Folders above a file in which a run is looked for: the run's own and one inside it.
+const RUN_DEPTH: usize = 2;
+
 /// A report whose corrections cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -60,6 +63,14 @@ struct RunReport {
     images: Vec<RunImage>,
 }
 
+impl RunReport {
+    fn read(path: &Path) -> Result<Self, CorrectionsError> {
+        let text = io::read_regular_text(path, files::TEXT_LIMIT)
+            .map_err(|source| CorrectionsError::Unreadable { path: path.to_owned(), source })?;
+        serde_json::from_str(&text).map_err(|source| CorrectionsError::NotAReport { path: path.to_owned(), source })
+    }
+}
+
 #[derive(Deserialize, Serialize)]
 struct RunImage {
     path: PathBuf,
@@ -72,10 +83,7 @@ impl Corrections {
     /// # Errors
     /// [`CorrectionsError`] if the file cannot be read or is not the report of a DSM run.
     pub fn read(path: &Path) -> Result<Self, CorrectionsError> {
-        let text = io::read_regular_text(path, crate::files::TEXT_LIMIT)
-            .map_err(|source| CorrectionsError::Unreadable { path: path.to_owned(), source })?;
-        let report: RunReport = serde_json::from_str(&text)
-            .map_err(|source| CorrectionsError::NotAReport { path: path.to_owned(), source })?;
+        let report = RunReport::read(path)?;
         let images = report.images.into_iter().filter_map(|image| Some((image.path, image.applied_correction?)));
         Ok(Self { images: images.collect() })
     }
@@ -98,6 +106,25 @@ impl Corrections {
     /// Returns the correction of one image.
     pub(crate) fn of_image(image: PathBuf, correction: ImageCorrection) -> Self {
         Self { images: vec![(image, correction)] }
+    }
+
+    /// Reads the corrections of the run in whose folder a file lies; none where it lies in no run.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub(crate) fn of_run_around(file: &Path) -> Result<Self, CorrectionsError> {
+        let file = file.canonicalize().unwrap_or_else(|_| file.to_owned());
+        let report = file.ancestors().skip(1).take(RUN_DEPTH).find_map(report_of_run);
+        report.map_or_else(|| Ok(Self::default()), |path| Self::read(&path))
+    }
+
+    /// Returns the images of the run that made a surface model; none where it lies in no run.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub(crate) fn images_of_run(surface: &Path) -> Result<Vec<PathBuf>, CorrectionsError> {
+        let report = report_of_run(surface).map(|path| RunReport::read(&path)).transpose()?;
+        Ok(report.map_or_else(Vec::new, |report| report.images.into_iter().map(|image| image.path).collect()))
     }
 
     /// Returns the corrections of some images only, which are known by the paths given here.
@@ -168,7 +195,7 @@ impl Corrections {
     }
 
     /// Finds an image by its path, or else by its file name where that is unique.
-    fn find(&self, path: &Path) -> Option<ImageCorrection> {
+    pub(crate) fn find(&self, path: &Path) -> Option<ImageCorrection> {
         let same = |a: &Path, b: &Path| a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b);
         let by_path = self.images.iter().find(|(other, _)| same(other, path));
         let mut by_name = self.images.iter().filter(|(other, _)| other.file_name() == path.file_name());

@@ -30,6 +30,7 @@ pub mod placed_model;
 pub mod priors;
 pub mod production;
 pub mod products;
+pub mod register;
 pub mod remote;
 mod report_page;
 pub mod rpc;

@@ -22,11 +22,11 @@ pub struct SplitJobConfig {
     pub output: Option<PathBuf>,
     /// Number of context views.
     pub contexts: usize,
-    /// Wanted overlap of each context with the contexts before it, as intersection over union.
+    /// Wanted overlap of each further context with the first one, as intersection over union.
     pub context_iou: f64,
-    /// Wanted overlap of each target with the contexts, as intersection over union.
+    /// Wanted average overlap of each target with the contexts, as intersection over union.
     pub target_ious: Vec<f64>,
-    /// Name of the first context; the one with the best split when `None`.
+    /// Name of the first context; the first by name of the images that see points when `None`.
     pub first: Option<String>,
     /// Whether an existing `output` may be replaced.
     pub overwrite: bool,
@@ -53,7 +53,8 @@ pub struct SplitImage {
     pub image: String,
     /// Overlap that was wanted; `None` for the first context.
     pub wanted_iou: Option<f64>,
-    /// Largest overlap with a context chosen before; `None` for the first context.
+    /// Overlap of a context with the first one, or average overlap of a target with all contexts;
+    /// `None` for the first context.
     pub iou: Option<f64>,
 }
 
@@ -143,7 +144,8 @@ pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobR
     let (model, points) = io::colmap::read_with_points(&config.model)?;
     progress.step();
     progress.check_cancelled()?;
-    let found = split(&points_by_view(&model, &points), &goal(config, &model)?)?;
+    let points = points_by_view(&model, &points);
+    let found = split(&points, &goal(config, &model, &points)?)?;
     let image = |choice: &ChosenView| SplitImage {
         image: model.views[choice.view].name.clone(),
         wanted_iou: choice.wanted_iou,
@@ -162,11 +164,16 @@ pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobR
     Ok(report)
 }
 
-/// The wanted overlaps with the first image as an index.
-fn goal(config: &SplitJobConfig, model: &ColmapModel) -> Result<SplitConfig, SplitJobError> {
+/// The wanted overlaps with the first image as an index. Without a name it is the first of the
+/// sequence: the lowest name among the images that see points.
+fn goal(config: &SplitJobConfig, model: &ColmapModel, points: &[Vec<u32>]) -> Result<SplitConfig, SplitJobError> {
     let index = |name: &String| {
         let found = model.views.iter().position(|view| view.name == *name);
         found.ok_or_else(|| SplitJobError::UnknownImage { name: name.clone() })
+    };
+    let first_of_sequence = || {
+        let usable = (0..model.views.len()).filter(|&view| points.get(view).is_some_and(|seen| !seen.is_empty()));
+        usable.min_by(|&a, &b| model.views[a].name.cmp(&model.views[b].name))
     };
     if config.contexts > model.views.len() {
         return Err(SplitJobError::TooManyContexts { contexts: config.contexts, images: model.views.len() });
@@ -175,7 +182,7 @@ fn goal(config: &SplitJobConfig, model: &ColmapModel) -> Result<SplitConfig, Spl
         contexts: config.contexts,
         context_iou: config.context_iou,
         target_ious: config.target_ious.clone(),
-        first: config.first.as_ref().map(index).transpose()?,
+        first: config.first.as_ref().map(index).transpose()?.or_else(first_of_sequence),
     })
 }
 

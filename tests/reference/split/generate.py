@@ -1,7 +1,8 @@
 """Context and target views of the COLMAP models in ../shared/data, chosen by brute force with Python sets.
 
-Reads points3D.bin and images.bin by COLMAP's published layout (struct only, no reader of ours), and follows the definition in
-`crates/bev/src/split/mod.rs` to the letter. Run in this folder: python3 generate.py > reference.txt
+Reads points3D.bin and images.bin by COLMAP's published layout (struct only, no reader of ours), and follows the text of the
+supplement of Cross-View Splatter: the first image of the sequence (lowest name) is the first context, contexts are closest in
+overlap to the first, targets are closest in average overlap to the contexts. Run in this folder: python3 generate.py > reference.txt
 """
 import struct
 from pathlib import Path
@@ -36,20 +37,23 @@ def seen(path, names):
     return [points[number] for number, _ in names]
 
 
-def greedy(points, first, context, targets, count):
-    def overlap(v, chosen):
-        return max(len(points[v] & points[c]) / len(points[v] | points[c]) for c in chosen)
+def iou(points, a, b):
+    return len(points[a] & points[b]) / len(points[a] | points[b])
 
+
+def chosen_views(points, first, context, targets, count):
     contexts, off, rest = [first], 0.0, [v for v in range(len(points)) if points[v] and v != first]
     for _ in range(count - 1):
-        best = min(rest, key=lambda v: (abs(overlap(v, contexts) - context), v))
-        off += abs(overlap(best, contexts) - context)
+        best = min(rest, key=lambda v: (abs(iou(points, v, first) - context), v))
+        off += abs(iou(points, best, first) - context)
         contexts.append(best)
         rest.remove(best)
     chosen = []
     for target in targets:
-        best = min(rest, key=lambda v: (abs(overlap(v, contexts) - target), v))
-        off += abs(overlap(best, contexts) - target)
+        def average(v):
+            return sum(iou(points, v, c) for c in contexts) / len(contexts)
+        best = min(rest, key=lambda v: (abs(average(v) - target), v))
+        off += abs(average(best) - target)
         chosen.append(best)
         rest.remove(best)
     return off, contexts, chosen
@@ -60,9 +64,7 @@ for model in MODELS:
     points = seen(COLMAP / model / "points3D.bin", names)
     for preset, (context, targets) in PRESETS.items():
         for count in (2, 3):
-            best = min(
-                (greedy(points, first, context, targets, count) for first in range(len(points)) if points[first]),
-                key=lambda found: found[0],
-            )
+            first = min((v for v in range(len(points)) if points[v]), key=lambda v: names[v][1])
+            best = chosen_views(points, first, context, targets, count)
             chosen = ",".join(names[v][1] for v in best[1]) + " " + ",".join(names[v][1] for v in best[2])
             print(f"{model} {preset} {count} {best[0]:.9f} {chosen}")

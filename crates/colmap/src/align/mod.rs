@@ -4,17 +4,20 @@
 //! - [`fit_similarity`] is the least-squares similarity of pairs (Umeyama 1991).
 //! - [`align`] finds it among outliers: triples of pairs propose similarities, and the fit to the
 //!   pairs that agree is repeated until nothing changes.
+//! - [`align_upright`] adds the up direction of the cameras, for positions on a line.
 //! - [`sensitivity`] measures what noise in the positions or in the heading does to the alignment.
 //!
 //! Positions are f64. Source positions are in the unit of the model, target positions in metres
 //! from a local origin.
 
 mod error;
+mod gravity;
 mod noise;
 mod robust;
 mod umeyama;
 
 pub use error::AlignError;
+pub use gravity::{CameraUp, camera_up, tilt_sigma_deg};
 pub use noise::{Disturbance, MeanStd, NoiseConfig, NoiseLevel, disturbed, sensitivity};
-pub use robust::{AlignConfig, ModelAlignment, align};
+pub use robust::{AlignConfig, ModelAlignment, align, align_upright};
 pub use umeyama::{PointPair, fit_similarity, spread_ratio};

@@ -290,7 +290,7 @@ fn plain_options(bands: &[Band<'_>]) -> [(&'static str, &'static str); 4] {
 
 /// Returns the RPC under GDAL's keys. Numbers have as many digits as they need to read back to the
 /// same bits.
-fn rpc_items(rpc: &Rpc) -> Vec<(&'static str, String)> {
+pub(super) fn rpc_items(rpc: &Rpc) -> Vec<(&'static str, String)> {
     let list = |c: &[f64; 20]| c.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
     vec![
         // −1 means "unknown" to GDAL.

@@ -40,10 +40,11 @@ pub enum RpcFormat {
 
 impl RpcFormat {
     /// All values with the names that people give them, and their meanings.
-    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+    pub const CHOICES: [(&'static str, Self, &'static str); 4] = [
         ("text", Self::Text, "`KEY: value` lines, as _RPC.TXT"),
         ("rpb", Self::Rpb, "DigitalGlobe's RPB"),
         ("json", Self::Json, "JSON with rpcm's names"),
+        ("tif", Self::TiffTag, "the image again, with the RPC in TIFF tag 50844"),
     ];
 }
 

@@ -26,6 +26,9 @@ pub struct AlignJobConfig {
     pub vertical: VerticalDatum,
     /// Largest residual of an inlier, metres; estimated from the residuals when `None`.
     pub threshold_m: Option<f64>,
+    /// Whether the up direction of the cameras is up in the world where the positions do not
+    /// determine the tilt.
+    pub use_gravity: bool,
     /// Seed of the random triples.
     pub seed: u64,
     /// Encoding of the model that is written.
@@ -48,6 +51,7 @@ impl AlignJobConfig {
             crs_epsg: None,
             vertical: VerticalDatum::Ellipsoid,
             threshold_m: None,
+            use_gravity: true,
             seed: AlignConfig::default().seed,
             encoding: ColmapEncoding::Binary,
             noise: None,

@@ -12,7 +12,8 @@ mod world;
 use std::path::{Path, PathBuf};
 
 use colmap::align::{
-    AlignConfig, Disturbance, ModelAlignment, NoiseLevel, align, disturbed, sensitivity, spread_ratio,
+    AlignConfig, AlignError, CameraUp, Disturbance, ModelAlignment, NoiseLevel, align, align_upright, camera_up,
+    disturbed, sensitivity, spread_ratio, tilt_sigma_deg,
 };
 use io::splat_ply::LocalOrigin;
 use serde::Serialize;
@@ -31,6 +32,11 @@ use world::{KnownPositions, World};
 const REPORT: &str = "align.json";
 /// Ratio of the cameras' spread across their line to that along it, below which the job warns.
 const SPREAD_LOW: f64 = 0.05;
+/// Standard deviation of the tilt above which positions do not determine it, degrees. Three of them
+/// are about two degrees.
+const TILT_LOOSE_DEG: f64 = 0.7;
+/// Greatest spread of the cameras' up directions that are held level, degrees.
+const HELD_SPREAD_DEG: f64 = 25.0;
 
 /// Where a model lies in the world, and how well the positions agree.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -56,6 +62,12 @@ pub struct AlignJobReport {
     pub rmse_m: f64,
     /// Spread of the positions across their line relative to that along it.
     pub spread_across_line: f64,
+    /// Standard deviation of the tilt as far as the positions determine it, degrees; `None` where
+    /// they do not.
+    pub tilt_sigma_deg: Option<f64>,
+    /// Whether the tilt comes from the up directions of the cameras, because the positions do not
+    /// determine it.
+    pub upright: bool,
     /// Residual of every pair.
     pub residuals: Vec<AlignResidual>,
     /// Sensitivity to noise, one entry per level.
@@ -108,13 +120,14 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     let world = World::of(&positions, config.crs_epsg, config.vertical)?;
     let known = world.known(&positions, &model.cameras)?;
     let search = AlignConfig { threshold_m: config.threshold_m, seed: config.seed, ..AlignConfig::default() };
-    let alignment =
-        align(&known.pairs, &search).map_err(|source| AlignJobError::Alignment { pairs: known.pairs.len(), source })?;
+    let Aligned { alignment, tilt_sigma_deg, upright } = aligned(config, &known, &model, &search)
+        .map_err(|source| AlignJobError::Alignment { pairs: known.pairs.len(), source })?;
     let noise = config.noise.as_ref();
     let levels = noise.map(|noise| sensitivity(&known.pairs, &alignment, noise, &search)).unwrap_or_default();
     progress.step();
     progress.check_cancelled()?;
-    let report = report(config, &world, &known, &alignment, levels);
+    let mut report = report(config, &world, &known, &alignment, levels);
+    (report.tilt_sigma_deg, report.upright) = (Some(tilt_sigma_deg).filter(|sigma| sigma.is_finite()), upright);
     folder.remove(REPORT)?;
     let writer =
         ModelWriter { model: &model, origin: &world.origin, encoding: config.encoding, overwrite: config.overwrite };
@@ -125,6 +138,40 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     progress.step();
     warn_of(&report, progress);
     Ok(report)
+}
+
+/// An alignment, and where its tilt comes from.
+struct Aligned {
+    alignment: ModelAlignment,
+    /// Standard deviation of the tilt that the positions give, degrees.
+    tilt_sigma_deg: f64,
+    upright: bool,
+}
+
+/// Aligns a model by its positions, and by the up directions of its cameras where the positions do
+/// not determine the tilt.
+fn aligned(
+    config: &AlignJobConfig,
+    known: &KnownPositions,
+    model: &ModelWithPoints,
+    search: &AlignConfig,
+) -> Result<Aligned, AlignError> {
+    let plain = align(&known.pairs, search);
+    let tilt_sigma_deg = plain.as_ref().map_or(f64::INFINITY, |found| tilt_sigma_deg(&known.pairs, found));
+    let up = if config.use_gravity && tilt_sigma_deg > TILT_LOOSE_DEG { held_up(model) } else { None };
+    match (plain, up) {
+        (Ok(_) | Err(AlignError::Degenerate { .. }), Some(up)) => {
+            let alignment = align_upright(&known.pairs, &up, search)?;
+            Ok(Aligned { alignment, tilt_sigma_deg, upright: true })
+        }
+        (plain, _) => Ok(Aligned { alignment: plain?, tilt_sigma_deg, upright: false }),
+    }
+}
+
+/// Returns the up direction of cameras that are held level.
+fn held_up(model: &ModelWithPoints) -> Option<CameraUp> {
+    let rotations: Vec<[[f64; 3]; 3]> = model.cameras.views.iter().map(|view| view.pose.rotation).collect();
+    camera_up(&rotations).filter(|up| up.spread_deg <= HELD_SPREAD_DEG)
 }
 
 fn read_model(folder: &Path, progress: &dyn Progress) -> Result<ModelWithPoints, AlignJobError> {
@@ -161,6 +208,8 @@ fn report(
         threshold_m: alignment.threshold_m,
         rmse_m: alignment.rmse_m(),
         spread_across_line: spread_ratio(known.pairs.iter().map(|p| p.source)),
+        tilt_sigma_deg: None,
+        upright: false,
         residuals: residuals.map(residual).collect(),
         noise,
     }
@@ -193,7 +242,19 @@ fn write_under_noise(
 
 fn warn_of(report: &AlignJobReport, progress: &dyn Progress) {
     let spread = report.spread_across_line;
-    if spread < SPREAD_LOW {
+    let tilt = report.tilt_sigma_deg.map_or("unbounded".to_owned(), |deg| format!("{deg:.1}°"));
+    let is_loose = report.tilt_sigma_deg.is_none_or(|deg| deg > TILT_LOOSE_DEG);
+    if report.upright {
+        progress.warn(&format!(
+            "the positions do not determine the tilt (standard deviation {tilt}), so it follows the up direction of the \
+             cameras"
+        ));
+    } else if is_loose {
+        progress.warn(&format!(
+            "the positions do not determine the tilt (standard deviation {tilt}): add positions beside their line, or at \
+             other heights"
+        ));
+    } else if spread < SPREAD_LOW {
         progress.warn(&format!(
             "the positions lie almost on a line (spread {spread:.3}): the rotation about it is uncertain"
         ));

@@ -31,13 +31,13 @@ pub(super) struct OrthoInputs {
 }
 
 /// An image with its camera.
-pub(super) struct OrthoImage {
-    pub(super) source: ImageSource,
-    pub(super) camera: RpcCamera,
+pub(crate) struct OrthoImage {
+    pub(crate) source: ImageSource,
+    pub(crate) camera: RpcCamera,
     /// Whether a correction of the pointing was found.
-    pub(super) corrected: bool,
+    pub(crate) corrected: bool,
     /// Directions towards the sensor over the cells of the surface model.
-    pub(super) eyeline: Eyeline,
+    pub(crate) eyeline: Eyeline,
 }
 
 /// The cells of the ortho.

@@ -22,3 +22,6 @@ pub use error::OrthoError;
 pub use output::{OrthoPart, OrthoReport};
 pub use run::run;
 pub use states::OrthoCounts;
+
+pub(crate) use inputs::OrthoImage;
+pub(crate) use view::{Cell, look};

@@ -20,21 +20,21 @@ const PIXELS_MAX: usize = 1 << 27;
 
 /// A cell of the ortho.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cell {
+pub(crate) struct Cell {
     /// Column and row in the surface model.
-    pub(super) in_dsm: [f64; 2],
-    pub(super) ground: LonLatHeight,
+    pub(crate) in_dsm: [f64; 2],
+    pub(crate) ground: LonLatHeight,
 }
 
 /// Cells as one image sees them.
-pub(super) struct Seen {
-    pub(super) sights: Vec<Sight>,
+pub(crate) struct Seen {
+    pub(crate) sights: Vec<Sight>,
     /// Values by band; NaN where the image has none.
-    pub(super) values: Vec<Vec<f32>>,
+    pub(crate) values: Vec<Vec<f32>>,
 }
 
 /// Looks at cells through an image. Hidden cells get the values of what hides them.
-pub(super) fn look(
+pub(crate) fn look(
     surface: &OcclusionSurface<'_>,
     image: &OrthoImage,
     cells: &[Option<Cell>],

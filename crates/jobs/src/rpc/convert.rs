@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use camera::RpcCamera;
 use io::rpc::RpcFormat;
 use serde::{Deserialize, Serialize};
 
 use super::error::RpcJobError;
 use super::input;
+use crate::corrections::{CorrectionSource, Corrections};
 use numeric::Progress;
 
 /// A conversion of the RPC of one file.
@@ -18,14 +20,18 @@ pub struct RpcConvertConfig {
     pub file: PathBuf,
     /// File to write.
     pub output: PathBuf,
-    /// Format to write: text, RPB or JSON. `None` takes it from the ending of `output`.
+    /// Format to write: text, RPB, JSON, or the image again with the RPC in its tag. `None` takes
+    /// it from the ending of `output`.
     pub format: Option<RpcFormat>,
+    /// Report with the pointing correction of the image, or the folder of a DSM run. The RPC that
+    /// is written includes it.
+    pub corrections: Option<PathBuf>,
     /// Whether an existing `output` may be replaced.
     pub overwrite: bool,
 }
 
 /// What a conversion wrote.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct RpcConvertReport {
     /// File that held the RPC.
@@ -36,12 +42,16 @@ pub struct RpcConvertReport {
     pub output: PathBuf,
     /// Format that was written.
     pub format: RpcFormat,
+    /// Whether the RPC includes a pointing correction.
+    pub corrected: bool,
+    /// Largest difference between the RPC that was written and the corrected one, pixels.
+    pub residual_px: f64,
 }
 
 impl RpcConvertConfig {
     /// A conversion that takes the format from the ending of `output` and replaces nothing.
     pub fn new(file: PathBuf, output: PathBuf) -> Self {
-        Self { file, output, format: None, overwrite: false }
+        Self { file, output, format: None, corrections: None, overwrite: false }
     }
 
     /// Checks that a format is known.
@@ -53,11 +63,11 @@ impl RpcConvertConfig {
     }
 }
 
-/// Writes the RPC of a file as text, RPB or JSON.
+/// Writes the RPC of a file as text, RPB or JSON, or an image again with the RPC in its tag.
 ///
 /// # Errors
-/// [`RpcJobError::UnknownEnding`], [`RpcJobError::Read`], and [`RpcJobError::Write`], among it an
-/// output that exists.
+/// [`RpcJobError::UnknownEnding`], [`RpcJobError::Read`], [`RpcJobError::NotCorrected`], and
+/// [`RpcJobError::Write`], among it an output that exists.
 ///
 /// ```
 /// use jobs::rpc::{RpcConvertConfig, convert};
@@ -72,8 +82,31 @@ pub fn convert(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<Rpc
     config.validate()?;
     let format = config.format.map_or_else(|| format_of(&config.output), Ok)?;
     let file = input::read(&config.file, progress)?;
-    io::rpc::write(&config.output, &file.rpc, format, config.overwrite)?;
-    Ok(RpcConvertReport { source: file.source, source_format: file.format, output: config.output.clone(), format })
+    let (rpc, residual_px) = match &config.corrections {
+        None => (file.rpc, 0.0),
+        Some(report) => {
+            let source =
+                if report.is_dir() { CorrectionSource::SurfaceRun } else { CorrectionSource::Report(report.clone()) };
+            let known = Corrections::for_surface(report, &source)?;
+            let correction = known
+                .find(&config.file)
+                .ok_or_else(|| RpcJobError::NotCorrected { path: config.file.clone(), report: report.clone() })?;
+            let fit = RpcCamera { rpc: file.rpc, correction }.folded()?;
+            (fit.rpc, fit.max_px)
+        }
+    };
+    match format {
+        RpcFormat::TiffTag => io::raster::copy_image_with_rpc(&config.file, &config.output, &rpc, config.overwrite)?,
+        format => io::rpc::write(&config.output, &rpc, format, config.overwrite)?,
+    }
+    Ok(RpcConvertReport {
+        source: file.source,
+        source_format: file.format,
+        output: config.output.clone(),
+        format,
+        corrected: config.corrections.is_some(),
+        residual_px,
+    })
 }
 
 fn format_of(output: &Path) -> Result<RpcFormat, RpcJobError> {
@@ -82,6 +115,7 @@ fn format_of(output: &Path) -> Result<RpcFormat, RpcJobError> {
         Some("txt" | "rpc") => Ok(RpcFormat::Text),
         Some("rpb") => Ok(RpcFormat::Rpb),
         Some("json") => Ok(RpcFormat::Json),
+        Some("tif" | "tiff") => Ok(RpcFormat::TiffTag),
         _ => Err(RpcJobError::UnknownEnding { path: output.to_owned() }),
     }
 }

@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use camera::CameraError;
+use camera::{CameraError, FitError};
+use io::raster::RasterError;
 use io::rpc::{RpcReadError, RpcWriteError};
 
+use crate::corrections::CorrectionsError;
 use crate::error::from_steps;
 
 /// An RPC job that could not be done.
@@ -19,13 +21,30 @@ pub enum RpcJobError {
     Write(#[from] RpcWriteError),
     /// The ending of the output file belongs to no format.
     #[error(
-        "no RPC format belongs to the ending of {}: expected .txt, .rpc, .rpb or .json, or a stated format",
+        "no RPC format belongs to the ending of {}: expected .txt, .rpc, .rpb, .json or .tif, or a stated format",
         path.display()
     )]
     UnknownEnding {
         /// The output file.
         path: PathBuf,
     },
+    /// The corrections cannot be read.
+    #[error(transparent)]
+    Corrections(#[from] CorrectionsError),
+    /// The report has no correction of the image.
+    #[error("the report has no pointing correction of {}: {}", path.display(), report.display())]
+    NotCorrected {
+        /// The image.
+        path: PathBuf,
+        /// The report, or the folder of the run.
+        report: PathBuf,
+    },
+    /// No RPC includes the correction.
+    #[error("no RPC includes the pointing correction")]
+    Folded(#[from] FitError),
+    /// The image cannot be written with another RPC.
+    #[error(transparent)]
+    Image(#[from] RasterError),
     /// The camera model has no answer for a point.
     #[error("the RPC has no answer for the point {point:?}")]
     NoAnswer {

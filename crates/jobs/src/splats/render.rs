@@ -50,7 +50,8 @@ pub struct SplatRenderConfig {
     /// and not compared.
     pub pictures: Option<PathBuf>,
     /// Source of the pointing corrections of the images. [`CorrectionSource::SurfaceRun`] takes
-    /// those that the splats were made with, which lie beside them.
+    /// those that the splats were made with, which lie beside them, or else those of the run in
+    /// whose folder they lie.
     pub corrections: CorrectionSource,
     /// Folder to write.
     pub output: PathBuf,
@@ -191,7 +192,11 @@ impl RenderSession<'_> {
             CorrectionSource::Report(path) => Corrections::read(path)?,
             CorrectionSource::SurfaceRun => {
                 let beside = pointing_path(&self.config.splats);
-                if beside.is_file() { Corrections::read(&beside)? } else { Corrections::default() }
+                if beside.is_file() {
+                    Corrections::read(&beside)?
+                } else {
+                    Corrections::of_run_around(&self.config.splats)?
+                }
             }
         };
         let cameras = model.as_ref().map_or(0, |model| model.views.len());

@@ -1,0 +1,212 @@
+//! Runs the register job.
+
+use std::path::PathBuf;
+
+use camera::{ImageCorrection, RpcCamera};
+use geodesy::LonLatHeight;
+use numeric::{Progress, upper_median};
+use serde::Serialize;
+use sweep::pointing::{AdjustConfig, ControlPoint, ModelOrder, Observations, adjust_to_control};
+
+use super::config::RegisterConfig;
+use super::error::RegisterError;
+use super::matching;
+use super::model::{Looks, Model, NewImage};
+use crate::{files, threads};
+
+/// Most rounds of matching. The first is within a pixel, the second within a tenth.
+const ROUNDS: usize = 5;
+/// Change of the correction that ends the rounds, pixels.
+const SETTLED_PX: f64 = 0.01;
+/// Search around the expected places after the first round, pixels.
+const CLOSE_PX: f64 = 4.0;
+/// Least number of points.
+const POINTS_MIN: usize = 8;
+/// Residual up to which a point agrees with the correction, pixels.
+const AGREES_PX: f64 = 1.5;
+/// Weak prior on the parameters, pixels: any error of the pointing is as likely as another.
+const PRIOR_PX: f64 = 100.0;
+
+/// The correction of an image, and how well it is known.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct RegisterReport {
+    /// The new image first, then the images of the model.
+    pub images: Vec<RegisteredImage>,
+    /// Points of the model that were searched for.
+    pub tried: usize,
+    /// Points that were found.
+    pub found: usize,
+    /// Points that agree with the correction.
+    pub agree: usize,
+    /// Root mean square residual of those, pixels.
+    pub rms_px: f64,
+    /// Median length of the residuals of all points found, pixels.
+    pub median_px: f64,
+    /// Shift of the pixel in the middle of the image, pixels (sample, line).
+    pub shift_px: [f64; 2],
+    /// Ground sampling distance of the image, metres.
+    pub gsd_m: f64,
+    /// Rounds of matching.
+    pub rounds: usize,
+}
+
+/// An image with its correction.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegisteredImage {
+    /// The image.
+    pub path: PathBuf,
+    /// Its correction, to be applied after the RPC.
+    pub applied_correction: Option<ImageCorrection>,
+}
+
+impl RegisterReport {
+    /// Returns the report as text, which ends in a line break.
+    pub fn text(&self) -> String {
+        let [sample, line] = self.shift_px;
+        format!(
+            "shift      {sample:+.3} px along the sample, {line:+.3} px along the line\n\
+             points     {} of {} found, {} agree: RMS {:.3} px, median {:.3} px\n",
+            self.found, self.tried, self.agree, self.rms_px, self.median_px
+        )
+    }
+}
+
+/// Registers an image and writes the report with its correction.
+///
+/// # Errors
+/// [`RegisterError`]: inputs that cannot be read, a model that the image does not show, matches
+/// that do not agree, an output that exists.
+///
+/// ```
+/// use jobs::register::{RegisterConfig, RegisterModel, run};
+/// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
+/// let folder = tempfile::tempdir()?;
+/// let images = vec![town.join("view_1.tif")];
+/// let model = RegisterModel::Surface { dsm: town.join("truth/dsm.tif"), images };
+/// let config = RegisterConfig::new(town.join("view_2.tif"), model, folder.path().join("view_2.json"));
+/// let report = run(&config, &numeric::Silent)?;
+/// assert!(report.agree > 50);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn run(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
+    config.validate()?;
+    files::check_destination(&config.output, config.overwrite)?;
+    let report = threads::install(config.threads, || register(config, progress))??;
+    files::write_json(&config.output, &report, config.overwrite)?;
+    Ok(report)
+}
+
+fn register(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
+    let rpc = io::rpc::read_for_image(&config.image)?.rpc;
+    let camera = RpcCamera { rpc, correction: ImageCorrection::IDENTITY };
+    let model = Model::open(config, &camera, progress)?;
+    let mut new = open(config, &model, camera)?;
+    let info = new.image.source.info();
+    let size = (info.width, info.height);
+    progress.begin("rounds", ROUNDS);
+    let mut rounds = 0;
+    loop {
+        progress.check_cancelled()?;
+        let reach_px = if rounds == 0 { config.reach_px } else { CLOSE_PX.min(config.reach_px) };
+        let found = matching::search(&model, &new, reach_px)?;
+        if found.points.len() < POINTS_MIN {
+            let (found, tried) = (found.points.len(), found.tried);
+            return Err(RegisterError::TooFew { found, tried, needed: POINTS_MIN, reach_px });
+        }
+        let order = if config.affine && rounds > 0 { ModelOrder::Affine } else { ModelOrder::Translation };
+        let before = new.image.camera.clone();
+        new.image.camera.correction = corrected(&before, size, &found.points, order);
+        rounds += 1;
+        progress.step();
+        let moved = change(&before, &new.image.camera, &found.points);
+        if rounds == ROUNDS || (moved < SETTLED_PX && rounds > 1) {
+            return judged(&model, &new, &found, rounds);
+        }
+    }
+}
+
+/// Opens the new image on the model.
+fn open(config: &RegisterConfig, model: &Model, camera: RpcCamera) -> Result<NewImage, RegisterError> {
+    let middle = [model.heights.width(), model.heights.height()].map(|cells| 0.5 * (cells as f64 - 1.0));
+    let [lon, lat] = model.ground.lonlat(middle[0], middle[1]);
+    let gsd = camera.gsd(LonLatHeight::new(lon, lat, model.middle_m));
+    let gsd_m = gsd.map_err(|source| RegisterError::Camera { path: config.image.clone(), source })?.mean_m();
+    let image = model.look_through(&config.image, camera)?;
+    Ok(NewImage { path: config.image.clone(), image, gsd_m })
+}
+
+/// Returns the correction that follows from points: first the shift that most of them share, then
+/// the least-squares one.
+fn corrected(camera: &RpcCamera, size: (usize, usize), points: &[ControlPoint], order: ModelOrder) -> ImageCorrection {
+    let median = |axis: usize| {
+        let mut all: Vec<f64> = residuals(camera, points).map(|residual| residual[axis]).collect();
+        upper_median(&mut all).unwrap_or(0.0)
+    };
+    let shift = ImageCorrection::translation(median(0), median(1));
+    let near = RpcCamera { rpc: camera.rpc.clone(), correction: camera.correction.then(&shift) };
+    // Matches of something else count with their full error in the first step of the adjustment.
+    let right = |residual: &[f64; 2]| residual[0].hypot(residual[1]) <= 2.0 * AGREES_PX;
+    let chosen = points.iter().zip(residuals(&near, points)).filter(|(_, residual)| right(residual));
+    let chosen: Vec<ControlPoint> = chosen.map(|(point, _)| point.clone()).collect();
+    if chosen.len() < POINTS_MIN {
+        return near.correction;
+    }
+    let adjust = AdjustConfig { max_order: order, prior_px: PRIOR_PX };
+    let observed = Observations { tracks: &[], control: &chosen };
+    let found = adjust_to_control(std::slice::from_ref(&near), &[size], observed, &adjust);
+    found.corrections.first().copied().unwrap_or(near.correction)
+}
+
+/// Iterates over observed minus projected places, pixels; NaN where the camera fails.
+fn residuals<'a>(camera: &'a RpcCamera, points: &'a [ControlPoint]) -> impl Iterator<Item = [f64; 2]> + 'a {
+    points.iter().map(|point| match (point.seen.first(), camera.project(point.ground)) {
+        (Some((_, seen)), Ok(at)) => [seen.sample - at.sample, seen.line - at.line],
+        _ => [f64::NAN; 2],
+    })
+}
+
+/// Returns how far a new correction moves the points at most, pixels.
+fn change(before: &RpcCamera, after: &RpcCamera, points: &[ControlPoint]) -> f64 {
+    let moved = residuals(before, points).zip(residuals(after, points));
+    moved.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
+}
+
+fn judged(
+    model: &Model,
+    new: &NewImage,
+    found: &matching::Found,
+    rounds: usize,
+) -> Result<RegisterReport, RegisterError> {
+    let camera = &new.image.camera;
+    let mut lengths: Vec<f64> = residuals(camera, &found.points).map(|[a, b]| a.hypot(b)).collect();
+    let agreeing: Vec<f64> = lengths.iter().copied().filter(|length| *length <= AGREES_PX).collect();
+    let (agree, count) = (agreeing.len(), lengths.len());
+    if agree < POINTS_MIN || 2 * agree < count {
+        return Err(RegisterError::NoAgreement { agree, found: count });
+    }
+    let info = new.image.source.info();
+    let middle = camera::ImagePoint::new(0.5 * (info.width as f64 - 1.0), 0.5 * (info.height as f64 - 1.0));
+    let moved = camera.correction.apply(middle);
+    let named = |path: &PathBuf, correction: ImageCorrection| RegisteredImage {
+        path: path.canonicalize().unwrap_or_else(|_| path.clone()),
+        applied_correction: Some(correction),
+    };
+    let others: &[(PathBuf, crate::ortho::OrthoImage)] = match &model.looks {
+        Looks::Images(images) => images,
+        Looks::Picture(_) => &[],
+    };
+    let others = others.iter().filter(|(_, image)| image.corrected);
+    let others = others.map(|(path, image)| named(path, image.camera.correction));
+    Ok(RegisterReport {
+        images: std::iter::once(named(&new.path, camera.correction)).chain(others).collect(),
+        tried: found.tried,
+        found: count,
+        agree,
+        rms_px: (agreeing.iter().map(|length| length * length).sum::<f64>() / agree as f64).sqrt(),
+        median_px: upper_median(&mut lengths).unwrap_or(f64::NAN),
+        shift_px: [moved.sample - middle.sample, moved.line - middle.line],
+        gsd_m: new.gsd_m,
+        rounds,
+    })
+}
