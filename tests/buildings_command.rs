@@ -85,7 +85,7 @@ fn what_cannot_be_looked_at_is_refused_with_a_reason() {
     };
     let image = town().join("view_1.tif");
     refused(&folder.path().join("none.tif"), &[], "none.tif");
-    refused(&image, &["--gsd", "-1"], "see --gsd");
+    refused(&image, &["--gsd=-1"], "see --gsd");
     refused(&image, &["--gsd", "30"], "a pixel measures 30 m");
     refused(&image, &["--dsm", "none.tif"], "none.tif");
     refused(&image, &["--corrections", "none"], "--dsm");
