@@ -41,7 +41,7 @@ fn prior_depths_become_the_buildings_again() {
     let out = tempfile::tempdir().unwrap();
     let path = out.path().join("town.ply");
     let model = sample("truth/buildings.city.json").display().to_string();
-    let coarse = ["--depths", &depths(), "--voxel", "0.4", "--masked"];
+    let coarse = ["--depths", &depths(), "--voxel", "1", "--masked"];
     mesh(&[&coarse[..], &["--reference", &model]].concat(), &path)
         .success()
         .stdout(predicate::str::contains("Chamfer"));
@@ -49,7 +49,7 @@ fn prior_depths_become_the_buildings_again() {
     let report: serde_json::Value = serde_json::from_str(&text).unwrap();
     // The cameras see no floors, and not all walls.
     let mean = report["comparison"]["result"]["accuracy"]["mean_m"].as_f64().unwrap();
-    assert!(mean < 0.1, "{mean} m from the mesh to the model");
+    assert!(mean < 0.25, "{mean} m from the mesh to the model");
     assert!(out.path().join("town.report.html").is_file());
     let surface = io::surfaces::read(&path, &city::MeshConfig::default()).unwrap();
     assert_eq!(surface.triangles.len() as u64, report["triangles"].as_u64().unwrap());

@@ -40,7 +40,7 @@ pub(crate) fn triangles(inside: u8) -> Vec<[CubeEdge; 3]> {
             let next = segments.iter().position(|segment| segment.0 == last).expect("segments join to loops");
             last = segments.swap_remove(next).1;
         }
-        out.extend((1..ring.len() - 1).map(|k| [ring[0], ring[k + 1], ring[k]]));
+        out.extend((1..ring.len() - 1).map(|k| [ring[0], ring[k], ring[k + 1]]));
     }
     out
 }
