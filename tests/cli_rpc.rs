@@ -145,7 +145,8 @@ fn convert_replaces_only_when_told_to() {
 fn convert_to_an_unknown_ending_or_folder_writes_nothing() {
     let folder = folder();
     let convert = |out: &str| skysweep(&folder).args(["convert", "a_RPC.TXT", "-o", out]).assert().code(2);
-    convert("b.tif").stderr(predicate::str::contains("--format"));
+    convert("b.xyz").stderr(predicate::str::contains("--format"));
+    convert("b.tif").stderr(predicate::str::contains("not a raster"));
     let told =
         predicate::str::starts_with("error: cannot write the file").and(predicate::str::contains("nowhere/b.json"));
     convert("nowhere/b.json").stderr(told);

@@ -57,7 +57,7 @@ fn prior_depths_become_the_buildings_again() {
     let again = out.path().join("again.ply");
     mesh(&[&coarse[..], &["--threads", "1"]].concat(), &again).success();
     assert!(std::fs::read(&path).unwrap() == std::fs::read(&again).unwrap(), "threads change the mesh");
-    let glb = out.path().join("town.glb");
+    let glb = out.path().join("binary.glb");
     mesh(&coarse, &glb).success();
     assert_eq!(&std::fs::read(&glb).unwrap()[..4], b"glTF");
 }

@@ -9,8 +9,8 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use crate::exception::raise;
 use crate::fault::Fault;
-use crate::raise;
 
 /// Triangles of a city model in a tree for rays.
 #[pyclass(frozen, module = "skysweep._native")]

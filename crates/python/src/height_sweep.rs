@@ -5,8 +5,8 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use raster::Grid;
 
+use crate::exception::raise;
 use crate::fault::Fault;
-use crate::raise;
 use crate::rpc_camera::RpcCore;
 use crate::watch::watched;
 

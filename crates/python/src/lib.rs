@@ -8,27 +8,18 @@
 
 mod catalogue;
 mod city_scene;
+mod exception;
 mod fault;
 mod height_sweep;
 mod rasters;
 mod rpc_camera;
 mod watch;
 
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use serde_json::Value;
 
+use crate::exception::raise;
 use crate::fault::Fault;
-
-/// Makes the exception of an error.
-fn raise(py: Python<'_>, fault: &Fault) -> PyErr {
-    let class =
-        || py.import("skysweep._errors")?.getattr(format!("{:?}Error", fault.kind))?.call1((fault.text.as_str(),));
-    match class() {
-        Ok(exception) => PyErr::from_value(exception),
-        Err(_) => PyRuntimeError::new_err(fault.text.clone()),
-    }
-}
 
 /// Runs the job called `name` with settings as JSON; returns its report as JSON.
 #[pyfunction]

@@ -8,8 +8,8 @@ use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use raster::{GeoTransform, Grid, Window};
 
+use crate::exception::raise;
 use crate::fault::Fault;
-use crate::raise;
 
 /// Most cells that are read at once: those of 4 GB.
 const CELLS_MAX: usize = 1 << 30;

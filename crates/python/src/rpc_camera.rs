@@ -12,8 +12,8 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use crate::exception::raise;
 use crate::fault::Fault;
-use crate::raise;
 
 /// Points from which on the work is shared out over threads.
 const PARALLEL: usize = 1 << 15;

@@ -14,8 +14,8 @@ use std::time::Duration;
 use numeric::{Choice, Progress};
 use pyo3::prelude::*;
 
+use crate::exception::raise;
 use crate::fault::Fault;
-use crate::raise;
 
 /// Time between two looks at signals and steps.
 const POLL: Duration = Duration::from_millis(50);

@@ -14,7 +14,6 @@ use camera::Similarity;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::error::AlignError;
-use super::robust::ModelAlignment;
 use super::umeyama::PointPair;
 
 /// Weight λ of the cameras' own up directions against their right axes.
@@ -97,28 +96,4 @@ pub(super) fn fit_with_up(pairs: &[PointPair], up: &CameraUp, sigma_m: f64) -> R
     let translation = target_mean - scale * (rotation * source_mean);
     let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| rotation[(i, j)]));
     Similarity::new(scale, rows, translation.into()).map_err(|_| degenerate())
-}
-
-/// Returns the standard deviation of the tilt of an alignment, as far as its positions determine
-/// it, degrees: that of the rotation about the worst horizontal axis. Infinite where nothing
-/// determines it.
-pub fn tilt_sigma_deg(pairs: &[PointPair], alignment: &ModelAlignment) -> f64 {
-    let chosen = || pairs.iter().zip(&alignment.inliers).filter(|(_, inlier)| **inlier).map(|(pair, _)| pair);
-    let count = chosen().count() as f64;
-    let place = |p: &PointPair| Vector3::from(alignment.world_from_model.apply(p.source));
-    let mean = chosen().map(place).sum::<Vector3<f64>>() / count;
-    let information: Matrix3<f64> =
-        chosen().map(|p| place(p) - mean).map(|p| Matrix3::identity() * p.norm_squared() - p * p.transpose()).sum();
-    // Seven parameters are fitted to three coordinates of each position.
-    let freedom = 3.0 * count - 7.0;
-    if freedom < 1.0 {
-        return f64::INFINITY;
-    }
-    let squares: f64 =
-        alignment.residuals_m.iter().zip(&alignment.inliers).filter(|(_, i)| **i).map(|(r, _)| r * r).sum();
-    let Some(covariance) = information.try_inverse() else { return f64::INFINITY };
-    let covariance = covariance * (squares / freedom);
-    let (a, b, c) = (covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]);
-    let greatest = 0.5 * (a + c) + (0.25 * (a - c).powi(2) + b * b).sqrt();
-    if greatest.is_finite() { greatest.sqrt().to_degrees() } else { f64::INFINITY }
 }

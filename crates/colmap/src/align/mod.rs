@@ -17,7 +17,7 @@ mod robust;
 mod umeyama;
 
 pub use error::AlignError;
-pub use gravity::{CameraUp, camera_up, tilt_sigma_deg};
+pub use gravity::{CameraUp, camera_up};
 pub use noise::{Disturbance, MeanStd, NoiseConfig, NoiseLevel, disturbed, sensitivity};
-pub use robust::{AlignConfig, ModelAlignment, align, align_upright};
+pub use robust::{AlignConfig, ModelAlignment, align, align_upright, tilt_sigma_deg};
 pub use umeyama::{PointPair, fit_similarity, spread_ratio};

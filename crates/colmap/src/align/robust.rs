@@ -9,6 +9,7 @@
 //! of the length of an isotropic normal vector. It is never less than a centimetre.
 
 use camera::Similarity;
+use nalgebra::{Matrix3, Vector3};
 
 use super::error::AlignError;
 use super::gravity::{CameraUp, fit_with_up};
@@ -238,10 +239,34 @@ fn median_of(residuals: &[f64], inliers: &[bool]) -> f64 {
     upper_median(&mut inside).unwrap_or(0.0)
 }
 
+/// Returns the standard deviation of the tilt of an alignment, as far as its positions determine
+/// it, degrees: that of the rotation about the worst horizontal axis. Infinite where nothing
+/// determines it.
+pub fn tilt_sigma_deg(pairs: &[PointPair], alignment: &ModelAlignment) -> f64 {
+    let chosen = || pairs.iter().zip(&alignment.inliers).filter(|(_, inlier)| **inlier).map(|(pair, _)| pair);
+    let count = chosen().count() as f64;
+    let place = |p: &PointPair| Vector3::from(alignment.world_from_model.apply(p.source));
+    let mean = chosen().map(place).sum::<Vector3<f64>>() / count;
+    let information: Matrix3<f64> =
+        chosen().map(|p| place(p) - mean).map(|p| Matrix3::identity() * p.norm_squared() - p * p.transpose()).sum();
+    // Seven parameters are fitted to three coordinates of each position.
+    let freedom = 3.0 * count - 7.0;
+    if freedom < 1.0 {
+        return f64::INFINITY;
+    }
+    let squares: f64 =
+        alignment.residuals_m.iter().zip(&alignment.inliers).filter(|(_, i)| **i).map(|(r, _)| r * r).sum();
+    let Some(covariance) = information.try_inverse() else { return f64::INFINITY };
+    let covariance = covariance * (squares / freedom);
+    let (a, b, c) = (covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]);
+    let greatest = 0.5 * (a + c) + (0.25 * (a - c).powi(2) + b * b).sqrt();
+    if greatest.is_finite() { greatest.sqrt().to_degrees() } else { f64::INFINITY }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::align::{camera_up, tilt_sigma_deg};
+    use crate::align::camera_up;
     use camera::Pose;
     use proptest::prelude::*;
 

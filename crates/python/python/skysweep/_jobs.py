@@ -1393,7 +1393,7 @@ def render_splats(
             rendered and not compared.
         corrections: Source of the pointing corrections of the images.
             `CorrectionSource::SurfaceRun` takes those that the splats were made with, which lie
-            beside them.
+            beside them, or else those of the run in whose folder they lie.
         threads: Worker threads; one per core when `None`.
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
@@ -1465,6 +1465,7 @@ def align(
     crs_epsg: int | None = None,
     vertical: str = "ellipsoid",
     threshold_m: float | None = None,
+    use_gravity: bool = True,
     seed: int = 1,
     encoding: Literal["binary", "text"] = "binary",
     noise: NoiseConfig | None = None,
@@ -1482,6 +1483,8 @@ def align(
         vertical: Datum of the heights in `positions`.
         threshold_m: Largest residual of an inlier, metres; estimated from the residuals when
             `None`.
+        use_gravity: Whether the up direction of the cameras is up in the world where the positions
+            do not determine the tilt.
         seed: Seed of the random triples.
         encoding: Encoding of the model that is written.
         noise: Noise under which the alignment is repeated; not repeated when `None`.
@@ -1516,10 +1519,12 @@ def split(
         model: Folder of a COLMAP model with its points.
         output: File for the report (JSON); not written when `None`.
         contexts: Number of context views.
-        context_iou: Wanted overlap of each context with the contexts before it, as intersection
-            over union.
-        target_ious: Wanted overlap of each target with the contexts, as intersection over union.
-        first: Name of the first context; the one with the best split when `None`.
+        context_iou: Wanted overlap of each further context with the first one, as intersection over
+            union.
+        target_ious: Wanted average overlap of each target with the contexts, as intersection over
+            union.
+        first: Name of the first context; the first by name of the images that see points when
+            `None`.
         overwrite: Whether an existing `output` may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
@@ -1621,6 +1626,7 @@ def rpc_convert(
     output: PathLike,
     *,
     format: Literal["text", "rpb", "digital-globe-xml", "dimap", "alos", "ossim-geom", "json", "vrt", "aux-xml", "envi-header", "tiff-tag", "gdal-metadata"] | None = None,
+    corrections: PathLike | None = None,
     overwrite: bool = False,
     progress: Progress = None,
 ) -> Report:
@@ -1629,7 +1635,10 @@ def rpc_convert(
     Args:
         file: RPC file, or image with an RPC.
         output: File to write.
-        format: Format to write: text, RPB or JSON. `None` takes it from the ending of `output`.
+        format: Format to write: text, RPB, JSON, or the image again with the RPC in its tag. `None`
+            takes it from the ending of `output`.
+        corrections: Report with the pointing correction of the image, or the folder of a DSM run.
+            The RPC that is written includes it.
         overwrite: Whether an existing `output` may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
