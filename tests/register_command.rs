@@ -105,7 +105,7 @@ fn splats_are_a_model_too() {
     make.arg("splats").arg(town().join("truth/dsm.tif"));
     make.args(["view_1.tif", "view_2.tif"].map(|view| town().join(view))).arg("-o").arg(&splats);
     make.args(["--progress", "none"]).assert().code(0);
-    let mut shift_of = |planted: [f64; 2]| {
+    let shift_of = |planted: [f64; 2]| {
         misplaced(&image, planted);
         let mut command = skysweep();
         command.arg("register").arg(&image).arg("--splats").arg(&splats).arg("-o").arg(&report);

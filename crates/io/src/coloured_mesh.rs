@@ -109,7 +109,7 @@ mod tests {
         write_mesh_ply(&path, &MESH, false).unwrap();
         let read = crate::surfaces::read(&path, &city::MeshConfig::default()).unwrap();
         assert_eq!((read.triangles.len(), read.horizontal_epsg), (1, Some(32631)));
-        assert!(read.positions.iter().any(|p| *p == [690_000.0, 4_820_002.0, 100.5]), "{:?}", read.positions);
+        assert!(read.positions.contains(&[690_000.0, 4_820_002.0, 100.5]), "{:?}", read.positions);
         assert!(write_mesh_ply(&path, &MESH, false).unwrap_err().to_string().contains("exists"));
     }
 

@@ -79,15 +79,10 @@ impl PlacedSurfels {
 
     /// Returns the box around the splats.
     fn bounds(&self) -> [[f64; 3]; 2] {
-        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        for surfel in &self.surfels {
-            for i in 0..3 {
-                let at = f64::from(surfel.position[i]);
-                bounds[0][i] = bounds[0][i].min(at - MARGIN_M);
-                bounds[1][i] = bounds[1][i].max(at + MARGIN_M);
-            }
-        }
-        bounds
+        let along = |axis: usize| self.surfels.iter().map(move |surfel| f64::from(surfel.position[axis]));
+        let low = [0, 1, 2].map(|axis| along(axis).fold(f64::INFINITY, f64::min) - MARGIN_M);
+        let high = [0, 1, 2].map(|axis| along(axis).fold(f64::NEG_INFINITY, f64::max) + MARGIN_M);
+        [low, high]
     }
 
     /// Reads the images that see the splats.
@@ -148,7 +143,7 @@ impl PlacedSurfels {
     /// Returns the view of a surface model from above.
     pub(super) fn above(&self, surface: &MapSurface) -> Option<TrainingView<LatticeView>> {
         let heights = &surface.dem.heights;
-        let camera = self.from_above(&surface.dem.geotransform, [heights.width(), heights.height()])?;
+        let camera = self.view_from_above(&surface.dem.geotransform, [heights.width(), heights.height()])?;
         let depth = |z: &f32| (self.origin.origin[2] - f64::from(*z)) as f32;
         let nothing = || vec![f32::NAN; heights.data().len()];
         Some(TrainingView {
@@ -161,7 +156,7 @@ impl PlacedSurfels {
     }
 
     /// Returns the camera that sees the cells of a grid from above.
-    fn from_above(&self, grid: &GeoTransform, size: [usize; 2]) -> Option<LatticeView> {
+    fn view_from_above(&self, grid: &GeoTransform, size: [usize; 2]) -> Option<LatticeView> {
         let [low, high] = self.bounds();
         let lattice = LatticeBox::new(low, high, f64::INFINITY);
         let [x0, y0, _] = self.origin.origin;
@@ -174,7 +169,7 @@ impl PlacedSurfels {
     /// splats cover a cell by less than half.
     pub(super) fn heights(&self, surfels: &[Surfel], surface: &MapSurface) -> Option<Grid<f32>> {
         let (width, height) = (surface.dem.heights.width(), surface.dem.heights.height());
-        let camera = self.from_above(&surface.dem.geotransform, [width, height])?;
+        let camera = self.view_from_above(&surface.dem.geotransform, [width, height])?;
         let drawing = Drawing::new(surfels, &camera, Registers::Longest);
         let images = drawing.images();
         let value = |cell: usize| {
