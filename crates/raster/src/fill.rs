@@ -20,15 +20,15 @@ pub fn fill_voids(grid: &Grid<f32>) -> Grid<f32> {
     while let Some(last) = levels.last().filter(|last| last.width() * last.height() > 1 && !is_full(last)) {
         levels.push(halved(last));
     }
-    let mut coarse = levels.pop();
-    while let (Some(full), Some(mut fine)) = (coarse.take(), levels.pop()) {
+    let mut filled = levels.pop().unwrap_or_else(|| grid.clone());
+    while let Some(mut fine) = levels.pop() {
         let width = fine.width();
         for (cell, value) in fine.data_mut().iter_mut().enumerate().filter(|(_, value)| value.is_nan()) {
-            *value = full[(cell % width / 2, cell / width / 2)];
+            *value = filled[(cell % width / 2, cell / width / 2)];
         }
-        coarse = Some(fine);
+        filled = fine;
     }
-    coarse.unwrap_or_else(|| grid.clone())
+    filled
 }
 
 /// Returns the means of the known cells of squares of two by two.
