@@ -6,7 +6,7 @@ mod common;
 
 use std::hint::black_box;
 
-use camera::ImagePoint;
+use camera::{ImagePoint, RpcCamera};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use geodesy::LonLatHeight;
 
@@ -32,6 +32,16 @@ fn projection_and_localisation(c: &mut Criterion) {
         let plane = rpc.plane(rpc.height_off);
         group.bench_function(BenchmarkId::new("project on a plane", name), |b| {
             b.iter(|| points.iter().filter(|g| plane.project(black_box(g.lon_deg), g.lat_deg).is_ok()).count());
+        });
+        let camera = RpcCamera::new(rpc.clone());
+        let column = |of: fn(&LonLatHeight) -> f64| points.iter().map(of).collect::<Vec<f64>>();
+        let [lon, lat, height] = [column(|g| g.lon_deg), column(|g| g.lat_deg), column(|g| g.height_m)];
+        let (mut sample, mut line) = (vec![0.0; POINTS], vec![0.0; POINTS]);
+        group.bench_function(BenchmarkId::new("project many", name), |b| {
+            b.iter(|| camera.project_many(black_box([&lon, &lat, &height]), [&mut sample, &mut line]));
+        });
+        group.bench_function(BenchmarkId::new("project many on a plane", name), |b| {
+            b.iter(|| plane.project_many(&camera.correction, black_box([&lon, &lat]), [&mut sample, &mut line]));
         });
         let images: Vec<ImagePoint> = points.iter().filter_map(|&g| rpc.project(g).ok()).collect();
         group.bench_function(BenchmarkId::new("localize", name), |b| {

@@ -38,6 +38,7 @@ impl ImageCorrection {
     }
 
     /// Returns the corrected position of a point that the RPC projected.
+    #[inline(always)]
     pub fn apply(&self, p: ImagePoint) -> ImagePoint {
         let (ds, dl) = (p.sample - self.centre.sample, p.line - self.centre.line);
         let t = self.translation_px;

@@ -6,11 +6,12 @@
 //! metres above the WGS 84 ellipsoid.
 //!
 //! - [`Rpc`] projects and localises, [`RpcPlane`] does so at one height, [`RpcCamera`] adds an
-//!   [`ImageCorrection`].
+//!   [`ImageCorrection`]. [`RpcCamera::project_many`] is for arrays.
 //! - [`RpcFit`] fits an RPC to correspondences or to any camera.
 //! - [`Rpc::validate`] checks that coefficients form a camera. [`Rpc::domain`] is the box in which
 //!   they hold.
 
+mod batch;
 mod camera;
 mod correction;
 mod domain;

@@ -84,6 +84,7 @@ impl RpcPlane {
     }
 
     /// Returns normalised longitude and latitude. The longitude difference is brought into ±180°.
+    #[inline(always)]
     pub(crate) fn normalised(&self, lon_deg: f64, lat_deg: f64) -> [f64; 2] {
         let Self { longitude, latitude, .. } = self;
         [short_way(lon_deg - longitude.off) / longitude.scale, (lat_deg - latitude.off) / latitude.scale]
@@ -118,6 +119,11 @@ impl PlaneSample {
 }
 
 impl AxisScale {
+    /// Returns offset and scale.
+    pub(crate) fn numbers(self) -> [f64; 2] {
+        [self.off, self.scale]
+    }
+
     #[inline]
     fn value(self, normalised: f64) -> f64 {
         self.off + self.scale * normalised

@@ -3,6 +3,7 @@
 //! Arrays are flat, contiguous and f64; the Python side brings them there. A point without an image
 //! or ground position becomes NaN: it is a value, not an error.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use camera::{Correspondence, ImagePoint, Rpc, RpcCamera, RpcFit};
@@ -31,14 +32,9 @@ fn json_error(error: &serde_json::Error) -> Fault {
     Fault::setting(error.to_string())
 }
 
-/// Applies `one` to all points; both results are NaN where it gives none.
-fn columns(count: usize, one: impl Fn(usize) -> Option<[f64; 2]> + Sync) -> (Vec<f64>, Vec<f64>) {
-    let (mut first, mut second) = (vec![f64::NAN; count], vec![f64::NAN; count]);
-    let fill = |start: usize, first: &mut [f64], second: &mut [f64]| {
-        for (i, (a, b)) in first.iter_mut().zip(second).enumerate() {
-            [*a, *b] = one(start + i).unwrap_or([f64::NAN; 2]);
-        }
-    };
+/// Lets `fill` write two columns of `count` numbers, by parts that start at its first argument.
+fn columns(count: usize, fill: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) -> (Vec<f64>, Vec<f64>) {
+    let (mut first, mut second) = (vec![0.0; count], vec![0.0; count]);
     if count < PARALLEL {
         fill(0, &mut first, &mut second);
     } else {
@@ -46,6 +42,14 @@ fn columns(count: usize, one: impl Fn(usize) -> Option<[f64; 2]> + Sync) -> (Vec
         parts.for_each(|(part, (first, second))| fill(part * PARALLEL, first, second));
     }
     (first, second)
+}
+
+/// A part of the numbers of the points, or so many times the one of all of them.
+fn part(values: &[f64], start: usize, count: usize) -> Cow<'_, [f64]> {
+    match values {
+        [only] => Cow::Owned(vec![*only; count]),
+        _ => Cow::Borrowed(&values[start..start + count]),
+    }
 }
 
 /// A number for each point, or one for all of them.
@@ -118,21 +122,18 @@ impl RpcCore {
         let count = lon.len().max(lat.len()).max(height.len());
         let count = if [lon, lat, height].iter().any(|values| values.is_empty()) { 0 } else { count };
         let camera = &self.camera;
-        let (sample, line) = py.detach(|| match height {
+        let (sample, line) = py.detach(|| {
             // The polynomials of one height have half as many terms.
-            [height_m] => {
-                let plane = camera.rpc.plane(*height_m);
-                columns(count, |i| {
-                    let point = plane.project(at(lon, i), at(lat, i)).ok()?;
-                    let ImagePoint { sample, line } = camera.correction.apply(point);
-                    Some([sample, line])
-                })
-            }
-            _ => columns(count, |i| {
-                let ground = LonLatHeight { lon_deg: at(lon, i), lat_deg: at(lat, i), height_m: height[i] };
-                let ImagePoint { sample, line } = camera.project(ground).ok()?;
-                Some([sample, line])
-            }),
+            let plane = if let [height_m] = height { Some(camera.rpc.plane(*height_m)) } else { None };
+            columns(count, |start, sample, line| {
+                let [lon, lat] = [lon, lat].map(|values| part(values, start, sample.len()));
+                if let Some(plane) = &plane {
+                    plane.project_many(&camera.correction, [&lon, &lat], [sample, line]);
+                } else {
+                    let height = &height[start..start + sample.len()];
+                    camera.project_many([&lon, &lat, height], [sample, line]);
+                }
+            })
         });
         Ok((sample.into_pyarray(py), line.into_pyarray(py)))
     }
@@ -150,9 +151,12 @@ impl RpcCore {
         let count = if [sample, line, height].iter().any(|values| values.is_empty()) { 0 } else { count };
         let camera = &self.camera;
         let (lon, lat) = py.detach(|| {
-            columns(count, |i| {
-                let ground = camera.localize(ImagePoint::new(at(sample, i), at(line, i)), at(height, i)).ok()?;
-                Some([ground.lon_deg, ground.lat_deg])
+            columns(count, |start, lon, lat| {
+                for (i, (lon, lat)) in lon.iter_mut().zip(lat).enumerate() {
+                    let [sample, line, height] = [sample, line, height].map(|values| at(values, start + i));
+                    let ground = camera.localize(ImagePoint::new(sample, line), height);
+                    [*lon, *lat] = ground.map_or([f64::NAN; 2], |g| [g.lon_deg, g.lat_deg]);
+                }
             })
         });
         Ok((lon.into_pyarray(py), lat.into_pyarray(py)))

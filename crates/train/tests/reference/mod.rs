@@ -2,7 +2,14 @@
 //!
 //! Where the image jumps with the parameters (the cutoff, the change to the least footprint, the
 //! greatest opacity, the order of depths), a pixel close to the jump is marked as unsure. Neither
-//! rounding nor differences can be judged there.
+//! rounding nor differences can be judged there. So is a pixel at a surfel that is almost seen from
+//! the edge, where the rounding of the pixel to f32 moves the point of its plane too far.
+
+/// Rounding of a pixel coordinate of a tile of 16 pixels to f32.
+const PIXEL_ROUNDING: f64 = 16.0 / (1 << 24) as f64;
+/// Move of the point of a plane that is too far, in standard deviations: with slopes that are
+/// judged to 1e-4 it is a fifth of that.
+const TOO_FAR: f64 = 2e-5;
 
 /// The parameters of a surfel in the order of `Surfel::to_array`.
 pub(crate) type Parameters = [f64; 13];
@@ -97,19 +104,33 @@ fn hit(eye: &Eye, surfel: &Parameters, pixel: [f64; 2]) -> (Option<Hit>, bool) {
     if facing.abs() < 0.02 {
         return (None, facing.abs() > 0.019);
     }
-    let (from, direction) = ray(eye, pixel);
-    let away = [0, 1, 2].map(|i| centre[i] - from[i]);
-    let t = dot(n, away) / dot(n, direction);
-    let met = [0, 1, 2].map(|i| from[i] + t * direction[i]);
-    let offset = [0, 1, 2].map(|i| met[i] - centre[i]);
-    let in_plane = (dot(offset, tu) / p[7].exp()).powi(2) + (dot(offset, tv) / p[8].exp()).powi(2);
+    // The point of the plane, and its place there in standard deviations.
+    let meet = |pixel: [f64; 2]| {
+        let (from, direction) = ray(eye, pixel);
+        let away = [0, 1, 2].map(|i| centre[i] - from[i]);
+        let t = dot(n, away) / dot(n, direction);
+        let met = [0, 1, 2].map(|i| from[i] + t * direction[i]);
+        let offset = [0, 1, 2].map(|i| met[i] - centre[i]);
+        (met, [dot(offset, tu) / p[7].exp(), dot(offset, tv) / p[8].exp()])
+    };
+    let (met, [u, v]) = meet(pixel);
+    let in_plane = u * u + v * v;
     let in_image = 2.0 * ((pixel[0] - at[0]).powi(2) + (pixel[1] - at[1]).powi(2));
     let met_depth = project(eye, met).1;
     let ratio = if perspective { depth / met_depth } else { 1.0 };
     let on_plane = in_plane <= in_image && ratio >= 0.05;
     let rho = if on_plane { in_plane } else { in_image };
     let alpha = opacity * (-rho / 2.0).exp();
+    let rounded = || {
+        (0..2).any(|i| {
+            let mut beside = pixel;
+            beside[i] += PIXEL_ROUNDING;
+            let [u_beside, v_beside] = meet(beside).1;
+            (u_beside - u).hypot(v_beside - v) > TOO_FAR
+        })
+    };
     let unsure = facing.abs() < 0.021
+        || rho <= cutoff + 0.1 && on_plane && rounded()
         || (rho - cutoff).abs() < 1e-2
         || rho <= cutoff + 0.1
             && ((in_plane - in_image).abs() < 1e-2 || (ratio - 0.05).abs() < 1e-2 || (alpha - 0.99).abs() < 1e-3);
