@@ -188,6 +188,20 @@ fn a_surfel_beside_the_camera_covers_what_its_plane_covers() {
 }
 
 #[test]
+fn gradients_hold_for_a_thin_surfel_that_is_almost_seen_from_the_edge() {
+    // The line of sight of the pinhole meets its plane at 1.7 degrees.
+    let needle = Surfel {
+        position: [1.3768001, -0.6684, 5.5355997],
+        rotation: [0.566, -0.38779998, 0.6428, 0.56939995],
+        log_scale: [-2.9016, -0.22110009],
+        opacity_logit: 1.9014001,
+        colour: [0.348, 0.6344, 0.6095],
+    };
+    let (camera, eye) = pinhole();
+    check_gradients(&[needle], &camera, &eye).expect("the gradients agree");
+}
+
+#[test]
 fn nothing_is_drawn_of_nothing() {
     let (camera, _) = pinhole();
     let empty = Drawing::new(&[], &camera, Registers::Longest);
