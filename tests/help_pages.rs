@@ -27,7 +27,7 @@ fn manual_pages_describe_a_command_and_its_subcommands() {
 }
 
 /// Commands with options, as words of the command line.
-const COMMANDS: [&[&str]; 33] = [
+const COMMANDS: [&[&str]; 34] = [
     &["align"],
     &["batch"],
     &["buildings"],
@@ -59,6 +59,7 @@ const COMMANDS: [&[&str]; 33] = [
     &["train"],
     &["split"],
     &["template"],
+    &["tiles"],
     &["view"],
     &["completions"],
 ];
@@ -111,7 +112,7 @@ fn one_option_has_one_meaning() {
         COMMANDS.iter().filter(has).map(|command| command.join(" ")).collect()
     };
     assert_eq!(with("--vertical"), ["dsm", "plan"]);
-    assert_eq!(with("--crs"), ["align", "dsm", "heightmap", "plan"]);
+    assert_eq!(with("--crs"), ["align", "dsm", "heightmap", "plan", "tiles"]);
     assert_eq!(with("--dsm-vertical"), ["buildings", "ortho", "register", "splats"]);
     for (command, old) in [("splats", "--vertical"), ("groundview", "--vertical"), ("align", "--vertical")] {
         let told = Command::cargo_bin("skysweep").unwrap().args([command, old, "none"]).assert().code(2);

@@ -87,7 +87,7 @@ struct UnprojectArgs {
 #[command(mut_arg("overwrite", |arg| {
     arg.help("Replace maps that exist; without it a list goes on where an earlier run was stopped")
 }))]
-struct MakeArgs {
+pub(crate) struct MakeArgs {
     #[command(flatten)]
     stand: StandArgs,
     /// Pixels along each side.
@@ -134,7 +134,7 @@ struct MakeArgs {
     #[arg(long, conflicts_with = "no_preview")]
     previews: bool,
     #[command(flatten)]
-    run: RunOptions,
+    pub(crate) run: RunOptions,
 }
 
 /// Runs `skysweep heightmap`.
@@ -157,7 +157,8 @@ fn make(args: &MakeArgs, source: &Path, output: &Path, global: Global) -> anyhow
     Ok(if failed.is_empty() { Outcome::Complete } else { Outcome::Partial(what()) })
 }
 
-fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<HeightMapConfig> {
+/// Returns the configuration of maps.
+pub(crate) fn config(args: &MakeArgs, source: &Path, output: &Path) -> anyhow::Result<HeightMapConfig> {
     let Some(stand) = args.stand.config() else {
         bail!("no position: give --center LON LAT, --camera FILE or --positions FILE");
     };
@@ -200,7 +201,13 @@ fn unproject(args: &UnprojectArgs, global: Global) -> anyhow::Result<Outcome> {
 
 /// Adds the option that helps with an error.
 fn hinted(error: HeightMapJobError) -> anyhow::Error {
-    let hint = match &error {
+    let hint = hint(&error);
+    with_hint(error, hint)
+}
+
+/// Returns the option that helps with an error.
+pub(crate) fn hint(error: &HeightMapJobError) -> Option<&'static str> {
+    match error {
         HeightMapJobError::OtherMap { .. } => Some(OVERWRITE),
         HeightMapJobError::NoCrs { .. } => Some("give --source-crs"),
         HeightMapJobError::City(CitySurfaceError::NoSurface { .. }) => Some("skysweep city info tells why"),
@@ -216,6 +223,5 @@ fn hinted(error: HeightMapJobError) -> anyhow::Error {
         },
         HeightMapJobError::MirroredAxes => Some("give --frame world"),
         _ => None,
-    };
-    with_hint(error, hint)
+    }
 }

@@ -34,6 +34,7 @@ mod simulate;
 mod splats;
 mod split;
 mod stand;
+mod tiles;
 mod train;
 mod view;
 
@@ -111,6 +112,8 @@ enum Command {
     Split(split::Args),
     /// Print a commented job file.
     Template(production::TemplateArgs),
+    /// Make training tiles around cameras: height map, ortho and cameras in one folder each.
+    Tiles(Box<tiles::Args>),
     /// Show a run or rasters in the browser: layers, profiles, 3D.
     View(view::Args),
 }
@@ -165,6 +168,7 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Splats(args) => splats::run(args, cli.global),
         Command::Train(args) => train::run(args, cli.global),
         Command::Split(args) => split::run(args, cli.global),
+        Command::Tiles(args) => tiles::run(args, cli.global),
         Command::Template(args) => production::template(args),
         Command::View(args) => view::run(args, cli.global),
     }

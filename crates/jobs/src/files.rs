@@ -156,6 +156,11 @@ pub(crate) fn remove(path: &Path) -> Result<(), FileError> {
     }
 }
 
+/// Moves a file to another name on the same file system.
+pub(crate) fn move_to(from: &Path, to: &Path) -> Result<(), FileError> {
+    fs::rename(from, to).map_err(|source| FileError::Move { path: to.to_owned(), source })
+}
+
 /// Reads a text file.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
     io::read_regular_text(path, TEXT_LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })

@@ -13,7 +13,7 @@
 use std::path::Path;
 
 use camera::Rpc;
-use crs::Crs;
+use crs::{Crs, VerticalDatum};
 use gdal::raster::{ColorInterpretation, RasterCreationOptions};
 use gdal::spatial_ref::SpatialRef;
 use gdal::{Dataset, DriverManager, Metadata};
@@ -42,13 +42,47 @@ pub enum Sampling {
     Nearest,
 }
 
+/// CRS of a COG.
+#[derive(Debug, Clone, Copy)]
+pub enum CogCrs<'a> {
+    /// By codes.
+    Codes(Crs),
+    /// Horizontal, as WKT, for maps without a code. Heights are above the ellipsoid.
+    Wkt(&'a str),
+}
+
+impl From<Crs> for CogCrs<'_> {
+    fn from(crs: Crs) -> Self {
+        Self::Codes(crs)
+    }
+}
+
+impl CogCrs<'_> {
+    /// Returns the vertical datum.
+    pub(super) fn vertical(&self) -> VerticalDatum {
+        match self {
+            Self::Codes(crs) => crs.vertical,
+            Self::Wkt(_) => VerticalDatum::Ellipsoid,
+        }
+    }
+
+    /// Returns the definition for GDAL, with the vertical part for heights.
+    fn definition(&self, holds_heights: bool) -> String {
+        match self {
+            Self::Codes(crs) if holds_heights => crs.to_string(),
+            Self::Codes(crs) => crs.horizontal_definition(),
+            Self::Wkt(wkt) => (*wkt).to_owned(),
+        }
+    }
+}
+
 /// Position, CRS and metadata of a COG.
 #[derive(Debug, Clone, Copy)]
 pub struct CogPlace<'a> {
     /// Position of the grid.
     pub geotransform: GeoTransform,
     /// Horizontal CRS and vertical datum.
-    pub crs: Crs,
+    pub crs: CogCrs<'a>,
     /// Whether the cells are heights. The vertical datum is written for heights only: it would give
     /// counts and shares the unit metre. Heights are given in metres, and written in the unit of
     /// the vertical CRS.
@@ -69,7 +103,7 @@ pub struct CogRaster<'a> {
     /// Position of the grid.
     pub geotransform: GeoTransform,
     /// Horizontal CRS and vertical datum.
-    pub crs: Crs,
+    pub crs: CogCrs<'a>,
     /// Whether the cells are heights, as in [`CogPlace`].
     pub holds_heights: bool,
     /// Bands that show red, green and blue, counted from 1, where the raster is a colour picture.
@@ -92,14 +126,14 @@ impl<'a> CogRaster<'a> {
     /// A raster of heights, or of a vertical datum without meaning (ellipsoid), with the defaults:
     /// no-data −32768 and averaged overviews for float bands, nearest overviews for others, one
     /// thread.
-    pub fn new(bands: &'a [Band<'a>], geotransform: GeoTransform, crs: Crs) -> Self {
+    pub fn new(bands: &'a [Band<'a>], geotransform: GeoTransform, crs: impl Into<CogCrs<'a>>) -> Self {
         let float = Band::first_is_float(bands);
         let no_data = float.then_some(f64::from(NO_DATA));
         let overviews = if float { Sampling::Average } else { Sampling::Nearest };
         Self {
             bands,
             geotransform,
-            crs,
+            crs: crs.into(),
             holds_heights: true,
             colours: None,
             alpha: None,
@@ -139,11 +173,13 @@ impl<'a> CogRaster<'a> {
 /// - [`RasterError::Crs`] for a code that PROJ does not know.
 pub fn write_cog(path: impl AsRef<Path>, raster: &CogRaster<'_>, overwrite: bool) -> Result<(), RasterError> {
     let path = path.as_ref();
-    raster.crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
+    if let CogCrs::Codes(crs) = raster.crs {
+        crs.wkt().map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;
+    }
     write_path(path, overwrite, |made| {
         let mut memory = in_memory(path, raster.bands, raster.no_data)?;
         if raster.holds_heights {
-            to_vertical_unit(&memory, raster.crs.vertical).map_err(|reason| RasterError::unwritable(path, reason))?;
+            to_vertical_unit(&memory, raster.crs.vertical()).map_err(|reason| RasterError::unwritable(path, reason))?;
         }
         // Overviews leave out what the alpha band marks, so it is named first.
         set_colours(&memory, raster).map_err(|reason| RasterError::unwritable(path, reason))?;
@@ -203,11 +239,11 @@ pub(super) fn finish_cog(
         ("NUM_THREADS", threads.as_str()),
     ];
     with_gdal(|| {
-        let crs = if place.holds_heights { place.crs.to_string() } else { place.crs.horizontal_definition() };
+        let crs = place.crs.definition(place.holds_heights);
         dataset.set_spatial_ref(&SpatialRef::from_definition(&crs)?)?;
         dataset.set_geo_transform(&place.geotransform.0)?;
         if place.holds_heights {
-            dataset.set_metadata_item(VERTICAL_DATUM, &place.crs.vertical.to_string(), "")?;
+            dataset.set_metadata_item(VERTICAL_DATUM, &place.crs.vertical().to_string(), "")?;
         }
         for (key, value) in place.provenance.map(Provenance::items).unwrap_or_default() {
             dataset.set_metadata_item(key, &value, "")?;

@@ -156,7 +156,7 @@ impl RasterSpool {
         let sampling = if self.is_float { Sampling::Average } else { Sampling::Nearest };
         write_path(path, overwrite, |made| {
             let in_unit =
-                if place.holds_heights { to_vertical_unit(&self.dataset, place.crs.vertical) } else { Ok(()) };
+                if place.holds_heights { to_vertical_unit(&self.dataset, place.crs.vertical()) } else { Ok(()) };
             let finished = in_unit.and_then(|()| finish_cog(&mut self.dataset, place, sampling, made));
             finished.map_err(|reason| RasterError::unwritable(path, reason))
         })?;
@@ -226,7 +226,14 @@ mod tests {
         assert!(spool.put((0, 0), BandData::U8(&Grid::filled(2, 2, 1))).is_err());
         assert!(spool.put((699, 0), BandData::F32(&Grid::filled(2, 2, 1.0))).is_err());
         let (a, b) = (folder.path().join("a.tif"), folder.path().join("b.tif"));
-        let place = CogPlace { geotransform, crs, holds_heights: true, provenance: None, metadata: &[], threads: 1 };
+        let place = CogPlace {
+            geotransform,
+            crs: crs.into(),
+            holds_heights: true,
+            provenance: None,
+            metadata: &[],
+            threads: 1,
+        };
         spool.into_cog(&a, place, false).unwrap();
         assert!(!folder.path().join("s.tif").exists());
         let bands = [Band { description: "height_m", data: BandData::F32(&whole) }];

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_image_with_rpc, write_map};
 use numeric::Progress;
 use raster::{GeoTransform, Grid, NO_DATA};
@@ -12,6 +11,7 @@ use super::error::BuildingMapError;
 use super::input::{Input, Place};
 use crate::corrections::{CorrectionSource, Corrections};
 use crate::files::FileError;
+use crate::map_crs::MapCrs;
 use crate::ortho::{self, OrthoConfig};
 use crate::run_folder::surface_file;
 use crate::threads;
@@ -25,7 +25,7 @@ const CORRECTION: &str = "correction.json";
 pub(super) struct Placed {
     pub(super) index: Grid<f32>,
     /// Geotransform and CRS of the surface model that it lies on.
-    map: Option<(GeoTransform, Crs)>,
+    map: Option<(GeoTransform, MapCrs)>,
 }
 
 impl Placed {
@@ -57,23 +57,23 @@ impl Placed {
         let mut found = read_dem(&on_ground)?;
         // Interpolation overshoots at steps.
         found.heights.data_mut().iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
-        let horizontal =
-            found.horizontal_epsg.ok_or_else(|| ortho::OrthoError::NoEpsg { path: surface_file(surface) })?;
-        Ok(Self { index: found.heights, map: Some((found.geotransform, Crs::ellipsoidal(horizontal))) })
+        let map = MapCrs::of(&found).ok_or_else(|| ortho::OrthoError::NoCrs { path: surface_file(surface) })?;
+        Ok(Self { index: found.heights, map: Some((found.geotransform, map)) })
     }
 
     /// Writes the index.
     pub(super) fn write(&self, config: &BuildingMapConfig, input: &Input) -> Result<(), BuildingMapError> {
         let bands = [Band { description: BAND, data: BandData::F32(&self.index) }];
         let (path, overwrite, no_data) = (&config.output, config.overwrite, Some(f64::from(NO_DATA)));
-        let on_map = |geotransform, crs| {
-            let plain = CogRaster::new(&bands, geotransform, crs);
+        let on_map = |geotransform: &GeoTransform, crs| {
+            let plain = CogRaster::new(&bands, *geotransform, crs);
             let threads = threads::count(config.threads);
             let raster = CogRaster { threads, holds_heights: false, provenance: Some(&input.provenance), ..plain };
             write_cog(path, &raster, overwrite)
         };
         match (&self.map, &input.place) {
-            (Some((geotransform, crs)), _) | (None, Place::Map(geotransform, crs)) => on_map(*geotransform, *crs),
+            (Some((geotransform, map)), _) => on_map(geotransform, map.ellipsoidal()),
+            (None, Place::Map(geotransform, crs)) => on_map(geotransform, (*crs).into()),
             (None, Place::Rpc(rpc)) => write_image_with_rpc(path, &bands, rpc, no_data, overwrite),
             (None, Place::Unknown) => {
                 let items = input.provenance.items();

@@ -307,8 +307,14 @@ impl<'a> ChunkedOutput<'a> {
         for ((name, _), spool) in BANDS.iter().zip(spools) {
             let holds_heights = *name == HEIGHTS;
             let threads = rayon::current_num_threads();
-            let place =
-                CogPlace { geotransform, crs, holds_heights, provenance: Some(&provenance), metadata: &[], threads };
+            let place = CogPlace {
+                geotransform,
+                crs: crs.into(),
+                holds_heights,
+                provenance: Some(&provenance),
+                metadata: &[],
+                threads,
+            };
             spool.into_cog(folder.dsm().join(name), place, false)?;
         }
         write_texts(&folder, config, report)?;

@@ -15,6 +15,7 @@ mod settings;
 mod source;
 mod source_map;
 mod tags;
+mod tile_maker;
 mod unproject;
 mod unproject_config;
 mod vector_source;
@@ -26,3 +27,5 @@ pub use run::run;
 pub use tags::HeightMapTags;
 pub use unproject::unproject;
 pub use unproject_config::{PointAxes, UnprojectConfig, UnprojectReport};
+
+pub(crate) use tile_maker::TileMaker;

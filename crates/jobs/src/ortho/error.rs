@@ -19,9 +19,9 @@ pub enum OrthoError {
     /// A satellite image cannot be read with its camera.
     #[error(transparent)]
     Image(#[from] ImageInputError),
-    /// The surface model's coordinate reference system has no EPSG code.
-    #[error("the surface model's coordinate system has no EPSG code: {}", path.display())]
-    NoEpsg {
+    /// The surface model names no coordinate reference system.
+    #[error("the surface model has no coordinate reference system: {}", path.display())]
+    NoCrs {
         /// The surface model.
         path: PathBuf,
     },

@@ -6,7 +6,7 @@ use camera::{ImageCorrection, RpcCamera};
 use crs::{HeightConverter, MapProjection, VerticalDatum};
 use io::raster::{Dem, ImageSource, read_dem};
 use occlusion::{Eyeline, GridGround};
-use raster::GeoTransform;
+use raster::{GeoTransform, Window};
 
 use numeric::Progress;
 
@@ -14,6 +14,7 @@ use super::config::OrthoConfig;
 use super::error::OrthoError;
 use crate::corrections::Corrections;
 use crate::error::SettingError;
+use crate::map_crs::MapCrs;
 
 /// Most cells of all bands of an ortho: they are held in memory as f32.
 const CELLS_MAX: usize = 1 << 28;
@@ -24,8 +25,8 @@ pub(super) struct OrthoInputs {
     pub(super) dsm: Dem,
     /// Side of the cells of the surface model, metres.
     pub(super) cell_m: f64,
-    /// EPSG code of its map.
-    pub(super) epsg: u32,
+    /// Its map.
+    pub(super) map: MapCrs,
     pub(super) images: Vec<OrthoImage>,
     pub(super) grid: OrthoGrid,
 }
@@ -51,12 +52,18 @@ pub(super) struct OrthoGrid {
 }
 
 impl OrthoInputs {
-    /// Opens all inputs of a configuration.
-    pub(super) fn open(config: &OrthoConfig, progress: &dyn Progress) -> Result<Self, OrthoError> {
+    /// Opens all inputs of a configuration. `window` are the cells of the surface model that the
+    /// ortho has, in place of what the configuration says.
+    pub(super) fn open(
+        config: &OrthoConfig,
+        window: Option<Window>,
+        corrections: &Corrections,
+        progress: &dyn Progress,
+    ) -> Result<Self, OrthoError> {
         let path = config.surface_file();
         let mut dsm = read_dem(&path)?;
-        let epsg = dsm.horizontal_epsg.ok_or_else(|| OrthoError::NoEpsg { path: path.clone() })?;
-        let projection = MapProjection::from_epsg(epsg)?;
+        let map = MapCrs::of(&dsm).ok_or_else(|| OrthoError::NoCrs { path: path.clone() })?;
+        let projection = map.projection()?;
         let metres = projection.metres_per_unit().ok_or_else(|| OrthoError::InDegrees { path: path.clone() })?;
         let (along_columns, along_rows) = dsm.geotransform.cell_size();
         let cell_m = metres * (along_columns * along_rows).sqrt();
@@ -66,9 +73,11 @@ impl OrthoInputs {
             return Err(OrthoError::NoHeights { path });
         }
         let middle_m = known.iter().sum::<f64>() / known.len() as f64;
-        let grid = OrthoGrid::new(config, &dsm, &projection)?;
-        let corrections = Corrections::for_surface(&config.surface, &config.corrections)?;
-        let scene = Scene { dsm: &dsm, projection: &projection, middle_m, corrections: &corrections };
+        let grid = match window {
+            Some(window) => OrthoGrid::within(&dsm, window, &projection)?,
+            None => OrthoGrid::new(config, &dsm, &projection)?,
+        };
+        let scene = Scene { dsm: &dsm, projection: &projection, middle_m, corrections };
         let open = |path| OrthoImage::open(path, &scene, progress);
         let images = config.images.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
         let bands = images.first().map_or(0, |image| image.source.info().bands);
@@ -80,7 +89,7 @@ impl OrthoInputs {
         if cells.saturating_mul(bands) > CELLS_MAX {
             return Err(OrthoError::TooLarge { width: grid.width, height: grid.height, bands });
         }
-        Ok(Self { dsm, cell_m, epsg, images, grid })
+        Ok(Self { dsm, cell_m, map, images, grid })
     }
 }
 
@@ -129,6 +138,14 @@ impl OrthoImage {
 }
 
 impl OrthoGrid {
+    /// A window of the cells of the surface model.
+    fn within(dsm: &Dem, window: Window, projection: &MapProjection) -> Result<Self, OrthoError> {
+        let geotransform = dsm.geotransform.shifted(window.x as f64, window.y as f64);
+        let (width, height) = (window.width, window.height);
+        let ground = GridGround::new(projection, &geotransform, (width, height))?;
+        Ok(Self { geotransform, width, height, ground, is_dsm: false })
+    }
+
     fn new(config: &OrthoConfig, dsm: &Dem, projection: &MapProjection) -> Result<Self, OrthoError> {
         let (width, height) = (dsm.heights.width(), dsm.heights.height());
         if config.cell_m.is_none() && config.bounds.is_none() {

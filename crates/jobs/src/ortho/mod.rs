@@ -24,4 +24,5 @@ pub use run::run;
 pub use states::OrthoCounts;
 
 pub(crate) use inputs::OrthoImage;
+pub(crate) use run::run_in_window;
 pub(crate) use view::{Cell, look};

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, LumaRule, Provenance, SampleType, iso_time, write_cog};
 use ortho::Balance;
 use raster::Grid;
@@ -68,7 +67,6 @@ pub struct OrthoPart {
 
 /// Writes the mask, then the ortho.
 pub(super) fn write(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho) -> Result<OrthoReport, OrthoError> {
-    let crs = Crs::ellipsoidal(inputs.epsg);
     let threads = threads::count(config.threads);
     let mask = config.mask();
     let mask_bands = [
@@ -76,7 +74,7 @@ pub(super) fn write(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho) ->
         Band { description: "image_from_1", data: BandData::U8(&made.view) },
     ];
     let provenance = provenance(inputs);
-    let plain = CogRaster::new(&mask_bands, inputs.grid.geotransform, crs);
+    let plain = CogRaster::new(&mask_bands, inputs.grid.geotransform, inputs.map.ellipsoidal());
     let raster = CogRaster { threads, holds_heights: false, provenance: Some(&provenance), ..plain };
     write_cog(&mask, &raster, config.overwrite).map_err(FileError::from)?;
     let colours = colours(inputs);
@@ -129,7 +127,7 @@ impl OrthoWriter<'_> {
         let bands: Vec<Band<'_>> =
             (self.names.iter().zip(&grids)).map(|(description, grid)| Band { description, data: data(grid) }).collect();
         let provenance = provenance(self.inputs);
-        let plain = CogRaster::new(&bands, self.inputs.grid.geotransform, Crs::ellipsoidal(self.inputs.epsg));
+        let plain = CogRaster::new(&bands, self.inputs.grid.geotransform, self.inputs.map.ellipsoidal());
         let raster = CogRaster {
             no_data: self.colours.is_none().then_some(f64::from(no_data)),
             threads: self.threads,
