@@ -92,7 +92,11 @@ fn a_tile_has_height_map_ortho_and_cameras_on_the_same_pixels() {
     // edge.
     assert!(hidden > 1000 && both as f64 > 0.8 * hidden as f64, "{both} of {hidden} hidden cells are found");
     let correlation = correlation(&pairs);
-    assert!(pairs.len() as f64 > 0.9 * (cells - hidden) as f64 && correlation > 0.97, "{} cells, correlation {correlation}", pairs.len());
+    assert!(
+        pairs.len() as f64 > 0.9 * (cells - hidden) as f64 && correlation > 0.97,
+        "{} cells, correlation {correlation}",
+        pairs.len()
+    );
 }
 
 fn correlation(pairs: &[(f64, f64)]) -> f64 {

@@ -10,17 +10,20 @@
 //! - [`splat_of_block`] makes the Gaussian: centre on the plane, tangents along the block, normal
 //!   of the plane.
 //! - [`render`] composites splats front to back through any [`SplatCamera`]: RPC, perspective, or
-//!   straight from above.
+//!   straight from above. Splats of one surface are mixed, whichever of them is in front.
 //! - [`fit_colours`] finds the colours that render back to the images, robustly and over all views
 //!   that see a splat.
 //! - [`make_splats`] does all of this and measures the result. [`picture_splats`] does it for a
 //!   picture on the grid of the surface.
 
+mod affine;
 mod block;
 mod camera;
+mod central;
 mod colour;
 mod division;
 mod gaussian;
+mod hits;
 mod overhang;
 mod pass;
 mod picture;
@@ -31,7 +34,7 @@ mod sight;
 mod surface;
 
 pub use block::{Plane, SplatBlock};
-pub use camera::{LensSplatCamera, MapSplatCamera, Projection, RpcSplatCamera, SplatCamera};
+pub use camera::{AffineCamera, LensSplatCamera, MapSplatCamera, Projection, RpcSplatCamera, Sight, SplatCamera};
 pub use colour::{ColourFit, FitView, fit_colours};
 pub use division::{DivisionConfig, divide, uniform};
 pub use gaussian::{GaussianConfig, splat_of_block};

@@ -1,4 +1,4 @@
-//! Rendering of splats: C = Σ cᵢ wᵢ with wᵢ = αᵢ Πⱼ₍ᵢ₎ (1 − αⱼ), front to back.
+//! Rendering of splats: C = Σ cᵢ wᵢ, front to back; the weights wᵢ are those of `hits`.
 //!
 //! The heights of a pixel are the heights of the splats' planes on its ray: their mean by weight,
 //! and their median, where the accumulated weight passes one half (as surfaces are read out of
@@ -22,6 +22,9 @@ pub struct Rendering {
     pub mean_height_m: Grid<f32>,
     /// Local height at half of the weight, metres; NaN where less than half is covered.
     pub median_height_m: Grid<f32>,
+    /// Depth at half of the weight, metres, as the camera counts it; NaN where less than half is
+    /// covered.
+    pub median_depth_m: Grid<f32>,
 }
 
 /// Renders splats through a camera.
@@ -40,6 +43,7 @@ pub(super) fn render_arranged(splats: &[Splat], arrangement: &Arrangement) -> Re
         coverage: Grid::filled(width, height, 0.0),
         mean_height_m: Grid::filled(width, height, f32::NAN),
         median_height_m: Grid::filled(width, height, f32::NAN),
+        median_depth_m: Grid::filled(width, height, f32::NAN),
     };
     for (column, row, pixel) in tiles.into_iter().flatten() {
         rendering.colour[(column, row)] = pixel.colour;
@@ -47,7 +51,7 @@ pub(super) fn render_arranged(splats: &[Splat], arrangement: &Arrangement) -> Re
         if pixel.coverage > 0.0 {
             rendering.mean_height_m[(column, row)] = pixel.height / pixel.coverage;
         }
-        rendering.median_height_m[(column, row)] = pixel.median;
+        [rendering.median_height_m[(column, row)], rendering.median_depth_m[(column, row)]] = pixel.median;
     }
     rendering
 }
@@ -58,12 +62,13 @@ struct Pixel {
     coverage: f32,
     /// Σ wᵢ zᵢ.
     height: f32,
-    median: f32,
+    /// Height and depth.
+    median: [f32; 2],
 }
 
 fn render_tile(splats: &[Splat], tile: &Tile<'_>) -> Vec<(usize, usize, Pixel)> {
     let colours: Vec<[f32; 3]> = tile.splats().map(|index| splats[index as usize].colour).collect();
-    let empty = Pixel { colour: [0.0; 3], coverage: 0.0, height: 0.0, median: f32::NAN };
+    let empty = Pixel { colour: [0.0; 3], coverage: 0.0, height: 0.0, median: [f32::NAN; 2] };
     let mut pixels = [empty; TILE_PIXELS];
     let mut parts = Vec::new();
     tile.parts(&mut parts);
@@ -72,8 +77,8 @@ fn render_tile(splats: &[Splat], tile: &Tile<'_>) -> Vec<(usize, usize, Pixel)> 
         (0..3).for_each(|i| pixel.colour[i] += part.weight * colour[i]);
         pixel.coverage += part.weight;
         pixel.height += part.weight * part.height;
-        if pixel.coverage >= 0.5 && pixel.median.is_nan() {
-            pixel.median = part.height;
+        if pixel.coverage >= 0.5 && pixel.median[0].is_nan() {
+            pixel.median = [part.height, part.depth];
         }
     }
     tile.pixels().map(|(index, column, row)| (column, row, pixels[index])).collect()

@@ -3,7 +3,8 @@
 //!
 //! The folder holds `colour/NAME.png` (over black), `alpha/NAME.png` (accumulated opacity),
 //! `height/NAME.npy` (metres above the datum of the origin where half of the light is stopped, NaN
-//! elsewhere) and `report.json`. Pictures are compared over the pixels that splats cover by more
+//! elsewhere), for perspective cameras `depth/NAME.npy` (metres along the optical axis to the same
+//! place), and `report.json`. Pictures are compared over the pixels that splats cover by more
 //! than half. Satellite images have units of their own, so they are compared after a gain and an
 //! offset per channel.
 
@@ -231,7 +232,8 @@ impl RenderSession<'_> {
         let size = (image.pixels.width(), image.pixels.height());
         let camera = RpcSplatCamera::new(&image.camera, &projection, self.origin.origin, size)?
             .ok_or_else(|| SplatsJobError::NotSeen { target: "the splats", path: path.to_owned() })?;
-        self.look(Path::new(path.file_name().unwrap_or_default()), &camera, Reference::OwnUnits(image.pixels))
+        let name = Path::new(path.file_name().unwrap_or_default());
+        self.look(name, &camera, false, Reference::OwnUnits(image.pixels))
     }
 
     fn render_perspective(&mut self, view: &ColmapView, model: Option<&ColmapModel>) -> Result<(), SplatsJobError> {
@@ -243,17 +245,23 @@ impl RenderSession<'_> {
             Some(path) => Reference::Display(image::read_pixels(&path)?.map(|p| p.map(|c| c / 255.0))),
             None => Reference::None,
         };
-        self.look(Path::new(&view.name), &LensSplatCamera { lens, pose: &view.pose }, reference)
+        self.look(Path::new(&view.name), &LensSplatCamera { lens, pose: &view.pose }, true, reference)
     }
 
     /// Renders, writes and compares one view.
-    fn look(&mut self, name: &Path, camera: &impl SplatCamera, reference: Reference) -> Result<(), SplatsJobError> {
+    fn look(
+        &mut self,
+        name: &Path,
+        camera: &impl SplatCamera,
+        with_depth: bool,
+        reference: Reference,
+    ) -> Result<(), SplatsJobError> {
         let name = name.with_extension("").to_string_lossy().replace(['/', '\\'], "_");
         if !self.taken.insert(name.clone()) {
             return Err(SplatsJobError::SameName { name });
         }
         let rendering = ::splats::render(&self.file.splats, camera)?;
-        self.write(&name, &rendering)?;
+        self.write(&name, with_depth, &rendering)?;
         let size = [rendering.colour.width(), rendering.colour.height()];
         let covered = rendering.coverage.map(|c| *c > COVERED);
         let picture = reference.against(&name, &rendering, &covered)?;
@@ -268,7 +276,7 @@ impl RenderSession<'_> {
         Ok(())
     }
 
-    fn write(&self, name: &str, rendering: &Rendering) -> Result<(), FileError> {
+    fn write(&self, name: &str, with_depth: bool, rendering: &Rendering) -> Result<(), FileError> {
         let path = |kind: &str, ending: &str| {
             let folder = self.config.output.join(kind);
             files::create_folder(&folder)?;
@@ -280,7 +288,12 @@ impl RenderSession<'_> {
         write_png_gray(path("alpha", "png")?, &rendering.coverage.map(|c| byte(*c)), overwrite)?;
         let absolute = heights.map(|&h| (f64::from(h) + self.origin.origin[2]) as f32);
         let shape = [heights.height(), heights.width()];
-        npy::write(path("height", "npy")?, &shape, absolute.data(), overwrite).map_err(FileError::write)
+        npy::write(path("height", "npy")?, &shape, absolute.data(), overwrite).map_err(FileError::write)?;
+        if with_depth {
+            let depths = rendering.median_depth_m.data();
+            npy::write(path("depth", "npy")?, &shape, depths, overwrite).map_err(FileError::write)?;
+        }
+        Ok(())
     }
 }
 
