@@ -205,7 +205,7 @@ fn threads_change_nothing_and_overwrite_replaces() {
     };
     // --points and --geometric-error exclude each other.
     run("one", "1", &[]).code(2);
-    let files = ["sparse/0/images.bin", "sparse/0/points3D.txt", "points3D.ply", "raw_depth/view_2.npy", "report.json"];
+    let files = ["sparse/0/images.bin", "sparse/0/points3D.txt", "points3D.ply", "raw_depth/view_2.npy"];
     let go = |out: &str, threads: &str, more: &[&str]| {
         let base = ["-o", out, "--threads", threads, "--spacing", "poisson"];
         bench.run(&[&OFFSET[..], &base, more].concat())
@@ -216,6 +216,13 @@ fn threads_change_nothing_and_overwrite_replaces() {
         let read = |out: &str| std::fs::read(bench.path(out).join(file)).unwrap();
         assert!(read("one") == read("four"), "{file}");
     }
+    let report = |out: &str| {
+        let mut report = bench.json(&format!("{out}/report.json"));
+        // The command lines name the folder.
+        assert!(report["commands"].take()[0].as_str().unwrap().contains(&format!("-s {out} ")));
+        report
+    };
+    assert_eq!(report("one"), report("four"));
     std::fs::write(bench.path("one/image.txt"), "mine").unwrap();
     go("one", "2", &[]).code(2);
     go("one", "2", &["--overwrite", "--maps-only"]).code(0);
@@ -356,6 +363,95 @@ fn bad_input_is_told_and_leaves_nothing() {
     std::fs::write(bench.path("out"), "a file").unwrap();
     bench.run(&[&OFFSET[..], &out].concat()).code(2);
     assert_eq!(std::fs::read_to_string(bench.path("out")).unwrap(), "a file");
+}
+
+/// A picture whose pixels tell where they are.
+fn picture(path: &Path, size: [usize; 2]) {
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    image::RgbImage::from_fn(size[0] as u32, size[1] as u32, |x, y| image::Rgb([x as u8, y as u8, 200]))
+        .save(path)
+        .unwrap();
+}
+
+#[test]
+fn pictures_are_masked_for_buildings_alone_and_copied_otherwise() {
+    let bench = Bench::new();
+    bench.refused(&["--images"], "there is no picture of the camera \"view_1.png\"");
+    for number in 1..=4 {
+        picture(&bench.path(&format!("scene/images/view_{number}.png")), SIZE);
+    }
+    bench.run(&[&OFFSET[..], &["-o", "copied", "--images", "--mode", "building-enhanced"]].concat()).code(0);
+    let read = |path: &str| std::fs::read(bench.path(path)).unwrap();
+    assert!(read("copied/images/view_3.png") == read("scene/images/view_3.png"));
+    let alone = ["-o", "alone", "--images=scene/images"];
+    bench.run(&[&OFFSET[..], &alone].concat()).code(0);
+    let masked = image::open(bench.path("alone/images/view_2.png")).unwrap();
+    let masked = masked.as_rgba8().expect("red, green, blue and alpha");
+    let mask = io::npy::read(&bench.path("alone/raw_mask/view_2.npy")).unwrap();
+    let NpyData::Bool(mask) = mask.data else { panic!("a mask of truth values") };
+    assert!(mask.iter().any(|m| *m) && mask.iter().any(|m| !*m));
+    for ((x, y, pixel), shown) in masked.enumerate_pixels().zip(mask) {
+        assert_eq!(pixel.0, if shown { [x as u8, y as u8, 200, 255] } else { [0; 4] }, "{x}, {y}");
+    }
+    // The originals are never replaced by masked ones.
+    let own = ["-o", "scene", "--images", "--overwrite"];
+    let told = bench.run(&[&OFFSET[..], &own].concat()).code(2);
+    assert!(String::from_utf8_lossy(&told.get_output().stderr).contains("lies in the folder that the dataset's"));
+    picture(&bench.path("scene/images/view_4.png"), [SIZE[0] + 1, SIZE[1]]);
+    bench.refused(&["--images"], "has 65 x 48 pixels, its camera needs 64 x 48");
+    // Cropped cameras have cropped pictures.
+    let mut cameras = ring(4);
+    cameras.lenses = vec![lens(LensModel::Pinhole, [36.5, 22.5], &[])];
+    bench.write_cameras(&cameras, &[]);
+    bench
+        .run(&[&OFFSET[..], &["-o", "cropped", "--recrop", "--images", "--mode", "building-enhanced"]].concat())
+        .code(0);
+    let cropped = image::open(bench.path("cropped/images/view_1.png")).unwrap().to_rgba8();
+    assert_eq!(cropped.dimensions(), (54, 46));
+    assert_eq!(cropped.get_pixel(0, 0).0, [10, 0, 200, 255]);
+}
+
+#[test]
+fn names_with_folders_keep_them_for_the_trainers_that_know_them() {
+    let bench = Bench::new();
+    let mut cameras = ring(4);
+    for (number, view) in cameras.views.iter_mut().enumerate() {
+        view.name = format!("{}/image_{}.png", ["left", "right"][number % 2], number / 2);
+        picture(&bench.path("pictures").join(&view.name), SIZE);
+    }
+    bench.write_cameras(&cameras, &[]);
+    // 2DGS leaves out the folders, and two images would share their maps.
+    bench.refused(&["--images=pictures"], "same file stem");
+    let wanted = ["-o", "nested out", "--trainer", "gsplat", "--images=pictures", "--geotiff", "--json"];
+    let told = bench.run(&[&OFFSET[..], &wanted].concat()).code(0);
+    let maps = ["raw_depth/left/image_1.npy", "masks/right/image_0.png", "images/right/image_1.png"];
+    let more = ["depth_png/left/image_0.png", "previews/left/image_0.png"];
+    for file in maps.into_iter().chain(more) {
+        assert!(bench.path("nested out").join(file).is_file(), "{file}");
+    }
+    let report: Value = serde_json::from_slice(&told.get_output().stdout).unwrap();
+    let commands = report["commands"].as_array().unwrap();
+    let step = report["depth_png_step"].as_f64().unwrap();
+    let has = |words: &str| commands.iter().any(|line| line.as_str().unwrap().contains(words));
+    assert!(has("simple_trainer_2dgs.py --data_dir 'nested out' --data_factor 1"), "{commands:?}");
+    assert!(has(&format!("--depth-unit-scale-factor {step}")), "{commands:?}");
+    // The last one is our own, and it runs.
+    let own = commands.last().unwrap().as_str().unwrap();
+    assert_eq!(own, "skysweep train 'nested out' -o 'nested out_trained'");
+    let train = ["train", "nested out", "-o", "trained", "--iterations", "2", "--progress", "none"];
+    Command::cargo_bin("skysweep").unwrap().current_dir(bench.folder.path()).args(train).assert().code(0);
+}
+
+#[test]
+fn misses_have_the_depth_that_the_reader_expects() {
+    let bench = Bench::new();
+    for (miss, is) in [("0", (|d: f32| d == 0.0) as fn(f32) -> bool), ("nan", f32::is_nan), ("inf", f32::is_infinite)] {
+        bench.run(&[&OFFSET[..], &["-o", miss, "--miss", miss, "--maps-only"]].concat()).code(0);
+        let (_, depth) = floats(&bench.path(miss).join("raw_depth/view_1.npy"));
+        let misses = depth.iter().filter(|depth| is(**depth)).count();
+        let hits = depth.iter().filter(|depth| (10.0..50.0).contains(*depth)).count();
+        assert!(misses > 100 && hits > 100 && misses + hits == depth.len(), "{miss}: {misses}, {hits}");
+    }
 }
 
 #[test]

@@ -7,7 +7,9 @@ use std::path::PathBuf;
 use ::priors::{Amount, DepthKind, NormalFrame, Spacing, VisibilityConfig};
 use city::Lod;
 use crs::{CrsRequest, VerticalDatum};
-use jobs::priors::{LensFault, PriorsClassWeight, PriorsConfig, PriorsJobError, PriorsMode, PriorsTrainer};
+use jobs::priors::{
+    LensFault, PriorsClassWeight, PriorsConfig, PriorsImages, PriorsJobError, PriorsMiss, PriorsMode, PriorsTrainer,
+};
 
 use crate::corrections::code_of;
 use crate::error::with_hint;
@@ -135,6 +137,14 @@ pub(crate) struct Args {
     /// initial splats for 2DGS and 3DGS.
     #[arg(long, conflicts_with = "maps_only")]
     extras: bool,
+    /// Write the pictures, too: those of this folder, or without a folder those beside the cameras.
+    /// Masked to the buildings in the mode building-only, cropped where cameras are. "--images=DIR"
+    /// names the folder.
+    #[arg(long, value_name = "DIR", num_args = 0..=1, require_equals = true, conflicts_with = "maps_only")]
+    images: Option<Option<PathBuf>>,
+    /// Depth of pixels that see no building, in the maps as .npy.
+    #[arg(long, value_parser = named(&PriorsMiss::CHOICES), default_value = "inf")]
+    miss: PriorsMiss,
     /// Write the maps as GeoTIFF too.
     #[arg(long)]
     geotiff: bool,
@@ -161,8 +171,9 @@ fn hinted(error: PriorsJobError) -> anyhow::Error {
     let hint = match &error {
         PriorsJobError::Job(error) if error.is_existing_output() => Some("choose another folder or pass --overwrite"),
         PriorsJobError::NothingInSight { .. } => Some("state it with --offset or --transform"),
+        PriorsJobError::NoPicture { .. } => Some("--images=DIR names the folder of the pictures"),
         PriorsJobError::NotSatellite => Some("leave out --model-crs, --model-vertical and --corrections"),
-        PriorsJobError::NotPerspective => Some("leave out --offset and --transform"),
+        PriorsJobError::NotPerspective => Some("leave out --offset, --transform and --images"),
         PriorsJobError::MapUnknown { .. } => Some("give --model-crs EPSG:n"),
         PriorsJobError::NoObject { .. } => Some("skysweep city info names the reasons"),
         PriorsJobError::Offset(_) => Some("it is given by --offset"),
@@ -206,6 +217,12 @@ impl Args {
         config.maps.depth = self.depth;
         config.maps.normals = self.normals;
         config.extras = self.extras;
+        config.images = match &self.images {
+            None => PriorsImages::None,
+            Some(None) => PriorsImages::Beside,
+            Some(Some(folder)) => PriorsImages::Folder(folder.clone()),
+        };
+        config.miss = self.miss;
         config.geotiff = self.geotiff;
         config.previews = self.previews;
         config.threads = self.run.threads.map(|threads| threads.max(1));

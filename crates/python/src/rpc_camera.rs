@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use camera::{Correspondence, ImagePoint, Rpc, RpcCamera, RpcFit};
 use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -18,9 +18,6 @@ use crate::fault::Fault;
 
 /// Points from which on the work is shared out over threads.
 const PARALLEL: usize = 1 << 15;
-
-/// Two columns of numbers.
-type Columns<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 /// An RPC with its correction.
 #[pyclass(frozen, module = "skysweep._native")]
@@ -32,16 +29,14 @@ fn json_error(error: &serde_json::Error) -> Fault {
     Fault::setting(error.to_string())
 }
 
-/// Lets `fill` write two columns of `count` numbers, by parts that start at its first argument.
-fn columns(count: usize, fill: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) -> (Vec<f64>, Vec<f64>) {
-    let (mut first, mut second) = (vec![0.0; count], vec![0.0; count]);
-    if count < PARALLEL {
-        fill(0, &mut first, &mut second);
+/// Lets `fill` write two columns, by parts that start at its first argument.
+fn fill_columns(first: &mut [f64], second: &mut [f64], fill: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) {
+    if first.len() < PARALLEL {
+        fill(0, first, second);
     } else {
         let parts = first.par_chunks_mut(PARALLEL).zip(second.par_chunks_mut(PARALLEL)).enumerate();
         parts.for_each(|(part, (first, second))| fill(part * PARALLEL, first, second));
     }
-    (first, second)
 }
 
 /// A part of the numbers of the points, or so many times the one of all of them.
@@ -110,22 +105,21 @@ impl RpcCore {
         Ok((text(serde_json::to_string(rpc))?, text(serde_json::to_string(correction))?))
     }
 
-    /// Image positions of ground points.
-    fn project<'py>(
+    /// Writes image positions of ground points into `sample` and `line`.
+    fn project(
         &self,
-        py: Python<'py>,
-        lon: PyReadonlyArray1<'py, f64>,
-        lat: PyReadonlyArray1<'py, f64>,
-        height: PyReadonlyArray1<'py, f64>,
-    ) -> PyResult<Columns<'py>> {
+        py: Python<'_>,
+        ground: [PyReadonlyArray1<'_, f64>; 3],
+        image: [PyReadwriteArray1<'_, f64>; 2],
+    ) -> PyResult<()> {
+        let ([lon, lat, height], [mut sample, mut line]) = (ground, image);
         let (lon, lat, height) = (lon.as_slice()?, lat.as_slice()?, height.as_slice()?);
-        let count = lon.len().max(lat.len()).max(height.len());
-        let count = if [lon, lat, height].iter().any(|values| values.is_empty()) { 0 } else { count };
+        let (sample, line) = (sample.as_slice_mut()?, line.as_slice_mut()?);
         let camera = &self.camera;
-        let (sample, line) = py.detach(|| {
+        py.detach(|| {
             // The polynomials of one height have half as many terms.
             let plane = if let [height_m] = height { Some(camera.rpc.plane(*height_m)) } else { None };
-            columns(count, |start, sample, line| {
+            fill_columns(sample, line, |start, sample, line| {
                 let [lon, lat] = [lon, lat].map(|values| part(values, start, sample.len()));
                 if let Some(plane) = &plane {
                     plane.project_many(&camera.correction, [&lon, &lat], [sample, line]);
@@ -133,33 +127,33 @@ impl RpcCore {
                     let height = &height[start..start + sample.len()];
                     camera.project_many([&lon, &lat, height], [sample, line]);
                 }
-            })
+            });
         });
-        Ok((sample.into_pyarray(py), line.into_pyarray(py)))
+        Ok(())
     }
 
-    /// Ground points that are seen at image positions, at given heights.
-    fn localize<'py>(
+    /// Writes ground points that are seen at image positions, at given heights, into `lon` and
+    /// `lat`.
+    fn localize(
         &self,
-        py: Python<'py>,
-        sample: PyReadonlyArray1<'py, f64>,
-        line: PyReadonlyArray1<'py, f64>,
-        height: PyReadonlyArray1<'py, f64>,
-    ) -> PyResult<Columns<'py>> {
+        py: Python<'_>,
+        image: [PyReadonlyArray1<'_, f64>; 3],
+        ground: [PyReadwriteArray1<'_, f64>; 2],
+    ) -> PyResult<()> {
+        let ([sample, line, height], [mut lon, mut lat]) = (image, ground);
         let (sample, line, height) = (sample.as_slice()?, line.as_slice()?, height.as_slice()?);
-        let count = sample.len().max(line.len()).max(height.len());
-        let count = if [sample, line, height].iter().any(|values| values.is_empty()) { 0 } else { count };
+        let (lon, lat) = (lon.as_slice_mut()?, lat.as_slice_mut()?);
         let camera = &self.camera;
-        let (lon, lat) = py.detach(|| {
-            columns(count, |start, lon, lat| {
+        py.detach(|| {
+            fill_columns(lon, lat, |start, lon, lat| {
                 for (i, (lon, lat)) in lon.iter_mut().zip(lat).enumerate() {
                     let [sample, line, height] = [sample, line, height].map(|values| at(values, start + i));
                     let ground = camera.localize(ImagePoint::new(sample, line), height);
                     [*lon, *lat] = ground.map_or([f64::NAN; 2], |g| [g.lon_deg, g.lat_deg]);
                 }
-            })
+            });
         });
-        Ok((lon.into_pyarray(py), lat.into_pyarray(py)))
+        Ok(())
     }
 
     /// Ground sampling distance along sample and line, metres, and the view direction (east, north,

@@ -45,6 +45,8 @@ pub struct PriorsReport {
     pub error_curve: Vec<ErrorRow>,
     /// Metres per step of the 16-bit depth maps. `None` if there are none.
     pub depth_png_step: Option<f64>,
+    /// Command lines that train on the dataset.
+    pub commands: Vec<String>,
     /// One row per view.
     pub views: Vec<ViewRow>,
     /// Settings, by name.
@@ -102,7 +104,13 @@ impl PriorsReport {
             notes(&self.notes),
         ];
         body.push(figures(pictures)?);
-        body.extend([self.curve_table(), self.class_table(), self.view_table(), self.setting_list()]);
+        body.extend([
+            self.curve_table(),
+            self.class_table(),
+            self.view_table(),
+            self.command_list(),
+            self.setting_list(),
+        ]);
         Ok(page(&title, &body.join("\n")))
     }
 
@@ -169,6 +177,14 @@ impl PriorsReport {
         table("All views", &heads, self.views.iter().map(row))
     }
 
+    fn command_list(&self) -> String {
+        if self.commands.is_empty() {
+            return String::new();
+        }
+        let items: String = self.commands.iter().map(|c| format!("<li><code>{}</code></li>", escape(c))).collect();
+        format!("<h2>How to train</h2><ul>{items}</ul>")
+    }
+
     fn setting_list(&self) -> String {
         let Value::Object(settings) = &self.settings else { return String::new() };
         let item = |(name, value): (&String, &Value)| {
@@ -206,6 +222,7 @@ mod tests {
             scene_points: 0,
             error_curve: vec![ErrorRow { error_m: 0.1, points: 5e3, even_points: 5e4 }],
             depth_png_step: Some(0.001),
+            commands: vec!["train <it>".to_owned()],
             views: vec![ViewRow {
                 name: "<a>.png".to_owned(),
                 size: [8, 6],

@@ -41,7 +41,7 @@ pub use image_copy::copy_image_with_rpc;
 pub use labels::{Provenance, iso_time};
 pub use luma::LumaTile;
 pub use luma_rule::{BandChoice, LumaRule};
-pub use png::{write_png_gray, write_png_rgb};
+pub use png::{write_png_gray, write_png_rgb, write_png_rgba};
 pub use reduced::BandLabel;
 pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};

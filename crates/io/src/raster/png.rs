@@ -28,6 +28,15 @@ pub fn write_png_rgb(path: impl AsRef<Path>, picture: &Grid<[u8; 3]>, overwrite:
     write(path.as_ref(), bytes, picture.width(), picture.height(), ExtendedColorType::Rgb8, overwrite)
 }
 
+/// Writes a colour picture with an alpha band. Pixels are red, green, blue, opacity.
+///
+/// # Errors
+/// As [`write_png_rgb`].
+pub fn write_png_rgba(path: impl AsRef<Path>, picture: &Grid<[u8; 4]>, overwrite: bool) -> Result<(), RasterError> {
+    let bytes = picture.data().as_flattened();
+    write(path.as_ref(), bytes, picture.width(), picture.height(), ExtendedColorType::Rgba8, overwrite)
+}
+
 fn write(
     path: &Path,
     bytes: &[u8],

@@ -1,8 +1,8 @@
 //! The cameras of a scene, checked for what pairs images with maps: one file stem per image.
 //!
-//! Trainers find the map of an image by the part of its name before the first dot, without folders.
-//! A name with more than one dot, or two images with one stem, would be paired wrongly and are
-//! refused.
+//! Trainers find the map of an image by the part of its name before the first dot; 2DGS without the
+//! folders of the name, gsplat and nerfstudio with them. A name with more than one dot, or two
+//! images with one stem, would be paired wrongly and are refused.
 
 use std::collections::HashMap;
 use std::fs;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use ::priors::MAX_PIXELS;
 use io::colmap::{self, ColmapModel, ColmapPoint};
 
-use super::config::{PriorsConfig, PriorsMode};
+use super::config::{PriorsConfig, PriorsMode, PriorsTrainer};
 use super::error::PriorsJobError;
 use super::trainer::{self, ImageCrop};
 
@@ -40,7 +40,7 @@ impl SceneCameras {
         if model.views.is_empty() {
             return Err(PriorsJobError::NoImages { path: source });
         }
-        let stems = stems(&model)?;
+        let stems = stems(&model, config.trainer)?;
         let crops = prepare_lenses(config, &mut model)?;
         Ok(Self { model, points, stems, crops, source })
     }
@@ -110,11 +110,11 @@ fn load(config: &PriorsConfig, source: &Path) -> Result<(ColmapModel, Vec<Colmap
 }
 
 /// Returns the stem of every view.
-fn stems(model: &ColmapModel) -> Result<Vec<String>, PriorsJobError> {
+fn stems(model: &ColmapModel, trainer: PriorsTrainer) -> Result<Vec<String>, PriorsJobError> {
     let mut known: HashMap<String, &str> = HashMap::new();
     let mut stems = Vec::with_capacity(model.views.len());
     for view in &model.views {
-        let stem = stem(&view.name)?;
+        let stem = stem(&view.name, trainer)?;
         // File systems that ignore case would give both the same file.
         if let Some(other) = known.insert(stem.to_lowercase(), &view.name) {
             return Err(PriorsJobError::SameStem { first: shown(other), second: shown(&view.name) });
@@ -124,8 +124,9 @@ fn stems(model: &ColmapModel) -> Result<Vec<String>, PriorsJobError> {
     Ok(stems)
 }
 
-fn stem(name: &str) -> Result<String, PriorsJobError> {
-    let file = name.rsplit('/').next().unwrap_or(name);
+/// Returns the name without ending, and for trainers that know no folders without these.
+fn stem(name: &str, trainer: PriorsTrainer) -> Result<String, PriorsJobError> {
+    let (folder, file) = name.rsplit_once('/').unwrap_or(("", name));
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     if stem.contains('.') {
         return Err(PriorsJobError::DotInName { name: shown(name) });
@@ -133,7 +134,14 @@ fn stem(name: &str) -> Result<String, PriorsJobError> {
     if stem.is_empty() || stem.len() > 200 || stem.chars().any(|c| c.is_control() || "<>:\"|?*\\".contains(c)) {
         return Err(PriorsJobError::BadName { name: shown(name) });
     }
-    Ok(stem.to_owned())
+    if folder.is_empty() || trainer == PriorsTrainer::TwoDgs {
+        return Ok(stem.to_owned());
+    }
+    let plain = |part: &str| !matches!(part, "" | "." | "..") && !part.chars().any(|c| c.is_control() || c == '\\');
+    if !folder.split('/').all(plain) || folder.len() > 200 {
+        return Err(PriorsJobError::BadName { name: shown(name) });
+    }
+    Ok(format!("{folder}/{stem}"))
 }
 
 /// Shortens a name for an error message.
@@ -167,15 +175,21 @@ fn prepare_lenses(config: &PriorsConfig, model: &mut ColmapModel) -> Result<Vec<
 
 #[cfg(test)]
 mod tests {
-    use super::stem;
+    use super::{PriorsTrainer, stem};
 
     #[test]
     fn stems_pair_images_with_maps() {
-        assert_eq!(stem("uav_001.png").unwrap(), "uav_001");
-        assert_eq!(stem("left/uav_001.JPG").unwrap(), "uav_001");
-        assert_eq!(stem("train/r_0").unwrap(), "r_0");
+        let flat = |name: &str| stem(name, PriorsTrainer::TwoDgs);
+        assert_eq!(flat("uav_001.png").unwrap(), "uav_001");
+        assert_eq!(flat("left/uav_001.JPG").unwrap(), "uav_001");
+        assert_eq!(flat("train/r_0").unwrap(), "r_0");
+        let nested = |name: &str| stem(name, PriorsTrainer::Gsplat);
+        assert_eq!(nested("left/day/uav_001.JPG").unwrap(), "left/day/uav_001");
+        for bad in ["../a.png", "/a.png", "x//a.png", "./a.png"] {
+            assert!(nested(bad).is_err(), "{bad:?}");
+        }
         for bad in ["a.b.png", "x/.png", "", "a\nb.png", "c:d.png", &"x".repeat(300)] {
-            assert!(stem(bad).is_err(), "{bad:?}");
+            assert!(flat(bad).is_err() && nested(bad).is_err(), "{bad:?}");
         }
     }
 }

@@ -65,6 +65,12 @@ pub struct PriorsConfig {
     /// points as PLY beside `sparse`, and initial splats of the points.
     #[serde(default)]
     pub extras: bool,
+    /// Where the pictures of the dataset come from. Perspective cameras only.
+    #[serde(default)]
+    pub images: PriorsImages,
+    /// Depth of pixels that see no building, in the `.npy` maps. Perspective cameras only.
+    #[serde(default)]
+    pub miss: PriorsMiss,
     /// Whether the maps are written as GeoTIFF too.
     pub geotiff: bool,
     /// Number of views with preview pictures.
@@ -108,6 +114,55 @@ impl PriorsTrainer {
     /// All values with the names that people give them, and their meanings.
     pub const CHOICES: [(&'static str, Self, &'static str); 2] =
         [("2dgs", Self::TwoDgs, "2DGS and the trainers made from it"), ("gsplat", Self::Gsplat, "gsplat, nerfstudio")];
+}
+
+/// Where the pictures of a dataset come from.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum PriorsImages {
+    /// The dataset has no pictures.
+    #[default]
+    None,
+    /// From where pictures usually lie: `images` beside the COLMAP model or above it, or as the
+    /// `transforms.json` names them.
+    Beside,
+    /// From this folder.
+    Folder(PathBuf),
+}
+
+/// Depth of a pixel that sees no building.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum PriorsMiss {
+    /// Positive infinity. Maps that are resized keep false depths out.
+    #[default]
+    #[serde(rename = "inf")]
+    Infinite,
+    /// NaN.
+    #[serde(rename = "nan")]
+    Nan,
+    /// Zero, as readers of depth sensors expect. A map that is resized gets false near depths at
+    /// its edges.
+    #[serde(rename = "0")]
+    Zero,
+}
+
+impl PriorsMiss {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+        ("inf", Self::Infinite, "Infinity, which survives resizing"),
+        ("nan", Self::Nan, "NaN"),
+        ("0", Self::Zero, "Zero, as readers of depth sensors expect"),
+    ];
+
+    /// Returns the depth.
+    pub(super) fn depth(self) -> f32 {
+        match self {
+            Self::Infinite => f32::INFINITY,
+            Self::Nan => f32::NAN,
+            Self::Zero => 0.0,
+        }
+    }
 }
 
 /// Weight of a surface class in the sampling; 0 leaves the class out.
@@ -168,6 +223,8 @@ impl PriorsConfig {
             visibility: VisibilityConfig::default(),
             maps: MapConfig::default(),
             extras: false,
+            images: PriorsImages::None,
+            miss: PriorsMiss::Infinite,
             geotiff: false,
             previews: 12,
             threads: None,

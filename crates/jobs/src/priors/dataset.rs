@@ -6,6 +6,7 @@ use io::citymodel::CityFile;
 use super::cameras::SceneCameras;
 use super::config::PriorsConfig;
 use super::frame::DatasetFrame;
+use super::images::Pictures;
 
 /// Inputs and results of a run, before they are written.
 #[derive(Debug)]
@@ -20,6 +21,8 @@ pub(super) struct Dataset<'a> {
     pub(super) sampling: &'a SampleConfig,
     pub(super) samples: &'a Samples,
     pub(super) visible: &'a Visible,
+    /// The pictures, where they are part of the dataset.
+    pub(super) pictures: Option<&'a Pictures>,
     /// Number of objects of the model that could not be used.
     pub(super) unusable: usize,
 }

@@ -35,7 +35,8 @@ pub enum PriorsJobError {
     NotSatellite,
     /// Values for perspective cameras were given with satellite images.
     #[error(
-        "an offset and a transform are for perspective cameras: satellite images find the model by its coordinates"
+        "an offset, a transform and pictures of the dataset are for perspective cameras: satellite images find the \
+         model by its coordinates, and their maps lie on their own pixels"
     )]
     NotPerspective,
     /// Not exactly one source of perspective cameras.
@@ -65,6 +66,33 @@ pub enum PriorsJobError {
     NoImages {
         /// Where the cameras were read.
         path: PathBuf,
+    },
+    /// A picture is missing.
+    #[error("there is no picture of the camera {name:?} in the folder: {}", folder.display())]
+    NoPicture {
+        /// Name of the image.
+        name: String,
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A picture lies in the folder that is to be replaced.
+    #[error("the picture lies in the folder that the dataset's pictures go to: {}", path.display())]
+    PictureInOutput {
+        /// The picture.
+        path: PathBuf,
+    },
+    /// A picture has another size than its camera.
+    #[error(
+        "the picture has {} x {} pixels, its camera needs {} x {}: {}",
+        found[0], found[1], expected[0], expected[1], path.display()
+    )]
+    PictureSize {
+        /// The picture.
+        path: PathBuf,
+        /// Its columns and rows.
+        found: [usize; 2],
+        /// Columns and rows of the camera.
+        expected: [usize; 2],
     },
     /// Among satellite images there is something else.
     #[error("among satellite images there is something else: {}", path.display())]

@@ -2,13 +2,15 @@
 //! written.
 //!
 //! The old report is removed first and the new one is moved last, so a folder with a report is
-//! complete. Other files in the folder (images, for example) are left alone.
+//! complete. Other files in the folder are left alone, also `images` of a run that wrote none.
 
 use std::path::Path;
 
 use tempfile::TempDir;
 
+use super::config::{PriorsConfig, PriorsImages};
 use super::error::PriorsJobError;
+use super::images;
 use crate::files::FileError;
 use crate::output_folder::OutputFolder;
 
@@ -44,19 +46,23 @@ pub(super) struct PriorsFolder {
     // Dropped first, so that an empty output folder can be removed after it.
     work: TempDir,
     folder: OutputFolder,
+    entries: Vec<&'static str>,
 }
 
 impl PriorsFolder {
     /// Takes the folder for this run, and refuses early what would fail at the end.
-    pub(super) fn take(path: &Path, overwrite: bool) -> Result<Self, PriorsJobError> {
+    pub(super) fn take(config: &PriorsConfig) -> Result<Self, PriorsJobError> {
+        let path = &config.output;
         if path.exists() && !path.is_dir() {
             return Err(PriorsJobError::OutputIsFile { path: path.to_owned() });
         }
         let folder = OutputFolder::take(path)?;
-        let taken = ENTRIES.iter().chain(&REPORT).map(|name| path.join(name)).find(|p| p.symlink_metadata().is_ok());
+        let images = (config.images != PriorsImages::None).then_some(images::FOLDER);
+        let entries: Vec<_> = ENTRIES.into_iter().chain(images).collect();
+        let taken = entries.iter().chain(&REPORT).map(|name| path.join(name)).find(|p| p.symlink_metadata().is_ok());
         match taken {
-            Some(path) if !overwrite => Err(FileError::Exists { path }.into()),
-            _ => Ok(Self { work: folder.work_folder()?, folder }),
+            Some(path) if !config.overwrite => Err(FileError::Exists { path }.into()),
+            _ => Ok(Self { work: folder.work_folder()?, folder, entries }),
         }
     }
 
@@ -68,10 +74,10 @@ impl PriorsFolder {
     /// Moves everything to its name.
     pub(super) fn publish(self) -> Result<(), PriorsJobError> {
         // Without its report the folder counts as incomplete from here on.
-        for name in REPORT.iter().rev().chain(&ENTRIES) {
+        for name in REPORT.iter().rev().chain(&self.entries) {
             self.folder.remove(name)?;
         }
-        for name in ENTRIES.iter().chain(&REPORT) {
+        for name in self.entries.iter().chain(&REPORT) {
             if self.path().join(name).symlink_metadata().is_ok() {
                 self.folder.publish(self.path(), name)?;
             }

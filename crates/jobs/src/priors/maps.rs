@@ -11,6 +11,7 @@ use report::{ViewPictures, ViewRow, depth_preview, mask_preview, normal_preview,
 
 use super::dataset::Dataset;
 use super::error::PriorsJobError;
+use super::images;
 use super::previews::{IN_PAGE, is_spread};
 use crate::files::{self, FileError};
 
@@ -32,8 +33,15 @@ pub(super) fn write(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<WrittenMaps, PriorsJobError> {
-    for name in FOLDERS.into_iter().chain(dataset.config.geotiff.then_some("geotiff")) {
+    let pictures = dataset.pictures.map(|_| images::FOLDER);
+    for name in FOLDERS.into_iter().chain(dataset.config.geotiff.then_some("geotiff")).chain(pictures) {
         files::create_folder(&folder.join(name))?;
+        // Names with folders have them in every kind of map.
+        for stem in &dataset.cameras.stems {
+            if let Some((above, _)) = stem.rsplit_once('/') {
+                files::create_folder(&folder.join(name).join(above))?;
+            }
+        }
     }
     let rays = dataset.cameras.model.lenses.iter().map(Rays::new).collect::<Result<Vec<_>, _>>()?;
     let count = dataset.views.len();
@@ -43,6 +51,10 @@ pub(super) fn write(
         progress.check_cancelled()?;
         let maps = render(dataset, view, &rays[dataset.cameras.model.views[view].lens]);
         write_view(dataset, folder, view, &maps)?;
+        if let Some(pictures) = dataset.pictures {
+            let crop = dataset.cameras.crops[dataset.cameras.model.views[view].lens];
+            pictures.write(folder, view, &maps.mask(), crop)?;
+        }
         pictures.extend(write_previews(dataset, folder, view, &maps)?);
         rows.push(row(dataset, view, &maps));
         progress.step();
@@ -140,7 +152,9 @@ fn write_view(dataset: &Dataset<'_>, folder: &Path, view: usize, maps: &PriorMap
     let (width, height) = (maps.depth_m.width(), maps.depth_m.height());
     let shape = [height, width];
     let mask = maps.mask();
-    npy::write(path("raw_depth", "npy"), &shape, maps.depth_m.data(), false).map_err(FileError::write)?;
+    let miss = dataset.config.miss.depth();
+    let depth = maps.depth_m.map(|depth| if depth.is_finite() { *depth } else { miss });
+    npy::write(path("raw_depth", "npy"), &shape, depth.data(), false).map_err(FileError::write)?;
     npy::write(path("raw_normal", "npy"), &[height, width, 3], maps.normal.data().as_flattened(), false)
         .map_err(FileError::write)?;
     npy::write(path("raw_mask", "npy"), &shape, mask.data(), false).map_err(FileError::write)?;

@@ -14,6 +14,7 @@ mod dataset;
 mod error;
 mod folder;
 mod frame;
+mod images;
 mod labels;
 mod maps;
 mod model;
@@ -26,7 +27,7 @@ mod satellite;
 mod size;
 mod trainer;
 
-pub use config::{PriorsClassWeight, PriorsConfig, PriorsMode, PriorsTrainer};
+pub use config::{PriorsClassWeight, PriorsConfig, PriorsImages, PriorsMiss, PriorsMode, PriorsTrainer};
 pub use error::{LensFault, PriorsJobError};
 pub use outcome::{PriorsJobReport, PriorsProduct};
 pub use trainer::ImageCrop;

@@ -53,7 +53,8 @@ impl PriorsJobReport {
             PriorsProduct::Dataset(made) => {
                 let (kept, all, least) = (made.kept, made.samples, made.min_views);
                 let views = counted(made.views.len(), "view");
-                format!("points     {kept} of {all} are seen by {least} or more of {views}\n{written}")
+                let train: String = made.commands.iter().map(|line| format!("train      {line}\n")).collect();
+                format!("points     {kept} of {all} are seen by {least} or more of {views}\n{written}{train}")
             }
             PriorsProduct::SatelliteMaps(made) => {
                 let line = |row: &SatelliteRow| {

@@ -18,6 +18,7 @@ use super::dataset::Dataset;
 use super::error::PriorsJobError;
 use super::folder::PriorsFolder;
 use super::frame::DatasetFrame;
+use super::images::Pictures;
 use super::labels::labels;
 use super::maps::{self, WrittenMaps};
 use super::model::UsableModel;
@@ -25,6 +26,7 @@ use super::notes::notes;
 use super::outcome::{PriorsJobReport, PriorsProduct};
 use super::points;
 use super::size::{in_words, largest_bytes};
+use super::trainer;
 use crate::files::{self, FileError};
 
 /// Geometric errors of the curve, relative to the one asked for.
@@ -35,7 +37,7 @@ pub(super) fn make(config: &PriorsConfig, progress: &dyn Progress) -> Result<Pri
     if config.map_epsg.is_some() || config.vertical.is_some() || config.corrections.is_some() {
         return Err(PriorsJobError::NotSatellite);
     }
-    let partial = PriorsFolder::take(&config.output, config.overwrite)?;
+    let partial = PriorsFolder::take(config)?;
     let sampling = config.sampling()?;
     let cameras = SceneCameras::read(config)?;
     let read = UsableModel::read(config)?;
@@ -43,6 +45,7 @@ pub(super) fn make(config: &PriorsConfig, progress: &dyn Progress) -> Result<Pri
     let frame = DatasetFrame::new(config, read.meshed.mesh.origin, &cameras)?;
     let model = PriorModel::new(read.meshed.mesh, &buildings_of(&read.file.model))?;
     let views = frame.views(&cameras);
+    let pictures = Pictures::find(config, &cameras)?;
     let samples = sample(&model, &sampling)?;
     progress.choice(&size(config, &cameras, samples.points.len()));
     let visible = visible(config, &model, &samples, &views, progress)?;
@@ -59,6 +62,7 @@ pub(super) fn make(config: &PriorsConfig, progress: &dyn Progress) -> Result<Pri
         sampling: &sampling,
         samples: &samples,
         visible: &visible,
+        pictures: pictures.as_ref(),
         unusable,
     };
     let report = write(&dataset, partial.path(), progress)?;
@@ -179,6 +183,7 @@ fn report(dataset: &Dataset<'_>, written: &WrittenMaps) -> Result<PriorsReport, 
             .collect(),
         depth_png_step: Some(written.depth_png_step),
         views: written.rows.clone(),
+        commands: trainer::commands(dataset.config, written.depth_png_step),
         settings: settings(dataset),
     })
 }
@@ -221,7 +226,7 @@ fn settings(dataset: &Dataset<'_>) -> Value {
             NormalFrame::World => "in the axes of the world",
             NormalFrame::Camera => "in the axes of each camera",
         },
-        "depth_miss": "+inf in npy, 0 in depth_png, -32768 in GeoTIFF",
+        "depth_miss": format!("{} in npy, 0 in depth_png, -32768 in GeoTIFF", config.miss.depth()),
         "units_per_metre": frame.scale(),
     })
 }

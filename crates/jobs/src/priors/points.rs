@@ -81,8 +81,11 @@ fn write_splats(dataset: &Dataset<'_>, folder: &Path, kept: &[Sample]) -> Result
 
 fn colmap_model(dataset: &Dataset<'_>) -> ColmapModel {
     let mut model = dataset.cameras.model.clone();
-    for view in &mut model.views {
+    for (number, view) in model.views.iter_mut().enumerate() {
         view.pose.centre = dataset.frame.dataset_from_camera(view.pose.centre);
+        if let Some(pictures) = dataset.pictures {
+            view.name = pictures.name(number).to_owned();
+        }
     }
     model
 }

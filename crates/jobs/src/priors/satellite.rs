@@ -15,7 +15,7 @@ use raster::NO_DATA;
 use report::{SatellitePriorsReport, SatelliteRow, ViewPictures, height_preview, normal_preview};
 use serde_json::json;
 
-use super::config::PriorsConfig;
+use super::config::{PriorsConfig, PriorsImages};
 use super::error::PriorsJobError;
 use super::folder::PriorsFolder;
 use super::labels::labels;
@@ -44,7 +44,7 @@ pub(super) fn make(
     paths: &[PathBuf],
     progress: &dyn Progress,
 ) -> Result<PriorsJobReport, PriorsJobError> {
-    let partial = PriorsFolder::take(&config.output, config.overwrite)?;
+    let partial = PriorsFolder::take(config)?;
     let images = read_images(config, paths, progress)?;
     let read = UsableModel::read(config)?;
     let unusable = read.unusable();
@@ -73,7 +73,7 @@ fn read_images(
     paths: &[PathBuf],
     progress: &dyn Progress,
 ) -> Result<Vec<PriorsImage>, PriorsJobError> {
-    if config.offset.is_some() || config.transform.is_some() {
+    if config.offset.is_some() || config.transform.is_some() || config.images != PriorsImages::None {
         return Err(PriorsJobError::NotPerspective);
     }
     let corrections = config.corrections.as_deref().map(Corrections::read).transpose()?.unwrap_or_default();

@@ -1,12 +1,14 @@
 //! How large a dataset gets, which is said before the work begins.
 
-use super::config::PriorsConfig;
+use super::config::{PriorsConfig, PriorsImages};
 
 /// Bytes of a pixel in the maps of a perspective view: depth, normal, mask, class and object in
 /// `.npy`, and the two PNG.
 const BYTES_PER_PIXEL: usize = 4 + 12 + 1 + 1 + 4 + 3;
 /// Bytes of a pixel that GeoTIFF maps add at most.
 const BYTES_PER_GEOTIFF_PIXEL: usize = 4 + 12 + 1 + 4;
+/// Bytes of a pixel of a picture at most: a PNG with alpha.
+const BYTES_PER_PICTURE_PIXEL: usize = 4;
 /// Bytes of a point in binary: in `points3D.bin` without its track, and in the PLY.
 const BYTES_PER_POINT: usize = 43 + 27;
 /// Bytes of an observation in binary: in `points3D.bin` and `images.bin`.
@@ -20,7 +22,10 @@ const BYTES_PER_EXTRA_OBSERVATION: usize = 10 + 45;
 /// Pictures for people are not counted.
 pub(super) fn largest_bytes(config: &PriorsConfig, points: usize, sizes: &[[usize; 2]]) -> usize {
     let pixels: usize = sizes.iter().map(|[width, height]| width.saturating_mul(*height)).sum();
-    let per_pixel = BYTES_PER_PIXEL + if config.geotiff { BYTES_PER_GEOTIFF_PIXEL } else { 0 };
+    let mut per_pixel = BYTES_PER_PIXEL + if config.geotiff { BYTES_PER_GEOTIFF_PIXEL } else { 0 };
+    if config.images != PriorsImages::None {
+        per_pixel += BYTES_PER_PICTURE_PIXEL;
+    }
     let maps = pixels.saturating_mul(per_pixel);
     if config.maps_only {
         return maps;

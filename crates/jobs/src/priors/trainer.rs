@@ -5,6 +5,8 @@
 //! point would be learned shifted. Cropping the image moves the middle to the principal point,
 //! within a quarter of a pixel.
 
+use std::path::Path;
+
 use camera::{Lens, LensModel};
 use serde::Serialize;
 
@@ -59,4 +61,50 @@ pub(super) fn usable(config: &PriorsConfig, lens: &Lens) -> Result<(Lens, Option
 fn pinhole(lens: &Lens, size: [usize; 2], centre: [f64; 2]) -> Result<Lens, LensFault> {
     let [fx, fy] = lens.focal_px();
     Ok(Lens::new(size[0], size[1], LensModel::Pinhole, &[fx, fy, centre[0], centre[1]])?)
+}
+
+/// Returns the command lines that train on a dataset, with the options that its files need.
+pub(super) fn commands(config: &PriorsConfig, depth_png_step: f64) -> Vec<String> {
+    if config.maps_only {
+        return Vec::new();
+    }
+    let dataset = quoted(&config.output, "");
+    let result = |suffix: &str| quoted(&config.output, suffix);
+    let own = format!("skysweep train {dataset} -o {}", result("_trained"));
+    let others = match config.trainer {
+        // Without -r 1 pictures of more than 1,600 columns are reduced, and no longer fit the maps.
+        PriorsTrainer::TwoDgs => vec![format!("python train.py -s {dataset} -m {} -r 1", result("_2dgs"))],
+        PriorsTrainer::Gsplat => vec![
+            format!(
+                "python examples/simple_trainer_2dgs.py --data_dir {dataset} --data_factor 1 --result_dir {}",
+                result("_gsplat")
+            ),
+            format!(
+                "ns-train splatfacto --output-dir {} colmap --data {dataset} --colmap-path sparse/0 --images-path images \
+                 --masks-path masks --depths-path depth_png --depth-unit-scale-factor {depth_png_step} --downscale-factor 1",
+                result("_nerfstudio")
+            ),
+        ],
+    };
+    // The trainer of skysweep reads depths along the optical axis only.
+    let readable = config.maps == ::priors::MapConfig::default();
+    others.into_iter().chain(readable.then_some(own)).collect()
+}
+
+/// Returns a path with something added to its name, as a POSIX shell takes it.
+fn quoted(path: &Path, suffix: &str) -> String {
+    let text = path.components().as_path().display().to_string() + suffix;
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
+    if text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_quoted_where_a_shell_needs_it() {
+        assert_eq!(quoted(Path::new("out/town/"), "_2dgs"), "out/town_2dgs");
+        assert_eq!(quoted(Path::new("my town's"), ""), r"'my town'\''s'");
+    }
 }

@@ -93,10 +93,17 @@ fn read_view(
     let brightest = pixels.data().iter().flatten().copied().fold(0.0f32, f32::max);
     let white = if brightest > 255.0 { 65_535.0 } else { 255.0 };
     let colour = [0, 1, 2].map(|c| shrunk(size, config.shrink, |x, y| pixels[(x, y)][c] / white));
-    let stem = Path::new(&view.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let nested = Path::new(&view.name).with_extension("");
+    let flat = nested.file_name().unwrap_or_default();
     let map = |kind: &str, channels: usize| -> Result<Option<Vec<f32>>, TrainError> {
-        let path = config.dataset.join(kind).join(format!("{stem}.npy"));
-        if path.is_file() { Ok(Some(numbers(&path, full, channels)?)) } else { Ok(None) }
+        // Maps for 2DGS leave out the folders of the name.
+        let paths = [nested.as_os_str(), flat].map(|stem| {
+            let mut file = config.dataset.join(kind).join(stem).into_os_string();
+            file.push(".npy");
+            PathBuf::from(file)
+        });
+        let found = paths.iter().find(|path| path.is_file());
+        found.map(|path| numbers(path, full, channels)).transpose()
     };
     let at = |x: usize, y: usize| y * full[0] + x;
     let half = config.shrink / 2;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,11 @@ def together(values: dict[str, ArrayLike]) -> tuple[list[Floats], tuple[int, ...
         return np.ascontiguousarray(np.broadcast_to(array, shape)).reshape(-1)
 
     return [flat(array) for array in arrays.values()], shape
+
+
+def empty(shape: tuple[int, ...]) -> Floats:
+    """A flat array for as many numbers as a shape has."""
+    return np.empty(math.prod(shape), dtype=np.float64)
 
 
 def shaped(values: Floats, shape: tuple[int, ...]) -> Any:

@@ -1262,6 +1262,8 @@ def priors(
     visibility: VisibilityConfig | None = None,
     maps: MapConfig | None = None,
     extras: bool = False,
+    images: Literal["none", "beside"] | Mapping[str, Any] = "none",
+    miss: Literal["inf", "nan", "0"] = "inf",
     geotiff: bool = False,
     previews: int = 12,
     threads: int | None = None,
@@ -1301,6 +1303,8 @@ def priors(
         maps: Meaning of depths and normals in the maps.
         extras: Whether files are written that repeat others in another form: the COLMAP model as
             text, the points as PLY beside `sparse`, and initial splats of the points.
+        images: Where the pictures of the dataset come from. Perspective cameras only.
+        miss: Depth of pixels that see no building, in the `.npy` maps. Perspective cameras only.
         geotiff: Whether the maps are written as GeoTIFF too.
         previews: Number of views with preview pictures.
         threads: Worker threads; one per core when `None`.

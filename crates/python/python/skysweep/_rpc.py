@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _native
-from ._arrays import shaped, together
+from ._arrays import empty, shaped, together
 from ._call import path_of
 from ._errors import InputError
 
@@ -173,7 +173,8 @@ class Rpc:
             InputError: An array does not hold real numbers, or the shapes do not fit.
         """
         (flat_lon, flat_lat, flat_height), shape = together({"lon": lon, "lat": lat, "height": height})
-        sample, line = self._core.project(flat_lon, flat_lat, flat_height)
+        sample, line = empty(shape), empty(shape)
+        self._core.project([flat_lon, flat_lat, flat_height], [sample, line])
         return shaped(sample, shape), shaped(line, shape)
 
     def localize(self, sample: ArrayLike, line: ArrayLike, height: ArrayLike) -> tuple[Any, Any]:
@@ -190,7 +191,8 @@ class Rpc:
             InputError: An array does not hold real numbers, or the shapes do not fit.
         """
         (flat_sample, flat_line, flat_height), shape = together({"sample": sample, "line": line, "height": height})
-        lon, lat = self._core.localize(flat_sample, flat_line, flat_height)
+        lon, lat = empty(shape), empty(shape)
+        self._core.localize([flat_sample, flat_line, flat_height], [lon, lat])
         return shaped(lon, shape), shaped(lat, shape)
 
     def gsd(self, lon: float, lat: float, height: float) -> tuple[float, float]:
