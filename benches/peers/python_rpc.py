@@ -10,7 +10,7 @@ from pathlib import Path
 
 THREADS = [1, os.cpu_count() or 1]
 #: Points of a call, and calls of which the fastest counts.
-POINTS, CALLS = 2_000_000, 7
+POINTS, CALLS = 2_000_000, 25
 TOWN = Path(__file__).resolve().parents[2] / "data-samples" / "town"
 IMAGE = TOWN / "view_1.tif"
 #: Packages with libraries of their own, such as GDAL, PROJ and OpenMP.

@@ -19,14 +19,17 @@ use jobs::dtm::DtmConfig;
 use jobs::eval::{EvalKind, GridEvalConfig, MapEvalConfig, SurfaceEvalConfig, detect_kind};
 use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig};
 use jobs::heightmap::{HeightMapConfig, UnprojectConfig};
+use jobs::mesh::{DepthSource, MeshJobConfig};
 use jobs::ortho::OrthoConfig;
 use jobs::priors::PriorsConfig;
 use jobs::production::{ChunkRunConfig, MergeConfig, PlanFile};
 use jobs::products::ProductsConfig;
+use jobs::register::{RegisterConfig, RegisterModel};
 use jobs::rpc::{RpcConvertConfig, RpcInfoConfig};
 use jobs::simulate::{SimulateConfig, SimulateJobError};
 use jobs::splats::{SplatRenderConfig, SplatsConfig};
 use jobs::split::SplitJobConfig;
+use jobs::tiles::TilesConfig;
 use jobs::train::TrainConfig;
 use numeric::Progress;
 use serde::de::DeserializeOwned;
@@ -92,7 +95,7 @@ fn town() -> SimulationConfig {
 }
 
 /// The jobs in the order of the documentation.
-pub(crate) const JOBS: [JobEntry; 32] = [
+pub(crate) const JOBS: [JobEntry; 35] = [
     job!(
         "dsm",
         "Make a surface model from satellite images with RPCs.",
@@ -198,6 +201,14 @@ pub(crate) const JOBS: [JobEntry; 32] = [
         OrthoConfig::new(Vec::new(), nowhere(), nowhere())
     ),
     job!(
+        "register",
+        "Correct the RPC of an image by a surface model or splats.",
+        RegisterConfig,
+        jobs::register::run,
+        ["image", "model", "output"],
+        RegisterConfig::new(nowhere(), RegisterModel::Splats(nowhere()), nowhere())
+    ),
+    job!(
         "evaluate_grids",
         "Measure the errors of a surface model against a reference.",
         GridEvalConfig,
@@ -246,6 +257,15 @@ pub(crate) const JOBS: [JobEntry; 32] = [
         UnprojectConfig::new(nowhere(), nowhere())
     ),
     job!(
+        "tiles",
+        "Make a folder for each position with its height map, satellite picture and cameras.",
+        TilesConfig,
+        jobs::tiles::run,
+        ["source", "output", "stand"],
+        TilesConfig::new(HeightMapConfig::new(nowhere(), nowhere(), stand())),
+        lifted "maps"
+    ),
+    job!(
         "groundview",
         "Make depths, normals and sky of cameras and panoramas on the ground.",
         GroundViewConfig,
@@ -292,6 +312,14 @@ pub(crate) const JOBS: [JobEntry; 32] = [
         jobs::train::run,
         ["dataset", "output"],
         TrainConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "mesh",
+        "Fuse the depth maps of a dataset, or its splats, to a mesh.",
+        MeshJobConfig,
+        jobs::mesh::run,
+        ["dataset", "depths", "output"],
+        MeshJobConfig::new(nowhere(), DepthSource::Maps(nowhere()), nowhere())
     ),
     job!(
         "align",
@@ -451,7 +479,7 @@ fn named_scene(scene: &str) -> Result<SimulationConfig, Fault> {
 
 /// Returns the job called `name`.
 pub(crate) fn job(name: &str) -> Option<&'static JobEntry> {
-    static ALL: [JobEntry; 32] = JOBS;
+    static ALL: [JobEntry; 35] = JOBS;
     ALL.iter().find(|entry| entry.name == name)
 }
 

@@ -20,14 +20,17 @@ use jobs::files::FileError;
 use jobs::groundview::GroundViewError;
 use jobs::heightmap::HeightMapJobError;
 use jobs::job_file::JobFileError;
+use jobs::mesh::MeshJobError;
 use jobs::ortho::OrthoError;
 use jobs::priors::PriorsJobError;
 use jobs::production::ProductionError;
 use jobs::products::ProductsError;
+use jobs::register::RegisterError;
 use jobs::rpc::RpcJobError;
 use jobs::simulate::SimulateJobError;
 use jobs::splats::SplatsJobError;
 use jobs::split::SplitJobError;
+use jobs::tiles::TilesError;
 use jobs::train::TrainError;
 
 /// Class of an exception. The names are those of the classes in `skysweep` without `Error`.
@@ -166,6 +169,7 @@ judged! {
     }
     GroundViewError {}
     HeightMapJobError {}
+    MeshJobError { Self::Model(_) | Self::Ply(_) | Self::Map(_) => Some(FaultKind::File) }
     OrthoError {}
     PriorsJobError {}
     ProductsError {}
@@ -173,8 +177,13 @@ judged! {
         Self::Scene(_) | Self::Parameters { .. } => Some(FaultKind::Input),
         Self::NotEmpty { .. } => Some(FaultKind::OutputExists),
     }
+    RegisterError { Self::Splats(_) => Some(FaultKind::File) }
     SplatsJobError {}
     SplitJobError {}
+    TilesError {
+        Self::Map(error) => error.kind(),
+        Self::Ortho(error) => error.kind(),
+    }
     TrainError {}
 }
 

@@ -25,18 +25,21 @@ __all__ = [
     "diff",
     "products",
     "ortho",
+    "register",
     "evaluate_grids",
     "evaluate_surfaces",
     "evaluate_maps",
     "kind_of_evaluation",
     "heightmap",
     "unproject",
+    "tiles",
     "groundview",
     "compose",
     "priors",
     "splats",
     "render_splats",
     "train",
+    "mesh",
     "align",
     "split",
     "city_info",
@@ -902,6 +905,42 @@ def ortho(
 
 
 @job
+def register(
+    image: PathLike,
+    model: Mapping[str, Any],
+    output: PathLike,
+    *,
+    corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
+    vertical: str | None = None,
+    reach_px: float = 20.0,
+    affine: bool = False,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress = None,
+) -> Report:
+    """Correct the RPC of an image by a surface model or splats.
+
+    Args:
+        image: Image with an RPC.
+        model: What it is registered to.
+        output: Report to write (JSON), which holds the correction.
+        corrections: Source of the pointing corrections of the model's images.
+        vertical: Vertical datum of the surface model; the one that the file states when `None`.
+        reach_px: Largest error of the pointing that is searched for, pixels of the image.
+        affine: Whether the correction is an affine map instead of a shift.
+        threads: Worker threads; one per core when `None`.
+        overwrite: Whether an existing report may be replaced.
+        progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
+
+    Raises:
+        TypeError: A keyword that the job does not have; the text names those that it has.
+        SkysweepError: The job has no result; see its subclasses.
+    """
+    result: Report = run_job("register", locals())
+    return result
+
+
+@job
 def evaluate_grids(
     test: PathLike,
     reference: PathLike,
@@ -1161,6 +1200,67 @@ def unproject(
         SkysweepError: The job has no result; see its subclasses.
     """
     result: Report = run_job("unproject", locals())
+    return result
+
+
+@job
+def tiles(
+    source: PathLike,
+    output: PathLike,
+    stand: StandConfig,
+    *,
+    size_px: int = 518,
+    resolution_px_per_m: float = 2.0,
+    terrain: PathLike | None = None,
+    normalization: Literal["none", "auto"] | Mapping[str, Any] = "none",
+    confidence: Literal["none", "automatic"] | Mapping[str, Any] = "none",
+    map: Literal["local", "utm"] | Mapping[str, Any] = "local",
+    interpolation: Literal["nearest", "bilinear", "cubic"] = "bilinear",
+    source_epsg: int | None = None,
+    source_vertical: str | None = None,
+    lod: str | None = None,
+    all_objects: bool = False,
+    previews: bool = False,
+    threads: int | None = None,
+    overwrite: bool = False,
+    images: Sequence[PathLike] = (),
+    corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
+    mosaic: Literal["best", "feather", "median"] = "best",
+    progress: Progress = None,
+) -> Report:
+    """Make a folder for each position with its height map, satellite picture and cameras.
+
+    Args:
+        source: Surface model (raster), city model (CityJSON, CityGML, OBJ, PLY) or point cloud
+            (LAS, LAZ, COPC).
+        output: GeoTIFF to write; for a list the folder of the maps.
+        stand: Positions and headings of the cameras.
+        size_px: Pixels along each side.
+        resolution_px_per_m: Pixels per metre on the ground.
+        terrain: Terrain model: the ground under the camera, and the height where the source has
+            none.
+        normalization: Unit of the heights.
+        confidence: Where the confidences come from.
+        map: Map projection to write in.
+        interpolation: Interpolation between the cells of a raster.
+        source_epsg: EPSG code of the source, where the file names none or a wrong one.
+        source_vertical: Vertical datum of the source, where the file names none or a wrong one.
+        lod: Level of detail of a city model. `None` takes the highest of each object up to 2.x.
+        all_objects: Whether every object of a city model is used, not only buildings.
+        previews: Whether a picture is written beside each map.
+        threads: Worker threads. `None` uses all cores.
+        overwrite: Whether existing maps are replaced. Otherwise a list goes on where an earlier run
+            was stopped.
+        images: Images with RPCs. Empty takes those of the run that made the surface model.
+        corrections: Where the pointing corrections of the images come from.
+        mosaic: How the values of several images become one.
+        progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
+
+    Raises:
+        TypeError: A keyword that the job does not have; the text names those that it has.
+        SkysweepError: The job has no result; see its subclasses.
+    """
+    result: Report = run_job("tiles", locals())
     return result
 
 
@@ -1457,6 +1557,53 @@ def train(
         SkysweepError: The job has no result; see its subclasses.
     """
     result: Report = run_job("train", locals())
+    return result
+
+
+@job
+def mesh(
+    dataset: PathLike,
+    depths: Mapping[str, Any],
+    output: PathLike,
+    *,
+    images: PathLike | None = None,
+    voxel_m: float = 0.1,
+    truncation_m: float | None = None,
+    least_views: int = 1,
+    least_part_m2: float = 1.0,
+    shrink: int = 1,
+    masked: bool = False,
+    reference: PathLike | None = None,
+    memory_gib: float = 4.0,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress = None,
+) -> Report:
+    """Fuse the depth maps of a dataset, or its splats, to a mesh.
+
+    Args:
+        dataset: Folder with a COLMAP model in `sparse/0`.
+        depths: The depth maps.
+        output: File of the mesh: `.ply` or `.glb`.
+        images: Folder of the images that give the colours, where splats do not; grey when `None`.
+        voxel_m: Edge of a voxel, metres.
+        truncation_m: Distance from a surface beyond which a map says nothing, metres; four voxels
+            when `None`.
+        least_views: Number of views that must have seen a place.
+        least_part_m2: Connected parts of a smaller area are left out, square metres.
+        shrink: Pixels of an image that become one, in each direction, where splats are drawn.
+        masked: Whether only what the masks of the dataset show becomes a mesh.
+        reference: Surface to compare the mesh with: a mesh, a city model or a cloud.
+        memory_gib: Greatest memory of the volume, gibibytes.
+        threads: Worker threads; one per core when `None`.
+        overwrite: Whether existing files may be replaced.
+        progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
+
+    Raises:
+        TypeError: A keyword that the job does not have; the text names those that it has.
+        SkysweepError: The job has no result; see its subclasses.
+    """
+    result: Report = run_job("mesh", locals())
     return result
 
 
