@@ -7,6 +7,8 @@ SHELL := /bin/bash
 .ONESHELL:
 .DEFAULT_GOAL := help
 
+# Builds GDAL and PROJ from source into what is built (see docs/decisions/static-build.md).
+STATIC := RUSTFLAGS='--cfg skysweep_static' CMAKE_TOOLCHAIN_FILE=$(CURDIR)/crates/io/static.cmake CARGO_TARGET_DIR=target/static
 PACKAGES := libgdal-dev pkg-config libsqlite3-dev g++
 SKYSWEEP := target/release/skysweep
 TOWN := data-samples/town
@@ -20,7 +22,7 @@ for tool in pkg-config c++; do command -v "$$tool" > /dev/null || MISSING="$$MIS
 for library in gdal proj sqlite3; do pkg-config --exists "$$library" 2> /dev/null || MISSING="$$MISSING $$library.pc"; done
 endef
 
-.PHONY: help setup check demo test test-python fuzz lint readme stubs wheel bench bench-kernels plugin test-qgis
+.PHONY: help setup check check-static demo test test-python fuzz lint readme stubs notebooks static wheel bench bench-kernels plugin test-qgis
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -42,6 +44,13 @@ setup: ## install the system packages that are missing (Debian, Ubuntu: apt-get,
 	$$SUDO env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $${WANTED:-$(PACKAGES)} > /dev/null
 	$(FIND_MISSING)
 	[ -z "$$MISSING" ] || { echo "error: after the installation these are still missing:$$MISSING" >&2; exit 2; }
+
+check-static:
+	@MISSING=
+	for tool in cargo cmake c++ pkg-config sqlite3; do command -v "$$tool" > /dev/null || MISSING="$$MISSING $$tool"; done
+	pkg-config --exists libopenjp2 2> /dev/null || MISSING="$$MISSING libopenjp2.pc"
+	[ -z "$$MISSING" ] || { echo "error: missing:$$MISSING. The static build needs Rust and, on Debian and Ubuntu," \
+	  "apt-get install cmake g++ pkg-config sqlite3 libopenjp2-7-dev" >&2; exit 2; }
 
 check:
 	@$(FIND_MISSING)
@@ -91,10 +100,21 @@ readme: check ## bring the numbers of benches/results into README.md and docs
 stubs: check ## write the Python functions of the jobs anew, of the configurations
 	@SKYSWEEP_WRITE_STUBS=1 cargo test --quiet -p skysweep-python --test signatures the_functions
 
-wheel: check ## the Python package as a wheel in out/wheels, which links the system's GDAL and PROJ
+notebooks: check ## run the notebooks of docs/notebooks and store what their cells show
+	@cargo build --workspace
+	PYTHONPATH=$$(crates/python/tests/site.sh); export PYTHONPATH
+	[ -d target/python/notebooks ] || python3 -m venv target/python/notebooks
+	target/python/notebooks/bin/pip install --quiet --disable-pip-version-check numpy matplotlib nbconvert ipykernel
+	env -u SKYSWEEP_DATA target/python/notebooks/bin/jupyter nbconvert --log-level WARN --to notebook --execute --inplace docs/notebooks/*.ipynb
+
+static: check-static ## one file for machines without GDAL and PROJ: target/static/release/skysweep (about 15 minutes)
+	@$(STATIC) cargo build --release --bin skysweep
+	ls -lh target/static/release/skysweep
+
+wheel: check-static ## the Python package as a wheel in out/wheels, with its own GDAL and PROJ (about 15 minutes)
 	@python3 -m venv target/python/maturin
 	target/python/maturin/bin/pip install --quiet --disable-pip-version-check 'maturin>=1.7,<2'
-	target/python/maturin/bin/maturin build --release --out out/wheels
+	$(STATIC) target/python/maturin/bin/maturin build --release --out out/wheels
 
 bench: check ## speed against error: every preset on every scene; writes benches/results (about 15 minutes)
 	@cargo bench --bench scenes

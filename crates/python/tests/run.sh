@@ -21,25 +21,18 @@ command -v "$python" > /dev/null || skip "$python is not installed"
 
 venv=$target/python/venv
 stamp=$venv/made
-wanted="numpy pytest mypy; distributed tqdm xarray shapely"
+wanted="numpy pytest mypy; distributed tqdm xarray shapely matplotlib"
 if [ "$(cat "$stamp" 2> /dev/null)" != "$wanted" ]; then
   rm -rf "$venv"
   "$python" -m venv "$venv" > /dev/null 2>&1 || skip "a virtual environment cannot be made (python3-venv)"
   pip=("$venv/bin/python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 30)
   "${pip[@]}" numpy pytest mypy 2> /dev/null || skip "numpy, pytest and mypy cannot be installed"
-  "${pip[@]}" distributed tqdm xarray shapely 2> /dev/null ||
-    echo "skipped: tests with distributed, tqdm, xarray and shapely, which cannot be installed"
+  "${pip[@]}" distributed tqdm xarray shapely matplotlib 2> /dev/null ||
+    echo "skipped: tests with distributed, tqdm, xarray, shapely and matplotlib, which cannot be installed"
   echo "$wanted" > "$stamp"
 fi
 
-# The package as an installation has it: the sources with the library beside them.
-site=$target/python/site
-mkdir -p "$site"
-rm -rf "$site/skysweep"
-mkdir "$site/skysweep"
-for file in crates/python/python/skysweep/*.py* crates/python/python/skysweep/py.typed; do ln -s "$PWD/$file" "$site/skysweep/"; done
-ln -s "$(realpath "$library")" "$site/skysweep/_native.abi3.so"
-
-export PYTHONPATH=$(realpath "$site") PYTHONDONTWRITEBYTECODE=1
+PYTHONPATH=$(crates/python/tests/site.sh)
+export PYTHONPATH PYTHONDONTWRITEBYTECODE=1
 export SKYSWEEP_COMMAND=${SKYSWEEP_COMMAND:-$(realpath "$target")/debug/skysweep}
 exec "$venv/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"
