@@ -47,6 +47,21 @@ def test_a_chain_of_jobs(tmp_path: Path) -> None:
     assert model and (tmp_path / "map.tif").is_file()
 
 
+def test_images_are_registered_and_tiles_and_meshes_are_made(tmp_path: Path) -> None:
+    truth = TOWN / "truth"
+    model = {"surface": {"dsm": truth / "dsm.tif", "images": VIEWS[:1]}}
+    registered = skysweep.register(VIEWS[1], model, tmp_path / "view.json", corrections="uncorrected", reach_px=5.0)
+    assert (tmp_path / "view.json").is_file() and registered.median_px < 1.0
+    stand = {"source": {"position": {"lon_deg": 5.4, "lat_deg": 43.53}}}
+    settings: dict[str, Any] = {"images": VIEWS, "size_px": 64, "corrections": "uncorrected"}
+    tiles = skysweep.tiles(truth / "dsm.tif", tmp_path / "tiles", stand, **settings)
+    assert list((tmp_path / "tiles").rglob("ortho.tif")) and tiles.made == 1
+    priors = tmp_path / "priors"
+    skysweep.priors(truth / "buildings.city.json", [TOWN / "cameras"], priors)
+    mesh = skysweep.mesh(priors, {"maps": priors / "raw_depth"}, tmp_path / "town.ply", voxel_m=2.0)
+    assert mesh.triangles > 100 and (tmp_path / "town.ply").is_file()
+
+
 def test_products_of_a_run(tmp_path: Path) -> None:
     skysweep.dsm(VIEWS, tmp_path / "run", **SMALL)
     skysweep.products(tmp_path / "run", products=["dtm"])
