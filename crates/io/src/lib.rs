@@ -25,6 +25,7 @@ mod regular;
 pub mod rpc;
 pub mod similarity;
 pub mod splat_ply;
+pub mod stac;
 pub mod surfaces;
 pub mod textured_mesh;
 pub mod transforms;

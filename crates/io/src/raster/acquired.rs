@@ -1,8 +1,9 @@
-//! When an image was taken, from its metadata.
+//! When an image was taken and where the sun stood, from its metadata.
 
 use chrono::NaiveDateTime;
 
 use super::source::ImageSource;
+use crate::stac::SunPosition;
 
 /// Where the time is found: the domain of GDAL, the key, and the form. GDAL's readers of the
 /// providers' metadata (IMD, DIMAP, PVL and others) write the first. The second is the field IDATIM
@@ -13,14 +14,31 @@ const PLACES: [(&str, &str, &str); 3] = [
     ("", "NITF_IDATIM", "%Y%m%d%H%M%S"),
 ];
 
+/// Domain of DigitalGlobe's metadata.
+const IMD: &str = "IMD";
+/// Azimuth and elevation of the sun in it, of older and newer products.
+const SUN: [[&str; 2]; 2] = [["IMAGE_1.meanSunAz", "IMAGE_1.meanSunEl"], ["IMAGE_1.sunAz", "IMAGE_1.sunEl"]];
+
 impl ImageSource {
-    /// Returns when the image was taken, seconds of UTC since 1970; `None` where its metadata do
-    /// not say.
+    /// Returns when the image was taken, seconds of UTC since 1970, by its metadata or by its STAC
+    /// item; `None` where they do not say.
     pub fn acquired_s(&self) -> Option<i64> {
-        PLACES.iter().find_map(|(domain, name, form)| {
-            let (_, text) = self.metadata(domain).into_iter().find(|(key, _)| key == name)?;
-            parse(&text, form)
-        })
+        let own = PLACES.iter().find_map(|(domain, name, form)| parse(&self.value(domain, name)?, form));
+        own.or_else(|| self.item()?.acquired_s)
+    }
+
+    /// Returns where the sun stood, by the image's metadata or by its STAC item; `None` where they
+    /// do not say.
+    pub fn sun(&self) -> Option<SunPosition> {
+        let angle = |name| self.value(IMD, name)?.trim().parse::<f64>().ok().filter(|angle| angle.is_finite());
+        let own = SUN.iter().find_map(|[azimuth, elevation]| {
+            Some(SunPosition { azimuth_deg: angle(azimuth)?, elevation_deg: angle(elevation)? })
+        });
+        own.or_else(|| self.item()?.sun)
+    }
+
+    fn value(&self, domain: &str, name: &str) -> Option<String> {
+        self.metadata(domain).into_iter().find(|(key, _)| key == name).map(|(_, text)| text)
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::luma_rule::BandChoice;
 use crate::atomic::SaveError;
+use crate::stac::StacError;
 
 /// A raster file that cannot be read or written. The text ends with the path, and `reason` is
 /// GDAL's message.
@@ -45,6 +46,14 @@ pub enum RasterError {
         path: PathBuf,
         /// GDAL's message.
         reason: String,
+    },
+    /// A STAC item does not lead to an image.
+    #[error("{source}: {}", path.display())]
+    Item {
+        /// The item.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: StacError,
     },
     /// GDAL opened the file but cannot decode its content.
     #[error("the raster is damaged or truncated ({reason}): {}", path.display())]

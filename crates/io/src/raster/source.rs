@@ -13,6 +13,7 @@ use super::error::RasterError;
 use super::gdal_access::files_of;
 use super::gdal_setup::{open_dataset, with_gdal};
 use super::luma_rule::{BandChoice, LumaRule, band_names};
+use crate::stac::{StacItem, is_item_name, read_item};
 
 /// Type of the stored samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,20 +81,22 @@ pub struct ImageSource {
     path: PathBuf,
     dataset: Dataset,
     info: ImageInfo,
+    item: Option<StacItem>,
 }
 
 impl ImageSource {
-    /// Opens a local raster of any format that GDAL reads.
+    /// Opens a local raster of any format that GDAL reads, or the one that a STAC item names.
     ///
     /// # Errors
-    /// [`RasterError::Unreadable`]; [`RasterError::NotLocal`]; [`RasterError::NotARaster`];
+    /// [`RasterError::Item`]; [`RasterError::Unreadable`]; [`RasterError::NotLocal`]; [`RasterError::NotARaster`];
     /// [`RasterError::Unsupported`] for a raster without bands and for complex or 64-bit integer
     /// samples.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RasterError> {
         let path = path.as_ref().to_owned();
-        let dataset = open_dataset(&path)?;
+        let item = item_at(&path)?;
+        let dataset = open_dataset(item.as_ref().map_or(&path, |item| &item.image))?;
         let info = describe(&path, &dataset)?;
-        Ok(Self { path, dataset, info })
+        Ok(Self { path, dataset, info, item })
     }
 
     /// Returns the image with one band as its luma and as its colour.
@@ -119,15 +122,21 @@ impl ImageSource {
         Self::open(&self.path)
     }
 
-    /// The file.
+    /// The file, or the STAC item that names it.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
+    /// What the STAC item says that names the image; `None` for an image that is given itself.
+    pub fn item(&self) -> Option<&StacItem> {
+        self.item.as_ref()
+    }
+
     /// Returns the files that the image consists of: its own, those beside it, and those that a
-    /// virtual raster names.
+    /// virtual raster or a STAC item names.
     pub fn files(&self) -> Vec<PathBuf> {
-        files_of(&self.dataset).into_iter().map(PathBuf::from).collect()
+        let named = self.item.iter().flat_map(|item| [Some(self.path.clone()), item.rpc.clone()]).flatten();
+        files_of(&self.dataset).into_iter().map(PathBuf::from).chain(named).collect()
     }
 
     /// Size, sample type, georeference.
@@ -221,6 +230,12 @@ fn read_buffer<T: Copy + gdal::raster::GdalType>(
 fn grid_of<T>(path: &Path, inside: Window, data: Vec<T>) -> Result<Grid<T>, RasterError> {
     Grid::from_vec(inside.width, inside.height, data)
         .ok_or_else(|| RasterError::damaged(path, "GDAL returned another number of pixels than requested"))
+}
+
+/// Reads the item at a path; `None` where the name is not that of one.
+fn item_at(path: &Path) -> Result<Option<StacItem>, RasterError> {
+    let read = is_item_name(path).then(|| read_item(path)).transpose();
+    read.map_err(|source| RasterError::Item { path: path.to_owned(), source })
 }
 
 fn describe(path: &Path, dataset: &Dataset) -> Result<ImageInfo, RasterError> {

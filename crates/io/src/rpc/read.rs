@@ -9,9 +9,10 @@ use super::error::{Attempt, Fault, RpcReadError};
 use super::file::{self, Content};
 use super::format::RpcFormat;
 use super::rpc_file::{Parsed, RpcFile};
-use super::text_file::{finish, not_rpc, too_large};
+use super::text_file::{self, finish, not_rpc, too_large};
 use super::{image, sidecar, tiff_tag};
 use crate::raster::{RasterError, open_address};
+use crate::stac::{StacError, is_item_name, read_item};
 
 /// Reads the RPC of a file: an RPC file, metadata that contains one, or an image (as
 /// [`read_for_image`]).
@@ -43,6 +44,11 @@ pub fn read(path: &Path) -> Result<RpcFile, RpcReadError> {
     if is_gdal_virtual(path) {
         return read_for_image(path);
     }
+    if is_item_name(path)
+        && let Some(file) = read_for_item(path)?
+    {
+        return Ok(file);
+    }
     match file::content(path)? {
         Content::Binary => read_for_image(path),
         Content::TooLarge(bytes) => Err(too_large(path, bytes)),
@@ -55,12 +61,18 @@ pub fn read(path: &Path) -> Result<RpcFile, RpcReadError> {
 }
 
 /// Finds the RPC of an image: GDAL's `RPC` metadata, TIFF tag 50844, the text of a virtual raster,
-/// then files beside it. Of an image at an address only what is inside it is read.
+/// then files beside it. Of an image that a STAC item names the item's own RPC file comes last. Of an
+/// image at an address only what is inside it is read.
 ///
 /// # Errors
 /// Every variant of [`RpcReadError`] but [`RpcReadError::TooLarge`] for the image itself. A broken
 /// RPC in one place is an error, even where another place has a sound one.
 pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
+    if is_item_name(path)
+        && let Some(file) = read_for_item(path)?
+    {
+        return Ok(file);
+    }
     if let Some(opened) = open_address(path) {
         return read_address(path, opened);
     }
@@ -99,6 +111,20 @@ pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
         return Ok(file);
     }
     Err(not_rpc(path, tried))
+}
+
+/// Reads the RPC of the image that a STAC item names, or the item's RPC file where the image has
+/// none; `None` for JSON that is no item, which may be an RPC itself.
+fn read_for_item(path: &Path) -> Result<Option<RpcFile>, RpcReadError> {
+    let item = match read_item(path) {
+        Ok(item) => item,
+        Err(StacError::NotAnItem { .. } | StacError::Unreadable(_)) => return Ok(None),
+        Err(error) => return Err(not_rpc(path, vec![Attempt::new("the STAC item", error.to_string())])),
+    };
+    match (read_for_image(&item.image), item.rpc) {
+        (Err(RpcReadError::NotRpc { .. }), Some(rpc)) => text_file::read(&rpc).map(Some),
+        (found, _) => found.map(Some),
+    }
 }
 
 /// Reads the RPC inside an image at an address that the user named. Nothing beside it is fetched.

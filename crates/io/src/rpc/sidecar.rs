@@ -15,6 +15,7 @@ use super::error::{Attempt, RpcReadError};
 use super::format::RpcFormat;
 use super::rpc_file::RpcFile;
 use super::text_file;
+use crate::stac::{is_item_name, read_item};
 
 /// Endings after the image's name without its extension, best first.
 const ENDINGS: [&str; 6] = ["_rpc.txt", ".rpb", ".xml", ".rpc", ".geom", ".json"];
@@ -41,10 +42,14 @@ pub(super) fn read(
     Ok(None)
 }
 
-/// Returns the files beside an image that may hold its RPC, best first; none where the folder
-/// cannot be read.
+/// Returns the files beside an image that may hold its RPC, best first; none where the folder cannot
+/// be read. Of a STAC item they are those of its image, the image itself, and the item's RPC file.
 pub fn side_files(image: &Path) -> Vec<PathBuf> {
-    candidates(image, &mut Vec::new()).unwrap_or_default()
+    let item = is_item_name(image).then(|| read_item(image).ok()).flatten();
+    let beside = item.as_ref().map_or(image, |item| &item.image);
+    let mut files = candidates(beside, &mut Vec::new()).unwrap_or_default();
+    files.extend(item.into_iter().flat_map(|item| [Some(item.image), item.rpc]).flatten());
+    files
 }
 
 /// Returns the existing files whose names fit, best first.

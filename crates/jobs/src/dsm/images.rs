@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use camera::{ImagePoint, RpcCamera};
+use io::stac::SunPosition;
 use raster::Window;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,13 @@ pub struct SceneImage {
     pub size: (usize, usize),
     /// When the image was taken, seconds of UTC since 1970; `None` where the file does not say.
     pub acquired_s: Option<i64>,
+    /// Where the sun stood; `None` where neither the file nor its STAC item says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sun: Option<SunPosition>,
+    /// Angle of the line of sight to the vertical that the STAC item states, degrees. It is compared
+    /// with that of the RPC.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stated_incidence_deg: Option<f64>,
     /// Factor of the grey values, a power of two: 1 unless a float image has a scale of its own,
     /// such as reflectances from 0 to 1. Noise and texture are then measured in numbers like those
     /// of sensors.

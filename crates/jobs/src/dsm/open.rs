@@ -70,6 +70,8 @@ fn open_one(
         size: (source.info().width, source.info().height),
         camera: RpcCamera::new(file.rpc),
         acquired_s: source.acquired_s(),
+        sun: source.sun(),
+        stated_incidence_deg: source.item().and_then(|item| item.incidence_deg),
         gain: match source.info().sample {
             SampleType::F32 | SampleType::F64 => gain(&source)?,
             _ => 1.0,

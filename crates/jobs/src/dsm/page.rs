@@ -129,10 +129,12 @@ fn time_plot(report: &DsmReport) -> (Chart, String, String) {
 
 fn image_table(report: &DsmReport) -> JobTable {
     let number = |value: Option<f64>, digits: usize| value.map_or(String::new(), |v| format!("{v:.digits$}"));
+    let has_sun = report.images.iter().any(|image| image.sun.is_some());
     let row = |(i, image): (usize, &ImageReport)| {
         let found = report.pointing.images.get(i);
         let [shift_x, shift_y] = shift_at_middle(image);
-        vec![
+        let sun = image.sun.map(|sun| format!("{:.0}, {:.0}", sun.azimuth_deg, sun.elevation_deg));
+        let mut cells = vec![
             format!("{} {}", i + 1, file_name(&image.path)),
             image.acquired.clone().unwrap_or_default(),
             image.rpc.clone(),
@@ -142,23 +144,26 @@ fn image_table(report: &DsmReport) -> JobTable {
             format!("{shift_x:+.2}, {shift_y:+.2}"),
             found.map_or(String::new(), |f| f.inliers.to_string()),
             number(found.map(|f| f.residual_px).filter(|v| v.is_finite()), 2),
-        ]
+        ];
+        if has_sun {
+            cells.push(sun.unwrap_or_default());
+        }
+        cells
     };
+    let heads = [
+        "image",
+        "taken",
+        "RPC",
+        "size, px",
+        "GSD, m",
+        "incidence, °",
+        "correction in the middle, px",
+        "tie points",
+        "residual, px",
+    ];
     JobTable {
         title: "Images".to_owned(),
-        heads: [
-            "image",
-            "taken",
-            "RPC",
-            "size, px",
-            "GSD, m",
-            "incidence, °",
-            "correction in the middle, px",
-            "tie points",
-            "residual, px",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
+        heads: heads.into_iter().chain(has_sun.then_some("sun: azimuth, elevation, °")).map(str::to_owned).collect(),
         rows: report.images.iter().enumerate().map(row).collect(),
     }
 }

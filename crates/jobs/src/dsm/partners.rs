@@ -22,6 +22,8 @@ const PARTNERS: usize = 4;
 const CONNECTIONS: usize = 3;
 /// A satellite passes in less than this, seconds.
 const PASS_S: i64 = 600;
+/// The sun moves by less than this in one pass, degrees: 15° in an hour.
+const PASS_SUN_DEG: f64 = 15.0 * PASS_S as f64 / 3600.0;
 /// Worth of a pair of two passes against a pair of one: shadows, vehicles and plants have changed.
 const OTHER_PASS: f64 = 0.5;
 /// Least rating of an angle: what connects two strips may have a bad one.
@@ -48,10 +50,11 @@ pub(crate) fn tie_pairs(images: &[SceneImage], geometry: &ViewGeometry, useful: 
 
 fn merit(images: &[SceneImage], geometry: &ViewGeometry, pair: ImagePair) -> f64 {
     let (angle_deg, overlap) = geometry.pair(pair).map_or((0.0, 0.0), |p| (p.angle_deg, p.overlap));
-    let pass = match [pair.first, pair.second].map(|i| images[i].acquired_s) {
-        [Some(a), Some(b)] if (a - b).abs() > PASS_S => OTHER_PASS,
-        _ => 1.0,
-    };
+    let (first, second) = (&images[pair.first], &images[pair.second]);
+    let apart_s = first.acquired_s.zip(second.acquired_s).map(|(a, b)| (a - b).abs());
+    let sun_deg = first.sun.zip(second.sun).map(|(a, b)| a.angle_deg(&b));
+    let other = apart_s.is_some_and(|s| s > PASS_S) || sun_deg.is_some_and(|deg| deg > PASS_SUN_DEG);
+    let pass = if other { OTHER_PASS } else { 1.0 };
     pass * overlap * angle_merit(angle_deg).max(MERIT_MIN)
 }
 

@@ -82,6 +82,10 @@ pub struct PlanReport {
     pub pointing: PointingReport,
 }
 
+/// Difference of the incidence angles that an item and the RPC of one image may have, degrees: the
+/// angle changes by 2° within a long strip, and some catalogues state it at the sensor.
+const STATED_VIEW_DEG: f64 = 5.0;
+
 /// Standard deviation of the residuals of tie points between images whose cameras are exact,
 /// pixels: what the simulated scenes have, 0.21 to 0.24.
 const TIE_NOISE_PX: f64 = 0.24;
@@ -123,6 +127,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
     let pixel_m = gsds_m.iter().flatten().copied().fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, pixel_m)?;
     note_grid(config, &grid, pixel_m, &mut notes);
+    note_stated_views(images, &geometry, &mut notes);
     let sources = choose_sources(config, &geometry, pointed, &tuning, &mut notes)?;
     if let Some(path) = &config.prior {
         session.prior(path)?.note(&grid, &mut notes)?;
@@ -292,6 +297,26 @@ impl PlannedScene<'_> {
     }
 }
 
+/// Warns of STAC items that state another line of sight than the RPC has.
+fn note_stated_views(images: &[SceneImage], geometry: &ViewGeometry, notes: &mut Notes<'_>) {
+    for (i, image) in images.iter().enumerate() {
+        let Some(stated_deg) = image.stated_incidence_deg else { continue };
+        let Some(found_deg) = incidence_deg(image, geometry, i) else { continue };
+        if (stated_deg - found_deg).abs() > STATED_VIEW_DEG {
+            notes.warn(format!(
+                "the item states an incidence angle of {stated_deg:.1}°, the RPC has {found_deg:.1}°: check whether they \
+                 belong to one image: {}",
+                image.path.display()
+            ));
+        }
+    }
+}
+
+/// Returns the angle of the line of sight to the vertical, degrees.
+fn incidence_deg(image: &SceneImage, geometry: &ViewGeometry, number: usize) -> Option<f64> {
+    image.camera.view_direction(geometry.middle_of(number)).ok().map(|v| v.incidence_deg())
+}
+
 fn image_reports(
     images: &[SceneImage],
     gsds_m: &[Option<f64>],
@@ -303,8 +328,9 @@ fn image_reports(
         rpc: image.rpc_format.clone(),
         size: image.size,
         acquired: image.acquired_s.and_then(iso_time),
+        sun: image.sun,
         gsd_m: gsds_m.get(i).copied().flatten(),
-        incidence_deg: image.camera.view_direction(geometry.middle_of(i)).ok().map(|v| v.incidence_deg()),
+        incidence_deg: incidence_deg(image, geometry, i),
         correction: corrections.get(i).copied(),
         applied_correction: image.camera.correction,
     };

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use camera::{ImageCorrection, ImagePoint};
+use io::stac::SunPosition;
 use numeric::Choice;
 use serde::{Deserialize, Serialize};
 use sweep::pointing::{Adjustment, ModelOrder};
@@ -57,6 +58,9 @@ pub struct ImageReport {
     /// When the image was taken, in the form of ISO 8601; `None` where the file does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub acquired: Option<String>,
+    /// Where the sun stood; absent where neither the file nor its STAC item says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sun: Option<SunPosition>,
     /// Side of a pixel on the ground at the centre of the scene, metres.
     pub gsd_m: Option<f64>,
     /// Angle of the line of sight to the vertical, degrees.

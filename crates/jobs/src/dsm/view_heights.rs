@@ -96,6 +96,8 @@ fn described(images: &[ViewImage]) -> Vec<SceneImage> {
         camera: image.camera.clone(),
         size: (image.pixels.width(), image.pixels.height()),
         acquired_s: None,
+        sun: None,
+        stated_incidence_deg: None,
         gain: 1.0,
         band: None,
         masks: Vec::new(),
