@@ -1,5 +1,5 @@
-//! STAC items in the place of images: the bytes are those of the images, dates and sun come from the
-//! items, and items that lead nowhere are refused.
+//! STAC items in the place of images: the bytes are those of the images, dates and sun come from
+//! the items, and items that lead nowhere are refused.
 
 mod common;
 
@@ -85,7 +85,8 @@ fn the_rpc_of_an_item_is_taken_where_the_image_has_none() {
     skysweep().args(["rpc", "convert"]).arg(sample("view_1.tif")).arg("-o").arg(&rpc).assert().success();
     let mut assets = json!({ "image": { "href": "plain.vrt", "roles": ["data"] },
                              "rpc": { "href": "meta/camera_RPC.TXT", "type": "text/plain" } });
-    let vrt = "<VRTDataset rasterXSize=\"32\" rasterYSize=\"32\"><VRTRasterBand dataType=\"Byte\" band=\"1\"/></VRTDataset>";
+    let vrt =
+        "<VRTDataset rasterXSize=\"32\" rasterYSize=\"32\"><VRTRasterBand dataType=\"Byte\" band=\"1\"/></VRTDataset>";
     fs::write(root.join("plain.vrt"), vrt).unwrap();
     let with_rpc = item(root, 1, &json!({}), assets.clone());
     assert_eq!(io::rpc::read_for_image(&with_rpc).unwrap().rpc, io::rpc::read(&rpc).unwrap().rpc);
@@ -103,7 +104,8 @@ fn items_that_lead_nowhere_are_refused() {
     let other = sample("view_3.tif");
     let refused = |assets: Value, expected: &str| {
         let path = item(root, 1, &json!({}), assets);
-        let done = skysweep().arg("dsm").args([&path, &other]).arg("-o").arg(root.join("out")).assert().failure().code(2);
+        let done =
+            skysweep().arg("dsm").args([&path, &other]).arg("-o").arg(root.join("out")).assert().failure().code(2);
         let text = stderr(&done);
         assert!(text.contains(expected) && text.contains("view_1.json"), "{text}");
     };

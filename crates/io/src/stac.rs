@@ -81,7 +81,9 @@ pub enum StacError {
         assets: String,
     },
     /// An asset lies elsewhere than in a file.
-    #[error("the asset `{asset}` lies at {href}: copy it beside the item and name the copy, since local files are read")]
+    #[error(
+        "the asset `{asset}` lies at {href}: copy it beside the item and name the copy, since local files are read"
+    )]
     NotLocal {
         /// Name of the asset.
         asset: String,
@@ -156,7 +158,8 @@ fn read_limited(path: &Path) -> Result<Vec<u8>, StacError> {
 /// An asset with its name.
 type Asset<'a> = (&'a str, &'a Value);
 
-/// Returns the image: of several, the one of role `data`; of several of these, the panchromatic one.
+/// Returns the image: of several, the one of role `data`; of several of these, the panchromatic
+/// one.
 fn image_asset(assets: &Map<String, Value>) -> Result<Asset<'_>, StacError> {
     let has_role = |asset: &Value, wanted: &[&str]| {
         let roles = asset["roles"].as_array().map(Vec::as_slice).unwrap_or_default();
@@ -276,7 +279,11 @@ fn time(properties: &Value) -> Result<Option<i64>, StacError> {
     let found = &properties[property];
     let parsed = found.as_str().and_then(|text| DateTime::parse_from_rfc3339(text).ok());
     let expected = "a time such as 2024-05-01T10:15:00Z";
-    parsed.map(|time| Some(time.timestamp())).ok_or(StacError::Property { property, found: found.to_string(), expected })
+    parsed.map(|time| Some(time.timestamp())).ok_or(StacError::Property {
+        property,
+        found: found.to_string(),
+        expected,
+    })
 }
 
 #[cfg(test)]

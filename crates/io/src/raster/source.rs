@@ -88,9 +88,9 @@ impl ImageSource {
     /// Opens a local raster of any format that GDAL reads, or the one that a STAC item names.
     ///
     /// # Errors
-    /// [`RasterError::Item`]; [`RasterError::Unreadable`]; [`RasterError::NotLocal`]; [`RasterError::NotARaster`];
-    /// [`RasterError::Unsupported`] for a raster without bands and for complex or 64-bit integer
-    /// samples.
+    /// [`RasterError::Item`]; [`RasterError::Unreadable`]; [`RasterError::NotLocal`];
+    /// [`RasterError::NotARaster`]; [`RasterError::Unsupported`] for a raster without bands and for
+    /// complex or 64-bit integer samples.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RasterError> {
         let path = path.as_ref().to_owned();
         let item = item_at(&path)?;

@@ -61,8 +61,8 @@ pub fn read(path: &Path) -> Result<RpcFile, RpcReadError> {
 }
 
 /// Finds the RPC of an image: GDAL's `RPC` metadata, TIFF tag 50844, the text of a virtual raster,
-/// then files beside it. Of an image that a STAC item names the item's own RPC file comes last. Of an
-/// image at an address only what is inside it is read.
+/// then files beside it. Of an image that a STAC item names the item's own RPC file comes last. Of
+/// an image at an address only what is inside it is read.
 ///
 /// # Errors
 /// Every variant of [`RpcReadError`] but [`RpcReadError::TooLarge`] for the image itself. A broken

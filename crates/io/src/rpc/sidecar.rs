@@ -42,8 +42,9 @@ pub(super) fn read(
     Ok(None)
 }
 
-/// Returns the files beside an image that may hold its RPC, best first; none where the folder cannot
-/// be read. Of a STAC item they are those of its image, the image itself, and the item's RPC file.
+/// Returns the files beside an image that may hold its RPC, best first; none where the folder
+/// cannot be read. Of a STAC item they are those of its image, the image itself, and the item's RPC
+/// file.
 pub fn side_files(image: &Path) -> Vec<PathBuf> {
     let item = is_item_name(image).then(|| read_item(image).ok()).flatten();
     let beside = item.as_ref().map_or(image, |item| &item.image);

@@ -27,8 +27,8 @@ pub struct SceneImage {
     /// Where the sun stood; `None` where neither the file nor its STAC item says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sun: Option<SunPosition>,
-    /// Angle of the line of sight to the vertical that the STAC item states, degrees. It is compared
-    /// with that of the RPC.
+    /// Angle of the line of sight to the vertical that the STAC item states, degrees. It is
+    /// compared with that of the RPC.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stated_incidence_deg: Option<f64>,
     /// Factor of the grey values, a power of two: 1 unless a float image has a scale of its own,
