@@ -35,8 +35,9 @@ pub(crate) struct Args {
 /// Inputs and settings of a surface model.
 #[derive(Debug, clap::Args)]
 pub(crate) struct SceneArgs {
-    /// The images, two or more: anything GDAL reads, with its RPC inside or beside it, or STAC items
-    /// that name it. Or one job file (see skysweep template dsm), whose settings the options replace.
+    /// The images, two or more: anything GDAL reads, with its RPC inside or beside it, or STAC
+    /// items that name it. Or one job file (see skysweep template dsm), whose settings the options
+    /// replace.
     #[arg(required = true, value_name = "IMAGE|JOB.toml")]
     images: Vec<PathBuf>,
     /// Folder for the results [default: the job file's].

@@ -1,4 +1,5 @@
-//! Links the system's PROJ, 9.1 or newer, except in the static build, where `proj-sys` brings its own.
+//! Links the system's PROJ, 9.1 or newer, except in the static build, where `proj-sys` brings its
+//! own.
 //!
 //! The build script of `proj-sys` requires PROJ 9.6 and otherwise compiles its own copy. That takes
 //! minutes and puts a second PROJ beside GDAL's into the same process. The feature `nobuild` leaves

@@ -45,13 +45,13 @@ pub trait SplatCamera: Sync {
         LOW_PASS_PX2
     }
 
-    /// Returns how the camera sees.
-    fn sight(&self) -> Sight<'_>;
+    /// Returns how the rays of the camera lie.
+    fn ray_model(&self) -> RayModel<'_>;
 }
 
-/// How a camera sees.
+/// How the rays of a camera lie.
 #[derive(Clone, Copy)]
-pub enum Sight<'a> {
+pub enum RayModel<'a> {
     /// By a projection that is affine over a splat.
     Affine(&'a dyn AffineCamera),
     /// By rays through one point.
@@ -137,8 +137,8 @@ impl SplatCamera for RpcSplatCamera<'_> {
         self.size
     }
 
-    fn sight(&self) -> Sight<'_> {
-        Sight::Affine(self)
+    fn ray_model(&self) -> RayModel<'_> {
+        RayModel::Affine(self)
     }
 }
 
@@ -179,8 +179,8 @@ impl SplatCamera for LensSplatCamera<'_> {
         (self.lens.width(), self.lens.height())
     }
 
-    fn sight(&self) -> Sight<'_> {
-        Sight::Central(self.lens, self.pose)
+    fn ray_model(&self) -> RayModel<'_> {
+        RayModel::Central(self.lens, self.pose)
     }
 }
 
@@ -213,8 +213,8 @@ impl SplatCamera for MapSplatCamera<'_> {
         0.0
     }
 
-    fn sight(&self) -> Sight<'_> {
-        Sight::Affine(self)
+    fn ray_model(&self) -> RayModel<'_> {
+        RayModel::Affine(self)
     }
 }
 

@@ -34,7 +34,7 @@ mod sight;
 mod surface;
 
 pub use block::{Plane, SplatBlock};
-pub use camera::{AffineCamera, LensSplatCamera, MapSplatCamera, Projection, RpcSplatCamera, Sight, SplatCamera};
+pub use camera::{AffineCamera, LensSplatCamera, MapSplatCamera, Projection, RayModel, RpcSplatCamera, SplatCamera};
 pub use colour::{ColourFit, FitView, fit_colours};
 pub use division::{DivisionConfig, divide, uniform};
 pub use gaussian::{GaussianConfig, splat_of_block};

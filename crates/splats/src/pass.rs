@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::affine::{self, AffineFootprint};
 use super::central::{self, CentralFootprint, Rays};
 use super::hits::{self, Hit, TILE};
-use super::{Sight, SplatCamera};
+use super::{RayModel, SplatCamera};
 
 /// Number of pixels of a tile.
 pub(super) const TILE_PIXELS: usize = TILE * TILE;
@@ -48,13 +48,13 @@ impl Arrangement {
     /// Projects splats and sorts them into tiles.
     pub(super) fn new(splats: &[Splat], camera: &impl SplatCamera) -> Result<Self, CrsError> {
         let (size, low_pass) = (camera.size(), camera.low_pass_px2());
-        let (footprints, tiles) = match camera.sight() {
-            Sight::Affine(camera) => {
+        let (footprints, tiles) = match camera.ray_model() {
+            RayModel::Affine(camera) => {
                 let footprints = affine::footprints(splats, camera, size, low_pass)?;
                 let tiles = affine::tiles(&footprints, size);
                 (Footprints::Affine(footprints), tiles)
             }
-            Sight::Central(lens, pose) => {
+            RayModel::Central(lens, pose) => {
                 let footprints = central::footprints(splats, lens, pose, low_pass);
                 let rays = Rays::new(lens, pose);
                 let tiles = central::tiles(&footprints, &rays, size);
