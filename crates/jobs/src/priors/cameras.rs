@@ -126,7 +126,7 @@ fn stems(model: &ColmapModel, trainer: PriorsTrainer) -> Result<Vec<String>, Pri
 
 /// Returns the name without ending, and for trainers that know no folders without these.
 fn stem(name: &str, trainer: PriorsTrainer) -> Result<String, PriorsJobError> {
-    let (folder, file) = name.rsplit_once('/').unwrap_or(("", name));
+    let (folder, file) = name.rsplit_once('/').map_or((None, name), |(folder, file)| (Some(folder), file));
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     if stem.contains('.') {
         return Err(PriorsJobError::DotInName { name: shown(name) });
@@ -134,9 +134,9 @@ fn stem(name: &str, trainer: PriorsTrainer) -> Result<String, PriorsJobError> {
     if stem.is_empty() || stem.len() > 200 || stem.chars().any(|c| c.is_control() || "<>:\"|?*\\".contains(c)) {
         return Err(PriorsJobError::BadName { name: shown(name) });
     }
-    if folder.is_empty() || trainer == PriorsTrainer::TwoDgs {
+    let Some(folder) = folder.filter(|_| trainer != PriorsTrainer::TwoDgs) else {
         return Ok(stem.to_owned());
-    }
+    };
     let plain = |part: &str| !matches!(part, "" | "." | "..") && !part.chars().any(|c| c.is_control() || c == '\\');
     if !folder.split('/').all(plain) || folder.len() > 200 {
         return Err(PriorsJobError::BadName { name: shown(name) });
