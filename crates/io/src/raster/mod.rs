@@ -29,6 +29,7 @@ mod tile;
 mod undeclared;
 mod verify;
 mod vertical_unit;
+mod world_file;
 
 pub use band::{Band, BandData};
 pub use contours::{ContourSurface, write_contours};
@@ -46,6 +47,7 @@ pub use reduced::BandLabel;
 pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use tile::{BandScale, MapTile, write_map_tile};
+pub use world_file::write_world_file;
 
 pub(crate) use gdal_access::register_geopackage;
 pub(crate) use gdal_setup::{open_address, prepare_gdal, with_gdal};

@@ -14,6 +14,7 @@ mod config;
 mod error;
 mod matching;
 mod model;
+mod page;
 mod run;
 
 pub use config::{RegisterConfig, RegisterModel};

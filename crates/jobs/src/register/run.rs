@@ -12,7 +12,8 @@ use super::config::RegisterConfig;
 use super::error::RegisterError;
 use super::matching;
 use super::model::{Looks, Model, NewImage};
-use crate::{files, threads};
+use super::page;
+use crate::{report_page, threads};
 
 /// Most rounds of matching. The first is within a pixel, the second within a tenth.
 const ROUNDS: usize = 5;
@@ -49,6 +50,10 @@ pub struct RegisterReport {
     pub gsd_m: f64,
     /// Rounds of matching.
     pub rounds: usize,
+    /// Columns and rows of the image.
+    pub size: (usize, usize),
+    /// Points that were found: sample, line, and residual along both after the correction, pixels.
+    pub residuals_px: Vec<[f64; 4]>,
 }
 
 /// An image with its correction.
@@ -91,9 +96,9 @@ impl RegisterReport {
 /// ```
 pub fn run(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
     config.validate()?;
-    files::check_destination(&config.output, config.overwrite)?;
+    report_page::refuse_existing(&config.output, config.overwrite)?;
     let report = threads::install(config.threads, || register(config, progress))??;
-    files::write_json(&config.output, &report, config.overwrite)?;
+    report_page::write_page(&config.output, &page::of(&report)?, &report, config.overwrite)?;
     Ok(report)
 }
 
@@ -172,6 +177,13 @@ fn change(before: &RpcCamera, after: &RpcCamera, points: &[ControlPoint]) -> f64
     moved.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
 }
 
+/// Returns the place of a point in the image and its residual, rounded to a thousandth of a pixel.
+fn seen_with((point, [along, across]): (&ControlPoint, [f64; 2])) -> Option<[f64; 4]> {
+    let (_, seen) = point.seen.first()?;
+    let values = [seen.sample, seen.line, along, across];
+    values.iter().all(|value| value.is_finite()).then(|| values.map(|value| (1e3 * value).round() / 1e3))
+}
+
 fn judged(
     model: &Model,
     new: &NewImage,
@@ -208,5 +220,7 @@ fn judged(
         shift_px: [moved.sample - middle.sample, moved.line - middle.line],
         gsd_m: new.gsd_m,
         rounds,
+        size: (info.width, info.height),
+        residuals_px: found.points.iter().zip(residuals(camera, &found.points)).filter_map(seen_with).collect(),
     })
 }
