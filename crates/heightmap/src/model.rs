@@ -18,8 +18,8 @@ pub struct PlacedTriangles<'a> {
 }
 
 impl PlacedTriangles<'_> {
-    /// Returns the z of the map at a position on the map, of the highest triangle (`up` is −1: the
-    /// ray goes down) or of the lowest one (1).
+    /// Returns the z of the highest triangle at a position on the map (`up` is −1: the ray goes
+    /// down), or of the lowest one (1).
     fn met(&self, x: f64, y: f64, up: f64) -> Option<f64> {
         let start = if up < 0.0 { self.z_span.1 + 1.0 } else { self.z_span.0 - 1.0 };
         let ray = Ray {

@@ -1,5 +1,5 @@
-//! A COLMAP model placed on a map. The alignment job and the ground views write `origin.json` beside
-//! such a model; a dataset of the priors job has one of its own form beside `sparse`.
+//! A COLMAP model placed on a map. The alignment job and the ground views write `origin.json`
+//! beside such a model; a dataset of the priors job has one of its own form beside `sparse`.
 
 use std::path::{Path, PathBuf};
 
@@ -49,8 +49,8 @@ pub enum PlacedModelError {
     },
 }
 
-/// Reads the cameras of a model, or of a dataset with a model in `sparse/0`, and shifts them so that
-/// their positions are relative to `origin`.
+/// Reads the cameras of a model, or of a dataset with a model in `sparse/0`, and shifts them so
+/// that their positions are relative to `origin`.
 ///
 /// # Errors
 /// [`PlacedModelError`] if the model or its origin cannot be read, or if it lies on another map.

@@ -37,7 +37,9 @@ pub use dem::{Dem, read_dem, read_dem_window};
 pub use depth_png::{DepthScale, write_depth_png};
 pub use error::RasterError;
 pub use gdal_setup::allow_remote;
-pub use geotiff::{CogCrs, CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
+pub use geotiff::{
+    CogCrs, CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map, write_map_with_rpc,
+};
 pub use image_copy::copy_image_with_rpc;
 pub use labels::{Provenance, iso_time};
 pub use luma::LumaTile;

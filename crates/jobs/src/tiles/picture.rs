@@ -14,8 +14,8 @@ use crate::report_page::{relief_layer, shown_range, thinned};
 /// Tiles that are shown on the page.
 const SHOWN: usize = 4;
 
-/// Writes red, green and blue of an ortho, or its first band as grey, with a world file. Returns the
-/// values that are black and white in each band. Cells without a value are black.
+/// Writes red, green and blue of an ortho, or its first band as grey, with a world file. Returns
+/// the values that are black and white in each band. Cells without a value are black.
 pub(super) fn write(ortho: &Path, picture: &Path) -> Result<Vec<[f32; 2]>, TilesError> {
     let source = ImageSource::open(ortho)?;
     let (pixels, ranges) = shown(&source)?;
