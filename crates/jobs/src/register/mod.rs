@@ -15,8 +15,10 @@ mod error;
 mod matching;
 mod model;
 mod page;
+mod report;
 mod run;
 
 pub use config::{RegisterConfig, RegisterModel};
 pub use error::RegisterError;
-pub use run::{RegisterReport, RegisteredImage, run};
+pub use report::{RegisterReport, RegisteredImage};
+pub use run::run;

@@ -2,7 +2,7 @@
 
 use report::{JobPage, JobTable, PointResidual, residual_map};
 
-use super::run::RegisterReport;
+use super::report::RegisterReport;
 use crate::files::FileError;
 
 /// Returns the page of a report.

@@ -18,7 +18,7 @@ const SHOWN: usize = 4;
 /// the values that are black and white in each band. Cells without a value are black.
 pub(super) fn write(ortho: &Path, picture: &Path) -> Result<Vec<[f32; 2]>, TilesError> {
     let source = ImageSource::open(ortho)?;
-    let (pixels, ranges) = shown(&source)?;
+    let Shown { pixels, ranges } = shown(&source)?;
     write_png_rgb(picture, &pixels, true).map_err(FileError::from)?;
     if let Some(place) = source.info().geotransform {
         write_world_file(picture, place, 1).map_err(FileError::from)?;
@@ -26,8 +26,15 @@ pub(super) fn write(ortho: &Path, picture: &Path) -> Result<Vec<[f32; 2]>, Tiles
     Ok(ranges)
 }
 
-/// Returns an ortho as an 8-bit picture, and the values that are black and white in each band.
-fn shown(source: &ImageSource) -> Result<(Grid<[u8; 3]>, Vec<[f32; 2]>), TilesError> {
+/// An ortho as an 8-bit picture.
+struct Shown {
+    pixels: Grid<[u8; 3]>,
+    /// Values that are black and white in each band.
+    ranges: Vec<[f32; 2]>,
+}
+
+/// Returns an ortho as a picture. Cells without a value are black.
+fn shown(source: &ImageSource) -> Result<Shown, TilesError> {
     let bands: Vec<usize> = match &source.info().luma {
         LumaRule::Rgb(bands) => bands.to_vec(),
         _ => vec![1],
@@ -45,7 +52,7 @@ fn shown(source: &ImageSource) -> Result<(Grid<[u8; 3]>, Vec<[f32; 2]>), TilesEr
     for (cell, pixel) in pixels.data_mut().iter_mut().enumerate() {
         *pixel = [0, 1, 2].map(|i| shown(i.min(bands.len() - 1), cell));
     }
-    Ok((pixels, ranges))
+    Ok(Shown { pixels, ranges })
 }
 
 /// Returns heights and orthos of the first tiles of a list for its page.
@@ -57,10 +64,10 @@ pub(super) fn layers(folder: &Path, report: &TilesReport, pixel_m: f64) -> Resul
         let heights = heights.read_samples(1, heights.window())?;
         let caption = "Heights relative to the camera, shaded.";
         layers.push(relief_layer(&format!("{id}: heights"), caption, &heights, pixel_m));
-        let (ortho, _) = shown(&ImageSource::open(folder.join(id).join("ortho.tif"))?)?;
+        let ortho = shown(&ImageSource::open(folder.join(id).join("ortho.tif"))?)?;
         layers.push(MapLayer {
             name: format!("{id}: ortho"),
-            picture: thinned(&ortho).0,
+            picture: thinned(&ortho.pixels).0,
             caption: "The images on the pixels of the heights; black where nothing is seen.".to_owned(),
             legend: None,
         });
