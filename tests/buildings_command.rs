@@ -30,11 +30,12 @@ fn the_index_lies_in_the_pixels_of_the_image_with_its_rpc() {
     let printed = buildings(&image, &out, &["--threads", "1", "--json"]).code(0).get_output().stdout.clone();
     let report: Value = serde_json::from_slice(&printed).unwrap();
     assert_eq!(report, json(&folder.path().join("a_report.json")));
-    assert!(folder.path().join("a_report.html").is_file());
+    assert!(folder.path().join("a_report.html").is_file() && folder.path().join("a.qml").is_file());
     assert!((report["gsd_m"].as_f64().unwrap() - 0.5).abs() < 0.1);
     let (own, made) = (ImageSource::open(&image).unwrap(), ImageSource::open(&out).unwrap());
     assert_eq!((made.info().width, made.info().height), (own.info().width, own.info().height));
     assert_eq!(made.metadata("RPC"), own.metadata("RPC"));
+    assert!(made.metadata("").iter().any(|(key, value)| key == "SOURCES" && value == "view_1.tif"));
     let values = band(&out, 1);
     assert!(values.data().iter().all(|v| v.is_nan() || (0.0..=1.0).contains(v)));
     assert!(report["pairs"].as_u64().unwrap() > 0 && report["cells_high"].as_u64().unwrap() > 0);

@@ -70,6 +70,7 @@ fn the_town_is_found_where_it_is() {
         "dsm/relief.png",
         "dsm/relief.pgw",
         "dsm/thumbnail.png",
+        "dsm/thumbnail.pgw",
         "dsm/source.qml",
         "used_config.toml",
         "stac/collection.json",
@@ -81,7 +82,9 @@ fn the_town_is_found_where_it_is() {
     let after = report["pointing"]["rms_px"].as_f64().unwrap();
     assert!(after < 0.2, "pointing residuals of {after} px are left");
     let page = std::fs::read_to_string(out.join("report/report.html")).unwrap();
-    for part in ["id=\"layer4\"", "id=\"hatched\"", "Residuals by image", "height range", "view_1.tif"] {
+    for part in
+        ["id=\"layer4\"", "id=\"hatched\"", "Residuals by image", "Residuals in image 2", "height range", "view_1.tif"]
+    {
         assert!(page.contains(part), "{part} is not on the page");
     }
     assert!(!page.contains("<script") && !page.contains("http://") && !page.contains("https://"));

@@ -59,6 +59,7 @@ fn a_surface_in_the_folder_of_a_run_has_its_report_there() {
     let page = fs::read_to_string(run.join("eval/report.html")).unwrap();
     assert!(page.contains("run/dsm/dsm.tif") && !page.contains("<script") && !page.contains("://"));
     assert!(read_dem(run.join("eval/error_map.tif")).unwrap().heights[(50, 50)].is_finite());
+    assert!(["error_map.pgw", "error_map.qml"].iter().all(|name| run.join("eval").join(name).is_file()));
     let shown = skysweep(&["--json"], &dsm, &reference).success().get_output().stdout.clone();
     let kept = fs::read(run.join("eval/report.json")).unwrap();
     assert_eq!(serde_json::from_slice::<Value>(&shown).unwrap(), serde_json::from_slice::<Value>(&kept).unwrap());

@@ -209,7 +209,47 @@ fn what_the_file_says_of_itself_is_what_was_asked_for_and_found() {
     let heights = values(&path, 1);
     let middle: f32 = [(258, 258), (259, 258), (258, 259), (259, 259)].iter().map(|&at| heights[at] / 4.0).sum();
     assert!((middle + 1.5).abs() < 1e-4, "{middle}");
-    assert!(path.with_extension("png").is_file());
+    assert!(path.with_extension("png").is_file() && path.with_extension("pgw").is_file());
+    let page = std::fs::read_to_string(folder.path().join("map_report.html")).unwrap();
+    assert!(page.contains("Heights relative to the camera") && page.contains("camera height, m"), "no map on the page");
+}
+
+/// A position that is off by a few metres lies on a roof. The ground is beside and under it.
+#[test]
+fn the_ground_under_a_camera_is_no_roof() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, ground) = (read_dem(town("dsm.tif")).unwrap(), read_dem(town("dtm.tif")).unwrap());
+    let numbers = values(&town("buildings.tif"), 1);
+    let projection = MapProjection::from_definition(surface.crs_wkt.as_deref().unwrap()).unwrap();
+    let mut seen = Vec::new();
+    for row in (100..surface.heights.height() - 100).step_by(7) {
+        for column in (100..surface.heights.width() - 100).step_by(7) {
+            let (number, terrain) = (numbers[(column, row)], ground.heights[(column, row)]);
+            if number <= 0.0 || seen.contains(&number) || surface.heights[(column, row)] - terrain < 4.0 {
+                continue;
+            }
+            seen.push(number);
+            let (x, y) = surface.geotransform.map_from_cell(column as f64, row as f64);
+            let (lon, lat) = projection.lonlat_from_map(x, y).unwrap();
+            for (source, vertical) in [("dsm.tif", None), ("buildings.city.json", Some("ellipsoid"))] {
+                let path = folder.path().join("map.tif");
+                let mut command = skysweep();
+                command.arg("heightmap").arg(town(source)).arg("--center").args([lon, lat].map(|v| v.to_string()));
+                command.args(vertical.iter().flat_map(|datum| ["--source-vertical", datum]));
+                command.args(["--size", "300", "--no-preview", "--overwrite", "-o"]).arg(&path).assert().code(0);
+                let found = number_of(&path, "GROUND_HEIGHT_M");
+                assert!((found - f64::from(terrain)).abs() < 1.5, "{source}: {found} instead of {terrain}");
+            }
+            if seen.len() == 4 {
+                return;
+            }
+        }
+    }
+    panic!("{} buildings", seen.len());
+}
+
+fn number_of(path: &Path, key: &str) -> f64 {
+    number(&tags(path), key)
 }
 
 /// Viewers read a large map by its tiles and overviews.

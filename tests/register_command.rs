@@ -86,6 +86,8 @@ fn planted_shifts_come_back_and_go_into_every_format() {
             assert!(apart(&written, &right) < 0.15, "{name}: {}", apart(&written, &right));
             std::fs::remove_file(&out).unwrap();
         }
+        let page = std::fs::read_to_string(report.with_extension("html")).unwrap();
+        assert!(page.contains("Residuals in the image") && page.contains("<svg"), "no map of residuals");
         let mut other = skysweep();
         other.args(["rpc", "convert"]).arg(sample("view_1.tif")).arg("--corrections").arg(&report);
         let told = predicate::str::contains("no pointing correction of");

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 const SMALL: [&str; 8] = ["simulate", "town", "--size", "60", "--gsd", "1", "--views", "2"];
 
-const FILES: [&str; 13] = [
+const FILES: [&str; 14] = [
     "view_1.tif",
     "view_2.tif",
     "truth/dsm.tif",
@@ -25,6 +25,7 @@ const FILES: [&str; 13] = [
     "truth/buildings.city.json",
     "scene.toml",
     "scene.json",
+    "scene.html",
 ];
 
 fn json(path: &Path) -> Value {

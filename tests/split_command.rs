@@ -58,6 +58,7 @@ fn options_are_obeyed_and_nonsense_is_refused() {
         command
     };
     run().assert().code(0).stdout(predicate::str::contains("street/007.jpg"));
+    assert!(std::fs::read_to_string(out.with_extension("html")).unwrap().contains("street/007.jpg"));
     let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
     assert_eq!(report["contexts"][0]["image"], "street/007.jpg");
     assert_eq!(

@@ -53,6 +53,13 @@ fn a_tile_has_height_map_ortho_and_cameras_on_the_same_pixels() {
     assert_eq!((height.heights.width(), ortho.heights.width()), (SIDE, SIDE));
     assert_eq!((height.geotransform, &height.crs_wkt), (ortho.geotransform, &ortho.crs_wkt));
 
+    let page = std::fs::read_to_string(folder.path().join("tiles/tiles.html")).unwrap();
+    assert!(page.contains("corner: ortho") && page.contains("beside: heights") && page.contains("far"));
+    let world = std::fs::read_to_string(tile.join("ortho.pgw")).unwrap();
+    let lines: Vec<f64> = world.lines().map(|line| line.parse().unwrap()).collect();
+    let (x, y) = ortho.geotransform.map_from_cell(0.0, 0.0);
+    assert!((lines[4] - x).hypot(lines[5] - y) < 1e-6, "{world}");
+
     // The same map as that of the command for height maps.
     let alone = folder.path().join("alone.tif");
     let mut command = skysweep();

@@ -96,6 +96,14 @@ fn views_that_were_not_trained_on_become_better() {
     assert_eq!(std::fs::read_dir(out.path().join("a/renders")).unwrap().count(), 3);
     let page = std::fs::read_to_string(out.path().join("a/report.html")).unwrap();
     assert!(page.contains("Loss by iteration") && page.contains("flight_04.png"), "no curve or view on the page");
+    // The splats are looked at through the cameras of the dataset, which lie on no map.
+    let seen = out.path().join("seen");
+    let mut render = skysweep();
+    render.args(["splats", "render"]).arg(out.path().join("a/splats.ply")).arg("--cameras").arg(dataset());
+    render.args(["--progress", "none", "-o"]).arg(&seen).assert().success();
+    let views = report_of(&seen)["views"].as_array().unwrap().clone();
+    assert_eq!(views.len(), report["views"].as_array().unwrap().len());
+    assert!(views.iter().all(|view| view["psnr_db"].as_f64().unwrap() > 12.0), "{views:?}");
     let losses = report["losses"].as_array().unwrap();
     let colour = |i: usize| losses[i]["colour"].as_f64().unwrap();
     assert!(colour(losses.len() - 1) < 0.8 * colour(0), "{losses:?}");

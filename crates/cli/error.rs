@@ -39,10 +39,16 @@ pub(crate) fn is_closed_pipe(e: &anyhow::Error) -> bool {
 /// Writes the error, its causes and its hint to standard error.
 pub(crate) fn report(e: &anyhow::Error) {
     let hint = e.downcast_ref::<Hint>();
-    let mut causes = e.chain().skip(usize::from(hint.is_some()));
-    let mut text = causes.next().map(|first| format!("error: {first}\n")).unwrap_or_default();
+    let causes = e.chain().skip(usize::from(hint.is_some())).map(ToString::to_string);
+    let (mut text, mut last) = (String::new(), String::new());
     for cause in causes {
-        text.push_str(&format!("  caused by: {cause}\n"));
+        // Some errors have the text of their cause within their own.
+        if text.is_empty() {
+            text = format!("error: {cause}\n");
+        } else if !last.contains(&cause) {
+            text.push_str(&format!("  caused by: {cause}\n"));
+        }
+        last = cause;
     }
     let overwrite = || text.contains(io::atomic::OUTPUT_EXISTS).then(|| OVERWRITE.to_owned());
     let remote = || text.contains("or allow addresses").then(|| REMOTE.to_owned());

@@ -11,11 +11,12 @@ use crate::{Global, Outcome};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: skysweep mesh dataset --splats trained/splats.ply --masked -o building.ply \
                   --reference truth.ply")]
+#[command(group = clap::ArgGroup::new("depths_of").args(["splats", "depths"]).required(true))]
 pub(crate) struct Args {
     /// Folder that skysweep priors wrote, or another folder with a COLMAP model in sparse/0.
     dataset: PathBuf,
     /// Splats (2DGS) that the cameras of the dataset look at, such as those of skysweep train.
-    #[arg(long, value_name = "PLY", required_unless_present = "depths", conflicts_with = "depths")]
+    #[arg(long, value_name = "PLY")]
     splats: Option<PathBuf>,
     /// Folder of depth maps (NAME.npy, along the optical axis), such as DATASET/raw_depth.
     #[arg(long, value_name = "FOLDER")]

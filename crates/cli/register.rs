@@ -18,12 +18,13 @@ use crate::{Global, Outcome};
 #[command(after_help = "The report is read wherever --corrections is an option. Examples: \
                   skysweep register new.tif --dsm run -o new.json; \
                   skysweep rpc convert new.tif --corrections new.json -o new_RPC.TXT")]
+#[command(group = clap::ArgGroup::new("model").args(["dsm", "splats"]).required(true))]
 pub(crate) struct Args {
     /// The image: anything GDAL reads, with its RPC inside or beside it.
     #[arg(value_name = "IMAGE")]
     image: PathBuf,
     /// Surface model on a projected map, or the folder of a run of skysweep dsm.
-    #[arg(long, value_name = "DSM", required_unless_present = "splats", conflicts_with = "splats")]
+    #[arg(long, value_name = "DSM")]
     dsm: Option<PathBuf>,
     /// Images that show what the surface model looks like [default: those of the run that made it].
     #[arg(long, value_name = "IMAGE", num_args = 1.., requires = "dsm")]

@@ -102,12 +102,12 @@ struct RenderArgs {
     /// Images with RPCs to look through.
     #[arg(value_name = "IMAGE")]
     images: Vec<PathBuf>,
-    /// Perspective cameras to look through: a COLMAP model on the splats' map, with origin.json
-    /// beside.
+    /// Perspective cameras to look through: a COLMAP model on the splats' map with origin.json
+    /// beside, or a dataset of skysweep priors.
     #[arg(long, value_name = "FOLDER")]
     cameras: Option<PathBuf>,
     /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered
-    /// and not compared.
+    /// and not compared [default: images of the dataset].
     #[arg(long, value_name = "FOLDER", requires = "cameras")]
     pictures: Option<PathBuf>,
     /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default:

@@ -62,16 +62,18 @@ pub enum CrsError {
     },
     /// The geoid grid that is needed is not installed.
     #[error(
-        "heights above {datum} need {}, which PROJ does not find: put it into ~/.local/share/proj or into \
-         PROJ's folder (PROJ's tool projsync fetches grids by their names; PROJ_DATA replaces \
-         the folders that PROJ searches, so it must list PROJ's folder too)",
-        grids(.candidates)
+        "heights above {datum} need {}, which PROJ does not find: put the file into one of the folders that PROJ \
+         searches ({}); PROJ's tool projsync fetches grids by their names, and https://cdn.proj.org has them all",
+        grids(.candidates),
+        listed(.folders)
     )]
     MissingGrid {
         /// The datum requested.
         datum: String,
         /// The file names that were tried.
         candidates: String,
+        /// The folders that PROJ searches.
+        folders: Vec<PathBuf>,
     },
     /// The given geoid grid cannot be used.
     #[error(
@@ -90,6 +92,11 @@ pub enum CrsError {
         /// The lengths found.
         lengths: Vec<usize>,
     },
+}
+
+/// Names folders.
+fn listed(folders: &[PathBuf]) -> String {
+    folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// Names the grids of a list, which any of them serves.

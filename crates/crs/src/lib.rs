@@ -1,11 +1,12 @@
 //! Coordinate reference systems: their identity, map projections and vertical datums.
 //!
 //! Angles are degrees, and heights are metres above the WGS 84 ellipsoid unless a name says
-//! otherwise. No other crate uses PROJ, and one private module calls its C interface. PROJ's
+//! otherwise. No other crate uses PROJ, and two private modules call its C interface. PROJ's
 //! network access is switched off: a grid is read from the local disk or reported as missing.
 
 mod area;
 mod error;
+mod grids;
 mod identity;
 mod proj_handle;
 mod projection;

@@ -17,11 +17,12 @@ use proj_sys::{
     PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS, PJ_TYPE_PJ_TYPE_PROJECTED_CRS,
     PJ_TYPE_PJ_TYPE_VERTICAL_CRS, PJ_WKT_TYPE, PJ_WKT_TYPE_PJ_WKT1_GDAL, PJ_WKT_TYPE_PJ_WKT2_2019, proj_as_wkt,
     proj_context_create, proj_context_destroy, proj_context_errno, proj_context_errno_string,
-    proj_context_set_enable_network, proj_create, proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D,
-    proj_crs_get_coordinate_system, proj_crs_get_sub_crs, proj_crs_promote_to_3D, proj_cs_get_axis_count,
-    proj_cs_get_axis_info, proj_destroy, proj_get_area_of_use, proj_get_id_auth_name, proj_get_id_code, proj_get_name,
-    proj_get_source_crs, proj_get_type, proj_identify, proj_int_list_destroy, proj_list_destroy, proj_list_get,
-    proj_list_get_count, proj_log_func, proj_log_level, proj_normalize_for_visualization, proj_trans_generic,
+    proj_context_get_database_path, proj_context_set_enable_network, proj_create, proj_create_crs_to_crs_from_pj,
+    proj_crs_demote_to_2D, proj_crs_get_coordinate_system, proj_crs_get_sub_crs, proj_crs_promote_to_3D,
+    proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_area_of_use, proj_get_id_auth_name,
+    proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify, proj_int_list_destroy,
+    proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_func, proj_log_level,
+    proj_normalize_for_visualization, proj_trans_generic,
 };
 
 /// The definition of a transformation.
@@ -34,6 +35,9 @@ pub(crate) enum Recipe {
     /// A pipeline in PROJ's syntax.
     Pipeline(String),
 }
+
+/// PROJ's code of an error that has no code of its own.
+const PROJ_ERR_OTHER: c_int = 4096;
 
 /// The direction of a transformation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,10 +59,10 @@ impl Direction {
 unsafe extern "C" fn ignore(_data: *mut c_void, _level: c_int, _message: *const c_char) {}
 
 /// A PROJ context. It must be destroyed after the objects made in it.
-struct Context(*mut PJ_CONTEXT);
+pub(crate) struct Context(*mut PJ_CONTEXT);
 
 impl Context {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         // SAFETY: a fresh context, used by this value only; the calls only set flags on it.
         unsafe {
             let raw = proj_context_create();
@@ -69,31 +73,46 @@ impl Context {
         }
     }
 
+    /// The context for calls of PROJ, valid as long as this value.
+    pub(crate) fn raw(&self) -> *mut PJ_CONTEXT {
+        self.0
+    }
+
     /// Returns PROJ's message for the last failure.
     fn reason(&self) -> String {
         // SAFETY: the context is alive; the returned text belongs to it and is copied at once.
-        unsafe {
-            let text = match proj_context_errno(self.0) {
-                0 => ptr::null(),
-                code => proj_context_errno_string(self.0, code),
-            };
-            if text.is_null() {
-                return "PROJ does not know the system, or has no operation with the installed grids".to_owned();
+        let text = unsafe {
+            match proj_context_errno(self.0) {
+                // PROJ_ERR_OTHER has the text "Unknown error".
+                0 | PROJ_ERR_OTHER => None,
+                code => text_of(proj_context_errno_string(self.0, code)),
             }
-            CStr::from_ptr(text).to_string_lossy().into_owned()
-        }
+        };
+        text.unwrap_or_else(|| "PROJ does not know the system, or has no operation with the installed grids".to_owned())
     }
 
     /// Takes ownership of a PROJ object made in this context. A null pointer becomes PROJ's
     /// message.
-    fn own(&self, raw: *mut PJ) -> Result<Object, String> {
+    pub(crate) fn own(&self, raw: *mut PJ) -> Result<Object, String> {
         if raw.is_null() { Err(self.reason()) } else { Ok(Object(raw)) }
     }
 
-    fn create(&self, definition: &str) -> Result<Object, String> {
+    pub(crate) fn create(&self, definition: &str) -> Result<Object, String> {
         let text = CString::new(definition).map_err(|_| "the definition has a NUL character".to_owned())?;
         // SAFETY: context and text are alive during the call; the result is owned by `Object`.
-        self.own(unsafe { proj_create(self.0, text.as_ptr()) })
+        let made = self.own(unsafe { proj_create(self.0, text.as_ptr()) });
+        made.map_err(|reason| if definition.starts_with("EPSG:") { self.why_no_code() } else { reason })
+    }
+
+    /// Returns why PROJ makes nothing of an EPSG code.
+    fn why_no_code(&self) -> String {
+        // SAFETY: the context is alive; the text belongs to it and is copied at once.
+        match unsafe { text_of(proj_context_get_database_path(self.0)) } {
+            Some(_) => "PROJ's database has no such EPSG code".to_owned(),
+            None => {
+                "PROJ does not find its database, proj.db: PROJ_DATA, if it is set, must list its folder".to_owned()
+            }
+        }
     }
 
     /// Returns the two-dimensional horizontal part of a CRS.
@@ -175,7 +194,14 @@ impl Drop for Context {
 }
 
 /// An owned PROJ object.
-struct Object(*mut PJ);
+pub(crate) struct Object(*mut PJ);
+
+impl Object {
+    /// The object for calls of PROJ, valid as long as this value.
+    pub(crate) fn raw(&self) -> *mut PJ {
+        self.0
+    }
+}
 
 impl Drop for Object {
     fn drop(&mut self) {
@@ -377,7 +403,7 @@ fn written(definition: &str, promote: bool, form: PJ_WKT_TYPE, options: &[&CStr]
 ///
 /// # Safety
 /// `text` must be null or a valid NUL-terminated string.
-unsafe fn text_of(text: *const c_char) -> Option<String> {
+pub(crate) unsafe fn text_of(text: *const c_char) -> Option<String> {
     // SAFETY: the caller guarantees that a pointer other than null is a valid NUL-terminated
     // string.
     (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())

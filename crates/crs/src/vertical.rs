@@ -14,6 +14,7 @@ use geodesy::GeodesyError;
 
 use crate::area::AreaOfUse;
 use crate::error::CrsError;
+use crate::grids;
 use crate::identity::VerticalDatum;
 use crate::proj_handle::{CrsKind, Direction, Pool, Recipe, named_kind};
 
@@ -178,7 +179,7 @@ fn first_grid(datum: VerticalDatum, names: &[&str]) -> Result<Pool, CrsError> {
     names
         .iter()
         .find_map(|name| Pool::new(Recipe::Pipeline(grid_pipeline(name))).ok())
-        .ok_or_else(|| CrsError::MissingGrid { datum: datum.to_string(), candidates: names.join(", ") })
+        .ok_or_else(|| missing(datum, names.join(", ")))
 }
 
 /// Returns the PROJ pipeline that subtracts the grid's value at a longitude and latitude in degrees
@@ -202,19 +203,29 @@ fn through_database(code: u32) -> Result<Pool, CrsError> {
     let target = format!("EPSG:4326+{code}");
     let recipe = Recipe::Spatial { source: "EPSG:4979".to_owned(), target: target.clone() };
     let known = GRIDS.iter().find(|(known, _)| *known == code).map(|(_, name)| (*name).to_owned());
-    let missing = |candidates| CrsError::MissingGrid { datum: format!("EPSG:{code}"), candidates };
-    let pool = match (Pool::new(recipe), known.clone()) {
-        (Ok(pool), _) => pool,
-        (Err(_), Some(grid)) => return Err(missing(grid)),
-        (Err(reason), None) => return Err(no_transformation(&target, reason)),
+    let wanted = || known.clone().or_else(|| names_of(&grids::missing_between("EPSG:4979", &target)));
+    let datum = VerticalDatum::Epsg(code);
+    let pool = match Pool::new(recipe) {
+        Ok(pool) => pool,
+        Err(reason) => {
+            return Err(wanted().map_or_else(|| no_transformation(&target, reason), |grids| missing(datum, grids)));
+        }
     };
     match AreaOfUse::of_epsg(code) {
         Ok(Some(area)) if !converts_somewhere(&pool, &area) => {
-            let unknown = || format!("that `projinfo -s EPSG:4979 -t EPSG:4326+{code}` names");
-            Err(missing(known.unwrap_or_else(unknown)))
+            let unknown = || format!("that `projinfo -s EPSG:4979 -t {target}` names");
+            Err(missing(datum, wanted().unwrap_or_else(unknown)))
         }
         _ => Ok(pool),
     }
+}
+
+fn names_of(grids: &[String]) -> Option<String> {
+    (!grids.is_empty()).then(|| grids.join(", "))
+}
+
+fn missing(datum: VerticalDatum, candidates: String) -> CrsError {
+    CrsError::MissingGrid { datum: datum.to_string(), candidates, folders: grids::folders() }
 }
 
 /// Whether a transformation has a value at one of a lattice of places in an area.
@@ -269,6 +280,16 @@ mod tests {
             assert!(matches!(error, CrsError::NotVertical { .. }), "{error}");
             assert!(error.to_string().contains(name), "{error}");
         }
+    }
+
+    /// The error names the grids that PROJ's database lists, and the folders that PROJ searches.
+    #[test]
+    fn a_missing_grid_of_the_database_is_named_with_the_folders() {
+        let Err(error) = HeightConverter::new(VerticalDatum::Epsg(6360)) else { return };
+        let text = error.to_string();
+        assert!(text.contains("us_noaa_g"), "{text}");
+        let CrsError::MissingGrid { folders, .. } = error else { panic!("{text}") };
+        assert!(!folders.is_empty() && folders.iter().all(|folder| text.contains(&*folder.to_string_lossy())));
     }
 
     /// German heights need a grid that PROJ's own package lacks: the error names it.

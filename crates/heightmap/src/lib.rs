@@ -24,7 +24,7 @@ pub use error::HeightMapError;
 pub use frame::{MapSystem, TileFrame, TileRequest};
 pub use ground::{GROUND_REACH_M, ground_height};
 pub use lattice::{SourceMap, TileMap};
-pub use model::heights_from_triangles;
+pub use model::{PlacedTriangles, heights_from_triangles, lowest_from_triangles};
 pub use normalise::mean_distance_m;
 pub use points::{HighestPoints, PointTiles};
 pub use surface::{Reading, heights_from_grid};

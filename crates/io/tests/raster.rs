@@ -7,8 +7,8 @@ use camera::Rpc;
 use crs::{Crs, VerticalDatum};
 use io::SaveError;
 use io::raster::{
-    Band, BandData, CogRaster, ImageSource, LumaRule, RasterError, SampleType, read_dem, read_dem_window, write_cog,
-    write_image_with_rpc, write_png_gray, write_png_rgb,
+    Band, BandData, CogRaster, ImageSource, LumaRule, Provenance, RasterError, SampleType, read_dem, read_dem_window,
+    write_cog, write_image_with_rpc, write_map_with_rpc, write_png_gray, write_png_rgb,
 };
 use raster::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, GeoTransform, Grid, Window};
 
@@ -179,6 +179,23 @@ fn an_image_keeps_its_rpc_to_the_last_bit() {
     assert_eq!(tile.flags[(0, 0)], FLAG_NO_DATA);
     assert_eq!(tile.luma[(5, 2)], f32::from(pixels[(5, 2)]));
     assert_eq!(source.info().geotransform, None);
+}
+
+/// A result in the pixels of an image has the RPC of the image, and says what it is.
+#[test]
+fn a_map_with_an_rpc_names_its_unit_and_sources() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("heights.tif");
+    let heights = Grid::from_vec(3, 1, vec![2.0_f32, f32::NAN, 4.0]).unwrap();
+    let bands = [Band { description: "height_m", data: BandData::F32(&heights) }];
+    let provenance = Provenance { sources: vec!["left.tif".to_owned()], acquired: Vec::new() };
+    write_map_with_rpc(&path, &bands, &rpc(), Some(-32768.0), &provenance, false).unwrap();
+    let source = ImageSource::open(&path).unwrap();
+    let items = source.metadata("");
+    let has = |key: &str, value: &str| items.iter().any(|(k, v)| k == key && v.starts_with(value));
+    assert!(has("SOURCES", "left.tif") && has("TIFFTAG_SOFTWARE", "skysweep"), "{items:?}");
+    assert!(source.metadata("RPC").iter().any(|(key, _)| key == "LINE_OFF"));
+    assert!(source.read_samples(1, source.window()).unwrap()[(1, 0)].is_nan());
 }
 
 #[test]

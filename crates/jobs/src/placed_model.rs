@@ -1,10 +1,14 @@
-//! A COLMAP model placed on a map: the alignment job and the ground views write `origin.json`
-//! beside such a model.
+//! A COLMAP model placed on a map. The alignment job and the ground views write `origin.json`
+//! beside such a model; a dataset of the priors job has one of its own form beside `sparse`.
 
 use std::path::{Path, PathBuf};
 
 use io::colmap::{ColmapError, ColmapModel};
 use io::splat_ply::LocalOrigin;
+
+use crate::dataset_folder::{
+    DatasetOriginError, UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, dataset_origin, sparse_folder,
+};
 
 /// A COLMAP model that cannot be placed on the map.
 #[derive(Debug, thiserror::Error)]
@@ -29,6 +33,9 @@ pub enum PlacedModelError {
         /// What the JSON reader found.
         source: serde_json::Error,
     },
+    /// The dataset around the model cannot be read.
+    #[error(transparent)]
+    Dataset(#[from] DatasetOriginError),
     /// The cameras and the surface are on different maps.
     #[error(
         "the cameras are in {} above the {}, the surface is in {} above the {}; align the cameras to the surface's map",
@@ -42,18 +49,26 @@ pub enum PlacedModelError {
     },
 }
 
-/// Reads the cameras of a model and shifts them so that their positions are relative to `origin`.
+/// Reads the cameras of a model, or of a dataset with a model in `sparse/0`, and shifts them so
+/// that their positions are relative to `origin`.
 ///
 /// # Errors
 /// [`PlacedModelError`] if the model or its origin cannot be read, or if it lies on another map.
 pub fn read(folder: &Path, origin: &LocalOrigin) -> Result<ColmapModel, PlacedModelError> {
-    let mut model = io::colmap::read(folder)?;
-    let path = folder.join("origin.json");
-    let text = io::read_regular_text(&path, crate::files::TEXT_LIMIT)
-        .map_err(|source| PlacedModelError::NoOrigin { path: path.clone(), source })?;
-    let own: LocalOrigin =
-        serde_json::from_str(&text).map_err(|source| PlacedModelError::NotAnOrigin { path, source })?;
-    if own.crs != origin.crs || own.vertical != origin.vertical {
+    let sparse = sparse_folder(folder);
+    let mut model = io::colmap::read(&sparse)?;
+    let path = sparse.join("origin.json");
+    let of_dataset = dataset_origin(&dataset_folder(&sparse))?;
+    // A model that is given by itself has a place on a map.
+    let own: LocalOrigin = if path.is_file() || (sparse == folder && of_dataset.crs == UNKNOWN_FRAME) {
+        let text = io::read_regular_text(&path, crate::files::TEXT_LIMIT)
+            .map_err(|source| PlacedModelError::NoOrigin { path: path.clone(), source })?;
+        serde_json::from_str(&text).map_err(|source| PlacedModelError::NotAnOrigin { path, source })?
+    } else {
+        of_dataset
+    };
+    let same_datum = own.vertical == origin.vertical || [&own, origin].iter().any(|o| o.vertical == UNKNOWN_DATUM);
+    if own.crs != origin.crs || !same_datum {
         return Err(PlacedModelError::OtherMap { cameras: Box::new(own), surface: Box::new(origin.clone()) });
     }
     let shift = [0, 1, 2].map(|i| own.origin[i] - origin.origin[i]);

@@ -24,10 +24,13 @@ use serde::{Deserialize, Serialize};
 use crate::error::{JobError, SettingError, from_steps};
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
+use crate::simulate_page;
 use crate::threads::{ThreadsError, install};
 
 /// The record, which is written last.
 const RECORD: &str = "scene.json";
+/// The page of the record.
+const PAGE: &str = "scene.html";
 /// The parameters.
 const PARAMETERS: &str = "scene.toml";
 /// The folder of the perspective cameras.
@@ -166,7 +169,7 @@ pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateR
     let simulation = install(config.threads, || Simulation::with_progress(config.scene.clone(), progress))??;
     progress.check_cancelled()?;
     // Without its record the folder counts as incomplete from here on.
-    folder.remove(RECORD)?;
+    [RECORD, PAGE].into_iter().try_for_each(|name| folder.remove(name))?;
     remove_earlier(&folder, config.flight > 0)?;
     folder.subfolder("truth")?;
     let writer = SceneWriter { simulation: &simulation, folder: output, overwrite: config.overwrite };
@@ -244,7 +247,7 @@ impl SceneWriter<'_> {
         // checked at the start.
         let parameters = self.simulation.config.to_toml()?;
         io::write_bytes(self.folder.join(PARAMETERS), parameters.as_bytes(), true).map_err(FileError::write)?;
-        Ok(files::write_json(&self.folder.join(RECORD), &self.simulation.record(), true)?)
+        Ok(simulate_page::write(&self.folder.join(RECORD), &self.simulation.record(), truth)?)
     }
 
     fn write_view(&self, number: usize, view: &SimulatedView) -> Result<(), FileError> {

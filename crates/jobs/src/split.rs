@@ -8,7 +8,8 @@ use io::colmap::{ColmapError, ColmapModel, ColmapPoint};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{JobError, from_steps};
-use crate::files::{self, FileError};
+use crate::files::FileError;
+use crate::report_page;
 use numeric::{Cancelled, Progress};
 
 /// A COLMAP model and the overlaps that are wanted.
@@ -18,7 +19,7 @@ use numeric::{Cancelled, Progress};
 pub struct SplitJobConfig {
     /// Folder of a COLMAP model with its points.
     pub model: PathBuf,
-    /// File for the report (JSON); not written when `None`.
+    /// File for the report (JSON), whose page is written beside it; neither is written when `None`.
     pub output: Option<PathBuf>,
     /// Number of context views.
     pub contexts: usize,
@@ -66,13 +67,13 @@ pub enum SplitJobError {
     #[error(transparent)]
     Model(#[from] ColmapError),
     /// No image has the name of the first context.
-    #[error("no image of the model is called {name:?}")]
+    #[error("no image of the COLMAP model has the name '{name}': expected a name of its list of images")]
     UnknownImage {
         /// The name.
         name: String,
     },
     /// More contexts than images.
-    #[error("{contexts} contexts of {images} images")]
+    #[error("{contexts} context views are asked for, and the model has {images} images: expected no more than these")]
     TooManyContexts {
         /// Number of contexts asked for.
         contexts: usize,
@@ -138,7 +139,7 @@ impl SplitJobConfig {
 /// ```
 pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobReport, SplitJobError> {
     if let Some(path) = &config.output {
-        files::check_destination(path, config.overwrite)?;
+        report_page::refuse_existing(path, config.overwrite)?;
     }
     progress.begin("split", 2);
     let (model, points) = io::colmap::read_with_points(&config.model)?;
@@ -158,7 +159,8 @@ pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobR
         deviation: found.deviation,
     };
     if let Some(path) = &config.output {
-        files::write_json(path, &report, config.overwrite)?;
+        let lead = "Views to reconstruct from, and views to predict, chosen by the points that they share.";
+        report_page::write(path, ("Context and target views", lead), &report, Vec::new(), config.overwrite)?;
     }
     progress.step();
     Ok(report)

@@ -10,7 +10,7 @@ use crate::page::page;
 use crate::parts::{cards_of, notes, table};
 use crate::picture::{PictureError, data_uri, grey_alpha_uri};
 use crate::svg::Chart;
-use crate::words::typeset;
+use crate::words::{field_words, typeset};
 
 /// Distance of the stripes of hatched cells, and their width, pixels.
 const HATCH: (usize, usize) = (8, 2);
@@ -40,6 +40,8 @@ pub struct JobPage {
     pub tables: Vec<JobTable>,
     /// Single values by name.
     pub facts: Vec<(String, String)>,
+    /// Further values by name, under headings.
+    pub groups: Vec<(String, Vec<(String, String)>)>,
 }
 
 /// A map of a page.
@@ -67,31 +69,38 @@ pub struct JobTable {
 }
 
 impl JobPage {
-    /// Returns a page with all that a report in JSON holds: its values as facts, its lists of
-    /// objects as tables.
+    /// Returns a page with all that a report in JSON holds: its values as facts, its objects as
+    /// groups, its lists of objects as tables. Names are written as words with their units.
     pub fn of_report(title: &str, lead: &str, report: &Value) -> Self {
         let mut page = Self { title: title.to_owned(), lead: lead.to_owned(), ..Self::default() };
-        if let Value::Object(fields) = report {
-            fields.iter().for_each(|(name, value)| page.take(name, value));
-        }
+        page.facts = page.take("", report);
         page
     }
 
-    /// Takes a field of a report.
-    fn take(&mut self, name: &str, value: &Value) {
-        match value {
-            Value::Null => {}
-            Value::Object(fields) => {
-                for (inner, value) in fields {
-                    self.take(&format!("{name}, {inner}"), value);
+    /// Takes the fields of an object: its lists and objects go to the page under their `path`. The
+    /// single values are returned.
+    fn take(&mut self, path: &str, object: &Value) -> Vec<(String, String)> {
+        let mut facts = Vec::new();
+        for (name, value) in object.as_object().into_iter().flatten() {
+            let heading = || heading(path, name);
+            match value {
+                Value::Null => {}
+                Value::Object(_) => {
+                    // The group stands before those inside of it.
+                    let (at, title) = (self.groups.len(), heading());
+                    self.groups.push((title.clone(), Vec::new()));
+                    self.groups[at].1 = self.take(&title, value);
                 }
+                Value::Array(rows) if rows.iter().any(Value::is_object) => {
+                    self.tables.push(JobTable::of(&heading(), rows));
+                }
+                Value::Array(items) if name == "warnings" || name == "notes" => {
+                    self.notes.extend(items.iter().map(in_words));
+                }
+                _ => facts.push((field_words(name), in_words(value))),
             }
-            Value::Array(rows) if rows.iter().any(Value::is_object) => self.tables.push(JobTable::of(name, rows)),
-            Value::Array(items) if name == "warnings" || name == "notes" => {
-                self.notes.extend(items.iter().map(in_words));
-            }
-            _ => self.facts.push((spaced(name), in_words(value))),
         }
+        facts
     }
 
     /// Returns the page.
@@ -158,14 +167,18 @@ impl JobPage {
     fn fact_list(&self) -> String {
         let fact =
             |(name, value): &(String, String)| format!("<dt>{}</dt><dd>{}</dd>", escape(name), typeset(&escape(value)));
-        let facts: String = self.facts.iter().map(fact).collect();
-        if facts.is_empty() { facts } else { format!("<h2>Values</h2><dl>{facts}</dl>") }
+        let group = |(title, facts): (&str, &Vec<(String, String)>)| {
+            let facts: String = facts.iter().map(fact).collect();
+            if facts.is_empty() { facts } else { format!("<h2>{}</h2><dl>{facts}</dl>", escape(title)) }
+        };
+        let groups = self.groups.iter().map(|(title, facts)| (title.as_str(), facts));
+        [("Values", &self.facts)].into_iter().chain(groups).map(group).collect()
     }
 }
 
 impl JobTable {
     /// Returns the objects of a list as a table, with a column for each field that is no list.
-    fn of(name: &str, rows: &[Value]) -> Self {
+    fn of(title: &str, rows: &[Value]) -> Self {
         let mut heads: Vec<&String> = Vec::new();
         for row in rows.iter().filter_map(Value::as_object) {
             heads.extend(row.iter().filter(|(_, v)| is_simple(v)).map(|(name, _)| name));
@@ -174,8 +187,8 @@ impl JobTable {
         heads.retain(|head| seen.insert(*head));
         let cells = |row: &Value| heads.iter().map(|head| row.get(*head).map_or_else(String::new, in_words)).collect();
         Self {
-            title: spaced(name),
-            heads: heads.iter().map(|head| spaced(head)).collect(),
+            title: title.to_owned(),
+            heads: heads.iter().map(|head| field_words(head)).collect(),
             rows: rows.iter().map(cells).collect(),
         }
     }
@@ -204,6 +217,7 @@ fn is_simple(value: &Value) -> bool {
 fn in_words(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
         Value::String(text) => text.clone(),
         Value::Number(number) if number.is_f64() => {
             let value = number.as_f64().unwrap_or(f64::NAN);
@@ -216,9 +230,14 @@ fn in_words(value: &Value) -> String {
     }
 }
 
-/// Returns the name of a field with spaces.
-fn spaced(name: &str) -> String {
-    name.replace('_', " ")
+/// Returns the heading of a list or an object of a report that lies under another heading.
+fn heading(path: &str, name: &str) -> String {
+    let name = field_words(name);
+    if !path.is_empty() {
+        return format!("{path}: {name}");
+    }
+    let mut characters = name.chars();
+    characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
 }
 
 /// Returns diagonal stripes over the marked cells: grey value and opacity.
@@ -265,14 +284,19 @@ mod tests {
         let report = json!({
             "cells": 12, "cell_m": 0.333_333_33, "tiny": 1e-9, "warnings": ["a - b"], "missing": null,
             "images": [{"path": "a.tif", "shift": [1.0, 2.5], "deep": {"x": 1}}, {"path": "b.tif", "more": true}],
-            "inner": {"depth": 3},
+            "inner": {"depth": 3, "rest": {"done": true}},
         });
         let page = JobPage::of_report("Job", "Done.", &report);
         let facts: Vec<(&str, &str)> = page.facts.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
-        assert_eq!(facts, [("cells", "12"), ("cell m", "0.3333"), ("tiny", "1.00e-9"), ("inner, depth", "3")]);
+        assert_eq!(facts, [("cells", "12"), ("cell, m", "0.3333"), ("tiny", "1.00e-9")]);
+        let group =
+            |title: &str, name: &str, value: &str| (title.to_owned(), vec![(name.to_owned(), value.to_owned())]);
+        assert_eq!(page.groups, [group("Inner", "depth", "3"), group("Inner: rest", "done", "yes")]);
+        let html = page.html().unwrap();
+        assert!(html.contains("<h2>Inner: rest</h2><dl><dt>done</dt><dd>yes</dd></dl>") && html.contains("<h2>Images"));
         assert_eq!(page.notes, ["a - b"]);
         assert_eq!(page.tables[0].heads, ["path", "shift", "more"]);
-        assert_eq!(page.tables[0].rows, [["a.tif", "1, 2.5", ""], ["b.tif", "", "true"]]);
+        assert_eq!(page.tables[0].rows, [["a.tif", "1, 2.5", ""], ["b.tif", "", "yes"]]);
     }
 
     #[test]

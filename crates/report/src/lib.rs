@@ -46,5 +46,5 @@ pub use preview::{depth_preview, height_preview, mask_preview, normal_preview, s
 pub use priors::{ErrorRow, PriorsReport, ViewRow};
 pub use protocol::Protocol;
 pub use satellite::{SatellitePriorsReport, SatelliteRow};
-pub use svg::{Axis, Chart};
+pub use svg::{Axis, Chart, PointResidual, residual_map};
 pub use words::{counted, plain_number};

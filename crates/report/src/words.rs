@@ -23,6 +23,39 @@ pub fn plain_number(value: f64) -> String {
     if short == "-0" { "0".to_owned() } else { short.to_owned() }
 }
 
+/// Units at the end of names of fields, and how they are written.
+const UNITS: [(&str, &str); 12] = [
+    ("m", "m"),
+    ("m2", "m²"),
+    ("m3", "m³"),
+    ("km", "km"),
+    ("px", "px"),
+    ("deg", "°"),
+    ("db", "dB"),
+    ("s", "s"),
+    ("seconds", "s"),
+    ("mb", "MB"),
+    ("gib", "GiB"),
+    ("percent", "%"),
+];
+/// Abbreviations in names of fields.
+const ABBREVIATIONS: [&str; 19] = [
+    "psnr", "ssim", "crs", "epsg", "dsm", "dtm", "rpc", "gsd", "glb", "laz", "copc", "ply", "rms", "rmse", "mae",
+    "nmad", "bic", "iou", "2dgs",
+];
+
+/// Returns the name of a field of a report in words, with its unit.
+pub(crate) fn field_words(name: &str) -> String {
+    let unit = |last: &str| UNITS.iter().find(|(text, _)| *text == last).map(|(_, unit)| *unit);
+    let (words, unit) = match name.rsplit_once('_') {
+        Some((words, last)) if unit(last).is_some() => (words, unit(last)),
+        _ => (name, None),
+    };
+    let word = |word: &str| if ABBREVIATIONS.contains(&word) { word.to_uppercase() } else { word.to_owned() };
+    let words = words.split('_').map(word).collect::<Vec<_>>().join(" ");
+    unit.map_or(words.clone(), |unit| format!("{words}, {unit}"))
+}
+
 /// Sets the numbers of a text as a page shows them: a hyphen before a number becomes a minus sign,
 /// a zero has no sign, and a lone hyphen becomes a dash. Hyphens inside words and names stay.
 pub(crate) fn typeset(text: &str) -> String {
@@ -53,6 +86,13 @@ fn is_zero(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn fields_are_words_with_units() {
+        let fields = ["psnr_before_db", "cell_m", "cells_below_ground", "m", "least_building_m2", "crs", "seconds"];
+        let words = ["PSNR before, dB", "cell, m", "cells below ground", "m", "least building, m²", "CRS", "seconds"];
+        assert_eq!(fields.map(field_words), words);
+    }
 
     #[test]
     fn numbers_have_true_signs_and_names_keep_their_hyphens() {

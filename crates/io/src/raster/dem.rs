@@ -83,8 +83,9 @@ fn read(path: &Path, dataset: &Dataset, window: Window) -> Result<Dem, RasterErr
     if dataset.raster_count() == 0 {
         return Err(unsupported("no band".to_owned(), "at least one band of heights"));
     }
-    let geotransform = with_gdal(|| dataset.geo_transform())
-        .map_err(|_| unsupported("no georeference".to_owned(), "a geotransform"))?;
+    let geotransform = with_gdal(|| dataset.geo_transform()).map_err(|_| {
+        unsupported("no georeference".to_owned(), "a raster on a map, such as a surface model, with a geotransform")
+    })?;
     let crs_wkt = Some(dataset.projection()).filter(|wkt| !wkt.is_empty());
     let identity = crs_wkt.as_deref().map(CrsIdentity::of).transpose();
     let identity = identity.map_err(|source| RasterError::Crs { path: path.to_owned(), source })?;

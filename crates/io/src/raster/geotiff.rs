@@ -273,6 +273,34 @@ pub fn write_image_with_rpc(
     write_in_pixels(path.as_ref(), bands, no_data, ItemsOfDomain { domain: "RPC", items: &items }, false, overwrite)
 }
 
+/// Writes a map in the pixels of an image with the RPC of the image, as [`write_image_with_rpc`]
+/// does, with units, statistics and the images that it was made of. NaN becomes `no_data`.
+///
+/// # Errors
+/// [`RasterError::NotWritten`] and [`RasterError::InconsistentBands`], as for [`write_cog`].
+pub fn write_map_with_rpc(
+    path: impl AsRef<Path>,
+    bands: &[Band<'_>],
+    rpc: &Rpc,
+    no_data: Option<f64>,
+    provenance: &Provenance,
+    overwrite: bool,
+) -> Result<(), RasterError> {
+    let path = path.as_ref();
+    write_path(path, overwrite, |made| {
+        let mut memory = in_memory(path, bands, no_data)?;
+        let options = plain_options(bands);
+        let (rpc, sources) = (rpc_items(rpc), provenance.items());
+        let items = rpc.iter().map(|item| (item, "RPC")).chain(sources.iter().map(|item| (item, "")));
+        with_gdal(|| {
+            items.into_iter().try_for_each(|((key, value), domain)| memory.set_metadata_item(key, value, domain))
+        })
+        .and_then(|()| label(&mut memory))
+        .and_then(|()| copy(&memory, "GTiff", made, &options))
+        .map_err(|reason| RasterError::unwritable(path, reason))
+    })
+}
+
 /// Writes a map in the pixels of an image: tiled, deflate, no georeference. NaN becomes `no_data`.
 ///
 /// # Errors

@@ -29,6 +29,7 @@ mod tile;
 mod undeclared;
 mod verify;
 mod vertical_unit;
+mod world_file;
 
 pub use band::{Band, BandData};
 pub use contours::{ContourSurface, write_contours};
@@ -36,7 +37,9 @@ pub use dem::{Dem, read_dem, read_dem_window};
 pub use depth_png::{DepthScale, write_depth_png};
 pub use error::RasterError;
 pub use gdal_setup::allow_remote;
-pub use geotiff::{CogCrs, CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map};
+pub use geotiff::{
+    CogCrs, CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map, write_map_with_rpc,
+};
 pub use image_copy::copy_image_with_rpc;
 pub use labels::{Provenance, iso_time};
 pub use luma::LumaTile;
@@ -46,6 +49,7 @@ pub use reduced::BandLabel;
 pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use tile::{BandScale, MapTile, write_map_tile};
+pub use world_file::write_world_file;
 
 pub(crate) use gdal_access::register_geopackage;
 pub(crate) use gdal_setup::{open_address, prepare_gdal, with_gdal};

@@ -17,6 +17,7 @@ use super::band::{Band, in_memory};
 use super::error::RasterError;
 use super::gdal_setup::with_gdal;
 use super::geotiff::{Sampling, VERTICAL_DATUM, copy, overview_factors, resampling};
+use super::labels::label;
 use crate::atomic::write_path;
 
 /// Side of a tile, cells.
@@ -85,6 +86,7 @@ pub fn write_map_tile(path: impl AsRef<Path>, tile: &MapTile<'_>, overwrite: boo
             let sampling = if float { Sampling::Average } else { Sampling::Nearest };
             memory.build_overviews(resampling(sampling), &overview_factors(memory.raster_size(), TILE), &[])
         })
+        .and_then(|()| label(&mut memory))
         .and_then(|()| copy(&memory, "GTiff", made, &options))
         .map_err(|reason| RasterError::unwritable(path, reason))
     })

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_image_with_rpc, write_map};
+use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_image_with_rpc, write_map, write_map_with_rpc};
 use numeric::Progress;
 use raster::{GeoTransform, Grid, NO_DATA};
 
@@ -74,7 +74,7 @@ impl Placed {
         match (&self.map, &input.place) {
             (Some((geotransform, map)), _) => on_map(geotransform, map.ellipsoidal()),
             (None, Place::Map(geotransform, crs)) => on_map(geotransform, (*crs).into()),
-            (None, Place::Rpc(rpc)) => write_image_with_rpc(path, &bands, rpc, no_data, overwrite),
+            (None, Place::Rpc(rpc)) => write_map_with_rpc(path, &bands, rpc, no_data, &input.provenance, overwrite),
             (None, Place::Unknown) => {
                 let items = input.provenance.items();
                 let items: Vec<(&str, &str)> = items.iter().map(|(key, value)| (*key, value.as_str())).collect();

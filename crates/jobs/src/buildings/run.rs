@@ -10,6 +10,7 @@ use super::error::BuildingMapError;
 use super::input::Input;
 use super::output::Placed;
 use super::report::BuildingMapReport;
+use crate::files::FileError;
 use crate::run_folder::surface_file;
 use crate::{files, report_page, threads};
 
@@ -36,6 +37,8 @@ const HIGH: f32 = 0.5;
 pub fn run(config: &BuildingMapConfig, progress: &dyn Progress) -> Result<BuildingMapReport, BuildingMapError> {
     config.validate()?;
     files::check_raster_destination(&config.output, config.overwrite)?;
+    let style = config.output.with_extension("qml");
+    files::refuse_existing(&style, config.overwrite)?;
     report_page::refuse_existing(&config.report(), config.overwrite)?;
     threads::install(config.threads, || {
         let input = Input::read(config)?;
@@ -50,6 +53,7 @@ pub fn run(config: &BuildingMapConfig, progress: &dyn Progress) -> Result<Buildi
         let report = report(config, &input, &found, &placed.index);
         let lead = format!("{} junctions, {} pairs, at {:.2} m.", report.junctions, report.pairs, report.gsd_m);
         let page = ("Building index", lead.as_str());
+        io::write_bytes(&style, index_legend().qml().as_bytes(), config.overwrite).map_err(FileError::from)?;
         report_page::write(&report.report, page, &report, layers(&input, &placed.index), config.overwrite)?;
         Ok(report)
     })?
@@ -77,11 +81,15 @@ fn layers(input: &Input, placed: &Grid<f32>) -> Vec<MapLayer> {
     let (low, high) = report_page::shown_range(&input.values);
     let grey = |part: f64| (f64::from(low) + part * f64::from(high - low), [(255.0 * part) as u8; 3]);
     let greys = Legend::Ramp { stops: [0.0, 0.25, 0.5, 0.75, 1.0].map(grey).to_vec(), unit: "" };
-    let ramp = Legend::sequential(0.0, 1.0, LightEnd::Low, "");
     let caption = "Geometric saliency of buildings, 0 to 1.";
     let of_image = "Grey values of the image, in its own pixels.";
     vec![
-        report_page::legend_layer("Index", caption, placed, ramp),
+        report_page::legend_layer("Index", caption, placed, index_legend()),
         report_page::legend_layer("Image", of_image, &input.values, greys),
     ]
+}
+
+/// Returns the colours of the index.
+fn index_legend() -> Legend {
+    Legend::sequential(0.0, 1.0, LightEnd::Low, "")
 }

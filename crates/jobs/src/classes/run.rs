@@ -4,7 +4,7 @@ use classes::{BUILDING, BuildingCue, Classes, ClassifyInput, GROUND, UNKNOWN, VE
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
-use report::{Legend, MapLayer};
+use report::{Legend, LightEnd, MapLayer};
 use terrain::bare_ground;
 
 use super::config::ClassesConfig;
@@ -25,8 +25,8 @@ const ROUGHNESS: &str = "roughness.tif";
 const REPORT: &str = "classes.json";
 const PAGE: &str = "classes.html";
 /// Style of QGIS for the classes, which are the first map of the page.
-const STYLE: &str = "classes.qml";
-const FILES: [&str; 5] = [CLASSES, ROUGHNESS, STYLE, PAGE, REPORT];
+const STYLES: [&str; 2] = ["classes.qml", "roughness.qml"];
+const FILES: [&str; 6] = [CLASSES, ROUGHNESS, STYLES[0], STYLES[1], PAGE, REPORT];
 
 /// Finds ground, buildings and vegetation of a surface model, and writes them with a report.
 ///
@@ -128,7 +128,7 @@ fn write(
     let share = 100.0 * report.cells_building as f64 / found.classes.data().len().max(1) as f64;
     let lead = format!("Buildings cover {share:.1} % of {} cells.", found.classes.data().len());
     let layers = layers(surface, found, report.cell_m);
-    report_page::write_styles(work.path(), [STYLE].into_iter().zip(&layers))?;
+    report_page::write_styles(work.path(), STYLES.into_iter().zip(&layers))?;
     report_page::write(&work.path().join(REPORT), ("Classes", &lead), report, layers, false)?;
     for name in FILES {
         folder.remove(name)?;
@@ -148,8 +148,13 @@ fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
     ]);
     let classes = found.classes.map(|class| f32::from(*class));
     let caption = "What stands is a building where it consists of planes, and vegetation where it is rough.";
+    let roughness = found.roughness.map(|r| if r.is_finite() { *r } else { f32::NAN });
+    let (_, highest) = report_page::shown_range(&roughness);
+    let ramp = Legend::sequential(0.0, f64::from(highest), LightEnd::Low, "m");
+    let of_roughness = "Residual of the best plane around each cell that stands above the ground.";
     vec![
         report_page::legend_layer("Classes", caption, &classes, legend),
+        report_page::legend_layer("Roughness", of_roughness, &roughness, ramp),
         report_page::relief_layer("Surface", "Heights of the surface, shaded.", &surface.heights, cell_m),
     ]
 }

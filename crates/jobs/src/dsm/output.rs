@@ -28,7 +28,7 @@ use crate::stac::{AssetKind, StacAsset, StacRasters, item_and_collection};
 
 /// Files of a run, relative to its folder. The report is the last to appear: a folder with a report
 /// is complete.
-pub(crate) const FILES: [&str; 22] = [
+pub(crate) const FILES: [&str; 23] = [
     "dsm/dsm.tif",
     "dsm/sigma.tif",
     "dsm/views.tif",
@@ -46,6 +46,7 @@ pub(crate) const FILES: [&str; 22] = [
     "dsm/relief.png",
     "dsm/relief.pgw",
     "dsm/thumbnail.png",
+    "dsm/thumbnail.pgw",
     "stac/item.json",
     "stac/collection.json",
     USED_CONFIG,
@@ -220,6 +221,18 @@ fn write_looks(
     Ok(write_json(&root.join("stac/collection.json"), &collection, false)?)
 }
 
+/// Returns what a raster holds, in words.
+fn layer_title(name: &str) -> &'static str {
+    match name {
+        HEIGHTS => "Heights of the upper surface",
+        "sigma.tif" => "Standard deviation of the heights",
+        "views.tif" => "Number of views behind each height",
+        "confidence.tif" => "Probability that the height is right",
+        "filled.tif" => "Filled cells",
+        _ => "Where each height comes from",
+    }
+}
+
 /// Returns the files of a run as an item of STAC.
 fn stac_rasters<'a>(config: &DsmConfig, grid: &DsmGrid, report: &DsmReport, crs: &Crs) -> StacRasters<'a> {
     let mut assets: Vec<StacAsset<'a>> = Vec::new();
@@ -230,7 +243,7 @@ fn stac_rasters<'a>(config: &DsmConfig, grid: &DsmGrid, report: &DsmReport, crs:
         assets.push(StacAsset {
             name: stem,
             path: format!("../dsm/{name}"),
-            title: band.description.replace('_', " "),
+            title: layer_title(name).to_owned(),
             role: if name == HEIGHTS { "data" } else { "metadata" },
             kind: AssetKind::Cog { band: band.description, data_type, no_data: band.no_data, unit },
         });
@@ -242,8 +255,8 @@ fn stac_rasters<'a>(config: &DsmConfig, grid: &DsmGrid, report: &DsmReport, crs:
         role,
         kind: AssetKind::Other(kind),
     };
-    assets.push(other("thumbnail", "../dsm/thumbnail.png", "thumbnail", "thumbnail", "image/png"));
-    assets.push(other("report", "../report/report.html", "report", "metadata", "text/html"));
+    assets.push(other("thumbnail", "../dsm/thumbnail.png", "Relief, small", "thumbnail", "image/png"));
+    assets.push(other("report", "../report/report.html", "Report of the run", "metadata", "text/html"));
     StacRasters {
         id: config.output.file_name().map_or_else(|| "dsm".to_owned(), |name| name.to_string_lossy().into_owned()),
         description: format!("Digital surface model from {} images, {crs}.", report.images.len()),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crs::Crs;
 use numeric::percentile;
-use report::{Axis, Chart, JobPage, JobTable, PictureError};
+use report::{Axis, Chart, JobPage, JobTable, PictureError, PointResidual, residual_map};
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::pictures::RunMaps;
@@ -16,6 +16,8 @@ const BARS: usize = 60;
 const SIGMA_END: f64 = 99.0;
 /// Most images with bars of their own.
 const IMAGES_MAX: usize = 60;
+/// Most images with a map of residuals; those with the largest residuals are shown.
+const MAPS_MAX: usize = 12;
 
 /// Returns the page.
 ///
@@ -60,6 +62,7 @@ pub(crate) fn html(
     page.plots.extend(histogram("Heights", "height, m", &maps.heights, None));
     page.plots.extend(histogram("Standard deviations", "σ, m", &maps.sigma, Some(SIGMA_END)));
     page.plots.extend(residual_plot(report));
+    page.plots.extend(residual_maps(report));
     page.plots.push(time_plot(report));
     page.tables = vec![image_table(report), pair_table(report), choice_table(report)];
     page.facts = facts(report);
@@ -113,6 +116,34 @@ fn residual_plot(report: &DsmReport) -> Option<(Chart, String, String)> {
     }
     let caption = "Robust standard deviation of the tie points of each image after the correction, outliers included.";
     Some((chart, "Residuals by image".to_owned(), caption.to_owned()))
+}
+
+/// Returns the residuals of the tie points at their places in the images.
+fn residual_maps(report: &DsmReport) -> Vec<(Chart, String, String)> {
+    let images = &report.pointing.images;
+    let mut chosen: Vec<usize> = (0..images.len()).filter(|&i| !images[i].tie_residuals_px.is_empty()).collect();
+    chosen.sort_by(|&a, &b| images[b].residual_px.total_cmp(&images[a].residual_px));
+    chosen.truncate(MAPS_MAX);
+    chosen.sort_unstable();
+    let map = |i: usize| {
+        let image = &images[i];
+        let point = |&[sample, line, along, across]: &[f64; 4]| PointResidual {
+            at: [sample, line],
+            residual_px: [along, across],
+        };
+        let points: Vec<PointResidual> = image.tie_residuals_px.iter().map(point).collect();
+        let size = report.images.get(i)?.size;
+        let title = format!("Residuals in image {}", i + 1);
+        let (chart, magnification) = residual_map(&title, size, &points)?;
+        let caption = format!(
+            "{} of {} tie points of {}, drawn {magnification} times as long as they are.",
+            points.len(),
+            image.inliers,
+            file_name(&image.path),
+        );
+        Some((chart, title, caption))
+    };
+    chosen.into_iter().filter_map(map).collect()
 }
 
 fn time_plot(report: &DsmReport) -> (Chart, String, String) {

@@ -6,7 +6,8 @@
 
 use std::path::Path;
 
-use raster::{GeoTransform, Grid, Light, Window};
+use io::raster::write_world_file;
+use raster::{Grid, Light, Window};
 use report::{Legend, LightEnd, MapLayer};
 use sweep::fusion::CellSource;
 
@@ -138,7 +139,7 @@ impl RunMaps {
     }
 }
 
-/// Writes hillshade and coloured relief with their world files, and a thumbnail. Filled cells are
+/// Writes hillshade, coloured relief and a thumbnail, with their world files. Filled cells are
 /// hatched in the relief.
 ///
 /// # Errors
@@ -154,14 +155,16 @@ pub(crate) fn write_pictures(folder: &Path, grid: &DsmGrid, read: ReadLayer<'_>)
     let mut picture = relief(&heights, cell_m);
     hatch(&mut picture, &filled);
     io::raster::write_png_rgb(folder.join("relief.png"), &picture, false)?;
-    let world = world_file(grid.geotransform, side);
-    for name in ["hillshade.pgw", "relief.pgw"] {
-        io::write_bytes(folder.join(name), world.as_bytes(), false).map_err(FileError::from)?;
+    for name in ["hillshade.png", "relief.png"] {
+        write_world_file(&folder.join(name), grid.geotransform, side).map_err(FileError::from)?;
     }
     drop((heights, filled, picture));
     let side = factor(grid.size, THUMBNAIL_SIDE);
     let small = relief(&reduced(read, Layer::Heights, grid.size, side)?, grid.gsd_m * side as f64);
-    Ok(io::raster::write_png_rgb(folder.join("thumbnail.png"), &small, false)?)
+    io::raster::write_png_rgb(folder.join("thumbnail.png"), &small, false)?;
+    let thumbnail = folder.join("thumbnail.png");
+    write_world_file(&thumbnail, grid.geotransform, side).map_err(FileError::from)?;
+    Ok(())
 }
 
 /// Returns the coloured relief of heights in cells of `cell_m`.
@@ -182,15 +185,6 @@ fn hatch(picture: &mut Grid<[u8; 3]>, filled: &Grid<f32>) {
             }
         }
     }
-}
-
-/// Returns the six lines of a world file: the pixel as a vector along the row and along the column,
-/// and the centre of the upper-left pixel.
-fn world_file(place: GeoTransform, factor: usize) -> String {
-    let (f, g) = (factor as f64, place.0);
-    let middle = |origin: f64, column: f64, row: f64| origin + 0.5 * f * (column + row);
-    let lines = [g[1] * f, g[4] * f, g[2] * f, g[5] * f, middle(g[0], g[1], g[2]), middle(g[3], g[4], g[5])];
-    lines.map(|value| format!("{value:.15}\n")).concat()
 }
 
 /// Returns the side of the squares of cells that become one pixel.
@@ -261,13 +255,6 @@ mod tests {
         assert_eq!(heights.data(), [1.5, 8.0]);
         let codes = reduced(&read, Layer::Source, (4, 2), 2).unwrap();
         assert_eq!(codes.data(), [1.0, 4.0]);
-    }
-
-    #[test]
-    fn a_world_file_names_the_centre_of_the_first_pixel() {
-        let place = GeoTransform::north_up(1000.0, 2000.0, 0.5);
-        let lines: Vec<f64> = world_file(place, 2).lines().map(|line| line.parse().unwrap()).collect();
-        assert_eq!(lines, [1.0, 0.0, 0.0, -1.0, 1000.5, 1999.5]);
     }
 
     #[test]

@@ -218,6 +218,10 @@ pub struct ImagePointing {
     /// included, pixels; NaN without tracks.
     #[serde(with = "null_is_nan")]
     pub residual_px: f64,
+    /// Inliers, evenly chosen where there are many: sample, line, and residual along both after the
+    /// correction, pixels.
+    #[serde(default)]
+    pub tie_residuals_px: Vec<[f64; 4]>,
 }
 
 /// The kind of a correction of the pointing.

@@ -28,6 +28,8 @@ const COVERED_MIN: f64 = 0.25;
 const RESIDUAL_TIMES: f64 = 3.0;
 /// Residuals below this are never named, pixels: they change heights by less than matching errors.
 const RESIDUAL_MIN_PX: f64 = 0.5;
+/// Most residuals of an image in a report.
+const SHOWN_MAX: usize = 150;
 
 /// Returns what the ties show of each image, in the order of the configuration.
 pub(crate) fn by_image(
@@ -52,11 +54,27 @@ pub(crate) fn by_image(
                 inliers: inliers.len(),
                 covered: covered.unwrap_or(f64::NAN),
                 residual_px: found.view_residual_px[view],
+                tie_residuals_px: tie_residuals(&looked.cameras[view], view, found, tracks),
             },
         ));
     }
     all.sort_by_key(|(number, _)| *number);
     all.into_iter().map(|(_, image)| image).collect()
+}
+
+/// Returns places and residuals of a view's inliers under its correction, rounded to a thousandth
+/// of a pixel.
+fn tie_residuals(camera: &RpcCamera, view: usize, found: &Adjustment, tracks: &[Track]) -> Vec<[f64; 4]> {
+    let corrected = RpcCamera { rpc: camera.rpc.clone(), correction: found.corrections[view] };
+    let residual = |(track, ground): (&Track, &Option<geodesy::LonLatHeight>)| {
+        let (_, seen) = track.iter().find(|(v, _)| *v == view)?;
+        let shown = corrected.project((*ground)?).ok()?;
+        let values = [seen.sample, seen.line, seen.sample - shown.sample, seen.line - shown.line];
+        Some(values.map(|value| (1e3 * value).round() / 1e3))
+    };
+    let all: Vec<[f64; 4]> = tracks.iter().zip(&found.ground).filter_map(residual).collect();
+    let step = all.len().div_ceil(SHOWN_MAX).max(1);
+    all.into_iter().step_by(step).collect()
 }
 
 /// Returns the share of a view's shared ground that ties cover; `None` when no other view shows any
@@ -139,7 +157,14 @@ mod tests {
     }
 
     fn image(name: &str, covered: f64, residual_px: f64) -> ImagePointing {
-        ImagePointing { path: name.into(), tracks: 100, inliers: 90, covered, residual_px }
+        ImagePointing {
+            path: name.into(),
+            tracks: 100,
+            inliers: 90,
+            covered,
+            residual_px,
+            tie_residuals_px: Vec::new(),
+        }
     }
 
     #[test]

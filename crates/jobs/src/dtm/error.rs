@@ -25,7 +25,7 @@ pub enum DtmError {
         path: PathBuf,
     },
     /// The surface model is in degrees.
-    #[error("the surface model is in degrees, expected a projected map: warp it first: {}", path.display())]
+    #[error("the surface model is on a map in degrees, expected a projected map; warp it first: {}", path.display())]
     InDegrees {
         /// The surface model.
         path: PathBuf,

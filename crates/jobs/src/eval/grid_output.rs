@@ -8,15 +8,17 @@
 use std::path::{Path, PathBuf};
 
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, write_cog, write_png_rgb};
+use io::raster::{Band, BandData, CogRaster, Provenance, write_cog, write_png_rgb, write_world_file};
 use io::write_bytes;
 use numeric::Progress;
-use report::{EvaluationReport, error_picture};
+use report::{EvaluationReport, Legend, error_picture};
 
 use super::error::EvalJobError;
 use super::grid_config::{EvalTarget, GridEvalConfig};
 use super::grid_inputs::GridInputs;
-use super::report_folder::{ERROR_MAP, ERROR_PICTURE, PAGE, REPORT_JSON, RUN_FOLDER, check_ours};
+use super::report_folder::{
+    ERROR_MAP, ERROR_PICTURE, ERROR_STYLE, ERROR_WORLD, PAGE, REPORT_JSON, RUN_FOLDER, check_ours,
+};
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
 
@@ -55,7 +57,8 @@ impl Target {
 
     /// Refuses to replace files that no evaluation wrote.
     fn check(&self, overwrite: bool) -> Result<(), EvalJobError> {
-        let taken = [REPORT_JSON, ERROR_MAP, ERROR_PICTURE, PAGE].map(|name| self.folder.join(name));
+        let names = [REPORT_JSON, ERROR_MAP, ERROR_STYLE, ERROR_PICTURE, ERROR_WORLD, PAGE];
+        let taken = names.map(|name| self.folder.join(name));
         check_ours(&self.folder, &taken, overwrite)
     }
 }
@@ -113,9 +116,13 @@ fn write_folder(
     files::write_json(&folder.join(REPORT_JSON), &report.json(), true)?;
     if let Some(horizontal) = inputs.reference.horizontal_epsg {
         write_error_map(&folder.join(ERROR_MAP), horizontal, inputs, report, true)?;
+        let style = Legend::signed(report.error_range_m(), "m").qml();
+        write_bytes(folder.join(ERROR_STYLE), style.as_bytes(), true).map_err(FileError::from)?;
     }
     let picture = error_picture(&report.found.errors, report.reference, report.error_range_m());
-    write_png_rgb(folder.join(ERROR_PICTURE), &picture, true).map_err(FileError::from)?;
+    let file = folder.join(ERROR_PICTURE);
+    write_png_rgb(&file, &picture, true).map_err(FileError::from)?;
+    write_world_file(&file, inputs.reference.geotransform, 1).map_err(FileError::from)?;
     let page = folder.join(PAGE);
     write_bytes(&page, report.html()?.as_bytes(), true).map_err(FileError::from)?;
     Ok(page)
@@ -131,6 +138,10 @@ fn write_error_map(
 ) -> Result<(), EvalJobError> {
     let bands = [Band { description: "error_m", data: BandData::F32(&report.found.errors) }];
     let place = (inputs.reference.geotransform, Crs::ellipsoidal(horizontal));
-    let raster = CogRaster { holds_heights: false, ..CogRaster::new(&bands, place.0, place.1) };
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let sources = [&report.protocol.test, &report.protocol.reference].map(|path| name(Path::new(path)));
+    let provenance = Provenance { sources: sources.to_vec(), acquired: Vec::new() };
+    let plain = CogRaster::new(&bands, place.0, place.1);
+    let raster = CogRaster { holds_heights: false, provenance: Some(&provenance), ..plain };
     Ok(write_cog(path, &raster, overwrite).map_err(FileError::from)?)
 }

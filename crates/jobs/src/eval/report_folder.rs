@@ -14,6 +14,10 @@ pub(super) const REPORT_JSON: &str = "report.json";
 pub(super) const ERROR_MAP: &str = "error_map.tif";
 /// Name of the errors as a picture.
 pub(super) const ERROR_PICTURE: &str = "error_map.png";
+/// Place of the picture on the map.
+pub(super) const ERROR_WORLD: &str = "error_map.pgw";
+/// Style of the GeoTIFF for QGIS.
+pub(super) const ERROR_STYLE: &str = "error_map.qml";
 /// Name of the page, which is written last, so that a folder with a page is complete.
 pub(super) const PAGE: &str = "report.html";
 
@@ -29,7 +33,7 @@ pub(crate) fn remove_evaluation(run: &OutputFolder) -> Result<(), FileError> {
         return Ok(());
     }
     // The JSON marks the folder, so it goes last.
-    for name in [PAGE, ERROR_PICTURE, ERROR_MAP, REPORT_JSON] {
+    for name in [PAGE, ERROR_STYLE, ERROR_WORLD, ERROR_PICTURE, ERROR_MAP, REPORT_JSON] {
         run.remove(&format!("{RUN_FOLDER}/{name}"))?;
     }
     // Stays when it holds anything else.

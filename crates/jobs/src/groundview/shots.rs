@@ -116,7 +116,7 @@ impl Shots {
         let (x, y) = (map.x - surface.origin[0], map.y - surface.origin[1]);
         let z = match at.height_m {
             Some(height) => height - surface.origin[2],
-            None => surface.height_at(x, y).ok_or(GroundViewError::NoGround)? + stand.ground_offset_m,
+            None => surface.ground_at(x, y).ok_or(GroundViewError::NoGround)? + stand.ground_offset_m,
         };
         if !z.is_finite() {
             return Err(GroundViewError::CameraHeight { height_m: z });

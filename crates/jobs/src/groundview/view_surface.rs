@@ -8,16 +8,19 @@ use city::MeshConfig;
 use crs::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
 use groundview::{Ground, HeightField, MeshGround, Met};
 use io::splat_ply::LocalOrigin;
-use raster::GeoTransform;
-
 use numeric::Progress;
+use raster::{GeoTransform, Grid};
 
 use super::error::GroundViewError;
 use crate::city_files::{CitySurfaceError, is_city_model, read_triangles};
 use crate::map_surface;
+use crate::standing::{LEAST_OBJECT_M, ground_under};
 
 /// Start of rays from above, metres above the origin: higher than any terrain.
 const FROM_ABOVE_M: f64 = 20_000.0;
+/// Side of the tile in which the ground under a camera is found, metres: twice a block of houses on
+/// each side.
+const GROUND_TILE: usize = 201;
 
 /// A surface with its map.
 pub(super) struct ViewSurface {
@@ -96,9 +99,28 @@ impl ViewSurface {
         Ok(Self { kind: SurfaceKind::Mesh(ground), projection, origin })
     }
 
+    /// Returns the height of the ground above the origin at a local position; `None` if there is no
+    /// surface. Of triangles it is the lowest, and under a roof of a raster the bare ground.
+    pub(super) fn ground_at(&self, x: f64, y: f64) -> Option<f64> {
+        if let SurfaceKind::Mesh(mesh) = &self.kind {
+            let up = Ray { origin: [x, y, -FROM_ABOVE_M], direction: [0.0, 0.0, 1.0], end: f64::INFINITY };
+            return mesh.meet(&up).map(|met| met.t - FROM_ABOVE_M);
+        }
+        let surface = self.height_at(x, y)?;
+        let middle = (GROUND_TILE - 1) as f64 / 2.0;
+        let height = |i: usize| {
+            let [column, row] = [i % GROUND_TILE, i / GROUND_TILE].map(|at| at as f64 - middle);
+            self.height_at(x + column, y + row).map_or(f32::NAN, |height| height as f32)
+        };
+        let tile = Grid::from_vec(GROUND_TILE, GROUND_TILE, (0..GROUND_TILE * GROUND_TILE).map(height).collect())?;
+        // What stands lower than the surface only by the interpolation of the tile is the surface.
+        let ground = ground_under(&tile, 1.0).unwrap_or(surface);
+        Some(if surface - ground > LEAST_OBJECT_M { ground } else { surface })
+    }
+
     /// Returns the height of the surface above the origin at a local position; `None` if there is
     /// none.
-    pub(super) fn height_at(&self, x: f64, y: f64) -> Option<f64> {
+    fn height_at(&self, x: f64, y: f64) -> Option<f64> {
         let down = Ray { origin: [x, y, FROM_ABOVE_M], direction: [0.0, 0.0, -1.0], end: f64::INFINITY };
         self.meet(&down).map(|met| FROM_ABOVE_M - met.t)
     }

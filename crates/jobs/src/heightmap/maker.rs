@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use heightmap::{GROUND_REACH_M, HeightMapError, Reading, ground_height, mean_distance_m};
-use io::raster::{Band, BandData, BandScale, MapTile, write_map_tile, write_png_rgb};
+use io::raster::{Band, BandData, BandScale, MapTile, write_map_tile, write_png_rgb, write_world_file};
 use numeric::Progress;
 use raster::{Grid, Light};
 
@@ -17,6 +17,7 @@ use super::source_map::Laid;
 use super::tags::HeightMapTags;
 use crate::camera_stand::CameraStand;
 use crate::files::FileError;
+use crate::standing::ground_under;
 
 /// Name of the confidence that a DSM run writes beside its surface model.
 const CONFIDENCE: &str = "confidence.tif";
@@ -88,7 +89,7 @@ impl Maker {
         laid: Laid,
         path: &Path,
     ) -> Result<HeightMapMade, HeightMapJobError> {
-        let Laid { frame, mut heights, zero_m } = laid;
+        let Laid { frame, mut heights, zero_m, lowest } = laid;
         let resolution = self.settings.config.resolution_px_per_m;
         let measured = heights.clone();
         let ground = match &self.terrain {
@@ -97,7 +98,10 @@ impl Maker {
                 fill(&mut heights, &terrain);
                 ground_height(&terrain, resolution)
             }
-            None => ground_height(&heights, resolution),
+            None => match &lowest {
+                Some(lowest) => ground_height(lowest, resolution),
+                None => ground_under(&heights, resolution),
+            },
         };
         let ground_height_m = ground.map(|above| above + zero_m);
         let camera_height_m = match (stand.height_m, ground_height_m) {
@@ -139,7 +143,9 @@ impl Maker {
         let file = MapFile { path, geotransform: frame.geotransform(), crs: &crs, overwrite: self.overwrite };
         file.write(&tags, &heights, confidence.as_ref())?;
         if self.previews {
-            write_preview(&path.with_extension("png"), &heights, resolution)?;
+            let picture = path.with_extension("png");
+            write_preview(&picture, &heights, resolution)?;
+            write_world_file(&picture, frame.geotransform(), 1).map_err(FileError::from)?;
         }
         let void = heights.data().iter().filter(|h| h.is_nan()).count();
         let height_range_m = raster::height_percentiles(&heights, 0.0, 100.0).unwrap_or((f32::NAN, f32::NAN));

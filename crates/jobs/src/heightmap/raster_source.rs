@@ -60,7 +60,7 @@ impl RasterSource {
         };
         let frame = TileFrame::new(request, zero_m, system)?;
         let heights = self.on(&frame, reading, zero_m)?;
-        Ok(Laid { frame, heights, zero_m })
+        Ok(Laid { frame, heights, zero_m, lowest: None })
     }
 
     /// Reads the heights above `zero_m` at the pixels of a tile.

@@ -18,6 +18,9 @@ pub(super) struct Laid {
     pub(super) heights: Grid<f32>,
     /// Zero of the heights, metres above the ellipsoid.
     pub(super) zero_m: f64,
+    /// Heights of the lowest surfaces around the camera above `zero_m`, metres, where the source
+    /// has several above one another.
+    pub(super) lowest: Option<Grid<f32>>,
 }
 
 /// The place that a file names.

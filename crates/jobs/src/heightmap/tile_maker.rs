@@ -45,7 +45,7 @@ impl TileMaker {
         path: &Path,
     ) -> Result<f64, HeightMapJobError> {
         let settings = Settings::new(&HeightMapConfig { size_px, ..self.maker.settings.config.clone() });
-        let Laid { frame, heights, zero_m } = self.lay(&settings, stand)?;
+        let Laid { frame, heights, zero_m, .. } = self.lay(&settings, stand)?;
         let (low, high) = raster::height_percentiles(&heights, 0.0, 100.0).ok_or(HeightMapJobError::EmptyTile)?;
         let crs = frame.crs().map_or_else(|| frame.wkt(), |crs| crs.horizontal_definition());
         let tile = MapTile {

@@ -6,7 +6,8 @@ use bvh::Bvh;
 use city::{LodChoice, MeshConfig, Scope};
 use crs::{CrsIdentity, VerticalDatum};
 use heightmap::{
-    HighestPoints, MapSystem, PointTiles, SourceMap, TileFrame, TileMap, TileRequest, heights_from_triangles,
+    GROUND_REACH_M, HighestPoints, MapSystem, PlacedTriangles, PointTiles, SourceMap, TileFrame, TileMap, TileRequest,
+    heights_from_triangles, lowest_from_triangles,
 };
 use io::points::PointCloud;
 use numeric::Progress;
@@ -55,8 +56,11 @@ impl ModelSource {
         let zero_m = self.origin[2] + self.z_span.0;
         let frame = TileFrame::new(request, zero_m, system)?;
         let map = TileMap::to_map(&frame, &self.map)?;
-        let heights = heights_from_triangles(&self.bvh, self.origin, self.z_span, &map, request.size, zero_m);
-        Ok(Laid { frame, heights, zero_m })
+        let triangles = PlacedTriangles { bvh: &self.bvh, origin: self.origin, z_span: self.z_span };
+        let heights = heights_from_triangles(&triangles, &map, request.size, zero_m);
+        let reach = (GROUND_REACH_M * request.resolution_px_per_m).ceil() as usize;
+        let lowest = Some(lowest_from_triangles(&triangles, &map, (request.size, reach), zero_m));
+        Ok(Laid { frame, heights, zero_m, lowest })
     }
 }
 
@@ -97,7 +101,7 @@ impl PointSource {
             let (heights, _) = filled.next().ok_or(HeightMapJobError::WorkerLost)?;
             match &failed {
                 Some(reason) => Err(HeightMapJobError::PointsStopped { reason: reason.clone() }),
-                None => Ok(Laid { frame, heights, zero_m: self.middle_m }),
+                None => Ok(Laid { frame, heights, zero_m: self.middle_m, lowest: None }),
             }
         };
         frames.into_iter().map(laid).collect()

@@ -11,11 +11,12 @@ use tsdf::{DepthView, FusedMesh, TsdfConfig, fuse};
 use super::config::MeshJobConfig;
 use super::depths;
 use super::error::MeshJobError;
+use crate::dataset_folder::sparse_folder;
 use crate::eval::{SurfaceEvalConfig, SurfaceEvalReport, evaluate_surfaces};
 use crate::files::{self, FileError};
 use crate::report_page;
 use crate::threads;
-use crate::train::{DatasetPlace, sparse_folder};
+use crate::train::DatasetPlace;
 
 /// A finished mesh.
 #[derive(Debug, Clone, Serialize)]

@@ -92,6 +92,11 @@ impl OrthoConfig {
         self.output.with_file_name(format!("{stem}_mask.tif"))
     }
 
+    /// Returns the style of QGIS for the mask.
+    pub(crate) fn mask_style(&self) -> PathBuf {
+        self.mask().with_extension("qml")
+    }
+
     /// Returns the file of the report.
     pub(crate) fn report(&self) -> PathBuf {
         let stem = self.output.file_stem().unwrap_or_default().to_string_lossy();

@@ -77,6 +77,8 @@ pub(super) fn write(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho) ->
     let plain = CogRaster::new(&mask_bands, inputs.grid.geotransform, inputs.map.ellipsoidal());
     let raster = CogRaster { threads, holds_heights: false, provenance: Some(&provenance), ..plain };
     write_cog(&mask, &raster, config.overwrite).map_err(FileError::from)?;
+    let style = state_legend().qml();
+    io::write_bytes(config.mask_style(), style.as_bytes(), config.overwrite).map_err(FileError::from)?;
     let colours = colours(inputs);
     let mut names: Vec<String> = (1..=made.bands.len()).map(|band| format!("band_{band}")).collect();
     names.extend(colours.map(|_| "alpha".to_owned()));
@@ -218,21 +220,25 @@ fn layers(inputs: &OrthoInputs, made: &Ortho) -> Vec<MapLayer> {
     for (i, pixel) in picture.data_mut().iter_mut().enumerate() {
         *pixel = std::array::from_fn(|c| stretched[c].data()[i]);
     }
-    let states = Legend::Codes(vec![
-        (SEEN, [86, 160, 96], "seen"),
-        (HIDDEN, [70, 70, 110], "hidden"),
-        (OUTSIDE, [200, 90, 60], "outside of the images"),
-        (VOID, [72, 72, 76], "no height"),
-    ]);
     let caption = "Values between the 1st and the 99th percentile.".to_owned();
     let of_states = made.state.map(|state| f32::from(*state));
     let of_views = made.view.map(|view| if *view == 0 { f32::NAN } else { f32::from(*view) });
     let views = Legend::sequential(1.0, inputs.images.len() as f64, LightEnd::Low, "");
     vec![
         MapLayer { name: "Ortho".to_owned(), picture, caption, legend: None },
-        report_page::legend_layer("States", "What the images show of each cell.", &of_states, states),
+        report_page::legend_layer("States", "What the images show of each cell.", &of_states, state_legend()),
         report_page::legend_layer("Images", "Number of the image that gives the cell.", &of_views, views),
     ]
+}
+
+/// Returns the colours of the states of cells.
+fn state_legend() -> Legend {
+    Legend::Codes(vec![
+        (SEEN, [86, 160, 96], "seen"),
+        (HIDDEN, [70, 70, 110], "hidden"),
+        (OUTSIDE, [200, 90, 60], "outside of the images"),
+        (VOID, [72, 72, 76], "no height"),
+    ])
 }
 
 impl OrthoReport {

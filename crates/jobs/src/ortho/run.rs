@@ -60,6 +60,7 @@ fn run_on(
     config.validate()?;
     files::check_raster_destination(&config.output, config.overwrite)?;
     files::check_raster_destination(&config.mask(), config.overwrite)?;
+    files::refuse_existing(&config.mask_style(), config.overwrite)?;
     report_page::refuse_existing(&config.report(), config.overwrite)?;
     threads::install(config.threads, || {
         let inputs = OrthoInputs::open(config, window, corrections, progress)?;

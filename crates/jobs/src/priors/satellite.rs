@@ -9,7 +9,7 @@ use ::priors::{
 use camera::{ImageCorrection, Rpc, RpcCamera};
 use city::CrsReference;
 use io::citymodel::CityFile;
-use io::raster::{Band, BandData, ImageSource, write_image_with_rpc, write_png_rgb};
+use io::raster::{Band, BandData, ImageSource, Provenance, write_map_with_rpc, write_png_rgb};
 use numeric::Progress;
 use raster::NO_DATA;
 use report::{SatellitePriorsReport, SatelliteRow, ViewPictures, height_preview, normal_preview};
@@ -155,9 +155,11 @@ impl MapWriter<'_> {
         maps: &SatelliteMaps,
         rpc: &Rpc,
     ) -> Result<(), FileError> {
+        let name = image.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let provenance = Provenance { sources: vec![name], acquired: Vec::new() };
         let write = |kind: &str, bands: &[Band<'_>], no_data: Option<f64>| {
             let path = self.folder.join(kind).join(format!("{}.tif", image.stem));
-            write_image_with_rpc(path, bands, rpc, no_data, false)
+            write_map_with_rpc(path, bands, rpc, no_data, &provenance, false)
         };
         let no_data = Some(f64::from(NO_DATA));
         let from = format!("distance_from_height_{:.3}_m", lines.from_height_m());

@@ -53,7 +53,11 @@ pub enum ProductsError {
         path: PathBuf,
     },
     /// The surface model is in degrees.
-    #[error("the surface model is in degrees, of which only a cloud can be made: warp it first: {}", path.display())]
+    #[error(
+        "the surface model is on a map in degrees, expected a projected map for all products but the point cloud; make \
+         the cloud alone, or warp the surface model first: {}",
+        path.display()
+    )]
     InDegrees {
         /// The surface model.
         path: PathBuf,

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use numeric::{Choice, Progress};
+use raster::Grid;
+use report::{JobPage, MapLayer};
 
 use super::cloud;
 use super::colour::colours;
@@ -26,7 +28,7 @@ use crate::threads;
 /// Names in the folder of the products.
 const ORTHO: &str = "ortho.tif";
 const ORTHO_MASK: &str = "ortho_mask.tif";
-const ORTHO_REPORTS: [&str; 2] = ["ortho_report.html", "ortho_report.json"];
+const BESIDE_ORTHO: [&str; 3] = ["ortho_mask.qml", "ortho_report.html", "ortho_report.json"];
 const DTM: &str = "dtm";
 const DTM_STATES: &str = "dtm/ground.tif";
 const DTM_HEIGHTS: &str = "dtm/dtm.tif";
@@ -66,6 +68,7 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
     let needs_ground = config.wants(ProductKind::Contours) && !has_ground;
     let wants_ground = config.wants(ProductKind::Dtm) || needs_ground;
     let dtm = wants_ground.then(|| terrain(config, output, progress)).transpose()?;
+    let mut shown = None;
     let mut report = ProductsReport {
         surface: surface.dem.path.clone(),
         folder: output.to_owned(),
@@ -90,6 +93,7 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
         let ortho = ortho_file(config, output, progress)?;
         let (colours, colour) = colours(&surface, &ortho)?;
         (report.ortho, report.colour) = (Some(ortho), Some(colour));
+        shown = Some(report_page::thinned(&colours).0.map(|colour| colour.map(|c| (c >> 8) as u8)));
         if config.wants(ProductKind::Mesh) {
             let fitting = || surface.layer("sigma.tif").map(|sigma| mesh::fitting_tolerance(&sigma, surface.cell_m()));
             let tolerance_m = config.mesh_tolerance_m.map_or_else(fitting, Ok)?;
@@ -100,9 +104,31 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
             report.cloud = Some(cloud::make(&surface, &colours, states.as_deref(), config.filled, &folder, progress)?);
         }
     }
-    let lead = format!("Made of {}.", report.surface.display());
-    report_page::write(&output.join(REPORT), ("Products", &lead), &report, Vec::new(), true)?;
+    let page = page(&report, &surface, shown)?;
+    report_page::write_page(&output.join(REPORT), &page, &report, true)?;
     Ok(report)
+}
+
+/// Returns the page: the surface with its filled cells, the colours where there are some, and the
+/// report.
+fn page(
+    report: &ProductsReport,
+    surface: &SurfaceOfRun,
+    colours: Option<Grid<[u8; 3]>>,
+) -> Result<JobPage, ProductsError> {
+    let value = serde_json::to_value(report).map_err(FileError::from)?;
+    let lead = format!("Made of {}.", report.surface.display());
+    let caption = "Heights of the surface, shaded.";
+    let mut layers = vec![report_page::relief_layer("Surface", caption, &surface.dem.heights, surface.cell_m())];
+    layers.extend(colours.map(|picture| MapLayer {
+        name: "Colours".to_owned(),
+        picture,
+        caption: "Colours of the cells in the point cloud and the mesh.".to_owned(),
+        legend: None,
+    }));
+    let filled = surface.layer("filled.tif").ok();
+    let hatched = filled.map(|filled| report_page::thinned(&filled).0.map(|code| *code == 1.0));
+    Ok(JobPage { layers, hatched, ..JobPage::of_report("Products", &lead, &value) })
 }
 
 /// Makes products of a run that has just ended in its folder.
@@ -130,7 +156,7 @@ pub(crate) fn remove_products(run_folder: &OutputFolder) -> Result<(), FileError
         return Ok(());
     }
     // The report marks the folder, so it goes last.
-    let names = cloud::FILES.map(|(name, _)| name).into_iter().chain(ORTHO_REPORTS).chain([
+    let names = cloud::FILES.map(|(name, _)| name).into_iter().chain(BESIDE_ORTHO).chain([
         contours::FILE,
         mesh::GLB,
         TILESET,

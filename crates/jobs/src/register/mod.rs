@@ -14,8 +14,11 @@ mod config;
 mod error;
 mod matching;
 mod model;
+mod page;
+mod report;
 mod run;
 
 pub use config::{RegisterConfig, RegisterModel};
 pub use error::RegisterError;
-pub use run::{RegisterReport, RegisteredImage, run};
+pub use report::{RegisterReport, RegisteredImage};
+pub use run::run;

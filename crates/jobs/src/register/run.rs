@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use camera::{ImageCorrection, RpcCamera};
 use geodesy::LonLatHeight;
 use numeric::{Progress, upper_median};
-use serde::Serialize;
 use sweep::pointing::{AdjustConfig, ControlPoint, ModelOrder, Observations, adjust_to_control};
 
 use super::config::RegisterConfig;
 use super::error::RegisterError;
 use super::matching;
 use super::model::{Looks, Model, NewImage};
-use crate::{files, threads};
+use super::page;
+use super::report::{RegisterReport, RegisteredImage};
+use crate::{report_page, threads};
 
 /// Most rounds of matching. The first is within a pixel, the second within a tenth.
 const ROUNDS: usize = 5;
@@ -26,51 +27,6 @@ const POINTS_MIN: usize = 8;
 const AGREES_PX: f64 = 1.5;
 /// Weak prior on the parameters, pixels: any error of the pointing is as likely as another.
 const PRIOR_PX: f64 = 100.0;
-
-/// The correction of an image, and how well it is known.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct RegisterReport {
-    /// The new image first, then the images of the model.
-    pub images: Vec<RegisteredImage>,
-    /// Points of the model that were searched for.
-    pub tried: usize,
-    /// Points that were found.
-    pub found: usize,
-    /// Points that agree with the correction.
-    pub agree: usize,
-    /// Root mean square residual of those, pixels.
-    pub rms_px: f64,
-    /// Median length of the residuals of all points found, pixels.
-    pub median_px: f64,
-    /// Shift of the pixel in the middle of the image, pixels (sample, line).
-    pub shift_px: [f64; 2],
-    /// Ground sampling distance of the image, metres.
-    pub gsd_m: f64,
-    /// Rounds of matching.
-    pub rounds: usize,
-}
-
-/// An image with its correction.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RegisteredImage {
-    /// The image.
-    pub path: PathBuf,
-    /// Its correction, to be applied after the RPC.
-    pub applied_correction: Option<ImageCorrection>,
-}
-
-impl RegisterReport {
-    /// Returns the report as text, which ends in a line break.
-    pub fn text(&self) -> String {
-        let [sample, line] = self.shift_px;
-        format!(
-            "shift      {sample:+.3} px along the sample, {line:+.3} px along the line\n\
-             points     {} of {} found, {} agree: RMS {:.3} px, median {:.3} px\n",
-            self.found, self.tried, self.agree, self.rms_px, self.median_px
-        )
-    }
-}
 
 /// Registers an image and writes the report with its correction.
 ///
@@ -91,9 +47,9 @@ impl RegisterReport {
 /// ```
 pub fn run(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
     config.validate()?;
-    files::check_destination(&config.output, config.overwrite)?;
+    report_page::refuse_existing(&config.output, config.overwrite)?;
     let report = threads::install(config.threads, || register(config, progress))??;
-    files::write_json(&config.output, &report, config.overwrite)?;
+    report_page::write_page(&config.output, &page::of(&report)?, &report, config.overwrite)?;
     Ok(report)
 }
 
@@ -172,6 +128,13 @@ fn change(before: &RpcCamera, after: &RpcCamera, points: &[ControlPoint]) -> f64
     moved.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
 }
 
+/// Returns the place of a point in the image and its residual, rounded to a thousandth of a pixel.
+fn seen_with((point, [along, across]): (&ControlPoint, [f64; 2])) -> Option<[f64; 4]> {
+    let (_, seen) = point.seen.first()?;
+    let values = [seen.sample, seen.line, along, across];
+    values.iter().all(|value| value.is_finite()).then(|| values.map(|value| (1e3 * value).round() / 1e3))
+}
+
 fn judged(
     model: &Model,
     new: &NewImage,
@@ -208,5 +171,7 @@ fn judged(
         shift_px: [moved.sample - middle.sample, moved.line - middle.line],
         gsd_m: new.gsd_m,
         rounds,
+        size: (info.width, info.height),
+        residuals_px: found.points.iter().zip(residuals(camera, &found.points)).filter_map(seen_with).collect(),
     })
 }

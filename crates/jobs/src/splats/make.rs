@@ -20,6 +20,7 @@ use crate::corrections::{CorrectionSource, Corrections};
 use crate::files::{self, FileError};
 use crate::map_surface::{self, MapSurface};
 use crate::output_folder::OutputFolder;
+use crate::report_page;
 use crate::threads::install;
 
 /// A surface model and its images, to be turned into splats.
@@ -54,7 +55,7 @@ pub struct SplatsConfig {
     pub sh_degree: u8,
     /// Whether uniform splats of several sizes are measured for comparison.
     pub compare: bool,
-    /// File for the report (JSON).
+    /// File for the report (JSON), whose page is written beside it.
     pub report: Option<PathBuf>,
     /// Folder for the splats as each image sees them (PNG, in the display range).
     pub renderings: Option<PathBuf>,
@@ -168,15 +169,17 @@ impl SplatsReport {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn make(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, SplatsJobError> {
-    for path in [Some(&config.output), config.report.as_ref()].into_iter().flatten() {
-        files::check_destination(path, config.overwrite)?;
+    files::check_destination(&config.output, config.overwrite)?;
+    if let Some(path) = &config.report {
+        report_page::refuse_existing(path, config.overwrite)?;
     }
     if let Some(folder) = &config.renderings {
         OutputFolder::check(folder)?;
     }
     let report = install(config.threads, || make_and_write(config, progress))??;
     if let Some(path) = &config.report {
-        files::write_json(path, &report.to_json().map_err(FileError::from)?, config.overwrite)?;
+        let lead = "Gaussian splats of a surface model and its images, and how well they render back.";
+        report_page::write(path, ("Splats", lead), &report, Vec::new(), config.overwrite)?;
     }
     Ok(report)
 }

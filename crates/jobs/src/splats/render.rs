@@ -25,6 +25,7 @@ use super::error::SplatsJobError;
 use super::image;
 use super::make::pointing_path;
 use crate::corrections::{CorrectionSource, Corrections};
+use crate::dataset_folder::{dataset_folder, sparse_folder};
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
 use crate::placed_model;
@@ -44,11 +45,11 @@ pub struct SplatRenderConfig {
     pub splats: PathBuf,
     /// Images with RPCs to look through.
     pub images: Vec<PathBuf>,
-    /// Perspective cameras to look through: folder of a COLMAP model on the map of the splats, with
-    /// `origin.json`.
+    /// Perspective cameras to look through: folder of a COLMAP model on the map of the splats with
+    /// `origin.json`, or of a dataset of the priors job.
     pub cameras: Option<PathBuf>,
     /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered
-    /// and not compared.
+    /// and not compared. `images` of the dataset when `None`.
     pub pictures: Option<PathBuf>,
     /// Source of the pointing corrections of the images. [`CorrectionSource::SurfaceRun`] takes
     /// those that the splats were made with, which lie beside them, or else those of the run in
@@ -157,7 +158,8 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
         .clone()
         .ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?;
     folder.remove(REPORT)?;
-    let session = RenderSession { config, file: &file, origin, taken: HashSet::new(), views: Vec::new() };
+    let pictures = config.pictures.clone().or_else(|| config.cameras.as_deref().and_then(pictures_of_dataset));
+    let session = RenderSession { config, file: &file, origin, pictures, taken: HashSet::new(), views: Vec::new() };
     let views = install(config.threads, || session.run(progress))??;
     let report = SplatRenderReport { splats: file.splats.len(), views };
     let lead = "Gaussian splats seen by the cameras of images.";
@@ -165,11 +167,18 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
     Ok(report)
 }
 
+/// Returns the pictures of a dataset whose folder, or whose model, is given.
+fn pictures_of_dataset(cameras: &Path) -> Option<PathBuf> {
+    Some(dataset_folder(&sparse_folder(cameras)).join("images")).filter(|folder| folder.is_dir())
+}
+
 /// Views rendered so far.
 struct RenderSession<'a> {
     config: &'a SplatRenderConfig,
     file: &'a SplatFile,
     origin: LocalOrigin,
+    /// Folder with the pictures of the perspective cameras.
+    pictures: Option<PathBuf>,
     /// Names of the views that were written.
     taken: HashSet<String>,
     views: Vec<SplatRenderView>,
@@ -240,7 +249,7 @@ impl RenderSession<'_> {
         let lens = model
             .and_then(|model| model.lenses.get(view.lens))
             .ok_or_else(|| SplatsJobError::NoLens { name: view.name.clone() })?;
-        let picture = self.config.pictures.as_deref().map(|folder| folder.join(&view.name)).filter(|p| p.is_file());
+        let picture = self.pictures.as_deref().map(|folder| folder.join(&view.name)).filter(|p| p.is_file());
         let reference = match picture {
             Some(path) => Reference::Display(image::read_pixels(&path)?.map(|p| p.map(|c| c / 255.0))),
             None => Reference::None,

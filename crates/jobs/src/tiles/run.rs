@@ -22,6 +22,7 @@ use crate::files;
 use crate::heightmap::{HeightMapConfig, TileMaker};
 use crate::ortho::{self, OrthoConfig};
 use crate::output_folder::OutputFolder;
+use crate::report_page;
 use crate::run_folder::surface_file;
 use crate::threads;
 
@@ -75,7 +76,9 @@ pub fn run(config: &TilesConfig, progress: &dyn Progress) -> Result<TilesReport,
             tiles,
             written: config.maps.output.join(LIST),
         };
-        files::write_json(&report.written, &report, true)?;
+        let lead = format!("{} tiles of height maps and orthos around cameras.", report.tiles.len());
+        let layers = picture::layers(&config.maps.output, &report, 1.0 / config.maps.resolution_px_per_m)?;
+        report_page::write(&report.written, ("Tiles", &lead), &report, layers, true)?;
         Ok(report)
     })?
 }

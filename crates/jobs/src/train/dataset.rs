@@ -13,7 +13,8 @@ use serde_json::Value;
 
 use super::config::{TrainConfig, TrainPriors};
 use super::error::TrainError;
-use super::place::{DatasetPlace, more_points, pinhole, sparse_folder};
+use super::place::{DatasetPlace, more_points, pinhole};
+use crate::dataset_folder::sparse_folder;
 use crate::files;
 
 /// A dataset in memory.

@@ -12,6 +12,7 @@ use io::splat_ply::SplatPlyError;
 use numeric::Cancelled;
 
 use crate::corrections::CorrectionsError;
+use crate::dataset_folder::DatasetOriginError;
 use crate::error::{ImageInputError, JobError, SettingError, from_steps};
 use crate::files::FileError;
 use crate::map_surface::MapSurfaceError;
@@ -47,6 +48,9 @@ pub enum TrainError {
         /// What was found and what was expected.
         what: String,
     },
+    /// The origin of the dataset cannot be read.
+    #[error(transparent)]
+    Origin(#[from] DatasetOriginError),
     /// No camera has an image.
     #[error("none of {cameras} cameras has an image, expected files with the cameras' names in {}", folder.display())]
     NoImages {

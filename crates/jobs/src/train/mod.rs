@@ -26,7 +26,7 @@ mod satellite;
 mod satellite_run;
 mod transients;
 
-pub(crate) use place::{DatasetPlace, pinhole, sparse_folder};
+pub(crate) use place::{DatasetPlace, pinhole};
 
 pub use config::{TrainConfig, TrainPriors};
 pub use error::TrainError;

@@ -1,21 +1,18 @@
 //! Where the cameras of a dataset stand, in a frame that numbers of 32 bits are precise in.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use ::train::PinholeView;
 use camera::Lens;
 use io::colmap::{ColmapModel, ColmapObservation, ColmapPoint, ColmapView, read_with_points};
 use io::splat_ply::LocalOrigin;
-use serde_json::Value;
 
 use super::error::TrainError;
-use crate::files;
+use crate::dataset_folder::{UNKNOWN_FRAME, dataset_origin};
 
 /// Coordinates beyond this are counted from an origin of their own, metres: numbers of 32 bits have
 /// steps of a millimetre there.
 const FAR_M: f64 = 1e4;
-/// Reference system of a dataset that does not name one.
-const UNKNOWN: &str = "frame of the dataset";
 /// Difference of the positions of a camera in two models of the same frame, metres.
 const SAME_M: f64 = 1e-3;
 
@@ -31,13 +28,13 @@ pub(crate) struct DatasetPlace {
 impl DatasetPlace {
     /// Returns whether the reference system of the positions is known.
     pub(crate) fn is_on_a_map(&self) -> bool {
-        self.origin.crs != UNKNOWN
+        self.origin.crs != UNKNOWN_FRAME
     }
 
     /// Reads where a dataset lies, as far as its origin says so, and moves the cameras of its model
     /// near the origin where they are far from it.
     pub(crate) fn read(folder: &Path, model: &mut ColmapModel) -> Result<Self, TrainError> {
-        let mut origin = origin(folder)?;
+        let mut origin = dataset_origin(folder)?;
         let far = |view: &ColmapView| view.pose.centre.iter().any(|c| c.abs() > FAR_M);
         let shift = match model.views.iter().find(|view| far(view)) {
             Some(view) => view.pose.centre.map(f64::floor),
@@ -49,13 +46,6 @@ impl DatasetPlace {
         (0..3).for_each(|i| origin.origin[i] += shift[i]);
         Ok(Self { shift, origin })
     }
-}
-
-/// Returns the folder of the model of a dataset.
-pub(crate) fn sparse_folder(folder: &Path) -> PathBuf {
-    let folders = [folder.join("sparse/0"), folder.join("sparse"), folder.to_owned()];
-    let has_cameras = |f: &&PathBuf| ["cameras.bin", "cameras.txt"].iter().any(|n| f.join(n).is_file());
-    folders.iter().find(has_cameras).unwrap_or(&folders[0]).clone()
 }
 
 /// Returns the view of a pinhole camera whose image is smaller by a factor; `None` for other
@@ -107,24 +97,4 @@ pub(super) fn more_points(model: &ColmapModel, folder: &Path) -> Result<Vec<Colm
         }
     };
     Ok(points.into_iter().map(moved).collect())
-}
-
-/// Returns where the positions of a dataset are counted from, as far as its origin says so.
-fn origin(dataset: &Path) -> Result<LocalOrigin, TrainError> {
-    let path = dataset.join("origin.json");
-    let unknown = LocalOrigin::new(UNKNOWN, "unknown", [0.0; 3]);
-    if !path.is_file() {
-        return Ok(unknown);
-    }
-    let invalid = |what: String| TrainError::Dataset { path: path.clone(), what };
-    let value: Value = serde_json::from_str(&files::read_text(&path)?).map_err(|e| invalid(e.to_string()))?;
-    let part = &value["model_from_dataset"];
-    let identity = serde_json::json!([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-    let shift: Option<[f64; 3]> = serde_json::from_value(part["translation"].clone()).ok();
-    match (value["model_crs"].as_str(), shift) {
-        (Some(crs), Some(shift)) if part["scale"] == 1.0 && part["rotation"] == identity => {
-            Ok(LocalOrigin::new(crs, "unknown", shift))
-        }
-        _ => Ok(unknown),
-    }
 }

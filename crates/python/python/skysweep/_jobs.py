@@ -1458,7 +1458,7 @@ def splats(
         sh_degree: Degree of the spherical harmonics in the file, 0 to 3. The original 3DGS and 2DGS
             loaders expect 3.
         compare: Whether uniform splats of several sizes are measured for comparison.
-        report: File for the report (JSON).
+        report: File for the report (JSON), whose page is written beside it.
         renderings: Folder for the splats as each image sees them (PNG, in the display range).
         threads: Worker threads; one per core when `None`.
         overwrite: Whether existing files may be replaced.
@@ -1492,9 +1492,9 @@ def render_splats(
         output: Folder to write.
         images: Images with RPCs to look through.
         cameras: Perspective cameras to look through: folder of a COLMAP model on the map of the
-            splats, with `origin.json`.
+            splats with `origin.json`, or of a dataset of the priors job.
         pictures: Folder with the pictures of the perspective cameras; cameras without a picture are
-            rendered and not compared.
+            rendered and not compared. `images` of the dataset when `None`.
         corrections: Source of the pointing corrections of the images.
             `CorrectionSource::SurfaceRun` takes those that the splats were made with, which lie
             beside them, or else those of the run in whose folder they lie.
@@ -1668,7 +1668,8 @@ def split(
 
     Args:
         model: Folder of a COLMAP model with its points.
-        output: File for the report (JSON); not written when `None`.
+        output: File for the report (JSON), whose page is written beside it; neither is written when
+            `None`.
         contexts: Number of context views.
         context_iou: Wanted overlap of each further context with the first one, as intersection over
             union.

@@ -7,6 +7,8 @@ pub struct Axis {
     low: f64,
     high: f64,
     logarithmic: bool,
+    /// Whether values grow to the left or downwards, as the lines of an image do.
+    reversed: bool,
     /// Ticks with their texts. They are computed if there are none.
     names: Vec<(f64, String)>,
 }
@@ -16,7 +18,7 @@ impl Axis {
     pub fn linear(label: &str, low: f64, high: f64) -> Self {
         let usable = low.is_finite() && high.is_finite() && high > low;
         let (low, high) = if usable { (low, high) } else { (0.0, 1.0) };
-        Self { label: label.to_owned(), low, high, logarithmic: false, names: Vec::new() }
+        Self { label: label.to_owned(), low, high, logarithmic: false, reversed: false, names: Vec::new() }
     }
 
     /// Returns a logarithmic axis that holds all positive values, with some margin.
@@ -33,6 +35,11 @@ impl Axis {
         Self { names: names.clone(), ..Self::linear(label, 0.0, names.len().max(1) as f64) }
     }
 
+    /// Returns the axis with its values growing the other way.
+    pub fn reversed(self) -> Self {
+        Self { reversed: !self.reversed, ..self }
+    }
+
     pub(super) fn label(&self) -> &str {
         &self.label
     }
@@ -44,7 +51,8 @@ impl Axis {
         } else {
             (value - self.low) / (self.high - self.low)
         };
-        if place.is_nan() { 0.0 } else { place.clamp(0.0, 1.0) }
+        let place = if place.is_nan() { 0.0 } else { place.clamp(0.0, 1.0) };
+        if self.reversed { 1.0 - place } else { place }
     }
 
     /// Returns the ticks with their texts, in rising order.
@@ -91,6 +99,12 @@ mod tests {
         assert_eq!(texts(Axis::logarithmic("", [0.9, 30.0].into_iter())), ["1", "2", "5", "10", "20"]);
         assert_eq!(texts(Axis::logarithmic("", [0.6, 1.4].into_iter())), ["0.5", "0.6", "0.8", "1", "1.5"]);
         assert_eq!(texts(Axis::names("", ["a", "b"].map(String::from).into_iter())), ["a", "b"]);
+    }
+
+    #[test]
+    fn a_reversed_axis_grows_the_other_way() {
+        let axis = Axis::linear("line", 0.0, 8.0).reversed();
+        assert_eq!([0.0, 2.0, 8.0, 99.0].map(|value| axis.fraction(value)), [1.0, 0.75, 0.0, 0.0]);
     }
 
     #[test]

@@ -82,6 +82,21 @@ impl Chart {
         ));
     }
 
+    /// Draws a line from a small dot, as an arrow without a head.
+    pub fn vector(&mut self, (from_x, from_y): (f64, f64), (to_x, to_y): (f64, f64)) {
+        let ((x, y), (end_x, end_y)) = (self.place(from_x, from_y), self.place(to_x, to_y));
+        self.add(format_args!(
+            "<path class=\"line\" d=\"M{x:.1} {y:.1}L{end_x:.1} {end_y:.1}\"/><circle class=\"dot2\" cx=\"{x:.1}\" \
+             cy=\"{y:.1}\" r=\"2.5\"/>"
+        ));
+    }
+
+    /// Returns how many times as wide as high the area of the marks is.
+    pub(super) fn shape() -> f64 {
+        let [left, right, top, bottom] = MARGINS;
+        (WIDTH - left - right) / (HEIGHT - top - bottom)
+    }
+
     /// Draws a dot. `class` is `dot`, `dot2` or `dot3`.
     pub fn dot(&mut self, class: &str, x: f64, y: f64) {
         let (x, y) = self.place(x, y);

@@ -6,7 +6,9 @@
 
 mod axis;
 mod chart;
+mod residuals;
 
 pub use axis::Axis;
 pub use chart::Chart;
 pub(crate) use chart::STYLE;
+pub use residuals::{PointResidual, residual_map};
