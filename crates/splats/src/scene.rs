@@ -13,6 +13,9 @@ use raster::{Grid, Interpolation, sample};
 use serde::Serialize;
 
 use super::colour::FitView;
+use super::sight::mark_pixels;
+use super::wall_light::WallView;
+use super::walls::{WallSplats, wall_splats};
 use super::{
     ColourFit, DivisionConfig, GaussianConfig, HeightErrors, MapSplatCamera, Rendering, RpcSplatCamera, SplatBlock,
     SplatSurface, divide, fit_colours, height_errors, psnr_db, render, splat_of_block, ssim, uniform, visible_cells,
@@ -37,6 +40,8 @@ pub struct SplatConfig {
     pub uniform_side: Option<usize>,
     /// Whether uniform splats of several sizes are measured for comparison.
     pub compare: bool,
+    /// Whether the walls between cells get splats too. Uniform splats have none.
+    pub walls: bool,
 }
 
 /// An image of the surface.
@@ -51,9 +56,9 @@ pub struct SplatView<'a> {
 /// Splats with their blocks, renderings and report.
 #[derive(Debug, Clone)]
 pub struct SplatScene {
-    /// The splats, metres from the surface's origin.
+    /// The splats, metres from the surface's origin: first those of the blocks, then the walls.
     pub splats: Vec<Splat>,
-    /// The block of each splat.
+    /// The blocks of the first splats.
     pub blocks: Vec<SplatBlock>,
     /// The splats as each image sees them, in the display range.
     pub renderings: Vec<Grid<[f32; 3]>>,
@@ -66,8 +71,15 @@ pub struct SplatScene {
 pub struct SplatReport<V = ViewReport> {
     /// Number of cells with a height.
     pub cells: usize,
-    /// Number of splats.
+    /// Number of splats, walls included.
     pub splats: usize,
+    /// Number of splats on walls.
+    pub walls: usize,
+    /// Number of splats on walls whose colours an image shows. The others have the mean of the
+    /// walls that are seen on the same outline, or of all.
+    pub walls_seen: usize,
+    /// Area of the walls, m².
+    pub walls_area_m2: f64,
     /// Largest distance of a height from the plane of its splat, metres.
     pub plane_error_max_m: f64,
     /// Errors of the heights rendered from above, as the mean by weight.
@@ -91,6 +103,9 @@ impl<V> SplatReport<V> {
         SplatReport {
             cells: self.cells,
             splats: self.splats,
+            walls: self.walls,
+            walls_seen: self.walls_seen,
+            walls_area_m2: self.walls_area_m2,
             plane_error_max_m: self.plane_error_max_m,
             mean_height: self.mean_height,
             median_height: self.median_height,
@@ -209,13 +224,26 @@ pub fn make_splats(
                 .map(|p| displayed([0, 1, 2].map(|i| gain[i] * p[i] + offset[i]), &range).map(|c| c.clamp(0.0, 1.0)))
         })
         .collect();
+    let walls = if config.walls && config.uniform_side.is_none() {
+        let views: Vec<WallView<'_>> =
+            views.iter().zip(&images).map(|(view, image)| WallView { camera: &view.camera, image }).collect();
+        wall_splats(surface, &views, confidence, &config.division, &config.gaussian)?
+    } else {
+        WallSplats::default()
+    };
+    splats.extend(&walls.splats);
+    let mut shows: Vec<Grid<bool>> = seen.iter().map(|seen| seen.shows.clone()).collect();
+    for ((shows, places), view) in shows.iter_mut().zip(&walls.shown).zip(views) {
+        mark_pixels(shows, &view.camera.pixels(places.iter().copied())?);
+    }
     let mut fits = Vec::with_capacity(views.len());
-    for ((view, image), seen) in views.iter().zip(&images).zip(&seen) {
-        fits.push(FitView::new(&splats, &view.camera, image, &seen.shows)?);
+    for ((view, image), shows) in views.iter().zip(&images).zip(&shows) {
+        fits.push(FitView::new(&splats, &view.camera, image, shows)?);
     }
     fit_colours(&mut splats, &fits, &config.colour);
     let mut report = heights_report(surface, &blocks, &splats, config)?;
     report.display_range = range;
+    (report.walls, report.walls_seen, report.walls_area_m2) = (walls.splats.len(), walls.seen, walls.area_m2);
     let mut renderings = Vec::with_capacity(views.len());
     for (((fit, image), seen), balance) in fits.iter().zip(&images).zip(&seen).zip(&balance) {
         let rendering = fit.render(&splats);
@@ -394,6 +422,9 @@ fn heights_report(
     Ok(SplatReport {
         cells: surface.heights().data().iter().filter(|h| h.is_finite()).count(),
         splats: splats.len(),
+        walls: 0,
+        walls_seen: 0,
+        walls_area_m2: 0.0,
         plane_error_max_m: blocks.iter().map(|block| plane_error(surface, block)).fold(0.0, f64::max),
         mean_height,
         median_height: errors(&rendering.median_height_m),
