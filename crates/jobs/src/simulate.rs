@@ -17,8 +17,8 @@ use crs::Crs;
 use io::citymodel::{CityJsonOptions, write_cityjson};
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
 use io::ply::{PlyPoint, write_points};
-use io::splat_ply::LocalOrigin;
 use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc, write_png_gray};
+use io::splat_ply::LocalOrigin;
 use numeric::{Cancelled, Progress};
 use serde::{Deserialize, Serialize};
 
@@ -307,7 +307,8 @@ impl SceneWriter<'_> {
         progress.begin("cameras", model.views.len());
         for view in &model.views {
             progress.check_cancelled()?;
-            let lens = model.lenses.get(view.lens).ok_or_else(|| SimulateJobError::NoLens { name: view.name.clone() })?;
+            let lens =
+                model.lenses.get(view.lens).ok_or_else(|| SimulateJobError::NoLens { name: view.name.clone() })?;
             let name = Path::new(&view.name).with_extension("").to_string_lossy().replace(['/', '\\'], "_");
             let path = |kind: &str, ending: &str| {
                 let folder = self.folder.join("truth/cameras").join(kind);
@@ -316,7 +317,8 @@ impl SceneWriter<'_> {
             };
             let exact = self.simulation.exact_view(lens, &view.pose);
             let shape = [exact.depth_m.height(), exact.depth_m.width()];
-            io::npy::write(path("depth", "npy")?, &shape, exact.depth_m.data(), self.overwrite).map_err(FileError::write)?;
+            io::npy::write(path("depth", "npy")?, &shape, exact.depth_m.data(), self.overwrite)
+                .map_err(FileError::write)?;
             write_png_gray(path("part", "png")?, &exact.part, self.overwrite).map_err(FileError::write)?;
             let picture = self.simulation.flight_picture(lens, &view.pose, &numeric::Silent);
             write_png_gray(path("picture", "png")?, &picture, self.overwrite).map_err(FileError::write)?;

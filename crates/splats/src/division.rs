@@ -15,7 +15,7 @@ use super::overhang::{self, Overhang};
 use super::surface::SLOPE_MAX;
 use super::{GaussianConfig, SplatSurface};
 
-/// Overhang that a block may have: a share of the overhang of its cells taken alone, and a share of
+/// Overhang that a side of a block may have: a share of that of its cells taken alone, and a share of
 /// the bound on heights.
 const OVERHANG_OF_CELLS: f64 = 1.0;
 const OVERHANG_OF_BOUND: f64 = 0.5;
@@ -128,7 +128,7 @@ struct Division<'a> {
     tables: Tables,
     config: &'a DivisionConfig,
     gaussian: &'a GaussianConfig,
-    alone: &'a Grid<f32>,
+    alone: &'a Grid<[f32; 4]>,
 }
 
 impl Division<'_> {
@@ -183,17 +183,20 @@ impl Division<'_> {
     /// within its bound.
     fn cut_for_overhang(&self, block: &SplatBlock) -> Option<(bool, usize)> {
         let overhang = Overhang::of(self.surface, block, self.gaussian, self.config.error_m);
-        let rows = block.row..block.row + block.height;
-        let alone: f64 = rows
-            .flat_map(|row| &self.alone.row(row)[block.column..block.column + block.width])
-            .map(|&h| f64::from(h))
-            .sum();
-        let allowed =
-            OVERHANG_OF_CELLS * alone + OVERHANG_OF_BOUND * self.config.error_m.powi(2) * block.cells() as f64;
-        if overhang.total() <= allowed {
-            return None;
-        }
-        let worst = overhang.worst();
+        let last = [block.column + block.width - 1, block.row + block.height - 1];
+        let (columns, rows) = (block.column..last[0] + 1, block.row..last[1] + 1);
+        let allowed = |side: usize| {
+            let (columns, rows) = match side {
+                0 => (block.column..block.column + 1, rows.clone()),
+                1 => (last[0]..last[0] + 1, rows.clone()),
+                2 => (columns.clone(), block.row..block.row + 1),
+                _ => (columns.clone(), last[1]..last[1] + 1),
+            };
+            let count = (columns.len() * rows.len()) as f64;
+            let alone = rows.flat_map(|row| &self.alone.row(row)[columns.clone()]).map(|cell| f64::from(cell[side]));
+            OVERHANG_OF_CELLS * alone.sum::<f64>() + OVERHANG_OF_BOUND * self.config.error_m.powi(2) * count
+        };
+        let worst = overhang.worst_beyond([allowed(0), allowed(1), allowed(2), allowed(3)])?;
         let side = if worst < 2 { block.width } else { block.height };
         if side == 1 {
             // The strip is one cell wide already, so it is cut across.

@@ -33,6 +33,8 @@ pub(super) struct WallView<'a> {
 pub(super) struct FaceLight {
     /// NaN where no view sees the place; columns along, rows down.
     colours: Grid<[f32; 3]>,
+    /// Largest cosine between the direction to a sensor that sees the face and its outside.
+    pub(super) facing: f64,
     /// For each view the positions that it sees.
     pub(super) shown: Vec<Vec<[f64; 3]>>,
 }
@@ -57,9 +59,10 @@ impl FaceLight {
         let places = |metres: f64| (PLACES_PER_CELL * metres / cell_m).ceil().clamp(1.0, PLACES_MAX) as usize;
         let (columns, rows) = (places(face.length()), places(face.mean_height()));
         let mut light =
-            Self { colours: Grid::filled(columns, rows, [f32::NAN; 3]), shown: vec![Vec::new(); views.len()] };
+            Self { colours: Grid::filled(columns, rows, [f32::NAN; 3]), facing: FACING_MIN, shown: Vec::new() };
         let mut best = Grid::filled(columns, rows, FACING_MIN);
-        for (view, shown) in views.iter().zip(&mut light.shown) {
+        for view in views {
+            light.shown.push(Vec::new());
             let towards = view.camera.towards_sensor();
             let facing = (0..2).map(|i| towards[i] * face.outward[i]).sum::<f64>();
             let Some(per_metre) = cells_per_metre(surface, towards).filter(|_| facing > FACING_MIN) else { continue };
@@ -76,6 +79,7 @@ impl FaceLight {
             let seen: Vec<(usize, [f64; 3])> =
                 (0..columns * rows).map(|k| (k, place(k))).filter(|(_, position)| is_seen(position)).collect();
             let pixels = view.camera.pixels(seen.iter().map(|(_, position)| *position))?;
+            let mut shown = Vec::with_capacity(seen.len());
             for ((k, position), [u, v]) in seen.into_iter().zip(pixels) {
                 let colour = colour_at(view.image, u, v);
                 if colour.iter().all(|c| c.is_finite()) {
@@ -84,6 +88,12 @@ impl FaceLight {
                         (best.data_mut()[k], light.colours.data_mut()[k]) = (facing, colour);
                     }
                 }
+            }
+            if !shown.is_empty() {
+                light.facing = light.facing.max(facing);
+            }
+            if let Some(last) = light.shown.last_mut() {
+                *last = shown;
             }
         }
         Ok(light)

@@ -19,9 +19,14 @@ use super::graded::graded;
 use super::wall_light::{FaceLight, WallView};
 use super::{DivisionConfig, GaussianConfig, SplatSurface};
 
-/// Size of the parts along an edge that nothing may hang over, cells: about the error of a wall's
+/// Size of the parts along the upper edge, cells: what hangs over is about the error of a wall's
 /// place between the cells.
 const EDGE_CELLS: f64 = 0.25;
+/// Size of the parts at a corner, cells.
+const CORNER_CELLS: f64 = 0.5;
+
+/// Size of the smallest part of a wall that is cut for its colours, cells of the image.
+const RESOLVED_CELLS: f64 = 1.0;
 
 /// Splats of the walls with their counts.
 #[derive(Debug, Clone, Default)]
@@ -48,6 +53,9 @@ struct LitPart {
     colour: Option<[f32; 3]>,
 }
 
+/// The parts of a face, and for each view the positions that it sees.
+type LitFace = (Vec<LitPart>, Vec<Vec<[f64; 3]>>);
+
 /// Makes the splats of all walls. `confidence` is per cell.
 pub(super) fn wall_splats(
     surface: &SplatSurface<'_>,
@@ -65,14 +73,14 @@ pub(super) fn wall_splats(
     let cutting = Cutting { cell_m, division };
     let lit = |face: &Facade| {
         let light = FaceLight::new(surface, &obstacle, views, face, cell_m)?;
-        Ok((cutting.parts(face, &light), light))
+        Ok((cutting.parts(face, &light), light.shown))
     };
-    let lit: Vec<(Vec<LitPart>, FaceLight)> = faces.par_iter().map(lit).collect::<Result<_, crs::CrsError>>()?;
+    let lit: Vec<LitFace> = faces.par_iter().map(lit).collect::<Result<_, crs::CrsError>>()?;
     let unseen = Fallback::new(&faces, &lit);
     let mut walls = WallSplats { shown: vec![Vec::new(); views.len()], ..WallSplats::default() };
-    for (face, (parts, light)) in faces.iter().zip(lit) {
+    for (face, (parts, shown)) in faces.iter().zip(lit) {
         walls.area_m2 += face.length() * face.mean_height();
-        walls.shown.iter_mut().zip(light.shown).for_each(|(all, some)| all.extend(some));
+        walls.shown.iter_mut().zip(shown).for_each(|(all, some)| all.extend(some));
         for LitPart { part, colour } in parts {
             walls.seen += usize::from(colour.is_some());
             let colour = colour.unwrap_or_else(|| unseen.of(face.line));
@@ -117,7 +125,7 @@ impl Cutting<'_> {
         let (length, height) = (face.length(), face.mean_height());
         let edge = EDGE_CELLS * self.cell_m;
         let most = self.division.side_max as f64 * self.cell_m;
-        let columns = graded(length, face.turn.map(|sine| edge / sine), most);
+        let columns = graded(length, face.turn.map(|turn| CORNER_CELLS * self.cell_m / turn), most);
         let rows = graded(height, [edge, f64::INFINITY], most);
         let mut parts = Vec::with_capacity((columns.len() - 1) * (rows.len() - 1));
         for down in rows.windows(2) {
@@ -133,11 +141,14 @@ impl Cutting<'_> {
     /// Adds a part, or its halves where its colours differ too much.
     fn add(&self, face: &Facade, light: &FaceLight, part: Part, parts: &mut Vec<LitPart>) {
         let over = light.over(part.along, part.down);
-        let sides =
-            [(part.along[1] - part.along[0]) * face.length(), (part.down[1] - part.down[0]) * face.mean_height()];
-        let is_even = over.deviation <= self.division.colour_error;
+        // In sizes of the smallest part that the image tells from the next one: an oblique image
+        // shows a wall the lower, the steeper it looks down on it.
+        let sides = [
+            (part.along[1] - part.along[0]) * face.length() / self.cell_m,
+            (part.down[1] - part.down[0]) * face.mean_height() * light.facing / self.cell_m,
+        ];
         let longer = usize::from(sides[1] > sides[0]);
-        if is_even || sides[longer] < 2.0 * self.cell_m {
+        if over.deviation <= self.division.colour_error || sides[longer] < 2.0 * RESOLVED_CELLS {
             parts.push(LitPart { part, colour: over.mean });
             return;
         }
@@ -178,7 +189,7 @@ impl Mean {
 }
 
 impl Fallback {
-    fn new(faces: &[Facade], lit: &[(Vec<LitPart>, FaceLight)]) -> Self {
+    fn new(faces: &[Facade], lit: &[LitFace]) -> Self {
         let lines = faces.iter().map(|face| face.line + 1).max().unwrap_or(0);
         let mut means = Self { by_line: vec![Mean::default(); lines], all: Mean::default() };
         for (face, (parts, _)) in faces.iter().zip(lit) {

@@ -116,7 +116,9 @@ impl Walls {
         place: [f32; 2],
     ) -> Option<f32> {
         let first = self.walls.get(self.first[corner] as usize)?;
-        Some(self.height_of(cells, corner, heights, self.own_of(Some(first), heights, [true; 4], place), place))
+        let own = self.own_of(Some(first), heights, [true; 4], place);
+        let continued = self.continued(cells, corner, heights, own, false);
+        Some(continued.iter().zip(weights(place)).map(|(z, w)| z * w).sum())
     }
 
     /// Returns what parts four cells of which the first is at `corner`: the first wall, and the walls
@@ -152,34 +154,39 @@ impl Walls {
         own
     }
 
-    /// The height at a place if all four centres were on the side of their `own`.
-    fn height_of(
+    /// The heights of four cells if all were on the side of their `own`. `steadily`: beyond a centre
+    /// the smaller of the last two rises counts, none where they differ in sign.
+    fn continued(
         &self,
         cells: &Grid<f32>,
         corner: (usize, usize),
         heights: [f32; 4],
         own: [bool; 4],
-        place: [f32; 2],
-    ) -> f32 {
-        self.continued(cells, corner, heights, own).iter().zip(weights(place)).map(|(z, w)| z * w).sum()
-    }
-
-    /// The heights of four cells if all were on the side of their `own`.
-    fn continued(&self, cells: &Grid<f32>, corner: (usize, usize), heights: [f32; 4], own: [bool; 4]) -> [f32; 4] {
+        steadily: bool,
+    ) -> [f32; 4] {
         let limit = CONTINUED * self.step_m;
         // From one of the four to the next along columns or rows.
         let beyond = |k: usize, along: usize| {
             let (column, row) = (corner.0 + k % 2, corner.1 + k / 2);
-            let back = |at: usize, towards: usize, size: usize| match towards {
-                0 => Some(at + 1).filter(|&i| i < size),
-                _ => at.checked_sub(1),
+            let back = |at: usize, towards: usize, by: usize, size: usize| match towards {
+                0 => Some(at + by).filter(|&i| i < size),
+                _ => at.checked_sub(by),
             };
-            let before = if along == 0 {
-                back(column, 1 - k % 2, cells.width()).map(|column| cells[(column, row)])
-            } else {
-                back(row, 1 - k / 2, cells.height()).map(|row| cells[(column, row)])
+            let before = |by: usize| {
+                if along == 0 {
+                    back(column, 1 - k % 2, by, cells.width()).map(|column| cells[(column, row)])
+                } else {
+                    back(row, 1 - k / 2, by, cells.height()).map(|row| cells[(column, row)])
+                }
             };
-            before.map(|before| heights[k] - before).filter(|rise| rise.abs() <= limit).unwrap_or(0.0)
+            let Some(first) = before(1) else { return 0.0 };
+            let rise = heights[k] - first;
+            let rise = match before(2).filter(|_| steadily).map(|second| first - second) {
+                Some(earlier) if earlier.abs() < rise.abs() => earlier,
+                _ => rise,
+            };
+            let is_steady = !steadily || rise * (heights[k] - first) > 0.0;
+            if rise.abs() <= limit && is_steady { rise } else { 0.0 }
         };
         std::array::from_fn(|k| {
             let (beside, over, across) = (k ^ 1, k ^ 2, k ^ 3);
@@ -223,13 +230,15 @@ impl Parting<'_> {
         })
     }
 
-    /// The heights of both sides at a place on the wall: lower, upper.
+    /// The heights of both sides at a place on the wall: lower, upper. A side is continued to the
+    /// wall only where it goes on as it came over two cells: a parapet does not rise further.
     pub(super) fn heights_at(&self, place: [f32; 2]) -> [f32; 2] {
         [false, true].map(|upper| {
             let own = self.wall.own_on(self.heights, self.own, upper);
             let next = self.walls.walls.get(self.wall.within[usize::from(upper)] as usize);
             let own = self.walls.own_of(next, self.heights, own, place);
-            self.walls.height_of(self.cells, self.corner, self.heights, own, place)
+            let continued = self.walls.continued(self.cells, self.corner, self.heights, own, true);
+            continued.iter().zip(weights(place)).map(|(z, w)| z * w).sum()
         })
     }
 }
