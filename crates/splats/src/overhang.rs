@@ -3,9 +3,10 @@
 //!
 //! The harm is Σ α² d² over the cells outside the block, with α the opacity of the Gaussian there
 //! and d the height of its plane above the surface. This is the squared height error of the
-//! overhang if nothing else were in front. Single cells overhang too, so each side of a block is
-//! compared with the cells along it taken one by one: a long block must not reach far beyond its
-//! end because many cells along it hang over a little. Higher surfaces beside the block hide the overhang and do not
+//! overhang if nothing else were in front. Single cells overhang too, so a block is compared with
+//! its own cells taken one by one; where walls are to be seen from below, each side with the cells
+//! along it: else a long block reaches far beyond its end because many cells along it hang over a
+//! little. Higher surfaces beside the block hide the overhang and do not
 //! count.
 
 use raster::Grid;
@@ -27,6 +28,15 @@ pub(super) struct Overhang {
 }
 
 impl Overhang {
+    pub(super) fn total(&self) -> f64 {
+        self.sides.iter().sum()
+    }
+
+    /// The side with the most harm.
+    pub(super) fn worst(&self) -> usize {
+        (1..4).fold(0, |worst, side| if self.sides[side] > self.sides[worst] { side } else { worst })
+    }
+
     /// The side with the most harm beyond what is allowed there; `None` where all sides are within.
     pub(super) fn worst_beyond(&self, allowed: [f64; 4]) -> Option<usize> {
         let beyond = |side: usize| self.sides[side] - allowed[side];

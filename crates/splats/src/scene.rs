@@ -220,7 +220,11 @@ pub fn make_splats(
     let shown = colours.map(|c| displayed(*c, &range));
     let blocks = match config.uniform_side {
         Some(side) => uniform(surface, side),
-        None => divide(surface, (!views.is_empty()).then_some(&shown), &config.division, &config.gaussian),
+        None => {
+            let division =
+                DivisionConfig { clear_sides: config.division.clear_sides || config.walls, ..config.division };
+            divide(surface, (!views.is_empty()).then_some(&shown), &division, &config.gaussian)
+        }
     };
     let splat = |block: &SplatBlock| {
         first_splat(surface, block, &shown, confidence, &gaussian_of_block(surface, block, config))
