@@ -75,7 +75,7 @@ fn a_quarter_of_the_splats_shows_the_same_town() {
         let number = |key: &str| report[key].as_f64().unwrap();
         // Uniform splats have no walls.
         assert!(number("walls") > 0.0 && number("walls") < 0.6 * number("splats"), "{report}");
-        assert!(number("walls_seen") > 0.1 * number("walls") && number("walls_area_m2") > 1000.0, "{report}");
+        assert!(number("walls_seen") > 0.02 * number("walls") && number("walls_area_m2") > 1000.0, "{report}");
         let times = number("uniform_at_equal_rmse") / (number("splats") - number("walls"));
         assert!(times >= 4.0, "uniform splats are only {times:.2} times as many at the same error");
         assert!(number("plane_error_max_m") <= 0.25 + 1e-6);

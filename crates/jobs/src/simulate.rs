@@ -32,6 +32,8 @@ use crate::threads::{ThreadsError, install};
 const RECORD: &str = "scene.json";
 /// The parameters.
 const PARAMETERS: &str = "scene.toml";
+/// The folder of what given cameras see exactly.
+const EXACT_VIEWS: &str = "truth/cameras";
 /// The folder of the perspective cameras.
 const FLIGHT: &str = "cameras/sparse/0";
 /// The folder of their pictures.
@@ -218,6 +220,15 @@ fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileErr
             folder.remove(&format!("{PICTURES}/{name}"))?;
         }
     }
+    for (kind, ending) in [("depth", "npy"), ("part", "png"), ("picture", "png")] {
+        let below = format!("{EXACT_VIEWS}/{kind}");
+        let entries = fs::read_dir(folder.path().join(&below)).into_iter().flatten().flatten();
+        for name in entries.filter_map(|entry| entry.file_name().into_string().ok()) {
+            if Path::new(&name).extension().is_some_and(|own| own == ending) {
+                folder.remove(&format!("{below}/{name}"))?;
+            }
+        }
+    }
     let cameras = ["cameras.txt", "images.txt", "points3D.txt"].map(|name| format!("{FLIGHT}/{name}"));
     let of_flight = cameras.iter().map(String::as_str).chain(CLOUDS);
     of_flight.filter(|_| !has_flight).try_for_each(|name| folder.remove(name))
@@ -311,7 +322,7 @@ impl SceneWriter<'_> {
                 model.lenses.get(view.lens).ok_or_else(|| SimulateJobError::NoLens { name: view.name.clone() })?;
             let name = Path::new(&view.name).with_extension("").to_string_lossy().replace(['/', '\\'], "_");
             let path = |kind: &str, ending: &str| {
-                let folder = self.folder.join("truth/cameras").join(kind);
+                let folder = self.folder.join(EXACT_VIEWS).join(kind);
                 files::create_folder(&folder)?;
                 Ok::<_, FileError>(folder.join(format!("{name}.{ending}")))
             };
