@@ -1,8 +1,8 @@
 //! Finds what a surface model hides from a satellite.
 //!
 //! [`OcclusionSurface`] finds whether it hides a point from a sensor, with upright
-//! walls between cells, which [`OcclusionSurface::wall_lines`] follows. [`Eyeline`] gives the direction towards the sensor at each cell,
-//! [`GridGround`] the position of each cell.
+//! walls between cells, which [`OcclusionSurface::wall_lines`] follows. [`Eyeline`] gives the
+//! direction towards the sensor at each cell, [`GridGround`] the position of each cell.
 
 mod eyeline;
 mod ground;

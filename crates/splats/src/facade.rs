@@ -10,8 +10,8 @@ use occlusion::{OcclusionSurface, WallLine};
 use super::SplatSurface;
 use super::surface::SLOPE_MAX;
 
-/// Notches of the upper edge and bumps of the lower one up to twice this length are closed, cells: a
-/// parapet thinner than the cells is missing in one or two of them.
+/// Notches of the upper edge and bumps of the lower one up to twice this length are closed, cells:
+/// a parapet thinner than the cells is missing in one or two of them.
 const NOTCH_CELLS: f64 = 1.5;
 /// How fast a wall leaves its last face where it stops. That is where its step becomes a slope, or
 /// where the next cells' pattern puts it a little aside: no corner that stands out.
@@ -28,9 +28,9 @@ pub(super) struct Facade {
     pub(super) upper: [f64; 2],
     /// Unit vector in plan towards the lower side.
     pub(super) outward: [f64; 2],
-    /// How fast the wall leaves this face at both ends, metres per metre: it turns back behind it, or
-    /// its upper edge falls below it. 1 where it turns by a right angle or more, 0 where it goes on,
-    /// turns forwards or rises, [`STOP`] where it stops.
+    /// How fast the wall leaves this face at both ends, metres per metre: it turns back behind it,
+    /// or its upper edge falls below it. 1 where it turns by a right angle or more, 0 where it goes
+    /// on, turns forwards or rises, [`STOP`] where it stops.
     pub(super) turn: [f64; 2],
     /// Number of the line.
     pub(super) line: usize,
@@ -130,8 +130,8 @@ fn face(surface: &SplatSurface<'_>, a: Corner, b: Corner, line: usize) -> Option
     })
 }
 
-/// Closes notches of the upper edge and bumps of the lower edge that are shorter than twice `reach_m`
-/// (a morphological closing along the line).
+/// Closes notches of the upper edge and bumps of the lower edge that are shorter than twice
+/// `reach_m` (a morphological closing along the line).
 fn close_notches(corners: &mut [Corner], is_closed: bool, reach_m: f64) {
     let count = corners.len();
     let step =

@@ -26,8 +26,8 @@ use super::{
 
 /// Share of the cells' colours that is clipped at each end of the display range.
 const TAIL: f64 = 0.0025;
-/// Spread of large blocks that hang over nothing: their corners are covered to 94 % instead of 84 %,
-/// so that no lattice shows from near by.
+/// Spread of large blocks that hang over nothing: their corners are covered to 94 % instead of
+/// 84 %, so that no lattice shows from near by.
 const SEAM_SPREAD: f64 = 0.6;
 /// Least side of a large block, cells: smaller ones follow the colours of the images, which a wider
 /// Gaussian would blur.

@@ -99,8 +99,8 @@ impl FaceLight {
         Ok(light)
     }
 
-    /// Returns the colours over shares of the length and of the way down: of the places within, else
-    /// of the nearest one.
+    /// Returns the colours over shares of the length and of the way down: of the places within,
+    /// else of the nearest one.
     pub(super) fn over(&self, along: [f64; 2], down: [f64; 2]) -> PartColours {
         let range = |share: [f64; 2], count: usize| {
             let place = |share: f64| (share * count as f64 - 0.5).max(0.0);

@@ -121,8 +121,8 @@ impl Walls {
         Some(continued.iter().zip(weights(place)).map(|(z, w)| z * w).sum())
     }
 
-    /// Returns what parts four cells of which the first is at `corner`: the first wall, and the walls
-    /// within its sides.
+    /// Returns what parts four cells of which the first is at `corner`: the first wall, and the
+    /// walls within its sides.
     pub(super) fn parting<'a>(&'a self, cells: &'a Grid<f32>, corner: (usize, usize)) -> Vec<Parting<'a>> {
         let Some(first) = self.walls.get(self.first[corner] as usize) else { return Vec::new() };
         let heights = four(cells, corner);
@@ -154,8 +154,8 @@ impl Walls {
         own
     }
 
-    /// The heights of four cells if all were on the side of their `own`. `steadily`: beyond a centre
-    /// the smaller of the last two rises counts, none where they differ in sign.
+    /// The heights of four cells if all were on the side of their `own`. `steadily`: beyond a
+    /// centre the smaller of the last two rises counts, none where they differ in sign.
     fn continued(
         &self,
         cells: &Grid<f32>,
