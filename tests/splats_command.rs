@@ -73,7 +73,10 @@ fn a_quarter_of_the_splats_shows_the_same_town() {
         command.arg("--render").arg(&pictures).args(["--compare", "--json", "--overwrite"]);
         let report = json(command.output().unwrap());
         let number = |key: &str| report[key].as_f64().unwrap();
-        let times = number("uniform_at_equal_rmse") / number("splats");
+        // Uniform splats have no walls.
+        assert!(number("walls") > 0.0 && number("walls") < 0.6 * number("splats"), "{report}");
+        assert!(number("walls_seen") > 0.02 * number("walls") && number("walls_area_m2") > 1000.0, "{report}");
+        let times = number("uniform_at_equal_rmse") / (number("splats") - number("walls"));
         assert!(times >= 4.0, "uniform splats are only {times:.2} times as many at the same error");
         assert!(number("plane_error_max_m") <= 0.25 + 1e-6);
         assert!(report["median_height"]["rmse_m"].as_f64().unwrap() < 0.1);
@@ -118,7 +121,7 @@ fn the_file_is_what_trainers_load_and_lies_on_the_surface() {
         serde_json::from_slice(&std::fs::read(ply.with_extension("origin.json")).unwrap()).unwrap();
     assert_eq!((origin.crs.as_str(), origin.vertical.as_str()), ("EPSG:32631", "ellipsoid"));
     let dsm = read_dem(scene.join("truth/dsm.tif")).unwrap();
-    let mut off_surface = 0;
+    let (mut off_surface, mut walls) = (0, 0);
     for row in &rows {
         let at = |name: &str| f64::from(row[column(name)]);
         let length: f64 = (0..4).map(|i| at(&format!("rot_{i}")).powi(2)).sum();
@@ -130,6 +133,16 @@ fn the_file_is_what_trainers_load_and_lies_on_the_surface() {
         let map = [x + origin.origin[0], y + origin.origin[1]];
         let (c, r) = dsm.geotransform.cell_from_map(map[0], map[1]).unwrap();
         let normal = third_axis([0, 1, 2, 3].map(|i| at(&format!("rot_{i}"))));
+        if normal[2].abs() < 1e-3 {
+            // Walls stand between the upper and the lower cells beside them.
+            walls += 1;
+            let cells = (0..25).map(|k| [c.round() + f64::from(k % 5) - 2.0, r.round() + f64::from(k / 5) - 2.0]);
+            let heights = cells.filter_map(|[c, r]| dsm.heights.get(c as usize, r as usize));
+            let (low, high) = heights.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &z| (l.min(z), h.max(z)));
+            let height = z + origin.origin[2];
+            assert!(height > f64::from(low) - 0.5 && height < f64::from(high) + 0.3, "{low} {height} {high}");
+            continue;
+        }
         // The middle of an even block lies between cells of the block; its plane is within the
         // bound of each.
         let near = [(c - 0.01).round(), (c + 0.01).round()];
@@ -143,6 +156,12 @@ fn the_file_is_what_trainers_load_and_lies_on_the_surface() {
         off_surface += usize::from(off > 0.25 + 0.01);
     }
     assert_eq!(off_surface, 0);
+    assert_eq!(walls, report["walls"].as_u64().unwrap());
+    let mut command = skysweep();
+    command.arg("splats").arg(scene.join("truth/dsm.tif")).arg(scene.join("view_2.tif")).arg("-o").arg(&ply);
+    let without = json(command.args(["--json", "--no-walls", "--overwrite"]).output().unwrap());
+    assert!(without["splats"].as_u64().unwrap() + walls <= rows.len() as u64);
+    assert_eq!(without["walls"], 0);
 }
 
 #[test]
@@ -229,7 +248,6 @@ fn splats_are_seen_again_through_images_and_perspective_cameras() {
     let (report, out) = render("image", &[image.as_os_str()]);
     let view = &report["views"][0];
     assert_eq!((report["views"].as_array().unwrap().len(), view["name"].as_str()), (1, Some("view_2")));
-    // Façades are in the image and in no splat.
     assert!(view["psnr_db"].as_f64().unwrap() > 24.0, "{view}");
     assert!(out.join("colour/view_2.png").is_file() && out.join("alpha/view_2.png").is_file());
 
@@ -245,7 +263,7 @@ fn splats_are_seen_again_through_images_and_perspective_cameras() {
     let origin: LocalOrigin = serde_json::from_slice(&std::fs::read(model.join("origin.json")).unwrap()).unwrap();
     let mut off: Vec<f64> = Vec::new();
     for view in &cameras.views {
-        // Splats lie on roofs and on the ground; there are none on walls.
+        // The surface that the depths are of leans where there are walls.
         let stem = view.name.strip_suffix(".png").unwrap();
         let depth = array(ground.join(format!("depth/{stem}.npy")));
         let normal = array(ground.join(format!("normal/{stem}.npy")));

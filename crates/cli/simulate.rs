@@ -49,6 +49,10 @@ pub(crate) struct Args {
     /// degrees clockwise from north.
     #[arg(long, num_args = 2, value_names = ["FROM", "TO"], allow_negative_numbers = true, requires = "flight")]
     flight_arc: Vec<f64>,
+    /// Also write what perspective cameras see exactly (depths, parts of the scene, pictures) to
+    /// truth/cameras: a COLMAP model on the map of the scene, with origin.json.
+    #[arg(long, value_name = "FOLDER")]
+    cameras: Option<PathBuf>,
     /// Folder for the images and the truth.
     #[arg(short, long, value_name = "DIR", required_unless_present_any = ["list", "template"])]
     output: Option<PathBuf>,
@@ -103,6 +107,7 @@ fn config(args: &Args) -> anyhow::Result<SimulationConfig> {
 
 fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> anyhow::Result<Outcome> {
     let mut config = SimulateConfig::new(scene, output.to_owned());
+    config.cameras.clone_from(&args.cameras);
     config.flight = args.flight;
     config.flight_arc_deg = args.flight_arc.first_chunk().copied();
     config.overwrite = args.overwrite;

@@ -58,6 +58,9 @@ struct MakeArgs {
     /// Squares of N cells instead of splats as large as the bounds allow.
     #[arg(long, value_name = "N")]
     uniform: Option<usize>,
+    /// Leave out the splats on the walls between cells.
+    #[arg(long)]
+    no_walls: bool,
     /// Confidence of the cells, 0 to 1, on the grid of the DSM; it becomes opacity [default: full].
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
@@ -135,6 +138,7 @@ fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::R
     config.error_m = args.error;
     config.colour_error = args.colour_error;
     config.uniform_side = args.uniform;
+    config.walls = !args.no_walls;
     config.confidence.clone_from(&args.confidence);
     config.corrections = corrections_of(args.corrections.as_deref());
     config.vertical = args.dsm_vertical;

@@ -4,7 +4,7 @@
 //! `scene.toml`, and in `truth/` the rasters, the heights of every image and the buildings at LoD2.
 //! A flight adds perspective cameras and the points of a reconstruction in `cameras/sparse/0`, in
 //! map coordinates, their pictures in `cameras/images`, and the exact surface that they see as
-//! clouds in `truth/`.
+//! clouds in `truth/`. Of given cameras it writes what they see exactly, in `truth/cameras`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,12 +18,14 @@ use io::citymodel::{CityJsonOptions, write_cityjson};
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
 use io::ply::{PlyPoint, write_points};
 use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc, write_png_gray};
+use io::splat_ply::LocalOrigin;
 use numeric::{Cancelled, Progress};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{JobError, SettingError, from_steps};
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
+use crate::placed_model::{self, PlacedModelError};
 use crate::simulate_page;
 use crate::threads::{ThreadsError, install};
 
@@ -33,6 +35,8 @@ const RECORD: &str = "scene.json";
 const PAGE: &str = "scene.html";
 /// The parameters.
 const PARAMETERS: &str = "scene.toml";
+/// The folder of what given cameras see exactly.
+const EXACT_VIEWS: &str = "truth/cameras";
 /// The folder of the perspective cameras.
 const FLIGHT: &str = "cameras/sparse/0";
 /// The folder of their pictures.
@@ -51,6 +55,9 @@ pub struct SimulateConfig {
     pub scene: SimulationConfig,
     /// Folder for the images and the truth.
     pub output: PathBuf,
+    /// Perspective cameras whose exact depths, parts of the scene and pictures are written: folder
+    /// of a COLMAP model on the map of the scene, with `origin.json`.
+    pub cameras: Option<PathBuf>,
     /// Number of perspective cameras around the scene; none when 0.
     pub flight: u32,
     /// Azimuths between which the perspective cameras stand, degrees clockwise from north; all
@@ -97,9 +104,18 @@ pub enum SimulateJobError {
         /// The folder.
         path: PathBuf,
     },
+    /// The given cameras cannot be read or are on another map.
+    #[error(transparent)]
+    Cameras(#[from] PlacedModelError),
     /// A perspective camera cannot be made.
     #[error(transparent)]
     Flight(#[from] LensError),
+    /// A given camera has no lens.
+    #[error("the camera has no lens in the model: {name}")]
+    NoLens {
+        /// Name of the camera.
+        name: String,
+    },
     /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
     Job(#[from] JobError),
@@ -119,7 +135,7 @@ impl SimulateReport {
 impl SimulateConfig {
     /// A simulation of `scene` without a flight, in a folder that is empty.
     pub fn new(scene: SimulationConfig, output: PathBuf) -> Self {
-        Self { scene, output, flight: 0, flight_arc_deg: None, threads: None, overwrite: false }
+        Self { scene, output, cameras: None, flight: 0, flight_arc_deg: None, threads: None, overwrite: false }
     }
 
     /// Checks the parameters of the scene and the flight.
@@ -207,6 +223,15 @@ fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileErr
             folder.remove(&format!("{PICTURES}/{name}"))?;
         }
     }
+    for (kind, ending) in [("depth", "npy"), ("part", "png"), ("picture", "png")] {
+        let below = format!("{EXACT_VIEWS}/{kind}");
+        let entries = fs::read_dir(folder.path().join(&below)).into_iter().flatten().flatten();
+        for name in entries.filter_map(|entry| entry.file_name().into_string().ok()) {
+            if Path::new(&name).extension().is_some_and(|own| own == ending) {
+                folder.remove(&format!("{below}/{name}"))?;
+            }
+        }
+    }
     let cameras = ["cameras.txt", "images.txt", "points3D.txt"].map(|name| format!("{FLIGHT}/{name}"));
     let of_flight = cameras.iter().map(String::as_str).chain(CLOUDS);
     of_flight.filter(|_| !has_flight).try_for_each(|name| folder.remove(name))
@@ -242,6 +267,9 @@ impl SceneWriter<'_> {
             .map_err(FileError::write)?;
         if config.flight > 0 {
             self.write_flight(config, progress)?;
+        }
+        if let Some(cameras) = &config.cameras {
+            self.write_exact_views(cameras, progress)?;
         }
         // The parameters and the record of an earlier simulation are replaced: the folder was
         // checked at the start.
@@ -285,6 +313,32 @@ impl SceneWriter<'_> {
                 .map_err(FileError::write)?;
         }
         self.write_clouds(&flight)
+    }
+
+    fn write_exact_views(&self, cameras: &Path, progress: &dyn Progress) -> Result<(), SimulateJobError> {
+        let map = LocalOrigin::new(format!("EPSG:{}", self.simulation.truth.epsg), "ellipsoid", [0.0; 3]);
+        let model = placed_model::read(cameras, &map)?;
+        progress.begin("cameras", model.views.len());
+        for view in &model.views {
+            progress.check_cancelled()?;
+            let lens =
+                model.lenses.get(view.lens).ok_or_else(|| SimulateJobError::NoLens { name: view.name.clone() })?;
+            let name = Path::new(&view.name).with_extension("").to_string_lossy().replace(['/', '\\'], "_");
+            let path = |kind: &str, ending: &str| {
+                let folder = self.folder.join(EXACT_VIEWS).join(kind);
+                files::create_folder(&folder)?;
+                Ok::<_, FileError>(folder.join(format!("{name}.{ending}")))
+            };
+            let exact = self.simulation.exact_view(lens, &view.pose);
+            let shape = [exact.depth_m.height(), exact.depth_m.width()];
+            io::npy::write(path("depth", "npy")?, &shape, exact.depth_m.data(), self.overwrite)
+                .map_err(FileError::write)?;
+            write_png_gray(path("part", "png")?, &exact.part, self.overwrite).map_err(FileError::write)?;
+            let picture = self.simulation.flight_picture(lens, &view.pose, &numeric::Silent);
+            write_png_gray(path("picture", "png")?, &picture, self.overwrite).map_err(FileError::write)?;
+            progress.step();
+        }
+        Ok(())
     }
 
     fn write_clouds(&self, flight: &Flight) -> Result<(), SimulateJobError> {

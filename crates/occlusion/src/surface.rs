@@ -10,6 +10,7 @@
 
 use raster::Grid;
 
+use super::lines::{self, WallLine};
 use super::wall::Walls;
 
 /// Slope between neighbours beyond which they form a wall (58°): a parapet of 0.9 m on cells of
@@ -56,6 +57,23 @@ impl<'a> OcclusionSurface<'a> {
     #[inline]
     pub fn height_at(&self, column: f64, row: f64) -> f32 {
         self.quad(column, row).map_or(f32::NAN, |quad| self.height_in(&quad))
+    }
+
+    /// Returns the walls between the cells as lines on the grid.
+    ///
+    /// ```
+    /// use occlusion::OcclusionSurface;
+    /// use raster::Grid;
+    ///
+    /// // A block of four by four cells, 10 m high: one closed line.
+    /// let high = |i: usize| (2..6).contains(&(i % 8)) && (2..6).contains(&(i / 8));
+    /// let heights = Grid::from_vec(8, 8, (0..64).map(|i| if high(i) { 10.0 } else { 0.0 }).collect()).unwrap();
+    /// let lines = OcclusionSurface::new(&heights, 1.0).wall_lines();
+    /// assert!(lines.len() == 1 && lines[0].is_closed);
+    /// assert!(lines[0].points.iter().all(|p| p.lower_m == 0.0 && p.upper_m == 10.0));
+    /// ```
+    pub fn wall_lines(&self) -> Vec<WallLine> {
+        lines::trace(&self.walls, self.heights)
     }
 
     /// The height at a (column, row) where it may be above a level, else something below it.

@@ -31,6 +31,7 @@ mod config;
 mod crown;
 mod date;
 mod error;
+mod exact_view;
 #[cfg(test)]
 mod fixtures;
 mod flight;
@@ -70,6 +71,7 @@ pub use config::{
 };
 pub use date::Date;
 pub use error::SimulateError;
+pub use exact_view::{ExactPart, ExactView};
 pub use flight::{ExactPoint, Flight, FlightPoint};
 pub use frame::SceneFrame;
 pub use preset_names::PRESETS;

@@ -32,12 +32,15 @@ pub struct DivisionConfig {
     pub colour_error: f64,
     /// Longest side of a block, cells.
     pub side_max: usize,
+    /// Whether each side of a block by itself keeps the bound on overhang, as for views from the
+    /// ground, instead of all sides together.
+    pub clear_sides: bool,
 }
 
 impl Default for DivisionConfig {
     /// A quarter of a metre, 3.7 % of the display range (28.6 dB by itself), 32 cells.
     fn default() -> Self {
-        Self { error_m: 0.25, colour_error: 0.037, side_max: 32 }
+        Self { error_m: 0.25, colour_error: 0.037, side_max: 32, clear_sides: false }
     }
 }
 
@@ -128,7 +131,7 @@ struct Division<'a> {
     tables: Tables,
     config: &'a DivisionConfig,
     gaussian: &'a GaussianConfig,
-    alone: &'a Grid<f32>,
+    alone: &'a Grid<[f32; 4]>,
 }
 
 impl Division<'_> {
@@ -183,17 +186,17 @@ impl Division<'_> {
     /// within its bound.
     fn cut_for_overhang(&self, block: &SplatBlock) -> Option<(bool, usize)> {
         let overhang = Overhang::of(self.surface, block, self.gaussian, self.config.error_m);
-        let rows = block.row..block.row + block.height;
-        let alone: f64 = rows
-            .flat_map(|row| &self.alone.row(row)[block.column..block.column + block.width])
-            .map(|&h| f64::from(h))
-            .sum();
-        let allowed =
-            OVERHANG_OF_CELLS * alone + OVERHANG_OF_BOUND * self.config.error_m.powi(2) * block.cells() as f64;
-        if overhang.total() <= allowed {
-            return None;
-        }
-        let worst = overhang.worst();
+        let worst = if self.config.clear_sides {
+            overhang.worst_beyond([0, 1, 2, 3].map(|side| self.allowed_beyond(block, side)))?
+        } else {
+            let rows = block.row..block.row + block.height;
+            let cells = rows.flat_map(|row| &self.alone.row(row)[block.column..block.column + block.width]);
+            let alone: f64 = cells.flatten().map(|&harm| f64::from(harm)).sum();
+            if overhang.total() <= self.allowed(alone, block.cells()) {
+                return None;
+            }
+            overhang.worst()
+        };
         let side = if worst < 2 { block.width } else { block.height };
         if side == 1 {
             // The strip is one cell wide already, so it is cut across.
@@ -202,6 +205,24 @@ impl Division<'_> {
         }
         let near = (side / 4).max(1);
         Some((worst < 2, if worst.is_multiple_of(2) { near } else { side - near }))
+    }
+
+    /// Returns the overhang that a number of cells may have that have `alone` one by one.
+    fn allowed(&self, alone: f64, cells: usize) -> f64 {
+        OVERHANG_OF_CELLS * alone + OVERHANG_OF_BOUND * self.config.error_m.powi(2) * cells as f64
+    }
+
+    /// Returns the overhang that a block may have beyond one side: that of its cells along it.
+    fn allowed_beyond(&self, block: &SplatBlock, side: usize) -> f64 {
+        let (first, last) = ([block.column, block.row], [block.column + block.width, block.row + block.height]);
+        let (mut from, mut to) = (first, last);
+        match side {
+            0 | 2 => to[side / 2] = first[side / 2] + 1,
+            _ => from[side / 2] = last[side / 2] - 1,
+        }
+        let cells = (from[1]..to[1]).flat_map(|row| &self.alone.row(row)[from[0]..to[0]]);
+        let alone: f64 = cells.map(|cell| f64::from(cell[side])).sum();
+        self.allowed(alone, (to[0] - from[0]) * (to[1] - from[1]))
     }
 
     /// Returns the cut with the least squares in both parts, in a tie the cut nearest to the

@@ -53,11 +53,37 @@ pub fn splat_of_block(
         |step: [f64; 2], rise: f64, cells: usize| [step[0], step[1], rise].map(|c| c * cells as f64 * config.spread);
     let first = side(by_column, block.plane.by_column_m, block.width);
     let second = side(by_row, block.plane.by_row_m, block.height);
-    let (axes, scales) = own_axes(first, second);
     let [column, row] = block.middle();
+    let position = surface.position(column, row, block.plane.middle_m);
+    flat_splat(position, [first, second], [0.0, 0.0, 1.0], colour, confidence, config)
+}
+
+/// Returns the splat of a parallelogram on a wall, from its sides.
+pub(super) fn upright_splat(
+    position: [f64; 3],
+    sides: [[f64; 3]; 2],
+    outward: [f64; 2],
+    colour: [f32; 3],
+    confidence: f64,
+    config: &GaussianConfig,
+) -> Splat {
+    let tangents = sides.map(|side| side.map(|c| c * config.spread));
+    flat_splat(position, tangents, [outward[0], outward[1], 0.0], colour, confidence, config)
+}
+
+/// Returns a splat with the covariance of two tangents, whose normal is turned to `outside`.
+fn flat_splat(
+    position: [f64; 3],
+    [first, second]: [[f64; 3]; 2],
+    outside: [f64; 3],
+    colour: [f32; 3],
+    confidence: f64,
+    config: &GaussianConfig,
+) -> Splat {
+    let (axes, scales) = own_axes(first, second, outside);
     let scale = |s: f64| s.max(1e-4) as f32;
     Splat {
-        position: surface.position(column, row, block.plane.middle_m).map(|c| c as f32),
+        position: position.map(|c| c as f32),
         scale_m: [scale(scales[0]), scale(scales[1]), scale(config.thickness_m)],
         rotation: quaternion_of_axes(axes).map(|q| q as f32),
         colour,
@@ -65,15 +91,15 @@ pub fn splat_of_block(
     }
 }
 
-/// Returns the axes of a Gaussian (the third is the upward normal) and the standard deviations
-/// along the first two, from two tangents.
-fn own_axes(first: [f64; 3], second: [f64; 3]) -> ([[f64; 3]; 3], [f64; 2]) {
+/// Returns the axes of a Gaussian (the third is the normal, turned to `outside`) and the standard
+/// deviations along the first two, from two tangents.
+fn own_axes(first: [f64; 3], second: [f64; 3], outside: [f64; 3]) -> ([[f64; 3]; 3], [f64; 2]) {
     let unit = |a: [f64; 3]| {
         let length = norm(a).max(f64::MIN_POSITIVE);
         a.map(|c| c / length)
     };
     let mut normal = unit(cross(first, second));
-    if normal[2] < 0.0 {
+    if dot(normal, outside) < 0.0 {
         normal = normal.map(|c| -c);
     }
     let e1 = unit(first);

@@ -9,6 +9,8 @@
 //!   dozen blocks, a tree many.
 //! - [`splat_of_block`] makes the Gaussian: centre on the plane, tangents along the block, normal
 //!   of the plane.
+//! - Walls stand where the crate `occlusion` puts them between the cells: upright splats between
+//!   the upper and the lower surface, with the colours of the oblique images that see them.
 //! - [`render`] composites splats front to back through any [`SplatCamera`]: RPC, perspective, or
 //!   straight from above. Splats of one surface are mixed, whichever of them is in front.
 //! - [`fit_colours`] finds the colours that render back to the images, robustly and over all views
@@ -22,7 +24,9 @@ mod camera;
 mod central;
 mod colour;
 mod division;
+mod facade;
 mod gaussian;
+mod graded;
 mod hits;
 mod overhang;
 mod pass;
@@ -32,6 +36,8 @@ mod render;
 mod scene;
 mod sight;
 mod surface;
+mod wall_light;
+mod walls;
 
 pub use block::{Plane, SplatBlock};
 pub use camera::{AffineCamera, LensSplatCamera, MapSplatCamera, Projection, RayModel, RpcSplatCamera, SplatCamera};

@@ -4,7 +4,9 @@
 //! The harm is Σ α² d² over the cells outside the block, with α the opacity of the Gaussian there
 //! and d the height of its plane above the surface. This is the squared height error of the
 //! overhang if nothing else were in front. Single cells overhang too, so a block is compared with
-//! its own cells taken one by one. Higher surfaces beside the block hide the overhang and do not
+//! its own cells taken one by one; where walls are to be seen from below, each side with the cells
+//! along it: else a long block reaches far beyond its end because many cells along it hang over a
+//! little. Higher surfaces beside the block hide the overhang and do not
 //! count.
 
 use raster::Grid;
@@ -33,6 +35,13 @@ impl Overhang {
     /// The side with the most harm.
     pub(super) fn worst(&self) -> usize {
         (1..4).fold(0, |worst, side| if self.sides[side] > self.sides[worst] { side } else { worst })
+    }
+
+    /// The side with the most harm beyond what is allowed there; `None` where all sides are within.
+    pub(super) fn worst_beyond(&self, allowed: [f64; 4]) -> Option<usize> {
+        let beyond = |side: usize| self.sides[side] - allowed[side];
+        let worst = (1..4).fold(0, |worst, side| if beyond(side) > beyond(worst) { side } else { worst });
+        (beyond(worst) > 0.0).then_some(worst)
     }
 
     /// Measures the overhang of a block. Depths below `tolerance_m` do no harm.
@@ -68,6 +77,16 @@ impl Overhang {
     }
 }
 
+/// Returns whether a block hangs over nothing by more than a tolerance.
+pub(super) fn is_free(
+    surface: &SplatSurface<'_>,
+    block: &SplatBlock,
+    gaussian: &GaussianConfig,
+    tolerance_m: f64,
+) -> bool {
+    Overhang::of(surface, block, gaussian, tolerance_m).worst_beyond([0.0; 4]).is_none()
+}
+
 /// Returns the side of the block that a cell is beyond; `None` inside the block.
 fn side_of(block: &SplatBlock, [column, row]: [i64; 2]) -> Option<usize> {
     let beyond = [
@@ -81,10 +100,10 @@ fn side_of(block: &SplatBlock, [column, row]: [i64; 2]) -> Option<usize> {
     (beyond[side] > 0).then_some(side)
 }
 
-/// Measures the overhang of every cell taken alone.
-pub(super) fn of_cells(surface: &SplatSurface<'_>, gaussian: &GaussianConfig, tolerance_m: f64) -> Grid<f32> {
+/// Measures the overhang of every cell taken alone, by sides.
+pub(super) fn of_cells(surface: &SplatSurface<'_>, gaussian: &GaussianConfig, tolerance_m: f64) -> Grid<[f32; 4]> {
     let heights = surface.heights();
-    let mut harm = Grid::filled(heights.width(), heights.height(), 0.0);
+    let mut harm = Grid::filled(heights.width(), heights.height(), [0.0; 4]);
     if heights.width() > 0 {
         harm.data_mut().par_chunks_mut(heights.width()).enumerate().for_each(|(row, cells)| {
             for (column, cell) in cells.iter_mut().enumerate() {
@@ -93,7 +112,7 @@ pub(super) fn of_cells(surface: &SplatSurface<'_>, gaussian: &GaussianConfig, to
                     let [by_column_m, by_row_m] = surface.slope(column, row);
                     let plane = Plane { middle_m, by_column_m, by_row_m };
                     let block = SplatBlock { column, row, width: 1, height: 1, plane };
-                    *cell = Overhang::of(surface, &block, gaussian, tolerance_m).total() as f32;
+                    *cell = Overhang::of(surface, &block, gaussian, tolerance_m).sides.map(|harm| harm as f32);
                 }
             }
         });
@@ -120,10 +139,12 @@ mod tests {
             plane: Plane { middle_m, ..Plane::default() },
         };
         let roof = Overhang::of(&surface, &block(0, 10.0), &gaussian, 0.1);
-        assert!(roof.sides[1] > 50.0 && roof.worst() == 1, "{roof:?}");
+        assert!(roof.sides[1] > 50.0 && roof.worst_beyond([10.0; 4]) == Some(1), "{roof:?}");
+        assert_eq!(roof.worst_beyond([1e3; 4]), None);
         assert_eq!((roof.sides[0], roof.sides[2], roof.sides[3]), (0.0, 0.0, 0.0));
-        assert_eq!(Overhang::of(&surface, &block(4, 0.0), &gaussian, 0.1).total(), 0.0);
+        assert_eq!(Overhang::of(&surface, &block(4, 0.0), &gaussian, 0.1), Overhang::default());
         let alone = of_cells(&surface, &gaussian, 0.1);
-        assert!(alone[(3, 1)] > 0.0 && alone[(3, 1)] < 20.0 && alone[(2, 1)] < 1e-3 && alone[(4, 1)] == 0.0);
+        assert!(alone[(3, 1)][1] > 0.0 && alone[(3, 1)][1] < 20.0 && alone[(2, 1)][1] < 1e-3);
+        assert_eq!(alone[(4, 1)], [0.0; 4]);
     }
 }

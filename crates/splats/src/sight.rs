@@ -12,7 +12,7 @@ use super::{RpcSplatCamera, SplatCamera, SplatSurface};
 
 /// Height above the line of sight up to which a surface does not hide, metres: half a step of a
 /// rough surface.
-const TOLERANCE_M: f64 = 0.3;
+pub(super) const TOLERANCE_M: f64 = 0.3;
 /// Number of positions along each side of a cell that are projected into the image.
 const SUBCELLS: usize = 2;
 
@@ -38,7 +38,7 @@ pub fn visible_cells(surface: &SplatSurface<'_>, towards_sensor: [f64; 3]) -> Gr
 
 /// Returns the columns and rows that the line of sight moves by per metre that it rises; `None`
 /// when it does not rise.
-fn cells_per_metre(surface: &SplatSurface<'_>, towards: [f64; 3]) -> Option<[f64; 2]> {
+pub(super) fn cells_per_metre(surface: &SplatSurface<'_>, towards: [f64; 3]) -> Option<[f64; 2]> {
     let transform = surface.geotransform();
     let (x, y) = transform.map_from_cell(0.0, 0.0);
     let (column, row) = transform.cell_from_map(x + towards[0], y + towards[1])?;
@@ -69,13 +69,19 @@ pub fn visible_pixels(
             camera.pixels(positions)
         })
         .collect();
-    for [sample, line] in rows?.into_iter().flatten() {
+    mark_pixels(&mut shows, &rows?.concat());
+    Ok(shows)
+}
+
+/// Marks the pixels that positions (sample, line) in an image fall on.
+pub(super) fn mark_pixels(shows: &mut Grid<bool>, positions: &[[f64; 2]]) {
+    let (width, height) = (shows.width() as f64, shows.height() as f64);
+    for [sample, line] in positions {
         let (column, row) = (sample.round(), line.round());
-        if column >= 0.0 && row >= 0.0 && column < width as f64 && row < height as f64 {
+        if column >= 0.0 && row >= 0.0 && column < width && row < height {
             shows[(column as usize, row as usize)] = true;
         }
     }
-    Ok(shows)
 }
 
 #[cfg(test)]

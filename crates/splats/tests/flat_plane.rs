@@ -7,7 +7,7 @@
 use camera::{ImageCorrection, ImagePoint, Rpc, RpcCamera};
 use crs::MapProjection;
 use raster::{GeoTransform, Grid};
-use splats::{RpcSplatCamera, SplatConfig, SplatSurface, SplatView, make_splats};
+use splats::{MapSplatCamera, RpcSplatCamera, SplatConfig, SplatSurface, SplatView, make_splats, render};
 
 const LON_LAT: [f64; 2] = [5.4, 43.53];
 const HEIGHT_M: f64 = 50.0;
@@ -129,5 +129,27 @@ fn opposite_views_of_a_plane_show_no_shift() {
             "{uniform_side:?}: {shifts:?}, {} splats",
             scene.splats.len()
         );
+    }
+}
+
+/// The seams between the blocks of a plane are covered like the blocks: no dark lattice.
+#[test]
+fn seams_of_large_blocks_are_covered() {
+    let projection = MapProjection::from_epsg(32631).unwrap();
+    let middle = projection.map_from_lonlat(LON_LAT[0], LON_LAT[1]).unwrap();
+    let heights = Grid::filled(220, 220, HEIGHT_M as f32);
+    let geotransform = GeoTransform::north_up(middle.x - 55.0, middle.y + 55.0, 0.5);
+    let origin = [middle.x.round(), middle.y.round(), HEIGHT_M - 10.0];
+    let surface = SplatSurface::new(&heights, geotransform, origin);
+    let scene = make_splats(&surface, None, &[], &SplatConfig { walls: true, ..SplatConfig::default() }).unwrap();
+    assert_eq!((scene.splats.len(), scene.report.walls), (49, 0));
+    let above = render(&scene.splats, &MapSplatCamera::new(&surface).unwrap()).unwrap().coverage;
+    let camera = satellite(0.6);
+    let oblique = RpcSplatCamera::new(&camera, &projection, origin, (SIZE, SIZE)).unwrap().unwrap();
+    let oblique = render(&scene.splats, &oblique).unwrap().coverage;
+    for (coverage, size) in [(above, 220), (oblique, SIZE)] {
+        let inner = (20..size - 20).flat_map(|row| &coverage.row(row)[20..size - 20]);
+        let least = inner.copied().fold(1.0, f32::min);
+        assert!(least > 0.92, "{least}");
     }
 }

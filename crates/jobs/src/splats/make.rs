@@ -41,6 +41,8 @@ pub struct SplatsConfig {
     pub colour_error: f64,
     /// Side of square splats, cells; splats as large as the bounds allow when `None`.
     pub uniform_side: Option<usize>,
+    /// Whether the walls between cells get splats. Square splats have none.
+    pub walls: bool,
     /// Confidence of the cells, 0 to 1, on the grid of the surface model; it becomes opacity. Full
     /// when `None`.
     pub confidence: Option<PathBuf>,
@@ -102,6 +104,7 @@ impl SplatsConfig {
             error_m: division.error_m,
             colour_error: division.colour_error,
             uniform_side: None,
+            walls: true,
             confidence: None,
             corrections: CorrectionSource::default(),
             vertical: None,
@@ -124,6 +127,7 @@ impl SplatsConfig {
             },
             colour: ColourFit::default(),
             uniform_side: self.uniform_side,
+            walls: self.walls,
             compare: self.compare,
             ..SplatConfig::default()
         }

@@ -11,6 +11,13 @@ impl SplatsReport {
             "splats     {} for {} cells ({share:.1} %)\nplanes     within {:.3} m\n",
             made.splats, made.cells, made.plane_error_max_m
         );
+        if made.walls > 0 {
+            let seen = 100.0 * made.walls_seen as f64 / made.walls as f64;
+            text += &format!(
+                "walls      {} of the splats on {:.0} m\u{b2}, {seen:.1} % of them seen by an image\n",
+                made.walls, made.walls_area_m2
+            );
+        }
         if let Some(heights) = &made.mean_height {
             text += &format!(
                 "heights    RMSE {:.3} m, MAE {:.3} m, median {:.3} m\n",
@@ -34,8 +41,8 @@ impl SplatsReport {
         }
         if let Some(count) = made.uniform_at_equal_rmse {
             text += &format!(
-                "equal RMSE takes {count:.0} uniform splats, {:.1} times as many\n",
-                count / made.splats as f64
+                "equal RMSE takes {count:.0} uniform splats, {:.1} times as many as without walls\n",
+                count / (made.splats - made.walls) as f64
             );
         }
         text + &format!("written    {}\n", self.output)

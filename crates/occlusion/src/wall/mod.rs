@@ -99,6 +99,11 @@ impl Walls {
         walls
     }
 
+    /// Difference of neighbours beyond which they form a wall, metres.
+    pub(super) fn step_m(&self) -> f32 {
+        self.step_m
+    }
+
     /// The height at a place `[u, v]` (0 to 1 along columns and rows) among four cells, of which
     /// the first is at `corner` and which all have heights: upper left, upper right, lower left,
     /// lower right. `None` where no wall is among them.
@@ -110,35 +115,78 @@ impl Walls {
         heights: [f32; 4],
         place: [f32; 2],
     ) -> Option<f32> {
-        let mut next = self.walls.get(self.first[corner] as usize);
-        next?;
-        let weights = weights(place);
-        let mut own = [true; 4];
-        while let Some(wall) = next {
-            let upper = wall.is_upper(&heights, &own, &weights, place);
-            own = std::array::from_fn(|k| own[k] && (heights[k] > wall.level) == upper);
-            next = self.walls.get(wall.within[usize::from(upper)] as usize);
-        }
-        let continued = self.continued(cells, corner, heights, own);
-        Some(continued.iter().zip(weights).map(|(z, w)| z * w).sum())
+        let first = self.walls.get(self.first[corner] as usize)?;
+        let own = self.own_of(Some(first), heights, [true; 4], place);
+        let continued = self.continued(cells, corner, heights, own, false);
+        Some(continued.iter().zip(weights(place)).map(|(z, w)| z * w).sum())
     }
 
-    /// The heights of four cells if all were on the side of their `own`.
-    fn continued(&self, cells: &Grid<f32>, corner: (usize, usize), heights: [f32; 4], own: [bool; 4]) -> [f32; 4] {
+    /// Returns what parts four cells of which the first is at `corner`: the first wall, and the
+    /// walls within its sides.
+    pub(super) fn parting<'a>(&'a self, cells: &'a Grid<f32>, corner: (usize, usize)) -> Vec<Parting<'a>> {
+        let Some(first) = self.walls.get(self.first[corner] as usize) else { return Vec::new() };
+        let heights = four(cells, corner);
+        let one = |wall, own, outer| Parting { walls: self, cells, corner, heights, wall, own, outer };
+        let mut all = vec![one(first, [true; 4], None)];
+        for upper in [false, true] {
+            if let Some(second) = self.walls.get(first.within[usize::from(upper)] as usize) {
+                all.push(one(second, first.own_on(heights, [true; 4], upper), Some((first, upper))));
+            }
+        }
+        all
+    }
+
+    /// Which of the four centres are on the side of a place: those of their `own` that `next` and
+    /// the walls within its sides do not part from it.
+    fn own_of<'a>(
+        &'a self,
+        mut next: Option<&'a Wall>,
+        heights: [f32; 4],
+        mut own: [bool; 4],
+        place: [f32; 2],
+    ) -> [bool; 4] {
+        let weights = weights(place);
+        while let Some(wall) = next {
+            let upper = wall.side_at(&heights, &own, &weights, place) >= 0.0;
+            own = wall.own_on(heights, own, upper);
+            next = self.walls.get(wall.within[usize::from(upper)] as usize);
+        }
+        own
+    }
+
+    /// The heights of four cells if all were on the side of their `own`. `steadily`: beyond a
+    /// centre the smaller of the last two rises counts, none where they differ in sign.
+    fn continued(
+        &self,
+        cells: &Grid<f32>,
+        corner: (usize, usize),
+        heights: [f32; 4],
+        own: [bool; 4],
+        steadily: bool,
+    ) -> [f32; 4] {
         let limit = CONTINUED * self.step_m;
         // From one of the four to the next along columns or rows.
         let beyond = |k: usize, along: usize| {
             let (column, row) = (corner.0 + k % 2, corner.1 + k / 2);
-            let back = |at: usize, towards: usize, size: usize| match towards {
-                0 => Some(at + 1).filter(|&i| i < size),
-                _ => at.checked_sub(1),
+            let back = |at: usize, towards: usize, by: usize, size: usize| match towards {
+                0 => Some(at + by).filter(|&i| i < size),
+                _ => at.checked_sub(by),
             };
-            let before = if along == 0 {
-                back(column, 1 - k % 2, cells.width()).map(|column| cells[(column, row)])
-            } else {
-                back(row, 1 - k / 2, cells.height()).map(|row| cells[(column, row)])
+            let before = |by: usize| {
+                if along == 0 {
+                    back(column, 1 - k % 2, by, cells.width()).map(|column| cells[(column, row)])
+                } else {
+                    back(row, 1 - k / 2, by, cells.height()).map(|row| cells[(column, row)])
+                }
             };
-            before.map(|before| heights[k] - before).filter(|rise| rise.abs() <= limit).unwrap_or(0.0)
+            let Some(first) = before(1) else { return 0.0 };
+            let rise = heights[k] - first;
+            let rise = match before(2).filter(|_| steadily).map(|second| first - second) {
+                Some(earlier) if earlier.abs() < rise.abs() => earlier,
+                _ => rise,
+            };
+            let is_steady = !steadily || rise * (heights[k] - first) > 0.0;
+            if rise.abs() <= limit && is_steady { rise } else { 0.0 }
         };
         std::array::from_fn(|k| {
             let (beside, over, across) = (k ^ 1, k ^ 2, k ^ 3);
@@ -155,9 +203,55 @@ impl Walls {
     }
 }
 
+/// A wall among four cells, with the cells.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parting<'a> {
+    walls: &'a Walls,
+    cells: &'a Grid<f32>,
+    corner: (usize, usize),
+    heights: [f32; 4],
+    wall: &'a Wall,
+    own: [bool; 4],
+    /// The wall whose side (upper or not) it parts.
+    outer: Option<(&'a Wall, bool)>,
+}
+
+impl Parting<'_> {
+    /// Signed distance of a place (0 to 1 along columns and rows), cells, positive on the upper
+    /// side.
+    pub(super) fn side_at(&self, place: [f32; 2]) -> f32 {
+        self.wall.side_at(&self.heights, &self.own, &weights(place), place)
+    }
+
+    /// Whether a place is on the side of another wall that this one parts.
+    pub(super) fn reaches(&self, place: [f32; 2]) -> bool {
+        self.outer.is_none_or(|(wall, upper)| {
+            (wall.side_at(&self.heights, &[true; 4], &weights(place), place) >= 0.0) == upper
+        })
+    }
+
+    /// The heights of both sides at a place on the wall: lower, upper. A side is continued to the
+    /// wall only where it goes on as it came over two cells: a parapet does not rise further.
+    pub(super) fn heights_at(&self, place: [f32; 2]) -> [f32; 2] {
+        [false, true].map(|upper| {
+            let own = self.wall.own_on(self.heights, self.own, upper);
+            let next = self.walls.walls.get(self.wall.within[usize::from(upper)] as usize);
+            let own = self.walls.own_of(next, self.heights, own, place);
+            let continued = self.walls.continued(self.cells, self.corner, self.heights, own, true);
+            continued.iter().zip(weights(place)).map(|(z, w)| z * w).sum()
+        })
+    }
+}
+
 impl Wall {
-    /// Whether a place is on the upper side; of the centres only their `own` have a say.
-    fn is_upper(&self, heights: &[f32; 4], own: &[bool; 4], weights: &[f32; 4], place: [f32; 2]) -> bool {
+    /// Those of the `own` centres that are on one side.
+    fn own_on(&self, heights: [f32; 4], own: [bool; 4], upper: bool) -> [bool; 4] {
+        std::array::from_fn(|k| own[k] && (heights[k] > self.level) == upper)
+    }
+
+    /// Signed distance of a place, cells, positive on the upper side; of the centres only their
+    /// `own` have a say.
+    fn side_at(&self, heights: &[f32; 4], own: &[bool; 4], weights: &[f32; 4], place: [f32; 2]) -> f32 {
         let (mut agrees, mut kept) = (true, 0.0);
         for k in 0..4 {
             let upper = heights[k] > self.level;
@@ -165,8 +259,7 @@ impl Wall {
             agrees &= !own[k] || (at > 0.0) == upper;
             kept += weights[k] * if upper { at.max(MARGIN) } else { at.min(-MARGIN) };
         }
-        let at = if agrees { self.outline.at([place[0] - 0.5, place[1] - 0.5]) } else { kept };
-        at >= 0.0
+        if agrees { self.outline.at([place[0] - 0.5, place[1] - 0.5]) } else { kept }
     }
 }
 

@@ -1428,6 +1428,7 @@ def splats(
     error_m: float = 0.25,
     colour_error: float = 0.037,
     uniform_side: int | None = None,
+    walls: bool = True,
     confidence: PathLike | None = None,
     corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
     vertical: str | None = None,
@@ -1450,6 +1451,7 @@ def splats(
         colour_error: Largest standard deviation of the colours under one splat, as a share of the
             display range. Infinity leaves the division to the geometry.
         uniform_side: Side of square splats, cells; splats as large as the bounds allow when `None`.
+        walls: Whether the walls between cells get splats. Square splats have none.
         confidence: Confidence of the cells, 0 to 1, on the grid of the surface model; it becomes
             opacity. Full when `None`.
         corrections: Source of the pointing corrections of the images.
@@ -1807,6 +1809,7 @@ def simulate(
     scene: str | Mapping[str, Any],
     output: PathLike,
     *,
+    cameras: PathLike | None = None,
     flight: int = 0,
     flight_arc_deg: Sequence[float] | None = None,
     threads: int | None = None,
@@ -1819,6 +1822,8 @@ def simulate(
     Args:
         scene: The scene, its cameras and its radiometry.
         output: Folder for the images and the truth.
+        cameras: Perspective cameras whose exact depths, parts of the scene and pictures are written:
+            folder of a COLMAP model on the map of the scene, with `origin.json`.
         flight: Number of perspective cameras around the scene; none when 0.
         flight_arc_deg: Azimuths between which the perspective cameras stand, degrees clockwise from
             north; all around when `None`.
