@@ -49,6 +49,9 @@ pub(crate) struct Args {
     /// degrees clockwise from north.
     #[arg(long, num_args = 2, value_names = ["FROM", "TO"], allow_negative_numbers = true, requires = "flight")]
     flight_arc: Vec<f64>,
+    /// Spacing of the points of the exact surface that the flight sees, metres.
+    #[arg(long, value_name = "METRES", default_value_t = 0.2, requires = "flight")]
+    flight_spacing: f64,
     /// Folder for the images and the truth.
     #[arg(short, long, value_name = "DIR", required_unless_present_any = ["list", "template"])]
     output: Option<PathBuf>,
@@ -105,6 +108,7 @@ fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> 
     let mut config = SimulateConfig::new(scene, output.to_owned());
     config.flight = args.flight;
     config.flight_arc_deg = args.flight_arc.first_chunk().copied();
+    config.flight_spacing_m = args.flight_spacing;
     config.overwrite = args.overwrite;
     let show = ShowOptions { progress: args.progress, json: false };
     let report = show.watch(global, output, |watcher| jobs::simulate::run(&config, watcher)).map_err(|error| {

@@ -9,12 +9,15 @@ use crate::arrange::Arrangement;
 use crate::bands::Painted;
 use crate::image::SurfelImages;
 use crate::screen::{ScreenGradient, gradient};
-use crate::simd::Registers;
+use crate::simd::{Registers, prefetch};
 use crate::surfel::Surfel;
 use crate::view::SurfelCamera;
 
 /// Greatest number of columns or rows of an image.
 pub const MAX_SIDE: usize = 65_535;
+
+/// Surfels whose entries are asked for before they are added.
+const AHEAD: usize = 8;
 
 /// A drawn image, with what its gradient needs. Drawing again reuses the memory.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -114,6 +117,9 @@ impl Drawing {
                 return (Surfel::default(), f32::NAN);
             };
             let mut sum = [0.0f32; 16];
+            for &place in arrangement.places_from(number + AHEAD) {
+                prefetch(&by_entry[place as usize]);
+            }
             for &place in arrangement.places_of(number) {
                 // Entries that were not drawn hold what was there before.
                 if painted.masks[place as usize] != 0 {

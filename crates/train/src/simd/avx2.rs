@@ -28,6 +28,18 @@ impl Avx2 {
     }
 }
 
+/// Asks for memory that is read soon.
+#[inline(always)]
+pub(super) fn prefetch<T>(soon: &T) {
+    let from: *const i8 = std::ptr::from_ref(soon).cast();
+    // SAFETY: every machine of this architecture has the instruction, which never faults.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(from) };
+    if size_of::<T>() > 64 {
+        // SAFETY: byte 64 belongs to the value, and the instruction never faults.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(from.add(64)) };
+    }
+}
+
 /// Adds the lanes of eight registers.
 ///
 /// # Safety
@@ -84,13 +96,17 @@ impl InstructionSet for Avx2 {
 
     #[inline(always)]
     fn prefetch<T>(self, soon: &T) {
-        let from: *const i8 = std::ptr::from_ref(soon).cast();
-        // SAFETY: every machine of this architecture has the instruction, which never faults.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(from) };
-        if size_of::<T>() > 64 {
-            // SAFETY: byte 64 belongs to the value, and the instruction never faults.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(from.add(64)) };
-        }
+        prefetch(soon);
+    }
+
+    #[inline(always)]
+    fn mask(self, bits: u16, part: usize) -> Mask256 {
+        // SAFETY: `self` proves that the machine has AVX2, which these intrinsics need.
+        Mask256(unsafe {
+            let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let all = _mm256_set1_epi32(i32::from(bits >> (8 * part)));
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(all, lanes), lanes))
+        })
     }
 
     #[inline(always)]
@@ -175,9 +191,9 @@ impl Lanes for Lanes256 {
     }
 
     #[inline(always)]
-    fn count(mask: Mask256) -> u32 {
+    fn bits(mask: Mask256, part: usize) -> u16 {
         // SAFETY: the mask was made from lanes of an `Avx2`, so the machine has the instruction.
-        unsafe { _mm256_movemask_ps(mask.0) }.count_ones()
+        (unsafe { _mm256_movemask_ps(mask.0) } as u16) << (8 * part)
     }
 
     #[inline(always)]
@@ -190,6 +206,6 @@ impl Lanes for Lanes256 {
     }
 }
 
-/// A mask of all bits or none per lane. It is made from [`Lanes256`] only.
+/// A mask of all bits or none per lane. It is made from an [`Avx2`] or from [`Lanes256`] only.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mask256(__m256);

@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::avx2::totals_of_eight;
+use super::avx2::{prefetch, totals_of_eight};
 use super::lanes::{Block, InstructionSet, Kernel, Lanes};
 
 /// Proof that the machine has AVX-512 (foundation, DQ), AVX2 and fused multiply-add: only
@@ -75,13 +75,12 @@ impl InstructionSet for Avx512 {
 
     #[inline(always)]
     fn prefetch<T>(self, soon: &T) {
-        let from: *const i8 = std::ptr::from_ref(soon).cast();
-        // SAFETY: every machine of this architecture has the instruction, which never faults.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(from) };
-        if size_of::<T>() > 64 {
-            // SAFETY: byte 64 belongs to the value, and the instruction never faults.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(from.add(64)) };
-        }
+        prefetch(soon);
+    }
+
+    #[inline(always)]
+    fn mask(self, bits: u16, _: usize) -> __mmask16 {
+        bits
     }
 
     #[inline(always)]
@@ -161,8 +160,8 @@ impl Lanes for Lanes512 {
     }
 
     #[inline(always)]
-    fn count(mask: __mmask16) -> u32 {
-        mask.count_ones()
+    fn bits(mask: __mmask16, _: usize) -> u16 {
+        mask
     }
 
     #[inline(always)]

@@ -15,6 +15,14 @@ pub enum Registers {
     Plain,
 }
 
+/// Asks for memory that is read soon, where the architecture has an instruction for it.
+#[inline(always)]
+pub(crate) fn prefetch<T>(soon: &T) {
+    #[cfg(target_arch = "x86_64")]
+    super::avx2::prefetch(soon);
+    let _ = soon;
+}
+
 /// Runs a kernel with the wanted registers, or with shorter ones where the machine lacks them.
 pub(crate) fn dispatch<K: Kernel>(registers: Registers, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -49,6 +57,7 @@ mod tests {
                 std::array::from_fn(|k| Block(std::array::from_fn(|i| ((k * 16 + i) as f32).sin() * 3.0)));
             let mut bits: Vec<u32> = isa.totals(&blocks).map(f32::to_bits).into();
             let mut results = [Block::ZERO; 12];
+            let (mut marked, mut again) = (0, 0);
             for part in 0..I::PARTS {
                 let [a, b, c] = [0, 1, 2].map(|i| isa.load(&blocks[i], part));
                 let mask = a.at_most(b);
@@ -70,9 +79,10 @@ mod tests {
                 for (result, lanes) in results.iter_mut().zip(made) {
                     lanes.store(result, part);
                 }
-                bits.push(u32::from(I::Lanes::any(mask)));
+                marked |= I::Lanes::bits(mask, part);
+                again |= I::Lanes::bits(isa.mask(0xb16d, part), part);
             }
-            bits.truncate(17);
+            bits.extend([u32::from(marked), u32::from(again)]);
             bits.extend(results.iter().flat_map(|block| block.0.map(f32::to_bits)));
             bits
         }
