@@ -54,7 +54,7 @@ pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool>(
     pixels: &mut TileGradients,
     out: &mut [ScreenGradient],
 ) {
-    let mut sums = [Block::ZERO; 16];
+    let mut kept = [Block::ZERO; 16];
     for (number, ((&entry, &mask), out)) in task.entries.iter().zip(masks).zip(out).enumerate().rev() {
         if let Some(soon) = number.checked_sub(AHEAD) {
             isa.prefetch(&task.splats[task.entries[soon] as usize]);
@@ -67,7 +67,7 @@ pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool>(
         let splat = &task.splats[entry as usize];
         let brush = Brush::new(isa, splat, task.origin, task.reference_depth);
         // The gradient by the centre of the least footprint.
-        let mut centre = [Block::ZERO; 2];
+        let (mut sums, mut centre) = ([0.0; 16], [Block::ZERO; 2]);
         for part in 0..I::PARTS {
             let (mut total, mut by_centre) = ([isa.splat(0.0); 16], [isa.splat(0.0); 2]);
             let mut left = u32::from(mask);
@@ -93,16 +93,14 @@ pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool>(
                     spread_block::<I, PERSPECTIVE>(isa, &brush, splat, &at, drawn, part, pixels, total);
                 }
             }
-            for (sum, lanes) in sums.iter_mut().zip(total) {
-                lanes.store(sum, part);
-            }
+            sums = isa.totals(total, part, &mut kept);
             if splat.is_fine {
                 by_centre[0].store(&mut centre[0], part);
                 by_centre[1].store(&mut centre[1], part);
             }
         }
         let centre = if splat.is_fine { [total(&centre[0]), total(&centre[1])] } else { [0.0; 2] };
-        *out = gathered(splat, isa.totals(&sums), centre);
+        *out = gathered(splat, sums, centre);
     }
 }
 

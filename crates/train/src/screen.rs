@@ -159,7 +159,8 @@ impl Plane {
 /// Returns the splat that a camera sees of a surfel; `None` where nothing of it is drawn.
 pub(crate) fn project(surfel: &Surfel, view: &LocalView, perspective: bool, size: [usize; 2]) -> Option<ScreenSplat> {
     let opacity = surfel.opacity();
-    let cutoff = 2.0 * (opacity / LEAST_ALPHA).ln();
+    let log_opacity = opacity.ln();
+    let cutoff = 2.0 * (log_opacity - LEAST_ALPHA.ln());
     // NaN is not visible either.
     let visible = cutoff > 0.0;
     if !visible {
@@ -185,7 +186,7 @@ pub(crate) fn project(surfel: &Surfel, view: &LocalView, perspective: bool, size
         inverse: [a0, b0, a1, b1].map(|a| a as f32),
         slopes: plane.slopes.map(|s| s as f32),
         depth: view.depth_m as f32,
-        log2_opacity: opacity.log2() as f32,
+        log2_opacity: (log_opacity * std::f64::consts::LOG2_E) as f32,
         colour: surfel.colour,
         normal: plane.axes[2].map(|n| (plane.turned * n) as f32),
         cutoff: cutoff as f32,

@@ -54,21 +54,22 @@ pub(super) unsafe fn totals_of_eight(v: [__m256; 8]) -> __m256 {
     }
 }
 
-/// Adds the lanes of sixteen blocks, given the registers whose lanes are half a block.
+/// Adds the lanes of sixteen blocks, given their first halves in memory and their second ones in
+/// registers.
 ///
 /// # Safety
 /// The machine has AVX2.
 #[inline(always)]
-unsafe fn totals(blocks: &[Block; 16]) -> [f32; 16] {
+unsafe fn totals(first: &[Block; 16], second: [Lanes256; 16]) -> [f32; 16] {
     let mut out = [0.0; 16];
     for (group, sums) in out.chunks_exact_mut(8).enumerate() {
-        // SAFETY: the caller vouches for AVX2. A block has 16 values, of which eight are read from
-        // the first and from the ninth on, and eight are written to a chunk of eight.
+        let halves = first[group * 8..group * 8 + 8].iter().zip(&second[group * 8..group * 8 + 8]);
+        // SAFETY: the caller vouches for AVX2. A block has 16 values, of which eight are read, and
+        // eight are written to a chunk of eight.
         unsafe {
             let mut folded = [_mm256_setzero_ps(); 8];
-            for (lanes, block) in folded.iter_mut().zip(&blocks[group * 8..group * 8 + 8]) {
-                let from = block.0.as_ptr();
-                *lanes = _mm256_add_ps(_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8)));
+            for (lanes, (first, Lanes256(second))) in folded.iter_mut().zip(halves) {
+                *lanes = _mm256_add_ps(_mm256_loadu_ps(first.0.as_ptr()), *second);
             }
             _mm256_storeu_ps(sums.as_mut_ptr(), totals_of_eight(folded));
         }
@@ -110,9 +111,15 @@ impl InstructionSet for Avx2 {
     }
 
     #[inline(always)]
-    fn totals(self, blocks: &[Block; 16]) -> [f32; 16] {
+    fn totals(self, lanes: [Lanes256; 16], part: usize, kept: &mut [Block; 16]) -> [f32; 16] {
+        if part == 0 {
+            for (lanes, block) in lanes.iter().zip(kept) {
+                lanes.store(block, 0);
+            }
+            return [0.0; 16];
+        }
         // SAFETY: `self` proves that the machine has AVX2.
-        unsafe { totals(blocks) }
+        unsafe { totals(kept, lanes) }
     }
 }
 

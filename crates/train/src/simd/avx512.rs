@@ -39,16 +39,15 @@ impl Avx512 {
 /// # Safety
 /// The machine has AVX-512 (foundation, DQ) and AVX2.
 #[inline(always)]
-unsafe fn totals(blocks: &[Block; 16]) -> [f32; 16] {
+unsafe fn totals(blocks: [Lanes512; 16]) -> [f32; 16] {
     let mut out = [0.0; 16];
     for (group, sums) in out.chunks_exact_mut(8).enumerate() {
-        // SAFETY: the caller vouches for the instructions. Sixteen values are read from a block,
-        // and eight are written to a chunk of eight.
+        // SAFETY: the caller vouches for the instructions. Eight values are written to a chunk of
+        // eight.
         unsafe {
             let mut folded = [_mm256_setzero_ps(); 8];
-            for (lanes, block) in folded.iter_mut().zip(&blocks[group * 8..group * 8 + 8]) {
-                let all = _mm512_loadu_ps(block.0.as_ptr());
-                *lanes = _mm256_add_ps(_mm512_castps512_ps256(all), _mm512_extractf32x8_ps::<1>(all));
+            for (lanes, Lanes512(all)) in folded.iter_mut().zip(&blocks[group * 8..group * 8 + 8]) {
+                *lanes = _mm256_add_ps(_mm512_castps512_ps256(*all), _mm512_extractf32x8_ps::<1>(*all));
             }
             _mm256_storeu_ps(sums.as_mut_ptr(), totals_of_eight(folded));
         }
@@ -84,9 +83,9 @@ impl InstructionSet for Avx512 {
     }
 
     #[inline(always)]
-    fn totals(self, blocks: &[Block; 16]) -> [f32; 16] {
+    fn totals(self, lanes: [Lanes512; 16], _: usize, _: &mut [Block; 16]) -> [f32; 16] {
         // SAFETY: `self` proves that the machine has AVX-512 (foundation, DQ) and AVX2.
-        unsafe { totals(blocks) }
+        unsafe { totals(lanes) }
     }
 }
 

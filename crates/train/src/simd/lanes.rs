@@ -39,8 +39,10 @@ pub(crate) trait InstructionSet: Copy {
     /// Returns the mask of a part whose lanes are the bits of a block, as [`Lanes::bits`] gives them.
     fn mask(self, bits: u16, part: usize) -> <Self::Lanes as Lanes>::Mask;
 
-    /// Returns the sum of each block. Lanes that are 8, then 1, 2 and 4 apart are added in turn.
-    fn totals(self, blocks: &[Block; 16]) -> [f32; 16];
+    /// Returns the sums of sixteen blocks, whose parts come one after another: the sums with the
+    /// last part, any values before it. `kept` holds the parts that came. Lanes that are 8, then 1,
+    /// 2 and 4 apart are added in turn.
+    fn totals(self, lanes: [Self::Lanes; 16], part: usize, kept: &mut [Block; 16]) -> [f32; 16];
 }
 
 /// The lanes of one register.

@@ -34,8 +34,8 @@ impl InstructionSet for Plain {
     }
 
     #[inline(always)]
-    fn totals(self, blocks: &[Block; 16]) -> [f32; 16] {
-        blocks.each_ref().map(total)
+    fn totals(self, lanes: [PlainLanes; 16], _: usize, _: &mut [Block; 16]) -> [f32; 16] {
+        lanes.map(|lanes| total(&Block(lanes.0)))
     }
 }
 
