@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """How well the mesh of trained splats shows one building: a simulated town, one of its buildings, through the whole chain.
 
-For each seed, `skysweep simulate --flight` makes a town without trees (masks of a city model do not know trees) and
-pictures from all around. The building is the one nearest to the middle of the town. `skysweep priors` makes the maps of
+For each seed, `skysweep simulate --flight` makes a town without trees on level ground, and pictures from all around.
+Masks of a city model know neither trees nor terrain: walls of an LoD2 reach below sloping ground, and nothing hides them. The building is the one nearest to the middle of the town. `skysweep priors` makes the maps of
 its LoD2, without chimneys and dormers; the other buildings only hide it. `skysweep train` makes splats of it alone with
 the priors, of it alone without them, and of the whole scene from the points of a reconstruction, which is plain 2DGS.
 `skysweep mesh` makes the mesh of each under the masks of the building.
@@ -126,7 +126,7 @@ def made(program, work, seed):
     """The town, the dataset of its building and the truth of it."""
     work.mkdir(parents=True, exist_ok=True)
     template = subprocess.run([program, "simulate", "town", "--template"], check=True, capture_output=True, text=True).stdout
-    for key, value in [("trees_per_ha", 0.0), ("size_m", float(SIZE_M)), ("gsd_m", 1.0), ("views", 2), ("seed", seed)]:
+    for key, value in [("trees_per_ha", 0.0), ("relief_m", 0.0), ("size_m", float(SIZE_M)), ("gsd_m", 1.0), ("views", 2), ("seed", seed)]:
         template, count = re.subn(rf"(?m)^{key} = .*", f"{key} = {value}", template)
         assert count == 1, key
     (work / "in.toml").write_text(template)
@@ -176,7 +176,7 @@ def judged(program, work, seed, name, out):
 def table(rows, seeds):
     out = [
         "# The mesh of one building\n",
-        f"Written by `benches/splats/building.py`: simulated towns of {SIZE_M} m without trees, {CAMERAS} pictures of {640 // SHRINK} × {480 // SHRINK} pixels",
+        f"Written by `benches/splats/building.py`: simulated towns of {SIZE_M} m without trees on level ground, {CAMERAS} pictures of {640 // SHRINK} × {480 // SHRINK} pixels",
         "from all around (0.2 to 0.4 m a pixel), the building nearest to the middle, of which the model is the exact LoD2 without",
         f"chimneys and dormers; {ITERATIONS} iterations, at most 20,000 splats (100,000 of the whole scene), voxels of {VOXEL_M} m. The truth is the exact surface of the building with its details, where a",
         f"camera sees it, one point in each cube of {TRUTH_SPACING_M} m. The Chamfer distance is half the sum of both mean distances, over",

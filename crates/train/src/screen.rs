@@ -123,8 +123,9 @@ impl Plane {
     /// Returns whether the least footprint may reach beyond the ellipse somewhere.
     ///
     /// Within the ellipse |(u, v)| ≤ c = √cutoff, so that r = 1 + ζ·(u, v) ≤ 1 + |ζ| c. Where the
-    /// greatest singular value of A times that is at most √2, u² + v² ≤ 2 |offset|² in the ellipse,
-    /// and the circle 2 |offset|² ≤ cutoff lies within it. With |ζ| c < 1 it lies before the camera.
+    /// greatest singular value of A times that is at most √2, u² + v² ≤ 2 |offset|² in the
+    /// ellipse, and the circle 2 |offset|² ≤ cutoff lies within it. With |ζ| c < 1 it lies before
+    /// the camera.
     fn is_fine(&self, cutoff: f64, perspective: bool) -> bool {
         let [[a0, b0], [a1, b1]] = self.inverse;
         let (squares, determinant) = (a0 * a0 + b0 * b0 + a1 * a1 + b1 * b1, a0 * b1 - b0 * a1);

@@ -151,8 +151,8 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
         order[place]
     }
 
-    /// Steps down the gradient of the surfels that were drawn. `modelled` is the share of the pixels
-    /// that the colours are compared at.
+    /// Steps down the gradient of the surfels that were drawn. `modelled` is the share of the
+    /// pixels that the colours are compared at.
     fn descend(&mut self, size: [usize; 2], modelled: f32) {
         let rates = self.rates();
         let scales = SCALE_RANGE.map(|s| (s * self.extent_m).ln() as f32);

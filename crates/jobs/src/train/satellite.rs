@@ -174,8 +174,8 @@ impl PlacedSurfels {
         LatticeView::new(lattice, pixels, [0.0, 0.0, -1.0], size.map(|s| s * side))
     }
 
-    /// Returns the heights of splats at the cells of a grid, metres above the ellipsoid: the medians
-    /// of places within each cell. A cell where splats cover no place by half is NaN.
+    /// Returns the heights of splats at the cells of a grid, metres above the ellipsoid: the
+    /// medians of places within each cell. A cell where splats cover no place by half is NaN.
     ///
     /// The depth of a pixel is a mean over splats, which lies between roof and ground at a wall.
     pub(super) fn heights(&self, surfels: &[Surfel], surface: &MapSurface) -> Option<Grid<f32>> {

@@ -36,7 +36,8 @@ pub(crate) trait InstructionSet: Copy {
     /// Asks for memory that is read soon.
     fn prefetch<T>(self, soon: &T);
 
-    /// Returns the mask of a part whose lanes are the bits of a block, as [`Lanes::bits`] gives them.
+    /// Returns the mask of a part whose lanes are the bits of a block, as [`Lanes::bits`] gives
+    /// them.
     fn mask(self, bits: u16, part: usize) -> <Self::Lanes as Lanes>::Mask;
 
     /// Returns the sums of sixteen blocks, whose parts come one after another: the sums with the
