@@ -122,11 +122,11 @@ def cut_out(cloud, footprint, out):
     out.write_bytes(header.encode() + kept)
 
 
-def made(program, work, seed):
+def made(program, work, seed, relief_m):
     """The town, the dataset of its building and the truth of it."""
     work.mkdir(parents=True, exist_ok=True)
     template = subprocess.run([program, "simulate", "town", "--template"], check=True, capture_output=True, text=True).stdout
-    for key, value in [("trees_per_ha", 0.0), ("relief_m", 0.0), ("size_m", float(SIZE_M)), ("gsd_m", 1.0), ("views", 2), ("seed", seed)]:
+    for key, value in [("trees_per_ha", 0.0), ("relief_m", relief_m), ("size_m", float(SIZE_M)), ("gsd_m", 1.0), ("views", 2), ("seed", seed)]:
         template, count = re.subn(rf"(?m)^{key} = .*", f"{key} = {value}", template)
         assert count == 1, key
     (work / "in.toml").write_text(template)
@@ -140,8 +140,8 @@ def made(program, work, seed):
     return scene
 
 
-def measure(program, work, seed, names):
-    scene = made(program, work, seed)
+def measure(program, work, seed, names, relief_m):
+    scene = made(program, work, seed, relief_m)
     rows = []
     for name, dataset, priors, budget in SETTINGS:
         if names and name not in names:
@@ -197,12 +197,14 @@ def main():
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--work", type=pathlib.Path)
+    parser.add_argument("--relief", type=float, default=0.0, help="relief of the ground, metres (6.5 in the preset)")
     parser.add_argument("--only", nargs="+", help="names of settings; no results are written then")
     args = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in args.seeds:
-            rows += measure(args.program.resolve(), (args.work or pathlib.Path(folder)) / str(seed), seed, args.only)
+            rows += measure(args.program.resolve(), (args.work or pathlib.Path(folder)) / str(seed), seed, args.only,
+                            args.relief)
     if args.only:
         return
     RESULTS.mkdir(exist_ok=True)
