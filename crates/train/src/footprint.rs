@@ -104,7 +104,7 @@ impl<L: Lanes> Brush<L> {
         let fraction_x = isa.splat((whole[0] - centre[0]) as f32);
         let fraction_y = isa.splat((whole[1] - centre[1]) as f32);
         let side = isa.splat(BLOCK_SIDE as f32);
-        for part in 0..I::PARTS {
+        for (part, within) in within.iter_mut().enumerate().take(I::PARTS) {
             let (column, row) = (isa.load(&COLUMNS, part), isa.load(&ROWS, part));
             let dx = column.add(blocks_x).mul_add(side, fraction_x);
             let dy = row.add(blocks_y).mul_add(side, fraction_y);
@@ -112,7 +112,7 @@ impl<L: Lanes> Brush<L> {
             dy.store(&mut offsets[1], part);
             a0.mul_add(dx, b0.mul(dy)).store(&mut origins[0], part);
             a1.mul_add(dx, b1.mul(dy)).store(&mut origins[1], part);
-            within[part] = [a0.mul_add(column, b0.mul(row)), a1.mul_add(column, b1.mul(row))];
+            *within = [a0.mul_add(column, b0.mul(row)), a1.mul_add(column, b1.mul(row))];
         }
         Self {
             offsets,

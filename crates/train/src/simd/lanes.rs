@@ -103,7 +103,7 @@ pub(crate) fn exp2<I: InstructionSet>(isa: I, x: I::Lanes) -> I::Lanes {
     let shifted = x.add(shifter);
     let f = x.sub(shifted.sub(shifter));
     let mut p = isa.splat(1.326_473_7e-3);
-    for c in [9.671_517e-3, 5.550_733_6e-2, 0.240_222_42, 0.693_147, 1.0] {
+    for c in [9.671_517e-3, 5.550_733_6e-2, 0.240_222_42, 0.693_147_06, 1.0] {
         p = p.mul_add(f, isa.splat(c));
     }
     p.scaled(shifted)
