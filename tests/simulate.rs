@@ -261,11 +261,12 @@ fn a_flight_sees_the_buildings_and_its_points_lie_on_them() {
     let (median, most) = near("flight_surface.ply");
     assert!(median < 0.2 && most < 0.5, "{median} {most}");
     assert!(near("flight_buildings.ply").1 > most, "buildings are a part of the surface");
-    skysweep()
-        .args(SMALL)
-        .args(["--flight", "2", "--flight-arc", "0", "400", "-o"])
-        .arg(folder.path().join("x"))
-        .assert()
-        .code(2)
-        .stderr(predicate::str::contains("arc of the flight is 400"));
+    for (setting, named) in [
+        (&["--flight-arc", "0", "400"][..], "arc of the flight is 400"),
+        (&["--flight-spacing", "0"], "spacing of the exact surface is 0"),
+    ] {
+        let mut command = skysweep();
+        command.args(SMALL).args(["--flight", "2"]).args(setting).arg("-o").arg(folder.path().join("x"));
+        command.assert().code(2).stderr(predicate::str::contains(named));
+    }
 }

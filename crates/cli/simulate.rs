@@ -53,6 +53,9 @@ pub(crate) struct Args {
     /// truth/cameras: a COLMAP model on the map of the scene, with origin.json.
     #[arg(long, value_name = "FOLDER")]
     cameras: Option<PathBuf>,
+    /// Spacing of the points of the exact surface that the flight sees, metres.
+    #[arg(long, value_name = "METRES", default_value_t = 0.2, requires = "flight")]
+    flight_spacing: f64,
     /// Folder for the images and the truth.
     #[arg(short, long, value_name = "DIR", required_unless_present_any = ["list", "template"])]
     output: Option<PathBuf>,
@@ -110,6 +113,7 @@ fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> 
     config.cameras.clone_from(&args.cameras);
     config.flight = args.flight;
     config.flight_arc_deg = args.flight_arc.first_chunk().copied();
+    config.flight_spacing_m = args.flight_spacing;
     config.overwrite = args.overwrite;
     let show = ShowOptions { progress: args.progress, json: false };
     let report = show.watch(global, output, |watcher| jobs::simulate::run(&config, watcher)).map_err(|error| {

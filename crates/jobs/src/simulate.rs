@@ -43,7 +43,7 @@ const FLIGHT: &str = "cameras/sparse/0";
 const PICTURES: &str = "cameras/images";
 /// The clouds of what a flight sees: everything, and the buildings.
 const CLOUDS: [&str; 2] = ["truth/flight_surface.ply", "truth/flight_buildings.ply"];
-/// Edge of the cubes that hold one point of these clouds each, metres.
+/// Spacing of their points unless another is asked for, metres.
 const CLOUD_SPACING_M: f64 = 0.2;
 
 /// A scene to be simulated and the folder for it.
@@ -63,6 +63,9 @@ pub struct SimulateConfig {
     /// Azimuths between which the perspective cameras stand, degrees clockwise from north; all
     /// around when `None`.
     pub flight_arc_deg: Option<[f64; 2]>,
+    /// Edge of the cubes that hold one point of the exact surface each, metres. Distances of a mesh
+    /// from the cloud are too large by about half of it.
+    pub flight_spacing_m: f64,
     /// Worker threads; one per core when `None`.
     pub threads: Option<usize>,
     /// Whether the files of an earlier simulation may be replaced.
@@ -135,16 +138,30 @@ impl SimulateReport {
 impl SimulateConfig {
     /// A simulation of `scene` without a flight, in a folder that is empty.
     pub fn new(scene: SimulationConfig, output: PathBuf) -> Self {
-        Self { scene, output, cameras: None, flight: 0, flight_arc_deg: None, threads: None, overwrite: false }
+        Self {
+            scene,
+            output,
+            cameras: None,
+            flight: 0,
+            flight_arc_deg: None,
+            flight_spacing_m: CLOUD_SPACING_M,
+            threads: None,
+            overwrite: false,
+        }
     }
 
     /// Checks the parameters of the scene and the flight.
     ///
     /// # Errors
-    /// [`SimulateJobError::Scene`]; [`SimulateJobError::Job`] for an arc out of range.
+    /// [`SimulateJobError::Scene`]; [`SimulateJobError::Job`] for an arc or a spacing out
+    /// of range.
     pub fn validate(&self) -> Result<(), SimulateJobError> {
         if let Some(end) = self.flight_arc_deg.iter().flatten().find(|end| !(-360.0..=360.0).contains(*end)) {
             return Err(SettingError::new("an end of the arc of the flight", *end, "-360 to 360").into());
+        }
+        if !(0.01..=100.0).contains(&self.flight_spacing_m) {
+            let found = self.flight_spacing_m;
+            return Err(SettingError::new("the spacing of the exact surface", found, "0.01 to 100 metres").into());
         }
         Ok(self.scene.validate()?)
     }
@@ -312,7 +329,7 @@ impl SceneWriter<'_> {
             write_png_gray(self.folder.join(PICTURES).join(picture_name(id)), &picture, self.overwrite)
                 .map_err(FileError::write)?;
         }
-        self.write_clouds(&flight)
+        self.write_clouds(&flight, config.flight_spacing_m)
     }
 
     fn write_exact_views(&self, cameras: &Path, progress: &dyn Progress) -> Result<(), SimulateJobError> {
@@ -341,8 +358,8 @@ impl SceneWriter<'_> {
         Ok(())
     }
 
-    fn write_clouds(&self, flight: &Flight) -> Result<(), SimulateJobError> {
-        let surface = self.simulation.flight_surface(flight, CLOUD_SPACING_M);
+    fn write_clouds(&self, flight: &Flight, spacing_m: f64) -> Result<(), SimulateJobError> {
+        let surface = self.simulation.flight_surface(flight, spacing_m);
         let origin = surface.first().map_or([0.0; 3], |point| point.position.map(f64::floor));
         let [x, y, z] = origin;
         let comments = [format!("origin {x} {y} {z}"), format!("crs EPSG:{}", self.simulation.truth.epsg)];

@@ -115,6 +115,12 @@ impl Arrangement {
         self.tile_starts[tile] as usize..self.tile_starts[tile + 1] as usize
     }
 
+    /// Returns the entries of a splat, which has none where it is not drawn or does not exist.
+    pub(crate) fn places_from(&self, number: usize) -> &[u32] {
+        let is_drawn = self.splats.get(number).is_some_and(ScreenSplat::is_drawn);
+        if is_drawn { self.places_of(number) } else { &[] }
+    }
+
     /// Returns the entries of a splat that is drawn.
     pub(crate) fn places_of(&self, number: usize) -> &[u32] {
         let TileRectangle { left, right, top, bottom, first_place } = self.rectangles[number];

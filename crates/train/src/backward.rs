@@ -8,7 +8,7 @@
 use crate::footprint::{BLOCKS, Brush, Footprint, GREATEST_ALPHA};
 use crate::forward::{AHEAD, TileTask};
 use crate::screen::{ScreenGradient, ScreenSplat};
-use crate::simd::{Block, InstructionSet, LANES, Lanes};
+use crate::simd::{Block, InstructionSet, Lanes, total};
 
 /// Gradients by the sums of a block, and what the pass keeps for each pixel.
 #[derive(Debug, Clone, Copy)]
@@ -16,8 +16,6 @@ use crate::simd::{Block, InstructionSet, LANES, Lanes};
 pub(crate) struct BlockGradients {
     /// Transmittance behind the entries that are still to come.
     pub(crate) transmittance: Block,
-    /// Number of the last entry that was drawn; −1 for none.
-    pub(crate) last: Block,
     /// Σ wⱼ fⱼ of the entries behind.
     pub(crate) rest: Block,
     pub(crate) colour: [Block; 3],
@@ -30,10 +28,8 @@ pub(crate) struct BlockGradients {
 pub(crate) type TileGradients = [BlockGradients; BLOCKS];
 
 impl BlockGradients {
-    /// Pixels that take no gradient, as nothing is drawn there.
-    pub(crate) const NONE: Self = Self {
+    pub(crate) const ZERO: Self = Self {
         transmittance: Block::ZERO,
-        last: Block([-1.0; LANES]),
         rest: Block::ZERO,
         colour: [Block::ZERO; 3],
         normal: [Block::ZERO; 3],
@@ -41,16 +37,24 @@ impl BlockGradients {
     };
 }
 
+/// Sums over the pixels of an entry, lane by lane. With u and v the position in the plane, s the
+/// gradient α ∂L/∂α, t that by 1 / r (perspective) or by the depth (affine):
+/// Σ s u², Σ s u v, Σ s v², Σ t u, Σ t v, Σ r s u, Σ r s v, Σ r t, then the slots of a
+/// [`ScreenGradient`] from the depth on.
+type EntrySums<L> = [L; 16];
+
 /// Computes the gradient of every entry that was drawn. Those of others are left as they are.
+/// `masks` and `drawn` are what the forward pass wrote.
 #[inline(always)]
 pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool>(
     isa: I,
     task: &TileTask<'_>,
     masks: &[u16],
+    mut drawn: &[u16],
     pixels: &mut TileGradients,
     out: &mut [ScreenGradient],
 ) {
-    let mut sums = [Block::ZERO; 16];
+    let mut kept = [Block::ZERO; 16];
     for (number, ((&entry, &mask), out)) in task.entries.iter().zip(masks).zip(out).enumerate().rev() {
         if let Some(soon) = number.checked_sub(AHEAD) {
             isa.prefetch(&task.splats[task.entries[soon] as usize]);
@@ -58,56 +62,86 @@ pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool>(
         if mask == 0 {
             continue;
         }
+        let (before, own) = drawn.split_at(drawn.len() - mask.count_ones() as usize);
+        drawn = before;
         let splat = &task.splats[entry as usize];
         let brush = Brush::new(isa, splat, task.origin, task.reference_depth);
+        // The gradient by the centre of the least footprint.
+        let (mut sums, mut centre) = ([0.0; 16], [Block::ZERO; 2]);
         for part in 0..I::PARTS {
-            let mut total = [isa.splat(0.0); 16];
+            let (mut total, mut by_centre) = ([isa.splat(0.0); 16], [isa.splat(0.0); 2]);
             let mut left = u32::from(mask);
-            while left != 0 {
+            for &bits in own {
                 let block = left.trailing_zeros() as usize % BLOCKS;
                 left &= left - 1;
-                spread_block::<I, PERSPECTIVE>(isa, &brush, splat, number, block, part, pixels, &mut total);
+                let drawn = isa.mask(bits, part);
+                if I::PARTS > 1 && !I::Lanes::any(drawn) {
+                    continue;
+                }
+                let (pixels, total) = (&mut pixels[block], &mut total);
+                if splat.is_fine {
+                    let at = brush.at::<I, PERSPECTIVE, true>(isa, block, part);
+                    let strength = spread_block::<I, PERSPECTIVE>(isa, &brush, splat, &at, drawn, part, pixels, total);
+                    if let Some((offset, least)) = at.least(drawn) {
+                        // ρ = 2 |offset|², and the offset falls as the centre moves.
+                        let pull = strength.add(strength).only(least);
+                        let ([dx, dy], [by_x, by_y]) = (offset, by_centre);
+                        by_centre = [dx.mul_add(pull, by_x), dy.mul_add(pull, by_y)];
+                    }
+                } else {
+                    let at = brush.at::<I, PERSPECTIVE, false>(isa, block, part);
+                    spread_block::<I, PERSPECTIVE>(isa, &brush, splat, &at, drawn, part, pixels, total);
+                }
             }
-            for (sum, lanes) in sums.iter_mut().zip(total) {
-                lanes.store(sum, part);
+            sums = isa.totals(total, part, &mut kept);
+            if splat.is_fine {
+                by_centre[0].store(&mut centre[0], part);
+                by_centre[1].store(&mut centre[1], part);
             }
         }
-        *out = isa.totals(&sums);
+        let centre = if splat.is_fine { [total(&centre[0]), total(&centre[1])] } else { [0.0; 2] };
+        *out = gathered(splat, sums, centre);
     }
 }
 
-/// Adds the gradient of a splat at a part of a block.
+/// Returns the gradient of an entry from its sums.
+#[inline(always)]
+fn gathered(splat: &ScreenSplat, mut sums: [f32; 16], centre: [f32; 2]) -> ScreenGradient {
+    let [a0, b0, a1, b1] = splat.inverse;
+    // ∂L/∂p; the offset from the centre falls as the centre moves.
+    let by_p = [0, 1].map(|k| splat.slopes[k].mul_add(sums[7], -sums[5 + k]));
+    sums[5] = a1.mul_add(-by_p[1], a0.mul_add(-by_p[0], centre[0]));
+    sums[6] = b1.mul_add(-by_p[1], b0.mul_add(-by_p[0], centre[1]));
+    sums
+}
+
+/// Adds the gradient of a splat at a part of a block. Returns α ∂L/∂α.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "registers are passed one by one")]
 fn spread_block<I: InstructionSet, const PERSPECTIVE: bool>(
     isa: I,
     brush: &Brush<I::Lanes>,
     splat: &ScreenSplat,
-    number: usize,
-    block: usize,
+    at: &Footprint<I::Lanes>,
+    drawn: <I::Lanes as Lanes>::Mask,
     part: usize,
-    pixels: &mut TileGradients,
-    total: &mut [I::Lanes; 16],
-) {
-    let pixels = &mut pixels[block];
-    let at = brush.at::<I, PERSPECTIVE>(isa, block, part);
-    let before_end = isa.splat(number as f32).at_most(isa.load(&pixels.last, part));
-    let drawn = I::Lanes::both(at.drawn, before_end);
-    if !I::Lanes::any(drawn) {
-        return;
-    }
-    let gaussian = at.gaussian(isa);
-    let unbounded = brush.opacity.mul(gaussian);
-    let alpha = unbounded.min(isa.splat(GREATEST_ALPHA)).only(drawn);
+    pixels: &mut BlockGradients,
+    total: &mut EntrySums<I::Lanes>,
+) -> I::Lanes {
+    let unbounded = brush.alpha(isa, at);
+    let greatest = isa.splat(GREATEST_ALPHA);
+    let alpha = unbounded.min(greatest).only(drawn);
     let one = isa.splat(1.0);
     let inverse = one.div(one.sub(alpha));
     let before = isa.load(&pixels.transmittance, part).mul(inverse);
     let weight = before.mul(alpha);
     before.store(&mut pixels.transmittance, part);
 
-    let depth = brush.depth::<I, PERSPECTIVE>(isa, &at);
-    let [by_sum, by_first, by_second] = [0, 1, 2].map(|i| isa.load(&pixels.moments[i], part));
-    let mut value = depth.mul_add(depth.mul_add(by_second, by_first), by_sum);
+    let depth = brush.depth::<PERSPECTIVE>(at);
+    let [by_sum, by_first, by_second] = &pixels.moments;
+    let (by_sum, by_first, by_second) = (isa.load(by_sum, part), isa.load(by_first, part), isa.load(by_second, part));
+    let slope = depth.mul_add(by_second, by_first);
+    let mut value = depth.mul_add(slope, by_sum);
     for i in 0..3 {
         let (by_colour, by_normal) = (isa.load(&pixels.colour[i], part), isa.load(&pixels.normal[i], part));
         total[10 + i] = weight.mul_add(by_colour, total[10 + i]);
@@ -119,11 +153,12 @@ fn spread_block<I: InstructionSet, const PERSPECTIVE: bool>(
     weight.mul_add(value, rest).store(&mut pixels.rest, part);
 
     // The opacity does not change where it is at its bound.
-    let changes = I::Lanes::both(drawn, unbounded.at_most(isa.splat(GREATEST_ALPHA)));
-    let by_alpha = rest.neg_mul_add(inverse, before.mul(value)).only(changes);
-    let by_depth = weight.mul(depth.add(depth).mul_add(by_second, by_first));
-    total[9] = gaussian.mul_add(by_alpha, total[9]);
-    add_plane::<I, PERSPECTIVE>(isa, brush, &at, alpha.mul(by_alpha), by_depth, total);
+    let by_alpha = rest.neg_mul_add(inverse, before.mul(value));
+    let strength = alpha.mul(by_alpha).only(unbounded.at_most(greatest));
+    total[9] = total[9].add(strength);
+    let by_depth = weight.mul(depth.mul_add(by_second, slope));
+    add_plane::<I, PERSPECTIVE>(isa, brush, at, strength, by_depth, total);
+    strength
 }
 
 /// Adds the gradient by position and shape. `strength` is α ∂L/∂α, so that ∂L/∂ρ is −½ of it.
@@ -134,39 +169,33 @@ fn add_plane<I: InstructionSet, const PERSPECTIVE: bool>(
     at: &Footprint<I::Lanes>,
     strength: I::Lanes,
     by_depth: I::Lanes,
-    total: &mut [I::Lanes; 16],
+    total: &mut EntrySums<I::Lanes>,
 ) {
     let zero = isa.splat(0.0);
-    let Footprint { dx, dy, p, r, uv, .. } = *at;
-    let on_plane = |lanes: I::Lanes| zero.or_else(at.low_pass, lanes);
-    // ∂L/∂u = −strength · u.
-    let (pull, by_depth_on_plane) = (on_plane(strength), on_plane(by_depth));
-    let by_p = if PERSPECTIVE {
-        let scaled = by_depth_on_plane.mul(r);
-        total[8] = total[8].add(by_depth.or_else(at.low_pass, scaled));
-        // −∂L/∂(1/r), from the position in the plane and from the depth.
-        let by_ratio = r.mul(pull.neg_mul_add(at.in_plane, scaled.mul(brush.depth)));
-        total[4] = p[0].mul_add(by_ratio, total[4]);
-        total[5] = p[1].mul_add(by_ratio, total[5]);
-        let pulled = pull.mul(r);
-        [0, 1].map(|k| uv[k].neg_mul_add(pulled, brush.slopes[k].mul(by_ratio)))
+    let [u, v] = at.uv;
+    // ∂L/∂u = −pull · u.
+    let pull = at.on_plane(strength, zero);
+    let (pull_u, pull_v) = (pull.mul(u), pull.mul(v));
+    total[0] = pull_u.mul_add(u, total[0]);
+    total[1] = pull_u.mul_add(v, total[1]);
+    total[2] = pull_v.mul_add(v, total[2]);
+    let turn = if PERSPECTIVE {
+        let scaled = by_depth.mul(at.r);
+        total[8] = total[8].add(at.on_plane(scaled, by_depth));
+        total[5] = pull_u.mul_add(at.r, total[5]);
+        total[6] = pull_v.mul_add(at.r, total[6]);
+        // −∂L/∂(1/r) / r, from the position in the plane and from the depth.
+        let turn = pull.neg_mul_add(at.in_plane, at.on_plane(scaled.mul(brush.depth), zero));
+        total[7] = turn.mul_add(at.r, total[7]);
+        turn
     } else {
         total[8] = total[8].add(by_depth);
-        total[4] = uv[0].mul_add(by_depth_on_plane, total[4]);
-        total[5] = uv[1].mul_add(by_depth_on_plane, total[5]);
-        [0, 1].map(|k| uv[k].neg_mul_add(pull, brush.slopes[k].mul(by_depth_on_plane)))
+        total[5] = total[5].add(pull_u);
+        total[6] = total[6].add(pull_v);
+        let turn = at.on_plane(by_depth, zero);
+        total[7] = total[7].add(turn);
+        turn
     };
-    let [a0, b0, a1, b1] = brush.inverse;
-    total[0] = by_p[0].mul_add(dx, total[0]);
-    total[1] = by_p[0].mul_add(dy, total[1]);
-    total[2] = by_p[1].mul_add(dx, total[2]);
-    total[3] = by_p[1].mul_add(dy, total[3]);
-    total[6] = by_p[1].neg_mul_add(a1, by_p[0].neg_mul_add(a0, total[6]));
-    total[7] = by_p[1].neg_mul_add(b1, by_p[0].neg_mul_add(b0, total[7]));
-    if I::Lanes::any(at.low_pass) {
-        // ρ = 2 |offset|², and the offset falls as the centre moves.
-        let pull = strength.add(strength).only(at.low_pass);
-        total[6] = dx.mul_add(pull, total[6]);
-        total[7] = dy.mul_add(pull, total[7]);
-    }
+    total[3] = turn.mul_add(u, total[3]);
+    total[4] = turn.mul_add(v, total[4]);
 }

@@ -6,14 +6,12 @@ use rayon::prelude::*;
 
 use crate::arrange::{Arrangement, TILE};
 use crate::backward::{self, BlockGradients, TileGradients};
-use crate::footprint::{BLOCK_SIDE, BLOCKS, pixel_of};
-use crate::forward::{self, BlockSums, TileSums, TileTask};
+use crate::footprint::BLOCKS;
+use crate::forward::{self, BlockSums, DrawnTile, TileSums, TileTask};
 use crate::image::SurfelImages;
+use crate::planes::{IMAGES, TileImages, read_tile, write_tile};
 use crate::screen::ScreenGradient;
-use crate::simd::{Block, InstructionSet, Kernel, LANES, Registers, dispatch};
-
-/// Images that are written: those of the drawing and those that its gradient needs.
-const PLANES: usize = 12;
+use crate::simd::{Block, InstructionSet, Kernel, Lanes, Registers, dispatch};
 
 /// What the forward pass leaves.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,39 +19,51 @@ pub(crate) struct Painted {
     pub(crate) images: SurfelImages,
     /// Blocks in which each entry was drawn.
     pub(crate) masks: Vec<u16>,
-    /// Σ wᵢ mᵢ², by rows.
-    second_moment: Vec<f32>,
-    /// Number of the last entry of a pixel, by rows.
-    last: Vec<f32>,
-    /// Π (1 − αᵢ), by rows. The coverage would have lost its digits.
-    transmittance: Vec<f32>,
+    /// Pixels of each of these blocks, one bit each, in the order of the entries: by rows of tiles.
+    pixels: Vec<Vec<u16>>,
+    /// End of the pixels of each tile in its row.
+    pixel_ends: Vec<u32>,
+    /// Sums of each tile.
+    ends: Vec<TileEnd>,
 }
+
+/// Transmittance and both moments of the blocks of a tile. The images would have lost their digits.
+type TileEnd = [[Block; 3]; BLOCKS];
 
 impl Painted {
     /// Draws what was arranged. Returns the number of pairs of a splat and a pixel.
     pub(crate) fn paint(&mut self, arrangement: &Arrangement, perspective: bool, registers: Registers) -> u64 {
         self.images.resize(arrangement.size);
-        let pixels = arrangement.size[0] * arrangement.size[1];
-        for plane in [&mut self.second_moment, &mut self.last, &mut self.transmittance] {
-            plane.resize(pixels, 0.0);
-        }
+        let [across, down] = arrangement.tiles;
         self.masks.clear();
         self.masks.resize(arrangement.entries.len(), 0);
-        if pixels == 0 {
+        self.pixels.resize(down, Vec::new());
+        self.pixel_ends.resize(across * down, 0);
+        self.ends.resize(across * down, [[Block::ZERO; 3]; BLOCKS]);
+        if across * down == 0 {
             return 0;
         }
-        let planes = self.images.planes_mut().into_iter().chain([
-            &mut self.second_moment,
-            &mut self.last,
-            &mut self.transmittance,
-        ]);
-        let planes = bands_of(planes, arrangement.size[0] * TILE);
+        let planes = bands_of(self.images.planes_mut().into_iter(), arrangement.size[0] * TILE);
         let masks = by_rows(arrangement, &mut self.masks);
-        let work: Vec<_> = planes.into_iter().zip(masks).enumerate().collect();
+        let tiles = self.ends.chunks_mut(across).zip(self.pixel_ends.chunks_mut(across)).zip(&mut self.pixels);
+        let work: Vec<_> = planes.into_iter().zip(masks).zip(tiles).enumerate().collect();
         let pairs = work.into_par_iter().map_init(
-            || Box::new([BlockSums::EMPTY; BLOCKS]),
-            |sums, (row, (planes, masks))| {
-                dispatch(registers, ForwardBand { arrangement, row, perspective, planes, masks, sums })
+            || Box::new(([BlockSums::EMPTY; BLOCKS], [[Block::ZERO; IMAGES]; BLOCKS])),
+            |scratch, (row, ((planes, masks), ((ends, pixel_ends), pixels)))| {
+                let (sums, images) = &mut **scratch;
+                let band = ForwardBand {
+                    arrangement,
+                    row,
+                    perspective,
+                    planes,
+                    masks,
+                    pixels,
+                    pixel_ends,
+                    ends,
+                    sums,
+                    images,
+                };
+                dispatch(registers, band)
             },
         );
         pairs.sum()
@@ -70,9 +80,12 @@ impl Painted {
     ) {
         let work: Vec<_> = by_rows(arrangement, by_entry).into_iter().enumerate().collect();
         work.into_par_iter().for_each_init(
-            || Box::new([BlockGradients::NONE; BLOCKS]),
-            |pixels, (row, out)| {
-                let band = BackwardBand { arrangement, painted: self, by_images, row, perspective, pixels, out };
+            || Box::new(([BlockGradients::ZERO; BLOCKS], [[Block::ZERO; IMAGES]; BLOCKS])),
+            |scratch, (row, out)| {
+                let (gradients, images) = &mut **scratch;
+                let planes = by_images.planes();
+                let band =
+                    BackwardBand { arrangement, painted: self, planes, row, perspective, gradients, images, out };
                 dispatch(registers, band);
             },
         );
@@ -124,39 +137,19 @@ fn task(arrangement: &Arrangement, row: usize, column: usize) -> (TileTask<'_>, 
     (task, entries.start - before..entries.end - before)
 }
 
-/// Calls `visit` for the rows of a block, as far as they lie in the image: pixels in the row of
-/// tiles, and lanes.
-#[inline(always)]
-fn for_rows(task: &TileTask<'_>, block: usize, mut visit: impl FnMut(Range<usize>, Range<usize>)) {
-    let [column, row] = pixel_of(block, 0);
-    let x = task.origin[0] + column;
-    let count = task.size[0].saturating_sub(x).min(BLOCK_SIDE);
-    for line in 0..task.size[1].saturating_sub(task.origin[1] + row).min(BLOCK_SIDE) {
-        let at = (row + line) * task.size[0] + x;
-        if count > 0 {
-            visit(at..at + count, line * BLOCK_SIDE..line * BLOCK_SIDE + count);
-        }
-    }
-}
-
-/// Copies a row of a block, which is mostly whole.
-#[inline(always)]
-fn copy_row(to: &mut [f32], from: &[f32]) {
-    match (<&mut [f32; BLOCK_SIDE]>::try_from(&mut *to), <&[f32; BLOCK_SIDE]>::try_from(from)) {
-        (Ok(to), Ok(from)) => *to = *from,
-        _ => to.copy_from_slice(from),
-    }
-}
-
 /// Draws a row of tiles.
 struct ForwardBand<'a> {
     arrangement: &'a Arrangement,
     row: usize,
     perspective: bool,
-    /// The nine images, the second moment, the last entry and the transmittance.
+    /// The row in all images.
     planes: Vec<&'a mut [f32]>,
     masks: &'a mut [u16],
+    pixels: &'a mut Vec<u16>,
+    pixel_ends: &'a mut [u32],
+    ends: &'a mut [TileEnd],
     sums: &'a mut TileSums,
+    images: &'a mut TileImages,
 }
 
 impl Kernel for ForwardBand<'_> {
@@ -164,45 +157,41 @@ impl Kernel for ForwardBand<'_> {
     type Output = u64;
 
     #[inline(always)]
-    fn run<I: InstructionSet>(mut self, isa: I) -> u64 {
+    fn run<I: InstructionSet>(self, isa: I) -> u64 {
+        let Self { arrangement, row, perspective, mut planes, masks, pixels, pixel_ends, ends, sums, images } = self;
         let mut pairs = 0;
-        for column in 0..self.arrangement.tiles[0] {
-            let (task, entries) = task(self.arrangement, self.row, column);
-            let masks = &mut self.masks[entries];
-            pairs += if self.perspective {
-                forward::draw::<I, true>(isa, &task, masks, self.sums)
+        let mut count = 0;
+        for column in 0..arrangement.tiles[0] {
+            let (task, entries) = task(arrangement, row, column);
+            let mut out = DrawnTile { sums, masks: &mut masks[entries], pixels, count: &mut count };
+            pairs += if perspective {
+                forward::draw::<I, true>(isa, &task, &mut out)
             } else {
-                forward::draw::<I, false>(isa, &task, masks, self.sums)
+                forward::draw::<I, false>(isa, &task, &mut out)
             };
-            self.write(&task);
+            pixel_ends[column] = count as u32;
+            finish(isa, task.reference_depth, sums, &mut ends[column], images);
+            write_tile(isa, images, task.origin[0], task.size[0], &mut planes);
         }
         pairs
     }
 }
 
-impl ForwardBand<'_> {
-    /// Writes the sums of a tile into the images.
-    #[inline(always)]
-    fn write(&mut self, task: &TileTask<'_>) {
-        for (block, sums) in self.sums.iter().enumerate() {
-            let [mut coverage, mut depth, mut distortion] = [Block::ZERO; 3];
-            let [first, second] = &sums.moments;
-            for lane in 0..LANES {
-                coverage.0[lane] = 1.0 - sums.transmittance.0[lane];
-                depth.0[lane] = task.reference_depth.mul_add(coverage.0[lane], first.0[lane]);
-                distortion.0[lane] = coverage.0[lane] * second.0[lane] - first.0[lane] * first.0[lane];
-            }
-            let [red, green, blue] = &sums.colour;
-            let [east, north, up] = &sums.normal;
-            let (last, transmittance) = (&sums.last, &sums.transmittance);
-            let from: [&Block; PLANES] =
-                [red, green, blue, &coverage, east, north, up, &depth, &distortion, second, last, transmittance];
-            for_rows(task, block, |pixels, lanes| {
-                for (plane, from) in self.planes.iter_mut().zip(from) {
-                    copy_row(&mut plane[pixels.clone()], &from.0[lanes.clone()]);
-                }
-            });
+/// Makes the images of a tile of its sums, and keeps what its gradient needs.
+#[inline(always)]
+fn finish<I: InstructionSet>(isa: I, reference_depth: f32, sums: &TileSums, end: &mut TileEnd, out: &mut TileImages) {
+    for ((sums, end), out) in sums.iter().zip(end).zip(out) {
+        let BlockSums { transmittance, colour: [red, green, blue], normal: [east, north, up], moments } = sums;
+        *end = [*transmittance, moments[0], moments[1]];
+        let (mut coverages, mut depths, mut distortions) = (Block::ZERO, Block::ZERO, Block::ZERO);
+        for part in 0..I::PARTS {
+            let (first, second) = (isa.load(&moments[0], part), isa.load(&moments[1], part));
+            let coverage = isa.splat(1.0).sub(isa.load(transmittance, part));
+            coverage.store(&mut coverages, part);
+            isa.splat(reference_depth).mul_add(coverage, first).store(&mut depths, part);
+            first.neg_mul_add(first, coverage.mul(second)).store(&mut distortions, part);
         }
+        *out = [*red, *green, *blue, coverages, *east, *north, *up, depths, distortions];
     }
 }
 
@@ -210,10 +199,12 @@ impl ForwardBand<'_> {
 struct BackwardBand<'a> {
     arrangement: &'a Arrangement,
     painted: &'a Painted,
-    by_images: &'a SurfelImages,
+    /// Gradients by all images.
+    planes: [&'a [f32]; IMAGES],
     row: usize,
     perspective: bool,
-    pixels: &'a mut TileGradients,
+    gradients: &'a mut TileGradients,
+    images: &'a mut TileImages,
     out: &'a mut [ScreenGradient],
 }
 
@@ -221,55 +212,50 @@ impl Kernel for BackwardBand<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<I: InstructionSet>(mut self, isa: I) {
-        let arrangement = self.arrangement;
-        let first = entries_of_row(arrangement, self.row).start;
+    fn run<I: InstructionSet>(self, isa: I) {
+        let Self { arrangement, painted, planes, row, perspective, gradients, images, out } = self;
+        let first = entries_of_row(arrangement, row).start;
+        let mut start = 0;
         for column in 0..arrangement.tiles[0] {
-            let (task, entries) = task(arrangement, self.row, column);
-            let masks = &self.painted.masks[first + entries.start..first + entries.end];
-            if masks.iter().all(|&mask| mask == 0) {
+            let (task, entries) = task(arrangement, row, column);
+            let tile = row * arrangement.tiles[0] + column;
+            let end = painted.pixel_ends[tile] as usize;
+            let pixels = &painted.pixels[row][start..end];
+            start = end;
+            if pixels.is_empty() {
                 continue;
             }
-            self.read(&task);
-            let out = &mut self.out[entries];
-            if self.perspective {
-                backward::spread::<I, true>(isa, &task, masks, self.pixels, out);
+            let masks = &painted.masks[first + entries.start..first + entries.end];
+            read_tile(isa, images, task.origin, task.size, &planes);
+            begin(isa, task.reference_depth, &painted.ends[tile], images, gradients);
+            let out = &mut out[entries];
+            if perspective {
+                backward::spread::<I, true>(isa, &task, masks, pixels, gradients, out);
             } else {
-                backward::spread::<I, false>(isa, &task, masks, self.pixels, out);
+                backward::spread::<I, false>(isa, &task, masks, pixels, gradients, out);
             }
         }
     }
 }
 
-impl BackwardBand<'_> {
-    /// Reads the state of a tile's pixels, and their gradients by the sums.
-    #[inline(always)]
-    fn read(&mut self, task: &TileTask<'_>) {
-        let (painted, by_images) = (self.painted, self.by_images);
-        let start = self.row * TILE * task.size[0];
-        for (block, to) in self.pixels.iter_mut().enumerate() {
-            *to = BlockGradients::NONE;
-            let [by_sum, by_first, by_second] = &mut to.moments;
-            for_rows(task, block, |pixels, lanes| {
-                let pixels = start + pixels.start..start + pixels.end;
-                let copy = |to: &mut Block, plane: &[f32]| copy_row(&mut to.0[lanes.clone()], &plane[pixels.clone()]);
-                copy(&mut to.last, &painted.last);
-                copy(&mut to.transmittance, &painted.transmittance);
-                for i in 0..3 {
-                    copy(&mut to.colour[i], &by_images.colour[i]);
-                    copy(&mut to.normal[i], &by_images.normal[i]);
-                }
-                for (at, lane) in pixels.clone().zip(lanes.clone()) {
-                    let (by_depth, by_spread) = (by_images.depth_m[at], by_images.distortion_m2[at]);
-                    let coverage = painted.images.coverage[at];
-                    let first = painted.images.depth_m[at] - task.reference_depth * coverage;
-                    by_sum.0[lane] = by_images.coverage[at]
-                        + task.reference_depth * by_depth
-                        + painted.second_moment[at] * by_spread;
-                    by_first.0[lane] = by_depth - 2.0 * first * by_spread;
-                    by_second.0[lane] = coverage * by_spread;
-                }
-            });
+/// Makes the gradients by the sums of a tile of those by its images.
+#[inline(always)]
+fn begin<I: InstructionSet>(isa: I, reference_depth: f32, end: &TileEnd, images: &TileImages, out: &mut TileGradients) {
+    for ((end, by_image), out) in end.iter().zip(images).zip(out) {
+        let [transmittances, firsts, seconds] = end;
+        let [red, green, blue, by_coverages, east, north, up, by_depths, by_distortions] = by_image;
+        out.transmittance = *transmittances;
+        out.rest = Block::ZERO;
+        out.colour = [*red, *green, *blue];
+        out.normal = [*east, *north, *up];
+        for part in 0..I::PARTS {
+            let (by_depth, by_distortion) = (isa.load(by_depths, part), isa.load(by_distortions, part));
+            let (first, second) = (isa.load(firsts, part), isa.load(seconds, part));
+            let coverage = isa.splat(1.0).sub(isa.load(transmittances, part));
+            let by_sum = isa.splat(reference_depth).mul_add(by_depth, isa.load(by_coverages, part));
+            second.mul_add(by_distortion, by_sum).store(&mut out.moments[0], part);
+            first.add(first).neg_mul_add(by_distortion, by_depth).store(&mut out.moments[1], part);
+            coverage.mul(by_distortion).store(&mut out.moments[2], part);
         }
     }
 }

@@ -16,7 +16,8 @@ pub(crate) const LEAST_TRANSMITTANCE: f32 = 1e-4;
 /// the horizon, and only the least footprint around the centre is drawn.
 const LEAST_DEPTH_RATIO: f32 = 0.05;
 
-/// Columns and rows of the pixels of a block.
+/// Columns and rows of the pixels of a block. A tile has as many blocks as a block has pixels, so
+/// that these are also the columns and rows of blocks.
 static COLUMNS: Block = Block([0., 1., 2., 3., 0., 1., 2., 3., 0., 1., 2., 3., 0., 1., 2., 3.]);
 static ROWS: Block = Block([0., 0., 0., 0., 1., 1., 1., 1., 2., 2., 2., 2., 3., 3., 3., 3.]);
 
@@ -44,36 +45,42 @@ pub(crate) fn blocks_within(splat: &ScreenSplat, tile_origin: [usize; 2]) -> u32
 
 /// A splat in the registers, for the blocks of a tile.
 pub(crate) struct Brush<L> {
-    /// Position of the centre relative to the first pixel of the tile.
-    offset: [f64; 2],
-    pub(crate) inverse: [L; 4],
+    /// Offset of the first pixel of each block from the centre, pixels.
+    offsets: [Block; 2],
+    /// A · that offset.
+    origins: [Block; 2],
+    /// A · the place of a pixel within its block, for each part.
+    within: [[L; 2]; 2],
     pub(crate) slopes: [L; 2],
     pub(crate) depth: L,
-    pub(crate) opacity: L,
+    /// Depth from which depths are measured, negative.
+    minus_reference: L,
+    /// Depth of the centre, measured from the reference depth.
+    relative_depth: L,
+    log2_opacity: L,
     cutoff: L,
-    /// Depth from which depths are measured.
-    reference_depth: L,
 }
 
 /// A splat at the pixels of a part of a block.
 pub(crate) struct Footprint<L: Lanes> {
-    /// Offset from the centre, pixels.
-    pub(crate) dx: L,
-    pub(crate) dy: L,
-    /// A · offset.
-    pub(crate) p: [L; 2],
     /// Depth of the intersection relative to that of the centre; 1 for affine cameras.
     pub(crate) r: L,
     /// Position in the plane, standard deviations.
     pub(crate) uv: [L; 2],
     /// u² + v².
     pub(crate) in_plane: L,
-    /// Where the least footprint is drawn rather than the ellipse.
-    pub(crate) low_pass: L::Mask,
-    /// Where the splat is drawn.
-    pub(crate) drawn: L::Mask,
-    /// Squared distance from the centre.
+    /// Squared distance from the centre: that in the plane or that in the image.
     rho: L,
+    /// Of splats that may be finer than the least footprint.
+    fine: Option<FineFootprint<L>>,
+}
+
+/// What the least footprint around the centre needs.
+struct FineFootprint<L: Lanes> {
+    /// Offset from the centre, pixels.
+    offset: [L; 2],
+    /// Where the ellipse is drawn rather than the least footprint.
+    on_plane: L::Mask,
 }
 
 impl<L: Lanes> Brush<L> {
@@ -84,35 +91,53 @@ impl<L: Lanes> Brush<L> {
         tile_origin: [usize; 2],
         reference_depth: f32,
     ) -> Self {
+        let [a0, b0, a1, b1] = splat.inverse;
+        // Lanes are not made in closures, which would not be compiled for the instruction set.
+        let (a0, b0, a1, b1) = (isa.splat(a0), isa.splat(b0), isa.splat(a1), isa.splat(b1));
+        let (mut offsets, mut origins) = ([Block::ZERO; 2], [Block::ZERO; 2]);
+        let mut within = [[isa.splat(0.0); 2]; 2];
+        // Whole pixels are subtracted first: no digit of the fraction is lost near the centre.
+        let centre = [0, 1].map(|i| splat.pixel[i] - tile_origin[i] as f64);
+        let whole = centre.map(f64::floor);
+        let [blocks_x, blocks_y] = whole.map(|c| (-c / BLOCK_SIDE as f64) as f32);
+        let (blocks_x, blocks_y) = (isa.splat(blocks_x), isa.splat(blocks_y));
+        let fraction_x = isa.splat((whole[0] - centre[0]) as f32);
+        let fraction_y = isa.splat((whole[1] - centre[1]) as f32);
+        let side = isa.splat(BLOCK_SIDE as f32);
+        for (part, within) in within.iter_mut().enumerate().take(I::PARTS) {
+            let (column, row) = (isa.load(&COLUMNS, part), isa.load(&ROWS, part));
+            let dx = column.add(blocks_x).mul_add(side, fraction_x);
+            let dy = row.add(blocks_y).mul_add(side, fraction_y);
+            dx.store(&mut offsets[0], part);
+            dy.store(&mut offsets[1], part);
+            a0.mul_add(dx, b0.mul(dy)).store(&mut origins[0], part);
+            a1.mul_add(dx, b1.mul(dy)).store(&mut origins[1], part);
+            *within = [a0.mul_add(column, b0.mul(row)), a1.mul_add(column, b1.mul(row))];
+        }
         Self {
-            offset: [0, 1].map(|i| splat.pixel[i] - tile_origin[i] as f64),
-            inverse: [
-                isa.splat(splat.inverse[0]),
-                isa.splat(splat.inverse[1]),
-                isa.splat(splat.inverse[2]),
-                isa.splat(splat.inverse[3]),
-            ],
+            offsets,
+            origins,
+            within,
             slopes: [isa.splat(splat.slopes[0]), isa.splat(splat.slopes[1])],
             depth: isa.splat(splat.depth),
-            opacity: isa.splat(splat.opacity),
+            minus_reference: isa.splat(-reference_depth),
+            relative_depth: isa.splat(splat.depth - reference_depth),
+            log2_opacity: isa.splat(splat.log2_opacity),
             cutoff: isa.splat(splat.cutoff),
-            reference_depth: isa.splat(reference_depth),
         }
     }
 
-    /// Intersects the rays of pixels with the plane.
+    /// Intersects the rays of pixels with the plane. `FINE` for splats that may be finer than the
+    /// least footprint.
     #[inline(always)]
-    pub(crate) fn at<I: InstructionSet<Lanes = L>, const PERSPECTIVE: bool>(
+    pub(crate) fn at<I: InstructionSet<Lanes = L>, const PERSPECTIVE: bool, const FINE: bool>(
         &self,
         isa: I,
         block: usize,
         part: usize,
     ) -> Footprint<L> {
-        let [column, row] = pixel_of(block, 0);
-        let dx = isa.load(&COLUMNS, part).add(isa.splat((column as f64 - self.offset[0]) as f32));
-        let dy = isa.load(&ROWS, part).add(isa.splat((row as f64 - self.offset[1]) as f32));
-        let [a0, b0, a1, b1] = self.inverse;
-        let p = [a0.mul_add(dx, b0.mul(dy)), a1.mul_add(dx, b1.mul(dy))];
+        let [p0, p1] = self.within[part];
+        let p = [p0.add(isa.splat(self.origins[0].0[block])), p1.add(isa.splat(self.origins[1].0[block]))];
         let one = isa.splat(1.0);
         let least = isa.splat(LEAST_DEPTH_RATIO);
         let ratio =
@@ -124,34 +149,64 @@ impl<L: Lanes> Brush<L> {
             (one, p)
         };
         let in_plane = uv[0].mul_add(uv[0], uv[1].mul(uv[1]));
+        if !FINE {
+            return Footprint { r, uv, in_plane, rho: in_plane, fine: None };
+        }
+        let dx = isa.load(&COLUMNS, part).add(isa.splat(self.offsets[0].0[block]));
+        let dy = isa.load(&ROWS, part).add(isa.splat(self.offsets[1].0[block]));
         let in_image = dx.mul_add(dx, dy.mul(dy)).mul(isa.splat(LOW_PASS_PER_PX2 as f32));
         let mut on_plane = in_plane.at_most(in_image);
         if PERSPECTIVE {
             on_plane = L::both(on_plane, least.at_most(ratio));
         }
         let rho = in_plane.or_else(on_plane, in_image);
-        let drawn = rho.at_most(self.cutoff);
-        Footprint { dx, dy, p, r, uv, in_plane, low_pass: L::only_first(drawn, on_plane), drawn, rho }
+        Footprint { r, uv, in_plane, rho, fine: Some(FineFootprint { offset: [dx, dy], on_plane }) }
+    }
+
+    /// Returns where the splat is drawn.
+    #[inline(always)]
+    pub(crate) fn reaches(&self, at: &Footprint<L>) -> L::Mask {
+        at.rho.at_most(self.cutoff)
+    }
+
+    /// Returns the opacity o · exp(−ρ/2) where the splat is drawn. Other values are any.
+    #[inline(always)]
+    pub(crate) fn alpha<I: InstructionSet<Lanes = L>>(&self, isa: I, at: &Footprint<L>) -> L {
+        exp2(isa, at.rho.mul_add(isa.splat(-0.5 * std::f32::consts::LOG2_E), self.log2_opacity))
     }
 
     /// Returns the depth at pixels, measured from the reference depth.
     #[inline(always)]
-    pub(crate) fn depth<I: InstructionSet<Lanes = L>, const PERSPECTIVE: bool>(&self, _: I, at: &Footprint<L>) -> L {
+    pub(crate) fn depth<const PERSPECTIVE: bool>(&self, at: &Footprint<L>) -> L {
         let on_plane = if PERSPECTIVE {
-            self.depth.mul(at.r)
+            self.depth.mul_add(at.r, self.minus_reference)
         } else {
-            at.uv[1].mul_add(self.slopes[1], at.uv[0].mul_add(self.slopes[0], self.depth))
+            at.uv[1].mul_add(self.slopes[1], at.uv[0].mul_add(self.slopes[0], self.relative_depth))
         };
-        self.depth.or_else(at.low_pass, on_plane).sub(self.reference_depth)
+        match &at.fine {
+            Some(fine) => on_plane.or_else(fine.on_plane, self.relative_depth),
+            None => on_plane,
+        }
     }
 }
 
 impl<L: Lanes> Footprint<L> {
-    /// Returns the Gaussian exp(−ρ/2).
+    /// Returns values where the ellipse is drawn, and `other` where the least footprint is.
     #[inline(always)]
-    pub(crate) fn gaussian<I: InstructionSet<Lanes = L>>(&self, isa: I) -> L {
-        // Beyond the cutoff the value is not used, but has to stay a number.
-        exp2(isa, self.rho.min(isa.splat(100.0)).mul(isa.splat(-0.5 * std::f32::consts::LOG2_E)))
+    pub(crate) fn on_plane(&self, lanes: L, other: L) -> L {
+        match &self.fine {
+            Some(fine) => lanes.or_else(fine.on_plane, other),
+            None => lanes,
+        }
+    }
+
+    /// Returns the offsets from the centre, and where of the given pixels the least footprint is
+    /// drawn; `None` where it is nowhere.
+    #[inline(always)]
+    pub(crate) fn least(&self, drawn: L::Mask) -> Option<([L; 2], L::Mask)> {
+        let fine = self.fine.as_ref()?;
+        let least = L::only_first(drawn, fine.on_plane);
+        L::any(least).then_some((fine.offset, least))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The forward pass of a tile: from front to back, C = Σ wᵢ cᵢ with wᵢ = αᵢ Πⱼ₍ᵢ₎ (1 − αⱼ).
 
+use crate::arrange::TILE;
 use crate::footprint::{BLOCKS, Brush, GREATEST_ALPHA, LEAST_TRANSMITTANCE, blocks_within, pixel_of};
 use crate::screen::ScreenSplat;
 use crate::simd::{Block, InstructionSet, LANES, Lanes};
@@ -14,8 +15,6 @@ pub(crate) const AHEAD: usize = 6;
 pub(crate) struct BlockSums {
     /// Π (1 − αᵢ).
     pub(crate) transmittance: Block,
-    /// Number of the last entry that was drawn; −1 for none.
-    pub(crate) last: Block,
     /// Σ wᵢ cᵢ.
     pub(crate) colour: [Block; 3],
     /// Σ wᵢ nᵢ.
@@ -31,7 +30,6 @@ impl BlockSums {
     /// Nothing is drawn yet.
     pub(crate) const EMPTY: Self = Self {
         transmittance: Block([1.0; LANES]),
-        last: Block([-1.0; LANES]),
         colour: [Block::ZERO; 3],
         normal: [Block::ZERO; 3],
         moments: [Block::ZERO; 2],
@@ -50,29 +48,52 @@ pub(crate) struct TileTask<'a> {
 }
 
 impl TileTask<'_> {
-    /// Returns the blocks that lie in the image, at least in part.
-    fn blocks_in_image(&self) -> u32 {
-        let inside = |block: &usize| {
-            let pixel = pixel_of(*block, 0);
-            (0..2).all(|i| self.origin[i] + pixel[i] < self.size[i])
-        };
-        (0..BLOCKS).filter(inside).fold(0, |mask, block| mask | 1 << block)
+    /// Returns the columns and rows of the tile that lie in the image.
+    pub(crate) fn size_in_image(&self) -> [usize; 2] {
+        [0, 1].map(|i| (self.size[i] - self.origin[i]).min(TILE))
+    }
+
+    /// Empties the sums. Pixels outside of the image take nothing.
+    fn clear(&self, sums: &mut TileSums) {
+        *sums = [BlockSums::EMPTY; BLOCKS];
+        let size = self.size_in_image();
+        if size == [TILE; 2] {
+            return;
+        }
+        for (block, sums) in sums.iter_mut().enumerate() {
+            for (lane, transmittance) in sums.transmittance.0.iter_mut().enumerate() {
+                let pixel = pixel_of(block, lane);
+                if pixel[0] >= size[0] || pixel[1] >= size[1] {
+                    *transmittance = 0.0;
+                }
+            }
+        }
     }
 }
 
-/// Draws the splats of a tile. `masks` takes the blocks in which each entry was drawn. Returns the
-/// number of pairs of a splat and a pixel.
+/// What the forward pass of a tile writes.
+pub(crate) struct DrawnTile<'a> {
+    pub(crate) sums: &'a mut TileSums,
+    /// Blocks in which each entry was drawn.
+    pub(crate) masks: &'a mut [u16],
+    /// Takes the pixels of each of these blocks, one bit each.
+    pub(crate) pixels: &'a mut Vec<u16>,
+    /// Number of blocks in `pixels`; what is behind them is of no meaning.
+    pub(crate) count: &'a mut usize,
+}
+
+/// Draws the splats of a tile. Returns the number of pairs of a splat and a pixel.
 #[inline(always)]
 pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool>(
     isa: I,
     task: &TileTask<'_>,
-    masks: &mut [u16],
-    sums: &mut TileSums,
+    out: &mut DrawnTile<'_>,
 ) -> u64 {
-    let mut pairs = 0;
-    *sums = [BlockSums::EMPTY; BLOCKS];
-    let mut open = task.blocks_in_image();
-    for (number, (&entry, mask)) in task.entries.iter().zip(masks).enumerate() {
+    task.clear(out.sums);
+    let first = *out.count;
+    let mut count = first;
+    let mut open = (1u32 << BLOCKS) - 1;
+    for (number, (&entry, mask)) in task.entries.iter().zip(&mut *out.masks).enumerate() {
         if let Some(&soon) = task.entries.get(number + AHEAD) {
             isa.prefetch(&task.splats[soon as usize]);
         }
@@ -84,17 +105,28 @@ pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool>(
         }
         let brush = Brush::new(isa, splat, task.origin, task.reference_depth);
         let mut met = 0u32;
+        if out.pixels.len() < count + BLOCKS {
+            out.pixels.resize(2 * (count + BLOCKS), 0);
+        }
         while left != 0 {
             let block = left.trailing_zeros() as usize % BLOCKS;
             left &= left - 1;
             let (mut drawn, mut alive) = (0, false);
             for part in 0..I::PARTS {
-                let (count, is_alive) = draw_block::<I, PERSPECTIVE>(isa, &brush, splat, number, block, part, sums);
-                drawn += count;
+                let sums = &mut out.sums[block];
+                let (pixels, is_alive) = if splat.is_fine {
+                    draw_block::<I, PERSPECTIVE, true>(isa, &brush, splat, block, part, sums)
+                } else {
+                    draw_block::<I, PERSPECTIVE, false>(isa, &brush, splat, block, part, sums)
+                };
+                drawn |= pixels;
                 alive |= is_alive;
             }
-            pairs += u64::from(drawn);
-            met |= u32::from(drawn > 0) << block;
+            // A branch would be guessed wrong and known late.
+            let is_drawn = drawn != 0;
+            out.pixels[count] = drawn;
+            count += usize::from(is_drawn);
+            met |= u32::from(is_drawn) << block;
             open &= !(u32::from(!alive) << block);
         }
         *mask = met as u16;
@@ -102,46 +134,40 @@ pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool>(
             break;
         }
     }
-    pairs
+    *out.count = count;
+    out.pixels[first..count].iter().map(|pixels| u64::from(pixels.count_ones())).sum()
 }
 
-/// Draws a splat on a part of a block. Returns at how many pixels, and whether any pixel takes more
+/// Draws a splat on a part of a block. Returns at which pixels, and whether any pixel takes more
 /// splats.
 #[inline(always)]
-fn draw_block<I: InstructionSet, const PERSPECTIVE: bool>(
+fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const FINE: bool>(
     isa: I,
     brush: &Brush<I::Lanes>,
     splat: &ScreenSplat,
-    number: usize,
     block: usize,
     part: usize,
-    sums: &mut TileSums,
-) -> (u32, bool) {
-    let sums = &mut sums[block];
+    sums: &mut BlockSums,
+) -> (u16, bool) {
     let before = isa.load(&sums.transmittance, part);
     let takes = isa.splat(LEAST_TRANSMITTANCE).at_most(before);
-    let at = brush.at::<I, PERSPECTIVE>(isa, block, part);
-    let drawn = I::Lanes::both(at.drawn, takes);
-    // A register that holds the whole block is rarely in vain, and a branch would be guessed wrong.
-    if I::PARTS > 1 && !I::Lanes::any(drawn) {
-        return (0, I::Lanes::any(takes));
-    }
-    let alpha = brush.opacity.mul(at.gaussian(isa)).min(isa.splat(GREATEST_ALPHA)).only(drawn);
+    let at = brush.at::<I, PERSPECTIVE, FINE>(isa, block, part);
+    let drawn = I::Lanes::both(brush.reaches(&at), takes);
+    // A register is rarely in vain, and a branch would be guessed wrong.
+    let alpha = brush.alpha(isa, &at).min(isa.splat(GREATEST_ALPHA)).only(drawn);
     let weight = before.mul(alpha);
     let after = before.sub(weight);
     after.store(&mut sums.transmittance, part);
-    let last = isa.splat(number as f32).or_else(drawn, isa.load(&sums.last, part));
-    last.store(&mut sums.last, part);
     for i in 0..3 {
         let sum = &mut sums.colour[i];
         weight.mul_add(isa.splat(splat.colour[i]), isa.load(sum, part)).store(sum, part);
         let sum = &mut sums.normal[i];
         weight.mul_add(isa.splat(splat.normal[i]), isa.load(sum, part)).store(sum, part);
     }
-    let depth = brush.depth::<I, PERSPECTIVE>(isa, &at);
+    let depth = brush.depth::<PERSPECTIVE>(&at);
     let moment = weight.mul(depth);
     let [first, second] = &mut sums.moments;
     isa.load(first, part).add(moment).store(first, part);
     moment.mul_add(depth, isa.load(second, part)).store(second, part);
-    (I::Lanes::count(drawn), I::Lanes::any(isa.splat(LEAST_TRANSMITTANCE).at_most(after)))
+    (I::Lanes::bits(drawn, part), I::Lanes::any(isa.splat(LEAST_TRANSMITTANCE).at_most(after)))
 }

@@ -20,6 +20,7 @@ mod image;
 mod lattice;
 mod loss;
 mod order;
+mod planes;
 mod raster;
 mod screen;
 mod simd;

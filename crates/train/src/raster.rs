@@ -9,12 +9,15 @@ use crate::arrange::Arrangement;
 use crate::bands::Painted;
 use crate::image::SurfelImages;
 use crate::screen::{ScreenGradient, gradient};
-use crate::simd::Registers;
+use crate::simd::{Registers, prefetch};
 use crate::surfel::Surfel;
 use crate::view::SurfelCamera;
 
 /// Greatest number of columns or rows of an image.
 pub const MAX_SIDE: usize = 65_535;
+
+/// Surfels whose entries are asked for before they are added.
+const AHEAD: usize = 8;
 
 /// A drawn image, with what its gradient needs. Drawing again reuses the memory.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -32,7 +35,7 @@ pub struct SurfelGradients {
     /// One for each surfel; 0 for those that are not drawn.
     pub surfels: Vec<Surfel>,
     /// Length of the gradient by the position in the image, per pixel; NaN for surfels that are not
-    /// drawn. Where it is large, more surfels are needed.
+    /// drawn or hidden by others. Where it is large, more surfels are needed.
     pub by_pixel: Vec<f32>,
 }
 
@@ -113,12 +116,19 @@ impl Drawing {
             let Some(view) = view.filter(|_| arrangement.splats[number].is_drawn()) else {
                 return (Surfel::default(), f32::NAN);
             };
-            let mut sum = [0.0f32; 16];
+            let (mut sum, mut is_hidden) = ([0.0f32; 16], true);
+            for &place in arrangement.places_from(number + AHEAD) {
+                prefetch(&by_entry[place as usize]);
+            }
             for &place in arrangement.places_of(number) {
                 // Entries that were not drawn hold what was there before.
                 if painted.masks[place as usize] != 0 {
                     sum.iter_mut().zip(by_entry[place as usize]).for_each(|(s, g)| *s += g);
+                    is_hidden = false;
                 }
+            }
+            if is_hidden {
+                return (Surfel::default(), f32::NAN);
             }
             (gradient(surfel, &view, C::PERSPECTIVE, &sum.map(f64::from)), sum[6].hypot(sum[7]))
         };

@@ -15,11 +15,15 @@ pub(crate) const LEAST_ALPHA: f64 = 1.0 / 255.0;
 /// Sine of the angle between a splat and the line of sight below which it is not drawn (1.1°). It
 /// is thinner than a pixel there, and its inverse has no precision in f32.
 const EDGE_ON: f64 = 0.02;
+/// Room for rounding when splats are told to be coarser than the least footprint.
+const ROUNDED: f64 = 0.999;
 /// Inverse variance of the least footprint, px⁻²: that of the 2DGS code.
 pub(crate) const LOW_PASS_PER_PX2: f64 = 2.0;
 
-/// Gradient slots of a splat in the image, in this order: A by rows, slopes, pixel, depth, opacity,
-/// colour, normal.
+/// Gradient slots of a splat in the image. With u and v the position in the plane, s the gradient
+/// α ∂L/∂α and t that by 1 / r (perspective) or by the depth (affine), they are, in this order:
+/// Σ s u², Σ s u v, Σ s v², by both slopes (Σ t u and Σ t v), by both coordinates of the pixel, one
+/// of no meaning here, by the depth, Σ s, by colour, by normal.
 pub(crate) type ScreenGradient = [f32; 16];
 
 /// A surfel in the image: two lines of the cache.
@@ -34,7 +38,8 @@ pub(crate) struct ScreenSplat {
     pub(crate) slopes: [f32; 2],
     /// Depth of the centre, metres.
     pub(crate) depth: f32,
-    pub(crate) opacity: f32,
+    /// Binary logarithm of the opacity at the centre.
+    pub(crate) log2_opacity: f32,
     pub(crate) colour: [f32; 3],
     /// Unit normal in the local frame, turned to the camera.
     pub(crate) normal: [f32; 3],
@@ -42,6 +47,8 @@ pub(crate) struct ScreenSplat {
     pub(crate) cutoff: f32,
     /// First and last column, first and last row; inside the image.
     pub(crate) bounds: [u16; 4],
+    /// Whether the least footprint may reach beyond the ellipse somewhere.
+    pub(crate) is_fine: bool,
 }
 
 impl ScreenSplat {
@@ -51,11 +58,12 @@ impl ScreenSplat {
         inverse: [0.0; 4],
         slopes: [0.0; 2],
         depth: 0.0,
-        opacity: 0.0,
+        log2_opacity: 0.0,
         colour: [0.0; 3],
         normal: [0.0; 3],
         cutoff: 0.0,
         bounds: [0; 4],
+        is_fine: true,
     };
 
     /// Returns whether the splat is drawn.
@@ -80,6 +88,10 @@ struct Plane {
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn dot2(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
 }
 
 impl Plane {
@@ -108,6 +120,23 @@ impl Plane {
         Some(Self { axes, scale, in_image, slopes, inverse, turned: if facing > 0.0 { -1.0 } else { 1.0 } })
     }
 
+    /// Returns whether the least footprint may reach beyond the ellipse somewhere.
+    ///
+    /// Within the ellipse |(u, v)| ≤ c = √cutoff, so that r = 1 + ζ·(u, v) ≤ 1 + |ζ| c. Where the
+    /// greatest singular value of A times that is at most √2, u² + v² ≤ 2 |offset|² in the
+    /// ellipse, and the circle 2 |offset|² ≤ cutoff lies within it. With |ζ| c < 1 it lies before
+    /// the camera.
+    fn is_fine(&self, cutoff: f64, perspective: bool) -> bool {
+        let [[a0, b0], [a1, b1]] = self.inverse;
+        let (squares, determinant) = (a0 * a0 + b0 * b0 + a1 * a1 + b1 * b1, a0 * b1 - b0 * a1);
+        let spread = (squares * squares - 4.0 * determinant * determinant).max(0.0).sqrt();
+        let greatest_squared = 0.5 * (squares + spread);
+        let slope = if perspective { (cutoff * dot2(self.slopes, self.slopes)).sqrt() } else { 0.0 };
+        let is_coarse =
+            slope < ROUNDED && greatest_squared * (1.0 + slope) * (1.0 + slope) < LOW_PASS_PER_PX2 * ROUNDED;
+        !is_coarse
+    }
+
     /// Returns least and greatest offsets from the centre's pixel at which the splat is drawn, or
     /// `None` where it reaches beyond the camera and may be anywhere.
     fn reach(&self, cutoff: f64, perspective: bool) -> Option<[[f64; 2]; 2]> {
@@ -131,7 +160,8 @@ impl Plane {
 /// Returns the splat that a camera sees of a surfel; `None` where nothing of it is drawn.
 pub(crate) fn project(surfel: &Surfel, view: &LocalView, perspective: bool, size: [usize; 2]) -> Option<ScreenSplat> {
     let opacity = surfel.opacity();
-    let cutoff = 2.0 * (opacity / LEAST_ALPHA).ln();
+    let log_opacity = opacity.ln();
+    let cutoff = 2.0 * (log_opacity - LEAST_ALPHA.ln());
     // NaN is not visible either.
     let visible = cutoff > 0.0;
     if !visible {
@@ -157,11 +187,12 @@ pub(crate) fn project(surfel: &Surfel, view: &LocalView, perspective: bool, size
         inverse: [a0, b0, a1, b1].map(|a| a as f32),
         slopes: plane.slopes.map(|s| s as f32),
         depth: view.depth_m as f32,
-        opacity: opacity as f32,
+        log2_opacity: (log_opacity * std::f64::consts::LOG2_E) as f32,
         colour: surfel.colour,
         normal: plane.axes[2].map(|n| (plane.turned * n) as f32),
         cutoff: cutoff as f32,
         bounds,
+        is_fine: plane.is_fine(cutoff, perspective),
     };
     let drawn = bounds[0] <= bounds[1] && bounds[2] <= bounds[3];
     let finite = made.inverse.iter().chain(&made.slopes).all(|v| v.is_finite());
@@ -171,15 +202,14 @@ pub(crate) fn project(surfel: &Surfel, view: &LocalView, perspective: bool, size
 /// Returns the gradient by a surfel's parameters, given that by its splat in the image.
 pub(crate) fn gradient(surfel: &Surfel, view: &LocalView, perspective: bool, by_splat: &[f64; 16]) -> Surfel {
     let Some(plane) = Plane::new(surfel, view, perspective) else { return Surfel::default() };
-    let [ga0, gb0, ga1, gb1, gs_u, gs_v, gx, gy, gz, g_opacity, red, green, blue, nx, ny, nz] = *by_splat;
+    let [suu, suv, svv, gs_u, gs_v, gx, gy, _, gz, sum, red, green, blue, nx, ny, nz] = *by_splat;
     let [[a0, b0], [a1, b1]] = plane.inverse;
-    // With A = J⁻¹, the gradient by J is −Aᵀ G Aᵀ. Columns of J are the axes in the image.
-    let left = [[a0 * ga0 + a1 * ga1, a0 * gb0 + a1 * gb1], [b0 * ga0 + b1 * ga1, b0 * gb0 + b1 * gb1]];
-    let by_image = [
-        [-(left[0][0] * a0 + left[0][1] * b0), -(left[1][0] * a0 + left[1][1] * b0)],
-        [-(left[0][0] * a1 + left[0][1] * b1), -(left[1][0] * a1 + left[1][1] * b1)],
-    ];
     let by_slopes = [gs_u, gs_v];
+    // S = Σ ∂L/∂p ⊗ p. With A = J⁻¹, the gradient by J is −Aᵀ S.
+    let pulled = [[suu, suv], [suv, svv]];
+    let s = [0, 1].map(|i| [0, 1].map(|j| plane.slopes[i] * by_slopes[j] - pulled[i][j]));
+    // Columns of J are the axes in the image.
+    let by_image = [0, 1].map(|k| [-(a0 * s[0][k] + a1 * s[1][k]), -(b0 * s[0][k] + b1 * s[1][k])]);
     let depth = if perspective { view.depth_m } else { 1.0 };
     let [column, row] = view.jacobian;
     // By the scaled axes in space.
@@ -207,7 +237,7 @@ pub(crate) fn gradient(surfel: &Surfel, view: &LocalView, perspective: bool, by_
         position,
         rotation,
         log_scale,
-        opacity_logit: (g_opacity * opacity * (1.0 - opacity)) as f32,
+        opacity_logit: (sum * (1.0 - opacity)) as f32,
         colour: [red, green, blue].map(|c| c as f32),
     }
 }

@@ -40,6 +40,12 @@ pub struct TrainingStep {
     pub densified: Option<DensifyCounts>,
 }
 
+/// Returns the share of the pixels of a view that belong to what is modelled.
+fn modelled_share<C>(view: &TrainingView<C>) -> f32 {
+    let share = |mask: &Vec<bool>| mask.iter().filter(|m| **m).count() as f32 / mask.len().max(1) as f32;
+    view.mask.as_ref().map_or(1.0, share)
+}
+
 impl<'a, C: SurfelCamera> Trainer<'a, C> {
     /// Begins a training, or goes on with one from its state.
     ///
@@ -97,7 +103,7 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
         };
         let (terms, slopes) = input.compute(&mut self.by_images);
         self.drawing.gradients(&self.state.surfels, &view.camera, &self.by_images, &mut self.gradients);
-        self.descend(view.camera.size());
+        self.descend(view.camera.size(), modelled_share(view));
         let rate = self.config.rates.view as f32;
         if self.config.appearance {
             let ViewAppearance { gain: [a, b, c], offset: [d, e, f] } = self.state.appearance[number];
@@ -145,12 +151,15 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
         order[place]
     }
 
-    /// Steps down the gradient of the surfels that were drawn.
-    fn descend(&mut self, size: [usize; 2]) {
+    /// Steps down the gradient of the surfels that were drawn. `modelled` is the share of the
+    /// pixels that the colours are compared at.
+    fn descend(&mut self, size: [usize; 2], modelled: f32) {
         let rates = self.rates();
         let scales = SCALE_RANGE.map(|s| (s * self.extent_m).ln() as f32);
-        // Gradients by the position are judged in halves of the image, as those of 3DGS.
-        let half = size[0].max(size[1]) as f32 / 2.0;
+        // Gradients by the position are judged as those of 3DGS: in halves of the image, for a loss
+        // that is a mean over all its pixels. Otherwise a masked scene would be split more finely
+        // than the same surface in a whole one.
+        let half = modelled * size[0].max(size[1]) as f32 / 2.0;
         let (state, gradients) = (&mut self.state, &self.gradients);
         let moved = state.surfels.par_iter_mut().zip(&mut state.moments).zip(&mut state.pulls);
         moved.zip(&gradients.surfels).zip(&gradients.by_pixel).for_each(
@@ -187,5 +196,28 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
             config.budget = 0;
         }
         Some(densify(&mut self.state, &config))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::PinholeView;
+
+    #[test]
+    fn a_mask_says_which_share_is_modelled() {
+        let camera = PinholeView {
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            centre: [0.0; 3],
+            focal_px: [4.0; 2],
+            principal_px: [1.5, 0.5],
+            size: [4, 2],
+        };
+        let plane = || vec![0.5; 8];
+        let colour = [plane(), plane(), plane()];
+        let mut view = TrainingView { camera, colour, mask: None, prior_depth_m: None, prior_normal: None };
+        assert_eq!(modelled_share(&view), 1.0);
+        view.mask = Some((0..8).map(|i| i < 2).collect());
+        assert_eq!(modelled_share(&view), 0.25);
     }
 }

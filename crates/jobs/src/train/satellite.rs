@@ -8,12 +8,12 @@
 use std::path::{Path, PathBuf};
 
 use ::splats::RpcSplatCamera;
-use ::train::{Drawing, LatticeBox, LatticeView, Registers, Surfel, SurfelImages, TrainingView};
+use ::train::{Drawing, LatticeBox, LatticeView, MAX_SIDE, Registers, Surfel, SurfelImages, TrainingView};
 use camera::RpcCamera;
 use crs::MapProjection;
 use io::raster::ImageSource;
 use io::splat_ply::LocalOrigin;
-use numeric::Progress;
+use numeric::{Progress, upper_median};
 use raster::{GeoTransform, Grid, Window};
 
 use super::error::TrainError;
@@ -31,6 +31,10 @@ const CHECKED: usize = 5000;
 const ERROR_MAX_PX: f64 = 0.02;
 /// Coverage above which a pixel belongs to the model.
 const COVERED: f32 = 0.5;
+/// Places along each side of a cell whose median height is the height of the cell.
+const PLACES: usize = 3;
+/// Rows of cells that are drawn at once, which bounds the memory.
+const BAND_ROWS: usize = 256;
 
 /// Splats with their place on the map.
 #[derive(Debug, Clone)]
@@ -143,41 +147,65 @@ impl PlacedSurfels {
     /// Returns the view of a surface model from above.
     pub(super) fn above(&self, surface: &MapSurface) -> Option<TrainingView<LatticeView>> {
         let heights = &surface.dem.heights;
-        let camera = self.view_from_above(&surface.dem.geotransform, [heights.width(), heights.height()])?;
+        let camera = self.view_from_above(&surface.dem.geotransform, [heights.width(), heights.height()], 1)?;
         let depth = |z: &f32| (self.origin.origin[2] - f64::from(*z)) as f32;
         let nothing = || vec![f32::NAN; heights.data().len()];
         Some(TrainingView {
             camera,
             colour: [nothing(), nothing(), nothing()],
-            mask: None,
+            // The surface has no holes where its height is known.
+            mask: Some(heights.data().iter().map(|z| z.is_finite()).collect()),
             prior_depth_m: Some(heights.data().iter().map(depth).collect()),
             prior_normal: None,
         })
     }
 
-    /// Returns the camera that sees the cells of a grid from above.
-    fn view_from_above(&self, grid: &GeoTransform, size: [usize; 2]) -> Option<LatticeView> {
+    /// Returns the camera that sees the cells of a grid from above, each as `side` × `side` pixels.
+    fn view_from_above(&self, grid: &GeoTransform, size: [usize; 2], side: usize) -> Option<LatticeView> {
         let [low, high] = self.bounds();
         let lattice = LatticeBox::new(low, high, f64::INFINITY);
         let [x0, y0, _] = self.origin.origin;
-        let pixel =
-            |p: [f64; 3]| grid.cell_from_map(p[0] + x0, p[1] + y0).map_or([f64::NAN; 2], |(column, row)| [column, row]);
-        LatticeView::new(lattice, lattice.nodes().map(pixel).collect(), [0.0, 0.0, -1.0], size)
+        let half = (side as f64 - 1.0) / 2.0;
+        let pixel = |p: [f64; 3]| {
+            let cell = grid.cell_from_map(p[0] + x0, p[1] + y0);
+            cell.map_or([f64::NAN; 2], |(column, row)| [column, row].map(|c| c * side as f64 + half))
+        };
+        let pixels = lattice.nodes().map(pixel).collect();
+        LatticeView::new(lattice, pixels, [0.0, 0.0, -1.0], size.map(|s| s * side))
     }
 
-    /// Returns the heights of splats at the cells of a grid, metres above the ellipsoid; NaN where
-    /// splats cover a cell by less than half.
+    /// Returns the heights of splats at the cells of a grid, metres above the ellipsoid: the
+    /// medians of places within each cell. A cell where splats cover no place by half is NaN.
+    ///
+    /// The depth of a pixel is a mean over splats, which lies between roof and ground at a wall.
     pub(super) fn heights(&self, surfels: &[Surfel], surface: &MapSurface) -> Option<Grid<f32>> {
         let (width, height) = (surface.dem.heights.width(), surface.dem.heights.height());
-        let camera = self.view_from_above(&surface.dem.geotransform, [width, height])?;
-        let drawing = Drawing::new(surfels, &camera, Registers::Longest);
-        let images = drawing.images();
-        let value = |cell: usize| {
-            let coverage = images.coverage[cell];
-            let depth = f64::from(images.depth_m[cell] / coverage);
-            if coverage > COVERED { (self.origin.origin[2] - depth) as f32 } else { f32::NAN }
+        let mut out = Grid::filled(width, height, f32::NAN);
+        let places = if width * PLACES <= MAX_SIDE { PLACES } else { 1 };
+        let mut drawing = None;
+        for first in (0..height).step_by(BAND_ROWS) {
+            let rows = BAND_ROWS.min(height - first);
+            let band = surface.dem.geotransform.shifted(0.0, first as f64);
+            let camera = self.view_from_above(&band, [width, rows], places)?;
+            let drawing = drawing.get_or_insert_with(|| Drawing::new(&[], &camera, Registers::Longest));
+            drawing.redraw(surfels, &camera);
+            let images = drawing.images();
+            for (cell, to) in out.data_mut()[first * width..(first + rows) * width].iter_mut().enumerate() {
+                *to = self.median_height(images, [cell % width * places, cell / width * places], places);
+            }
+        }
+        Some(out)
+    }
+
+    /// Returns the median height of the pixels of a cell, given its first pixel.
+    fn median_height(&self, images: &SurfelImages, [x, y]: [usize; 2], side: usize) -> f32 {
+        let seen = |k: usize| {
+            let pixel = (y + k / side) * images.size[0] + x + k % side;
+            let (coverage, depth_m) = (images.coverage[pixel], images.depth_m[pixel]);
+            (coverage > COVERED).then(|| self.origin.origin[2] - f64::from(depth_m / coverage))
         };
-        Grid::from_vec(width, height, (0..width * height).map(value).collect())
+        let mut heights: Vec<f64> = (0..side * side).filter_map(seen).collect();
+        upper_median(&mut heights).map_or(f32::NAN, |height| height as f32)
     }
 }
 

@@ -1812,6 +1812,7 @@ def simulate(
     cameras: PathLike | None = None,
     flight: int = 0,
     flight_arc_deg: Sequence[float] | None = None,
+    flight_spacing_m: float = 0.2,
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
@@ -1827,6 +1828,8 @@ def simulate(
         flight: Number of perspective cameras around the scene; none when 0.
         flight_arc_deg: Azimuths between which the perspective cameras stand, degrees clockwise from
             north; all around when `None`.
+        flight_spacing_m: Edge of the cubes that hold one point of the exact surface each, metres.
+            Distances of a mesh from the cloud are too large by about half of it.
         threads: Worker threads; one per core when `None`.
         overwrite: Whether the files of an earlier simulation may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.

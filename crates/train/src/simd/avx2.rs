@@ -28,6 +28,18 @@ impl Avx2 {
     }
 }
 
+/// Asks for memory that is read soon.
+#[inline(always)]
+pub(super) fn prefetch<T>(soon: &T) {
+    let from: *const i8 = std::ptr::from_ref(soon).cast();
+    // SAFETY: every machine of this architecture has the instruction, which never faults.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(from) };
+    if size_of::<T>() > 64 {
+        // SAFETY: byte 64 belongs to the value, and the instruction never faults.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(from.add(64)) };
+    }
+}
+
 /// Adds the lanes of eight registers.
 ///
 /// # Safety
@@ -42,21 +54,22 @@ pub(super) unsafe fn totals_of_eight(v: [__m256; 8]) -> __m256 {
     }
 }
 
-/// Adds the lanes of sixteen blocks, given the registers whose lanes are half a block.
+/// Adds the lanes of sixteen blocks, given their first halves in memory and their second ones in
+/// registers.
 ///
 /// # Safety
 /// The machine has AVX2.
 #[inline(always)]
-unsafe fn totals(blocks: &[Block; 16]) -> [f32; 16] {
+unsafe fn totals(first: &[Block; 16], second: [Lanes256; 16]) -> [f32; 16] {
     let mut out = [0.0; 16];
     for (group, sums) in out.chunks_exact_mut(8).enumerate() {
-        // SAFETY: the caller vouches for AVX2. A block has 16 values, of which eight are read from
-        // the first and from the ninth on, and eight are written to a chunk of eight.
+        let halves = first[group * 8..group * 8 + 8].iter().zip(&second[group * 8..group * 8 + 8]);
+        // SAFETY: the caller vouches for AVX2. A block has 16 values, of which eight are read, and
+        // eight are written to a chunk of eight.
         unsafe {
             let mut folded = [_mm256_setzero_ps(); 8];
-            for (lanes, block) in folded.iter_mut().zip(&blocks[group * 8..group * 8 + 8]) {
-                let from = block.0.as_ptr();
-                *lanes = _mm256_add_ps(_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8)));
+            for (lanes, (first, Lanes256(second))) in folded.iter_mut().zip(halves) {
+                *lanes = _mm256_add_ps(_mm256_loadu_ps(first.0.as_ptr()), *second);
             }
             _mm256_storeu_ps(sums.as_mut_ptr(), totals_of_eight(folded));
         }
@@ -84,19 +97,29 @@ impl InstructionSet for Avx2 {
 
     #[inline(always)]
     fn prefetch<T>(self, soon: &T) {
-        let from: *const i8 = std::ptr::from_ref(soon).cast();
-        // SAFETY: every machine of this architecture has the instruction, which never faults.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(from) };
-        if size_of::<T>() > 64 {
-            // SAFETY: byte 64 belongs to the value, and the instruction never faults.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(from.add(64)) };
-        }
+        prefetch(soon);
     }
 
     #[inline(always)]
-    fn totals(self, blocks: &[Block; 16]) -> [f32; 16] {
+    fn mask(self, bits: u16, part: usize) -> Mask256 {
+        // SAFETY: `self` proves that the machine has AVX2, which these intrinsics need.
+        Mask256(unsafe {
+            let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let all = _mm256_set1_epi32(i32::from(bits >> (8 * part)));
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(all, lanes), lanes))
+        })
+    }
+
+    #[inline(always)]
+    fn totals(self, lanes: [Lanes256; 16], part: usize, kept: &mut [Block; 16]) -> [f32; 16] {
+        if part == 0 {
+            for (lanes, block) in lanes.iter().zip(kept) {
+                lanes.store(block, 0);
+            }
+            return [0.0; 16];
+        }
         // SAFETY: `self` proves that the machine has AVX2.
-        unsafe { totals(blocks) }
+        unsafe { totals(kept, lanes) }
     }
 }
 
@@ -175,9 +198,9 @@ impl Lanes for Lanes256 {
     }
 
     #[inline(always)]
-    fn count(mask: Mask256) -> u32 {
+    fn bits(mask: Mask256, part: usize) -> u16 {
         // SAFETY: the mask was made from lanes of an `Avx2`, so the machine has the instruction.
-        unsafe { _mm256_movemask_ps(mask.0) }.count_ones()
+        (unsafe { _mm256_movemask_ps(mask.0) } as u16) << (8 * part)
     }
 
     #[inline(always)]
@@ -190,6 +213,6 @@ impl Lanes for Lanes256 {
     }
 }
 
-/// A mask of all bits or none per lane. It is made from [`Lanes256`] only.
+/// A mask of all bits or none per lane. It is made from an [`Avx2`] or from [`Lanes256`] only.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mask256(__m256);

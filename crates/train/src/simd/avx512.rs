@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::avx2::totals_of_eight;
+use super::avx2::{prefetch, totals_of_eight};
 use super::lanes::{Block, InstructionSet, Kernel, Lanes};
 
 /// Proof that the machine has AVX-512 (foundation, DQ), AVX2 and fused multiply-add: only
@@ -39,16 +39,15 @@ impl Avx512 {
 /// # Safety
 /// The machine has AVX-512 (foundation, DQ) and AVX2.
 #[inline(always)]
-unsafe fn totals(blocks: &[Block; 16]) -> [f32; 16] {
+unsafe fn totals(blocks: [Lanes512; 16]) -> [f32; 16] {
     let mut out = [0.0; 16];
     for (group, sums) in out.chunks_exact_mut(8).enumerate() {
-        // SAFETY: the caller vouches for the instructions. Sixteen values are read from a block,
-        // and eight are written to a chunk of eight.
+        // SAFETY: the caller vouches for the instructions. Eight values are written to a chunk of
+        // eight.
         unsafe {
             let mut folded = [_mm256_setzero_ps(); 8];
-            for (lanes, block) in folded.iter_mut().zip(&blocks[group * 8..group * 8 + 8]) {
-                let all = _mm512_loadu_ps(block.0.as_ptr());
-                *lanes = _mm256_add_ps(_mm512_castps512_ps256(all), _mm512_extractf32x8_ps::<1>(all));
+            for (lanes, Lanes512(all)) in folded.iter_mut().zip(&blocks[group * 8..group * 8 + 8]) {
+                *lanes = _mm256_add_ps(_mm512_castps512_ps256(*all), _mm512_extractf32x8_ps::<1>(*all));
             }
             _mm256_storeu_ps(sums.as_mut_ptr(), totals_of_eight(folded));
         }
@@ -75,19 +74,18 @@ impl InstructionSet for Avx512 {
 
     #[inline(always)]
     fn prefetch<T>(self, soon: &T) {
-        let from: *const i8 = std::ptr::from_ref(soon).cast();
-        // SAFETY: every machine of this architecture has the instruction, which never faults.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(from) };
-        if size_of::<T>() > 64 {
-            // SAFETY: byte 64 belongs to the value, and the instruction never faults.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(from.add(64)) };
-        }
+        prefetch(soon);
     }
 
     #[inline(always)]
-    fn totals(self, blocks: &[Block; 16]) -> [f32; 16] {
+    fn mask(self, bits: u16, _: usize) -> __mmask16 {
+        bits
+    }
+
+    #[inline(always)]
+    fn totals(self, lanes: [Lanes512; 16], _: usize, _: &mut [Block; 16]) -> [f32; 16] {
         // SAFETY: `self` proves that the machine has AVX-512 (foundation, DQ) and AVX2.
-        unsafe { totals(blocks) }
+        unsafe { totals(lanes) }
     }
 }
 
@@ -161,8 +159,8 @@ impl Lanes for Lanes512 {
     }
 
     #[inline(always)]
-    fn count(mask: __mmask16) -> u32 {
-        mask.count_ones()
+    fn bits(mask: __mmask16, _: usize) -> u16 {
+        mask
     }
 
     #[inline(always)]

@@ -15,6 +15,14 @@ pub enum Registers {
     Plain,
 }
 
+/// Asks for memory that is read soon, where the architecture has an instruction for it.
+#[inline(always)]
+pub(crate) fn prefetch<T>(soon: &T) {
+    #[cfg(target_arch = "x86_64")]
+    super::avx2::prefetch(soon);
+    let _ = soon;
+}
+
 /// Runs a kernel with the wanted registers, or with shorter ones where the machine lacks them.
 pub(crate) fn dispatch<K: Kernel>(registers: Registers, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -47,9 +55,15 @@ mod tests {
         fn run<I: InstructionSet>(self, isa: I) -> Vec<u32> {
             let blocks: [Block; 16] =
                 std::array::from_fn(|k| Block(std::array::from_fn(|i| ((k * 16 + i) as f32).sin() * 3.0)));
-            let mut bits: Vec<u32> = isa.totals(&blocks).map(f32::to_bits).into();
+            let (mut kept, mut totals) = ([Block::ZERO; 16], [0.0; 16]);
             let mut results = [Block::ZERO; 12];
+            let (mut marked, mut again) = (0, 0);
             for part in 0..I::PARTS {
+                let mut lanes = [isa.splat(0.0); 16];
+                for (lanes, block) in lanes.iter_mut().zip(&blocks) {
+                    *lanes = isa.load(block, part);
+                }
+                totals = isa.totals(lanes, part, &mut kept);
                 let [a, b, c] = [0, 1, 2].map(|i| isa.load(&blocks[i], part));
                 let mask = a.at_most(b);
                 let other = b.at_most(c);
@@ -70,9 +84,11 @@ mod tests {
                 for (result, lanes) in results.iter_mut().zip(made) {
                     lanes.store(result, part);
                 }
-                bits.push(u32::from(I::Lanes::any(mask)));
+                marked |= I::Lanes::bits(mask, part);
+                again |= I::Lanes::bits(isa.mask(0xb16d, part), part);
             }
-            bits.truncate(17);
+            let mut bits: Vec<u32> = totals.map(f32::to_bits).into();
+            bits.extend([u32::from(marked), u32::from(again)]);
             bits.extend(results.iter().flat_map(|block| block.0.map(f32::to_bits)));
             bits
         }

@@ -15,5 +15,5 @@ mod lanes;
 mod plain;
 
 pub use dispatch::Registers;
-pub(crate) use dispatch::dispatch;
-pub(crate) use lanes::{Block, InstructionSet, Kernel, LANES, Lanes, exp2};
+pub(crate) use dispatch::{dispatch, prefetch};
+pub(crate) use lanes::{Block, InstructionSet, Kernel, LANES, Lanes, exp2, total};

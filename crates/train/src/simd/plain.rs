@@ -1,6 +1,6 @@
 //! Lanes in an array, on every machine.
 
-use super::lanes::{Block, InstructionSet, LANES, Lanes};
+use super::lanes::{Block, InstructionSet, LANES, Lanes, total};
 
 /// Plain Rust.
 #[derive(Debug, Clone, Copy)]
@@ -29,12 +29,13 @@ impl InstructionSet for Plain {
     fn prefetch<T>(self, _: &T) {}
 
     #[inline(always)]
-    fn totals(self, blocks: &[Block; 16]) -> [f32; 16] {
-        std::array::from_fn(|k| {
-            let v = &blocks[k].0;
-            let e: [f32; 8] = std::array::from_fn(|i| v[i] + v[i + 8]);
-            ((e[0] + e[1]) + (e[2] + e[3])) + ((e[4] + e[5]) + (e[6] + e[7]))
-        })
+    fn mask(self, bits: u16, _: usize) -> [bool; LANES] {
+        std::array::from_fn(|i| bits >> i & 1 == 1)
+    }
+
+    #[inline(always)]
+    fn totals(self, lanes: [PlainLanes; 16], _: usize, _: &mut [Block; 16]) -> [f32; 16] {
+        lanes.map(|lanes| total(&Block(lanes.0)))
     }
 }
 
@@ -124,8 +125,8 @@ impl Lanes for PlainLanes {
     }
 
     #[inline(always)]
-    fn count(mask: [bool; LANES]) -> u32 {
-        mask.iter().map(|&set| u32::from(set)).sum()
+    fn bits(mask: [bool; LANES], _: usize) -> u16 {
+        (0..LANES).fold(0, |bits, i| bits | u16::from(mask[i]) << i)
     }
 
     #[inline(always)]
