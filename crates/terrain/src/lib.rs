@@ -16,13 +16,16 @@
 //! Heights are in metres above any datum, NaN is a void. The work is done on cells of about a metre
 //! and takes memory in proportion to the cells.
 
+mod canopy;
 mod coarse;
 mod config;
 mod error;
+mod forest;
 mod ground;
 mod membrane;
 mod objects;
 mod opening;
+mod plate;
 mod regions;
 mod trend;
 
