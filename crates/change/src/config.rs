@@ -70,3 +70,17 @@ impl ChangeConfig {
         within("the deviation of the overreach", self.overreach_sigma_m, 0.0, 10.0, "0 to 10 m")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_overreach_grows_above_low_walls_only() {
+        let config = ChangeConfig { overreach_m: 0.1, overreach_growth: 0.03, low_wall_m: 5.0, ..Default::default() };
+        assert_eq!(config.overreach_of_m(4.0), 0.1);
+        assert!((config.overreach_of_m(15.0) - 0.4).abs() < 1e-12);
+        let wrong = ChangeConfig { overreach_growth: f64::NAN, ..config };
+        assert!(matches!(wrong.validate(), Err(ChangeError::Parameter { .. })));
+    }
+}

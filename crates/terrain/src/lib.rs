@@ -12,8 +12,8 @@
 //!    follows the lower part of the surface, the second the ground that the first search left.
 //! 3. The ground under objects and voids is a **thin plate** under tension through the ground
 //!    around them.
-//! 4. Under forests the plate is guided by the **tree tops**, whose height above the ground is known
-//!    beside clearings, or by gaps that reach down to the ground.
+//! 4. Under forests the plate is guided by the **tree tops**, whose height above the ground is
+//!    known beside clearings, or by gaps that reach down to the ground.
 //!
 //! Heights are in metres above any datum, NaN is a void. The work is done on cells of about a metre
 //! and takes memory in proportion to the cells.

@@ -17,10 +17,11 @@ const SWEEPS: usize = 40;
 const RELAXATION: f32 = 1.5;
 /// Known cells around unknown ones that the plate may smooth, cells.
 const MARGIN: usize = 4;
-/// Usual curvature of the ground, 1/m: a metre over 10 m.
+/// Usual curvature of the ground, 1/m, against which its noise is weighed. Half and twice of it
+/// change the errors of simulated towns by a tenth.
 const CURVATURE: f64 = 0.01;
-/// Length of the tension, metres: half of the width of a large building. Wider gaps have little to
-/// extrapolate a slope from.
+/// Length of the tension, metres: half of the width of a large building. Wider gaps are too wide to
+/// extrapolate a slope into.
 const TENSION_M: f64 = 40.0;
 /// Side of the level that a membrane starts, cells.
 const COARSEST: usize = 4;

@@ -34,9 +34,9 @@ const FILES: [&str; 9] = [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, STYLES
 /// Range of the page's map of significance, standard deviations.
 const SHOWN_SIGMAS: f64 = 5.0;
 
-/// Growth of the distance by which the walls of surfaces of this toolkit reach too far outwards, per
-/// metre of height above low walls. It was measured on buildings of simulated towns (seeds 11 to
-/// 15) as in `benches/products/diff.py`.
+/// Growth of the distance by which the walls of surfaces of this toolkit reach too far outwards,
+/// per metre of height above low walls. It was measured on buildings of simulated towns (seeds 11
+/// to 15) as in `benches/products/diff.py`.
 const OVERREACH_GROWTH: f64 = 0.036;
 /// Height of low walls, metres, measured on the same buildings: their outlines are not biased.
 const LOW_WALL_M: f64 = 5.6;
