@@ -88,29 +88,6 @@ fn a_ridge_under_a_forest_stays() {
     assert!(rmse(&found, &ridge) < 4.0);
 }
 
-/// A closed canopy over hills, as surfaces made from images show it: crowns of 8 to 12 m with
-/// bottoms of gaps half-way down, outliers far below the ground, and a few clearings.
-#[test]
-fn hills_under_a_closed_canopy_follow_the_tree_tops() {
-    let hills = surface(280, |x, y| 20.0 * (x / 40.0).sin() * (y / 50.0).cos());
-    let is_clearing = |x: f32, y: f32| (x - 70.0).hypot(y - 70.0) < 30.0 || (x - 215.0).hypot(y - 190.0) < 32.0;
-    let canopy = |x: f32, y: f32| {
-        let (across, along) = ((x % 9.0 - 4.5) / 4.5, (y % 9.0 - 4.5) / 4.5);
-        let top = 8.0 + 4.0 * (((x / 9.0) as u32 * 7 + (y / 9.0) as u32 * 13) % 5) as f32 / 4.0;
-        let is_outlier = (x as u32 * 31 + y as u32 * 17).is_multiple_of(211);
-        if is_outlier { -15.0 } else { top * (1.0 - 0.25 * (across * across + along * along)) }
-    };
-    let cover = |x: f32, y: f32| if is_clearing(x, y) { noise(x, y, 0.1) } else { canopy(x, y) };
-    let forest = surface(280, |x, y| hills[(x as usize, y as usize)] + cover(x, y));
-    let found = ground(&forest);
-    assert!(share(&found, GROUND, is_clearing) > 0.9);
-    let error = rmse(&found, &hills);
-    assert!(error < 2.0, "{error}");
-    // Returning the surface would be worse by far, and so would a flat ground.
-    let heights = forest.data().iter().zip(hills.data()).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
-    assert!((heights / 78_400.0).sqrt() > 4.0 * error);
-}
-
 #[test]
 fn a_forest_without_any_clearing_has_some_ground() {
     let found = ground(&surface(120, |x, y| 10.0 + noise(x, y, 3.0)));
