@@ -41,7 +41,7 @@ pub(crate) fn at_cell(coarse: &Grid<f32>, side: usize, column: usize, row: usize
 }
 
 /// Returns the means over windows of `2·radius + 1` cells, cut at the borders.
-fn blurred(grid: &Grid<f32>, radius: usize) -> Grid<f32> {
+pub(crate) fn blurred(grid: &Grid<f32>, radius: usize) -> Grid<f32> {
     let (width, height) = (grid.width(), grid.height());
     let mut along_rows = grid.clone();
     for row in 0..height {
@@ -70,6 +70,18 @@ fn running_mean(line: &[f32], radius: usize, mut put: impl FnMut(usize, f32)) {
         }
         put(at, (sum / (end - start) as f64) as f32);
     }
+}
+
+/// One surface above another.
+pub(crate) fn difference(upper: &Grid<f32>, lower: &Grid<f32>) -> Grid<f32> {
+    let cells = upper.data().iter().zip(lower.data()).map(|(upper, lower)| upper - lower);
+    Grid::from_vec(upper.width(), upper.height(), cells.collect()).expect("both surfaces have the same cells")
+}
+
+/// Returns the heights with the cells of a mask as voids.
+pub(crate) fn without_cells(heights: &Grid<f32>, mask: &Grid<bool>) -> Grid<f32> {
+    let cells = heights.data().iter().zip(mask.data()).map(|(&h, &is_void)| if is_void { f32::NAN } else { h });
+    Grid::from_vec(heights.width(), heights.height(), cells.collect()).expect("one flag per cell")
 }
 
 /// Widens a mask by squares of `2·radius + 1` cells.

@@ -49,7 +49,7 @@ fn sweep(out: &mut Grid<f32>, unknown: &[u32]) {
 }
 
 /// Means of the known heights of 2 × 2 cells.
-fn halved(fine: &Grid<f32>) -> Grid<f32> {
+pub(crate) fn halved(fine: &Grid<f32>) -> Grid<f32> {
     let (width, height) = (fine.width().div_ceil(2), fine.height().div_ceil(2));
     let mut coarse = Grid::filled(width, height, f32::NAN);
     for row in 0..height {
@@ -70,7 +70,7 @@ fn halved(fine: &Grid<f32>) -> Grid<f32> {
 }
 
 /// Interpolates a coarse level at a cell of the level that is twice as fine.
-fn doubled_at(coarse: &Grid<f32>, column: usize, row: usize) -> f32 {
+pub(crate) fn doubled_at(coarse: &Grid<f32>, column: usize, row: usize) -> f32 {
     let place = |at: usize, count: usize| {
         let near = at / 2;
         let far = if at % 2 == 1 { (near + 1).min(count - 1) } else { near.saturating_sub(1) };

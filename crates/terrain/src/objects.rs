@@ -53,18 +53,25 @@ pub(crate) fn without_pits(surface: &Grid<f32>, cell_m: f64) -> Grid<f32> {
 /// [`Cancelled`].
 pub(crate) fn objects(
     surface: &Grid<f32>,
+    whole: &Grid<f32>,
     cell_m: f64,
     config: &GroundConfig,
     progress: &dyn Progress,
 ) -> Result<Grid<bool>, Cancelled> {
     let mut left = surface.clone();
+    let mut around = whole.clone();
     let mut found = Grid::filled(surface.width(), surface.height(), false);
     for radius in radii(config.widest_object_m / cell_m) {
         progress.check_cancelled()?;
         let low = opened(&left, radius);
         let candidates = above(&left, &low, config.threshold_m(radius as f64 * cell_m));
-        let doubtful = judge(&Candidates { left: &left, low: &low, cells: &candidates, cell_m }, &mut found);
+        let doubtful =
+            judge(&Candidates { left: &left, low: &low, around: &around, cells: &candidates, cell_m }, &mut found);
         left = without(surface, &found, &doubtful);
+        around = left.clone();
+        for (cell, whole) in around.data_mut().iter_mut().zip(whole.data()).filter(|(cell, _)| cell.is_nan()) {
+            *cell = *whole;
+        }
         progress.step();
     }
     Ok(found)
@@ -80,7 +87,7 @@ fn without(surface: &Grid<f32>, objects: &Grid<bool>, doubtful: &Grid<bool>) -> 
     let ground = filled(&out);
     out.clone_from(surface);
     for ((cell, &ground), &is_object) in out.data_mut().iter_mut().zip(ground.data()).zip(objects.data()) {
-        if is_object {
+        if is_object && !cell.is_nan() {
             *cell = ground;
         }
     }
@@ -95,6 +102,8 @@ struct Candidates<'a> {
     low: &'a Grid<f32>,
     /// The cells that stand out.
     cells: &'a Grid<bool>,
+    /// The surface with the forests that give no candidates.
+    around: &'a Grid<f32>,
     cell_m: f64,
 }
 
@@ -132,7 +141,7 @@ impl Candidates<'_> {
         let mut heights: Vec<f32> = cells.map(|cell| self.left.data()[cell] - self.low.data()[cell]).collect();
         let height = quantile(&mut heights, 0.5).unwrap_or(0.0);
         // A candidate that is known only from voids around it cannot be told from ground.
-        let drop = quantile(&mut regions.drops_m(region, self.left, self.cell_m), free_share);
+        let drop = quantile(&mut regions.drops_m(region, self.around, self.cell_m), free_share);
         drop.is_some_and(|drop| drop >= DROP_SHARE * height)
     }
 }

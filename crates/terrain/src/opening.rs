@@ -16,6 +16,17 @@ pub(crate) fn opened(surface: &Grid<f32>, radius: usize) -> Grid<f32> {
     minima(negative, radius).map(|&h| if h == f32::INFINITY { f32::NAN } else { -h })
 }
 
+/// Returns the lowest heights over square windows of `2·radius + 1` cells, NaN without any.
+pub(crate) fn lowest(surface: &Grid<f32>, radius: usize) -> Grid<f32> {
+    let low = surface.map(|&h| if h.is_nan() { f32::INFINITY } else { h });
+    minima(low, radius).map(|&h| if h == f32::INFINITY { f32::NAN } else { h })
+}
+
+/// Returns the highest heights over such windows.
+pub(crate) fn highest(surface: &Grid<f32>, radius: usize) -> Grid<f32> {
+    lowest(&surface.map(|h| -h), radius).map(|h| -h)
+}
+
 /// Closes a surface: what is narrower than the window and lies deep is filled.
 pub(crate) fn closed(surface: &Grid<f32>, radius: usize) -> Grid<f32> {
     opened(&surface.map(|h| -h), radius).map(|h| -h)

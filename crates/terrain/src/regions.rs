@@ -7,6 +7,10 @@ use raster::Grid;
 const OUTSIDE_M: f64 = 4.0;
 /// Distance inside of a region within which the surface must have reached its height, metres.
 const INSIDE_M: f64 = 2.0;
+/// Distance further outside and inside over which the slope across the border is measured, metres.
+const FURTHER_M: f64 = 6.0;
+/// Steepest slope that is taken for ground that goes on across a border.
+const STEEPEST: f32 = 1.5;
 /// No number of a region.
 const NONE: u32 = 0;
 
@@ -80,7 +84,7 @@ impl Regions {
     /// whose whole border lies at voids or at the border of the raster.
     pub(crate) fn drops_m(&self, region: usize, surface: &Grid<f32>, cell_m: f64) -> Vec<f32> {
         let steps = |metres: f64| ((metres / cell_m).round() as i64).max(1);
-        let (outside, inside) = (steps(OUTSIDE_M), steps(INSIDE_M));
+        let (outside, inside, further) = (steps(OUTSIDE_M), steps(INSIDE_M), steps(FURTHER_M));
         let (number, width) = (region as u32 + 1, surface.width());
         let at = |x: i64, y: i64| {
             (x >= 0 && y >= 0).then_some(())?;
@@ -97,7 +101,16 @@ impl Regions {
                     continue;
                 }
                 let own = (0..=inside).map_while(|k| at(x - k * dx, y - k * dy).filter(|(is_own, _)| *is_own));
-                drops.push(own.map(|(_, height)| height).fold(f32::NAN, f32::max) - low);
+                let drop = own.map(|(_, height)| height).fold(f32::NAN, f32::max) - low;
+                // A slope that goes on across the border is no wall.
+                let along = |k: i64| at(x + k * dx, y + k * dy).map_or(f32::NAN, |(_, height)| height);
+                let (within, beyond) =
+                    (along(-inside - further) - along(-inside), along(outside) - along(outside + further));
+                let slope = within.min(beyond);
+                let is_one =
+                    within.max(beyond) <= 2.0 * slope + 1.0 && slope <= STEEPEST * further as f32 * cell_m as f32;
+                let on_slope = if is_one { slope.max(0.0) * (inside + outside) as f32 / further as f32 } else { 0.0 };
+                drops.push(drop - on_slope);
             }
         }
         drops

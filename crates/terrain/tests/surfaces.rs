@@ -89,6 +89,12 @@ fn a_ridge_under_a_forest_stays() {
 }
 
 #[test]
+fn a_forest_without_any_clearing_has_some_ground() {
+    let found = ground(&surface(120, |x, y| 10.0 + noise(x, y, 3.0)));
+    assert_eq!(share(&found, UNKNOWN, |_, _| true), 0.0);
+}
+
+#[test]
 fn a_quay_and_a_terrace_stay() {
     // A quay along a bent line, and a terrace that only one side of the raster shows whole.
     let quay = surface(250, |x, y| if x + 20.0 * (y / 40.0).sin() > 120.0 { 4.0 } else { 0.0 });

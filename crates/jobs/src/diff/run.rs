@@ -34,10 +34,13 @@ const FILES: [&str; 9] = [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, STYLES
 /// Range of the page's map of significance, standard deviations.
 const SHOWN_SIGMAS: f64 = 5.0;
 
-/// Distance by which the walls of surfaces of this toolkit reach too far outwards, cells. It was
-/// measured on buildings of simulated towns (seeds 1 to 3), as in `benches/products/diff.py`.
-const OVERREACH_CELLS: f64 = 0.6;
-/// Its standard deviation from building to building.
+/// Growth of the distance by which the walls of surfaces of this toolkit reach too far outwards,
+/// per metre of height above low walls. It was measured on buildings of simulated towns (seeds 11
+/// to 15) as in `benches/products/diff.py`.
+const OVERREACH_GROWTH: f64 = 0.036;
+/// Height of low walls, metres, measured on the same buildings: their outlines are not biased.
+const LOW_WALL_M: f64 = 5.6;
+/// Standard deviation of that distance from building to building, cells.
 const OVERREACH_SIGMA_CELLS: f64 = 0.4;
 
 /// Finds what changed between two surface models, and writes rasters, polygons and a report.
@@ -92,10 +95,12 @@ pub fn run(config: &DiffConfig, progress: &dyn Progress) -> Result<DiffReport, D
 fn parameters(config: &DiffConfig, aligned: &Aligned) -> ChangeConfig {
     let mut parameters = config.change;
     if aligned.is_own {
-        parameters.overreach_m = OVERREACH_CELLS * aligned.cell_m;
         parameters.overreach_sigma_m = OVERREACH_SIGMA_CELLS * aligned.cell_m;
+        (parameters.overreach_growth, parameters.low_wall_m) = (OVERREACH_GROWTH, LOW_WALL_M);
     }
-    parameters.overreach_m = config.overreach_m.unwrap_or(parameters.overreach_m);
+    if let Some(stated) = config.overreach_m {
+        (parameters.overreach_m, parameters.overreach_growth) = (stated, 0.0);
+    }
     parameters
 }
 
