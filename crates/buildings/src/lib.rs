@@ -25,6 +25,7 @@ mod index;
 mod junctions;
 mod shadow;
 mod shapes;
+mod sunlight;
 
 pub use config::BuildingIndexConfig;
 pub use error::BuildingIndexError;

@@ -263,7 +263,8 @@ impl SceneWriter<'_> {
         let no_data = Some(f64::from(raster::NO_DATA));
         write_image_with_rpc(path("heights"), &heights, &view.true_rpc, no_data, self.overwrite)?;
         if let Some(image) = &view.multispectral {
-            let bands: Vec<(Band<'_>, BandSpectrum<'_>)> = SPECTRAL_BANDS.iter().zip(&image.bands).map(spectral).collect();
+            let bands: Vec<(Band<'_>, BandSpectrum<'_>)> =
+                SPECTRAL_BANDS.iter().zip(&image.bands).map(spectral).collect();
             let path = self.folder.join(format!("ms_{number}.tif"));
             write_multispectral_with_rpc(path, &bands, &image.rpc, Some(0.0), self.overwrite)?;
         }

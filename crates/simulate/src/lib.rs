@@ -68,7 +68,8 @@ pub use building::Building;
 pub use camera_model::Look;
 pub use config::{
     AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, CrownForm, GroundCover,
-    LookAngles, MultispectralConfig, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
+    LookAngles, MultispectralConfig, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig,
+    VehiclesConfig,
 };
 pub use date::Date;
 pub use error::SimulateError;

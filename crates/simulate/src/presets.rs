@@ -2,7 +2,8 @@
 
 use crate::config::{
     AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, CrownForm, GroundCover,
-    MultispectralConfig, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
+    MultispectralConfig, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig,
+    VehiclesConfig,
 };
 use crate::error::SimulateError;
 use crate::seasons::SeasonsConfig;

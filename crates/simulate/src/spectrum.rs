@@ -41,8 +41,7 @@ const BRIGHT_METAL: Tint = [1.06, 1.02, 0.98, 0.92];
 const GREEN_PAINT: Tint = [0.75, 1.30, 0.72, 1.00];
 const SEDUM: Tint = [0.50, 0.80, 0.72, 1.90];
 const PLASTER: Tint = [0.82, 0.96, 1.06, 1.16];
-const BODYWORK: [Tint; 4] =
-    [[1.0; BANDS], [0.55, 0.60, 1.40, 1.30], [1.45, 0.95, 0.60, 0.90], [1.05, 1.0, 0.97, 0.95]];
+const BODYWORK: [Tint; 4] = [[1.0; BANDS], [0.55, 0.60, 1.40, 1.30], [1.45, 0.95, 0.60, 0.90], [1.05, 1.0, 0.97, 0.95]];
 
 /// Materials of pitched and of flat roofs with their shares.
 const PITCHED: [(f64, Tint); 4] = [(0.58, CLAY_TILES), (0.30, SLATE), (0.06, GREEN_PAINT), (0.06, CONCRETE)];
