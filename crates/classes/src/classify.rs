@@ -49,6 +49,9 @@ pub struct ClassifyInput<'a> {
     pub above_ground: &'a Grid<f32>,
     /// Vegetation index (NDVI) of each cell, −1 to 1; NaN where none is known.
     pub index: Option<&'a Grid<f32>>,
+    /// Whether the pixels of the vegetation index are wider than the cells. Along eaves they hold
+    /// roof and lawn, so that what stands is told by its shape.
+    pub is_index_coarse: bool,
     /// What an image says about buildings.
     pub cue: Option<BuildingCue<'a>>,
     /// What images say about crowns without heights.
@@ -117,7 +120,7 @@ pub struct Classes {
 /// for row in 20..40 {
 ///     surface.row_mut(row)[15..45].fill(5.0);
 /// }
-/// let input = ClassifyInput { surface: &surface, above_ground: &surface, index: None, cue: None, crowns: None, cell_m: 0.5 };
+/// let input = ClassifyInput { surface: &surface, above_ground: &surface, index: None, is_index_coarse: false, cue: None, crowns: None, cell_m: 0.5 };
 /// let found = classify(&input, &ClassifyConfig::default())?;
 /// assert_eq!((found.classes[(30, 30)], found.classes[(5, 5)]), (BUILDING, GROUND));
 /// # Ok::<(), classes::ClassifyError>(())
@@ -136,7 +139,7 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     let limit_m = scale.roughness_m as f32;
     let cells = |area_m2: f64| (area_m2 / (input.cell_m * input.cell_m)).ceil() as usize;
     let steps = |length_m: f64| (length_m / input.cell_m).round().max(1.0) as usize;
-    let green = Greenness::of(input, config, &stands, steps(0.5 * config.mixed_m));
+    let green = Greenness::of(input, config);
     let mut buildings = roughness.map(|r| *r < limit_m);
     clear(&mut buildings, &green.tall);
     let mut stands = stands;
@@ -160,9 +163,7 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     if input.index.is_some() {
         let is_green = |at: usize| green.all.data()[at];
         let known = |at: usize| green.known.data()[at];
-        let mut dry = without_share(&mut vegetation, config.least_green_share, known, is_green);
-        without_small(&mut dry, cells(config.least_building_m2));
-        add(&mut buildings, &dry);
+        without_share(&mut vegetation, config.least_green_share, known, is_green);
     }
     let mut left = stands;
     clear(&mut left, &vegetation);
@@ -201,19 +202,17 @@ struct Greenness {
     known: Grid<bool>,
     /// Green cells.
     all: Grid<bool>,
-    /// Green cells that stand, without strips that are narrower than a mixed pixel: along the eaves
-    /// the coarse pixels of the index hold roof and lawn.
+    /// Green cells that are no buildings.
     tall: Grid<bool>,
 }
 
 impl Greenness {
-    fn of(input: &ClassifyInput<'_>, config: &ClassifyConfig, stands: &Grid<bool>, steps: usize) -> Self {
-        let none = || stands.map(|_| false);
+    fn of(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Self {
+        let none = || input.surface.map(|_| false);
         let Some(index) = input.index else { return Self { known: none(), all: none(), tall: none() } };
         let all = index.map(|v| f64::from(*v) >= config.least_index);
-        let mut tall = all.clone();
-        tall.data_mut().iter_mut().zip(stands.data()).for_each(|(tall, stands)| *tall &= *stands);
-        Self { known: index.map(|v| v.is_finite()), all, tall: opened(&tall, steps) }
+        let tall = if input.is_index_coarse { none() } else { all.clone() };
+        Self { known: index.map(|v| v.is_finite()), all, tall }
     }
 }
 

@@ -32,11 +32,8 @@ pub struct ClassifyConfig {
     pub ramp_m: f64,
     /// Least vegetation index of vegetation, where one is given.
     pub least_index: f64,
-    /// Width of the strips along roofs where coarse pixels of the index hold roof and lawn, metres: a
-    /// multispectral pixel and a half.
-    pub mixed_m: f64,
-    /// Least share of green cells in vegetation, where an index is given: a crown is also seen in
-    /// its own shade and beside its leaves.
+    /// Least share of green cells in vegetation, where an index is given. Coarse pixels hold little of
+    /// a small crown.
     pub least_green_share: f64,
     /// Narrowest crown that is found without a height, metres.
     pub least_crown_m: f64,
@@ -65,8 +62,7 @@ impl Default for ClassifyConfig {
             least_vegetation_m2: 4.0,
             ramp_m: 1.5,
             least_index: 0.3,
-            mixed_m: 3.0,
-            least_green_share: 0.25,
+            least_green_share: 0.05,
             least_crown_m: 1.0,
             water_index: -0.1,
             least_water_m2: 100.0,
@@ -102,7 +98,6 @@ impl ClassifyConfig {
         within("the least area of vegetation", self.least_vegetation_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the width of ramps", self.ramp_m, 0.0, 20.0, "0 to 20 m")?;
         within("the least vegetation index", self.least_index, -1.0, 1.0, "-1 to 1")?;
-        within("the width of mixed strips", self.mixed_m, 0.0, 100.0, "0 to 100 m")?;
         within("the least share of green cells", self.least_green_share, 0.0, 1.0, "0 to 1")?;
         within("the width of the narrowest crown", self.least_crown_m, 0.0, 50.0, "0 to 50 m")?;
         let range = "-1 to that of vegetation";

@@ -12,9 +12,9 @@
 //! 4. What else stands is **vegetation** if it is wide enough for a shrub, and belongs to its
 //!    surroundings otherwise.
 //!
-//! A vegetation index of near-infrared light overrules the roughness where it is given: what stands
-//! and is green is vegetation, except for strips along roofs where its coarse pixels are mixed, and
-//! what is rough and not green is none. Plants on the ground are low vegetation. Crowns that the
+//! A vegetation index of near-infrared light overrules the roughness where it is given, unless its
+//! pixels are wider than the cells; what is rough and not green at all is no vegetation. Plants on
+//! the ground are low vegetation. Crowns that the
 //! surface lacks are vegetation where the index is green above uncertain heights. A building index, made of an image, decides only where heights are weak: cells that
 //! were not observed, or whose height or roughness lies near its threshold. Heights are in metres,
 //! NaN is a void. Values are the ASPRS LAS classes.

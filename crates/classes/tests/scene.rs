@@ -1,6 +1,9 @@
 //! A scene of houses and trees with noise: their classes, a vegetation index, and what is refused.
 
-use classes::{BUILDING, BuildingCue, ClassifyConfig, ClassifyInput, GROUND, UNKNOWN, VEGETATION, WATER, classify};
+use classes::{
+    BUILDING, BuildingCue, ClassifyConfig, ClassifyInput, CrownCue, GROUND, LOW_VEGETATION, UNKNOWN, VEGETATION, WATER,
+    classify,
+};
 use numeric::SplitMix64;
 use raster::{Grid, gaussian};
 
@@ -53,6 +56,7 @@ fn houses_and_trees_are_told_apart() {
             surface: &heights,
             above_ground: &heights,
             index: None,
+            is_index_coarse: false,
             cue: None,
             crowns: None,
             cell_m: CELL_M,
@@ -80,6 +84,7 @@ fn a_vegetation_index_overrules_the_roughness() {
         surface: &heights,
         above_ground: &heights,
         index: Some(&index),
+        is_index_coarse: false,
         cue: None,
         crowns: None,
         cell_m: 0.5,
@@ -101,8 +106,15 @@ fn a_building_index_decides_where_heights_are_weak_and_only_there() {
         weak.row_mut(row)[40..60].fill(true);
         index.row_mut(row)[10..90].fill(0.8);
     }
-    let input =
-        ClassifyInput { surface: &heights, above_ground: &heights, index: None, cue: None, crowns: None, cell_m: 0.5 };
+    let input = ClassifyInput {
+        surface: &heights,
+        above_ground: &heights,
+        index: None,
+        is_index_coarse: false,
+        cue: None,
+        crowns: None,
+        cell_m: 0.5,
+    };
     let classes = |input: &ClassifyInput<'_>| {
         let found = classify(input, &ClassifyConfig::default()).unwrap().classes;
         [(20, 20), (50, 20), (70, 20), (110, 20)].map(|at| found[at])
@@ -116,8 +128,15 @@ fn a_building_index_decides_where_heights_are_weak_and_only_there() {
 #[test]
 fn unusable_input_is_refused() {
     let (heights, other) = (Grid::filled(5, 5, 1.0f32), Grid::filled(4, 5, 1.0f32));
-    let input =
-        ClassifyInput { surface: &heights, above_ground: &heights, index: None, cue: None, crowns: None, cell_m: 0.5 };
+    let input = ClassifyInput {
+        surface: &heights,
+        above_ground: &heights,
+        index: None,
+        is_index_coarse: false,
+        cue: None,
+        crowns: None,
+        cell_m: 0.5,
+    };
     let told = |input: &ClassifyInput<'_>, config: &ClassifyConfig| classify(input, config).unwrap_err().to_string();
     let usual = ClassifyConfig::default();
     assert!(told(&ClassifyInput { above_ground: &other, ..input }, &usual).contains("heights above ground"));
@@ -130,4 +149,32 @@ fn unusable_input_is_refused() {
     let mut wrong = usual;
     wrong.roughness_m = -1.0;
     assert!(told(&input, &wrong).contains("roughness"));
+}
+
+/// A roof beside a lawn, a street, and a tree whose height is missing.
+#[test]
+fn coarse_images_find_crowns_without_heights_and_leave_roofs_alone() {
+    let (mut heights, mut index) = (Grid::filled(80, 60, 0.0f32), Grid::filled(80, 60, 0.0f32));
+    let mut unsure = Grid::filled(80, 60, false);
+    for row in 10..40 {
+        heights.row_mut(row)[10..40].fill(5.0);
+        index.row_mut(row)[36..70].fill(0.6);
+        unsure.row_mut(row)[39..42].fill(true);
+    }
+    for row in 20..28 {
+        unsure.row_mut(row)[55..63].fill(true);
+    }
+    let crowns = Some(CrownCue { index: &index, unsure: &unsure });
+    let input = ClassifyInput {
+        surface: &heights,
+        above_ground: &heights,
+        index: Some(&index),
+        is_index_coarse: true,
+        cue: None,
+        crowns,
+        cell_m: 0.5,
+    };
+    let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
+    let at = [(20, 20), (38, 20), (41, 20), (50, 20), (58, 24), (75, 50)];
+    assert_eq!(at.map(|at| found[at]), [BUILDING, BUILDING, LOW_VEGETATION, LOW_VEGETATION, VEGETATION, GROUND]);
 }

@@ -8,7 +8,7 @@ use gdal::raster::ColorInterpretation;
 use gdal::{Dataset, Metadata};
 use serde::{Deserialize, Serialize};
 
-use super::spectral::{colour_name, colour_of};
+use super::band_colour::{colour_name, colour_of};
 
 /// A band of an image, as people name it.
 ///

@@ -8,6 +8,7 @@
 
 mod acquired;
 mod band;
+mod band_colour;
 mod colour;
 mod contours;
 mod dem;

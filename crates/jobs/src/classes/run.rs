@@ -79,6 +79,7 @@ pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRep
             surface: &surface.heights,
             above_ground: &above,
             index: given.as_ref(),
+            is_index_coarse: !config.multispectral.is_empty(),
             cue: None,
             crowns: None,
             cell_m,
