@@ -120,7 +120,15 @@ pub struct Classes {
 /// for row in 20..40 {
 ///     surface.row_mut(row)[15..45].fill(5.0);
 /// }
-/// let input = ClassifyInput { surface: &surface, above_ground: &surface, index: None, is_index_coarse: false, cue: None, crowns: None, cell_m: 0.5 };
+/// let input = ClassifyInput {
+///     surface: &surface,
+///     above_ground: &surface,
+///     index: None,
+///     is_index_coarse: false,
+///     cue: None,
+///     crowns: None,
+///     cell_m: 0.5,
+/// };
 /// let found = classify(&input, &ClassifyConfig::default())?;
 /// assert_eq!((found.classes[(30, 30)], found.classes[(5, 5)]), (BUILDING, GROUND));
 /// # Ok::<(), classes::ClassifyError>(())
