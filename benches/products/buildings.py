@@ -23,11 +23,10 @@ import time
 import numpy as np
 import rasterio
 
-from classes import at_cells, iou
+from classes import at_cells, iou, shift_of
 
 RESULTS = pathlib.Path(__file__).resolve().parents[1] / "results"
 BUILDING, EDGE, UNLABELLED = 6, 64, 65
-SHIFT_MAX = 8
 
 
 def average_precision(score, truth):
@@ -69,17 +68,6 @@ def simulated(program, scene, seen, work):
         rows.append({"scene": scene.name, "view": view.stem, "constants_chosen_on_it": seen, "cells": int(counts.sum()),
                      "building_share": float(truth.mean()), "average_precision": average_precision(index[counts], truth)})
     return rows
-
-
-def shift_of(surface, reference):
-    """Whole cells (rows, columns) by which a surface must be moved to lie on the reference."""
-    best = (np.inf, (0, 0))
-    for dy in range(-SHIFT_MAX, SHIFT_MAX + 1):
-        for dx in range(-SHIFT_MAX, SHIFT_MAX + 1):
-            apart = (np.roll(surface, (dy, dx), (0, 1)) - reference)[SHIFT_MAX:-SHIFT_MAX, SHIFT_MAX:-SHIFT_MAX]
-            apart = apart[np.isfinite(apart)]
-            best = min(best, (float(np.median(np.abs(apart - np.median(apart)))), (dy, dx)))
-    return best[1]
 
 
 def nearest(values, source, grid):
@@ -188,6 +176,15 @@ TRIED = [
     "- Closure squared instead of cubed, a smoothing of one metre, and a few more false alarms: the values above.",
     "- Neighbouring junctions that support each other without limit: worse by 0.06 to 0.1, because the blocks between streets have",
     "  four perfect corners. A second junction now weighs a quarter.",
+    "",
+    "On the towns of seeds 11 to 13 and 31 to 33 (0.830 and 0.790 before), with the direction of the sun found in the image:",
+    "",
+    "- Shapes that are darker behind the sides away from the sun count more: + 0.01; a threshold of darkness instead: less.",
+    "- Lit pixels with a shadow within 5 m behind them count twice: + 0.05; within 9 m: + 0.08 to 0.09. Both are in use.",
+    "- Shapes ranked by logistic regression or boosted trees on twenty properties: worse than the formula by 0.01 to 0.06.",
+    "- Large shapes lose by what smaller ones inside say; sides near the junction; contrast to the outside: nothing.",
+    "- The pointing error of the RPC, which shifts the index against the truth, costs 0.008.",
+    "",
     "- Brightness of the inside, contrast to the outside: worse beside the top-hat. Darkness on one side only (cast shadows): 0.01.",
 ]
 

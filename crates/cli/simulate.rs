@@ -1,6 +1,6 @@
 //! `skysweep simulate`: a seeded scene seen through RPC cameras, with its exact surface beside.
 //!
-//! Writes `view_1.tif` … (RPC in the file), the record `scene.json`, the parameters `scene.toml`,
+//! Writes `view_1.tif` … (RPC in the file), with `--multispectral` `ms_1.tif` …, the record `scene.json`, the parameters `scene.toml`,
 //! and in `truth/` the rasters, the heights of every image and the buildings at LoD2. With
 //! `--flight` also perspective cameras with their pictures, in `cameras`.
 
@@ -40,6 +40,10 @@ pub(crate) struct Args {
     /// --dates says otherwise.
     #[arg(long)]
     seasons: bool,
+    /// Also take a multispectral image of each view (ms_1.tif …): blue, green, red and near infrared
+    /// on pixels four times as wide.
+    #[arg(long)]
+    multispectral: bool,
     /// Also write N perspective cameras around the scene with their pictures (a COLMAP dataset in
     /// cameras, in map coordinates), for skysweep priors and train, and the exact surface that they
     /// see.
@@ -103,6 +107,9 @@ fn config(args: &Args) -> anyhow::Result<SimulationConfig> {
     if args.seasons {
         config.seasons = SeasonsConfig::YEAR;
         config.acquisition.dates = args.dates.unwrap_or(config.views);
+    }
+    if args.multispectral {
+        config.multispectral.get_or_insert_default();
     }
     config.validate()?;
     Ok(config)

@@ -33,6 +33,10 @@ pub struct BuildingIndexConfig {
     pub tolerance_m: f64,
     /// Width of the widest shadow, metres.
     pub shadow_m: f64,
+    /// Distance within which a building has a shadow behind it, metres.
+    pub cast_m: f64,
+    /// How much more salient a lit pixel is with a shadow behind it, as a share.
+    pub cast_gain: f64,
     /// Standard deviation of the smoothing of the index, metres.
     pub blur_m: f64,
     /// Saliency at which the index is a half.
@@ -53,6 +57,8 @@ impl Default for BuildingIndexConfig {
             log_false_alarms: 1.5,
             tolerance_m: 1.0,
             shadow_m: 30.0,
+            cast_m: 9.0,
+            cast_gain: 1.0,
             blur_m: 1.0,
             half_saliency: 0.3,
         }
@@ -80,6 +86,8 @@ impl BuildingIndexConfig {
         within("the logarithm of false alarms", self.log_false_alarms, -100.0, 10.0, "-100 to 10")?;
         within("the tolerance", self.tolerance_m, 0.0, 20.0, "0 to 20 m")?;
         within("the width of shadows", self.shadow_m, 0.0, 500.0, "0 to 500 m")?;
+        within("the reach of cast shadows", self.cast_m, 0.0, 500.0, "0 to 500 m")?;
+        within("the gain of cast shadows", self.cast_gain, 0.0, 100.0, "0 to 100")?;
         within("the smoothing of the index", self.blur_m, 0.0, 100.0, "0 to 100 m")?;
         within("the saliency of a half", self.half_saliency, 1e-6, 1e6, "0.000001 to 1000000")
     }

@@ -2,6 +2,7 @@
 
 use numeric::Progress;
 use raster::{Grid, gaussian, height_percentiles};
+use rayon::prelude::*;
 
 use crate::config::BuildingIndexConfig;
 use crate::error::{BuildingIndexError, SIDE_MAX};
@@ -9,9 +10,12 @@ use crate::gradient::gradients;
 use crate::junctions::{BranchLimits, junctions};
 use crate::shadow::black_top_hat;
 use crate::shapes::{ShapeLimits, coverage, shapes};
+use crate::sunlight::Sunlight;
 
 /// Least smoothing before gradients, pixels: below it gradients have few directions.
 const SMOOTHING_PX: f64 = 0.8;
+/// Smoothing before light and shadow are told apart, metres: less than the narrowest shadow.
+const LIGHT_SMOOTHING_M: f64 = 0.5;
 /// Percentiles of the image between which its contrast is measured.
 const CONTRAST: (f64, f64) = (10.0, 90.0);
 
@@ -79,11 +83,21 @@ pub fn building_index(
         spread_deg: config.angle_spread_deg as f32,
         tolerance_px: pixels(config.tolerance_m) as f32,
     };
-    let (shapes, pairs) = shapes(&found, &slopes, &limits);
-    let mut index = coverage(&shapes, image.width(), image.height());
-    let shadow = black_top_hat(image, pixels(0.5 * config.shadow_m).round() as usize);
+    let (mut shapes, pairs) = shapes(&found, &slopes, &limits);
     let (low, high) = height_percentiles(image, CONTRAST.0, CONTRAST.1).unwrap_or((0.0, 0.0));
     let (contrast, half) = ((high - low).max(f32::MIN_POSITIVE), config.half_saliency as f32);
+    let light_px = pixels(LIGHT_SMOOTHING_M).max(SMOOTHING_PX) as f32;
+    let sunlight = Sunlight::of(image, &shapes, contrast, light_px, gsd_m as f32);
+    if let Some(sunlight) = &sunlight {
+        shapes.par_iter_mut().for_each(|shape| shape.weight *= sunlight.factor(shape));
+    }
+    let mut index = coverage(&shapes, image.width(), image.height());
+    if let Some(sunlight) = &sunlight {
+        let support = sunlight.support(config.cast_m as f32, light_px);
+        let gain = config.cast_gain as f32;
+        index.data_mut().iter_mut().zip(support.data()).for_each(|(value, cast)| *value *= 1.0 + gain * cast);
+    }
+    let shadow = black_top_hat(image, pixels(0.5 * config.shadow_m).round() as usize);
     index.data_mut().iter_mut().zip(shadow.data()).for_each(|(value, darker)| {
         let saliency = *value * (-darker / contrast).exp();
         *value = saliency / (saliency + half);

@@ -8,7 +8,9 @@
 //!    if its angle is near a right one, and within the areas of buildings.
 //! 3. **Second-order saliency**: more still if edges close the parallelogram, and if another
 //!    junction is one of its other corners.
-//! 4. **Index**: the saliencies that cover a pixel add up to `s`. Shadows, which have corners too,
+//! 4. **Shadows**: the sun's direction follows from the image. Shapes that are dark behind, and
+//!    lit pixels with a shadow behind them, are more salient.
+//! 5. **Index**: the saliencies that cover a pixel add up to `s`. Shadows, which have corners too,
 //!    are attenuated by the black top-hat `b` of the image: `s' = s exp(−b / contrast)`. The index
 //!    is `s' / (s' + half)`, 0 to 1.
 //!
@@ -25,6 +27,7 @@ mod index;
 mod junctions;
 mod shadow;
 mod shapes;
+mod sunlight;
 
 pub use config::BuildingIndexConfig;
 pub use error::BuildingIndexError;

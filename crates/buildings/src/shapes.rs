@@ -121,6 +121,26 @@ impl Shape {
         [(plus(corner, a), [-1.0, 1.0]), (plus(corner, b), [1.0, -1.0]), (plus(plus(corner, a), b), [-1.0, -1.0])]
     }
 
+    /// Returns the four sides, each with its start, its vector and its unit normal away from the
+    /// middle.
+    pub(crate) fn outer_sides(&self) -> [([f32; 2], [f32; 2], [f32; 2]); 4] {
+        let [a, b] = self.sides;
+        let corner = self.corner;
+        let outer = |start: [f32; 2], side: [f32; 2], across: [f32; 2]| {
+            let length = side[0].hypot(side[1]);
+            let normal = [-side[1] / length, side[0] / length];
+            let sign = if normal[0] * across[0] + normal[1] * across[1] < 0.0 { -1.0 } else { 1.0 };
+            (start, side, normal.map(|part| sign * part))
+        };
+        let back = |v: [f32; 2]| v.map(|part| -part);
+        [
+            outer(corner, a, back(b)),
+            outer(plus(corner, b), a, b),
+            outer(corner, b, back(a)),
+            outer(plus(corner, a), b, a),
+        ]
+    }
+
     fn rows(&self) -> (f32, f32) {
         let [a, b] = self.sides.map(|side| side[1]);
         (self.corner[1] + a.min(0.0) + b.min(0.0), self.corner[1] + a.max(0.0) + b.max(0.0))

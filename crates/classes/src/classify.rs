@@ -4,14 +4,16 @@ use raster::Grid;
 
 use crate::config::ClassifyConfig;
 use crate::error::ClassifyError;
-use crate::regions::{grow, take_enclosed, without_small};
+use crate::regions::{closed, grow, opened, spread, take_enclosed, without_share, without_small};
 use crate::roughness::{least_residual, median_residual};
 
 /// A cell without a height or without ground.
 pub const UNKNOWN: u8 = 0;
 /// Bare ground.
 pub const GROUND: u8 = 2;
-/// Vegetation higher than the least height.
+/// Grass and other plants on the ground, which only a vegetation index tells from it.
+pub const LOW_VEGETATION: u8 = 3;
+/// Trees and other vegetation higher than the least height.
 pub const VEGETATION: u8 = 5;
 /// A building.
 pub const BUILDING: u8 = 6;
@@ -27,6 +29,17 @@ pub struct BuildingCue<'a> {
     pub weak: Option<&'a Grid<bool>>,
 }
 
+/// What tells crowns that the surface lacks: matching drops small trees, and leaves uncertain heights
+/// of the ground in their places.
+#[derive(Debug, Clone, Copy)]
+pub struct CrownCue<'a> {
+    /// Vegetation index of each cell, looked at above the surface in several images, where a crown
+    /// would be; NaN where none is known.
+    pub index: &'a Grid<f32>,
+    /// Cells whose height was not observed or is uncertain.
+    pub unsure: &'a Grid<bool>,
+}
+
 /// A surface and its height above the ground, on one grid of square cells.
 #[derive(Debug, Clone, Copy)]
 pub struct ClassifyInput<'a> {
@@ -36,8 +49,13 @@ pub struct ClassifyInput<'a> {
     pub above_ground: &'a Grid<f32>,
     /// Vegetation index (NDVI) of each cell, −1 to 1; NaN where none is known.
     pub index: Option<&'a Grid<f32>>,
+    /// Whether the pixels of the vegetation index are wider than the cells. Along eaves they hold
+    /// roof and lawn, so that what stands is told by its shape.
+    pub is_index_coarse: bool,
     /// What an image says about buildings.
     pub cue: Option<BuildingCue<'a>>,
+    /// What images say about crowns without heights.
+    pub crowns: Option<CrownCue<'a>>,
     /// Side of a cell, metres.
     pub cell_m: f64,
 }
@@ -72,6 +90,8 @@ const BARE_M: f32 = 0.3;
 /// Fewest windows on bare ground that tell the noise of a surface.
 const WINDOWS_MIN: usize = 100;
 
+/// Distance from a building within which heights are unsure because of its walls, metres.
+const WALL_M: f64 = 1.0;
 /// Area of smooth cells that is no accident, in windows.
 const CHANCE_WINDOWS: f64 = 1.2;
 
@@ -100,7 +120,15 @@ pub struct Classes {
 /// for row in 20..40 {
 ///     surface.row_mut(row)[15..45].fill(5.0);
 /// }
-/// let input = ClassifyInput { surface: &surface, above_ground: &surface, index: None, cue: None, cell_m: 0.5 };
+/// let input = ClassifyInput {
+///     surface: &surface,
+///     above_ground: &surface,
+///     index: None,
+///     is_index_coarse: false,
+///     cue: None,
+///     crowns: None,
+///     cell_m: 0.5,
+/// };
 /// let found = classify(&input, &ClassifyConfig::default())?;
 /// assert_eq!((found.classes[(30, 30)], found.classes[(5, 5)]), (BUILDING, GROUND));
 /// # Ok::<(), classes::ClassifyError>(())
@@ -117,14 +145,15 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     let scale = Scale::of(input, config);
     let roughness = least_residual(input.surface, &stands, reach_of(scale.window_m, input.cell_m));
     let limit_m = scale.roughness_m as f32;
-    let is_green = |at: usize| input.index.is_some_and(|index| f64::from(index.data()[at]) >= config.least_index);
     let cells = |area_m2: f64| (area_m2 / (input.cell_m * input.cell_m)).ceil() as usize;
+    let steps = |length_m: f64| (length_m / input.cell_m).round().max(1.0) as usize;
+    let green = Greenness::of(input, config);
     let mut buildings = roughness.map(|r| *r < limit_m);
-    buildings.data_mut().iter_mut().enumerate().for_each(|(at, smooth)| *smooth = *smooth && !is_green(at));
+    clear(&mut buildings, &green.tall);
     let mut stands = stands;
     if let Some(cue) = &input.cue {
         let likely = likely_buildings(input, cue, (&roughness, scale.roughness_m), config);
-        for at in (0..likely.len()).filter(|at| likely[*at] && !is_green(*at)) {
+        for at in (0..likely.len()).filter(|at| likely[*at] && !green.tall.data()[*at]) {
             buildings.data_mut()[at] = true;
             stands.data_mut()[at] = true;
         }
@@ -133,19 +162,26 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     let chance_m2 = CHANCE_WINDOWS * scale.window_m * scale.window_m;
     without_small(&mut buildings, cells(chance_m2.min(config.least_building_m2)));
     let mut free = stands.clone();
-    free.data_mut().iter_mut().enumerate().for_each(|(at, free)| *free = *free && !is_green(at));
-    grow(&mut buildings, &free, (scale.ramp_m / input.cell_m).round().max(1.0) as usize);
+    clear(&mut free, &green.tall);
+    grow(&mut buildings, &free, steps(scale.ramp_m));
     without_small(&mut buildings, cells(config.least_building_m2));
     let mut vegetation = stands.clone();
-    let cleared = vegetation.data_mut().iter_mut().zip(buildings.data());
-    cleared.filter(|(_, building)| **building).for_each(|(plant, _)| *plant = false);
+    clear(&mut vegetation, &buildings);
     without_small(&mut vegetation, cells(config.least_vegetation_m2));
+    if input.index.is_some() {
+        let is_green = |at: usize| green.all.data()[at];
+        let known = |at: usize| green.known.data()[at];
+        without_share(&mut vegetation, config.least_green_share, known, is_green);
+    }
     let mut left = stands;
-    let taken = left.data_mut().iter_mut().zip(vegetation.data());
-    taken.filter(|(_, plant)| **plant).for_each(|(left, _)| *left = false);
+    clear(&mut left, &vegetation);
     // Scraps that touch a building are parts of it; others are too small for anything.
     grow(&mut buildings, &left, 1);
-    take_enclosed(&mut vegetation, &mut buildings, is_green);
+    take_enclosed(&mut vegetation, &mut buildings, |at| green.tall.data()[at]);
+    if let Some(crowns) = &input.crowns {
+        let found = without_heights(input, crowns, &buildings, config);
+        add(&mut vegetation, &found);
+    }
     let mut water = left.map(|_| false);
     if let Some(index) = input.index {
         water.data_mut().iter_mut().enumerate().for_each(|(at, wet)| {
@@ -161,10 +197,62 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
             _ if buildings.data()[at] => BUILDING,
             _ if vegetation.data()[at] => VEGETATION,
             _ if water.data()[at] => WATER,
+            _ if green.all.data()[at] => LOW_VEGETATION,
             _ => GROUND,
         };
     }
     Ok(Classes { classes, roughness })
+}
+
+/// What the vegetation index says.
+struct Greenness {
+    /// Cells with an index.
+    known: Grid<bool>,
+    /// Green cells.
+    all: Grid<bool>,
+    /// Green cells that are no buildings.
+    tall: Grid<bool>,
+}
+
+impl Greenness {
+    fn of(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Self {
+        let none = || input.surface.map(|_| false);
+        let Some(index) = input.index else { return Self { known: none(), all: none(), tall: none() } };
+        let all = index.map(|v| f64::from(*v) >= config.least_index);
+        let tall = if input.is_index_coarse { none() } else { all.clone() };
+        Self { known: index.map(|v| v.is_finite()), all, tall }
+    }
+}
+
+/// Returns crowns that the surface lacks: green above the surface where its height is unsure, away
+/// from walls, where heights are unsure too, and as wide as a crown.
+fn without_heights(
+    input: &ClassifyInput<'_>,
+    crowns: &CrownCue<'_>,
+    buildings: &Grid<bool>,
+    config: &ClassifyConfig,
+) -> Grid<bool> {
+    let steps = |length_m: f64| (length_m / input.cell_m).round().max(1.0) as usize;
+    let mut found = crowns.unsure.clone();
+    for (at, crown) in found.data_mut().iter_mut().enumerate() {
+        *crown = *crown && f64::from(crowns.index.data()[at]) >= config.least_index;
+    }
+    clear(&mut found, &spread(buildings, steps(WALL_M)));
+    let reach = steps(0.5 * config.least_crown_m);
+    let mut found = closed(&opened(&found, reach), reach);
+    clear(&mut found, buildings);
+    without_small(&mut found, (config.least_vegetation_m2 / (input.cell_m * input.cell_m)).ceil() as usize);
+    found
+}
+
+/// Takes the cells of one mask out of another.
+fn clear(mask: &mut Grid<bool>, other: &Grid<bool>) {
+    mask.data_mut().iter_mut().zip(other.data()).for_each(|(cell, other)| *cell &= !other);
+}
+
+/// Adds the cells of one mask to another.
+fn add(mask: &mut Grid<bool>, other: &Grid<bool>) {
+    mask.data_mut().iter_mut().zip(other.data()).for_each(|(cell, other)| *cell |= other);
 }
 
 /// Returns the cells whose heights are too weak to tell and that the building index says are
@@ -200,6 +288,8 @@ fn check(input: &ClassifyInput<'_>) -> Result<(), ClassifyError> {
     fits("the building index", input.cue.map(|cue| (cue.index.width(), cue.index.height())))?;
     let weak = input.cue.and_then(|cue| cue.weak);
     fits("the mask of weak heights", weak.map(|grid| (grid.width(), grid.height())))?;
+    fits("the index of crowns", input.crowns.map(|crowns| (crowns.index.width(), crowns.index.height())))?;
+    fits("the mask of unsure heights", input.crowns.map(|crowns| (crowns.unsure.width(), crowns.unsure.height())))?;
     if !(input.cell_m.is_finite() && input.cell_m > 0.0) {
         let (name, expected) = ("the side of a cell", "a positive number of metres");
         return Err(ClassifyError::Parameter { name, found: input.cell_m, expected });

@@ -32,6 +32,11 @@ pub struct ClassifyConfig {
     pub ramp_m: f64,
     /// Least vegetation index of vegetation, where one is given.
     pub least_index: f64,
+    /// Least share of green cells in vegetation, where an index is given. Coarse pixels hold little of
+    /// a small crown.
+    pub least_green_share: f64,
+    /// Narrowest crown that is found without a height, metres.
+    pub least_crown_m: f64,
     /// Largest vegetation index of water, where one is given. Water swallows the near infrared;
     /// asphalt and soil lie about 0.
     pub water_index: f64,
@@ -57,6 +62,8 @@ impl Default for ClassifyConfig {
             least_vegetation_m2: 4.0,
             ramp_m: 1.5,
             least_index: 0.3,
+            least_green_share: 0.05,
+            least_crown_m: 1.0,
             water_index: -0.1,
             least_water_m2: 100.0,
             least_building_index: 0.5,
@@ -91,6 +98,8 @@ impl ClassifyConfig {
         within("the least area of vegetation", self.least_vegetation_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the width of ramps", self.ramp_m, 0.0, 20.0, "0 to 20 m")?;
         within("the least vegetation index", self.least_index, -1.0, 1.0, "-1 to 1")?;
+        within("the least share of green cells", self.least_green_share, 0.0, 1.0, "0 to 1")?;
+        within("the width of the narrowest crown", self.least_crown_m, 0.0, 50.0, "0 to 50 m")?;
         let range = "-1 to that of vegetation";
         within("the largest vegetation index of water", self.water_index, -1.0, self.least_index, range)?;
         within("the least area of water", self.least_water_m2, 0.0, 1e6, "0 to 1000000 m²")?;

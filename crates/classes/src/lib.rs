@@ -12,17 +12,25 @@
 //! 4. What else stands is **vegetation** if it is wide enough for a shrub, and belongs to its
 //!    surroundings otherwise.
 //!
-//! A map of vegetation, such as an index of near-infrared light, overrules the roughness where it
-//! is given. A building index, made of an image, decides only where heights are weak: cells that
-//! were not observed, or whose height or roughness lies near its threshold. Heights are in metres,
-//! NaN is a void. Values are the ASPRS LAS classes.
+//! A vegetation index of near-infrared light overrules the roughness where it is given, unless its
+//! pixels are wider than the cells; what is rough and not green at all is no vegetation. Plants on
+//! the ground are low vegetation. Crowns that the
+//! surface lacks are vegetation where the index is green above uncertain heights. A building index,
+//! made of an image, decides only where heights are weak: cells that were not observed, or whose
+//! height or roughness lies near its threshold. Heights are in metres, NaN is a void. Values are the
+//! ASPRS LAS classes.
 
 mod classify;
 mod config;
 mod error;
+mod greenness;
 mod regions;
 mod roughness;
 
-pub use classify::{BUILDING, BuildingCue, Classes, ClassifyInput, GROUND, UNKNOWN, VEGETATION, WATER, classify};
+pub use classify::{
+    BUILDING, BuildingCue, Classes, ClassifyInput, CrownCue, GROUND, LOW_VEGETATION, UNKNOWN, VEGETATION, WATER,
+    classify,
+};
 pub use config::ClassifyConfig;
 pub use error::ClassifyError;
+pub use greenness::{SpectralCells, black_level, nir_gain, vegetation_index};

@@ -61,6 +61,56 @@ fn regions_of(mask: &Grid<bool>) -> Vec<Vec<usize>> {
     regions
 }
 
+/// Returns the parts of a mask that are wider than `2 steps` cells: what is left when the mask
+/// shrinks by `steps` cells and grows again. Beyond the edge of the raster the mask goes on.
+pub(crate) fn opened(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
+    spread(&shrunk(mask, steps), steps)
+}
+
+/// Returns a mask without gaps narrower than `2 steps` cells.
+pub(crate) fn closed(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
+    shrunk(&spread(mask, steps), steps)
+}
+
+/// Shrinks a mask: cells that share a side with one outside of it leave it, `steps` times.
+fn shrunk(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
+    spread(&mask.map(|inside| !inside), steps).map(|outside| !outside)
+}
+
+/// Grows a mask to the cells that share a side with it, `steps` times.
+pub(crate) fn spread(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
+    let (width, height) = (mask.width(), mask.height());
+    let mut wide = mask.clone();
+    let mut front: Vec<usize> = (0..mask.data().len()).filter(|at| mask.data()[*at]).collect();
+    for _ in 0..steps {
+        let mut next = Vec::new();
+        for near in front.into_iter().flat_map(|at| beside(width, height, at)) {
+            if !std::mem::replace(&mut wide.data_mut()[near], true) {
+                next.push(near);
+            }
+        }
+        front = next;
+    }
+    wide
+}
+
+/// Takes the regions out of a mask of whose cells a smaller share than `share_min` `counts`. Regions
+/// of which fewer than half of the cells are `known` stay.
+pub(crate) fn without_share(
+    mask: &mut Grid<bool>,
+    share_min: f64,
+    known: impl Fn(usize) -> bool,
+    counts: impl Fn(usize) -> bool,
+) {
+    for region in regions_of(mask) {
+        let seen = region.iter().filter(|at| known(**at)).count();
+        let counted = region.iter().filter(|at| counts(**at)).count();
+        if 2 * seen >= region.len() && (counted as f64) < share_min * seen as f64 {
+            region.into_iter().for_each(|at| mask.data_mut()[at] = false);
+        }
+    }
+}
+
 /// Grows a mask by `steps` cells, as far as `within` allows.
 pub(crate) fn grow(mask: &mut Grid<bool>, within: &Grid<bool>, steps: usize) {
     let mut front: Vec<usize> = (0..mask.data().len()).filter(|at| mask.data()[*at]).collect();
@@ -95,6 +145,29 @@ fn beside(width: usize, height: usize, at: usize) -> impl Iterator<Item = usize>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn opening_takes_strips_away_and_closing_fills_gaps() {
+        let mut mask = Grid::filled(20, 12, false);
+        (2..10).for_each(|row| mask.row_mut(row)[3..11].fill(true));
+        (4..6).for_each(|row| mask.row_mut(row)[11..18].fill(true));
+        mask[(7, 7)] = false;
+        assert!(closed(&mask, 1)[(7, 7)] && closed(&mask, 1)[(3, 2)] && !closed(&mask, 1)[(1, 5)]);
+        let wide = opened(&closed(&mask, 1), 1);
+        assert!(wide[(5, 5)] && !wide[(15, 4)] && !wide[(17, 5)]);
+    }
+
+    #[test]
+    fn regions_with_few_cells_that_count_leave_the_mask() {
+        let mut mask = Grid::filled(12, 3, false);
+        mask.row_mut(1)[0..4].fill(true);
+        mask.row_mut(1)[6..10].fill(true);
+        let mut unknown = mask.clone();
+        without_share(&mut mask, 0.5, |_| true, |at| at < 15);
+        assert!(mask[(0, 1)] && !mask[(9, 1)]);
+        without_share(&mut unknown, 0.5, |at| at < 13, |_| false);
+        assert!(unknown[(0, 1)], "most of it is not known");
+    }
 
     #[test]
     fn what_stands_on_a_roof_is_part_of_it_and_what_stands_beside_it_is_not() {

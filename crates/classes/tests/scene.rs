@@ -1,6 +1,9 @@
 //! A scene of houses and trees with noise: their classes, a vegetation index, and what is refused.
 
-use classes::{BUILDING, BuildingCue, ClassifyConfig, ClassifyInput, GROUND, UNKNOWN, VEGETATION, WATER, classify};
+use classes::{
+    BUILDING, BuildingCue, ClassifyConfig, ClassifyInput, CrownCue, GROUND, LOW_VEGETATION, UNKNOWN, VEGETATION, WATER,
+    classify,
+};
 use numeric::SplitMix64;
 use raster::{Grid, gaussian};
 
@@ -49,7 +52,15 @@ fn iou(found: &Grid<u8>, truth: &Grid<u8>, class: u8) -> f64 {
 fn houses_and_trees_are_told_apart() {
     for seed in 0..4 {
         let (heights, truth) = scene(seed);
-        let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cue: None, cell_m: CELL_M };
+        let input = ClassifyInput {
+            surface: &heights,
+            above_ground: &heights,
+            index: None,
+            is_index_coarse: false,
+            cue: None,
+            crowns: None,
+            cell_m: CELL_M,
+        };
         let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
         let (buildings, plants) = (iou(&found, &truth, BUILDING), iou(&found, &truth, VEGETATION));
         assert!(buildings > 0.95 && plants > 0.9, "seed {seed}: {buildings:.3}, {plants:.3}");
@@ -69,8 +80,15 @@ fn a_vegetation_index_overrules_the_roughness() {
     }
     index[(55, 5)] = -0.4;
     heights[(0, 0)] = f32::NAN;
-    let input =
-        ClassifyInput { surface: &heights, above_ground: &heights, index: Some(&index), cue: None, cell_m: 0.5 };
+    let input = ClassifyInput {
+        surface: &heights,
+        above_ground: &heights,
+        index: Some(&index),
+        is_index_coarse: false,
+        cue: None,
+        crowns: None,
+        cell_m: 0.5,
+    };
     let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
     assert_eq!([found[(20, 20)], found[(40, 20)]], [BUILDING, VEGETATION]);
     assert_eq!([found[(0, 0)], found[(55, 55)]], [UNKNOWN, GROUND]);
@@ -88,7 +106,15 @@ fn a_building_index_decides_where_heights_are_weak_and_only_there() {
         weak.row_mut(row)[40..60].fill(true);
         index.row_mut(row)[10..90].fill(0.8);
     }
-    let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cue: None, cell_m: 0.5 };
+    let input = ClassifyInput {
+        surface: &heights,
+        above_ground: &heights,
+        index: None,
+        is_index_coarse: false,
+        cue: None,
+        crowns: None,
+        cell_m: 0.5,
+    };
     let classes = |input: &ClassifyInput<'_>| {
         let found = classify(input, &ClassifyConfig::default()).unwrap().classes;
         [(20, 20), (50, 20), (70, 20), (110, 20)].map(|at| found[at])
@@ -102,7 +128,15 @@ fn a_building_index_decides_where_heights_are_weak_and_only_there() {
 #[test]
 fn unusable_input_is_refused() {
     let (heights, other) = (Grid::filled(5, 5, 1.0f32), Grid::filled(4, 5, 1.0f32));
-    let input = ClassifyInput { surface: &heights, above_ground: &heights, index: None, cue: None, cell_m: 0.5 };
+    let input = ClassifyInput {
+        surface: &heights,
+        above_ground: &heights,
+        index: None,
+        is_index_coarse: false,
+        cue: None,
+        crowns: None,
+        cell_m: 0.5,
+    };
     let told = |input: &ClassifyInput<'_>, config: &ClassifyConfig| classify(input, config).unwrap_err().to_string();
     let usual = ClassifyConfig::default();
     assert!(told(&ClassifyInput { above_ground: &other, ..input }, &usual).contains("heights above ground"));
@@ -115,4 +149,32 @@ fn unusable_input_is_refused() {
     let mut wrong = usual;
     wrong.roughness_m = -1.0;
     assert!(told(&input, &wrong).contains("roughness"));
+}
+
+/// A roof beside a lawn, a street, and a tree whose height is missing.
+#[test]
+fn coarse_images_find_crowns_without_heights_and_leave_roofs_alone() {
+    let (mut heights, mut index) = (Grid::filled(80, 60, 0.0f32), Grid::filled(80, 60, 0.0f32));
+    let mut unsure = Grid::filled(80, 60, false);
+    for row in 10..40 {
+        heights.row_mut(row)[10..40].fill(5.0);
+        index.row_mut(row)[36..70].fill(0.6);
+        unsure.row_mut(row)[39..42].fill(true);
+    }
+    for row in 20..28 {
+        unsure.row_mut(row)[55..63].fill(true);
+    }
+    let crowns = Some(CrownCue { index: &index, unsure: &unsure });
+    let input = ClassifyInput {
+        surface: &heights,
+        above_ground: &heights,
+        index: Some(&index),
+        is_index_coarse: true,
+        cue: None,
+        crowns,
+        cell_m: 0.5,
+    };
+    let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
+    let at = [(20, 20), (38, 20), (41, 20), (50, 20), (58, 24), (75, 50)];
+    assert_eq!(at.map(|at| found[at]), [BUILDING, BUILDING, LOW_VEGETATION, LOW_VEGETATION, VEGETATION, GROUND]);
 }

@@ -1,7 +1,8 @@
 //! The simulation job: a seeded scene seen through RPC cameras, with its exact surface.
 //!
-//! Writes `view_1.tif` … (with the RPC in the file), the record `scene.json`, the parameters
-//! `scene.toml`, and in `truth/` the rasters, the heights of every image and the buildings at LoD2.
+//! Writes `view_1.tif` … (with the RPC in the file), where asked for `ms_1.tif` … (multispectral),
+//! the record `scene.json`, the parameters `scene.toml`, and in `truth/` the rasters, the heights of
+//! every image and the buildings at LoD2.
 //! A flight adds perspective cameras and the points of a reconstruction in `cameras/sparse/0`, in
 //! map coordinates, their pictures in `cameras/images`, and the exact surface that they see as
 //! clouds in `truth/`. Of given cameras it writes what they see exactly, in `truth/cameras`.
@@ -10,16 +11,21 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use ::simulate::{
-    ExactPoint, Flight, FlightPoint, SceneRecord, SimulateError, SimulatedView, Simulation, SimulationConfig,
+    ExactPoint, Flight, FlightPoint, SPECTRAL_BANDS, SceneRecord, SimulateError, SimulatedView, Simulation,
+    SimulationConfig, SpectralBand,
 };
 use camera::{LensError, Pose};
 use crs::Crs;
 use io::citymodel::{CityJsonOptions, write_cityjson};
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
 use io::ply::{PlyPoint, write_points};
-use io::raster::{Band, BandData, CogRaster, write_cog, write_image_with_rpc, write_png_gray};
+use io::raster::{
+    Band, BandData, BandSpectrum, CogRaster, write_cog, write_image_with_rpc, write_multispectral_with_rpc,
+    write_png_gray,
+};
 use io::splat_ply::LocalOrigin;
 use numeric::{Cancelled, Progress};
+use raster::Grid;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{JobError, SettingError, from_steps};
@@ -221,7 +227,7 @@ fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileErr
     if !folder.path().join(PARAMETERS).is_file() {
         return Ok(());
     }
-    for (below, stems) in [("", &["view"][..]), ("truth/", &["heights", "clouds"])] {
+    for (below, stems) in [("", &["view", "ms"][..]), ("truth/", &["heights", "clouds"])] {
         let entries = fs::read_dir(folder.path().join(below)).into_iter().flatten().flatten();
         for name in entries.filter_map(|entry| entry.file_name().into_string().ok()) {
             let numbered = name.strip_suffix(".tif").and_then(|name| name.rsplit_once('_'));
@@ -305,6 +311,12 @@ impl SceneWriter<'_> {
         let heights = [Band { description: "height_m", data: BandData::F32(&view.heights) }];
         let no_data = Some(f64::from(raster::NO_DATA));
         write_image_with_rpc(path("heights"), &heights, &view.true_rpc, no_data, self.overwrite)?;
+        if let Some(image) = &view.multispectral {
+            let bands: Vec<(Band<'_>, BandSpectrum<'_>)> =
+                SPECTRAL_BANDS.iter().zip(&image.bands).map(spectral).collect();
+            let path = self.folder.join(format!("ms_{number}.tif"));
+            write_multispectral_with_rpc(path, &bands, &image.rpc, Some(0.0), self.overwrite)?;
+        }
         if let Some(cover) = &view.clouds {
             let clouds = [Band { description: "cloud", data: BandData::U8(cover) }];
             write_image_with_rpc(path("clouds"), &clouds, &view.true_rpc, None, self.overwrite)?;
@@ -383,6 +395,12 @@ impl SceneWriter<'_> {
         let cog = CogRaster { holds_heights, ..CogRaster::new(bands, truth.geotransform, crs) };
         Ok(write_cog(self.folder.join("truth").join(name), &cog, self.overwrite)?)
     }
+}
+
+/// Returns a band of a multispectral image with its name, colour and wavelength.
+fn spectral<'a>((band, numbers): (&'a SpectralBand, &'a Grid<u16>)) -> (Band<'a>, BandSpectrum<'a>) {
+    let spectrum = BandSpectrum { colour: band.name, centre_um: band.centre_um, width_um: band.width_um };
+    (Band { description: band.name, data: BandData::U16(numbers) }, spectrum)
 }
 
 fn picture_name(id: u32) -> String {

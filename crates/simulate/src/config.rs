@@ -51,6 +51,21 @@ pub struct SimulationConfig {
     /// Change of the scene and of the sharpness from date to date.
     #[serde(default, skip_serializing_if = "SeasonsConfig::is_none")]
     pub seasons: SeasonsConfig,
+    /// A multispectral image of each view beside the panchromatic one. `None` makes none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub multispectral: Option<MultispectralConfig>,
+}
+
+/// Multispectral images: blue, green, red and near infrared, taken with the panchromatic images.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MultispectralConfig {
+    /// Side of a multispectral pixel, in panchromatic pixels.
+    pub ratio: usize,
+    /// Share of the trees whose leaves are yellow or brown, 0 to 1.
+    pub autumn_share: f64,
+    /// Share of the flat roofs that are planted, 0 to 1.
+    pub planted_roof_share: f64,
 }
 
 /// The shape of the bare ground.

@@ -55,6 +55,8 @@ mod seasons;
 mod sensor;
 mod sight;
 mod simulation;
+mod spectral_image;
+mod spectrum;
 mod streets;
 mod sun;
 mod terrain;
@@ -67,7 +69,8 @@ pub use building::Building;
 pub use camera_model::Look;
 pub use config::{
     AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, CrownForm, GroundCover,
-    LookAngles, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
+    LookAngles, MultispectralConfig, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig,
+    VehiclesConfig,
 };
 pub use date::Date;
 pub use error::SimulateError;
@@ -82,6 +85,7 @@ pub use seasons::{Season, SeasonsConfig};
 pub use sensor::Sensor;
 pub use sight::SightLines;
 pub use simulation::{SceneRecord, SimulatedView, Simulation, ViewRecord};
+pub use spectral_image::{SPECTRAL_BANDS, SpectralBand, SpectralImage};
 pub use sun::Sun;
 pub use terrain::Terrain;
 pub use truth::{ORTHO_SCALE, Truth};

@@ -141,6 +141,11 @@ impl SimulationConfig {
         within("sensor.read_noise_electrons", s.read_noise_electrons, 0.0, 1e6)?;
         within("sensor.white_share", s.white_share, 0.05, 5.0)?;
         within("sensor.offset_share", s.offset_share, 0.0, 0.5)?;
+        if let Some(multispectral) = &self.multispectral {
+            within("multispectral.ratio", multispectral.ratio as f64, 1.0, 8.0)?;
+            within("multispectral.autumn_share", multispectral.autumn_share, 0.0, 1.0)?;
+            within("multispectral.planted_roof_share", multispectral.planted_roof_share, 0.0, 1.0)?;
+        }
         within("clouds.share", self.clouds.share, 0.0, 1.0)?;
         within("clouds.extent_m", self.clouds.extent_m, 10.0, 5000.0)
     }

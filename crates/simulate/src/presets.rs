@@ -2,7 +2,8 @@
 
 use crate::config::{
     AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, CrownForm, GroundCover,
-    QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig, VehiclesConfig,
+    MultispectralConfig, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig,
+    VehiclesConfig,
 };
 use crate::error::SimulateError;
 use crate::seasons::SeasonsConfig;
@@ -29,7 +30,16 @@ impl Default for SimulationConfig {
             sensor: SensorConfig::default(),
             clouds: CloudsConfig { share: 0.0, extent_m: 120.0, masked: true },
             seasons: SeasonsConfig::default(),
+            multispectral: None,
         }
+    }
+}
+
+impl Default for MultispectralConfig {
+    /// Pixels four times as wide, as WorldView, Pléiades and SuperView have them; a few trees are
+    /// autumnal, and few flat roofs are planted.
+    fn default() -> Self {
+        Self { ratio: 4, autumn_share: 0.12, planted_roof_share: 0.06 }
     }
 }
 

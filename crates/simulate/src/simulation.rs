@@ -20,6 +20,8 @@ use crate::scene::Scene;
 use crate::seasons::SeasonLook;
 use crate::sensor::{PointSpread, Sensor};
 use crate::sight::SightLines;
+use crate::spectral_image::{SpectralCamera, SpectralImage};
+use crate::spectrum::Spectrum;
 use crate::texture::Texture;
 use crate::truth::{self, Truth, Witness};
 use numeric::{Progress, Silent};
@@ -45,6 +47,8 @@ pub struct SimulatedView {
     pub heights: Grid<f32>,
     /// 1 where clouds hide the scene, else 0. `None` without clouds.
     pub clouds: Option<Grid<u8>>,
+    /// The multispectral image, where the configuration asks for one.
+    pub multispectral: Option<SpectralImage>,
     /// How the view was taken.
     pub record: ViewRecord,
     sight: SightLines,
@@ -194,7 +198,8 @@ fn view(
     let texture = Texture::new(config.seed, 1 + index as u64, config.surface).on_date(look_of_date);
     let mtf_at_nyquist = date.season.map_or(config.sensor.mtf_at_nyquist, |season| season.mtf_at_nyquist);
     let spread = PointSpread::new(&SensorConfig { mtf_at_nyquist, ..config.sensor });
-    let radiance = LitScene::new(scene, texture, &date.sun).image(&sight, &spread, size, progress);
+    let lit = LitScene::new(scene, texture, &date.sun);
+    let radiance = lit.image(&sight, &spread, size, progress);
     let sensor = Sensor::new(&config.sensor, &date);
     let opacity =
         clouds::opacity(&config.clouds, derived(config.campaign_seed(), 4000 + index as u64), config.gsd_m, size);
@@ -202,6 +207,20 @@ fn view(
         digital(&radiance, opacity.as_ref(), &sensor, config, derived(config.campaign_seed(), 2000 + index as u64));
     let pointing = acquisition::pointing(config, index, size);
     let rpc = RpcCamera { rpc: fitted.rpc.clone(), correction: pointing }.folded()?.rpc;
+    let multispectral = config.multispectral.as_ref().map(|of| {
+        let camera = SpectralCamera {
+            config: of,
+            optics: SensorConfig { mtf_at_nyquist, ..config.sensor },
+            sensor: &sensor,
+            clouds: &config.clouds,
+            sight: &sight,
+            size,
+            seed: derived(config.campaign_seed(), 7000 + index as u64),
+        };
+        progress.begin(&format!("multispectral view {}", index + 1), camera.rows().div_ceil(BAND));
+        let spectrum = Spectrum::new(config.seed, config.surface.cover, *of);
+        camera.image(&lit, &spectrum, &rpc, opacity.as_ref(), progress)
+    });
     let record = ViewRecord {
         look,
         date,
@@ -212,7 +231,7 @@ fn view(
     };
     let clouds = opacity.map(|cover| cover.map(|o| u8::from(*o > 0.0)));
     let heights = truth::image_heights(scene, &sight, size);
-    Ok(SimulatedView { image, rpc, true_rpc: fitted.rpc, heights, clouds, record, sight })
+    Ok(SimulatedView { image, rpc, true_rpc: fitted.rpc, heights, clouds, multispectral, record, sight })
 }
 
 /// Returns the digital numbers of a view. `seed` is the seed of the noise.

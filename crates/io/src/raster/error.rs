@@ -124,6 +124,13 @@ impl RasterError {
         Self::NotWritten(SaveError::unwritable(path, reason))
     }
 
+    /// A band that is asked for and not among those of a file, whose names are given.
+    pub(super) fn no_band(path: &Path, wanted: &BandChoice, names: &[Vec<String>]) -> Self {
+        let bands = names.iter().enumerate().map(|(i, names)| format!("{} {}", i + 1, names.join(", ")));
+        let bands: Vec<String> = bands.map(|band| band.trim_end().to_owned()).collect();
+        Self::NoBand { path: path.to_owned(), wanted: wanted.clone(), bands: bands.join("; ") }
+    }
+
     pub(crate) fn damaged(path: &Path, reason: impl ToString) -> Self {
         Self::Damaged { path: path.to_owned(), reason: reason.to_string() }
     }

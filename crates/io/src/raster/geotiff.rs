@@ -346,6 +346,17 @@ fn write_in_pixels<T: AsRef<str>>(
     })
 }
 
+/// Copies the bands of a dataset in memory with an RPC into a file at `made`.
+pub(super) fn write_samples_with_rpc(
+    memory: &mut Dataset,
+    bands: &[Band<'_>],
+    rpc: &Rpc,
+    made: &Path,
+) -> Result<(), String> {
+    with_gdal(|| rpc_items(rpc).iter().try_for_each(|(key, value)| memory.set_metadata_item(key, value, "RPC")))?;
+    copy(memory, "GTiff", made, &plain_options(bands))
+}
+
 /// Options of a tiled file with deflate and the predictor of the sample type.
 fn plain_options(bands: &[Band<'_>]) -> [(&'static str, &'static str); 4] {
     let float = Band::first_is_float(bands);

@@ -8,6 +8,8 @@ use gdal::raster::ColorInterpretation;
 use gdal::{Dataset, Metadata};
 use serde::{Deserialize, Serialize};
 
+use super::band_colour::{colour_name, colour_of};
+
 /// A band of an image, as people name it.
 ///
 /// ```
@@ -60,11 +62,7 @@ impl BandChoice {
 pub(super) fn band_names(dataset: &Dataset) -> Vec<Vec<String>> {
     let names = |i| {
         let Ok(band) = dataset.rasterband(i) else { return Vec::new() };
-        let colour = match band.color_interpretation() {
-            ColorInterpretation::Undefined => None,
-            colour => Some(colour.name()),
-        };
-        [band.description().ok(), colour].into_iter().flatten().filter(|name| !name.is_empty()).collect()
+        [band.description().ok(), colour_name(&band)].into_iter().flatten().filter(|name| !name.is_empty()).collect()
     };
     (1..=dataset.raster_count()).map(names).collect()
 }
@@ -86,7 +84,7 @@ impl LumaRule {
     /// Picks the rule by the colours that the file gives to its bands; alpha bands are left out.
     pub(super) fn of(dataset: &Dataset) -> Self {
         let colours: Vec<_> = (1..=dataset.raster_count())
-            .map(|i| dataset.rasterband(i).map_or(ColorInterpretation::Undefined, |b| b.color_interpretation()))
+            .map(|i| dataset.rasterband(i).map_or(ColorInterpretation::Undefined, |band| colour_of(&band)))
             .collect();
         Self::from_colours(&colours)
     }

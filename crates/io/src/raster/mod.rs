@@ -8,6 +8,7 @@
 
 mod acquired;
 mod band;
+mod band_colour;
 mod colour;
 mod contours;
 mod dem;
@@ -24,6 +25,7 @@ mod named_files;
 mod png;
 mod reduced;
 mod source;
+mod spectral;
 mod spool;
 mod tile;
 mod undeclared;
@@ -47,6 +49,7 @@ pub use luma_rule::{BandChoice, LumaRule};
 pub use png::{write_png_gray, write_png_rgb, write_png_rgba};
 pub use reduced::BandLabel;
 pub use source::{ImageInfo, ImageSource, SampleType};
+pub use spectral::{BandSpectrum, IndexBands, write_multispectral_with_rpc};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use tile::{BandScale, MapTile, write_map_tile};
 pub use world_file::write_world_file;

@@ -106,9 +106,7 @@ impl ImageSource {
     pub fn with_band(mut self, choice: &BandChoice) -> Result<Self, RasterError> {
         let names = band_names(&self.dataset);
         let Some(position) = choice.position(&names) else {
-            let bands = names.iter().enumerate().map(|(i, names)| format!("{} {}", i + 1, names.join(", ")));
-            let bands: Vec<String> = bands.map(|band| band.trim_end().to_owned()).collect();
-            return Err(RasterError::NoBand { path: self.path, wanted: choice.clone(), bands: bands.join("; ") });
+            return Err(RasterError::no_band(&self.path, choice, &names));
         };
         self.info.luma = LumaRule::Single(position);
         Ok(self)

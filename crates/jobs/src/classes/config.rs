@@ -3,10 +3,13 @@
 use std::path::PathBuf;
 
 use classes::ClassifyConfig;
+use io::raster::BandChoice;
 use serde::{Deserialize, Serialize};
 use terrain::GroundConfig;
 
 use super::error::ClassesError;
+use crate::corrections::CorrectionSource;
+use crate::error::SettingError;
 
 /// Classes of a surface model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,6 +23,18 @@ pub struct ClassesConfig {
     /// Vegetation index (NDVI, −1 to 1) on any grid, which overrules the roughness.
     #[serde(default)]
     pub vegetation_index: Option<PathBuf>,
+    /// Multispectral images with RPCs, of which the vegetation index is made.
+    #[serde(default)]
+    pub multispectral: Vec<PathBuf>,
+    /// Red band of the multispectral images. `None` takes the one that the file names.
+    #[serde(default)]
+    pub red_band: Option<BandChoice>,
+    /// Near-infrared band of the multispectral images. `None` takes the one that the file names.
+    #[serde(default)]
+    pub nir_band: Option<BandChoice>,
+    /// Where the pointing corrections of the multispectral images come from.
+    #[serde(default)]
+    pub corrections: CorrectionSource,
     /// Building index (0 to 1) on any grid, which decides where the heights are weak.
     #[serde(default)]
     pub building_index: Option<PathBuf>,
@@ -44,6 +59,10 @@ impl ClassesConfig {
             surface,
             output,
             vegetation_index: None,
+            multispectral: Vec::new(),
+            red_band: None,
+            nir_band: None,
+            corrections: CorrectionSource::default(),
             building_index: None,
             terrain: GroundConfig::default(),
             classes: ClassifyConfig::default(),
@@ -56,8 +75,12 @@ impl ClassesConfig {
     ///
     /// # Errors
     /// [`ClassesError::Terrain`] and [`ClassesError::Classify`] for parameters outside of their
-    /// range.
+    /// range; [`ClassesError::Job`] for both a vegetation index and images to make one of.
     pub fn validate(&self) -> Result<(), ClassesError> {
+        if self.vegetation_index.is_some() && !self.multispectral.is_empty() {
+            let expected = "either a vegetation index or multispectral images";
+            return Err(SettingError::new("the source of the vegetation index", "given twice", expected).into());
+        }
         self.terrain.validate()?;
         Ok(self.classes.validate()?)
     }

@@ -1,9 +1,10 @@
-//! What a building index says at the cells of a surface, and where the heights are weak.
+//! What a building index says at the cells of a surface, and where the heights are weak or unsure.
 
 use std::path::Path;
 
 use classes::ClassifyConfig;
 use io::raster::{Dem, ImageSource, read_dem};
+use numeric::upper_median;
 use raster::Grid;
 
 use super::error::ClassesError;
@@ -46,6 +47,24 @@ impl Cue {
         }
         Ok(Self { index, weak })
     }
+}
+
+/// Standard deviation from which a height is unsure, in those of the median cell of the surface. On
+/// level ground nine of ten cells are below twice the median.
+const UNSURE: f32 = 2.5;
+
+/// Returns the cells of a surface whose heights were not observed or are less certain than most;
+/// `None` where no standard deviations lie beside the surface.
+pub(super) fn unsure_heights(surface: &Dem) -> Result<Option<Grid<bool>>, ClassesError> {
+    let Some(sigma) = beside(surface, SIGMA)? else { return Ok(None) };
+    let mut known: Vec<f32> = sigma.data().iter().copied().filter(|s| s.is_finite()).collect();
+    let Some(median) = upper_median(&mut known) else { return Ok(None) };
+    let mut unsure = sigma.map(|s| *s > UNSURE * median as f32);
+    if let Some(filled) = beside(surface, FILLED)? {
+        let observed = f32::from(OBSERVED);
+        unsure.data_mut().iter_mut().zip(filled.data()).for_each(|(unsure, state)| *unsure |= *state != observed);
+    }
+    Ok(Some(unsure))
 }
 
 /// Reads a raster beside a surface; `None` where there is none of its size.

@@ -3,13 +3,16 @@
 use std::path::PathBuf;
 
 use classes::ClassifyError;
+use io::raster::RasterError;
 use numeric::Cancelled;
 use terrain::TerrainError;
 
+use crate::corrections::CorrectionsError;
 use crate::dtm::DtmError;
-use crate::error::{JobError, from_steps};
+use crate::error::{ImageInputError, JobError, SettingError, from_steps};
 use crate::eval::EvalJobError;
 use crate::files::FileError;
+use crate::ortho::OrthoError;
 use crate::threads::ThreadsError;
 
 /// A class raster that cannot be made.
@@ -22,6 +25,24 @@ pub enum ClassesError {
     /// The vegetation index cannot be read at the cells of the surface.
     #[error("cannot use the vegetation index")]
     Index(#[source] Box<EvalJobError>),
+    /// A multispectral image cannot be read.
+    #[error(transparent)]
+    Image(#[from] ImageInputError),
+    /// A multispectral image does not say which bands are red and near infrared.
+    #[error(
+        "the image has {bands} bands and does not say which are red and near infrared: name the bands, in their \
+         descriptions or in the settings: {}",
+        path.display()
+    )]
+    NoIndexBands {
+        /// The image.
+        path: PathBuf,
+        /// Number of its bands.
+        bands: usize,
+    },
+    /// A multispectral image cannot be laid on the surface.
+    #[error(transparent)]
+    Ortho(Box<OrthoError>),
     /// The building index cannot be read at the cells of the surface.
     #[error("cannot use the building index")]
     Cue(#[source] Box<EvalJobError>),
@@ -44,7 +65,21 @@ pub enum ClassesError {
     Job(#[from] JobError),
 }
 
-from_steps!(ClassesError: Index(EvalJobError), Job(FileError, ThreadsError, Cancelled));
+from_steps!(
+    ClassesError: Index(EvalJobError),
+    Image(RasterError, CorrectionsError),
+    Job(FileError, ThreadsError, SettingError, Cancelled),
+);
+
+impl From<OrthoError> for ClassesError {
+    fn from(error: OrthoError) -> Self {
+        match error {
+            OrthoError::Job(job) => Self::Job(job),
+            OrthoError::Image(image) => Self::Image(image),
+            other => Self::Ortho(other.into()),
+        }
+    }
+}
 
 impl From<TerrainError> for ClassesError {
     fn from(error: TerrainError) -> Self {

@@ -6,6 +6,8 @@ use classes::ClassifyConfig;
 use serde::Serialize;
 use terrain::GroundConfig;
 
+use super::multispectral::IndexImage;
+
 /// A finished class raster.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
@@ -22,7 +24,9 @@ pub struct ClassesReport {
     pub cells_ground: usize,
     /// Cells of buildings.
     pub cells_building: usize,
-    /// Cells of vegetation.
+    /// Cells of plants on the ground; none without a vegetation index.
+    pub cells_low_vegetation: usize,
+    /// Cells of vegetation that stands.
     pub cells_vegetation: usize,
     /// Cells of water; none without a vegetation index.
     pub cells_water: usize,
@@ -30,6 +34,10 @@ pub struct ClassesReport {
     pub cells_unknown: usize,
     /// Whether a vegetation index took part.
     pub has_vegetation_index: bool,
+    /// File of the vegetation index, where it was made of images.
+    pub vegetation_index: Option<PathBuf>,
+    /// The multispectral images, the steepest first.
+    pub index_images: Vec<IndexImage>,
     /// Whether a building index took part.
     pub has_building_index: bool,
     /// Cells whose height was not observed or is uncertain, where the building index decides.
@@ -46,10 +54,11 @@ impl ClassesReport {
         let cells = self.size.0 * self.size.1;
         let share = |n: usize| 100.0 * n as f64 / cells.max(1) as f64;
         format!(
-            "classes {}\ncells   {cells} ({:.1} % ground, {:.1} % building, {:.1} % vegetation, {:.1} % water, {:.1} % \
-             unknown)\n",
+            "classes {}\ncells   {cells} ({:.1} % ground, {:.1} % low vegetation, {:.1} % building, {:.1} % vegetation, \
+             {:.1} % water, {:.1} % unknown)\n",
             self.classes.display(),
             share(self.cells_ground),
+            share(self.cells_low_vegetation),
             share(self.cells_building),
             share(self.cells_vegetation),
             share(self.cells_water),

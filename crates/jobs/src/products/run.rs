@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use io::raster::ImageSource;
 use numeric::{Choice, Progress};
 use raster::Grid;
 use report::{JobPage, MapLayer};
@@ -83,6 +84,7 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
     if config.wants(ProductKind::Classes) {
         let mut of = ClassesConfig::new(config.run.clone(), output.join(CLASSES));
         of.overwrite = config.overwrite;
+        of.multispectral = multispectral(&config.run);
         report.classes = Some(classes::run(&of, progress)?);
     }
     if config.wants(ProductKind::Contours) {
@@ -174,6 +176,17 @@ pub(crate) fn remove_products(run_folder: &OutputFolder) -> Result<(), FileError
     // Stays when it holds anything else.
     let _ = std::fs::remove_dir(&folder);
     Ok(())
+}
+
+/// Returns the images of a run that name a red and a near-infrared band; none where the images are
+/// no longer there, because classes need none.
+fn multispectral(run: &Path) -> Vec<PathBuf> {
+    let Ok(settings) = read_dsm_job(&run.join(SETTINGS)) else { return Vec::new() };
+    let has_index = |path: &PathBuf| {
+        let bands = ImageSource::open(path).and_then(|source| source.index_bands(None, None));
+        matches!(bands, Ok(Some(_)))
+    };
+    settings.images.into_iter().filter(has_index).collect()
 }
 
 /// Makes the terrain model.
