@@ -387,7 +387,7 @@ fn pictures_are_masked_for_buildings_alone_and_copied_otherwise() {
     bench.run(&[&OFFSET[..], &alone].concat()).code(0);
     let masked = image::open(bench.path("alone/images/view_2.png")).unwrap();
     let masked = masked.as_rgba8().expect("red, green, blue and alpha");
-    let mask = io::npy::read(&bench.path("alone/raw_mask/view_2.npy")).unwrap();
+    let mask = io::npy::read(bench.path("alone/raw_mask/view_2.npy")).unwrap();
     let NpyData::Bool(mask) = mask.data else { panic!("a mask of truth values") };
     assert!(mask.iter().any(|m| *m) && mask.iter().any(|m| !*m));
     for ((x, y, pixel), shown) in masked.enumerate_pixels().zip(mask) {

@@ -103,9 +103,9 @@ mod tests {
         cells.nir_gain = nir_gain(&cells, &roofs);
         let index = vegetation_index(&cells);
         let expected = [f32::NAN, 0.45 / 0.55, 0.08 / 0.1, 0.02 / 0.42];
-        for at in 0..4 {
-            let apart = (index.data()[at] - expected[at]).abs();
-            assert!(apart < 1e-3 || expected[at].is_nan() && index.data()[at].is_nan(), "{at}: {apart}");
+        for (found, expected) in index.data().iter().zip(expected) {
+            let is_close = (found - expected).abs() < 1e-3;
+            assert!(is_close || expected.is_nan() && found.is_nan(), "{found} instead of {expected}");
         }
         let few = roofs.map(|_| false);
         assert_eq!(nir_gain(&cells, &few), 1.0);

@@ -59,7 +59,7 @@ pub(super) fn unsure_heights(surface: &Dem) -> Result<Option<Grid<bool>>, Classe
     let Some(sigma) = beside(surface, SIGMA)? else { return Ok(None) };
     let mut known: Vec<f32> = sigma.data().iter().copied().filter(|s| s.is_finite()).collect();
     let Some(median) = upper_median(&mut known) else { return Ok(None) };
-    let mut unsure = sigma.map(|s| *s > UNSURE * median as f32);
+    let mut unsure = sigma.map(|s| *s > UNSURE * median);
     if let Some(filled) = beside(surface, FILLED)? {
         let observed = f32::from(OBSERVED);
         unsure.data_mut().iter_mut().zip(filled.data()).for_each(|(unsure, state)| *unsure |= *state != observed);
