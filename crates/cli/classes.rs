@@ -22,20 +22,20 @@ pub(crate) struct Args {
     /// Vegetation index (NDVI, −1 to 1) on any grid, which overrules the roughness of the surface.
     #[arg(long, value_name = "FILE")]
     ndvi: Option<PathBuf>,
-    /// Multispectral images with RPCs to make a vegetation index of, with the pointing corrections of
-    /// the run, which those of its panchromatic images give.
+    /// Multispectral images with RPCs to make a vegetation index of, with the pointing corrections
+    /// of the run, which those of its panchromatic images give.
     #[arg(long, value_name = "IMAGE", num_args = 1.., conflicts_with = "ndvi")]
     multispectral: Vec<PathBuf>,
-    /// Red band of the multispectral images, by number or name [default: the one that the file names
-    /// so].
+    /// Red band of the multispectral images, by number or name [default: the one that the file
+    /// names so].
     #[arg(long, value_name = "BAND", requires = "multispectral")]
     red_band: Option<BandChoice>,
     /// Near-infrared band of the multispectral images, by number or name [default: the one that the
     /// file names so].
     #[arg(long, value_name = "BAND", requires = "multispectral")]
     nir_band: Option<BandChoice>,
-    /// Pointing corrections of the multispectral images: the report of a run of skysweep dsm, or none
-    /// [default: from the run that made the surface model].
+    /// Pointing corrections of the multispectral images: the report of a run of skysweep dsm, or
+    /// none [default: from the run that made the surface model].
     #[arg(long, value_name = "report.json|none", requires = "multispectral")]
     corrections: Option<PathBuf>,
     /// Building index (0 to 1, from skysweep buildings) on any grid, which decides where the

@@ -1,8 +1,9 @@
 //! `skysweep simulate`: a seeded scene seen through RPC cameras, with its exact surface beside.
 //!
-//! Writes `view_1.tif` … (RPC in the file), with `--multispectral` `ms_1.tif` …, the record `scene.json`, the parameters `scene.toml`,
-//! and in `truth/` the rasters, the heights of every image and the buildings at LoD2. With
-//! `--flight` also perspective cameras with their pictures, in `cameras`.
+//! Writes `view_1.tif` … (RPC in the file), with `--multispectral` `ms_1.tif` …, the record
+//! `scene.json`, the parameters `scene.toml`, and in `truth/` the rasters, the heights of every
+//! image and the buildings at LoD2. With `--flight` also perspective cameras with their pictures,
+//! in `cameras`.
 
 use std::path::{Path, PathBuf};
 
@@ -40,8 +41,8 @@ pub(crate) struct Args {
     /// --dates says otherwise.
     #[arg(long)]
     seasons: bool,
-    /// Also take a multispectral image of each view (ms_1.tif …): blue, green, red and near infrared
-    /// on pixels four times as wide.
+    /// Also take a multispectral image of each view (ms_1.tif …): blue, green, red and near
+    /// infrared on pixels four times as wide.
     #[arg(long)]
     multispectral: bool,
     /// Also write N perspective cameras around the scene with their pictures (a COLMAP dataset in

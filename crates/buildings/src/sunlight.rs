@@ -1,8 +1,8 @@
 //! Shadows that buildings cast: where the sun stands, and what has a shadow behind it.
 //!
-//! The sun's direction in the image follows from the image itself. Around each shape, the sides away
-//! from the sun have the shadow behind them. Each side pulls by its outward normal, as strongly as
-//! it is long and dark outside and as its shape is salient:
+//! The sun's direction in the image follows from the image itself. Around each shape, the sides
+//! away from the sun have the shadow behind them. Each side pulls by its outward normal, as
+//! strongly as it is long and dark outside and as its shape is salient:
 //!
 //! ```text
 //! away from the sun ∝ − Σ weight · length · brightness outside · normal
@@ -10,8 +10,8 @@
 //!
 //! Bright and dark surroundings cancel between opposite sides. Two cues follow. A shape is the more
 //! salient, the darker it is outside of its sides away from the sun than outside of those towards
-//! it; blocks between streets are equally dark on all sides. And a lit pixel is the more likely on a
-//! building, if a shadow begins within a few metres away from the sun. Where the shapes disagree
+//! it; blocks between streets are equally dark on all sides. And a lit pixel is the more likely on
+//! a building, if a shadow begins within a few metres away from the sun. Where the shapes disagree
 //! about the direction, as in images without shadows, there are no cues.
 
 use numeric::nearest_quantile;

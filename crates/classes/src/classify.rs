@@ -29,8 +29,8 @@ pub struct BuildingCue<'a> {
     pub weak: Option<&'a Grid<bool>>,
 }
 
-/// What tells crowns that the surface lacks: matching drops small trees, and leaves uncertain heights
-/// of the ground in their places.
+/// What tells crowns that the surface lacks: matching drops small trees, and leaves uncertain
+/// heights of the ground in their places.
 #[derive(Debug, Clone, Copy)]
 pub struct CrownCue<'a> {
     /// Vegetation index of each cell, looked at above the surface in several images, where a crown

@@ -32,8 +32,8 @@ pub struct ClassifyConfig {
     pub ramp_m: f64,
     /// Least vegetation index of vegetation, where one is given.
     pub least_index: f64,
-    /// Least share of green cells in vegetation, where an index is given. Coarse pixels hold little of
-    /// a small crown.
+    /// Least share of green cells in vegetation, where an index is given. Coarse pixels hold little
+    /// of a small crown.
     pub least_green_share: f64,
     /// Narrowest crown that is found without a height, metres.
     pub least_crown_m: f64,

@@ -4,11 +4,12 @@
 //! NDVI = (g n − r) / (g n + r),   r = red − black,  n = near infrared − black
 //! ```
 //!
-//! The black level of a band holds the path radiance and the dark current; it is that of the darkest
-//! cells, which are shadows and water (Chavez 1988). Without it shadows are neither green nor grey.
-//! The gain `g` makes up for the gains of the bands and for the sunlight, which is weaker in the near
-//! infrared. It is the one that gives most roofs the index of roofing, because tiles, gravel, metal
-//! and concrete are nearly as bright in both bands. On reflectances both do nothing much.
+//! The black level of a band holds the path radiance and the dark current; it is that of the
+//! darkest cells, which are shadows and water (Chavez 1988). Without it shadows are neither green
+//! nor grey. The gain `g` makes up for the gains of the bands and for the sunlight, which is weaker
+//! in the near infrared. It is the one that gives most roofs the index of roofing, because tiles,
+//! gravel, metal and concrete are nearly as bright in both bands. On reflectances both do nothing
+//! much.
 
 use numeric::nearest_quantile;
 use raster::Grid;

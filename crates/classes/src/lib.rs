@@ -14,11 +14,10 @@
 //!
 //! A vegetation index of near-infrared light overrules the roughness where it is given, unless its
 //! pixels are wider than the cells; what is rough and not green at all is no vegetation. Plants on
-//! the ground are low vegetation. Crowns that the
-//! surface lacks are vegetation where the index is green above uncertain heights. A building index,
-//! made of an image, decides only where heights are weak: cells that were not observed, or whose
-//! height or roughness lies near its threshold. Heights are in metres, NaN is a void. Values are the
-//! ASPRS LAS classes.
+//! the ground are low vegetation. Crowns that the surface lacks are vegetation where the index is
+//! green above uncertain heights. A building index, made of an image, decides only where heights
+//! are weak: cells that were not observed, or whose height or roughness lies near its threshold.
+//! Heights are in metres, NaN is a void. Values are the ASPRS LAS classes.
 
 mod classify;
 mod config;

@@ -94,8 +94,8 @@ pub(crate) fn spread(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
     wide
 }
 
-/// Takes the regions out of a mask of whose cells a smaller share than `share_min` `counts`. Regions
-/// of which fewer than half of the cells are `known` stay.
+/// Takes the regions out of a mask of whose cells a smaller share than `share_min` `counts`.
+/// Regions of which fewer than half of the cells are `known` stay.
 pub(crate) fn without_share(
     mask: &mut Grid<bool>,
     share_min: f64,

@@ -1,11 +1,11 @@
 //! The simulation job: a seeded scene seen through RPC cameras, with its exact surface.
 //!
 //! Writes `view_1.tif` … (with the RPC in the file), where asked for `ms_1.tif` … (multispectral),
-//! the record `scene.json`, the parameters `scene.toml`, and in `truth/` the rasters, the heights of
-//! every image and the buildings at LoD2.
-//! A flight adds perspective cameras and the points of a reconstruction in `cameras/sparse/0`, in
-//! map coordinates, their pictures in `cameras/images`, and the exact surface that they see as
-//! clouds in `truth/`. Of given cameras it writes what they see exactly, in `truth/cameras`.
+//! the record `scene.json`, the parameters `scene.toml`, and in `truth/` the rasters, the heights
+//! of every image and the buildings at LoD2. A flight adds perspective cameras and the points of a
+//! reconstruction in `cameras/sparse/0`, in map coordinates, their pictures in `cameras/images`,
+//! and the exact surface that they see as clouds in `truth/`. Of given cameras it writes what they
+//! see exactly, in `truth/cameras`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

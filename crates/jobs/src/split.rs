@@ -8,7 +8,7 @@ use io::colmap::{ColmapError, ColmapModel, ColmapPoint};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{JobError, from_steps};
-use crate::files::FileError;
+use crate::files::{self, FileError};
 use crate::report_page;
 use numeric::{Cancelled, Progress};
 
@@ -139,6 +139,7 @@ impl SplitJobConfig {
 /// ```
 pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobReport, SplitJobError> {
     if let Some(path) = &config.output {
+        files::check_destination(path, config.overwrite)?;
         report_page::refuse_existing(path, config.overwrite)?;
     }
     progress.begin("split", 2);

@@ -40,7 +40,7 @@ fn bytes(output: &Path) -> BTreeMap<OsString, Vec<u8>> {
     let files = std::fs::read_dir(output.join("dsm")).unwrap().map(Result::unwrap);
     let read = |file: std::fs::DirEntry| (file.file_name(), std::fs::read(file.path()).unwrap());
     let all: BTreeMap<_, _> = files.map(read).collect();
-    assert_eq!(all.len(), 17);
+    assert_eq!(all.len(), 18);
     all
 }
 

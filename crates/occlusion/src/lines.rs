@@ -296,11 +296,12 @@ mod tests {
                 (a.abs() - 13.0).max(b.abs() - 8.0)
             };
             let points = &lines[0].points;
-            // Along the grid the pattern does not tell where between the centres a wall stands;
-            // at a corner few centres do.
+            // Along the grid and its diagonals the pattern does not tell where between the rows of
+            // centres a wall stands; at a corner few centres do.
             let off: Vec<f64> = points.iter().map(|p| outside(p.place).abs()).collect();
             assert!(off.iter().all(|off| *off < 0.55), "{degrees}");
-            assert!(degrees == 0.0 || off.iter().sum::<f64>() / (off.len() as f64) < 0.1, "{degrees}");
+            let is_along_centres = degrees % 45.0 == 0.0;
+            assert!(is_along_centres || off.iter().sum::<f64>() / (off.len() as f64) < 0.1, "{degrees}");
             // The lower side is to the right of the way: around the house in the sense of the rows.
             let area: f64 = (0..points.len())
                 .map(|k| {

@@ -70,7 +70,7 @@ impl<'a> OcclusionSurface<'a> {
     /// let heights = Grid::from_vec(8, 8, (0..64).map(|i| if high(i) { 10.0 } else { 0.0 }).collect()).unwrap();
     /// let lines = OcclusionSurface::new(&heights, 1.0).wall_lines();
     /// assert!(lines.len() == 1 && lines[0].is_closed);
-    /// assert!(lines[0].points.iter().all(|p| p.lower_m == 0.0 && p.upper_m == 10.0));
+    /// assert!(lines[0].points.iter().all(|p| p.lower_m == 0.0 && (p.upper_m - 10.0).abs() < 1e-4));
     /// ```
     pub fn wall_lines(&self) -> Vec<WallLine> {
         lines::trace(&self.walls, self.heights)

@@ -3,9 +3,9 @@
 //!
 //! A pixel covers `ratio × ratio` panchromatic ones. Its digital number is `offset + gain · E ·
 //! radiance`, where E is the sunlight of the band relative to the panchromatic one, so that numbers
-//! of two bands are not reflectances on one scale, as in delivered images. The offset is that of the
-//! path radiance, which is strongest in blue. The RPC is the panchromatic one on the coarser pixels,
-//! with the same pointing error.
+//! of two bands are not reflectances on one scale, as in delivered images. The offset is that of
+//! the path radiance, which is strongest in blue. The RPC is the panchromatic one on the coarser
+//! pixels, with the same pointing error.
 
 use camera::{ImagePoint, Rpc};
 use raster::Grid;

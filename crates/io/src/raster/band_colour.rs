@@ -25,7 +25,8 @@ pub(super) fn colour_name(band: &RasterBand<'_>) -> Option<String> {
     if colour == gdal_sys::GDALColorInterp::GCI_Undefined {
         return None;
     }
-    // SAFETY: the function takes any number and returns a constant text that ends with NUL, or null.
+    // SAFETY: the function takes any number and returns a constant text that ends with NUL, or
+    // null.
     let name = unsafe { gdal_sys::GDALGetColorInterpretationName(colour) };
     if name.is_null() {
         return None;

@@ -4,7 +4,9 @@
 //! A band is known, in this order, by
 //!
 //! 1. its name: the description, or GDAL's colour interpretation (near infrared from GDAL 3.10 on);
-//! 2. its wavelength: GDAL's item `CENTRAL_WAVELENGTH_UM` of the domain `IMAGERY`;
+//! 2. its wavelength: GDAL's item `CENTRAL_WAVELENGTH_UM` of the domain `IMAGERY`, or the items
+//!    `wavelength` and `wavelength_units` that GDAL makes of ENVI headers. GeoTIFFs of GDAL before
+//!    3.10 cannot hold the former, so both are written;
 //! 3. its place in the `IMD` metadata of a Maxar product, whose groups `BAND_B`, `BAND_G`, … stand
 //!    in the order of the bands.
 //!
@@ -30,6 +32,9 @@ use crate::atomic::write_path;
 const IMAGERY: &str = "IMAGERY";
 const CENTRE: &str = "CENTRAL_WAVELENGTH_UM";
 const WIDTH: &str = "FWHM_UM";
+/// Items of GDAL for the wavelengths of ENVI headers.
+const WAVELENGTH: &str = "wavelength";
+const WAVELENGTH_UNITS: &str = "wavelength_units";
 /// Wavelengths of red and of near infrared, micrometres: from one edge of the band of a usual
 /// instrument to the other.
 const RED_UM: [f64; 2] = [0.62, 0.69];
@@ -114,11 +119,22 @@ fn by_name(bands: &[Vec<String>], names: &[&str]) -> Option<usize> {
 
 /// Returns the first band whose centre lies between two wavelengths.
 fn by_wavelength(dataset: &Dataset, [low, high]: [f64; 2]) -> Option<usize> {
-    let centre_um = |number: usize| {
-        let text = dataset.rasterband(number).ok()?.metadata_item(CENTRE, IMAGERY)?;
-        text.trim().parse::<f64>().ok()
-    };
+    let centre_um = |number: usize| centre_um(&dataset.rasterband(number).ok()?);
     (1..=dataset.raster_count()).find(|number| centre_um(*number).is_some_and(|um| (low..=high).contains(&um)))
+}
+
+/// Returns the wavelength at the centre of a band, micrometres.
+fn centre_um(band: &RasterBand<'_>) -> Option<f64> {
+    let number = |text: String| text.trim().parse::<f64>().ok();
+    if let Some(um) = band.metadata_item(CENTRE, IMAGERY).and_then(number) {
+        return Some(um);
+    }
+    let per_um = match band.metadata_item(WAVELENGTH_UNITS, "")?.to_ascii_lowercase().as_str() {
+        "micrometers" | "um" => 1.0,
+        "nanometers" | "nm" => 1000.0,
+        _ => return None,
+    };
+    Some(number(band.metadata_item(WAVELENGTH, "")?)? / per_um)
 }
 
 /// Writes an image with its RPC, as [`super::write_image_with_rpc`] does, whose bands name their
@@ -141,8 +157,11 @@ pub fn write_multispectral_with_rpc(
             for (number, (_, spectrum)) in (1..).zip(bands) {
                 let mut band = memory.rasterband(number)?;
                 set_colour(&mut band, spectrum.colour);
-                band.set_metadata_item(CENTRE, &spectrum.centre_um.to_string(), IMAGERY)?;
+                let centre_um = spectrum.centre_um.to_string();
+                band.set_metadata_item(CENTRE, &centre_um, IMAGERY)?;
                 band.set_metadata_item(WIDTH, &spectrum.width_um.to_string(), IMAGERY)?;
+                band.set_metadata_item(WAVELENGTH, &centre_um, "")?;
+                band.set_metadata_item(WAVELENGTH_UNITS, "Micrometers", "")?;
             }
             Ok(())
         })

@@ -7,8 +7,8 @@
 //!   6 building, 9 water.
 //! - `roughness.tif`: residual of the best plane around each cell that stands, metres; no-data
 //!   elsewhere.
-//! - `ndvi.tif`: the vegetation index, where it was made of multispectral images; no-data where none
-//!   sees a cell.
+//! - `ndvi.tif`: the vegetation index, where it was made of multispectral images; no-data where
+//!   none sees a cell.
 //! - `classes.json` and `classes.html`: the report, and its page with maps.
 
 mod config;

@@ -1,10 +1,10 @@
 //! A vegetation index of multispectral images at the cells of a surface.
 //!
-//! Each image is laid on the surface as an ortho is, with the pointing correction that the run found
-//! for it or for the panchromatic image of the same pass. A cell takes the index of the image that
-//! sees it most steeply, as what the surface lacks leans away from the sensor. Crowns that the
-//! surface lacks are looked for above it: there the images agree about them, and disagree about what
-//! lies beside.
+//! Each image is laid on the surface as an ortho is, with the pointing correction that the run
+//! found for it or for the panchromatic image of the same pass. A cell takes the index of the image
+//! that sees it most steeply, as what the surface lacks leans away from the sensor. Crowns that the
+//! surface lacks are looked for above it: there the images agree about them, and disagree about
+//! what lies beside.
 
 use std::path::{Path, PathBuf};
 
