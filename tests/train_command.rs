@@ -119,13 +119,14 @@ fn threads_change_no_byte() {
     assert!(splats("one", "1") == splats("two", "2"));
 }
 
-/// A small town in three images with exact RPCs, and splats of its true surface and two images.
+/// A small town in five images with exact RPCs, and splats of its true surface and two images. The
+/// views on both sides of the judged one show the walls that it shows.
 fn satellite() -> &'static (PathBuf, PathBuf) {
     static SCENE: OnceLock<(PathBuf, PathBuf)> = OnceLock::new();
     SCENE.get_or_init(|| {
         let exact = ("pointing_error_px = [1.0, 3.0]", "pointing_error_px = [0.0, 0.0]");
-        let scene =
-            simulated("train_satellite", &[("size_m = 320.0", "size_m = 60.0"), ("gsd_m = 0.5", "gsd_m = 0.8"), exact]);
+        let small = [("size_m = 320.0", "size_m = 60.0"), ("gsd_m = 0.5", "gsd_m = 0.8"), ("views = 3", "views = 5")];
+        let scene = simulated("train_satellite", &[&small[..], &[exact]].concat());
         let splats = scene.join("splats.ply");
         let mut command = skysweep();
         command
@@ -140,7 +141,7 @@ fn satellite() -> &'static (PathBuf, PathBuf) {
 fn train_on_images(output: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
     let (scene, splats) = satellite();
     let mut command = skysweep();
-    command.arg("train").args(["view_1.tif", "view_2.tif"].map(|v| scene.join(v))).arg("--splats").arg(splats);
+    command.arg("train").args([1, 2, 4, 5].map(|k| scene.join(format!("view_{k}.tif")))).arg("--splats").arg(splats);
     command.arg("--dsm").arg(scene.join("truth/dsm.tif")).arg("--judge").arg(scene.join("view_3.tif"));
     command.args(["--iterations", "60"]).args(arguments).arg("-o").arg(output).assert()
 }
@@ -152,10 +153,10 @@ fn splats_learn_from_satellite_images_and_keep_their_heights() {
     let report = report_of(&out.path().join("two"));
     assert!(report["camera_error_px"].as_f64().unwrap() < 0.01, "{report}");
     let views = report["views"].as_array().unwrap();
-    assert_eq!(views.len(), 3);
+    assert_eq!(views.len(), 5);
     for view in views {
         let [before, after] = ["psnr_before_db", "psnr_db"].map(|key| view[key].as_f64().unwrap());
-        let gain = if view["held_out"] == true { 0.5 } else { 2.0 };
+        let gain = if view["held_out"] == true { 1.5 } else { 2.0 };
         assert!(after > before + gain, "{view}");
     }
     let [before, after] = [0, 1].map(|i| report["height_change_m"][i].as_f64().unwrap());

@@ -74,7 +74,8 @@ fn of_line(surface: &SplatSurface<'_>, line: &WallLine, number: usize, tolerance
     let local = |height: f32| f64::from(height) - surface.origin()[2];
     let corner = |point: &occlusion::WallPoint| {
         let [x, y, lower] = surface.position(point.place[0], point.place[1], local(point.lower_m));
-        [x, y, lower, local(point.upper_m)]
+        let upper = local(point.upper_m).min(highest_around(surface, point.place)).max(lower);
+        [x, y, lower, upper]
     };
     let mut corners: Vec<Corner> = line.points.iter().map(corner).collect();
     let (width, height) = surface.geotransform().cell_size();
@@ -98,6 +99,14 @@ fn of_line(surface: &SplatSurface<'_>, line: &WallLine, number: usize, tolerance
         }
     }
     faces
+}
+
+/// Returns the height of the highest of the 16 cells around a place. The plane that goes on from a
+/// roof to its wall rises above a parapet of one cell.
+fn highest_around(surface: &SplatSurface<'_>, place: [f64; 2]) -> f64 {
+    let [column, row] = place.map(|c| c.floor() as i64 - 1);
+    let around = (0..16).map(|k| surface.local_height(column + k % 4, row + k / 4));
+    around.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Rise of the upper edge along a face, metres per metre.

@@ -88,6 +88,12 @@ class BuildingIndexConfig(TypedDict, total=False):
     shadow_m: float
     """Width of the widest shadow, metres."""
 
+    cast_m: float
+    """Distance within which a building has a shadow behind it, metres."""
+
+    cast_gain: float
+    """How much more salient a lit pixel is with a shadow behind it, as a share."""
+
     blur_m: float
     """Standard deviation of the smoothing of the index, metres."""
 
@@ -114,6 +120,13 @@ class ChangeConfig(TypedDict, total=False):
     overreach_m: float
     """Distance by which the walls of both surfaces reach too far outwards, metres. It is taken
     off the volumes of regions."""
+
+    overreach_growth: float
+    """Growth of that distance per metre of a wall's height above `low_wall_m`: high walls hide
+    more beside them."""
+
+    low_wall_m: float
+    """Height of the walls up to which the distance does not grow, metres."""
 
     overreach_sigma_m: float
     """Standard deviation of that distance for one region, metres."""
@@ -154,6 +167,13 @@ class ClassifyConfig(TypedDict, total=False):
 
     least_index: float
     """Least vegetation index of vegetation, where one is given."""
+
+    least_green_share: float
+    """Least share of green cells in vegetation, where an index is given. Coarse pixels hold
+    little of a small crown."""
+
+    least_crown_m: float
+    """Narrowest crown that is found without a height, metres."""
 
     water_index: float
     """Largest vegetation index of water, where one is given. Water swallows the near infrared;
@@ -691,6 +711,10 @@ def classes(
     output: PathLike,
     *,
     vegetation_index: PathLike | None = None,
+    multispectral: Sequence[PathLike] = (),
+    red_band: int | str | None = None,
+    nir_band: int | str | None = None,
+    corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
     building_index: PathLike | None = None,
     terrain: GroundConfig | None = None,
     classes: ClassifyConfig | None = None,
@@ -705,6 +729,11 @@ def classes(
         output: Folder for the rasters and the report.
         vegetation_index: Vegetation index (NDVI, −1 to 1) on any grid, which overrules the
             roughness.
+        multispectral: Multispectral images with RPCs, of which the vegetation index is made.
+        red_band: Red band of the multispectral images. `None` takes the one that the file names.
+        nir_band: Near-infrared band of the multispectral images. `None` takes the one that the file
+            names.
+        corrections: Where the pointing corrections of the multispectral images come from.
         building_index: Building index (0 to 1) on any grid, which decides where the heights are
             weak.
         terrain: Parameters of the search for the ground.
@@ -1823,8 +1852,8 @@ def simulate(
     Args:
         scene: The scene, its cameras and its radiometry.
         output: Folder for the images and the truth.
-        cameras: Perspective cameras whose exact depths, parts of the scene and pictures are written:
-            folder of a COLMAP model on the map of the scene, with `origin.json`.
+        cameras: Perspective cameras whose exact depths, parts of the scene and pictures are
+            written: folder of a COLMAP model on the map of the scene, with `origin.json`.
         flight: Number of perspective cameras around the scene; none when 0.
         flight_arc_deg: Azimuths between which the perspective cameras stand, degrees clockwise from
             north; all around when `None`.
