@@ -1,6 +1,7 @@
 //! `skysweep dsm --prior`: a city model that is right helps, and one that is wrong does no harm.
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use predicates::prelude::*;
@@ -22,11 +23,19 @@ fn skysweep() -> Command {
     Command::cargo_bin("skysweep").expect("the binary is built with the tests")
 }
 
+/// The town's surface model without a prior, made once.
+static WITHOUT: LazyLock<PathBuf> =
+    LazyLock::new(|| surface(Path::new(env!("CARGO_TARGET_TMPDIR")), "dsm_prior_without", None));
+
 /// Makes the town's surface model with a prior or without; returns its file.
 fn surface(folder: &Path, name: &str, prior: Option<&Path>) -> PathBuf {
     let out = folder.join(name);
     let mut command = skysweep();
-    command.arg("dsm").args(["view_1.tif", "view_2.tif", "view_3.tif"].map(town)).args(["-q", "-o"]).arg(&out);
+    command
+        .arg("dsm")
+        .args(["view_1.tif", "view_2.tif", "view_3.tif"].map(town))
+        .args(["-q", "--overwrite", "-o"])
+        .arg(&out);
     if let Some(path) = prior {
         command.arg("--prior").arg(path);
     }
@@ -141,8 +150,7 @@ fn a_model_that_lacks_a_building_and_has_one_too_many_still_helps() {
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("wrong.city.json");
     wrong_model(&model);
-    let (without, with) =
-        (surface(folder.path(), "without", None), surface(folder.path(), "with", Some(model.as_path())));
+    let with = surface(folder.path(), "with", Some(model.as_path()));
     let report: Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("with/report/report.json")).unwrap()).unwrap();
     let wrong = report["prior"]["left_out"].as_array().unwrap().iter().find(|b| b["id"] == "not-there").unwrap();
@@ -150,7 +158,7 @@ fn a_model_that_lacks_a_building_and_has_one_too_many_still_helps() {
     assert!(number("views") == number("of_views") && number("compared_pixels") > 100, "{wrong}");
     assert!(number("agreeing_pixels") * 10 < number("compared_pixels"), "{wrong}");
     assert!(report["choices"].as_array().unwrap().iter().any(|choice| choice["name"] == "buildings left out"));
-    let (before, after) = (evaluation(&without), evaluation(&with));
+    let (before, after) = (evaluation(&WITHOUT), evaluation(&with));
     let roofs = format!("/classes/{ROOF}/mae");
     for (name, path, share) in
         [("all", "/metrics/mae", 0.96), ("roofs", roofs.as_str(), 0.85), ("edges", "/edges/edge/mae", 0.97)]
@@ -160,7 +168,7 @@ fn a_model_that_lacks_a_building_and_has_one_too_many_still_helps() {
     }
     let (rest, worse) = (mae(&before, "/edges/rest/mae"), mae(&after, "/edges/rest/mae"));
     assert!(worse <= rest, "away from edges the prior costs accuracy: {rest} m without, {worse} m with");
-    let (open, beside) = (heights_in_the_open_place(&without), heights_in_the_open_place(&with));
+    let (open, beside) = (heights_in_the_open_place(&WITHOUT), heights_in_the_open_place(&with));
     let changed = open.iter().zip(&beside).filter(|(a, b)| (*a - *b).abs() > 1.0).count();
     assert!(changed * 50 < open.len(), "the wrong building shows in {changed} of {} cells", open.len());
 }
@@ -168,7 +176,7 @@ fn a_model_that_lacks_a_building_and_has_one_too_many_still_helps() {
 #[test]
 fn buildings_with_wrong_heights_are_refuted_one_by_one_and_cost_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let before = evaluation(&surface(folder.path(), "without", None));
+    let before = evaluation(&WITHOUT);
     for every in [1, 2] {
         let (name, model) = (format!("every-{every}"), folder.path().join(format!("{every}.city.json")));
         let wrong = model_with_wrong_heights(&model, every);
@@ -198,7 +206,7 @@ fn a_model_that_is_ten_metres_off_costs_nothing() {
     *west = json!(west.as_f64().unwrap() - 10.0);
     let path = folder.path().join("shifted.city.json");
     std::fs::write(&path, serde_json::to_vec(&model).unwrap()).unwrap();
-    let before = evaluation(&surface(folder.path(), "without", None));
+    let before = evaluation(&WITHOUT);
     let after = evaluation(&surface(folder.path(), "with", Some(&path)));
     for path in ["/metrics/mae".to_owned(), format!("/classes/{ROOF}/mae")] {
         let (without, with) = (mae(&before, &path), mae(&after, &path));

@@ -52,12 +52,12 @@ fn ties(stage: &Stage, shots: &[Shot]) -> usize {
 /// Spread over the whole image, a twelfth of the points would lie where the other one sees them.
 #[test]
 fn a_large_image_beside_a_crop_or_a_strip_has_tie_points_where_both_see() {
-    let stage = Stage { size_px: 640, ..Stage::default() };
+    let stage = Stage { size_px: 480, ..Stage::default() };
     let shots = stage.shots(&[look(12.0, 12.0, 0.5), look(12.0, 195.0, 0.5)]);
-    let small = crop(&shots[1], [230, 250], [180, 180]);
+    let small = crop(&shots[1], [170, 190], [140, 140]);
     assert!(ties(&stage, &[shots[0].clone(), small.clone()]) > 150);
     assert!(ties(&stage, &[small, shots[0].clone()]) > 150);
-    let strip = [crop(&shots[0], [0, 0], [640, 360]), crop(&shots[1], [0, 290], [640, 350])];
+    let strip = [crop(&shots[0], [0, 0], [480, 270]), crop(&shots[1], [0, 215], [480, 265])];
     assert!(ties(&stage, &strip) > 60);
 }
 
