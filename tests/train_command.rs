@@ -5,9 +5,13 @@ mod common;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use common::{sample, simulated, skysweep};
-use io::raster::write_png_rgb;
+use crs::Crs;
+use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_rgb};
+use jobs::train::{SatelliteTrainConfig, TrainConfig, TrainError, run, run_on_images};
+use numeric::{Choice, Progress, Silent, upper_median};
 use predicates::prelude::*;
 use raster::Grid;
 use train::{Drawing, PinholeView, Registers, Surfel};
@@ -167,12 +171,139 @@ fn splats_learn_from_satellite_images_and_keep_their_heights() {
     train_on_images(&out.path().join("one"), &["--threads", "1"]).success();
     let bytes = |name: &str| std::fs::read(out.path().join(name).join("splats.ply")).unwrap();
     assert!(bytes("one") == bytes("two"), "threads change the splats");
-    train_on_images(&out.path().join("x"), &["--resume"]).code(2).stderr(predicate::str::contains("--resume"));
+    train_on_images(&out.path().join("x"), &["--shrink", "2"]).code(2).stderr(predicate::str::contains("--shrink"));
     let lone = out.path().join("lone.ply");
     std::fs::copy(&satellite().1, &lone).unwrap();
     let mut command = skysweep();
     command.arg("train").arg(satellite().0.join("view_1.tif")).arg("--splats").arg(&lone).arg("-o");
     command.arg(out.path().join("y")).assert().code(2).stderr(predicate::str::contains("no origin beside the splats"));
+}
+
+/// Stops a training after a number of iterations.
+struct StopAfter {
+    iterations: AtomicUsize,
+    trains: AtomicBool,
+}
+
+impl StopAfter {
+    fn new(iterations: usize) -> Self {
+        Self { iterations: iterations.into(), trains: false.into() }
+    }
+}
+
+impl Progress for StopAfter {
+    fn begin(&self, stage: &str, _: usize) {
+        self.trains.store(stage == "training", Ordering::Relaxed);
+    }
+
+    fn step(&self) {
+        if self.trains.load(Ordering::Relaxed) {
+            let _ = self.iterations.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+        }
+    }
+
+    fn choice(&self, _: &Choice) {}
+    fn warn(&self, _: &str) {}
+
+    fn is_cancelled(&self) -> bool {
+        self.iterations.load(Ordering::Relaxed) == 0
+    }
+}
+
+/// A training of 30 iterations leaves pixels out after 12. It is stopped before and after that.
+#[test]
+fn a_stopped_training_goes_on_to_the_same_bytes() {
+    let out = tempfile::tempdir().unwrap();
+    let (scene, splats) = satellite();
+    let on_images = |name: &str, resume: bool| {
+        let images = [1, 2, 4, 5].map(|k| scene.join(format!("view_{k}.tif"))).to_vec();
+        let mut config = SatelliteTrainConfig::new(images, splats.clone(), out.path().join(name));
+        config.dsm = Some(scene.join("truth/dsm.tif"));
+        (config.iterations, config.resume) = (30, resume);
+        config
+    };
+    let on_dataset = |name: &str, resume: bool| {
+        let mut config = TrainConfig::new(dataset().to_owned(), out.path().join(name));
+        (config.iterations, config.budget, config.shrink) = (30, 8000, 4);
+        (config.resume, config.transients) = (resume, true);
+        config
+    };
+    let bytes = |name: &str| std::fs::read(out.path().join(name).join("splats.ply")).unwrap();
+    let checkpoint = |name: &str| out.path().join(name).join("checkpoint.bin").exists();
+    let report = run_on_images(&on_images("whole", false), &Silent).unwrap();
+    assert!(report.transient_share.iter().all(|share| (0.0..0.2).contains(share)), "{:?}", report.transient_share);
+    let report = run(&on_dataset("whole_dataset", false), &Silent).unwrap();
+    assert!(report.transient_share.iter().all(|share| (0.0..0.2).contains(share)), "{:?}", report.transient_share);
+    for after in [5, 20] {
+        let name = format!("images_{after}");
+        let stopped = run_on_images(&on_images(&name, false), &StopAfter::new(after));
+        assert!(matches!(stopped, Err(TrainError::Job(_))) && checkpoint(&name), "{stopped:?}");
+        run_on_images(&on_images(&name, true), &Silent).unwrap();
+        assert!(bytes(&name) == bytes("whole") && !checkpoint(&name), "stopped after {after}");
+        let name = format!("dataset_{after}");
+        let stopped = run(&on_dataset(&name, false), &StopAfter::new(after));
+        assert!(matches!(stopped, Err(TrainError::Job(_))) && checkpoint(&name), "{stopped:?}");
+        run(&on_dataset(&name, true), &Silent).unwrap();
+        assert!(bytes(&name) == bytes("whole_dataset") && !checkpoint(&name), "stopped after {after}");
+    }
+}
+
+/// Splats of a surface with bumps of up to half a metre come closer to the truth when they follow
+/// its form, given in another unit and from another zero.
+#[test]
+fn heights_of_unknown_scale_give_splats_their_form() {
+    let out = tempfile::tempdir().unwrap();
+    let scene = &satellite().0;
+    let truth = read_dem(scene.join("truth/dsm.tif")).unwrap();
+    let write = |name: &str, height: &dyn Fn(usize, f32) -> f32| {
+        let values = truth.heights.data().iter().enumerate().map(|(cell, z)| height(cell, *z)).collect();
+        let grid = Grid::from_vec(truth.heights.width(), truth.heights.height(), values).unwrap();
+        let bands = [Band { description: "height", data: BandData::F32(&grid) }];
+        let crs = Crs::ellipsoidal(truth.horizontal_epsg.unwrap());
+        let path = out.path().join(name);
+        write_cog(&path, &CogRaster::new(&bands, truth.geotransform, crs), false).unwrap();
+        path
+    };
+    let width = truth.heights.width();
+    let bump = |cell: usize| 0.5 * (0.8 * (cell % width) as f32).sin() * (0.8 * (cell / width) as f32).cos();
+    let bumpy = write("bumpy.tif", &|cell, z| z + bump(cell));
+    let relative = write("relative.tif", &|_, z| 0.02 * z - 7.0);
+    let splats = out.path().join("s.ply");
+    let mut command = skysweep();
+    command.arg("splats").arg(&bumpy).args(["view_1.tif", "view_2.tif"].map(|view| scene.join(view)));
+    command.args(["--form", "2d", "-o"]).arg(&splats).assert().success();
+    let error = |name: &str, heights: Option<&Path>| {
+        let mut command = skysweep();
+        command.arg("train").args([1, 2, 4, 5].map(|k| scene.join(format!("view_{k}.tif")))).arg("--splats");
+        command.arg(&splats).args(["--iterations", "300", "-o"]).arg(out.path().join(name));
+        if let Some(path) = heights {
+            command.arg("--relative-heights").arg(path);
+        }
+        command.assert().success();
+        let file = io::splat_ply::read(&out.path().join(name).join("splats.ply")).unwrap();
+        let origin = file.origin.unwrap().origin;
+        // Splats that lie on flat places.
+        let level = file.splats.iter().filter(|splat| splat.normal()[2].abs() > 0.9);
+        let off = level.filter_map(|splat| {
+            let [x, y, z] = [0, 1, 2].map(|i| f64::from(splat.position[i]) + origin[i]);
+            let (c, r) = truth.geotransform.cell_from_map(x, y)?;
+            let height = truth.heights.get(c.round() as usize, r.round() as usize)?;
+            Some((z - f64::from(*height)).abs()).filter(|off| off.is_finite())
+        });
+        upper_median(&mut off.collect::<Vec<f64>>()).unwrap()
+    };
+    let (without, with) = (error("without", None), error("with", Some(&relative)));
+    assert!(with < 0.8 * without, "{without} m without, {with} m with");
+    // A raster of another zone is refused.
+    let elsewhere = out.path().join("elsewhere.tif");
+    let bands = [Band { description: "height", data: BandData::F32(&truth.heights) }];
+    write_cog(&elsewhere, &CogRaster::new(&bands, truth.geotransform, Crs::ellipsoidal(32632)), false).unwrap();
+    for option in ["--relative-heights", "--dsm"] {
+        let mut command = skysweep();
+        command.arg("train").arg(scene.join("view_1.tif")).arg("--splats").arg(&splats).arg(option).arg(&elsewhere);
+        let told = predicate::str::contains("the raster is in EPSG:32632, the splats in EPSG:32631: warp it first");
+        command.arg("-o").arg(out.path().join("x")).assert().code(2).stderr(told);
+    }
 }
 
 #[test]

@@ -48,6 +48,10 @@ pub(crate) struct Args {
     /// nothing but the images holds them].
     #[arg(long, value_name = "FILE", requires = "splats", help_heading = "Satellite images")]
     dsm: Option<PathBuf>,
+    /// Raster on the map of the splats with heights in any unit and from any zero, such as those of
+    /// a network for single images: the splats follow its form (Pearson's correlation).
+    #[arg(long, value_name = "FILE", requires = "splats", help_heading = "Satellite images")]
+    relative_heights: Option<PathBuf>,
     /// Image that is not trained on and only judged; may be given several times.
     #[arg(long, value_name = "IMAGE", requires = "splats", help_heading = "Satellite images")]
     judge: Vec<PathBuf>,
@@ -55,9 +59,10 @@ pub(crate) struct Args {
     /// the corrections that the splats were made with].
     #[arg(long, value_name = "report.json|none", requires = "splats", help_heading = "Satellite images")]
     corrections: Option<PathBuf>,
-    /// Train also on pixels that one image does not share with the others, such as vehicles.
-    #[arg(long, requires = "splats", help_heading = "Satellite images")]
-    keep_transients: bool,
+    /// Pixels that one image does not share with the others, such as vehicles [default: leave-out
+    /// for satellite images, keep for datasets, whose images are often taken within minutes].
+    #[arg(long, value_parser = named(&TRANSIENTS), value_name = "CHOICE")]
+    transients: Option<bool>,
     /// Every N-th view is kept for the judgement and not trained on (0: none).
     #[arg(long, value_name = "N", default_value_t = 8)]
     hold_out: usize,
@@ -84,6 +89,11 @@ const PRIORS: [Named<TrainPriors>; 4] = [
     ("none", TrainPriors::None, "the images alone"),
 ];
 
+const TRANSIENTS: [Named<bool>; 2] = [
+    ("leave-out", true, "not trained on once they stay unexplained while other images agree"),
+    ("keep", false, "trained on as all others"),
+];
+
 /// Runs `skysweep train`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if let Some(splats) = &args.splats {
@@ -99,6 +109,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.hold_out = args.hold_out;
     config.priors = args.priors;
     config.appearance = args.appearance;
+    config.transients = args.transients.unwrap_or(config.transients);
     config.seed = args.seed;
     config.resume = args.resume;
     config.threads = args.run.threads;
@@ -111,12 +122,8 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 /// Trains on satellite images.
 fn on_images(args: &Args, splats: &Path, global: Global) -> anyhow::Result<Outcome> {
-    let given = [
-        ("--pictures", args.pictures.is_some()),
-        ("--points", args.points.is_some()),
-        ("--resume", args.resume),
-        ("--shrink", args.shrink != 1),
-    ];
+    let given =
+        [("--pictures", args.pictures.is_some()), ("--points", args.points.is_some()), ("--shrink", args.shrink != 1)];
     if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
         bail!("{option} is for datasets, and --splats for satellite images: leave one of them out");
     }
@@ -126,8 +133,10 @@ fn on_images(args: &Args, splats: &Path, global: Global) -> anyhow::Result<Outco
     config.corrections = corrections_of(args.corrections.as_deref());
     config.iterations = args.iterations;
     config.budget = args.budget;
-    config.transients = !args.keep_transients;
+    config.relative_heights.clone_from(&args.relative_heights);
+    config.transients = args.transients.unwrap_or(config.transients);
     config.seed = args.seed;
+    config.resume = args.resume;
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;

@@ -23,11 +23,22 @@ pub struct LossWeights {
     pub prior_depth: f64,
     /// Difference from the prior normals.
     pub prior_normal: f64,
+    /// One less the correlation with depths of unknown scale. Chosen on a simulated town of 60 m
+    /// (1, 4 and 16).
+    pub correlation: f64,
 }
 
 impl Default for LossWeights {
     fn default() -> Self {
-        Self { absolute: 0.8, mask: 0.5, distortion: 10.0, consistency: 0.05, prior_depth: 5.0, prior_normal: 0.1 }
+        Self {
+            absolute: 0.8,
+            mask: 0.5,
+            distortion: 10.0,
+            consistency: 0.05,
+            prior_depth: 5.0,
+            prior_normal: 0.1,
+            correlation: 4.0,
+        }
     }
 }
 

@@ -1,9 +1,10 @@
 //! The loss of a drawing against a view, and its gradient by the images.
 //!
 //! All terms are means over pixels, so that images of any size count alike:
-//! L = L_colour + λ L_mask + λ L_distortion + λ L_consistency + λ L_depth + λ L_normal. The terms
-//! with priors are those of GS4Buildings: |M|⁻¹ Σ |D̂ − s D| with a learned scale s, and
-//! |M|⁻¹ Σ (1 − ⟨N̂, N⟩).
+//! L = L_colour + λ L_mask + λ L_distortion + λ L_consistency + λ L_depth + λ L_normal + λ L_r. The
+//! terms with priors are those of GS4Buildings: |M|⁻¹ Σ |D̂ − s D| with a learned scale s, and
+//! |M|⁻¹ Σ (1 − ⟨N̂, N⟩). L_r = 1 − r with Pearson's correlation r is that of SkySplat, for depths
+//! whose scale and zero are unknown.
 
 use crate::config::LossWeights;
 use crate::image::SurfelImages;
@@ -26,6 +27,15 @@ pub struct TrainingView<C> {
     pub prior_depth_m: Option<Vec<f32>>,
     /// Unit normals of a prior model in the local frame; NaN where it has none.
     pub prior_normal: Option<[Vec<f32>; 3]>,
+    /// Depths of any scale and from any zero, such as a network's; NaN where there is none.
+    pub relative_depth: Option<Vec<f32>>,
+}
+
+impl<C> TrainingView<C> {
+    /// A view of a picture alone.
+    pub fn new(camera: C, colour: [Vec<f32>; 3]) -> Self {
+        Self { camera, colour, mask: None, prior_depth_m: None, prior_normal: None, relative_depth: None }
+    }
 }
 
 /// What belongs to an image rather than to the scene.
@@ -59,6 +69,8 @@ pub struct LossTerms {
     pub prior_depth: f64,
     /// Normals against the prior.
     pub prior_normal: f64,
+    /// One less the correlation with depths of unknown scale.
+    pub correlation: f64,
     /// Sum with the weights.
     pub total: f64,
 }
@@ -98,13 +110,15 @@ impl<C: SurfelCamera> LossInput<'_, C> {
         self.consistency(out, &mut terms);
         self.prior_depth(out, &mut terms, &mut slopes);
         self.prior_normal(out, &mut terms);
+        self.correlation(out, &mut terms);
         let w = &self.weights;
         terms.total = terms.colour
             + w.mask * terms.mask
             + w.distortion * terms.distortion
             + w.consistency * terms.consistency
             + w.prior_depth * terms.prior_depth
-            + w.prior_normal * terms.prior_normal;
+            + w.prior_normal * terms.prior_normal
+            + w.correlation * terms.correlation;
         (terms, slopes)
     }
 
@@ -226,6 +240,44 @@ impl<C: SurfelCamera> LossInput<'_, C> {
     }
 }
 
+impl<C> LossInput<'_, C> {
+    /// One less Pearson's correlation r of the drawn depths d and the relative depths q. With the
+    /// deviations d' and q' from their means, ∂r/∂d_i = q'_i / √(Σd'² Σq'²) − r d'_i / Σd'².
+    fn correlation(&self, out: &mut SurfelImages, terms: &mut LossTerms) {
+        let Some(relative) = self.view.relative_depth.as_ref().filter(|_| self.weights.correlation > 0.0) else {
+            return;
+        };
+        let images = self.images;
+        let compared = |pixel: &usize| relative[*pixel].is_finite() && images.coverage[*pixel] > LEAST_COVERAGE;
+        let pixels: Vec<usize> = (0..relative.len()).filter(compared).collect();
+        let drawn: Vec<f64> = pixels.iter().map(|&p| f64::from(images.depth_m[p] / images.coverage[p])).collect();
+        let given: Vec<f64> = pixels.iter().map(|&p| f64::from(relative[p])).collect();
+        let (drawn, given) = (deviations(drawn), deviations(given));
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (by_drawn, by_given) = (product(&drawn, &drawn), product(&given, &given));
+        let norm = (by_drawn * by_given).sqrt();
+        if norm.is_nan() || norm <= 0.0 {
+            return;
+        }
+        let r = product(&drawn, &given) / norm;
+        terms.correlation = 1.0 - r;
+        for ((&pixel, d), q) in pixels.iter().zip(&drawn).zip(&given) {
+            let slope = -self.weights.correlation * (q / norm - r * d / by_drawn);
+            let coverage = f64::from(images.coverage[pixel]);
+            let depth = f64::from(images.depth_m[pixel]) / coverage;
+            out.depth_m[pixel] += (slope / coverage) as f32;
+            out.coverage[pixel] -= (slope * depth / coverage) as f32;
+        }
+    }
+}
+
+/// Returns the differences of values from their mean.
+fn deviations(mut values: Vec<f64>) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    values.iter_mut().for_each(|value| *value -= mean);
+    values
+}
+
 /// The slope of the absolute value, 0 at 0.
 fn sign(value: f32) -> f32 {
     if value == 0.0 { 0.0 } else { value.signum() }
@@ -267,6 +319,7 @@ mod tests {
             mask: Some((0..20).map(|i| i % 3 > 0).collect()),
             prior_depth_m: Some(prior_depth_m),
             prior_normal: Some([40, 41, 42].map(|k| plane(k, -1.0, 1.0))),
+            relative_depth: Some(plane(50, -3.0, 9.0)),
         };
         // The normals of the drawn depths are held fixed, so that they have no differences.
         let weights = LossWeights { consistency: 0.0, ..LossWeights::default() };

@@ -215,7 +215,7 @@ mod tests {
         };
         let plane = || vec![0.5; 8];
         let colour = [plane(), plane(), plane()];
-        let mut view = TrainingView { camera, colour, mask: None, prior_depth_m: None, prior_normal: None };
+        let mut view = TrainingView::new(camera, colour);
         assert_eq!(modelled_share(&view), 1.0);
         view.mask = Some((0..8).map(|i| i < 2).collect());
         assert_eq!(modelled_share(&view), 0.25);

@@ -61,11 +61,9 @@ fn view(camera: PinholeView, with_priors: bool) -> TrainingView<PinholeView> {
         of.map(|(v, a)| if *a > 0.9 { v / a } else { f32::NAN }).collect::<Vec<f32>>()
     };
     TrainingView {
-        camera,
-        colour: images.colour.clone(),
-        mask: None,
         prior_depth_m: with_priors.then(|| where_covered(&images.depth_m)),
         prior_normal: with_priors.then(|| images.normal.each_ref().map(|plane| where_covered(plane))),
+        ..TrainingView::new(camera, images.colour.clone())
     }
 }
 

@@ -46,6 +46,8 @@ pub struct TrainConfig {
     pub priors: TrainPriors,
     /// Whether each image has a gain and an offset of its own.
     pub appearance: bool,
+    /// Whether pixels that stay unexplained while other views agree are left out, such as vehicles.
+    pub transients: bool,
     /// Seed of everything random.
     pub seed: u64,
     /// Iterations between two checkpoints.
@@ -72,6 +74,7 @@ impl TrainConfig {
             hold_out: 8,
             priors: TrainPriors::Both,
             appearance: false,
+            transients: false,
             seed: 1,
             checkpoint_every: 500,
             resume: false,

@@ -118,8 +118,6 @@ fn read_view(
     let normal = if wants(TrainPriors::Normal) { map("raw_normal", 3)? } else { None };
     let mask = if masked { map("raw_mask", 1)? } else { None };
     Ok(TrainingView {
-        camera,
-        colour,
         mask: mask.map(|mask| nearest(&|i| mask[i]).into_iter().map(|v| v > 0.0).collect()),
         prior_depth_m: depth.map(|depth| nearest(&|i| finite(depth[i]))),
         prior_normal: normal.map(|normal| {
@@ -127,6 +125,7 @@ fn read_view(
             let known = |i: usize| normal[3 * i..3 * i + 3].iter().any(|c| *c != 0.0);
             [0, 1, 2].map(|c| nearest(&|i| if known(i) { normal[3 * i + c] } else { f32::NAN }))
         }),
+        ..TrainingView::new(camera, colour)
     })
 }
 

@@ -18,7 +18,6 @@ const NEWEST: f64 = 0.05;
 /// The iterations of a training.
 pub(super) struct Iterations<'a> {
     progress: &'a dyn Progress,
-    total: u32,
     shown: Option<f64>,
     points: Vec<LossPoint>,
     recent: Vec<TrainingStep>,
@@ -30,7 +29,7 @@ impl<'a> Iterations<'a> {
     pub(super) fn new(total: u32, done: u32, progress: &'a dyn Progress) -> Self {
         progress.begin("training", total as usize);
         (0..done).for_each(|_| progress.step());
-        Self { progress, total, shown: None, points: Vec::new(), recent: Vec::new(), begun: Instant::now() }
+        Self { progress, shown: None, points: Vec::new(), recent: Vec::new(), begun: Instant::now() }
     }
 
     /// Runs iterations until a number of them is done or the training is. `keep` is called after
@@ -65,11 +64,6 @@ impl<'a> Iterations<'a> {
         Ok(())
     }
 
-    /// Returns whether all iterations are done.
-    pub(super) fn is_done(&self, state: &TrainingState) -> bool {
-        state.iteration >= self.total
-    }
-
     /// Returns the curve of the loss, and the seconds since the beginning.
     pub(super) fn finish(self) -> (Vec<LossPoint>, f64) {
         (self.points, self.begun.elapsed().as_secs_f64())
@@ -85,6 +79,7 @@ fn loss_point(iteration: u32, splats: usize, steps: &[TrainingStep]) -> LossPoin
         colour: mean(|s| s.terms.colour),
         prior_depth: mean(|s| s.terms.prior_depth),
         prior_normal: mean(|s| s.terms.prior_normal),
+        correlation: mean(|s| s.terms.correlation),
     }
 }
 

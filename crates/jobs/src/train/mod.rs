@@ -10,10 +10,12 @@
 //! | `splats.ply` | the splats (2DGS), in the frame of the dataset; `splats.origin.json` beside |
 //! | `renders/NAME.png` | the images that were not trained on, as the splats show them |
 //! | `report.json`, `report.html` | settings, quality of every view, loss by iteration |
-//! | `checkpoint.bin` | the state to go on from, until the training on a dataset is done |
+//! | `checkpoint.bin` | the state to go on from, until the training is done |
 //! | `dsm.tif` | heights of the splats that learned from satellite images, on the grid of the model |
 
+mod checkpoint;
 mod config;
+mod course;
 mod dataset;
 mod error;
 mod initial;

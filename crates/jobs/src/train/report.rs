@@ -24,6 +24,8 @@ pub struct TrainReport {
     pub depth_scale: f32,
     /// Seconds of the iterations of this run.
     pub seconds: f64,
+    /// Share of the pixels of each trained image that were left out as transient.
+    pub transient_share: Vec<f64>,
     /// Quality of the views before and after.
     pub views: Vec<TrainedViewRow>,
     /// Mean loss of the iterations before each point.
@@ -62,6 +64,8 @@ pub struct LossPoint {
     pub prior_depth: f64,
     /// Normals against the prior.
     pub prior_normal: f64,
+    /// One less the correlation with heights of unknown scale.
+    pub correlation: f64,
 }
 
 impl TrainReport {

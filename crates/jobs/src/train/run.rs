@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ::train::{Drawing, PinholeView, Registers, Surfel, Trainer, TrainingConfig, TrainingState, TrainingView};
+use ::train::{Drawing, PinholeView, Registers, Surfel, TrainingConfig, TrainingView};
 use io::raster::write_png_rgb;
 use io::splat_ply::{self, SplatForm, SplatLayout};
 use numeric::Progress;
@@ -11,13 +11,13 @@ use report::MapLayer;
 use splats::{psnr_db, ssim};
 
 use super::config::TrainConfig;
+use super::course::{Course, Trained};
 use super::dataset::TrainData;
 use super::error::TrainError;
 use super::initial;
-use super::iterate::{Iterations, extent_m};
 use super::page;
 use super::report::{TrainReport, TrainedViewRow};
-use crate::files::{self, FileError};
+use crate::files;
 use crate::output_folder::OutputFolder;
 use crate::report_page;
 use crate::threads;
@@ -27,8 +27,6 @@ const SPLATS: &str = "splats.ply";
 const REPORT: &str = "report.json";
 const CHECKPOINT: &str = "checkpoint.bin";
 const RENDERS: &str = "renders";
-/// Largest checkpoint, bytes.
-const CHECKPOINT_LIMIT: u64 = 1 << 33;
 /// Thickness of a splat in the file, metres. 2DGS has none.
 const THICKNESS_M: f32 = 1e-4;
 
@@ -63,18 +61,15 @@ fn train(config: &TrainConfig, data: &TrainData, progress: &dyn Progress) -> Res
     let initial = initial::surfels(data, config.budget / 2);
     let (before, _) = quality(data, &initial, None)?;
     let checkpoint = config.output.join(CHECKPOINT);
-    let state = match config.resume && checkpoint.is_file() {
-        true => read_checkpoint(&checkpoint, views.len())?,
-        false => TrainingState::new(initial.clone(), views.len()),
+    let course = Course {
+        checkpoint: &checkpoint,
+        checkpoint_every: config.checkpoint_every,
+        resume: config.resume,
+        transients: config.transients,
+        pictures: views.len(),
+        settings: settings(config, data),
     };
-    let mut run = Iterations::new(config.iterations, state.iteration, progress);
-    let mut trainer = Trainer::new(&views, extent_m(&initial), state, settings(config, data));
-    run.until(&mut trainer, u32::MAX, |state, stopped| {
-        let due = state.iteration.is_multiple_of(config.checkpoint_every.max(1)) && state.iteration < config.iterations;
-        if due || stopped { Ok(write_checkpoint(&checkpoint, state)?) } else { Ok(()) }
-    })?;
-    let (losses, seconds) = run.finish();
-    let state = trainer.into_state();
+    let Trained { state, transient_share, losses, seconds } = course.run(&initial, views, progress)?;
     files::create_folder(&config.output.join(RENDERS))?;
     let (after, layers) = quality(data, &state.surfels, Some((config, &config.output.join(RENDERS))))?;
     let splats: Vec<_> = state.surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect();
@@ -97,6 +92,7 @@ fn train(config: &TrainConfig, data: &TrainData, progress: &dyn Progress) -> Res
         masked: data.masked,
         depth_scale: state.depth_scale,
         seconds,
+        transient_share,
         views: (0..data.views.len()).map(row).collect(),
         losses,
     };
@@ -116,22 +112,6 @@ fn settings(config: &TrainConfig, data: &TrainData) -> TrainingConfig {
         densify.budget = config.budget;
     }
     settings
-}
-
-fn write_checkpoint(path: &Path, state: &TrainingState) -> Result<(), FileError> {
-    Ok(io::write_bytes(path, &state.to_bytes(), true)?)
-}
-
-fn read_checkpoint(path: &Path, views: usize) -> Result<TrainingState, TrainError> {
-    let bytes =
-        io::read_regular(path, CHECKPOINT_LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
-    let state =
-        TrainingState::from_bytes(&bytes).map_err(|source| TrainError::Checkpoint { path: path.to_owned(), source })?;
-    let found = state.appearance.len();
-    if found != views {
-        return Err(TrainError::OtherViews { path: path.to_owned(), found, expected: views });
-    }
-    Ok(state)
 }
 
 /// Signal-to-noise ratio (dB) and structural similarity of a view.

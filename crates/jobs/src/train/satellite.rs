@@ -11,7 +11,7 @@ use ::splats::RpcSplatCamera;
 use ::train::{Drawing, LatticeBox, LatticeView, MAX_SIDE, Registers, Surfel, SurfelImages, TrainingView};
 use camera::RpcCamera;
 use crs::MapProjection;
-use io::raster::ImageSource;
+use io::raster::{Dem, ImageSource};
 use io::splat_ply::LocalOrigin;
 use numeric::{Progress, upper_median};
 use raster::{GeoTransform, Grid, Window};
@@ -137,7 +137,7 @@ impl PlacedSurfels {
         }
         let grid = source.read_colour(window)?;
         let colour = [0, 1, 2].map(|c| grid.data().iter().map(|p| p[c]).collect());
-        let mut view = TrainingView { camera, colour, mask: None, prior_depth_m: None, prior_normal: None };
+        let mut view = TrainingView::new(camera, colour);
         let drawing = Drawing::new(&self.surfels, &view.camera, Registers::Longest);
         toned(&mut view, drawing.images());
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -146,18 +146,40 @@ impl PlacedSurfels {
 
     /// Returns the view of a surface model from above.
     pub(super) fn above(&self, surface: &MapSurface) -> Option<TrainingView<LatticeView>> {
-        let heights = &surface.dem.heights;
-        let camera = self.view_from_above(&surface.dem.geotransform, [heights.width(), heights.height()], 1)?;
+        let heights = surface.dem.heights.data();
         let depth = |z: &f32| (self.origin.origin[2] - f64::from(*z)) as f32;
-        let nothing = || vec![f32::NAN; heights.data().len()];
         Some(TrainingView {
-            camera,
-            colour: [nothing(), nothing(), nothing()],
             // The surface has no holes where its height is known.
-            mask: Some(heights.data().iter().map(|z| z.is_finite()).collect()),
-            prior_depth_m: Some(heights.data().iter().map(depth).collect()),
-            prior_normal: None,
+            mask: Some(heights.iter().map(|z| z.is_finite()).collect()),
+            prior_depth_m: Some(heights.iter().map(depth).collect()),
+            ..self.blank_from_above(&surface.dem)?
         })
+    }
+
+    /// Returns the view from above of heights in any unit and from any zero.
+    pub(super) fn above_relative(&self, heights: &Dem) -> Option<TrainingView<LatticeView>> {
+        let depths = heights.heights.data().iter().map(|z| -z).collect();
+        Some(TrainingView { relative_depth: Some(depths), ..self.blank_from_above(heights)? })
+    }
+
+    /// Returns a view of the cells of a grid from above that shows nothing.
+    fn blank_from_above(&self, grid: &Dem) -> Option<TrainingView<LatticeView>> {
+        let size = [grid.heights.width(), grid.heights.height()];
+        let nothing = || vec![f32::NAN; size[0] * size[1]];
+        let camera = self.view_from_above(&grid.geotransform, size, 1)?;
+        Some(TrainingView::new(camera, [nothing(), nothing(), nothing()]))
+    }
+
+    /// Checks that a raster lies on the map of the splats.
+    pub(super) fn check_map(&self, path: &Path, raster: &Dem) -> Result<(), TrainError> {
+        let found = raster.horizontal_epsg.map(|code| format!("EPSG:{code}"));
+        match found.filter(|found| *found != self.origin.crs && self.origin.crs.starts_with("EPSG:")) {
+            None => Ok(()),
+            Some(found) => Err(TrainError::Dataset {
+                path: path.to_owned(),
+                what: format!("the raster is in {found}, the splats in {}: warp it first", self.origin.crs),
+            }),
+        }
     }
 
     /// Returns the camera that sees the cells of a grid from above, each as `side` × `side` pixels.

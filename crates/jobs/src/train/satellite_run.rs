@@ -2,23 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use ::train::{
-    Drawing, LatticeView, Registers, Surfel, SurfelCamera, Trainer, TrainingConfig, TrainingState, TrainingView,
-};
+use ::train::{Drawing, LatticeView, Registers, Surfel, SurfelCamera, TrainingConfig, TrainingView};
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, write_cog, write_png_rgb};
+use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_rgb};
 use io::splat_ply::{self, SplatForm, SplatLayout};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
 use splats::{psnr_db, ssim};
 
+use super::course::{Course, Trained};
 use super::error::TrainError;
-use super::iterate::{Iterations, extent_m};
+use super::iterate::extent_m;
 use super::page;
 use super::report::{LossPoint, TrainedViewRow};
 use super::satellite::{PlacedSurfels, SatelliteImage, corrections, line};
-use super::transients::find_transients;
 use crate::corrections::CorrectionSource;
 use crate::error::SettingError;
 use crate::files::{self, FileError};
@@ -32,6 +30,7 @@ use crate::threads;
 const SPLATS: &str = "splats.ply";
 const REPORT: &str = "report.json";
 const HEIGHTS: &str = "dsm.tif";
+const CHECKPOINT: &str = "checkpoint.bin";
 const RENDERS: &str = "renders";
 /// Thickness of a splat in the file, metres. 2DGS has none.
 const THICKNESS_M: f32 = 1e-4;
@@ -42,8 +41,6 @@ const STEPS_M: [f64; 2] = [0.01, 0.001];
 /// trainings. A surface model of the same images is right in the mean, and colours of few
 /// directions pull splats away from it. Chosen on a town of seed 1 (1, 4 and 16).
 const HEIGHTS_WEIGHT: f64 = 4.0;
-/// Share of the training after which pixels that stay unexplained are left out.
-const TRANSIENTS_AT: f64 = 0.4;
 
 /// A training of splats on satellite images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,6 +55,9 @@ pub struct SatelliteTrainConfig {
     pub splats: PathBuf,
     /// Surface model that holds the heights; nothing but the images does when `None`.
     pub dsm: Option<PathBuf>,
+    /// Raster on the map of the splats with heights in any unit and from any zero, such as those of
+    /// a network for single images: the splats follow its form.
+    pub relative_heights: Option<PathBuf>,
     /// Source of the pointing corrections of the images.
     pub corrections: CorrectionSource,
     /// Folder for the results.
@@ -70,6 +70,10 @@ pub struct SatelliteTrainConfig {
     pub transients: bool,
     /// Seed of everything random.
     pub seed: u64,
+    /// Iterations between two checkpoints.
+    pub checkpoint_every: u32,
+    /// Whether a training that was stopped goes on.
+    pub resume: bool,
     /// Worker threads; one per core when `None`.
     pub threads: Option<usize>,
     /// Whether earlier results may be replaced.
@@ -111,12 +115,15 @@ impl SatelliteTrainConfig {
             judged: Vec::new(),
             splats,
             dsm: None,
+            relative_heights: None,
             corrections: CorrectionSource::default(),
             output,
             iterations: 1500,
             budget: 200_000,
             transients: true,
             seed: 1,
+            checkpoint_every: 500,
+            resume: false,
             threads: None,
             overwrite: false,
         }
@@ -166,6 +173,9 @@ impl SatelliteTrainReport {
 
 /// Trains splats on satellite images.
 ///
+/// A training that is cancelled leaves a checkpoint, from which it goes on with `resume`: the
+/// result has the same bytes.
+///
 /// # Errors
 /// [`TrainError`]: splats without an origin on a map, images that do not see them, outputs that
 /// exist.
@@ -182,46 +192,36 @@ pub fn run_on_images(
 fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<SatelliteTrainReport, TrainError> {
     let placed = PlacedSurfels::read(&config.splats)?;
     let found = corrections(&config.splats, &config.corrections)?;
-    let mut images = placed.images(&config.images, &found, progress)?;
+    let images = placed.images(&config.images, &found, progress)?;
     let judged = placed.images(&config.judged, &found, progress)?;
     let invalid = |path: &Path, what: &str| TrainError::Dataset { path: path.to_owned(), what: what.to_owned() };
     let surface = config.dsm.as_ref().map(|path| map_surface::read(path, None, progress)).transpose()?;
-    let above = match (&surface, &config.dsm) {
-        (Some(surface), Some(path)) => {
-            Some(placed.above(surface).ok_or_else(|| invalid(path, "the grid of the surface model is not regular"))?)
-        }
-        _ => None,
-    };
+    let mut views: Vec<TrainingView<LatticeView>> = images.iter().map(|image| image.view.clone()).collect();
+    if let (Some(surface), Some(path)) = (&surface, &config.dsm) {
+        placed.check_map(path, &surface.dem)?;
+        let above = placed.above(surface);
+        views.push(above.ok_or_else(|| invalid(path, "the grid of the surface model is not regular"))?);
+    }
+    if let Some(path) = &config.relative_heights {
+        let heights = read_dem(path)?;
+        placed.check_map(path, &heights)?;
+        let above = placed.above_relative(&heights);
+        views.push(above.ok_or_else(|| invalid(path, "the grid of the heights is not regular"))?);
+    }
     let _folder = OutputFolder::take(&config.output)?;
     let pictures: Vec<&SatelliteImage> = images.iter().chain(&judged).collect();
     let before: Vec<Quality> = pictures.iter().map(|image| quality(&placed.surfels, &image.view).0).collect();
     let all: Vec<SatelliteImage> = pictures.into_iter().cloned().collect();
-    let extent = extent_m(&placed.surfels);
-    let settings = settings(config, extent);
-    let views = |images: &[SatelliteImage]| -> Vec<TrainingView<LatticeView>> {
-        images.iter().map(|image| image.view.clone()).chain(above.clone()).collect()
+    let checkpoint = config.output.join(CHECKPOINT);
+    let course = Course {
+        checkpoint: &checkpoint,
+        checkpoint_every: config.checkpoint_every,
+        resume: config.resume,
+        transients: config.transients,
+        pictures: images.len(),
+        settings: settings(config, extent_m(&placed.surfels)),
     };
-    let first = views(&images);
-    let mut run = Iterations::new(settings.iterations, 0, progress);
-    let mut trainer = Trainer::new(&first, extent, TrainingState::new(placed.surfels.clone(), first.len()), settings);
-    let changed = if config.transients { (TRANSIENTS_AT * f64::from(config.iterations)) as u32 } else { u32::MAX };
-    run.until(&mut trainer, changed, |_, _| Ok(()))?;
-    let mut state = trainer.into_state();
-    let mut transient_share = vec![0.0; images.len()];
-    if !run.is_done(&state) {
-        let masks = find_transients(&state, &first[..images.len()]);
-        for ((image, mask), share) in images.iter_mut().zip(&masks).zip(&mut transient_share) {
-            *share = mask.iter().filter(|m| **m).count() as f64 / mask.len().max(1) as f64;
-            for plane in &mut image.view.colour {
-                plane.iter_mut().zip(mask).filter(|(_, m)| **m).for_each(|(value, _)| *value = f32::NAN);
-            }
-        }
-        let second = views(&images);
-        let mut trainer = Trainer::new(&second, extent, state, settings);
-        run.until(&mut trainer, u32::MAX, |_, _| Ok(()))?;
-        state = trainer.into_state();
-    }
-    let (losses, seconds) = run.finish();
+    let Trained { state, transient_share, losses, seconds } = course.run(&placed.surfels, views, progress)?;
     let splats: Vec<_> = state.surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect();
     let path = config.output.join(SPLATS);
     let layout = SplatLayout { form: SplatForm::Discs, ..SplatLayout::default() };
@@ -266,6 +266,7 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
     };
     let lead = "Splats that learned from satellite images.";
     page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, config.overwrite)?;
+    files::remove(&checkpoint)?;
     Ok(report)
 }
 

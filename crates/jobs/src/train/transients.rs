@@ -4,7 +4,7 @@
 //! the same place agree with the model. What no view explains is an error of the model and keeps
 //! pulling.
 
-use ::train::{Drawing, LatticeView, Registers, SurfelCamera, SurfelImages, TrainingState, TrainingView};
+use ::train::{Drawing, Registers, SurfelCamera, SurfelImages, TrainingState, TrainingView};
 use numeric::upper_median;
 use rayon::prelude::*;
 
@@ -14,8 +14,9 @@ const RADIUS: usize = 2;
 const LIMIT: f64 = 4.0;
 /// Standard deviation of a normal distribution in median absolute deviations.
 const NMAD: f64 = 1.4826;
-/// Difference of depths within which another view sees the same place, metres.
-const SAME_M: f64 = 1.5;
+/// Distance along the line of sight within which another view sees the same place, sizes of a pixel
+/// there: heights that images of a size of pixel give are off by one or two of them.
+const SAME_PIXELS: f64 = 3.0;
 
 /// A view as the model shows it.
 struct Explained {
@@ -28,18 +29,21 @@ struct Explained {
 
 /// Returns for each view which of its pixels are transient. `views` are the first views of the
 /// training.
-pub(super) fn find_transients(state: &TrainingState, views: &[TrainingView<LatticeView>]) -> Vec<Vec<bool>> {
+pub(super) fn find_transients<C: SurfelCamera>(state: &TrainingState, views: &[TrainingView<C>]) -> Vec<Vec<bool>> {
     let explained: Vec<Explained> =
         views.iter().enumerate().map(|(number, view)| Explained::new(state, number, view)).collect();
     (0..views.len()).map(|number| transient(number, views, &explained)).collect()
 }
 
 impl Explained {
-    fn new(state: &TrainingState, number: usize, view: &TrainingView<LatticeView>) -> Self {
+    fn new<C: SurfelCamera>(state: &TrainingState, number: usize, view: &TrainingView<C>) -> Self {
         let drawing = Drawing::new(&state.surfels, &view.camera, Registers::Longest);
         let images = drawing.images().clone();
         let look = state.appearance[number];
         let one = |pixel: usize| {
+            if view.mask.as_ref().is_some_and(|mask| !mask[pixel]) {
+                return f32::NAN;
+            }
             let error = |k: usize| {
                 let shown = look.gain[k] * images.colour[k][pixel] + look.offset[k] * images.coverage[pixel];
                 (shown - view.colour[k][pixel]).abs()
@@ -77,7 +81,7 @@ fn averaged(values: &[f32], [width, height]: [usize; 2]) -> Vec<f32> {
     (0..values.len()).into_par_iter().map(one).collect()
 }
 
-fn transient(number: usize, views: &[TrainingView<LatticeView>], explained: &[Explained]) -> Vec<bool> {
+fn transient<C: SurfelCamera>(number: usize, views: &[TrainingView<C>], explained: &[Explained]) -> Vec<bool> {
     let (camera, own) = (&views[number].camera, &explained[number]);
     let width = own.images.size[0];
     let one = |pixel: usize| {
@@ -96,7 +100,7 @@ fn transient(number: usize, views: &[TrainingView<LatticeView>], explained: &[Ex
 
 /// Returns whether a view that sees a place agrees with the model there; `None` where it does not
 /// see the place.
-fn agreement(place: [f64; 3], camera: &LatticeView, seen: &Explained) -> Option<bool> {
+fn agreement<C: SurfelCamera>(place: [f64; 3], camera: &C, seen: &Explained) -> Option<bool> {
     let local = camera.local(0, place)?;
     let [width, height] = seen.images.size;
     let [x, y] = local.pixel.map(f64::round);
@@ -106,5 +110,7 @@ fn agreement(place: [f64; 3], camera: &LatticeView, seen: &Explained) -> Option<
     let pixel = y as usize * width + x as usize;
     let depth = f64::from(seen.images.depth_m[pixel] / seen.images.coverage[pixel]);
     let error = seen.error[pixel];
-    ((depth - local.depth_m).abs() < SAME_M && error.is_finite()).then_some(error <= seen.limit)
+    let [here, beside] = [x, x + 1.0].map(|x| camera.point([x, y], local.depth_m));
+    let size_m = here.zip(beside).map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt())?;
+    ((depth - local.depth_m).abs() < SAME_PIXELS * size_m && error.is_finite()).then_some(error <= seen.limit)
 }

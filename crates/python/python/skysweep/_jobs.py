@@ -1554,6 +1554,7 @@ def train(
     hold_out: int = 8,
     priors: Literal["both", "depth", "normal", "none"] = "both",
     appearance: bool = False,
+    transients: bool = False,
     seed: int = 1,
     checkpoint_every: int = 500,
     resume: bool = False,
@@ -1576,6 +1577,8 @@ def train(
             0.
         priors: Prior maps in use, as far as the dataset has them.
         appearance: Whether each image has a gain and an offset of its own.
+        transients: Whether pixels that stay unexplained while other views agree are left out, such
+            as vehicles.
         seed: Seed of everything random.
         checkpoint_every: Iterations between two checkpoints.
         resume: Whether a training that was stopped goes on.
