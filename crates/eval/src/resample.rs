@@ -43,8 +43,8 @@ pub fn nearest<T: Copy>(grid: &Grid<T>, column: f64, row: f64) -> Option<T> {
     grid.get(usize::try_from(column).ok()?, usize::try_from(row).ok()?).copied()
 }
 
-/// Returns the upper left, upper right, lower left and lower right cell; `None` unless all four have
-/// a value.
+/// Returns the upper left, upper right, lower left and lower right cell; `None` unless all have a
+/// value.
 fn four(grid: &Grid<f32>, left: i64, top: i64) -> Option<[f64; 4]> {
     let (left, top) = (usize::try_from(left).ok()?, usize::try_from(top).ok()?);
     if top + 1 >= grid.height() {
