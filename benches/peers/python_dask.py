@@ -22,7 +22,7 @@ from distributed import Client
 SETTINGS = {"gsd_m": 0.5, "memory_mb": 2000}
 OPTIONS = ["--gsd", "0.5", "--memory", "2000"]
 #: Runs of each kind, one after another in turn; the median counts.
-RUNS = 3
+RUNS = int(os.environ.get("SKYSWEEP_RUNS", "3"))
 #: Chunks after which a worker is killed, in the middle of its next one.
 KILLS = (1, 4)
 

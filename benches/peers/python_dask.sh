@@ -4,7 +4,7 @@
 # SITE is a folder in which the package lies (target/python/site, or an unpacked wheel), COMMAND the command skysweep of the
 # same build. The scene of 8192² pixels is made by
 #   cargo bench --bench scale -- 8192 --folder /tmp/scale
-# as /tmp/scale/view_*_8192.tif. Writes benches/results/python_dask.json and python_dask.md. Neither the build nor the tests need it.
+# as /tmp/scale/view_*_8192.vrt. Writes benches/results/python_dask.json and python_dask.md. Neither the build nor the tests need it.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 site=$(realpath "$1")
