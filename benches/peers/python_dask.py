@@ -94,11 +94,12 @@ def main(results, command, *images):
         "kinds": {kind: {**row, "cpu_to_command": row["cpu_s"] / base} for kind, row in middle.items()},
     }
     Path(results, "python_dask.json").write_text(json.dumps(report, indent=2) + "\n")
+    turns = f"medians of {RUNS} runs in turn" if RUNS > 1 else "one run of each"
     lines = [
         "# A planned run on Dask beside the command",
         "",
         f"Written by `benches/peers/python_dask.sh`. {report['machine']}, distributed {report['distributed']}, two workers of",
-        f"one thread. {', '.join(report['images'])} with `{' '.join(OPTIONS)}`, medians of {RUNS} runs in turn. Processor time is user and",
+        f"one thread. {', '.join(report['images'])} with `{' '.join(OPTIONS)}`, {turns}. Processor time is user and",
         "system time of all processes, the planning, the cluster's start and lost work included.",
         "",
         "| run | chunks | CPU, s | wall, s | CPU to the command | workers killed | chunks tried again |",
