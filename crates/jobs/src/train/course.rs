@@ -10,6 +10,7 @@ use super::checkpoint::Checkpoint;
 use super::error::TrainError;
 use super::iterate::{Iterations, extent_m};
 use super::report::LossPoint;
+use super::results::CHECKPOINT;
 use super::transients::find_transients;
 
 /// Share of the training after which pixels that stay unexplained are left out.
@@ -17,8 +18,8 @@ const TRANSIENTS_AT: f64 = 0.4;
 
 /// How a training runs.
 pub(super) struct Course<'a> {
-    /// The checkpoint, which is there until the results are written.
-    pub(super) checkpoint: &'a Path,
+    /// Folder of the results.
+    pub(super) output: &'a Path,
     /// Iterations between two checkpoints.
     pub(super) checkpoint_every: u32,
     /// Whether the training goes on from the checkpoint where there is one.
@@ -51,8 +52,9 @@ impl Course<'_> {
         progress: &dyn Progress,
     ) -> Result<Trained, TrainError> {
         let extent_m = extent_m(initial);
-        let Checkpoint { mut state, left_out } = match self.resume && self.checkpoint.is_file() {
-            true => Checkpoint::read(self.checkpoint, &views, self.pictures)?,
+        let checkpoint = self.output.join(CHECKPOINT);
+        let Checkpoint { mut state, left_out } = match self.resume && checkpoint.is_file() {
+            true => Checkpoint::read(&checkpoint, &views, self.pictures)?,
             false => Checkpoint { state: TrainingState::new(initial.to_vec(), views.len()), left_out: Vec::new() },
         };
         let mut run = Iterations::new(self.settings.iterations, state.iteration, progress);
@@ -86,6 +88,6 @@ impl Course<'_> {
     fn keep(&self, state: &TrainingState, left_out: &[Vec<bool>], stopped: bool) -> Result<(), TrainError> {
         let every = self.checkpoint_every.max(1);
         let is_due = state.iteration.is_multiple_of(every) && state.iteration < self.settings.iterations;
-        if is_due || stopped { Ok(Checkpoint::write(self.checkpoint, state, left_out)?) } else { Ok(()) }
+        if is_due || stopped { Ok(Checkpoint::write(&self.output.join(CHECKPOINT), state, left_out)?) } else { Ok(()) }
     }
 }

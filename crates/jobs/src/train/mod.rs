@@ -23,6 +23,7 @@ mod iterate;
 mod page;
 mod place;
 mod report;
+mod results;
 mod run;
 mod satellite;
 mod satellite_run;

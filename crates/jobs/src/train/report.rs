@@ -49,6 +49,22 @@ pub struct TrainedViewRow {
     pub ssim: Option<f64>,
 }
 
+/// Signal-to-noise ratio (dB) and structural similarity of a view.
+pub(super) type Quality = (Option<f64>, Option<f64>);
+
+impl TrainedViewRow {
+    pub(super) fn new(name: &str, held_out: bool, before: Quality, after: Quality) -> Self {
+        Self {
+            name: name.to_owned(),
+            held_out,
+            psnr_before_db: before.0,
+            psnr_db: after.0,
+            ssim_before: before.1,
+            ssim: after.1,
+        }
+    }
+}
+
 /// Mean terms of the loss over some iterations, without their weights.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct LossPoint {

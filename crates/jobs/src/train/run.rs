@@ -4,7 +4,6 @@ use std::path::Path;
 
 use ::train::{Drawing, PinholeView, Registers, Surfel, TrainingConfig, TrainingView};
 use io::raster::write_png_rgb;
-use io::splat_ply::{self, SplatForm, SplatLayout};
 use numeric::Progress;
 use raster::Grid;
 use report::MapLayer;
@@ -16,19 +15,11 @@ use super::dataset::TrainData;
 use super::error::TrainError;
 use super::initial;
 use super::page;
-use super::report::{TrainReport, TrainedViewRow};
+use super::report::{Quality, TrainReport, TrainedViewRow};
+use super::results::{self, CHECKPOINT, RENDERS, REPORT};
 use crate::files;
 use crate::output_folder::OutputFolder;
-use crate::report_page;
 use crate::threads;
-
-/// Names of the results.
-const SPLATS: &str = "splats.ply";
-const REPORT: &str = "report.json";
-const CHECKPOINT: &str = "checkpoint.bin";
-const RENDERS: &str = "renders";
-/// Thickness of a splat in the file, metres. 2DGS has none.
-const THICKNESS_M: f32 = 1e-4;
 
 /// Trains splats on a dataset.
 ///
@@ -39,8 +30,7 @@ const THICKNESS_M: f32 = 1e-4;
 /// [`TrainError`]: a dataset that cannot be read or has no images, outputs that exist.
 pub fn run(config: &TrainConfig, progress: &dyn Progress) -> Result<TrainReport, TrainError> {
     config.validate()?;
-    files::refuse_existing(&config.output.join(SPLATS), config.overwrite)?;
-    report_page::refuse_existing(&config.output.join(REPORT), config.overwrite)?;
+    results::refuse_existing(&config.output, config.overwrite)?;
     threads::install(config.threads, || {
         let data = TrainData::read(config, progress)?;
         let _folder = OutputFolder::take(&config.output)?;
@@ -60,9 +50,8 @@ fn train(config: &TrainConfig, data: &TrainData, progress: &dyn Progress) -> Res
     }
     let initial = initial::surfels(data, config.budget / 2);
     let (before, _) = quality(data, &initial, None)?;
-    let checkpoint = config.output.join(CHECKPOINT);
     let course = Course {
-        checkpoint: &checkpoint,
+        output: &config.output,
         checkpoint_every: config.checkpoint_every,
         resume: config.resume,
         transients: config.transients,
@@ -72,23 +61,13 @@ fn train(config: &TrainConfig, data: &TrainData, progress: &dyn Progress) -> Res
     let Trained { state, transient_share, losses, seconds } = course.run(&initial, views, progress)?;
     files::create_folder(&config.output.join(RENDERS))?;
     let (after, layers) = quality(data, &state.surfels, Some((config, &config.output.join(RENDERS))))?;
-    let splats: Vec<_> = state.surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect();
-    let path = config.output.join(SPLATS);
-    let layout = SplatLayout { form: SplatForm::Discs, ..SplatLayout::default() };
-    splat_ply::write(&path, &splats, &data.place.origin, layout, config.overwrite)?;
-    let row = |v: usize| TrainedViewRow {
-        name: data.names[v].clone(),
-        held_out: is_held_out(config, data, v),
-        psnr_before_db: before[v].0,
-        psnr_db: after[v].0,
-        ssim_before: before[v].1,
-        ssim: after[v].1,
-    };
+    let splats = results::write_splats(&config.output, &state.surfels, &data.place.origin, config.overwrite)?;
+    let row = |v: usize| TrainedViewRow::new(&data.names[v], is_held_out(config, data, v), before[v], after[v]);
     let report = TrainReport {
         settings: config.clone(),
-        splats: path,
+        splats,
         splats_before: initial.len(),
-        splats_after: splats.len(),
+        splats_after: state.surfels.len(),
         masked: data.masked,
         depth_scale: state.depth_scale,
         seconds,
@@ -98,7 +77,7 @@ fn train(config: &TrainConfig, data: &TrainData, progress: &dyn Progress) -> Res
     };
     let lead = "Flat Gaussian splats that learned from the images of a dataset.";
     page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, config.overwrite)?;
-    files::remove(&checkpoint)?;
+    files::remove(&config.output.join(CHECKPOINT))?;
     Ok(report)
 }
 
@@ -113,9 +92,6 @@ fn settings(config: &TrainConfig, data: &TrainData) -> TrainingConfig {
     }
     settings
 }
-
-/// Signal-to-noise ratio (dB) and structural similarity of a view.
-type Quality = (Option<f64>, Option<f64>);
 
 /// Returns the quality of every view. Writes what the views that were not trained show, and returns
 /// them for the page.

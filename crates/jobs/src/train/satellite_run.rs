@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use ::train::{Drawing, LatticeView, Registers, Surfel, SurfelCamera, TrainingConfig, TrainingView};
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_rgb};
-use io::splat_ply::{self, SplatForm, SplatLayout};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
@@ -15,25 +14,19 @@ use super::course::{Course, Trained};
 use super::error::TrainError;
 use super::iterate::extent_m;
 use super::page;
-use super::report::{LossPoint, TrainedViewRow};
+use super::report::{LossPoint, Quality, TrainedViewRow};
+use super::results::{self, CHECKPOINT, RENDERS, REPORT};
 use super::satellite::{PlacedSurfels, SatelliteImage, corrections, line};
 use crate::corrections::CorrectionSource;
 use crate::error::SettingError;
 use crate::files::{self, FileError};
 use crate::map_surface::{self, MapSurface};
 use crate::output_folder::OutputFolder;
-use crate::report_page;
 use crate::splats::pointing_path;
 use crate::threads;
 
-/// Names of the results.
-const SPLATS: &str = "splats.ply";
-const REPORT: &str = "report.json";
+/// Name of the heights of the splats.
 const HEIGHTS: &str = "dsm.tif";
-const CHECKPOINT: &str = "checkpoint.bin";
-const RENDERS: &str = "renders";
-/// Thickness of a splat in the file, metres. 2DGS has none.
-const THICKNESS_M: f32 = 1e-4;
 /// Steps of positions at the beginning and at the end, metres. The surface model is right within a
 /// cell or two, so that splats have no long way to go.
 const STEPS_M: [f64; 2] = [0.01, 0.001];
@@ -184,8 +177,7 @@ pub fn run_on_images(
     progress: &dyn Progress,
 ) -> Result<SatelliteTrainReport, TrainError> {
     config.validate()?;
-    files::refuse_existing(&config.output.join(SPLATS), config.overwrite)?;
-    report_page::refuse_existing(&config.output.join(REPORT), config.overwrite)?;
+    results::refuse_existing(&config.output, config.overwrite)?;
     threads::install(config.threads, || train(config, progress))?
 }
 
@@ -211,10 +203,8 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
     let _folder = OutputFolder::take(&config.output)?;
     let pictures: Vec<&SatelliteImage> = images.iter().chain(&judged).collect();
     let before: Vec<Quality> = pictures.iter().map(|image| quality(&placed.surfels, &image.view).0).collect();
-    let all: Vec<SatelliteImage> = pictures.into_iter().cloned().collect();
-    let checkpoint = config.output.join(CHECKPOINT);
     let course = Course {
-        checkpoint: &checkpoint,
+        output: &config.output,
         checkpoint_every: config.checkpoint_every,
         resume: config.resume,
         transients: config.transients,
@@ -222,18 +212,15 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
         settings: settings(config, extent_m(&placed.surfels)),
     };
     let Trained { state, transient_share, losses, seconds } = course.run(&placed.surfels, views, progress)?;
-    let splats: Vec<_> = state.surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect();
-    let path = config.output.join(SPLATS);
-    let layout = SplatLayout { form: SplatForm::Discs, ..SplatLayout::default() };
-    splat_ply::write(&path, &splats, &placed.origin, layout, config.overwrite)?;
+    let splats = results::write_splats(&config.output, &state.surfels, &placed.origin, config.overwrite)?;
     let used: Vec<PathBuf> = config.images.iter().chain(&config.judged).cloned().collect();
-    found.of_images(&used).write(&pointing_path(&path), config.overwrite)?;
+    found.of_images(&used).write(&pointing_path(&splats), config.overwrite)?;
     let height_change_m = match &surface {
         Some(surface) => heights(config, &placed, [&placed.surfels, &state.surfels], surface)?,
         None => None,
     };
     let (mut views, mut layers) = (Vec::new(), Vec::new());
-    for (number, (image, before)) in all.iter().zip(&before).enumerate() {
+    for (number, (image, before)) in pictures.iter().zip(before).enumerate() {
         let (after, shown) = quality(&state.surfels, &image.view);
         let held_out = number >= config.images.len();
         if held_out {
@@ -243,21 +230,14 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
             write_png_rgb(file, &page::bytes(&shown), config.overwrite)?;
             layers.push(page::layer(&image.name, picture));
         }
-        views.push(TrainedViewRow {
-            name: image.name.clone(),
-            held_out,
-            psnr_before_db: before.0,
-            psnr_db: after.0,
-            ssim_before: before.1,
-            ssim: after.1,
-        });
+        views.push(TrainedViewRow::new(&image.name, held_out, before, after));
     }
     let report = SatelliteTrainReport {
         settings: config.clone(),
-        splats: path,
+        splats,
         splats_before: placed.surfels.len(),
-        splats_after: splats.len(),
-        camera_error_px: all.iter().map(|image| image.camera_error_px).fold(0.0, f64::max),
+        splats_after: state.surfels.len(),
+        camera_error_px: pictures.iter().map(|image| image.camera_error_px).fold(0.0, f64::max),
         seconds,
         height_change_m,
         transient_share,
@@ -266,7 +246,7 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
     };
     let lead = "Splats that learned from satellite images.";
     page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, config.overwrite)?;
-    files::remove(&checkpoint)?;
+    files::remove(&config.output.join(CHECKPOINT))?;
     Ok(report)
 }
 
@@ -285,9 +265,6 @@ fn settings(config: &SatelliteTrainConfig, extent_m: f64) -> TrainingConfig {
     }
     settings
 }
-
-/// Signal-to-noise ratio (dB) and structural similarity of a view.
-type Quality = (Option<f64>, Option<f64>);
 
 fn truth(view: &TrainingView<LatticeView>) -> Grid<[f32; 3]> {
     let [width, height] = view.camera.size();
