@@ -14,12 +14,6 @@ pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
     let (u, v) = (column - left, row - top);
     let (nearest_right, nearest_low) = (u >= 0.5, v >= 0.5);
     let (left, top) = (whole(left)?, whole(top)?);
-    if let Some(corners) = four(grid, left, top) {
-        let nearest = corners[usize::from(nearest_right) + 2 * usize::from(nearest_low)];
-        let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
-        let sum: f64 = (0..4).map(|k| weights[k] * (corners[k] - nearest)).sum();
-        return Some(nearest + sum / weights.iter().sum::<f64>());
-    }
     let corner = |right: bool, low: bool| finite(grid, left + i64::from(right), top + i64::from(low));
     let nearest = corner(nearest_right, nearest_low)?;
     let mut sum = 0.0;
@@ -41,18 +35,6 @@ pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
 pub fn nearest<T: Copy>(grid: &Grid<T>, column: f64, row: f64) -> Option<T> {
     let (column, row) = (whole((column + 0.5).floor())?, whole((row + 0.5).floor())?);
     grid.get(usize::try_from(column).ok()?, usize::try_from(row).ok()?).copied()
-}
-
-/// Returns the upper left, upper right, lower left and lower right cell; `None` unless all have a
-/// value.
-fn four(grid: &Grid<f32>, left: i64, top: i64) -> Option<[f64; 4]> {
-    let (left, top) = (usize::try_from(left).ok()?, usize::try_from(top).ok()?);
-    if top + 1 >= grid.height() {
-        return None;
-    }
-    let [upper, lower] = [grid.row(top), grid.row(top + 1)].map(|row| row.get(left..left + 2));
-    let cells = [upper?[0], upper?[1], lower?[0], lower?[1]];
-    cells.iter().all(|cell| cell.is_finite()).then(|| cells.map(f64::from))
 }
 
 /// Converts a whole-valued float to an index. Returns `None` for NaN and for values that no grid
