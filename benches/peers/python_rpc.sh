@@ -3,7 +3,7 @@
 #   benches/peers/python_rpc.sh SITE [FOLDER]
 # SITE is a folder in which the package lies (`crates/python/tests/run.sh` makes target/python/site; an unpacked wheel is one,
 # too); FOLDER (default target/python/peers) gets the environment. Writes benches/results/python_rpc.json and python_rpc.md.
-# Neither the build nor the tests need it.
+# SKYSWEEP_PROFILE names the profile that the library was built with (default: that of the tests). Neither the build nor the tests need it.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 site=$(realpath "$1")

@@ -160,8 +160,8 @@ def markdown(result):
             lines.append(f"| {row['surface']} | {row['score']} | {' | '.join(values)} |")
     if "speed" in result:
         s = result["speed"]
-        lines += ["", f"The command takes {s['seconds']:.1f} s for {s['pixels'] / 1e6:.2f} million pixels (debug profile of this workspace, "
-                  "which is optimised; machine with two cores, shared with other work)."]
+        lines += ["", f"The command takes {s['seconds']:.1f} s for {s['pixels'] / 1e6:.2f} million pixels on a machine with two cores, "
+                  "shared with other work."]
     lines += ["", "## What was tried"] + ["", *TRIED]
     return "\n".join(lines) + "\n"
 

@@ -39,6 +39,19 @@ fn scene(seed: u64) -> (Grid<f32>, Grid<u8>) {
     (heights, classes)
 }
 
+/// Heights above flat ground, and nothing else that is known.
+fn heights_alone(heights: &Grid<f32>) -> ClassifyInput<'_> {
+    ClassifyInput {
+        surface: heights,
+        above_ground: heights,
+        index: None,
+        is_index_coarse: false,
+        cue: None,
+        crowns: None,
+        cell_m: CELL_M,
+    }
+}
+
 /// Intersection over union of a class.
 fn iou(found: &Grid<u8>, truth: &Grid<u8>, class: u8) -> f64 {
     let count = |is: fn(bool, bool) -> bool| {
@@ -52,15 +65,7 @@ fn iou(found: &Grid<u8>, truth: &Grid<u8>, class: u8) -> f64 {
 fn houses_and_trees_are_told_apart() {
     for seed in 0..4 {
         let (heights, truth) = scene(seed);
-        let input = ClassifyInput {
-            surface: &heights,
-            above_ground: &heights,
-            index: None,
-            is_index_coarse: false,
-            cue: None,
-            crowns: None,
-            cell_m: CELL_M,
-        };
+        let input = heights_alone(&heights);
         let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
         let (buildings, plants) = (iou(&found, &truth, BUILDING), iou(&found, &truth, VEGETATION));
         assert!(buildings > 0.95 && plants > 0.9, "seed {seed}: {buildings:.3}, {plants:.3}");
@@ -80,15 +85,7 @@ fn a_vegetation_index_overrules_the_roughness() {
     }
     index[(55, 5)] = -0.4;
     heights[(0, 0)] = f32::NAN;
-    let input = ClassifyInput {
-        surface: &heights,
-        above_ground: &heights,
-        index: Some(&index),
-        is_index_coarse: false,
-        cue: None,
-        crowns: None,
-        cell_m: 0.5,
-    };
+    let input = ClassifyInput { index: Some(&index), ..heights_alone(&heights) };
     let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
     assert_eq!([found[(20, 20)], found[(40, 20)]], [BUILDING, VEGETATION]);
     assert_eq!([found[(0, 0)], found[(55, 55)]], [UNKNOWN, GROUND]);
@@ -106,15 +103,7 @@ fn a_building_index_decides_where_heights_are_weak_and_only_there() {
         weak.row_mut(row)[40..60].fill(true);
         index.row_mut(row)[10..90].fill(0.8);
     }
-    let input = ClassifyInput {
-        surface: &heights,
-        above_ground: &heights,
-        index: None,
-        is_index_coarse: false,
-        cue: None,
-        crowns: None,
-        cell_m: 0.5,
-    };
+    let input = heights_alone(&heights);
     let classes = |input: &ClassifyInput<'_>| {
         let found = classify(input, &ClassifyConfig::default()).unwrap().classes;
         [(20, 20), (50, 20), (70, 20), (110, 20)].map(|at| found[at])
@@ -128,15 +117,7 @@ fn a_building_index_decides_where_heights_are_weak_and_only_there() {
 #[test]
 fn unusable_input_is_refused() {
     let (heights, other) = (Grid::filled(5, 5, 1.0f32), Grid::filled(4, 5, 1.0f32));
-    let input = ClassifyInput {
-        surface: &heights,
-        above_ground: &heights,
-        index: None,
-        is_index_coarse: false,
-        cue: None,
-        crowns: None,
-        cell_m: 0.5,
-    };
+    let input = heights_alone(&heights);
     let told = |input: &ClassifyInput<'_>, config: &ClassifyConfig| classify(input, config).unwrap_err().to_string();
     let usual = ClassifyConfig::default();
     assert!(told(&ClassifyInput { above_ground: &other, ..input }, &usual).contains("heights above ground"));
@@ -165,15 +146,7 @@ fn coarse_images_find_crowns_without_heights_and_leave_roofs_alone() {
         unsure.row_mut(row)[55..63].fill(true);
     }
     let crowns = Some(CrownCue { index: &index, unsure: &unsure });
-    let input = ClassifyInput {
-        surface: &heights,
-        above_ground: &heights,
-        index: Some(&index),
-        is_index_coarse: true,
-        cue: None,
-        crowns,
-        cell_m: 0.5,
-    };
+    let input = ClassifyInput { index: Some(&index), is_index_coarse: true, crowns, ..heights_alone(&heights) };
     let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
     let at = [(20, 20), (38, 20), (41, 20), (50, 20), (58, 24), (75, 50)];
     assert_eq!(at.map(|at| found[at]), [BUILDING, BUILDING, LOW_VEGETATION, LOW_VEGETATION, VEGETATION, GROUND]);
