@@ -173,6 +173,18 @@ pub(crate) fn write_json(path: &Path, value: &impl Serialize, overwrite: bool) -
     Ok(io::write_bytes(path, text.as_bytes(), overwrite)?)
 }
 
+/// Returns the names of everything in a folder; nothing where there is none.
+pub(crate) fn names_in(folder: &Path) -> impl Iterator<Item = String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter_map(|entry| entry.file_name().into_string().ok())
+}
+
+/// Returns what files of a view are called: the name of its image without the ending, with its
+/// folders joined by underscores.
+pub(crate) fn flat_stem(image: impl AsRef<Path>) -> String {
+    image.as_ref().with_extension("").to_string_lossy().replace(['/', '\\'], "_")
+}
+
 /// Returns the size of all files in a folder, bytes. Links are not followed.
 pub(crate) fn bytes_below(folder: &Path) -> u64 {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();

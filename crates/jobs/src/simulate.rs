@@ -228,8 +228,7 @@ fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileErr
         return Ok(());
     }
     for (below, stems) in [("", &["view", "ms"][..]), ("truth/", &["heights", "clouds"])] {
-        let entries = fs::read_dir(folder.path().join(below)).into_iter().flatten().flatten();
-        for name in entries.filter_map(|entry| entry.file_name().into_string().ok()) {
+        for name in files::names_in(&folder.path().join(below)) {
             let numbered = name.strip_suffix(".tif").and_then(|name| name.rsplit_once('_'));
             let is_earlier = |(stem, number): (&str, &str)| {
                 stems.contains(&stem) && !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
@@ -239,8 +238,7 @@ fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileErr
             }
         }
     }
-    let pictures = fs::read_dir(folder.path().join(PICTURES)).into_iter().flatten().flatten();
-    for name in pictures.filter_map(|entry| entry.file_name().into_string().ok()) {
+    for name in files::names_in(&folder.path().join(PICTURES)) {
         let number = name.strip_prefix("flight_").and_then(|name| name.strip_suffix(".png"));
         if number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())) {
             folder.remove(&format!("{PICTURES}/{name}"))?;
@@ -248,8 +246,7 @@ fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileErr
     }
     for (kind, ending) in [("depth", "npy"), ("part", "png"), ("picture", "png")] {
         let below = format!("{EXACT_VIEWS}/{kind}");
-        let entries = fs::read_dir(folder.path().join(&below)).into_iter().flatten().flatten();
-        for name in entries.filter_map(|entry| entry.file_name().into_string().ok()) {
+        for name in files::names_in(&folder.path().join(&below)) {
             if Path::new(&name).extension().is_some_and(|own| own == ending) {
                 folder.remove(&format!("{below}/{name}"))?;
             }
@@ -352,7 +349,7 @@ impl SceneWriter<'_> {
             progress.check_cancelled()?;
             let lens =
                 model.lenses.get(view.lens).ok_or_else(|| SimulateJobError::NoLens { name: view.name.clone() })?;
-            let name = Path::new(&view.name).with_extension("").to_string_lossy().replace(['/', '\\'], "_");
+            let name = files::flat_stem(&view.name);
             let path = |kind: &str, ending: &str| {
                 let folder = self.folder.join(EXACT_VIEWS).join(kind);
                 files::create_folder(&folder)?;

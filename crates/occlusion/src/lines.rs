@@ -5,7 +5,7 @@
 //! wall crosses the side between them nearest, between about the same heights; the two crossings
 //! are joined in their middle.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use raster::Grid;
 use rayon::prelude::*;
@@ -73,17 +73,12 @@ pub(super) fn trace(walls: &Walls, cells: &Grid<f32>) -> Vec<WallLine> {
 fn pieces(parting: &Parting<'_>, corner: [usize; 2]) -> Vec<Piece> {
     let segments = segments(parting);
     let from: HashMap<Crossing, usize> = segments.iter().enumerate().map(|(k, s)| (s[0], k)).collect();
-    let ends: std::collections::HashSet<Crossing> = segments.iter().map(|s| s[1]).collect();
+    let ends: HashSet<Crossing> = segments.iter().map(|s| s[1]).collect();
     let mut taken = vec![false; segments.len()];
     let mut found = Vec::new();
     // Open lines begin where no segment ends; what is left is closed.
-    let starts = segments.iter().map(|s| !ends.contains(&s[0]));
-    let order: Vec<usize> = {
-        let mut order: Vec<usize> = (0..segments.len()).collect();
-        let is_start: Vec<bool> = starts.collect();
-        order.sort_by_key(|&k| !is_start[k]);
-        order
-    };
+    let mut order: Vec<usize> = (0..segments.len()).collect();
+    order.sort_by_key(|&k| ends.contains(&segments[k][0]));
     for first in order {
         if taken[first] {
             continue;

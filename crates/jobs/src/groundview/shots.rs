@@ -13,6 +13,7 @@ use super::report::GroundViewFailure;
 use super::view_surface::ViewSurface;
 use crate::camera_stand::{CameraStand, Cameras, StandConfig};
 use crate::error_text::with_causes;
+use crate::files;
 use crate::placed_model;
 
 /// Endings of the pictures of panoramas, in the order of preference.
@@ -87,7 +88,7 @@ impl Shots {
         let mut taken = HashSet::new();
         let mut shots = Vec::with_capacity(model.views.len());
         for view in model.views {
-            let stem = Path::new(&view.name).with_extension("").to_string_lossy().replace(['/', '\\'], "_");
+            let stem = files::flat_stem(&view.name);
             if !taken.insert(stem.clone()) {
                 return Err(GroundViewError::SameName { stem });
             }

@@ -265,7 +265,7 @@ impl RenderSession<'_> {
         with_depth: bool,
         reference: Reference,
     ) -> Result<(), SplatsJobError> {
-        let name = name.with_extension("").to_string_lossy().replace(['/', '\\'], "_");
+        let name = files::flat_stem(name);
         if !self.taken.insert(name.clone()) {
             return Err(SplatsJobError::SameName { name });
         }
