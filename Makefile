@@ -1,6 +1,6 @@
 # skysweep: `make demo` shows it at work, `make test` and `make lint` are what CI runs.
-# Rust must be installed in the version that Cargo.toml names or newer. `make setup` (and `make demo`, which calls it) installs the
-# system packages that are missing, with apt-get. No other target installs anything: it names `make setup` instead.
+# Rust must be installed in the version that Cargo.toml names or newer. `make setup` installs the system packages that are missing,
+# with apt-get; `make demo` and `make test` call it. No other target installs system packages: it names `make setup` instead.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -22,7 +22,7 @@ for tool in pkg-config c++; do command -v "$$tool" > /dev/null || MISSING="$$MIS
 for library in gdal proj sqlite3; do pkg-config --exists "$$library" 2> /dev/null || MISSING="$$MISSING $$library.pc"; done
 endef
 
-.PHONY: help setup check check-static demo test test-python fuzz lint readme stubs notebooks static wheel bench bench-kernels plugin test-qgis
+.PHONY: help setup check check-static demo test quick test-python fuzz lint readme stubs notebooks static wheel bench bench-kernels plugin test-qgis
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -67,9 +67,19 @@ demo: setup ## a surface model of the sample town, its accuracy and its picture,
 	echo "picture        $(DEMO)/dsm/relief.png"
 	echo "report         $(DEMO)/report/report.html"
 
-test: check ## unit, property, integration and documentation tests, and those of the Python package
+test: setup ## unit, property, integration and documentation tests, and those of the Python package
 	@cargo test --workspace
 	crates/python/tests/run.sh
+
+quick: check ## before a commit: format, clippy, rules of the code and of the pages, unit tests of the crates that differ from BASE (HEAD~1)
+	@cargo fmt --all --check
+	cargo clippy --workspace --lib --bins -- -D warnings
+	cargo test --quiet --test architecture --test documents
+	BASE=$${BASE:-$$(git rev-parse --quiet --verify HEAD~1 || echo HEAD)}
+	CHANGED=$$({ git diff --name-only "$$BASE"; git ls-files --others --exclude-standard; } |
+	  sed -nE 's|^crates/([a-z]+)/.*|\1|p' | sort -u)
+	PACKAGES=; for crate in $$CHANGED; do [ ! -f "crates/$$crate/Cargo.toml" ] || PACKAGES="$$PACKAGES -p skysweep-$$crate"; done
+	if [ -n "$$PACKAGES" ]; then cargo test --quiet --lib $$PACKAGES; else echo "no crate differs from $$BASE"; fi
 
 test-python: check ## the tests of the Python package alone, in target/python/venv
 	@cargo build --workspace

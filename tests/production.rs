@@ -322,8 +322,9 @@ fn a_used_configuration_fed_back_gives_the_same_bytes() {
     // From another folder: the paths are relative to the file.
     let elsewhere = folder.path().join("elsewhere");
     std::fs::create_dir(&elsewhere).unwrap();
-    run("dsm", &["../first/used_config.toml", "-o", "second", "-q"], &elsewhere, 0);
-    assert!(products(&elsewhere.join("second")) == products(&folder.path().join("first")));
+    // Products name their images relative to their own folder, so both runs lie equally deep.
+    run("dsm", &["../first/used_config.toml", "-o", "../second", "-q"], &elsewhere, 0);
+    assert!(products(&folder.path().join("second")) == products(&folder.path().join("first")));
     // Options replace settings of the file.
     run("dsm", &["../first/used_config.toml", "-o", "third", "--gsd", "4", "-q"], &elsewhere, 0);
     let dsm = io::raster::read_dem(elsewhere.join("third/dsm/dsm.tif")).unwrap();

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Shares of a run's time by stage: the table in crates/sweep/src/lib.rs.
 
-    cargo build --release
-    perf record -F 1500 -o run.data target/release/skysweep dsm IMAGES... -o out
-    benches/profile/shares.py run.data target/release/skysweep
+    cargo build --profile profiling
+    perf record -F 1500 -o run.data target/profiling/skysweep dsm IMAGES... -o out
+    benches/profile/shares.py run.data target/profiling/skysweep
 
 Every sample in the program goes to the innermost of its inlined frames that lies in a file of a stage below (addr2line; the
-release profile keeps line tables), every other one to the library or to the system that it is in. Needs perf and binutils.
+profiling profile keeps line tables), every other one to the library or to the system that it is in. Needs perf and binutils.
 """
 
 import collections
