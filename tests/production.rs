@@ -162,6 +162,132 @@ fn two_processes_share_a_folder() {
     }
 }
 
+/// Starts a command whose signals do what they usually do, or which ignores Ctrl-C.
+#[cfg(target_os = "linux")]
+fn listening(folder: &Path, arguments: &[&str], ignores: bool) -> Child {
+    // Whoever runs the tests in the background may have turned Ctrl-C off.
+    let signals = if ignores { "--ignore-signal=INT" } else { "--default-signal=INT,TERM,HUP" };
+    let mut command = Command::new("env");
+    command.arg(signals).arg(assert_cmd::cargo::cargo_bin("skysweep")).args(arguments).current_dir(folder);
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+/// Waits until something is there, and sends a signal to a process. Returns how it ended.
+#[cfg(target_os = "linux")]
+fn signalled(mut process: Child, signal: &str, is_there: impl Fn() -> bool) -> std::process::ExitStatus {
+    let since = std::time::Instant::now();
+    while !is_there() {
+        assert!(since.elapsed() < Duration::from_secs(60), "it did not begin");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let kill = format!("kill -{signal} {}", process.id());
+    assert!(Command::new("bash").args(["-c", &kill]).status().unwrap().success());
+    process.wait().unwrap()
+}
+
+/// Whether a file below a folder holds a text.
+#[cfg(target_os = "linux")]
+fn is_told(folder: &Path, text: &str) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else { return false };
+    entries.flatten().any(|entry| match entry.file_type() {
+        Ok(kind) if kind.is_dir() => is_told(&entry.path(), text),
+        _ => std::fs::read(entry.path()).is_ok_and(|bytes| String::from_utf8_lossy(&bytes).contains(text)),
+    })
+}
+
+/// A scheduler that ends a job sends SIGTERM, a person presses Ctrl-C.
+#[cfg(target_os = "linux")]
+#[test]
+fn signals_leave_no_temporary_files_and_no_claims() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = tempfile::tempdir().unwrap();
+    let images = views().map(|view| view.to_str().unwrap().to_owned());
+    let small = [&["dsm", images[0].as_str(), images[1].as_str(), "-o", "out"][..], &SMALL].concat();
+    for (name, number) in [("TERM", 15), ("INT", 2), ("HUP", 1)] {
+        let ended = signalled(listening(folder.path(), &small, false), name, || !temporary(folder.path()).is_empty());
+        assert_eq!(ended.signal(), Some(number), "{ended:?}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{name} left files");
+    }
+    plan(folder.path(), "run", &[]);
+    let chunks = folder.path().join("run/chunks");
+    let computing = listening(folder.path(), &["run", "run", "-q"], false);
+    let ended = signalled(computing, "TERM", || is_told(&chunks, "running"));
+    assert_eq!(ended.signal(), Some(15), "{ended:?}");
+    assert!(!is_told(&chunks, "running"), "the claim is not given back");
+    assert!(temporary(folder.path()).is_empty(), "{:?}", temporary(folder.path()));
+    // In the background of a script Ctrl-C does nothing.
+    let computing = listening(folder.path(), &["run", "run", "-q"], true);
+    let ended = signalled(computing, "INT", || is_told(&chunks, "running"));
+    assert_eq!(ended.code(), Some(0), "{ended:?}");
+    run("merge", &["run", "-q"], folder.path(), 0);
+    assert!(products(&folder.path().join("run")) == *EXPECTED);
+    let text = format!(
+        "output = 'night'\n[[scene]]\nname = 'a'\nimages = ['{}', '{}']\ntasks = ['dsm']\n\
+         dsm.preset = 'fast'\ndsm.gsd_m = 2.0\ndsm.chunk = 128\n",
+        images[0], images[1]
+    );
+    std::fs::write(folder.path().join("batch.toml"), text).unwrap();
+    let chunks = folder.path().join("night/a/chunks");
+    let night = listening(folder.path(), &["batch", "batch.toml", "-q"], false);
+    let ended = signalled(night, "TERM", || is_told(&chunks, "running"));
+    assert_eq!(ended.signal(), Some(15), "{ended:?}");
+    assert!(!is_told(&chunks, "running") && temporary(folder.path()).is_empty());
+    run("batch", &["batch.toml", "-q"], folder.path(), 0);
+    assert!(folder.path().join("night/a/dsm/dsm.tif").is_file());
+}
+
+/// Files of a user among the chunks stay, and are named; so do files that only have our names.
+#[cfg(unix)]
+#[test]
+fn what_others_put_among_the_chunks_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let (run_folder, outside) = (folder.path().join("run"), folder.path().join("outside"));
+    std::fs::create_dir(&outside).unwrap();
+    std::fs::write(outside.join("canary"), "kept").unwrap();
+    let chunk = run_folder.join("chunks/0000");
+    type Plant = fn(&Path, &Path);
+    let plants: [(&str, &str, Plant); 7] = [
+        ("chunks/mine", "mine", |path, _| std::fs::create_dir(path).unwrap()),
+        ("chunks/notes.txt", "notes.txt", |path, _| std::fs::write(path, "kept").unwrap()),
+        ("chunks/0000/notes.txt", "notes.txt", |path, _| std::fs::write(path, "kept").unwrap()),
+        ("chunks/0000/status", "status", |path, _| std::fs::write(path, "kept").unwrap()),
+        ("chunks/0000/status", "status", |path, outside| {
+            std::os::unix::fs::symlink(outside.join("canary"), path).unwrap();
+        }),
+        ("chunks/0000/status", "status", |path, _| {
+            assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+        }),
+        ("chunks/0000/.claim-1", ".claim-1", |path, _| {
+            std::fs::create_dir(path).unwrap();
+            std::fs::write(path.join("notes"), "kept").unwrap();
+        }),
+    ];
+    let views = views().map(|view| view.to_str().unwrap().to_owned());
+    for (name, told, plant) in plants {
+        let _ = std::fs::remove_dir_all(&run_folder);
+        std::fs::create_dir_all(&chunk).unwrap();
+        plant(&run_folder.join(name), &outside);
+        let planning = [&[views[0].as_str(), views[1].as_str(), "-o", "run"][..], &SMALL].concat();
+        let refused = run("plan", &planning, folder.path(), 2).1;
+        assert!(refused.contains(told) && refused.contains("did not make"), "{name}: {refused}");
+        assert!(run_folder.join(name).symlink_metadata().is_ok() && chunk.is_dir(), "{name} is gone");
+        assert!(!run_folder.join("plan.json").exists());
+    }
+    assert_eq!(std::fs::read_to_string(outside.join("canary")).unwrap(), "kept");
+    // The same in a folder that is planned.
+    std::fs::remove_dir_all(&run_folder).unwrap();
+    plan(folder.path(), "run", &[]);
+    run("run", &["run", "--chunks", "0", "-q"], folder.path(), 0);
+    std::fs::write(chunk.join("result/notes.txt"), "kept").unwrap();
+    std::fs::create_dir_all(run_folder.join("chunks/0001")).unwrap();
+    std::fs::write(run_folder.join("chunks/0001/notes.txt"), "kept").unwrap();
+    for command in [&["run", "run", "-q"][..], &["merge", "run", "--partial", "-q"]] {
+        let refused = run(command[0], &command[1..], folder.path(), 2).1;
+        assert!(refused.contains("notes.txt"), "{refused}");
+    }
+    assert!(chunk.join("result/notes.txt").is_file() && run_folder.join("chunks/0001/notes.txt").is_file());
+}
+
 /// The moments are random, and the same in every run of the test.
 #[test]
 fn killed_at_any_moment_a_run_goes_on_to_the_same_bytes() {

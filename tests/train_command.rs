@@ -248,6 +248,62 @@ fn a_stopped_training_goes_on_to_the_same_bytes() {
     }
 }
 
+/// Puts a folder into the place of the page at the end of a training, so that its results are only
+/// half there.
+struct InTheWay {
+    page: PathBuf,
+    count: std::sync::atomic::AtomicU32,
+}
+
+impl Progress for InTheWay {
+    fn begin(&self, _: &str, _: usize) {}
+
+    fn step(&self) {
+        if self.count.fetch_add(1, Ordering::Relaxed) == 8 {
+            std::fs::create_dir_all(&self.page).unwrap();
+        }
+    }
+
+    fn choice(&self, _: &Choice) {}
+    fn warn(&self, _: &str) {}
+}
+
+#[test]
+fn a_training_that_was_killed_while_its_results_got_names_goes_on() {
+    let out = tempfile::tempdir().unwrap();
+    let (scene, splats) = satellite();
+    let config = |name: &str, resume: bool| {
+        let images = [1, 2].map(|k| scene.join(format!("view_{k}.tif"))).to_vec();
+        let mut config = SatelliteTrainConfig::new(images, splats.clone(), out.path().join(name));
+        (config.iterations, config.resume) = (10, resume);
+        config
+    };
+    run_on_images(&config("whole", false), &Silent).unwrap();
+    let folder = out.path().join("half");
+    let page = folder.join("report.html/kept");
+    let half = run_on_images(&config("half", false), &InTheWay { page: page.clone(), count: 0.into() });
+    assert!(half.is_err() && folder.join("splats.ply").is_file() && !folder.join("report.json").exists(), "{half:?}");
+    std::fs::remove_dir_all(page.parent().unwrap()).unwrap();
+    // Without being asked to go on, results are not replaced.
+    let refused = run_on_images(&config("half", false), &Silent).unwrap_err().to_string();
+    assert!(refused.contains("exists already"), "{refused}");
+    run_on_images(&config("half", true), &Silent).unwrap();
+    let bytes = |name: &str| std::fs::read(out.path().join(name).join("splats.ply")).unwrap();
+    assert!(bytes("half") == bytes("whole") && !folder.join("checkpoint.bin").exists());
+    assert!(folder.join("report.json").is_file());
+    // Results beside a training that has not ended are of another one, and stay.
+    std::fs::create_dir(out.path().join("other")).unwrap();
+    std::fs::write(out.path().join("other/splats.ply"), b"old").unwrap();
+    let refused = run_on_images(&config("other", true), &Silent).unwrap_err().to_string();
+    assert!(refused.contains("exists already"), "{refused}");
+    // A file that only has the name of a checkpoint is no checkpoint.
+    std::fs::create_dir(out.path().join("foreign")).unwrap();
+    std::fs::write(out.path().join("foreign/checkpoint.bin"), b"mine").unwrap();
+    let refused = run_on_images(&config("foreign", false), &Silent).unwrap_err().to_string();
+    assert!(refused.contains("checkpoint.bin, which no training wrote"), "{refused}");
+    assert_eq!(std::fs::read(out.path().join("foreign/checkpoint.bin")).unwrap(), b"mine");
+}
+
 /// Splats of a surface with bumps of up to half a metre come closer to the truth when they follow
 /// its form, given in another unit and from another zero.
 #[test]

@@ -13,6 +13,7 @@ use jobs::error::JobError;
 use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig, GroundViewError};
 
 use crate::error::{OVERWRITE, with_hint};
+use crate::interrupt::{self, Interruptible};
 use crate::progress::{Log, RunOptions};
 use crate::stand::StandArgs;
 use crate::{Global, Outcome};
@@ -146,7 +147,8 @@ fn compose(args: &ComposeArgs) -> anyhow::Result<Outcome> {
     let (ground, alpha, satellite) = (args.ground.clone(), args.alpha.clone(), args.satellite.clone());
     let mut config = ComposeConfig::new(ground, alpha, satellite, args.output.clone());
     config.overwrite = args.overwrite;
-    jobs::groundview::compose(&config, &Log).map_err(hinted)?;
+    interrupt::listen();
+    jobs::groundview::compose(&config, &Interruptible(&Log)).map_err(hinted)?;
     Ok(Outcome::Complete)
 }
 

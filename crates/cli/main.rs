@@ -19,6 +19,7 @@ mod eval;
 mod global;
 mod groundview;
 mod heightmap;
+mod interrupt;
 mod log;
 mod mesh;
 mod options;
@@ -135,6 +136,7 @@ fn main() -> ExitCode {
         Err(e) if error::is_closed_pipe(&e) => ExitCode::SUCCESS,
         Err(e) => {
             error::report(&e);
+            interrupt::end_if_interrupted();
             ExitCode::from(2)
         }
     }

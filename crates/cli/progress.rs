@@ -10,6 +10,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle as
 use jobs::event_lines::EventLines;
 use numeric::{Choice, Progress};
 
+use crate::interrupt::{self, Interruptible};
 use crate::{Global, print};
 
 /// How progress is shown.
@@ -42,14 +43,15 @@ impl ShowOptions {
         output: &Path,
         job: impl FnOnce(&dyn Progress) -> Result<T, E>,
     ) -> Result<T, E> {
+        interrupt::listen();
         if self.progress == ProgressStyle::Json {
             let lines = EventLines::new(say);
-            let result = job(&lines);
+            let result = job(&Interruptible(&lines));
             lines.finish(output, result.as_ref().err().map(|error| error as _));
             return result;
         }
         let watcher = Watcher::new(self.progress, global);
-        let result = job(&watcher);
+        let result = job(&Interruptible(&watcher));
         watcher.bar.finish_and_clear();
         watcher.say_time();
         result

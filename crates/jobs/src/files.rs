@@ -66,6 +66,18 @@ pub enum FileError {
         /// The link.
         path: PathBuf,
     },
+    /// A folder that would be replaced or removed holds what no run of ours made.
+    #[error(
+        "the folder holds what skysweep did not make ({found}), so nothing in it is replaced; move this elsewhere, or \
+         choose another output folder: {}",
+        path.display()
+    )]
+    Foreign {
+        /// The folder.
+        path: PathBuf,
+        /// Names of some entries, and how many more there are.
+        found: String,
+    },
     /// An old result cannot be removed.
     #[error("cannot remove an old result: {}", path.display())]
     Remove {

@@ -19,6 +19,7 @@ pub mod eval;
 pub mod event_lines;
 pub mod files;
 pub mod groundview;
+mod guarded;
 pub mod heightmap;
 pub mod job_file;
 mod job_paths;

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use crate::files::{FileError, create_folder};
+use crate::guarded::{self, Known};
 
 /// Beginning of the names of work folders.
 const WORK: &str = ".skysweep-partial";
@@ -114,30 +115,52 @@ impl OutputFolder {
     /// # Errors
     /// [`FileError::Link`], [`FileError::Folder`].
     pub(crate) fn subfolder(&self, name: &str) -> Result<PathBuf, FileError> {
-        let mut path = self.path.clone();
-        for part in name.split('/') {
-            path.push(part);
-            if path.is_symlink() {
-                return Err(FileError::Link { path });
-            }
-            create_folder(&path)?;
-        }
-        Ok(path)
+        guarded::make_folder(&self.path, name)
     }
 
-    /// Removes the file or folder of a name inside, if there is one. A link is removed, and not
-    /// what it leads to.
+    /// Checks before the work that files can get their names inside.
     ///
     /// # Errors
-    /// [`FileError::Remove`].
-    pub(crate) fn remove(&self, name: &str) -> Result<(), FileError> {
-        let path = self.path.join(name);
-        let Ok(found) = path.symlink_metadata() else { return Ok(()) };
-        let removed = if found.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
-        removed.map_err(|source| FileError::Remove { path, source })
+    /// [`FileError::Link`], [`FileError::Foreign`].
+    pub(crate) fn check_places<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<(), FileError> {
+        guarded::check_places(&self.path, names)
     }
 
-    /// Moves a file or folder from a work folder to its name.
+    /// Refuses links and files in the place of folders inside, before the work.
+    ///
+    /// # Errors
+    /// [`FileError::Link`], [`FileError::Folder`].
+    pub(crate) fn check_folders<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<(), FileError> {
+        guarded::check_folders(&self.path, names)
+    }
+
+    /// Removes the file of a name inside, if there is one. A link is removed, and not what it leads
+    /// to.
+    ///
+    /// # Errors
+    /// [`FileError::Link`], [`FileError::Foreign`], [`FileError::Remove`].
+    pub(crate) fn remove(&self, name: &str) -> Result<(), FileError> {
+        guarded::remove_file(&self.path, name)
+    }
+
+    /// Removes the folder of a name inside, if there is one, when all of it is known.
+    ///
+    /// # Errors
+    /// [`FileError::Link`], [`FileError::Foreign`], [`FileError::Remove`]; nothing was removed then.
+    pub(crate) fn remove_folder(&self, name: &str, known: Known<'_>) -> Result<(), FileError> {
+        guarded::remove_folder(&guarded::place(&self.path, name)?, known)
+    }
+
+    /// Checks that the folder of a name inside could be removed.
+    ///
+    /// # Errors
+    /// [`FileError::Link`], [`FileError::Foreign`].
+    pub(crate) fn require_own(&self, name: &str, known: Known<'_>) -> Result<(), FileError> {
+        guarded::require_own(&guarded::place(&self.path, name)?, known)
+    }
+
+    /// Moves a file or folder from a work folder to its name. A folder must have been removed
+    /// before.
     ///
     /// # Errors
     /// [`FileError::Link`], [`FileError::Folder`], [`FileError::Move`].

@@ -30,6 +30,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{JobError, SettingError, from_steps};
 use crate::files::{self, FileError};
+use crate::guarded;
 use crate::output_folder::OutputFolder;
 use crate::placed_model::{self, PlacedModelError};
 use crate::simulate_page;
@@ -47,6 +48,9 @@ const EXACT_VIEWS: &str = "truth/cameras";
 const FLIGHT: &str = "cameras/sparse/0";
 /// The folder of their pictures.
 const PICTURES: &str = "cameras/images";
+/// Folders of a scene.
+const FOLDERS: [&str; 6] =
+    ["truth", FLIGHT, PICTURES, "truth/cameras/depth", "truth/cameras/part", "truth/cameras/picture"];
 /// The clouds of what a flight sees: everything, and the buildings.
 const CLOUDS: [&str; 2] = ["truth/flight_surface.ply", "truth/flight_buildings.ply"];
 /// Spacing of their points unless another is asked for, metres.
@@ -205,6 +209,7 @@ pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateR
     if !config.overwrite && fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_some()) {
         return Err(SimulateJobError::NotEmpty { path: output.clone() });
     }
+    folder.check_folders(FOLDERS)?;
     let simulation = install(config.threads, || Simulation::with_progress(config.scene.clone(), progress))??;
     progress.check_cancelled()?;
     // Without its record the folder counts as incomplete from here on.
@@ -244,12 +249,13 @@ fn remove_earlier(folder: &OutputFolder, has_flight: bool) -> Result<(), FileErr
             folder.remove(&format!("{PICTURES}/{name}"))?;
         }
     }
-    for (kind, ending) in [("depth", "npy"), ("part", "png"), ("picture", "png")] {
-        let below = format!("{EXACT_VIEWS}/{kind}");
-        for name in files::names_in(&folder.path().join(&below)) {
-            if Path::new(&name).extension().is_some_and(|own| own == ending) {
-                folder.remove(&format!("{below}/{name}"))?;
-            }
+    // A view has a file of each kind. A file that stands alone may be the user's.
+    let kinds = [("depth", "npy"), ("part", "png"), ("picture", "png")];
+    let of_view = |stem: &str| kinds.map(|(kind, ending)| format!("{EXACT_VIEWS}/{kind}/{stem}.{ending}"));
+    for name in files::names_in(&folder.path().join(EXACT_VIEWS).join(kinds[0].0)) {
+        let own = name.strip_suffix(".npy").map(of_view);
+        for name in own.iter().filter(|own| own.iter().all(|name| folder.path().join(name).is_file())).flatten() {
+            folder.remove(name)?;
         }
     }
     let cameras = ["cameras.txt", "images.txt", "points3D.txt"].map(|name| format!("{FLIGHT}/{name}"));
@@ -327,10 +333,9 @@ impl SceneWriter<'_> {
         let views = (1..).zip(&flight.poses).map(view).collect();
         let model = ColmapModel { lenses: vec![flight.lens.clone()], views };
         let points: Vec<ColmapPoint> = self.simulation.flight_points(&flight).into_iter().map(colmap_point).collect();
-        let folder = self.folder.join(FLIGHT);
-        files::create_folder(&folder)?;
+        let folder = guarded::make_folder(self.folder, FLIGHT)?;
         colmap::write(&folder, &model, &points, ColmapEncoding::Text, self.overwrite).map_err(FileError::write)?;
-        files::create_folder(&self.folder.join(PICTURES))?;
+        guarded::make_folder(self.folder, PICTURES)?;
         progress.begin("flight", Simulation::flight_picture_steps(&flight.lens) * flight.poses.len());
         for (id, pose) in (1..).zip(&flight.poses) {
             progress.check_cancelled()?;
@@ -351,8 +356,7 @@ impl SceneWriter<'_> {
                 model.lenses.get(view.lens).ok_or_else(|| SimulateJobError::NoLens { name: view.name.clone() })?;
             let name = files::flat_stem(&view.name);
             let path = |kind: &str, ending: &str| {
-                let folder = self.folder.join(EXACT_VIEWS).join(kind);
-                files::create_folder(&folder)?;
+                let folder = guarded::make_folder(self.folder, &format!("{EXACT_VIEWS}/{kind}"))?;
                 Ok::<_, FileError>(folder.join(format!("{name}.{ending}")))
             };
             let exact = self.simulation.exact_view(lens, &view.pose);

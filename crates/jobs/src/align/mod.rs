@@ -9,7 +9,7 @@ mod output;
 mod text;
 mod world;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use colmap::align::{
     AlignConfig, AlignError, CameraUp, Disturbance, ModelAlignment, NoiseLevel, align, align_upright, camera_up,
@@ -22,6 +22,7 @@ pub use config::AlignJobConfig;
 pub use error::AlignJobError;
 pub use output::SimilarityParts;
 
+use crate::files::create_folder;
 use crate::output_folder::OutputFolder;
 use crate::report_page;
 use numeric::Progress;
@@ -131,7 +132,7 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     folder.remove(REPORT)?;
     let writer =
         ModelWriter { model: &model, origin: &world.origin, encoding: config.encoding, overwrite: config.overwrite };
-    writer.write(&config.output, &alignment.world_from_model)?;
+    writer.write(&config.output, "", &alignment.world_from_model)?;
     write_under_noise(config, &known, &alignment, &search, &writer, progress)?;
     let lead = "A camera model moved to the world by pairs of points.";
     report_page::write(&report_path, ("Alignment", lead), &report, Vec::new(), config.overwrite)?;
@@ -226,13 +227,13 @@ fn write_under_noise(
     progress: &dyn Progress,
 ) -> Result<(), AlignJobError> {
     let (Some(noise), Some(folder)) = (&config.noise, &config.noise_output) else { return Ok(()) };
+    create_folder(folder)?;
     let translations = noise.translation_m.iter().map(|&m| (Disturbance::TranslationM(m), format!("translation_{m}m")));
     let rotations = noise.rotation_deg.iter().map(|&deg| (Disturbance::RotationDeg(deg), format!("rotation_{deg}deg")));
     for (disturbance, name) in translations.chain(rotations) {
         for seed in 1..=noise.seeds {
-            let path: PathBuf = folder.join(format!("{name}_seed_{seed}"));
             match disturbed(&known.pairs, alignment, disturbance, seed, search) {
-                Ok(similarity) => writer.write(&path, &similarity)?,
+                Ok(similarity) => writer.write(folder, &format!("{name}_seed_{seed}"), &similarity)?,
                 Err(error) => progress.warn(&format!("{name}, seed {seed}: {error}")),
             }
         }

@@ -8,6 +8,7 @@ use io::splat_ply::LocalOrigin;
 use serde::Serialize;
 
 use crate::files::{self, FileError};
+use crate::guarded;
 
 /// A COLMAP model with its points.
 pub(super) struct ModelWithPoints {
@@ -41,9 +42,10 @@ impl From<&Similarity> for SimilarityParts {
 }
 
 impl ModelWriter<'_> {
-    /// Writes the model moved by a similarity, with its origin and the similarity.
-    pub(super) fn write(&self, folder: &Path, world_from_model: &Similarity) -> Result<(), FileError> {
-        files::create_folder(folder)?;
+    /// Writes the model moved by a similarity, with its origin and the similarity, into the folder of
+    /// a name below an output folder; the output folder itself for no name.
+    pub(super) fn write(&self, root: &Path, name: &str, world_from_model: &Similarity) -> Result<(), FileError> {
+        let folder = &guarded::make_folder(root, name)?;
         let move_view = |view: &ColmapView| ColmapView { pose: world_from_model.move_pose(&view.pose), ..view.clone() };
         let move_point =
             |point: &ColmapPoint| ColmapPoint { position: world_from_model.apply(point.position), ..point.clone() };

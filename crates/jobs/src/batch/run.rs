@@ -1,6 +1,6 @@
 //! Running a batch: several scenes at a time, and a report at the end.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -11,9 +11,11 @@ use crate::batch::batch_report::{BatchReport, SceneReport};
 use crate::batch::error::BatchError;
 use crate::batch::images::images_of;
 use crate::batch::task::{TaskJob, TaskKind, TaskScene};
-use crate::batch::tasks_of_scene::{SceneJobs, TaskLimits};
+use crate::batch::tasks_of_scene::{SceneJobs, TASKS, TaskLimits};
 use crate::files::{FileError, write_json};
+use crate::guarded::{self, TEMPORARY};
 use crate::output_folder::OutputFolder;
+use crate::production::{CHUNKS, is_chunk, is_left_over};
 use crate::threads;
 
 /// Names of the reports in the folder of a batch.
@@ -21,10 +23,8 @@ const REPORT_JSON: &str = "batch_report.json";
 const REPORT_PAGE: &str = "batch_report.html";
 /// Memory of the surface models that are computed at a time where none is given, megabytes.
 const MEMORY_MB: u64 = 4000;
-/// Beginnings of the names of files that killed runs leave.
-const LEFT_OVER: [&str; 2] = [".skysweep-", ".claim-"];
-/// Name of a result of a chunk that a killed run leaves.
-const PARTIAL_RESULT: &str = "result.partial";
+/// Folders of the tasks of a scene, and those that their jobs write below the folder of the scene.
+const SCENE_FOLDERS: [&str; 9] = [TASKS, CHUNKS, "dsm", "report", "stac", "eval", "ortho", "heightmaps", "priors"];
 
 /// Runs a batch. What an earlier run of it completed is left alone.
 ///
@@ -35,8 +35,12 @@ const PARTIAL_RESULT: &str = "result.partial";
 pub fn run(batch: &BatchConfig, progress: &dyn Progress) -> Result<BatchReport, BatchError> {
     let scenes = batch.scenes.iter().map(|scene| prepare(batch, scene)).collect::<Result<Vec<_>, _>>()?;
     let folder = OutputFolder::take(&batch.output)?;
-    remove_left_over(folder.path())?;
-    scenes.iter().try_for_each(|scene| remove_left_over_below(&scene.folder))?;
+    guarded::remove_inside(folder.path(), &|name| name.starts_with(TEMPORARY))?;
+    for scene in &scenes {
+        guarded::check_folders(folder.path(), [scene.name.as_str()])?;
+        guarded::check_folders(&scene.folder, SCENE_FOLDERS)?;
+        remove_left_over(&scene.folder)?;
+    }
     progress.begin("tasks", scenes.iter().map(|scene| scene.tasks.len()).sum());
     let parallel = batch.limits.parallel.min(scenes.len());
     let limits = TaskLimits {
@@ -104,25 +108,11 @@ fn memory_mb(batch: &BatchConfig) -> u64 {
     batch.limits.memory_mb.unwrap_or(MEMORY_MB) / batch.limits.parallel.max(1) as u64
 }
 
-/// Removes the files that killed runs left in a folder.
-fn remove_left_over(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-    let mut folders = Vec::new();
-    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-        let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
-        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-        if name == PARTIAL_RESULT || LEFT_OVER.iter().any(|beginning| name.starts_with(beginning)) {
-            let removed = if is_folder { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
-            removed.map_err(|source| FileError::Remove { path, source })?;
-        } else if is_folder {
-            folders.push(path);
-        }
-    }
-    Ok(folders)
-}
-
-/// Removes the files that killed runs left in the folder of a scene and in those below it. A folder
-/// in which another run works is left alone.
-fn remove_left_over_below(folder: &Path) -> Result<(), FileError> {
+/// Removes the temporary files that killed runs left in the folder of a scene, in those of its
+/// tasks, and in those of its chunks. A folder in which another run works is left alone. Links are
+/// not followed.
+fn remove_left_over(folder: &Path) -> Result<(), FileError> {
+    guarded::check_folder(folder)?;
     if !folder.is_dir() {
         return Ok(());
     }
@@ -130,11 +120,17 @@ fn remove_left_over_below(folder: &Path) -> Result<(), FileError> {
         Err(FileError::InUse { .. }) => return Ok(()),
         other => other?,
     };
+    let is_temporary = |name: &str| name.starts_with(TEMPORARY);
     let mut folders = vec![folder.to_owned()];
     while let Some(folder) = folders.pop() {
-        folders.extend(remove_left_over(&folder)?);
+        guarded::remove_inside(&folder, &is_temporary)?;
+        folders.extend(guarded::folders_in(&folder));
     }
-    Ok(())
+    let chunks = folder.join(CHUNKS);
+    let of_chunks = guarded::folders_in(&chunks)
+        .into_iter()
+        .filter(|path| path.file_name().is_some_and(|name| is_chunk(&name.to_string_lossy())));
+    of_chunks.into_iter().try_for_each(|chunk| guarded::remove_inside(&chunk, &is_left_over))
 }
 
 #[cfg(test)]
@@ -145,16 +141,21 @@ mod tests {
     fn only_what_killed_runs_left_is_removed() {
         let folder = tempfile::tempdir().unwrap();
         let scene = folder.path().join("scene");
-        let names = ["chunks/0000/result.partial", "chunks/.claim-1", "result.partial.txt"];
-        for name in names {
-            std::fs::create_dir_all(scene.join(name)).unwrap();
+        let left = ["chunks/0000/.skysweep-result-1/result/height.npy", "chunks/0000/.claim-1", "tasks/.skysweep-2"];
+        let others = ["chunks/.claim-1", "chunks/mine/.claim-1", "chunks/0000/.claim-2/a", "mine/.claim-3", "notes"];
+        for name in left.iter().chain(&others) {
+            let path = scene.join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
         }
         let share = OutputFolder::share(&scene).unwrap();
-        remove_left_over_below(&scene).unwrap();
-        assert!(names.iter().all(|name| scene.join(name).exists()), "another run works here");
+        remove_left_over(&scene).unwrap();
+        assert!(left.iter().all(|name| scene.join(name).exists()), "another run works here");
         drop(share);
-        remove_left_over_below(&scene).unwrap();
-        assert_eq!(names.map(|name| scene.join(name).exists()), [false, false, true]);
+        remove_left_over(&scene).unwrap();
+        assert_eq!(left.map(|name| scene.join(name).exists()), [false; 3]);
+        assert_eq!(others.map(|name| scene.join(name).exists()), [true; 5]);
+        assert!(!scene.join("chunks/0000/.skysweep-result-1").exists());
     }
 
     #[test]

@@ -244,6 +244,7 @@ impl TaskJob {
             }
             Self::Ortho(config) => {
                 let folder = config.output.parent().unwrap_or(Path::new(""));
+                crate::guarded::check_folder(folder).map_err(|e| with_causes(&e))?;
                 crate::files::create_folder(folder).map_err(|e| with_causes(&e))?;
                 crate::ortho::run(config, progress).map(|_| None).map_err(|e| with_causes(&e))
             }

@@ -12,9 +12,10 @@ use crate::batch::task::{TaskJob, TaskKind};
 use crate::batch::task_log;
 use crate::error_text::with_causes;
 use crate::files::create_folder;
+use crate::guarded;
 
 /// Folder of the records and logs of a scene's tasks.
-const TASKS: &str = "tasks";
+pub(super) const TASKS: &str = "tasks";
 
 /// A scene with its jobs.
 #[derive(Debug)]
@@ -88,10 +89,11 @@ impl SceneJobs {
     }
 
     fn work(&self, job: &TaskJob, limits: &TaskLimits<'_>) -> Ended {
-        let folder = self.folder.join(TASKS);
-        if let Err(error) = create_folder(&folder) {
-            return Ended::failed(with_causes(&error));
-        }
+        let made = create_folder(&self.folder).and_then(|()| guarded::make_folder(&self.folder, TASKS));
+        let folder = match made {
+            Ok(folder) => folder,
+            Err(error) => return Ended::failed(with_causes(&error)),
+        };
         let name = job.kind().name();
         let place = folder.join(format!("{name}.json"));
         let record = TaskRecord::read(&place);

@@ -32,7 +32,7 @@ const REPORT: &str = "classes.json";
 const PAGE: &str = "classes.html";
 /// Style of QGIS for the classes, which are the first map of the page.
 const STYLES: [&str; 2] = ["classes.qml", "roughness.qml"];
-const FILES: [&str; 7] = [CLASSES, ROUGHNESS, NDVI, STYLES[0], STYLES[1], PAGE, REPORT];
+pub(crate) const FILES: [&str; 7] = [CLASSES, ROUGHNESS, NDVI, STYLES[0], STYLES[1], PAGE, REPORT];
 
 /// Finds ground, buildings and vegetation of a surface model, and writes them with a report.
 ///

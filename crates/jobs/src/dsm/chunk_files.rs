@@ -6,7 +6,7 @@
 //! and renamed, so that it is complete under its name.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use io::npy::NpyData;
 use raster::{Grid, Window};
@@ -22,6 +22,8 @@ use crate::files::TEXT_LIMIT;
 
 /// Name of the file with everything but the rasters.
 const RECORD: &str = "result.json";
+/// Names of the rasters.
+const ARRAYS: [&str; 6] = ["height.npy", "sigma.npy", "confidence.npy", "views.npy", "filled.npy", "source.npy"];
 
 /// Everything of a chunk's result but the rasters.
 #[derive(Debug, Serialize, Deserialize)]
@@ -54,16 +56,20 @@ impl ChunkResult {
     /// [`DsmError::Output`] for a folder that exists or cannot be written. Nothing stays behind.
     pub fn write(&self, folder: &Path) -> Result<(), DsmError> {
         let failed = |source| DsmError::Output { path: folder.to_owned(), source };
-        if folder.exists() {
+        if folder.symlink_metadata().is_ok() {
             return Err(failed(std::io::ErrorKind::AlreadyExists.into()));
         }
-        let partial = partial_of(folder);
-        let written = self.write_files(&partial).and_then(|()| fs::rename(&partial, folder));
-        if written.is_err() {
-            // Best effort: the error that led here is the one to report.
-            let _ = fs::remove_dir_all(&partial);
-        }
-        written.map_err(failed)
+        // A name that nobody can foresee, so that nobody can put a link in its place.
+        let beside = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        fs::create_dir_all(beside).map_err(failed)?;
+        let work = tempfile::Builder::new().prefix(".skysweep-result-").tempdir_in(beside).map_err(failed)?;
+        let partial = work.path().join("result");
+        self.write_files(&partial).and_then(|()| fs::rename(&partial, folder)).map_err(failed)
+    }
+
+    /// Whether an entry of the folder of a result is ours.
+    pub(crate) fn is_part(name: &str) -> bool {
+        name == RECORD || ARRAYS.contains(&name)
     }
 
     fn write_files(&self, folder: &Path) -> std::io::Result<()> {
@@ -106,13 +112,6 @@ impl ChunkResult {
         };
         Ok(Self { core, content })
     }
-}
-
-/// Returns the name under which a folder is made.
-fn partial_of(folder: &Path) -> PathBuf {
-    let mut name = folder.as_os_str().to_owned();
-    name.push(".partial");
-    name.into()
 }
 
 fn write_rasters(folder: &Path, rasters: &ChunkRasters) -> Result<(), io::npy::NpyError> {

@@ -112,6 +112,7 @@ impl DsmFolder {
     /// # Errors
     /// [`DsmError::Output`].
     pub(crate) fn inside(folder: OutputFolder) -> Result<Self, DsmError> {
+        folder.check_places(FILES)?;
         let work = folder.work_folder()?;
         for name in ["dsm", "report", "spool", "stac"] {
             create_folder(&work.path().join(name))?;

@@ -19,5 +19,6 @@ mod run;
 pub use config::DtmConfig;
 pub use error::DtmError;
 pub use report::DtmReport;
+pub(crate) use run::FILES;
 pub(crate) use run::read_surface;
 pub use run::run;

@@ -24,7 +24,7 @@ const REPORT: &str = "dtm.json";
 const PAGE: &str = "dtm.html";
 /// Styles of QGIS, in the order of the maps of the page.
 const STYLES: [&str; 3] = ["dtm.qml", "height_above_ground.qml", "ground.qml"];
-const FILES: [&str; 8] = [DTM, ABOVE, STATES, STYLES[0], STYLES[1], STYLES[2], PAGE, REPORT];
+pub(crate) const FILES: [&str; 8] = [DTM, ABOVE, STATES, STYLES[0], STYLES[1], STYLES[2], PAGE, REPORT];
 /// Largest difference of the sides of a cell, as a share.
 const SQUARE_TOLERANCE: f64 = 0.01;
 

@@ -20,6 +20,7 @@ use super::report_folder::{
     ERROR_MAP, ERROR_PICTURE, ERROR_STYLE, ERROR_WORLD, PAGE, REPORT_JSON, RUN_FOLDER, check_ours,
 };
 use crate::files::{self, FileError};
+use crate::guarded;
 use crate::output_folder::OutputFolder;
 
 /// Folder that the report is written to.
@@ -57,6 +58,10 @@ impl Target {
 
     /// Refuses to replace files that no evaluation wrote.
     fn check(&self, overwrite: bool) -> Result<(), EvalJobError> {
+        if self.automatic {
+            // Nobody named this folder; a link in its place could lead anywhere.
+            guarded::check_folder(&self.folder)?;
+        }
         let names = [REPORT_JSON, ERROR_MAP, ERROR_STYLE, ERROR_PICTURE, ERROR_WORLD, PAGE];
         let taken = names.map(|name| self.folder.join(name));
         check_ours(&self.folder, &taken, overwrite)

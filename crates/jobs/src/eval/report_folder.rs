@@ -6,6 +6,7 @@ use report::EvaluationReport;
 
 use super::error::EvalJobError;
 use crate::files::{self, FileError};
+use crate::guarded;
 use crate::output_folder::OutputFolder;
 
 /// Name of the JSON report. It marks the folder of an evaluation.
@@ -32,13 +33,10 @@ pub(crate) fn remove_evaluation(run: &OutputFolder) -> Result<(), FileError> {
     if folder.is_symlink() || !report.is_ok_and(|text| EvaluationReport::is_ours(&text)) {
         return Ok(());
     }
+    let others = [PAGE, ERROR_STYLE, ERROR_WORLD, ERROR_PICTURE, ERROR_MAP];
+    guarded::remove_known(&folder, &|name| others.contains(&name))?;
     // The JSON marks the folder, so it goes last.
-    for name in [PAGE, ERROR_STYLE, ERROR_WORLD, ERROR_PICTURE, ERROR_MAP, REPORT_JSON] {
-        run.remove(&format!("{RUN_FOLDER}/{name}"))?;
-    }
-    // Stays when it holds anything else.
-    let _ = std::fs::remove_dir(&folder);
-    Ok(())
+    guarded::remove_known(&folder, &|name| name == REPORT_JSON)
 }
 
 /// Fails if one of `paths` exists in a folder without the report of an evaluation, unless it may be

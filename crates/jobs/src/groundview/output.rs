@@ -15,8 +15,14 @@ use super::shots::{Shot, Shots};
 use super::view_files::{points_of, view_row, write_maps};
 use super::view_surface::{SurfaceKind, ViewSurface};
 use crate::error_text::with_causes;
-use crate::files::{self, FileError};
+use crate::files::FileError;
+use crate::output_folder::OutputFolder;
 use crate::report_page;
+
+/// Folders of the views.
+pub(super) const FOLDERS: [&str; 7] = ["depth", "normal", "mask", "sky", "previews", "sparse/0", PICTURES];
+/// Folder of the crops of pictures.
+const PICTURES: &str = "images";
 
 /// A picture of a panorama, with its file.
 type OpenPicture = (PathBuf, Grid<[f32; 3]>);
@@ -24,14 +30,14 @@ type OpenPicture = (PathBuf, Grid<[f32; 3]>);
 /// Renders and writes all views.
 pub(super) fn write(
     config: &GroundViewConfig,
+    folder: &OutputFolder,
     surface: &ViewSurface,
     shots: &Shots,
     progress: &dyn Progress,
 ) -> Result<GroundViewReport, GroundViewError> {
     let pictures = shots.shots.iter().any(|shot| shot.picture.is_some());
-    let folders = ["depth", "normal", "mask", "sky", "previews", "sparse/0"];
-    for name in folders.into_iter().chain(pictures.then_some("images")) {
-        files::create_folder(&config.output.join(name))?;
+    for name in FOLDERS.into_iter().filter(|name| pictures || *name != PICTURES) {
+        folder.subfolder(name)?;
     }
     let mut made = Made::new(surface, shots);
     let mut open: Option<OpenPicture> = None;
@@ -87,7 +93,7 @@ impl Made {
         let view: GroundView = render(surface, &viewer, &shot.pose);
         write_maps(folder, shot, &view, config.overwrite)?;
         if let Some(picture) = picture {
-            write_png_rgb(folder.join("images").join(&shot.name), picture, config.overwrite)
+            write_png_rgb(folder.join(PICTURES).join(&shot.name), picture, config.overwrite)
                 .map_err(FileError::from)?;
         }
         // A panorama and its crops count as one camera.

@@ -38,11 +38,12 @@ pub fn run(config: &GroundViewConfig, progress: &dyn Progress) -> Result<GroundV
         return Err(GroundViewError::FolderInUse { path: config.output.clone() });
     }
     let folder = OutputFolder::take(&config.output)?;
+    folder.check_folders(output::FOLDERS)?;
     threads::install(config.threads, || {
         let surface = ViewSurface::open(&config.surface, config.surface_vertical, progress)?;
         let shots = Shots::of(config, &surface)?;
         // Without its report the folder counts as incomplete from here on.
         folder.remove(REPORT)?;
-        output::write(config, &surface, &shots, progress)
+        output::write(config, &folder, &surface, &shots, progress)
     })?
 }

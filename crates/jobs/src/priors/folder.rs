@@ -2,7 +2,8 @@
 //! written.
 //!
 //! The old report is removed first and the new one is moved last, so a folder with a report is
-//! complete. Other files in the folder are left alone, also `images` of a run that wrote none.
+//! complete. Other files in the folder are left alone, also `images` of a run that wrote none. Files
+//! inside its folders that no earlier run made are refused before the work.
 
 use std::path::Path;
 
@@ -11,6 +12,7 @@ use tempfile::TempDir;
 use super::config::{PriorsConfig, PriorsImages};
 use super::error::PriorsJobError;
 use super::images;
+use super::made::{Made, NOTE};
 use crate::files::FileError;
 use crate::output_folder::OutputFolder;
 
@@ -47,6 +49,7 @@ pub(super) struct PriorsFolder {
     work: TempDir,
     folder: OutputFolder,
     entries: Vec<&'static str>,
+    made: Made,
 }
 
 impl PriorsFolder {
@@ -62,7 +65,13 @@ impl PriorsFolder {
         let taken = entries.iter().chain(&REPORT).map(|name| path.join(name)).find(|p| p.symlink_metadata().is_ok());
         match taken {
             Some(path) if !config.overwrite => Err(FileError::Exists { path }.into()),
-            _ => Ok(Self { work: folder.work_folder()?, folder, entries }),
+            _ => {
+                let made = Made::of(path);
+                for name in &entries {
+                    made.check(&folder, name)?;
+                }
+                Ok(Self { work: folder.work_folder()?, folder, entries, made })
+            }
         }
     }
 
@@ -74,14 +83,21 @@ impl PriorsFolder {
     /// Moves everything to its name.
     pub(super) fn publish(self) -> Result<(), PriorsJobError> {
         // Without its report the folder counts as incomplete from here on.
-        for name in REPORT.iter().rev().chain(&self.entries) {
+        for name in &self.entries {
+            self.made.check(&self.folder, name)?;
+        }
+        self.made.note(&self.folder, self.path())?;
+        for name in REPORT.iter().rev() {
             self.folder.remove(name)?;
+        }
+        for name in &self.entries {
+            self.made.remove(&self.folder, name)?;
         }
         for name in self.entries.iter().chain(&REPORT) {
             if self.path().join(name).symlink_metadata().is_ok() {
                 self.folder.publish(self.path(), name)?;
             }
         }
-        Ok(())
+        Ok(self.folder.remove(NOTE)?)
     }
 }

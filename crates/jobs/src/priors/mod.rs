@@ -16,6 +16,7 @@ mod folder;
 mod frame;
 mod images;
 mod labels;
+mod made;
 mod maps;
 mod model;
 mod notes;

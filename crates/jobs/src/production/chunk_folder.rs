@@ -5,15 +5,16 @@
 //! renaming, so a reader never sees a half-written one. A status belongs to the plan that it names.
 
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::{FileError, TEXT_LIMIT, create_folder};
+use crate::dsm::ChunkResult;
+use crate::files::{FileError, TEXT_LIMIT, create_folder, names_in};
+use crate::guarded::{self, TEMPORARY};
 
 /// Folder of all chunks.
-pub(super) const CHUNKS: &str = "chunks";
+pub(crate) const CHUNKS: &str = "chunks";
 /// Beginning of the names of files that become claims, or were some.
 pub(super) const CLAIM_WORK: &str = ".claim-";
 /// Name of the status of a chunk.
@@ -76,11 +77,12 @@ impl ChunkFolder {
         Self(run.join(CHUNKS).join(format!("{index:04}")))
     }
 
-    /// Makes the folder if there is none.
+    /// Makes the folder if there is none, and refuses one with anything in it that is not ours.
     ///
     /// # Errors
-    /// [`FileError::Folder`].
+    /// As [`Self::check`].
     pub(super) fn create(&self) -> Result<&Path, FileError> {
+        self.check()?;
         create_folder(&self.0)?;
         Ok(&self.0)
     }
@@ -110,13 +112,34 @@ impl ChunkFolder {
         Ok(io::write_bytes(self.status_file(), json.as_bytes(), true)?)
     }
 
+    /// Checks that nothing but what processes of ours make is in the folder, and that it is reached
+    /// through no link.
+    ///
+    /// # Errors
+    /// [`FileError::Link`], [`FileError::Folder`], [`FileError::Foreign`].
+    pub(super) fn check(&self) -> Result<(), FileError> {
+        if let Some(chunks) = self.0.parent() {
+            guarded::check_folder(chunks)?;
+        }
+        guarded::require_own(&self.0, &is_ours)?;
+        // Whatever fields a status of another version has, it names its plan and its state.
+        let is_status = |json: serde_json::Value| json.get("plan").is_some() && json.get("state").is_some();
+        match io::read_regular(&self.status_file(), TEXT_LIMIT) {
+            Ok(json) if !serde_json::from_slice(&json).is_ok_and(is_status) => {
+                let found = format!("{STATUS}, which is not the status of a chunk");
+                Err(FileError::Foreign { path: self.0.clone(), found })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Removes an old result, and what a killed process left of one. Files of claims stay: another
     /// process may be asking for the chunk at this moment.
     ///
     /// # Errors
     /// [`FileError::Remove`].
     pub(super) fn clear(&self) -> Result<(), FileError> {
-        self.remove(|name| name != STATUS && !name.starts_with(CLAIM_WORK))
+        guarded::remove_known(&self.0, &|name| is_ours(name) && name != STATUS && !name.starts_with(CLAIM_WORK))
     }
 
     /// Removes what a killed process left in the folder. The caller has the run folder for itself.
@@ -124,44 +147,65 @@ impl ChunkFolder {
     /// # Errors
     /// [`FileError::Remove`].
     pub(super) fn remove_left_over(&self) -> Result<(), FileError> {
-        self.remove(|name| name != STATUS && name != RESULT)
-    }
-
-    fn remove(&self, is_old: impl Fn(&str) -> bool) -> Result<(), FileError> {
-        for entry in fs::read_dir(&self.0).into_iter().flatten().flatten() {
-            if is_old(&entry.file_name().to_string_lossy()) {
-                let path = entry.path();
-                let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-                let removed = if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
-                match removed {
-                    // Another process was faster.
-                    Err(error) if error.kind() == ErrorKind::NotFound => {}
-                    other => other.map_err(|source| FileError::Remove { path, source })?,
-                }
-            }
-        }
-        Ok(())
+        let is_result = |name: &str| name.split('/').next() == Some(RESULT);
+        guarded::remove_known(&self.0, &|name| is_ours(name) && name != STATUS && !is_result(name))
     }
 
     /// Removes the folder. The status goes first, so that what a killed process leaves of a result
     /// never counts as one.
     ///
     /// # Errors
-    /// [`FileError::Remove`].
+    /// [`FileError::Foreign`], [`FileError::Remove`].
     fn remove_whole(&self) -> Result<(), FileError> {
+        self.check()?;
         crate::files::remove(&self.status_file())?;
-        fs::remove_dir_all(&self.0).map_err(|source| FileError::Remove { path: self.0.clone(), source })
+        guarded::remove_folder(&self.0, &is_ours)
     }
 }
 
-/// Removes the folders of chunks that belong to other plans. The caller has the run folder for
-/// itself.
+/// Whether an entry of the folder of a chunk is ours, by its name there.
+fn is_ours(name: &str) -> bool {
+    let Some((folder, below)) = name.split_once('/') else { return name == STATUS || is_left_over(name) };
+    match folder {
+        RESULT => below.is_empty() || ChunkResult::is_part(below),
+        _ => folder.starts_with(TEMPORARY),
+    }
+}
+
+/// Whether a file of this name is what a killed process leaves in the folder of a chunk.
+pub(crate) fn is_left_over(name: &str) -> bool {
+    name.starts_with(CLAIM_WORK) || name.starts_with(TEMPORARY)
+}
+
+/// Whether a folder of this name is one of a chunk.
+pub(crate) fn is_chunk(name: &str) -> bool {
+    name.len() >= 4 && name.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Checks that the folder of the chunks holds chunks and nothing else.
 ///
 /// # Errors
-/// [`FileError::Remove`].
+/// As [`ChunkFolder::check`].
+pub(super) fn check_all(run: &Path) -> Result<(), FileError> {
+    let chunks = run.join(CHUNKS);
+    let known = |name: &str| match name.split_once('/') {
+        Some((chunk, below)) => is_chunk(chunk) && (below.is_empty() || is_ours(below)),
+        None => false,
+    };
+    guarded::require_own(&chunks, &known)?;
+    names_in(&chunks).try_for_each(|name| ChunkFolder(chunks.join(name)).check())
+}
+
+/// Removes the folders of chunks that belong to other plans. The caller has the run folder for
+/// itself. Where anything else lies among them, all of them stay.
+///
+/// # Errors
+/// As [`check_all`]; [`FileError::Remove`].
 pub(super) fn remove_others(run: &Path, plan: &str) -> Result<(), FileError> {
-    for entry in fs::read_dir(run.join(CHUNKS)).into_iter().flatten().flatten() {
-        let folder = ChunkFolder(entry.path());
+    check_all(run)?;
+    let chunks = run.join(CHUNKS);
+    for name in names_in(&chunks) {
+        let folder = ChunkFolder(chunks.join(name));
         if folder.status(plan).is_none() {
             folder.remove_whole()?;
         }

@@ -7,7 +7,7 @@ use numeric::Progress;
 use crate::dsm::{DsmConfig, DsmReport};
 use crate::files::FileError;
 use crate::output_folder::OutputFolder;
-use crate::production::chunk_folder::CHUNKS;
+use crate::production::chunk_folder::{self, CHUNKS};
 use crate::production::chunk_run::{ChunkRunConfig, run_chunks};
 use crate::production::error::ProductionError;
 use crate::production::merge_run::{MergeConfig, merge_run};
@@ -34,20 +34,25 @@ pub(crate) fn make_or_resume(config: &DsmConfig, progress: &dyn Progress) -> Res
     (merge.overwrite, merge.threads) = (true, config.threads);
     let report = merge_run(&merge, progress)?.report;
     if report.chunks.as_ref().is_none_or(|chunks| chunks.failed.is_empty()) {
-        remove_chunks(config)?;
+        remove_chunks(config, progress)?;
     }
     Ok(report)
 }
 
 /// Removes the results of the chunks, unless somebody works on them. They leave their name at once,
 /// so that a killed process leaves none that looks whole.
-fn remove_chunks(config: &DsmConfig) -> Result<(), FileError> {
+fn remove_chunks(config: &DsmConfig, progress: &dyn Progress) -> Result<(), FileError> {
     let path = config.output.join(CHUNKS);
     let folder = match OutputFolder::take(&config.output) {
         // Whoever has the folder now goes on with them.
         Err(FileError::InUse { .. }) => return Ok(()),
         other => other?,
     };
+    if let Err(error) = chunk_folder::check_all(folder.path()) {
+        // The surface model is whole; what somebody put among the chunks stays with them.
+        progress.warn(&format!("the results of the chunks are not removed: {error}"));
+        return Ok(());
+    }
     let work = folder.work_folder()?;
     let failed = |source| FileError::Remove { path: path.clone(), source };
     fs::rename(&path, work.path().join(CHUNKS)).map_err(failed)?;

@@ -69,6 +69,7 @@ fn states(config: &MergeConfig, file: &PlanFile) -> Result<Vec<Option<ChunkState
     for index in 0..count {
         let folder = ChunkFolder::of(&config.folder, index);
         // Nobody computes now: this run has the folder for itself.
+        folder.check()?;
         folder.remove_left_over()?;
         let state = folder.status(&file.id).map(|status| status.state);
         states.push(state.filter(|state| !matches!(state, ChunkState::Running(_))));

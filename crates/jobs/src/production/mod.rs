@@ -26,6 +26,7 @@ mod plan_run;
 mod plan_text;
 
 pub use chunk_folder::ChunkWorker;
+pub(crate) use chunk_folder::{CHUNKS, is_chunk, is_left_over};
 pub use chunk_run::{ChunkFault, ChunkRunConfig, ChunkRunReport, run_chunks};
 pub use chunk_selection::{ChunkSelection, ChunkSelectionError};
 pub(crate) use content_hash::of_value as hash_of;

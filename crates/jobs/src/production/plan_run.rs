@@ -65,6 +65,7 @@ pub fn plan_run(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile,
         let results: Vec<&str> = FILES.into_iter().filter(|name| *name != USED_CONFIG).collect();
         refuse_results(folder.path(), &results)?;
     }
+    chunk_folder::check_all(folder.path())?;
     let file = stored_plan(config, progress)?;
     replace(&folder, config, &file)?;
     Ok(file.located(&config.output))
@@ -114,6 +115,7 @@ pub(super) fn plan_again(
     let mut config = crate::job_file::read_dsm_job(&folder.join(USED_CONFIG))?;
     folder.clone_into(&mut config.output);
     config.validate()?;
+    chunk_folder::check_all(folder)?;
     let file = stored_plan(&DsmConfig { threads: threads.or(config.threads), ..config.clone() }, progress)?;
     replace(&taken, &config, &file)
 }

@@ -19,7 +19,7 @@ use serde_json::json;
 
 use super::error::ProductsError;
 use super::mesh_level::{MeshLevel, TILE};
-use super::mesh_tiles::{self, TILES, TILESET};
+use super::mesh_tiles::{self, TILES, TILESET, is_tile};
 use super::scene::SurfaceOfRun;
 use crate::files::FileError;
 use crate::output_folder::OutputFolder;
@@ -75,10 +75,10 @@ pub(super) fn make(
     progress.check_cancelled()?;
     progress.step();
     let made = mesh_tiles::make(surface, finest, tolerance_m, work.path(), progress)?;
-    for name in [GLB, TILES, TILESET] {
-        folder.remove(name)?;
-        folder.publish(work.path(), name)?;
-    }
+    // The list of the tiles goes before them and comes after them.
+    [GLB, TILESET].into_iter().try_for_each(|name| folder.remove(name))?;
+    folder.remove_folder(TILES, &is_tile)?;
+    [GLB, TILES, TILESET].into_iter().try_for_each(|name| folder.publish(work.path(), name))?;
     progress.step();
     Ok(MeshReport {
         glb: folder.path().join(GLB),

@@ -22,6 +22,14 @@ pub(super) const TILESET: &str = "tileset.json";
 /// than 16 pixels; a cell of its picture then covers two.
 const CELLS_OF_ERROR: f64 = 8.0;
 
+/// Whether an entry of the folder of the tiles is ours: the folder of a level or a tile in it.
+pub(super) fn is_tile(name: &str) -> bool {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let Some((_, file)) = name.split_once('/').filter(|(level, _)| is_number(level)) else { return false };
+    let place = file.strip_suffix(".glb").and_then(|place| place.split_once('_'));
+    file.is_empty() || place.is_some_and(|(column, row)| is_number(column) && is_number(row))
+}
+
 /// Counts of a tileset.
 pub(super) struct TilesMade {
     pub(super) levels: usize,

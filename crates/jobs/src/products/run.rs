@@ -13,13 +13,14 @@ use super::config::{FOLDER, ProductsConfig};
 use super::contours;
 use super::error::ProductsError;
 use super::mesh;
-use super::mesh_tiles::{TILES, TILESET};
+use super::mesh_tiles::{TILES, TILESET, is_tile};
 use super::product::ProductKind;
 use super::report::ProductsReport;
 use super::scene::SurfaceOfRun;
 use crate::classes::{self, ClassesConfig};
 use crate::dtm::{self, DtmConfig, DtmReport};
 use crate::files::{self, FileError};
+use crate::guarded;
 use crate::job_file::read_dsm_job;
 use crate::ortho::{self, OrthoConfig};
 use crate::output_folder::OutputFolder;
@@ -64,7 +65,14 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
     if !only_points && surface.projection.metres_per_unit().is_none() {
         return Err(ProductsError::InDegrees { path: surface.dem.path });
     }
+    if config.output.is_none() {
+        guarded::check_folder(output)?;
+    }
     let folder = OutputFolder::take(output)?;
+    folder.check_folders([DTM, CLASSES])?;
+    if config.wants(ProductKind::Mesh) {
+        folder.require_own(TILES, &is_tile)?;
+    }
     let has_ground = output.join(DTM_HEIGHTS).is_file();
     let needs_ground = config.wants(ProductKind::Contours) && !has_ground;
     let wants_ground = config.wants(ProductKind::Dtm) || needs_ground;
@@ -157,25 +165,15 @@ pub(crate) fn remove_products(run_folder: &OutputFolder) -> Result<(), FileError
     if folder.is_symlink() || !folder.join(REPORT).is_file() {
         return Ok(());
     }
+    guarded::remove_known(&folder.join(TILES), &is_tile)?;
+    guarded::remove_known(&folder.join(DTM), &|name| dtm::FILES.contains(&name))?;
+    guarded::remove_known(&folder.join(CLASSES), &|name| classes::FILES.contains(&name))?;
+    let clouds = cloud::FILES.map(|(name, _)| name);
+    let others = [contours::FILE, mesh::GLB, TILESET, ORTHO, ORTHO_MASK, PAGE];
+    let is_product = |name: &str| clouds.iter().chain(&BESIDE_ORTHO).chain(&others).any(|known| *known == name);
+    guarded::remove_known(&folder, &is_product)?;
     // The report marks the folder, so it goes last.
-    let names = cloud::FILES.map(|(name, _)| name).into_iter().chain(BESIDE_ORTHO).chain([
-        contours::FILE,
-        mesh::GLB,
-        TILESET,
-        TILES,
-        DTM,
-        CLASSES,
-        ORTHO,
-        ORTHO_MASK,
-        PAGE,
-        REPORT,
-    ]);
-    for name in names {
-        run_folder.remove(&format!("{FOLDER}/{name}"))?;
-    }
-    // Stays when it holds anything else.
-    let _ = std::fs::remove_dir(&folder);
-    Ok(())
+    guarded::remove_known(&folder, &|name| name == REPORT)
 }
 
 /// Returns the images of a run that name a red and a near-infrared band; none where the images are

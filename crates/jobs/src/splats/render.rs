@@ -152,6 +152,7 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
     report_page::refuse_existing(&report_path, config.overwrite)?;
     config.validate()?;
     let folder = OutputFolder::take(&config.output)?;
+    folder.check_folders(["colour", "alpha", "height", "depth"])?;
     let file = io::splat_ply::read(&config.splats)?;
     let origin = file
         .origin
@@ -159,7 +160,8 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
         .ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?;
     folder.remove(REPORT)?;
     let pictures = config.pictures.clone().or_else(|| config.cameras.as_deref().and_then(pictures_of_dataset));
-    let session = RenderSession { config, file: &file, origin, pictures, taken: HashSet::new(), views: Vec::new() };
+    let (taken, views) = (HashSet::new(), Vec::new());
+    let session = RenderSession { config, folder: &folder, file: &file, origin, pictures, taken, views };
     let views = install(config.threads, || session.run(progress))??;
     let report = SplatRenderReport { splats: file.splats.len(), views };
     let lead = "Gaussian splats seen by the cameras of images.";
@@ -175,6 +177,7 @@ fn pictures_of_dataset(cameras: &Path) -> Option<PathBuf> {
 /// Views rendered so far.
 struct RenderSession<'a> {
     config: &'a SplatRenderConfig,
+    folder: &'a OutputFolder,
     file: &'a SplatFile,
     origin: LocalOrigin,
     /// Folder with the pictures of the perspective cameras.
@@ -287,8 +290,7 @@ impl RenderSession<'_> {
 
     fn write(&self, name: &str, with_depth: bool, rendering: &Rendering) -> Result<(), FileError> {
         let path = |kind: &str, ending: &str| {
-            let folder = self.config.output.join(kind);
-            files::create_folder(&folder)?;
+            let folder = self.folder.subfolder(kind)?;
             Ok::<_, FileError>(folder.join(format!("{name}.{ending}")))
         };
         let byte = |share: f32| (255.0 * share.clamp(0.0, 1.0)).round() as u8;

@@ -125,6 +125,7 @@ impl Work<'_> {
     fn fate(&self, id: &str, stand: &CameraStand, progress: &dyn Progress) -> Result<TileFate, TilesError> {
         let request = self.request(stand);
         let path = self.folder.path().join(id);
+        self.folder.require_own(id, &is_of_tile)?;
         if !self.config.maps.overwrite && path.symlink_metadata().is_ok() {
             let same = request_of(&path.join(TILE)).is_some_and(|found| found == request);
             return if same { Ok(TileFate::Kept) } else { Err(TilesError::OtherTile { path }) };
@@ -187,7 +188,7 @@ impl Work<'_> {
             request,
         };
         files::write_json(&tile.join(TILE), &manifest, false)?;
-        self.folder.remove(id)?;
+        self.folder.remove_folder(id, &is_of_tile)?;
         Ok(self.folder.publish(work.path(), id)?)
     }
 
@@ -256,6 +257,11 @@ impl Work<'_> {
         }
         Ok(found)
     }
+}
+
+/// Whether a tile has a file of this name.
+fn is_of_tile(name: &str) -> bool {
+    ["height.tif", "ortho.tif", "ortho_mask.tif", "ortho.png", "ortho.pgw", TILE].contains(&name)
 }
 
 /// Returns the request number of a tile's description.

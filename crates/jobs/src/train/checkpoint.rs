@@ -33,6 +33,22 @@ impl Checkpoint {
         Ok(io::write_bytes(path, &bytes, true)?)
     }
 
+    /// Whether a training wrote a file, by its beginning.
+    pub(super) fn is_ours(path: &Path) -> bool {
+        io::read_regular(path, LIMIT).is_ok_and(|bytes| bytes.starts_with(MAGIC))
+    }
+
+    /// Returns the number of iterations that are done; `None` where there is no checkpoint.
+    pub(super) fn iteration(path: &Path) -> Result<Option<u32>, TrainError> {
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let bytes =
+            io::read_regular(path, LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+        let state = parts(&bytes).and_then(|(state, _)| TrainingState::from_bytes(state));
+        Ok(Some(state.map_err(|source| TrainError::Checkpoint { path: path.to_owned(), source })?.iteration))
+    }
+
     /// Reads the checkpoint of a training on `views`, of which the first have pictures.
     pub(super) fn read<C: SurfelCamera>(
         path: &Path,

@@ -75,6 +75,8 @@ impl Course<'_> {
         let mut trainer = Trainer::new(&views, extent_m, state, self.settings);
         run.until(&mut trainer, u32::MAX, |state, stopped| self.keep(state, &masks, stopped))?;
         let state = trainer.into_state();
+        // Writing the results may be stopped, too. They are made again from here.
+        self.keep(&state, &masks, true)?;
         let (losses, seconds) = run.finish();
         let share = |number: usize| {
             masks
@@ -84,7 +86,7 @@ impl Course<'_> {
         Ok(Trained { state, transient_share: (0..self.pictures).map(share).collect(), losses, seconds })
     }
 
-    /// Writes a checkpoint where one is due.
+    /// Writes a checkpoint where one is due, or where the training stops.
     fn keep(&self, state: &TrainingState, left_out: &[Vec<bool>], stopped: bool) -> Result<(), TrainError> {
         let every = self.checkpoint_every.max(1);
         let is_due = state.iteration.is_multiple_of(every) && state.iteration < self.settings.iterations;

@@ -30,11 +30,13 @@ use crate::threads;
 /// [`TrainError`]: a dataset that cannot be read or has no images, outputs that exist.
 pub fn run(config: &TrainConfig, progress: &dyn Progress) -> Result<TrainReport, TrainError> {
     config.validate()?;
-    results::refuse_existing(&config.output, config.overwrite)?;
+    let (overwrite, resume) = (config.overwrite, config.resume);
+    let may_replace = results::may_replace(&config.output, overwrite, resume, config.iterations)?;
     threads::install(config.threads, || {
         let data = TrainData::read(config, progress)?;
-        let _folder = OutputFolder::take(&config.output)?;
-        train(config, &data, progress)
+        let folder = OutputFolder::take(&config.output)?;
+        folder.check_folders([RENDERS])?;
+        train(config, &data, &folder, may_replace, progress)
     })?
 }
 
@@ -42,7 +44,13 @@ fn is_held_out(config: &TrainConfig, data: &TrainData, view: usize) -> bool {
     config.hold_out > 1 && data.views.len() > 2 && view % config.hold_out == config.hold_out - 1
 }
 
-fn train(config: &TrainConfig, data: &TrainData, progress: &dyn Progress) -> Result<TrainReport, TrainError> {
+fn train(
+    config: &TrainConfig,
+    data: &TrainData,
+    folder: &OutputFolder,
+    may_replace: bool,
+    progress: &dyn Progress,
+) -> Result<TrainReport, TrainError> {
     let trained: Vec<usize> = (0..data.views.len()).filter(|&v| !is_held_out(config, data, v)).collect();
     let views: Vec<TrainingView<PinholeView>> = trained.iter().map(|&v| data.views[v].clone()).collect();
     if data.points.len() < 4 {
@@ -59,9 +67,10 @@ fn train(config: &TrainConfig, data: &TrainData, progress: &dyn Progress) -> Res
         settings: settings(config, data),
     };
     let Trained { state, transient_share, losses, seconds } = course.run(&initial, views, progress)?;
-    files::create_folder(&config.output.join(RENDERS))?;
-    let (after, layers) = quality(data, &state.surfels, Some((config, &config.output.join(RENDERS))))?;
-    let splats = results::write_splats(&config.output, &state.surfels, &data.place.origin, config.overwrite)?;
+    results::begin(folder)?;
+    let renders = Renders { config, folder: &folder.subfolder(RENDERS)?, may_replace };
+    let (after, layers) = quality(data, &state.surfels, Some(renders))?;
+    let splats = results::write_splats(&config.output, &state.surfels, &data.place.origin, may_replace)?;
     let row = |v: usize| TrainedViewRow::new(&data.names[v], is_held_out(config, data, v), before[v], after[v]);
     let report = TrainReport {
         settings: config.clone(),
@@ -76,7 +85,7 @@ fn train(config: &TrainConfig, data: &TrainData, progress: &dyn Progress) -> Res
         losses,
     };
     let lead = "Flat Gaussian splats that learned from the images of a dataset.";
-    page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, config.overwrite)?;
+    page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, may_replace)?;
     files::remove(&config.output.join(CHECKPOINT))?;
     Ok(report)
 }
@@ -93,12 +102,19 @@ fn settings(config: &TrainConfig, data: &TrainData) -> TrainingConfig {
     settings
 }
 
+/// Where the views are written that were not trained on.
+struct Renders<'a> {
+    config: &'a TrainConfig,
+    folder: &'a Path,
+    may_replace: bool,
+}
+
 /// Returns the quality of every view. Writes what the views that were not trained show, and returns
 /// them for the page.
 fn quality(
     data: &TrainData,
     surfels: &[Surfel],
-    write: Option<(&TrainConfig, &Path)>,
+    write: Option<Renders<'_>>,
 ) -> Result<(Vec<Quality>, Vec<MapLayer>), TrainError> {
     let (mut rows, mut layers) = (Vec::with_capacity(data.views.len()), Vec::new());
     let mut drawing = Drawing::new(&[], &data.views[0].camera, Registers::Longest);
@@ -116,9 +132,10 @@ fn quality(
             counts.data_mut().copy_from_slice(mask);
         }
         rows.push((psnr_db(&found, &truth, &counts), ssim(&found, &truth, &counts)));
-        if let Some((config, folder)) = write.filter(|(config, _)| is_held_out(config, data, number)) {
+        if let Some(renders) = write.as_ref().filter(|write| is_held_out(write.config, data, number)) {
             let stem = Path::new(&data.names[number]).file_stem().unwrap_or_default().to_string_lossy();
-            write_png_rgb(folder.join(format!("{stem}.png")), &page::bytes(&found), config.overwrite)?;
+            let path = renders.folder.join(format!("{stem}.png"));
+            write_png_rgb(path, &page::bytes(&found), renders.may_replace)?;
             layers.push(page::layer(&data.names[number], page::beside(&truth, &found)));
         }
     }

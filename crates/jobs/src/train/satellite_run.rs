@@ -177,11 +177,16 @@ pub fn run_on_images(
     progress: &dyn Progress,
 ) -> Result<SatelliteTrainReport, TrainError> {
     config.validate()?;
-    results::refuse_existing(&config.output, config.overwrite)?;
-    threads::install(config.threads, || train(config, progress))?
+    let (overwrite, resume) = (config.overwrite, config.resume);
+    let may_replace = results::may_replace(&config.output, overwrite, resume, config.iterations)?;
+    threads::install(config.threads, || train(config, may_replace, progress))?
 }
 
-fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<SatelliteTrainReport, TrainError> {
+fn train(
+    config: &SatelliteTrainConfig,
+    may_replace: bool,
+    progress: &dyn Progress,
+) -> Result<SatelliteTrainReport, TrainError> {
     let placed = PlacedSurfels::read(&config.splats)?;
     let found = corrections(&config.splats, &config.corrections)?;
     let images = placed.images(&config.images, &found, progress)?;
@@ -200,7 +205,8 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
         let above = placed.above_relative(&heights);
         views.push(above.ok_or_else(|| invalid(path, "the grid of the heights is not regular"))?);
     }
-    let _folder = OutputFolder::take(&config.output)?;
+    let folder = OutputFolder::take(&config.output)?;
+    folder.check_folders([RENDERS])?;
     let pictures: Vec<&SatelliteImage> = images.iter().chain(&judged).collect();
     let before: Vec<Quality> = pictures.iter().map(|image| quality(&placed.surfels, &image.view).0).collect();
     let course = Course {
@@ -212,11 +218,12 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
         settings: settings(config, extent_m(&placed.surfels)),
     };
     let Trained { state, transient_share, losses, seconds } = course.run(&placed.surfels, views, progress)?;
-    let splats = results::write_splats(&config.output, &state.surfels, &placed.origin, config.overwrite)?;
+    results::begin(&folder)?;
+    let splats = results::write_splats(&config.output, &state.surfels, &placed.origin, may_replace)?;
     let used: Vec<PathBuf> = config.images.iter().chain(&config.judged).cloned().collect();
-    found.of_images(&used).write(&pointing_path(&splats), config.overwrite)?;
+    found.of_images(&used).write(&pointing_path(&splats), may_replace)?;
     let height_change_m = match &surface {
-        Some(surface) => heights(config, &placed, [&placed.surfels, &state.surfels], surface)?,
+        Some(surface) => heights(&folder, &placed, [&placed.surfels, &state.surfels], surface, may_replace)?,
         None => None,
     };
     let (mut views, mut layers) = (Vec::new(), Vec::new());
@@ -225,9 +232,8 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
         let held_out = number >= config.images.len();
         if held_out {
             let picture = page::beside(&truth(&image.view), &shown);
-            files::create_folder(&config.output.join(RENDERS))?;
-            let file = config.output.join(RENDERS).join(Path::new(&image.name).with_extension("png"));
-            write_png_rgb(file, &page::bytes(&shown), config.overwrite)?;
+            let file = folder.subfolder(RENDERS)?.join(Path::new(&image.name).with_extension("png"));
+            write_png_rgb(file, &page::bytes(&shown), may_replace)?;
             layers.push(page::layer(&image.name, picture));
         }
         views.push(TrainedViewRow::new(&image.name, held_out, before, after));
@@ -245,7 +251,7 @@ fn train(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<Satel
         losses,
     };
     let lead = "Splats that learned from satellite images.";
-    page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, config.overwrite)?;
+    page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, may_replace)?;
     files::remove(&config.output.join(CHECKPOINT))?;
     Ok(report)
 }
@@ -290,10 +296,11 @@ fn quality(surfels: &[Surfel], view: &TrainingView<LatticeView>) -> (Quality, Gr
 /// Writes the heights of the splats on the grid of the surface model, and returns the mean absolute
 /// difference from it, before and after.
 fn heights(
-    config: &SatelliteTrainConfig,
+    folder: &OutputFolder,
     placed: &PlacedSurfels,
     splats: [&[Surfel]; 2],
     surface: &MapSurface,
+    may_replace: bool,
 ) -> Result<Option<[f64; 2]>, TrainError> {
     let [Some(before), Some(after)] = splats.map(|surfels| placed.heights(surfels, surface)) else { return Ok(None) };
     let change = |found: &Grid<f32>| {
@@ -310,7 +317,7 @@ fn heights(
             holds_heights: true,
             ..CogRaster::new(&bands, surface.dem.geotransform, Crs::ellipsoidal(epsg))
         };
-        write_cog(config.output.join(HEIGHTS), &raster, config.overwrite).map_err(FileError::from)?;
+        write_cog(folder.path().join(HEIGHTS), &raster, may_replace).map_err(FileError::from)?;
     }
     Ok(Some([change(&before), change(&after)]))
 }

@@ -7,7 +7,11 @@
 
 #![cfg(unix)]
 
+mod commands;
+#[path = "../common/mod.rs"]
 mod common;
+mod links;
+mod small_disks;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
