@@ -19,7 +19,7 @@ use crate::dsm::view_geometry::ViewGeometry;
 /// border of two UTM zones are written in either, and half a zone beyond it distorts by 2 in 1000.
 const FAR_OUTSIDE_DEG: f64 = 3.0;
 /// Grids of more cells than this come from a cell size or bounds in wrong units.
-const CELLS_MAX: f64 = 4e9;
+pub(crate) const CELLS_MAX: f64 = 4e9;
 
 /// The grid of a DSM.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
