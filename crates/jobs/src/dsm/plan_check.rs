@@ -304,9 +304,6 @@ impl ChunkSweep {
                 ensure(source < n && source != i && !sources[..k].contains(&source), || {
                     format!("image {i} has the source {source}, expected each other image of {n} at most once")
                 })?;
-                ensure(self.windows[i].is_some() && self.windows[source].is_some(), || {
-                    format!("images {i} and {source} are compared, and one of them is not read")
-                })?;
                 let pair = ImagePair::new(i, source).ordered();
                 ensure(plan.useful.contains(&pair), || {
                     format!("the pair {pair} is compared and not among the useful")
