@@ -207,7 +207,7 @@ fn cell_of(projection: &MapProjection, gsd_m: f64, lat_deg: f64) -> (f64, f64) {
 
 /// Returns a north-up grid on whole multiples of the cell's width and height that holds the bounds:
 /// its geotransform, columns and rows.
-fn snapped(b: MapBounds, (width, height): (f64, f64)) -> Result<(GeoTransform, (usize, usize)), DsmError> {
+pub(crate) fn snapped(b: MapBounds, (width, height): (f64, f64)) -> Result<(GeoTransform, (usize, usize)), DsmError> {
     // Slightly inside, so that bounds on the lattice do not gain a cell by rounding.
     let down = |v: f64, side: f64| ((v + 1e-6 * side) / side).floor() * side;
     let up = |v: f64, side: f64| ((v / side) - 1e-6).ceil() * side;

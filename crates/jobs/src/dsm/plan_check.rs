@@ -6,21 +6,24 @@
 //! levels and memory with the windows, steps with the cameras. What remains are measurements that
 //! nothing else in the plan tells, such as noise. They are bounded.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use camera::{ImageCorrection, RpcCamera};
 use crs::MapProjection;
 use geodesy::{LonLatHeight, metres_per_degree};
+use io::raster::iso_time;
 use raster::Window;
 
 use crate::dsm::character::ImageCharacter;
 use crate::dsm::chunk_plan::{ChunkSweep, ChunkWork};
-use crate::dsm::chunk_side::with_rim;
-use crate::dsm::grid::{CELLS_MAX, DsmGrid};
+use crate::dsm::chunk_side::{MARGIN_PX, aligned, with_rim};
+use crate::dsm::grid::{CELLS_MAX, DsmGrid, snapped};
+use crate::dsm::image_windows::GroundBox;
 use crate::dsm::images::SceneImage;
 use crate::dsm::levels::{PYRAMID_LEVELS_MAX, choose_levels, smallest_sides};
 use crate::dsm::memory;
 use crate::dsm::open::Opened;
+use crate::dsm::order::sort_by_content;
 use crate::dsm::plan::{Plan, PlanReport};
 use crate::dsm::report::{PointingReport, ReferenceReport};
 use crate::dsm::values::{HeightRange, ImagePair};
@@ -44,6 +47,8 @@ const REACH_MAX_PX: f64 = 1e7;
 /// degrees, where the latitude of the middle of a scene counts, the length of degrees elsewhere.
 const CELL_TOLERANCE: f64 = 1e-6;
 const CELL_TOLERANCE_DEGREES: f64 = 0.1;
+/// Share of a cell by which the corner of a grid may miss the lattice: rounding.
+const LATTICE_TOLERANCE: f64 = 1e-3;
 /// Height step of a plan over what the pairs used need. The widest pair of the scene, which counts,
 /// may be used by no chunk, and has up to a hundred times the parallax of the narrowest. The other
 /// way it is the same pair at another place.
@@ -87,7 +92,10 @@ impl Plan {
         self.check_division()?;
         for (index, chunk) in self.chunks.iter().enumerate() {
             if let ChunkWork::Sweep(sweep) = &chunk.work {
-                sweep.check(self, chunk.core).map_err(|text| format!("chunk {index}: {text}"))?;
+                sweep
+                    .check(self, chunk.core)
+                    .and_then(|()| sweep.check_windows(self, &projection))
+                    .map_err(|text| format!("chunk {index}: {text}"))?;
             }
         }
         self.check_steps(&projection)?;
@@ -126,8 +134,12 @@ impl Plan {
             })?;
             image.check().map_err(|text| format!("{text}: {}", image.path.display()))?;
         }
+        let mut sorted = self.images.clone();
+        sort_by_content(&mut sorted);
+        ensure(sorted == self.images, || "its images are not in the order of their content".to_owned())?;
         self.characters.iter().try_for_each(ImageCharacter::check)?;
-        ensure(self.useful.len() <= n * n, || format!("it has {} useful pairs of {n} images", self.useful.len()))?;
+        let different: BTreeSet<&ImagePair> = self.useful.iter().collect();
+        ensure_count("useful pairs", self.useful.len(), different.len())?;
         self.useful.iter().try_for_each(|pair| {
             ensure(pair.first < pair.second && pair.second < n, || format!("the pair {pair} is none of {n} images"))
         })
@@ -138,6 +150,15 @@ impl Plan {
         let (grid, config) = (&self.grid, &self.config);
         ensure(config.gsd_m.is_none_or(|gsd_m| gsd_m == grid.gsd_m), || {
             format!("cells are {} m wide, asked for are {:?} m", grid.gsd_m, config.gsd_m)
+        })?;
+        let [x, width, _, y, _, height] = grid.geotransform.0;
+        let is_whole = |at: f64, side: f64| ((at / side).round() * side - at).abs() <= LATTICE_TOLERANCE * side.abs();
+        ensure(is_whole(x, width) && is_whole(y, height), || {
+            format!("the corner {x}, {y} of the grid is no whole multiple of its cells")
+        })?;
+        let asked = config.bounds.map(|bounds| snapped(bounds, (width, -height))).transpose();
+        ensure(asked.is_ok_and(|asked| asked.is_none_or(|asked| asked == (grid.geotransform, grid.size))), || {
+            format!("the grid {:?} is not that of the bounds in the configuration", grid.bounds().to_array())
         })?;
         ensure(config.crs_epsg.is_none_or(|code| code == grid.epsg), || {
             format!("the grid has EPSG:{}, asked for is {:?}", grid.epsg, config.crs_epsg)
@@ -289,6 +310,27 @@ impl ChunkSweep {
         ensure(least_mb <= limit_mb, || format!("takes at least {least_mb} MB, allowed are {limit_mb} MB"))
     }
 
+    /// Compares the windows with the pixels that show the cells. The last digit of a projection may
+    /// differ between machines, and with it the pixel at which a window ends.
+    fn check_windows(&self, plan: &Plan, projection: &MapProjection) -> Checked {
+        let ground = GroundBox::new(&plan.grid.part(self.extent), projection, self.height_range);
+        let ground = ground.map_err(|e| e.to_string())?;
+        for (i, (image, window)) in plan.images.iter().zip(&self.windows).enumerate() {
+            let is_used = !self.sources[i].is_empty() || self.sources.iter().any(|sources| sources.contains(&i));
+            let is_whole = plan.chunk_side.is_none() && *window == Some(image.whole());
+            if is_whole || (!is_used && window.is_none()) {
+                continue;
+            }
+            let mut is_expected = false;
+            for margin in [MARGIN_PX, MARGIN_PX - 1, MARGIN_PX + 1] {
+                let span = ground.span_in(image, margin).map_err(|e| e.to_string())?;
+                is_expected |= aligned(span).intersection(&image.whole()) == *window;
+            }
+            ensure(is_expected, || format!("reads {window:?} of image {i}, which is not what shows its cells"))?;
+        }
+        Ok(())
+    }
+
     fn check_sources(&self, plan: &Plan) -> Checked {
         let n = plan.images.len();
         ensure_count("windows", self.windows.len(), n)?;
@@ -321,8 +363,9 @@ impl PlanReport {
         for image in &plan.images {
             let told = &self.images[image.number];
             let is_same = told.path == image.path && told.size == image.size;
-            ensure(is_same && told.applied_correction == image.camera.correction, || {
-                format!("the report names another image or correction than the plan: {}", told.path.display())
+            let is_dated = told.acquired == image.acquired_s.and_then(iso_time) && told.sun == image.sun;
+            ensure(is_same && is_dated && told.applied_correction == image.camera.correction, || {
+                format!("the report names another image, date or correction than the plan: {}", told.path.display())
             })?;
         }
         for pair in &self.pairs {
