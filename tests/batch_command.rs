@@ -111,6 +111,47 @@ fn states(report: &Value) -> Vec<(String, String, String, String)> {
     scenes.flat_map(of_scene).collect()
 }
 
+/// Times and warnings of the tasks that are complete, by scene and task.
+fn courses(report: &Value) -> BTreeMap<String, (f64, Vec<String>)> {
+    let mut found = BTreeMap::new();
+    for scene in report["scenes"].as_array().unwrap() {
+        for task in scene["tasks"].as_array().unwrap() {
+            if task["state"] == "done" || task["state"] == "done_before" {
+                let warnings = task["warnings"].as_array().into_iter().flatten();
+                let warnings = warnings.map(|warning| warning.as_str().unwrap().to_owned()).collect();
+                let name = format!("{} {}", scene["name"], task["task"]);
+                found.insert(name, (task["seconds"].as_f64().unwrap(), warnings));
+            }
+        }
+    }
+    found
+}
+
+/// Truncates, changes and deletes products of a batch that is done, and runs it again.
+fn damaged_products_are_made_again(file: &Path, night: &Path, expected: &BTreeMap<PathBuf, Vec<u8>>) {
+    let damage = |name: &str, change: &dyn Fn(&mut Vec<u8>)| {
+        let path = night.join(name);
+        let mut bytes = std::fs::read(&path).unwrap();
+        change(&mut bytes);
+        std::fs::write(&path, bytes).unwrap();
+    };
+    damage("part 0/dsm/dsm.tif", &|bytes| bytes.truncate(bytes.len() / 2));
+    damage("part 1/dsm/source.tif", &|bytes| bytes.last_mut().into_iter().for_each(|last| *last ^= 1));
+    damage("part 2/report/report.html", &Vec::clear);
+    damage("chunks/heightmap.tif", &|bytes| bytes[1000] ^= 1);
+    for gone in ["part 3/dsm/dsm.tif", "part 4/stac/item.json", "both/eval/report.html", "both/ortho/ortho_mask.tif"] {
+        std::fs::remove_file(night.join(gone)).unwrap();
+    }
+    let report = run(file, 1);
+    let states = states(&report);
+    let again: Vec<_> = states.iter().filter(|s| s.2 == "done").map(|s| format!("{} {}", s.0, s.1)).collect();
+    let wanted =
+        ["both ortho", "both eval", "chunks heightmap", "part 0 dsm", "part 1 dsm", "part 2 dsm", "part 3 dsm"];
+    assert_eq!(again, [&wanted[..], &["part 4 dsm"]].concat(), "{report}");
+    assert_eq!(states.iter().filter(|s| s.2 == "done_before").count(), 5, "{report}");
+    assert!(products(night) == *expected && night.join("both/eval/report.html").is_file());
+}
+
 /// Names and contents of all files of a batch but those that hold times.
 fn products(output: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
@@ -202,6 +243,10 @@ fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
     // Once more: what is complete is left alone.
     let again = run(&file, 1);
     assert_eq!(states(&again).iter().filter(|state| state.2 == "done_before").count(), 13, "{again}");
+    let courses = courses(&report);
+    assert!(courses.values().any(|(_, warnings)| !warnings.is_empty()), "{report}");
+    assert_eq!(self::courses(&again), courses, "times and warnings are those of the run that did the task");
+    damaged_products_are_made_again(&file, &night, &expected_bytes);
 
     std::fs::remove_dir_all(&night).unwrap();
     let moments = RandomByIndex::new(18, 1);
@@ -263,6 +308,27 @@ fn results_that_the_batch_did_not_make_stay() {
         assert_eq!(std::fs::read_to_string(&place).unwrap(), "precious");
         std::fs::remove_dir_all(folder.path().join("out")).unwrap();
     }
+}
+
+/// The automatic report of an evaluation may be missing; that of a task may not.
+#[test]
+fn a_task_that_cannot_write_its_result_is_failed() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("batch.toml");
+    let town = sample("");
+    let text = format!(
+        "output = 'out'\n[[scene]]\nname = 'a'\nimages = ['{0}/view_1.tif', '{0}/view_3.tif']\ntasks = ['dsm', 'eval']\n\
+         bounds = [693812.0, 4822332.0, 693912.0, 4822432.0]\ndsm = {{ gsd_m = 2.0, preset = 'fast' }}\n\
+         eval.reference = '{0}/truth/dsm.tif'\n",
+        town.display()
+    );
+    std::fs::write(&file, text).unwrap();
+    let page = folder.path().join("out/a/eval/report.html");
+    std::fs::create_dir_all(page.parent().unwrap()).unwrap();
+    std::fs::write(&page, "precious").unwrap();
+    let states = states(&run(&file, 1));
+    assert!(states[0].2 == "done" && states[1].2 == "failed" && states[1].3.contains("report.html"), "{states:?}");
+    assert_eq!(std::fs::read_to_string(&page).unwrap(), "precious");
 }
 
 #[test]

@@ -8,10 +8,16 @@
 
 mod common;
 
-use std::path::Path;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::sample;
+use common::{sample, skysweep};
+use jobs::dsm::DsmConfig;
+use jobs::production::{PlanEstimate, PlanFile};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 
 /// Address space of a command, kilobytes.
 const MEMORY_KB: u32 = 3_000_000;
@@ -154,4 +160,156 @@ fn a_lost_standard_error_does_not_stop_the_work() {
         assert_eq!(run.status.code(), Some(0), "{redirections} {progress}");
         assert!(out.join("report/report.json").is_file());
     }
+}
+
+/// Forged plans that are computed and merged by the command, of those that are read, unless
+/// `SKYSWEEP_FORGED=all`.
+const COMPUTED: usize = 24;
+/// Parts of a plan that are measured or asked for, and that nothing else in the plan tells.
+const MEASURED: [&str; 6] =
+    ["/plan/config", "/plan/characters", "/height_range", "/plan/step_m", "/plan/pixel_m", "/plan/report/pointing"];
+/// Elements at both ends of an array that are forged.
+const ENDS: usize = 1;
+
+/// What one value of a plan may be replaced by, of which a third is tried for each value, unless
+/// `SKYSWEEP_FORGED=all`.
+fn forgeries_of(value: &Value) -> Vec<Value> {
+    match value {
+        Value::Number(number) => {
+            let own = number.as_f64().unwrap();
+            let others = [0.0, -1.0, 1e18, 1e-9, own + 0.5, -own, 2.0 * own, own + 1.0].into_iter();
+            let numbers = others.map(|other| if number.is_f64() { json!(other) } else { json!(other as i128 as i64) });
+            numbers.chain([Value::Null, json!(u64::MAX)]).filter(|other| other != value).collect()
+        }
+        Value::Array(all) => {
+            let reversed: Vec<&Value> = all.iter().rev().collect();
+            [json!([]), json!([&all[..], &all[..]].concat()), json!(reversed)]
+                .into_iter()
+                .filter(|v| v != value)
+                .collect()
+        }
+        Value::String(text) => vec![json!(""), json!(format!("{text}/../x"))],
+        Value::Bool(flag) => vec![json!(!flag)],
+        Value::Null => vec![json!(0), json!([1e18, -1e18])],
+        Value::Object(_) => vec![json!({})],
+    }
+}
+
+/// Collects the place (a JSON pointer) and the new value of every forgery of a plan.
+fn forge(value: &Value, place: &str, is_all: bool, found: &mut Vec<(String, Value)>) {
+    let others = forgeries_of(value);
+    let every = if is_all { 1 } else { 3 };
+    let first = found.len() % every.min(others.len().max(1));
+    found.extend(others.into_iter().skip(first).step_by(every).map(|other| (place.to_owned(), other)));
+    match value {
+        Value::Array(all) => {
+            for (i, inner) in all.iter().enumerate().filter(|(i, _)| *i < ENDS || i + ENDS >= all.len()) {
+                forge(inner, &format!("{place}/{i}"), is_all, found);
+            }
+        }
+        Value::Object(all) => {
+            all.iter().for_each(|(key, inner)| forge(inner, &format!("{place}/{key}"), is_all, found))
+        }
+        _ => {}
+    }
+}
+
+/// Writes a forged plan with the identity, the estimate and the configuration that belong to it, as
+/// one who knows the program would. One that is no plan any more is written as it is.
+fn write_forged(folder: &Path, good: &Value, (place, other): &(String, Value)) {
+    let mut forged = good.clone();
+    *forged.pointer_mut(place).unwrap() = other.clone();
+    if let Ok(mut file) = serde_json::from_value::<PlanFile>(forged.clone()) {
+        if !place.starts_with("/estimate") {
+            file.estimate = PlanEstimate::of(&file.plan);
+        }
+        // The identity does not hold what leaves the surface as it is.
+        let mut plan = file.plan.clone();
+        let plain = DsmConfig::new(Vec::new(), PathBuf::new());
+        (plan.config.products, plan.config.threads) = (plain.products, plain.threads);
+        (plan.config.tile, plan.config.overwrite) = (plain.tile, plain.overwrite);
+        let inputs: Vec<_> = file.inputs.iter().map(|input| (&input.path, &input.sha256)).collect();
+        let digest = Sha256::digest(serde_json::to_vec(&(inputs, &plan)).unwrap());
+        if place != "/id" {
+            file.id = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        }
+        if let Ok(text) = toml::to_string_pretty(&file.plan.config) {
+            std::fs::write(folder.join("used_config.toml"), text).unwrap();
+        }
+        forged = serde_json::to_value(&file).unwrap();
+    }
+    std::fs::write(folder.join("plan.json"), serde_json::to_vec_pretty(&forged).unwrap()).unwrap();
+}
+
+/// Computes and merges a plan with limited memory; returns the last exit code and what was told.
+fn computed(folder: &Path) -> (i32, String) {
+    for arguments in [&["run"][..], &["merge", "--overwrite"]] {
+        let run = bounded(&[arguments, &[text(folder), "-q"]].concat(), "");
+        let told = String::from_utf8_lossy(&run.stderr).into_owned();
+        let code = run.status.code().unwrap_or(-1);
+        if code != 0 {
+            return (code, told);
+        }
+    }
+    (0, String::new())
+}
+
+/// A plan is trusted by all that follows it. Every value of a small one is replaced in turn, and
+/// the plan is signed anew.
+#[test]
+fn forged_plans_are_refused_or_computed_and_nothing_breaks() {
+    let is_all = std::env::var("SKYSWEEP_FORGED").is_ok_and(|value| value == "all");
+    let root = tempfile::tempdir().unwrap();
+    let folder = |name: &str| root.path().join(name);
+    let mut command = skysweep();
+    command.arg("plan").args(["view_1.tif", "view_3.tif"].map(sample)).arg("-o").arg(folder("good"));
+    command.args(["--bounds", "693812", "4822332", "694012", "4822632", "--gsd", "2", "--preset", "fast"]);
+    command.args(["--chunk", "128", "-q"]).assert().code(0);
+    assert_eq!(computed(&folder("good")), (0, String::new()));
+    let surface = |folder: PathBuf| std::fs::read(folder.join("dsm/dsm.tif")).unwrap();
+    let expected = surface(folder("good"));
+    let good: Value = serde_json::from_slice(&std::fs::read(folder("good").join("plan.json")).unwrap()).unwrap();
+    let mut forged = Vec::new();
+    forge(&good, "", is_all, &mut forged);
+    assert!(forged.len() >= 150, "{}", forged.len());
+    let place = |i: usize| folder(&format!("forged_{i}"));
+    // Whether the plan is read; an error for one that breaks the reader.
+    let is_read = |i: usize| {
+        std::fs::create_dir(place(i)).unwrap();
+        write_forged(&place(i), &good, &forged[i]);
+        let read = catch_unwind(AssertUnwindSafe(|| PlanFile::read(&place(i)).map(|file| file.text())));
+        read.map_or_else(|_| Err(format!("{:?} breaks the reader", forged[i])), |read| Ok(read.is_ok()))
+    };
+    let read: Vec<Result<bool, String>> = (0..forged.len()).into_par_iter().map(is_read).collect();
+    let mut broken: Vec<String> = read.iter().filter_map(|read| read.clone().err()).collect();
+    let read: Vec<usize> = (0..forged.len()).filter(|i| read[*i] == Ok(true)).collect();
+    let every = if is_all { 1 } else { read.len().div_ceil(COMPUTED).max(1) };
+    let chosen: Vec<usize> = read.iter().copied().step_by(every).collect();
+    let ended: Vec<(usize, i32, String)> = chosen
+        .par_iter()
+        .map(|&i| {
+            let (code, told) = computed(&place(i));
+            (i, code, told)
+        })
+        .collect();
+    let is_whole = |code: i32, told: &str| {
+        (0..=2).contains(&code) && !told.contains("panicked") && (code == 0 || told.contains("error: "))
+    };
+    broken.extend(
+        ended.iter().filter(|(_, code, told)| !is_whole(*code, told)).map(|e| format!("{:?} {e:?}", forged[e.0])),
+    );
+    let is_other = |(i, code, _): &&(usize, i32, String)| *code == 0 && surface(place(*i)) != expected;
+    let other: Vec<_> = ended.iter().filter(is_other).map(|(i, ..)| &forged[*i]).collect();
+    println!(
+        "forged {}: refused when read {}; computed {}: refused {}, another surface {}: {other:?}",
+        forged.len(),
+        forged.len() - read.len() - broken.len(),
+        ended.len(),
+        ended.iter().filter(|(_, code, _)| *code != 0).count(),
+        other.len(),
+    );
+    assert!(broken.is_empty(), "{broken:#?}");
+    // Measurements that nothing else in the plan tells. Whoever changes them asks for another surface.
+    let is_measured = |place: &str| MEASURED.iter().any(|part| place.contains(part));
+    assert!(other.iter().all(|(place, _)| is_measured(place)), "{other:?}");
 }

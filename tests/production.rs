@@ -9,7 +9,9 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use common::{sample, skysweep};
-use numeric::RandomByIndex;
+use jobs::dsm::{ChunkContent, ChunkResult, ChunkSurface, merge};
+use jobs::production::PlanFile;
+use numeric::{RandomByIndex, Silent};
 use predicates::prelude::*;
 use serde_json::Value;
 
@@ -384,6 +386,71 @@ fn an_array_job_is_resumed_after_a_change() {
     let dsm = io::raster::read_dem(folder.path().join("run/dsm/dsm.tif")).unwrap();
     assert_eq!(dsm.geotransform.0[1], 2.5);
     assert!(temporary(folder.path()).is_empty(), "{:?}", temporary(folder.path()));
+}
+
+/// A result of a chunk that was truncated, changed or deleted is never merged.
+#[test]
+fn damaged_chunks_are_named_and_computed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    plan(folder.path(), "run", &[]);
+    run("run", &["run", "-q"], folder.path(), 0);
+    let chunk = |index: usize| folder.path().join(format!("run/chunks/{index:04}/result"));
+    let height = chunk(1).join("height.npy");
+    let bytes = std::fs::read(&height).unwrap();
+    std::fs::write(&height, &bytes[..bytes.len() - 4]).unwrap();
+    let told = run("merge", &["run", "-q"], folder.path(), 2).1;
+    assert!(told.contains("chunk 1") && told.contains("height.npy") && told.contains("bytes, expected"), "{told}");
+    let (out, _) = run("merge", &["run", "--partial", "--json"], folder.path(), 1);
+    let report: Value = serde_json::from_str(&out).unwrap();
+    let reason = report["chunks"]["failed"][0]["reason"].as_str().unwrap();
+    assert!(reason.contains("damaged") && reason.contains("height.npy"), "{report}");
+    let mut turned = std::fs::read(chunk(2).join("height.npy")).unwrap();
+    *turned.last_mut().unwrap() ^= 64;
+    std::fs::write(chunk(2).join("height.npy"), turned).unwrap();
+    std::fs::remove_dir_all(chunk(3)).unwrap();
+    let (out, told) = run("run", &["run", "--json"], folder.path(), 0);
+    let report: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((&report["computed"], &report["done_before"]), (&3.into(), &1.into()), "{report}");
+    assert!(["chunk 1", "chunk 2", "chunk 3"].iter().all(|name| told.contains(name)), "{told}");
+    run("merge", &["run", "-q", "--overwrite"], folder.path(), 0);
+    assert!(products(&folder.path().join("run")) == *EXPECTED);
+}
+
+/// Results that another program made, or a defect of ours, are no surface.
+#[test]
+fn heights_that_are_not_finite_or_were_never_searched_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    plan(folder.path(), "run", &[]);
+    run("run", &["run", "-q"], folder.path(), 0);
+    let mut plan = PlanFile::read(&folder.path().join("run")).unwrap().plan;
+    plan.config.output = folder.path().join("merged");
+    let place = |index: usize| folder.path().join(format!("run/chunks/{index:04}/result"));
+    let merged = |change: &dyn Fn(&mut ChunkSurface)| {
+        let results = (0..plan.chunks.len()).map(|index| {
+            let mut result = ChunkResult::read(&place(index))?;
+            if let (2, ChunkContent::Surface(surface)) = (index, &mut result.content) {
+                change(surface);
+            }
+            Ok(result)
+        });
+        merge(&plan, results, &Silent).map(|_| ()).map_err(|error| error.to_string())
+    };
+    let set = |height_m: f32| {
+        move |surface: &mut ChunkSurface| {
+            let observed = surface.rasters.filled.data().iter().position(|mark| *mark == 0).unwrap();
+            surface.rasters.height_m.data_mut()[observed] = height_m;
+        }
+    };
+    for (height_m, found) in [(f32::INFINITY, "inf m"), (f32::NAN, "NaN m"), (5000.0, "m, expected heights from")] {
+        let told = merged(&set(height_m)).unwrap_err();
+        assert!(told.contains("chunk 2") && told.contains(found) && told.contains("compute it again"), "{told}");
+    }
+    let told = merged(&|surface| surface.counts.void += 1).unwrap_err();
+    assert!(told.contains("void") && told.contains("chunk 2"), "{told}");
+    let told = merged(&|surface| surface.height_range.high_m += 1.0).unwrap_err();
+    assert!(told.contains("expected heights from"), "{told}");
+    assert!(!folder.path().join("merged/dsm").exists());
+    merged(&|_| {}).unwrap();
 }
 
 #[test]

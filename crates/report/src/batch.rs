@@ -27,6 +27,8 @@ pub struct BatchRow {
     pub seconds: f64,
     /// Why it is not complete; empty when it is.
     pub reason: String,
+    /// Warnings that it gave.
+    pub warnings: Vec<String>,
 }
 
 impl BatchPage {
@@ -35,9 +37,16 @@ impl BatchPage {
         let cards = [(self.complete.to_string(), "tasks complete"), (self.incomplete.to_string(), "tasks incomplete")];
         let rows = self.rows.iter().map(|row| {
             let seconds = format!("{:.1} s", row.seconds);
-            vec![row.scene.clone(), row.task.clone(), row.state.clone(), seconds, row.reason.clone()]
+            vec![
+                row.scene.clone(),
+                row.task.clone(),
+                row.state.clone(),
+                seconds,
+                row.reason.clone(),
+                row.warnings.join("; "),
+            ]
         });
-        let tasks = table("Tasks", &["scene", "task", "state", "time", "reason"], rows);
+        let tasks = table("Tasks", &["scene", "task", "state", "time", "reason", "warnings"], rows);
         page("Batch", &format!("<h1>Batch</h1>{}{tasks}", cards_of(&cards)))
     }
 }
@@ -54,8 +63,15 @@ mod tests {
             state: "failed".to_owned(),
             seconds: 1.25,
             reason: "a & b".to_owned(),
+            warnings: vec!["<i>".to_owned(), "c".to_owned()],
         };
         let html = BatchPage { complete: 0, incomplete: 1, rows: vec![row] }.html();
-        assert!(html.contains("&lt;b&gt;") && html.contains("a &amp; b") && html.contains("1.2 s"), "{html}");
+        assert!(
+            html.contains("&lt;b&gt;")
+                && html.contains("a &amp; b")
+                && html.contains("1.2 s")
+                && html.contains("&lt;i&gt;; c"),
+            "{html}"
+        );
     }
 }

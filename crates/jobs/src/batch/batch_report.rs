@@ -44,10 +44,13 @@ pub struct TaskReport {
     /// Why it is not done.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Times that it was tried in this run.
+    /// Times that it was tried in the run that did it.
     pub attempts: usize,
-    /// Wall time of this run, seconds.
+    /// Wall time of the run that did it, seconds.
     pub seconds: f64,
+    /// Warnings of the run that did it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// How a task ended.
@@ -86,7 +89,8 @@ impl TaskState {
 
 impl TaskReport {
     pub(super) fn not_begun(task: TaskKind, reason: impl Into<String>) -> Self {
-        Self { task, state: TaskState::NotBegun, reason: Some(reason.into()), attempts: 0, seconds: 0.0 }
+        let reason = Some(reason.into());
+        Self { task, state: TaskState::NotBegun, reason, attempts: 0, seconds: 0.0, warnings: Vec::new() }
     }
 }
 
@@ -107,6 +111,9 @@ impl BatchReport {
                 let reason = task.reason.as_ref().map_or_else(String::new, |reason| format!(": {reason}"));
                 let (name, words) = (task.task.name(), task.state.words());
                 text += &format!("{:<20} {name:<10} {words:<12} {:>8.1} s{reason}\n", scene.name, task.seconds);
+                for warning in &task.warnings {
+                    text += &format!("{:<20} {name:<10} warning: {warning}\n", scene.name);
+                }
             }
         }
         text + &format!("{} tasks are complete, {} are not\n", self.complete, self.incomplete)
@@ -121,6 +128,7 @@ impl BatchReport {
                 state: task.state.words().to_owned(),
                 seconds: task.seconds,
                 reason: task.reason.clone().unwrap_or_default(),
+                warnings: task.warnings.clone(),
             })
         });
         BatchPage { complete: self.complete, incomplete: self.incomplete, rows: rows.collect() }.html()

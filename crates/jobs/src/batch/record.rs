@@ -10,7 +10,7 @@ use crate::batch::task::TaskJob;
 use crate::dsm::files_of;
 use crate::error_text::with_causes;
 use crate::files::{TEXT_LIMIT, write_json};
-use crate::production::{InputFile, added_input, check_inputs, inputs_of};
+use crate::production::{InputFile, ProductFile, added_input, check_inputs, inputs_of};
 
 /// The record of a task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,6 +21,35 @@ pub(super) struct TaskRecord {
     pub(super) is_done: bool,
     /// Files that the task read.
     pub(super) inputs: Vec<InputFile>,
+    /// Files that the task made, relative to the folder of the scene. A record without any proves
+    /// nothing.
+    #[serde(default)]
+    pub(super) products: Vec<ProductFile>,
+    /// How the task went.
+    #[serde(default)]
+    pub(super) course: TaskCourse,
+}
+
+/// How a task went, for the reports of later runs of the batch.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct TaskCourse {
+    /// Wall time, seconds.
+    pub(super) seconds: f64,
+    /// Times that it was tried.
+    pub(super) attempts: usize,
+    /// Warnings that it gave.
+    pub(super) warnings: Vec<String>,
+}
+
+/// What a record says of a task that is to be done.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Standing {
+    /// It is done, and settings, inputs and products are as they were.
+    Complete,
+    /// It was never done to the end, or settings or inputs have changed since.
+    Open,
+    /// It was done, and a product is no longer as it was written: the product and what is wrong.
+    Damaged(String),
 }
 
 impl TaskRecord {
@@ -29,7 +58,13 @@ impl TaskRecord {
     /// # Errors
     /// A text for an input that cannot be read.
     pub(super) fn begin(job: &TaskJob) -> Result<Self, String> {
-        Ok(Self { key: key_of(job)?, is_done: false, inputs: inputs_of_job(job)? })
+        Ok(Self {
+            key: key_of(job)?,
+            is_done: false,
+            inputs: inputs_of_job(job)?,
+            products: Vec::new(),
+            course: TaskCourse::default(),
+        })
     }
 
     /// Reads a record; `None` when there is none.
@@ -45,13 +80,35 @@ impl TaskRecord {
         write_json(path, self, true).map_err(|e| with_causes(&e))
     }
 
-    /// Whether the task is done, and neither its settings nor its inputs have changed since.
-    pub(super) fn is_current(&self, job: &TaskJob) -> bool {
-        self.is_done
+    /// Notes that the task is done: its products in the folder of the scene, with their hashes.
+    ///
+    /// # Errors
+    /// A text for a product that is missing or cannot be read.
+    pub(super) fn finish(&mut self, job: &TaskJob, scene: &Path, course: TaskCourse) -> Result<(), String> {
+        if let Some(missing) = job.needed().into_iter().find(|path| path.symlink_metadata().is_err()) {
+            return Err(format!("the task ended without its result: {} is missing", missing.display()));
+        }
+        let inside = |path: PathBuf| path.strip_prefix(scene).map(Path::to_owned).unwrap_or(path);
+        let places: Vec<PathBuf> = job.places().into_iter().map(inside).collect();
+        self.products = ProductFile::all_of(scene, &places).map_err(|e| with_causes(&e))?;
+        self.course = course;
+        self.is_done = true;
+        Ok(())
+    }
+
+    /// Returns how the task stands: whether it is done, and settings, inputs and products are as
+    /// they were.
+    pub(super) fn standing(&self, job: &TaskJob, scene: &Path) -> Standing {
+        let is_as_asked = self.is_done
             && key_of(job).is_ok_and(|key| key == self.key)
             && check_inputs(&self.inputs).is_ok()
             && files_of_images(job).is_ok_and(|files| added_input(&files, &self.inputs).is_none())
-            && job.product().exists()
+            && !self.products.is_empty();
+        match ProductFile::damage(scene, &self.products) {
+            _ if !is_as_asked => Standing::Open,
+            Some(what) => Standing::Damaged(what),
+            None => Standing::Complete,
+        }
     }
 }
 

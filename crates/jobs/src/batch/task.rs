@@ -11,7 +11,7 @@ use toml::{Table, Value};
 use crate::camera_stand::{StandConfig, StandSource};
 use crate::dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
 use crate::error_text::with_causes;
-use crate::eval::GridEvalConfig;
+use crate::eval::{EvalTarget, GridEvalConfig};
 use crate::heightmap::HeightMapConfig;
 use crate::job_file::{JobFileError, defect};
 use crate::job_paths::resolved;
@@ -94,6 +94,21 @@ pub struct TaskSettings<'a> {
     pub own: &'a Table,
 }
 
+/// What a job that ran to its end left.
+#[derive(Debug, Default)]
+pub(super) struct TaskOutcome {
+    /// What is missing from the result; `None` when it is whole.
+    pub(super) missing: Option<String>,
+    /// Warnings that the report of the result holds.
+    pub(super) warnings: Vec<String>,
+}
+
+impl TaskOutcome {
+    fn whole_unless(missing: Option<String>) -> Self {
+        Self { missing, warnings: Vec::new() }
+    }
+}
+
 /// The scene that a task works on.
 #[derive(Debug, Clone)]
 pub(super) struct TaskScene<'a> {
@@ -150,7 +165,10 @@ impl TaskJob {
                 Self::Ortho(with(&OrthoConfig::new(images, folder, output), &given)?)
             }
             TaskKind::Eval => {
-                Self::Eval(Box::new(with(&GridEvalConfig::new(folder.join("dsm/dsm.tif"), PathBuf::new()), &given)?))
+                let mut base = GridEvalConfig::new(folder.join("dsm/dsm.tif"), PathBuf::new());
+                // A report that is asked for is an error when it cannot be written.
+                base.target = EvalTarget::Folder(folder.join("eval"));
+                Self::Eval(Box::new(with(&base, &given)?))
             }
             TaskKind::HeightMap => Self::HeightMap(Box::new(height_map(&folder, &given)?)),
             TaskKind::Priors => {
@@ -194,6 +212,29 @@ impl TaskJob {
         }
     }
 
+    /// Files and folders without which the task is not done.
+    pub(super) fn needed(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Dsm(config) => FILES.iter().map(|name| config.output.join(name)).collect(),
+            Self::Ortho(config) => vec![config.output.clone(), config.mask()],
+            Self::Eval(_) => vec![self.product(), self.product().with_extension("html")],
+            _ => vec![self.product()],
+        }
+    }
+
+    /// Files and folders that hold all that the task makes.
+    pub(super) fn places(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Dsm(config) => {
+                let products = (!config.products.is_empty()).then_some("products");
+                let names = FILES.into_iter().chain([PLAN, POINTING]).chain(products);
+                names.map(|name| config.output.join(name)).collect()
+            }
+            Self::Eval(_) => self.product().parent().map(Path::to_owned).into_iter().collect(),
+            _ => self.needed(),
+        }
+    }
+
     /// The kind of the task.
     pub(super) const fn kind(&self) -> TaskKind {
         match self {
@@ -231,38 +272,45 @@ impl TaskJob {
         (*own_threads, *own_overwrite) = (threads, overwrite);
     }
 
-    /// Runs the job. The text says what is missing from a result that is there, but not whole.
+    /// Runs the job.
     ///
     /// # Errors
     /// The reason why there is no result.
-    pub(super) fn run(&self, progress: &dyn Progress) -> Result<Option<String>, String> {
-        match self {
+    pub(super) fn run(&self, progress: &dyn Progress) -> Result<TaskOutcome, String> {
+        let missing = match self {
             Self::Dsm(config) => {
                 let report = make_or_resume(config, progress).map_err(|e| with_causes(&e))?;
                 let failed = report.chunks.map_or(0, |chunks| chunks.failed.len());
-                Ok((failed > 0).then(|| format!("{failed} chunks could not be computed and are void")))
+                let missing = (failed > 0).then(|| format!("{failed} chunks could not be computed and are void"));
+                return Ok(TaskOutcome { missing, warnings: report.warnings });
             }
             Self::Ortho(config) => {
                 let folder = config.output.parent().unwrap_or(Path::new(""));
                 crate::guarded::check_folder(folder).map_err(|e| with_causes(&e))?;
                 crate::files::create_folder(folder).map_err(|e| with_causes(&e))?;
-                crate::ortho::run(config, progress).map(|_| None).map_err(|e| with_causes(&e))
+                crate::ortho::run(config, progress).map_err(|e| with_causes(&e))?;
+                None
             }
             Self::Eval(config) => {
                 let report = crate::eval::compare_grids(config, progress).map_err(|e| with_causes(&e))?;
                 let missed = report.missed();
-                Ok((!missed.is_empty()).then(|| missed.join("; ")))
+                (!missed.is_empty()).then(|| missed.join("; "))
             }
             Self::HeightMap(config) => {
                 let report = crate::heightmap::run(config, progress).map_err(|e| with_causes(&e))?;
-                let crate::heightmap::HeightMapReport::List(list) = report else { return Ok(None) };
-                Ok((list.failed > 0).then(|| format!("{} height maps could not be made", list.failed)))
+                match report {
+                    crate::heightmap::HeightMapReport::List(list) if list.failed > 0 => {
+                        Some(format!("{} height maps could not be made", list.failed))
+                    }
+                    _ => None,
+                }
             }
             Self::Priors(config) => {
                 let report = crate::priors::run(config, progress).map_err(|e| with_causes(&e))?;
-                Ok((!report.is_whole()).then(|| "objects of the model cannot be used or are not seen".to_owned()))
+                (!report.is_whole()).then(|| "objects of the model cannot be used or are not seen".to_owned())
             }
-        }
+        };
+        Ok(TaskOutcome::whole_unless(missing))
     }
 }
 

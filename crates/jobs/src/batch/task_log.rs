@@ -17,6 +17,8 @@ pub(super) struct TaskLog<'a, W> {
     task: &'a str,
     /// The current stage with the number of its steps, done and in all.
     stage: Mutex<(String, usize, usize)>,
+    /// Warnings since they were last taken.
+    warnings: Mutex<Vec<String>>,
     batch: &'a dyn Progress,
 }
 
@@ -32,7 +34,7 @@ pub(super) fn open<'a>(
     let file = File::options().create(true).append(true).open(folder.join(format!("{task}.jsonl")))?;
     // A log that cannot be written is no reason to lose the result.
     let lines = EventLines::new(move |line: &str| drop((&file).write_all(format!("{line}\n").as_bytes())));
-    Ok(TaskLog { lines, scene, task, stage: Mutex::default(), batch })
+    Ok(TaskLog { lines, scene, task, stage: Mutex::default(), warnings: Mutex::default(), batch })
 }
 
 impl<W: Fn(&str) + Sync> TaskLog<'_, W> {
@@ -41,6 +43,11 @@ impl<W: Fn(&str) + Sync> TaskLog<'_, W> {
         let error = reason.map(|reason| std::io::Error::other(reason.to_owned()));
         self.lines.finish(output, error.as_ref().map(|error| error as _));
         self.batch.part(self.scene, None);
+    }
+
+    /// Takes the warnings that were given since the last call.
+    pub(super) fn take_warnings(&self) -> Vec<String> {
+        self.warnings.lock().map(|mut warnings| std::mem::take(&mut *warnings)).unwrap_or_default()
     }
 
     /// Changes the stage and shows it.
@@ -69,6 +76,9 @@ impl<W: Fn(&str) + Sync> Progress for TaskLog<'_, W> {
 
     fn warn(&self, text: &str) {
         self.lines.warn(text);
+        if let Ok(mut warnings) = self.warnings.lock() {
+            warnings.push(text.to_owned());
+        }
     }
 
     fn is_cancelled(&self) -> bool {

@@ -7,9 +7,9 @@ use std::time::Instant;
 use numeric::Progress;
 
 use crate::batch::batch_report::{SceneReport, TaskReport, TaskState};
-use crate::batch::record::TaskRecord;
-use crate::batch::task::{TaskJob, TaskKind};
-use crate::batch::task_log;
+use crate::batch::record::{Standing, TaskCourse, TaskRecord};
+use crate::batch::task::{TaskJob, TaskKind, TaskOutcome};
+use crate::batch::task_log::{self, TaskLog};
 use crate::error_text::with_causes;
 use crate::files::create_folder;
 use crate::guarded;
@@ -42,12 +42,12 @@ pub(super) struct TaskLimits<'a> {
 struct Ended {
     state: TaskState,
     reason: Option<String>,
-    attempts: usize,
+    course: TaskCourse,
 }
 
 impl Ended {
     fn failed(reason: impl Into<String>) -> Self {
-        Self { state: TaskState::Failed, reason: Some(reason.into()), attempts: 0 }
+        Self { state: TaskState::Failed, reason: Some(reason.into()), course: TaskCourse::default() }
     }
 }
 
@@ -75,13 +75,12 @@ impl SceneJobs {
             if has_no_surface || limits.progress.is_cancelled() {
                 tasks.push(TaskReport::not_begun(job.kind(), "there is no surface model"));
             } else {
-                let since = Instant::now();
-                let Ended { state, reason, attempts } = self.work(job, limits);
+                let Ended { state, reason, course } = self.work(job, limits);
                 if let Some(reason) = &reason {
                     limits.progress.warn(&format!("{} {}: {reason}", self.name, job.kind().name()));
                 }
-                let seconds = since.elapsed().as_secs_f64();
-                tasks.push(TaskReport { task: job.kind(), state, reason, attempts, seconds });
+                let TaskCourse { seconds, attempts, warnings } = course;
+                tasks.push(TaskReport { task: job.kind(), state, reason, attempts, seconds, warnings });
             }
             limits.progress.step();
         }
@@ -89,6 +88,7 @@ impl SceneJobs {
     }
 
     fn work(&self, job: &TaskJob, limits: &TaskLimits<'_>) -> Ended {
+        let since = Instant::now();
         let made = create_folder(&self.folder).and_then(|()| guarded::make_folder(&self.folder, TASKS));
         let folder = match made {
             Ok(folder) => folder,
@@ -97,8 +97,16 @@ impl SceneJobs {
         let name = job.kind().name();
         let place = folder.join(format!("{name}.json"));
         let record = TaskRecord::read(&place);
-        if record.as_ref().is_some_and(|record| record.is_current(job)) {
-            return Ended { state: TaskState::DoneBefore, reason: None, attempts: 0 };
+        match record.as_ref().map(|record| record.standing(job, &self.folder)) {
+            Some(Standing::Complete) => {
+                let course = record.map(|record| record.course).unwrap_or_default();
+                return Ended { state: TaskState::DoneBefore, reason: None, course };
+            }
+            Some(Standing::Damaged(what)) => {
+                let task = format!("{} {name}", self.name);
+                limits.progress.warn(&format!("{task}: a result is damaged and made again: {what}"));
+            }
+            Some(Standing::Open) | None => {}
         }
         let log = match task_log::open(&folder, (&self.name, name), limits.progress) {
             Ok(log) => log,
@@ -109,7 +117,7 @@ impl SceneJobs {
         job.set_running(limits.threads, record.is_some());
         let mut ended = Ended::failed("it was not tried");
         for attempt in 1..=limits.retries + 1 {
-            ended = Ended { attempts: attempt, ..try_once(&job, &place, &log) };
+            ended = self.try_once(&job, &place, &log, (since, attempt));
             log.finish(&job.product(), ended.reason.as_deref());
             if ended.state != TaskState::Failed || limits.progress.is_cancelled() {
                 break;
@@ -118,29 +126,47 @@ impl SceneJobs {
         }
         ended
     }
-}
 
-/// Tries a task and keeps its record.
-fn try_once(job: &TaskJob, place: &Path, log: &dyn Progress) -> Ended {
-    let begun = TaskRecord::begin(job).and_then(|record| match job.refused() {
-        Some(reason) => Err(reason),
-        None => record.write(place).map(|()| record),
-    });
-    let mut record = match begun {
-        Ok(record) => record,
-        Err(reason) => return Ended::failed(reason),
-    };
-    // A defect of ours in one task is no reason to lose the night.
-    let result = catch_unwind(AssertUnwindSafe(|| job.run(log)));
-    match result.unwrap_or_else(|_| Err("the program has a defect; the log ends where it was met".to_owned())) {
-        Err(reason) => Ended::failed(reason),
-        Ok(Some(reason)) => Ended { state: TaskState::Partial, reason: Some(reason), attempts: 0 },
-        Ok(None) => {
-            record.is_done = true;
-            match record.write(place) {
-                Ok(()) => Ended { state: TaskState::Done, reason: None, attempts: 0 },
-                Err(reason) => Ended::failed(reason),
+    /// Tries a task and keeps its record. `since` is when it was first tried.
+    fn try_once<W: Fn(&str) + Sync>(
+        &self,
+        job: &TaskJob,
+        place: &Path,
+        log: &TaskLog<'_, W>,
+        (since, attempts): (Instant, usize),
+    ) -> Ended {
+        let begun = TaskRecord::begin(job).and_then(|record| match job.refused() {
+            Some(reason) => Err(reason),
+            None => record.write(place).map(|()| record),
+        });
+        let mut record = match begun {
+            Ok(record) => record,
+            Err(reason) => {
+                return Ended { course: TaskCourse { attempts, ..TaskCourse::default() }, ..Ended::failed(reason) };
             }
-        }
+        };
+        // A defect of ours in one task is no reason to lose the night.
+        let result = catch_unwind(AssertUnwindSafe(|| job.run(log)));
+        let result =
+            result.unwrap_or_else(|_| Err("the program has a defect; the log ends where it was met".to_owned()));
+        let mut warnings = log.take_warnings();
+        // A run that goes on with an earlier plan does not say again what the plan warned of.
+        let kept = result.iter().flat_map(|outcome| &outcome.warnings);
+        let forgotten: Vec<String> = kept.filter(|warning| !warnings.contains(warning)).cloned().collect();
+        warnings.splice(0..0, forgotten);
+        let course = TaskCourse { seconds: since.elapsed().as_secs_f64(), attempts, warnings };
+        let ended = match result {
+            Err(reason) => Ended::failed(reason),
+            Ok(TaskOutcome { missing: Some(reason), .. }) => {
+                Ended { state: TaskState::Partial, reason: Some(reason), course: TaskCourse::default() }
+            }
+            Ok(TaskOutcome { missing: None, .. }) => {
+                match record.finish(job, &self.folder, course.clone()).and_then(|()| record.write(place)) {
+                    Ok(()) => Ended { state: TaskState::Done, reason: None, course: TaskCourse::default() },
+                    Err(reason) => Ended::failed(reason),
+                }
+            }
+        };
+        Ended { course, ..ended }
     }
 }

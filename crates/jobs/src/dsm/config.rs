@@ -374,9 +374,11 @@ impl DsmConfig {
         let references = self.references.iter().flatten().map(|&position| (DsmSetting::References, position));
         match paired.chain(references).find(|(_, position)| *position >= n) {
             None => Ok(()),
-            Some((setting, bad)) => {
-                Err(DsmError::value(setting, (bad + 1).to_string(), format!("positions of images, 1 to {n}")))
-            }
+            Some((setting, bad)) => Err(DsmError::value(
+                setting,
+                bad.saturating_add(1).to_string(),
+                format!("positions of images, 1 to {n}"),
+            )),
         }
     }
 }

@@ -297,6 +297,19 @@ pub enum DsmError {
         /// Cause.
         reason: String,
     },
+    /// The result of a chunk cannot be one of the plan.
+    #[error(
+        "the result of chunk {index} cannot be one of the plan: found {found}, expected {expected}; remove the folder \
+         of the chunk and compute it again"
+    )]
+    ChunkContent {
+        /// Number of the chunk, counted from 0.
+        index: usize,
+        /// What was found.
+        found: String,
+        /// What was expected.
+        expected: String,
+    },
     /// The plan has no chunk of a number.
     #[error("the plan has {count} chunks and none with number {index}")]
     NoSuchChunk {

@@ -19,7 +19,7 @@ use crate::dsm::view_geometry::ViewGeometry;
 /// border of two UTM zones are written in either, and half a zone beyond it distorts by 2 in 1000.
 const FAR_OUTSIDE_DEG: f64 = 3.0;
 /// Grids of more cells than this come from a cell size or bounds in wrong units.
-const CELLS_MAX: f64 = 4e9;
+pub(crate) const CELLS_MAX: f64 = 4e9;
 
 /// The grid of a DSM.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -207,7 +207,7 @@ fn cell_of(projection: &MapProjection, gsd_m: f64, lat_deg: f64) -> (f64, f64) {
 
 /// Returns a north-up grid on whole multiples of the cell's width and height that holds the bounds:
 /// its geotransform, columns and rows.
-fn snapped(b: MapBounds, (width, height): (f64, f64)) -> Result<(GeoTransform, (usize, usize)), DsmError> {
+pub(crate) fn snapped(b: MapBounds, (width, height): (f64, f64)) -> Result<(GeoTransform, (usize, usize)), DsmError> {
     // Slightly inside, so that bounds on the lattice do not gain a cell by rounding.
     let down = |v: f64, side: f64| ((v + 1e-6 * side) / side).floor() * side;
     let up = |v: f64, side: f64| ((v / side) - 1e-6).ceil() * side;

@@ -14,7 +14,7 @@ const TOP_SIDE_MIN: usize = 48;
 /// [`sweep::SweepView::new`].
 const PYRAMID_SIDE_MIN: usize = 32;
 /// Number of levels at which the pyramid of a view stops.
-const PYRAMID_LEVELS_MAX: usize = 16;
+pub(crate) const PYRAMID_LEVELS_MAX: usize = 16;
 
 /// Pyramid levels of a sweep; 0 is the full resolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -49,9 +49,19 @@ pub(crate) fn area(w: &Window) -> u64 {
 /// Returns the memory needed to sweep views of `pixels` pixels each onto `cells` cells at once,
 /// megabytes.
 pub(crate) fn needed_mb(pixels: &[u64], cells: u64) -> u64 {
-    let all = pixels.iter().fold(0, |sum: u64, p| sum.saturating_add(*p));
     let largest = pixels.iter().copied().max().unwrap_or(0);
     let blocks = BYTES_PER_BLOCK_PIXEL * BLOCK_PIXELS.min(largest) * rayon::current_num_threads() as u64;
+    with_blocks(pixels, cells, blocks)
+}
+
+/// Returns the part of [`needed_mb`] that does not depend on the number of threads, megabytes.
+pub(crate) fn least_mb(pixels: &[u64], cells: u64) -> u64 {
+    with_blocks(pixels, cells, 0)
+}
+
+/// Returns the memory needed when blocks in work take `blocks` bytes, megabytes.
+fn with_blocks(pixels: &[u64], cells: u64, blocks: u64) -> u64 {
+    let all = pixels.iter().fold(0, |sum: u64, p| sum.saturating_add(*p));
     let stage =
         |per_pixel: u64, per_cell: u64| all.saturating_mul(per_pixel).saturating_add(cells.saturating_mul(per_cell));
     let stages = [

@@ -93,7 +93,7 @@ impl<'a> Merger<'a> {
             ChunkContent::Failed { reason } => self.add_failed(core, reason),
             ChunkContent::Surface(surface) => {
                 self.counts.add(&surface.counts);
-                self.hypotheses += surface.hypotheses;
+                self.hypotheses = self.hypotheses.saturating_add(surface.hypotheses);
                 let range = surface.height_range;
                 self.height_range = Some(self.height_range.map_or(range, |all| all.union(range)));
                 self.findings.extend(&surface.findings);
@@ -172,7 +172,8 @@ impl<'a> Merger<'a> {
 ///
 /// # Errors
 /// [`DsmError::ChunksMissing`] when a chunk has no result or more than one, the errors of
-/// `results`, [`DsmError::NoSurface`] when no cell has an observed height, [`DsmError::Exists`],
+/// `results`, [`DsmError::ChunkContent`] for a result that cannot be one of the plan,
+/// [`DsmError::NoSurface`] when no cell has an observed height, [`DsmError::Exists`],
 /// [`DsmError::Output`], [`DsmError::Image`], [`DsmError::Crs`], [`DsmError::Cancelled`]. Nothing
 /// stays behind.
 pub fn merge(
@@ -182,14 +183,14 @@ pub fn merge(
 ) -> Result<Product, DsmError> {
     let folder = DsmFolder::take(&plan.config)?;
     let mut merger = Merger::begin(plan, folder, progress)?;
-    let mut missing: Vec<Window> = plan.chunks.iter().map(|chunk| chunk.core).collect();
-    let count = missing.len();
+    let count = plan.chunks.len();
+    let mut missing: Vec<usize> = (0..count).collect();
     for result in results {
         progress.check_cancelled()?;
         let result = result?;
-        let place = missing.iter().position(|core| *core == result.core);
+        let place = missing.iter().position(|index| plan.chunks[*index].core == result.core);
         let place = place.ok_or(DsmError::ChunksMissing { found: count - missing.len(), count })?;
-        missing.swap_remove(place);
+        result.check(plan, missing.swap_remove(place))?;
         merger.add(result)?;
     }
     if !missing.is_empty() {

@@ -49,6 +49,7 @@
 mod character;
 mod chips;
 mod chunk;
+mod chunk_check;
 mod chunk_files;
 mod chunk_plan;
 mod chunk_side;
@@ -84,6 +85,7 @@ mod page;
 mod partners;
 mod pictures;
 mod plan;
+mod plan_check;
 mod plane_fit;
 mod point;
 mod prior_findings;

@@ -100,11 +100,11 @@ impl SurfaceCounts {
         self.filled += other.filled;
         self.void += other.void;
         self.masked += other.masked;
-        self.speckle_removed += other.speckle_removed;
+        self.speckle_removed = self.speckle_removed.saturating_add(other.speckle_removed);
         self.views.resize(self.views.len().max(other.views.len()), KeptPixels::default());
         for (own, theirs) in self.views.iter_mut().zip(&other.views) {
-            own.kept += theirs.kept;
-            own.all += theirs.all;
+            own.kept = own.kept.saturating_add(theirs.kept);
+            own.all = own.all.saturating_add(theirs.all);
         }
     }
 }

@@ -120,7 +120,7 @@ impl From<ImagePair> for [usize; 2] {
 impl fmt::Display for ImagePair {
     /// Writes the positions as people count them, from 1: `1-2`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}-{}", self.first + 1, self.second + 1)
+        write!(f, "{}-{}", self.first.saturating_add(1), self.second.saturating_add(1))
     }
 }
 

@@ -164,7 +164,7 @@ fn middle_of_both(a: &Polygon<f64>, b: &Polygon<f64>) -> Option<EnuPoint> {
 }
 
 /// Computes the geometry of a pair of cameras at a ground point.
-fn pair_geometry(
+pub(crate) fn pair_geometry(
     a: &RpcCamera,
     b: &RpcCamera,
     centre: LonLatHeight,

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::dsm::ChunkResult;
 use crate::files::{FileError, TEXT_LIMIT, create_folder, names_in};
 use crate::guarded::{self, TEMPORARY};
+use crate::production::product_file::ProductFile;
 
 /// Folder of all chunks.
 pub(crate) const CHUNKS: &str = "chunks";
@@ -41,6 +42,8 @@ pub(super) enum ChunkState {
     Done {
         /// Wall time, seconds.
         seconds: f64,
+        /// Files of the result.
+        files: Vec<ProductFile>,
     },
     /// The chunk could not be computed.
     Failed {
@@ -101,6 +104,23 @@ impl ChunkFolder {
     pub(super) fn status(&self, plan: &str) -> Option<ChunkStatus> {
         let json = io::read_regular(&self.status_file(), TEXT_LIMIT).ok()?;
         serde_json::from_slice::<ChunkStatus>(&json).ok().filter(|status| status.plan == plan)
+    }
+
+    /// Returns the files of the result, as they are kept with the status.
+    ///
+    /// # Errors
+    /// [`FileError::Read`].
+    pub(super) fn result_files(&self) -> Result<Vec<ProductFile>, FileError> {
+        ProductFile::all_of(&self.0, &[PathBuf::from(RESULT)])
+    }
+
+    /// Returns what is wrong with a result that was complete; `None` when it is as it was written,
+    /// and for other states.
+    pub(super) fn damage(&self, state: &ChunkState) -> Option<String> {
+        match state {
+            ChunkState::Done { files, .. } => ProductFile::damage(&self.0, files),
+            _ => None,
+        }
     }
 
     /// Replaces the status.

@@ -170,7 +170,14 @@ impl Worker<'_> {
     ) -> Result<(), ProductionError> {
         let folder = ChunkFolder::of(&self.config.folder, index);
         let plan = &self.file.id;
-        let again = |state: &ChunkState| self.config.resume && matches!(state, ChunkState::Failed { .. });
+        // A result that is no longer as it was written is computed again, whoever damaged it.
+        let again = |state: &ChunkState| match state {
+            ChunkState::Failed { .. } => self.config.resume,
+            done => folder.damage(done).is_some_and(|what| {
+                session.progress.warn(&format!("the result of chunk {index} is damaged and computed again: {what}"));
+                true
+            }),
+        };
         let Claimed::Ours(claim) = Claim::take(&folder, plan, again)? else {
             match folder.status(plan).map(|status| status.state) {
                 Some(ChunkState::Done { .. }) => report.done_before += 1,
@@ -195,7 +202,8 @@ impl Worker<'_> {
             Ok(ChunkResult { content: ChunkContent::Failed { reason }, .. }) => ChunkState::Failed { reason },
             Ok(result) => {
                 result.write(&folder.result())?;
-                ChunkState::Done { seconds: since.elapsed().as_secs_f64() }
+                let files = folder.result_files()?;
+                ChunkState::Done { seconds: since.elapsed().as_secs_f64(), files }
             }
         };
         match &state {

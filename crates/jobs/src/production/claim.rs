@@ -3,7 +3,8 @@
 //! A claim is the status file `running` of a chunk. It is created exclusively, complete and locked:
 //! whoever finds it there leaves the chunk alone while its process lives. A process is gone when
 //! its lock is free and it ran on this machine, or when its heartbeat, the time of the file, is
-//! older than a minute. The claim is then taken over.
+//! more than a minute from now. The claim is then taken over. That holds for both sides of now: a
+//! clock that is wrong, or a forged time, must not keep a chunk for ever.
 //!
 //! A process that was only suspended may wake up after its claim was taken. It notices before it
 //! writes, and both would write the same bytes.
@@ -20,7 +21,8 @@ use crate::production::chunk_folder::{CLAIM_WORK, ChunkFolder, ChunkState, Chunk
 
 /// Time between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(10);
-/// A process without a heartbeat for this time is gone.
+/// A process without a heartbeat for this time is gone. One whose clock is ahead of ours by as much
+/// counts as gone, too: its claim would hold for longer than that.
 const GONE: Duration = Duration::from_secs(60);
 
 /// The right to compute a chunk. Dropping it gives the chunk back, unless another status was set.
@@ -121,8 +123,8 @@ fn heartbeat(file: File) -> (Sender<()>, JoinHandle<()>) {
 /// Whether the process of a claim lives.
 fn is_alive(claim: &Path, worker: &ChunkWorker) -> bool {
     let Ok(file) = File::open(claim) else { return false };
-    let age = file.metadata().and_then(|found| found.modified()).map(|time| time.elapsed().unwrap_or_default());
-    let beats = age.is_ok_and(|age| age < GONE);
+    let time = file.metadata().and_then(|found| found.modified());
+    let beats = time.is_ok_and(|time| distance(time, SystemTime::now()) < GONE);
     // Those who ask share their lock, so that they do not take each other for the owner.
     match file.try_lock_shared() {
         Err(TryLockError::WouldBlock) => true,
@@ -130,6 +132,11 @@ fn is_alive(claim: &Path, worker: &ChunkWorker) -> bool {
         // Locks may not reach from one machine to another.
         _ => beats,
     }
+}
+
+/// Returns the time between two times, whichever is the earlier.
+fn distance(a: SystemTime, b: SystemTime) -> Duration {
+    a.duration_since(b).unwrap_or_else(|earlier| earlier.duration())
 }
 
 #[cfg(unix)]
@@ -168,7 +175,7 @@ mod tests {
         drop(claim);
         assert!(folder.status("p").is_none(), "a claim without a result is given back");
         let claim = ours(Claim::take(&folder, "p", NEVER).unwrap());
-        folder.set_status("p", ChunkState::Done { seconds: 1.0 }).unwrap();
+        folder.set_status("p", ChunkState::Done { seconds: 1.0, files: Vec::new() }).unwrap();
         drop(claim);
         assert!(matches!(folder.status("p").unwrap().state, ChunkState::Done { .. }));
         assert!(matches!(Claim::take(&folder, "p", NEVER).unwrap(), Claimed::Theirs));
@@ -184,14 +191,16 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let folder = ChunkFolder::of(root.path(), 0);
         folder.create().unwrap();
-        let left = |host: &str, age: u64| {
+        let now = SystemTime::now();
+        let second = Duration::from_secs(1);
+        let left = |host: &str, time: SystemTime| {
             let worker = ChunkWorker { host: host.to_owned(), pid: 1 };
             folder.set_status("p", ChunkState::Running(worker)).unwrap();
             let file = File::options().write(true).open(folder.status_file()).unwrap();
-            file.set_modified(SystemTime::now() - Duration::from_secs(age)).unwrap();
+            file.set_modified(time).unwrap();
             fs::create_dir_all(folder.result()).unwrap();
         };
-        left(&ChunkWorker::here().host, 0);
+        left(&ChunkWorker::here().host, now);
         drop(ours(Claim::take(&folder, "p", NEVER).unwrap()));
         assert!(!folder.result().exists());
         // The file of a process that asks for the chunk at the same time is its own.
@@ -200,11 +209,18 @@ mod tests {
         drop(ours(Claim::take(&folder, "p", NEVER).unwrap()));
         assert!(asking.exists());
         // A machine without a name may be any machine.
-        left("", 5);
+        left("", now - 5 * second);
         assert!(matches!(Claim::take(&folder, "p", NEVER).unwrap(), Claimed::Theirs));
-        left("another machine", 5);
+        left("another machine", now - 5 * second);
         assert!(matches!(Claim::take(&folder, "p", NEVER).unwrap(), Claimed::Theirs));
-        left("another machine", 90);
+        left("another machine", now - 90 * second);
         drop(ours(Claim::take(&folder, "p", NEVER).unwrap()));
+        // A clock that is a little ahead is no reason, and one that is far ahead holds no chunk.
+        left("another machine", now + 30 * second);
+        assert!(matches!(Claim::take(&folder, "p", NEVER).unwrap(), Claimed::Theirs));
+        for ahead in [90, 3600, 400 * 86_400] {
+            left("another machine", now + ahead * second);
+            drop(ours(Claim::take(&folder, "p", NEVER).unwrap()));
+        }
     }
 }

@@ -82,6 +82,17 @@ pub enum ProductionError {
         /// Number of chunks in the plan.
         count: usize,
     },
+    /// The result of a chunk is not as it was written.
+    #[error(
+        "the result of chunk {chunk} was damaged after it was computed: {what}; run the plan again, which computes \
+         the chunk again, or allow a partial result, which is void there"
+    )]
+    ChunkDamaged {
+        /// Number of the chunk, from 0.
+        chunk: usize,
+        /// The file, what it is and what was expected.
+        what: String,
+    },
     /// No chunk has a surface.
     #[error("no chunk has a surface; the first failed: {reason}")]
     NothingDone {

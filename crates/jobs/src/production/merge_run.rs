@@ -15,6 +15,19 @@ use crate::threads;
 /// Reason of a chunk that was not computed before a partial merge.
 const NOT_COMPUTED: &str = "not computed";
 
+/// How a chunk stands when its plan is merged.
+enum Standing {
+    /// It has a result.
+    Done {
+        /// Wall time, seconds.
+        seconds: f64,
+    },
+    /// It is void for a reason.
+    Void(String),
+    /// Nobody has computed it.
+    Missing,
+}
+
 /// Configuration of a merge.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -40,8 +53,9 @@ impl MergeConfig {
 ///
 /// # Errors
 /// [`ProductionError::NoPlan`], [`ProductionError::Plan`], [`ProductionError::OtherVersion`],
-/// [`ProductionError::ConfigChanged`]; [`ProductionError::ChunksMissing`] unless a partial result
-/// is allowed; [`ProductionError::NothingDone`]; [`ProductionError::Dsm`] for products that exist,
+/// [`ProductionError::ConfigChanged`]; [`ProductionError::ChunksMissing`] and
+/// [`ProductionError::ChunkDamaged`] unless a partial result is allowed;
+/// [`ProductionError::NothingDone`]; [`ProductionError::Dsm`] for products that exist,
 /// for a folder in which chunks are computed, for what cannot be read or written, and when
 /// cancelled. Nothing is left half-written.
 pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Product, ProductionError> {
@@ -62,8 +76,8 @@ pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Produc
     })?
 }
 
-/// Returns the states of all chunks: `None` for one without a result.
-fn states(config: &MergeConfig, file: &PlanFile) -> Result<Vec<Option<ChunkState>>, ProductionError> {
+/// Returns how all chunks stand. The results are compared with what was written.
+fn states(config: &MergeConfig, file: &PlanFile) -> Result<Vec<Standing>, ProductionError> {
     let count = file.plan.chunks.len();
     let mut states = Vec::with_capacity(count);
     for index in 0..count {
@@ -72,9 +86,15 @@ fn states(config: &MergeConfig, file: &PlanFile) -> Result<Vec<Option<ChunkState
         folder.check()?;
         folder.remove_left_over()?;
         let state = folder.status(&file.id).map(|status| status.state);
-        states.push(state.filter(|state| !matches!(state, ChunkState::Running(_))));
+        states.push(match (state.as_ref().and_then(|state| folder.damage(state)), state) {
+            (Some(what), _) if config.partial => Standing::Void(format!("its result was damaged: {what}")),
+            (Some(what), _) => return Err(ProductionError::ChunkDamaged { chunk: index, what }),
+            (None, Some(ChunkState::Done { seconds, .. })) => Standing::Done { seconds },
+            (None, Some(ChunkState::Failed { reason })) => Standing::Void(reason),
+            (None, Some(ChunkState::Running(_)) | None) => Standing::Missing,
+        });
     }
-    let missing: Vec<usize> = (0..count).filter(|index| states[*index].is_none()).collect();
+    let missing: Vec<usize> = (0..count).filter(|index| matches!(states[*index], Standing::Missing)).collect();
     if !config.partial && !missing.is_empty() {
         return Err(ProductionError::ChunksMissing { missing, count });
     }
@@ -83,7 +103,7 @@ fn states(config: &MergeConfig, file: &PlanFile) -> Result<Vec<Option<ChunkState
 
 fn merge(
     file: &PlanFile,
-    states: &[Option<ChunkState>],
+    states: &[Standing],
     folder: DsmFolder,
     progress: &dyn Progress,
 ) -> Result<Product, ProductionError> {
@@ -92,21 +112,18 @@ fn merge(
     progress.begin("merging chunks", states.len());
     for (index, (chunk, state)) in file.plan.chunks.iter().zip(states).enumerate() {
         let reason = match state {
-            Some(ChunkState::Done { seconds: taken }) => {
+            Standing::Done { seconds: taken } => {
                 progress.check_cancelled().map_err(DsmError::from)?;
                 let place = ChunkFolder::of(&file.plan.config.output, index).result();
                 let result = ChunkResult::read(&place)?;
-                if result.core != chunk.core {
-                    let reason = "it belongs to other cells".to_owned();
-                    return Err(DsmError::ChunkFile { path: place, reason }.into());
-                }
+                result.check(&file.plan, index)?;
                 merger.add(result)?;
                 seconds += taken;
                 progress.step();
                 continue;
             }
-            Some(ChunkState::Failed { reason }) => reason.clone(),
-            _ => NOT_COMPUTED.to_owned(),
+            Standing::Void(reason) => reason.clone(),
+            Standing::Missing => NOT_COMPUTED.to_owned(),
         };
         first.get_or_insert_with(|| reason.clone());
         merger.add_failed(chunk.core, reason);

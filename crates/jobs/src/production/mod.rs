@@ -24,6 +24,7 @@ mod merge_run;
 mod plan_file;
 mod plan_run;
 mod plan_text;
+mod product_file;
 
 pub use chunk_folder::ChunkWorker;
 pub(crate) use chunk_folder::{CHUNKS, is_chunk, is_left_over};
@@ -39,3 +40,4 @@ pub use merge_run::{MergeConfig, merge_run};
 pub use plan_file::PlanFile;
 pub(crate) use plan_file::{PLAN, POINTING};
 pub use plan_run::{make_plan, plan_run};
+pub(crate) use product_file::ProductFile;

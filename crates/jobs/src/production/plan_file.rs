@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::dsm::{DsmConfig, Plan, USED_CONFIG, files_of};
+use crate::dsm::{DsmConfig, Plan, USED_CONFIG, files_of, open};
 use crate::files::TEXT_LIMIT;
 use crate::job_file::read_dsm_job;
 use crate::job_paths::{relative, resolved};
@@ -71,7 +71,7 @@ impl PlanFile {
     ///
     /// # Errors
     /// [`ProductionError::NoPlan`], [`ProductionError::Plan`] for a file that is damaged or was
-    /// edited, [`ProductionError::OtherVersion`].
+    /// edited or whose parts do not fit each other, [`ProductionError::OtherVersion`].
     pub fn read(folder: &Path) -> Result<Self, ProductionError> {
         let path = folder.join(PLAN);
         let failed = |reason: String| ProductionError::Plan { path: path.clone(), reason };
@@ -87,7 +87,12 @@ impl PlanFile {
         if file.identity()? != file.id {
             return Err(failed("it is not as it was written".to_owned()));
         }
-        Ok(file.located(folder))
+        if file.estimate != PlanEstimate::of(&file.plan) {
+            return Err(failed("its estimate is that of another plan".to_owned()));
+        }
+        let file = file.located(folder);
+        file.plan.check().map_err(failed)?;
+        Ok(file)
     }
 
     /// Reads the plan in the folder of a run, and checks that the configuration there is still the
@@ -117,17 +122,22 @@ impl PlanFile {
         self
     }
 
-    /// Checks that the inputs have the content that was planned, and that no file was added to the
-    /// images, such as another RPC.
+    /// Checks that the inputs have the content that was planned, that no file was added to the
+    /// images, such as another RPC, and that the images of the plan are those of the files.
     ///
     /// # Errors
     /// [`ProductionError::InputChanged`], [`ProductionError::InputAdded`],
-    /// [`ProductionError::File`], [`ProductionError::Dsm`].
+    /// [`ProductionError::Plan`], [`ProductionError::File`], [`ProductionError::Dsm`].
     pub(super) fn check_inputs(&self) -> Result<(), ProductionError> {
         input_files::check(&self.inputs)?;
         let files = files_of(&self.plan.config)?;
         let added = input_files::added(&files, &self.inputs);
-        added.map_or(Ok(()), |path| Err(ProductionError::InputAdded { path: path.clone() }))
+        if let Some(path) = added {
+            return Err(ProductionError::InputAdded { path: path.clone() });
+        }
+        let path = self.plan.config.output.join(PLAN);
+        let failed = |reason: String| ProductionError::Plan { path, reason };
+        self.plan.check_opened(&open(&self.plan.config)?).map_err(failed)
     }
 }
 
