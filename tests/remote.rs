@@ -3,9 +3,10 @@
 
 mod common;
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use common::{sample, skysweep};
 use predicates::str::contains;
@@ -41,6 +42,20 @@ fn answer(mut stream: TcpStream, files: &[(&str, Vec<u8>)], noted: &Mutex<Vec<St
         }
     }
     noted.lock().unwrap().push(name.clone());
+    // What begins with `late` is moved when more than its first byte is asked for.
+    let is_first = range == Some((0, 0));
+    if let Some(to) = name.strip_prefix("/to?").or_else(|| name.strip_prefix("/late?").filter(|_| !is_first)) {
+        return write!(
+            stream,
+            "HTTP/1.1 302 Found\r\nLocation: {to}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+        );
+    }
+    if name == "/stall" {
+        // The client leaves first.
+        stream.write_all(b"HTTP/1.1 206 Partial")?;
+        return stream.read(&mut [0]).map(|_| ());
+    }
+    let name = if name.starts_with("/late?") { "/dsm.tif".to_owned() } else { name };
     let Some((_, content)) = files.iter().find(|(known, _)| *known == name) else {
         return stream.write_all(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
     };
@@ -119,4 +134,37 @@ fn images_at_addresses_bring_their_rpc() {
     told.stderr(contains("files beside an address are not fetched"));
     let known = ["/view_1.tif", "/view_2.tif", "/plain.tif"];
     assert!(asked.lock().unwrap().iter().all(|name| known.contains(&name.as_str())), "{:?}", asked.lock().unwrap());
+}
+
+/// A server that the user named cannot make the program ask another one, nor keep it waiting.
+#[test]
+fn servers_neither_lead_elsewhere_nor_stall() {
+    let reference = sample("truth/dsm.tif");
+    let content = std::fs::read(&reference).unwrap();
+    let (port, _) = server(vec![("/dsm.tif", content.clone())]);
+    let (other, asked) = server(vec![("/dsm.tif", content)]);
+    let evaluate = |name: &str| {
+        let mut command = skysweep();
+        command.env("GDAL_HTTP_TIMEOUT", "1").arg("eval").arg(format!("http://127.0.0.1:{port}/{name}"));
+        command.arg(&reference).args(["--no-report", "--allow-remote"]).assert()
+    };
+    for name in ["to?/dsm.tif", "to?dsm.tif", &format!("to?http://127.0.0.1:{port}/dsm.tif")] {
+        evaluate(name).code(0);
+    }
+    let elsewhere = [
+        format!("http://127.0.0.1:{other}/dsm.tif"),
+        format!("http://localhost:{port}/dsm.tif"),
+        format!("//127.0.0.1:{other}/dsm.tif"),
+        format!("http://127.0.0.1:{port}@127.0.0.1:{other}/dsm.tif"),
+    ];
+    for to in elsewhere {
+        evaluate(&format!("to?{to}")).code(2).stderr(contains("redirects to another server"));
+        evaluate(&format!("late?{to}")).code(2).stderr(contains("redirects to another server"));
+    }
+    evaluate("to?file:///etc/passwd").code(2).stderr(contains("redirects to another server"));
+    evaluate("to?to?to?to?to?to?to?to?/dsm.tif").code(2);
+    assert!(asked.lock().unwrap().is_empty(), "another server was asked");
+    let start = Instant::now();
+    evaluate("stall").code(2).stderr(contains("did not answer in time"));
+    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
 }

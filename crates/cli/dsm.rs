@@ -44,7 +44,7 @@ pub(crate) struct SceneArgs {
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Cell size of the DSM in metres [default: the coarsest image's].
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     gsd: Option<f64>,
     /// CRS of the DSM: auto, or a projected EPSG code [default: the scene's UTM zone].
     #[arg(long, value_name = "CRS")]
@@ -247,6 +247,7 @@ fn hint(error: &DsmError) -> Option<&'static str> {
         DsmError::RangeMissesScene { .. } => "without --height-range the heights are found from tie points",
         DsmError::Memory { .. } => "--memory MB raises the limit, and --bounds makes the area smaller",
         DsmError::BoundsMissScene { .. } => "without --bounds the DSM covers all the ground that two images see",
+        DsmError::AreaMissesScene { .. } => "without --area the DSM covers all the ground that two images see",
         DsmError::Prior { .. } => "`skysweep city info MODEL` checks a city model",
         DsmError::Value { setting, .. } => match setting {
             DsmSetting::Output => "-o DIR names it",

@@ -196,6 +196,24 @@ mod tests {
         }
     }
 
+    /// Positions of images count from 1, as on the command line, and a configuration that was used
+    /// is one that can be used again.
+    #[test]
+    fn positions_count_from_one() {
+        let text = "images = ['a.tif', 'b.tif', 'c.tif']\npairs = [[1, 3]]\nreferences = [1, 2]\n";
+        let config = job(text).unwrap();
+        assert_eq!(config.pairs.as_deref(), Some(&[crate::dsm::ImagePair::new(0, 2)][..]));
+        assert_eq!(config.references.as_deref(), Some(&[0, 1][..]));
+        let written = toml::to_string(&config).unwrap();
+        assert!(written.contains("pairs = [[1, 3]]") && written.contains("references = [1, 2]"), "{written}");
+        let again = job(&written).unwrap();
+        assert_eq!((&again, toml::to_string(&again).unwrap()), (&config, written));
+        for wrong in ["pairs = [[0, 1]]", "references = [0]"] {
+            let error = job(&format!("images = ['a.tif', 'b.tif']\n{wrong}\n")).unwrap_err().to_string();
+            assert!(error.contains("positions of images count from 1, found 0 (line 2)"), "{error}");
+        }
+    }
+
     /// The template has every key of the configuration, and the values that hold without it.
     #[test]
     fn the_template_has_every_key() {

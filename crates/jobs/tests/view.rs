@@ -4,7 +4,7 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use io::raster::{ImageSource, read_dem};
 use jobs::view::{ViewConfig, ViewError, ViewServer};
@@ -186,10 +186,23 @@ fn hostile_requests_are_refused_within_bounds() {
         let fields = format!("GET / HTTP/1.1\r\n{}\r\n", "x: y\r\n".repeat(3000));
         assert_eq!(client.raw(fields.as_bytes()).status, 431);
         assert_eq!(client.raw(b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03 tls").status, 400);
-        // Idle connections do not keep others from being answered.
-        let idle: Vec<TcpStream> = (0..20).map(|_| TcpStream::connect(&client.host).unwrap()).collect();
+        // Clients that send one byte, or nothing, do not keep others from being answered.
+        let slow: Vec<TcpStream> = (0..60)
+            .map(|i| {
+                let mut stream = TcpStream::connect(&client.host).unwrap();
+                if i < 40 {
+                    stream.write_all(b"G").unwrap();
+                }
+                stream
+            })
+            .collect();
+        let start = Instant::now();
         assert_eq!(client.get("scene.json").status, 200);
-        drop(idle);
+        assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
+        // They lose their connections.
+        let mut first = &slow[0];
+        first.set_read_timeout(Some(Duration::from_secs(15))).unwrap();
+        assert!(first.read_to_end(&mut Vec::new()).is_ok() && start.elapsed() < Duration::from_secs(10));
     });
 }
 
@@ -326,10 +339,42 @@ fn a_viewer_ends_after_its_time_and_bad_inputs_are_refused() {
     assert!(matches!(open(vec![empty.path().to_owned()]), Err(ViewError::NoRasters { .. })));
     assert!(matches!(open(vec![empty.path().join("nothing.tif")]), Err(ViewError::Raster(_))));
     assert!(matches!(open(Vec::new()), Err(ViewError::Job(_))));
+    // One picture of a large raster must not take minutes.
+    let large = empty.path().join("large.tif");
+    std::fs::write(&large, bare_tiff(60_000, 256)).unwrap();
+    assert!(matches!(open(vec![large.clone()]), Err(ViewError::NoOverviews { columns: 60_000, .. })));
+    std::fs::write(&large, bare_tiff(9_000, 256)).unwrap();
+    open(vec![large.clone()]).unwrap();
+    std::fs::remove_file(large).unwrap();
     // A raster of a folder that cannot be read is left out.
     let run = tempfile::tempdir().unwrap();
     std::fs::write(run.path().join("a.tif"), b"no raster").unwrap();
     assert!(matches!(open(vec![run.path().to_owned()]), Err(ViewError::NoRasters { .. })));
     std::fs::copy(truth().join("dsm.tif"), run.path().join("b.tif")).unwrap();
     open(vec![run.path().to_owned()]).unwrap();
+}
+
+/// A tiled TIFF of one band of bytes, all 0: no tile is stored, and there are no overviews.
+fn bare_tiff(side: u32, tile: u32) -> Vec<u8> {
+    let tiles = side.div_ceil(tile).pow(2);
+    let after = 8 + 2 + 10 * 12 + 4;
+    let tags: [(u16, u16, u32, u32); 10] = [
+        (256, 4, 1, side),
+        (257, 4, 1, side),
+        (258, 3, 1, 8),
+        (259, 3, 1, 1),
+        (262, 3, 1, 1),
+        (277, 3, 1, 1),
+        (322, 4, 1, tile),
+        (323, 4, 1, tile),
+        (324, 4, tiles, after),
+        (325, 4, tiles, after + 4 * tiles),
+    ];
+    let mut bytes = b"II*\0\x08\0\0\0\x0a\0".to_vec();
+    for (tag, kind, count, value) in tags {
+        bytes.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
+        bytes.extend([count.to_le_bytes(), value.to_le_bytes()].concat());
+    }
+    bytes.resize(after as usize + 8 * tiles as usize, 0);
+    bytes
 }

@@ -15,6 +15,8 @@ use std::sync::{Once, OnceLock};
 use gdal::errors::GdalError;
 use gdal::{Driver, DriverManager};
 
+use super::web_files;
+
 /// Drivers that read local raster files, and the writers of this crate.
 const DRIVERS: &str = "VRT GTiff COG PNG JPEG JPEGXL WEBP BMP GIF BIGGIF JP2OpenJPEG JP2KAK JP2MrSID JPEG2000 NITF \
     RPFTOC HFA ENVI EHdr EIR ERS PCIDSK PAux MFF GenBin AAIGrid GRASSASCIIGrid AIG ISG XYZ \
@@ -24,10 +26,6 @@ const DRIVERS: &str = "VRT GTiff COG PNG JPEG JPEGXL WEBP BMP GIF BIGGIF JP2Open
 
 /// File systems of local files: plain memory, archives and parts of files.
 const FILE_SYSTEMS: [&str; 6] = ["/vsimem/", "/vsizip/", "/vsitar/", "/vsigzip/", "/vsisubfile/", "/vsisparse/"];
-
-/// The file system of user-named addresses. It opens the one address that
-/// `CPL_VSIL_CURL_ALLOWED_FILENAME` names, which is set while the user's file is opened.
-pub(super) const GUARDED_FILE_SYSTEM: &str = "/vsicurl/";
 
 /// File systems that [`VSIGetFileSystemsPrefixes`](gdal_sys::VSIGetFileSystemsPrefixes) leaves out.
 const UNLISTED_FILE_SYSTEMS: [&str; 2] = ["/vsicurl?", "/vsicurl_streaming/"];
@@ -70,11 +68,11 @@ pub(super) fn restrict() {
         drivers.filter(|driver| !DRIVERS.split(' ').any(|name| name == driver.short_name())).collect();
     strange.iter().for_each(DriverManager::deregister_driver);
     for prefix in file_systems() {
-        let is_listed = FILE_SYSTEMS.contains(&prefix.as_str()) || prefix == GUARDED_FILE_SYSTEM;
-        if !is_listed {
+        if !FILE_SYSTEMS.contains(&prefix.as_str()) {
             close_file_system(&prefix);
         }
     }
+    web_files::install();
 }
 
 /// Registers GDAL's driver of GeoPackages, where there is one, for the rest of the process. To be

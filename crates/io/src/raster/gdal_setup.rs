@@ -13,8 +13,9 @@ use gdal::errors::GdalError;
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, config};
 
 use super::error::RasterError;
-use super::gdal_access::{GUARDED_FILE_SYSTEM, is_local_file_system, restrict};
+use super::gdal_access::{is_local_file_system, restrict};
 use super::named_files::refuse_named_devices;
+use super::web_files::{WEB_FILES, with_leave};
 
 /// Beginnings of names that lead to a network or a service.
 const REMOTE_SCHEMES: [&str; 8] = ["http", "https", "ftp", "ftps", "s3", "gs", "az", "hdfs"];
@@ -27,8 +28,6 @@ const MESSAGES_MAX: usize = 8;
 /// TIFFs that the error about a folder names.
 const NAMED_TIFFS: usize = 8;
 
-/// GDAL's option with the one name that its file system of addresses opens.
-const ALLOWED_ADDRESS: &str = "CPL_VSIL_CURL_ALLOWED_FILENAME";
 /// GDAL's option for looking at the files beside one that is opened.
 const BESIDE: &str = "GDAL_DISABLE_READDIR_ON_OPEN";
 
@@ -114,8 +113,8 @@ pub(crate) fn open_address(path: &Path) -> Option<Result<Dataset, RasterError>> 
     if is_local_file_system(&name) || !leads_away(&name) || path.exists() {
         return None;
     }
-    Some(match remote_name(&name) {
-        Some(remote) if REMOTE_ALLOWED.load(Ordering::Relaxed) => open_remote(path, &remote),
+    Some(match web_address(&name) {
+        Some(address) if REMOTE_ALLOWED.load(Ordering::Relaxed) => open_remote(path, address),
         _ => Err(RasterError::NotLocal { path: path.to_owned() }),
     })
 }
@@ -134,24 +133,22 @@ pub fn allow_remote() {
     REMOTE_ALLOWED.store(true, Ordering::Relaxed);
 }
 
-/// Returns GDAL's name of an address of the web; `None` for other services, which are not read.
-fn remote_name(name: &str) -> Option<String> {
-    let address = name.strip_prefix(GUARDED_FILE_SYSTEM).unwrap_or(name);
+/// Returns the address of the web that a name means; `None` for other services, which are not read.
+fn web_address(name: &str) -> Option<&str> {
+    let address = name.strip_prefix(WEB_FILES).unwrap_or(name);
     let lower = address.to_ascii_lowercase();
-    let is_web = lower.starts_with("http://") || lower.starts_with("https://");
-    is_web.then(|| format!("{GUARDED_FILE_SYSTEM}{address}"))
+    (lower.starts_with("http://") || lower.starts_with("https://")).then_some(address)
 }
 
 /// Opens an address that the user named: this name alone is allowed on this thread while it is
 /// opened, and files beside it are not looked for.
-fn open_remote(path: &Path, remote: &str) -> Result<Dataset, RasterError> {
+fn open_remote(path: &Path, address: &str) -> Result<Dataset, RasterError> {
     prepare_gdal();
-    let allow = |key, value| drop(config::set_thread_local_config_option(key, value));
-    allow(ALLOWED_ADDRESS, remote);
-    allow(BESIDE, "EMPTY_DIR");
-    let opened = open_name(path, Path::new(remote));
-    // Clearing fails only when the text has a NUL.
-    [ALLOWED_ADDRESS, BESIDE].into_iter().for_each(|key| drop(config::clear_thread_local_config_option(key)));
+    // Setting and clearing fail only when the text has a NUL.
+    let _ = config::set_thread_local_config_option(BESIDE, "EMPTY_DIR");
+    let name = format!("{WEB_FILES}{address}");
+    let opened = with_leave(address, || open_name(path, Path::new(&name)));
+    let _ = config::clear_thread_local_config_option(BESIDE);
     opened
 }
 
@@ -173,7 +170,6 @@ fn prepare() {
     });
     // Setting an option fails only when the text has a NUL, which these constants have not.
     let set = |key, value| drop(config::set_config_option(key, value));
-    set(ALLOWED_ADDRESS, "/vsicurl/nothing");
     set("GDAL_VRT_ENABLE_PYTHON", "NO");
     if config::get_config_option("GDAL_CACHEMAX", "").is_ok_and(|value| value.is_empty()) {
         set("GDAL_CACHEMAX", CACHE_MB);

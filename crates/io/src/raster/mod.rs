@@ -31,6 +31,8 @@ mod tile;
 mod undeclared;
 mod verify;
 mod vertical_unit;
+mod web_file;
+mod web_files;
 mod world_file;
 
 pub use band::{Band, BandData};

@@ -36,6 +36,38 @@ impl ImageSource {
         .map_err(|reason| RasterError::damaged(self.path(), reason))
     }
 
+    /// Returns the most cells that are decoded for any picture of at most `side` × `side` cells of a
+    /// band, counted from 1. Blocks are decoded whole, and those between the cells of a picture are
+    /// passed over.
+    ///
+    /// # Errors
+    /// [`RasterError::Damaged`] for a band that the file does not have.
+    pub fn cells_of_picture(&self, band: usize, side: usize) -> Result<u64, RasterError> {
+        let levels = with_gdal(|| {
+            let band = self.dataset().rasterband(band)?;
+            let mut levels = vec![(band.size(), band.block_size())];
+            for index in 0..band.overview_count()? {
+                let overview = band.overview(index as usize)?;
+                levels.push((overview.size(), overview.block_size()));
+            }
+            Ok(levels)
+        });
+        let mut levels = levels.map_err(|reason| RasterError::damaged(self.path(), reason))?;
+        levels.sort_by_key(|((width, height), _)| std::cmp::Reverse(width.saturating_mul(*height)));
+        let one = |length: usize, block: usize, next: Option<usize>| {
+            // A picture is read from the level that is just finer than itself.
+            let step = next.map_or(length, |next| length.div_ceil(next.max(1)));
+            let covered = length.min(side.saturating_mul(step));
+            let blocks = (covered.div_ceil(block.max(1)) + 1).min(length.div_ceil(block.max(1))).min(side);
+            blocks as u64 * block as u64
+        };
+        let cells = levels.iter().enumerate().map(|(i, ((width, height), block))| {
+            let next = levels.get(i + 1).map(|(size, _)| *size);
+            one(*width, block.0, next.map(|size| size.0)).saturating_mul(one(*height, block.1, next.map(|size| size.1)))
+        });
+        Ok(cells.max().unwrap_or(0))
+    }
+
     /// Reads the part of a window that lies inside the image, in `size` columns and rows, with the
     /// scale and the offset of the band applied. NaN marks no-data. Bands are counted from 1.
     ///
@@ -103,6 +135,12 @@ mod tests {
         let label = source.band_label(1).unwrap();
         assert_eq!((label.description.as_str(), label.overviews > 0), ("height_m", true));
         assert!(source.band_label(2).is_err() && source.band_label(0).is_err());
+        // Pictures of 16 cells are at most so large on the overview, or lie in two tiles each way.
+        let cells = source.cells_of_picture(1, 16).unwrap();
+        assert!((16 * 16..=4 * 512 * 512).contains(&cells), "{cells}");
+        assert!(
+            source.cells_of_picture(1, 2000).unwrap() >= (side * side) as u64 && source.cells_of_picture(2, 9).is_err()
+        );
 
         let window = Window { x: 150, y: 40, width: 100, height: 60 };
         let same = |a: &Grid<f32>, b: &Grid<f32>| {

@@ -37,7 +37,7 @@ mod xml;
 pub use error::{Attempt, Fault, RpcReadError, RpcWriteError};
 pub use file::TEXT_LIMIT;
 pub use format::RpcFormat;
-pub use read::{read, read_for_image};
+pub use read::{all_of_image, read, read_for_image};
 pub use rpc_file::RpcFile;
 pub use sidecar::side_files;
 pub use write::{to_text, write};

@@ -113,6 +113,20 @@ pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
     Err(not_rpc(path, tried))
 }
 
+/// Returns every RPC of an image that can be read: TIFF tag 50844, and those of the files beside it.
+/// [`read_for_image`] takes one of them; where they differ, the image may have the wrong one. An
+/// image at an address, or in one of GDAL's virtual file systems, has none here.
+pub fn all_of_image(path: &Path) -> Vec<RpcFile> {
+    if is_gdal_virtual(path) || !path.is_file() {
+        return Vec::new();
+    }
+    let item = is_item_name(path).then(|| read_item(path).ok()).flatten();
+    let path = item.as_ref().map_or(path, |item| item.image.as_path());
+    let inside = tag_alone(path).ok().flatten().and_then(|found| found.ok());
+    let inside = inside.map(|parsed| RpcFile::new(path, RpcFormat::TiffTag, parsed));
+    inside.into_iter().chain(sidecar::all(path)).collect()
+}
+
 /// Reads the RPC of the image that a STAC item names, or the item's RPC file where the image has
 /// none; `None` for JSON that is no item, which may be an RPC itself.
 fn read_for_item(path: &Path) -> Result<Option<RpcFile>, RpcReadError> {

@@ -42,6 +42,14 @@ pub(super) fn read(
     Ok(None)
 }
 
+/// Reads the RPCs of all files beside an image that have one. That of a `.geom` is that of the
+/// scene, which is the image's own only where the image is no cut of it.
+pub(super) fn all(image: &Path) -> Vec<RpcFile> {
+    let files = candidates(image, &mut Vec::new()).unwrap_or_default();
+    let read = files.iter().filter_map(|file| text_file::read(file).ok());
+    read.filter(|file| file.format != RpcFormat::OssimGeom).collect()
+}
+
 /// Returns the files beside an image that may hold its RPC, best first; none where the folder
 /// cannot be read. Of a STAC item they are those of its image, the image itself, and the item's RPC
 /// file.

@@ -8,7 +8,7 @@ use io::raster::BandChoice;
 use serde::{Deserialize, Serialize};
 
 use crate::dsm::error::{DsmError, DsmSetting};
-use crate::dsm::values::{HeightRange, ImagePair, MapBounds};
+use crate::dsm::values::{HeightRange, ImagePair, MapBounds, positions_from_one};
 use crate::products::ProductKind;
 
 /// Heights of the Earth's surface above the ellipsoid: the shore of the Dead Sea and Everest,
@@ -106,7 +106,8 @@ impl LayerArea {
     }
 }
 
-/// Configuration of a DSM run. A field that is `None` is chosen from the scene.
+/// Configuration of a DSM run. A field that is `None` is chosen from the scene. Positions of images
+/// count from 0 here, and from 1 where the configuration is written as text.
 ///
 /// ```
 /// use jobs::dsm::{DsmConfig, DsmError, DsmSetting};
@@ -177,9 +178,10 @@ pub struct DsmConfig {
     /// Choice of the voids that are closed.
     #[serde(default)]
     pub fill: Fill,
-    /// Pairs of images to match; all useful ones when `None`.
+    /// Pairs of images to match, by positions that are written from 1; all useful ones when `None`.
     pub pairs: Option<Vec<ImagePair>>,
-    /// Positions of the images to compute heights for, counted from 0; all when `None`.
+    /// Images to compute heights for, by positions that are written from 1; all when `None`.
+    #[serde(default, with = "positions_from_one")]
     pub references: Option<Vec<usize>>,
     /// Whether the pointing of the RPCs is corrected.
     #[serde(default = "yes")]

@@ -230,10 +230,11 @@ pub enum DsmError {
         /// Description of the values that can be used.
         expected: String,
     },
-    /// The requested area is not covered by the images.
+    /// The requested bounds are not covered by the images.
     #[error(
-        "the bounds [{}] share no ground with the images, which cover [{}] in EPSG:{epsg}",
-        bounds.to_array().map(plain_number).join(", "), covered.to_array().map(plain_number).join(", ")
+        "the bounds [{}] share no ground with the images, which cover [{}] in EPSG:{epsg}{}",
+        bounds.to_array().map(plain_number).join(", "), covered.to_array().map(plain_number).join(", "),
+        axes_hint(*bounds, *covered)
     )]
     BoundsMissScene {
         /// Requested area.
@@ -242,6 +243,19 @@ pub enum DsmError {
         covered: MapBounds,
         /// EPSG code of the CRS of both areas.
         epsg: u32,
+    },
+    /// The polygons of the requested area are not covered by the images.
+    #[error(
+        "the polygons lie at {}, and the images see {}{}: {}",
+        degrees(*area), degrees(*covered), axes_hint(*area, *covered), path.display()
+    )]
+    AreaMissesScene {
+        /// File of the polygons.
+        path: PathBuf,
+        /// Longitudes and latitudes of the polygons.
+        area: MapBounds,
+        /// Longitudes and latitudes that the images cover.
+        covered: MapBounds,
     },
     /// No height survived.
     #[error(
@@ -338,6 +352,18 @@ pub enum DsmError {
     /// The caller asked the run to stop.
     #[error("the run was cancelled")]
     Cancelled,
+}
+
+/// Writes a rectangle of longitudes and latitudes.
+pub(crate) fn degrees(place: MapBounds) -> String {
+    let MapBounds { x_min, y_min, x_max, y_max } = place;
+    format!("longitudes {x_min:.4}° to {x_max:.4}° and latitudes {y_min:.4}° to {y_max:.4}°")
+}
+
+/// Says that a rectangle would meet the scene with x and y exchanged, if it would.
+pub(crate) fn axes_hint(found: MapBounds, scene: MapBounds) -> &'static str {
+    let is_swapped = !found.meets(scene) && found.swapped().meets(scene);
+    if is_swapped { "; with x and y exchanged they would meet: give x (longitude, easting) first" } else { "" }
 }
 
 impl DsmError {

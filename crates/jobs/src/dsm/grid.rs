@@ -18,6 +18,9 @@ use crate::dsm::view_geometry::ViewGeometry;
 /// Beyond this distance from its area of use a CRS needs to be forced, degrees. Scenes at the
 /// border of two UTM zones are written in either, and half a zone beyond it distorts by 2 in 1000.
 const FAR_OUTSIDE_DEG: f64 = 3.0;
+/// Fewest cells on a side of a grid whose cell size is given. Fewer come from a size in wrong units:
+/// with two cells between a void border on each side, nothing of a surface has a shape.
+const SIDE_MIN: usize = 5;
 /// Grids of more cells than this come from a cell size or bounds in wrong units.
 pub(crate) const CELLS_MAX: f64 = 4e9;
 
@@ -96,6 +99,12 @@ pub(crate) fn choose_grid(
     HeightConverter::new(config.vertical)?;
     let gsd_m = config.gsd_m.unwrap_or_else(|| rounded_gsd_m(coarsest_gsd_m * config.preset.pixels_per_cell()));
     let covered = covered_bounds(geometry, &projection)?;
+    if let Some(area) = &config.area {
+        let (polygons, covered) = (extent(area)?, lonlat_extent(covered, &projection)?);
+        if !polygons.meets(covered) {
+            return Err(DsmError::AreaMissesScene { path: area.file.clone(), area: polygons, covered });
+        }
+    }
     let bounds = match (config.bounds, &config.area) {
         (Some(bounds), _) => bounds,
         (None, Some(area)) => bounds_of_area(area, &projection)?,
@@ -105,7 +114,29 @@ pub(crate) fn choose_grid(
         return Err(DsmError::BoundsMissScene { bounds, covered, epsg });
     }
     let (geotransform, size) = snapped(bounds, cell_of(&projection, gsd_m, centre.lat_deg))?;
+    if config.gsd_m.is_some() && size.0.min(size.1) < SIDE_MIN {
+        let found = format!("{gsd_m} m, which gives a grid of {} × {} cells", size.0, size.1);
+        let expected = format!(
+            "a cell size in metres for {SIDE_MIN} or more cells on each side; a pixel of the images has {coarsest_gsd_m:.2} m"
+        );
+        return Err(DsmError::value(DsmSetting::CellSize, found, expected));
+    }
     Ok(DsmGrid { epsg, geotransform, size, gsd_m })
+}
+
+/// Returns the longitudes and latitudes of the polygons of an area.
+fn extent(area: &LayerArea) -> Result<MapBounds, DsmError> {
+    let polygons = read_polygons(&area.file, area.wanted(), None)?;
+    Ok(polygons.exterior_coords_iter().fold(MapBounds::EMPTY, |extent, corner| extent.including(corner.x, corner.y)))
+}
+
+/// Returns the longitudes and latitudes of a map rectangle.
+pub(crate) fn lonlat_extent(bounds: MapBounds, map: &MapProjection) -> Result<MapBounds, CrsError> {
+    let corners = [bounds.x_min, bounds.x_max].map(|x| [bounds.y_min, bounds.y_max].map(|y| (x, y)));
+    corners.into_iter().flatten().try_fold(MapBounds::EMPTY, |extent, (x, y)| {
+        let (lon, lat) = map.lonlat_from_map(x, y)?;
+        Ok(extent.including(lon, lat))
+    })
 }
 
 /// Returns the map rectangle around the polygons of an area.

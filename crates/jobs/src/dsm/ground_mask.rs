@@ -5,14 +5,20 @@ use std::path::Path;
 
 use crs::MapProjection;
 use eval::CellMap;
+use geo::{Area, CoordsIter, Rect};
 use io::areas::AreaName;
 use io::raster::ImageSource;
 use raster::{GeoTransform, Grid, Window, mark_inside};
 
 use crate::dsm::config::DsmConfig;
-use crate::dsm::error::{DsmError, DsmSetting};
-use crate::dsm::grid::DsmGrid;
+use crate::dsm::error::{DsmError, DsmSetting, axes_hint, degrees};
+use crate::dsm::grid::{DsmGrid, lonlat_extent};
 use crate::dsm::ground_polygons::{ground_around, holds_polygons, read_polygons, rings_in_cells};
+use crate::dsm::notes::Notes;
+use crate::dsm::values::MapBounds;
+
+/// Cells of a grid that are looked at together for a mask that covers nothing.
+const STRIP_CELLS: usize = 1 << 22;
 
 /// Cells of a grid that get no height.
 #[derive(Debug, Clone)]
@@ -78,6 +84,64 @@ impl GroundMask {
     pub(crate) fn excludes(&self, cell: usize) -> bool {
         self.masked.data()[cell] || self.outside.data()[cell]
     }
+}
+
+/// Warns of each mask that covers no cell of a grid.
+///
+/// # Errors
+/// As [`GroundMask::on`].
+pub(crate) fn warn_of_masks(config: &DsmConfig, grid: &DsmGrid, notes: &mut Notes<'_>) -> Result<(), DsmError> {
+    let map = grid.projection()?;
+    let scene = lonlat_extent(grid.bounds(), &map)?;
+    for path in &config.masks {
+        let found = match holds_polygons(path) {
+            true => polygons_beside(path, scene)?,
+            false => raster_beside(path, grid, &map)?,
+        };
+        if let Some(place) = found {
+            notes.warn(format!(
+                "the mask covers nothing of the surface: it lies at {}, the surface at {}{}: {}",
+                degrees(place),
+                degrees(scene),
+                axes_hint(place, scene),
+                path.display()
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Returns the extent of the polygons of a mask that has none on the ground of a scene.
+fn polygons_beside(path: &Path, scene: MapBounds) -> Result<Option<MapBounds>, DsmError> {
+    let ground = Rect::new((scene.x_min, scene.y_min), (scene.x_max, scene.y_max));
+    if read_polygons(path, AreaName::ALL, Some(ground))?.unsigned_area() > 0.0 {
+        return Ok(None);
+    }
+    let all = read_polygons(path, AreaName::ALL, None)?;
+    Ok(Some(all.exterior_coords_iter().fold(MapBounds::EMPTY, |extent, at| extent.including(at.x, at.y))))
+}
+
+/// Returns the extent of a raster mask that marks no cell of a grid.
+fn raster_beside(path: &Path, grid: &DsmGrid, map: &MapProjection) -> Result<Option<MapBounds>, DsmError> {
+    let rows = (STRIP_CELLS / grid.size.0.max(1)).max(1);
+    for y in (0..grid.size.1).step_by(rows) {
+        let height = rows.min(grid.size.1 - y);
+        let part = grid.part(Window { x: 0, y: y as i64, width: grid.size.0, height });
+        let mut cells = Grid::filled(part.size.0, part.size.1, false);
+        mark_raster(path, &part, map, &mut cells)?;
+        if cells.data().iter().any(|marked| *marked) {
+            return Ok(None);
+        }
+    }
+    let MaskRaster { source, geotransform, map: of_file } = MaskRaster::open(path)?;
+    let (width, height) = (source.info().width as f64, source.info().height as f64);
+    let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
+    let extent = corners.into_iter().try_fold(MapBounds::EMPTY, |extent, (column, row)| {
+        let (x, y) = geotransform.map_from_cell(column - 0.5, row - 0.5);
+        let (lon, lat) = of_file.lonlat_from_map(x, y)?;
+        Ok::<_, DsmError>(extent.including(lon, lat))
+    });
+    extent.map(Some)
 }
 
 /// Marks the cells whose centres lie in a polygon.

@@ -40,6 +40,9 @@ pub struct SceneImage {
     /// Masks of pixels that are not matched: rasters in the frame of the image, polygons on the
     /// ground.
     pub masks: Vec<PathBuf>,
+    /// What is doubtful about the image and its RPC by themselves, a sentence for each finding.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
 }
 
 impl SceneImage {

@@ -59,6 +59,7 @@ mod config;
 mod control;
 mod covering;
 mod dem;
+mod doubts;
 mod error;
 mod evidence;
 mod footprints;

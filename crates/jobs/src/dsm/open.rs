@@ -7,10 +7,11 @@ use camera::RpcCamera;
 use serde::{Deserialize, Serialize};
 
 use io::raster::{BandChoice, ImageSource, LumaRule, SampleType};
-use numeric::order_statistic;
+use numeric::{Progress, order_statistic};
 use raster::Window;
 
 use crate::dsm::config::DsmConfig;
+use crate::dsm::doubts::doubts;
 use crate::dsm::error::DsmError;
 use crate::dsm::ground_mask::GroundMask;
 use crate::dsm::image_mask::masks_of_images;
@@ -55,6 +56,13 @@ pub fn open(config: &DsmConfig) -> Result<Opened, DsmError> {
     Ok(Opened { images })
 }
 
+impl Opened {
+    /// Tells what is doubtful about the images by themselves.
+    pub(crate) fn warn(&self, progress: &dyn Progress) {
+        self.images.iter().flat_map(|image| &image.doubts).for_each(|doubt| progress.warn(doubt));
+    }
+}
+
 fn open_one(
     path: &Path,
     number: usize,
@@ -63,6 +71,7 @@ fn open_one(
 ) -> Result<SceneImage, DsmError> {
     let source = open_source(path, band)?;
     let file = io::rpc::read_for_image(path)?;
+    let doubts = doubts(&source, &file)?;
     Ok(SceneImage {
         path: path.to_owned(),
         number,
@@ -81,6 +90,7 @@ fn open_one(
             _ => None,
         },
         masks,
+        doubts,
     })
 }
 

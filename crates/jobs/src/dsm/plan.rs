@@ -11,6 +11,7 @@ use crate::dsm::chunk_side::{choose_side, cores, needed_mb};
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::grid::{DsmGrid, choose_grid, note_grid};
+use crate::dsm::ground_mask::warn_of_masks;
 use crate::dsm::height_choice::{choose_heights, middle_height_m};
 use crate::dsm::image_pixels::read_view;
 use crate::dsm::images::SceneImage;
@@ -120,6 +121,8 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
     let tuning = config.preset.tuning();
     let mut notes = Notes::resume(&pointed.choices, &pointed.warnings, session.progress);
     let images = &pointed.images;
+    // They were told when the images were opened.
+    notes.warnings.extend(images.iter().flat_map(|image| image.doubts.iter().cloned()));
     let (given, config) = (config, &in_order_of(config, images));
     let range = choose_heights(config, pointed, &mut notes)?;
     let geometry = ViewGeometry::at(images, middle_height_m(pointed.tie_heights, range))?;
@@ -127,6 +130,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
     let pixel_m = gsds_m.iter().flatten().copied().fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, pixel_m)?;
     note_grid(config, &grid, pixel_m, &mut notes);
+    warn_of_masks(config, &grid, &mut notes)?;
     note_stated_views(images, &geometry, &mut notes);
     let sources = choose_sources(config, &geometry, pointed, &tuning, &mut notes)?;
     if let Some(path) = &config.prior {

@@ -49,6 +49,7 @@ pub fn run(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, Dsm
     threads::install(config.threads, || {
         let mut session = Session::new(progress);
         let opened = open(config)?;
+        opened.warn(progress);
         let pointed = register(config, point(config, &opened, &mut session)?, &mut session)?;
         let plan = plan(config, &pointed, &mut session)?;
         drop((opened, pointed));

@@ -76,14 +76,14 @@ impl From<HeightRange> for [f64; 2] {
     }
 }
 
-/// A pair of images by their positions in the list of images, counted from 0. It is written as
-/// `[first, second]`.
+/// A pair of images by their positions in the list of images. It is written as `[first, second]`
+/// with positions as people count them, from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(from = "[usize; 2]", into = "[usize; 2]")]
+#[serde(try_from = "[usize; 2]", into = "[usize; 2]")]
 pub struct ImagePair {
-    /// Position of the first image.
+    /// Position of the first image, counted from 0.
     pub first: usize,
-    /// Position of the second image.
+    /// Position of the second image, counted from 0.
     pub second: usize,
 }
 
@@ -105,15 +105,43 @@ impl ImagePair {
     }
 }
 
-impl From<[usize; 2]> for ImagePair {
-    fn from([first, second]: [usize; 2]) -> Self {
-        Self { first, second }
+impl TryFrom<[usize; 2]> for ImagePair {
+    type Error = String;
+
+    /// Takes two different positions that are counted from 1.
+    fn try_from([first, second]: [usize; 2]) -> Result<Self, String> {
+        if first == second {
+            return Err(format!("a pair needs two different images, found [{first}, {second}]"));
+        }
+        Ok(Self { first: from_one(first)?, second: from_one(second)? })
     }
 }
 
 impl From<ImagePair> for [usize; 2] {
     fn from(pair: ImagePair) -> Self {
-        [pair.first, pair.second]
+        [pair.first + 1, pair.second + 1]
+    }
+}
+
+/// Returns the position counted from 0 of one that people count from 1.
+fn from_one(position: usize) -> Result<usize, String> {
+    position.checked_sub(1).ok_or_else(|| "positions of images count from 1, found 0".to_owned())
+}
+
+/// Serde adapter for positions of images, which are written as people count them, from 1.
+pub(crate) mod positions_from_one {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(crate) fn serialize<S: Serializer>(positions: &Option<Vec<usize>>, out: S) -> Result<S::Ok, S::Error> {
+        let written = positions.as_ref().map(|all| all.iter().map(|position| position + 1).collect::<Vec<usize>>());
+        written.serialize(out)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(input: D) -> Result<Option<Vec<usize>>, D::Error> {
+        let read = Option::<Vec<usize>>::deserialize(input)?;
+        let positions = read.map(|all| all.into_iter().map(super::from_one).collect());
+        positions.transpose().map_err(D::Error::custom)
     }
 }
 
@@ -173,6 +201,12 @@ impl MapBounds {
         self.x_min < other.x_max && self.x_max > other.x_min && self.y_min < other.y_max && self.y_max > other.y_min
     }
 
+    /// Returns the rectangle with x and y exchanged.
+    #[must_use]
+    pub(crate) fn swapped(self) -> Self {
+        Self { x_min: self.y_min, y_min: self.x_min, x_max: self.y_max, y_max: self.x_max }
+    }
+
     /// Returns `[x_min, y_min, x_max, y_max]`.
     pub fn to_array(self) -> [f64; 4] {
         [self.x_min, self.y_min, self.x_max, self.y_max]
@@ -211,7 +245,11 @@ mod tests {
     #[test]
     fn values_are_written_as_arrays() {
         assert_eq!(serde_json::to_string(&HeightRange::new(-1.5, 20.0)).unwrap(), "[-1.5,20.0]");
-        assert_eq!(serde_json::to_string(&ImagePair::new(0, 2)).unwrap(), "[0,2]");
+        assert_eq!(serde_json::to_string(&ImagePair::new(0, 2)).unwrap(), "[1,3]");
+        assert_eq!(serde_json::from_str::<ImagePair>("[1,3]").unwrap(), ImagePair::new(0, 2));
+        let zero = serde_json::from_str::<ImagePair>("[0,2]").unwrap_err().to_string();
+        assert!(zero.contains("positions of images count from 1, found 0"), "{zero}");
+        assert!(serde_json::from_str::<ImagePair>("[2,2]").is_err());
         assert_eq!(serde_json::to_string(&MapBounds::from([1.0, 2.0, 3.0, 4.0])).unwrap(), "[1.0,2.0,3.0,4.0]");
         assert_eq!(serde_json::from_str::<HeightRange>("[3,4]").unwrap(), HeightRange::new(3.0, 4.0));
         assert_eq!(ImagePair::new(2, 0).ordered().to_string(), "1-3");

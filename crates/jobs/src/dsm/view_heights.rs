@@ -101,6 +101,7 @@ fn described(images: &[ViewImage]) -> Vec<SceneImage> {
         gain: 1.0,
         band: None,
         masks: Vec::new(),
+        doubts: Vec::new(),
     };
     images.iter().enumerate().map(one).collect()
 }

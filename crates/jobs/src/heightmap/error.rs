@@ -60,6 +60,27 @@ pub enum HeightMapJobError {
     /// The tile cannot be made.
     #[error(transparent)]
     Tile(#[from] heightmap::HeightMapError),
+    /// The tile lies beside the source.
+    #[error(
+        "the map around {lat_deg:.5}° N, {lon_deg:.5}° E lies outside the source: it covers x {:.1} to {:.1}, y {:.1} to \
+         {:.1}, and the source x {:.1} to {:.1}, y {:.1} to {:.1}{}: {}",
+        tile[0], tile[2], tile[1], tile[3], source_extent[0], source_extent[2], source_extent[1], source_extent[3],
+        if *is_swapped { "; with latitude and longitude exchanged it would lie inside" } else { "" }, path.display()
+    )]
+    OutsideSource {
+        /// File of the source.
+        path: PathBuf,
+        /// Longitude of the camera, degrees.
+        lon_deg: f64,
+        /// Latitude of the camera, degrees.
+        lat_deg: f64,
+        /// Extent of the tile on the map of the source: x and y from, x and y to.
+        tile: [f64; 4],
+        /// Extent of the source.
+        source_extent: [f64; 4],
+        /// Whether a camera with latitude and longitude exchanged would stand on the source.
+        is_swapped: bool,
+    },
     /// The tile is empty.
     #[error("the source has no height anywhere in the tile: check position and coordinate systems")]
     EmptyTile,

@@ -90,6 +90,9 @@ impl Maker {
         path: &Path,
     ) -> Result<HeightMapMade, HeightMapJobError> {
         let Laid { frame, mut heights, zero_m, lowest } = laid;
+        if let HeightSource::Raster(raster) = &self.source {
+            raster.check_meets(stand, &frame)?;
+        }
         let resolution = self.settings.config.resolution_px_per_m;
         let measured = heights.clone();
         let ground = match &self.terrain {

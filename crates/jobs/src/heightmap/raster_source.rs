@@ -25,6 +25,8 @@ pub(super) struct RasterSource {
     path: PathBuf,
     map: SourceMap,
     geotransform: GeoTransform,
+    /// Columns and rows.
+    size: (usize, usize),
     whole: Option<Grid<f32>>,
 }
 
@@ -43,7 +45,8 @@ impl RasterSource {
         let crs = dem.horizontal_epsg.map(|code| format!("EPSG:{code}")).or(dem.crs_wkt);
         let map = source_map(path, FilePlace { crs, vertical: dem.vertical }, epsg, vertical, progress)?;
         let whole = small.then_some(dem.heights);
-        Ok(Self { path: path.to_owned(), map, geotransform: dem.geotransform, whole })
+        let size = (info.width, info.height);
+        Ok(Self { path: path.to_owned(), map, geotransform: dem.geotransform, size, whole })
     }
 
     /// Reads the heights at the tile of a camera.
@@ -61,6 +64,37 @@ impl RasterSource {
         let frame = TileFrame::new(request, zero_m, system)?;
         let heights = self.on(&frame, reading, zero_m)?;
         Ok(Laid { frame, heights, zero_m, lowest: None })
+    }
+
+    /// Checks that a tile and the raster share ground.
+    ///
+    /// # Errors
+    /// [`HeightMapJobError::OutsideSource`].
+    pub(super) fn check_meets(&self, stand: &CameraStand, frame: &TileFrame) -> Result<(), HeightMapJobError> {
+        let (low, high) = TileMap::to_grid(frame, &self.map, &self.geotransform)?.extent();
+        let size = [self.size.0 as f64, self.size.1 as f64];
+        if (0..2).all(|i| high[i] >= -0.5 && low[i] <= size[i] - 0.5) {
+            return Ok(());
+        }
+        let extent = |low: [f64; 2], high: [f64; 2]| {
+            let corners = [(low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])];
+            let start = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+            corners.into_iter().fold(start, |[x0, y0, x1, y1], (column, row)| {
+                let (x, y) = self.geotransform.map_from_cell(column, row);
+                [x0.min(x), y0.min(y), x1.max(x), y1.max(y)]
+            })
+        };
+        let CameraStand { lon_deg, lat_deg, .. } = *stand;
+        let swapped = self.map.projection.map_from_lonlat(lat_deg, lon_deg).ok();
+        let swapped = swapped.and_then(|at| self.geotransform.cell_from_map(at.x, at.y));
+        Err(HeightMapJobError::OutsideSource {
+            path: self.path.clone(),
+            lon_deg,
+            lat_deg,
+            tile: extent(low, high),
+            source_extent: extent([-0.5, -0.5], [size[0] - 0.5, size[1] - 0.5]),
+            is_swapped: swapped.is_some_and(|(x, y)| (0.0..size[0]).contains(&x) && (0.0..size[1]).contains(&y)),
+        })
     }
 
     /// Reads the heights above `zero_m` at the pixels of a tile.

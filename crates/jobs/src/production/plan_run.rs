@@ -45,7 +45,9 @@ fn stored_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, 
 }
 
 fn chain(config: &DsmConfig, session: &mut Session<'_>) -> Result<Plan, DsmError> {
-    let pointed = register(config, point(config, &open(config)?, session)?, session)?;
+    let opened = open(config)?;
+    opened.warn(session.progress);
+    let pointed = register(config, point(config, &opened, session)?, session)?;
     plan(config, &pointed, session)
 }
 

@@ -20,11 +20,9 @@ use serde::Serialize;
 use super::files::file;
 use super::http::{Answer, Refusal};
 use super::query::{Query, whole};
-use super::scene::{Scene, SceneLayer, SceneRaster, TILE, reduced};
+use super::scene::{SIDE_MAX, Scene, SceneLayer, SceneRaster, TILE, reduced};
 use crate::error_text::with_causes;
 
-/// Longest side of a picture or a grid.
-const SIDE_MAX: usize = 1024;
 /// Most samples of a profile.
 const SAMPLES_MAX: usize = 4000;
 /// Most rasters of a profile.

@@ -19,6 +19,23 @@ pub enum ViewError {
         /// The folder.
         path: PathBuf,
     },
+    /// One picture of a raster would take too long.
+    #[error(
+        "the raster of {columns} × {rows} cells has no overviews that fit: one picture would read {megacells} million \
+         cells. Add overviews (gdaladdo -r average FILE), or make a Cloud-Optimised GeoTIFF of it (gdal_translate -of \
+         COG FILE NEW): {}",
+        path.display()
+    )]
+    NoOverviews {
+        /// The raster.
+        path: PathBuf,
+        /// Its columns.
+        columns: usize,
+        /// Its rows.
+        rows: usize,
+        /// Cells that one picture would need, millions.
+        megacells: u64,
+    },
     /// The port cannot be used.
     #[error("cannot listen on port {port} of 127.0.0.1: choose another port, or none")]
     Port {

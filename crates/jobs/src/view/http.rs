@@ -1,44 +1,75 @@
-//! Requests and responses of HTTP/1.1, one per connection, within fixed bounds.
+//! Requests and responses of HTTP/1.1, one per connection, within fixed bounds. `hyper` reads and
+//! writes them.
 //!
-//! A head has at most 16 KiB, 64 fields and five seconds, and begins within one second. A body is
-//! not read.
+//! A head has at most 16 KiB, 64 fields and five seconds. A body is not read. Connections wait for
+//! their clients without a thread, so that slow ones keep nobody from being answered.
 
-use std::io::{ErrorKind, Read, Write};
-use std::net::{Shutdown, TcpStream};
-use std::time::{Duration, Instant};
+use std::convert::Infallible;
+use std::future::poll_fn;
+use std::sync::Arc;
+use std::time::Duration;
+
+use http_body_util::Full;
+use hyper::body::{Bytes, Incoming};
+use hyper::header::{ALLOW, CONTENT_LENGTH, CONTENT_TYPE, HOST, HeaderName, HeaderValue};
+use hyper::server::conn::http1::Builder;
+use hyper::service::service_fn;
+use hyper::{Method, Response, StatusCode};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{Semaphore, mpsc, oneshot};
+use tokio::time::timeout;
 
 /// Longest head of a request, bytes.
-pub(super) const HEAD_MAX: usize = 16 << 10;
+const HEAD_MAX: usize = 16 << 10;
 /// Most fields of a head.
 const FIELDS_MAX: usize = 64;
 /// Time within which the head of a request must arrive.
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// Time within which it must begin. Browsers open connections in advance that they leave idle.
-const IDLE_TIME: Duration = Duration::from_millis(1000);
-/// Time after which a connection looks whether the viewer ends.
-const SLICE: Duration = Duration::from_millis(100);
-/// Time that a client may take to receive a part of a response.
-const WRITE_TIME: Duration = Duration::from_secs(10);
-/// Parts of 4 KiB of a refused request that are read after the response.
-const REST_PARTS: usize = 64;
+/// Time for a whole connection: the head, the work, and a slow client that receives the response.
+const CONNECTION_TIME: Duration = Duration::from_secs(60);
+/// Connections that are open at once; further ones wait until one ends. A browser opens six, and
+/// macOS allows 256 open files to a program.
+const CONNECTIONS_MAX: usize = 128;
+/// Time between two looks whether the viewer ends.
+const PAUSE: Duration = Duration::from_millis(50);
+/// Parts of 4 KiB of a refused request that are read after the response, and the time for them. A
+/// socket that is closed with unread bytes would take the response back.
+const REST_PARTS: usize = 512;
+const REST_TIME: Duration = Duration::from_secs(1);
 
 /// Fields of every response. The page loads nothing from elsewhere and is shown in no frame; its
 /// address, which holds the token, is told to nobody.
-const FIELDS: &str = "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; \
-    img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n\
-    X-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\nX-Frame-Options: DENY\r\n\
-    Cross-Origin-Resource-Policy: same-origin\r\nCross-Origin-Opener-Policy: same-origin\r\n\
-    Cache-Control: no-store\r\nConnection: close\r\n";
+const FIELDS: [(&str, &str); 8] = [
+    (
+        "content-security-policy",
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
+         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    ),
+    ("x-content-type-options", "nosniff"),
+    ("referrer-policy", "no-referrer"),
+    ("x-frame-options", "DENY"),
+    ("cross-origin-resource-policy", "same-origin"),
+    ("cross-origin-opener-policy", "same-origin"),
+    ("cache-control", "no-store"),
+    ("connection", "close"),
+];
 
 /// A request that may be answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Request {
-    /// Whether only the head of the response is wanted.
-    pub(super) is_head: bool,
     /// Path and query.
     pub(super) target: String,
     /// The field `Host`.
     pub(super) host: String,
+}
+
+/// A request, and where its answer is expected.
+pub(super) struct Question {
+    /// The request, or why it is refused.
+    pub(super) request: Result<Request, Refusal>,
+    reply: oneshot::Sender<Result<Answer, Refusal>>,
 }
 
 /// The content of a response.
@@ -53,7 +84,7 @@ pub(super) struct Answer {
 /// Why a request is not answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Refusal {
-    /// The request is malformed, or asks for something out of range.
+    /// The request asks for something out of range.
     Malformed(String),
     /// The request names another host.
     ForeignHost,
@@ -61,137 +92,140 @@ pub(super) enum Refusal {
     NotFound,
     /// The method is neither GET nor HEAD.
     Method,
-    /// The request did not arrive in time.
-    TooSlow,
-    /// The head is too long.
-    TooLong,
     /// The data cannot be read.
     Failed(String),
-    /// The connection was closed before a request, or the viewer ends: nothing is sent.
-    Gone,
+}
+
+impl Question {
+    /// Gives the answer. A client that went away is no error.
+    pub(super) fn reply(self, answer: Result<Answer, Refusal>) {
+        drop(self.reply.send(answer));
+    }
 }
 
 impl Refusal {
-    /// Returns the status line's code and words; `None` when nothing is sent.
-    fn status(&self) -> Option<(u16, &'static str)> {
-        Some(match self {
-            Self::Malformed(_) => (400, "Bad Request"),
-            Self::ForeignHost => (403, "Forbidden"),
-            Self::NotFound => (404, "Not Found"),
-            Self::Method => (405, "Method Not Allowed"),
-            Self::TooSlow => (408, "Request Timeout"),
-            Self::TooLong => (431, "Request Header Fields Too Large"),
-            Self::Failed(_) => (500, "Internal Server Error"),
-            Self::Gone => return None,
-        })
-    }
-}
-
-/// Reads the head of a request. `is_over` is asked while it waits.
-///
-/// # Errors
-/// [`Refusal`], never [`Refusal::NotFound`], [`Refusal::ForeignHost`] or [`Refusal::Failed`].
-pub(super) fn receive(stream: &mut TcpStream, is_over: &dyn Fn() -> bool) -> Result<Request, Refusal> {
-    let start = Instant::now();
-    let mut head = Vec::new();
-    let mut part = [0u8; 4096];
-    stream.set_read_timeout(Some(SLICE)).map_err(|_| Refusal::Gone)?;
-    loop {
-        match stream.read(&mut part) {
-            Ok(0) => return Err(Refusal::Gone),
-            Ok(count) => head.extend_from_slice(part.get(..count).unwrap_or_default()),
-            Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
-            Err(_) => return Err(Refusal::Gone),
-        }
-        if let Some(request) = parse(&head)? {
-            return Ok(request);
-        }
-        if is_over() {
-            return Err(Refusal::Gone);
-        }
-        match head.is_empty() {
-            true if start.elapsed() > IDLE_TIME => return Err(Refusal::Gone),
-            false if start.elapsed() > HEAD_TIME => return Err(Refusal::TooSlow),
-            _ => {}
+    fn status(&self) -> StatusCode {
+        match self {
+            Self::Malformed(_) => StatusCode::BAD_REQUEST,
+            Self::ForeignHost => StatusCode::FORBIDDEN,
+            Self::NotFound => StatusCode::NOT_FOUND,
+            Self::Method => StatusCode::METHOD_NOT_ALLOWED,
+            Self::Failed(_) => StatusCode::INTERNAL_SERVER_ERROR,
         }
     }
 }
 
-/// Parses a head; `None` when more of it is needed.
+/// Accepts connections and passes their requests on, until `is_over`.
 ///
 /// # Errors
-/// As [`receive`].
-fn parse(head: &[u8]) -> Result<Option<Request>, Refusal> {
-    let mut fields = [httparse::EMPTY_HEADER; FIELDS_MAX];
-    let mut parsed = httparse::Request::new(&mut fields);
-    let malformed = |e: httparse::Error| match e {
-        httparse::Error::TooManyHeaders => Refusal::TooLong,
-        other => Refusal::Malformed(other.to_string()),
-    };
-    if parsed.parse(head).map_err(malformed)?.is_partial() {
-        return if head.len() > HEAD_MAX { Err(Refusal::TooLong) } else { Ok(None) };
+/// The error of the system when the listener cannot be used.
+pub(super) async fn serve(
+    listener: std::net::TcpListener,
+    questions: mpsc::UnboundedSender<Question>,
+    is_over: impl Fn() -> bool,
+) -> std::io::Result<()> {
+    listener.set_nonblocking(true)?;
+    let listener = TcpListener::from_std(listener)?;
+    let places = Arc::new(Semaphore::new(CONNECTIONS_MAX));
+    let mut place = None;
+    while !is_over() {
+        if place.is_none() {
+            place = timeout(PAUSE, Arc::clone(&places).acquire_owned()).await.ok().and_then(Result::ok);
+            continue;
+        }
+        match timeout(PAUSE, listener.accept()).await {
+            Ok(Ok((stream, _))) => {
+                let (taken, questions) = (place.take(), questions.clone());
+                tokio::spawn(async move {
+                    // A client that is too slow has lost its connection.
+                    let _ = timeout(CONNECTION_TIME, converse(stream, questions)).await;
+                    drop(taken);
+                });
+            }
+            // Too many open files, for example.
+            Ok(Err(_)) => tokio::time::sleep(PAUSE).await,
+            Err(_) => {}
+        }
     }
-    let is_head = match parsed.method {
-        Some("GET") => false,
-        Some("HEAD") => true,
-        _ => return Err(Refusal::Method),
+    Ok(())
+}
+
+/// Answers the request of one connection.
+async fn converse(stream: TcpStream, questions: mpsc::UnboundedSender<Question>) {
+    let service = service_fn(|request| Box::pin(answer(request, questions.clone())));
+    let mut builder = Builder::new();
+    builder.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME);
+    builder.keep_alive(false).max_buf_size(HEAD_MAX).max_headers(FIELDS_MAX).auto_date_header(false);
+    let mut connection = builder.serve_connection(TokioIo::new(stream), service);
+    // A malformed request has its answer already, and a client that went away needs none.
+    let _ = poll_fn(|context| connection.poll_without_shutdown(context)).await;
+    let mut stream = connection.into_parts().io.into_inner();
+    let rest = async {
+        stream.shutdown().await?;
+        let mut part = [0u8; 4096];
+        let mut parts = REST_PARTS;
+        while parts > 0 && stream.read(&mut part).await? > 0 {
+            parts -= 1;
+        }
+        std::io::Result::Ok(())
     };
-    let mut hosts = parsed.headers.iter().filter(|field| field.name.eq_ignore_ascii_case("host"));
+    let _ = timeout(REST_TIME, rest).await;
+}
+
+/// Passes a request on and makes the response of its answer.
+async fn answer(
+    request: hyper::Request<Incoming>,
+    questions: mpsc::UnboundedSender<Question>,
+) -> Result<Response<Full<Bytes>>, Infallible> {
+    let (reply, answer) = oneshot::channel();
+    let is_head = request.method() == Method::HEAD;
+    let ends = || Refusal::Failed("the viewer ends".to_owned());
+    let answer = match questions.send(Question { request: checked(&request), reply }) {
+        Ok(()) => answer.await.unwrap_or_else(|_| Err(ends())),
+        Err(_) => Err(ends()),
+    };
+    Ok(response(answer, is_head))
+}
+
+/// Returns what a request asks for.
+fn checked(request: &hyper::Request<Incoming>) -> Result<Request, Refusal> {
+    if ![Method::GET, Method::HEAD].contains(request.method()) {
+        return Err(Refusal::Method);
+    }
+    let mut hosts = request.headers().get_all(HOST).iter();
     let (Some(host), None) = (hosts.next(), hosts.next()) else { return Err(Refusal::ForeignHost) };
-    let host = String::from_utf8_lossy(host.value).into_owned();
-    Ok(Some(Request { is_head, target: parsed.path.unwrap_or_default().to_owned(), host }))
+    let host = host.to_str().map_err(|_| Refusal::ForeignHost)?.to_owned();
+    // An address with a host is for proxies.
+    if request.uri().authority().is_some() {
+        return Err(Refusal::NotFound);
+    }
+    let target = request.uri().path_and_query().ok_or(Refusal::NotFound)?.as_str().to_owned();
+    Ok(Request { target, host })
 }
 
-/// Sends a response. A client that went away is no error.
-pub(super) fn send(stream: &mut TcpStream, is_head: bool, answer: &Result<Answer, Refusal>) {
+fn response(answer: Result<Answer, Refusal>, is_head: bool) -> Response<Full<Bytes>> {
     let (status, kind, body) = match answer {
-        Ok(answer) => ((200, "OK"), answer.kind, answer.body.as_slice()),
+        Ok(answer) => (StatusCode::OK, answer.kind, answer.body),
         Err(refusal) => {
-            let Some(status) = refusal.status() else { return };
+            let status = refusal.status();
             let text = match refusal {
-                Refusal::Malformed(text) | Refusal::Failed(text) => text.as_bytes(),
-                _ => status.1.as_bytes(),
+                Refusal::Malformed(text) | Refusal::Failed(text) => text,
+                _ => status.canonical_reason().unwrap_or_default().to_owned(),
             };
-            (status, "text/plain; charset=utf-8", text)
+            (status, "text/plain; charset=utf-8", text.into_bytes())
         }
     };
-    let allow = if status.0 == 405 { "Allow: GET, HEAD\r\n" } else { "" };
-    let (code, words, length) = (status.0, status.1, body.len());
-    let head =
-        format!("HTTP/1.1 {code} {words}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{allow}{FIELDS}\r\n");
-    let body = if is_head { &[] } else { body };
-    let sent = stream
-        .set_write_timeout(Some(WRITE_TIME))
-        .and_then(|()| stream.write_all(head.as_bytes()))
-        .and_then(|()| stream.write_all(body));
-    // After a refusal, the rest of the request is taken and thrown away for a while: a connection
-    // that is closed with unread bytes would take the response with it.
-    let is_refused = answer.is_err() && sent.is_ok() && stream.shutdown(Shutdown::Write).is_ok();
-    let mut part = [0u8; 4096];
-    let mut parts = if is_refused { REST_PARTS } else { 0 };
-    while parts > 0 && stream.read(&mut part).is_ok_and(|count| count > 0) {
-        parts -= 1;
+    let length = body.len();
+    let mut response = Response::new(Full::new(Bytes::from(if is_head { Vec::new() } else { body })));
+    *response.status_mut() = status;
+    let fields = response.headers_mut();
+    for (name, value) in FIELDS {
+        fields.insert(HeaderName::from_static(name), HeaderValue::from_static(value));
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn heads_are_parsed_within_bounds() {
-        let get = parse(b"GET /a?b HTTP/1.1\r\nhost: 127.0.0.1:80\r\n\r\n").unwrap().unwrap();
-        assert_eq!((get.target.as_str(), get.host.as_str(), get.is_head), ("/a?b", "127.0.0.1:80", false));
-        assert!(parse(b"HEAD / HTTP/1.1\r\nHost: a\r\n\r\n").unwrap().unwrap().is_head);
-        assert_eq!(parse(b"GET / HTTP/1.1\r\nHos"), Ok(None));
-        assert_eq!(parse(b"POST / HTTP/1.1\r\nHost: a\r\n\r\n"), Err(Refusal::Method));
-        for text in ["GET / HTTP/1.1\r\n\r\n", "GET / HTTP/1.1\r\nHost: a\r\nHost: a\r\n\r\n"] {
-            assert_eq!(parse(text.as_bytes()), Err(Refusal::ForeignHost));
-        }
-        let long = format!("GET /{} HTTP/1.1", "a".repeat(HEAD_MAX));
-        assert_eq!(parse(long.as_bytes()), Err(Refusal::TooLong));
-        let many = format!("GET / HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(FIELDS_MAX + 1));
-        assert_eq!(parse(many.as_bytes()), Err(Refusal::TooLong));
-        assert!(matches!(parse(b"\0\0\0\0"), Err(Refusal::Malformed(_))));
+    fields.insert(CONTENT_TYPE, HeaderValue::from_static(kind));
+    fields.insert(CONTENT_LENGTH, HeaderValue::from(length));
+    if status == StatusCode::METHOD_NOT_ALLOWED {
+        fields.insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
     }
+    response
 }

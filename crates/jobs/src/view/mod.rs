@@ -9,12 +9,13 @@
 //! - GET and HEAD are answered, nothing else. Nothing of a request becomes the name of a file:
 //!   layers have numbers.
 //! - A request, its time and the work that it asks for are bounded, and so is the number of
-//!   requests that are answered at once.
+//!   connections and of requests that are answered at once. A raster of which one picture would
+//!   take long, because it has no overviews, is refused.
 //! - The page consists of the files in `page/`, which are part of the program. It may talk to this
 //!   server only (Content-Security-Policy).
 //!
-//! HTTP heads are parsed by `httparse`. The small servers that were looked at keep heads of any
-//! length in memory and wait for them without end, so the socket is read here.
+//! HTTP is spoken by `hyper`. Servers with a thread for each connection were looked at, too: they
+//! bound neither the time for a head nor the number of threads that slow clients hold.
 
 mod answers;
 mod config;

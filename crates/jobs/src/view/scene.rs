@@ -22,10 +22,15 @@ use crate::error_text::with_causes;
 
 /// Side of a tile, pixels.
 pub(super) const TILE: usize = 256;
+/// Longest side of a picture or a grid.
+pub(super) const SIDE_MAX: usize = 1024;
 /// Longest side of the reduced raster from which the range of the colours follows.
 const SAMPLE_SIDE: usize = 512;
-/// Cells above which a raster without overviews is slow to show.
-const SLOW_CELLS: usize = 64 << 20;
+/// Cells to decode for one picture above which a raster is slow to show.
+const SLOW_CELLS: u64 = 64 << 20;
+/// Cells to decode for one picture above which a raster is refused: a few seconds, as GDAL decodes
+/// about 10⁸ cells in a second. Beyond, moving the map asks for more than the computer answers.
+const REFUSED_CELLS: u64 = 256 << 20;
 /// Metres in a degree of latitude.
 const DEGREE_M: f64 = 111_195.0;
 
@@ -119,8 +124,8 @@ impl Scene {
             progress.check_cancelled().map_err(JobError::from)?;
             match add(&mut scene, file, config.inputs.len() > 1, progress) {
                 Ok(()) => {}
-                Err(error) if file.is_named => return Err(error.into()),
-                Err(error) => progress.warn(&format!("left out, because it cannot be read: {}", with_causes(&error))),
+                Err(error) if file.is_named => return Err(error),
+                Err(error) => progress.warn(&format!("left out: {}", with_causes(&error))),
             }
         }
         let path = || config.inputs.first().cloned().unwrap_or_default();
@@ -134,7 +139,7 @@ fn add(
     file: &FoundRaster,
     is_one_of_several: bool,
     progress: &dyn Progress,
-) -> Result<(), RasterError> {
+) -> Result<(), ViewError> {
     let source = ImageSource::open(&file.path)?;
     let info = source.info();
     let map = match scene {
@@ -146,10 +151,18 @@ fn add(
         return Ok(());
     }
     let label = source.band_label(1)?;
-    if label.overviews == 0 && info.width.saturating_mul(info.height) > SLOW_CELLS {
-        progress.warn(&format!("has no overviews, so that its pictures take long: {}", file.path.display()));
-    }
     let bands = bands(info);
+    let mut cells = 0_u64;
+    for band in &bands {
+        cells = cells.saturating_add(source.cells_of_picture(*band, SIDE_MAX)?);
+    }
+    if cells > REFUSED_CELLS {
+        let (columns, rows, cells) = (info.width, info.height, cells / 1_000_000);
+        return Err(ViewError::NoOverviews { path: file.path.clone(), columns, rows, megacells: cells });
+    }
+    if cells > SLOW_CELLS {
+        progress.warn(&format!("has no fitting overviews, so that its pictures take long: {}", file.path.display()));
+    }
     let size = reduced((info.width, info.height), SAMPLE_SIDE);
     let sample: Vec<Grid<f32>> =
         bands.iter().map(|&band| source.read_reduced(band, source.window(), size)).collect::<Result<_, _>>()?;

@@ -1,26 +1,27 @@
-//! The server: threads that accept connections, check requests and answer them.
+//! The server: one thread that holds the connections, and others that check requests and answer
+//! them.
 
 use std::fmt::Write;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
-use numeric::{CancelFlag, Progress};
+use numeric::Progress;
+use tokio::sync::mpsc;
 
 use super::answers::Answers;
 use super::config::ViewConfig;
 use super::error::ViewError;
-use super::http::{Answer, Refusal, Request, receive, send};
+use super::http::{Answer, Question, Refusal, Request, serve};
 use super::report::ViewerReport;
 use super::scene::Scene;
 
-/// Connections that are served at once. A browser opens six, and some that it leaves idle.
-const WORKERS: usize = 12;
+/// Requests that are answered at once. A browser asks six at a time.
+const WORKERS: usize = 6;
 /// Bytes of the token.
 const TOKEN_BYTES: usize = 16;
-/// Time between two looks whether the viewer ends.
-const PAUSE: Duration = Duration::from_millis(50);
 
 /// A viewer that listens and is not served yet.
 pub struct ViewServer {
@@ -88,21 +89,22 @@ impl ViewServer {
     /// [`ViewError::Thread`] when the system starts no threads.
     pub fn serve(&self, progress: &dyn Progress) -> Result<ViewerReport, ViewError> {
         let start = Instant::now();
-        let (stop, counts) = (CancelFlag::new(), Counts::default());
-        let started = std::thread::scope(|scope| {
-            let work = || self.work(&stop, &counts);
+        let counts = Counts::default();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(ViewError::Thread)?;
+        let listener = self.listener.try_clone().map_err(ViewError::Thread)?;
+        let is_over = || self.seconds.is_some_and(|seconds| start.elapsed().as_secs_f64() >= seconds);
+        let (questions, received) = mpsc::unbounded_channel();
+        let received = Mutex::new(received);
+        let served = std::thread::scope(|scope| {
+            let work = || self.work(&received, &counts);
             let spawn = |_| std::thread::Builder::new().name("view".to_owned()).spawn_scoped(scope, work);
-            let started = (0..WORKERS).try_for_each(|i| spawn(i).map(drop));
-            let is_over = || self.seconds.is_some_and(|seconds| start.elapsed().as_secs_f64() >= seconds);
-            while started.is_ok() && !progress.is_cancelled() && !is_over() {
-                std::thread::sleep(PAUSE);
-            }
-            stop.cancel();
-            // Each thread that waits for a connection gets one, and then sees the flag.
-            (0..WORKERS).for_each(|_| drop(TcpStream::connect_timeout(&self.address, PAUSE)));
-            started
+            (0..WORKERS).try_for_each(|i| spawn(i).map(drop))?;
+            let served = runtime.block_on(serve(listener, questions, || progress.is_cancelled() || is_over()));
+            // The connections end with the runtime, and the threads when no connection may ask.
+            drop(runtime);
+            served
         });
-        started.map_err(ViewError::Thread)?;
+        served.map_err(ViewError::Thread)?;
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         Ok(ViewerReport {
             layers: self.scene.layers.iter().map(|layer| layer.title.clone()).collect(),
@@ -113,26 +115,20 @@ impl ViewServer {
         })
     }
 
-    /// Answers one connection after the other until the flag is set.
-    fn work(&self, stop: &CancelFlag, counts: &Counts) {
+    /// Answers one request after the other until no more can come.
+    fn work(&self, questions: &Mutex<mpsc::UnboundedReceiver<Question>>, counts: &Counts) {
         let mut answers = Answers::new(&self.scene);
-        while !stop.is_cancelled() {
-            let Ok((mut stream, _)) = self.listener.accept() else {
-                // Too many open files, for example.
-                std::thread::sleep(PAUSE);
-                continue;
-            };
-            let request = receive(&mut stream, &|| stop.is_cancelled());
-            let is_head = request.as_ref().is_ok_and(|request| request.is_head);
+        let next = || questions.lock().unwrap_or_else(PoisonError::into_inner).blocking_recv();
+        while let Some(question) = next() {
+            let request = question.request.clone();
             let answer = request.and_then(|request| self.answer(&request, &mut answers));
             let counter = match &answer {
-                Err(Refusal::Gone) => continue,
                 Ok(_) => &counts.answered,
                 Err(Refusal::Failed(_)) => &counts.failed,
                 Err(_) => &counts.refused,
             };
             counter.fetch_add(1, Ordering::Relaxed);
-            send(&mut stream, is_head, &answer);
+            question.reply(answer);
         }
     }
 
