@@ -259,8 +259,14 @@ fn facts(report: &DsmReport) -> Vec<(String, String)> {
     }
     if let Some(reference) = &pointing.reference {
         let [east, north, up] = reference.shift_m;
-        let text =
-            format!("{}: moved by {east:.2} m east, {north:.2} m north, {up:.2} m up", file_name(&reference.path));
+        let [x, y, z] = reference.deviation_m;
+        let text = format!(
+            "{}: moved by {east:.2} m east, {north:.2} m north, {up:.2} m up, with standard errors of {x:.2}, {y:.2} and \
+             {z:.2} m; NMAD {:.2} m before, {:.2} m after",
+            file_name(&reference.path),
+            reference.nmad_before_m,
+            reference.nmad_after_m
+        );
         facts.push(("reference".to_owned(), text));
     }
     if let Some(chunks) = &report.chunks {

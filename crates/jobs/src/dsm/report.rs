@@ -126,6 +126,9 @@ pub struct ReferenceReport {
     pub path: PathBuf,
     /// Shift east, north and up that the surface was given, metres.
     pub shift_m: [f64; 3],
+    /// Standard errors of the shift, metres, from the shifts that the parts of the scene find.
+    #[serde(default)]
+    pub deviation_m: [f64; 3],
     /// Tilt that the heights were given, metres per kilometre east and north; `None` unless asked
     /// for.
     pub plane_m_per_km: Option<[f64; 2]>,
@@ -137,9 +140,17 @@ pub struct ReferenceReport {
     /// NMAD of the differences after the shift, metres.
     #[serde(with = "null_is_nan")]
     pub nmad_after_m: f64,
-    /// Length of the second and last shift, metres, which tells how well the first one was
+    /// NMAD that a typical shift leaves, divided by that of the best one: near 1 there is no relief
+    /// that both surfaces share.
+    #[serde(default = "no_contrast")]
+    pub contrast: f64,
+    /// Length of the last shift, metres, which tells how well the first one was
     /// followed.
     pub last_shift_m: f64,
+}
+
+fn no_contrast() -> f64 {
+    1.0
 }
 
 /// What became of the search for the chip of a ground point in an image.
