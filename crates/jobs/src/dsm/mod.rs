@@ -56,6 +56,7 @@ mod city_prior;
 mod clean_up;
 mod config;
 mod control;
+mod control_doubt;
 mod covering;
 mod dem;
 mod error;

@@ -8,7 +8,7 @@ use report::{Axis, Chart, JobPage, JobTable, PictureError, PointResidual, residu
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::pictures::RunMaps;
-use crate::dsm::report::{DsmReport, ImageReport};
+use crate::dsm::report::{ControlReport, DsmReport, ImageReport};
 
 /// Number of bars of a histogram.
 const BARS: usize = 60;
@@ -65,6 +65,7 @@ pub(crate) fn html(
     page.plots.extend(residual_maps(report));
     page.plots.push(time_plot(report));
     page.tables = vec![image_table(report), pair_table(report), choice_table(report)];
+    page.tables.extend(report.pointing.control.as_ref().map(control_table));
     page.facts = facts(report);
     page.html()
 }
@@ -221,6 +222,14 @@ fn pair_table(report: &DsmReport) -> JobTable {
         title: "Pairs".to_owned(),
         heads: ["images", "angle, °", "overlap", "parallax, px/m", "tie points"].map(str::to_owned).to_vec(),
         rows: report.pairs.iter().map(row).collect(),
+    }
+}
+
+fn control_table(control: &ControlReport) -> JobTable {
+    JobTable {
+        title: "Ground points".to_owned(),
+        heads: ControlReport::HEADS.map(str::to_owned).to_vec(),
+        rows: control.rows().into_iter().map(Vec::from).collect(),
     }
 }
 
