@@ -80,6 +80,28 @@ fn voids_in_a_view_leave_the_other_views_heights() {
     }
 }
 
+/// The middle view of three has a gap beside the roof of 20 m. What the other two do not match there
+/// is not taken for ground that the house hides.
+#[test]
+fn a_gap_in_an_image_is_not_taken_for_hidden_ground() {
+    let stage = Stage::default();
+    let mut shots = EASY.shots.clone();
+    let size = shots[1].image.width();
+    for (i, value) in shots[1].image.data_mut().iter_mut().enumerate() {
+        let (column, line) = (i % size, i / size);
+        if (190..235).contains(&column) && (115..180).contains(&line) {
+            *value = 0;
+        }
+    }
+    shots[1].no_data = Some(0.0);
+    let outcome = stage.run(&shots, |_| {}).unwrap();
+    let roof = |x: f64, y: f64| (x - 35.0).abs() < 11.0 && (y + 5.0).abs() < 14.0;
+    let errors = stage.errors(&outcome, 50.0, AlignmentMethod::None);
+    let (beside, all) = (errors.over(roof), errors.over(|_, _| true));
+    assert!(beside.wrong < 0.12, "{beside:?}");
+    all.expect("a gap beside a house", 0.92, 0.04);
+}
+
 /// All views are void west of x = −20 m: there is nothing to see, declared or not, and nothing may
 /// be invented.
 #[test]

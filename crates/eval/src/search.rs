@@ -36,7 +36,7 @@ const MOST_CANDIDATES: usize = 50_000;
 /// Shortest search radius, cells.
 const LEAST_RADIUS_CELLS: f64 = 2.0;
 /// Number of winners on the small sample that are compared on the large one.
-const FINALISTS: usize = 5;
+pub(crate) const FINALISTS: usize = 5;
 /// Number of cells of the small sample.
 const SMALL_SAMPLE: std::ops::RangeInclusive<usize> = 10_000..=60_000;
 /// Number of heights read from the small sample over all shifts. It bounds the time of a wide
@@ -88,20 +88,32 @@ struct Sample {
 
 /// Shift in reference cells and its score.
 #[derive(Clone, Copy)]
-struct Candidate {
-    columns: f64,
-    rows: f64,
-    n: usize,
-    nmad: f64,
+pub(crate) struct Candidate {
+    pub(crate) columns: f64,
+    pub(crate) rows: f64,
+    pub(crate) n: usize,
+    pub(crate) nmad: f64,
 }
 
 impl Search<'_> {
     /// Returns the shift, in reference cells, that is added to the test surface.
     pub(crate) fn run(&self, radius_m: f64) -> Result<((f64, f64), SearchSummary), EvalError> {
         let steps = self.steps(radius_m)?;
-        let small_count = (SMALL_SAMPLE_READS / steps.len()).clamp(*SMALL_SAMPLE.start(), *SMALL_SAMPLE.end());
-        let cells = self.cells_near_test(&steps);
-        let small = self.at_centres(&cells, small_count);
+        let count = (SMALL_SAMPLE_READS / steps.len()).clamp(*SMALL_SAMPLE.start(), *SMALL_SAMPLE.end());
+        let ranked = self.try_steps(&steps, count)?;
+        let (start, best) = self.finest(&steps, &ranked, LARGE_SAMPLE);
+        let summary = SearchSummary {
+            radius_m: self.radius_m(radius_m),
+            candidates: steps.len(),
+            contrast: contrast(&ranked),
+            at_edge: at_edge(&steps, start),
+        };
+        Ok(((best.columns, best.rows), summary))
+    }
+
+    /// Compares whole-cell shifts at `count` cells; the best come first.
+    pub(crate) fn try_steps(&self, steps: &[(i32, i32)], count: usize) -> Result<Vec<Candidate>, EvalError> {
+        let small = self.at_centres(&self.cells_near_test(steps), count);
         let tried = steps.par_iter().map(|&(c, r)| self.candidate(&small, f64::from(c), f64::from(r))).collect();
         let ranked = ranked(tried);
         let found = ranked.first().map_or(0, |c| c.n);
@@ -113,21 +125,20 @@ impl Search<'_> {
         if found < LEAST_CELLS {
             return Err(EvalError::TooFewCells { found, needed: LEAST_CELLS });
         }
+        Ok(ranked)
+    }
+
+    /// Returns the best of the ranked whole-cell shifts, and the shift next to it that fits best,
+    /// compared at `count` positions.
+    pub(crate) fn finest(&self, steps: &[(i32, i32)], ranked: &[Candidate], count: usize) -> (Candidate, Candidate) {
         let (reference, test) = (smoothed(self.reference), smoothed(self.test));
         let smooth = Search { reference: &reference, test: &test, ..*self };
-        let large = smooth.scattered(&cells, LARGE_SAMPLE);
+        let large = smooth.scattered(&self.cells_near_test(steps), count);
         let finalists: Vec<Candidate> =
             ranked.par_iter().take(FINALISTS).map(|c| smooth.candidate(&large, c.columns, c.rows)).collect();
         let nowhere = Candidate { columns: 0.0, rows: 0.0, n: 0, nmad: f64::INFINITY };
         let start = finalists.into_iter().fold(nowhere, better);
-        let best = smooth.levelled(&large, smooth.refined(&large, start));
-        let summary = SearchSummary {
-            radius_m: self.radius_m(radius_m),
-            candidates: steps.len(),
-            contrast: contrast(&ranked),
-            at_edge: at_edge(&steps, start),
-        };
-        Ok(((best.columns, best.rows), summary))
+        (start, smooth.levelled(&large, smooth.refined(&large, start)))
     }
 
     fn radius_m(&self, radius_m: f64) -> f64 {
@@ -136,7 +147,7 @@ impl Search<'_> {
     }
 
     /// Returns all whole-cell shifts within the radius, nearest first.
-    fn steps(&self, radius_m: f64) -> Result<Vec<(i32, i32)>, EvalError> {
+    pub(crate) fn steps(&self, radius_m: f64) -> Result<Vec<(i32, i32)>, EvalError> {
         let radius_m = self.radius_m(radius_m);
         let (along_columns, along_rows) = self.metres_from_cells.cell_size_m();
         let (columns, rows) = (radius_m / along_columns, radius_m / along_rows);
@@ -289,7 +300,7 @@ fn ranked(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
 }
 
 /// Returns the NMAD of the middle candidate divided by the first; 1 if every shift fits equally.
-fn contrast(ranked: &[Candidate]) -> f64 {
+pub(crate) fn contrast(ranked: &[Candidate]) -> f64 {
     match (ranked.first(), ranked.get(ranked.len() / 2)) {
         (Some(first), Some(middle)) if first.nmad > 0.0 => middle.nmad / first.nmad,
         (Some(_), Some(middle)) if middle.nmad > 0.0 => f64::MAX,
@@ -298,7 +309,7 @@ fn contrast(ranked: &[Candidate]) -> f64 {
 }
 
 /// Returns whether a neighbour of the whole-cell shift was not searched.
-fn at_edge(steps: &[(i32, i32)], start: Candidate) -> bool {
+pub(crate) fn at_edge(steps: &[(i32, i32)], start: Candidate) -> bool {
     let (column, row) = (start.columns as i32, start.rows as i32);
     [(0, -1), (-1, 0), (1, 0), (0, 1)].iter().any(|(c, r)| !steps.contains(&(column + c, row + r)))
 }

@@ -135,6 +135,96 @@ fn a_wrong_control_point_is_named_and_does_no_harm() {
     assert!(report.ce90_m.unwrap() < 0.5 && report.le90_m.unwrap() < 0.5, "{report:?}");
 }
 
+/// Rewrites the rows of some points of a file: name, longitude, latitude and height.
+fn rewrite(path: &Path, change: impl Fn(&str, &mut [f64; 3])) {
+    let text = std::fs::read_to_string(path).unwrap();
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        let Ok(height) = fields[3].parse::<f64>() else { return line.to_owned() };
+        let mut place = [fields[1].parse().unwrap(), fields[2].parse().unwrap(), height];
+        change(fields[0], &mut place);
+        let [lon, lat, height] = place;
+        format!("{},{lon},{lat},{height},{}", fields[0], fields[4..].join(","))
+    };
+    std::fs::write(path, text.lines().map(row).collect::<Vec<_>>().join("\n")).unwrap();
+}
+
+/// One point of five that is off by 2.5 m is left out: the scene stays where the other four put it.
+/// Neither it nor a position beside the scene is blamed on an RPC.
+#[test]
+fn one_wrong_point_of_five_moves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("points.csv");
+    let mut config = config(folder.path());
+    config.control = Some(path.clone());
+    let views = View::all();
+    let run = |change: &dyn Fn(&str, &mut [f64; 3])| {
+        write_points(&path, &views, 0.2);
+        rewrite(&path, change);
+        pointed(&config)
+    };
+    let good = run(&|_, _| {});
+    assert!(good.warnings.is_empty(), "{:?}", good.warnings);
+    assert!(good.pointing.control.as_ref().unwrap().control.iter().all(|point| point.used));
+    let height_m = |pointed: &Pointed| {
+        let cameras: Vec<RpcCamera> = pointed.images.iter().map(|image| image.camera.clone()).collect();
+        let at = views[1].delivered.localize(ImagePoint::new(320.0, 320.0), 200.0).unwrap();
+        let track = (0..3).map(|view| (view, views[view].shows(at))).collect();
+        sweep::pointing::ground_of(&cameras, &track).unwrap().height_m
+    };
+    let height = run(&|name, place| place[2] += if name == "p4" { 2.5 } else { 0.0 });
+    let beside = run(&|name, place| place[0] += if name == "p4" { 0.5 } else { 0.0 });
+    for (wrong, why) in [(height, "its height is off by"), (beside, "outside of all images")] {
+        let control = wrong.pointing.control.as_ref().unwrap();
+        let point = control.control.iter().find(|point| point.name == "p4").unwrap();
+        assert!(!point.used && point.reason.as_ref().unwrap().contains(why), "{point:?}");
+        assert_eq!(control.control.iter().filter(|point| point.used).count(), 4);
+        let [warning] = &wrong.warnings[..] else { panic!("{:?}", wrong.warnings) };
+        assert!(warning.contains("p4") && !warning.contains("RPC"), "{warning}");
+        let moved_m = height_m(&wrong) - height_m(&good);
+        assert!(moved_m.abs() < 0.1, "{moved_m}");
+    }
+}
+
+/// Coordinates, units and datums that do not fit the images are refused or named, with the cause.
+#[test]
+fn points_with_other_axes_units_or_datums_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("points.csv");
+    let mut config = config(folder.path());
+    config.control = Some(path.clone());
+    let views = View::all();
+    let geoid = crs::HeightConverter::new(crs::VerticalDatum::Egm96).unwrap();
+    let run = |change: &dyn Fn(&str, &mut [f64; 3])| {
+        write_points(&path, &views, 0.2);
+        rewrite(&path, change);
+        point(&config, &open(&config).unwrap(), &mut Session::new(&Silent))
+    };
+    type Change<'a> = &'a dyn Fn(&str, &mut [f64; 3]);
+    let refused: [(Change<'_>, &str); 4] = [
+        (&|_, place| place.swap(0, 1), "coordinates exchanged"),
+        (&|_, place| place[0] += 1.0, "outside of all images"),
+        (&|_, place| place[2] /= 0.3048, "in feet they would fit"),
+        (&|_, place| place[2] += 300.0, "heights 300 m above"),
+    ];
+    for (change, words) in refused {
+        let error = run(change).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains("points.csv"), "{words}: {error}");
+    }
+    let above_geoid = |place: &mut [f64; 3]| {
+        place[2] -= geoid.ellipsoid_from_datum(place[0], place[1], 0.0).unwrap();
+    };
+    let named: [(Change<'_>, &str); 2] = [
+        (&|_, place| above_geoid(place), "above the EGM96 geoid (mean sea level) they would fit"),
+        (&|_, place| place[2] += 29.0, "where RPCs usually err by"),
+    ];
+    for (change, words) in named {
+        let warnings = run(change).unwrap().warnings;
+        let [warning] = &warnings[..] else { panic!("{words}: {warnings:?}") };
+        assert!(warning.contains(words), "{warning}");
+    }
+}
+
 /// The pointing of a run is written into its report. A later run with other images starts from it.
 #[test]
 fn a_later_run_starts_from_saved_pointing() {

@@ -41,6 +41,10 @@ const FILL_NARROW_M: f64 = 10.0;
 /// Heights around a void that differ by more than this per metre between them are two surfaces:
 /// steeper than streets.
 const FILL_SLOPE: f64 = 0.05;
+/// Distance in a void over which blank pixels are the reason for it, metres: the patches that are
+/// compared reach two pixels of up to 2 m into what is blank, and blank pixels are marked at heights
+/// that are off.
+const FILL_BLIND_M: f64 = 5.0;
 /// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
 /// rises and falls, and something small may stand there.
 const FILL_SIGMA_SLOPE: f64 = 0.1;
@@ -154,6 +158,7 @@ fn fill_config(fill: Fill, gsd_m: f64) -> FillConfig {
         reach_cells: (reach_m / gsd_m).ceil() as usize,
         hidden_reach_cells: (FILL_REACH_FAR_M / gsd_m).ceil() as usize,
         narrow_cells: (FILL_NARROW_M / gsd_m) as f32,
+        blind_reach_cells: (FILL_BLIND_M / gsd_m).ceil() as usize,
         island_cells: (FILL_NARROW_M / gsd_m).powi(2) as usize,
         same_surface_m: (2.0 * gsd_m) as f32,
         slope_m: (FILL_SLOPE * gsd_m) as f32,

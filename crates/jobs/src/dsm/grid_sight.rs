@@ -22,25 +22,39 @@ const LATTICE: usize = 32;
 /// Lines of sight are followed up and down by this much, metres: the height of a tower.
 const ALONG_M: f64 = 50.0;
 
+/// Reach of a gap inside of an image, pixels: the patches that are compared reach two pixels into
+/// it, and a height of two storeys off the ground around moves a place by some more.
+const GAP_REACH: usize = 8;
+
 /// The camera of a view and the valid pixels of one level. It takes a fraction of the view's
 /// memory.
 pub(crate) struct ViewPixels {
     camera: RpcCamera,
     level: u32,
     valid: Grid<bool>,
+    /// Pixels in and beside gaps inside of the image; `None` where there are none.
+    gaps: Option<Grid<bool>>,
 }
 
 impl ViewPixels {
     /// Takes from a view what tells where it sees.
     pub(crate) fn of(view: &SweepView, level: usize) -> Self {
         let valid = view.levels[level].map(|v| !v.is_nan());
-        Self { camera: view.camera.clone(), level: level as u32, valid }
+        let gaps = inner_gaps(&valid);
+        Self { camera: view.camera.clone(), level: level as u32, valid, gaps }
     }
 
     /// Returns whether the image shows the place (column, row) of its level.
     fn shows(&self, [column, row]: [f64; 2]) -> bool {
         let (x, y) = (column.round(), row.round());
         x >= 0.0 && y >= 0.0 && self.valid.get(x as usize, y as usize).is_some_and(|v| *v)
+    }
+
+    /// Returns whether the place lies in or beside a gap inside of the image.
+    fn has_gap(&self, [column, row]: [f64; 2]) -> bool {
+        let (x, y) = (column.round(), row.round());
+        let at = |gaps: &Grid<bool>| x >= 0.0 && y >= 0.0 && gaps.get(x as usize, y as usize).is_some_and(|v| *v);
+        self.gaps.as_ref().is_some_and(at)
     }
 }
 
@@ -59,7 +73,9 @@ pub(crate) fn grid_sights(
     let lattice = Lattice::new(grid, &projection, height_m, origin_m)?;
     let sight = |view: &ViewPixels| {
         let cells_per_m = cells_per_m(&view.camera, grid, &projection, lattice.middle).ok()?;
-        Some(GridSight { cells_per_m, images: lattice.imaged(view, grid.size) })
+        let images = lattice.marked(view, grid.size, ViewPixels::shows);
+        let gaps = lattice.marked(view, grid.size, ViewPixels::has_gap);
+        Some(GridSight { cells_per_m, images, gaps })
     };
     Ok(views.par_iter().filter_map(sight).collect())
 }
@@ -115,8 +131,14 @@ impl Lattice {
         Ok(Self { points, middle })
     }
 
-    /// Marks the cells that a view images. Nothing is imaged beside a point where its camera fails.
-    fn imaged(&self, view: &ViewPixels, size: (usize, usize)) -> Grid<bool> {
+    /// Marks the cells at whose places a view has something. It has nothing beside a point where its
+    /// camera fails.
+    fn marked(
+        &self,
+        view: &ViewPixels,
+        size: (usize, usize),
+        has: impl Fn(&ViewPixels, [f64; 2]) -> bool,
+    ) -> Grid<bool> {
         let pixel = |ground: &LonLatHeight| match view.camera.project(*ground) {
             Ok(p) => [p.sample, p.line].map(|v| level_from_level0(v, view.level)),
             Err(_) => [f64::NAN; 2],
@@ -125,21 +147,68 @@ impl Lattice {
         let mut out = Grid::filled(size.0, size.1, false);
         for y in 0..size.1 {
             let (v, b) = (y / LATTICE, (y % LATTICE) as f64 / LATTICE as f64);
-            for (x, imaged) in out.row_mut(y).iter_mut().enumerate() {
+            for (x, marked) in out.row_mut(y).iter_mut().enumerate() {
                 let (u, a) = (x / LATTICE, (x % LATTICE) as f64 / LATTICE as f64);
                 let [p, q, r, s] = [(u, v), (u + 1, v), (u, v + 1), (u + 1, v + 1)].map(|at| pixels[at]);
                 let between = |i: usize| {
                     let (above, below) = (p[i] + a * (q[i] - p[i]), r[i] + a * (s[i] - r[i]));
                     above + b * (below - above)
                 };
-                *imaged = view.shows([between(0), between(1)]);
+                *marked = has(view, [between(0), between(1)]);
             }
         }
         out
     }
 }
 
+/// Marks the pixels in and beside gaps that valid pixels enclose; `None` where there are none. What
+/// is void up to the border of an image is where the image ends.
+fn inner_gaps(valid: &Grid<bool>) -> Option<Grid<bool>> {
+    let (width, height) = (valid.width(), valid.height());
+    if valid.data().iter().all(|v| *v) {
+        return None;
+    }
+    let mut is_inner = valid.map(|v| !*v);
+    let border = (0..width).flat_map(|x| [(x, 0), (x, height - 1)]);
+    let mut open: Vec<(usize, usize)> = border.chain((0..height).flat_map(|y| [(0, y), (width - 1, y)])).collect();
+    while let Some(at) = open.pop() {
+        if is_inner.get(at.0, at.1) != Some(&true) {
+            continue;
+        }
+        is_inner[at] = false;
+        let (x, y) = at;
+        open.extend([(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)]);
+    }
+    if !is_inner.data().contains(&true) {
+        return None;
+    }
+    let mut out = valid.map(|_| false);
+    for (i, _) in is_inner.data().iter().enumerate().filter(|(_, inner)| **inner) {
+        let (x, y) = (i % width, i / width);
+        for row in y.saturating_sub(GAP_REACH)..(y + GAP_REACH + 1).min(height) {
+            out.row_mut(row)[x.saturating_sub(GAP_REACH)..(x + GAP_REACH + 1).min(width)].fill(true);
+        }
+    }
+    Some(out)
+}
+
 fn mean<'a>(values: impl Iterator<Item = &'a f32>) -> Option<f64> {
     let (sum, n) = values.fold((0.0, 0u32), |(sum, n), v| (sum + f64::from(*v), n + 1));
     (n > 0).then(|| sum / f64::from(n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_is_what_valid_pixels_enclose() {
+        let mut valid = Grid::filled(60, 50, true);
+        (0..20).for_each(|y| (0..6).for_each(|x| valid[(x, y)] = false));
+        assert_eq!(inner_gaps(&valid), None);
+        (30..33).for_each(|y| (30..34).for_each(|x| valid[(x, y)] = false));
+        let gaps = inner_gaps(&valid).unwrap();
+        assert!(gaps[(31, 31)] && gaps[(30 - GAP_REACH, 31)] && !gaps[(30 - GAP_REACH - 1, 31)] && !gaps[(2, 2)]);
+        assert_eq!(inner_gaps(&Grid::filled(4, 4, false)), None);
+    }
 }

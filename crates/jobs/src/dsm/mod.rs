@@ -57,6 +57,7 @@ mod city_prior;
 mod clean_up;
 mod config;
 mod control;
+mod control_doubt;
 mod covering;
 mod dem;
 mod doubts;

@@ -8,7 +8,7 @@ use report::{Axis, Chart, JobPage, JobTable, PictureError, PointResidual, residu
 
 use crate::dsm::config::DsmConfig;
 use crate::dsm::pictures::RunMaps;
-use crate::dsm::report::{DsmReport, ImageReport};
+use crate::dsm::report::{ControlReport, DsmReport, ImageReport};
 
 /// Number of bars of a histogram.
 const BARS: usize = 60;
@@ -65,6 +65,7 @@ pub(crate) fn html(
     page.plots.extend(residual_maps(report));
     page.plots.push(time_plot(report));
     page.tables = vec![image_table(report), pair_table(report), choice_table(report)];
+    page.tables.extend(report.pointing.control.as_ref().map(control_table));
     page.facts = facts(report);
     page.html()
 }
@@ -224,6 +225,14 @@ fn pair_table(report: &DsmReport) -> JobTable {
     }
 }
 
+fn control_table(control: &ControlReport) -> JobTable {
+    JobTable {
+        title: "Ground points".to_owned(),
+        heads: ControlReport::HEADS.map(str::to_owned).to_vec(),
+        rows: control.rows().into_iter().map(Vec::from).collect(),
+    }
+}
+
 fn choice_table(report: &DsmReport) -> JobTable {
     JobTable {
         title: "Choices".to_owned(),
@@ -259,8 +268,14 @@ fn facts(report: &DsmReport) -> Vec<(String, String)> {
     }
     if let Some(reference) = &pointing.reference {
         let [east, north, up] = reference.shift_m;
-        let text =
-            format!("{}: moved by {east:.2} m east, {north:.2} m north, {up:.2} m up", file_name(&reference.path));
+        let [x, y, z] = reference.deviation_m;
+        let text = format!(
+            "{}: moved by {east:.2} m east, {north:.2} m north, {up:.2} m up, with standard errors of {x:.2}, {y:.2} and \
+             {z:.2} m; NMAD {:.2} m before, {:.2} m after",
+            file_name(&reference.path),
+            reference.nmad_before_m,
+            reference.nmad_after_m
+        );
         facts.push(("reference".to_owned(), text));
     }
     if let Some(chunks) = &report.chunks {

@@ -3,12 +3,12 @@
 use camera::ImageCorrection;
 use numeric::{Choice, upper_median};
 use serde::{Deserialize, Serialize};
-use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Observations, adjust_to_control};
+use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
 
 use crate::corrections::Corrections;
 use crate::dsm::character::ImageCharacter;
 use crate::dsm::config::DsmConfig;
-use crate::dsm::control::GroundControl;
+use crate::dsm::control::{Controlled, GroundControl};
 use crate::dsm::dem::dem_heights;
 use crate::dsm::error::DsmError;
 use crate::dsm::evidence::{PairHeight, off_along_sight, warn_of_domains};
@@ -86,19 +86,19 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     note_masks(&images, &mut notes)?;
     let looked = look(config, &images, session)?;
     check_pictures(&images, &looked)?;
-    let points = GroundControl::read(config.control.as_deref(), &images, &mut notes)?;
+    let mut points = GroundControl::read(config.control.as_deref(), &images, &mut notes)?;
     let (tracks, contradictory) = join_pairs(&looked.ties);
-    let observations = Observations { tracks: &tracks, control: &points.control };
-    let found = adjust_to_control(&looked.cameras, &looked.sizes, observations, &AdjustConfig::default());
-    let is_applied = is_applied(config, &found, &mut notes);
-    warn_of_sights(&images, &looked, &found, &mut notes);
+    // What control points do to an image is no fault of its RPC, which ties alone can tell.
+    let Controlled { found, by_ties } = points.adjust(&looked.cameras, &looked.sizes, &tracks, &mut notes)?;
+    let is_applied = is_applied(config, &found, &by_ties, &mut notes);
+    warn_of_sights(&images, &looked, &by_ties, &mut notes);
     let by_image = by_image(&images, &looked, &found, &tracks);
     if is_applied {
         warn_of_images(&by_image, &mut notes);
         correct_cameras(&mut images, session, &found.corrections);
     }
     let mut pointing = PointingReport::new(&found, (tracks.len(), contradictory), is_applied, by_image);
-    pointing.control = points.report(&looked.cameras, &found, is_applied, &mut notes);
+    pointing.control = points.report(&images, &looked.cameras, (&found, is_applied), &mut notes);
     let FirstLook { geometry, mut useful, ties, characters, is_whole, .. } = looked;
     if is_applied {
         drop_unconnected(config, &mut useful, &ties, &mut notes);
@@ -141,7 +141,7 @@ fn check_pictures(images: &[SceneImage], looked: &FirstLook) -> Result<(), DsmEr
 
 /// Returns whether corrections are to be put into the cameras: unless that is switched off or the
 /// ties are too few.
-fn is_applied(config: &DsmConfig, found: &Adjustment, notes: &mut Notes<'_>) -> bool {
+fn is_applied(config: &DsmConfig, found: &Adjustment, by_ties: &Adjustment, notes: &mut Notes<'_>) -> bool {
     let ties = found.ground.iter().flatten().count();
     if !config.pointing {
         notes.choose("pointing", "as given".to_owned(), "the correction is switched off");
@@ -156,7 +156,7 @@ fn is_applied(config: &DsmConfig, found: &Adjustment, notes: &mut Notes<'_>) -> 
         ));
         return false;
     }
-    for (view, apart_px) in grossly_off(&found.corrections) {
+    for (view, apart_px) in grossly_off(&by_ties.corrections) {
         notes.warn(format!(
             "the pointing of an image is {apart_px:.0} px off that of the others, far more than providers state; it is \
              corrected, but check that the RPC belongs to the image: {}",

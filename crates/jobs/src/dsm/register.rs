@@ -1,21 +1,22 @@
 //! Stage between the pointing and the plan: co-registration to a reference elevation model.
 //!
 //! A trial DSM of half the resolution is made with the pointing found so far and aligned with the
-//! reference as `eval` aligns surfaces: the horizontal shift with the least NMAD, and the median of
-//! the differences. All cameras are moved by that shift. A second trial DSM of the run's own preset
-//! then measures what is left, because edges are found to a fraction of a pixel only, and the
-//! cameras are moved by that.
+//! reference: the horizontal shift with the least NMAD, and the median of the differences. All
+//! cameras are moved by that shift. A second trial DSM of the run's own preset then measures what
+//! is left, because edges are found to a fraction of a pixel only, and the cameras are moved by
+//! that. Where much was left, a third one tells whether the shifts converge.
 //!
 //! A shift without evidence is an error: a reference beside the scene, surfaces that differ too
-//! much, ground without relief, or a shift that the method of Nuth and Kääb (2011) does not
-//! confirm.
+//! much, relief that fits hardly better at the shift than elsewhere or whose parts find shifts of
+//! their own, or shifts that do not converge. The standard error of the shift follows from those of
+//! the parts and is reported.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use camera::{ImageCorrection, ImagePoint, RpcCamera};
 use crs::{MapProjection, VerticalDatum};
-use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, Evaluation, MetresFromCells, Shift, evaluate};
+use eval::{MetresFromCells, Registration, Shift, register_surfaces};
 use geodesy::LonLatHeight;
 use numeric::{Silent, nearest_quantile};
 use raster::{Grid, reduce};
@@ -59,10 +60,18 @@ const COMMON_SHARE_MIN: f64 = 0.2;
 /// Greatest NMAD of the differences after the alignment, metres. Global elevation models of 30 m
 /// stay below it in mountains.
 const NMAD_MAX_M: f64 = 8.0;
-/// Greatest difference between the shifts that two methods find, cells of the coarser surface and
-/// metres on top of them.
-const AGREEMENT_CELLS: f64 = 0.2;
-const AGREEMENT_M: f64 = 0.5;
+/// Greatest standard error of the horizontal shift, and greatest shift that may be left after the
+/// cameras were moved, cells of the coarser surface and metres on top of them. Parts of one scene
+/// that find shifts by chance have a standard error of three cells.
+const ERROR_CELLS: f64 = 0.2;
+const ERROR_M: f64 = 0.5;
+/// Standard errors that belong to what may be left.
+const LEFT_ERRORS: f64 = 2.0;
+/// Trial surfaces after which the shifts must have converged.
+const TRIALS_MAX: usize = 3;
+/// Least ratio of the NMAD that a typical shift of the search leaves to that of the best one. Of
+/// relief that has nothing to do with the scene it is one, but for the chance of the best.
+const CONTRAST_MIN: f64 = 1.1;
 /// Rounds of the fit of the plane, each of which leaves out what is further off than
 /// [`PLANE_NMADS`].
 const PLANE_ROUNDS: usize = 4;
@@ -98,42 +107,57 @@ pub fn register(config: &DsmConfig, mut pointed: Pointed, session: &mut Session<
     }
     let mut notes = Notes::resume(&pointed.choices, &pointed.warnings, session.progress);
     session.progress.begin("co-registering", 2);
-    let first = Round::of(config, Preset::Fast, &pointed, session)?;
-    warn_of_datum(path, config.dem_vertical, first.named, &mut notes);
-    first.check(path)?;
-    first.apply(config, &mut pointed)?;
-    session.progress.step();
-    let second = Round::of(config, config.preset, &pointed, session)?;
-    second.check(path)?;
-    let remaining_m = second.length_m();
-    if remaining_m > first.tolerance_m() {
-        return Err(weak(
-            path,
-            format!(
-                "the surface is still {remaining_m:.2} m off after the cameras were moved by {:.2} m",
-                first.length_m()
-            ),
-        ));
+    let mut rounds: Vec<Round> = Vec::new();
+    loop {
+        let preset = if rounds.is_empty() { Preset::Fast } else { config.preset };
+        let round = Round::of(config, preset, &pointed, session)?;
+        if rounds.is_empty() {
+            warn_of_datum(path, config.dem_vertical, round.named, &mut notes);
+        }
+        round.check(path)?;
+        round.apply(config, &mut pointed)?;
+        session.progress.step();
+        rounds.push(round);
+        if let [first, .., last] = &rounds[..] {
+            if last.length_m() <= last.left_m(first) {
+                break;
+            }
+            if rounds.len() == TRIALS_MAX {
+                return Err(weak(
+                    path,
+                    format!(
+                        "the shifts do not converge: the surface was moved by {} m in turn, and at most {:.2} m may be \
+                         left; {}",
+                        rounds.iter().map(|round| format!("{:.2}", round.length_m())).collect::<Vec<_>>().join(", "),
+                        last.left_m(first),
+                        last.likely_cause()
+                    ),
+                ));
+            }
+        }
     }
-    second.apply(config, &mut pointed)?;
-    session.progress.step();
-    second.warn_of_bare_ground(path, &mut notes);
+    let [first, .., last] = &rounds[..] else { return Ok(pointed) };
+    last.warn_of_bare_ground(path, &mut notes);
+    let plane = |axis: usize| 1e3 * rounds.iter().map(|round| round.plane.slope[axis]).sum::<f64>();
     let report = ReferenceReport {
         path: path.to_owned(),
-        shift_m: std::array::from_fn(|axis| first.shift_m()[axis] + second.shift_m()[axis]),
-        plane_m_per_km: config
-            .reference_plane
-            .then(|| [0, 1].map(|i| 1e3 * (first.plane.slope[i] + second.plane.slope[i]))),
-        cells: second.common,
+        shift_m: std::array::from_fn(|axis| rounds.iter().map(|round| round.shift_m()[axis]).sum()),
+        deviation_m: last.deviation_m,
+        plane_m_per_km: config.reference_plane.then(|| [0, 1].map(plane)),
+        cells: last.common,
         nmad_before_m: first.nmad_m.0,
-        nmad_after_m: second.nmad_m.1,
-        last_shift_m: remaining_m,
+        nmad_after_m: last.nmad_m.1,
+        contrast: last.contrast,
+        last_shift_m: last.length_m(),
     };
-    let [dx, dy, dz] = report.shift_m;
+    let ([dx, dy, dz], [ex, ey, ez]) = (report.shift_m, report.deviation_m);
     notes.choose(
         "reference",
         format!("surface moved by {dx:.2} m east, {dy:.2} m north, {dz:.2} m up"),
-        format!("NMAD against the reference {:.2} m before, {:.2} m after", report.nmad_before_m, report.nmad_after_m),
+        format!(
+            "NMAD against the reference {:.2} m before, {:.2} m after; standard error {ex:.2}, {ey:.2}, {ez:.2} m",
+            report.nmad_before_m, report.nmad_after_m
+        ),
     );
     if let (Some(control), Some(points)) = (&mut pointed.pointing.control, &config.control) {
         let cameras: Vec<RpcCamera> = pointed.images.iter().map(|image| image.camera.clone()).collect();
@@ -158,8 +182,10 @@ struct Round {
     shift: Shift,
     /// What is added to the vertical shift, over the map.
     plane: FittedPlane,
-    /// Shift that the other method found.
-    other: Shift,
+    /// Standard errors of the shift, metres.
+    deviation_m: [f64; 3],
+    /// NMAD of a typical shift over that of the best.
+    contrast: f64,
     /// Whether the shift lies at the edge of the search.
     is_at_edge: bool,
     /// Number of cells that both surfaces have.
@@ -208,30 +234,31 @@ impl Round {
                 ),
             ));
         }
-        let aligned = |surface: &Grid<f32>, method| {
-            let found = align(surface, &reference.heights, &grid, method);
+        let metres = MetresFromCells::new(&grid.geotransform, (1.0, 1.0));
+        let aligned = |surface: &Grid<f32>| {
+            let found = register_surfaces(surface, &reference.heights, metres, SEARCH_M);
             found.map_err(|error| weak(path, error.to_string()))
         };
-        let (mut by_search, mut plane) = (aligned(&surface, AlignmentMethod::Xyz)?, LEVEL);
+        let (mut found, mut plane) = (aligned(&surface)?, LEVEL);
         if config.reference_plane {
-            let found = known_plane(&by_search, &grid, (&surface, &reference.heights));
-            plane = found.map_err(|reason| weak(path, reason))?;
+            let fitted = known_plane(&found, &grid, (&surface, &reference.heights));
+            plane = fitted.map_err(|reason| weak(path, reason))?;
             // A tilt looks like a shift where slopes face one way.
             add_plane(&mut surface, &plane, &grid);
-            by_search = aligned(&surface, AlignmentMethod::Xyz)?;
+            found = aligned(&surface)?;
         }
-        let by_slopes = aligned(&surface, AlignmentMethod::NuthKaab)?;
-        let nmad = by_slopes.nuth_kaab.map_or((f64::NAN, f64::NAN), |found| (found.nmad_before_m, found.nmad_after_m));
+        let parts = "it shares heights with too few parts of the scene to tell how well the shift is known";
         Ok(Self {
             heights: trial.heights,
-            shift: by_search.shift,
-            other: by_slopes.shift,
-            is_at_edge: by_search.search.is_some_and(|search| search.at_edge),
+            shift: found.shift,
+            deviation_m: found.deviation_m.ok_or_else(|| weak(path, parts.to_owned()))?,
+            contrast: found.contrast,
+            is_at_edge: found.is_at_edge,
             plane,
             common,
-            nmad_m: nmad,
+            nmad_m: found.nmad_m,
             cell_m: reference.cell_m.max(grid.gsd_m),
-            reach_m: reach_m(&by_search.errors),
+            reach_m: reach_m(&found.errors),
             named: reference.named,
             grid,
         })
@@ -239,7 +266,6 @@ impl Round {
 
     /// Refuses a shift without evidence.
     fn check(&self, path: &Path) -> Result<(), DsmError> {
-        let apart = (self.shift.dx_m - self.other.dx_m).hypot(self.shift.dy_m - self.other.dy_m);
         let reason = if self.is_at_edge {
             format!("the shift seems to be larger than the {SEARCH_M} m that are searched")
         } else if self.nmad_m.1.is_nan() || self.nmad_m.1 > NMAD_MAX_M {
@@ -247,24 +273,60 @@ impl Round {
                 "the surfaces differ by {:.1} m (NMAD) after the alignment, at most {NMAD_MAX_M} m are trusted",
                 self.nmad_m.1
             )
+        } else if self.contrast < CONTRAST_MIN {
+            format!(
+                "an NMAD of {:.2} m is left, and any other shift leaves hardly more, {:.2} times as much where at least \
+                 {CONTRAST_MIN} are needed: one of the surfaces is flat, or their relief is not the same",
+                self.nmad_m.1, self.contrast
+            )
         } else if self.shift_m()[2].abs() > SEARCH_M {
             format!(
                 "the scene would be moved by {:.1} m in height, more than {SEARCH_M} m; check what its heights are above, \
                  and that they are in metres",
                 self.shift_m()[2]
             )
-        } else if apart > self.tolerance_m() {
-            format!("two methods find shifts that are {apart:.1} m apart, so the relief does not tell the shift")
+        } else if self.horizontal_error_m() > self.tolerance_m() {
+            format!(
+                "the relief does not tell the shift: the parts of the scene leave a standard error of {:.2} m, at most \
+                 {:.2} m are trusted",
+                self.horizontal_error_m(),
+                self.tolerance_m()
+            )
         } else {
             return Ok(());
         };
-        Err(weak(path, reason))
+        Err(weak(path, format!("{reason}; {}", self.likely_cause())))
+    }
+
+    /// Says what a reference that does not fit may be, and what to do next.
+    fn likely_cause(&self) -> &'static str {
+        if self.is_one_sided() {
+            "it looks like a model of the bare ground, which lacks the scene's roofs and trees: give a surface model"
+        } else {
+            "check that it shows this place at about the time of the images, or leave it out"
+        }
+    }
+
+    /// Returns whether the surface stands above the reference, but hardly reaches below.
+    fn is_one_sided(&self) -> bool {
+        let [below_m, above_m] = self.reach_m;
+        above_m > STANDING_MIN_M && above_m > ONE_SIDED * below_m
+    }
+
+    fn horizontal_error_m(&self) -> f64 {
+        self.deviation_m[0].hypot(self.deviation_m[1])
+    }
+
+    /// Returns the length of the shift that may be left after the cameras were moved by the first.
+    fn left_m(&self, first: &Self) -> f64 {
+        let both = self.deviation_m.iter().chain(&first.deviation_m).map(|m| m * m).sum::<f64>().sqrt();
+        self.tolerance_m() + LEFT_ERRORS * both
     }
 
     /// Warns of a reference that the surface stands above, but hardly reaches below.
     fn warn_of_bare_ground(&self, path: &Path, notes: &mut Notes<'_>) {
-        let [below_m, above_m] = self.reach_m;
-        if above_m > STANDING_MIN_M && above_m > ONE_SIDED * below_m {
+        if self.is_one_sided() {
+            let above_m = self.reach_m[1];
             notes.warn(format!(
                 "the reference looks like a model of the bare ground: a twentieth of the scene stands {above_m:.1} m or \
                  more above it, and hardly anything lies below; roofs and trees pull the scene down then, use a surface \
@@ -275,7 +337,7 @@ impl Round {
     }
 
     fn tolerance_m(&self) -> f64 {
-        AGREEMENT_M + AGREEMENT_CELLS * self.cell_m
+        ERROR_M + ERROR_CELLS * self.cell_m
     }
 
     fn shift_m(&self) -> [f64; 3] {
@@ -431,18 +493,6 @@ fn trial_cell_m(trial: &DsmConfig, pointed: &Pointed) -> Result<f64, DsmError> {
     Ok(pixel_m * (cells / CELLS_MAX).sqrt().max(1.0))
 }
 
-fn align(
-    surface: &Grid<f32>,
-    reference: &Grid<f32>,
-    grid: &DsmGrid,
-    alignment: AlignmentMethod,
-) -> Result<Evaluation, eval::EvalError> {
-    let cells = CellMap::identity();
-    let metres = MetresFromCells::new(&grid.geotransform, (1.0, 1.0));
-    let config = EvalConfig { alignment, search_m: SEARCH_M, ..EvalConfig::default() };
-    evaluate(&EvalInput::new(surface, reference, &cells, metres), &config)
-}
-
 /// Returns how far the errors reach below and above their median, without [`BEYOND`] at either end.
 fn reach_m(errors: &Grid<f32>) -> [f64; 2] {
     let mut errors: Vec<f64> =
@@ -466,7 +516,7 @@ fn spanned(surface: &Grid<f32>, is_used: impl Fn(usize) -> bool) -> [usize; 2] {
 
 /// Returns [`plane_of`], or why the reference shows no plane over the whole surface.
 fn known_plane(
-    aligned: &Evaluation,
+    aligned: &Registration,
     grid: &DsmGrid,
     (surface, reference): (&Grid<f32>, &Grid<f32>),
 ) -> Result<FittedPlane, String> {
@@ -492,7 +542,7 @@ fn add_plane(surface: &mut Grid<f32>, plane: &FittedPlane, grid: &DsmGrid) {
 
 /// Returns what must be added to the heights beyond the shift: a robust plane through the remaining
 /// differences.
-fn plane_of(aligned: &Evaluation, grid: &DsmGrid) -> Option<FittedPlane> {
+fn plane_of(aligned: &Registration, grid: &DsmGrid) -> Option<FittedPlane> {
     let width = aligned.errors.width();
     let place = |i: usize| {
         let (x, y) = grid.geotransform.map_from_cell((i % width) as f64, (i / width) as f64);

@@ -126,6 +126,9 @@ pub struct ReferenceReport {
     pub path: PathBuf,
     /// Shift east, north and up that the surface was given, metres.
     pub shift_m: [f64; 3],
+    /// Standard errors of the shift, metres, from the shifts that the parts of the scene find.
+    #[serde(default)]
+    pub deviation_m: [f64; 3],
     /// Tilt that the heights were given, metres per kilometre east and north; `None` unless asked
     /// for.
     pub plane_m_per_km: Option<[f64; 2]>,
@@ -137,9 +140,17 @@ pub struct ReferenceReport {
     /// NMAD of the differences after the shift, metres.
     #[serde(with = "null_is_nan")]
     pub nmad_after_m: f64,
-    /// Length of the second and last shift, metres, which tells how well the first one was
+    /// NMAD that a typical shift leaves, divided by that of the best one: near 1 there is no relief
+    /// that both surfaces share.
+    #[serde(default = "no_contrast")]
+    pub contrast: f64,
+    /// Length of the last shift, metres, which tells how well the first one was
     /// followed.
     pub last_shift_m: f64,
+}
+
+fn no_contrast() -> f64 {
+    1.0
 }
 
 /// What became of the search for the chip of a ground point in an image.
@@ -162,7 +173,7 @@ pub struct ChipReport {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ControlReport {
-    /// Points that took part in the adjustment.
+    /// Points that were given for the adjustment.
     pub control: Vec<ControlPointReport>,
     /// Points that only measure.
     pub checks: Vec<CheckPointReport>,
@@ -184,10 +195,31 @@ pub struct ControlReport {
 pub struct ControlPointReport {
     /// Name of the point.
     pub name: String,
+    /// Whether it took part in the adjustment.
+    #[serde(default = "is_used")]
+    pub used: bool,
     /// Root mean square residual, in standard deviations of its position and places; NaN when no
     /// camera sees it.
     #[serde(with = "null_is_nan")]
     pub residual: f64,
+    /// Name of the image in which the point is furthest from its place.
+    #[serde(default)]
+    pub image: String,
+    /// Its place in that image minus where the corrected camera sees its position, along samples
+    /// and lines, pixels; `None` when no camera sees it.
+    #[serde(default)]
+    pub off_px: Option<[f64; 2]>,
+    /// Height at which the corrected cameras see its places, minus its height, metres; `None` for a
+    /// point with a place in one image.
+    #[serde(default)]
+    pub off_height_m: Option<f64>,
+    /// Why it did not take part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+fn is_used() -> bool {
+    true
 }
 
 /// A check point after the adjustment.

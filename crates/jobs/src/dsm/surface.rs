@@ -141,6 +141,7 @@ pub(crate) fn make_surface(
         progress.check_cancelled()?;
         let blank = own.view.blank(sweep.levels.finest);
         let mut keep = agreeing(*own, &witnesses(*own, &all, useful, &sweep.sources), level)?;
+        drop_at_rim(&mut keep, own.map, sweep.range, sweep.step_at(sweep.levels.finest));
         let mut shows_nothing = blank.clone();
         if let Some(asked) = config.height_range_m {
             drop_outside(&mut keep, own.map, asked);
@@ -251,6 +252,20 @@ fn agreeing(own: Heights<'_>, others: &[Heights<'_>], level: u32) -> Result<Grid
     Ok(keep)
 }
 
+/// Drops the pixels whose height is the first or the last hypothesis of the searched range: a least
+/// cost without costs on both sides of it is no minimum. A range of fewer than `HYPOTHESES_MIN`
+/// hypotheses is all rim, and is what was asked for.
+fn drop_at_rim(keep: &mut Grid<bool>, map: &HeightMap, searched: HeightRange, step_m: f64) {
+    const HYPOTHESES_MIN: f64 = 8.0;
+    if searched.span_m() < HYPOTHESES_MIN * step_m {
+        return;
+    }
+    let inside = searched.grown(-step_m, -step_m);
+    for (keep, height_m) in keep.data_mut().iter_mut().zip(map.height_m.data()) {
+        *keep &= inside.contains(map.origin_m + f64::from(*height_m));
+    }
+}
+
 /// Drops the pixels whose best height lies outside the range that was asked for, and those whose
 /// patch may hold one.
 fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: HeightRange) {
@@ -269,4 +284,24 @@ fn drop_outside(keep: &mut Grid<bool>, map: &HeightMap, asked: HeightRange) {
 
 fn is_outside(map: &HeightMap, height_m: f32, asked: HeightRange) -> bool {
     !asked.contains(map.origin_m + f64::from(height_m))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heights_at_the_rim_of_the_range_are_dropped() {
+        // Relative to an origin of 150 m, in a range of 100 to 200 m.
+        let heights = vec![-50.0, -49.6, -48.9, 0.0, 49.1, 49.6, 50.2, f32::NAN];
+        let mut map = HeightMap::empty(8, 1, 150.0);
+        map.height_m = Grid::from_vec(8, 1, heights).unwrap();
+        let kept = |range: HeightRange| {
+            let mut keep = Grid::filled(8, 1, true);
+            drop_at_rim(&mut keep, &map, range, 0.5);
+            keep.data().to_vec()
+        };
+        assert_eq!(kept(HeightRange::new(100.0, 200.0)), [false, false, true, true, true, false, false, false]);
+        assert_eq!(kept(HeightRange::new(149.0, 151.0)), [true; 8]);
+    }
 }

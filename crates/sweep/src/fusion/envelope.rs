@@ -23,10 +23,16 @@ pub struct GridSight {
     pub cells_per_m: [f64; 2],
     /// Whether the view images the cell.
     pub images: Grid<bool>,
+    /// Whether the view has a gap there, inside of its image. A gap says nothing of what hides the
+    /// cell.
+    pub gaps: Grid<bool>,
 }
 
 /// Computes the bound of each cell of `cells`, metres like `height_m`: +∞ where fewer than two
 /// views image it, −∞ where two views see everything.
+///
+/// A view with a gap at a cell counts as one that sees it, where two others image the cell: that the
+/// image is missing is then the reason why nothing matches, as likely as that something hides it.
 ///
 /// All grids have the size of `height_m`, which is NaN in voids.
 pub fn occlusion_bounds(height_m: &Grid<f32>, views: &[GridSight], cells: &[usize]) -> Vec<f32> {
@@ -43,7 +49,11 @@ pub fn occlusion_bounds(height_m: &Grid<f32>, views: &[GridSight], cells: &[usiz
         all
     };
     let all = views.par_iter().fold(unseen, two_smallest).reduce(unseen, merged);
-    all.into_iter().map(|[_, second]| second).collect()
+    let has_gap = |cell: &usize| views.iter().any(|view| view.gaps.data()[*cell]);
+    let bound = |([first, second], cell): ([f32; 2], &usize)| {
+        if second < f32::INFINITY && has_gap(cell) { first } else { second }
+    };
+    all.into_iter().zip(cells).map(bound).collect()
 }
 
 /// Returns the two smallest of three heights, of which the first two are in order.
@@ -98,7 +108,8 @@ mod tests {
     }
 
     fn sight(cells_per_m: [f64; 2]) -> GridSight {
-        GridSight { cells_per_m, images: Grid::filled(60, 60, true) }
+        let [images, gaps] = [true, false].map(|value| Grid::filled(60, 60, value));
+        GridSight { cells_per_m, images, gaps }
     }
 
     /// The definition of the envelope, by trial of all distances.
@@ -143,6 +154,20 @@ mod tests {
         // The third view sees the west side, so that the lower of the other two bounds it.
         assert_eq!((bound(&views, 26), bound(&views, 20)), (16.0, 4.0));
         assert_eq!(bound(&views[..1], 26), f32::INFINITY);
+    }
+
+    #[test]
+    fn a_gap_of_a_view_is_not_taken_for_what_a_tower_hides() {
+        let (z, cell) = (tower(), 30 * 60 + 26);
+        let bound = |views: &[GridSight]| occlusion_bounds(&z, views, &[cell])[0];
+        let mut views = [sight([0.5, 0.0]), sight([0.0, 0.0]), sight([-1.0, 0.0])];
+        // Two see the cell, and one of them is lost: the tower seems to hide it from the other two.
+        views[1].images[(26, 30)] = false;
+        assert!(bound(&views) > 0.0);
+        views[1].gaps[(26, 30)] = true;
+        assert!(bound(&views) < 0.0, "{}", bound(&views));
+        // What one view alone images is outside all the same.
+        assert_eq!(bound(&views[..2]), f32::INFINITY);
     }
 
     #[test]

@@ -4,6 +4,8 @@
 //! `envelope`). The surface around a cell is the lower one of the nearest known heights in eight
 //! directions. Each void cell is judged by both:
 //!
+//! - Where the images are blank in or beside the cell, they are the reason for the void: it is not
+//!   taken for hidden ground.
 //! - If the surface around lies under the bound, the cell is *hidden* from all but one view, and
 //!   gets this surface. If it lies above, two views would have seen it. A wide void then gets the
 //!   nearest surface under the bound: a street between towers is not filled with a roof.
@@ -88,6 +90,8 @@ pub struct FillConfig {
     /// Largest distance of two opposite known heights between which a void is filled in any case,
     /// cells.
     pub narrow_cells: f32,
+    /// Distance in a void over which blind cells are the reason for it, cells.
+    pub blind_reach_cells: usize,
     /// Smallest number of connected cells with heights from which voids are filled.
     pub island_cells: usize,
     /// Largest difference of neighbouring heights on one level, metres.
@@ -165,7 +169,9 @@ pub fn fill_voids(
     keep_trusted(&mut sources);
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
-    let filling = Filling { numbers: &numbers, border: &border, planes: &planes, blind, completed_m, config };
+    let beside_blind = beside(blind, &numbers, config.blind_reach_cells);
+    let filling =
+        Filling { numbers: &numbers, border: &border, planes: &planes, blind, beside_blind, completed_m, config };
     let cells = voids.par_iter().zip(bounds.par_iter().zip(&around));
     let judged: Vec<Judged> = cells.map(|(&index, (&bound_m, around))| filling.judge(index, bound_m, around)).collect();
     for (&index, judged) in voids.iter().zip(judged) {
@@ -176,6 +182,31 @@ pub fn fill_voids(
         }
     }
     FilledVoids { source, sigma_m }
+}
+
+/// Marks the void cells that a way of at most `reach` cells through their void joins with blind
+/// ones. `numbers` are those of the voids, 0 where there are heights.
+fn beside(blind: &Grid<bool>, numbers: &Grid<u32>, reach: usize) -> Grid<bool> {
+    let (width, height) = (blind.width(), blind.height());
+    let mut out = blind.clone();
+    let is_blind = |i: &usize| blind.data()[*i] && numbers.data()[*i] != 0;
+    let mut last: Vec<usize> = (0..blind.data().len()).filter(is_blind).collect();
+    for _ in 0..reach {
+        let mut next = Vec::new();
+        for i in last {
+            let (x, y) = (i % width, i / width);
+            let around = [(x > 0, i.wrapping_sub(1)), (x + 1 < width, i + 1)];
+            let across = [(y > 0, i.wrapping_sub(width)), (y + 1 < height, i + width)];
+            for (_, j) in around.into_iter().chain(across).filter(|(is_inside, _)| *is_inside) {
+                if !out.data()[j] && numbers.data()[j] != 0 {
+                    out.data_mut()[j] = true;
+                    next.push(j);
+                }
+            }
+        }
+        last = next;
+    }
+    out
 }
 
 /// A height found from known ones.
@@ -199,6 +230,8 @@ struct Filling<'a> {
     /// Planes of the voids, by their numbers from 1.
     planes: &'a [Option<Plane>],
     blind: &'a Grid<bool>,
+    /// Void cells in and beside blind ones.
+    beside_blind: Grid<bool>,
     completed_m: &'a Grid<f32>,
     config: &'a FillConfig,
 }
@@ -214,10 +247,12 @@ impl Filling<'_> {
         let void = self.numbers.data()[index];
         let plane = self.planes[void as usize - 1];
         let lower = self.lower_level(&known);
-        let is_under = !is_outside && lower.is_some_and(|lower| lower.base_m <= bound_m);
+        // Where the images cannot show anything, nothing tells whether the ground is hidden.
+        let may_be_hidden = !is_outside && !self.beside_blind.data()[index];
+        let is_under = may_be_hidden && lower.is_some_and(|lower| lower.base_m <= bound_m);
         // A narrow void, or one inside a plane, is a gap in what surrounds it. In another the
         // ground may be further away than the walls.
-        let may_be_far = !is_outside && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
+        let may_be_far = may_be_hidden && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
         let hidden = match lower {
             Some(lower) if is_under => Some(lower.estimate),
             _ if may_be_far => self.surface_under(index, bound_m),
@@ -379,6 +414,7 @@ mod tests {
         reach_cells: 8,
         hidden_reach_cells: 50,
         narrow_cells: 6.0,
+        blind_reach_cells: 4,
         island_cells: 36,
         same_surface_m: 1.0,
         slope_m: 0.05,
@@ -501,6 +537,31 @@ mod tests {
         (0..60).for_each(|y| (10..50).for_each(|x| g[(x, y)] = if y < 20 { g[(x, y)] } else { f32::NAN }));
         let found = fill_with(&mut g, 20.0, &FillConfig { hidden_reach_cells: 12, ..CONFIG });
         assert_eq!((found.source[(30, 50)], g[(30, 50)].is_nan()), (CellSource::Hidden, true));
+    }
+
+    #[test]
+    fn a_void_of_a_blank_roof_is_not_taken_for_hidden_ground() {
+        // A roof at 16 m whose blank inside is open to one side, beside ground at −20 m.
+        let mut g = Grid::filled(60, 60, -20.0f32);
+        (10..50).for_each(|x| (10..50).for_each(|y| g[(x, y)] = 16.0));
+        (14..46).for_each(|x| (14..60).for_each(|y| g[(x, y)] = if y < 50 { f32::NAN } else { -20.0 }));
+        let trusted = g.map(|_| true);
+        let completed_m = g.map(|_| f32::NAN);
+        let filled = |blind: Grid<bool>| {
+            let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
+            let mut filled = g.clone();
+            let source = fill_voids(&mut filled, known, |_, voids| vec![10.0; voids.len()], &CONFIG).source;
+            let is_hidden = |i: usize| source.data()[i] == CellSource::FilledHidden;
+            let inside = (14..46).flat_map(|x| (14..46).map(move |y| y * 60 + x));
+            (inside.filter(|i| is_hidden(*i)).count(), source[(30, 30)])
+        };
+        // With texture it is hidden ground; the images could not show it where they are blank.
+        assert!(filled(g.map(|_| false)).0 > 900);
+        assert_eq!(filled(g.map(|h| h.is_nan())), (0, CellSource::Blank));
+        // Blind cells in the middle are the reason for the void beside them.
+        let mut middle = g.map(|_| false);
+        (18..42).for_each(|x| (18..46).for_each(|y| middle[(x, y)] = true));
+        assert_eq!(filled(middle).0, 0);
     }
 
     #[test]
