@@ -18,9 +18,9 @@ use super::pair::{Pair, Tie, TieConfig};
 use super::ties::{ScaledPair, shared_window};
 use crate::view::SweepView;
 
-/// Patches tried for each corner that is tried: the patches of a scene of 600 × 600 pixels then
-/// touch each other, and more would only repeat what these say.
-const PATCHES_PER_CORNER: usize = 3;
+/// Patches tried for each corner that is tried. Those of a scene of 600 × 600 pixels then cover each
+/// other by a quarter of their sides, and more would only repeat what these say.
+const PATCHES_PER_CORNER: usize = 4;
 /// Distance from its expected place within which a patch is searched for, pixels: two storeys under
 /// a wide angle along the trajectory, and what shadows have displaced ties across it.
 const REACH: i32 = 6;
@@ -31,16 +31,26 @@ const LIKENESS_MIN: f32 = 0.3;
 const RETURN_PX: f64 = 1.0;
 /// The heights of this many ties around a patch give the height at which it is expected.
 const NEAR: usize = 8;
-/// Errors across the trajectory that agree lie this close to one another, pixels: two and a half
-/// deviations of the places of weak texture (0.3 px).
-const AGREE_PX: f64 = 0.75;
+/// Distance from where most errors lie at which one no longer counts, pixels, in the first round:
+/// three deviations of the places of weak texture (0.3 px).
+const COUNTS_FIRST_PX: f64 = 1.0;
+/// The same in the last round for [`MANY`] patches or more. It still holds nine in ten of those
+/// places, and less of the shadows that lie beside them to one side. Fewer patches show the mode
+/// less sharply, by the fifth root of their number (Silverman 1986), up to [`COUNTS_MOST_PX`].
+const COUNTS_LAST_PX: f64 = 0.5;
+const COUNTS_MOST_PX: f64 = 0.75;
+const MANY: f64 = 500.0;
+/// Errors change over the image when a plane holds this many times as many patches as a constant
+/// does. A smaller drift stays among the ties that count, and the adjustment sees it.
+const PLANE_TIMES: f64 = 1.2;
 /// At least one patch in this many agrees, or the views show nothing together. Of chance
-/// likenesses one in nine does: `2 · AGREE_PX` of the places across that are searched.
-const AGREE_ONE_IN: usize = 3;
+/// likenesses one in twelve does: a pixel of the places across that are searched.
+const AGREE_ONE_IN: usize = 4;
 /// Fewer patches than this do not determine where most agree.
 const PATCHES_MIN: usize = 50;
-/// Rounds of the plane, which settles in a few.
-const ROUNDS: usize = 10;
+/// Rounds of the plane: a third at the first distance, a third between, a third at the last. It
+/// settles in a few.
+const ROUNDS: usize = 24;
 
 /// What a tie says: where, and how far from its height trajectory.
 #[derive(Clone, Copy)]
@@ -87,7 +97,7 @@ pub fn agreeing_ties(
         return None;
     }
     let plane = Plane::of_most(&found)?;
-    let agrees = |sight: &&Sight| (sight.across_px - plane.at(sight.tie.reference)).abs() <= AGREE_PX;
+    let agrees = |sight: &&Sight| plane.holds(sight);
     if AGREE_ONE_IN * found.iter().filter(agrees).count() < found.len() {
         return None;
     }
@@ -185,6 +195,8 @@ struct Plane {
     half: f64,
     /// At the centre, by sample, by line, pixels.
     terms: Vector3<f64>,
+    /// Distance from the plane within which errors agree with it, pixels.
+    counts_px: f64,
 }
 
 impl Plane {
@@ -198,13 +210,28 @@ impl Plane {
         let (top, bottom) = span(|sight| sight.tie.reference.line);
         let centre = ImagePoint::new(0.5 * (left + right), 0.5 * (top + bottom));
         let half = (0.5 * (right - left).max(bottom - top)).max(1.0);
-        let mut plane = Self { centre, half, terms: Vector3::new(mode(sights)?, 0.0, 0.0) };
-        for _ in 0..ROUNDS {
-            let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let wider = (MANY / sights.len() as f64).powf(0.2);
+        let counts_px = (COUNTS_LAST_PX * wider).clamp(COUNTS_LAST_PX, COUNTS_MOST_PX);
+        let start = Self { centre, half, terms: Vector3::new(mode(sights)?, 0.0, 0.0), counts_px };
+        let (constant, plane) = (start.settled(sights, false)?, start.settled(sights, true)?);
+        let held = |plane: &Self| sights.iter().filter(|sight| plane.holds(sight)).count() as f64;
+        Some(if held(&plane) > PLANE_TIMES * held(&constant) { plane } else { constant })
+    }
+
+    /// Returns the plane, or else the constant, that settles on most errors from here.
+    fn settled(&self, sights: &[Sight], slopes: bool) -> Option<Self> {
+        let mut plane = Self { ..*self };
+        let fixed = if slopes { 0.0 } else { 1.0 };
+        for round in 0..ROUNDS {
+            let narrowed = (3.0 * round as f64 / ROUNDS as f64 - 1.0).clamp(0.0, 1.0);
+            let counts_px = COUNTS_FIRST_PX + (self.counts_px - COUNTS_FIRST_PX) * narrowed;
+            let mut normal = Matrix3::from_diagonal(&Vector3::new(0.0, fixed, fixed));
+            let mut right = Vector3::zeros();
             for sight in sights {
-                let row = plane.row(sight.tie.reference);
-                let off = (sight.across_px - row.dot(&plane.terms)) / AGREE_PX;
+                let mut row = plane.row(sight.tie.reference);
+                let off = (sight.across_px - row.dot(&plane.terms)) / counts_px;
                 let weight = (1.0 - off * off).max(0.0).powi(2);
+                (1..3).for_each(|i| row[i] *= 1.0 - fixed);
                 normal += row * row.transpose() * weight;
                 right += row * (sight.across_px * weight);
             }
@@ -213,12 +240,13 @@ impl Plane {
         Some(plane)
     }
 
-    fn row(&self, at: ImagePoint) -> Vector3<f64> {
-        Vector3::new(1.0, (at.sample - self.centre.sample) / self.half, (at.line - self.centre.line) / self.half)
+    /// Returns whether an error lies on the plane.
+    fn holds(&self, sight: &Sight) -> bool {
+        (sight.across_px - self.row(sight.tie.reference).dot(&self.terms)).abs() <= self.counts_px
     }
 
-    fn at(&self, at: ImagePoint) -> f64 {
-        self.row(at).dot(&self.terms)
+    fn row(&self, at: ImagePoint) -> Vector3<f64> {
+        Vector3::new(1.0, (at.sample - self.centre.sample) / self.half, (at.line - self.centre.line) / self.half)
     }
 }
 
@@ -226,7 +254,7 @@ impl Plane {
 fn mode(sights: &[Sight]) -> Option<f64> {
     let mut all: Vec<f64> = sights.iter().map(|sight| sight.across_px).collect();
     all.sort_by(f64::total_cmp);
-    let within = |from: usize| all[from..].partition_point(|v| *v <= all[from] + 2.0 * AGREE_PX);
+    let within = |from: usize| all[from..].partition_point(|v| *v <= all[from] + COUNTS_FIRST_PX);
     let densest = (0..all.len()).rev().max_by_key(|&from| within(from))?;
     all.get(densest + within(densest) / 2).copied()
 }
@@ -239,22 +267,24 @@ mod tests {
     #[test]
     fn the_mode_stays_where_shadows_pull_to_one_side() {
         let fraction = |i: usize, by: f64| (i as f64 * by).fract();
-        let sight = |i: usize| {
+        let sight = |i: usize, slope: f64| {
             let at = ImagePoint::new(900.0 * fraction(i, 0.618_034), 700.0 * fraction(i, 0.414_214));
             let noise = 0.5 * (fraction(i, 0.732_051) - 0.5) + 0.5 * (fraction(i, 0.236_068) - 0.5);
             let shadow = if i % 3 == 0 { 4.0 * fraction(i, 0.645_751) } else { 0.0 };
-            let across_px = 1.5 + 0.001 * (at.sample - 450.0) + noise + shadow;
+            let across_px = 1.5 + slope * (at.sample - 450.0) + noise + shadow;
             let tie = Tie { reference: at, source: at, correlation: 0.5 };
             Sight { tie, height_m: 0.0, across_px }
         };
-        let sights: Vec<Sight> = (0..600).map(sight).collect();
-        let mean = sights.iter().map(|s| s.across_px).sum::<f64>() / 600.0;
-        assert!(mean > 2.0, "the shadows move the mean to {mean}");
-        let plane = Plane::of_most(&sights).unwrap();
-        for sample in [0.0, 450.0, 900.0] {
-            let found = plane.at(ImagePoint::new(sample, 350.0));
-            let expected = 1.5 + 0.001 * (sample - 450.0);
-            assert!((found - expected).abs() < 0.1, "{found} instead of {expected}");
+        for slope in [0.0, 0.002] {
+            let sights: Vec<Sight> = (0..600).map(|i| sight(i, slope)).collect();
+            let mean = sights.iter().map(|s| s.across_px).sum::<f64>() / 600.0;
+            assert!(mean > 2.0, "the shadows move the mean to {mean}");
+            let plane = Plane::of_most(&sights).unwrap();
+            for sample in [0.0, 450.0, 900.0] {
+                let found = plane.row(ImagePoint::new(sample, 350.0)).dot(&plane.terms);
+                let expected = 1.5 + slope * (sample - 450.0);
+                assert!((found - expected).abs() < 0.1, "{found} instead of {expected} with a slope of {slope}");
+            }
         }
     }
 }
