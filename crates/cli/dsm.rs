@@ -243,6 +243,7 @@ pub(crate) fn production_hinted(error: ProductionError) -> anyhow::Error {
 fn hint(error: &DsmError) -> Option<&'static str> {
     Some(match error {
         DsmError::Exists { .. } => OVERWRITE,
+        DsmError::NoPointing { .. } => "--no-pointing uses the RPCs as they are",
         DsmError::NoTies { .. } => "--height-range LO HI gives the heights to search, and --dem takes them from a file",
         DsmError::RangeMissesScene { .. } => "without --height-range the heights are found from tie points",
         DsmError::Memory { .. } => "--memory MB raises the limit, and --bounds makes the area smaller",

@@ -184,6 +184,21 @@ pub enum DsmError {
         /// File of the second image.
         second: PathBuf,
     },
+    /// There are too few tie points to correct the pointing.
+    #[error(
+        "found {ties} tie points, expected at least {needed}: the pointing of the RPCs cannot be corrected; \
+         check that the images show the same ground and that each RPC belongs to its image, or use the RPCs as \
+         they are: {}",
+        images.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+    )]
+    NoPointing {
+        /// Number of tie points found.
+        ties: usize,
+        /// Least number that is enough.
+        needed: usize,
+        /// Files of the images.
+        images: Vec<PathBuf>,
+    },
     /// There are too few tie points to find the height range.
     #[error(
         "found {ties} tie points, expected at least {needed}: the height range cannot be found automatically; \

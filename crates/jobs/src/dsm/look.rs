@@ -1,6 +1,9 @@
 //! The first look at a scene of which only the RPCs are known: the pixels, when they fit the
 //! memory, and tie points.
 //!
+//! Pointing is a property of the images. How ties are searched for follows from the images alone,
+//! whatever the cells, the chunks, the preset and the memory of the run.
+//!
 //! The search begins at the heights for which the RPCs state that they are made. Where that gives
 //! no ties, it is repeated at all heights at which the images share ground, see [`SharedHeights`].
 
@@ -9,7 +12,7 @@ use sweep::pointing::TieConfig;
 
 use crate::dsm::character::ImageCharacter;
 use crate::dsm::chunk_side::choose_side;
-use crate::dsm::config::DsmConfig;
+use crate::dsm::config::{DsmConfig, Preset};
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::grid::{DsmGrid, choose_grid};
 use crate::dsm::image_pixels::read_views;
@@ -23,6 +26,11 @@ use crate::dsm::tie_windows::match_in_windows;
 use crate::dsm::ties::{PairTies, TIES_MIN, match_pairs};
 use crate::dsm::values::{HeightRange, ImagePair};
 use crate::dsm::view_geometry::ViewGeometry;
+
+/// Images of up to this many pixels in all are matched as a whole, larger ones in windows. The
+/// windows of eight images, which are read at once, have as many pixels, so that neither way takes
+/// more memory than the other: some 250 MB.
+const WHOLE_PIXELS: u64 = 24_000_000;
 
 /// What is known before the pointing is corrected.
 pub(crate) struct FirstLook {
@@ -95,27 +103,42 @@ fn look_at(
     let gsd = gsds.fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, gsd)?;
     let progress = session.progress;
-    let cameras = images.iter().map(|o| o.camera.clone()).collect();
-    let sizes = images.iter().map(|o| o.size).collect();
-    if config.bounds.is_some() || config.area.is_some() || !fits(config, images, &grid) {
+    let is_whole = config.bounds.is_none() && config.area.is_none() && fits(config, images, &grid);
+    if !is_whole {
         // A limit too small for the smallest chunk is refused before anything is read.
         choose_side(config, images, &grid, HeightRange::at(geometry.centre.height_m))?;
-        // Ties come from all over the scene, so that runs with other bounds find the same pointing.
-        let whole = DsmConfig { bounds: None, area: None, gsd_m: None, ..config.clone() };
-        let (ties, characters) =
-            match_in_windows(images, &choose_grid(&whole, &geometry, gsd)?, &geometry, &pairs, search, progress)?;
-        return Ok(FirstLook { geometry, useful, ties, cameras, sizes, characters, is_whole: false });
     }
-    progress.begin("reading images", images.len());
-    let views = read_views(images, &|| progress.step())?;
-    session.lap("read");
-    progress.check_cancelled()?;
-    progress.begin("matching tie points", pairs.len());
-    let ties = match_pairs(&views, &pairs, search, (&TieConfig::default(), TIES_MIN), &|| progress.step());
-    let mut characters = vec![ImageCharacter::default(); images.len()];
-    characters.iter_mut().zip(&views).for_each(|(character, view)| character.learn(view));
-    session.views = Some(views);
-    Ok(FirstLook { geometry, useful, ties, cameras, sizes, characters, is_whole: true })
+    let is_small = images.iter().map(|image| memory::area(&image.whole())).sum::<u64>() <= WHOLE_PIXELS;
+    let in_windows = if is_small {
+        None
+    } else {
+        let scene = DsmConfig { bounds: None, area: None, gsd_m: None, crs_epsg: None, ..config.clone() };
+        let scene = DsmConfig { preset: Preset::Balanced, ..scene };
+        Some(match_in_windows(images, &choose_grid(&scene, &geometry, gsd)?, &geometry, &pairs, search, progress)?)
+    };
+    let views = if is_small || is_whole {
+        progress.begin("reading images", images.len());
+        let views = read_views(images, &|| progress.step())?;
+        session.lap("read");
+        progress.check_cancelled()?;
+        Some(views)
+    } else {
+        None
+    };
+    let (ties, mut characters) = in_windows.unwrap_or_else(|| {
+        progress.begin("matching tie points", pairs.len());
+        let views = views.as_deref().unwrap_or_default();
+        let ties = match_pairs(views, &pairs, search, (&TieConfig::default(), TIES_MIN), &|| progress.step());
+        (ties, Vec::new())
+    });
+    if let Some(views) = &views {
+        characters = vec![ImageCharacter::default(); images.len()];
+        characters.iter_mut().zip(views).for_each(|(character, view)| character.learn(view));
+    }
+    session.views = views.filter(|_| is_whole);
+    let cameras = images.iter().map(|o| o.camera.clone()).collect();
+    let sizes = images.iter().map(|o| o.size).collect();
+    Ok(FirstLook { geometry, useful, ties, cameras, sizes, characters, is_whole })
 }
 
 /// Returns whether the scene may be computed at once: it fits the memory, and smaller chunks are

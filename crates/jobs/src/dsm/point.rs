@@ -22,7 +22,7 @@ use crate::dsm::order::{as_given, in_order_of};
 use crate::dsm::partners::ALL_MAX;
 use crate::dsm::report::{CorrectionOrder, PointingReport};
 use crate::dsm::session::Session;
-use crate::dsm::tie_quality::{by_image, warn_of_images};
+use crate::dsm::tie_quality::{by_image, warn_of_images, warn_of_residual};
 use crate::dsm::ties::{PairTies, TIES_MIN, adjust_cameras, join_pairs, tie_heights};
 use crate::dsm::values::{HeightRange, ImagePair};
 use crate::dsm::view_geometry::ViewGeometry;
@@ -69,9 +69,10 @@ pub struct Pointed {
 ///
 /// # Errors
 /// [`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Blank`], [`DsmError::SamePixels`]
-/// for images that give no heights; [`DsmError::Value`], [`DsmError::BoundsMissScene`],
-/// [`DsmError::Memory`] for a request that cannot be served; [`DsmError::Image`],
-/// [`DsmError::Camera`], [`DsmError::Crs`], [`DsmError::Cancelled`].
+/// for images that give no heights; [`DsmError::NoPointing`] for too few tie points;
+/// [`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`] for a request that
+/// cannot be served; [`DsmError::Image`], [`DsmError::Camera`], [`DsmError::Crs`],
+/// [`DsmError::Cancelled`].
 pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> Result<Pointed, DsmError> {
     session.progress.check_cancelled()?;
     let mut images = opened.images.clone();
@@ -90,11 +91,12 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     let (tracks, contradictory) = join_pairs(&looked.ties);
     // What control points do to an image is no fault of its RPC, which ties alone can tell.
     let Controlled { found, by_ties } = points.adjust(&looked.cameras, &looked.sizes, &tracks, &mut notes)?;
-    let is_applied = is_applied(config, &found, &by_ties, &mut notes);
+    let is_applied = is_applied(config, &found, &by_ties, &mut notes)?;
     warn_of_sights(&images, &looked, &by_ties, &mut notes);
     let by_image = by_image(&images, &looked, &found, &tracks);
     if is_applied {
         warn_of_images(&by_image, &mut notes);
+        warn_of_residual(found.residual_px.1, &by_image, &mut notes);
         correct_cameras(&mut images, session, &found.corrections);
     }
     let mut pointing = PointingReport::new(&found, (tracks.len(), contradictory), is_applied, by_image);
@@ -139,22 +141,23 @@ fn check_pictures(images: &[SceneImage], looked: &FirstLook) -> Result<(), DsmEr
     }
 }
 
-/// Returns whether corrections are to be put into the cameras: unless that is switched off or the
-/// ties are too few.
-fn is_applied(config: &DsmConfig, found: &Adjustment, by_ties: &Adjustment, notes: &mut Notes<'_>) -> bool {
+/// Returns whether corrections are to be put into the cameras: unless that is switched off.
+///
+/// # Errors
+/// [`DsmError::NoPointing`] when the ties are too few.
+fn is_applied(
+    config: &DsmConfig,
+    found: &Adjustment,
+    by_ties: &Adjustment,
+    notes: &mut Notes<'_>,
+) -> Result<bool, DsmError> {
     let ties = found.ground.iter().flatten().count();
     if !config.pointing {
         notes.choose("pointing", "as given".to_owned(), "the correction is switched off");
-        return false;
+        return Ok(false);
     }
     if ties < TIES_MIN {
-        let names: Vec<String> = config.images.iter().map(|path| path.display().to_string()).collect();
-        notes.warn(format!(
-            "the pointing of the RPCs is not corrected: {ties} tie points found, {TIES_MIN} needed; check that the \
-             images show the same ground: {}",
-            names.join(", ")
-        ));
-        return false;
+        return Err(DsmError::NoPointing { ties, needed: TIES_MIN, images: config.images.clone() });
     }
     for (view, apart_px) in grossly_off(&by_ties.corrections) {
         notes.warn(format!(
@@ -175,7 +178,7 @@ fn is_applied(config: &DsmConfig, found: &Adjustment, by_ties: &Adjustment, note
         order.to_owned(),
         format!("{ties} tie points, residual {before:.2} px before and {after:.2} px after, by BIC"),
     );
-    true
+    Ok(true)
 }
 
 /// Warns of images that are off along their lines of sight, which ties of one pair cannot tell from

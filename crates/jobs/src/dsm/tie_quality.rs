@@ -142,6 +142,22 @@ pub(crate) fn warn_of_images(images: &[ImagePointing], notes: &mut Notes<'_>) {
     }
 }
 
+/// Warns of a correction that leaves larger residuals than matching errors, and names the image
+/// that fits worst.
+pub(crate) fn warn_of_residual(residual_px: f64, images: &[ImagePointing], notes: &mut Notes<'_>) {
+    let known = images.iter().filter(|image| image.residual_px.is_finite());
+    let worst = known.max_by(|a, b| a.residual_px.total_cmp(&b.residual_px));
+    if let Some(worst) = worst.filter(|_| residual_px > RESIDUAL_MIN_PX) {
+        notes.warn(format!(
+            "the tie points contradict each other by {residual_px:.2} px after the correction, where less than \
+             {RESIDUAL_MIN_PX} px are usual: shadows or plants may have changed between the dates, and heights may be \
+             wrong; check the RPC of the image that fits worst, with {:.2} px, or leave it out: {}",
+            worst.residual_px,
+            worst.path.display()
+        ));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -195,5 +211,16 @@ mod tests {
         let [covered, residual] = &notes.warnings[..] else { panic!("{:?}", notes.warnings) };
         assert!(covered.contains("10 %") && covered.ends_with(": b"), "{covered}");
         assert!(residual.contains("0.90 px") && residual.ends_with(": c"), "{residual}");
+    }
+
+    #[test]
+    fn residuals_beyond_matching_errors_name_the_worst_image() {
+        let mut notes = Notes::new(&numeric::Silent);
+        let images = [image("a", 0.9, 0.5), image("b", 0.9, 1.1), image("c", 0.9, f64::NAN)];
+        warn_of_residual(0.45, &images, &mut notes);
+        assert!(notes.warnings.is_empty(), "{:?}", notes.warnings);
+        warn_of_residual(0.85, &images, &mut notes);
+        let [warning] = &notes.warnings[..] else { panic!("{:?}", notes.warnings) };
+        assert!(warning.contains("0.85 px") && warning.contains("1.10 px") && warning.ends_with(": b"), "{warning}");
     }
 }

@@ -35,6 +35,8 @@ const SIDE: usize = 1024;
 /// Number of places looked at. Denser ones are tried where footprints fill little of the grid. A
 /// dozen windows determine a shift and an affine map over an image many times over.
 const PLACES: [f64; 3] = [12.0, 24.0, 48.0];
+/// Share of a place that both images of a pair show, for the place to count as seen.
+const SEEN_SHARE: f64 = 0.5;
 /// Number of places that some pair must see, or the next denser places are tried.
 const SEEN_MIN: usize = 8;
 /// Largest number of windows read.
@@ -204,17 +206,26 @@ fn places(
     search: HeightRange,
 ) -> Result<Vec<Window>, DsmError> {
     let middle = HeightRange::at(search.middle_m());
-    let mut seen = Vec::new();
-    for wanted in PLACES {
-        seen.clear();
+    let seen_by = |wanted: f64, share: f64| -> Result<Vec<Window>, DsmError> {
+        let mut seen = Vec::new();
         for place in lattice(grid.size, wanted) {
-            if is_seen(images, &GroundBox::new(&grid.part(place), projection, middle)?, pairs)? {
+            let ground = GroundBox::new(&grid.part(place), projection, middle)?;
+            if is_seen(images, &ground, pairs, share)? {
                 seen.push(place);
             }
         }
+        Ok(seen)
+    };
+    let mut seen = Vec::new();
+    for wanted in PLACES {
+        seen = seen_by(wanted, SEEN_SHARE)?;
         if seen.len() >= SEEN_MIN {
             break;
         }
+    }
+    if seen.is_empty() {
+        // Strips narrower than a window see no window whole.
+        seen = seen_by(PLACES[PLACES.len() - 1], 0.0)?;
     }
     let every = seen.len().div_ceil(WINDOWS_MAX).max(1);
     Ok(seen.into_iter().step_by(every).collect())
@@ -237,12 +248,17 @@ fn lattice((width, height): (usize, usize), wanted: f64) -> Vec<Window> {
     (0..rows).flat_map(|r| (0..columns).map(move |c| (c, r))).map(|(c, r)| window(c, r)).collect()
 }
 
-/// Returns whether both images of a pair see most of a place, whose box has a single height.
-fn is_seen(images: &[SceneImage], place: &GroundBox, pairs: &[ImagePair]) -> Result<bool, DsmError> {
+/// Returns whether both images of a pair see a share of a place, whose box has a single height, and
+/// enough of it to be matched.
+fn is_seen(images: &[SceneImage], place: &GroundBox, pairs: &[ImagePair], share: f64) -> Result<bool, DsmError> {
     let sees = |image: &SceneImage| {
         let span = place.span_in(image, 0)?;
         let inside = span.intersection(&image.whole());
-        Ok::<bool, DsmError>(inside.is_some_and(|i| 2 * i.width * i.height >= span.width * span.height))
+        let is_enough = |inside: Window| {
+            let pixels = |w: Window| w.width as f64 * w.height as f64;
+            inside.width.min(inside.height) >= PART_MIN && pixels(inside) >= share * pixels(span)
+        };
+        Ok::<bool, DsmError>(inside.is_some_and(is_enough))
     };
     let seeing: Vec<bool> = images.iter().map(sees).collect::<Result<_, _>>()?;
     Ok(pairs.iter().any(|p| seeing[p.first] && seeing[p.second]))

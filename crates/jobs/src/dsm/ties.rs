@@ -4,7 +4,8 @@ use camera::RpcCamera;
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 use sweep::pointing::{
-    AdjustConfig, Adjustment, ModelOrder, PlacedTie, Tie, TieConfig, Track, adjust, join_ties, match_pair,
+    AdjustConfig, Adjustment, ModelOrder, PlacedTie, Tie, TieConfig, Track, adjust, agreeing_ties, join_ties,
+    match_pair,
 };
 
 use crate::dsm::evidence::is_beyond_chance;
@@ -38,6 +39,9 @@ pub struct PairTies {
 
 /// Matches pairs of views, given best first, over the heights in `range`. `done` is called after
 /// each pair.
+///
+/// The ties of a pair that the views agree on all over their ground take the place of the first
+/// ones, which hold on to shadows where the sun has moved.
 ///
 /// A few points of the first pair with enough ties narrow the height range of the others, and all
 /// its points that of the other pairs. A pair with fewer than `least` ties is searched again for a
@@ -90,6 +94,11 @@ pub(crate) fn match_pairs(
             // Over all heights the points were spread over more than both images see at one.
             let again = ties_of(near, config);
             found = if again.ties.len() > found.ties.len() { again } else { found };
+        }
+        if found.ties.len() >= least {
+            let heights = (near.low_m, near.high_m);
+            let agreeing = agreeing_ties(&views[pair.first], &views[pair.second], &found.ties, heights, config);
+            found.ties = agreeing.unwrap_or(found.ties);
         }
         out.push(found);
         done();

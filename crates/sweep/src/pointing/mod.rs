@@ -6,6 +6,7 @@
 mod adjust;
 #[cfg(test)]
 mod adjust_tests;
+mod agreement;
 mod block_system;
 mod chip;
 mod chip_fit;
@@ -22,6 +23,7 @@ mod ties;
 mod tracks;
 
 pub use adjust::{AdjustConfig, Adjustment, Observations, adjust, adjust_to_control};
+pub use agreement::agreeing_ties;
 pub use chip::{ChipConfig, ChipMiss, ChipPlace, find_chip};
 pub use chip_fit::{Chip, ChipSearch};
 pub use control::ControlPoint;

@@ -22,6 +22,10 @@ use crate::view::SweepView;
 
 /// An image this many times smaller than the other one is searched from.
 const SMALLER: usize = 2;
+/// Distance within which a match is refined on each level, pixels of the level.
+const REACH: i32 = 2;
+/// Largest distance that can be searched at once, pixels.
+const REACH_MAX: usize = 6;
 /// Largest distance of the search back from the corner, pixels.
 const RETURN_PX: f64 = 1.0;
 
@@ -30,20 +34,8 @@ const RETURN_PX: f64 = 1.0;
 /// Points are spread over what both views see. Views of different sampling distances are matched at
 /// the coarser one.
 pub fn match_pair(reference: &SweepView, source: &SweepView, range_m: (f64, f64), config: &TieConfig) -> Vec<Tie> {
-    let (skip_reference, skip_source) = skipped_levels(&Pair { reference, source }, range_m);
-    let (reference, source) = (scaled(reference, skip_reference), scaled(source, skip_source));
-    let full = |p: ImagePoint, skipped: usize| {
-        let [sample, line] = [p.sample, p.line].map(|v| level0_from_level(v, skipped as u32));
-        ImagePoint::new(sample, line)
-    };
-    let noise = (shared_noise(&reference, &source), shared_noise(&source, &reference));
-    let (reference, source) = if skip_reference + skip_source == 0 {
-        (reference, source)
-    } else {
-        let with = |view: Cow<'_, SweepView>, noise: f32| Cow::Owned(SweepView { noise, ..view.into_owned() });
-        (with(reference, noise.0), with(source, noise.1))
-    };
-    let pair = Pair { reference: &reference, source: &source };
+    let scaled = ScaledPair::of(&Pair { reference, source }, range_m);
+    let pair = scaled.pair();
     let swapped = || {
         let found = match_scaled(&Pair { reference: pair.source, source: pair.reference }, range_m, config)?;
         let back = |tie: Tie| Tie { reference: tie.source, source: tie.reference, ..tie };
@@ -52,15 +44,46 @@ pub fn match_pair(reference: &SweepView, source: &SweepView, range_m: (f64, f64)
     // The smaller of two images sees less ground that the other one does not see. And a camera may
     // fail far from the scene, where the other one does not.
     let area = |view: &SweepView| view.levels[0].width() * view.levels[0].height();
-    let found = if SMALLER * area(&source) < area(&reference) {
+    let found = if SMALLER * area(pair.source) < area(pair.reference) {
         swapped().or_else(|| match_scaled(&pair, range_m, config))
     } else {
         match_scaled(&pair, range_m, config).or_else(swapped)
     };
     let found = found.unwrap_or_default();
+    let full = |p: ImagePoint, skipped: usize| {
+        let [sample, line] = [p.sample, p.line].map(|v| level0_from_level(v, skipped as u32));
+        ImagePoint::new(sample, line)
+    };
+    let (in_reference, in_source) = scaled.skipped;
     let in_full =
-        |tie: Tie| Tie { reference: full(tie.reference, skip_reference), source: full(tie.source, skip_source), ..tie };
+        |tie: Tie| Tie { reference: full(tie.reference, in_reference), source: full(tie.source, in_source), ..tie };
     found.into_iter().map(in_full).collect()
+}
+
+/// Two views without the finest levels of the sharper one, so that pixels of both are about the
+/// same size on the ground.
+pub(super) struct ScaledPair<'a> {
+    reference: Cow<'a, SweepView>,
+    source: Cow<'a, SweepView>,
+    /// Levels left out of the reference and of the source.
+    pub(super) skipped: (usize, usize),
+}
+
+impl<'a> ScaledPair<'a> {
+    pub(super) fn of(pair: &Pair<'a>, range_m: (f64, f64)) -> Self {
+        let skipped = skipped_levels(pair, range_m);
+        let (reference, source) = (scaled(pair.reference, skipped.0), scaled(pair.source, skipped.1));
+        if skipped == (0, 0) {
+            return Self { reference, source, skipped };
+        }
+        let noise = (shared_noise(&reference, &source), shared_noise(&source, &reference));
+        let with = |view: Cow<'a, SweepView>, noise: f32| Cow::Owned(SweepView { noise, ..view.into_owned() });
+        Self { reference: with(reference, noise.0), source: with(source, noise.1), skipped }
+    }
+
+    pub(super) fn pair(&self) -> Pair<'_> {
+        Pair { reference: &self.reference, source: &self.source }
+    }
 }
 
 /// Returns the noise of a view beside another one of the same ground and sampling distance.
@@ -126,7 +149,7 @@ fn scaled(view: &SweepView, skipped: usize) -> Cow<'_, SweepView> {
 
 /// Returns the window of the reference at full resolution that the source may see at some height,
 /// grown by the pointing error; `None` when it sees none of it.
-fn shared_window(pair: &Pair<'_>, range_m: (f64, f64), band_px: f64) -> Option<Window> {
+pub(super) fn shared_window(pair: &Pair<'_>, range_m: (f64, f64), band_px: f64) -> Option<Window> {
     /// Fields of the lattice of places that are tried, on a side.
     const FIELDS: usize = 24;
     /// Pieces of a height trajectory that count as straight.
@@ -203,7 +226,7 @@ impl Pair<'_> {
             let scale = f64::from(1u32 << level);
             let at = [level_from_level0(full[0], level as u32), level_from_level0(full[1], level as u32)];
             let start = [offset[0] / scale, offset[1] / scale];
-            let (refined, c) = self.refine(at, level, height_m, start, config)?;
+            let (refined, c) = self.refine(at, level, height_m, (start, REACH), config)?;
             offset = [refined[0] * scale, refined[1] * scale];
             correlation = c;
         }
@@ -215,7 +238,7 @@ impl Pair<'_> {
         let back = Pair { reference: self.source, source: self.reference };
         let back_predicted = back.chain(found, 0, height_m).ok()?;
         let start = [full[0] - back_predicted[0], full[1] - back_predicted[1]];
-        let (end, _) = back.refine(found, 0, height_m, start, config)?;
+        let (end, _) = back.refine(found, 0, height_m, (start, REACH), config)?;
         ((end[0] - start[0]).hypot(end[1] - start[1]) < RETURN_PX).then_some(Tie {
             reference: ImagePoint::new(full[0], full[1]),
             source: ImagePoint::new(found[0], found[1]),
@@ -223,27 +246,27 @@ impl Pair<'_> {
         })
     }
 
-    /// Finds the offset of best correlation within two pixels of `start`, to a fraction of a pixel,
-    /// and the correlation.
+    /// Finds the offset of best correlation within `reach` pixels of `start`, to a fraction of a
+    /// pixel, and the correlation. The reach is at most [`REACH_MAX`].
     ///
     /// `at` is a position on the level in the reference; offsets are source pixels from its
     /// projection at `height_m`. The source is resampled once in the frame of the reference, so
     /// that every place tried is a part of that picture.
-    fn refine(
+    pub(super) fn refine(
         &self,
         at: [f64; 2],
         level: usize,
         height_m: f64,
-        start: [f64; 2],
+        (start, reach_px): ([f64; 2], i32),
         config: &TieConfig,
     ) -> Option<([f64; 2], f32)> {
-        const REACH: i32 = 2;
-        const SIDE: usize = 2 * REACH as usize + 1;
+        const SIDE_MAX: usize = 2 * REACH_MAX + 1;
+        let places = 2 * reach_px as usize + 1;
         let own = Patch::around(&self.reference.levels[level], at, config.radius, self.reference.noise_at(level))?;
         let frame = LocalFrame::at(&self.reference.camera, &self.source.camera, level, at, height_m).ok()?;
         let centre = self.chain(at, level, height_m).ok()?;
         let from = [centre[0] + start[0], centre[1] + start[1]];
-        let reach = config.radius + REACH;
+        let reach = config.radius + reach_px;
         let (side, whole) = (2 * config.radius as usize + 1, 2 * reach as usize + 1);
         let mut picture = Grid::filled(whole + padded(side) - side, whole, f32::NAN);
         for j in 0..picture.height() {
@@ -252,10 +275,10 @@ impl Pair<'_> {
         }
         remove_mean(picture.data_mut());
         let noise = self.source.noise_at(level);
-        let mut scores = [[-1.0f32; SIDE]; SIDE];
+        let mut scores = [[-1.0f32; SIDE_MAX]; SIDE_MAX];
         let mut best = (-1.0f32, 0usize, 0usize);
-        for (j, row) in scores.iter_mut().enumerate() {
-            for (i, score) in row.iter_mut().enumerate() {
+        for (j, row) in scores[..places].iter_mut().enumerate() {
+            for (i, score) in row[..places].iter_mut().enumerate() {
                 *score = own.correlation_at(&picture, (i, j), noise).unwrap_or(-1.0);
                 if *score > best.0 {
                     best = (*score, i, j);
@@ -264,12 +287,12 @@ impl Pair<'_> {
         }
         let (score, i, j) = best;
         // A best place at the rim is a slope and not a peak.
-        if !(1..SIDE - 1).contains(&i) || !(1..SIDE - 1).contains(&j) {
+        if !(1..places - 1).contains(&i) || !(1..places - 1).contains(&j) {
             return None;
         }
         let dx = parabola_peak(scores[j][i - 1], score, scores[j][i + 1]);
         let dy = parabola_peak(scores[j - 1][i], score, scores[j + 1][i]);
-        let steps = |i: usize, d: f64| f64::from(i as i32 - REACH) + d;
+        let steps = |i: usize, d: f64| f64::from(i as i32 - reach_px) + d;
         Some((frame.moved(start, steps(i, dx), steps(j, dy)), score))
     }
 }

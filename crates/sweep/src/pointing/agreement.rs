@@ -1,0 +1,290 @@
+//! Ties on which two views agree all over the ground that they share.
+//!
+//! The strongest corners lie where shadows end, and shadows move with the sun. Patches of a lattice
+//! lie on lit ground and roofs as often as these do in the image. They are searched for around the
+//! heights of ties and back again. What each says alone is weak, but all true ones have the same
+//! pointing error across their height trajectories, which drifts slowly over the image, while
+//! shadows are moved by as much as their objects are high. The largest set that agrees is found by
+//! the mode of the errors and a plane with Tukey's weights (Beaton and Tukey 1974) that starts
+//! there.
+
+use camera::ImagePoint;
+use nalgebra::{Matrix3, Vector3};
+use numeric::upper_median;
+use raster::{level_from_level0, level0_from_level};
+use rayon::prelude::*;
+
+use super::pair::{Pair, Tie, TieConfig};
+use super::ties::{ScaledPair, shared_window};
+use crate::view::SweepView;
+
+/// Patches tried for each corner that is tried. Those of a scene of 600 × 600 pixels then cover each
+/// other by a quarter of their sides, and more would only repeat what these say.
+const PATCHES_PER_CORNER: usize = 4;
+/// Distance from its expected place within which a patch is searched for, pixels: two storeys under
+/// a wide angle along the trajectory, and what shadows have displaced ties across it.
+const REACH: i32 = 6;
+/// Least correlation. A patch of 15 × 15 pixels of texture as strong as the noise has 0.4 to 0.5,
+/// and chance likenesses among these many places reach 0.3.
+const LIKENESS_MIN: f32 = 0.3;
+/// Largest distance of the search back from the patch, pixels.
+const RETURN_PX: f64 = 1.0;
+/// The heights of this many ties around a patch give the height at which it is expected.
+const NEAR: usize = 8;
+/// Distance from where most errors lie at which one no longer counts, pixels, in the first round:
+/// three deviations of the places of weak texture (0.3 px).
+const COUNTS_FIRST_PX: f64 = 1.0;
+/// The same in the last round for [`MANY`] patches or more. It still holds nine in ten of those
+/// places, and less of the shadows that lie beside them to one side. Fewer patches show the mode
+/// less sharply, by the fifth root of their number (Silverman 1986), up to [`COUNTS_MOST_PX`].
+const COUNTS_LAST_PX: f64 = 0.5;
+const COUNTS_MOST_PX: f64 = 0.75;
+const MANY: f64 = 500.0;
+/// Errors change over the image when a plane holds this many times as many patches as a constant
+/// does. A smaller drift stays among the ties that count, and the adjustment sees it.
+const PLANE_TIMES: f64 = 1.2;
+/// At least one patch in this many agrees, or the views show nothing together. Of chance
+/// likenesses one in twelve does: a pixel of the places across that are searched.
+const AGREE_ONE_IN: usize = 4;
+/// Fewer patches than this do not determine where most agree.
+const PATCHES_MIN: usize = 50;
+/// Rounds of the plane: a third at the first distance, a third between, a third at the last. It
+/// settles in a few.
+const ROUNDS: usize = 24;
+
+/// What a tie says: where, and how far from its height trajectory.
+#[derive(Clone, Copy)]
+struct Sight {
+    tie: Tie,
+    height_m: f64,
+    across_px: f64,
+}
+
+/// Returns the ties on which two views agree over the ground that they share, with those of the
+/// given ties that agree with them; `None` where the views show too little together.
+///
+/// `ties` say at which heights to search. All positions are in pixels of the full resolution.
+pub fn agreeing_ties(
+    reference: &SweepView,
+    source: &SweepView,
+    ties: &[Tie],
+    range_m: (f64, f64),
+    config: &TieConfig,
+) -> Option<Vec<Tie>> {
+    let scaled = ScaledPair::of(&Pair { reference, source }, range_m);
+    let pair = scaled.pair();
+    let (skip_reference, skip_source) = scaled.skipped;
+    let moved = |p: ImagePoint, skipped: usize, f: fn(f64, u32) -> f64| {
+        ImagePoint::new(f(p.sample, skipped as u32), f(p.line, skipped as u32))
+    };
+    let middle_m = 0.5 * (range_m.0 + range_m.1);
+    let on_scale = |tie: &Tie| Tie {
+        reference: moved(tie.reference, skip_reference, level_from_level0),
+        source: moved(tie.source, skip_source, level_from_level0),
+        ..*tie
+    };
+    let known: Vec<Sight> = ties.iter().filter_map(|tie| pair.sight(&on_scale(tie), middle_m)).collect();
+    let usual_px = upper_median(&mut known.iter().map(|sight| sight.across_px).collect::<Vec<f64>>())?;
+    let patches = pair.lattice(&known, range_m, config);
+    let found: Vec<Sight> = patches
+        .par_iter()
+        .filter_map(|&at| {
+            let height_m = height_near(&known, at)?;
+            pair.patch(at, height_m, usual_px, config)
+        })
+        .collect();
+    if found.len() < PATCHES_MIN {
+        return None;
+    }
+    let plane = Plane::of_most(&found)?;
+    let agrees = |sight: &&Sight| plane.holds(sight);
+    if AGREE_ONE_IN * found.iter().filter(agrees).count() < found.len() {
+        return None;
+    }
+    let full = |sight: &Sight| Tie {
+        reference: moved(sight.tie.reference, skip_reference, level0_from_level),
+        source: moved(sight.tie.source, skip_source, level0_from_level),
+        ..sight.tie
+    };
+    Some(known.iter().chain(&found).filter(agrees).map(full).collect())
+}
+
+/// Returns the median height of the ties nearest to a place.
+fn height_near(known: &[Sight], at: [f64; 2]) -> Option<f64> {
+    let square = |sight: &Sight| {
+        let place = sight.tie.reference;
+        (place.sample - at[0]).powi(2) + (place.line - at[1]).powi(2)
+    };
+    let mut all: Vec<(f64, f64)> = known.iter().map(|sight| (square(sight), sight.height_m)).collect();
+    if all.len() > NEAR {
+        all.select_nth_unstable_by(NEAR, |a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        all.truncate(NEAR);
+    }
+    upper_median(&mut all.into_iter().map(|(_, height_m)| height_m).collect::<Vec<f64>>())
+}
+
+impl Pair<'_> {
+    /// Returns the centres of a lattice of patches over what the source sees of the reference.
+    fn lattice(&self, known: &[Sight], range_m: (f64, f64), config: &TieConfig) -> Vec<[f64; 2]> {
+        let heights = || known.iter().map(|sight| sight.height_m);
+        let (low, high) = (heights().fold(range_m.1, f64::min), heights().fold(range_m.0, f64::max));
+        let Some(part) = shared_window(self, (low, high.max(low)), config.band_px) else { return Vec::new() };
+        let wanted = (PATCHES_PER_CORNER * config.points) as f64;
+        let step = ((part.width * part.height) as f64 / wanted).sqrt().max(f64::from(config.radius));
+        let places = |from: i64, length: usize| {
+            let count = (length as f64 / step) as usize;
+            (0..count).map(move |i| (from as f64 + (i as f64 + 0.5) * step).round())
+        };
+        places(part.y, part.height).flat_map(|y| places(part.x, part.width).map(move |x| [x, y])).collect()
+    }
+
+    /// Searches for the patch around a place near where it is expected, and back.
+    fn patch(&self, at: [f64; 2], height_m: f64, across_px: f64, config: &TieConfig) -> Option<Sight> {
+        let predicted = self.chain(at, 0, height_m).ok()?;
+        let [along_sample, along_line] = self.along(at, height_m)?;
+        let expected = [-along_line * across_px, along_sample * across_px];
+        let (offset, correlation) = self.refine(at, 0, height_m, (expected, REACH), config)?;
+        if correlation < LIKENESS_MIN {
+            return None;
+        }
+        let found = [predicted[0] + offset[0], predicted[1] + offset[1]];
+        let back = Pair { reference: self.source, source: self.reference };
+        let back_predicted = back.chain(found, 0, height_m).ok()?;
+        let start = [at[0] - back_predicted[0], at[1] - back_predicted[1]];
+        let (end, _) = back.refine(found, 0, height_m, (start, REACH), config)?;
+        if (end[0] - start[0]).hypot(end[1] - start[1]) >= RETURN_PX {
+            return None;
+        }
+        let place = |[sample, line]: [f64; 2]| ImagePoint::new(sample, line);
+        let tie = Tie { reference: place(at), source: place(found), correlation };
+        Some(Sight { tie, height_m, across_px: along_sample * offset[1] - along_line * offset[0] })
+    }
+
+    /// Returns the direction of a height trajectory in the source.
+    fn along(&self, at: [f64; 2], height_m: f64) -> Option<[f64; 2]> {
+        /// Length of the piece that gives the direction, metres. Trajectories are nearly straight.
+        const PIECE_M: f64 = 20.0;
+        let (from, to) = (self.chain(at, 0, height_m).ok()?, self.chain(at, 0, height_m + PIECE_M).ok()?);
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        (length > 0.0).then(|| [(to[0] - from[0]) / length, (to[1] - from[1]) / length])
+    }
+
+    /// Returns the height at which a tie is closest to its trajectory, and how far off it is there.
+    fn sight(&self, tie: &Tie, start_m: f64) -> Option<Sight> {
+        /// Trajectories are nearly straight, so that the second round is exact.
+        const ROUNDS: usize = 3;
+        const PIECE_M: f64 = 20.0;
+        let at = [tie.reference.sample, tie.reference.line];
+        let (mut height_m, mut across_px) = (start_m, 0.0);
+        for _ in 0..ROUNDS {
+            let (from, to) = (self.chain(at, 0, height_m).ok()?, self.chain(at, 0, height_m + PIECE_M).ok()?);
+            let along = [to[0] - from[0], to[1] - from[1]];
+            let found = [tie.source.sample - from[0], tie.source.line - from[1]];
+            let square = along[0] * along[0] + along[1] * along[1];
+            across_px = (along[0] * found[1] - along[1] * found[0]) / square.sqrt();
+            height_m += PIECE_M * (along[0] * found[0] + along[1] * found[1]) / square;
+        }
+        (across_px.is_finite() && height_m.is_finite()).then_some(Sight { tie: *tie, height_m, across_px })
+    }
+}
+
+/// Errors across trajectories that change linearly over the reference.
+struct Plane {
+    /// Place about which it is written, and the distance that is 1, pixels.
+    centre: ImagePoint,
+    half: f64,
+    /// At the centre, by sample, by line, pixels.
+    terms: Vector3<f64>,
+    /// Distance from the plane within which errors agree with it, pixels.
+    counts_px: f64,
+}
+
+impl Plane {
+    /// Finds the plane on which most errors lie.
+    fn of_most(sights: &[Sight]) -> Option<Self> {
+        let span = |value: fn(&Sight) -> f64| {
+            let all = || sights.iter().map(value);
+            (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max))
+        };
+        let (left, right) = span(|sight| sight.tie.reference.sample);
+        let (top, bottom) = span(|sight| sight.tie.reference.line);
+        let centre = ImagePoint::new(0.5 * (left + right), 0.5 * (top + bottom));
+        let half = (0.5 * (right - left).max(bottom - top)).max(1.0);
+        let wider = (MANY / sights.len() as f64).powf(0.2);
+        let counts_px = (COUNTS_LAST_PX * wider).clamp(COUNTS_LAST_PX, COUNTS_MOST_PX);
+        let start = Self { centre, half, terms: Vector3::new(mode(sights)?, 0.0, 0.0), counts_px };
+        let (constant, plane) = (start.settled(sights, false)?, start.settled(sights, true)?);
+        let held = |plane: &Self| sights.iter().filter(|sight| plane.holds(sight)).count() as f64;
+        Some(if held(&plane) > PLANE_TIMES * held(&constant) { plane } else { constant })
+    }
+
+    /// Returns the plane, or else the constant, that settles on most errors from here.
+    fn settled(&self, sights: &[Sight], slopes: bool) -> Option<Self> {
+        let mut plane = Self { ..*self };
+        let fixed = if slopes { 0.0 } else { 1.0 };
+        for round in 0..ROUNDS {
+            let narrowed = (3.0 * round as f64 / ROUNDS as f64 - 1.0).clamp(0.0, 1.0);
+            let counts_px = COUNTS_FIRST_PX + (self.counts_px - COUNTS_FIRST_PX) * narrowed;
+            let mut normal = Matrix3::from_diagonal(&Vector3::new(0.0, fixed, fixed));
+            let mut right = Vector3::zeros();
+            for sight in sights {
+                let mut row = plane.row(sight.tie.reference);
+                let off = (sight.across_px - row.dot(&plane.terms)) / counts_px;
+                let weight = (1.0 - off * off).max(0.0).powi(2);
+                (1..3).for_each(|i| row[i] *= 1.0 - fixed);
+                normal += row * row.transpose() * weight;
+                right += row * (sight.across_px * weight);
+            }
+            plane.terms = normal.cholesky()?.solve(&right);
+        }
+        Some(plane)
+    }
+
+    /// Returns whether an error lies on the plane.
+    fn holds(&self, sight: &Sight) -> bool {
+        (sight.across_px - self.row(sight.tie.reference).dot(&self.terms)).abs() <= self.counts_px
+    }
+
+    fn row(&self, at: ImagePoint) -> Vector3<f64> {
+        Vector3::new(1.0, (at.sample - self.centre.sample) / self.half, (at.line - self.centre.line) / self.half)
+    }
+}
+
+/// Returns the middle of the densest interval of errors.
+fn mode(sights: &[Sight]) -> Option<f64> {
+    let mut all: Vec<f64> = sights.iter().map(|sight| sight.across_px).collect();
+    all.sort_by(f64::total_cmp);
+    let within = |from: usize| all[from..].partition_point(|v| *v <= all[from] + COUNTS_FIRST_PX);
+    let densest = (0..all.len()).rev().max_by_key(|&from| within(from))?;
+    all.get(densest + within(densest) / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Most patches lie on a plane. A third is moved to one side by shadows of unlike length.
+    #[test]
+    fn the_mode_stays_where_shadows_pull_to_one_side() {
+        let fraction = |i: usize, by: f64| (i as f64 * by).fract();
+        let sight = |i: usize, slope: f64| {
+            let at = ImagePoint::new(900.0 * fraction(i, 0.618_034), 700.0 * fraction(i, 0.414_214));
+            let noise = 0.5 * (fraction(i, 0.732_051) - 0.5) + 0.5 * (fraction(i, 0.236_068) - 0.5);
+            let shadow = if i % 3 == 0 { 4.0 * fraction(i, 0.645_751) } else { 0.0 };
+            let across_px = 1.5 + slope * (at.sample - 450.0) + noise + shadow;
+            let tie = Tie { reference: at, source: at, correlation: 0.5 };
+            Sight { tie, height_m: 0.0, across_px }
+        };
+        for slope in [0.0, 0.002] {
+            let sights: Vec<Sight> = (0..600).map(|i| sight(i, slope)).collect();
+            let mean = sights.iter().map(|s| s.across_px).sum::<f64>() / 600.0;
+            assert!(mean > 2.0, "the shadows move the mean to {mean}");
+            let plane = Plane::of_most(&sights).unwrap();
+            for sample in [0.0, 450.0, 900.0] {
+                let found = plane.row(ImagePoint::new(sample, 350.0)).dot(&plane.terms);
+                let expected = 1.5 + slope * (sample - 450.0);
+                assert!((found - expected).abs() < 0.1, "{found} instead of {expected} with a slope of {slope}");
+            }
+        }
+    }
+}
