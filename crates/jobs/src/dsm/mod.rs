@@ -100,6 +100,7 @@ mod run;
 mod same_picture;
 mod scene_sweep;
 mod session;
+mod shadow_side;
 mod shared_heights;
 mod sources;
 mod surface;
@@ -137,6 +138,7 @@ pub use report::{
 };
 pub use run::run;
 pub use session::Session;
+pub use shadow_side::ShadowCounts;
 pub use surface::{KeptPixels, SurfaceCounts};
 pub use ties::PairTies;
 pub use tuning::SweepTuning;

@@ -23,6 +23,9 @@ const SIDE: usize = 192;
 const REACH: usize = 256;
 /// Number of times the sides are halved for the first search.
 const COARSE: usize = 3;
+/// Places of the first search that are looked at closer: a shift of half a coarse pixel lets the true
+/// one lose to a similar one.
+const CANDIDATES: usize = 6;
 /// Places of the squares, as shares of the smallest image's sides: far enough apart to show a
 /// difference of scale of one in three hundred.
 const PLACES: [(f64, f64); 5] = [(0.5, 0.5), (0.22, 0.22), (0.78, 0.78), (0.78, 0.22), (0.22, 0.78)];
@@ -147,16 +150,19 @@ fn likeness(first: &Place, second: &Place, square: Window) -> Likeness {
     }
     let reach = (REACH >> COARSE) as i64;
     let at = of_square(COARSE, second);
-    let Some((mut place, _)) = coarse.best_near(other, [at.x, at.y], reach) else { return Likeness::Blank };
-    let mut correlation = 0.0;
-    for level in (0..COARSE).rev() {
-        let Some(template) = template(level) else { return Likeness::Blank };
-        // A pixel of the coarser level is two here, and the square began on an odd one.
-        match template.best_near(&second.levels[level], [2 * place[0], 2 * place[1]], 3) {
-            Some(found) => (place, correlation) = found,
-            None => return Likeness::Nowhere,
-        }
+    let places = coarse.places_near(other, [at.x, at.y], reach, CANDIDATES);
+    if places.is_empty() {
+        return Likeness::Blank;
     }
+    let refined = |place: [i64; 2]| {
+        (0..COARSE).rev().try_fold((place, 0.0), |(place, _), level| {
+            // A pixel of the coarser level is two here, and the square began on an odd one.
+            let near = [2 * place[0], 2 * place[1]];
+            template(level)?.places_near(&second.levels[level], near, 3, 1).pop()
+        })
+    };
+    let best = places.into_iter().filter_map(|(place, _)| refined(place)).max_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((place, correlation)) = best else { return Likeness::Nowhere };
     if correlation < ALIKE {
         return Likeness::Nowhere;
     }
@@ -183,13 +189,22 @@ impl Template {
         (deviation > 0.0).then_some(Self { width: cut.width(), height: cut.height(), pixels, deviation })
     }
 
-    /// Returns the place within `reach` of `near` at which the image is most alike, and the
-    /// correlation there; `None` when the image has pixels at none.
-    fn best_near(&self, image: &Grid<f32>, near: [i64; 2], reach: i64) -> Option<([i64; 2], f32)> {
+    /// Returns up to `count` places within `reach` of `near` at which the image is most alike, with
+    /// the correlation there, the best first. None is beside a better one.
+    fn places_near(&self, image: &Grid<f32>, near: [i64; 2], reach: i64, count: usize) -> Vec<([i64; 2], f32)> {
         let shifts = -reach..=reach;
         let places = shifts.clone().flat_map(|dy| shifts.clone().map(move |dx| [near[0] + dx, near[1] + dy]));
-        let all = places.filter_map(|place| Some((place, self.correlation(image, place)?)));
-        all.max_by(|a, b| a.1.total_cmp(&b.1))
+        let mut all: Vec<([i64; 2], f32)> =
+            places.filter_map(|place| Some((place, self.correlation(image, place)?))).collect();
+        all.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut best: Vec<([i64; 2], f32)> = Vec::with_capacity(count);
+        for (place, correlation) in all {
+            let is_beside = |other: &([i64; 2], f32)| (0..2).all(|axis| (other.0[axis] - place[axis]).abs() <= 1);
+            if best.len() < count && !best.iter().any(is_beside) {
+                best.push((place, correlation));
+            }
+        }
+        best
     }
 
     /// Returns the correlation with the square of an image that begins at a pixel.
