@@ -146,8 +146,7 @@ fn town(count: usize) -> Vec<Shot> {
 
 /// Returns an image with its columns, or also its lines, in the other direction.
 fn reversed(image: &Grid<u16>, lines_too: bool) -> Grid<u16> {
-    let mut rows: Vec<Vec<u16>> =
-        (0..image.height()).map(|y| image.row(y).iter().rev().copied().collect()).collect();
+    let mut rows: Vec<Vec<u16>> = (0..image.height()).map(|y| image.row(y).iter().rev().copied().collect()).collect();
     if lines_too {
         rows.reverse();
     }

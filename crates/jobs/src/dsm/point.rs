@@ -23,7 +23,7 @@ use crate::dsm::order::{as_given, in_order_of};
 use crate::dsm::other_fits::warn_of_other_fits;
 use crate::dsm::partners::ALL_MAX;
 use crate::dsm::report::{CorrectionOrder, PointingReport};
-use crate::dsm::same_picture::same_picture;
+use crate::dsm::same_picture::{at_one_shift, same_picture};
 use crate::dsm::session::Session;
 use crate::dsm::tie_quality::{by_image, warn_of_images};
 use crate::dsm::ties::{PairTies, TIES_MIN, join_pairs, tie_heights};
@@ -137,7 +137,7 @@ fn check_pictures(images: &[SceneImage], looked: &FirstLook, views: Option<&[Swe
     if let (Some(first), true) = (blank, pictures < 2) {
         return Err(DsmError::Blank { path: path(first) });
     }
-    match same_picture(images, views)? {
+    match at_one_shift(&looked.ties).map_or_else(|| same_picture(images, views), |pair| Ok(Some(pair)))? {
         Some(pair) => Err(DsmError::SamePixels { first: path(pair.first), second: path(pair.second) }),
         None => Ok(()),
     }

@@ -5,7 +5,10 @@
 //! around the same pixel, coarse to fine, by normalised correlation. Two exposures from different
 //! directions differ in scale, in parallax and in what hides what, so that squares in the corners
 //! and in the middle lie at different shifts. Copies have one shift everywhere.
+//!
+//! Where the detail is too fine for the coarse search, tie points tell the same.
 
+use numeric::upper_median;
 use raster::{Grid, Window, reduce};
 use rayon::prelude::*;
 use sweep::SweepView;
@@ -13,6 +16,7 @@ use sweep::SweepView;
 use crate::dsm::error::DsmError;
 use crate::dsm::image_pixels::read_view;
 use crate::dsm::images::SceneImage;
+use crate::dsm::ties::{PairTies, TIES_MIN};
 use crate::dsm::values::ImagePair;
 
 /// Side of the squares that are searched for, pixels: wide enough to hold detail of its own when it
@@ -39,6 +43,12 @@ const ALIKE: f32 = 0.9;
 const SHIFT_SPREAD: i64 = 1;
 /// Texture of a square that says anything, in standard deviations of the image's noise.
 const TEXTURE_MIN: f32 = 3.0;
+
+/// Ties of copies lie at one shift to this, pixels. Those of two exposures do so only where the
+/// ground is flat to a few decimetres and both directions foreshorten it alike.
+const TIE_SPREAD_PX: f64 = 0.1;
+/// Share of the ties that must lie at one shift: of copies all but a few wrong ones do.
+const TIE_SHARE: f64 = 0.9;
 
 /// What one place says of two images.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,6 +111,22 @@ pub(crate) fn same_picture(images: &[SceneImage], views: Option<&[SweepView]>) -
         suspects = suspects.into_par_iter().filter_map(remains).collect();
     }
     Ok(suspects.into_iter().find(|suspect| suspect.shifts.len() >= PLACES_MIN).map(|suspect| suspect.pair))
+}
+
+/// Finds a pair whose ties all lie at one shift.
+pub(crate) fn at_one_shift(ties: &[PairTies]) -> Option<ImagePair> {
+    let is_copy = |found: &&PairTies| {
+        let shifts: Vec<[f64; 2]> = found
+            .ties
+            .iter()
+            .map(|tie| [tie.source.sample - tie.reference.sample, tie.source.line - tie.reference.line])
+            .collect();
+        let middle = |axis: usize| upper_median(&mut shifts.iter().map(|shift| shift[axis]).collect::<Vec<f64>>());
+        let (Some(x), Some(y)) = (middle(0), middle(1)) else { return false };
+        let near = shifts.iter().filter(|shift| (shift[0] - x).hypot(shift[1] - y) < TIE_SPREAD_PX).count();
+        shifts.len() >= TIES_MIN && near as f64 >= TIE_SHARE * shifts.len() as f64
+    };
+    ties.iter().find(is_copy).map(|found| found.pair)
 }
 
 impl Place {
@@ -235,6 +261,9 @@ impl Template {
 mod tests {
     use std::path::Path;
 
+    use camera::ImagePoint;
+    use sweep::pointing::Tie;
+
     use super::*;
     use crate::dsm::config::DsmConfig;
     use crate::dsm::image_pixels::read_views;
@@ -247,6 +276,20 @@ mod tests {
         let images = open(&DsmConfig::new(paths.into(), "unused".into())).unwrap().images;
         let views = read_views(&images, &|| ()).unwrap();
         (images, views)
+    }
+
+    #[test]
+    fn ties_at_one_shift_are_a_copy_and_ties_with_parallax_are_not() {
+        let pair = |parallax: f64| {
+            let tie = |i: usize| {
+                let at = ImagePoint::new(i as f64 * 7.0, i as f64 * 3.0);
+                let source = ImagePoint::new(at.sample - 12.0, at.line + 31.0 + parallax * (i % 5) as f64);
+                Tie { reference: at, source, correlation: 0.9 }
+            };
+            PairTies { pair: ImagePair::new(0, 1), ties: (0..20).map(tie).collect() }
+        };
+        assert_eq!(at_one_shift(&[pair(0.01)]), Some(ImagePair::new(0, 1)));
+        assert_eq!(at_one_shift(&[pair(0.4)]), None);
     }
 
     #[test]
