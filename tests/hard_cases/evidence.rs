@@ -3,8 +3,8 @@
 use camera::ImagePoint;
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, write_cog};
-use jobs::dsm::{DsmConfig, DsmError};
-use raster::Window;
+use jobs::dsm::{DsmConfig, DsmError, Preset};
+use raster::{Grid, Window};
 
 use crate::stage::{EASY, Shot, Stage, triplet};
 
@@ -129,4 +129,84 @@ fn an_overlap_of_twenty_lines_is_named_or_refused() {
     named_or_refused("20 lines and a range", &shots, |c| {
         c.height_range_m = Some(jobs::dsm::HeightRange::new(160.0, 240.0));
     });
+}
+
+/// Views of the sample town, whose sun throws shadows.
+fn town(count: usize) -> Vec<Shot> {
+    let town = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town");
+    let shot = |number: usize| {
+        let path = town.join(format!("view_{number}.tif"));
+        let source = io::raster::ImageSource::open(&path).unwrap();
+        let whole = Window::whole(source.info().width, source.info().height);
+        let image = source.read_luma(whole).unwrap().luma.map(|value| value.round() as u16);
+        Shot { image, rpc: io::rpc::read_for_image(&path).unwrap().rpc, no_data: None }
+    };
+    [1, 3, 2][..count].iter().map(|number| shot(*number)).collect()
+}
+
+/// Returns an image with its columns, or also its lines, in the other direction.
+fn reversed(image: &Grid<u16>, lines_too: bool) -> Grid<u16> {
+    let mut rows: Vec<Vec<u16>> = (0..image.height()).map(|y| image.row(y).iter().rev().copied().collect()).collect();
+    if lines_too {
+        rows.reverse();
+    }
+    Grid::from_vec(image.width(), image.height(), rows.concat()).unwrap()
+}
+
+/// Runs shots of the town, fast.
+fn run_fast(shots: &[Shot]) -> Result<Vec<String>, DsmError> {
+    let outcome = EASY.stage.run(shots, |config| config.preset = Preset::Fast)?;
+    Ok(outcome.report.warnings)
+}
+
+/// The town as it is gives no warning.
+#[test]
+fn images_that_are_turned_or_mirrored_against_their_rpcs_are_named() {
+    let good = town(2);
+    assert_eq!(run_fast(&good).unwrap(), Vec::<String>::new());
+    let changed = |lines_too: bool, count: usize| -> Vec<Shot> {
+        let shots = town(count).into_iter();
+        shots.map(|shot| Shot { image: reversed(&shot.image, lines_too), ..shot }).collect()
+    };
+    let is_named = |shots: &[Shot], word: &str| {
+        let warnings = run_fast(shots).unwrap();
+        assert!(warnings.iter().any(|w| w.contains(word) && w.contains("view_2.tif")), "{word}: {warnings:?}");
+    };
+    is_named(&changed(true, 2), "upside down");
+    is_named(&changed(false, 2), "mirrored");
+    is_named(&changed(false, 3), "mirrored");
+}
+
+#[test]
+fn exchanged_rpcs_of_three_images_are_named_or_refused() {
+    let mut shots = town(3);
+    let first = shots[0].rpc.clone();
+    shots[0].rpc = shots[1].rpc.clone();
+    shots[1].rpc = shots[2].rpc.clone();
+    shots[2].rpc = first;
+    if let Ok(warnings) = run_fast(&shots) {
+        assert!(warnings.iter().any(|w| w.contains("exchange") && w.contains("view_2.tif")), "{warnings:?}");
+    }
+}
+
+/// A copy with noise, other grey values and a cut border is refused among two and among three views.
+#[test]
+fn copies_of_one_picture_are_refused() {
+    let shots = town(3);
+    let source = &shots[0].image;
+    let copy = |change: &dyn Fn(usize, u16) -> u16| {
+        let data = source.data().iter().enumerate().map(|(i, value)| change(i, *value)).collect();
+        Grid::from_vec(source.width(), source.height(), data).unwrap()
+    };
+    let grainy = copy(&|i, value| value + (i.wrapping_mul(2_654_435_761) >> 9) as u16 % 5);
+    let dull = copy(&|_, value| (0.8 * f64::from(value)) as u16 + 20);
+    let cut = source.window(Window { x: 31, y: 17, width: source.width() - 31, height: source.height() - 17 }, 0);
+    for (case, image) in [("grainy", grainy), ("dull", dull), ("cut", cut)] {
+        for count in [2, 3] {
+            let mut shots = shots[..count].to_vec();
+            shots[1].image = image.clone();
+            let refused = run_fast(&shots).err();
+            assert!(matches!(refused, Some(DsmError::SamePixels { .. })), "{case} among {count}: {refused:?}");
+        }
+    }
 }

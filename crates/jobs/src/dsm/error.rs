@@ -172,10 +172,10 @@ pub enum DsmError {
         /// File of the image.
         path: PathBuf,
     },
-    /// Two images have the same pixels and different RPCs.
+    /// Two images are one picture with different RPCs.
     #[error(
-        "no parallax: two images have the same pixels; \
-         remove one, or give the image that its RPC belongs to: {} and {}",
+        "no parallax: two images are one picture, whose copies differ by compression, brightness, noise or a cut \
+         border at most; remove one, or give the image that its RPC belongs to: {} and {}",
         first.display(), second.display()
     )]
     SamePixels {

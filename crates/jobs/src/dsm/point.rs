@@ -1,9 +1,10 @@
 //! Second stage of a run: tie points, and the correction of the cameras' pointing.
 
 use camera::ImageCorrection;
-use numeric::{Choice, upper_median};
+use numeric::Choice;
 use serde::{Deserialize, Serialize};
-use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder};
+use sweep::SweepView;
+use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Track, adjust};
 
 use crate::corrections::Corrections;
 use crate::dsm::character::ImageCharacter;
@@ -11,19 +12,21 @@ use crate::dsm::config::DsmConfig;
 use crate::dsm::control::{Controlled, GroundControl};
 use crate::dsm::dem::dem_heights;
 use crate::dsm::error::DsmError;
-use crate::dsm::evidence::{PairHeight, off_along_sight, warn_of_domains};
-use crate::dsm::image_checks::{grossly_off, same_picture, unconnected};
+use crate::dsm::evidence::{PairHeights, off_along_sight, warn_of_domains};
+use crate::dsm::image_checks::{grossly_off, unconnected};
 use crate::dsm::image_mask::note_masks;
 use crate::dsm::images::SceneImage;
 use crate::dsm::look::{FirstLook, asked_pairs, look, pair_names};
 use crate::dsm::notes::{LISTED_MAX, Notes};
 use crate::dsm::open::Opened;
 use crate::dsm::order::{as_given, in_order_of};
+use crate::dsm::other_fits::warn_of_other_fits;
 use crate::dsm::partners::ALL_MAX;
 use crate::dsm::report::{CorrectionOrder, PointingReport};
+use crate::dsm::same_picture::{at_one_shift, same_picture};
 use crate::dsm::session::Session;
 use crate::dsm::tie_quality::{by_image, warn_of_images, warn_of_residual};
-use crate::dsm::ties::{PairTies, TIES_MIN, adjust_cameras, join_pairs, tie_heights};
+use crate::dsm::ties::{PairTies, TIES_MIN, join_pairs, tie_heights};
 use crate::dsm::values::{HeightRange, ImagePair};
 use crate::dsm::view_geometry::ViewGeometry;
 
@@ -86,13 +89,14 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     let mut notes = Notes::new(session.progress);
     note_masks(&images, &mut notes)?;
     let looked = look(config, &images, session)?;
-    check_pictures(&images, &looked)?;
+    check_pictures(&images, &looked, session.views.as_deref())?;
     let mut points = GroundControl::read(config.control.as_deref(), &images, &mut notes)?;
     let (tracks, contradictory) = join_pairs(&looked.ties);
     // What control points do to an image is no fault of its RPC, which ties alone can tell.
     let Controlled { found, by_ties } = points.adjust(&looked.cameras, &looked.sizes, &tracks, &mut notes)?;
     let is_applied = is_applied(config, &found, &by_ties, &mut notes)?;
-    warn_of_sights(&images, &looked, &by_ties, &mut notes);
+    warn_of_sights(&images, &looked, (&tracks, &by_ties), &mut notes);
+    warn_of_other_fits(&images, &looked, (&tracks, &by_ties), &mut notes);
     let by_image = by_image(&images, &looked, &found, &tracks);
     if is_applied {
         warn_of_images(&by_image, &mut notes);
@@ -128,14 +132,14 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
 }
 
 /// Refuses images without contrast, and one picture under two RPCs.
-fn check_pictures(images: &[SceneImage], looked: &FirstLook) -> Result<(), DsmError> {
+fn check_pictures(images: &[SceneImage], looked: &FirstLook, views: Option<&[SweepView]>) -> Result<(), DsmError> {
     let path = |i: usize| images[i].path.clone();
     let blank = looked.characters.iter().position(ImageCharacter::is_blank);
     let pictures = looked.characters.iter().filter(|c| !c.is_blank()).count();
     if let (Some(first), true) = (blank, pictures < 2) {
         return Err(DsmError::Blank { path: path(first) });
     }
-    match same_picture(&looked.ties) {
+    match at_one_shift(&looked.ties).map_or_else(|| same_picture(images, views), |pair| Ok(Some(pair)))? {
         Some(pair) => Err(DsmError::SamePixels { first: path(pair.first), second: path(pair.second) }),
         None => Ok(()),
     }
@@ -183,18 +187,25 @@ fn is_applied(
 
 /// Warns of images that are off along their lines of sight, which ties of one pair cannot tell from
 /// a height.
-fn warn_of_sights(images: &[SceneImage], looked: &FirstLook, found: &Adjustment, notes: &mut Notes<'_>) {
+fn warn_of_sights(
+    images: &[SceneImage],
+    looked: &FirstLook,
+    (tracks, found): (&[Track], &Adjustment),
+    notes: &mut Notes<'_>,
+) {
     let as_given = AdjustConfig { max_order: ModelOrder::None, ..AdjustConfig::default() };
-    let height = |ties: &PairTies| {
+    let heights = |ties: &PairTies| {
         let pair = ties.pair;
         let geometry = looked.geometry.pair(pair).filter(|_| ties.ties.len() >= TIES_MIN)?;
-        let (seen, _) = adjust_cameras(&looked.cameras, &looked.sizes, std::slice::from_ref(ties), &as_given);
-        let mut heights: Vec<f64> = seen.ground.iter().flatten().map(|ground| ground.height_m).collect();
+        let of_pair = |track: &Track| -> Track { track.iter().filter(|(view, _)| pair.has(*view)).copied().collect() };
+        let seen = tracks.iter().map(of_pair).enumerate().filter(|(_, track)| track.len() == 2);
+        let (numbers, seen): (Vec<usize>, Vec<Track>) = seen.unzip();
+        let ground = adjust(&looked.cameras, &looked.sizes, &seen, &as_given).ground;
+        let heights = numbers.into_iter().zip(ground).filter_map(|(track, ground)| Some((track, ground?.height_m)));
         let views = [pair.first, pair.second];
-        let height_m = upper_median(&mut heights)?;
-        Some(PairHeight { views, height_m, px_per_m: geometry.parallax_px_per_m })
+        Some(PairHeights { views, height_m: heights.collect(), px_per_m: geometry.parallax_px_per_m })
     };
-    let pairs: Vec<PairHeight> = looked.ties.iter().filter_map(height).collect();
+    let pairs: Vec<PairHeights> = looked.ties.iter().filter_map(heights).collect();
     let correction_px = |view: usize| {
         let [sample, line] = found.corrections[view].translation_px;
         sample.hypot(line)

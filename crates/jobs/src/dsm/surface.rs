@@ -19,6 +19,7 @@ use crate::dsm::grid_sight::{ViewPixels, grid_sights};
 use crate::dsm::ground_mask::GroundMask;
 use crate::dsm::rasters::{ChunkRasters, FILLED, OBSERVED, VOID};
 use crate::dsm::scene_sweep::{SceneHeights, SceneSweep};
+use crate::dsm::shadow_side::ShadowCounts;
 use crate::dsm::values::{HeightRange, ImagePair};
 
 /// A facet steeper than this (rise over run) is a tear and not a surface: about 70°. Two hypotheses
@@ -78,6 +79,9 @@ pub struct KeptPixels {
     pub kept: u64,
     /// All pixels.
     pub all: u64,
+    /// Dark pixels beside height jumps.
+    #[serde(default)]
+    pub shadows: ShadowCounts,
 }
 
 impl SurfaceCounts {
@@ -105,6 +109,7 @@ impl SurfaceCounts {
         for (own, theirs) in self.views.iter_mut().zip(&other.views) {
             own.kept = own.kept.saturating_add(theirs.kept);
             own.all = own.all.saturating_add(theirs.all);
+            own.shadows.add(&theirs.shadows);
         }
     }
 }
@@ -134,6 +139,7 @@ pub(crate) fn make_surface(
     let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &map_from_ground };
     let level = sweep.levels.finest as u32;
     let jump_m = same_surface_m(sweep, grid);
+    let (side_m, step_m) = (input.pixel_m * f64::from(1u32 << level), sweep.step_at(sweep.levels.finest));
     let mut placed = Vec::with_capacity(all.len());
     let mut kept = vec![KeptPixels::default(); views.len()];
     let mut blind = Grid::filled(grid.size.0, grid.size.1, false);
@@ -150,7 +156,11 @@ pub(crate) fn make_surface(
         }
         mark_cells(*own, level, &shows_nothing, &frame, &mut blind)?;
         let data = keep.data();
-        kept[own.index] = KeptPixels { kept: data.iter().filter(|k| **k).count() as u64, all: data.len() as u64 };
+        kept[own.index] = KeptPixels {
+            kept: data.iter().filter(|k| **k).count() as u64,
+            all: data.len() as u64,
+            shadows: ShadowCounts::of(&own.view.levels[sweep.levels.finest], own.map, &keep, side_m, step_m),
+        };
         placed.push(place_view(*own, level, &keep, &blank, jump_m, &frame)?);
         progress.step();
     }
