@@ -309,7 +309,7 @@ fn forged_plans_are_refused_or_computed_and_nothing_breaks() {
         other.len(),
     );
     assert!(broken.is_empty(), "{broken:#?}");
-    // Measurements that nothing else in the plan tells. Whoever changes them asks for another surface.
+    // Whoever changes what nothing else in the plan tells asks for another surface.
     let is_measured = |place: &str| MEASURED.iter().any(|part| place.contains(part));
     assert!(other.iter().all(|(place, _)| is_measured(place)), "{other:?}");
 }

@@ -102,7 +102,7 @@ impl Plan {
         self.report.check(self)
     }
 
-    /// Checks that the images of the plan are those of its files, as [`crate::dsm::open`] finds
+    /// Checks that the images of the plan are those of its files, as the first stage finds
     /// them, but for the corrections of their cameras.
     ///
     /// # Errors
