@@ -189,7 +189,7 @@ fn exchanged_rpcs_of_three_images_are_named_or_refused() {
     }
 }
 
-/// A copy with noise, other grey values and a cut border is refused among two and among three views.
+/// A copy with noise, other grey values or a cut border is refused among two and three views.
 #[test]
 fn copies_of_one_picture_are_refused() {
     let shots = town(3);
