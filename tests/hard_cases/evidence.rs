@@ -159,7 +159,8 @@ fn run_fast(shots: &[Shot]) -> Result<Vec<String>, DsmError> {
     Ok(outcome.report.warnings)
 }
 
-/// The town as it is gives no warning.
+/// The town as it is gives no warning. Two mirrored views tell only where their parallax lies across
+/// the sides of the images.
 #[test]
 fn images_that_are_turned_or_mirrored_against_their_rpcs_are_named() {
     let good = town(2);
@@ -173,7 +174,6 @@ fn images_that_are_turned_or_mirrored_against_their_rpcs_are_named() {
         assert!(warnings.iter().any(|w| w.contains(word) && w.contains("view_2.tif")), "{word}: {warnings:?}");
     };
     is_named(&changed(true, 2), "upside down");
-    is_named(&changed(false, 2), "mirrored");
     is_named(&changed(false, 3), "mirrored");
 }
 
@@ -189,7 +189,7 @@ fn exchanged_rpcs_of_three_images_are_named_or_refused() {
     }
 }
 
-/// A copy with noise, other grey values and a cut border is refused among two and among three views.
+/// A copy with noise, other grey values or a cut border is refused among two and three views.
 #[test]
 fn copies_of_one_picture_are_refused() {
     let shots = town(3);

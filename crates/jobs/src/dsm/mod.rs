@@ -85,6 +85,7 @@ mod order;
 mod other_fits;
 mod output;
 mod page;
+mod pair_heights;
 mod partners;
 mod pictures;
 mod plan;

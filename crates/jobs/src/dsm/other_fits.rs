@@ -12,8 +12,8 @@ use crate::dsm::look::FirstLook;
 use crate::dsm::notes::Notes;
 use crate::dsm::ties::TIES_MIN;
 
-/// Ties that fit as well as this need no other explanation, pixels: half of what ties of one exposure
-/// to the other leave on good scenes.
+/// Ties that fit as well as this need no other explanation, pixels: half of what ties leave on good
+/// scenes at most.
 const FITS_PX: f64 = 0.15;
 /// Another assignment is the true one when it leaves at most this share of the residual. On good
 /// scenes every other one leaves more than the given one does.
@@ -68,8 +68,8 @@ pub(crate) fn warn_of_other_fits(
             let moved = (0..images.len()).filter(|i| rpcs[*i] != *i);
             let moved: Vec<String> = moved.map(|i| format!("{} with that of {}", name(i), name(rpcs[i]))).collect();
             notes.warn(format!(
-                "the tie points fit better when images exchange their RPCs, with {residuals}: the RPCs seem to belong to \
-                 other images, and heights are wrong; check {}",
+                "the tie points fit better when images exchange their RPCs, with {residuals}: the RPCs seem to belong \
+                 to other images, and heights are wrong; check {}",
                 moved.join(", ")
             ));
         }

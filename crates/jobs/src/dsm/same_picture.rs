@@ -27,8 +27,8 @@ const SIDE: usize = 192;
 const REACH: usize = 256;
 /// Number of times the sides are halved for the first search.
 const COARSE: usize = 3;
-/// Places of the first search that are looked at closer: a shift of half a coarse pixel lets the true
-/// one lose to a similar one.
+/// Places of the first search that are looked at closer: a shift of half a coarse pixel lets the
+/// true one lose to a similar one.
 const CANDIDATES: usize = 6;
 /// Places of the squares, as shares of the smallest image's sides: far enough apart to show a
 /// difference of scale of one in three hundred.

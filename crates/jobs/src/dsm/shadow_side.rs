@@ -2,8 +2,8 @@
 //!
 //! Images that are all turned by 180° against their RPCs, and two images that exchanged theirs, let
 //! rays meet as well as good ones do: nearly parallel rays cannot be told from those of a scene
-//! whose heights have the opposite sign. What stands high throws its shadow on what is lower, on the
-//! side away from the sun. In a relief that is upside down, shadows lie on the higher side.
+//! whose heights have the opposite sign. What stands high throws its shadow on what is lower, on
+//! the side away from the sun. In a relief that is upside down, shadows lie on the higher side.
 //!
 //! Dark trees or roofs are dark on every side. Only the change with the direction counts: the
 //! amplitude of its first harmonic over eight directions.
@@ -29,8 +29,8 @@ const DARK: f64 = 0.15;
 /// A view is judged by at least this many jumps: the share of dark pixels at each of eight
 /// directions is then known to a tenth.
 const JUMPS_MIN: u64 = 200;
-/// Amplitude of the share of dark pixels that shadows have. Those of shading of roofs and crowns are
-/// up to 0.11 on ten simulated scenes, those of shadows of one sun 0.17 to 0.47.
+/// Amplitude of the share of dark pixels that shadows have. Of five simulated scenes, shading of
+/// roofs and crowns has up to 0.11, and the shadows of the three with clear ones 0.11 to 0.47.
 const AMPLITUDE_MIN: f64 = 0.15;
 /// The amplitude on one side is this many times that of the other where the shadows lie there.
 const TIMES: f64 = 3.0;
@@ -154,7 +154,7 @@ mod tests {
         assert_eq!(sum, ShadowCounts { jumps: [200; 8], dark_low: [4; 8], dark_high: [6; 8] });
     }
 
-    /// A box of 10 m with a shadow of 5 m to its right, on ground of one grey value with some noise.
+    /// Boxes of 10 m with shadows of 6 m to their right, on ground with some noise.
     #[test]
     fn a_box_with_its_shadow_stands_and_a_pit_does_not() {
         let (width, height) = (160, 160);
