@@ -267,8 +267,8 @@ fn contradiction(point: &SurveyedPoint, others: &[&SurveyedPoint], cameras: &[Rp
         let is_wrong = residual > OWN_DEVIATIONS && residual > TIMES_OTHERS * usual;
         return is_wrong.then(|| {
             let text = format!(
-                "it is {residual:.1} of its standard deviations from where the cameras see it that fit the others, which \
-                 are {usual:.1} away"
+                "it is {residual:.1} of its standard deviations from where the cameras see it that fit the others, \
+                 which are {usual:.1} away"
             );
             (residual / usual, text)
         });
@@ -280,8 +280,8 @@ fn contradiction(point: &SurveyedPoint, others: &[&SurveyedPoint], cameras: &[Rp
         let is_wrong = times > TIMES_OTHERS && off_m.abs() > OWN_DEVIATIONS * own[axis];
         let text = || {
             format!(
-                "its {} is off by {off_m:+.2} m where the cameras fit the others to {spread_m:.2} m; check its position, \
-                 what its height is above, and its places in the images",
+                "its {} is off by {off_m:+.2} m where the cameras fit the others to {spread_m:.2} m; check its \
+                 position, what its height is above, and its places in the images",
                 PARTS[axis]
             )
         };
