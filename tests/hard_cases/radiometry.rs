@@ -80,8 +80,8 @@ fn voids_in_a_view_leave_the_other_views_heights() {
     }
 }
 
-/// The middle view of three has a gap beside the roof of 20 m. What the other two do not match there
-/// is not taken for ground that the house hides.
+/// The middle view of three has a gap beside the roof of 20 m. What the other two do not match
+/// there is not taken for ground that the house hides.
 #[test]
 fn a_gap_in_an_image_is_not_taken_for_hidden_ground() {
     let stage = Stage::default();

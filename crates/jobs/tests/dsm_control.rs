@@ -205,7 +205,7 @@ fn points_with_other_axes_units_or_datums_are_told() {
         (&|_, place| place.swap(0, 1), "coordinates exchanged"),
         (&|_, place| place[0] += 1.0, "outside of all images"),
         (&|_, place| place[2] /= 0.3048, "in feet they would fit"),
-        (&|_, place| place[2] += 300.0, "heights 300 m above"),
+        (&|_, place| place[2] += 300.0, "check their unit and what they are above"),
     ];
     for (change, words) in refused {
         let error = run(change).unwrap_err().to_string();

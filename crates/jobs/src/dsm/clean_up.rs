@@ -42,8 +42,8 @@ const FILL_NARROW_M: f64 = 10.0;
 /// steeper than streets.
 const FILL_SLOPE: f64 = 0.05;
 /// Distance in a void over which blank pixels are the reason for it, metres: the patches that are
-/// compared reach two pixels of up to 2 m into what is blank, and blank pixels are marked at heights
-/// that are off.
+/// compared reach two pixels of up to 2 m into what is blank, and blank pixels are marked at
+/// heights that are off.
 const FILL_BLIND_M: f64 = 5.0;
 /// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
 /// rises and falls, and something small may stand there.

@@ -25,7 +25,8 @@ use crate::dsm::notes::Notes;
 const BESIDE_PX: f64 = 200.0;
 /// Metres in a foot; the survey foot differs by two millionths.
 const FOOT_M: f64 = 0.3048;
-/// Another meaning of the heights is named when it leaves at most this part of the difference. The
+/// Another meaning of the heights is named when it leaves at most this part of the difference, and
+/// no more than RPCs err by. The
 /// pointing of RPCs by chance hits a geoid's undulation so well in one of six scenes where both are
 /// of one size, and hardly ever where the undulation is several times larger.
 const EXPLAINED: f64 = 0.25;
@@ -203,7 +204,8 @@ pub(crate) fn refuse_or_warn_of_heights(
     };
     let meanings = [Meaning::Feet, Meaning::Above(VerticalDatum::Ellipsoid), Meaning::Above(VerticalDatum::Egm96)];
     let best = meanings.into_iter().filter_map(meaning).min_by(|a, b| a.1.total_cmp(&b.1));
-    let explained = best.filter(|(_, left_m)| away > 1.0 && *left_m <= EXPLAINED * as_given_m.abs());
+    let left_max_m = (EXPLAINED * as_given_m.abs()).min(NAMED * deviation_m);
+    let explained = best.filter(|(_, left_m)| away > 1.0 && *left_m <= left_max_m);
     let cause = explained.map_or("check their unit and what they are above", |(meaning, _)| meaning.hint());
     let side = if as_given_m > 0.0 { "above" } else { "below" };
     let off = as_given_m.abs();
@@ -265,8 +267,8 @@ fn contradiction(point: &SurveyedPoint, others: &[&SurveyedPoint], cameras: &[Rp
         let is_wrong = residual > OWN_DEVIATIONS && residual > TIMES_OTHERS * usual;
         return is_wrong.then(|| {
             let text = format!(
-                "it is {residual:.1} of its standard deviations from where the cameras see it that fit the others, which \
-                 are {usual:.1} away"
+                "it is {residual:.1} of its standard deviations from where the cameras see it that fit the others, \
+                 which are {usual:.1} away"
             );
             (residual / usual, text)
         });
@@ -278,8 +280,8 @@ fn contradiction(point: &SurveyedPoint, others: &[&SurveyedPoint], cameras: &[Rp
         let is_wrong = times > TIMES_OTHERS && off_m.abs() > OWN_DEVIATIONS * own[axis];
         let text = || {
             format!(
-                "its {} is off by {off_m:+.2} m where the cameras fit the others to {spread_m:.2} m; check its position, \
-                 what its height is above, and its places in the images",
+                "its {} is off by {off_m:+.2} m where the cameras fit the others to {spread_m:.2} m; check its \
+                 position, what its height is above, and its places in the images",
                 PARTS[axis]
             )
         };

@@ -131,8 +131,8 @@ impl Lattice {
         Ok(Self { points, middle })
     }
 
-    /// Marks the cells at whose places a view has something. It has nothing beside a point where its
-    /// camera fails.
+    /// Marks the cells at whose places a view has something. It has nothing beside a point where
+    /// its camera fails.
     fn marked(
         &self,
         view: &ViewPixels,

@@ -270,8 +270,8 @@ fn facts(report: &DsmReport) -> Vec<(String, String)> {
         let [east, north, up] = reference.shift_m;
         let [x, y, z] = reference.deviation_m;
         let text = format!(
-            "{}: moved by {east:.2} m east, {north:.2} m north, {up:.2} m up, with standard errors of {x:.2}, {y:.2} and \
-             {z:.2} m; NMAD {:.2} m before, {:.2} m after",
+            "{}: moved by {east:.2} m east, {north:.2} m north, {up:.2} m up, with standard errors of {x:.2}, {y:.2} \
+             and {z:.2} m; NMAD {:.2} m before, {:.2} m after",
             file_name(&reference.path),
             reference.nmad_before_m,
             reference.nmad_after_m

@@ -275,8 +275,8 @@ impl Round {
             )
         } else if self.contrast < CONTRAST_MIN {
             format!(
-                "an NMAD of {:.2} m is left, and any other shift leaves hardly more, {:.2} times as much where at least \
-                 {CONTRAST_MIN} are needed: one of the surfaces is flat, or their relief is not the same",
+                "an NMAD of {:.2} m is left, and any other shift leaves hardly more, {:.2} times as much where at \
+                 least {CONTRAST_MIN} are needed: one of the surfaces is flat, or their relief is not the same",
                 self.nmad_m.1, self.contrast
             )
         } else if self.shift_m()[2].abs() > SEARCH_M {

@@ -31,8 +31,8 @@ pub struct GridSight {
 /// Computes the bound of each cell of `cells`, metres like `height_m`: +∞ where fewer than two
 /// views image it, −∞ where two views see everything.
 ///
-/// A view with a gap at a cell counts as one that sees it, where two others image the cell: that the
-/// image is missing is then the reason why nothing matches, as likely as that something hides it.
+/// A view with a gap at a cell counts as one that sees it, where two others image the cell: that
+/// the image is missing is as likely the reason why nothing matches as that something hides it.
 ///
 /// All grids have the size of `height_m`, which is NaN in voids.
 pub fn occlusion_bounds(height_m: &Grid<f32>, views: &[GridSight], cells: &[usize]) -> Vec<f32> {
