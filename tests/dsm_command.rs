@@ -4,7 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use io::raster::{Band, BandData, ImageSource, write_image_with_rpc};
 use predicates::prelude::*;
+use raster::Grid;
 use serde_json::Value;
 
 fn skysweep() -> Command {
@@ -241,6 +243,102 @@ fn a_height_range_or_bounds_that_miss_the_scene_are_refused() {
     let mut command = small(&out);
     command.args(["--memory", "10"]);
     refused(command, &out, "--memory");
+}
+
+/// Writes a polygon in longitude and latitude.
+fn polygon(path: &Path, [x0, y0, x1, y1]: [f64; 4]) {
+    let ring = format!("[[[{x0}, {y0}], [{x1}, {y0}], [{x1}, {y1}], [{x0}, {y1}], [{x0}, {y0}]]]");
+    let geometry = format!(r#"{{"type": "Polygon", "coordinates": {ring}}}"#);
+    let feature = format!(r#"{{"type": "Feature", "properties": {{}}, "geometry": {geometry}}}"#);
+    std::fs::write(path, format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#)).unwrap();
+}
+
+/// What misses the scene is told with both places, and that the axes are exchanged where they are.
+#[test]
+fn inputs_that_have_no_effect_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    for (gsd, found) in
+        [("500", "the cell size is 500 m, which gives a grid of"), ("-1", "the cell size is -1, expected")]
+    {
+        let mut command = skysweep();
+        command.arg("dsm").args(views()).arg("-o").arg(&out).args(["-q", "--gsd", gsd]);
+        let told = command.assert().code(2).stderr(predicate::str::contains(found));
+        told.stderr(predicate::str::contains("the cell size is set by --gsd"));
+    }
+    let exchanged = "with x and y exchanged they would meet";
+    let mut command = small(&out);
+    command.args(["--bounds", "4822000", "693000", "4823000", "694500"]);
+    refused(command, &out, exchanged);
+    let (swapped, far) = (folder.path().join("swapped.geojson"), folder.path().join("far.geojson"));
+    polygon(&swapped, [43.529, 5.3986, 43.531, 5.4014]);
+    polygon(&far, [6.3986, 43.529, 6.4014, 43.531]);
+    let mut command = small(&out);
+    command.arg("--area").arg(&swapped);
+    refused(command, &out, exchanged);
+    let mut command = small(&out);
+    command.arg("--area").arg(&far);
+    refused(command, &out, "longitudes 6.3986° to 6.4014°");
+    let good = folder.path().join("good.geojson");
+    polygon(&good, [5.3986, 43.529, 5.3995, 43.531]);
+    let mut command = small(&out);
+    [&swapped, &far, &good].into_iter().for_each(|mask| drop(command.arg("--mask").arg(mask)));
+    let run = command.args(["--preset", "fast", "--dry-run"]).assert().code(0);
+    let told = String::from_utf8_lossy(&run.get_output().stdout).into_owned();
+    let warned = |mask: &str| told.lines().filter(|l| l.contains("covers nothing") && l.contains(mask)).count();
+    assert_eq!(["swapped.geojson", "far.geojson", "good.geojson"].map(warned), [1, 1, 0], "{told}");
+    assert!(told.contains(exchanged), "{told}");
+}
+
+/// An image is doubtful by itself when its two RPCs differ, when its RPC is that of another size,
+/// and when a constant takes its rim.
+#[test]
+fn doubtful_images_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let warnings = |name: &str, change: &dyn Fn(&Path, usize)| -> Vec<String> {
+        let place = folder.path().join(name);
+        std::fs::create_dir(&place).unwrap();
+        let images = ["view_1.tif", "view_2.tif"].map(|view| place.join(view));
+        for (number, image) in images.iter().enumerate() {
+            std::fs::copy(town(&image.file_name().unwrap().to_string_lossy()), image).unwrap();
+            change(image, number);
+        }
+        let mut command = skysweep();
+        command.arg("dsm").args(&images).arg("-o").arg(place.join("out")).args(["--preset", "fast", "--gsd", "2"]);
+        let run = command.args(["--dry-run", "--progress", "none"]).assert();
+        let told = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
+        let is_doubt = |line: &&str| ["two RPCs", "centred on", "exactly"].iter().any(|word| line.contains(word));
+        told.lines().filter(is_doubt).map(str::to_owned).collect()
+    };
+    let beside = |image: &Path, shift_px: f64| {
+        let mut rpc = io::rpc::read_for_image(image).unwrap().rpc;
+        rpc.samp_off += shift_px;
+        let path = image.with_file_name(format!("{}_RPC.TXT", image.file_stem().unwrap().to_string_lossy()));
+        io::rpc::write(&path, &rpc, io::rpc::RpcFormat::Text, false).unwrap();
+    };
+    // Pixels that are made of those of an image, under its RPC.
+    let redrawn = |image: &Path, step: usize, void_to: usize| {
+        let source = ImageSource::open(image).unwrap();
+        let (pixels, rpc) =
+            (source.read_samples(1, source.window()).unwrap(), io::rpc::read_for_image(image).unwrap().rpc);
+        let (width, height) = (pixels.width() / step, pixels.height() / step);
+        let value =
+            |i: usize| if i % width < void_to { 65_535 } else { pixels[(i % width * step, i / width * step)] as u16 };
+        let made = Grid::from_vec(width, height, (0..width * height).map(value).collect()).unwrap();
+        let bands = [Band { description: "grey", data: BandData::U16(&made) }];
+        write_image_with_rpc(image, &bands, &rpc, None, true).unwrap();
+    };
+    assert_eq!(warnings("plain", &|_, _| {}), Vec::<String>::new());
+    assert_eq!(warnings("same", &|image, _| beside(image, 0.0)), Vec::<String>::new());
+    let moved = warnings("moved", &|image, number| beside(image, if number == 0 { 7.0 } else { 0.0 }));
+    assert!(
+        moved.len() == 1 && moved[0].contains("differ by up to 7.0 px") && moved[0].contains("view_1_RPC.TXT"),
+        "{moved:?}"
+    );
+    let half = warnings("half", &|image, _| redrawn(image, 2, 0));
+    assert!(half.len() == 2 && half[0].contains("2 times as large in both directions"), "{half:?}");
+    let void = warnings("void", &|image, _| redrawn(image, 1, 120));
+    assert!(void.len() == 2 && void[0].contains("16 % of the image is one patch of exactly 65535"), "{void:?}");
 }
 
 #[test]

@@ -436,3 +436,31 @@ fn the_folder_of_a_run_is_its_surface_model() {
         .code(2)
         .stderr(contains("a folder is given").and(contains("reference.tif")));
 }
+
+/// A unit or a constant that makes a comparison meaningless is told by name.
+#[test]
+fn feet_and_undeclared_constants_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let heights = sampled((200, 180), &grid(), |x, y| 180.0 + surface(x, y));
+    let metres = write(&folder, "metres.tif", BandData::F32(&heights), grid(), Crs::ellipsoidal(32617));
+    let notes = |name: &str, change: &dyn Fn(usize, f32) -> f32| -> (String, PathBuf) {
+        let changed = heights.data().iter().enumerate().map(|(i, height)| change(i, *height)).collect();
+        let changed = Grid::from_vec(200, 180, changed).unwrap();
+        let test = write(&folder, name, BandData::F32(&changed), grid(), Crs::ellipsoidal(32617));
+        let told = json(&["--no-report"], &test, &metres);
+        (told["notes"].to_string(), test)
+    };
+    let (feet, test) = notes("feet.tif", &|_, height| height / 0.3048);
+    assert!(feet.contains("they are probably in feet"), "{feet}");
+    let turned = json(&["--no-report"], &metres, &test);
+    assert!(turned["notes"].to_string().contains("those of the reference are probably in feet"), "{turned}");
+    let (far, _) = notes("far.tif", &|_, height| height + 300.0);
+    assert!(far.contains("more than any two vertical datums differ"), "{far}");
+    let (near, _) = notes("near.tif", &|_, height| height + 29.0);
+    assert!(!near.contains("feet") && !near.contains("datums differ") && !near.contains("exactly"), "{near}");
+    for value in [0.0, 200.0] {
+        let name = format!("{value}.tif");
+        let (constant, _) = notes(&name, &|i, height| if i % 200 < 100 { value } else { height });
+        assert!(constant.contains(&format!("50 % of the cells have exactly the height {value}")), "{constant}");
+    }
+}

@@ -473,8 +473,9 @@ fn what_cannot_be_a_map_is_refused() {
     for (options, words) in [
         (vec![], "--center"),
         (vec!["--center", "5.4", "95"], "(5.4, 95)"),
-        (vec!["--center", "5.5", "43.53"], "--dtm or --camera-height"),
-        (vec!["--center", "5.5", "43.53", "--camera-height", "200"], "no height anywhere"),
+        (vec!["--center", "5.4032", "43.53"], "--dtm or --camera-height"),
+        (vec!["--center", "5.5", "43.53", "--camera-height", "200"], "lies outside the source: it covers x"),
+        (vec!["--center", "43.53", "5.4"], "with latitude and longitude exchanged it would lie inside"),
         (vec!["--center", "5.4", "43.53", "--size", "0"], "0 x 0"),
         (vec!["--center", "5.4", "43.53", "--resolution", "nan"], "NaN"),
         (vec!["--center", "5.4", "43.53", "--heading", "inf"], "heading"),

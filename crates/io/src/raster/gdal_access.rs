@@ -140,7 +140,8 @@ pub(super) fn files_of(dataset: &gdal::Dataset) -> Vec<String> {
 
 /// Replaces a file system of GDAL by one that opens nothing.
 fn close_file_system(prefix: &str) {
-    let Ok(prefix) = CString::new(prefix) else { return };
+    // GDAL keeps the pointer to the prefix, not a copy: the text must live as long as the process.
+    let Ok(prefix) = CString::new(prefix).map(CString::into_raw) else { return };
     // SAFETY: the function takes nothing, and returns a struct of null pointers or null.
     let callbacks = unsafe { gdal_sys::VSIAllocFilesystemPluginCallbacksStruct() };
     if callbacks.is_null() {
@@ -148,10 +149,11 @@ fn close_file_system(prefix: &str) {
     }
     // SAFETY: the struct is allocated and ours. GDAL copies it together with the function, which
     // lives as long as the process, and every other operation stays null, which GDAL answers with
-    // failure. The prefix lives during the call. The struct is freed once, after its last use.
+    // failure. The prefix was given up above and is never freed. The struct is freed once, after
+    // its last use.
     unsafe {
         (*callbacks).open = Some(open_nothing);
-        gdal_sys::VSIInstallPluginHandler(prefix.as_ptr(), callbacks);
+        gdal_sys::VSIInstallPluginHandler(prefix, callbacks);
         gdal_sys::VSIFreeFilesystemPluginCallbacksStruct(callbacks);
     }
 }

@@ -36,7 +36,8 @@ pub(super) fn with_leave<T>(address: &str, call: impl FnOnce() -> T) -> T {
 
 /// Installs the file system.
 pub(super) fn install() {
-    let Ok(prefix) = CString::new(WEB_FILES) else { return };
+    // GDAL keeps the pointer to the prefix, not a copy.
+    let prefix: &'static CStr = c"/vsicurl/";
     // SAFETY: the function takes nothing, and returns a struct of null pointers or null.
     let callbacks = unsafe { gdal_sys::VSIAllocFilesystemPluginCallbacksStruct() };
     if callbacks.is_null() {
@@ -44,8 +45,8 @@ pub(super) fn install() {
     }
     // SAFETY: the struct is allocated and ours. GDAL copies it together with the functions, which
     // live as long as the process, and calls them with the files that `open` returned only. What
-    // stays null GDAL answers with failure. The prefix lives during the call. The struct is freed
-    // once, after its last use.
+    // stays null GDAL answers with failure. The prefix lives as long as the process. The struct is
+    // freed once, after its last use.
     unsafe {
         (*callbacks).open = Some(open);
         (*callbacks).tell = Some(tell);

@@ -15,6 +15,7 @@ use super::grid_layers::TestLayers;
 use super::on_reference::{
     cell_map, definition, metres_per_unit, metres_per_unit_at, numbers_on_reference, surface_on_reference,
 };
+use super::surface_doubts::undeclared_constant;
 use super::vertical::{StatedDatums, bring_terrain};
 use crate::error::SettingError;
 
@@ -59,6 +60,7 @@ impl GridInputs {
                 notes.push(format!("no coordinate system, taken as that of the other file: {}", dem.path.display()));
             }
         }
+        notes.extend([&test, &reference].into_iter().filter_map(undeclared_constant));
         let metres_from_cells = MetresFromCells::new(&reference.geotransform, metres_per_unit(&reference)?);
         let (along_columns, along_rows) = metres_from_cells.cell_size_m();
         let margin = config.search_m / along_columns.min(along_rows) + MARGIN_CELLS;

@@ -16,6 +16,7 @@ use super::grid_inputs::GridInputs;
 use super::grid_output;
 use super::on_reference::metres_per_unit;
 use super::requirements::EvalRequirements;
+use super::surface_doubts::offset_cause;
 use crate::threads;
 
 /// Below this ratio of the NMADs at the edge and at the middle of the search, the NMAD hardly
@@ -172,7 +173,10 @@ fn protocol(config: &GridEvalConfig, settings: EvalConfig, inputs: &GridInputs, 
         terrain: config.terrain.as_ref().map(name),
         objects: config.objects.as_ref().map(name),
         layers: inputs.layers.names.clone(),
-        notes: inputs.notes.iter().cloned().chain(notes(found, &settings)).collect(),
+        notes: (inputs.notes.iter().cloned())
+            .chain(offset_cause(&reference.heights, found))
+            .chain(notes(found, &settings))
+            .collect(),
         missed: missed(&config.requirements, found),
         config: settings,
     }

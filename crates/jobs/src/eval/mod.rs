@@ -20,6 +20,7 @@ pub(crate) mod on_reference;
 mod report_folder;
 mod requirements;
 mod surface_config;
+mod surface_doubts;
 mod surface_inputs;
 mod surface_text;
 mod surfaces;

@@ -155,7 +155,12 @@ async fn converse(stream: TcpStream, questions: mpsc::UnboundedSender<Question>)
     let service = service_fn(|request| Box::pin(answer(request, questions.clone())));
     let mut builder = Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME);
-    builder.keep_alive(false).max_buf_size(HEAD_MAX).max_headers(FIELDS_MAX).auto_date_header(false);
+    builder
+        .keep_alive(false)
+        .title_case_headers(true)
+        .max_buf_size(HEAD_MAX)
+        .max_headers(FIELDS_MAX)
+        .auto_date_header(false);
     let mut connection = builder.serve_connection(TokioIo::new(stream), service);
     // A malformed request has its answer already, and a client that went away needs none.
     let _ = poll_fn(|context| connection.poll_without_shutdown(context)).await;
