@@ -22,20 +22,21 @@ const fn writing(name: &'static str, command: &'static str) -> Writing {
     Writing { name, before: &[], command, overwrite: "--overwrite" }
 }
 
-const PLAN: &str = "plan $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 2 --chunk 32";
+const DSM: &str = "dsm $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 2";
+const PLAN: &str = "plan $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 1 --chunk 64";
 
 /// The commands.
 pub(crate) const COMMANDS: &[Writing] = &[
-    writing("dsm", "dsm $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 2"),
-    writing("dsm by chunks", "dsm $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 2 --chunk 32"),
+    writing("dsm", DSM),
+    writing("dsm by chunks", "dsm $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 1 --chunk 64"),
     writing("plan", PLAN),
     Writing { name: "run", before: &[PLAN], command: "run out", overwrite: "" },
     Writing { name: "merge", before: &[PLAN, "run out"], command: "merge out", overwrite: "--overwrite" },
     Writing { name: "batch", before: &["files batch"], command: "batch batch.toml", overwrite: "" },
-    Writing { name: "products", before: &["files run"], command: "products out", overwrite: "--overwrite" },
+    Writing { name: "products", before: &[DSM], command: "products out", overwrite: "--overwrite" },
     Writing {
         name: "eval of a run",
-        before: &["files run"],
+        before: &[DSM],
         command: "eval out/dsm/dsm.tif $town/truth/dsm.tif",
         overwrite: "--overwrite",
     },
@@ -64,10 +65,10 @@ pub(crate) const COMMANDS: &[Writing] = &[
     ),
     writing(
         "priors of images",
-        "priors $town/truth/buildings.city.json --cameras $town/view_1.tif $town/view_3.tif --satellite -o out",
+        "priors $town/truth/buildings.city.json --cameras $town/view_1.tif $town/view_3.tif -o out",
     ),
     writing("splats", "splats $town/truth/dsm.tif $town/view_1.tif -o splats.ply --render out"),
-    writing("splats render", "splats render $made/splats.ply --images $town/view_1.tif -o out"),
+    writing("splats render", "splats render $made/splats.ply $town/view_1.tif -o out"),
     writing("train", "train $town/view_1.tif $town/view_3.tif --splats $made/splats.ply --iterations 4 -o out"),
     writing("mesh", "mesh $made/dataset --depths $made/dataset/raw_depth --voxel 4 -o mesh.ply"),
     writing("city convert", "city convert $town/truth/buildings.city.json -o town.obj"),
@@ -116,12 +117,11 @@ pub(crate) fn prepare(folder: &Path, of: &Writing) {
                 let town = made().town.display();
                 let text = format!(
                     "output = 'out'\n[[scene]]\nname = 'a'\nimages = ['{town}/view_1.tif', '{town}/view_3.tif']\n\
-                     tasks = ['dsm', 'ortho', 'eval']\ndsm.preset = 'fast'\ndsm.gsd_m = 2.0\ndsm.chunk = 32\n\
+                     tasks = ['dsm', 'ortho', 'eval']\ndsm.preset = 'fast'\ndsm.gsd_m = 1.0\ndsm.chunk = 64\n\
                      eval.reference = '{town}/truth/dsm.tif'\n"
                 );
                 std::fs::write(folder.join("batch.toml"), text).unwrap();
             }
-            "files run" => copy(&made().folder.join("run"), &folder.join("out")),
             command => {
                 let ended = run(folder, command, "");
                 assert_eq!(ended.code, 0, "{command}: {}", ended.told);

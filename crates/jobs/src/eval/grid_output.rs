@@ -58,10 +58,6 @@ impl Target {
 
     /// Refuses to replace files that no evaluation wrote.
     fn check(&self, overwrite: bool) -> Result<(), EvalJobError> {
-        if self.automatic {
-            // Nobody named this folder; a link in its place could lead anywhere.
-            guarded::check_folder(&self.folder)?;
-        }
         let names = [REPORT_JSON, ERROR_MAP, ERROR_STYLE, ERROR_PICTURE, ERROR_WORLD, PAGE];
         let taken = names.map(|name| self.folder.join(name));
         check_ours(&self.folder, &taken, overwrite)
@@ -73,6 +69,10 @@ pub(super) fn check(config: &GridEvalConfig, target: Option<&Target>) -> Result<
     let (error_map, page) = (config.error_map.as_deref(), config.page.as_deref());
     error_map.map_or(Ok(()), |path| files::check_raster_destination(path, config.overwrite))?;
     page.map_or(Ok(()), |path| files::check_destination(path, config.overwrite))?;
+    if let Some(target) = target.filter(|target| target.automatic) {
+        // Nobody named this folder; a link in its place could lead anywhere.
+        guarded::check_folder(&target.folder)?;
+    }
     let Some(target) = target.filter(|target| !target.automatic) else { return Ok(()) };
     target.check(config.overwrite)?;
     Ok(OutputFolder::check(&target.folder)?)
