@@ -111,6 +111,40 @@ fn share_apart(a: &Grid<f32>, b: &Grid<f32>) -> f64 {
     apart.iter().filter(|d| **d > 1.0).count() as f64 / apart.len() as f64
 }
 
+/// Pointing is a property of the images: chunks and presets leave every bit of it.
+#[test]
+fn pointing_is_the_same_for_every_preset_and_chunk() {
+    let folder = tempfile::tempdir().unwrap();
+    let pointing = |name: &str, options: &[&str]| {
+        let out = folder.path().join(name);
+        let mut command = skysweep();
+        command.arg("plan").args(["view_1.tif", "view_2.tif", "view_3.tif"].map(town)).arg("-o").arg(&out);
+        command.args(["-q", "--height-range", "160", "300"]).args(options).assert().code(0);
+        let text = std::fs::read(out.join("pointing.json")).unwrap();
+        let plan: Value = serde_json::from_slice(&text).unwrap();
+        let corrections: Vec<Value> =
+            plan["images"].as_array().unwrap().iter().map(|image| image["correction"].clone()).collect();
+        assert!(corrections.len() == 3 && corrections.iter().all(|c| !c.is_null()), "{plan}");
+        corrections
+    };
+    let whole = pointing("whole", &[]);
+    assert_eq!(whole, pointing("chunks", &["--chunk", "300"]));
+    assert_eq!(whole, pointing("fast", &["--preset", "fast"]));
+    assert_eq!(whole, pointing("fast_chunks", &["--preset", "fast", "--chunk", "200", "--memory", "1000"]));
+}
+
+#[test]
+fn fast_chunks_have_the_heights_of_one_piece() {
+    let folder = tempfile::tempdir().unwrap();
+    let heights = |name: &str, options: &[&str]| {
+        let out = folder.path().join(name);
+        run(&out, &[&["--preset", "fast"], options].concat());
+        io::raster::read_dem(out.join("dsm/dsm.tif")).unwrap().heights
+    };
+    let apart = share_apart(&heights("once", &[]), &heights("chunks", &["--chunk", "200"]));
+    assert!(apart < 0.005, "{:.2} % of the cells are more than a metre apart", 100.0 * apart);
+}
+
 /// Pointing, noise and heights come from the whole scene, whatever the bounds.
 #[test]
 fn overlapping_bounds_agree_where_they_overlap() {

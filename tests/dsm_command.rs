@@ -227,6 +227,25 @@ fn images_of_different_places_are_refused() {
     refused_beside_a_view(&far, &out, "share no ground");
 }
 
+/// Without tie points the pointing is unknown, whatever else is given.
+#[test]
+fn images_without_tie_points_are_refused_unless_the_pointing_is_taken_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let (other, out) = (folder.path().join("other.tif"), folder.path().join("out"));
+    let rpc = io::rpc::read_for_image(&town("view_3.tif")).unwrap().rpc;
+    let mut random = numeric::SplitMix64::new(7);
+    let values = (0..722 * 752).map(|_| random.uniform_in(200.0, 1800.0) as u16).collect();
+    let pixels = raster::Grid::from_vec(722, 752, values).unwrap();
+    let bands = [io::raster::Band { description: "pan", data: io::raster::BandData::U16(&pixels) }];
+    io::raster::write_image_with_rpc(&other, &bands, &rpc, None, false).unwrap();
+    for command in ["dsm", "plan"] {
+        let mut command_line = skysweep();
+        command_line.arg(command).arg(town("view_1.tif")).arg(&other).arg("-o").arg(&out);
+        command_line.args(["--preset", "fast", "--chunk", "300", "--height-range", "170", "280"]);
+        refused(command_line, &out, "--no-pointing");
+    }
+}
+
 #[test]
 fn a_height_range_or_bounds_that_miss_the_scene_are_refused() {
     let folder = tempfile::tempdir().unwrap();
