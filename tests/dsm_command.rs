@@ -301,7 +301,9 @@ fn inputs_that_have_no_effect_are_told() {
     let good = folder.path().join("good.geojson");
     polygon(&good, [5.3986, 43.529, 5.3995, 43.531]);
     let mut command = small(&out);
-    [&swapped, &far, &good].into_iter().for_each(|mask| drop(command.arg("--mask").arg(mask)));
+    [&swapped, &far, &good].into_iter().for_each(|mask| {
+        command.arg("--mask").arg(mask);
+    });
     let run = command.args(["--preset", "fast", "--dry-run"]).assert().code(0);
     let told = String::from_utf8_lossy(&run.get_output().stdout).into_owned();
     let warned = |mask: &str| told.lines().filter(|l| l.contains("covers nothing") && l.contains(mask)).count();

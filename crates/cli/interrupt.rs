@@ -1,6 +1,7 @@
 //! Ctrl-C and requests to end (SIGINT, SIGTERM, SIGHUP): a job stops at its next step, removes its
 //! temporary files and gives its claims back, as [`numeric::Cancelled`] asks of it. Then the
-//! process ends by the signal, so that a shell or a scheduler sees the usual status (130, 143, 129).
+//! process ends by the signal, so that a shell or a scheduler sees the usual status (130, 143,
+//! 129).
 //!
 //! A second signal ends the process at once. A signal that the caller has made it ignore (`nohup`,
 //! a job in the background of a script) stays ignored.

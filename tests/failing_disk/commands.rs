@@ -175,7 +175,8 @@ fn made() -> &'static Made {
     })
 }
 
-/// Returns every file and link below a folder with its content, by its name; links are not followed.
+/// Returns every file and link below a folder with its content, by its name; links are not
+/// followed.
 pub(crate) fn snapshot(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![folder.to_owned()];

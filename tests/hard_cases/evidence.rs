@@ -159,8 +159,8 @@ fn run_fast(shots: &[Shot]) -> Result<Vec<String>, DsmError> {
     Ok(outcome.report.warnings)
 }
 
-/// The town as it is gives no warning. Two mirrored views tell only where their parallax lies across
-/// the sides of the images.
+/// The town as it is gives no warning. Two mirrored views tell only where their parallax lies
+/// across the sides of the images.
 #[test]
 fn images_that_are_turned_or_mirrored_against_their_rpcs_are_named() {
     let good = town(2);

@@ -263,7 +263,9 @@ mod tests {
         remove_folder(&folder, &known).unwrap();
         let fill = || {
             fs::create_dir_all(folder.join("below")).unwrap();
-            ["a.npy", "below/b.npy"].map(|name| fs::write(folder.join(name), b"ours").unwrap());
+            for name in ["a.npy", "below/b.npy"] {
+                fs::write(folder.join(name), b"ours").unwrap();
+            }
         };
         fill();
         remove_folder(&folder, &known).unwrap();

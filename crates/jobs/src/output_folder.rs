@@ -146,7 +146,8 @@ impl OutputFolder {
     /// Removes the folder of a name inside, if there is one, when all of it is known.
     ///
     /// # Errors
-    /// [`FileError::Link`], [`FileError::Foreign`], [`FileError::Remove`]; nothing was removed then.
+    /// [`FileError::Link`], [`FileError::Foreign`], [`FileError::Remove`]; nothing was removed
+    /// then.
     pub(crate) fn remove_folder(&self, name: &str, known: Known<'_>) -> Result<(), FileError> {
         guarded::remove_folder(&guarded::place(&self.path, name)?, known)
     }

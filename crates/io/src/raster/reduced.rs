@@ -36,9 +36,9 @@ impl ImageSource {
         .map_err(|reason| RasterError::damaged(self.path(), reason))
     }
 
-    /// Returns the most cells that are decoded for any picture of at most `side` × `side` cells of a
-    /// band, counted from 1. Blocks are decoded whole, and those between the cells of a picture are
-    /// passed over.
+    /// Returns the most cells that are decoded for any picture of at most `side` × `side` cells of
+    /// a band, counted from 1. Blocks are decoded whole, and those between the cells of a picture
+    /// are passed over.
     ///
     /// # Errors
     /// [`RasterError::Damaged`] for a band that the file does not have.

@@ -82,7 +82,8 @@ unsafe extern "C" fn open(_: *mut c_void, name: *const c_char, _: *const c_char)
         Ok(file) => Box::into_raw(Box::new(file)).cast(),
         Err(reason) => {
             report(&reason);
-            // GDAL's drivers would try again, and a server that stalls would be waited for each time.
+            // GDAL's drivers would try again, and a server that stalls would be waited for each
+            // time.
             ALLOWED.set(None);
             null_mut()
         }

@@ -113,9 +113,9 @@ pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
     Err(not_rpc(path, tried))
 }
 
-/// Returns every RPC of an image that can be read: TIFF tag 50844, and those of the files beside it.
-/// [`read_for_image`] takes one of them; where they differ, the image may have the wrong one. An
-/// image at an address, or in one of GDAL's virtual file systems, has none here.
+/// Returns every RPC of an image that can be read: TIFF tag 50844, and those of the files beside
+/// it. [`read_for_image`] takes one of them; where they differ, the image may have the wrong one.
+/// An image at an address, or in one of GDAL's virtual file systems, has none here.
 pub fn all_of_image(path: &Path) -> Vec<RpcFile> {
     if is_gdal_virtual(path) || !path.is_file() {
         return Vec::new();

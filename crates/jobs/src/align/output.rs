@@ -42,8 +42,8 @@ impl From<&Similarity> for SimilarityParts {
 }
 
 impl ModelWriter<'_> {
-    /// Writes the model moved by a similarity, with its origin and the similarity, into the folder of
-    /// a name below an output folder; the output folder itself for no name.
+    /// Writes the model moved by a similarity, with its origin and the similarity, into the folder
+    /// of a name below an output folder; the output folder itself for no name.
     pub(super) fn write(&self, root: &Path, name: &str, world_from_model: &Similarity) -> Result<(), FileError> {
         let folder = &guarded::make_folder(root, name)?;
         let move_view = |view: &ColmapView| ColmapView { pose: world_from_model.move_pose(&view.pose), ..view.clone() };

@@ -23,8 +23,8 @@ const FACTORS: [f64; 6] = [0.25, 1.0 / 3.0, 0.5, 2.0, 3.0, 4.0];
 /// Largest relative difference between such a factor and that of an axis. Providers centre their
 /// RPCs within 1 % (15 images of five sensors); crops have other factors along each axis.
 const FACTOR_TOLERANCE: f64 = 0.03;
-/// Domain of an RPC over the image that it was made for. It was 1.0 to 1.2 where the RPC was centred
-/// on the image; a crop of a large scene has 7 to 57.
+/// Domain of an RPC over the image that it was made for. It was 1.0 to 1.2 where the RPC was
+/// centred on the image; a crop of a large scene has 7 to 57.
 const DOMAIN_RATIO: std::ops::Range<f64> = 0.95..1.6;
 
 /// Longest side of the lattice on which constants are looked for, pixels.

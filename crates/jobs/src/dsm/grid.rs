@@ -18,8 +18,8 @@ use crate::dsm::view_geometry::ViewGeometry;
 /// Beyond this distance from its area of use a CRS needs to be forced, degrees. Scenes at the
 /// border of two UTM zones are written in either, and half a zone beyond it distorts by 2 in 1000.
 const FAR_OUTSIDE_DEG: f64 = 3.0;
-/// Fewest cells on a side of a grid whose cell size is given. Fewer come from a size in wrong units:
-/// with two cells between a void border on each side, nothing of a surface has a shape.
+/// Fewest cells on a side of a grid whose cell size is given. Fewer come from a size in wrong
+/// units: with two cells between a void border on each side, nothing of a surface has a shape.
 const SIDE_MIN: usize = 5;
 /// Grids of more cells than this come from a cell size or bounds in wrong units.
 pub(crate) const CELLS_MAX: f64 = 4e9;

@@ -1,5 +1,5 @@
-//! Doubts about the heights of two surfaces: a constant that nobody declared as no-data, and heights
-//! in another unit.
+//! Doubts about the heights of two surfaces: a constant that nobody declared as no-data, and
+//! heights in another unit.
 
 use eval::Evaluation;
 use io::raster::Dem;
@@ -8,8 +8,8 @@ use raster::Grid;
 
 /// Most cells that are looked at, spread evenly.
 const CELLS_MAX: usize = 1 << 18;
-/// Share of one exact height from which on it is doubtful in a surface whose heights have fractions:
-/// computed and measured heights repeat by chance only.
+/// Share of one exact height from which on it is doubtful in a surface whose heights have
+/// fractions: computed and measured heights repeat by chance only.
 const CONSTANT_SHARE: f64 = 0.25;
 /// The same for a height that lies apart from all others.
 const APART_SHARE: f64 = 0.05;
@@ -24,7 +24,8 @@ const FOOT_M: f64 = 0.3048;
 const OFFSET_M: f64 = 10.0;
 /// What a factor leaves of an offset that it explains.
 const LEFT_SHARE: f64 = 0.1;
-/// No datum differs from another by more, metres: geoids lie 107 m below to 86 m above the ellipsoid.
+/// No datum differs from another by more, metres: geoids lie 107 m below to 86 m above the
+/// ellipsoid.
 const DATUM_M: f64 = 110.0;
 
 /// Tells that many cells of a surface have exactly one height.

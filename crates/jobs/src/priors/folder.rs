@@ -2,8 +2,8 @@
 //! written.
 //!
 //! The old report is removed first and the new one is moved last, so a folder with a report is
-//! complete. Other files in the folder are left alone, also `images` of a run that wrote none. Files
-//! inside its folders that no earlier run made are refused before the work.
+//! complete. Other files in the folder are left alone, also `images` of a run that wrote none.
+//! Files inside its folders that no earlier run made are refused before the work.
 
 use std::path::Path;
 

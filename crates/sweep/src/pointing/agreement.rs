@@ -18,8 +18,8 @@ use super::pair::{Pair, Tie, TieConfig};
 use super::ties::{ScaledPair, shared_window};
 use crate::view::SweepView;
 
-/// Patches tried for each corner that is tried. Those of a scene of 600 × 600 pixels then cover each
-/// other by a quarter of their sides, and more would only repeat what these say.
+/// Patches tried for each corner that is tried. Those of a scene of 600 × 600 pixels then cover
+/// each other by a quarter of their sides, and more would only repeat what these say.
 const PATCHES_PER_CORNER: usize = 4;
 /// Distance from its expected place within which a patch is searched for, pixels: two storeys under
 /// a wide angle along the trajectory, and what shadows have displaced ties across it.
@@ -46,6 +46,10 @@ const PLANE_TIMES: f64 = 1.2;
 /// At least one patch in this many agrees, or the views show nothing together. Of chance
 /// likenesses one in twelve does: a pixel of the places across that are searched.
 const AGREE_ONE_IN: usize = 4;
+/// Corners are placed more exactly than patches of any texture. Where as many as this share of them
+/// agree with the patches, shadows have not moved them, and they stay as they are. Under one sun
+/// nine in ten do (three scenes), under several suns a twentieth to six in seven (seven scenes).
+const CORNERS_AGREE: f64 = 0.8;
 /// Fewer patches than this do not determine where most agree.
 const PATCHES_MIN: usize = 50;
 /// Rounds of the plane: a third at the first distance, a third between, a third at the last. It
@@ -61,7 +65,8 @@ struct Sight {
 }
 
 /// Returns the ties on which two views agree over the ground that they share, with those of the
-/// given ties that agree with them; `None` where the views show too little together.
+/// given ties that agree with them; `None` where the given ties agree as they are, or where the
+/// views show too little together.
 ///
 /// `ties` say at which heights to search. All positions are in pixels of the full resolution.
 pub fn agreeing_ties(
@@ -99,6 +104,9 @@ pub fn agreeing_ties(
     let plane = Plane::of_most(&found)?;
     let agrees = |sight: &&Sight| plane.holds(sight);
     if AGREE_ONE_IN * found.iter().filter(agrees).count() < found.len() {
+        return None;
+    }
+    if known.iter().filter(agrees).count() as f64 >= CORNERS_AGREE * known.len() as f64 {
         return None;
     }
     let full = |sight: &Sight| Tie {
