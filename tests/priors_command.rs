@@ -393,10 +393,16 @@ fn pictures_are_masked_for_buildings_alone_and_copied_otherwise() {
     for ((x, y, pixel), shown) in masked.enumerate_pixels().zip(mask) {
         assert_eq!(pixel.0, if shown { [x as u8, y as u8, 200, 255] } else { [0; 4] }, "{x}, {y}");
     }
-    // The originals are never replaced by masked ones.
-    let own = ["-o", "scene", "--images", "--overwrite"];
-    let told = bench.run(&[&OFFSET[..], &own].concat()).code(2);
-    assert!(String::from_utf8_lossy(&told.get_output().stderr).contains("lies in the folder that the dataset's"));
+    // The originals are never replaced by masked ones: neither a user's own nor copies of an
+    // earlier run.
+    let own = (["-o", "scene", "--images", "--overwrite"], "view_1.png");
+    let copies = (["-o", "copied", "--images=copied/images", "--overwrite"], "lies in the folder that the dataset's");
+    for (options, reason) in [own, copies] {
+        let told = bench.run(&[&OFFSET[..], &options].concat()).code(2);
+        let told = String::from_utf8_lossy(&told.get_output().stderr).into_owned();
+        assert!(told.contains(reason), "{told}");
+    }
+    assert!(read("copied/images/view_3.png") == read("scene/images/view_3.png"));
     picture(&bench.path("scene/images/view_4.png"), [SIZE[0] + 1, SIZE[1]]);
     bench.refused(&["--images"], "has 65 x 48 pixels, its camera needs 64 x 48");
     // Cropped cameras have cropped pictures.

@@ -248,8 +248,8 @@ fn a_stopped_training_goes_on_to_the_same_bytes() {
     }
 }
 
-/// Puts a folder into the place of the page at the end of a training, so that its results are only
-/// half there.
+/// Puts a folder into the place of the page at the end of a training, so that its results cannot
+/// get their names.
 struct InTheWay {
     page: PathBuf,
     count: std::sync::atomic::AtomicU32,
@@ -282,8 +282,12 @@ fn a_training_that_was_killed_while_its_results_got_names_goes_on() {
     let folder = out.path().join("half");
     let page = folder.join("report.html/kept");
     let half = run_on_images(&config("half", false), &InTheWay { page: page.clone(), count: 0.into() });
-    assert!(half.is_err() && folder.join("splats.ply").is_file() && !folder.join("report.json").exists(), "{half:?}");
+    // Nothing gets its name before all can.
+    assert!(half.is_err() && folder.join("checkpoint.bin").is_file(), "{half:?}");
+    assert!(!folder.join("splats.ply").exists() && !folder.join("report.json").exists());
     std::fs::remove_dir_all(page.parent().unwrap()).unwrap();
+    // As a kill leaves it between two files.
+    std::fs::copy(out.path().join("whole/splats.ply"), folder.join("splats.ply")).unwrap();
     // Without being asked to go on, results are not replaced.
     let refused = run_on_images(&config("half", false), &Silent).unwrap_err().to_string();
     assert!(refused.contains("exists already"), "{refused}");

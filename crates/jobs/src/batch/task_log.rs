@@ -1,7 +1,7 @@
 //! The log of a task: its progress as lines of JSON in a file of its own.
 
 use std::fs::File;
-use std::io::Write;
+use std::io::{Error, ErrorKind, Write};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -22,16 +22,25 @@ pub(super) struct TaskLog<'a, W> {
     batch: &'a dyn Progress,
 }
 
-/// Opens the log of a task of a scene in `folder`. Lines are added to its end.
+/// Opens the log of a task of a scene in `folder`. Lines are added to its end; a link in its place
+/// is replaced.
 ///
 /// # Errors
-/// Those of the system.
+/// Those of the system; [`ErrorKind::InvalidInput`] where something else than a file has its name.
 pub(super) fn open<'a>(
     folder: &Path,
     (scene, task): (&'a str, &'a str),
     batch: &'a dyn Progress,
 ) -> std::io::Result<TaskLog<'a, impl Fn(&str) + Sync + use<>>> {
-    let file = File::options().create(true).append(true).open(folder.join(format!("{task}.jsonl")))?;
+    let path = folder.join(format!("{task}.jsonl"));
+    match path.symlink_metadata() {
+        Ok(found) if found.is_symlink() => std::fs::remove_file(&path)?,
+        Ok(found) if !found.is_file() => {
+            return Err(Error::new(ErrorKind::InvalidInput, format!("{} is no file", path.display())));
+        }
+        _ => {}
+    }
+    let file = File::options().create(true).append(true).open(path)?;
     // A log that cannot be written is no reason to lose the result.
     let lines = EventLines::new(move |line: &str| drop((&file).write_all(format!("{line}\n").as_bytes())));
     Ok(TaskLog { lines, scene, task, stage: Mutex::default(), warnings: Mutex::default(), batch })

@@ -138,7 +138,7 @@ impl<'a> Merger<'a> {
         if self.counts.observed == 0 {
             return Err(self.error.unwrap_or(DsmError::NoSurface { range: plan.height_range }));
         }
-        warn_of_share(plan.grid.size, &self.counts, &mut self.notes);
+        warn_of_share(plan, &self.counts, &mut self.notes);
         warn_of_shadows(plan, &self.counts, &mut self.notes);
         let prior = plan.config.prior.clone().map(|model| self.findings.report(model, &mut self.notes));
         self.progress.begin("writing", 1);
@@ -202,15 +202,25 @@ pub fn merge(
 }
 
 /// Warns when hardly any cell has an observed height.
-fn warn_of_share(size: (usize, usize), counts: &SurfaceCounts, notes: &mut Notes<'_>) {
-    let share = counts.observed as f64 / (size.0 * size.1).saturating_sub(counts.masked).max(1) as f64;
+fn warn_of_share(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
+    let (columns, rows) = plan.grid.size;
+    let share = counts.observed as f64 / (columns * rows).saturating_sub(counts.masked).max(1) as f64;
     if share < OBSERVED_WEAK {
         notes.warn(format!(
             "only {:.1} % of the cells have an observed height: the images may not show the same ground, or its heights \
-             lie outside those that were searched",
-            100.0 * share
+             lie outside those that were searched: {}",
+            100.0 * share,
+            image_names(plan)
         ));
     }
+}
+
+/// Returns the files of the images in the order in which they were given.
+fn image_names(plan: &Plan) -> String {
+    let mut images: Vec<_> = plan.images.iter().collect();
+    images.sort_by_key(|image| image.number);
+    let names: Vec<String> = images.iter().map(|image| image.path.display().to_string()).collect();
+    names.join(", ")
 }
 
 /// Warns when shadows lie on what stands higher.
@@ -219,15 +229,12 @@ fn warn_of_shadows(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
     let on = |side: ShadowSide| sides().filter(|s| *s == Some(side)).count();
     let (high, low) = (on(ShadowSide::High), on(ShadowSide::Low));
     if high > low {
-        let mut images: Vec<_> = plan.images.iter().collect();
-        images.sort_by_key(|image| image.number);
-        let names: Vec<String> = images.iter().map(|image| image.path.display().to_string()).collect();
         notes.warn(format!(
             "shadows lie on the higher side of height jumps in {high} of {} images that tell: the relief seems to be \
              upside down, as it is when images are turned by 180° against their RPCs or two images exchanged theirs; \
              check that the RPCs belong to the pixels: {}",
             high + low,
-            names.join(", ")
+            image_names(plan)
         ));
     }
 }

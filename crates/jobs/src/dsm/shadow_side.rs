@@ -96,7 +96,9 @@ impl ShadowCounts {
 
     /// Adds the counts of another part of the image.
     pub(crate) fn add(&mut self, other: &Self) {
-        let add = |own: &mut [u64; 8], other: &[u64; 8]| own.iter_mut().zip(other).for_each(|(a, b)| *a = a.saturating_add(*b));
+        let add = |own: &mut [u64; 8], other: &[u64; 8]| {
+            own.iter_mut().zip(other).for_each(|(a, b)| *a = a.saturating_add(*b))
+        };
         add(&mut self.jumps, &other.jumps);
         add(&mut self.dark_low, &other.dark_low);
         add(&mut self.dark_high, &other.dark_high);

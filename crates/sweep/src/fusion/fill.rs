@@ -560,7 +560,7 @@ mod tests {
         assert_eq!(filled(g.map(|h| h.is_nan())), (0, CellSource::Blank));
         // Blind cells in the middle are the reason for the void beside them.
         let mut middle = g.map(|_| false);
-        (18..42).for_each(|x| (18..46).for_each(|y| middle[(x, y)] = true));
+        (17..43).for_each(|x| (17..46).for_each(|y| middle[(x, y)] = true));
         assert_eq!(filled(middle).0, 0);
     }
 
