@@ -8,6 +8,7 @@
 
 mod common;
 
+use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -300,7 +301,8 @@ fn forged_plans_are_refused_or_computed_and_nothing_breaks() {
     );
     let is_other = |(i, code, _): &&(usize, i32, String)| *code == 0 && surface(place(*i)) != expected;
     let other: Vec<_> = ended.iter().filter(is_other).map(|(i, ..)| &forged[*i]).collect();
-    println!(
+    let _ = writeln!(
+        std::io::stderr(),
         "forged {}: refused when read {}; computed {}: refused {}, another surface {}: {other:?}",
         forged.len(),
         forged.len() - read.len() - broken.len(),

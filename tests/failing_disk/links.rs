@@ -127,7 +127,7 @@ fn check(of: &Writing) {
         let planted: Vec<&str> = folders.iter().map(|folder| folder.rsplit('/').next().unwrap()).collect();
         trial.check(of, &ended, &whole, &[&planted[..], &[FOREIGN.0]].concat(), &format!("{options}, notes"));
     }
-    for options in if is_whole() { &["", of.overwrite][..] } else { &[of.overwrite][..] } {
+    for options in ["", of.overwrite].into_iter().skip(usize::from(!is_whole())) {
         let mut trial = Trial::from(&begin);
         for file in files.iter().filter(|file| !before.contains_key(**file)) {
             let path = trial.root.path().join("work").join(file);

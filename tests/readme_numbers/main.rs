@@ -22,7 +22,7 @@ const UNITS: [&str; 14] =
 /// Words beside which a decimal number is a result.
 const METRICS: [&str; 5] = ["MAE", "NMAD", "RMSE", "completeness", "coverage"];
 /// Numbers that are parameters or definitions, not results.
-const PARAMETERS: [&str; 1] = ["3 GB"];
+const PARAMETERS: [&str; 3] = ["3 GB", "10 s", "60 s"];
 
 /// A page with its blocks made from the results.
 fn renewed(page: &str, results: &Results) -> String {

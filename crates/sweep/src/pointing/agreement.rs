@@ -278,7 +278,7 @@ mod tests {
         let sight = |i: usize, slope: f64| {
             let at = ImagePoint::new(900.0 * fraction(i, 0.618_034), 700.0 * fraction(i, 0.414_214));
             let noise = 0.5 * (fraction(i, 0.732_051) - 0.5) + 0.5 * (fraction(i, 0.236_068) - 0.5);
-            let shadow = if i % 3 == 0 { 4.0 * fraction(i, 0.645_751) } else { 0.0 };
+            let shadow = if i.is_multiple_of(3) { 4.0 * fraction(i, 0.645_751) } else { 0.0 };
             let across_px = 1.5 + slope * (at.sample - 450.0) + noise + shadow;
             let tie = Tie { reference: at, source: at, correlation: 0.5 };
             Sight { tie, height_m: 0.0, across_px }
