@@ -382,8 +382,10 @@ def dsm(
         vertical: Datum of the heights of the DSM.
         preset: Trade-off of speed and accuracy.
         fill: Choice of the voids that are closed.
-        pairs: Pairs of images to match, by positions that are written from 1; all useful ones when `None`.
-        references: Images to compute heights for, by positions that are written from 1; all when `None`.
+        pairs: Pairs of images to match, by positions that are written from 1; all useful ones when
+            `None`.
+        references: Images to compute heights for, by positions that are written from 1; all when
+            `None`.
         pointing: Whether the pointing of the RPCs is corrected.
         products: What is made of the DSM beside it, as `crate::products` does.
         threads: Number of worker threads; all cores when `None`.
@@ -470,8 +472,10 @@ def plan_run(
         vertical: Datum of the heights of the DSM.
         preset: Trade-off of speed and accuracy.
         fill: Choice of the voids that are closed.
-        pairs: Pairs of images to match, by positions that are written from 1; all useful ones when `None`.
-        references: Images to compute heights for, by positions that are written from 1; all when `None`.
+        pairs: Pairs of images to match, by positions that are written from 1; all useful ones when
+            `None`.
+        references: Images to compute heights for, by positions that are written from 1; all when
+            `None`.
         pointing: Whether the pointing of the RPCs is corrected.
         products: What is made of the DSM beside it, as `crate::products` does.
         threads: Number of worker threads; all cores when `None`.
@@ -558,8 +562,10 @@ def make_plan(
         vertical: Datum of the heights of the DSM.
         preset: Trade-off of speed and accuracy.
         fill: Choice of the voids that are closed.
-        pairs: Pairs of images to match, by positions that are written from 1; all useful ones when `None`.
-        references: Images to compute heights for, by positions that are written from 1; all when `None`.
+        pairs: Pairs of images to match, by positions that are written from 1; all useful ones when
+            `None`.
+        references: Images to compute heights for, by positions that are written from 1; all when
+            `None`.
         pointing: Whether the pointing of the RPCs is corrected.
         products: What is made of the DSM beside it, as `crate::products` does.
         threads: Number of worker threads; all cores when `None`.
