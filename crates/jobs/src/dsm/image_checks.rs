@@ -45,7 +45,7 @@ mod tests {
             let at = ImagePoint::new(i as f64 * 7.0, i as f64 * 3.0);
             Tie { reference: at, source: ImagePoint::new(at.sample + apart_px, at.line), correlation: 0.9 }
         };
-        PairTies { pair: ImagePair { first, second }, ties: (0..20).map(tie).collect() }
+        PairTies::new(ImagePair { first, second }, (0..20).map(tie).collect())
     }
 
     #[test]

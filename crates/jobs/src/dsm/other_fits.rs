@@ -10,7 +10,7 @@ use sweep::pointing::{AdjustConfig, Adjustment, Track, adjust};
 use crate::dsm::images::SceneImage;
 use crate::dsm::look::FirstLook;
 use crate::dsm::notes::Notes;
-use crate::dsm::ties::TIES_MIN;
+use crate::dsm::ties::{PairTies, TIES_MIN, join_pairs};
 
 /// Ties that fit as well as this need no other explanation, pixels: half of what ties leave on good
 /// scenes at most.
@@ -34,12 +34,13 @@ enum Other {
 }
 
 /// Warns when the ties fit much better with mirrored images or with exchanged RPCs.
-pub(crate) fn warn_of_other_fits(
-    images: &[SceneImage],
-    looked: &FirstLook,
-    (tracks, found): (&[Track], &Adjustment),
-    notes: &mut Notes<'_>,
-) {
+///
+/// The ties are taken as they were found. Those on which the views agree under the given RPCs were
+/// chosen to fit these.
+pub(crate) fn warn_of_other_fits(images: &[SceneImage], looked: &FirstLook, notes: &mut Notes<'_>) {
+    let pairs: Vec<PairTies> = looked.ties.iter().map(PairTies::as_found).collect();
+    let tracks = &join_pairs(&pairs).0;
+    let found = adjust(&looked.cameras, &looked.sizes, tracks, &AdjustConfig::default());
     let given_px = found.residual_px.1;
     if tracks.len() < TIES_MIN || given_px.is_nan() || given_px <= FITS_PX {
         return;

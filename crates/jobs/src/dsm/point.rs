@@ -97,7 +97,7 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     let Controlled { found, by_ties } = points.adjust(&looked.cameras, &looked.sizes, &tracks, &mut notes)?;
     let is_applied = is_applied(config, &found, &by_ties, &mut notes)?;
     warn_of_sights(&images, &looked, (&tracks, &by_ties), &mut notes);
-    warn_of_other_fits(&images, &looked, (&tracks, &by_ties), &mut notes);
+    warn_of_other_fits(&images, &looked, &mut notes);
     let by_image = by_image(&images, &looked, &found, &tracks);
     if is_applied {
         warn_of_images(&by_image, &mut notes);

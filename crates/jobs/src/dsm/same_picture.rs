@@ -286,7 +286,7 @@ mod tests {
                 let source = ImagePoint::new(at.sample - 12.0, at.line + 31.0 + parallax * (i % 5) as f64);
                 Tie { reference: at, source, correlation: 0.9 }
             };
-            PairTies { pair: ImagePair::new(0, 1), ties: (0..20).map(tie).collect() }
+            PairTies::new(ImagePair::new(0, 1), (0..20).map(tie).collect())
         };
         assert_eq!(at_one_shift(&[pair(0.01)]), Some(ImagePair::new(0, 1)));
         assert_eq!(at_one_shift(&[pair(0.4)]), None);

@@ -95,7 +95,7 @@ pub(crate) fn match_in_windows(
     };
     let config = TieConfig { points, ..all };
     let mut characters = vec![ImageCharacter::default(); images.len()];
-    let mut out: Vec<PairTies> = pairs.iter().map(|&pair| PairTies { pair, ties: Vec::new() }).collect();
+    let mut out: Vec<PairTies> = pairs.iter().map(|&pair| PairTies::new(pair, Vec::new())).collect();
     let mut range = search;
     progress.begin("matching tie points", places.len());
     for place in places {
@@ -116,15 +116,17 @@ pub(crate) fn match_in_windows(
             range = seen.grown(far, far).cut_to(search);
         }
         for pair in &found {
-            let own = out.iter_mut().find(|p| p.pair == pair.pair);
-            own.into_iter().for_each(|p| p.ties.extend(in_whole_images(pair, &windows)));
+            if let Some(own) = out.iter_mut().find(|own| own.pair == pair.pair) {
+                own.ties.extend(in_whole_images(pair, &windows));
+                own.corners.extend(in_whole_images(&pair.as_found(), &windows));
+            }
         }
         progress.step();
     }
     for pair in &mut out {
         let cameras = (&images[pair.pair.first].camera, &images[pair.pair.second].camera);
         if !is_beyond_chance(cameras, &pair.ties, range.middle_m(), TIES_MIN) {
-            pair.ties.clear();
+            *pair = PairTies::new(pair.pair, Vec::new());
         }
     }
     Ok((out, characters))

@@ -35,6 +35,22 @@ pub struct PairTies {
     /// Tie points found, each written as `[sample, line, sample, line, correlation]`.
     #[serde(with = "tie_rows")]
     pub ties: Vec<Tie>,
+    /// The ties before those were left out on which the views do not agree; empty where none were.
+    /// They show what the RPCs explain, and a file of the ties does without them.
+    #[serde(skip)]
+    pub(crate) corners: Vec<Tie>,
+}
+
+impl PairTies {
+    pub(crate) fn new(pair: ImagePair, ties: Vec<Tie>) -> Self {
+        Self { pair, ties, corners: Vec::new() }
+    }
+
+    /// The ties as they were found, whether the views agree on them or not.
+    pub(crate) fn as_found(&self) -> Self {
+        let ties = if self.corners.is_empty() { &self.ties } else { &self.corners };
+        Self::new(self.pair, ties.clone())
+    }
 }
 
 /// Matches pairs of views, given best first, over the heights in `range`. `done` is called after
@@ -63,7 +79,7 @@ pub(crate) fn match_pairs(
     for &pair in pairs {
         let ties_of = |heights: HeightRange, config: &TieConfig| {
             let heights = (heights.low_m, heights.high_m);
-            PairTies { pair, ties: match_pair(&views[pair.first], &views[pair.second], heights, config) }
+            PairTies::new(pair, match_pair(&views[pair.first], &views[pair.second], heights, config))
         };
         let is_wide = near == range;
         if is_wide {
@@ -73,7 +89,7 @@ pub(crate) fn match_pairs(
         let cameras = (&views[pair.first].camera, &views[pair.second].camera);
         let true_ties = |found: PairTies| {
             let is_true = is_beyond_chance(cameras, &found.ties, near.middle_m(), least);
-            if is_true { found } else { PairTies { pair, ties: Vec::new() } }
+            if is_true { found } else { PairTies::new(pair, Vec::new()) }
         };
         let mut found = true_ties(ties_of(near, config));
         if found.ties.len() < least && near != range {
@@ -98,7 +114,9 @@ pub(crate) fn match_pairs(
         if found.ties.len() >= least {
             let heights = (near.low_m, near.high_m);
             let agreeing = agreeing_ties(&views[pair.first], &views[pair.second], &found.ties, heights, config);
-            found.ties = agreeing.unwrap_or(found.ties);
+            if let Some(agreeing) = agreeing {
+                found.corners = std::mem::replace(&mut found.ties, agreeing);
+            }
         }
         out.push(found);
         done();
