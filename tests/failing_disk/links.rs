@@ -62,7 +62,10 @@ impl Trial {
     fn check(&self, of: &Writing, ended: &Ended, whole: &BTreeMap<String, Vec<u8>>, planted: &[&str], case: &str) {
         // A command that takes only new folders says so before it looks further.
         let taken = ["exists already", "is not empty", "holds views already"];
-        let is_named = planted.iter().chain(&taken).any(|name| ended.told.contains(name));
+        // The reasons of a batch are in its report.
+        let report = self.root.path().join("work/out/batch_report.json");
+        let told = format!("{} {}", ended.told, std::fs::read_to_string(report).unwrap_or_default());
+        let is_named = planted.iter().chain(&taken).any(|name| told.contains(name));
         match ended.code {
             0 => {
                 let found = snapshot(&self.root.path().join("work"));
@@ -70,7 +73,7 @@ impl Trial {
                 assert!(lost.is_empty(), "{}, {case}: exit code 0 without {lost:?}", of.name);
             }
             // Parts of a batch or of a list are refused one by one.
-            1 | 2 => assert!(is_named, "{}, {case}: nothing is named: {}", of.name, ended.told),
+            1 | 2 => assert!(is_named, "{}, {case}: nothing is named: {told}", of.name),
             code => panic!("{}, {case}: exit code {code}: {}", of.name, ended.told),
         }
     }
