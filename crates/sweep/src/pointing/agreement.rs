@@ -106,7 +106,15 @@ pub fn agreeing_ties(
     if AGREE_ONE_IN * found.iter().filter(agrees).count() < found.len() {
         return None;
     }
-    if known.iter().filter(agrees).count() as f64 >= CORNERS_AGREE * known.len() as f64 {
+    let shift = |sight: &Sight, of: fn(ImagePoint) -> f64| of(sight.tie.source) - of(sight.tie.reference);
+    let same = |of: fn(ImagePoint) -> f64| {
+        let middle = upper_median(&mut found.iter().map(|sight| shift(sight, of)).collect::<Vec<f64>>());
+        let near = found.iter().filter(|sight| middle.is_some_and(|m| (shift(sight, of) - m).abs() < 0.1)).count();
+        2 * near > found.len()
+    };
+    // Patches at one shift are those of copies, which all of them together show best.
+    let is_copy = same(|p| p.sample) && same(|p| p.line);
+    if !is_copy && known.iter().filter(agrees).count() as f64 >= CORNERS_AGREE * known.len() as f64 {
         return None;
     }
     let full = |sight: &Sight| Tie {
