@@ -7,8 +7,7 @@
 //! heights for which the RPCs were not made.
 
 use camera::RpcCamera;
-use sweep::pointing::Tie;
-use sweep::source_from_reference;
+use sweep::pointing::{Tie, off_trajectory};
 
 use crate::dsm::error::DsmError;
 use crate::dsm::images::SceneImage;
@@ -31,31 +30,12 @@ pub(crate) fn is_beyond_chance(
     height_m: f64,
     least: usize,
 ) -> bool {
-    let mut across: Vec<f64> = ties.iter().filter_map(|tie| across_px(reference, source, tie, height_m)).collect();
+    let off = |tie: &Tie| off_trajectory(reference, source, tie, height_m);
+    let mut across: Vec<f64> = ties.iter().filter_map(off).map(|off| off.across_px).collect();
     across.sort_by(f64::total_cmp);
     let within = |from: usize| across[from..].partition_point(|v| *v <= across[from] + TRUE_BAND_PX);
     let densest = (0..across.len()).map(within).max().unwrap_or(0);
     densest >= least && TRUE_ONE_IN * densest >= ties.len()
-}
-
-/// Returns the distance of a tie from its height trajectory, with a sign, pixels; `None` where a
-/// camera fails. The search for the nearest height begins at `height_m`.
-fn across_px(reference: &RpcCamera, source: &RpcCamera, tie: &Tie, height_m: f64) -> Option<f64> {
-    /// Length of the piece of the trajectory that gives its direction, metres.
-    const PIECE_M: f64 = 20.0;
-    /// Trajectories are nearly straight, so that the second round is exact.
-    const ROUNDS: usize = 3;
-    let place = |h: f64| source_from_reference(reference, source, 0, tie.reference, h).ok();
-    let (mut height_m, mut across) = (height_m, 0.0);
-    for _ in 0..ROUNDS {
-        let (from, to) = (place(height_m)?, place(height_m + PIECE_M)?);
-        let along = [to.sample - from.sample, to.line - from.line];
-        let found = [tie.source.sample - from.sample, tie.source.line - from.line];
-        let square = along[0] * along[0] + along[1] * along[1];
-        across = (along[0] * found[1] - along[1] * found[0]) / square.sqrt();
-        height_m += PIECE_M * (along[0] * found[0] + along[1] * found[1]) / square;
-    }
-    across.is_finite().then_some(across)
 }
 
 /// Warns of images whose RPCs are not made for the heights at which the ties lie.
@@ -108,6 +88,7 @@ pub(crate) fn dem_with_ties(
 #[cfg(test)]
 mod tests {
     use camera::ImagePoint;
+    use sweep::source_from_reference;
 
     use super::*;
 

@@ -38,7 +38,8 @@ enum Other {
 /// The ties are taken as they were found. Those on which the views agree under the given RPCs were
 /// chosen to fit these.
 pub(crate) fn warn_of_other_fits(images: &[SceneImage], looked: &FirstLook, notes: &mut Notes<'_>) {
-    let pairs: Vec<PairTies> = looked.ties.iter().map(PairTies::as_found).collect();
+    let as_found = |found: &PairTies| PairTies::new(found.pair, found.as_found().to_vec());
+    let pairs: Vec<PairTies> = looked.ties.iter().map(as_found).collect();
     let tracks = &join_pairs(&pairs).0;
     let found = adjust(&looked.cameras, &looked.sizes, tracks, &AdjustConfig::default());
     let given_px = found.residual_px.1;

@@ -113,11 +113,12 @@ pub(crate) fn same_picture(images: &[SceneImage], views: Option<&[SweepView]>) -
     Ok(suspects.into_iter().find(|suspect| suspect.shifts.len() >= PLACES_MIN).map(|suspect| suspect.pair))
 }
 
-/// Finds a pair whose ties all lie at one shift.
+/// Finds a pair whose ties all lie at one shift, judged by its patches where it has some: there
+/// are more of them, and they lie all over the ground.
 pub(crate) fn at_one_shift(ties: &[PairTies]) -> Option<ImagePair> {
     let is_copy = |found: &&PairTies| {
-        let shifts: Vec<[f64; 2]> = found
-            .ties
+        let ties = if found.patches.is_empty() { &found.ties } else { &found.patches };
+        let shifts: Vec<[f64; 2]> = ties
             .iter()
             .map(|tie| [tie.source.sample - tie.reference.sample, tie.source.line - tie.reference.line])
             .collect();

@@ -117,8 +117,10 @@ pub(crate) fn match_in_windows(
         }
         for pair in &found {
             if let Some(own) = out.iter_mut().find(|own| own.pair == pair.pair) {
-                own.ties.extend(in_whole_images(pair, &windows));
-                own.corners.extend(in_whole_images(&pair.as_found(), &windows));
+                let whole = |ties: &[Tie]| in_whole_images(pair.pair, ties, &windows);
+                own.ties.extend(whole(&pair.ties));
+                own.corners.extend(whole(pair.as_found()));
+                own.patches.extend(whole(&pair.patches));
             }
         }
         progress.step();
@@ -142,14 +144,15 @@ fn read_parts(images: &[SceneImage], windows: &[Option<Window>]) -> Result<Vec<S
 }
 
 /// Returns ties found in windows in the frames of the whole images.
-fn in_whole_images(found: &PairTies, windows: &[Option<Window>]) -> impl Iterator<Item = Tie> {
+fn in_whole_images(pair: ImagePair, ties: &[Tie], windows: &[Option<Window>]) -> Vec<Tie> {
     let origin = |i: usize| windows[i].map_or(ImagePoint::new(0.0, 0.0), |w| ImagePoint::new(w.x as f64, w.y as f64));
-    let (a, b) = (origin(found.pair.first), origin(found.pair.second));
-    found.ties.iter().map(move |t| Tie {
+    let (a, b) = (origin(pair.first), origin(pair.second));
+    let moved = |t: &Tie| Tie {
         reference: ImagePoint::new(t.reference.sample + a.sample, t.reference.line + a.line),
         source: ImagePoint::new(t.source.sample + b.sample, t.source.line + b.line),
         ..*t
-    })
+    };
+    ties.iter().map(moved).collect()
 }
 
 /// Returns the parts of the images that may show a place.

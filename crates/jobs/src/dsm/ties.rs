@@ -4,8 +4,7 @@ use camera::RpcCamera;
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 use sweep::pointing::{
-    AdjustConfig, Adjustment, ModelOrder, PlacedTie, Tie, TieConfig, Track, adjust, agreeing_ties, join_ties,
-    match_pair,
+    AdjustConfig, Adjustment, ModelOrder, PlacedTie, Tie, TieConfig, Track, adjust, agreement, join_ties, match_pair,
 };
 
 use crate::dsm::evidence::is_beyond_chance;
@@ -39,17 +38,20 @@ pub struct PairTies {
     /// They show what the RPCs explain, and a file of the ties does without them.
     #[serde(skip)]
     pub(crate) corners: Vec<Tie>,
+    /// Patches on which the views agree, whether they are used or not. They lie all over the pair,
+    /// and show whether it is one picture.
+    #[serde(skip)]
+    pub(crate) patches: Vec<Tie>,
 }
 
 impl PairTies {
     pub(crate) fn new(pair: ImagePair, ties: Vec<Tie>) -> Self {
-        Self { pair, ties, corners: Vec::new() }
+        Self { pair, ties, corners: Vec::new(), patches: Vec::new() }
     }
 
     /// The ties as they were found, whether the views agree on them or not.
-    pub(crate) fn as_found(&self) -> Self {
-        let ties = if self.corners.is_empty() { &self.ties } else { &self.corners };
-        Self::new(self.pair, ties.clone())
+    pub(crate) fn as_found(&self) -> &[Tie] {
+        if self.corners.is_empty() { &self.ties } else { &self.corners }
     }
 }
 
@@ -113,9 +115,12 @@ pub(crate) fn match_pairs(
         }
         if found.ties.len() >= least {
             let heights = (near.low_m, near.high_m);
-            let agreeing = agreeing_ties(&views[pair.first], &views[pair.second], &found.ties, heights, config);
-            if let Some(agreeing) = agreeing {
-                found.corners = std::mem::replace(&mut found.ties, agreeing);
+            if let Some(agreed) = agreement(&views[pair.first], &views[pair.second], &found.ties, heights, config) {
+                if !agreed.holds_ties {
+                    let agreeing = agreed.ties.iter().chain(&agreed.patches).copied().collect();
+                    found.corners = std::mem::replace(&mut found.ties, agreeing);
+                }
+                found.patches = agreed.patches;
             }
         }
         out.push(found);

@@ -14,6 +14,7 @@ use numeric::upper_median;
 use raster::{level_from_level0, level0_from_level};
 use rayon::prelude::*;
 
+use super::off_trajectory::{PIECE_M, off_trajectory};
 use super::pair::{Pair, Tie, TieConfig};
 use super::ties::{ScaledPair, shared_window};
 use crate::view::SweepView;
@@ -64,18 +65,28 @@ struct Sight {
     across_px: f64,
 }
 
-/// Returns the ties on which two views agree over the ground that they share, with those of the
-/// given ties that agree with them; `None` where the given ties agree as they are, or where the
-/// views show too little together.
+/// On what two views agree over the ground that they share.
+pub struct Agreement {
+    /// Those of the given ties that agree.
+    pub ties: Vec<Tie>,
+    /// The patches that agree.
+    pub patches: Vec<Tie>,
+    /// Whether so many of the given ties agree that shadows have not moved them. They are placed
+    /// more exactly than patches.
+    pub holds_ties: bool,
+}
+
+/// Finds the patches on which two views agree over the ground that they share; `None` where they
+/// show too little together.
 ///
 /// `ties` say at which heights to search. All positions are in pixels of the full resolution.
-pub fn agreeing_ties(
+pub fn agreement(
     reference: &SweepView,
     source: &SweepView,
     ties: &[Tie],
     range_m: (f64, f64),
     config: &TieConfig,
-) -> Option<Vec<Tie>> {
+) -> Option<Agreement> {
     let scaled = ScaledPair::of(&Pair { reference, source }, range_m);
     let pair = scaled.pair();
     let (skip_reference, skip_source) = scaled.skipped;
@@ -88,7 +99,12 @@ pub fn agreeing_ties(
         source: moved(tie.source, skip_source, level_from_level0),
         ..*tie
     };
-    let known: Vec<Sight> = ties.iter().filter_map(|tie| pair.sight(&on_scale(tie), middle_m)).collect();
+    let (reference, source) = (&pair.reference.camera, &pair.source.camera);
+    let sight = |tie: Tie| {
+        let off = off_trajectory(reference, source, &tie, middle_m)?;
+        Some(Sight { tie, height_m: off.height_m, across_px: off.across_px })
+    };
+    let known: Vec<Sight> = ties.iter().filter_map(|tie| sight(on_scale(tie))).collect();
     let usual_px = upper_median(&mut known.iter().map(|sight| sight.across_px).collect::<Vec<f64>>())?;
     let patches = pair.lattice(&known, range_m, config);
     let found: Vec<Sight> = patches
@@ -106,23 +122,15 @@ pub fn agreeing_ties(
     if AGREE_ONE_IN * found.iter().filter(agrees).count() < found.len() {
         return None;
     }
-    let shift = |sight: &Sight, of: fn(ImagePoint) -> f64| of(sight.tie.source) - of(sight.tie.reference);
-    let same = |of: fn(ImagePoint) -> f64| {
-        let middle = upper_median(&mut found.iter().map(|sight| shift(sight, of)).collect::<Vec<f64>>());
-        let near = found.iter().filter(|sight| middle.is_some_and(|m| (shift(sight, of) - m).abs() < 0.1)).count();
-        2 * near > found.len()
-    };
-    // Patches at one shift are those of copies, which all of them together show best.
-    let is_copy = same(|p| p.sample) && same(|p| p.line);
-    if !is_copy && known.iter().filter(agrees).count() as f64 >= CORNERS_AGREE * known.len() as f64 {
-        return None;
-    }
     let full = |sight: &Sight| Tie {
         reference: moved(sight.tie.reference, skip_reference, level0_from_level),
         source: moved(sight.tie.source, skip_source, level0_from_level),
         ..sight.tie
     };
-    Some(known.iter().chain(&found).filter(agrees).map(full).collect())
+    let agreeing = |sights: &[Sight]| sights.iter().filter(agrees).map(full).collect::<Vec<Tie>>();
+    let (ties, patches) = (agreeing(&known), agreeing(&found));
+    let holds_ties = ties.len() as f64 >= CORNERS_AGREE * known.len() as f64;
+    Some(Agreement { ties, patches, holds_ties })
 }
 
 /// Returns the median height of the ties nearest to a place.
@@ -178,29 +186,9 @@ impl Pair<'_> {
 
     /// Returns the direction of a height trajectory in the source.
     fn along(&self, at: [f64; 2], height_m: f64) -> Option<[f64; 2]> {
-        /// Length of the piece that gives the direction, metres. Trajectories are nearly straight.
-        const PIECE_M: f64 = 20.0;
         let (from, to) = (self.chain(at, 0, height_m).ok()?, self.chain(at, 0, height_m + PIECE_M).ok()?);
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);
         (length > 0.0).then(|| [(to[0] - from[0]) / length, (to[1] - from[1]) / length])
-    }
-
-    /// Returns the height at which a tie is closest to its trajectory, and how far off it is there.
-    fn sight(&self, tie: &Tie, start_m: f64) -> Option<Sight> {
-        /// Trajectories are nearly straight, so that the second round is exact.
-        const ROUNDS: usize = 3;
-        const PIECE_M: f64 = 20.0;
-        let at = [tie.reference.sample, tie.reference.line];
-        let (mut height_m, mut across_px) = (start_m, 0.0);
-        for _ in 0..ROUNDS {
-            let (from, to) = (self.chain(at, 0, height_m).ok()?, self.chain(at, 0, height_m + PIECE_M).ok()?);
-            let along = [to[0] - from[0], to[1] - from[1]];
-            let found = [tie.source.sample - from[0], tie.source.line - from[1]];
-            let square = along[0] * along[0] + along[1] * along[1];
-            across_px = (along[0] * found[1] - along[1] * found[0]) / square.sqrt();
-            height_m += PIECE_M * (along[0] * found[0] + along[1] * found[1]) / square;
-        }
-        (across_px.is_finite() && height_m.is_finite()).then_some(Sight { tie: *tie, height_m, across_px })
     }
 }
 
