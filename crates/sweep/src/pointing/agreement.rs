@@ -1,17 +1,17 @@
 //! Ties on which two views agree all over the ground that they share.
 //!
 //! The strongest corners lie where shadows end, and shadows move with the sun. Patches of a lattice
-//! lie on lit ground and roofs as often as these do in the image. They are searched for around the
-//! heights of ties and back again. What each says alone is weak, but all true ones have the same
-//! pointing error across their height trajectories, which drifts slowly over the image, while
-//! shadows are moved by as much as their objects are high. The largest set that agrees is found by
-//! the mode of the errors and a plane with Tukey's weights (Beaton and Tukey 1974) that starts
-//! there.
+//! lie on lit ground and roofs as often as these do in the image, in images whose contrast is made
+//! even, so that no edge outweighs the rest. They are searched for around the heights of ties and
+//! back again. What each says alone is weak, but all true ones have the same pointing error across
+//! their height trajectories, which drifts slowly over the image, while shadows are moved by as
+//! much as their objects are high. The largest set that agrees is found by the mode of the errors
+//! and a plane with Tukey's weights (Beaton and Tukey 1974) that starts there.
 
 use camera::ImagePoint;
 use nalgebra::{Matrix3, Vector3};
 use numeric::upper_median;
-use raster::{level_from_level0, level0_from_level};
+use raster::{Grid, gaussian, level_from_level0, level0_from_level};
 use rayon::prelude::*;
 
 use super::off_trajectory::{PIECE_M, off_trajectory};
@@ -28,6 +28,9 @@ const REACH: i32 = 6;
 /// Least correlation. A patch of 15 × 15 pixels of texture as strong as the noise has 0.4 to 0.5,
 /// and chance likenesses among these many places reach 0.3.
 const LIKENESS_MIN: f32 = 0.3;
+/// Surroundings over which mean and contrast are made even, standard deviation in pixels. Of 2 to 5
+/// pixels to each side of a square, 3 left the least; this has the same deviation.
+const EVEN_PX: f32 = 2.0;
 /// Largest distance of the search back from the patch, pixels.
 const RETURN_PX: f64 = 1.0;
 /// The heights of this many ties around a patch give the height at which it is expected.
@@ -107,6 +110,8 @@ pub fn agreement(
     let known: Vec<Sight> = ties.iter().filter_map(|tie| sight(on_scale(tie))).collect();
     let usual_px = upper_median(&mut known.iter().map(|sight| sight.across_px).collect::<Vec<f64>>())?;
     let patches = pair.lattice(&known, range_m, config);
+    let (reference, source) = (evened(pair.reference), evened(pair.source));
+    let pair = Pair { reference: &reference, source: &source };
     let found: Vec<Sight> = patches
         .par_iter()
         .filter_map(|&at| {
@@ -131,6 +136,25 @@ pub fn agreement(
     let (ties, patches) = (agreeing(&known), agreeing(&found));
     let holds_ties = ties.len() as f64 >= CORNERS_AGREE * known.len() as f64;
     Some(Agreement { ties, patches, holds_ties })
+}
+
+/// Returns the finest level of a view with one mean and one contrast everywhere.
+///
+/// The edges of shadows are the strongest texture there is, and would lead every patch that holds
+/// one. Here they count as much as the texture of lit or shaded ground.
+fn evened(view: &SweepView) -> SweepView {
+    let image = &view.levels[0];
+    let combined = |a: &Grid<f32>, b: &Grid<f32>, of: &dyn Fn(f32, f32) -> f32| {
+        let mut out = a.clone();
+        out.data_mut().iter_mut().zip(b.data()).for_each(|(a, b)| *a = of(*a, *b));
+        out
+    };
+    let noise = view.noise * view.noise;
+    let high = combined(image, &gaussian(image, EVEN_PX), &|value, mean| value - mean);
+    let variance = gaussian(&combined(&high, &high, &|a, b| a * b), EVEN_PX);
+    let even = combined(&high, &variance, &|value, variance| value / (variance + noise).sqrt());
+    // No patch is flat now. Those that were hold noise, which the correlation tells.
+    SweepView { camera: view.camera.clone(), levels: vec![even], noise: 0.0, contrast: Vec::new() }
 }
 
 /// Returns the median height of the ties nearest to a place.
