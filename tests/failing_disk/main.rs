@@ -11,6 +11,7 @@ mod commands;
 #[path = "../common/mod.rs"]
 mod common;
 mod links;
+mod small_disks;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

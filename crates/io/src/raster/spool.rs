@@ -185,8 +185,8 @@ impl RasterSpool {
         self.flush()?;
         let reported = left_over_messages();
         let window = Window { x: at.0 as i64, y: at.1 as i64, width: size.0, height: size.1 };
-        let found = read_as::<T>(&self.path, &self.dataset, 1, window)?;
-        if found.data() != buffer.data() {
+        let found = read_as::<T>(&self.path, &self.dataset, 1, window);
+        if !found.is_ok_and(|found| found.data() == buffer.data()) {
             let reason =
                 format!("other cells come back than were written; check that the disk is not full: {reported}");
             return Err(RasterError::unwritable(&self.path, reason));

@@ -13,7 +13,7 @@ use crate::dsm::output::{self, ChunkedOutput, DsmFolder, FILES};
 use crate::dsm::plan::Plan;
 use crate::dsm::prior_findings::PriorFindings;
 use crate::dsm::report::{ChunksReport, DsmReport, FailedChunk, StageTime, SurfaceReport};
-use crate::dsm::shadow_side::ShadowSide;
+use crate::dsm::shadow_side::{ShadowSide, shadow_side};
 use crate::dsm::surface::SurfaceCounts;
 use crate::dsm::values::HeightRange;
 use crate::error_text::with_causes;
@@ -225,15 +225,11 @@ fn image_names(plan: &Plan) -> String {
 
 /// Warns when shadows lie on what stands higher.
 fn warn_of_shadows(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
-    let sides = || counts.views.iter().map(|view| view.shadows.side());
-    let on = |side: ShadowSide| sides().filter(|s| *s == Some(side)).count();
-    let (high, low) = (on(ShadowSide::High), on(ShadowSide::Low));
-    if high > low {
+    if shadow_side(counts.views.iter().map(|view| &view.shadows)) == Some(ShadowSide::High) {
         notes.warn(format!(
-            "shadows lie on the higher side of height jumps in {high} of {} images that tell: the relief seems to be \
-             upside down, as it is when images are turned by 180° against their RPCs or two images exchanged theirs; \
-             check that the RPCs belong to the pixels: {}",
-            high + low,
+            "shadows lie on the higher side of height jumps: the relief seems to be upside down, as it is when images \
+             are turned by 180° against their RPCs or two images exchanged theirs; check that the RPCs belong to the \
+             pixels: {}",
             image_names(plan)
         ));
     }
