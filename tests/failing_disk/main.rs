@@ -89,7 +89,9 @@ fn check(arguments: &[&str], varying: &[&str]) {
 /// Returns whether a file that holds times is there to its end.
 fn ends_as(name: &Path, content: &[u8]) -> bool {
     match name.extension().and_then(|e| e.to_str()) {
-        Some("json") => serde_json::from_slice::<serde_json::Value>(content).is_ok(),
+        // The status of a chunk is JSON without an extension.
+        Some("json") | None => serde_json::from_slice::<serde_json::Value>(content).is_ok(),
+        Some("gpkg") => content.starts_with(b"SQLite format 3") && content.len().is_multiple_of(4096),
         Some("toml") => content.ends_with(b"\n"),
         _ => content.trim_ascii_end().ends_with(b"</html>"),
     }
