@@ -4,7 +4,8 @@ use camera::RpcCamera;
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 use sweep::pointing::{
-    AdjustConfig, Adjustment, ModelOrder, PlacedTie, Tie, TieConfig, Track, adjust, agreement, join_ties, match_pair,
+    AdjustConfig, Adjustment, EvenView, ModelOrder, PlacedTie, Tie, TieConfig, Track, adjust, agreement, join_ties,
+    match_pair,
 };
 
 use crate::dsm::evidence::is_beyond_chance;
@@ -73,6 +74,7 @@ pub(crate) fn match_pairs(
 ) -> Vec<PairTies> {
     let mut near = range;
     let mut out = Vec::with_capacity(pairs.len());
+    let even: Vec<EvenView> = views.iter().map(|_| EvenView::default()).collect();
     let narrowed = |found: &PairTies| {
         let seen = heights_seen(views, found)?;
         let margin = seen.span_m() + NARROWED_MARGIN_M;
@@ -115,7 +117,9 @@ pub(crate) fn match_pairs(
         }
         if found.ties.len() >= least {
             let heights = (near.low_m, near.high_m);
-            if let Some(agreed) = agreement(&views[pair.first], &views[pair.second], &found.ties, heights, config) {
+            let (first, second) = (&views[pair.first], &views[pair.second]);
+            let even = [&even[pair.first], &even[pair.second]];
+            if let Some(agreed) = agreement(first, second, &found.ties, heights, config, even) {
                 if !agreed.holds_ties {
                     let agreeing = agreed.ties.iter().chain(&agreed.patches).copied().collect();
                     found.corners = std::mem::replace(&mut found.ties, agreeing);

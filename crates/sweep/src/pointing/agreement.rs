@@ -8,6 +8,9 @@
 //! much as their objects are high. The largest set that agrees is found by the mode of the errors
 //! and a plane with Tukey's weights (Beaton and Tukey 1974) that starts there.
 
+use std::borrow::Cow;
+use std::sync::OnceLock;
+
 use camera::ImagePoint;
 use nalgebra::{Matrix3, Vector3};
 use numeric::upper_median;
@@ -68,7 +71,12 @@ struct Sight {
     across_px: f64,
 }
 
+/// A view with even contrast, made when its first pair asks for it. Empty by default.
+#[derive(Debug, Default)]
+pub struct EvenView(OnceLock<SweepView>);
+
 /// On what two views agree over the ground that they share.
+#[derive(Debug)]
 pub struct Agreement {
     /// Those of the given ties that agree.
     pub ties: Vec<Tie>,
@@ -82,13 +90,15 @@ pub struct Agreement {
 /// Finds the patches on which two views agree over the ground that they share; `None` where they
 /// show too little together.
 ///
-/// `ties` say at which heights to search. All positions are in pixels of the full resolution.
+/// `ties` say at which heights to search. `even` belongs to the two views, and is kept for their
+/// other pairs. All positions are in pixels of the full resolution.
 pub fn agreement(
     reference: &SweepView,
     source: &SweepView,
     ties: &[Tie],
     range_m: (f64, f64),
     config: &TieConfig,
+    even: [&EvenView; 2],
 ) -> Option<Agreement> {
     let scaled = ScaledPair::of(&Pair { reference, source }, range_m);
     let pair = scaled.pair();
@@ -110,8 +120,11 @@ pub fn agreement(
     let known: Vec<Sight> = ties.iter().filter_map(|tie| sight(on_scale(tie))).collect();
     let usual_px = upper_median(&mut known.iter().map(|sight| sight.across_px).collect::<Vec<f64>>())?;
     let patches = pair.lattice(&known, range_m, config);
-    let (reference, source) = (evened(pair.reference), evened(pair.source));
-    let pair = Pair { reference: &reference, source: &source };
+    let kept = scaled.skipped == (0, 0);
+    let even = [(pair.reference, even[0]), (pair.source, even[1])].map(|(view, even)| {
+        if kept { Cow::Borrowed(even.0.get_or_init(|| evened(view))) } else { Cow::Owned(evened(view)) }
+    });
+    let pair = Pair { reference: &even[0], source: &even[1] };
     let found: Vec<Sight> = patches
         .par_iter()
         .filter_map(|&at| {

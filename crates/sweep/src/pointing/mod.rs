@@ -24,7 +24,7 @@ mod ties;
 mod tracks;
 
 pub use adjust::{AdjustConfig, Adjustment, Observations, adjust, adjust_to_control};
-pub use agreement::{Agreement, agreement};
+pub use agreement::{Agreement, EvenView, agreement};
 pub use chip::{ChipConfig, ChipMiss, ChipPlace, find_chip};
 pub use chip_fit::{Chip, ChipSearch};
 pub use control::ControlPoint;
