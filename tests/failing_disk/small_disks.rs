@@ -7,6 +7,7 @@
 //! asked for.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 
@@ -35,6 +36,11 @@ impl Drop for Disk<'_> {
     fn drop(&mut self) {
         let _ = Command::new("umount").arg("-l").arg(self.0).status();
     }
+}
+
+/// Writes a line to standard error. A test that cannot print still fails where it must.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// Bytes that files take on the disk.
@@ -84,7 +90,7 @@ fn check(of: &Writing, shares: &[f64]) -> Option<Counts> {
         let more = (taken(&whole) - taken(&before)) as f64 * share;
         let bytes = taken(&before) + more as u64 + if *share == 0.0 { 0 } else { PAGE };
         let Some(_mounted) = Disk::mount(&disk, bytes) else {
-            println!("skipped: no file system in memory can be mounted (as root: mount -t tmpfs)");
+            say("skipped: no file system in memory can be mounted (as root: mount -t tmpfs)");
             return None;
         };
         let place = disk.join("work");
@@ -130,12 +136,12 @@ fn disks_that_are_too_small_leave_nothing_broken() {
     let mut all = Counts::default();
     for of in COMMANDS.iter().step_by(if sizes.is_some() { 1 } else { ONE_IN }) {
         let Some(counts) = check(of, &shares) else { return };
-        println!("{:20} {:3} complete {:3} refused", of.name, counts.complete, counts.refused);
+        say(&format!("{:20} {:3} complete {:3} refused", of.name, counts.complete, counts.refused));
         all.complete += counts.complete;
         all.refused += counts.refused;
         all.faults.extend(counts.faults);
     }
     assert!(all.faults.is_empty(), "{} faults:\n{}", all.faults.len(), all.faults.join("\n"));
-    println!("{:20} {:3} complete {:3} refused", "all", all.complete, all.refused);
+    say(&format!("{:20} {:3} complete {:3} refused", "all", all.complete, all.refused));
     assert!(all.refused > 0, "no disk was too small");
 }

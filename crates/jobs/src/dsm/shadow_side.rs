@@ -26,11 +26,11 @@ const JUMP_M: f32 = 3.0;
 const JUMP_STEPS: f32 = 3.0;
 /// Share of the pixels that are called dark. Shadows cover 5 to 30 % of built-up ground.
 const DARK: f64 = 0.15;
-/// A view tells by at least this many jumps: the share of dark pixels at each of eight directions is
-/// then known to a tenth.
+/// A view tells by at least this many jumps: the share of dark pixels at each of eight directions
+/// is then known to a tenth.
 const JUMPS_MIN: u64 = 200;
-/// Amplitude of the share of dark pixels that shadows have in one view at least. Of 33 scenes of two
-/// simulators and of real images, only those with long shadows on open ground reach it.
+/// Amplitude of the share of dark pixels that shadows have in one view at least. Of 33 scenes of
+/// two simulators and of real images, only those with long shadows on open ground reach it.
 const AMPLITUDE_MIN: f64 = 0.15;
 /// The sum of the amplitudes on one side is this many times that of the other where the shadows lie
 /// there. Shading of roofs and crowns is on both sides, and up to 2.5 times as strong on one.

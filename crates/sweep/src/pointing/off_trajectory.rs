@@ -1,4 +1,5 @@
-//! How far a tie is from its height trajectory: the pointing error of its pair, whatever the height.
+//! How far a tie is from its height trajectory: the pointing error of its pair, whatever the
+//! height.
 
 use camera::RpcCamera;
 
