@@ -122,7 +122,8 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
         is_whole,
         useful,
         pairs,
-        ties,
+        // What was only looked at stays behind: stages that are written and read back are the same.
+        ties: ties.into_iter().map(|found| PairTies::new(found.pair, found.ties)).collect(),
         pointing,
         tie_heights: tie_heights(&found),
         corrections: found.corrections,
