@@ -57,10 +57,14 @@ struct Counts {
     faults: Vec<String>,
 }
 
-/// Whether a file of this name is there to go on with a run: it may end anywhere, and goes at the
-/// end of the run.
+/// Whether a file of this name grows with a run, so that it may end anywhere.
 fn is_journal(name: &str) -> bool {
-    [".jsonl", ".log"].iter().any(|end| name.ends_with(end)) || name.contains("/chunks/")
+    [".jsonl", ".log"].iter().any(|end| name.ends_with(end))
+}
+
+/// Whether a file of this name is kept to go on with a run, and goes at its end.
+fn is_to_go_on(name: &str) -> bool {
+    is_journal(name) || name.contains("/chunks/")
 }
 
 /// Whether a file of this name holds times, so that its bytes differ from run to run.
@@ -118,8 +122,10 @@ fn check(of: &Writing, shares: &[f64]) -> Option<Counts> {
         for (name, bytes) in left.iter().filter(|(name, _)| !name.ends_with('/')) {
             let is_as_before = before.get(name) == Some(bytes);
             let is_whole = whole.get(name) == Some(bytes) || (holds_times(name) && ends_as(Path::new(name), bytes));
-            if !whole.contains_key(name) && !is_journal(name) {
-                counts.faults.push(format!("{case}: {name} is left ({})", ended.told));
+            if !whole.contains_key(name) {
+                if !is_to_go_on(name) {
+                    counts.faults.push(format!("{case}: {name} is left ({})", ended.told));
+                }
             } else if !is_as_before && !is_whole && !is_journal(name) {
                 counts.faults.push(format!("{case}: {name} is broken ({})", ended.told));
             }

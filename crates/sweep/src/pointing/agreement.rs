@@ -31,8 +31,9 @@ const REACH: i32 = 6;
 /// Least correlation. A patch of 15 × 15 pixels of texture as strong as the noise has 0.4 to 0.5,
 /// and chance likenesses among these many places reach 0.3.
 const LIKENESS_MIN: f32 = 0.3;
-/// Surroundings over which mean and contrast are made even, standard deviation in pixels. Of 2 to 5
-/// pixels to each side of a square, 3 left the least; this has the same deviation.
+/// Surroundings over which mean and contrast are made even, standard deviation in pixels. Of
+/// squares that reach 2, 3 and 5 pixels to each side, 3 left the least; this has the same
+/// deviation.
 const EVEN_PX: f32 = 2.0;
 /// Largest distance of the search back from the patch, pixels.
 const RETURN_PX: f64 = 1.0;
