@@ -121,7 +121,9 @@ fn check(of: &Writing, shares: &[f64]) -> Option<Counts> {
         }
         for (name, bytes) in left.iter().filter(|(name, _)| !name.ends_with('/')) {
             let is_as_before = before.get(name) == Some(bytes);
-            let is_whole = whole.get(name) == Some(bytes) || (holds_times(name) && ends_as(Path::new(name), bytes));
+            let is_whole = whole.get(name).is_some_and(|expected| {
+                expected == bytes || (holds_times(name) && ends_as(Path::new(name), bytes, expected))
+            });
             if !whole.contains_key(name) {
                 if !is_to_go_on(name) {
                     counts.faults.push(format!("{case}: {name} is left ({})", ended.told));

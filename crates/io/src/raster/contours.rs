@@ -10,7 +10,9 @@ use gdal::DriverManager;
 use gdal::cpl::CslStringList;
 use gdal::errors::GdalError;
 use gdal::spatial_ref::SpatialRef;
+use gdal::vector::sql::Dialect;
 use gdal::vector::{LayerAccess, LayerOptions, OGRFieldType};
+use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
 use raster::{GeoTransform, Grid, NO_DATA};
 
 use super::band::{Band, BandData, in_memory};
@@ -53,13 +55,43 @@ pub fn write_contours(path: &Path, surface: &ContourSurface<'_>, overwrite: bool
             memory.set_geo_transform(&surface.geotransform.0)?;
             draw(&memory, surface, made)
         })
+        .and_then(|drawn| verify(made, drawn).map(|()| drawn))
         .map_err(|reason| RasterError::unwritable(path, reason))?;
         Ok::<(), RasterError>(())
     })?;
     Ok(lines)
 }
 
-fn draw(memory: &gdal::Dataset, surface: &ContourSurface<'_>, made: &Path) -> Result<u64, GdalError> {
+/// Checks that the file holds so many lines and that SQLite finds it whole.
+///
+/// GDAL before 3.7 reports nothing when closing a file fails, and SQLite writes most of it then: on
+/// a full disk a file without the lines, or even without the layer, is left.
+fn verify(made: &Path, lines: u64) -> Result<(), String> {
+    let broken = |what: &str| format!("the written lines read back broken ({what}); check that the disk is not full");
+    let options = DatasetOptions {
+        open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_READONLY,
+        allowed_drivers: Some(&["GPKG"]),
+        ..DatasetOptions::default()
+    };
+    let checked = with_gdal(|| {
+        let file = Dataset::open_ex(made, options)?;
+        let found = file.layer_by_name(LAYER)?.feature_count();
+        let mut state = file.execute_sql("PRAGMA integrity_check", None, Dialect::DEFAULT)?;
+        let state = match state.as_mut().and_then(|rows| rows.features().next()) {
+            Some(row) => row.field_as_string(0)?,
+            None => None,
+        };
+        Ok((found, state))
+    });
+    match checked {
+        Ok((found, Some(state))) if found == lines && state == "ok" => Ok(()),
+        Ok((found, _)) if found != lines => Err(broken(&format!("{found} of {lines} lines"))),
+        Ok((_, state)) => Err(broken(&state.unwrap_or_else(|| "it cannot be checked".to_owned()))),
+        Err(reason) => Err(broken(&reason)),
+    }
+}
+
+fn draw(memory: &Dataset, surface: &ContourSurface<'_>, made: &Path) -> Result<u64, GdalError> {
     register_geopackage();
     let driver = DriverManager::get_driver_by_name("GPKG")?;
     let mut file = driver.create_vector_only(made)?;
@@ -82,7 +114,10 @@ fn draw(memory: &gdal::Dataset, surface: &ContourSurface<'_>, made: &Path) -> Re
         gdal_sys::GDALContourGenerateEx(band.c_rasterband(), layer.c_layer().cast(), options.as_ptr(), None, null_mut())
     };
     // SAFETY: as for the start of the transaction.
-    unsafe { gdal_sys::OGR_L_CommitTransaction(layer.c_layer()) };
+    let committed = unsafe { gdal_sys::OGR_L_CommitTransaction(layer.c_layer()) };
+    if committed != gdal_sys::OGRErr::OGRERR_NONE {
+        return Err(GdalError::OgrError { err: committed, method_name: "OGR_L_CommitTransaction" });
+    }
     if result != gdal_sys::CPLErr::CE_None {
         return Err(GdalError::BadArgument("no contour lines can be drawn".to_owned()));
     }
@@ -106,11 +141,8 @@ mod tests {
         let crs = Crs { horizontal: 32631, vertical: VerticalDatum::Egm96 };
         let surface = ContourSurface { heights: &heights, geotransform, crs, interval: 10.0 };
         let lines = write_contours(&path, &surface, false).unwrap();
-        let file = gdal::Dataset::open_ex(
-            &path,
-            gdal::DatasetOptions { open_flags: gdal::GdalOpenFlags::GDAL_OF_VECTOR, ..Default::default() },
-        )
-        .unwrap();
+        let open_flags = GdalOpenFlags::GDAL_OF_VECTOR;
+        let file = Dataset::open_ex(&path, DatasetOptions { open_flags, ..Default::default() }).unwrap();
         let mut layer = file.layer(0).unwrap();
         let found = crs::CrsIdentity::of(&layer.spatial_ref().unwrap().to_wkt().unwrap()).unwrap();
         assert_eq!((found.horizontal, found.vertical), (Some(32631), Some(VerticalDatum::Egm96)));
@@ -132,5 +164,24 @@ mod tests {
         levels.sort_by(f64::total_cmp);
         levels.dedup();
         assert!(levels.ends_with(&[10.0, 20.0, 30.0, 40.0, 50.0]), "{levels:?}");
+    }
+
+    #[test]
+    fn a_file_that_was_cut_short_is_not_taken_for_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("contours.gpkg");
+        let heights = Grid::from_vec(64, 64, (0..64 * 64).map(|i| (i % 64) as f32).collect()).unwrap();
+        let geotransform = GeoTransform::north_up(500_000.0, 4_000_000.0, 1.0);
+        let crs = Crs { horizontal: 32631, vertical: VerticalDatum::Ellipsoid };
+        let surface = ContourSurface { heights: &heights, geotransform, crs, interval: 1.0 };
+        let lines = write_contours(&path, &surface, false).unwrap();
+        verify(&path, lines).unwrap();
+        assert!(verify(&path, lines + 1).unwrap_err().contains("lines"));
+        let whole = std::fs::read(&path).unwrap();
+        for pages in [1, 3, whole.len() / 4096 - 1] {
+            std::fs::write(&path, &whole[..4096 * pages]).unwrap();
+            let reason = verify(&path, lines).unwrap_err();
+            assert!(reason.contains("read back broken"), "{pages} pages: {reason}");
+        }
     }
 }

@@ -7,6 +7,9 @@
 //! their height trajectories, which drifts slowly over the image, while shadows are moved by as
 //! much as their objects are high. The largest set that agrees is found by the mode of the errors
 //! and a plane with Tukey's weights (Beaton and Tukey 1974) that starts there.
+//!
+//! A quarter of the lattice is searched first. Where the corners agree with it, shadows have not
+//! moved them, and the rest is not needed.
 
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -120,36 +123,47 @@ pub fn agreement(
     };
     let known: Vec<Sight> = ties.iter().filter_map(|tie| sight(on_scale(tie))).collect();
     let usual_px = upper_median(&mut known.iter().map(|sight| sight.across_px).collect::<Vec<f64>>())?;
-    let patches = pair.lattice(&known, range_m, config);
+    let [first, rest] = pair.lattice(&known, range_m, config);
     let kept = scaled.skipped == (0, 0);
     let even = [(pair.reference, even[0]), (pair.source, even[1])].map(|(view, even)| {
         if kept { Cow::Borrowed(even.0.get_or_init(|| evened(view))) } else { Cow::Owned(evened(view)) }
     });
     let pair = Pair { reference: &even[0], source: &even[1] };
-    let found: Vec<Sight> = patches
-        .par_iter()
-        .filter_map(|&at| {
-            let height_m = height_near(&known, at)?;
-            pair.patch(at, height_m, usual_px, config)
-        })
-        .collect();
-    if found.len() < PATCHES_MIN {
-        return None;
-    }
-    let plane = Plane::of_most(&found)?;
-    let agrees = |sight: &&Sight| plane.holds(sight);
-    if AGREE_ONE_IN * found.iter().filter(agrees).count() < found.len() {
-        return None;
-    }
+    let searched = |places: &[[f64; 2]]| {
+        let patch = |&at: &[f64; 2]| pair.patch(at, height_near(&known, at)?, usual_px, config);
+        places.par_iter().filter_map(patch).collect::<Vec<Sight>>()
+    };
+    let holds_ties =
+        |plane: &Plane| count_held(plane, &known) as f64 >= CORNERS_AGREE * known.len() as f64;
+    let mut found = searched(&first);
+    let plane = match plane_of_agreement(&found).filter(holds_ties) {
+        Some(plane) => plane,
+        None => {
+            found.extend(searched(&rest));
+            plane_of_agreement(&found)?
+        }
+    };
     let full = |sight: &Sight| Tie {
         reference: moved(sight.tie.reference, skip_reference, level0_from_level),
         source: moved(sight.tie.source, skip_source, level0_from_level),
         ..sight.tie
     };
-    let agreeing = |sights: &[Sight]| sights.iter().filter(agrees).map(full).collect::<Vec<Tie>>();
-    let (ties, patches) = (agreeing(&known), agreeing(&found));
-    let holds_ties = ties.len() as f64 >= CORNERS_AGREE * known.len() as f64;
-    Some(Agreement { ties, patches, holds_ties })
+    let agreeing = |sights: &[Sight]| sights.iter().filter(|s| plane.holds(s)).map(full).collect::<Vec<Tie>>();
+    Some(Agreement { ties: agreeing(&known), patches: agreeing(&found), holds_ties: holds_ties(&plane) })
+}
+
+/// Returns the plane on which most patches lie; `None` where there are few, or most are chance
+/// likenesses.
+fn plane_of_agreement(patches: &[Sight]) -> Option<Plane> {
+    if patches.len() < PATCHES_MIN {
+        return None;
+    }
+    Plane::of_most(patches).filter(|plane| AGREE_ONE_IN * count_held(plane, patches) >= patches.len())
+}
+
+/// Returns how many errors lie on a plane.
+fn count_held(plane: &Plane, sights: &[Sight]) -> usize {
+    sights.iter().filter(|sight| plane.holds(sight)).count()
 }
 
 /// Returns the finest level of a view with one mean and one contrast everywhere.
@@ -186,18 +200,23 @@ fn height_near(known: &[Sight], at: [f64; 2]) -> Option<f64> {
 }
 
 impl Pair<'_> {
-    /// Returns the centres of a lattice of patches over what the source sees of the reference.
-    fn lattice(&self, known: &[Sight], range_m: (f64, f64), config: &TieConfig) -> Vec<[f64; 2]> {
+    /// Returns the centres of a lattice of patches over what the source sees of the reference: every
+    /// second one in both directions, and the rest.
+    fn lattice(&self, known: &[Sight], range_m: (f64, f64), config: &TieConfig) -> [Vec<[f64; 2]>; 2] {
         let heights = || known.iter().map(|sight| sight.height_m);
         let (low, high) = (heights().fold(range_m.1, f64::min), heights().fold(range_m.0, f64::max));
-        let Some(part) = shared_window(self, (low, high.max(low)), config.band_px) else { return Vec::new() };
+        let Some(part) = shared_window(self, (low, high.max(low)), config.band_px) else {
+            return [Vec::new(), Vec::new()];
+        };
         let wanted = (PATCHES_PER_CORNER * config.points) as f64;
         let step = ((part.width * part.height) as f64 / wanted).sqrt().max(f64::from(config.radius));
         let places = |from: i64, length: usize| {
             let count = (length as f64 / step) as usize;
-            (0..count).map(move |i| (from as f64 + (i as f64 + 0.5) * step).round())
+            (0..count).map(move |i| (i % 2, (from as f64 + (i as f64 + 0.5) * step).round()))
         };
-        places(part.y, part.height).flat_map(|y| places(part.x, part.width).map(move |x| [x, y])).collect()
+        let all = places(part.y, part.height).flat_map(|y| places(part.x, part.width).map(move |x| [x, y]));
+        let (first, rest): (Vec<_>, Vec<_>) = all.partition(|[(column, _), (row, _)]| (*column, *row) == (0, 0));
+        [first, rest].map(|places| places.into_iter().map(|at| at.map(|(_, place)| place)).collect())
     }
 
     /// Searches for the patch around a place near where it is expected, and back.
@@ -256,7 +275,7 @@ impl Plane {
         let counts_px = (COUNTS_LAST_PX * wider).clamp(COUNTS_LAST_PX, COUNTS_MOST_PX);
         let start = Self { centre, half, terms: Vector3::new(mode(sights)?, 0.0, 0.0), counts_px };
         let (constant, plane) = (start.settled(sights, false)?, start.settled(sights, true)?);
-        let held = |plane: &Self| sights.iter().filter(|sight| plane.holds(sight)).count() as f64;
+        let held = |plane: &Self| count_held(plane, sights) as f64;
         Some(if held(&plane) > PLANE_TIMES * held(&constant) { plane } else { constant })
     }
 

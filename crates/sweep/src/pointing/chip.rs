@@ -15,7 +15,7 @@ use raster::{Grid, bicubic_along, level_from_level0, level0_from_level, reduce};
 
 use super::chip_fit::{Chip, ChipSearch, fit};
 use super::moments::remove_mean;
-use super::patch::{Patch, padded};
+use super::patch::{NO_PIXELS, Patch, padded};
 
 /// How a chip is searched for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,8 +160,6 @@ fn find(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<
 const SCALES: std::ops::RangeInclusive<f64> = 1e-2..=1e2;
 /// Most times that an image is halved. A chip with still larger pixels tells no place.
 const HALVED_MAX: u32 = 4;
-/// Correlation of a place without valid pixels.
-const NO_PIXELS: f32 = -1.0;
 
 /// Returns how far a chip reaches around its point on all sides, with a margin for resampling.
 fn half_width(chip: Chip<'_>) -> Option<usize> {
@@ -184,8 +182,8 @@ fn correlations(own: &Patch, radius: i32, search: &ChipSearch<'_>, centre: [f64;
         bicubic_along(search.image, line, [a, c], &mut picture.row_mut(j)[..whole]);
     }
     remove_mean(picture.data_mut());
-    let score = |k: usize| own.correlation_at(&picture, (k % side, k / side), 0.0).unwrap_or(NO_PIXELS);
-    ((0..side * side).map(score).collect(), side)
+    let scores = own.correlations(picture, 0.0);
+    ((0..side * side).map(|k| scores[(k % side, k / side)]).collect(), side)
 }
 
 #[cfg(test)]

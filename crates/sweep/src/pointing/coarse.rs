@@ -5,7 +5,7 @@
 
 use raster::{Grid, Window, bicubic_along};
 
-use super::moments::{patch_moments, remove_mean};
+use super::moments::{inverse_deviations, remove_mean};
 use super::pair::{Pair, TieConfig};
 use super::patch::{Patch, padded};
 use crate::geometry::{LocalMap, PixelBox};
@@ -45,7 +45,7 @@ impl Coarse {
         let side = 2 * config.radius as usize + 1;
         let (origin, mut picture) = lay_over(source, &map, padded(side) - side)?;
         remove_mean(picture.data_mut());
-        let inverse_deviation = deviations(&picture, side, pair.source.noise_at(level));
+        let inverse_deviation = inverse_deviations(&picture, side, pair.source.noise_at(level), QUANTISATION_VARIANCE);
         picture.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
         Some(Self { map, origin, picture, inverse_deviation, places })
     }
@@ -124,19 +124,4 @@ fn lay_over(source: &Grid<f32>, map: &LocalMap, more: usize) -> Option<([i64; 2]
         bicubic_along(source, from, [next[0] - from[0], next[1] - from[1]], &mut out.row_mut(y)[..columns]);
     }
     Some((origin, out))
-}
-
-/// Computes `1 / deviation` of every whole patch of the picture; NaN where it is invalid or no
-/// stronger than the noise.
-fn deviations(picture: &Grid<f32>, side: usize, noise: f32) -> Grid<f32> {
-    if picture.width() < side || picture.height() < side {
-        return Grid::filled(0, 0, f32::NAN);
-    }
-    let (w, h) = (picture.width() + 1 - side, picture.height() + 1 - side);
-    let mut mean = vec![0.0; w * h];
-    let mut out = Grid::filled(w, h, f32::NAN);
-    let mut line = vec![0.0; 2 * picture.width()];
-    patch_moments(picture.data(), picture.width(), side, QUANTISATION_VARIANCE, &mut line, &mut mean, out.data_mut());
-    out.data_mut().iter_mut().filter(|v| **v * noise >= 1.0).for_each(|v| *v = f32::NAN);
-    out
 }

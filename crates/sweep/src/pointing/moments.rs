@@ -2,6 +2,7 @@
 //! patch that touches one.
 
 use multiversion::multiversion;
+use raster::Grid;
 
 /// Subtracts the mean of the valid values, which keeps f32 sums of squares well conditioned.
 pub(crate) fn remove_mean(v: &mut [f32]) {
@@ -69,4 +70,19 @@ pub(crate) fn patch_moments(
             s[x] = 1.0 / variance.sqrt() + 0.0 * m[x];
         }
     }
+}
+
+/// Computes `1 / deviation` of every whole `side × side` patch of a picture, `floor` added to the
+/// variance; NaN where the patch is invalid or no stronger than the noise.
+pub(crate) fn inverse_deviations(picture: &Grid<f32>, side: usize, noise: f32, floor: f32) -> Grid<f32> {
+    if picture.width() < side || picture.height() < side {
+        return Grid::filled(0, 0, f32::NAN);
+    }
+    let (w, h) = (picture.width() + 1 - side, picture.height() + 1 - side);
+    let mut mean = vec![0.0; w * h];
+    let mut out = Grid::filled(w, h, f32::NAN);
+    let mut line = vec![0.0; 2 * picture.width()];
+    patch_moments(picture.data(), picture.width(), side, floor, &mut line, &mut mean, out.data_mut());
+    out.data_mut().iter_mut().filter(|v| **v * noise >= 1.0 || v.is_infinite()).for_each(|v| *v = f32::NAN);
+    out
 }

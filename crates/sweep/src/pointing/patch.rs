@@ -4,8 +4,12 @@
 use multiversion::multiversion;
 use raster::{Grid, bicubic_along};
 
+use super::moments::inverse_deviations;
+
 /// Values that are worked on together. Rows of patches are padded to multiples of it.
 const LANES: usize = 16;
+/// Correlation with a part of a picture that has no valid pixels or no texture.
+pub(crate) const NO_PIXELS: f32 = -1.0;
 
 /// A zero-mean, unit-norm patch of `2 · radius + 1` pixels.
 pub(crate) struct Patch {
@@ -49,14 +53,24 @@ impl Patch {
         product(&self.values, padded(self.side), picture, at)
     }
 
-    /// Returns the zero-mean normalised cross-correlation with the part of a picture that begins at
-    /// `(x, y)`; `None` if that part holds invalid pixels or is flatter than the noise. The picture
-    /// must have a mean near 0 and [`padded`] columns from there on.
-    pub(crate) fn correlation_at(&self, picture: &Grid<f32>, at: (usize, usize), noise: f32) -> Option<f32> {
-        let [sum, square, product] = moments(&self.values, self.side, picture, at);
-        let n = (self.side * self.side) as f32;
-        let spread = square - sum * sum / n;
-        (spread > n * noise * noise).then(|| product / spread.sqrt())
+    /// Returns the zero-mean normalised cross-correlation with every part of a picture;
+    /// [`NO_PIXELS`] where a part holds invalid pixels or is flatter than the noise. The picture
+    /// must have a mean near 0. A part without [`padded`] columns from its first one counts as
+    /// invalid.
+    pub(crate) fn correlations(&self, mut picture: Grid<f32>, noise: f32) -> Grid<f32> {
+        let mut scores = inverse_deviations(&picture, self.side, noise, 0.0);
+        picture.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
+        let columns = (picture.width() + 1).saturating_sub(padded(self.side));
+        for y in 0..scores.height() {
+            for (x, score) in scores.row_mut(y).iter_mut().enumerate() {
+                *score = if x < columns && !score.is_nan() {
+                    *score * self.product_at(&picture, (x, y)) / self.side as f32
+                } else {
+                    NO_PIXELS
+                };
+            }
+        }
+        scores
     }
 }
 
@@ -69,25 +83,6 @@ fn product(values: &[f32], stride: usize, picture: &Grid<f32>, at: (usize, usize
         }
     }
     sums.iter().sum()
-}
-
-/// Returns the sums of the picture's values, of their squares, and of their products with a patch
-/// of `side` columns.
-#[multiversion(targets("x86_64+avx2"))]
-fn moments(values: &[f32], side: usize, picture: &Grid<f32>, at: (usize, usize)) -> [f32; 3] {
-    let (mut sum, mut square, mut product) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
-    for (own, other) in rows(values, padded(side), picture, at) {
-        for (k, (a, b)) in own.iter().zip(other).enumerate() {
-            for i in 0..LANES {
-                // Values behind the patch do not count, NaN included.
-                let b = if k * LANES + i < side { b[i] } else { 0.0 };
-                sum[i] += b;
-                square[i] += b * b;
-                product[i] += a[i] * b;
-            }
-        }
-    }
-    [sum, square, product].map(|lanes| lanes.iter().sum())
 }
 
 type Lanes = [f32; LANES];
@@ -136,16 +131,18 @@ mod tests {
         };
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let a = window(&image, 8, 5);
+        let scores = patch.correlations(other.clone(), 0.1);
         for at in [(6, 4), (0, 0), (18, 3), (3, 14)] {
             let b = window(&other, at.0, at.1);
             let expected = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
-            let found = patch.correlation_at(&other, at, 0.1).unwrap();
+            let found = scores[at];
             assert!((f64::from(found) - expected).abs() < 1e-4, "{found} {expected} at {at:?}");
             let product = f64::from(patch.product_at(&other, at)) / dot(&b, &b).sqrt();
             assert!(at == (18, 3) || (product - expected).abs() < 1e-4, "{product} {expected} at {at:?}");
         }
-        assert_eq!(patch.correlation_at(&other, (19, 0), 0.1), None);
-        assert!(patch.correlation_at(&image, (8, 5), 0.1).unwrap() > 0.9999);
+        assert_eq!(scores[(19, 0)], NO_PIXELS);
+        assert!(patch.correlations(image.clone(), 0.1)[(8, 5)] > 0.9999);
+        assert!(patch.correlations(image.map(|_| 0.0), 0.0).data().iter().all(|score| *score == NO_PIXELS));
         assert!(
             Patch::around(&other, [30.0, 6.0], 7, 0.1).is_none() && Patch::around(&image, [3.0, 9.0], 7, 0.1).is_none()
         );

@@ -16,7 +16,7 @@ use super::coarse::Coarse;
 use super::interest::corners;
 use super::moments::remove_mean;
 use super::pair::{Pair, Tie, TieConfig};
-use super::patch::{Patch, padded, parabola_peak};
+use super::patch::{NO_PIXELS, Patch, padded, parabola_peak};
 use crate::geometry::source_column_row;
 use crate::view::SweepView;
 
@@ -24,8 +24,6 @@ use crate::view::SweepView;
 const SMALLER: usize = 2;
 /// Distance within which a match is refined on each level, pixels of the level.
 const REACH: i32 = 2;
-/// Largest distance that can be searched at once, pixels.
-const REACH_MAX: usize = 6;
 /// Largest distance of the search back from the corner, pixels.
 const RETURN_PX: f64 = 1.0;
 
@@ -247,7 +245,7 @@ impl Pair<'_> {
     }
 
     /// Finds the offset of best correlation within `reach` pixels of `start`, to a fraction of a
-    /// pixel, and the correlation. The reach is at most [`REACH_MAX`].
+    /// pixel, and the correlation.
     ///
     /// `at` is a position on the level in the reference; offsets are source pixels from its
     /// projection at `height_m`. The source is resampled once in the frame of the reference, so
@@ -260,7 +258,6 @@ impl Pair<'_> {
         (start, reach_px): ([f64; 2], i32),
         config: &TieConfig,
     ) -> Option<([f64; 2], f32)> {
-        const SIDE_MAX: usize = 2 * REACH_MAX + 1;
         let places = 2 * reach_px as usize + 1;
         let own = Patch::around(&self.reference.levels[level], at, config.radius, self.reference.noise_at(level))?;
         let frame = LocalFrame::at(&self.reference.camera, &self.source.camera, level, at, height_m).ok()?;
@@ -274,15 +271,11 @@ impl Pair<'_> {
             bicubic_along(&self.source.levels[level], line, frame.column_step(), &mut picture.row_mut(j)[..whole]);
         }
         remove_mean(picture.data_mut());
-        let noise = self.source.noise_at(level);
-        let mut scores = [[-1.0f32; SIDE_MAX]; SIDE_MAX];
-        let mut best = (-1.0f32, 0usize, 0usize);
-        for (j, row) in scores[..places].iter_mut().enumerate() {
-            for (i, score) in row[..places].iter_mut().enumerate() {
-                *score = own.correlation_at(&picture, (i, j), noise).unwrap_or(-1.0);
-                if *score > best.0 {
-                    best = (*score, i, j);
-                }
+        let scores = own.correlations(picture, self.source.noise_at(level));
+        let mut best = (NO_PIXELS, 0usize, 0usize);
+        for (j, i) in (0..places).flat_map(|j| (0..places).map(move |i| (j, i))) {
+            if scores[(i, j)] > best.0 {
+                best = (scores[(i, j)], i, j);
             }
         }
         let (score, i, j) = best;
@@ -290,8 +283,8 @@ impl Pair<'_> {
         if !(1..places - 1).contains(&i) || !(1..places - 1).contains(&j) {
             return None;
         }
-        let dx = parabola_peak(scores[j][i - 1], score, scores[j][i + 1]);
-        let dy = parabola_peak(scores[j - 1][i], score, scores[j + 1][i]);
+        let dx = parabola_peak(scores[(i - 1, j)], score, scores[(i + 1, j)]);
+        let dy = parabola_peak(scores[(i, j - 1)], score, scores[(i, j + 1)]);
         let steps = |i: usize, d: f64| f64::from(i as i32 - reach_px) + d;
         Some((frame.moved(start, steps(i, dx), steps(j, dy)), score))
     }
