@@ -17,7 +17,7 @@ use crate::{HOLD_TIMES, ends_as};
 /// One command in this many is tried with every test run, on the size of half of its results.
 const ONE_IN: usize = 6;
 /// What tells that a disk is full. The report of a batch holds the reasons of its tasks.
-const CAUSES: [&str; 3] = ["space", "disk is not full", "the report names the reasons"];
+const CAUSES: [&str; 4] = ["space", "disk is not full", "disk is full", "the report names the reasons"];
 /// Bytes that a file system gives to a file at a time.
 const PAGE: u64 = 4096;
 

@@ -22,8 +22,8 @@ const REMOTE_SCHEMES: [&str; 8] = ["http", "https", "ftp", "ftps", "s3", "gs", "
 
 /// GDAL's cache of decoded blocks, megabytes; GDAL's default is a share of the machine's memory.
 const CACHE_MB: &str = "128";
-/// Messages kept per call; further ones only repeat the cause.
-const MESSAGES_MAX: usize = 8;
+/// Messages kept per call: the cause, and what came of it. Further ones are other consequences.
+const MESSAGES_MAX: usize = 2;
 
 /// TIFFs that the error about a folder names.
 const NAMED_TIFFS: usize = 8;

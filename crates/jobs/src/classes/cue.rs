@@ -8,7 +8,7 @@ use numeric::upper_median;
 use raster::Grid;
 
 use super::error::ClassesError;
-use crate::dsm::rasters::OBSERVED;
+use crate::dsm::OBSERVED;
 use crate::eval::EvalJobError;
 use crate::eval::on_reference::surface_on_reference;
 use crate::files::FileError;

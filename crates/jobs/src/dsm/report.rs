@@ -8,8 +8,8 @@ use numeric::Choice;
 use serde::{Deserialize, Serialize};
 use sweep::pointing::{Adjustment, ModelOrder};
 
+use crate::dsm::planning::view_geometry::PairGeometry;
 use crate::dsm::values::{HeightRange, MapBounds, null_is_nan};
-use crate::dsm::view_geometry::PairGeometry;
 
 /// The report of a DSM run, written as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

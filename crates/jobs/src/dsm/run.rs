@@ -2,18 +2,18 @@
 
 use numeric::Progress;
 
-use crate::dsm::chunk::run_chunk;
+use crate::dsm::chunks::chunk::run_chunk;
+use crate::dsm::chunks::merge::{Merger, Product};
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
-use crate::dsm::input_stamps::InputStamps;
-use crate::dsm::merge::{Merger, Product};
-use crate::dsm::open::open;
-use crate::dsm::output::DsmFolder;
-use crate::dsm::plan::{Plan, plan};
-use crate::dsm::point::point;
-use crate::dsm::register::register;
+use crate::dsm::georeferencing::register::register;
+use crate::dsm::images::input_stamps::InputStamps;
+use crate::dsm::images::open::open;
+use crate::dsm::planning::plan::{Plan, plan};
+use crate::dsm::pointing::point::point;
 use crate::dsm::report::DsmReport;
 use crate::dsm::session::Session;
+use crate::dsm::writing::output::DsmFolder;
 use crate::products;
 use crate::threads;
 

@@ -10,8 +10,8 @@ use std::time::Instant;
 use numeric::{Choice, Progress};
 use sweep::SweepView;
 
-use crate::dsm::city_prior::CityPrior;
 use crate::dsm::error::DsmError;
+use crate::dsm::prior::city_prior::CityPrior;
 use crate::dsm::report::StageTime;
 
 /// The watcher of a run, a cache of what was read, and the times of the stages.

@@ -133,8 +133,7 @@ pub fn agreement(
         let patch = |&at: &[f64; 2]| pair.patch(at, height_near(&known, at)?, usual_px, config);
         places.par_iter().filter_map(patch).collect::<Vec<Sight>>()
     };
-    let holds_ties =
-        |plane: &Plane| count_held(plane, &known) as f64 >= CORNERS_AGREE * known.len() as f64;
+    let holds_ties = |plane: &Plane| count_held(plane, &known) as f64 >= CORNERS_AGREE * known.len() as f64;
     let mut found = searched(&first);
     let plane = match plane_of_agreement(&found).filter(holds_ties) {
         Some(plane) => plane,

@@ -1,0 +1,6 @@
+//! The files of a run: rasters, pictures and report.
+
+pub(super) mod output;
+pub(super) mod page;
+pub(super) mod pictures;
+pub(super) mod report_text;
