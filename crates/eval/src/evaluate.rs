@@ -1,22 +1,22 @@
 //! Evaluation of one surface against another: alignment, then errors over all cells, per class, per
 //! slope and at edges, and the objects above the terrain.
 
-use crate::align::{AlignmentMethod, MetresFromCells, Shift};
-use crate::breakdown::{Cells, ClassMetrics, CoverageMetrics, EdgeMetrics, SlopeMetrics};
-use crate::calibration::{Reliability, SigmaReport, reliability, sigma_report};
-use crate::cell_map::CellMap;
-use crate::edges::{EdgeRule, edge_zone};
+use crate::alignment::align::{AlignmentMethod, MetresFromCells, Shift};
+use crate::alignment::cell_map::CellMap;
+use crate::alignment::nuth_kaab::{NuthKaab, NuthKaabSummary};
+use crate::alignment::resample::{bilinear, nearest};
+use crate::alignment::search::{Search, SearchSummary};
 use crate::error::EvalError;
-use crate::gradient::slope_deg;
-use crate::metrics::Metrics;
-use crate::nuth_kaab::{NuthKaab, NuthKaabSummary};
-use crate::objects::{Objects, ObjectsFound};
-use crate::origin::{CellOrigin, OriginSplit, split};
-use crate::resample::{bilinear, nearest};
-use crate::search::{Search, SearchSummary};
-use crate::sharpness::{Sharpness, sharpness};
-use crate::standing::{Standing, standing};
-use crate::terrain::{TerrainSource, estimated_terrain, terrain_from_ground};
+use crate::measures::breakdown::{Cells, ClassMetrics, CoverageMetrics, EdgeMetrics, SlopeMetrics};
+use crate::measures::calibration::{Reliability, SigmaReport, reliability, sigma_report};
+use crate::measures::edges::{EdgeRule, edge_zone};
+use crate::measures::gradient::slope_deg;
+use crate::measures::metrics::Metrics;
+use crate::measures::objects::{Objects, ObjectsFound};
+use crate::measures::origin::{CellOrigin, OriginSplit, split};
+use crate::measures::sharpness::{Sharpness, sharpness};
+use crate::measures::standing::{Standing, standing};
+use crate::measures::terrain::{TerrainSource, estimated_terrain, terrain_from_ground};
 use numeric::percentile;
 use raster::Grid;
 use rayon::prelude::*;

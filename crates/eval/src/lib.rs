@@ -15,60 +15,40 @@
 //! (x along the map's x axis, y along its y axis, z upwards). This crate reads no file and prints
 //! nothing.
 
-mod align;
-mod breakdown;
-mod calibration;
-mod cell_map;
-mod distance;
-mod distribution;
-mod edges;
+mod alignment;
 mod error;
 mod evaluate;
-mod gradient;
 mod maps;
-mod metrics;
-mod nuth_kaab;
-mod objects;
-mod opening;
-mod origin;
-mod registration;
-mod resample;
-mod search;
-mod sharpness;
-mod smooth;
-mod standing;
-mod statistics;
+mod measures;
 mod surface;
-mod terrain;
-mod transpose;
 mod vertical;
 
-pub use align::{AlignmentMethod, MetresFromCells, Shift};
-pub use breakdown::{COVERAGES, ClassMetrics, CoverageMetrics, EdgeMetrics, SLOPE_BOUNDS_DEG, SlopeMetrics};
-pub use calibration::{Reliability, ReliabilityRow, SigmaCalibration, SigmaReport};
-pub use cell_map::CellMap;
-pub use distribution::{Cumulative, Histogram, cumulative, histogram, round_up};
-pub use edges::{EdgeRule, JUMP_M, JUMP_STEEPNESS, ZONE_CELLS, ZONE_M, edge_zone};
+pub use alignment::align::{AlignmentMethod, MetresFromCells, Shift};
+pub use alignment::cell_map::CellMap;
+pub use alignment::nuth_kaab::NuthKaabSummary;
+pub use alignment::registration::{Registration, register_surfaces};
+pub use alignment::resample::{bilinear, nearest};
+pub use alignment::search::SearchSummary;
 pub use error::EvalError;
 pub use evaluate::{EvalConfig, EvalInput, Evaluation, evaluate};
-pub use gradient::slope_deg;
 pub use maps::{
     AngleErrors, DepthComparison, DepthErrors, MapSizeError, MaskComparison, NormalComparison, PixelCounts,
     compare_depths, compare_masks, compare_normals,
 };
-pub use metrics::Metrics;
-pub use nuth_kaab::NuthKaabSummary;
-pub use objects::{DamagedBuilding, ObjectsFound};
-pub use origin::{CellOrigin, OriginMetrics, OriginSplit};
-pub use registration::{Registration, register_surfaces};
-pub use resample::{bilinear, nearest};
-pub use search::SearchSummary;
-pub use sharpness::{REACH_M, Sharpness};
-pub use standing::{Overlap, Standing};
-pub use statistics::{ErrorStatistics, OUTLIER_NMADS, RobustStatistics};
+pub use measures::breakdown::{COVERAGES, ClassMetrics, CoverageMetrics, EdgeMetrics, SLOPE_BOUNDS_DEG, SlopeMetrics};
+pub use measures::calibration::{Reliability, ReliabilityRow, SigmaCalibration, SigmaReport};
+pub use measures::distribution::{Cumulative, Histogram, cumulative, histogram, round_up};
+pub use measures::edges::{EdgeRule, JUMP_M, JUMP_STEEPNESS, ZONE_CELLS, ZONE_M, edge_zone};
+pub use measures::gradient::slope_deg;
+pub use measures::metrics::Metrics;
+pub use measures::objects::{DamagedBuilding, ObjectsFound};
+pub use measures::origin::{CellOrigin, OriginMetrics, OriginSplit};
+pub use measures::sharpness::{REACH_M, Sharpness};
+pub use measures::standing::{Overlap, Standing};
+pub use measures::statistics::{ErrorStatistics, OUTLIER_NMADS, RobustStatistics};
+pub use measures::terrain::{TerrainSource, WINDOW_M, estimated_terrain, terrain_from_ground};
 pub use surface::{
     DistanceStatistics, LocalSurface, M3c2, NormalAngle, SurfaceComparison, SurfaceComparisonConfig, SurfaceError,
     ThresholdScore, VoxelOverlap, compare_surfaces,
 };
-pub use terrain::{TerrainSource, WINDOW_M, estimated_terrain, terrain_from_ground};
 pub use vertical::convert_heights;

@@ -7,8 +7,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::random::derived;
-use crate::seasons::SeasonsConfig;
-use crate::sun::Sun;
+use crate::views::seasons::SeasonsConfig;
+use crate::views::sun::Sun;
 
 /// A scene, its views and its sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

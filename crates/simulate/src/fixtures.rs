@@ -3,7 +3,7 @@
 use geodesy::LonLatHeight;
 use nalgebra::Vector3;
 
-use crate::camera_model::Look;
+use crate::views::camera_model::Look;
 
 /// Centre of the scenes.
 pub(crate) const CENTRE: LonLatHeight = LonLatHeight::new(5.4, 43.5, 200.0);

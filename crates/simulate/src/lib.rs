@@ -23,69 +23,40 @@
 //! # Ok::<(), simulate::SimulateError>(())
 //! ```
 
-mod acquisition;
-mod building;
-mod camera_model;
-mod clouds;
 mod config;
-mod crown;
-mod date;
 mod error;
-mod exact_view;
 #[cfg(test)]
 mod fixtures;
-mod flight;
-mod frame;
-mod index;
-#[cfg(test)]
-mod linear;
-mod lod2;
-mod natural_crown;
-mod noise;
 mod parameters;
-mod planting;
 mod preset_names;
 mod presets;
-mod prism;
 mod random;
-mod ray;
-mod render;
-mod scene;
-mod seasons;
-mod sensor;
-mod sight;
 mod simulation;
-mod spectral_image;
-mod spectrum;
-mod streets;
-mod sun;
-mod terrain;
-mod texture;
-mod town;
-mod tree;
+mod surface;
 mod truth;
+mod views;
 
-pub use building::Building;
-pub use camera_model::Look;
 pub use config::{
     AcquisitionConfig, AppearanceConfig, BuildingsConfig, CameraModel, CloudsConfig, CrownForm, GroundCover,
     LookAngles, MultispectralConfig, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig,
     VehiclesConfig,
 };
-pub use date::Date;
 pub use error::SimulateError;
-pub use exact_view::{ExactPart, ExactView};
-pub use flight::{ExactPoint, Flight, FlightPoint};
-pub use frame::SceneFrame;
 pub use preset_names::PRESETS;
-pub use prism::{BuildingBlock, Roof};
-pub use ray::SceneRay;
-pub use scene::{Scene, TREE_NUMBER, TruthClass};
-pub use seasons::{Season, SeasonsConfig};
-pub use sensor::Sensor;
-pub use sight::SightLines;
 pub use simulation::{SceneRecord, SimulatedView, Simulation, ViewRecord};
-pub use spectral_image::{SPECTRAL_BANDS, SpectralBand, SpectralImage};
-pub use sun::Sun;
-pub use terrain::Terrain;
+pub use surface::building::Building;
+pub use surface::frame::SceneFrame;
+pub use surface::prism::{BuildingBlock, Roof};
+pub use surface::ray::SceneRay;
+pub use surface::scene::{Scene, TREE_NUMBER, TruthClass};
+pub use surface::terrain::Terrain;
 pub use truth::{ORTHO_SCALE, Truth};
+pub use views::camera_model::Look;
+pub use views::date::Date;
+pub use views::exact_view::{ExactPart, ExactView};
+pub use views::flight::{ExactPoint, Flight, FlightPoint};
+pub use views::seasons::{Season, SeasonsConfig};
+pub use views::sensor::Sensor;
+pub use views::sight::SightLines;
+pub use views::spectral_image::{SPECTRAL_BANDS, SpectralBand, SpectralImage};
+pub use views::sun::Sun;

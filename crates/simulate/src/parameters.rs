@@ -5,7 +5,7 @@
 
 use crate::config::SimulationConfig;
 use crate::error::SimulateError;
-use crate::sun::Sun;
+use crate::views::sun::Sun;
 
 /// The key of a parameter file that names the preset it starts from.
 const PRESET_KEY: &str = "preset";

@@ -6,8 +6,8 @@ use crate::config::{
     VehiclesConfig,
 };
 use crate::error::SimulateError;
-use crate::seasons::SeasonsConfig;
-use crate::sun::Sun;
+use crate::views::seasons::SeasonsConfig;
+use crate::views::sun::Sun;
 
 impl Default for SimulationConfig {
     /// The preset `town`.

@@ -7,23 +7,23 @@ use camera::{ImageCorrection, Rpc, RpcCamera};
 use raster::Grid;
 use serde::{Deserialize, Serialize};
 
-use crate::acquisition;
-use crate::camera_model::Look;
-use crate::clouds::{self, CLOUD_RADIANCE};
 use crate::config::{SensorConfig, SimulationConfig};
-use crate::date::Date;
 use crate::error::SimulateError;
-use crate::frame::SceneFrame;
 use crate::random::derived;
-use crate::render::{BAND, LitScene};
-use crate::scene::Scene;
-use crate::seasons::SeasonLook;
-use crate::sensor::{PointSpread, Sensor};
-use crate::sight::SightLines;
-use crate::spectral_image::{SpectralCamera, SpectralImage};
-use crate::spectrum::Spectrum;
-use crate::texture::Texture;
+use crate::surface::frame::SceneFrame;
+use crate::surface::scene::Scene;
+use crate::surface::texture::Texture;
 use crate::truth::{self, Truth, Witness};
+use crate::views::acquisition;
+use crate::views::camera_model::Look;
+use crate::views::clouds::{self, CLOUD_RADIANCE};
+use crate::views::date::Date;
+use crate::views::render::{BAND, LitScene};
+use crate::views::seasons::SeasonLook;
+use crate::views::sensor::{PointSpread, Sensor};
+use crate::views::sight::SightLines;
+use crate::views::spectral_image::{SpectralCamera, SpectralImage};
+use crate::views::spectrum::Spectrum;
 use numeric::{Progress, Silent};
 
 /// Width of the scene beyond the area, metres, so that houses and shadows surround its edge too.

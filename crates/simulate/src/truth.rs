@@ -15,11 +15,11 @@ use rayon::prelude::*;
 use crate::SceneRay;
 use crate::config::SimulationConfig;
 use crate::error::SimulateError;
-use crate::frame::SceneFrame;
-use crate::lod2;
-use crate::scene::{Scene, TruthClass};
-use crate::sight::SightLines;
-use crate::texture::Texture;
+use crate::surface::frame::SceneFrame;
+use crate::surface::lod2;
+use crate::surface::scene::{Scene, TruthClass};
+use crate::surface::texture::Texture;
+use crate::views::sight::SightLines;
 
 /// Value of the reflectance 1 in [`Truth::ortho`].
 pub const ORTHO_SCALE: f64 = 10_000.0;
