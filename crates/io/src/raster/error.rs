@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::luma_rule::BandChoice;
+use super::read::luma_rule::BandChoice;
 use crate::atomic::SaveError;
 use crate::stac::StacError;
 

@@ -6,55 +6,31 @@
 //! are read, and addresses only after [`allow_remote`]; nothing that a file names on a network is
 //! fetched. A file appears under its final name when it is complete.
 
-mod acquired;
-mod band;
-mod band_colour;
-mod colour;
-mod contours;
-mod dem;
-mod depth_png;
+mod access;
 mod error;
-mod gdal_access;
-mod gdal_setup;
-mod geotiff;
-mod image_copy;
-mod labels;
-mod luma;
-mod luma_rule;
-mod named_files;
-mod png;
-mod reduced;
-mod source;
-mod spectral;
-mod spool;
-mod tile;
-mod undeclared;
-mod verify;
-mod vertical_unit;
-mod web_file;
-mod web_files;
-mod world_file;
+mod read;
+mod write;
 
-pub use band::{Band, BandData};
-pub use contours::{ContourSurface, write_contours};
-pub use dem::{Dem, read_dem, read_dem_window};
-pub use depth_png::{DepthScale, write_depth_png};
+pub use access::gdal_setup::allow_remote;
 pub use error::RasterError;
-pub use gdal_setup::allow_remote;
-pub use geotiff::{
+pub use read::dem::{Dem, read_dem, read_dem_window};
+pub use read::luma::LumaTile;
+pub use read::luma_rule::{BandChoice, LumaRule};
+pub use read::reduced::BandLabel;
+pub use read::source::{ImageInfo, ImageSource, SampleType};
+pub use read::spectral::{BandSpectrum, IndexBands, write_multispectral_with_rpc};
+pub use write::band::{Band, BandData};
+pub use write::contours::{ContourSurface, write_contours};
+pub use write::depth_png::{DepthScale, write_depth_png};
+pub use write::geotiff::{
     CogCrs, CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map, write_map_with_rpc,
 };
-pub use image_copy::copy_image_with_rpc;
-pub use labels::{Provenance, iso_time};
-pub use luma::LumaTile;
-pub use luma_rule::{BandChoice, LumaRule};
-pub use png::{write_png_gray, write_png_rgb, write_png_rgba};
-pub use reduced::BandLabel;
-pub use source::{ImageInfo, ImageSource, SampleType};
-pub use spectral::{BandSpectrum, IndexBands, write_multispectral_with_rpc};
-pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
-pub use tile::{BandScale, MapTile, write_map_tile};
-pub use world_file::write_world_file;
+pub use write::image_copy::copy_image_with_rpc;
+pub use write::labels::{Provenance, iso_time};
+pub use write::png::{write_png_gray, write_png_rgb, write_png_rgba};
+pub use write::spool::{RasterSpool, SPOOL_TILE, SpoolBand};
+pub use write::tile::{BandScale, MapTile, write_map_tile};
+pub use write::world_file::write_world_file;
 
-pub(crate) use gdal_access::register_geopackage;
-pub(crate) use gdal_setup::{open_address, prepare_gdal, with_gdal};
+pub(crate) use access::gdal_access::register_geopackage;
+pub(crate) use access::gdal_setup::{open_address, prepare_gdal, with_gdal};

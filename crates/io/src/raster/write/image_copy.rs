@@ -6,9 +6,9 @@ use camera::Rpc;
 use gdal::raster::RasterCreationOptions;
 use gdal::{DriverManager, Metadata};
 
-use super::error::RasterError;
-use super::gdal_setup::{open_dataset, with_gdal};
 use super::geotiff::{copy, rpc_items};
+use crate::raster::access::gdal_setup::{open_dataset, with_gdal};
+use crate::raster::error::RasterError;
 
 use crate::atomic::write_path;
 

@@ -12,7 +12,7 @@ use std::ptr::null_mut;
 use super::web_file::WebFile;
 
 /// The prefix of GDAL's names of addresses.
-pub(super) const WEB_FILES: &str = "/vsicurl/";
+pub(in crate::raster) const WEB_FILES: &str = "/vsicurl/";
 
 /// Bytes that GDAL keeps together. Headers and tiles of 256 × 256 values fit in one request.
 const BLOCK: usize = 128 << 10;
@@ -27,7 +27,7 @@ thread_local! {
 }
 
 /// Runs `call` with leave to open one address on this thread.
-pub(super) fn with_leave<T>(address: &str, call: impl FnOnce() -> T) -> T {
+pub(in crate::raster) fn with_leave<T>(address: &str, call: impl FnOnce() -> T) -> T {
     ALLOWED.set(Some(address.to_owned()));
     let result = call();
     ALLOWED.set(None);
@@ -35,7 +35,7 @@ pub(super) fn with_leave<T>(address: &str, call: impl FnOnce() -> T) -> T {
 }
 
 /// Installs the file system.
-pub(super) fn install() {
+pub(in crate::raster) fn install() {
     // GDAL keeps the pointer to the prefix, not a copy.
     let prefix: &'static CStr = c"/vsicurl/";
     // SAFETY: the function takes nothing, and returns a struct of null pointers or null.

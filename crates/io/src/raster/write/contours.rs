@@ -16,10 +16,10 @@ use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
 use raster::{GeoTransform, Grid, NO_DATA};
 
 use super::band::{Band, BandData, in_memory};
-use super::error::RasterError;
-use super::gdal_access::register_geopackage;
-use super::gdal_setup::with_gdal;
 use crate::atomic::write_path;
+use crate::raster::access::gdal_access::register_geopackage;
+use crate::raster::access::gdal_setup::with_gdal;
+use crate::raster::error::RasterError;
 
 /// Name of the layer.
 const LAYER: &str = "contours";

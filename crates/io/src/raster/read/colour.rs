@@ -6,9 +6,9 @@
 
 use raster::{Grid, Window};
 
-use super::error::RasterError;
 use super::luma_rule::LumaRule;
 use super::source::ImageSource;
+use crate::raster::error::RasterError;
 
 impl ImageSource {
     /// Reads red, green and blue of a window, which may reach outside the image. NaN marks no-data

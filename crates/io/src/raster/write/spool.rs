@@ -12,12 +12,12 @@ use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, Metadata};
 use raster::{Grid, NO_DATA, Window};
 
 use super::band::BandData;
-use super::error::RasterError;
-use super::gdal_setup::{left_over_messages, with_gdal};
 use super::geotiff::{CogPlace, Sampling, finish_cog};
-use super::source::read_as;
-use super::vertical_unit::to_vertical_unit;
 use crate::atomic::write_path;
+use crate::raster::access::gdal_setup::{left_over_messages, with_gdal};
+use crate::raster::error::RasterError;
+use crate::raster::read::source::read_as;
+use crate::raster::read::vertical_unit::to_vertical_unit;
 
 /// Side length of a spool's tiles, cells.
 pub const SPOOL_TILE: usize = 256;
@@ -144,7 +144,7 @@ impl RasterSpool {
         Ok(cells)
     }
 
-    /// Copies the cells into a Cloud-Optimised GeoTIFF (as [`super::write_cog`] makes it) and
+    /// Copies the cells into a Cloud-Optimised GeoTIFF (as [`crate::raster::write_cog`] makes it) and
     /// removes the spool.
     ///
     /// # Errors

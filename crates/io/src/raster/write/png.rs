@@ -6,8 +6,8 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use raster::Grid;
 
-use super::error::RasterError;
 use crate::atomic::write_bytes;
+use crate::raster::error::RasterError;
 
 /// Writes a grey picture.
 ///

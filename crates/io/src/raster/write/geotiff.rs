@@ -8,7 +8,7 @@
 //! The CRS is compound where heights have a vertical datum. Ellipsoidal heights have no vertical
 //! CRS, and GDAL 3.6 writes a three-dimensional projected CRS that reads back as no CRS, so for
 //! them the CRS is the horizontal one. In every case the metadata item `VERTICAL_DATUM`
-//! (`ellipsoid`, `egm96`, …) names the vertical datum, and [`super::read_dem`] reads it.
+//! (`ellipsoid`, `egm96`, …) names the vertical datum, and [`crate::raster::read_dem`] reads it.
 
 use std::path::Path;
 
@@ -20,15 +20,15 @@ use gdal::{Dataset, DriverManager, Metadata};
 use raster::{GeoTransform, NO_DATA};
 
 use super::band::{Band, in_memory};
-use super::error::RasterError;
-use super::gdal_setup::{left_over_messages, with_gdal};
 use super::labels::{Provenance, label};
 use super::verify::verify;
-use super::vertical_unit::to_vertical_unit;
 use crate::atomic::write_path;
+use crate::raster::access::gdal_setup::{left_over_messages, with_gdal};
+use crate::raster::error::RasterError;
+use crate::raster::read::vertical_unit::to_vertical_unit;
 
 /// Metadata item that names the vertical datum.
-pub(super) const VERTICAL_DATUM: &str = "VERTICAL_DATUM";
+pub(in crate::raster) const VERTICAL_DATUM: &str = "VERTICAL_DATUM";
 /// Side of a COG's tiles, cells.
 const BLOCK: usize = 512;
 
@@ -59,7 +59,7 @@ impl From<Crs> for CogCrs<'_> {
 
 impl CogCrs<'_> {
     /// Returns the vertical datum.
-    pub(super) fn vertical(&self) -> VerticalDatum {
+    pub(in crate::raster) fn vertical(&self) -> VerticalDatum {
         match self {
             Self::Codes(crs) => crs.vertical,
             Self::Wkt(_) => VerticalDatum::Ellipsoid,
@@ -205,13 +205,13 @@ fn set_colours(dataset: &Dataset, raster: &CogRaster<'_>) -> Result<(), String> 
 }
 
 /// Returns the reduction of each overview: halves, until one tile holds the whole raster.
-pub(super) fn overview_factors((width, height): (usize, usize), tile: usize) -> Vec<i32> {
+pub(in crate::raster) fn overview_factors((width, height): (usize, usize), tile: usize) -> Vec<i32> {
     let halvings = width.max(height).div_ceil(tile).next_power_of_two().ilog2();
     (1..=halvings).map(|k| 1 << k).collect()
 }
 
 /// Returns GDAL's name of the resampling.
-pub(super) fn resampling(sampling: Sampling) -> &'static str {
+pub(in crate::raster) fn resampling(sampling: Sampling) -> &'static str {
     match sampling {
         Sampling::Average => "AVERAGE",
         Sampling::Nearest => "NEAREST",
@@ -220,7 +220,7 @@ pub(super) fn resampling(sampling: Sampling) -> &'static str {
 
 /// Sets the georeference and metadata of a dataset and copies it into a Cloud-Optimised GeoTIFF at
 /// `made`.
-pub(super) fn finish_cog(
+pub(in crate::raster) fn finish_cog(
     dataset: &mut Dataset,
     place: CogPlace<'_>,
     overviews: Sampling,
@@ -347,7 +347,7 @@ fn write_in_pixels<T: AsRef<str>>(
 }
 
 /// Copies the bands of a dataset in memory with an RPC into a file at `made`.
-pub(super) fn write_samples_with_rpc(
+pub(in crate::raster) fn write_samples_with_rpc(
     memory: &mut Dataset,
     bands: &[Band<'_>],
     rpc: &Rpc,
@@ -365,7 +365,7 @@ fn plain_options(bands: &[Band<'_>]) -> [(&'static str, &'static str); 4] {
 
 /// Returns the RPC under GDAL's keys. Numbers have as many digits as they need to read back to the
 /// same bits.
-pub(super) fn rpc_items(rpc: &Rpc) -> Vec<(&'static str, String)> {
+pub(in crate::raster) fn rpc_items(rpc: &Rpc) -> Vec<(&'static str, String)> {
     let list = |c: &[f64; 20]| c.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
     vec![
         // −1 means "unknown" to GDAL.
@@ -393,7 +393,12 @@ pub(super) fn rpc_items(rpc: &Rpc) -> Vec<(&'static str, String)> {
 ///
 /// # Errors
 /// The message of GDAL, or the first difference between the file and the dataset.
-pub(super) fn copy(source: &Dataset, driver: &str, made: &Path, options: &[(&str, &str)]) -> Result<(), String> {
+pub(in crate::raster) fn copy(
+    source: &Dataset,
+    driver: &str,
+    made: &Path,
+    options: &[(&str, &str)],
+) -> Result<(), String> {
     with_gdal(|| {
         let options = RasterCreationOptions::from_iter(options.iter().map(|(key, value)| format!("{key}={value}")));
         let driver = DriverManager::get_driver_by_name(driver)?;

@@ -8,8 +8,8 @@
 
 use raster::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, Flags, Grid, Window};
 
-use super::error::RasterError;
 use super::source::ImageSource;
+use crate::raster::error::RasterError;
 
 /// Luma and flags of a window.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +25,7 @@ impl ImageSource {
     /// Reads the luma of a window with the flags of each pixel. The window may reach outside the
     /// image. Nothing is resampled.
     ///
-    /// See [`LumaRule`](super::LumaRule) for the bands and [`LumaTile`] for the flags.
+    /// See [`LumaRule`](crate::raster::LumaRule) for the bands and [`LumaTile`] for the flags.
     ///
     /// # Errors
     /// [`RasterError::Damaged`] when GDAL cannot decode the pixels.

@@ -7,9 +7,9 @@ use gdal::Metadata;
 use gdal::raster::{GdalType, RasterBand};
 use raster::{Grid, Window};
 
-use super::error::RasterError;
-use super::gdal_setup::with_gdal;
 use super::source::ImageSource;
+use crate::raster::access::gdal_setup::with_gdal;
+use crate::raster::error::RasterError;
 
 /// What a file says of one of its bands.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,8 +118,8 @@ mod tests {
     use crs::Crs;
     use raster::GeoTransform;
 
-    use super::super::{Band, BandData, CogRaster, write_cog};
     use super::*;
+    use crate::raster::{Band, BandData, CogRaster, write_cog};
 
     #[test]
     fn a_window_is_read_whole_or_reduced_with_its_voids() {

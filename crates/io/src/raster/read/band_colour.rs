@@ -13,14 +13,14 @@ fn colour_number(band: &RasterBand<'_>) -> gdal_sys::GDALColorInterp::Type {
 
 /// Returns the colour of a band. Colours that the binding does not have are undefined: its own
 /// function panics on them.
-pub(super) fn colour_of(band: &RasterBand<'_>) -> ColorInterpretation {
+pub(in crate::raster) fn colour_of(band: &RasterBand<'_>) -> ColorInterpretation {
     ColorInterpretation::from_c_int(colour_number(band)).unwrap_or(ColorInterpretation::Undefined)
 }
 
 /// Returns GDAL's name of the colour of a band; `None` for an undefined one. Colours that GDAL has
 /// and its binding does not, such as near infrared, have names, too.
 #[allow(unsafe_code)]
-pub(super) fn colour_name(band: &RasterBand<'_>) -> Option<String> {
+pub(in crate::raster) fn colour_name(band: &RasterBand<'_>) -> Option<String> {
     let colour = colour_number(band);
     if colour == gdal_sys::GDALColorInterp::GCI_Undefined {
         return None;

@@ -7,7 +7,7 @@ use chrono::{DateTime, NaiveDateTime};
 use gdal::raster::RasterBand;
 use gdal::{Dataset, Metadata};
 
-use super::gdal_setup::with_gdal;
+use crate::raster::access::gdal_setup::with_gdal;
 
 /// TIFF tag 305, which GDAL shows under this name.
 const SOFTWARE: &str = "TIFFTAG_SOFTWARE";
@@ -71,7 +71,7 @@ impl Provenance {
     }
 
     /// Returns what a file says of the images that it was made of.
-    pub(super) fn of(dataset: &Dataset) -> Self {
+    pub(in crate::raster) fn of(dataset: &Dataset) -> Self {
         let list = |name: &str| -> Vec<String> {
             let text = dataset.metadata_item(name, "").unwrap_or_default();
             text.split(SEPARATOR).filter(|part| !part.is_empty()).map(str::to_owned).collect()
@@ -93,7 +93,7 @@ fn unit_of(description: &str) -> Option<&'static str> {
 
 /// Writes the unit and the statistics of each band and the name of the program into the metadata.
 /// The statistics are of all cells; a band without a valid cell gets none.
-pub(super) fn label(dataset: &mut Dataset) -> Result<(), String> {
+pub(in crate::raster) fn label(dataset: &mut Dataset) -> Result<(), String> {
     with_gdal(|| {
         dataset.set_metadata_item(SOFTWARE, PROGRAM, "")?;
         for index in 1..=dataset.raster_count() {
@@ -124,8 +124,8 @@ mod tests {
     use crs::Crs;
     use raster::{GeoTransform, Grid};
 
-    use super::super::{Band, BandData, CogRaster, write_cog};
     use super::*;
+    use crate::raster::{Band, BandData, CogRaster, write_cog};
 
     #[test]
     fn the_ending_of_a_name_is_its_unit() {

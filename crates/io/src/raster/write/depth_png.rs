@@ -10,8 +10,8 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Encoder, EncodingError};
 use raster::Grid;
 
-use super::error::RasterError;
 use crate::atomic::write_bytes;
+use crate::raster::error::RasterError;
 
 /// Largest value of a pixel, steps.
 const STEPS: f64 = u16::MAX as f64;

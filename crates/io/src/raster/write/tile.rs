@@ -5,7 +5,7 @@
 //! where it is larger than a tile. A rotated geotransform is written as the file's
 //! transformation matrix, and a coordinate system without an EPSG code by its parameters. With a
 //! scale and an offset, the height above the ellipsoid is `value · scale + offset` of the first
-//! band, which [`super::read_dem`] and GDAL's tools apply.
+//! band, which [`crate::raster::read_dem`] and GDAL's tools apply.
 
 use std::path::Path;
 
@@ -14,11 +14,11 @@ use gdal::spatial_ref::SpatialRef;
 use raster::{GeoTransform, NO_DATA};
 
 use super::band::{Band, in_memory};
-use super::error::RasterError;
-use super::gdal_setup::with_gdal;
 use super::geotiff::{Sampling, VERTICAL_DATUM, copy, overview_factors, resampling};
 use super::labels::label;
 use crate::atomic::write_path;
+use crate::raster::access::gdal_setup::with_gdal;
+use crate::raster::error::RasterError;
 
 /// Side of a tile, cells.
 const TILE: usize = 256;
@@ -114,7 +114,7 @@ mod tests {
                 metadata: &[],
             };
             write_map_tile(&path, &tile, false).unwrap();
-            let dataset = crate::raster::gdal_setup::open_dataset(&path).unwrap();
+            let dataset = crate::raster::access::gdal_setup::open_dataset(&path).unwrap();
             let band = dataset.rasterband(1).unwrap();
             assert_eq!((band.block_size(), band.overview_count().unwrap()), ((TILE, TILE), expected), "{side}");
         }

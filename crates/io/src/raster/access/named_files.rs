@@ -10,7 +10,7 @@ use std::collections::HashSet;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::error::RasterError;
+use crate::raster::error::RasterError;
 
 /// Bytes at the beginning of a file in which GDAL looks for the root of a VRT.
 const HEAD: u64 = 1024;
@@ -26,7 +26,7 @@ const NAME_MAX: usize = 4096;
 ///
 /// # Errors
 /// [`RasterError::NotAFile`] with the name, [`RasterError::Unreadable`].
-pub(super) fn refuse_named_devices(path: &Path) -> Result<(), RasterError> {
+pub(in crate::raster) fn refuse_named_devices(path: &Path) -> Result<(), RasterError> {
     let mut waiting = vec![path.to_owned()];
     let mut known = HashSet::new();
     while let Some(path) = waiting.pop() {

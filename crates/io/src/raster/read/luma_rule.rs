@@ -47,7 +47,7 @@ impl fmt::Display for BandChoice {
 
 impl BandChoice {
     /// Returns the position of the band among the names of the bands, counted from 1.
-    pub(super) fn position(&self, bands: &[Vec<String>]) -> Option<usize> {
+    pub(in crate::raster) fn position(&self, bands: &[Vec<String>]) -> Option<usize> {
         match self {
             Self::Number(number) => (1..=bands.len()).contains(number).then_some(*number),
             Self::Name(name) => {
@@ -59,7 +59,7 @@ impl BandChoice {
 }
 
 /// Returns the names that the bands of a file have: descriptions and colours.
-pub(super) fn band_names(dataset: &Dataset) -> Vec<Vec<String>> {
+pub(in crate::raster) fn band_names(dataset: &Dataset) -> Vec<Vec<String>> {
     let names = |i| {
         let Ok(band) = dataset.rasterband(i) else { return Vec::new() };
         [band.description().ok(), colour_name(&band)].into_iter().flatten().filter(|name| !name.is_empty()).collect()
@@ -82,7 +82,7 @@ pub enum LumaRule {
 
 impl LumaRule {
     /// Picks the rule by the colours that the file gives to its bands; alpha bands are left out.
-    pub(super) fn of(dataset: &Dataset) -> Self {
+    pub(in crate::raster) fn of(dataset: &Dataset) -> Self {
         let colours: Vec<_> = (1..=dataset.raster_count())
             .map(|i| dataset.rasterband(i).map_or(ColorInterpretation::Undefined, |band| colour_of(&band)))
             .collect();
@@ -103,7 +103,7 @@ impl LumaRule {
     }
 
     /// The bands with their weights in the sum.
-    pub(super) fn weights(&self) -> Vec<(usize, f32)> {
+    pub(in crate::raster) fn weights(&self) -> Vec<(usize, f32)> {
         match self {
             Self::Single(band) => vec![(*band, 1.0)],
             Self::Rgb([r, g, b]) => vec![(*r, 0.299), (*g, 0.587), (*b, 0.114)],

@@ -9,7 +9,7 @@ use std::path::Path;
 use gdal::raster::{GdalDataType, GdalType, RasterBand};
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
 
-use super::gdal_setup::with_gdal;
+use crate::raster::access::gdal_setup::with_gdal;
 
 /// Rows that are read at a time: a multiple of the sides of our tiles.
 const ROWS: usize = 512;
@@ -35,7 +35,7 @@ impl Bits for f64 {
 ///
 /// # Errors
 /// The first difference, in words.
-pub(super) fn verify(source: &Dataset, made: &Path) -> Result<(), String> {
+pub(in crate::raster) fn verify(source: &Dataset, made: &Path) -> Result<(), String> {
     let open_flags = GdalOpenFlags::GDAL_OF_RASTER | GdalOpenFlags::GDAL_OF_READONLY;
     let options = || DatasetOptions { open_flags, allowed_drivers: Some(&["GTiff"]), ..Default::default() };
     let written =

@@ -12,12 +12,12 @@ use crs::{CrsIdentity, VerticalDatum};
 use gdal::{Dataset, Metadata};
 use raster::{GeoTransform, Grid, Window};
 
-use super::error::RasterError;
-use super::gdal_setup::{open_dataset, with_gdal};
-use super::geotiff::VERTICAL_DATUM;
-use super::labels::Provenance;
 use super::source::read_as;
 use super::undeclared::undeclared_no_data;
+use crate::raster::access::gdal_setup::{open_dataset, with_gdal};
+use crate::raster::error::RasterError;
+use crate::raster::write::geotiff::VERTICAL_DATUM;
+use crate::raster::write::labels::Provenance;
 
 /// Most cells that are read at once (4 GiB of f32).
 const CELLS_MAX: usize = 1 << 30;
@@ -108,7 +108,7 @@ fn read(path: &Path, dataset: &Dataset, window: Window) -> Result<Dem, RasterErr
     })
 }
 
-/// Returns the datum in the metadata item that [`super::write_cog`] writes.
+/// Returns the datum in the metadata item that [`crate::raster::write_cog`] writes.
 fn stated_datum(dataset: &Dataset) -> Option<VerticalDatum> {
     dataset.metadata_item(VERTICAL_DATUM, "")?.parse().ok()
 }

@@ -12,10 +12,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use gdal::errors::GdalError;
 use gdal::{Dataset, DatasetOptions, DriverManager, GdalOpenFlags, config};
 
-use super::error::RasterError;
 use super::gdal_access::{is_local_file_system, restrict};
 use super::named_files::refuse_named_devices;
 use super::web_files::{WEB_FILES, with_leave};
+use crate::raster::error::RasterError;
 
 /// Beginnings of names that lead to a network or a service.
 const REMOTE_SCHEMES: [&str; 8] = ["http", "https", "ftp", "ftps", "s3", "gs", "az", "hdfs"];
@@ -180,7 +180,7 @@ fn prepare() {
 
 /// Returns what GDAL reported in the latest call of [`with_gdal`] on this thread, although it
 /// returned no error. Empty when there is nothing.
-pub(super) fn left_over_messages() -> String {
+pub(in crate::raster) fn left_over_messages() -> String {
     MESSAGES.with_borrow_mut(std::mem::take).join("; ")
 }
 

@@ -6,9 +6,9 @@ use gdal::raster::{Buffer, GdalType};
 use gdal::{Dataset, Metadata};
 use raster::Grid;
 
-use super::error::RasterError;
-use super::gdal_access::memory_driver;
-use super::gdal_setup::with_gdal;
+use crate::raster::access::gdal_access::memory_driver;
+use crate::raster::access::gdal_setup::with_gdal;
+use crate::raster::error::RasterError;
 
 /// Rows converted at a time between a grid and GDAL's memory.
 const CHUNK_ROWS: usize = 256;
@@ -40,13 +40,17 @@ pub struct Band<'a> {
 
 impl Band<'_> {
     /// Whether the first of `bands` is a float band, which decides for the file.
-    pub(super) fn first_is_float(bands: &[Band<'_>]) -> bool {
+    pub(in crate::raster) fn first_is_float(bands: &[Band<'_>]) -> bool {
         matches!(bands.first(), Some(Band { data: BandData::F32(_), .. }))
     }
 }
 
 /// Copies the bands into a dataset of GDAL's MEM driver. NaN becomes `no_data` where there is one.
-pub(super) fn in_memory(path: &Path, bands: &[Band<'_>], no_data: Option<f64>) -> Result<Dataset, RasterError> {
+pub(in crate::raster) fn in_memory(
+    path: &Path,
+    bands: &[Band<'_>],
+    no_data: Option<f64>,
+) -> Result<Dataset, RasterError> {
     let first = bands.first().ok_or_else(|| inconsistent(path, "found no band, expected at least one"))?;
     match first.data {
         BandData::F32(_) => fill(path, bands, no_data, as_f32, |v: f32| match no_data {

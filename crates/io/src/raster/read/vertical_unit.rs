@@ -5,7 +5,7 @@ use crs::VerticalDatum;
 use gdal::raster::Buffer;
 use gdal::{Dataset, Metadata};
 
-use super::gdal_setup::with_gdal;
+use crate::raster::access::gdal_setup::with_gdal;
 
 /// Ending of the names of bands in metres, and its replacements.
 const METRES: &str = "_m";
@@ -21,7 +21,7 @@ const ROWS: usize = 256;
 ///
 /// # Errors
 /// The message of GDAL or PROJ.
-pub(super) fn to_vertical_unit(dataset: &Dataset, datum: VerticalDatum) -> Result<(), String> {
+pub(in crate::raster) fn to_vertical_unit(dataset: &Dataset, datum: VerticalDatum) -> Result<(), String> {
     let metres = datum.metres_per_unit().map_err(|error| error.to_string())?;
     if metres == 1.0 {
         return Ok(());
@@ -53,8 +53,8 @@ mod tests {
     use crs::Crs;
     use raster::{GeoTransform, Grid};
 
-    use super::super::{Band, BandData, CogRaster, read_dem, write_cog};
     use super::*;
+    use crate::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 
     /// NAVD 88 in US survey feet and in international feet, on a map in US survey feet.
     #[test]

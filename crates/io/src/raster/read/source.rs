@@ -9,10 +9,10 @@ use gdal::raster::{GdalDataType, RasterBand};
 use gdal::{Dataset, Metadata};
 use raster::{GeoTransform, Grid, Window};
 
-use super::error::RasterError;
-use super::gdal_access::files_of;
-use super::gdal_setup::{open_dataset, with_gdal};
 use super::luma_rule::{BandChoice, LumaRule, band_names};
+use crate::raster::access::gdal_access::files_of;
+use crate::raster::access::gdal_setup::{open_dataset, with_gdal};
+use crate::raster::error::RasterError;
 use crate::stac::{StacItem, is_item_name, read_item};
 
 /// Type of the stored samples.
@@ -181,7 +181,7 @@ impl ImageSource {
     }
 
     /// The open dataset.
-    pub(super) fn dataset(&self) -> &Dataset {
+    pub(in crate::raster) fn dataset(&self) -> &Dataset {
         &self.dataset
     }
 
@@ -205,7 +205,7 @@ impl ImageSource {
 }
 
 /// Reads one band, counted from 1, over a window inside a dataset.
-pub(super) fn read_as<T: Copy + gdal::raster::GdalType>(
+pub(in crate::raster) fn read_as<T: Copy + gdal::raster::GdalType>(
     path: &Path,
     dataset: &Dataset,
     band: usize,

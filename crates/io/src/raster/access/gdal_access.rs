@@ -47,14 +47,14 @@ static GEOPACKAGE: OnceLock<KeptDriver> = OnceLock::new();
 
 /// Whether a path as the user wrote it is in one of GDAL's file systems for local files, and leads
 /// through no other one.
-pub(super) fn is_local_file_system(name: &str) -> bool {
+pub(in crate::raster) fn is_local_file_system(name: &str) -> bool {
     let is_local = |(at, _): (usize, &str)| FILE_SYSTEMS.iter().any(|prefix| name[at..].starts_with(prefix));
     name.starts_with("/vsi") && name.match_indices("/vsi").all(is_local)
 }
 
 /// Removes all drivers and file systems that are not listed. To be called once, after the drivers
 /// are registered.
-pub(super) fn restrict() {
+pub(in crate::raster) fn restrict() {
     for (name, place) in [("MEM", &MEMORY), ("GPKG", &GEOPACKAGE)] {
         if let Ok(driver) = DriverManager::get_driver_by_name(name) {
             // SAFETY: the function only reads the pointer that the driver holds, and the driver is
@@ -91,7 +91,7 @@ pub(crate) fn register_geopackage() {
 ///
 /// # Errors
 /// The error of GDAL when it was built without the driver.
-pub(super) fn memory_driver() -> Result<Driver, GdalError> {
+pub(in crate::raster) fn memory_driver() -> Result<Driver, GdalError> {
     match MEMORY.get() {
         // SAFETY: the pointer came from a driver of GDAL, which is never freed.
         Some(memory) => Ok(unsafe { Driver::from_c_driver(memory.0) }),
@@ -119,7 +119,7 @@ fn file_systems() -> Vec<String> {
 }
 
 /// Returns the files that a raster consists of: its own, those beside it and those it names.
-pub(super) fn files_of(dataset: &gdal::Dataset) -> Vec<String> {
+pub(in crate::raster) fn files_of(dataset: &gdal::Dataset) -> Vec<String> {
     // SAFETY: the handle is of a dataset that is open and borrowed during the call, which returns a
     // list that belongs to the caller, or null.
     let list = unsafe { gdal_sys::GDALGetFileList(dataset.c_dataset()) };

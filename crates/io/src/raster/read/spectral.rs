@@ -20,13 +20,13 @@ use camera::Rpc;
 use gdal::raster::RasterBand;
 use gdal::{Dataset, Metadata};
 
-use super::band::{Band, in_memory};
-use super::error::RasterError;
-use super::gdal_setup::with_gdal;
-use super::geotiff::write_samples_with_rpc;
 use super::luma_rule::{BandChoice, band_names};
 use super::source::ImageSource;
 use crate::atomic::write_path;
+use crate::raster::access::gdal_setup::with_gdal;
+use crate::raster::error::RasterError;
+use crate::raster::write::band::{Band, in_memory};
+use crate::raster::write::geotiff::write_samples_with_rpc;
 
 /// Domain and items of GDAL for wavelengths, in micrometres.
 const IMAGERY: &str = "IMAGERY";
@@ -137,11 +137,11 @@ fn centre_um(band: &RasterBand<'_>) -> Option<f64> {
     Some(number(band.metadata_item(WAVELENGTH, "")?)? / per_um)
 }
 
-/// Writes an image with its RPC, as [`super::write_image_with_rpc`] does, whose bands name their
+/// Writes an image with its RPC, as [`crate::raster::write_image_with_rpc`] does, whose bands name their
 /// colours and wavelengths.
 ///
 /// # Errors
-/// [`RasterError::NotWritten`] and [`RasterError::InconsistentBands`], as for [`super::write_cog`].
+/// [`RasterError::NotWritten`] and [`RasterError::InconsistentBands`], as for [`crate::raster::write_cog`].
 pub fn write_multispectral_with_rpc(
     path: impl AsRef<Path>,
     bands: &[(Band<'_>, BandSpectrum<'_>)],
@@ -187,8 +187,8 @@ fn set_colour(band: &mut RasterBand<'_>, name: &str) {
 mod tests {
     use raster::Grid;
 
-    use super::super::{BandData, LumaRule};
     use super::*;
+    use crate::raster::{BandData, LumaRule};
 
     fn rpc() -> Rpc {
         let town = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/view_1.tif");
