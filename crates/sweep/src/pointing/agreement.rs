@@ -199,8 +199,8 @@ fn height_near(known: &[Sight], at: [f64; 2]) -> Option<f64> {
 }
 
 impl Pair<'_> {
-    /// Returns the centres of a lattice of patches over what the source sees of the reference: every
-    /// second one in both directions, and the rest.
+    /// Returns the centres of a lattice of patches over what the source sees of the reference:
+    /// every second one in both directions, and the rest.
     fn lattice(&self, known: &[Sight], range_m: (f64, f64), config: &TieConfig) -> [Vec<[f64; 2]>; 2] {
         let heights = || known.iter().map(|sight| sight.height_m);
         let (low, high) = (heights().fold(range_m.1, f64::min), heights().fold(range_m.0, f64::max));

@@ -137,11 +137,12 @@ fn centre_um(band: &RasterBand<'_>) -> Option<f64> {
     Some(number(band.metadata_item(WAVELENGTH, "")?)? / per_um)
 }
 
-/// Writes an image with its RPC, as [`crate::raster::write_image_with_rpc`] does, whose bands name their
-/// colours and wavelengths.
+/// Writes an image with its RPC, as [`crate::raster::write_image_with_rpc`] does, whose bands name
+/// their colours and wavelengths.
 ///
 /// # Errors
-/// [`RasterError::NotWritten`] and [`RasterError::InconsistentBands`], as for [`crate::raster::write_cog`].
+/// [`RasterError::NotWritten`] and [`RasterError::InconsistentBands`], as for
+/// [`crate::raster::write_cog`].
 pub fn write_multispectral_with_rpc(
     path: impl AsRef<Path>,
     bands: &[(Band<'_>, BandSpectrum<'_>)],

@@ -144,8 +144,8 @@ impl RasterSpool {
         Ok(cells)
     }
 
-    /// Copies the cells into a Cloud-Optimised GeoTIFF (as [`crate::raster::write_cog`] makes it) and
-    /// removes the spool.
+    /// Copies the cells into a Cloud-Optimised GeoTIFF (as [`crate::raster::write_cog`] makes it)
+    /// and removes the spool.
     ///
     /// # Errors
     /// [`RasterError::NotWritten`] for a file that exists without `overwrite`, and when GDAL or the
