@@ -39,6 +39,7 @@ mod report_page;
 pub mod rpc;
 mod run_folder;
 mod same_view;
+mod small_view;
 pub mod simulate;
 mod simulate_page;
 pub mod splats;
