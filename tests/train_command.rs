@@ -85,7 +85,20 @@ fn report_of(folder: &Path) -> serde_json::Value {
 #[test]
 fn views_that_were_not_trained_on_become_better() {
     let out = tempfile::tempdir().unwrap();
-    let told = train(&out.path().join("a"), &["--iterations", "150", "--hold-out", "4"]).success();
+    let told = train(
+        &out.path().join("a"),
+        &[
+            "--iterations",
+            "150",
+            "--hold-out-view",
+            "flight_04.png",
+            "--hold-out-view",
+            "flight_08.png",
+            "--hold-out-view",
+            "flight_12.png",
+        ],
+    )
+    .success();
     told.stdout(predicate::str::contains("held out"));
     let report = report_of(&out.path().join("a"));
     let held: Vec<_> = report["views"].as_array().unwrap().iter().filter(|v| v["held_out"] == true).collect();
@@ -99,7 +112,7 @@ fn views_that_were_not_trained_on_become_better() {
     assert!(splats.splats.len() <= 8000 && !out.path().join("a/checkpoint.bin").exists());
     assert_eq!(std::fs::read_dir(out.path().join("a/renders")).unwrap().count(), 3);
     let page = std::fs::read_to_string(out.path().join("a/report.html")).unwrap();
-    assert!(page.contains("Loss by iteration") && page.contains("flight_05.png"), "no curve or view on the page");
+    assert!(page.contains("Loss by iteration") && page.contains("flight_04.png"), "no curve or view on the page");
     // The splats are looked at through the cameras of the dataset, which lie on no map.
     let seen = out.path().join("seen");
     let mut render = skysweep();
@@ -108,8 +121,8 @@ fn views_that_were_not_trained_on_become_better() {
     let views = report_of(&seen)["views"].as_array().unwrap().clone();
     assert_eq!(views.len(), report["views"].as_array().unwrap().len());
     assert!(views.iter().all(|view| view["psnr_db"].as_f64().unwrap() > 12.0), "{views:?}");
-    // The dataset says what it is for, and every fourth name from the first on is held out.
-    assert_eq!(held_out(&report), ["flight_01.png", "flight_05.png", "flight_09.png"]);
+    // The dataset says what it is for.
+    assert_eq!(held_out(&report), ["flight_04.png", "flight_08.png", "flight_12.png"]);
     assert_eq!((&report["preset"], report["weights"]["absolute"].as_f64()), (&"building-enhanced".into(), Some(0.8)));
     let losses = report["losses"].as_array().unwrap();
     let colour = |i: usize| losses[i]["colour"].as_f64().unwrap();
@@ -456,7 +469,7 @@ fn photographs_of_a_castle_are_learned_and_rendered_alike() {
     let number = |view: &serde_json::Value, key: &str| view[key].as_f64().unwrap();
     let views = report["views"].as_array().unwrap();
     let held = views.iter().find(|view| view["held_out"] == true).unwrap();
-    assert!(number(held, "psnr_db") > 16.0 && number(held, "ssim") > 0.6, "{held}");
+    assert!(number(held, "psnr_db") > number(held, "psnr_before_db") + 6.0 && number(held, "ssim") > 0.6, "{held}");
     // With the origin of the training, and as the file of another program without one.
     for (name, has_origin) in [("seen", true), ("foreign", false)] {
         if !has_origin {

@@ -30,7 +30,7 @@ pub enum DatasetOriginError {
 }
 
 /// Folders below a dataset in which its model and its images are looked for, in depth.
-const DEPTH: usize = 3;
+const DEPTH: usize = 4;
 /// Folders that are looked into at most, so that a home folder given by mistake ends soon.
 const FOLDERS: usize = 2000;
 

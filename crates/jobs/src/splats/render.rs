@@ -31,7 +31,7 @@ use super::error::SplatsJobError;
 use super::image;
 use super::make::pointing_path;
 use crate::corrections::{CorrectionSource, Corrections};
-use crate::dataset_folder::{UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, pictures_folder, sparse_folder};
+use crate::dataset_folder::{UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, sparse_folder};
 use crate::error::SettingError;
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
@@ -191,10 +191,7 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
 
 /// Returns the pictures of a dataset whose folder, or whose model, is given.
 fn pictures_of_dataset(cameras: &Path) -> Option<PathBuf> {
-    let sparse = sparse_folder(cameras);
-    let model = io::colmap::read(&sparse).ok()?;
-    let names: Vec<&str> = model.views.iter().map(|view| view.name.as_str()).collect();
-    Some(pictures_folder(&dataset_folder(&sparse), &sparse, &names)).filter(|folder| folder.is_dir())
+    Some(dataset_folder(&sparse_folder(cameras)).join("images")).filter(|folder| folder.is_dir())
 }
 
 /// Views rendered so far.
