@@ -85,7 +85,20 @@ fn report_of(folder: &Path) -> serde_json::Value {
 #[test]
 fn views_that_were_not_trained_on_become_better() {
     let out = tempfile::tempdir().unwrap();
-    let told = train(&out.path().join("a"), &["--iterations", "150", "--hold-out", "4"]).success();
+    let told = train(
+        &out.path().join("a"),
+        &[
+            "--iterations",
+            "150",
+            "--hold-out-view",
+            "flight_04.png",
+            "--hold-out-view",
+            "flight_08.png",
+            "--hold-out-view",
+            "flight_12.png",
+        ],
+    )
+    .success();
     told.stdout(predicate::str::contains("held out"));
     let report = report_of(&out.path().join("a"));
     let held: Vec<_> = report["views"].as_array().unwrap().iter().filter(|v| v["held_out"] == true).collect();
@@ -108,9 +121,68 @@ fn views_that_were_not_trained_on_become_better() {
     let views = report_of(&seen)["views"].as_array().unwrap().clone();
     assert_eq!(views.len(), report["views"].as_array().unwrap().len());
     assert!(views.iter().all(|view| view["psnr_db"].as_f64().unwrap() > 12.0), "{views:?}");
+    // The dataset says what it is for.
+    assert_eq!(held_out(&report), ["flight_04.png", "flight_08.png", "flight_12.png"]);
+    assert_eq!((&report["preset"], report["weights"]["absolute"].as_f64()), (&"building-enhanced".into(), Some(0.8)));
     let losses = report["losses"].as_array().unwrap();
     let colour = |i: usize| losses[i]["colour"].as_f64().unwrap();
     assert!(colour(losses.len() - 1) < 0.8 * colour(0), "{losses:?}");
+}
+
+/// The views of a training, by name, that were held out.
+fn held_out(report: &serde_json::Value) -> Vec<String> {
+    let views = report["views"].as_array().unwrap().iter();
+    views.filter(|view| view["held_out"] == true).map(|view| view["name"].as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn recipes_are_chosen_and_their_numbers_given() {
+    let out = tempfile::tempdir().unwrap();
+    let folder = out.path().join("a");
+    let chosen =
+        ["--iterations", "10", "--preset", "photographs", "--weight", "distortion=0.5", "--step", "colour-last=0.01"];
+    let more = ["--schedule", "reset-every=5", "--hold-out-view", "flight_02.png", "--hold-out-view", "flight_11.png"];
+    train(&folder, &[&chosen[..], &more].concat()).success();
+    let report = report_of(&folder);
+    assert_eq!(held_out(&report), ["flight_02.png", "flight_11.png"]);
+    assert_eq!(report["preset"], "photographs");
+    assert_eq!(
+        (report["weights"]["distortion"].as_f64(), report["weights"]["similarity"].as_f64()),
+        (Some(0.5), Some(0.2))
+    );
+    assert_eq!(report["settings"]["steps"]["colour_last"].as_f64(), Some(0.01));
+    let refused = |arguments: &[&str], what: &str| {
+        train(&out.path().join("x"), arguments).code(2).stderr(predicate::str::contains(what.to_owned()));
+    };
+    refused(&["--weight", "depth=1"], "the name of a number is depth, expected one of: absolute, squared");
+    refused(&["--weight", "mask"], "not of the form NAME=NUMBER");
+    refused(&["--step", "scale=-1"], "scale is -1");
+    refused(&["--hold-out-view", "flight_13.png"], "0 views have the name flight_13.png");
+}
+
+/// A dataset in the layout of many reconstructions: the model in a folder of its own, the images in
+/// folders by camera beside it.
+#[test]
+fn models_and_images_are_found_where_they_lie() {
+    let out = tempfile::tempdir().unwrap();
+    let root = out.path().join("scene");
+    let (mut model, points) = io::colmap::read_with_points(&dataset().join("sparse/0")).unwrap();
+    for (number, view) in model.views.iter_mut().enumerate() {
+        let name = format!("camera_{}/{}", number % 2, view.name);
+        std::fs::create_dir_all(root.join("dense/pictures").join(&name).parent().unwrap()).unwrap();
+        std::fs::copy(dataset().join("images").join(&view.name), root.join("dense/pictures").join(&name)).unwrap();
+        view.name = name;
+    }
+    let sparse = root.join("dense/colmap/sparse/3");
+    std::fs::create_dir_all(&sparse).unwrap();
+    io::colmap::write(&sparse, &model, &points, io::colmap::ColmapEncoding::Text, false).unwrap();
+    let folder = out.path().join("a");
+    let mut command = skysweep();
+    command.arg("train").arg(&root).arg("-o").arg(&folder).args(["--shrink", "8", "--iterations", "5"]);
+    command.assert().success();
+    let report = report_of(&folder);
+    assert_eq!(report["preset"], "photographs");
+    assert_eq!(held_out(&report), ["camera_0/flight_01.png", "camera_1/flight_06.png"]);
 }
 
 #[test]
@@ -380,4 +452,39 @@ fn what_cannot_be_trained_is_refused() {
     refused(&["--resume"], "cannot go on from the checkpoint");
     std::fs::write(out.path().join("x/splats.ply"), b"old").unwrap();
     refused(&[], "exists already");
+}
+
+/// The castle, quarter pictures: trainings and `splats render` see the same splats alike, and the
+/// recipe for photographs shows a photograph that was held out.
+#[test]
+fn photographs_of_a_castle_are_learned_and_rendered_alike() {
+    let Some(castle) = testing::shared_data("photos/sceaux_castle") else { return };
+    let out = tempfile::tempdir().unwrap();
+    let folder = out.path().join("a");
+    let mut command = skysweep();
+    command.arg("train").arg(&castle).args(["--shrink", "4", "--iterations", "200", "--budget", "12000"]);
+    command.args(["--hold-out-view", "100_7107.jpg", "--progress", "none", "-o"]).arg(&folder).assert().success();
+    let report = report_of(&folder);
+    assert_eq!(report["preset"], "photographs");
+    let number = |view: &serde_json::Value, key: &str| view[key].as_f64().unwrap();
+    let views = report["views"].as_array().unwrap();
+    let held = views.iter().find(|view| view["held_out"] == true).unwrap();
+    assert!(number(held, "psnr_db") > number(held, "psnr_before_db") + 6.0 && number(held, "ssim") > 0.6, "{held}");
+    // With the origin of the training, and as the file of another program without one.
+    for (name, has_origin) in [("seen", true), ("foreign", false)] {
+        if !has_origin {
+            std::fs::remove_file(folder.join("splats.origin.json")).unwrap();
+        }
+        let seen = out.path().join(name);
+        let mut render = skysweep();
+        render.args(["splats", "render"]).arg(folder.join("splats.ply")).arg("--cameras").arg(&castle);
+        render.args(["--shrink", "4", "--progress", "none", "-o"]).arg(&seen).assert().success();
+        let rendered = report_of(&seen);
+        for view in views {
+            let stem = view["name"].as_str().unwrap().trim_end_matches(".jpg").to_owned();
+            let same = rendered["views"].as_array().unwrap().iter().find(|other| other["name"] == stem.as_str());
+            let [trained, shown] = [number(view, "psnr_db"), number(same.unwrap(), "psnr_whole_db")];
+            assert!((trained - shown).abs() < 0.1, "{stem}: {trained} dB trained, {shown} dB rendered");
+        }
+    }
 }

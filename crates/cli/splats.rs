@@ -100,7 +100,8 @@ const FORMS: [Named<bool>; 2] = [("3d", false, "three scales: ellipsoids"), ("2d
 #[command(after_help = "Examples: skysweep splats render splats.ply view_*.tif -o seen; \
                   skysweep splats render splats.ply --cameras views/sparse/0 --pictures views/images -o seen")]
 struct RenderArgs {
-    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them.
+    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them. Without one they lie in the frame
+    /// of the cameras.
     splats: PathBuf,
     /// Images with RPCs to look through.
     #[arg(value_name = "IMAGE")]
@@ -113,6 +114,9 @@ struct RenderArgs {
     /// and not compared [default: images of the dataset].
     #[arg(long, value_name = "FOLDER", requires = "cameras")]
     pictures: Option<PathBuf>,
+    /// Pixels of a perspective camera that become one, in each direction.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "cameras")]
+    shrink: usize,
     /// Corrections of the images' pointing: the report of a run of skysweep dsm, or none [default:
     /// the corrections that the splats were made with].
     #[arg(long, value_name = "report.json|none")]
@@ -158,6 +162,7 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     let mut config = SplatRenderConfig::new(args.splats.clone(), args.output.clone());
     config.images.clone_from(&args.images);
     config.cameras.clone_from(&args.cameras);
+    config.shrink = args.shrink;
     config.pictures.clone_from(&args.pictures);
     config.corrections = corrections_of(args.corrections.as_deref());
     config.overwrite = args.write.overwrite;

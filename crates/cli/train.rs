@@ -3,8 +3,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{bail, ensure};
-use jobs::train::{SatelliteTrainConfig, TrainConfig, TrainPriors};
+use anyhow::{Context, bail, ensure};
+use jobs::train::{
+    PriorSchedule, SatelliteTrainConfig, TrainConfig, TrainNumbers, TrainPreset, TrainPriors, TrainSchedule,
+    TrainSteps, TrainWeights,
+};
 
 use crate::corrections::corrections_of;
 use crate::options::{Named, named};
@@ -18,11 +21,12 @@ use crate::{Global, Outcome};
                   leaves a checkpoint, from which --resume goes on. Satellite images: skysweep train \
                   *.tif --splats town.ply --dsm dsm.tif -o trained")]
 pub(crate) struct Args {
-    /// Folder that skysweep priors wrote, or another folder with a COLMAP model in sparse/0; or
-    /// satellite images with RPCs, with --splats.
+    /// Folder that skysweep priors wrote, or another folder with a COLMAP model, such as in
+    /// sparse/0; or satellite images with RPCs, with --splats.
     #[arg(required = true, value_name = "DATASET|IMAGES")]
     inputs: Vec<PathBuf>,
-    /// Folder of the images, with the names that the cameras have [default: DATASET/images].
+    /// Folder of the images, with the names that the cameras have [default: DATASET/images, or the
+    /// folder in or beside it that has them].
     #[arg(long, value_name = "FOLDER")]
     pictures: Option<PathBuf>,
     /// Another COLMAP model of the same cameras, whose points are added, such as the reconstruction
@@ -63,12 +67,39 @@ pub(crate) struct Args {
     /// for satellite images, keep for datasets, whose images are often taken within minutes].
     #[arg(long, value_parser = named(&TRANSIENTS), value_name = "CHOICE")]
     transients: Option<bool>,
-    /// Every N-th view is kept for the judgement and not trained on (0: none).
+    /// Every N-th view in the order of their names, from the first on, is kept for the judgement
+    /// and not trained on, as LLFF splits (0: none).
     #[arg(long, value_name = "N", default_value_t = 8)]
     hold_out: usize,
+    /// View that is kept for the judgement, by its name, instead of every N-th; may be given several
+    /// times.
+    #[arg(long, value_name = "NAME", conflicts_with = "hold_out")]
+    hold_out_view: Vec<String>,
+    /// What the training is for, each with the recipe of its paper [default: satellite with
+    /// --splats, the buildings of a dataset that skysweep priors wrote, or else photographs].
+    #[arg(long, value_parser = named(&PRESETS))]
+    preset: Option<TrainPreset>,
+    /// Weight of a term of the loss that differs from the preset: absolute, squared (of colours),
+    /// similarity (D-SSIM), mask, distortion (of inverse depths, in sizes of the scene), consistency
+    /// (of normals), prior-depth (in sizes of the scene), prior-normal, correlation.
+    #[arg(long, value_name = "NAME=NUMBER", value_parser = pair, help_heading = "Recipe")]
+    weight: Vec<(String, f64)>,
+    /// Step of the optimiser that differs from the preset: position-first, position-last (in sizes
+    /// of the scene), rotation, scale (logarithms), opacity (logits), colour-first, colour-last (of
+    /// colours from 0 to 1).
+    #[arg(long, value_name = "NAME=NUMBER", value_parser = pair, help_heading = "Recipe")]
+    step: Vec<(String, f64)>,
+    /// Time that differs from the preset: distortion-from, consistency-from, split-from,
+    /// split-until (shares of the training), split-every, reset-every (iterations; 0: opacities are
+    /// never brought down), and the limits split-gradient (halves of the image) and least-opacity.
+    #[arg(long, value_name = "NAME=NUMBER", value_parser = pair, help_heading = "Recipe")]
+    schedule: Vec<(String, f64)>,
     /// Prior maps in use, as far as the dataset has them.
     #[arg(long, value_parser = named(&PRIORS), default_value = "both")]
     priors: TrainPriors,
+    /// Where the factors of the priors by iteration come from.
+    #[arg(long, value_parser = named(&PRIOR_SCHEDULES), default_value = "preset")]
+    prior_schedule: PriorSchedule,
     /// Learn a gain and an offset for each image, where exposures differ.
     #[arg(long)]
     appearance: bool,
@@ -89,10 +120,46 @@ const PRIORS: [Named<TrainPriors>; 4] = [
     ("none", TrainPriors::None, "the images alone"),
 ];
 
+const PRESETS: [Named<TrainPreset>; 4] = [
+    ("photographs", TrainPreset::Photographs, "a scene without bounds, as the code of 2DGS"),
+    ("building-only", TrainPreset::BuildingOnly, "nothing but buildings, with priors (GS4Buildings)"),
+    ("building-enhanced", TrainPreset::BuildingEnhanced, "the scene, with priors of its buildings (GS4Buildings)"),
+    ("satellite", TrainPreset::Satellite, "satellite images with the heights of a surface model"),
+];
+
+const PRIOR_SCHEDULES: [Named<PriorSchedule>; 2] = [
+    ("preset", PriorSchedule::Preset, "the preset: two phases for buildings"),
+    ("dataset", PriorSchedule::Dataset, "schedule.json of the dataset"),
+];
+
 const TRANSIENTS: [Named<bool>; 2] = [
     ("leave-out", true, "not trained on once they stay unexplained while other images agree"),
     ("keep", false, "trained on as all others"),
 ];
+
+/// Returns the two sides of `NAME=NUMBER`.
+fn pair(text: &str) -> Result<(String, f64), String> {
+    let expected = || format!("{text:?} is not of the form NAME=NUMBER");
+    let (name, number) = text.split_once('=').ok_or_else(expected)?;
+    Ok((name.trim().to_owned(), number.trim().parse().map_err(|_| expected())?))
+}
+
+/// The numbers that differ from the preset.
+fn numbers(args: &Args) -> anyhow::Result<(TrainWeights, TrainSteps, TrainSchedule)> {
+    let (mut weights, mut steps, mut schedule) =
+        (TrainWeights::default(), TrainSteps::default(), TrainSchedule::default());
+    let groups: [(&mut dyn TrainNumbers, _, _); 3] = [
+        (&mut weights, &args.weight, "--weight"),
+        (&mut steps, &args.step, "--step"),
+        (&mut schedule, &args.schedule, "--schedule"),
+    ];
+    for (group, given, option) in groups {
+        for (name, value) in given {
+            group.set(name, *value).with_context(|| option.to_owned())?;
+        }
+    }
+    Ok((weights, steps, schedule))
+}
 
 /// Runs `skysweep train`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
@@ -107,7 +174,11 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.budget = args.budget;
     config.shrink = args.shrink;
     config.hold_out = args.hold_out;
+    config.hold_out_names.clone_from(&args.hold_out_view);
+    config.preset = args.preset;
+    (config.weights, config.steps, config.schedule) = numbers(args)?;
     config.priors = args.priors;
+    config.prior_schedule = args.prior_schedule;
     config.appearance = args.appearance;
     config.transients = args.transients.unwrap_or(config.transients);
     config.seed = args.seed;
@@ -133,6 +204,8 @@ fn on_images(args: &Args, splats: &Path, global: Global) -> anyhow::Result<Outco
     config.corrections = corrections_of(args.corrections.as_deref());
     config.iterations = args.iterations;
     config.budget = args.budget;
+    config.preset = args.preset.unwrap_or(config.preset);
+    (config.weights, config.steps, config.schedule) = numbers(args)?;
     config.relative_heights.clone_from(&args.relative_heights);
     config.transients = args.transients.unwrap_or(config.transients);
     config.seed = args.seed;

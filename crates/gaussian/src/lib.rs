@@ -4,6 +4,10 @@
 //! enough. The covariance is R S Sᵀ Rᵀ. The third principal axis is the surface normal. The crate
 //! `io` converts to the logarithms, logits and harmonics that trainers store.
 
+mod harmonics;
+
+pub use harmonics::SplatHarmonics;
+
 /// An oriented Gaussian with a colour and an opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Splat {

@@ -41,6 +41,7 @@ mod run_folder;
 mod same_view;
 pub mod simulate;
 mod simulate_page;
+mod small_view;
 pub mod splats;
 pub mod split;
 mod stac;

@@ -1,7 +1,7 @@
 //! The backward pass of a tile: from back to front, the gradient of each entry.
 //!
 //! All images are sums Σ wᵢ fᵢ, so that a pixel's gradient reaches the splats through
-//! f = g · (colour, normal, 1, m, m²). With the rest R = Σⱼ₍ₖ₎ wⱼ fⱼ behind a splat,
+//! f = g · (colour, normal, 1, m, s², s). With the rest R = Σⱼ₍ₖ₎ wⱼ fⱼ behind a splat,
 //! ∂L/∂αᵢ = Tᵢ fᵢ − R / (1 − αᵢ). The transmittance is taken back by division, which keeps its
 //! relative error small.
 
@@ -20,8 +20,8 @@ pub(crate) struct BlockGradients {
     pub(crate) rest: Block,
     pub(crate) colour: [Block; 3],
     pub(crate) normal: [Block; 3],
-    /// By Σ wᵢ, Σ wᵢ mᵢ and Σ wᵢ mᵢ².
-    pub(crate) moments: [Block; 3],
+    /// By Σ wᵢ, Σ wᵢ mᵢ, Σ wᵢ sᵢ² and Σ wᵢ sᵢ; s is m itself, or the inverse depth.
+    pub(crate) moments: [Block; 4],
 }
 
 /// Gradients by the sums of a tile.
@@ -33,7 +33,7 @@ impl BlockGradients {
         rest: Block::ZERO,
         colour: [Block::ZERO; 3],
         normal: [Block::ZERO; 3],
-        moments: [Block::ZERO; 3],
+        moments: [Block::ZERO; 4],
     };
 }
 
@@ -46,7 +46,7 @@ type EntrySums<L> = [L; 16];
 /// Computes the gradient of every entry that was drawn. Those of others are left as they are.
 /// `masks` and `drawn` are what the forward pass wrote.
 #[inline(always)]
-pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool>(
+pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool>(
     isa: I,
     task: &TileTask<'_>,
     masks: &[u16],
@@ -81,7 +81,8 @@ pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool>(
                 let (pixels, total) = (&mut pixels[block], &mut total);
                 if splat.is_fine {
                     let at = brush.at::<I, PERSPECTIVE, true>(isa, block, part);
-                    let strength = spread_block::<I, PERSPECTIVE>(isa, &brush, splat, &at, drawn, part, pixels, total);
+                    let strength =
+                        spread_block::<I, PERSPECTIVE, INVERSE>(isa, &brush, splat, &at, drawn, part, pixels, total);
                     if let Some((offset, least)) = at.least(drawn) {
                         // ρ = 2 |offset|², and the offset falls as the centre moves.
                         let pull = strength.add(strength).only(least);
@@ -90,7 +91,7 @@ pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool>(
                     }
                 } else {
                     let at = brush.at::<I, PERSPECTIVE, false>(isa, block, part);
-                    spread_block::<I, PERSPECTIVE>(isa, &brush, splat, &at, drawn, part, pixels, total);
+                    spread_block::<I, PERSPECTIVE, INVERSE>(isa, &brush, splat, &at, drawn, part, pixels, total);
                 }
             }
             sums = isa.totals(total, part, &mut kept);
@@ -118,7 +119,7 @@ fn gathered(splat: &ScreenSplat, mut sums: [f32; 16], centre: [f32; 2]) -> Scree
 /// Adds the gradient of a splat at a part of a block. Returns α ∂L/∂α.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "registers are passed one by one")]
-fn spread_block<I: InstructionSet, const PERSPECTIVE: bool>(
+fn spread_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool>(
     isa: I,
     brush: &Brush<I::Lanes>,
     splat: &ScreenSplat,
@@ -138,10 +139,18 @@ fn spread_block<I: InstructionSet, const PERSPECTIVE: bool>(
     before.store(&mut pixels.transmittance, part);
 
     let depth = brush.depth::<PERSPECTIVE>(at);
-    let [by_sum, by_first, by_second] = &pixels.moments;
+    let [by_sum, by_first, by_second, by_other] = &pixels.moments;
     let (by_sum, by_first, by_second) = (isa.load(by_sum, part), isa.load(by_first, part), isa.load(by_second, part));
-    let slope = depth.mul_add(by_second, by_first);
-    let mut value = depth.mul_add(slope, by_sum);
+    // The value of the depth's moments, and the slope by the depth.
+    let (mut value, by_depth) = if INVERSE {
+        let inverse = brush.inverse_depth(isa, at);
+        let slope = inverse.mul_add(by_second, isa.load(by_other, part));
+        let value = inverse.mul_add(slope, depth.mul_add(by_first, by_sum));
+        (value, inverse.mul_add(by_second, slope).mul_add(brush.by_depth(isa, inverse), by_first))
+    } else {
+        let slope = depth.mul_add(by_second, by_first);
+        (depth.mul_add(slope, by_sum), depth.mul_add(by_second, slope))
+    };
     for i in 0..3 {
         let (by_colour, by_normal) = (isa.load(&pixels.colour[i], part), isa.load(&pixels.normal[i], part));
         total[10 + i] = weight.mul_add(by_colour, total[10 + i]);
@@ -156,7 +165,7 @@ fn spread_block<I: InstructionSet, const PERSPECTIVE: bool>(
     let by_alpha = rest.neg_mul_add(inverse, before.mul(value));
     let strength = alpha.mul(by_alpha).only(unbounded.at_most(greatest));
     total[9] = total[9].add(strength);
-    let by_depth = weight.mul(depth.mul_add(by_second, slope));
+    let by_depth = weight.mul(by_depth);
     add_plane::<I, PERSPECTIVE>(isa, brush, at, strength, by_depth, total);
     strength
 }

@@ -8,7 +8,7 @@ use crate::arrange::{Arrangement, TILE};
 use crate::backward::{self, BlockGradients, TileGradients};
 use crate::footprint::BLOCKS;
 use crate::forward::{self, BlockSums, DrawnTile, TileSums, TileTask};
-use crate::image::SurfelImages;
+use crate::image::{DepthSpread, SurfelImages};
 use crate::planes::{IMAGES, TileImages, read_tile, write_tile};
 use crate::screen::ScreenGradient;
 use crate::simd::{Block, InstructionSet, Kernel, Lanes, Registers, dispatch};
@@ -27,12 +27,57 @@ pub(crate) struct Painted {
     ends: Vec<TileEnd>,
 }
 
-/// Transmittance and both moments of the blocks of a tile. The images would have lost their digits.
+/// Transmittance, Σ wᵢ sᵢ and Σ wᵢ sᵢ² of the blocks of a tile. The images would have lost their
+/// digits.
 type TileEnd = [[Block; 3]; BLOCKS];
+
+/// How the rays of a camera lie, and whether the spread of a ray is that of inverse depths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rays {
+    /// An affine camera, with the spread of depths.
+    Affine,
+    /// A perspective camera, with the spread of depths.
+    Perspective,
+    /// A perspective camera, with the spread of inverse depths.
+    InverseDepths,
+}
+
+impl Rays {
+    pub(crate) fn new(perspective: bool, spread: DepthSpread) -> Self {
+        match (perspective, spread) {
+            (false, _) => Self::Affine,
+            (true, DepthSpread::Depths) => Self::Perspective,
+            (true, DepthSpread::InverseDepths) => Self::InverseDepths,
+        }
+    }
+}
+
+/// What the sums of a tile are measured in.
+#[derive(Debug, Clone, Copy)]
+struct Measure {
+    reference_depth: f32,
+    /// The moment that holds Σ wᵢ sᵢ.
+    first: usize,
+    /// Spread of an image per spread of the sums.
+    unit: f32,
+}
+
+impl Measure {
+    fn new(rays: Rays, reference_depth: f32) -> Self {
+        // A tile without splats has no reference depth, and no spread either.
+        match rays {
+            Rays::InverseDepths if reference_depth > 0.0 => {
+                Self { reference_depth, first: 2, unit: 1.0 / (reference_depth * reference_depth) }
+            }
+            Rays::InverseDepths => Self { reference_depth, first: 2, unit: 0.0 },
+            Rays::Affine | Rays::Perspective => Self { reference_depth, first: 0, unit: 1.0 },
+        }
+    }
+}
 
 impl Painted {
     /// Draws what was arranged. Returns the number of pairs of a splat and a pixel.
-    pub(crate) fn paint(&mut self, arrangement: &Arrangement, perspective: bool, registers: Registers) -> u64 {
+    pub(crate) fn paint(&mut self, arrangement: &Arrangement, rays: Rays, registers: Registers) -> u64 {
         self.images.resize(arrangement.size);
         let [across, down] = arrangement.tiles;
         self.masks.clear();
@@ -51,18 +96,8 @@ impl Painted {
             || Box::new(([BlockSums::EMPTY; BLOCKS], [[Block::ZERO; IMAGES]; BLOCKS])),
             |scratch, (row, ((planes, masks), ((ends, pixel_ends), pixels)))| {
                 let (sums, images) = &mut **scratch;
-                let band = ForwardBand {
-                    arrangement,
-                    row,
-                    perspective,
-                    planes,
-                    masks,
-                    pixels,
-                    pixel_ends,
-                    ends,
-                    sums,
-                    images,
-                };
+                let band =
+                    ForwardBand { arrangement, row, rays, planes, masks, pixels, pixel_ends, ends, sums, images };
                 dispatch(registers, band)
             },
         );
@@ -74,7 +109,7 @@ impl Painted {
         &self,
         arrangement: &Arrangement,
         by_images: &SurfelImages,
-        perspective: bool,
+        rays: Rays,
         registers: Registers,
         by_entry: &mut [ScreenGradient],
     ) {
@@ -84,8 +119,7 @@ impl Painted {
             |scratch, (row, out)| {
                 let (gradients, images) = &mut **scratch;
                 let planes = by_images.planes();
-                let band =
-                    BackwardBand { arrangement, painted: self, planes, row, perspective, gradients, images, out };
+                let band = BackwardBand { arrangement, painted: self, planes, row, rays, gradients, images, out };
                 dispatch(registers, band);
             },
         );
@@ -141,7 +175,7 @@ fn task(arrangement: &Arrangement, row: usize, column: usize) -> (TileTask<'_>, 
 struct ForwardBand<'a> {
     arrangement: &'a Arrangement,
     row: usize,
-    perspective: bool,
+    rays: Rays,
     /// The row in all images.
     planes: Vec<&'a mut [f32]>,
     masks: &'a mut [u16],
@@ -158,19 +192,19 @@ impl Kernel for ForwardBand<'_> {
 
     #[inline(always)]
     fn run<I: InstructionSet>(self, isa: I) -> u64 {
-        let Self { arrangement, row, perspective, mut planes, masks, pixels, pixel_ends, ends, sums, images } = self;
+        let Self { arrangement, row, rays, mut planes, masks, pixels, pixel_ends, ends, sums, images } = self;
         let mut pairs = 0;
         let mut count = 0;
         for column in 0..arrangement.tiles[0] {
             let (task, entries) = task(arrangement, row, column);
             let mut out = DrawnTile { sums, masks: &mut masks[entries], pixels, count: &mut count };
-            pairs += if perspective {
-                forward::draw::<I, true>(isa, &task, &mut out)
-            } else {
-                forward::draw::<I, false>(isa, &task, &mut out)
+            pairs += match rays {
+                Rays::Affine => forward::draw::<I, false, false>(isa, &task, &mut out),
+                Rays::Perspective => forward::draw::<I, true, false>(isa, &task, &mut out),
+                Rays::InverseDepths => forward::draw::<I, true, true>(isa, &task, &mut out),
             };
             pixel_ends[column] = count as u32;
-            finish(isa, task.reference_depth, sums, &mut ends[column], images);
+            finish(isa, Measure::new(rays, task.reference_depth), sums, &mut ends[column], images);
             write_tile(isa, images, task.origin[0], task.size[0], &mut planes);
         }
         pairs
@@ -179,17 +213,19 @@ impl Kernel for ForwardBand<'_> {
 
 /// Makes the images of a tile of its sums, and keeps what its gradient needs.
 #[inline(always)]
-fn finish<I: InstructionSet>(isa: I, reference_depth: f32, sums: &TileSums, end: &mut TileEnd, out: &mut TileImages) {
+fn finish<I: InstructionSet>(isa: I, measure: Measure, sums: &TileSums, end: &mut TileEnd, out: &mut TileImages) {
     for ((sums, end), out) in sums.iter().zip(end).zip(out) {
         let BlockSums { transmittance, colour: [red, green, blue], normal: [east, north, up], moments } = sums;
-        *end = [*transmittance, moments[0], moments[1]];
+        *end = [*transmittance, moments[measure.first], moments[1]];
         let (mut coverages, mut depths, mut distortions) = (Block::ZERO, Block::ZERO, Block::ZERO);
         for part in 0..I::PARTS {
-            let (first, second) = (isa.load(&moments[0], part), isa.load(&moments[1], part));
+            let (depth, second) = (isa.load(&moments[0], part), isa.load(&moments[1], part));
+            let first = isa.load(&moments[measure.first], part);
             let coverage = isa.splat(1.0).sub(isa.load(transmittance, part));
             coverage.store(&mut coverages, part);
-            isa.splat(reference_depth).mul_add(coverage, first).store(&mut depths, part);
-            first.neg_mul_add(first, coverage.mul(second)).store(&mut distortions, part);
+            isa.splat(measure.reference_depth).mul_add(coverage, depth).store(&mut depths, part);
+            let spread = first.neg_mul_add(first, coverage.mul(second));
+            spread.mul(isa.splat(measure.unit)).store(&mut distortions, part);
         }
         *out = [*red, *green, *blue, coverages, *east, *north, *up, depths, distortions];
     }
@@ -202,7 +238,7 @@ struct BackwardBand<'a> {
     /// Gradients by all images.
     planes: [&'a [f32]; IMAGES],
     row: usize,
-    perspective: bool,
+    rays: Rays,
     gradients: &'a mut TileGradients,
     images: &'a mut TileImages,
     out: &'a mut [ScreenGradient],
@@ -213,7 +249,7 @@ impl Kernel for BackwardBand<'_> {
 
     #[inline(always)]
     fn run<I: InstructionSet>(self, isa: I) {
-        let Self { arrangement, painted, planes, row, perspective, gradients, images, out } = self;
+        let Self { arrangement, painted, planes, row, rays, gradients, images, out } = self;
         let first = entries_of_row(arrangement, row).start;
         let mut start = 0;
         for column in 0..arrangement.tiles[0] {
@@ -227,12 +263,12 @@ impl Kernel for BackwardBand<'_> {
             }
             let masks = &painted.masks[first + entries.start..first + entries.end];
             read_tile(isa, images, task.origin, task.size, &planes);
-            begin(isa, task.reference_depth, &painted.ends[tile], images, gradients);
+            begin(isa, Measure::new(rays, task.reference_depth), &painted.ends[tile], images, gradients);
             let out = &mut out[entries];
-            if perspective {
-                backward::spread::<I, true>(isa, &task, masks, pixels, gradients, out);
-            } else {
-                backward::spread::<I, false>(isa, &task, masks, pixels, gradients, out);
+            match rays {
+                Rays::Affine => backward::spread::<I, false, false>(isa, &task, masks, pixels, gradients, out),
+                Rays::Perspective => backward::spread::<I, true, false>(isa, &task, masks, pixels, gradients, out),
+                Rays::InverseDepths => backward::spread::<I, true, true>(isa, &task, masks, pixels, gradients, out),
             }
         }
     }
@@ -240,7 +276,7 @@ impl Kernel for BackwardBand<'_> {
 
 /// Makes the gradients by the sums of a tile of those by its images.
 #[inline(always)]
-fn begin<I: InstructionSet>(isa: I, reference_depth: f32, end: &TileEnd, images: &TileImages, out: &mut TileGradients) {
+fn begin<I: InstructionSet>(isa: I, measure: Measure, end: &TileEnd, images: &TileImages, out: &mut TileGradients) {
     for ((end, by_image), out) in end.iter().zip(images).zip(out) {
         let [transmittances, firsts, seconds] = end;
         let [red, green, blue, by_coverages, east, north, up, by_depths, by_distortions] = by_image;
@@ -249,12 +285,18 @@ fn begin<I: InstructionSet>(isa: I, reference_depth: f32, end: &TileEnd, images:
         out.colour = [*red, *green, *blue];
         out.normal = [*east, *north, *up];
         for part in 0..I::PARTS {
-            let (by_depth, by_distortion) = (isa.load(by_depths, part), isa.load(by_distortions, part));
+            let by_depth = isa.load(by_depths, part);
+            let by_distortion = isa.load(by_distortions, part).mul(isa.splat(measure.unit));
             let (first, second) = (isa.load(firsts, part), isa.load(seconds, part));
             let coverage = isa.splat(1.0).sub(isa.load(transmittances, part));
-            let by_sum = isa.splat(reference_depth).mul_add(by_depth, isa.load(by_coverages, part));
+            let by_sum = isa.splat(measure.reference_depth).mul_add(by_depth, isa.load(by_coverages, part));
             second.mul_add(by_distortion, by_sum).store(&mut out.moments[0], part);
-            first.add(first).neg_mul_add(by_distortion, by_depth).store(&mut out.moments[1], part);
+            if measure.first == 0 {
+                first.add(first).neg_mul_add(by_distortion, by_depth).store(&mut out.moments[1], part);
+            } else {
+                by_depth.store(&mut out.moments[1], part);
+                first.add(first).neg_mul_add(by_distortion, isa.splat(0.0)).store(&mut out.moments[3], part);
+            }
             coverage.mul(by_distortion).store(&mut out.moments[2], part);
         }
     }

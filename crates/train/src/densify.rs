@@ -56,6 +56,17 @@ pub(crate) fn densify(state: &mut TrainingState, config: &DensifyConfig) -> Dens
     counts
 }
 
+/// Brings the opacities down to at most `most`, so that surfels which no view needs stay transparent
+/// and are removed (3DGS). The steps of the optimiser begin anew.
+pub(crate) fn reset_opacities(state: &mut TrainingState, most: f64) {
+    let most = (most / (1.0 - most)).ln() as f32;
+    for (surfel, moments) in state.surfels.iter_mut().zip(&mut state.moments) {
+        surfel.opacity_logit = surfel.opacity_logit.min(most);
+        moments.mean[Surfel::OPACITY] = 0.0;
+        moments.square[Surfel::OPACITY] = 0.0;
+    }
+}
+
 /// Returns the halves of a surfel, cut across its longer axis.
 fn halves(surfel: &Surfel) -> [Surfel; 2] {
     let longer = usize::from(surfel.log_scale[1] > surfel.log_scale[0]);
@@ -95,5 +106,11 @@ mod tests {
         x.sort_by(f32::total_cmp);
         assert_eq!(x, [0.0, 10.0, 39.4, 40.6]);
         assert_eq!((state.moments.len(), state.pulls.len()), (4, 4));
+        state.surfels[1].opacity_logit = -7.0;
+        state.moments[0].square = [1.0; Surfel::PARAMETERS];
+        reset_opacities(&mut state, 0.01);
+        let opacity = |number: usize| state.surfels[number].opacity();
+        assert!((opacity(0) - 0.01).abs() < 1e-6 && (opacity(1) - 1.0 / (1.0 + 7f64.exp())).abs() < 1e-6);
+        assert_eq!((state.moments[0].square[8], state.moments[0].square[9]), (1.0, 0.0));
     }
 }

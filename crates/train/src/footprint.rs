@@ -55,6 +55,8 @@ pub(crate) struct Brush<L> {
     pub(crate) depth: L,
     /// Depth from which depths are measured, negative.
     minus_reference: L,
+    /// That depth relative to the depth of the centre.
+    reference_ratio: L,
     /// Depth of the centre, measured from the reference depth.
     relative_depth: L,
     log2_opacity: L,
@@ -65,6 +67,8 @@ pub(crate) struct Brush<L> {
 pub(crate) struct Footprint<L: Lanes> {
     /// Depth of the intersection relative to that of the centre; 1 for affine cameras.
     pub(crate) r: L,
+    /// 1 / r.
+    ratio: L,
     /// Position in the plane, standard deviations.
     pub(crate) uv: [L; 2],
     /// u² + v².
@@ -121,6 +125,7 @@ impl<L: Lanes> Brush<L> {
             slopes: [isa.splat(splat.slopes[0]), isa.splat(splat.slopes[1])],
             depth: isa.splat(splat.depth),
             minus_reference: isa.splat(-reference_depth),
+            reference_ratio: isa.splat(reference_depth / splat.depth),
             relative_depth: isa.splat(splat.depth - reference_depth),
             log2_opacity: isa.splat(splat.log2_opacity),
             cutoff: isa.splat(splat.cutoff),
@@ -142,15 +147,16 @@ impl<L: Lanes> Brush<L> {
         let least = isa.splat(LEAST_DEPTH_RATIO);
         let ratio =
             if PERSPECTIVE { p[1].neg_mul_add(self.slopes[1], p[0].neg_mul_add(self.slopes[0], one)) } else { one };
+        let bounded = if PERSPECTIVE { ratio.max(least) } else { one };
         let (r, uv) = if PERSPECTIVE {
-            let r = one.div(ratio.max(least));
+            let r = one.div(bounded);
             (r, [p[0].mul(r), p[1].mul(r)])
         } else {
             (one, p)
         };
         let in_plane = uv[0].mul_add(uv[0], uv[1].mul(uv[1]));
         if !FINE {
-            return Footprint { r, uv, in_plane, rho: in_plane, fine: None };
+            return Footprint { r, ratio: bounded, uv, in_plane, rho: in_plane, fine: None };
         }
         let dx = isa.load(&COLUMNS, part).add(isa.splat(self.offsets[0].0[block]));
         let dy = isa.load(&ROWS, part).add(isa.splat(self.offsets[1].0[block]));
@@ -160,7 +166,7 @@ impl<L: Lanes> Brush<L> {
             on_plane = L::both(on_plane, least.at_most(ratio));
         }
         let rho = in_plane.or_else(on_plane, in_image);
-        Footprint { r, uv, in_plane, rho, fine: Some(FineFootprint { offset: [dx, dy], on_plane }) }
+        Footprint { r, ratio: bounded, uv, in_plane, rho, fine: Some(FineFootprint { offset: [dx, dy], on_plane }) }
     }
 
     /// Returns where the splat is drawn.
@@ -187,6 +193,22 @@ impl<L: Lanes> Brush<L> {
             Some(fine) => on_plane.or_else(fine.on_plane, self.relative_depth),
             None => on_plane,
         }
+    }
+
+    /// Returns the inverse depth at pixels of a perspective camera in units of that of the reference
+    /// depth, less 1.
+    #[inline(always)]
+    pub(crate) fn inverse_depth<I: InstructionSet<Lanes = L>>(&self, isa: I, at: &Footprint<L>) -> L {
+        let one = isa.splat(1.0);
+        at.on_plane(at.ratio, one).mul_add(self.reference_ratio, isa.splat(-1.0))
+    }
+
+    /// Returns the derivative of [`Self::inverse_depth`], which is given, by the depth.
+    #[inline(always)]
+    pub(crate) fn by_depth<I: InstructionSet<Lanes = L>>(&self, isa: I, inverse_depth: L) -> L {
+        // The reference depth over the squared depth, as both are measured.
+        let whole = inverse_depth.add(isa.splat(1.0));
+        whole.mul(whole).div(self.minus_reference)
     }
 }
 

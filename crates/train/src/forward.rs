@@ -19,8 +19,10 @@ pub(crate) struct BlockSums {
     pub(crate) colour: [Block; 3],
     /// Σ wᵢ nᵢ.
     pub(crate) normal: [Block; 3],
-    /// Σ wᵢ mᵢ and Σ wᵢ mᵢ², m measured from the tile's reference depth.
-    pub(crate) moments: [Block; 2],
+    /// Σ wᵢ mᵢ with the depth m, and Σ wᵢ sᵢ² and Σ wᵢ sᵢ with that whose spread is asked for.
+    /// Depths are measured from the tile's reference depth. Where they are s themselves, the third
+    /// sum is not used.
+    pub(crate) moments: [Block; 3],
 }
 
 /// The sums of a tile's pixels.
@@ -32,7 +34,7 @@ impl BlockSums {
         transmittance: Block([1.0; LANES]),
         colour: [Block::ZERO; 3],
         normal: [Block::ZERO; 3],
-        moments: [Block::ZERO; 2],
+        moments: [Block::ZERO; 3],
     };
 }
 
@@ -82,9 +84,9 @@ pub(crate) struct DrawnTile<'a> {
     pub(crate) count: &'a mut usize,
 }
 
-/// Draws the splats of a tile. Returns the number of pairs of a splat and a pixel.
+/// Draws the splats of a tile; `INVERSE` where the spread of inverse depths is asked for. Returns the number of pairs of a splat and a pixel.
 #[inline(always)]
-pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool>(
+pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool>(
     isa: I,
     task: &TileTask<'_>,
     out: &mut DrawnTile<'_>,
@@ -115,9 +117,9 @@ pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool>(
             for part in 0..I::PARTS {
                 let sums = &mut out.sums[block];
                 let (pixels, is_alive) = if splat.is_fine {
-                    draw_block::<I, PERSPECTIVE, true>(isa, &brush, splat, block, part, sums)
+                    draw_block::<I, PERSPECTIVE, INVERSE, true>(isa, &brush, splat, block, part, sums)
                 } else {
-                    draw_block::<I, PERSPECTIVE, false>(isa, &brush, splat, block, part, sums)
+                    draw_block::<I, PERSPECTIVE, INVERSE, false>(isa, &brush, splat, block, part, sums)
                 };
                 drawn |= pixels;
                 alive |= is_alive;
@@ -141,7 +143,7 @@ pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool>(
 /// Draws a splat on a part of a block. Returns at which pixels, and whether any pixel takes more
 /// splats.
 #[inline(always)]
-fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const FINE: bool>(
+fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool, const FINE: bool>(
     isa: I,
     brush: &Brush<I::Lanes>,
     splat: &ScreenSplat,
@@ -166,8 +168,15 @@ fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const FINE: bool>(
     }
     let depth = brush.depth::<PERSPECTIVE>(&at);
     let moment = weight.mul(depth);
-    let [first, second] = &mut sums.moments;
+    let [first, second, other] = &mut sums.moments;
     isa.load(first, part).add(moment).store(first, part);
-    moment.mul_add(depth, isa.load(second, part)).store(second, part);
+    if INVERSE {
+        let inverse = brush.inverse_depth(isa, &at);
+        let moment = weight.mul(inverse);
+        isa.load(other, part).add(moment).store(other, part);
+        moment.mul_add(inverse, isa.load(second, part)).store(second, part);
+    } else {
+        moment.mul_add(depth, isa.load(second, part)).store(second, part);
+    }
     (I::Lanes::bits(drawn, part), I::Lanes::any(isa.splat(LEAST_TRANSMITTANCE).at_most(after)))
 }

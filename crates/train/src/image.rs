@@ -1,5 +1,17 @@
 //! The images that a drawing gives, and the gradients of a loss by them.
 
+/// What the distortion of a ray is the spread of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DepthSpread {
+    /// Of the depths; the distortion is in square metres.
+    #[default]
+    Depths,
+    /// Of the inverse depths of a perspective camera; the distortion is per square metre. It is that
+    /// of normalised device coordinates (2DGS) but for a factor, so that what is far away may
+    /// spread. Affine cameras have no inverse depths, and keep the spread of depths.
+    InverseDepths,
+}
+
 /// The images of a drawing, by rows; the same type holds the gradients of a loss by each value.
 ///
 /// All are sums over the splats of a pixel with their weights wᵢ = αᵢ Πⱼ₍ᵢ₎ (1 − αⱼ), which add up
@@ -17,8 +29,9 @@ pub struct SurfelImages {
     /// Σ wᵢ zᵢ: depths of the intersections, metres. Divided by the coverage, it is the expected
     /// depth.
     pub depth_m: Vec<f32>,
-    /// ½ Σᵢⱼ wᵢ wⱼ (zᵢ − zⱼ)², square metres: how far the splats of a ray are apart.
-    pub distortion_m2: Vec<f32>,
+    /// ½ Σᵢⱼ wᵢ wⱼ (sᵢ − sⱼ)²: how far the splats of a ray are apart. s is the depth or its inverse,
+    /// see [`DepthSpread`].
+    pub distortion: Vec<f32>,
 }
 
 impl SurfelImages {
@@ -41,13 +54,13 @@ impl SurfelImages {
     pub fn planes(&self) -> [&[f32]; 9] {
         let [red, green, blue] = &self.colour;
         let [east, north, up] = &self.normal;
-        [red, green, blue, &self.coverage, east, north, up, &self.depth_m, &self.distortion_m2]
+        [red, green, blue, &self.coverage, east, north, up, &self.depth_m, &self.distortion]
     }
 
     /// Returns all images in the order of [`Self::planes`].
     pub fn planes_mut(&mut self) -> [&mut Vec<f32>; 9] {
         let [red, green, blue] = &mut self.colour;
         let [east, north, up] = &mut self.normal;
-        [red, green, blue, &mut self.coverage, east, north, up, &mut self.depth_m, &mut self.distortion_m2]
+        [red, green, blue, &mut self.coverage, east, north, up, &mut self.depth_m, &mut self.distortion]
     }
 }

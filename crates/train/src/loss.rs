@@ -2,12 +2,15 @@
 //!
 //! All terms are means over pixels, so that images of any size count alike:
 //! L = L_colour + λ L_mask + λ L_distortion + λ L_consistency + λ L_depth + λ L_normal + λ L_r. The
+//! colour term is λ |e| + λ e² + λ (1 − SSIM). The
 //! terms with priors are those of GS4Buildings: |M|⁻¹ Σ |D̂ − s D| with a learned scale s, and
 //! |M|⁻¹ Σ (1 − ⟨N̂, N⟩). L_r = 1 − r with Pearson's correlation r is that of SkySplat, for depths
 //! whose scale and zero are unknown.
 
 use crate::config::LossWeights;
-use crate::image::SurfelImages;
+use crate::image::{DepthSpread, SurfelImages};
+use crate::normals::Consistency;
+use crate::ssim::{Channel, Similarity};
 use crate::view::SurfelCamera;
 
 /// Coverage below which a pixel has no depth to compare.
@@ -59,9 +62,11 @@ pub struct LossTerms {
     pub colour: f64,
     /// Mean squared difference of colours, for the signal-to-noise ratio.
     pub squared: f64,
+    /// One less the structural similarity; 0 where its weight is.
+    pub dissimilarity: f64,
     /// Coverage against the mask.
     pub mask: f64,
-    /// Spread of the depths of a ray.
+    /// Spread of the depths of a ray; 0 where its weight is.
     pub distortion: f64,
     /// Normals of splats against those of depths.
     pub consistency: f64,
@@ -96,18 +101,41 @@ pub(crate) struct LossInput<'a, C> {
     pub(crate) extent_m: f64,
 }
 
+/// Memory of losses, which is kept from one to the next.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LossScratch {
+    similarity: Similarity,
+    consistency: Consistency,
+    /// Whether the colours of a pixel are compared.
+    counts: Vec<bool>,
+    /// A channel as it is shown and as it is to be, 0 where it is not compared.
+    shown: Vec<f32>,
+    truth: Vec<f32>,
+    /// Gradient by what is shown.
+    by_shown: Vec<f32>,
+}
+
 impl<C: SurfelCamera> LossInput<'_, C> {
+    /// What the distortion of the drawing has to be the spread of.
+    pub(crate) fn spread(weights: &LossWeights) -> DepthSpread {
+        let wanted = C::PERSPECTIVE && weights.distortion > 0.0;
+        if wanted { DepthSpread::InverseDepths } else { DepthSpread::Depths }
+    }
+
     /// Computes the loss, and its gradient into `out`.
-    pub(crate) fn compute(&self, out: &mut SurfelImages) -> (LossTerms, ViewSlopes) {
+    pub(crate) fn compute(&self, scratch: &mut LossScratch, out: &mut SurfelImages) -> (LossTerms, ViewSlopes) {
         out.resize(self.images.size);
         for plane in out.planes_mut() {
             plane.fill(0.0);
         }
         let (mut terms, mut slopes) = (LossTerms::default(), ViewSlopes::default());
-        self.colour(out, &mut terms, &mut slopes);
+        self.colour(scratch, out, &mut terms, &mut slopes);
         self.mask(out, &mut terms);
         self.distortion(out, &mut terms);
-        self.consistency(out, &mut terms);
+        if self.weights.consistency > 0.0 {
+            let (images, camera, weight) = (self.images, &self.view.camera, self.weights.consistency);
+            terms.consistency = scratch.consistency.add_gradient(images, &images.coverage, camera, weight, out);
+        }
         self.prior_depth(out, &mut terms, &mut slopes);
         self.prior_normal(out, &mut terms);
         self.correlation(out, &mut terms);
@@ -126,30 +154,59 @@ impl<C: SurfelCamera> LossInput<'_, C> {
         self.view.mask.as_ref().is_none_or(|mask| mask[pixel])
     }
 
-    fn colour(&self, out: &mut SurfelImages, terms: &mut LossTerms, slopes: &mut ViewSlopes) {
-        let target = &self.view.colour;
-        let seen = |pixel: &usize| self.is_modelled(*pixel) && target.iter().all(|c| c[*pixel].is_finite());
-        let count = (0..self.images.coverage.len()).filter(seen).count().max(1) as f64 * 3.0;
-        let (absolute, squared) = (self.weights.absolute as f32, 1.0 - self.weights.absolute as f32);
+    fn colour(
+        &self,
+        scratch: &mut LossScratch,
+        out: &mut SurfelImages,
+        terms: &mut LossTerms,
+        slopes: &mut ViewSlopes,
+    ) {
+        let LossScratch { similarity, counts, shown, truth, by_shown, .. } = scratch;
+        let (target, pixels) = (&self.view.colour, self.images.coverage.len());
+        counts.clear();
+        counts.extend((0..pixels).map(|p| self.is_modelled(p) && target.iter().all(|c| c[p].is_finite())));
+        let seen = counts.iter().filter(|counted| **counted).count();
+        let count = seen.max(1) as f64 * 3.0;
+        let [absolute, squared, alike] =
+            [self.weights.absolute, self.weights.squared, self.weights.similarity].map(|weight| weight as f32);
         let unit = (1.0 / count) as f32;
+        let mut similar = 0.0;
         for (k, target) in target.iter().enumerate() {
             let (gain, offset) = (self.appearance.gain[k], self.appearance.offset[k]);
-            let (mut sum, mut squares, mut by_gain, mut by_offset) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
-            for pixel in (0..self.images.coverage.len()).filter(seen) {
-                let (colour, coverage) = (self.images.colour[k][pixel], self.images.coverage[pixel]);
-                let error = gain * colour + offset * coverage - target[pixel];
+            let (colour, coverage) = (&self.images.colour[k], &self.images.coverage);
+            let compared = |value: f32, pixel: usize| if counts[pixel] { value } else { 0.0 };
+            truth.clear();
+            truth.extend(target.iter().enumerate().map(|(pixel, value)| compared(*value, pixel)));
+            shown.clear();
+            shown.extend((0..pixels).map(|pixel| compared(gain * colour[pixel] + offset * coverage[pixel], pixel)));
+            by_shown.clear();
+            let (mut sum, mut squares) = (0.0f64, 0.0f64);
+            by_shown.extend(shown.iter().zip(truth.iter()).map(|(shown, truth)| {
+                let error = shown - truth;
                 sum += f64::from(absolute * error.abs() + squared * error * error);
                 squares += f64::from(error * error);
-                let slope = (absolute * sign(error) + 2.0 * squared * error) * unit;
+                (absolute * sign(error) + 2.0 * squared * error) * unit
+            }));
+            if alike > 0.0 {
+                let channel = Channel { size: self.images.size, shown, truth, counts };
+                similar += similarity.add_gradient(&channel, -alike * unit, by_shown);
+            }
+            let (mut by_gain, mut by_offset) = (0.0f64, 0.0f64);
+            for pixel in (0..pixels).filter(|pixel| counts[*pixel]) {
+                let slope = by_shown[pixel];
                 out.colour[k][pixel] += slope * gain;
                 out.coverage[pixel] += slope * offset;
-                by_gain += f64::from(slope * colour);
-                by_offset += f64::from(slope * coverage);
+                by_gain += f64::from(slope * colour[pixel]);
+                by_offset += f64::from(slope * coverage[pixel]);
             }
             terms.colour += sum / count;
             terms.squared += squares / count;
             slopes.appearance[k] = by_gain as f32;
             slopes.appearance[3 + k] = by_offset as f32;
+        }
+        if alike > 0.0 && seen > 0 {
+            terms.dissimilarity = 1.0 - similar / count;
+            terms.colour += self.weights.similarity * terms.dissimilarity;
         }
     }
 
@@ -165,48 +222,16 @@ impl<C: SurfelCamera> LossInput<'_, C> {
         }
     }
 
+    /// The distortion in units of the size of the scene: of depths for affine cameras, of inverse
+    /// depths for others.
     fn distortion(&self, out: &mut SurfelImages, terms: &mut LossTerms) {
-        let unit = 1.0 / (self.images.coverage.len().max(1) as f64 * self.extent_m * self.extent_m);
-        terms.distortion = self.images.distortion_m2.iter().map(|&d| f64::from(d)).sum::<f64>() * unit;
-        out.distortion_m2.fill((self.weights.distortion * unit) as f32);
-    }
-
-    /// The normals of the splats are turned to those of the drawn depths, which are held fixed.
-    fn consistency(&self, out: &mut SurfelImages, terms: &mut LossTerms) {
-        if self.weights.consistency == 0.0 {
+        if self.weights.distortion == 0.0 {
             return;
         }
-        let [width, height] = self.images.size;
-        let unit = 1.0 / self.images.coverage.len().max(1) as f64;
-        for row in 0..height.saturating_sub(1) {
-            for column in 0..width.saturating_sub(1) {
-                let Some(normal) = self.normal_of_depth(column, row) else { continue };
-                let pixel = row * width + column;
-                let along: f32 = (0..3).map(|i| self.images.normal[i][pixel] * normal[i]).sum();
-                terms.consistency += f64::from(self.images.coverage[pixel] - along) * unit;
-                let slope = (self.weights.consistency * unit) as f32;
-                out.coverage[pixel] += slope;
-                (0..3).for_each(|i| out.normal[i][pixel] -= slope * normal[i]);
-            }
-        }
-    }
-
-    /// Returns the unit normal of the drawn depths at a pixel, turned to the camera.
-    fn normal_of_depth(&self, column: usize, row: usize) -> Option<[f32; 3]> {
-        let width = self.images.size[0];
-        let point = |column: usize, row: usize| {
-            let pixel = row * width + column;
-            let coverage = self.images.coverage[pixel];
-            let depth = f64::from(self.images.depth_m[pixel] / coverage);
-            let point = self.view.camera.point([column as f64, row as f64], depth);
-            point.filter(|_| coverage > 0.5)
-        };
-        let (here, right, below) = (point(column, row)?, point(column + 1, row)?, point(column, row + 1)?);
-        let (a, b) = ([0, 1, 2].map(|i| right[i] - here[i]), [0, 1, 2].map(|i| below[i] - here[i]));
-        // Columns run to the right and rows down, so that this points to the camera.
-        let n = [b[1] * a[2] - b[2] * a[1], b[2] * a[0] - b[0] * a[2], b[0] * a[1] - b[1] * a[0]];
-        let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
-        (length > 0.0).then(|| n.map(|c| (c / length) as f32))
+        let size = self.extent_m * self.extent_m;
+        let unit = if C::PERSPECTIVE { size } else { 1.0 / size } / self.images.coverage.len().max(1) as f64;
+        terms.distortion = self.images.distortion.iter().map(|&d| f64::from(d)).sum::<f64>() * unit;
+        out.distortion.fill((self.weights.distortion * unit) as f32);
     }
 
     fn prior_depth(&self, out: &mut SurfelImages, terms: &mut LossTerms, slopes: &mut ViewSlopes) {
@@ -321,16 +346,32 @@ mod tests {
             prior_normal: Some([40, 41, 42].map(|k| plane(k, -1.0, 1.0))),
             relative_depth: Some(plane(50, -3.0, 9.0)),
         };
-        // The normals of the drawn depths are held fixed, so that they have no differences.
-        let weights = LossWeights { consistency: 0.0, ..LossWeights::default() };
+        // Every term counts. The random depths make normals of any direction, whose slopes are steep.
+        let weights = LossWeights {
+            absolute: 0.8,
+            squared: 0.4,
+            similarity: 0.2,
+            mask: 0.5,
+            distortion: 10.0,
+            consistency: 0.02,
+            prior_depth: 5.0,
+            prior_normal: 0.1,
+            correlation: 4.0,
+        };
         let appearance = ViewAppearance { gain: [1.1, 0.9, 1.0], offset: [0.05, 0.0, -0.05] };
+        let held = &images.coverage;
         let loss = |images: &SurfelImages, appearance: ViewAppearance, depth_scale: f32| {
-            let mut out = SurfelImages::default();
+            let (mut out, mut scratch) = (SurfelImages::default(), LossScratch::default());
             let input = LossInput { images, view: &view, weights, appearance, depth_scale, extent_m: 2.0 };
-            let (terms, slopes) = input.compute(&mut out);
-            (terms.total, slopes, out)
+            let (terms, slopes) = input.compute(&mut scratch, &mut out);
+            // The coverage that the normals are multiplied with is held fixed.
+            let mut none = SurfelImages::zeros(SIZE);
+            let free = Consistency::default().add_gradient(images, &images.coverage, &camera, 0.0, &mut none);
+            let fixed = Consistency::default().add_gradient(images, held, &camera, 0.0, &mut none);
+            (terms.total + weights.consistency * (fixed - free), slopes, out)
         };
         let (_, slopes, by_images) = loss(&images, appearance, 1.02);
+        assert!(by_images.depth_m.iter().any(|slope| *slope != 0.0));
         let step = 1e-3f32;
         let close = |found: f32, ahead: f64, behind: f64, what: &str| {
             let slope = (ahead - behind) / f64::from(2.0 * step);

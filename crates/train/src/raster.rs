@@ -6,8 +6,8 @@
 use rayon::prelude::*;
 
 use crate::arrange::Arrangement;
-use crate::bands::Painted;
-use crate::image::SurfelImages;
+use crate::bands::{Painted, Rays};
+use crate::image::{DepthSpread, SurfelImages};
 use crate::screen::{ScreenGradient, gradient};
 use crate::simd::{Registers, prefetch};
 use crate::surfel::Surfel;
@@ -27,6 +27,7 @@ pub struct Drawing {
     by_entry: Vec<ScreenGradient>,
     pairs: u64,
     registers: Registers,
+    spread: DepthSpread,
 }
 
 /// The gradient of a loss by the parameters of surfels.
@@ -82,7 +83,12 @@ impl Drawing {
         let size = camera.size();
         assert!(size.iter().all(|&s| s <= MAX_SIDE), "an image of {size:?} pixels is too large");
         self.arrangement.arrange(surfels, camera);
-        self.pairs = self.painted.paint(&self.arrangement, C::PERSPECTIVE, self.registers);
+        self.pairs = self.painted.paint(&self.arrangement, Rays::new(C::PERSPECTIVE, self.spread), self.registers);
+    }
+
+    /// Chooses what the distortion is the spread of, from the next drawing on.
+    pub fn set_spread(&mut self, spread: DepthSpread) {
+        self.spread = spread;
     }
 
     /// Returns the images.
@@ -106,11 +112,11 @@ impl Drawing {
         by_images: &SurfelImages,
         out: &mut SurfelGradients,
     ) {
-        let Self { painted, arrangement, by_entry, registers, .. } = self;
+        let Self { painted, arrangement, by_entry, registers, spread, .. } = self;
         assert_eq!(by_images.size, arrangement.size, "the gradient belongs to another image");
         assert_eq!(surfels.len(), arrangement.splats.len(), "other surfels were drawn");
         by_entry.resize(arrangement.entries.len(), [0.0; 16]);
-        painted.spread(arrangement, by_images, C::PERSPECTIVE, *registers, by_entry);
+        painted.spread(arrangement, by_images, Rays::new(C::PERSPECTIVE, *spread), *registers, by_entry);
         let one = |(number, surfel): (usize, &Surfel)| {
             let view = camera.local(number, surfel.position.map(f64::from));
             let Some(view) = view.filter(|_| arrangement.splats[number].is_drawn()) else {

@@ -27,6 +27,8 @@ pub struct Surfel {
 impl Surfel {
     /// Number of parameters.
     pub const PARAMETERS: usize = 13;
+    /// Place of the opacity among the parameters.
+    pub(crate) const OPACITY: usize = 9;
 
     /// Returns the parameters in the order of the fields.
     pub fn to_array(self) -> [f32; Self::PARAMETERS] {

@@ -4,9 +4,9 @@ use numeric::SplitMix64;
 use rayon::prelude::*;
 
 use crate::config::TrainingConfig;
-use crate::densify::{DensifyCounts, densify};
+use crate::densify::{DensifyCounts, densify, reset_opacities};
 use crate::image::SurfelImages;
-use crate::loss::{LossInput, LossTerms, TrainingView, ViewAppearance};
+use crate::loss::{LossInput, LossScratch, LossTerms, TrainingView, ViewAppearance};
 use crate::raster::{Drawing, SurfelGradients};
 use crate::simd::Registers;
 use crate::state::TrainingState;
@@ -26,6 +26,7 @@ pub struct Trainer<'a, C> {
     state: TrainingState,
     drawing: Drawing,
     by_images: SurfelImages,
+    scratch: LossScratch,
     gradients: SurfelGradients,
 }
 
@@ -68,6 +69,7 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
             state,
             drawing: Drawing::new(&[], &views[0].camera, Registers::Longest),
             by_images: SurfelImages::default(),
+            scratch: LossScratch::default(),
             gradients: SurfelGradients::default(),
         }
     }
@@ -91,17 +93,18 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
     pub fn step(&mut self) -> TrainingStep {
         let iteration = self.state.iteration;
         let number = self.view_at(iteration);
-        let view = &self.views[number];
+        let (view, weights) = (&self.views[number], self.config.weights_at(iteration));
+        self.drawing.set_spread(LossInput::<C>::spread(&weights));
         self.drawing.redraw(&self.state.surfels, &view.camera);
         let input = LossInput {
             images: self.drawing.images(),
             view,
-            weights: self.config.weights_at(iteration),
+            weights,
             appearance: self.state.appearance[number],
             depth_scale: self.state.depth_scale,
             extent_m: self.extent_m,
         };
-        let (terms, slopes) = input.compute(&mut self.by_images);
+        let (terms, slopes) = input.compute(&mut self.scratch, &mut self.by_images);
         self.drawing.gradients(&self.state.surfels, &view.camera, &self.by_images, &mut self.gradients);
         self.descend(view.camera.size(), modelled_share(view));
         let rate = self.config.rates.view as f32;
@@ -123,16 +126,18 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
 
     /// Draws a view as the training sees it, and compares it without taking a step.
     pub fn judge(&mut self, view: &TrainingView<C>, appearance: ViewAppearance) -> LossTerms {
+        let weights = self.config.weights_at(self.state.iteration);
+        self.drawing.set_spread(LossInput::<C>::spread(&weights));
         self.drawing.redraw(&self.state.surfels, &view.camera);
         let input = LossInput {
             images: self.drawing.images(),
             view,
-            weights: self.config.weights_at(self.state.iteration),
+            weights,
             appearance,
             depth_scale: self.state.depth_scale,
             extent_m: self.extent_m,
         };
-        input.compute(&mut self.by_images).0
+        input.compute(&mut self.scratch, &mut self.by_images).0
     }
 
     /// Returns the images of the last drawing.
@@ -180,7 +185,8 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
     fn rates(&self) -> [f32; Surfel::PARAMETERS] {
         let r = &self.config.rates;
         let position = self.config.position_rate(self.state.iteration) * self.extent_m;
-        let [p, q, s, o, c] = [position, r.rotation, r.scale, r.opacity, r.colour].map(|rate| rate as f32);
+        let colour = self.config.colour_rate(self.state.iteration);
+        let [p, q, s, o, c] = [position, r.rotation, r.scale, r.opacity, colour].map(|rate| rate as f32);
         [p, p, p, q, q, q, q, s, s, o, c, c, c]
     }
 
@@ -195,7 +201,12 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
         if iteration > to {
             config.budget = 0;
         }
-        Some(densify(&mut self.state, &config))
+        let counts = densify(&mut self.state, &config);
+        let resets = config.reset_every > 0 && iteration <= to && iteration.is_multiple_of(config.reset_every);
+        if resets {
+            reset_opacities(&mut self.state, config.reset_opacity);
+        }
+        Some(counts)
     }
 }
 

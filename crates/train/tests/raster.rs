@@ -6,7 +6,8 @@ use numeric::SplitMix64;
 use proptest::prelude::*;
 use reference::{Eye, Parameters, draw};
 use train::{
-    AffineView, Drawing, LocalView, PinholeView, Registers, Surfel, SurfelCamera, SurfelGradients, SurfelImages,
+    AffineView, DepthSpread, Drawing, LocalView, PinholeView, Registers, Surfel, SurfelCamera, SurfelGradients,
+    SurfelImages,
 };
 
 const SIZE: [usize; 2] = [37, 29];
@@ -68,15 +69,28 @@ fn weight(plane: usize, place: usize) -> f32 {
     ((plane * 7919 + place * 104_729 + 13) % 2003) as f32 / 1001.0 - 1.0
 }
 
-fn check_image<C: SurfelCamera>(surfels: &[Surfel], camera: &C, eye: &Eye) -> Result<(), TestCaseError> {
-    let found = Drawing::new(surfels, camera, Registers::Longest);
-    let truth = draw(&exact(surfels), eye, SIZE);
+fn drawing<C: SurfelCamera>(surfels: &[Surfel], camera: &C, spread: DepthSpread) -> Drawing {
+    let mut drawing = Drawing::new(&[], camera, Registers::Longest);
+    drawing.set_spread(spread);
+    drawing.redraw(surfels, camera);
+    drawing
+}
+
+fn check_image<C: SurfelCamera>(
+    surfels: &[Surfel],
+    camera: &C,
+    eye: &Eye,
+    spread: DepthSpread,
+) -> Result<(), TestCaseError> {
+    let found = drawing(surfels, camera, spread);
+    let truth = draw(&exact(surfels), eye, SIZE, spread);
     let sure = truth.unsure.iter().filter(|u| !**u).count();
     // A surfel that is almost seen from the edge makes the whole image unsure.
     prop_assume!(sure > SIZE[0] * SIZE[1] / 2);
     for (number, (found, plane)) in found.images().planes().into_iter().zip(&truth.planes).enumerate() {
         // Depths are metres at up to 10 m, so that they are compared relative to 10.
-        let unit = if number >= 7 { 10.0 } else { 1.0 };
+        let is_inverse = number == 8 && spread == DepthSpread::InverseDepths;
+        let unit = if number >= 7 && !is_inverse { 10.0 } else { 1.0 };
         for place in (0..found.len()).filter(|&p| !truth.unsure[p]) {
             let error = (f64::from(found[place]) - plane[place]).abs() / unit;
             prop_assert!(error < 1e-5, "image {number}, pixel {place}: {} is not {}", found[place], plane[place]);
@@ -85,24 +99,32 @@ fn check_image<C: SurfelCamera>(surfels: &[Surfel], camera: &C, eye: &Eye) -> Re
     Ok(())
 }
 
-fn check_gradients<C: SurfelCamera>(surfels: &[Surfel], camera: &C, eye: &Eye) -> Result<(), TestCaseError> {
+fn check_gradients<C: SurfelCamera>(
+    surfels: &[Surfel],
+    camera: &C,
+    eye: &Eye,
+    spread: DepthSpread,
+) -> Result<(), TestCaseError> {
     let parameters = exact(surfels);
-    let unsure = draw(&parameters, eye, SIZE).unsure;
+    let unsure = draw(&parameters, eye, SIZE, spread).unsure;
+    // Inverse depths differ by less than depths, so that their gradient is enlarged to be seen.
+    let of_spread = if spread == DepthSpread::InverseDepths { 200.0 } else { 1.0 };
     let mut by_images = SurfelImages::zeros(SIZE);
     for (number, plane) in by_images.planes_mut().into_iter().enumerate() {
         for (place, value) in plane.iter_mut().enumerate() {
-            *value = if unsure[place] { 0.0 } else { weight(number, place) };
+            let size = if number == 8 { of_spread } else { 1.0 };
+            *value = if unsure[place] { 0.0 } else { size * weight(number, place) };
         }
     }
     let mut found = SurfelGradients::default();
-    Drawing::new(surfels, camera, Registers::Longest).gradients(surfels, camera, &by_images, &mut found);
+    drawing(surfels, camera, spread).gradients(surfels, camera, &by_images, &mut found);
     // The slope of the loss, and the sum of its absolute parts: what rounding is relative to where
     // the parts cancel.
     let slope = |number: usize, parameter: usize| {
         let moved = |by: f64| {
             let mut moved = parameters.clone();
             moved[number][parameter] += by;
-            draw(&moved, eye, SIZE).planes
+            draw(&moved, eye, SIZE, spread).planes
         };
         let (ahead, behind, weights) = (moved(STEP), moved(-STEP), by_images.planes());
         let parts = (0..9).flat_map(|k| (0..weights[k].len()).map(move |p| (k, p)));
@@ -126,10 +148,17 @@ fn check_gradients<C: SurfelCamera>(surfels: &[Surfel], camera: &C, eye: &Eye) -
 }
 
 /// Images and gradients of a scene with a tile that is cut by the border.
-fn whole<C: SurfelCamera>(surfels: &[Surfel], camera: &C, registers: Registers, threads: usize) -> Vec<u32> {
+fn whole<C: SurfelCamera>(
+    surfels: &[Surfel],
+    camera: &C,
+    (registers, spread): (Registers, DepthSpread),
+    threads: usize,
+) -> Vec<u32> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     pool.install(|| {
-        let mut drawing = Drawing::new(surfels, camera, registers);
+        let mut drawing = Drawing::new(&[], camera, registers);
+        drawing.set_spread(spread);
+        drawing.redraw(surfels, camera);
         let mut by_images = SurfelImages::zeros(camera.size());
         for (number, plane) in by_images.planes_mut().into_iter().enumerate() {
             plane.iter_mut().enumerate().for_each(|(place, value)| *value = weight(number, place));
@@ -157,12 +186,17 @@ fn threads_and_registers_change_no_bit() {
         .collect();
     let pinhole = PinholeView { focal_px: [150.0; 2], principal_px: [89.0, 61.0], size: [181, 125], ..pinhole().0 };
     let (affine, _) = affine(&surfels);
-    let plain = [whole(&surfels, &pinhole, Registers::Plain, 1), whole(&surfels, &affine, Registers::Plain, 1)];
-    assert!(plain[0].iter().filter(|bits| **bits != 0).count() > 200_000);
+    let (depths, inverse) = (DepthSpread::Depths, DepthSpread::InverseDepths);
+    let of = |registers: Registers, threads: usize| {
+        let pinhole = [depths, inverse].map(|spread| whole(&surfels, &pinhole, (registers, spread), threads));
+        let [by_depth, by_inverse] = pinhole;
+        [by_depth, by_inverse, whole(&surfels, &affine, (registers, depths), threads)]
+    };
+    let plain = of(Registers::Plain, 1);
+    assert!(plain[0] != plain[1] && plain[0].iter().filter(|bits| **bits != 0).count() > 200_000);
     for registers in [Registers::Plain, Registers::AtMost256, Registers::Longest] {
         for threads in [1, 2, 5] {
-            assert!(whole(&surfels, &pinhole, registers, threads) == plain[0], "{registers:?}, {threads} threads");
-            assert!(whole(&surfels, &affine, registers, threads) == plain[1], "{registers:?}, {threads} threads");
+            assert!(of(registers, threads) == plain, "{registers:?}, {threads} threads");
         }
     }
 }
@@ -181,7 +215,7 @@ fn a_surfel_beside_the_camera_covers_what_its_plane_covers() {
         opacity_logit: 3.0,
         colour: [1.0, 0.5, 0.25],
     };
-    check_image(&[floor], &camera, &eye).expect("the images agree");
+    check_image(&[floor], &camera, &eye, DepthSpread::InverseDepths).expect("the images agree");
     let drawing = Drawing::new(&[floor], &camera, Registers::Longest);
     let coverage = |row: usize| drawing.images().coverage[row * SIZE[0] + SIZE[0] / 2];
     assert!(coverage(28) > 0.5 && coverage(5) == 0.0, "{} {}", coverage(28), coverage(5));
@@ -198,7 +232,7 @@ fn gradients_hold_for_a_thin_surfel_that_is_almost_seen_from_the_edge() {
         colour: [0.348, 0.6344, 0.6095],
     };
     let (camera, eye) = pinhole();
-    check_gradients(&[needle], &camera, &eye).expect("the gradients agree");
+    check_gradients(&[needle], &camera, &eye, DepthSpread::Depths).expect("the gradients agree");
 }
 
 #[test]
@@ -223,16 +257,18 @@ proptest! {
     #[test]
     fn images_are_those_of_the_reference(surfels in prop::collection::vec(surfel(), 1..25)) {
         let (camera, eye) = pinhole();
-        check_image(&surfels, &camera, &eye)?;
+        check_image(&surfels, &camera, &eye, DepthSpread::Depths)?;
+        check_image(&surfels, &camera, &eye, DepthSpread::InverseDepths)?;
         let (camera, eye) = affine(&surfels);
-        check_image(&surfels, &camera, &eye)?;
+        check_image(&surfels, &camera, &eye, DepthSpread::Depths)?;
     }
 
     #[test]
     fn gradients_are_central_differences(surfels in prop::collection::vec(surfel(), 1..9)) {
         let (camera, eye) = pinhole();
-        check_gradients(&surfels, &camera, &eye)?;
+        check_gradients(&surfels, &camera, &eye, DepthSpread::Depths)?;
+        check_gradients(&surfels, &camera, &eye, DepthSpread::InverseDepths)?;
         let (camera, eye) = affine(&surfels);
-        check_gradients(&surfels, &camera, &eye)?;
+        check_gradients(&surfels, &camera, &eye, DepthSpread::Depths)?;
     }
 }

@@ -1,8 +1,8 @@
 //! Surfels learn a scene that is known: a textured wall before a textured floor, seen from above.
 
 use train::{
-    Drawing, PinholeView, Registers, Surfel, SurfelImages, Trainer, TrainingConfig, TrainingState, TrainingView,
-    ViewAppearance,
+    Drawing, PinholeView, Recipe, Registers, Surfel, SurfelImages, Trainer, TrainingConfig, TrainingState,
+    TrainingView, ViewAppearance,
 };
 
 const SIZE: [usize; 2] = [96, 72];
@@ -120,7 +120,9 @@ fn judged(state: &TrainingState) -> (f64, f64) {
 fn surfels_learn_a_scene_and_priors_mend_its_shape() {
     let before = judged(&TrainingState::new(start(), 1));
     let plain = judged(&trained(&views(false), config(400)));
-    let guided = judged(&trained(&views(true), config(400)));
+    let mut buildings = TrainingConfig::of(Recipe::BuildingEnhanced);
+    buildings.iterations = 400;
+    let guided = judged(&trained(&views(true), buildings));
     assert!(plain.0 > before.0 + 8.0, "{before:?} became {plain:?} dB, m");
     assert!(guided.0 > before.0 + 8.0, "{before:?} became {guided:?} dB, m");
     assert!(guided.1 < 0.7 * plain.1, "with priors {guided:?}, without {plain:?} dB, m");

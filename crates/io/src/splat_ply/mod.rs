@@ -7,7 +7,8 @@
 //! - `x y z`: position, metres from a local origin
 //! - `nx ny nz`: surface normal
 //! - `f_dc_0..2`: colour as the constant spherical harmonic, colour = ½ + C₀ f with C₀ = ½ √(1/π)
-//! - `f_rest_*`: higher harmonics, zero; some loaders demand them
+//! - `f_rest_*`: higher harmonics, all of red, of green and of blue; some loaders demand them, and
+//!   get zeros
 //! - `opacity`: logit of the opacity
 //! - `scale_0..2`: natural logarithm of the standard deviations in metres; 2DGS has only two
 //! - `rot_0..3`: quaternion, w first
@@ -27,7 +28,7 @@ pub use error::SplatPlyError;
 pub use layout::{SH_DEGREE_MAX, SplatForm, SplatLayout};
 pub use origin::{LocalOrigin, origin_path};
 pub use read::{SplatFile, read};
-pub use write::write;
+pub use write::{write, write_with_harmonics};
 
 #[cfg(test)]
 mod tests;

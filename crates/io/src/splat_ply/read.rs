@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use gaussian::Splat;
+use gaussian::{Splat, SplatHarmonics};
 
 use super::error::{SplatPlyError, invalid};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatForm, SplatLayout};
@@ -23,6 +23,8 @@ const DISC_THICKNESS: f32 = 1e-3;
 pub struct SplatFile {
     /// The splats. Discs get a third scale of a thousandth of their smaller one.
     pub splats: Vec<Splat>,
+    /// Harmonics beyond the constant one; `None` where the file has none that are not 0.
+    pub harmonics: Option<SplatHarmonics>,
     /// Properties of the file.
     pub layout: SplatLayout,
     /// Origin of the positions, when a file with it lies beside.
@@ -60,7 +62,7 @@ struct Column {
 ///
 /// # Examples
 /// ```
-/// use gaussian::Splat;
+/// use gaussian::{Splat, SplatHarmonics};
 /// use io::splat_ply::{LocalOrigin, SplatLayout, read, write};
 ///
 /// let folder = tempfile::tempdir()?;
@@ -92,12 +94,21 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
     let columns = Columns::of(&header).map_err(|what| invalid(path, what))?;
     let rows = bytes[header.body..].chunks_exact(header.row).take(header.count as usize);
     let mut splats = Vec::with_capacity(header.count as usize);
+    let mut coefficients: Vec<f32> = Vec::new();
     for (index, row) in rows.enumerate() {
         let splat = columns.splat(row);
         splat.validate().map_err(|defect| invalid(path, format!("splat {index}: {defect}")))?;
         splats.push(splat);
+        coefficients.extend(columns.rest.iter().map(|&column| value(row, column) as f32));
     }
-    Ok(SplatFile { splats, layout: columns.layout, origin: LocalOrigin::read_beside(path)? })
+    if let Some(place) = coefficients.iter().position(|c| !c.is_finite()) {
+        let what = format!("splat {}: a harmonic is not finite", place / columns.rest.len().max(1));
+        return Err(invalid(path, what));
+    }
+    // Trainers without harmonics pad files with zeros for loaders.
+    let are_zero = coefficients.iter().all(|c| *c == 0.0);
+    let harmonics = SplatHarmonics::new(columns.layout.sh_degree, coefficients).filter(|_| !are_zero);
+    Ok(SplatFile { splats, harmonics, layout: columns.layout, origin: LocalOrigin::read_beside(path)? })
 }
 
 fn header(bytes: &[u8]) -> Result<Header, String> {
@@ -155,6 +166,15 @@ impl Header {
     }
 }
 
+/// Returns a number of a row.
+fn value(row: &[u8], Column { at, size }: Column) -> f64 {
+    match *row[at..at + size].as_ref() {
+        [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
+        [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        _ => f64::NAN,
+    }
+}
+
 /// Places of the numbers of a splat within a row.
 struct Columns {
     position: [Column; 3],
@@ -162,6 +182,8 @@ struct Columns {
     opacity: Column,
     scale: [Column; 3],
     rotation: [Column; 4],
+    /// The harmonics beyond the constant one.
+    rest: Vec<Column>,
     layout: SplatLayout,
 }
 
@@ -180,7 +202,9 @@ impl Columns {
             .ok_or_else(|| {
                 format!("found {rest} f_rest properties, expected 0, 9, 24 or 45 (harmonics of degree 0 to 3)")
             })?;
+        let rest = (0..rest).map(|i| numbered("f_rest", i)).collect::<Result<Vec<Column>, String>>()?;
         Ok(Self {
+            rest,
             position: [column("x")?, column("y")?, column("z")?],
             colour: [numbered("f_dc", 0)?, numbered("f_dc", 1)?, numbered("f_dc", 2)?],
             opacity: column("opacity")?,
@@ -194,11 +218,7 @@ impl Columns {
     }
 
     fn splat(&self, row: &[u8]) -> Splat {
-        let value = |Column { at, size }: Column| match *row[at..at + size].as_ref() {
-            [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
-            [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
-            _ => f64::NAN,
-        };
+        let value = |column: Column| value(row, column);
         let rotation = self.rotation.map(value);
         // Trainers store quaternions of any length and normalise them when they use them.
         let length = rotation.iter().map(|q| q * q).sum::<f64>().sqrt();

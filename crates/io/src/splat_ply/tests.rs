@@ -54,6 +54,33 @@ fn every_layout_comes_back() {
     }
 }
 
+/// A foreign file keeps its harmonics, also in another degree; zeros are none.
+#[test]
+fn harmonics_come_back_padded_or_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.ply");
+    let coefficients: Vec<f32> = (0..48).map(|i| 0.25 * i as f32 - 3.0).collect();
+    let harmonics = gaussian::SplatHarmonics::new(2, coefficients).unwrap();
+    for sh_degree in 1..=3 {
+        let layout = SplatLayout { form: SplatForm::Discs, sh_degree };
+        write_with_harmonics(&path, &splats(), Some(&harmonics), &origin(), layout, true).unwrap();
+        // Loaders of other programs have no origin beside.
+        std::fs::remove_file(origin_path(&path)).unwrap();
+        let file = read(&path).unwrap();
+        let found = file.harmonics.unwrap();
+        assert_eq!((found.degree(), file.origin), (sh_degree, None));
+        let both = found.of(1, 2).len().min(8);
+        assert_eq!(found.of(1, 2)[..both], harmonics.of(1, 2)[..both]);
+        assert!(found.of(1, 2)[both..].iter().all(|c| *c == 0.0));
+    }
+    let layout = SplatLayout { sh_degree: 3, ..SplatLayout::default() };
+    write(&path, &splats(), &origin(), layout, true).unwrap();
+    assert_eq!(read(&path).unwrap().harmonics, None);
+    let broken = gaussian::SplatHarmonics::new(1, vec![f32::NAN; 18]).unwrap();
+    write_with_harmonics(&path, &splats(), Some(&broken), &origin(), layout, true).unwrap();
+    assert!(read(&path).unwrap_err().to_string().contains("splat 0: a harmonic is not finite"));
+}
+
 /// Compares the first splat with what the loader of the original 3DGS code expects, computed by
 /// hand.
 #[test]

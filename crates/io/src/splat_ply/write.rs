@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use gaussian::Splat;
+use gaussian::{Splat, SplatHarmonics};
 
 use super::error::{SplatPlyError, invalid};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatLayout};
@@ -25,6 +25,25 @@ pub fn write(
     layout: SplatLayout,
     overwrite: bool,
 ) -> Result<(), SplatPlyError> {
+    write_with_harmonics(path, splats, None, origin, layout, overwrite)
+}
+
+/// Writes splats as [`write()`] does, with their harmonics: padded with zeros or cut to the degree of
+/// the layout.
+///
+/// # Errors
+/// Those of [`write()`].
+///
+/// # Panics
+/// If there are harmonics of fewer splats.
+pub fn write_with_harmonics(
+    path: &Path,
+    splats: &[Splat],
+    harmonics: Option<&SplatHarmonics>,
+    origin: &LocalOrigin,
+    layout: SplatLayout,
+    overwrite: bool,
+) -> Result<(), SplatPlyError> {
     if layout.sh_degree > SH_DEGREE_MAX {
         let what = format!("the degree of the harmonics is {}, expected 0 to {SH_DEGREE_MAX}", layout.sh_degree);
         return Err(invalid(path, what));
@@ -35,23 +54,32 @@ pub fn write(
     refuse_existing(path, overwrite)?;
     // The splats are written last, so that a file of splats always has its origin.
     origin.write_beside(path, overwrite)?;
-    Ok(write_stream(path, overwrite, |out| body(out, splats, layout))?)
+    Ok(write_stream(path, overwrite, |out| body(out, splats, harmonics, layout))?)
 }
 
-fn body(out: &mut dyn Write, splats: &[Splat], layout: SplatLayout) -> std::io::Result<()> {
+fn body(
+    out: &mut dyn Write,
+    splats: &[Splat],
+    harmonics: Option<&SplatHarmonics>,
+    layout: SplatLayout,
+) -> std::io::Result<()> {
     writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", splats.len())?;
     for name in layout.properties() {
         writeln!(out, "property float {name}")?;
     }
     writeln!(out, "end_header")?;
     let mut row: Vec<u8> = Vec::new();
-    for splat in splats {
+    for (number, splat) in splats.iter().enumerate() {
         row.clear();
         let mut put = |value: f64| row.extend_from_slice(&(value as f32).to_le_bytes());
         splat.position.iter().for_each(|&p| put(f64::from(p)));
         splat.normal().into_iter().for_each(&mut put);
         splat.colour.iter().for_each(|&c| put((f64::from(c) - 0.5) / SH_C0));
-        (0..layout.rest()).for_each(|_| put(0.0));
+        for channel in 0..3 {
+            let known = harmonics.map_or(&[][..], |harmonics| harmonics.of(number, channel));
+            let coefficient = |i: usize| known.get(i).copied().map_or(0.0, f64::from);
+            (0..layout.rest() / 3).for_each(|i| put(coefficient(i)));
+        }
         let opacity = f64::from(splat.opacity);
         put((opacity / (1.0 - opacity)).ln());
         splat.scale_m[..layout.form.scales()].iter().for_each(|&s| put(f64::from(s).ln()));

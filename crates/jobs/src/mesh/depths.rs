@@ -12,7 +12,8 @@ use raster::Grid;
 
 use super::config::{DepthSource, MeshJobConfig};
 use super::error::MeshJobError;
-use crate::train::{DatasetPlace, pinhole};
+use crate::small_view::pinhole;
+use crate::train::DatasetPlace;
 
 /// Coverage by splats above which a pixel has a depth.
 const COVERED: f32 = 0.5;
@@ -94,7 +95,7 @@ fn drawn(
     let depth = |pixel: usize| {
         let coverage = images.coverage[pixel];
         // Where splats of a ray lie apart, their mean depth is on none of them.
-        let spread = images.distortion_m2[pixel].max(0.0).sqrt() / coverage;
+        let spread = images.distortion[pixel].max(0.0).sqrt() / coverage;
         if coverage > COVERED && spread < most_spread { images.depth_m[pixel] / coverage } else { f32::NAN }
     };
     let colour = |pixel: usize| images.colour.each_ref().map(|plane| plane[pixel] / images.coverage[pixel]);

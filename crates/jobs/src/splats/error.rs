@@ -10,7 +10,7 @@ use io::splat_ply::SplatPlyError;
 use numeric::Cancelled;
 
 use crate::corrections::CorrectionsError;
-use crate::error::{ImageInputError, JobError, from_steps};
+use crate::error::{ImageInputError, JobError, SettingError, from_steps};
 use crate::files::FileError;
 use crate::map_surface::MapSurfaceError;
 use crate::placed_model::PlacedModelError;
@@ -78,6 +78,14 @@ pub enum SplatsJobError {
         /// Name of the image.
         name: String,
     },
+    /// A camera that is to be made smaller has a lens with distortion.
+    #[error("the lens of {name} has distortion ({model}), expected a pinhole to make the image smaller: shrink by 1")]
+    ShrunkLens {
+        /// Name of the view.
+        name: String,
+        /// Name of the lens model.
+        model: &'static str,
+    },
     /// Two views have the same name.
     #[error("two views would be written as {name}")]
     SameName {
@@ -99,4 +107,4 @@ pub enum SplatsJobError {
     Job(#[from] JobError),
 }
 
-from_steps!(SplatsJobError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));
+from_steps!(SplatsJobError: Job(FileError, ThreadsError, SettingError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));

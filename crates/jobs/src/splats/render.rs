@@ -5,18 +5,24 @@
 //! `height/NAME.npy` (metres above the datum of the origin where half of the light is stopped, NaN
 //! elsewhere), for perspective cameras `depth/NAME.npy` (metres along the optical axis to the same
 //! place), and `report.json`. Pictures are compared over the pixels that splats cover by more
-//! than half. Satellite images have units of their own, so they are compared after a gain and an
+//! than half, and over all. Flat splats through pinholes are drawn as trainings and meshes draw them
+//! (2DGS), and their depths are means by weight; others are mixed where they lie on one surface.
+//! Satellite images have units of their own, so they are compared after a gain and an
 //! offset per channel.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use ::splats::{LensSplatCamera, Rendering, RpcSplatCamera, SplatCamera, psnr_db, ssim};
+use ::splats::{LensSplatCamera, Rendering, RpcSplatCamera, psnr_db, ssim};
+use ::train::{Drawing, PinholeView, Registers, Surfel, SurfelCamera};
+use camera::{Lens, LensModel};
 use crs::MapProjection;
+use gaussian::Splat;
 use io::colmap::{ColmapModel, ColmapView};
 use io::npy;
 use io::raster::{write_png_gray, write_png_rgb};
-use io::splat_ply::{LocalOrigin, SplatFile};
+use io::splat_ply::{LocalOrigin, SplatFile, SplatForm};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
@@ -25,11 +31,13 @@ use super::error::SplatsJobError;
 use super::image;
 use super::make::pointing_path;
 use crate::corrections::{CorrectionSource, Corrections};
-use crate::dataset_folder::{dataset_folder, sparse_folder};
+use crate::dataset_folder::{UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, sparse_folder};
+use crate::error::SettingError;
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
-use crate::placed_model;
+use crate::placed_model::{self, PlacedModelError};
 use crate::report_page;
+use crate::small_view::{pinhole, shrunk};
 use crate::threads::install;
 
 const REPORT: &str = "report.json";
@@ -41,7 +49,8 @@ const COVERED: f32 = 0.5;
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct SplatRenderConfig {
-    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them.
+    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them. Files of other programs have
+    /// none: they lie in the frame of the perspective cameras.
     pub splats: PathBuf,
     /// Images with RPCs to look through.
     pub images: Vec<PathBuf>,
@@ -51,6 +60,8 @@ pub struct SplatRenderConfig {
     /// Folder with the pictures of the perspective cameras; cameras without a picture are rendered
     /// and not compared. `images` of the dataset when `None`.
     pub pictures: Option<PathBuf>,
+    /// Pixels of a perspective camera that become one, in each direction.
+    pub shrink: usize,
     /// Source of the pointing corrections of the images. [`CorrectionSource::SurfaceRun`] takes
     /// those that the splats were made with, which lie beside them, or else those of the run in
     /// whose folder they lie.
@@ -82,9 +93,12 @@ pub struct SplatRenderView {
     pub size: [usize; 2],
     /// Mean accumulated opacity.
     pub coverage: f64,
-    /// Peak signal-to-noise ratio against the picture, decibels, where there is a picture.
+    /// Peak signal-to-noise ratio against the picture, decibels, where there is a picture: over the
+    /// pixels that splats cover by more than half.
     pub psnr_db: Option<f64>,
-    /// Structural similarity with the picture, where there is a picture.
+    /// The same over all pixels, as trainings judge their views.
+    pub psnr_whole_db: Option<f64>,
+    /// Structural similarity with the picture, where there is a picture, over the covered pixels.
     pub ssim: Option<f64>,
 }
 
@@ -109,6 +123,7 @@ impl SplatRenderConfig {
             images: Vec::new(),
             cameras: None,
             pictures: None,
+            shrink: 1,
             corrections: CorrectionSource::default(),
             output,
             threads: None,
@@ -119,10 +134,13 @@ impl SplatRenderConfig {
     /// Checks that there is a camera.
     ///
     /// # Errors
-    /// [`SplatsJobError::NoCamera`].
+    /// [`SplatsJobError::NoCamera`], or a factor outside of its range.
     pub fn validate(&self) -> Result<(), SplatsJobError> {
         if self.images.is_empty() && self.cameras.is_none() {
             return Err(SplatsJobError::NoCamera);
+        }
+        if !(1..=64).contains(&self.shrink) {
+            return Err(SettingError::new("the factor that images shrink by", self.shrink, "1 to 64").into());
         }
         Ok(())
     }
@@ -154,10 +172,12 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
     let folder = OutputFolder::take(&config.output)?;
     folder.check_folders(["colour", "alpha", "height", "depth"])?;
     let file = io::splat_ply::read(&config.splats)?;
-    let origin = file
-        .origin
-        .clone()
-        .ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?;
+    let unplaced = || LocalOrigin::new(UNKNOWN_FRAME, UNKNOWN_DATUM, [0.0; 3]);
+    // Files of other programs lie in the frame of their cameras.
+    let origin = match file.origin.clone() {
+        None if config.images.is_empty() => unplaced(),
+        found => found.ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?,
+    };
     folder.remove(REPORT)?;
     let pictures = config.pictures.clone().or_else(|| config.cameras.as_deref().and_then(pictures_of_dataset));
     let (taken, views) = (HashSet::new(), Vec::new());
@@ -198,7 +218,10 @@ enum Reference {
 
 impl RenderSession<'_> {
     fn run(mut self, progress: &dyn Progress) -> Result<Vec<SplatRenderView>, SplatsJobError> {
-        let placed = |folder: &PathBuf| placed_model::read(folder, &self.origin);
+        let placed = |folder: &PathBuf| match &self.file.origin {
+            Some(origin) => Ok::<_, SplatsJobError>(placed_model::read(folder, origin)?),
+            None => Ok(io::colmap::read(&sparse_folder(folder)).map_err(PlacedModelError::from)?),
+        };
         let model = self.config.cameras.as_ref().map(placed).transpose()?;
         let corrections = match &self.config.corrections {
             CorrectionSource::Uncorrected => Corrections::default(),
@@ -245,7 +268,9 @@ impl RenderSession<'_> {
         let camera = RpcSplatCamera::new(&image.camera, &projection, self.origin.origin, size)?
             .ok_or_else(|| SplatsJobError::NotSeen { target: "the splats", path: path.to_owned() })?;
         let name = Path::new(path.file_name().unwrap_or_default());
-        self.look(name, &camera, false, Reference::OwnUnits(image.pixels))
+        let sight = camera.towards_sensor().map(|c| -c);
+        let rendering = ::splats::render(&self.seen(|_| sight), &camera)?;
+        self.keep(name, false, &rendering, Reference::OwnUnits(image.pixels))
     }
 
     fn render_perspective(&mut self, view: &ColmapView, model: Option<&ColmapModel>) -> Result<(), SplatsJobError> {
@@ -253,36 +278,73 @@ impl RenderSession<'_> {
             .and_then(|model| model.lenses.get(view.lens))
             .ok_or_else(|| SplatsJobError::NoLens { name: view.name.clone() })?;
         let picture = self.pictures.as_deref().map(|folder| folder.join(&view.name)).filter(|p| p.is_file());
+        let shrink = self.config.shrink;
+        let refused = || SplatsJobError::ShrunkLens { name: view.name.clone(), model: lens.model().name() };
+        let small = pinhole(view, lens, shrink);
         let reference = match picture {
-            Some(path) => Reference::Display(image::read_pixels(&path)?.map(|p| p.map(|c| c / 255.0))),
+            Some(path) => {
+                let picture = image::read_pixels(&path)?;
+                let (found, expected) = ([picture.width(), picture.height()], [lens.width(), lens.height()]);
+                if found != expected {
+                    return Err(SplatsJobError::PictureSize { name: view.name.clone(), found, expected });
+                }
+                let size = expected.map(|side| side / shrink);
+                let planes = [0, 1, 2].map(|c| shrunk(size, shrink, |x, y| picture[(x, y)][c] / 255.0));
+                let pixels = (0..size[0] * size[1]).map(|i| planes.each_ref().map(|plane| plane[i])).collect();
+                Reference::Display(Grid::from_vec(size[0], size[1], pixels).expect("as many values as pixels"))
+            }
             None => Reference::None,
         };
-        self.look(Path::new(&view.name), &LensSplatCamera { lens, pose: &view.pose }, true, reference)
+        let centre = view.pose.centre;
+        let splats = self.seen(|splat| [0, 1, 2].map(|i| f64::from(splat.position[i]) - centre[i]));
+        let is_flat = self.file.layout.form == SplatForm::Discs;
+        let rendering = match (is_flat, small) {
+            (true, Some(camera)) => flat(&splats, &camera),
+            (_, None) if shrink > 1 => return Err(refused()),
+            (_, None) => ::splats::render(&splats, &LensSplatCamera { lens, pose: &view.pose })?,
+            (false, Some(PinholeView { focal_px: [fx, fy], principal_px: [cx, cy], size: [width, height], .. })) => {
+                let lens = Lens::new(width, height, LensModel::Pinhole, &[fx, fy, cx, cy]).map_err(|_| refused())?;
+                ::splats::render(&splats, &LensSplatCamera { lens: &lens, pose: &view.pose })?
+            }
+        };
+        self.keep(Path::new(&view.name), true, &rendering, reference)
     }
 
-    /// Renders, writes and compares one view.
-    fn look(
+    /// Returns the splats with the colours that their harmonics have along a direction.
+    fn seen(&self, direction: impl Fn(&Splat) -> [f64; 3]) -> Cow<'_, [Splat]> {
+        let SplatFile { splats, harmonics, .. } = self.file;
+        let Some(harmonics) = harmonics else { return Cow::Borrowed(splats) };
+        let coloured = |(number, splat): (usize, &Splat)| Splat {
+            colour: harmonics.colour(number, splat.colour, direction(splat)),
+            ..*splat
+        };
+        Cow::Owned(splats.iter().enumerate().map(coloured).collect())
+    }
+
+    /// Writes and compares one view.
+    fn keep(
         &mut self,
         name: &Path,
-        camera: &impl SplatCamera,
         with_depth: bool,
+        rendering: &Rendering,
         reference: Reference,
     ) -> Result<(), SplatsJobError> {
         let name = files::flat_stem(name);
         if !self.taken.insert(name.clone()) {
             return Err(SplatsJobError::SameName { name });
         }
-        let rendering = ::splats::render(&self.file.splats, camera)?;
-        self.write(&name, with_depth, &rendering)?;
+        self.write(&name, with_depth, rendering)?;
         let size = [rendering.colour.width(), rendering.colour.height()];
         let covered = rendering.coverage.map(|c| *c > COVERED);
-        let picture = reference.against(&name, &rendering, &covered)?;
+        let all = rendering.coverage.map(|_| true);
+        let picture = reference.against(&name, rendering, &covered)?;
         let pixels = rendering.coverage.data().len().max(1) as f64;
         self.views.push(SplatRenderView {
             name,
             size,
             coverage: rendering.coverage.data().iter().map(|c| f64::from(*c)).sum::<f64>() / pixels,
             psnr_db: picture.as_ref().and_then(|picture| psnr_db(&rendering.colour, picture, &covered)),
+            psnr_whole_db: picture.as_ref().and_then(|picture| psnr_db(&rendering.colour, picture, &all)),
             ssim: picture.as_ref().and_then(|picture| ssim(&rendering.colour, picture, &covered)),
         });
         Ok(())
@@ -327,6 +389,32 @@ impl Reference {
             return Err(SplatsJobError::PictureSize { name: name.to_owned(), found, expected });
         }
         Ok(Some(if own_units { fitted(&picture, &rendering.colour, covered) } else { picture }))
+    }
+}
+
+/// Draws flat splats as trainings and meshes do: the rule of 2DGS. Depths are means by weight there.
+fn flat(splats: &[Splat], camera: &PinholeView) -> Rendering {
+    let surfels: Vec<Surfel> = splats.iter().map(Surfel::of_splat).collect();
+    let drawing = Drawing::new(&surfels, camera, Registers::Longest);
+    let (images, [width, height]) = (drawing.images(), camera.size);
+    let depth = |pixel: usize, least: f32| {
+        let coverage = images.coverage[pixel];
+        if coverage > least { images.depth_m[pixel] / coverage } else { f32::NAN }
+    };
+    let local_height = |pixel: usize, depth: f32| {
+        let place = [(pixel % width) as f64, (pixel / width) as f64];
+        camera.point(place, f64::from(depth)).map_or(f32::NAN, |point| point[2] as f32)
+    };
+    let grid = |value: &dyn Fn(usize) -> f32| {
+        Grid::from_vec(width, height, (0..width * height).map(value).collect()).expect("as many values as pixels")
+    };
+    let colours = (0..width * height).map(|pixel| images.colour.each_ref().map(|plane| plane[pixel])).collect();
+    Rendering {
+        colour: Grid::from_vec(width, height, colours).expect("as many values as pixels"),
+        coverage: grid(&|pixel| images.coverage[pixel]),
+        mean_height_m: grid(&|pixel| local_height(pixel, depth(pixel, 0.0))),
+        median_height_m: grid(&|pixel| local_height(pixel, depth(pixel, COVERED))),
+        median_depth_m: grid(&|pixel| depth(pixel, COVERED)),
     }
 }
 

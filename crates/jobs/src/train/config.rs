@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::recipe::{TrainNumbers, TrainPreset, TrainSchedule, TrainSteps, TrainWeights};
 use crate::error::SettingError;
 
 /// Prior maps that a training uses.
@@ -20,17 +21,29 @@ pub enum TrainPriors {
     None,
 }
 
+/// Where the factors of the priors by iteration come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PriorSchedule {
+    /// The preset: two phases for buildings.
+    Preset,
+    /// `schedule.json` of the dataset, where there is one.
+    Dataset,
+}
+
 /// A training of splats on a dataset.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct TrainConfig {
-    /// Dataset of the priors job, or another folder with a COLMAP model in `sparse/0`.
+    /// Dataset of the priors job, or another folder with a COLMAP model in it or in a folder below,
+    /// such as `sparse/0`.
     pub dataset: PathBuf,
     /// Another COLMAP model of the same cameras, whose points are added to those of the dataset,
     /// such as the reconstruction that the cameras come from.
     pub more_points: Option<PathBuf>,
-    /// Folder of the images; `images` of the dataset when `None`.
+    /// Folder of the images; when `None`, `images` of the dataset or the folder in or beside it that
+    /// has the images of the model.
     pub images: Option<PathBuf>,
     /// Folder for the results.
     pub output: PathBuf,
@@ -40,8 +53,22 @@ pub struct TrainConfig {
     pub budget: usize,
     /// Pixels of an image that become one, in each direction.
     pub shrink: usize,
-    /// Every view of this number is kept for the judgement and not trained on; none when 0.
+    /// Every view of this number in the order of their names, from the first on, is kept for the
+    /// judgement and not trained on (LLFF); none when 0.
     pub hold_out: usize,
+    /// Names of the views that are kept instead, where there are any.
+    pub hold_out_names: Vec<String>,
+    /// What the training is for; what the dataset says when `None`: buildings where the priors job
+    /// wrote it, or else photographs.
+    pub preset: Option<TrainPreset>,
+    /// Weights of the loss that differ from those of the preset.
+    pub weights: TrainWeights,
+    /// Steps of the optimiser that differ from those of the preset.
+    pub steps: TrainSteps,
+    /// Where the factors of the priors by iteration come from.
+    pub prior_schedule: PriorSchedule,
+    /// Times of the training that differ from those of the preset.
+    pub schedule: TrainSchedule,
     /// Prior maps in use, as far as the dataset has them.
     pub priors: TrainPriors,
     /// Whether each image has a gain and an offset of its own.
@@ -72,6 +99,12 @@ impl TrainConfig {
             budget: 100_000,
             shrink: 1,
             hold_out: 8,
+            hold_out_names: Vec::new(),
+            preset: None,
+            weights: TrainWeights::default(),
+            steps: TrainSteps::default(),
+            prior_schedule: PriorSchedule::Preset,
+            schedule: TrainSchedule::default(),
             priors: TrainPriors::Both,
             appearance: false,
             transients: false,
@@ -100,6 +133,8 @@ impl TrainConfig {
         if self.hold_out == 1 {
             return Err(SettingError::new("the number of the view to keep", self.hold_out, "0 for none, or 2 or more"));
         }
-        Ok(())
+        self.weights.validate()?;
+        self.steps.validate()?;
+        self.schedule.validate()
     }
 }

@@ -13,9 +13,12 @@ use serde_json::Value;
 
 use super::config::{TrainConfig, TrainPriors};
 use super::error::TrainError;
-use super::place::{DatasetPlace, more_points, pinhole};
-use crate::dataset_folder::sparse_folder;
+use super::held_out::held_out;
+use super::place::{DatasetPlace, more_points};
+use super::recipe::TrainPreset;
+use crate::dataset_folder::{pictures_folder, sparse_folder};
 use crate::files;
+use crate::small_view::{pinhole, shrunk};
 
 /// A dataset in memory.
 #[derive(Debug)]
@@ -23,10 +26,15 @@ pub(super) struct TrainData {
     /// File names of the views.
     pub(super) names: Vec<String>,
     pub(super) views: Vec<TrainingView<PinholeView>>,
+    /// Whether a view is kept for the judgement.
+    pub(super) held_out: Vec<bool>,
     /// Number of the view of each camera of the model; `None` where it has no image.
     pub(super) view_of: Vec<Option<usize>>,
     pub(super) points: Vec<ColmapPoint>,
-    pub(super) schedule: Schedule,
+    /// Factors of the priors, where the dataset states them.
+    pub(super) schedule: Option<Schedule>,
+    /// What the dataset was made for.
+    pub(super) preset: TrainPreset,
     /// Whether only what is masked is modelled.
     pub(super) masked: bool,
     /// Folder of the model.
@@ -46,11 +54,14 @@ impl TrainData {
         let place = DatasetPlace::read(folder, &mut model)?;
         let [x, y, z] = place.shift;
         points.iter_mut().for_each(|p| p.position = [p.position[0] - x, p.position[1] - y, p.position[2] - z]);
-        let (schedule, masked) = schedule(folder)?;
+        let (schedule, preset) = schedule(folder)?;
+        let masked = schedule.is_some() && preset == TrainPreset::BuildingOnly;
         check_conventions(folder)?;
-        let images = config.images.clone().unwrap_or_else(|| folder.join("images"));
+        let wanted: Vec<&str> = model.views.iter().map(|view| view.name.as_str()).collect();
+        let images = config.images.clone().unwrap_or_else(|| pictures_folder(folder, &sparse, &wanted));
         let (names, views, view_of) = (Vec::new(), Vec::new(), Vec::new());
-        let mut data = Self { names, views, view_of, points, schedule, masked, sparse, place };
+        let held = Vec::new();
+        let mut data = Self { names, views, held_out: held, view_of, points, schedule, preset, masked, sparse, place };
         progress.begin("images", model.views.len());
         for view in &model.views {
             progress.check_cancelled()?;
@@ -67,6 +78,7 @@ impl TrainData {
         if data.views.is_empty() {
             return Err(TrainError::NoImages { cameras: model.views.len(), folder: images });
         }
+        data.held_out = held_out(config, &data.names)?;
         let missing = model.views.len() - data.views.len();
         if missing > 0 {
             progress.warn(&format!("{missing} of {} cameras have no image and are left out", model.views.len()));
@@ -129,16 +141,6 @@ fn read_view(
     })
 }
 
-/// Returns the means of squares of pixels.
-fn shrunk(size: [usize; 2], by: usize, value: impl Fn(usize, usize) -> f32) -> Vec<f32> {
-    let mean = |i: usize| {
-        let (x, y) = (i % size[0] * by, i / size[0] * by);
-        let sum: f32 = (0..by * by).map(|k| value(x + k % by, y + k / by)).sum();
-        sum / (by * by) as f32
-    };
-    (0..size[0] * size[1]).map(mean).collect()
-}
-
 fn numbers(path: &Path, size: [usize; 2], channels: usize) -> Result<Vec<f32>, TrainError> {
     let NpyArray { shape, data } = npy::read(path)?;
     let expected: &[usize] = if channels == 1 { &[size[1], size[0]] } else { &[size[1], size[0], channels] };
@@ -152,17 +154,18 @@ fn numbers(path: &Path, size: [usize; 2], channels: usize) -> Result<Vec<f32>, T
     })
 }
 
-/// Reads the schedule, and whether only buildings are trained. A dataset without one has no mask.
-fn schedule(folder: &Path) -> Result<(Schedule, bool), TrainError> {
+/// Reads the schedule, and what the dataset is for. One without a schedule is of photographs.
+fn schedule(folder: &Path) -> Result<(Option<Schedule>, TrainPreset), TrainError> {
     let path = folder.join("schedule.json");
     if !path.is_file() {
-        return Ok((Schedule::default(), false));
+        return Ok((None, TrainPreset::Photographs));
     }
     let invalid = |what: String| TrainError::Dataset { path: path.clone(), what };
     let value: Value = serde_json::from_str(&files::read_text(&path)?).map_err(|e| invalid(e.to_string()))?;
     let factors = serde_json::from_value(value["factors"].clone())
         .map_err(|error| invalid(format!("the factors are not those of a schedule ({error})")))?;
-    Ok((factors, value["mode"] == "building-only"))
+    let only = value["mode"] == "building-only";
+    Ok((Some(factors), if only { TrainPreset::BuildingOnly } else { TrainPreset::BuildingEnhanced }))
 }
 
 /// Checks that depths and normals are meant as the rasteriser means them.

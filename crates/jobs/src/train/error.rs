@@ -87,6 +87,22 @@ pub enum TrainError {
         /// The model.
         path: PathBuf,
     },
+    /// A view that is to be held out is not there, or there are several of its name.
+    #[error("{found} views have the name {name}, which is to be held out; expected one, named such as {expected:?}")]
+    HeldOut {
+        /// The name that was given.
+        name: String,
+        /// Number of views of that name.
+        found: usize,
+        /// Name of a view.
+        expected: String,
+    },
+    /// No view is left to train on.
+    #[error("all {count} views are to be held out, so that none is left to train on: hold out fewer")]
+    NothingLeft {
+        /// Number of views.
+        count: usize,
+    },
     /// The checkpoint cannot be used.
     #[error("cannot go on from the checkpoint; remove it to begin again: {}", path.display())]
     Checkpoint {

@@ -18,10 +18,12 @@ mod config;
 mod course;
 mod dataset;
 mod error;
+mod held_out;
 mod initial;
 mod iterate;
 mod page;
 mod place;
+mod recipe;
 mod report;
 mod results;
 mod run;
@@ -29,10 +31,11 @@ mod satellite;
 mod satellite_run;
 mod transients;
 
-pub(crate) use place::{DatasetPlace, pinhole};
+pub(crate) use place::DatasetPlace;
 
-pub use config::{TrainConfig, TrainPriors};
+pub use config::{PriorSchedule, TrainConfig, TrainPriors};
 pub use error::TrainError;
+pub use recipe::{TrainNumbers, TrainPreset, TrainSchedule, TrainSteps, TrainWeights};
 pub use report::{LossPoint, TrainReport, TrainedViewRow};
 pub use run::run;
 pub use satellite_run::{SatelliteTrainConfig, SatelliteTrainReport, run_on_images};

@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use ::train::PinholeView;
-use camera::Lens;
 use io::colmap::{ColmapModel, ColmapObservation, ColmapPoint, ColmapView, read_with_points};
 use io::splat_ply::LocalOrigin;
 
@@ -46,23 +44,6 @@ impl DatasetPlace {
         (0..3).for_each(|i| origin.origin[i] += shift[i]);
         Ok(Self { shift, origin })
     }
-}
-
-/// Returns the view of a pinhole camera whose image is smaller by a factor; `None` for other
-/// lenses.
-pub(crate) fn pinhole(view: &ColmapView, lens: &Lens, shrink: usize) -> Option<PinholeView> {
-    if !lens.model().is_pinhole() {
-        return None;
-    }
-    let k = shrink as f64;
-    let principal = [lens.principal_point().sample, lens.principal_point().line];
-    Some(PinholeView {
-        rotation: view.pose.rotation,
-        centre: view.pose.centre,
-        focal_px: lens.focal_px().map(|f| f / k),
-        principal_px: principal.map(|p| (p + 0.5) / k - 0.5),
-        size: [lens.width() / shrink, lens.height() / shrink],
-    })
 }
 
 /// Returns the points of another model of the same cameras, in the frame of the first. Frames may

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::config::TrainConfig;
+use super::recipe::{TrainPreset, TrainWeights};
 
 /// A finished training.
 #[derive(Debug, Clone, Serialize)]
@@ -12,6 +13,10 @@ use super::config::TrainConfig;
 pub struct TrainReport {
     /// The settings.
     pub settings: TrainConfig,
+    /// What the training was for.
+    pub preset: TrainPreset,
+    /// The weights of the loss that it had.
+    pub weights: TrainWeights,
     /// The splats.
     pub splats: PathBuf,
     /// Number of splats at the beginning.

@@ -9,12 +9,13 @@ use raster::Grid;
 use report::MapLayer;
 use splats::{psnr_db, ssim};
 
-use super::config::TrainConfig;
+use super::config::{PriorSchedule, TrainConfig};
 use super::course::{Course, Trained};
 use super::dataset::TrainData;
 use super::error::TrainError;
 use super::initial;
 use super::page;
+use super::recipe::{self, TrainPreset};
 use super::report::{Quality, TrainReport, TrainedViewRow};
 use super::results::{self, CHECKPOINT, RENDERS, REPORT};
 use crate::files;
@@ -40,10 +41,6 @@ pub fn run(config: &TrainConfig, progress: &dyn Progress) -> Result<TrainReport,
     })?
 }
 
-fn is_held_out(config: &TrainConfig, data: &TrainData, view: usize) -> bool {
-    config.hold_out > 1 && data.views.len() > 2 && view % config.hold_out == config.hold_out - 1
-}
-
 fn train(
     config: &TrainConfig,
     data: &TrainData,
@@ -51,11 +48,12 @@ fn train(
     may_replace: bool,
     progress: &dyn Progress,
 ) -> Result<TrainReport, TrainError> {
-    let trained: Vec<usize> = (0..data.views.len()).filter(|&v| !is_held_out(config, data, v)).collect();
+    let trained: Vec<usize> = (0..data.views.len()).filter(|&v| !data.held_out[v]).collect();
     let views: Vec<TrainingView<PinholeView>> = trained.iter().map(|&v| data.views[v].clone()).collect();
     if data.points.len() < 4 {
         return Err(TrainError::NoPoints { count: data.points.len(), path: data.sparse.clone() });
     }
+    let (preset, settings) = settings(config, data);
     let initial = initial::surfels(data, config.budget / 2);
     let (before, _) = quality(data, &initial, None)?;
     let course = Course {
@@ -64,16 +62,18 @@ fn train(
         resume: config.resume,
         transients: config.transients,
         pictures: views.len(),
-        settings: settings(config, data),
+        settings,
     };
     let Trained { state, transient_share, losses, seconds } = course.run(&initial, views, progress)?;
     results::begin(folder)?;
-    let renders = Renders { config, folder: &folder.subfolder(RENDERS)?, may_replace };
+    let renders = Renders { folder: &folder.subfolder(RENDERS)?, may_replace };
     let (after, layers) = quality(data, &state.surfels, Some(renders))?;
     let splats = results::write_splats(&config.output, &state.surfels, &data.place.origin, may_replace)?;
-    let row = |v: usize| TrainedViewRow::new(&data.names[v], is_held_out(config, data, v), before[v], after[v]);
+    let row = |v: usize| TrainedViewRow::new(&data.names[v], data.held_out[v], before[v], after[v]);
     let report = TrainReport {
         settings: config.clone(),
+        preset,
+        weights: recipe::used(&settings.weights),
         splats,
         splats_before: initial.len(),
         splats_after: state.surfels.len(),
@@ -90,21 +90,23 @@ fn train(
     Ok(report)
 }
 
-fn settings(config: &TrainConfig, data: &TrainData) -> TrainingConfig {
-    let mut settings = TrainingConfig::default();
+fn settings(config: &TrainConfig, data: &TrainData) -> (TrainPreset, TrainingConfig) {
+    let preset = config.preset.unwrap_or(data.preset);
+    let mut settings = recipe::settings(preset, &config.weights, &config.steps, &config.schedule);
     settings.iterations = config.iterations;
     settings.seed = config.seed;
     settings.appearance = config.appearance;
-    settings.schedule = data.schedule;
+    if let Some(schedule) = data.schedule.filter(|_| config.prior_schedule == PriorSchedule::Dataset) {
+        settings.schedule = schedule;
+    }
     if let Some(densify) = &mut settings.densify {
         densify.budget = config.budget;
     }
-    settings
+    (preset, settings)
 }
 
 /// Where the views are written that were not trained on.
 struct Renders<'a> {
-    config: &'a TrainConfig,
     folder: &'a Path,
     may_replace: bool,
 }
@@ -132,7 +134,7 @@ fn quality(
             counts.data_mut().copy_from_slice(mask);
         }
         rows.push((psnr_db(&found, &truth, &counts), ssim(&found, &truth, &counts)));
-        if let Some(renders) = write.as_ref().filter(|write| is_held_out(write.config, data, number)) {
+        if let Some(renders) = write.as_ref().filter(|_| data.held_out[number]) {
             let stem = Path::new(&data.names[number]).file_stem().unwrap_or_default().to_string_lossy();
             let path = renders.folder.join(format!("{stem}.png"));
             write_png_rgb(path, &page::bytes(&found), renders.may_replace)?;

@@ -14,6 +14,7 @@ use super::course::{Course, Trained};
 use super::error::TrainError;
 use super::iterate::extent_m;
 use super::page;
+use super::recipe::{self, TrainNumbers, TrainPreset, TrainSchedule, TrainSteps, TrainWeights};
 use super::report::{LossPoint, Quality, TrainedViewRow};
 use super::results::{self, CHECKPOINT, RENDERS, REPORT};
 use super::satellite::{PlacedSurfels, SatelliteImage, corrections, line};
@@ -61,6 +62,14 @@ pub struct SatelliteTrainConfig {
     pub budget: usize,
     /// Whether pixels that stay unexplained while other views agree are left out.
     pub transients: bool,
+    /// What the training is for.
+    pub preset: TrainPreset,
+    /// Weights of the loss that differ from those of the preset.
+    pub weights: TrainWeights,
+    /// Steps of the optimiser that differ from those of the preset.
+    pub steps: TrainSteps,
+    /// Times of the training that differ from those of the preset.
+    pub schedule: TrainSchedule,
     /// Seed of everything random.
     pub seed: u64,
     /// Iterations between two checkpoints.
@@ -114,6 +123,10 @@ impl SatelliteTrainConfig {
             iterations: 1500,
             budget: 200_000,
             transients: true,
+            preset: TrainPreset::Satellite,
+            weights: TrainWeights::default(),
+            steps: TrainSteps::default(),
+            schedule: TrainSchedule::default(),
             seed: 1,
             checkpoint_every: 500,
             resume: false,
@@ -136,7 +149,9 @@ impl SatelliteTrainConfig {
         if self.iterations == 0 {
             return Err(SettingError::new("the number of iterations", self.iterations, "1 or more"));
         }
-        Ok(())
+        self.weights.validate()?;
+        self.steps.validate()?;
+        self.schedule.validate()
     }
 }
 
@@ -257,15 +272,19 @@ fn train(
 }
 
 fn settings(config: &SatelliteTrainConfig, extent_m: f64) -> TrainingConfig {
-    let mut settings = TrainingConfig::default();
+    let mut steps = config.steps;
+    steps.position_first = steps.position_first.or(Some(STEPS_M[0] / extent_m));
+    steps.position_last = steps.position_last.or(Some(STEPS_M[1] / extent_m));
+    let mut settings = recipe::settings(config.preset, &config.weights, &steps, &config.schedule);
     settings.iterations = config.iterations;
     settings.seed = config.seed;
     settings.appearance = true;
-    settings.rates.position = STEPS_M.map(|step| step / extent_m);
     // The surface model holds the heights from the first iteration to the last.
     settings.schedule.depth.from_factor = 1.0;
     settings.schedule.depth.to_factor = 1.0;
-    settings.weights.prior_depth *= HEIGHTS_WEIGHT;
+    if config.weights.prior_depth.is_none() {
+        settings.weights.prior_depth *= HEIGHTS_WEIGHT;
+    }
     if let Some(densify) = &mut settings.densify {
         densify.budget = config.budget;
     }

@@ -5,6 +5,8 @@
 //! rounding nor differences can be judged there. So is a pixel at a surfel that is almost seen from
 //! the edge, where the rounding of the pixel to f32 moves the point of its plane too far.
 
+use train::DepthSpread;
+
 /// Rounding of a pixel coordinate of a tile of 16 pixels to f32.
 const PIXEL_ROUNDING: f64 = 16.0 / (1 << 24) as f64;
 /// Move of the point of a plane that is too far, in standard deviations: with slopes that are
@@ -146,8 +148,8 @@ fn hit(eye: &Eye, surfel: &Parameters, pixel: [f64; 2]) -> (Option<Hit>, bool) {
     ((rho <= cutoff).then_some(hit), unsure)
 }
 
-/// Draws surfels.
-pub(crate) fn draw(surfels: &[Parameters], eye: &Eye, size: [usize; 2]) -> Reference {
+/// Draws surfels. The ninth image is the spread of depths, or of inverse depths of a pinhole.
+pub(crate) fn draw(surfels: &[Parameters], eye: &Eye, size: [usize; 2], spread: DepthSpread) -> Reference {
     let count = size[0] * size[1];
     let mut planes: [Vec<f64>; 9] = std::array::from_fn(|_| vec![0.0; count]);
     let mut unsure = vec![false; count];
@@ -176,7 +178,8 @@ pub(crate) fn draw(surfels: &[Parameters], eye: &Eye, size: [usize; 2]) -> Refer
             }
             planes[3][place] += weight;
             planes[7][place] += weight * hit.depth;
-            drawn.push([weight, hit.depth]);
+            let inverse = spread == DepthSpread::InverseDepths && matches!(eye, Eye::Pinhole { .. });
+            drawn.push([weight, if inverse { 1.0 / hit.depth } else { hit.depth }]);
         }
         let pairs = drawn.iter().flat_map(|a| drawn.iter().map(move |b| a[0] * b[0] * (a[1] - b[1]).powi(2)));
         planes[8][place] = pairs.sum::<f64>() / 2.0;
