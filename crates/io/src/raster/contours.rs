@@ -15,7 +15,7 @@ use raster::{GeoTransform, Grid, NO_DATA};
 
 use super::band::{Band, BandData, in_memory};
 use super::error::RasterError;
-use super::gdal_access::register_geopackage;
+use super::gdal_access::{VectorFormat, register_vector};
 use super::gdal_setup::with_gdal;
 use crate::atomic::write_path;
 
@@ -60,7 +60,7 @@ pub fn write_contours(path: &Path, surface: &ContourSurface<'_>, overwrite: bool
 }
 
 fn draw(memory: &gdal::Dataset, surface: &ContourSurface<'_>, made: &Path) -> Result<u64, GdalError> {
-    register_geopackage();
+    register_vector(VectorFormat::GeoPackage);
     let driver = DriverManager::get_driver_by_name("GPKG")?;
     let mut file = driver.create_vector_only(made)?;
     let place = SpatialRef::from_definition(&surface.crs.to_string())?;

@@ -54,7 +54,8 @@ pub use source::{ImageInfo, ImageSource, SampleType};
 pub use spectral::{BandSpectrum, IndexBands, write_multispectral_with_rpc};
 pub use spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use tile::{BandScale, MapTile, write_map_tile};
+pub use undeclared::undeclared_no_data;
 pub use world_file::write_world_file;
 
-pub(crate) use gdal_access::register_geopackage;
+pub(crate) use gdal_access::{VectorFormat, register_vector};
 pub(crate) use gdal_setup::{open_address, prepare_gdal, with_gdal};

@@ -17,7 +17,8 @@ use raster::Window;
 use crate::dsm::character::ImageCharacter;
 use crate::dsm::chunk_plan::{ChunkSweep, ChunkWork};
 use crate::dsm::chunk_side::{MARGIN_PX, aligned, with_rim};
-use crate::dsm::grid::{CELLS_MAX, DsmGrid, snapped};
+use crate::dsm::error::DsmError;
+use crate::dsm::grid::{CELLS_MAX, DsmGrid, asked_bounds, snapped};
 use crate::dsm::image_windows::GroundBox;
 use crate::dsm::images::SceneImage;
 use crate::dsm::levels::{PYRAMID_LEVELS_MAX, choose_levels, smallest_sides};
@@ -156,7 +157,8 @@ impl Plan {
         ensure(is_whole(x, width) && is_whole(y, height), || {
             format!("the corner {x}, {y} of the grid is no whole multiple of its cells")
         })?;
-        let asked = config.bounds.map(|bounds| snapped(bounds, (width, -height))).transpose();
+        let asked = grid.projection().map_err(DsmError::from).and_then(|map| asked_bounds(config, &map));
+        let asked = asked.and_then(|asked| asked.map(|bounds| snapped(bounds, (width, -height))).transpose());
         ensure(asked.is_ok_and(|asked| asked.is_none_or(|asked| asked == (grid.geotransform, grid.size))), || {
             format!("the grid {:?} is not that of the bounds in the configuration", grid.bounds().to_array())
         })?;
