@@ -485,16 +485,18 @@ fn folders_and_patterns_stand_for_their_images() {
     assert_eq!(plan(std::slice::from_ref(&pass)), named);
     assert_eq!(plan(&[pass.join("view_*.tif")]), named);
     assert_eq!(plan(&[pass.join("view_1.tif"), folder.path().join("p?ss/view_3.tif")]), named);
-    for (image, words) in [(pass.join("*.jp2"), "no file matches the pattern"), (town("truth"), "no image with an RPC")]
-    {
+    let surfaces = folder.path().join("surfaces");
+    std::fs::create_dir(&surfaces).unwrap();
+    std::fs::copy(town("truth/dsm.tif"), surfaces.join("dsm.tif")).unwrap();
+    for (image, words) in [(pass.join("*.jp2"), "no file matches the pattern"), (surfaces, "no image with an RPC")] {
         let mut command = skysweep();
         command.arg("dsm").arg(image).arg("-o").arg(folder.path().join("out")).arg("-q");
         command.assert().code(2).stderr(predicate::str::contains(words));
     }
 }
 
-/// Bounds in degrees or on another map give a grid that holds them; maps that stretch the ground are
-/// told.
+/// Bounds in degrees or on another map give a grid that holds them; maps that stretch the ground
+/// are told.
 #[test]
 fn bounds_have_a_map_of_their_own_and_a_stretched_map_is_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -120,7 +120,7 @@ def test_an_array_with_a_map_against_its_own_file_is_told_the_datum_that_is_assu
 
 
 def test_a_datum_that_is_assumed_when_writing_is_a_warning(truth: skysweep.Raster, tmp_path: Path) -> None:
-    with pytest.warns(skysweep.DatumWarning, match="heights does not say .* taken as ellipsoid") as told:
+    with pytest.warns(skysweep.DatumWarning, match="the raster does not say .* taken as ellipsoid") as told:
         skysweep.write_raster(tmp_path / "a.tif", truth.values, truth.geotransform, 32631)
     assert told[0].filename == __file__
     assert skysweep.read_raster(tmp_path / "a.tif").vertical == "ellipsoid"

@@ -554,7 +554,7 @@ def write_raster(
         raise InputError("heights have no CRS: give crs")
     datum = raster.vertical
     if datum is None:
-        assumed("heights", "ellipsoid", "give vertical to name it")
+        assumed("the raster", "ellipsoid", "give vertical to name it")
         datum = "ellipsoid"
     _native.write_grid(path_of(path), metres, raster.geotransform, (raster.crs, datum), overwrite)
 
@@ -618,7 +618,11 @@ def _unit_of(vertical: str | None) -> str | None:
     """Unit of heights above a datum."""
     if vertical is None:
         return None
-    return {1.0: "m", 0.3048: "ft"}.get(_native.vertical_parts(vertical)[1], "US survey foot")
+    try:
+        return {1.0: "m", 0.3048: "ft"}.get(_native.vertical_parts(vertical)[1], "US survey foot")
+    except CrsError:
+        # A file may name a datum that PROJ does not know; using it is an error, reading it is none.
+        return None
 
 
 def _in_unit_of(vertical: str, metres: NDArray[np.float32]) -> NDArray[np.float32]:
