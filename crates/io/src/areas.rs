@@ -332,15 +332,17 @@ mod tests {
         let driver = gdal::DriverManager::get_driver_by_name("ESRI Shapefile").unwrap();
         let srs = SpatialRef::from_epsg(2154).unwrap();
         let mut dataset = driver.create_vector_only(&path).unwrap();
-        let options =
-            LayerOptions { name: "areas", srs: Some(&srs), ty: OGRwkbGeometryType::wkbPolygon, options: None };
-        let layer = dataset.create_layer(options).unwrap();
-        FieldDefn::new("name", OGRFieldType::OFTString).unwrap().add_to_layer(&layer).unwrap();
-        let mut feature = gdal::vector::Feature::new(layer.defn()).unwrap();
-        feature.set_field_string(feature.field_index("name").unwrap(), "north").unwrap();
-        feature.set_geometry(Geometry::bbox(893_000.0, 6_222_000.0, 893_500.0, 6_222_400.0).unwrap()).unwrap();
-        feature.create(&layer).unwrap();
-        drop((layer, dataset));
+        {
+            let options =
+                LayerOptions { name: "areas", srs: Some(&srs), ty: OGRwkbGeometryType::wkbPolygon, options: None };
+            let layer = dataset.create_layer(options).unwrap();
+            FieldDefn::new("name", OGRFieldType::OFTString).unwrap().add_to_layer(&layer).unwrap();
+            let mut feature = gdal::vector::Feature::new(layer.defn()).unwrap();
+            feature.set_field_string(feature.field_index("name").unwrap(), "north").unwrap();
+            feature.set_geometry(Geometry::bbox(893_000.0, 6_222_000.0, 893_500.0, 6_222_400.0).unwrap()).unwrap();
+            feature.create(&layer).unwrap();
+        }
+        drop(dataset);
         let area = read(&path, named(None, "north")).unwrap();
         assert!(area.crs.contains("Lambert-93") || area.crs.contains("Lambert_93"), "{}", area.crs);
         assert!(area.polygons.coords_iter().any(|c| (c.x, c.y) == (893_500.0, 6_222_400.0)), "{:?}", area.polygons);
