@@ -460,14 +460,81 @@ fn overwriting_removes_the_evaluation_of_the_old_surface() {
     assert_eq!(left, ["notes.txt"]);
 }
 
-/// A folder is a likely first try: the error names the images in it.
+/// A folder stands for the images with an RPC in it, and a pattern in quotes for the files that
+/// match: the plan is that of the images by name.
 #[test]
-fn a_folder_as_an_image_is_told_from_one_image() {
+fn folders_and_patterns_stand_for_their_images() {
     let folder = tempfile::tempdir().unwrap();
-    let mut command = skysweep();
-    command.arg("dsm").arg(town("")).arg("-o").arg(folder.path().join("out")).arg("-q");
-    let text = predicate::str::contains("a folder is given as an image").and(predicate::str::contains("view_2.tif"));
-    command.assert().code(2).stderr(text);
+    let pass = folder.path().join("pass");
+    std::fs::create_dir(&pass).unwrap();
+    for view in ["view_1.tif", "view_3.tif"] {
+        std::fs::copy(town(view), pass.join(view)).unwrap();
+    }
+    std::fs::copy(town("truth/dsm.tif"), pass.join("no_image.tif")).unwrap();
+    let plan = |images: &[PathBuf]| {
+        let mut command = skysweep();
+        command.arg("dsm").args(images).arg("-o").arg(folder.path().join("out")).args(["--dry-run", "--json"]);
+        let told = command.args(["--gsd", "2"]).assert().code(0).get_output().stdout.clone();
+        let plan: Value = serde_json::from_slice(&told).unwrap();
+        let images = plan["plan"]["config"]["images"].as_array().map(Vec::len);
+        assert_eq!(images, Some(2));
+        plan["plan"]["grid"].clone()
+    };
+    let named = plan(&[pass.join("view_1.tif"), pass.join("view_3.tif")]);
+    assert!(named.is_object());
+    assert_eq!(plan(std::slice::from_ref(&pass)), named);
+    assert_eq!(plan(&[pass.join("view_*.tif")]), named);
+    assert_eq!(plan(&[pass.join("view_1.tif"), folder.path().join("p?ss/view_3.tif")]), named);
+    let surfaces = folder.path().join("surfaces");
+    std::fs::create_dir(&surfaces).unwrap();
+    std::fs::copy(town("truth/dsm.tif"), surfaces.join("dsm.tif")).unwrap();
+    for (image, words) in [(pass.join("*.jp2"), "no file matches the pattern"), (surfaces, "no image with an RPC")] {
+        let mut command = skysweep();
+        command.arg("dsm").arg(image).arg("-o").arg(folder.path().join("out")).arg("-q");
+        command.assert().code(2).stderr(predicate::str::contains(words));
+    }
+}
+
+/// Bounds in degrees or on another map give a grid that holds them; maps that stretch the ground
+/// are told.
+#[test]
+fn bounds_have_a_map_of_their_own_and_a_stretched_map_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let planned = |options: &[&str]| {
+        let mut command = skysweep();
+        command.arg("dsm").args(views()).arg("-o").arg(folder.path().join("out")).args(["--dry-run", "--gsd", "2"]);
+        command.args(options).assert().get_output().clone()
+    };
+    let grid = |options: &[&str]| -> Value {
+        let output = planned(&[options, &["--json"]].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["plan"]["grid"].clone()
+    };
+    let on_map = ["--bounds", "693880", "4822280", "693980", "4822380"];
+    let plain = grid(&on_map);
+    assert_eq!(grid(&[&on_map[..], &["--bounds-crs", "EPSG:32631"]].concat()), plain);
+    let map = crs::MapProjection::from_epsg(32631).unwrap();
+    let (west, south) = map.lonlat_from_map(693_880.0, 4_822_280.0).unwrap();
+    let (east, north) = map.lonlat_from_map(693_980.0, 4_822_380.0).unwrap();
+    let degrees = [west, south, east, north].map(|edge| edge.to_string());
+    let options = |flag: &'static str| {
+        let mut options = vec!["--bounds"];
+        options.extend(degrees.iter().map(String::as_str));
+        options.extend([flag, "EPSG:4326"]);
+        options
+    };
+    let around = grid(&options("--bounds-crs"));
+    assert_eq!(grid(&options("-te_srs")), around);
+    let size = |grid: &Value| [0, 1].map(|side| grid["size"][side].as_u64().unwrap());
+    let (inner, outer) = (size(&plain), size(&around));
+    // The meridian is turned by less than two degrees here, which adds a few cells.
+    assert!((0..2).all(|side| inner[side] <= outer[side] && outer[side] <= inner[side] + 6), "{inner:?} {outer:?}");
+    let told = String::from_utf8_lossy(&planned(&["--bounds-crs", "EPSG:4326"]).stderr).into_owned();
+    assert!(told.contains("a CRS for them"), "{told}");
+    let told = String::from_utf8_lossy(&planned(&["--crs", "EPSG:3857"]).stderr).into_owned();
+    assert!(told.contains("EPSG:3857 stretches the ground by 1.3"), "{told}");
+    let told = String::from_utf8_lossy(&planned(&[]).stderr).into_owned();
+    assert!(!told.contains("stretches"), "{told}");
 }
 
 #[cfg(unix)]

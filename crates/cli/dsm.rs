@@ -7,6 +7,7 @@ use io::raster::BandChoice;
 use jobs::dsm::{
     DsmConfig, DsmError, DsmReport, DsmSetting, Fill, HeightRange, ImagePair, LayerArea, MapBounds, Preset, SweepError,
 };
+use jobs::image_files::image_files;
 use jobs::job_file::{is_job_file, read_dsm_job};
 use jobs::production::{ProductionError, make_plan};
 use jobs::products::ProductKind;
@@ -36,8 +37,9 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Args)]
 pub(crate) struct SceneArgs {
     /// The images, two or more: anything GDAL reads, with its RPC inside or beside it, or STAC
-    /// items that name it. Or one job file (see skysweep template dsm), whose settings the options
-    /// replace.
+    /// items that name it; a folder stands for the images with an RPC in it, and a pattern in
+    /// quotes ('pass_*/*.tif') for the files that match. Or one job file (see skysweep template
+    /// dsm), whose settings the options replace.
     #[arg(required = true, value_name = "IMAGE|JOB.toml")]
     images: Vec<PathBuf>,
     /// Folder for the results [default: the job file's].
@@ -55,7 +57,10 @@ pub(crate) struct SceneArgs {
     /// Area of the DSM in its CRS [default: the ground that at least two images see].
     #[arg(long, num_args = 4, value_names = ["X_MIN", "Y_MIN", "X_MAX", "Y_MAX"], allow_negative_numbers = true)]
     bounds: Option<Vec<f64>>,
-    /// Polygons in which the DSM lies (GeoPackage, GeoJSON); cells outside are void.
+    /// CRS of --bounds, such as EPSG:4326 for degrees [default: that of the DSM].
+    #[arg(long, value_name = "CRS", value_parser = parse_epsg)]
+    bounds_crs: Option<u32>,
+    /// Polygons in which the DSM lies (GeoPackage, GeoJSON, shapefile); cells outside are void.
     #[arg(long, value_name = "FILE", conflicts_with = "bounds")]
     area: Option<PathBuf>,
     /// Ground without heights, such as water: polygons, or a georeferenced raster that is not 0
@@ -143,12 +148,21 @@ fn parse_position(text: &str) -> Result<usize, String> {
     }
 }
 
+/// Parses a CRS that is named by its code.
+fn parse_epsg(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(CrsRequest::Epsg { horizontal, .. }) => Ok(horizontal),
+        Ok(CrsRequest::Auto) => Err("expected an EPSG code such as EPSG:4326".to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
 impl SceneArgs {
     /// Returns the configuration: that of the job file, or the defaults, with the options given.
     pub(crate) fn config(&self) -> anyhow::Result<DsmConfig> {
         let mut config = match self.images.as_slice() {
             [file] if is_job_file(file) => read_dsm_job(file)?,
-            images => DsmConfig::new(images.to_vec(), PathBuf::new()),
+            images => DsmConfig::new(image_files(images)?, PathBuf::new()),
         };
         let range = |v: &Vec<f64>| Some(HeightRange::new(*v.first()?, *v.get(1)?));
         let bounds = |b: &Vec<f64>| <[f64; 4]>::try_from(b.as_slice()).ok().map(MapBounds::from);
@@ -165,6 +179,7 @@ impl SceneArgs {
         config.vertical = self.vertical.unwrap_or(config.vertical);
         config.force_crs |= self.force;
         config.bounds = self.bounds.as_ref().and_then(bounds).or(config.bounds);
+        config.bounds_epsg = self.bounds_crs.or(config.bounds_epsg.filter(|_| self.bounds.is_none()));
         config.area = self.area.clone().map(LayerArea::new).or(config.area);
         for (given, own) in [(&self.masks, &mut config.masks), (&self.image_masks, &mut config.image_masks)] {
             if !given.is_empty() {

@@ -62,6 +62,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "crs",
             "force",
             "bounds",
+            "bounds_crs",
             "vertical",
             "format",
             "encoding",
@@ -86,8 +87,9 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Messages", &["progress", "json", "quiet", "verbose", "help", "version"]),
 ];
 
-/// GDAL's options and ours.
-const OF_GDAL: [(&str, &str); 4] = [("-t_srs", "crs"), ("-te", "bounds"), ("-tr", "gsd"), ("-overwrite", "overwrite")];
+/// GDAL's options and the names of the fields of ours.
+const OF_GDAL: [(&str, &str); 5] =
+    [("-t_srs", "crs"), ("-te", "bounds"), ("-te_srs", "bounds_crs"), ("-tr", "gsd"), ("-overwrite", "overwrite")];
 
 /// A value of an option with its name and, for the help, its meaning. The `CHOICES` of enums are
 /// such values.
@@ -136,6 +138,7 @@ pub(crate) fn without_gdal_spellings(arguments: impl Iterator<Item = OsString>, 
             }
             _ => {}
         }
+        let ours = ours.replace('_', "-");
         arguments[at] = value.map_or(format!("--{ours}"), |value| format!("--{ours}={value}")).into();
     }
     arguments

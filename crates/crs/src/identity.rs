@@ -198,6 +198,36 @@ impl CrsIdentity {
     }
 }
 
+/// Returns the WKT2:2019 of the horizontal part of any CRS that PROJ reads.
+///
+/// # Errors
+/// [`CrsError::NoTransformation`] when PROJ cannot read the definition as a CRS.
+pub fn horizontal_wkt(definition: &str) -> Result<String, CrsError> {
+    proj_handle::horizontal_wkt(definition).map_err(|reason| unknown(&"the definition", reason))
+}
+
+/// Returns the WKT2:2019 of a CRS with heights, made of the horizontal part of any CRS that PROJ
+/// reads and a vertical datum.
+///
+/// ```
+/// use crs::{CrsIdentity, VerticalDatum, compound_wkt};
+///
+/// let map = "+proj=tmerc +lat_0=43.5 +lon_0=5.4 +datum=WGS84 +units=m +type=crs";
+/// let identity = CrsIdentity::of(&compound_wkt(map, VerticalDatum::Egm96)?)?;
+/// assert_eq!((identity.horizontal, identity.vertical), (None, Some(VerticalDatum::Egm96)));
+/// # Ok::<(), crs::CrsError>(())
+/// ```
+///
+/// # Errors
+/// [`CrsError::NoTransformation`] when PROJ does not know one of the two, or they do not fit.
+pub fn compound_wkt(horizontal: &str, vertical: VerticalDatum) -> Result<String, CrsError> {
+    let made = match vertical.epsg() {
+        None => proj_handle::horizontal_wkt(horizontal).and_then(|wkt| proj_handle::wkt(&wkt, true)),
+        Some(code) => proj_handle::compound_wkt(horizontal, &format!("EPSG:{code}")),
+    };
+    made.map_err(|reason| unknown(&format!("the definition with heights above {vertical}"), reason))
+}
+
 fn unknown(what: &dyn fmt::Display, reason: String) -> CrsError {
     CrsError::NoTransformation { source_crs: "EPSG:4979".to_owned(), target_crs: what.to_string(), reason }
 }
@@ -300,6 +330,31 @@ mod tests {
         assert_eq!((flat.horizontal, flat.vertical), (Some(32617), None));
         assert!(CrsIdentity::of("nothing").is_err());
         assert!(Crs::ellipsoidal(1).wkt().is_err());
+    }
+
+    #[test]
+    fn heights_above_an_unknown_datum_are_not_ellipsoidal() {
+        let wkt = Crs { horizontal: 32617, vertical: VerticalDatum::Egm96 }.wkt().unwrap();
+        let end = wkt.find("VERTCRS").unwrap();
+        let local = format!(
+            "{}VERTCRS[\"local level\",VDATUM[\"gauge of the harbour\"],CS[vertical,1],AXIS[\"up\",up,\
+             LENGTHUNIT[\"metre\",1]]]]",
+            &wkt[..end]
+        );
+        let found = CrsIdentity::of(&local).unwrap();
+        assert_eq!((found.horizontal, found.vertical), (Some(32617), None));
+    }
+
+    #[test]
+    fn maps_without_a_code_take_a_datum() {
+        let map = "+proj=tmerc +lat_0=43.5 +lon_0=5.4 +datum=WGS84 +units=m +type=crs";
+        for vertical in [VerticalDatum::Ellipsoid, VerticalDatum::Egm2008, VerticalDatum::Epsg(5720)] {
+            let wkt = compound_wkt(map, vertical).unwrap();
+            assert_eq!(CrsIdentity::of(&wkt).unwrap().vertical, Some(vertical), "{wkt}");
+            let flat = CrsIdentity::of(&horizontal_wkt(&wkt).unwrap()).unwrap();
+            assert_eq!((flat.horizontal, flat.vertical), (None, None));
+        }
+        assert!(compound_wkt(map, VerticalDatum::Epsg(1)).is_err() && horizontal_wkt("nothing").is_err());
     }
 
     #[test]

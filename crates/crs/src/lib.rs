@@ -14,6 +14,6 @@ mod vertical;
 
 pub use area::AreaOfUse;
 pub use error::CrsError;
-pub use identity::{Crs, CrsIdentity, CrsRequest, VerticalDatum, compound_epsg};
+pub use identity::{Crs, CrsIdentity, CrsRequest, VerticalDatum, compound_epsg, compound_wkt, horizontal_wkt};
 pub use projection::MapProjection;
 pub use vertical::HeightConverter;

@@ -17,11 +17,11 @@ use proj_sys::{
     PJ_TYPE_PJ_TYPE_GEOGRAPHIC_2D_CRS, PJ_TYPE_PJ_TYPE_GEOGRAPHIC_3D_CRS, PJ_TYPE_PJ_TYPE_PROJECTED_CRS,
     PJ_TYPE_PJ_TYPE_VERTICAL_CRS, PJ_WKT_TYPE, PJ_WKT_TYPE_PJ_WKT1_GDAL, PJ_WKT_TYPE_PJ_WKT2_2019, proj_as_wkt,
     proj_context_create, proj_context_destroy, proj_context_errno, proj_context_errno_string,
-    proj_context_get_database_path, proj_context_set_enable_network, proj_create, proj_create_crs_to_crs_from_pj,
-    proj_crs_demote_to_2D, proj_crs_get_coordinate_system, proj_crs_get_sub_crs, proj_crs_promote_to_3D,
-    proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_area_of_use, proj_get_id_auth_name,
-    proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify, proj_int_list_destroy,
-    proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_func, proj_log_level,
+    proj_context_get_database_path, proj_context_set_enable_network, proj_create, proj_create_compound_crs,
+    proj_create_crs_to_crs_from_pj, proj_crs_demote_to_2D, proj_crs_get_coordinate_system, proj_crs_get_sub_crs,
+    proj_crs_promote_to_3D, proj_cs_get_axis_count, proj_cs_get_axis_info, proj_destroy, proj_get_area_of_use,
+    proj_get_id_auth_name, proj_get_id_code, proj_get_name, proj_get_source_crs, proj_get_type, proj_identify,
+    proj_int_list_destroy, proj_list_destroy, proj_list_get, proj_list_get_count, proj_log_func, proj_log_level,
     proj_normalize_for_visualization, proj_trans_generic,
 };
 
@@ -160,6 +160,14 @@ impl Context {
             proj_list_destroy(list);
             text_of(proj_get_id_code(best?.0, 0))?.parse().ok()
         }
+    }
+
+    /// Returns the WKT2:2019 of a CRS.
+    fn wkt2(&self, crs: &Object) -> Result<String, String> {
+        // SAFETY: the object belongs to this context; no options are given; the text belongs to the
+        // object and is copied at once.
+        let text = unsafe { text_of(proj_as_wkt(self.0, crs.0, PJ_WKT_TYPE_PJ_WKT2_2019, ptr::null())) };
+        text.ok_or_else(|| self.reason())
     }
 
     fn axis_count(&self, crs: &Object) -> Result<i32, String> {
@@ -357,7 +365,8 @@ pub(crate) fn codes(definition: &str) -> Result<Codes, String> {
         }
         let name = text_of(proj_get_name(crs.0)).unwrap_or_default();
         let (mut ground, mut vertical) = (context.own(proj_crs_demote_to_2D(context.0, ptr::null(), crs.0))?, None);
-        if proj_get_type(crs.0) == PJ_TYPE_PJ_TYPE_COMPOUND_CRS {
+        let is_compound = proj_get_type(crs.0) == PJ_TYPE_PJ_TYPE_COMPOUND_CRS;
+        if is_compound {
             ground = context.own(proj_crs_get_sub_crs(context.0, crs.0, 0))?;
             let height = context.own(proj_crs_get_sub_crs(context.0, crs.0, 1))?;
             vertical = context.epsg(&height);
@@ -367,7 +376,8 @@ pub(crate) fn codes(definition: &str) -> Result<Codes, String> {
             name,
             horizontal: context.epsg(&ground),
             vertical,
-            three_dimensional: vertical.is_none() && axes == 3,
+            // A compound CRS whose vertical part has no code has heights above something else.
+            three_dimensional: !is_compound && axes == 3,
         })
     }
 }
@@ -382,6 +392,28 @@ pub(crate) fn wkt(definition: &str, promote: bool) -> Result<String, String> {
 pub(crate) fn wkt1(definition: &str, promote: bool) -> Result<String, String> {
     let options = [c"MULTILINE=NO", c"ALLOW_ELLIPSOIDAL_HEIGHT_AS_VERTICAL_CRS=YES"];
     written(definition, promote, PJ_WKT_TYPE_PJ_WKT1_GDAL, &options)
+}
+
+/// Returns the WKT2:2019 of the horizontal part of a CRS.
+pub(crate) fn horizontal_wkt(definition: &str) -> Result<String, String> {
+    let context = Context::new();
+    let crs = context.horizontal(definition)?;
+    context.wkt2(&crs)
+}
+
+/// Returns the WKT2:2019 of the compound CRS of a horizontal and a vertical one.
+pub(crate) fn compound_wkt(horizontal: &str, vertical: &str) -> Result<String, String> {
+    let context = Context::new();
+    let (ground, heights) = (context.horizontal(horizontal)?, context.create(vertical)?);
+    // SAFETY: all objects belong to this context and are alive; the names belong to them and are
+    // copied at once; the result is owned by `Object`.
+    let crs = unsafe {
+        let [ground_name, height_name] =
+            [&ground, &heights].map(|crs| text_of(proj_get_name(crs.0)).unwrap_or_default());
+        let name = CString::new(format!("{ground_name} + {height_name}")).unwrap_or_default();
+        context.own(proj_create_compound_crs(context.0, name.as_ptr(), ground.0, heights.0))?
+    };
+    context.wkt2(&crs)
 }
 
 fn written(definition: &str, promote: bool, form: PJ_WKT_TYPE, options: &[&CStr]) -> Result<String, String> {

@@ -1,4 +1,5 @@
-//! Areas: the polygons of a GeoPackage or a GeoJSON file, and writing polygons as GeoJSON.
+//! Areas: the polygons of a GeoPackage, a shapefile or a GeoJSON file, and writing polygons as
+//! GeoJSON.
 //!
 //! A GeoJSON file is in longitude and latitude (RFC 7946) unless it names another system in the way
 //! of older files.
@@ -11,7 +12,7 @@ use geo::{Coord, CoordsIter, LineString, MultiPolygon, Polygon};
 use serde_json::{Value, json};
 
 use crate::atomic::{SaveError, write_stream};
-use crate::raster::{prepare_gdal, register_geopackage, with_gdal};
+use crate::raster::{VectorFormat, prepare_gdal, register_vector, with_gdal};
 use crate::regular::read_regular;
 
 /// Largest GeoJSON file that is read, bytes.
@@ -58,7 +59,8 @@ pub struct AreaError {
     pub what: String,
 }
 
-/// Reads the area of a name, or all areas, from a GeoPackage (`.gpkg`) or a GeoJSON file.
+/// Reads the area of a name, or all areas, from a GeoPackage (`.gpkg`), a shapefile (`.shp`) or a
+/// GeoJSON file.
 ///
 /// ```
 /// # let folder = tempfile::tempdir()?;
@@ -163,8 +165,17 @@ struct Feature {
 
 /// Reads the reference system and the features of a layer.
 fn layer(path: &Path, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), String> {
-    let is_package = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gpkg"));
-    if is_package { geopackage(path, wanted) } else { geojson(path, wanted) }
+    let ending = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    match ending.as_deref() {
+        Some("gpkg") => through_gdal(path, VectorFormat::GeoPackage, wanted),
+        Some("shp") => through_gdal(path, VectorFormat::Shapefile, wanted),
+        Some("parquet") => {
+            Err("GeoParquet is not read: write it as GeoPackage (ogr2ogr out.gpkg in.parquet), or give it \
+                                to Python as a GeoDataFrame (geopandas.read_parquet)"
+                .to_owned())
+        }
+        _ => geojson(path, wanted),
+    }
 }
 
 /// Returns the polygons of the only feature of a name, or those of all features.
@@ -223,15 +234,15 @@ fn polygon(rings: &Value) -> Option<Polygon<f64>> {
     Some(Polygon::new(rings.next()?, rings.collect()))
 }
 
-fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), String> {
+fn through_gdal(path: &Path, format: VectorFormat, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), String> {
     if !path.metadata().map_err(|e| e.to_string())?.is_file() {
         return Err("it is not a regular file".to_owned());
     }
     prepare_gdal();
-    register_geopackage();
+    register_vector(format);
     let options = DatasetOptions {
         open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_READONLY,
-        allowed_drivers: Some(&["GPKG"]),
+        allowed_drivers: Some(&[format.driver()]),
         ..DatasetOptions::default()
     };
     let dataset = with_gdal(|| Dataset::open_ex(path, options))?;
@@ -243,7 +254,10 @@ fn geopackage(path: &Path, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>
             return Err(format!("it has {} layers, name one of {}", names.len(), names.join(", ")));
         }
     };
-    let crs = layer.spatial_ref().and_then(|system| system.to_wkt().ok()).ok_or("the layer has no reference system")?;
+    let crs = layer
+        .spatial_ref()
+        .and_then(|system| system.to_wkt().ok())
+        .ok_or("the layer has no reference system, in a shapefile the file .prj beside it")?;
     let mut features = Vec::new();
     for feature in layer.features() {
         let name = match wanted.field {
@@ -284,7 +298,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("areas.gpkg");
         prepare_gdal();
-        register_geopackage();
+        register_vector(VectorFormat::GeoPackage);
         let Ok(driver) = gdal::DriverManager::get_driver_by_name("GPKG") else { return };
         let mut dataset = driver.create_vector_only(&path).unwrap();
         let srs = SpatialRef::from_epsg(32631).unwrap();
@@ -307,6 +321,36 @@ mod tests {
         assert!(told.contains("2 layers, name one of blocks, others"), "{told}");
         let told = read(&path, named(Some("blocks"), "south")).unwrap_err().to_string();
         assert!(told.contains("no feature has the name \"south\"; there are north"), "{told}");
+    }
+
+    #[test]
+    fn shapefiles_give_their_polygons_and_their_map() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("areas.shp");
+        prepare_gdal();
+        register_vector(VectorFormat::Shapefile);
+        let driver = gdal::DriverManager::get_driver_by_name("ESRI Shapefile").unwrap();
+        let srs = SpatialRef::from_epsg(2154).unwrap();
+        let mut dataset = driver.create_vector_only(&path).unwrap();
+        {
+            let options =
+                LayerOptions { name: "areas", srs: Some(&srs), ty: OGRwkbGeometryType::wkbPolygon, options: None };
+            let layer = dataset.create_layer(options).unwrap();
+            FieldDefn::new("name", OGRFieldType::OFTString).unwrap().add_to_layer(&layer).unwrap();
+            let mut feature = gdal::vector::Feature::new(layer.defn()).unwrap();
+            feature.set_field_string(feature.field_index("name").unwrap(), "north").unwrap();
+            feature.set_geometry(Geometry::bbox(893_000.0, 6_222_000.0, 893_500.0, 6_222_400.0).unwrap()).unwrap();
+            feature.create(&layer).unwrap();
+        }
+        drop(dataset);
+        let area = read(&path, named(None, "north")).unwrap();
+        assert!(area.crs.contains("Lambert-93") || area.crs.contains("Lambert_93"), "{}", area.crs);
+        assert!(area.polygons.coords_iter().any(|c| (c.x, c.y) == (893_500.0, 6_222_400.0)), "{:?}", area.polygons);
+        std::fs::remove_file(folder.path().join("areas.prj")).unwrap();
+        let told = read(&path, AreaName::ALL).unwrap_err().to_string();
+        assert!(told.contains(".prj beside it"), "{told}");
+        let told = read(&folder.path().join("a.parquet"), AreaName::ALL).unwrap_err().to_string();
+        assert!(told.contains("write it as GeoPackage"), "{told}");
     }
 
     #[test]

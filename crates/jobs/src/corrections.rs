@@ -49,6 +49,48 @@ pub enum CorrectionsError {
         /// What the JSON reader found.
         source: serde_json::Error,
     },
+    /// The folder is none of a finished run.
+    #[error("the folder holds no report of a DSM run (report/report.json); give the folder of one: {}", path.display())]
+    NoRun {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The run did not use the image.
+    #[error("the run used no image {wanted:?}; it used {}: {}", known.join(", "), path.display())]
+    NotInRun {
+        /// The image as it was named.
+        wanted: String,
+        /// Names of the images that the run used.
+        known: Vec<String>,
+        /// Folder of the run.
+        path: PathBuf,
+    },
+}
+
+/// Finds an image among those that a DSM run used: where it lies, and the pointing correction that
+/// the run found for it (the identity where it found none).
+///
+/// `image` is the path of the image, or its file name alone where that is unique in the run. The
+/// path that is given is preferred to that of the run, which may have moved.
+///
+/// # Errors
+/// [`CorrectionsError`] if the folder holds no report, or the run did not use the image.
+pub(crate) fn image_of_run(run: &Path, image: &Path) -> Result<(PathBuf, ImageCorrection), CorrectionsError> {
+    let report = report_of_run(run).filter(|_| run.is_dir());
+    let report = RunReport::read(&report.ok_or_else(|| CorrectionsError::NoRun { path: run.to_owned() })?)?;
+    let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let wanted = whole(image);
+    let by_path = report.images.iter().find(|known| whole(&known.path) == wanted);
+    let mut by_name = report.images.iter().filter(|known| known.path.file_name() == image.file_name());
+    let only = by_name.next().filter(|_| by_name.next().is_none());
+    let name = |known: &RunImage| known.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let known = by_path.or(only).ok_or_else(|| CorrectionsError::NotInRun {
+        wanted: image.display().to_string(),
+        known: report.images.iter().map(name).collect(),
+        path: run.to_owned(),
+    })?;
+    let place = if image.exists() { image } else { &known.path };
+    Ok((place.to_owned(), known.applied_correction.unwrap_or(ImageCorrection::IDENTITY)))
 }
 
 /// Pointing corrections by image. An image that the run did not use, or did not correct, has none.

@@ -19,6 +19,7 @@ use jobs::dtm::DtmConfig;
 use jobs::eval::{EvalKind, GridEvalConfig, MapEvalConfig, SurfaceEvalConfig, detect_kind};
 use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig};
 use jobs::heightmap::{HeightMapConfig, UnprojectConfig};
+use jobs::image_files::image_files;
 use jobs::mesh::{DepthSource, MeshJobConfig};
 use jobs::ortho::OrthoConfig;
 use jobs::priors::PriorsConfig;
@@ -100,7 +101,7 @@ pub(crate) const JOBS: [JobEntry; 35] = [
         "dsm",
         "Make a surface model from satellite images with RPCs.",
         DsmConfig,
-        jobs::dsm::run,
+        surface_model,
         ["images", "output"],
         DsmConfig::new(Vec::new(), nowhere())
     ),
@@ -116,7 +117,7 @@ pub(crate) const JOBS: [JobEntry; 35] = [
         "make_plan",
         "Plan a surface model in parts and write nothing.",
         DsmConfig,
-        jobs::production::make_plan,
+        unwritten_plan,
         ["images", "output"],
         DsmConfig::new(Vec::new(), nowhere())
     ),
@@ -433,8 +434,23 @@ struct KindSettings {
     reference: PathBuf,
 }
 
+/// Folders and patterns among the images stand for the images in them.
+fn with_images(config: &DsmConfig) -> Result<DsmConfig, Fault> {
+    let mut whole = config.clone();
+    whole.images = image_files(&config.images).map_err(|error| Fault::input(&error))?;
+    Ok(whole)
+}
+
+fn surface_model(config: &DsmConfig, progress: &dyn Progress) -> Result<impl Serialize + use<>, Fault> {
+    Ok(jobs::dsm::run(&with_images(config)?, progress)?)
+}
+
 fn located_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, Fault> {
-    Ok(jobs::production::plan_run(config, progress)?)
+    Ok(jobs::production::plan_run(&with_images(config)?, progress)?)
+}
+
+fn unwritten_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<impl Serialize + use<>, Fault> {
+    Ok(jobs::production::make_plan(&with_images(config)?, progress)?)
 }
 
 fn stored_plan(settings: &PlanSettings, _: &dyn Progress) -> Result<PlanFile, Fault> {

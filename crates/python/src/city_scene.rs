@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use bvh::{Bvh, MISS, Ray};
-use city::{Lod, LodChoice, MeshConfig, Scope, TriangleMesh};
+use city::{Lod, LodChoice, MeshConfig, MeshSurface, ModelPoint, Scope, SurfaceClass, TriangleMesh};
 use io::citymodel::CityFile;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::exception::raise;
+use crate::exception::{raise, raise_about};
 use crate::fault::Fault;
+use crate::forked::in_own_pool;
 
 /// Triangles of a city model in a tree for rays.
 #[pyclass(frozen, module = "skysweep._native")]
@@ -39,7 +40,57 @@ impl CityCore {
     /// Reads a model.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, lod: Option<&str>, all_objects: bool) -> PyResult<Self> {
-        py.detach(|| opened(&path, lod, all_objects)).map_err(|fault| raise(py, &fault))
+        py.detach(|| in_own_pool(|| opened(&path, lod, all_objects))).map_err(|fault| raise_about(py, &fault, &[&path]))
+    }
+
+    /// Makes a model of its parts: those of [`Self::parts`].
+    #[staticmethod]
+    fn from_parts(
+        py: Python<'_>,
+        ids: Vec<String>,
+        epsg: (Option<u32>, Option<u32>),
+        origin: [f64; 3],
+        positions: PyReadonlyArray2<'_, f64>,
+        indices: (PyReadonlyArray2<'_, u32>, Vec<u32>),
+        surfaces: Vec<(u32, u8)>,
+    ) -> PyResult<Self> {
+        let (triangles, surface_of) = indices;
+        let [x, y, z] = origin;
+        let class = |number| SurfaceClass::from_number(number).unwrap_or_default();
+        let mesh = TriangleMesh {
+            origin: ModelPoint { x, y, z },
+            positions: positions.as_slice()?.as_chunks::<3>().0.to_vec(),
+            triangles: triangles.as_slice()?.as_chunks::<3>().0.to_vec(),
+            surface_of,
+            surfaces: surfaces
+                .into_iter()
+                .map(|(object, number)| MeshSurface { object, class: class(number) })
+                .collect(),
+        };
+        let corner_is_known = |corner: &u32| (*corner as usize) < mesh.positions.len();
+        let fits = mesh.triangles.iter().flatten().all(corner_is_known)
+            && mesh.surface_of.len() == mesh.triangles.len()
+            && mesh.surface_of.iter().all(|surface| (*surface as usize) < mesh.surfaces.len());
+        if !fits {
+            return Err(raise(py, &Fault::setting("the parts of the city model do not fit one another".to_owned())));
+        }
+        let grown = py.detach(|| in_own_pool(|| Ok(Bvh::new(&mesh.positions, &mesh.triangles)?)));
+        let tree = grown.map_err(|fault| raise(py, &fault))?;
+        Ok(Self { ids, mesh, tree, epsg })
+    }
+
+    /// What the model is made of, for pickles: origin, corners (n, 3) from there, triangles (m, 3),
+    /// the surface of each, and the object and the number of the class of each surface.
+    fn parts<'py>(&self, py: Python<'py>) -> PyResult<MeshParts<'py>> {
+        let TriangleMesh { origin, positions, triangles, surface_of, surfaces } = &self.mesh;
+        let corners: Vec<f64> = positions.iter().flatten().copied().collect();
+        let indices: Vec<u32> = triangles.iter().flatten().copied().collect();
+        Ok((
+            [origin.x, origin.y, origin.z],
+            corners.into_pyarray(py).reshape([positions.len(), 3])?,
+            (indices.into_pyarray(py).reshape([triangles.len(), 3])?, surface_of.clone()),
+            surfaces.iter().map(|surface| (surface.object, surface.class as u8)).collect(),
+        ))
     }
 
     /// EPSG codes of the map and of the heights.
@@ -88,8 +139,8 @@ impl CityCore {
                 _ => (f64::INFINITY, -1),
             }
         };
-        let (distance, triangle): (Vec<f64>, Vec<i64>) =
-            py.detach(|| from.par_iter().zip(to.par_iter()).map(cast).unzip());
+        let found = || in_own_pool(|| Ok(from.par_iter().zip(to.par_iter()).map(cast).unzip()));
+        let (distance, triangle): (Vec<f64>, Vec<i64>) = py.detach(found).map_err(|fault| raise(py, &fault))?;
         Ok((distance.into_pyarray(py), triangle.into_pyarray(py)))
     }
 }
@@ -99,3 +150,6 @@ type Hits<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>);
 
 /// Corners, triangles, and object and class of each triangle.
 type Triangles<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u32>>, Vec<String>);
+
+/// Origin, corners, triangles with their surfaces, and object and class of each surface.
+type MeshParts<'py> = ([f64; 3], Bound<'py, PyArray2<f64>>, (Bound<'py, PyArray2<u32>>, Vec<u32>), Vec<(u32, u8)>);

@@ -11,15 +11,17 @@ use jobs::batch::BatchError;
 use jobs::buildings::BuildingMapError;
 use jobs::city::CityJobError;
 use jobs::classes::ClassesError;
+use jobs::corrections::CorrectionsError;
 use jobs::diff::DiffError;
 use jobs::dsm::DsmError;
 use jobs::dtm::DtmError;
-use jobs::error::{FileCrsError, JobError};
+use jobs::error::{FileCrsError, ImageInputError, JobError};
 use jobs::eval::EvalJobError;
 use jobs::files::FileError;
 use jobs::groundview::GroundViewError;
 use jobs::heightmap::HeightMapJobError;
 use jobs::job_file::JobFileError;
+use jobs::map_surface::MapSurfaceError;
 use jobs::mesh::MeshJobError;
 use jobs::ortho::OrthoError;
 use jobs::priors::PriorsJobError;
@@ -57,17 +59,19 @@ pub(crate) struct Fault {
     pub(crate) kind: FaultKind,
     /// What happened, with all causes.
     pub(crate) text: String,
+    /// Number of the system's error among the causes, if there is one.
+    pub(crate) system_code: Option<i32>,
 }
 
 impl Fault {
     /// A setting that serde does not take.
     pub(crate) fn setting(text: String) -> Self {
-        Self { kind: FaultKind::Input, text }
+        Self { kind: FaultKind::Input, text, system_code: None }
     }
 
     /// A defect of the program or of the system.
     pub(crate) fn internal(text: &str) -> Self {
-        Self { kind: FaultKind::Skysweep, text: text.to_owned() }
+        Self { kind: FaultKind::Skysweep, text: text.to_owned(), system_code: None }
     }
 
     /// A value that cannot be used.
@@ -102,7 +106,7 @@ impl<E: Judged> From<E> for Fault {
         let text = with_causes(&error);
         // The writers of single files say it in their text alone.
         let kind = if text.contains(io::atomic::OUTPUT_EXISTS) { FaultKind::OutputExists } else { kind };
-        Self { kind, text }
+        Self { kind, text, system_code: system_code(&error) }
     }
 }
 
@@ -139,6 +143,12 @@ fn kind_of_causes(error: &(dyn Error + 'static)) -> Option<FaultKind> {
     last
 }
 
+/// Looks for the number of an error of the system among the causes.
+fn system_code(error: &(dyn Error + 'static)) -> Option<i32> {
+    let own = error.downcast_ref::<std::io::Error>().and_then(std::io::Error::raw_os_error);
+    own.or_else(|| system_code(error.source()?))
+}
+
 /// Judges errors that hold those of every job as `Job(JobError)`, and some variants of their own.
 macro_rules! judged {
     ($($error:ident { $($variant:pat => $kind:expr),* $(,)? })+) => {$(
@@ -157,34 +167,58 @@ macro_rules! judged {
 
 judged! {
     AlignJobError {}
-    BuildingMapError {}
+    BuildingMapError {
+        Self::Image(error) => error.kind(),
+        Self::Surface(error) => error.kind(),
+    }
     CityJobError { Self::Read(_) => Some(FaultKind::File) }
-    ClassesError { Self::Index(error) => error.kind() }
+    ClassesError {
+        Self::Index(error) => error.kind(),
+        Self::Surface(error) => error.kind(),
+        Self::Image(error) => error.kind(),
+    }
     DiffError { Self::Surfaces(error) => error.kind() }
-    DtmError {}
+    DtmError { Self::Surface(error) => error.kind() }
     EvalJobError {
         Self::Raster(_) | Self::Points(_) | Self::SurfaceFile(_) | Self::MapFile(_) => Some(FaultKind::File),
         Self::FileCrs(_) | Self::Crs(_) => Some(FaultKind::Crs),
         Self::ForeignFile { .. } => Some(FaultKind::OutputExists),
     }
-    GroundViewError {}
-    HeightMapJobError {}
-    MeshJobError { Self::Model(_) | Self::Ply(_) | Self::Map(_) => Some(FaultKind::File) }
-    OrthoError {}
-    PriorsJobError {}
-    ProductsError {}
+    GroundViewError {
+        Self::Surface(error) => error.kind(),
+        Self::Raster(error) => error.kind(),
+    }
+    HeightMapJobError { Self::Raster(error) => error.kind() }
+    MeshJobError {
+        Self::Model(_) | Self::Ply(_) | Self::Map(_) => Some(FaultKind::File),
+        Self::Image(error) => error.kind(),
+    }
+    OrthoError { Self::Image(error) => error.kind() }
+    PriorsJobError { Self::Image(error) => error.kind() }
+    ProductsError { Self::Raster(error) => error.kind() }
     SimulateJobError {
         Self::Scene(_) | Self::Parameters { .. } => Some(FaultKind::Input),
         Self::NotEmpty { .. } => Some(FaultKind::OutputExists),
     }
-    RegisterError { Self::Splats(_) => Some(FaultKind::File) }
-    SplatsJobError {}
+    RegisterError {
+        Self::Splats(_) => Some(FaultKind::File),
+        Self::Surface(error) => error.kind(),
+        Self::Image(error) => error.kind(),
+    }
+    SplatsJobError {
+        Self::Surface(error) => error.kind(),
+        Self::Image(error) => error.kind(),
+    }
     SplitJobError {}
     TilesError {
         Self::Map(error) => error.kind(),
         Self::Ortho(error) => error.kind(),
+        Self::Image(error) => error.kind(),
     }
-    TrainError {}
+    TrainError {
+        Self::Surface(error) => error.kind(),
+        Self::Image(error) => error.kind(),
+    }
 }
 
 impl Judged for DsmError {
@@ -249,6 +283,24 @@ impl Judged for RpcJobError {
             Self::Read(_) => Some(FaultKind::File),
             Self::Cancelled(_) => Some(FaultKind::Cancelled),
             _ => None,
+        }
+    }
+}
+
+impl Judged for ImageInputError {
+    fn kind(&self) -> Option<FaultKind> {
+        match self {
+            Self::Corrections(CorrectionsError::NotInRun { .. }) => Some(FaultKind::Input),
+            _ => Some(FaultKind::File),
+        }
+    }
+}
+
+impl Judged for MapSurfaceError {
+    fn kind(&self) -> Option<FaultKind> {
+        match self {
+            Self::Raster(error) => error.kind(),
+            _ => Some(FaultKind::Crs),
         }
     }
 }

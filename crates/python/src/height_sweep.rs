@@ -48,7 +48,7 @@ pub(crate) fn sweep_views<'py>(
     });
     let views: Vec<ViewImage> = views.collect::<PyResult<_>>()?;
     let range = HeightRange::from(height_range);
-    let found = watched(py, watcher, |progress| Ok(sweep(views, range, *preset, progress)?))?;
+    let found = watched(py, watcher, &[], |progress| Ok(sweep(views, range, *preset, progress)?))?;
     found.into_iter().map(|heights| arrays(py, heights)).collect()
 }
 

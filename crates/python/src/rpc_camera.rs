@@ -13,8 +13,9 @@ use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::exception::raise;
+use crate::exception::{raise, raise_about};
 use crate::fault::Fault;
+use crate::forked::in_own_pool;
 
 /// Points from which on the work is shared out over threads.
 const PARALLEL: usize = 1 << 15;
@@ -30,13 +31,20 @@ fn json_error(error: &serde_json::Error) -> Fault {
 }
 
 /// Lets `fill` write two columns, by parts that start at its first argument.
-fn fill_columns(first: &mut [f64], second: &mut [f64], fill: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) {
+fn fill_columns(
+    first: &mut [f64],
+    second: &mut [f64],
+    fill: impl Fn(usize, &mut [f64], &mut [f64]) + Send + Sync,
+) -> Result<(), Fault> {
     if first.len() < PARALLEL {
         fill(0, first, second);
-    } else {
+        return Ok(());
+    }
+    in_own_pool(|| {
         let parts = first.par_chunks_mut(PARALLEL).zip(second.par_chunks_mut(PARALLEL)).enumerate();
         parts.for_each(|(part, (first, second))| fill(part * PARALLEL, first, second));
-    }
+        Ok(())
+    })
 }
 
 /// A part of the numbers of the points, or so many times the one of all of them.
@@ -58,10 +66,17 @@ impl RpcCore {
     /// warnings.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Self, String, PathBuf, Vec<String>)> {
-        let file = py.detach(|| io::rpc::read(&path)).map_err(|e| raise(py, &e.into()))?;
+        let file = py.detach(|| io::rpc::read(&path)).map_err(|e| raise_about(py, &e.into(), &[&path]))?;
         let format = serde_json::to_value(file.format).map(|v| v.as_str().unwrap_or_default().to_owned());
         let format = format.map_err(|e| raise(py, &json_error(&e)))?;
         Ok((Self { camera: RpcCamera::new(file.rpc) }, format, file.source, file.warnings))
+    }
+
+    /// The camera of an image as a run corrected it.
+    #[staticmethod]
+    fn from_run(py: Python<'_>, run: PathBuf, image: PathBuf) -> PyResult<Self> {
+        let camera = py.detach(|| jobs::rpc::camera_of_run(&run, &image));
+        Ok(Self { camera: camera.map_err(|e| raise_about(py, &e.into(), &[&run, &image]))? })
     }
 
     /// Makes a camera of its numbers as JSON: an RPC, and a correction.
@@ -116,7 +131,7 @@ impl RpcCore {
         let (lon, lat, height) = (lon.as_slice()?, lat.as_slice()?, height.as_slice()?);
         let (sample, line) = (sample.as_slice_mut()?, line.as_slice_mut()?);
         let camera = &self.camera;
-        py.detach(|| {
+        let filled = py.detach(|| {
             // The polynomials of one height have half as many terms.
             let plane = if let [height_m] = height { Some(camera.rpc.plane(*height_m)) } else { None };
             fill_columns(sample, line, |start, sample, line| {
@@ -127,9 +142,9 @@ impl RpcCore {
                     let height = &height[start..start + sample.len()];
                     camera.project_many([&lon, &lat, height], [sample, line]);
                 }
-            });
+            })
         });
-        Ok(())
+        filled.map_err(|fault| raise(py, &fault))
     }
 
     /// Writes ground points that are seen at image positions, at given heights, into `lon` and
@@ -144,16 +159,16 @@ impl RpcCore {
         let (sample, line, height) = (sample.as_slice()?, line.as_slice()?, height.as_slice()?);
         let (lon, lat) = (lon.as_slice_mut()?, lat.as_slice_mut()?);
         let camera = &self.camera;
-        py.detach(|| {
+        let filled = py.detach(|| {
             fill_columns(lon, lat, |start, lon, lat| {
                 for (i, (lon, lat)) in lon.iter_mut().zip(lat).enumerate() {
                     let [sample, line, height] = [sample, line, height].map(|values| at(values, start + i));
                     let ground = camera.localize(ImagePoint::new(sample, line), height);
                     [*lon, *lat] = ground.map_or([f64::NAN; 2], |g| [g.lon_deg, g.lat_deg]);
                 }
-            });
+            })
         });
-        Ok(())
+        filled.map_err(|fault| raise(py, &fault))
     }
 
     /// Ground sampling distance along sample and line, metres, and the view direction (east, north,
@@ -190,7 +205,8 @@ impl RpcCore {
     /// Writes an RPC file.
     fn write(&self, py: Python<'_>, path: PathBuf, format: &str, overwrite: bool) -> PyResult<()> {
         let format = format_of(py, format)?;
-        io::rpc::write(&path, &self.camera.rpc, format, overwrite).map_err(|e| raise(py, &e.into()))
+        let written = io::rpc::write(&path, &self.camera.rpc, format, overwrite);
+        written.map_err(|e| raise_about(py, &e.into(), &[&path]))
     }
 }
 

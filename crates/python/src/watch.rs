@@ -6,16 +6,18 @@
 //! worker, and Ctrl-C is seen within [`POLL`]. A signal, or an exception of the callback, asks the
 //! work to stop; it is raised once the work has ended, which leaves nothing half-written.
 
+use std::path::Path;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 use numeric::{Choice, Progress};
 use pyo3::prelude::*;
 
-use crate::exception::raise;
+use crate::exception::raise_about;
 use crate::fault::Fault;
+use crate::forked::in_own_pool;
 
 /// Time between two looks at signals and steps.
 const POLL: Duration = Duration::from_millis(50);
@@ -74,10 +76,12 @@ impl Progress for Bridge {
 /// Runs `work` and tells `watcher` of its progress.
 ///
 /// `watcher` has the methods `begin(stage, steps)`, `steps(count)`, `choice(name, value, reason)`,
-/// `warn(text)` and `part(name, state)`.
+/// `warn(text)` and `part(name, state)`. Errors of files name the one of `paths` that they are
+/// about.
 pub(crate) fn watched<T: Send>(
     py: Python<'_>,
     watcher: &Bound<'_, PyAny>,
+    paths: &[&Path],
     work: impl FnOnce(&dyn Progress) -> Result<T, Fault> + Send,
 ) -> PyResult<T> {
     let (events, received) = channel();
@@ -109,7 +113,7 @@ pub(crate) fn watched<T: Send>(
         let result = py.detach(|| handle.join());
         raised?;
         let failed = |_| Fault::internal("the job ended by a panic; please report what standard error says");
-        result.map_err(failed).and_then(|result| result).map_err(|fault| raise(py, &fault))
+        result.map_err(failed).and_then(|result| result).map_err(|fault| raise_about(py, &fault, paths))
     })
 }
 
@@ -146,22 +150,4 @@ fn served(watcher: &Bound<'_, PyAny>, received: &Mutex<Receiver<Event>>) -> PyRe
         }
     }
     tell(&mut steps)
-}
-
-/// Process that loaded the library.
-static LOADED_BY: AtomicU32 = AtomicU32::new(0);
-
-/// Notes the process that loads the library.
-pub(crate) fn note_process() {
-    LOADED_BY.store(std::process::id(), Ordering::Relaxed);
-}
-
-/// Runs work on the usual pool of threads, or on a pool of its own in a forked process: the threads
-/// of the usual one stayed in the parent.
-fn in_own_pool<T: Send>(work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
-    if std::process::id() == LOADED_BY.load(Ordering::Relaxed) {
-        return work();
-    }
-    let pool = rayon::ThreadPoolBuilder::new().build();
-    pool.map_err(|e| Fault::internal(&format!("cannot start worker threads: {e}")))?.install(work)
 }

@@ -21,14 +21,15 @@ command -v "$python" > /dev/null || skip "$python is not installed"
 
 venv=$target/python/venv
 stamp=$venv/made
-wanted="numpy pytest mypy; distributed tqdm xarray shapely matplotlib"
+optional="distributed tqdm xarray shapely matplotlib rasterio rioxarray geopandas pyproj pyarrow"
+wanted="numpy pytest mypy; $optional"
 if [ "$(cat "$stamp" 2> /dev/null)" != "$wanted" ]; then
   rm -rf "$venv"
   "$python" -m venv "$venv" > /dev/null 2>&1 || skip "a virtual environment cannot be made (python3-venv)"
   pip=("$venv/bin/python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 30)
   "${pip[@]}" numpy pytest mypy 2> /dev/null || skip "numpy, pytest and mypy cannot be installed"
-  "${pip[@]}" distributed tqdm xarray shapely matplotlib 2> /dev/null ||
-    echo "skipped: tests with distributed, tqdm, xarray, shapely and matplotlib, which cannot be installed"
+  # shellcheck disable=SC2086
+  "${pip[@]}" $optional 2> /dev/null || echo "skipped: tests with $optional, which cannot be installed"
   echo "$wanted" > "$stamp"
 fi
 

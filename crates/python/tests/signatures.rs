@@ -9,6 +9,7 @@
 #[allow(dead_code, reason = "the test runs no job")]
 #[path = "../src/catalogue.rs"]
 mod catalogue;
+mod examples;
 #[allow(dead_code, reason = "the test looks at two errors only")]
 #[path = "../src/fault.rs"]
 mod fault;
@@ -19,6 +20,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use catalogue::{Fields, JOBS, JobEntry};
+use examples::EXAMPLES;
 use fault::FaultKind;
 use serde_json::{Map, Value};
 use syn::{Attribute, Expr, Field, GenericArgument, Item, ItemEnum, ItemStruct, Lit, Meta, PathArguments, Type};
@@ -167,6 +169,24 @@ impl Writer<'_> {
         }
     }
 
+    /// The type of a field. Areas are also polygons in memory, and codes objects with one.
+    fn field_type(&mut self, field: &Field) -> String {
+        let ty = self.python_type(&field.ty, &field.attrs);
+        let like = match key(field).as_str() {
+            "bounds" => Some("BoundsLike"),
+            "area" => Some("LayerArea | PathLike"),
+            name if name.ends_with("_epsg") => Some("CrsCode"),
+            _ => None,
+        };
+        like.map_or(ty.clone(), |like| if ty.ends_with("| None") { format!("{like} | None") } else { like.to_owned() })
+    }
+
+    /// The type of a field that may be left out.
+    fn optional_type(&mut self, field: &Field, base: &Map<String, Value>) -> String {
+        let ty = self.field_type(field);
+        if default(base, &key(field)) == "None" && !ty.ends_with("| None") { ty + " | None" } else { ty }
+    }
+
     fn named_type(&mut self, name: &str) -> String {
         let types = self.types;
         if let Some(item) = types.structs.get(name) {
@@ -242,11 +262,7 @@ impl Writer<'_> {
         let (mut optional, mut arguments) = (Vec::new(), Vec::new());
         for name in entry.required {
             let field = fields.iter().find(|f| key(f) == *name).unwrap_or_else(|| panic!("{name} is no field"));
-            let ty = if *name == "scene" {
-                "str | Mapping[str, Any]".to_owned()
-            } else {
-                self.python_type(&field.ty, &field.attrs)
-            };
+            let ty = if *name == "scene" { "str | Mapping[str, Any]".to_owned() } else { self.field_type(field) };
             required.push(format!("    {name}: {ty},\n"));
             arguments.push((*name, docs(&field.attrs)));
         }
@@ -256,10 +272,7 @@ impl Writer<'_> {
                 continue;
             }
             let default = default(&base, &name);
-            let mut ty = self.python_type(&field.ty, &field.attrs);
-            if default == "None" && !ty.ends_with("| None") {
-                ty += " | None";
-            }
+            let ty = self.optional_type(field, &base);
             optional.push(format!("    {name}: {ty} = {default},\n"));
             arguments.push((Box::leak(name.into_boxed_str()), docs(&field.attrs)));
         }
@@ -275,14 +288,59 @@ impl Writer<'_> {
         }
         text +=
             &hanging("progress", "`True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.");
+        text += "\n    Returns:\n";
+        text += if result == "str" {
+            "        ``grids``, ``surfaces`` or ``maps``.\n"
+        } else {
+            "        The report of the job, as the command's ``--json`` has it.\n"
+        };
         text += "\n    Raises:\n";
         text += &hanging("TypeError", "A keyword that the job does not have; the text names those that it has.");
         text += &hanging("SkysweepError", "The job has no result; see its subclasses.");
+        let example = EXAMPLES.iter().find(|(name, _)| *name == entry.name);
+        let (_, lines) = example.unwrap_or_else(|| panic!("{} has no example", entry.name));
+        text += "\n    Example:\n        >>> import skysweep\n";
+        text.extend(lines.iter().map(|line| format!("        >>> {line}\n")));
         let _ = writeln!(
             text,
             "    \"\"\"\n    result: {result} = run_job(\"{}\", locals())\n    return result",
             entry.name
         );
+        text
+    }
+}
+
+/// The settings of some jobs together, without those of the positions: for functions that pass them
+/// on.
+const SETTINGS: [(&str, &str, &[&str]); 2] = [
+    ("DsmSettings", "Settings of :func:`dsm`.", &["dsm"]),
+    (
+        "EvaluateSettings",
+        "Settings of :func:`evaluate_grids`, :func:`evaluate_surfaces` and :func:`evaluate_maps`.",
+        &["evaluate_grids", "evaluate_surfaces", "evaluate_maps"],
+    ),
+];
+
+impl Writer<'_> {
+    fn settings(&mut self, name: &str, summary: &str, jobs: &[&str]) -> String {
+        let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for entry in JOBS.iter().filter(|entry| jobs.contains(&entry.name)) {
+            let item = &self.types.structs[entry.config];
+            for field in fields_of(item).filter(|field| !entry.required.contains(&key(field).as_str())) {
+                let ty = self.optional_type(field, &(entry.base)());
+                let known = types.entry(key(field)).or_default();
+                known.extend(
+                    ty.split(" | ").map(str::to_owned).filter(|part| !known.contains(part)).collect::<Vec<_>>(),
+                );
+            }
+        }
+        let mut text = format!("class {name}(TypedDict, total=False):\n");
+        text += &docstring(summary, "    ");
+        text.push('\n');
+        for (field, parts) in types {
+            let _ = writeln!(text, "    {field}: {}", parts.join(" | "));
+        }
+        text += if jobs.contains(&"dsm") { "" } else { "    progress: Progress\n" };
         text
     }
 }
@@ -349,7 +407,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
-from ._call import PathLike, Progress, Report, job, run as run_job
+from ._call import BoundsLike, CrsCode, PathLike, Progress, Report, job, run as run_job
 
 ";
 
@@ -363,8 +421,9 @@ fn made() -> String {
     }
     let mut writer = Writer { types: &types, named: BTreeMap::new() };
     let functions: Vec<String> = JOBS.iter().map(|entry| writer.function(entry)).collect();
+    let settings: Vec<String> = SETTINGS.iter().map(|(name, text, jobs)| writer.settings(name, text, jobs)).collect();
     let names = JOBS.iter().map(|entry| format!("    \"{}\",\n", entry.name)).collect::<String>();
-    let named: Vec<String> = writer.named.into_values().collect();
+    let named: Vec<String> = writer.named.into_values().chain(settings).collect();
     format!("{HEAD}__all__ = [\n{names}]\n\n\n{}\n\n{}", named.join("\n\n"), functions.join("\n\n"))
 }
 

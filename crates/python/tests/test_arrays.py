@@ -219,13 +219,15 @@ def test_rays_at_a_city_model() -> None:
 
 def test_grids_in_memory_are_evaluated(tmp_path: Path) -> None:
     truth = skysweep.read_raster(TOWN / "truth" / "dsm.tif")
-    shifted = truth._replace(values=truth.values + 0.25)
+    shifted = truth.with_values(truth.values + 0.25)
     found = skysweep.evaluate(shifted, truth, alignment="none")
     assert abs(found.metrics.mae - 0.25) < 1e-3
     arrays = skysweep.evaluate(shifted.values, truth.values, cell_m=1.0, alignment="none")
     assert abs(arrays.metrics.mae - 0.25) < 1e-3
     mixed = skysweep.evaluate(TOWN / "truth" / "dsm.tif", truth, alignment="none", target="nowhere")
     assert mixed.metrics.mae == 0.0
+    beside = skysweep.evaluate(shifted.values, truth, alignment="none", test_vertical="ellipsoid")
+    assert abs(beside.metrics.mae - 0.25) < 1e-3
     with pytest.raises(skysweep.InputError, match="test has no place: give cell_m"):
         skysweep.evaluate(shifted.values, truth.values)
     for bad in (np.zeros((0, 4)), np.zeros(4), np.float64(3.0), np.zeros((2, 2), dtype=complex)):
@@ -239,12 +241,12 @@ def test_rasters_go_to_files_and_back(tmp_path: Path) -> None:
     heights = np.arange(12, dtype=np.float64).reshape(3, 4)
     heights[1, 2] = np.nan
     place = (500_000.0, 2.0, 0.0, 4_800_000.0, 0.0, -2.0)
-    skysweep.write_raster(tmp_path / "a.tif", heights, place, "EPSG:32631")
+    skysweep.write_raster(tmp_path / "a.tif", heights, place, "EPSG:32631", vertical="ellipsoid")
     found = skysweep.read_raster(tmp_path / "a.tif")
     assert np.array_equal(found.values, heights.astype(np.float32), equal_nan=True)
     assert found.geotransform == place and found.crs is not None and "32631" in found.crs
     with pytest.raises(skysweep.FileError):
-        skysweep.write_raster(tmp_path / "a.tif", heights, place, 32631)
+        skysweep.write_raster(tmp_path / "a.tif", heights, place, 32631, vertical="ellipsoid")
     with pytest.raises(skysweep.CrsError):
         skysweep.write_raster(tmp_path / "b.tif", heights, place, 999_999)
     with pytest.raises(skysweep.InputError, match="six finite numbers"):

@@ -218,10 +218,10 @@ def test_objects_of_other_packages_are_settings(tmp_path: Path) -> None:
         def to_epsg(self) -> None:
             return None
 
-    report = skysweep.make_plan([Dataset(), VIEWS[1]], tmp_path / "out", crs_epsg=Crs(), **SMALL)  # type: ignore[arg-type]
+    report = skysweep.make_plan([Dataset(), VIEWS[1]], tmp_path / "out", crs_epsg=Crs(), **SMALL)
     assert report.plan.grid.epsg == 32631
     with pytest.raises(skysweep.CrsError, match="no EPSG code"):
-        skysweep.make_plan(VIEWS, tmp_path / "out", crs_epsg=Nameless())  # type: ignore[arg-type]
+        skysweep.make_plan(VIEWS, tmp_path / "out", crs_epsg=Nameless())
     with pytest.raises(skysweep.InputError, match="threads is a object"):
         skysweep.make_plan(VIEWS, tmp_path / "out", threads=object())  # type: ignore[arg-type]
 

@@ -295,7 +295,7 @@ mod tests {
         assert!((normal(700) - 1.0).abs() < 1e-12 && (normal(900) - 0.1).abs() < 1e-12);
         assert_eq!([700, 701].map(|at| config.weights_at(at).consistency), [0.0, 0.05]);
         let building = TrainingConfig::of(Recipe::BuildingOnly);
-        let [depth, distortion] = [|w: LossWeights| w.prior_depth, |w| w.distortion];
+        let [depth, distortion] = [|w: LossWeights| w.prior_depth, |w: LossWeights| w.distortion];
         let share = |of: fn(LossWeights) -> f64, at| of(building.weights_at(at)) / of(building.weights);
         assert_eq!([0, 1500, 3000].map(|at| share(depth, at)), [1.0, 1.0, 0.1]);
         assert_eq!([0, 1500, 2250, 3000].map(|at| share(distortion, at)), [0.0, 0.0, 0.5, 1.0]);

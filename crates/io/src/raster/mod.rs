@@ -19,6 +19,7 @@ pub use read::luma_rule::{BandChoice, LumaRule};
 pub use read::reduced::BandLabel;
 pub use read::source::{ImageInfo, ImageSource, SampleType};
 pub use read::spectral::{BandSpectrum, IndexBands, write_multispectral_with_rpc};
+pub use read::undeclared::undeclared_no_data;
 pub use write::band::{Band, BandData};
 pub use write::contours::{ContourSurface, write_contours};
 pub use write::depth_png::{DepthScale, write_depth_png};
@@ -32,5 +33,5 @@ pub use write::spool::{RasterSpool, SPOOL_TILE, SpoolBand};
 pub use write::tile::{BandScale, MapTile, write_map_tile};
 pub use write::world_file::write_world_file;
 
-pub(crate) use access::gdal_access::register_geopackage;
+pub(crate) use access::gdal_access::{VectorFormat, register_vector};
 pub(crate) use access::gdal_setup::{open_address, prepare_gdal, with_gdal};

@@ -7,7 +7,6 @@
 mod batch_file;
 mod batch_report;
 mod error;
-mod images;
 mod record;
 mod run;
 mod task;

@@ -135,11 +135,14 @@ pub struct DsmConfig {
     pub crs_epsg: Option<u32>,
     /// Area of the DSM, in its CRS.
     pub bounds: Option<MapBounds>,
+    /// EPSG code of the CRS of `bounds` where that is another one, such as 4326 for degrees. The
+    /// grid is the rectangle around them.
+    pub bounds_epsg: Option<u32>,
     /// Polygons in which the DSM lies. Cells outside are void, and without `bounds` the grid is the
     /// rectangle around them.
     pub area: Option<LayerArea>,
-    /// Ground without heights, such as water: polygons (GeoJSON, GeoPackage), and georeferenced
-    /// rasters where they are neither 0 nor without data.
+    /// Ground without heights, such as water: polygons (GeoJSON, GeoPackage, shapefile), and
+    /// georeferenced rasters where they are neither 0 nor without data.
     #[serde(default)]
     pub masks: Vec<PathBuf>,
     /// Pixels that are not matched, such as clouds: polygons on the ground, and rasters in the
@@ -222,6 +225,7 @@ impl DsmConfig {
             gsd_m: None,
             crs_epsg: None,
             bounds: None,
+            bounds_epsg: None,
             area: None,
             masks: Vec::new(),
             image_masks: Vec::new(),
@@ -349,7 +353,17 @@ impl DsmConfig {
             return Err(DsmError::value(
                 DsmSetting::Bounds,
                 format!("{:?}", bounds.to_array()),
-                "x_min y_min x_max y_max in the DSM's CRS",
+                self.bounds_epsg.map_or_else(
+                    || "x_min y_min x_max y_max in the DSM's CRS".to_owned(),
+                    |code| format!("x_min y_min x_max y_max in EPSG:{code}"),
+                ),
+            ));
+        }
+        if let Some(code) = self.bounds_epsg.filter(|_| self.bounds.is_none()) {
+            return Err(DsmError::value(
+                DsmSetting::Bounds,
+                format!("not given, but a CRS for them, EPSG:{code}"),
+                "both or neither",
             ));
         }
         Ok(())

@@ -10,6 +10,7 @@ mod error;
 mod info;
 mod input;
 mod lines;
+mod of_run;
 mod points;
 mod text;
 
@@ -17,4 +18,5 @@ pub use convert::{RpcConvertConfig, RpcConvertReport, convert};
 pub use error::RpcJobError;
 pub use info::{RpcCentre, RpcInfoConfig, RpcInfoReport, RpcValidity, info};
 pub use lines::{RpcLineAnswer, RpcLinesConfig, RpcLinesReport, answer_lines, open_lines};
+pub use of_run::camera_of_run;
 pub use points::{RpcDirection, RpcPoint, RpcPointsConfig, RpcPointsReport, RpcQuery, points};

@@ -25,6 +25,24 @@ def floats(name: str, values: ArrayLike) -> Floats:
     return np.asarray(array.data, dtype=np.float64)
 
 
+#: Values by which files without NaN mark cells without data, when these are not declared.
+_MARKS = (-9999.0, -32768.0, -32767.0, float(np.finfo(np.float32).min))
+
+
+def refuse_marks(name: str, values: NDArray[Any]) -> None:
+    """Refuses arrays in which a value such as −9999 stands for no data.
+
+    Raises:
+        InputError: Some of several values are one of these.
+    """
+    if values.size < 2 or not np.fmin.reduce(values, axis=None) < -9000.0:
+        return
+    for mark in _MARKS:
+        count = int(np.count_nonzero(values == mark))
+        if count:
+            raise InputError(f"{name} has {count} values of exactly {mark:g}, which stands for no data: put NaN there")
+
+
 def together(values: dict[str, ArrayLike]) -> tuple[list[Floats], tuple[int, ...]]:
     """Arrays of any shapes that fit one another, flat and contiguous, with their common shape.
 

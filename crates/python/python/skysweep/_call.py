@@ -11,19 +11,47 @@ import logging
 import math
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Callable, TypeVar, Union, cast
+from typing import Any, Callable, Protocol, TypeVar, Union, cast
 
 from . import _native
-from ._errors import CrsError, InputError
+from ._crs import epsg_of, parts_of
+from ._errors import InputError
 
-__all__ = ["PathLike", "Progress", "Report", "Step", "job", "run"]
+__all__ = ["BoundsLike", "CrsCode", "PathLike", "Progress", "Report", "Step", "job", "run"]
 
 _LOG = logging.getLogger("skysweep")
 
-#: Text, an `os.PathLike`, or an open rasterio dataset, of which the file is taken.
-PathLike = Any
+
+
+class Dataset(Protocol):
+    """An open dataset of rasterio."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def profile(self) -> Any: ...
+
+
+class Polygons(Protocol):
+    """A GeoDataFrame or GeoSeries with its CRS, or a geometry in longitude and latitude."""
+
+    @property
+    def __geo_interface__(self) -> Any: ...
+
+
+class _WithCode(Protocol):
+    def to_epsg(self) -> int | None: ...
+
+
+#: Text, an `os.PathLike`, or an open rasterio dataset, of which the file is taken. Polygons where a
+#: setting takes areas or masks.
+PathLike = Union[str, "os.PathLike[str]", Dataset, Polygons]
+#: x_min, y_min, x_max, y_max on the map; or a GeoDataFrame, whose bounds are brought to the map.
+BoundsLike = Union[Sequence[float], Polygons]
+#: An EPSG code, `EPSG:32631`, or a CRS of pyproj or rasterio that has a code.
+CrsCode = Union[int, str, _WithCode]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -132,28 +160,32 @@ def watcher(progress: Progress) -> Iterator[_Watcher]:
         raise TypeError(f"progress is {progress!r}, expected None, True or a function")
 
 
+#: Where GDAL keeps files in the memory of one process, with its own copy of GDAL.
+_IN_MEMORY = "/vsimem/"
+
+
+@contextlib.contextmanager
+def local_path(value: Any) -> Iterator[str]:
+    """The path that a value names, while the block lasts: datasets in memory are copied to a file."""
+    with contextlib.ExitStack() as stack:
+        if _is_dataset(value) and str(value.name).startswith(_IN_MEMORY):
+            yield _Files(stack).dataset(value)
+        else:
+            yield path_of(value)
+
+
+def _is_dataset(value: Any) -> bool:
+    return hasattr(value, "profile") and isinstance(getattr(value, "name", None), str)
+
+
 def path_of(value: Any) -> str:
     """The path that a value names: text, `os.PathLike`, or an open dataset of rasterio."""
     if isinstance(value, (str, os.PathLike)):
         path = os.fspath(value)
         return os.fsdecode(path)
-    if hasattr(value, "profile") and isinstance(getattr(value, "name", None), str):
+    if _is_dataset(value):
         return str(value.name)
     raise InputError(f"expected a path or an open dataset, found {type(value).__name__}")
-
-
-def epsg_of(value: Any) -> int:
-    """The EPSG code of a CRS: a number, `EPSG:32631`, or an object of pyproj or rasterio."""
-    code: Any = value
-    if hasattr(value, "to_epsg"):
-        code = value.to_epsg()
-        if code is None:
-            raise CrsError(f"the CRS has no EPSG code: {value}")
-    elif isinstance(value, str):
-        code = value.strip().upper().removeprefix("EPSG:")
-        if not code.isdigit():
-            raise CrsError(f"expected an EPSG code such as EPSG:32631, found {value!r}")
-    return int(code)
 
 
 class _Files:
@@ -170,11 +202,17 @@ class _Files:
         self._count += 1
         return os.path.join(self._folder, f"{self._count}{ending}")
 
-    def polygons(self, value: Any) -> str:
+    def dataset(self, value: Any) -> str:
+        """Writes a dataset of rasterio that lies in memory, with its RPC and metadata."""
+        import rasterio.shutil
+
+        path = self.path(".tif")
+        rasterio.shutil.copy(value, path, driver="GTiff")
+        return path
+
+    def polygons(self, name: str, value: Any) -> str:
         """Writes a GeoDataFrame, or a geometry in longitude and latitude, as GeoJSON."""
-        frame = value
-        if getattr(frame, "crs", None) is not None and hasattr(frame, "to_crs"):
-            frame = frame.to_crs(4326)
+        frame = _in_degrees(name, value)
         shape = _plain_json(frame.__geo_interface__)
         if shape["type"] not in ("FeatureCollection", "Feature"):
             shape = {"type": "Feature", "properties": {}, "geometry": shape}
@@ -184,6 +222,32 @@ class _Files:
         with open(path, "w", encoding="utf-8") as file:
             json.dump(shape, file)
         return path
+
+
+def _is_frame(value: Any) -> bool:
+    """Whether a value is a GeoDataFrame or a GeoSeries, which have a CRS or lack it."""
+    return hasattr(value, "to_crs") and hasattr(value, "total_bounds")
+
+
+def _with_crs(name: str, frame: Any) -> Any:
+    if frame.crs is None:
+        raise InputError(f"{name} is a {type(frame).__name__} without a CRS; name it with set_crs")
+    return frame
+
+
+def _in_degrees(name: str, value: Any) -> Any:
+    """Polygons in longitude and latitude. Geometries without a CRS are taken to be so."""
+    if _is_frame(value):
+        return _with_crs(name, value).to_crs(4326)
+    if bounds := getattr(value, "bounds", None):
+        west, south, east, north = bounds
+        # Longitudes up to 360 are common; easting and northing lie far beyond.
+        if not (-360.0 <= west <= east <= 360.0 and -90.0 <= south <= north <= 90.0):
+            raise InputError(
+                f"{name} reaches from {west:g}, {south:g} to {east:g}, {north:g}, which is no longitude and latitude; "
+                "give a GeoDataFrame with its CRS"
+            )
+    return value
 
 
 def _plain_json(value: Any) -> Any:
@@ -201,13 +265,15 @@ def _plain(name: str, value: Any, files: _Files) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _plain(str(key), item, files) for key, item in value.items()}
     if name == "bounds" and hasattr(value, "bounds"):
+        # The bounds of a geometry are on the map.
         return [float(edge) for edge in value.bounds]
     if hasattr(value, "to_epsg"):
         return epsg_of(value)
     if isinstance(value, os.PathLike) or hasattr(value, "profile"):
-        return path_of(value)
+        in_memory = _is_dataset(value) and str(value.name).startswith(_IN_MEMORY)
+        return files.dataset(value) if in_memory else path_of(value)
     if hasattr(value, "__geo_interface__"):
-        return files.polygons(value)
+        return files.polygons(name, value)
     if hasattr(value, "dtype") and hasattr(value, "tolist"):
         if getattr(value, "size", 1) > 1_000_000:
             raise InputError(f"{name} has {value.size} values; settings are short")
@@ -222,8 +288,22 @@ def _area(value: Any, files: _Files) -> Any:
     if isinstance(value, Mapping) or value is None:
         return value
     if hasattr(value, "__geo_interface__"):
-        return {"file": files.polygons(value)}
+        return {"file": files.polygons("area", value)}
     return {"file": path_of(value)}
+
+
+def _bounds(given: dict[str, Any], known: Mapping[str, Any]) -> None:
+    """Brings the bounds of a GeoDataFrame to a map that the job knows."""
+    frame = _with_crs("bounds", given["bounds"])
+    if "bounds_epsg" in known:
+        given["bounds_epsg"] = frame.crs.to_epsg() or 4326
+        frame = frame.to_crs(given["bounds_epsg"])
+    else:
+        wkt = _native.file_crs(path_of(given["surface"]))[0]
+        if wkt is None:
+            raise InputError("the surface has no CRS, so bounds are four numbers on its map")
+        frame = frame.to_crs(parts_of(wkt).map)
+    given["bounds"] = [float(edge) for edge in frame.total_bounds]
 
 
 def run(name: str, settings: Mapping[str, Any]) -> Any:
@@ -234,6 +314,8 @@ def run(name: str, settings: Mapping[str, Any]) -> Any:
         files = _Files(stack)
         if "area" in given:
             given["area"] = _area(given["area"], files)
+        if _is_frame(given.get("bounds")):
+            _bounds(given, settings)
         plain = {key: _plain(key, value, files) for key, value in given.items()}
         watching = stack.enter_context(watcher(progress))
         text = _native.run_job(name, json.dumps(plain, allow_nan=False), watching)

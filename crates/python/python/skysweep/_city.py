@@ -37,6 +37,16 @@ class CityModel:
     Raises:
         FileError: The file cannot be read.
         InputError: The model is not consistent, or the level is none.
+
+    A model can be pickled, with its triangles; the file is not needed again.
+
+    Example:
+        >>> import skysweep
+        >>> model = skysweep.CityModel("data-samples/town/truth/buildings.city.json")
+        >>> middle = model.vertices[model.triangles[0]].mean(axis=0)
+        >>> hits = model.cast(middle + [0.0, 0.0, 500.0], [0.0, 0.0, -1.0])
+        >>> bool(hits.distance <= 500.0)
+        True
     """
 
     #: Identifiers of the objects.
@@ -55,10 +65,17 @@ class CityModel:
     class_of: list[str]
 
     def __init__(self, path: Any, *, lod: str | None = None, all_objects: bool = False) -> None:
-        self._core = _native.CityCore.read(path_of(path), None if lod is None else str(lod), bool(all_objects))
+        self._take(_native.CityCore.read(path_of(path), None if lod is None else str(lod), bool(all_objects)))
+
+    def _take(self, core: _native.CityCore) -> None:
+        self._core = core
         self.ids = self._core.ids()
         self.epsg, self.vertical_epsg = self._core.epsg()
         self.vertices, self.triangles, self.object_of, self.class_of = self._core.triangles()
+
+    def __reduce__(self) -> Any:
+        origin, positions, indices, surfaces = self._core.parts()
+        return _again, (self.ids, (self.epsg, self.vertical_epsg), origin, positions, indices, surfaces)
 
     def __repr__(self) -> str:
         return f"<skysweep.CityModel of {len(self.ids)} objects, {len(self.triangles)} triangles>"
@@ -93,3 +110,9 @@ class CityModel:
         objects[hit] = self.object_of[triangle[hit]]
         whole = shape[:-1]
         return Hits(distance.reshape(whole), triangle.reshape(whole), objects.reshape(whole))
+
+
+def _again(*parts: Any) -> CityModel:
+    model = CityModel.__new__(CityModel)
+    model._take(_native.CityCore.from_parts(*parts))
+    return model

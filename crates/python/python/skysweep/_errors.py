@@ -1,4 +1,4 @@
-"""The exceptions of the package. Their text is that of the command line."""
+"""The exceptions and warnings of the package. Their text is that of the command line."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ __all__ = [
     "SkysweepError",
     "InputError",
     "FileError",
+    "FileMissingError",
     "OutputExistsError",
     "CrsError",
     "CancelledError",
+    "DatumWarning",
 ]
 
 
@@ -21,7 +23,21 @@ class InputError(SkysweepError, ValueError):
 
 
 class FileError(SkysweepError, OSError):
-    """A file cannot be read or written."""
+    """A file cannot be read or written.
+
+    ``filename`` is the file as it was given, where the error is about one, and ``errno`` the number
+    of the system's error, where the system refused.
+    """
+
+    def __str__(self) -> str:
+        if self.strerror is not None:
+            return str(self.strerror)
+        # The text of Python's own errors with a file but without a number names neither.
+        return str(self.args[0]) if self.args else super().__str__()
+
+
+class FileMissingError(FileError, FileNotFoundError):
+    """A file or a folder does not exist."""
 
 
 class OutputExistsError(FileError, FileExistsError):
@@ -36,5 +52,19 @@ class CancelledError(SkysweepError):
     """The job was asked to stop. Raise it in a progress function to stop a job."""
 
 
-for _class in (SkysweepError, InputError, FileError, OutputExistsError, CrsError, CancelledError):
+class DatumWarning(UserWarning):
+    """Heights do not say what they are above, and a datum was assumed. Between the ellipsoid and a
+    geoid lie up to 100 metres."""
+
+
+for _class in (
+    SkysweepError,
+    InputError,
+    FileError,
+    FileMissingError,
+    OutputExistsError,
+    CrsError,
+    CancelledError,
+    DatumWarning,
+):
     _class.__module__ = "skysweep"

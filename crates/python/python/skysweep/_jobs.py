@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
-from ._call import PathLike, Progress, Report, job, run as run_job
+from ._call import BoundsLike, CrsCode, PathLike, Progress, Report, job, run as run_job
 
 __all__ = [
     "dsm",
@@ -316,15 +316,87 @@ class VisibilityConfig(TypedDict, total=False):
     """Largest number of observations that are kept per point."""
 
 
+class DsmSettings(TypedDict, total=False):
+    """Settings of :func:`dsm`."""
+
+    area: LayerArea | PathLike | None
+    band: int | str | None
+    bounds: BoundsLike | None
+    bounds_epsg: CrsCode | None
+    chunk: int | None
+    control: PathLike | None
+    corrections: PathLike | None
+    crs_epsg: CrsCode | None
+    dem: PathLike | None
+    dem_vertical: str | None
+    fill: Literal["none", "justified", "all"]
+    force_crs: bool
+    gsd_m: float | None
+    height_range_m: Sequence[float] | None
+    image_masks: Sequence[PathLike]
+    masks: Sequence[PathLike]
+    memory_mb: int | None
+    overwrite: bool
+    pairs: Sequence[Sequence[int]] | None
+    pointing: bool
+    preset: Literal["fast", "balanced", "accurate"]
+    prior: PathLike | None
+    products: Sequence[Literal["cloud", "dtm", "classes", "contours", "mesh"]]
+    reference_dem: PathLike | None
+    reference_plane: bool
+    references: Sequence[int] | None
+    threads: int | None
+    tile: int
+    vertical: str
+
+
+class EvaluateSettings(TypedDict, total=False):
+    """Settings of :func:`evaluate_grids`, :func:`evaluate_surfaces` and :func:`evaluate_maps`."""
+
+    alignment: Literal["none", "z", "xyz", "nuth-kaab"]
+    all_objects: bool
+    classes: PathLike | None
+    confidence: PathLike | None
+    cylinder_m: float
+    cylinder_reach_m: float
+    error_map: PathLike | None
+    kind: Literal["depth", "normals", "mask"] | None
+    lod: str | None
+    mask: PathLike | None
+    max_mae: float | None
+    normal_scale_m: float
+    objects: PathLike | None
+    output: PathLike | None
+    overwrite: bool
+    page: PathLike | None
+    reference_cell_m: float | None
+    reference_vertical: str | None
+    registration_m: float
+    requirements: EvalRequirements | None
+    sample_seed: int
+    samples_per_m2: float
+    search_m: float
+    skip: Sequence[int]
+    standing_m: float
+    target: Literal["run_folder", "nowhere"] | Mapping[str, Any]
+    terrain: PathLike | None
+    test_vertical: str | None
+    threads: int | None
+    thresholds_m: Sequence[float]
+    voxel_m: float
+    progress: Progress
+
+
 @job
 def dsm(
     images: Sequence[PathLike],
     output: PathLike,
     *,
     gsd_m: float | None = None,
-    crs_epsg: int | None = None,
-    bounds: Sequence[float] | None = None,
-    area: LayerArea | None = None,
+    crs_epsg: CrsCode | None = None,
+    bounds: BoundsLike | None = None,
+    bounds_epsg: CrsCode | None = None,
+    area: LayerArea | PathLike | None = None,
     masks: Sequence[PathLike] = (),
     image_masks: Sequence[PathLike] = (),
     band: int | str | None = None,
@@ -359,9 +431,11 @@ def dsm(
         gsd_m: Cell size of the DSM, metres.
         crs_epsg: EPSG code of the horizontal CRS.
         bounds: Area of the DSM, in its CRS.
+        bounds_epsg: EPSG code of the CRS of `bounds` where that is another one, such as 4326 for
+            degrees. The grid is the rectangle around them.
         area: Polygons in which the DSM lies. Cells outside are void, and without `bounds` the grid
             is the rectangle around them.
-        masks: Ground without heights, such as water: polygons (GeoJSON, GeoPackage), and
+        masks: Ground without heights, such as water: polygons (GeoJSON, GeoPackage, shapefile), and
             georeferenced rasters where they are neither 0 nor without data.
         image_masks: Pixels that are not matched, such as clouds: polygons on the ground, and
             rasters in the frame of an image. The name of each begins with that of its image.
@@ -398,9 +472,17 @@ def dsm(
         overwrite: Whether existing results may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.dsm(["left.tif", "right.tif"], "run", gsd_m=0.5, preset="fast")
+        >>> print(report.surface.observed)
     """
     result: Report = run_job("dsm", locals())
     return result
@@ -412,9 +494,10 @@ def plan_run(
     output: PathLike,
     *,
     gsd_m: float | None = None,
-    crs_epsg: int | None = None,
-    bounds: Sequence[float] | None = None,
-    area: LayerArea | None = None,
+    crs_epsg: CrsCode | None = None,
+    bounds: BoundsLike | None = None,
+    bounds_epsg: CrsCode | None = None,
+    area: LayerArea | PathLike | None = None,
     masks: Sequence[PathLike] = (),
     image_masks: Sequence[PathLike] = (),
     band: int | str | None = None,
@@ -449,9 +532,11 @@ def plan_run(
         gsd_m: Cell size of the DSM, metres.
         crs_epsg: EPSG code of the horizontal CRS.
         bounds: Area of the DSM, in its CRS.
+        bounds_epsg: EPSG code of the CRS of `bounds` where that is another one, such as 4326 for
+            degrees. The grid is the rectangle around them.
         area: Polygons in which the DSM lies. Cells outside are void, and without `bounds` the grid
             is the rectangle around them.
-        masks: Ground without heights, such as water: polygons (GeoJSON, GeoPackage), and
+        masks: Ground without heights, such as water: polygons (GeoJSON, GeoPackage, shapefile), and
             georeferenced rasters where they are neither 0 nor without data.
         image_masks: Pixels that are not matched, such as clouds: polygons on the ground, and
             rasters in the frame of an image. The name of each begins with that of its image.
@@ -488,9 +573,16 @@ def plan_run(
         overwrite: Whether existing results may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> plan = skysweep.plan_run(["left.tif", "right.tif"], "run", gsd_m=0.5, chunk=2048)
     """
     result: Report = run_job("plan_run", locals())
     return result
@@ -502,9 +594,10 @@ def make_plan(
     output: PathLike,
     *,
     gsd_m: float | None = None,
-    crs_epsg: int | None = None,
-    bounds: Sequence[float] | None = None,
-    area: LayerArea | None = None,
+    crs_epsg: CrsCode | None = None,
+    bounds: BoundsLike | None = None,
+    bounds_epsg: CrsCode | None = None,
+    area: LayerArea | PathLike | None = None,
     masks: Sequence[PathLike] = (),
     image_masks: Sequence[PathLike] = (),
     band: int | str | None = None,
@@ -539,9 +632,11 @@ def make_plan(
         gsd_m: Cell size of the DSM, metres.
         crs_epsg: EPSG code of the horizontal CRS.
         bounds: Area of the DSM, in its CRS.
+        bounds_epsg: EPSG code of the CRS of `bounds` where that is another one, such as 4326 for
+            degrees. The grid is the rectangle around them.
         area: Polygons in which the DSM lies. Cells outside are void, and without `bounds` the grid
             is the rectangle around them.
-        masks: Ground without heights, such as water: polygons (GeoJSON, GeoPackage), and
+        masks: Ground without heights, such as water: polygons (GeoJSON, GeoPackage, shapefile), and
             georeferenced rasters where they are neither 0 nor without data.
         image_masks: Pixels that are not matched, such as clouds: polygons on the ground, and
             rasters in the frame of an image. The name of each begins with that of its image.
@@ -578,9 +673,17 @@ def make_plan(
         overwrite: Whether existing results may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> plan = skysweep.make_plan(["left.tif", "right.tif"], "run", memory_mb=2000)
+        >>> print(len(plan.plan.chunks))
     """
     result: Report = run_job("make_plan", locals())
     return result
@@ -598,9 +701,16 @@ def read_plan(
         folder: Folder of a planned run.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> plan = skysweep.read_plan("run")
     """
     result: Report = run_job("read_plan", locals())
     return result
@@ -626,9 +736,17 @@ def run_chunks(
         threads: Worker threads; all cores when `None`.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.run_chunks("run", chunks="2/5", threads=4)
+        >>> print(report.computed)
     """
     result: Report = run_job("run_chunks", locals())
     return result
@@ -652,9 +770,16 @@ def merge_run(
         threads: Worker threads; all cores when `None`.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.merge_run("run", partial=True)
     """
     result: Report = run_job("merge_run", locals())
     return result
@@ -672,9 +797,16 @@ def batch(
         file: Batch file (TOML).
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.batch("night.toml", progress=True)
     """
     result: Report = run_job("batch", locals())
     return result
@@ -703,9 +835,16 @@ def dtm(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.dtm("run", "terrain", surface_vertical="egm96")
     """
     result: Report = run_job("dtm", locals())
     return result
@@ -748,9 +887,16 @@ def classes(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.classes("run", "classes", multispectral=["multispectral.tif"])
     """
     result: Report = run_job("classes", locals())
     return result
@@ -787,9 +933,16 @@ def buildings(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.buildings("left.tif", "index.tif", surface="run")
     """
     result: Report = run_job("buildings", locals())
     return result
@@ -843,9 +996,17 @@ def diff(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.diff("run_2023", "run_2024", "change", areas="blocks.geojson", areas_field="name")
+        >>> print(report.areas)
     """
     result: Report = run_job("diff", locals())
     return result
@@ -883,9 +1044,16 @@ def products(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.products("run", products=["cloud", "dtm"])
     """
     result: Report = run_job("products", locals())
     return result
@@ -898,7 +1066,7 @@ def ortho(
     output: PathLike,
     *,
     cell_m: float | None = None,
-    bounds: Sequence[float] | None = None,
+    bounds: BoundsLike | None = None,
     corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
     surface_vertical: str | None = None,
     tolerance_m: float = 0.05,
@@ -931,9 +1099,16 @@ def ortho(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.ortho(["left.tif"], "run", "orthos", cell_m=0.5)
     """
     result: Report = run_job("ortho", locals())
     return result
@@ -967,9 +1142,17 @@ def register(
         overwrite: Whether an existing report may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> model = {"surface": {"dsm": "run", "images": ["left.tif"]}}
+        >>> report = skysweep.register("new.tif", model, "new.json")
     """
     result: Report = run_job("register", locals())
     return result
@@ -1033,9 +1216,17 @@ def evaluate_grids(
         threads: Worker threads. `None` uses all cores.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.evaluate_grids("run", "lidar.laz", alignment="xyz", error_map="errors.tif")
+        >>> print(report.metrics.mae)
     """
     result: Report = run_job("evaluate_grids", locals())
     return result
@@ -1089,9 +1280,16 @@ def evaluate_surfaces(
         threads: Worker threads. `None` uses all cores.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.evaluate_surfaces("town.ply", "town.city.json", lod="2.2")
     """
     result: Report = run_job("evaluate_surfaces", locals())
     return result
@@ -1117,9 +1315,16 @@ def evaluate_maps(
         threads: Worker threads. `None` uses all cores.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.evaluate_maps("depth.npy", "truth.npy", kind="depth")
     """
     result: Report = run_job("evaluate_maps", locals())
     return result
@@ -1139,9 +1344,16 @@ def kind_of_evaluation(
         reference: File that is believed.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        ``grids``, ``surfaces`` or ``maps``.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> kind = skysweep.kind_of_evaluation("run", "lidar.laz")
     """
     result: str = run_job("kind_of_evaluation", locals())
     return result
@@ -1160,7 +1372,7 @@ def heightmap(
     confidence: Literal["none", "automatic"] | Mapping[str, Any] = "none",
     map: Literal["local", "utm"] | Mapping[str, Any] = "local",
     interpolation: Literal["nearest", "bilinear", "cubic"] = "bilinear",
-    source_epsg: int | None = None,
+    source_epsg: CrsCode | None = None,
     source_vertical: str | None = None,
     lod: str | None = None,
     all_objects: bool = False,
@@ -1194,9 +1406,17 @@ def heightmap(
             was stopped.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> place = {"lon_deg": 5.4, "lat_deg": 43.53}
+        >>> report = skysweep.heightmap("run", "map.tif", {"source": {"position": place}}, size_px=256)
     """
     result: Report = run_job("heightmap", locals())
     return result
@@ -1230,9 +1450,16 @@ def unproject(
         overwrite: Whether an existing file may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.unproject("map.tif", "points.ply", axes="world")
     """
     result: Report = run_job("unproject", locals())
     return result
@@ -1251,7 +1478,7 @@ def tiles(
     confidence: Literal["none", "automatic"] | Mapping[str, Any] = "none",
     map: Literal["local", "utm"] | Mapping[str, Any] = "local",
     interpolation: Literal["nearest", "bilinear", "cubic"] = "bilinear",
-    source_epsg: int | None = None,
+    source_epsg: CrsCode | None = None,
     source_vertical: str | None = None,
     lod: str | None = None,
     all_objects: bool = False,
@@ -1291,9 +1518,17 @@ def tiles(
         mosaic: How the values of several images become one.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> place = {"lon_deg": 5.4, "lat_deg": 43.53}
+        >>> report = skysweep.tiles("run", "tiles", {"source": {"position": place}}, images=["left.tif"], size_px=256)
     """
     result: Report = run_job("tiles", locals())
     return result
@@ -1335,9 +1570,16 @@ def groundview(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.groundview("run", "views", {"model": "sparse/0"})
     """
     result: Report = run_job("groundview", locals())
     return result
@@ -1364,9 +1606,16 @@ def compose(
         overwrite: Whether an existing file may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.compose("ground.png", "alpha.png", "satellite.png", "both.png")
     """
     result: Report = run_job("compose", locals())
     return result
@@ -1381,7 +1630,7 @@ def priors(
     offset: Sequence[float] | None = None,
     transform: PathLike | None = None,
     image_size: Sequence[int] | None = None,
-    map_epsg: int | None = None,
+    map_epsg: CrsCode | None = None,
     vertical: str | None = None,
     corrections: PathLike | None = None,
     mode: Literal["building-only", "building-enhanced"] = "building-only",
@@ -1446,9 +1695,16 @@ def priors(
         overwrite: Whether an earlier dataset may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.priors("town.city.json", ["cameras"], "priors", mode="building-only")
     """
     result: Report = run_job("priors", locals())
     return result
@@ -1501,9 +1757,16 @@ def splats(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.splats("run", ["left.tif", "right.tif"], "splats.ply", walls=False)
     """
     result: Report = run_job("splats", locals())
     return result
@@ -1539,9 +1802,16 @@ def render_splats(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.render_splats("splats.ply", "views", images=["left.tif"])
     """
     result: Report = run_job("render_splats", locals())
     return result
@@ -1592,9 +1862,16 @@ def train(
         overwrite: Whether earlier results may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.train("priors", "trained", iterations=3000, priors="both")
     """
     result: Report = run_job("train", locals())
     return result
@@ -1639,9 +1916,16 @@ def mesh(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.mesh("priors", {"maps": "priors/raw_depth"}, "town.ply", voxel_m=0.5)
     """
     result: Report = run_job("mesh", locals())
     return result
@@ -1653,7 +1937,7 @@ def align(
     positions: PathLike,
     output: PathLike,
     *,
-    crs_epsg: int | None = None,
+    crs_epsg: CrsCode | None = None,
     vertical: str = "ellipsoid",
     threshold_m: float | None = None,
     use_gravity: bool = True,
@@ -1684,9 +1968,16 @@ def align(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.align("sparse/0", "positions.csv", "aligned", crs_epsg=32631)
     """
     result: Report = run_job("align", locals())
     return result
@@ -1720,9 +2011,16 @@ def split(
         overwrite: Whether an existing `output` may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.split("sparse/0", contexts=2, output="split.json")
     """
     result: Report = run_job("split", locals())
     return result
@@ -1750,9 +2048,17 @@ def city_info(
         overwrite: Whether existing files may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.city_info("town.city.json", lod="2.2")
+        >>> print(report.triangles)
     """
     result: Report = run_job("city_info", locals())
     return result
@@ -1784,9 +2090,16 @@ def city_convert(
         format: Format to write; taken from the ending of `output` when `None`.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.city_convert("town.city.json", "town.ply")
     """
     result: Report = run_job("city_convert", locals())
     return result
@@ -1804,9 +2117,16 @@ def rpc_info(
         file: RPC file, or image with an RPC.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.rpc_info("left.tif")
     """
     result: Report = run_job("rpc_info", locals())
     return result
@@ -1834,9 +2154,16 @@ def rpc_convert(
         overwrite: Whether an existing `output` may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.rpc_convert("left.tif", "left.rpb")
     """
     result: Report = run_job("rpc_convert", locals())
     return result
@@ -1872,9 +2199,17 @@ def simulate(
         overwrite: Whether the files of an earlier simulation may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
     Raises:
         TypeError: A keyword that the job does not have; the text names those that it has.
         SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.simulate({"size_m": 60.0, "views": 2}, "scene")
+        >>> print(report.views)
     """
     result: Report = run_job("simulate", locals())
     return result

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _jobs
-from ._call import Progress, Report, path_of
+from ._call import PathLike, Progress, Report, path_of
 from ._errors import InputError
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._jobs import DsmSettings
 
 __all__ = ["Plan"]
 
@@ -20,6 +25,13 @@ class Plan:
 
     Raises:
         FileError: The folder has no plan, or the plan cannot be read.
+
+    Example:
+        >>> import skysweep
+        >>> plan = skysweep.Plan.make(["left.tif", "right.tif"], "run", gsd_m=0.5, chunk=2048)
+        >>> for chunk in range(len(plan)):
+        ...     computed = plan.run_chunk(chunk).computed
+        >>> report = plan.merge()
     """
 
     #: Folder of the run.
@@ -32,7 +44,9 @@ class Plan:
         self.content = _jobs.read_plan(self.folder)
 
     @classmethod
-    def make(cls, images: Sequence[Any], output: Any, *, progress: Progress = None, **settings: Any) -> Plan:
+    def make(
+        cls, images: Sequence[PathLike], output: PathLike, *, progress: Progress = None, **settings: Unpack[DsmSettings]
+    ) -> Plan:
         """Plans a run into the folder `output`. The settings are those of :func:`dsm`.
 
         Raises:

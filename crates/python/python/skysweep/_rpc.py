@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _native
-from ._arrays import empty, shaped, together
-from ._call import path_of
+from ._arrays import empty, refuse_marks, shaped, together
+from ._call import local_path, path_of
 from ._errors import InputError
 
 __all__ = ["FittedRpc", "Rpc"]
@@ -65,8 +65,16 @@ class Rpc:
         correction: What moves the positions that the RPC gives, as :attr:`correction` has it.
 
     Raises:
-        FileError: The file cannot be read or holds no RPC.
+        FileError: The file cannot be read or holds no RPC; `FileMissingError` where there is none.
         InputError: The numbers do not form a camera.
+
+    Example:
+        >>> import skysweep
+        >>> rpc = skysweep.Rpc("data-samples/town/view_1.tif")
+        >>> sample, line = rpc.project(5.4, 43.53, 210.0)
+        >>> lon, lat = rpc.localize(sample, line, 210.0)
+        >>> round(float(lon), 6), round(float(lat), 6)
+        (5.4, 43.53)
     """
 
     #: Format in which a file held the RPC; `None` for other sources.
@@ -89,7 +97,8 @@ class Rpc:
             text = json.dumps({"err_bias_m": None, "err_rand_m": None, **numbers})
             self._core = _native.RpcCore.from_json(_finite(text), _correction(correction))
         else:
-            self._core, self.format, found, self.warnings = _native.RpcCore.read(path_of(source))
+            with local_path(source) as local:
+                self._core, self.format, found, self.warnings = _native.RpcCore.read(local)
             self.path = os.fspath(found)
             if correction is not None:
                 self._core = _native.RpcCore.from_json(self._core.to_json()[0], _correction(correction))
@@ -98,6 +107,26 @@ class Rpc:
     def _of(cls, core: _native.RpcCore) -> Rpc:
         new = cls.__new__(cls)
         new._core, new.format, new.path, new.warnings = core, None, None, []
+        return new
+
+    @classmethod
+    def from_run(cls, run: Any, image: Any) -> Rpc:
+        """The camera of an image with the pointing correction that a run of :func:`dsm` found.
+
+        Args:
+            run: Folder of the run.
+            image: An image of the run: its file, or its name alone where that is unique.
+
+        Raises:
+            FileError: The folder holds no report of a run, or the image has no usable RPC.
+            InputError: The run did not use the image.
+
+        Example:
+            >>> import skysweep
+            >>> rpc = skysweep.Rpc.from_run("run", "left.tif")
+            >>> shift_px = rpc.correction["translation_px"]
+        """
+        new = cls._of(_native.RpcCore.from_run(path_of(run), path_of(image)))
         return new
 
     def __repr__(self) -> str:
@@ -170,9 +199,11 @@ class Rpc:
             the point: a coordinate is not finite, or the point is far outside of its domain.
 
         Raises:
-            InputError: An array does not hold real numbers, or the shapes do not fit.
+            InputError: An array does not hold real numbers, the shapes do not fit, or heights such as
+                −9999 stand for no data.
         """
         (flat_lon, flat_lat, flat_height), shape = together({"lon": lon, "lat": lat, "height": height})
+        refuse_marks("height", flat_height)
         sample, line = empty(shape), empty(shape)
         self._core.project([flat_lon, flat_lat, flat_height], [sample, line])
         return shaped(sample, shape), shaped(line, shape)
@@ -188,9 +219,11 @@ class Rpc:
             Longitude and latitude, degrees, f64, in the common shape; NaN where there is none.
 
         Raises:
-            InputError: An array does not hold real numbers, or the shapes do not fit.
+            InputError: An array does not hold real numbers, the shapes do not fit, or heights such as
+                −9999 stand for no data.
         """
         (flat_sample, flat_line, flat_height), shape = together({"sample": sample, "line": line, "height": height})
+        refuse_marks("height", flat_height)
         lon, lat = empty(shape), empty(shape)
         self._core.localize([flat_sample, flat_line, flat_height], [lon, lat])
         return shaped(lon, shape), shaped(lat, shape)

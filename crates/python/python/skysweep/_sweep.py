@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from ._arrays import floats
+from ._arrays import floats, refuse_marks
 from ._call import Progress, watcher
 from ._errors import InputError
 from ._rpc import Rpc
@@ -49,7 +49,16 @@ class HeightSweep:
     :func:`dsm`, which finds the corrections.
 
     Raises:
-        InputError: A view is no grid of real numbers or too small, or a setting is out of range.
+        InputError: A view is no grid of real numbers or too small, holds a value such as −9999 for no
+            data, or a setting is out of range.
+
+    Example:
+        >>> import skysweep
+        >>> paths = ["data-samples/town/view_1.tif", "data-samples/town/view_3.tif"]
+        >>> views = [(skysweep.read_raster(path), skysweep.Rpc(path)) for path in paths]
+        >>> heights = skysweep.HeightSweep(views, (170.0, 280.0), preset="fast").run()
+        >>> len(heights)
+        2
     """
 
     def __init__(
@@ -57,7 +66,7 @@ class HeightSweep:
         views: Sequence[tuple[ArrayLike, Rpc]],
         height_range: tuple[float, float],
         *,
-        preset: str = "balanced",
+        preset: Literal["fast", "balanced", "accurate"] = "balanced",
     ) -> None:
         self._views: list[tuple[NDArray[np.float32], _native.RpcCore]] = []
         for number, (pixels, rpc) in enumerate(views):
@@ -66,6 +75,7 @@ class HeightSweep:
             array = floats(f"view {number}", pixels) if not _is_f32(pixels) else np.asarray(pixels)
             if array.ndim != 2:
                 raise InputError(f"view {number} has the shape {array.shape}, expected rows and columns")
+            refuse_marks(f"view {number}", array)
             self._views.append((np.asarray(array, dtype=np.float32), rpc._core))
         low, high = (float(height) for height in height_range)
         if not (np.isfinite(low) and np.isfinite(high)):

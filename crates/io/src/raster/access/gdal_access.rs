@@ -31,8 +31,8 @@ const FILE_SYSTEMS: [&str; 6] = ["/vsimem/", "/vsizip/", "/vsitar/", "/vsigzip/"
 const UNLISTED_FILE_SYSTEMS: [&str; 2] = ["/vsicurl?", "/vsicurl_streaming/"];
 
 /// A driver of GDAL that is kept beside the registered ones. That of rasters in memory would open
-/// names that hold an address in memory. That of GeoPackages opens databases, and is registered
-/// when the user gives one.
+/// names that hold an address in memory. Those of GeoPackages, which open databases, and of
+/// shapefiles are registered when the user gives one.
 struct KeptDriver(gdal_sys::GDALDriverH);
 
 // SAFETY: the pointer is to a driver of GDAL, which lives until the end of the process (drivers are
@@ -44,6 +44,26 @@ unsafe impl Sync for KeptDriver {}
 
 static MEMORY: OnceLock<KeptDriver> = OnceLock::new();
 static GEOPACKAGE: OnceLock<KeptDriver> = OnceLock::new();
+static SHAPEFILE: OnceLock<KeptDriver> = OnceLock::new();
+
+/// Formats of polygons whose drivers are registered when the user gives a file of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum VectorFormat {
+    /// GeoPackages.
+    GeoPackage,
+    /// Shapefiles: `.shp` with its `.shx`, `.dbf` and `.prj`.
+    Shapefile,
+}
+
+impl VectorFormat {
+    /// GDAL's name of the driver.
+    pub(crate) const fn driver(self) -> &'static str {
+        match self {
+            Self::GeoPackage => "GPKG",
+            Self::Shapefile => "ESRI Shapefile",
+        }
+    }
+}
 
 /// Whether a path as the user wrote it is in one of GDAL's file systems for local files, and leads
 /// through no other one.
@@ -55,7 +75,7 @@ pub(in crate::raster) fn is_local_file_system(name: &str) -> bool {
 /// Removes all drivers and file systems that are not listed. To be called once, after the drivers
 /// are registered.
 pub(in crate::raster) fn restrict() {
-    for (name, place) in [("MEM", &MEMORY), ("GPKG", &GEOPACKAGE)] {
+    for (name, place) in [("MEM", &MEMORY), ("GPKG", &GEOPACKAGE), ("ESRI Shapefile", &SHAPEFILE)] {
         if let Ok(driver) = DriverManager::get_driver_by_name(name) {
             // SAFETY: the function only reads the pointer that the driver holds, and the driver is
             // one that GDAL registered.
@@ -75,12 +95,16 @@ pub(in crate::raster) fn restrict() {
     web_files::install();
 }
 
-/// Registers GDAL's driver of GeoPackages, where there is one, for the rest of the process. To be
-/// called for a file that the user names, after [`restrict`].
-pub(crate) fn register_geopackage() {
-    static REGISTERED: Once = Once::new();
-    REGISTERED.call_once(|| {
-        if let Some(driver) = GEOPACKAGE.get() {
+/// Registers GDAL's driver of a format of polygons, where there is one, for the rest of the
+/// process. To be called for a file that the user names, after [`restrict`].
+pub(crate) fn register_vector(format: VectorFormat) {
+    static REGISTERED: [Once; 2] = [const { Once::new() }; 2];
+    let (once, kept) = match format {
+        VectorFormat::GeoPackage => (&REGISTERED[0], &GEOPACKAGE),
+        VectorFormat::Shapefile => (&REGISTERED[1], &SHAPEFILE),
+    };
+    once.call_once(|| {
+        if let Some(driver) = kept.get() {
             // SAFETY: the pointer came from a driver of GDAL, which is never freed.
             DriverManager::register_driver(&unsafe { Driver::from_c_driver(driver.0) });
         }

@@ -9,14 +9,14 @@
 use std::path::{Path, PathBuf};
 
 use crs::{CrsIdentity, VerticalDatum};
-use gdal::{Dataset, Metadata};
+use gdal::Dataset;
 use raster::{GeoTransform, Grid, Window};
 
 use super::source::read_as;
 use super::undeclared::undeclared_no_data;
 use crate::raster::access::gdal_setup::{open_dataset, with_gdal};
 use crate::raster::error::RasterError;
-use crate::raster::write::geotiff::VERTICAL_DATUM;
+use crate::raster::write::geotiff::stated_datum;
 use crate::raster::write::labels::Provenance;
 
 /// Most cells that are read at once (4 GiB of f32).
@@ -106,11 +106,6 @@ fn read(path: &Path, dataset: &Dataset, window: Window) -> Result<Dem, RasterErr
         no_data,
         provenance: Provenance::of(dataset),
     })
-}
-
-/// Returns the datum in the metadata item that [`crate::raster::write_cog`] writes.
-fn stated_datum(dataset: &Dataset) -> Option<VerticalDatum> {
-    dataset.metadata_item(VERTICAL_DATUM, "")?.parse().ok()
 }
 
 /// Reads band 1 with its scale and offset applied, and its no-data value. NaN marks void cells.

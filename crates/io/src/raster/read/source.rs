@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crs::{CrsIdentity, VerticalDatum};
 use gdal::raster::{GdalDataType, RasterBand};
 use gdal::{Dataset, Metadata};
 use raster::{GeoTransform, Grid, Window};
@@ -13,6 +14,7 @@ use super::luma_rule::{BandChoice, LumaRule, band_names};
 use crate::raster::access::gdal_access::files_of;
 use crate::raster::access::gdal_setup::{open_dataset, with_gdal};
 use crate::raster::error::RasterError;
+use crate::raster::write::geotiff::stated_datum;
 use crate::stac::{StacItem, is_item_name, read_item};
 
 /// Type of the stored samples.
@@ -151,6 +153,20 @@ impl ImageSource {
     pub fn metadata(&self, domain: &str) -> Vec<(String, String)> {
         let items = self.dataset.metadata_domain(domain).unwrap_or_default();
         items.iter().filter_map(|item| item.split_once('=')).map(|(k, v)| (k.to_owned(), v.to_owned())).collect()
+    }
+
+    /// Returns the unit of a band, counted from 1, as the file names it (`m`, `US survey foot`);
+    /// `None` when it names none.
+    pub fn unit(&self, band: usize) -> Option<String> {
+        let unit = with_gdal(|| Ok(self.dataset.rasterband(band)?.unit())).ok()?;
+        Some(unit.trim().to_owned()).filter(|unit| !unit.is_empty())
+    }
+
+    /// Returns the vertical datum that the file states, in its CRS or in the metadata item that
+    /// [`super::write_cog`] writes; `None` when it states none.
+    pub fn vertical(&self) -> Option<VerticalDatum> {
+        let identity = self.info.crs_wkt.as_deref().and_then(|wkt| CrsIdentity::of(wkt).ok());
+        identity.and_then(|identity| identity.vertical).or_else(|| stated_datum(&self.dataset))
     }
 
     /// Reads one band, counted from 1, over a window, in the stored values. NaN marks no-data and

@@ -42,7 +42,7 @@ impl End {
 
 /// Returns a value that looks like no-data among heights in metres, and the number of its cells.
 /// Voids are NaN.
-pub(in crate::raster) fn undeclared_no_data(heights: &[f32]) -> Option<(f32, usize)> {
+pub fn undeclared_no_data(heights: &[f32]) -> Option<(f32, usize)> {
     let low = End::of(heights.iter().copied());
     if low.is_no_data() && low.value < *EARTH_M.start() {
         return Some((low.value, low.cells));

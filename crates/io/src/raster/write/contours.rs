@@ -17,7 +17,7 @@ use raster::{GeoTransform, Grid, NO_DATA};
 
 use super::band::{Band, BandData, in_memory};
 use crate::atomic::write_path;
-use crate::raster::access::gdal_access::register_geopackage;
+use crate::raster::access::gdal_access::{VectorFormat, register_vector};
 use crate::raster::access::gdal_setup::with_gdal;
 use crate::raster::error::RasterError;
 
@@ -92,7 +92,7 @@ fn verify(made: &Path, lines: u64) -> Result<(), String> {
 }
 
 fn draw(memory: &Dataset, surface: &ContourSurface<'_>, made: &Path) -> Result<u64, GdalError> {
-    register_geopackage();
+    register_vector(VectorFormat::GeoPackage);
     let driver = DriverManager::get_driver_by_name("GPKG")?;
     let mut file = driver.create_vector_only(made)?;
     let place = SpatialRef::from_definition(&surface.crs.to_string())?;

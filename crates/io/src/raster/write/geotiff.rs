@@ -49,6 +49,13 @@ pub enum CogCrs<'a> {
     Codes(Crs),
     /// Horizontal, as WKT, for maps without a code. Heights are above the ellipsoid.
     Wkt(&'a str),
+    /// With heights, as WKT, for maps without a code.
+    Compound {
+        /// The horizontal and the vertical part.
+        wkt: &'a str,
+        /// Datum of the heights.
+        vertical: VerticalDatum,
+    },
 }
 
 impl From<Crs> for CogCrs<'_> {
@@ -63,6 +70,7 @@ impl CogCrs<'_> {
         match self {
             Self::Codes(crs) => crs.vertical,
             Self::Wkt(_) => VerticalDatum::Ellipsoid,
+            Self::Compound { vertical, .. } => *vertical,
         }
     }
 
@@ -71,7 +79,7 @@ impl CogCrs<'_> {
         match self {
             Self::Codes(crs) if holds_heights => crs.to_string(),
             Self::Codes(crs) => crs.horizontal_definition(),
-            Self::Wkt(wkt) => (*wkt).to_owned(),
+            Self::Wkt(wkt) | Self::Compound { wkt, .. } => (*wkt).to_owned(),
         }
     }
 }
@@ -191,6 +199,11 @@ pub fn write_cog(path: impl AsRef<Path>, raster: &CogRaster<'_>, overwrite: bool
         let place = CogPlace { geotransform, crs, holds_heights, provenance, metadata, threads };
         finish_cog(&mut memory, place, raster.overviews, made).map_err(|reason| RasterError::unwritable(path, reason))
     })
+}
+
+/// Returns the datum in the metadata item that [`write_cog`] writes.
+pub(in crate::raster) fn stated_datum(dataset: &Dataset) -> Option<VerticalDatum> {
+    dataset.metadata_item(VERTICAL_DATUM, "")?.parse().ok()
 }
 
 /// Names the bands that show red, green, blue and opacity.

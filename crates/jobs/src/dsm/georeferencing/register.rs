@@ -429,6 +429,7 @@ fn trial_surface(
         fill: Fill::None,
         gsd_m: None,
         bounds: None,
+        bounds_epsg: None,
         area: None,
         crs_epsg: None,
         vertical: VerticalDatum::Ellipsoid,

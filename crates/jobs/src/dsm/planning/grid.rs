@@ -21,6 +21,12 @@ const FAR_OUTSIDE_DEG: f64 = 3.0;
 /// Fewest cells on a side of a grid whose cell size is given. Fewer come from a size in wrong
 /// units: with two cells between a void border on each side, nothing of a surface has a shape.
 const SIDE_MIN: usize = 5;
+/// Deviation of a map's scale from 1 that is told. Maps for measuring, such as UTM and national
+/// grids, stay far below, and cell sizes are given with two digits.
+const SCALE_TOLERANCE: f64 = 0.01;
+/// Steps along each edge of bounds in another CRS. A bend of an edge between two of them is below a
+/// thousandth of its whole bend, which for a scene of 100 km is below a metre.
+const EDGE_STEPS: usize = 32;
 /// Grids of more cells than this come from a cell size or bounds in wrong units.
 pub(crate) const CELLS_MAX: f64 = 4e9;
 
@@ -105,7 +111,7 @@ pub(crate) fn choose_grid(
             return Err(DsmError::AreaMissesScene { path: area.file.clone(), area: polygons, covered });
         }
     }
-    let bounds = match (config.bounds, &config.area) {
+    let bounds = match (asked_bounds(config, &projection)?, &config.area) {
         (Some(bounds), _) => bounds,
         (None, Some(area)) => bounds_of_area(area, &projection)?,
         (None, None) => covered,
@@ -122,6 +128,28 @@ pub(crate) fn choose_grid(
         return Err(DsmError::value(DsmSetting::CellSize, found, expected));
     }
     Ok(DsmGrid { epsg, geotransform, size, gsd_m })
+}
+
+/// Returns the bounds that are asked for, on the map of the DSM: where they are given in another
+/// CRS, the rectangle around them, whose edges are curves there.
+pub(crate) fn asked_bounds(config: &DsmConfig, map: &MapProjection) -> Result<Option<MapBounds>, DsmError> {
+    let (Some(bounds), Some(code)) = (config.bounds, config.bounds_epsg) else { return Ok(config.bounds) };
+    if map.definition() == format!("EPSG:{code}") {
+        return Ok(Some(bounds));
+    }
+    let own = MapProjection::from_epsg(code)?;
+    let mut on_map = MapBounds::EMPTY;
+    for step in 0..=EDGE_STEPS {
+        let share = step as f64 / EDGE_STEPS as f64;
+        let x = bounds.x_min + share * (bounds.x_max - bounds.x_min);
+        let y = bounds.y_min + share * (bounds.y_max - bounds.y_min);
+        for (x, y) in [(x, bounds.y_min), (x, bounds.y_max), (bounds.x_min, y), (bounds.x_max, y)] {
+            let (lon, lat) = own.lonlat_from_map(x, y)?;
+            let at = map.map_from_lonlat(lon, lat)?;
+            on_map = on_map.including(at.x, at.y);
+        }
+    }
+    Ok(Some(on_map))
 }
 
 /// Returns the longitudes and latitudes of the polygons of an area.
@@ -179,11 +207,40 @@ fn warn_of_area(grid: &DsmGrid, notes: &mut Notes<'_>) {
     }
 }
 
+/// Warns of a map whose metres are none on the ground, such as that of web maps (EPSG:3857).
+fn warn_of_scale(grid: &DsmGrid, notes: &mut Notes<'_>) {
+    if let Some(scale) = scale_of(grid).filter(|scale| (scale - 1.0).abs() > SCALE_TOLERANCE) {
+        notes.warn(format!(
+            "EPSG:{} stretches the ground by {scale:.3} here: a cell of {} m on the map is {:.3} m on the ground, \
+             and lengths, areas and volumes on the map are wrong; a UTM zone, which is the default, is true to scale",
+            grid.epsg,
+            grid.gsd_m,
+            grid.gsd_m / scale
+        ));
+    }
+}
+
+/// Returns the metres on the map for a metre on the ground in the middle of the grid, going east;
+/// `None` for degrees, and where the place cannot be found.
+fn scale_of(grid: &DsmGrid) -> Option<f64> {
+    let projection = grid.projection().ok()?;
+    let metres = projection.metres_per_unit()?;
+    let bounds = grid.bounds();
+    let (x, y) = (0.5 * (bounds.x_min + bounds.x_max), 0.5 * (bounds.y_min + bounds.y_max));
+    let step = 0.5 * (bounds.x_max - bounds.x_min);
+    let (lon, lat) = projection.lonlat_from_map(x, y).ok()?;
+    let (east_lon, east_lat) = projection.lonlat_from_map(x + step, y).ok()?;
+    let (across, along) = metres_per_degree(lat);
+    let ground_m = ((east_lon - lon) * across).hypot((east_lat - lat) * along);
+    (ground_m > 0.0).then_some(step * metres / ground_m)
+}
+
 /// Notes the choices of [`choose_grid`].
 pub(crate) fn note_grid(config: &DsmConfig, grid: &DsmGrid, coarsest_gsd_m: f64, notes: &mut Notes<'_>) {
     let given = |is_given: bool, else_why: String| if is_given { "given".to_owned() } else { else_why };
     let zone = given(config.crs_epsg.is_some(), "the UTM (or polar) zone of the scene's centre".to_owned());
     warn_of_area(grid, notes);
+    warn_of_scale(grid, notes);
     notes.choose("crs", format!("EPSG:{}, heights above {}", grid.epsg, config.vertical), zone);
     let matched = match config.preset {
         Preset::Fast => "twice the coarsest image's",

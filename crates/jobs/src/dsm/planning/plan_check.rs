@@ -14,6 +14,7 @@ use geodesy::{LonLatHeight, metres_per_degree};
 use io::raster::iso_time;
 use raster::Window;
 
+use crate::dsm::error::DsmError;
 use crate::dsm::images::character::ImageCharacter;
 use crate::dsm::images::image_windows::GroundBox;
 use crate::dsm::images::images::SceneImage;
@@ -22,7 +23,7 @@ use crate::dsm::images::order::sort_by_content;
 use crate::dsm::memory;
 use crate::dsm::planning::chunk_plan::{ChunkSweep, ChunkWork};
 use crate::dsm::planning::chunk_side::{MARGIN_PX, aligned, with_rim};
-use crate::dsm::planning::grid::{CELLS_MAX, DsmGrid, snapped};
+use crate::dsm::planning::grid::{CELLS_MAX, DsmGrid, asked_bounds, snapped};
 use crate::dsm::planning::levels::{PYRAMID_LEVELS_MAX, choose_levels, smallest_sides};
 use crate::dsm::planning::plan::{Plan, PlanReport};
 use crate::dsm::planning::view_geometry::pair_geometry;
@@ -156,7 +157,8 @@ impl Plan {
         ensure(is_whole(x, width) && is_whole(y, height), || {
             format!("the corner {x}, {y} of the grid is no whole multiple of its cells")
         })?;
-        let asked = config.bounds.map(|bounds| snapped(bounds, (width, -height))).transpose();
+        let asked = grid.projection().map_err(DsmError::from).and_then(|map| asked_bounds(config, &map));
+        let asked = asked.and_then(|asked| asked.map(|bounds| snapped(bounds, (width, -height))).transpose());
         ensure(asked.is_ok_and(|asked| asked.is_none_or(|asked| asked == (grid.geotransform, grid.size))), || {
             format!("the grid {:?} is not that of the bounds in the configuration", grid.bounds().to_array())
         })?;

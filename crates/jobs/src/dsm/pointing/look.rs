@@ -112,7 +112,8 @@ fn look_at(
     let in_windows = if is_small {
         None
     } else {
-        let scene = DsmConfig { bounds: None, area: None, gsd_m: None, crs_epsg: None, ..config.clone() };
+        let scene =
+            DsmConfig { bounds: None, bounds_epsg: None, area: None, gsd_m: None, crs_epsg: None, ..config.clone() };
         let scene = DsmConfig { preset: Preset::Balanced, ..scene };
         Some(match_in_windows(images, &choose_grid(&scene, &geometry, gsd)?, &geometry, &pairs, search, progress)?)
     };

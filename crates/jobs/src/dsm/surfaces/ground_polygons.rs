@@ -21,7 +21,7 @@ const METRES_PER_DEGREE: f64 = 111_000.0;
 /// Whether a file holds polygons, by its ending. Other files are rasters.
 pub(crate) fn holds_polygons(path: &Path) -> bool {
     let ending = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    ending.is_some_and(|ending| matches!(ending.as_str(), "geojson" | "json" | "gpkg"))
+    ending.is_some_and(|ending| matches!(ending.as_str(), "geojson" | "json" | "gpkg" | "shp"))
 }
 
 /// Returns the rectangle around points in longitude and latitude, with something beyond.

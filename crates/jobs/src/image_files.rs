@@ -1,4 +1,4 @@
-//! The images of a scene, by name or by pattern.
+//! The images of a scene, by name, by pattern or by folder.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -6,17 +6,85 @@ use glob::{Pattern, glob};
 
 use crate::job_paths::{is_address, resolved};
 
+/// Endings of the names of images that are looked for in folders, in lower case.
+const ENDINGS: [&str; 8] = ["tif", "tiff", "ntf", "nitf", "jp2", "j2k", "img", "vrt"];
+
+/// Images that a pattern or a folder does not give.
+#[derive(Debug, thiserror::Error)]
+#[error("{what}")]
+#[non_exhaustive]
+pub struct ImageFilesError {
+    /// Text found and text expected.
+    pub what: String,
+}
+
+/// Returns the images that paths stand for: a file is itself, a pattern (`*`, `?`, `[…]`) the files
+/// that match it, and a folder the images with an RPC that lie in it. Patterns and folders give
+/// each image once, by name; an image that is named twice stays so.
+///
+/// # Errors
+/// [`ImageFilesError`] for a pattern that matches no file, or that is none, and for a folder that
+/// cannot be read or holds no image with an RPC.
+pub fn image_files(given: &[PathBuf]) -> Result<Vec<PathBuf>, ImageFilesError> {
+    let mut images: Vec<PathBuf> = Vec::new();
+    for path in given {
+        let is_plain = is_address(path) || path.is_file();
+        let found = if path.is_dir() && !is_address(path) {
+            images_in(path)
+        } else if let Some(pattern) = path.to_str().filter(|text| !is_plain && is_pattern(text)) {
+            matches(pattern, Path::new(".")).and_then(|found| match found.as_slice() {
+                [] => Err(format!("no file matches the pattern {pattern:?} for images")),
+                _ => Ok(found),
+            })
+        } else {
+            images.push(path.clone());
+            continue;
+        };
+        for image in found.map_err(|what| ImageFilesError { what })? {
+            if !images.contains(&image) {
+                images.push(image);
+            }
+        }
+    }
+    Ok(images)
+}
+
+/// Returns the images of a folder that have an RPC, by name.
+fn images_in(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let entries = folder.read_dir().map_err(|e| format!("cannot read the folder ({e}): {}", folder.display()))?;
+    let is_named_so = |path: &Path| {
+        let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
+        path.is_file() && ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
+    };
+    let mut named: Vec<PathBuf> =
+        entries.flatten().map(|entry| entry.path()).filter(|path| is_named_so(path)).collect();
+    named.sort();
+    let images: Vec<PathBuf> = named.iter().filter(|path| io::rpc::read_for_image(path).is_ok()).cloned().collect();
+    if images.is_empty() {
+        return Err(format!(
+            "the folder holds no image with an RPC ({} rasters without); give the images, or a folder of them: {}",
+            named.len(),
+            folder.display()
+        ));
+    }
+    Ok(images)
+}
+
+fn is_pattern(text: &str) -> bool {
+    text.contains(['*', '?', '['])
+}
+
 /// Returns the images that names and patterns stand for, each once, in the order of the patterns
 /// and then of the names.
 ///
 /// # Errors
 /// A text for a pattern that matches no file, or that is none.
-pub(super) fn images_of(patterns: &[String], folder: &Path) -> Result<Vec<PathBuf>, String> {
+pub(crate) fn images_of(patterns: &[String], folder: &Path) -> Result<Vec<PathBuf>, String> {
     let mut images: Vec<PathBuf> = Vec::new();
     for pattern in patterns {
         let path = resolved(Path::new(pattern), folder);
         // A file may have a name that looks like a pattern, and an address may have one, too.
-        let is_pattern = pattern.contains(['*', '?', '[']) && !is_address(&path) && !path.exists();
+        let is_pattern = is_pattern(pattern) && !is_address(&path) && !path.exists();
         let found = if is_pattern {
             matches(pattern, folder)
                 .map_err(|reason| format!("cannot use the pattern {pattern:?} for images: {reason}"))?
