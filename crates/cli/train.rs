@@ -98,7 +98,7 @@ pub(crate) struct Args {
     #[arg(long, value_parser = named(&PRIORS), default_value = "both")]
     priors: TrainPriors,
     /// Where the factors of the priors by iteration come from.
-    #[arg(long, value_parser = named(&PRIOR_SCHEDULES), default_value = "preset")]
+    #[arg(long, value_parser = named(&PRIOR_SCHEDULES), default_value = "dataset")]
     prior_schedule: PriorSchedule,
     /// Learn a gain and an offset for each image, where exposures differ.
     #[arg(long)]

@@ -71,11 +71,12 @@ impl LossWeights {
             prior_normal: 0.1,
             correlation: 4.0,
         };
+        // GS4Buildings and SkySplat compare colours without D-SSIM.
+        let without = Self { squared: 0.2, similarity: 0.0, distortion: 10.0, ..photographs };
         match recipe {
             Recipe::Photographs => photographs,
-            Recipe::BuildingOnly => Self { distortion: 10.0, ..photographs },
-            Recipe::BuildingEnhanced => Self { distortion: 1.0, ..photographs },
-            Recipe::Satellite => Self { squared: 0.2, similarity: 0.0, distortion: 10.0, ..photographs },
+            Recipe::BuildingOnly | Recipe::Satellite => without,
+            Recipe::BuildingEnhanced => Self { distortion: 1.0, ..without },
         }
     }
 }

@@ -27,7 +27,7 @@ pub enum TrainPriors {
 pub enum PriorSchedule {
     /// The preset: two phases for buildings.
     Preset,
-    /// `schedule.json` of the dataset, where there is one.
+    /// `schedule.json` of the dataset, where there is one, or else the preset.
     Dataset,
 }
 
@@ -103,7 +103,7 @@ impl TrainConfig {
             preset: None,
             weights: TrainWeights::default(),
             steps: TrainSteps::default(),
-            prior_schedule: PriorSchedule::Preset,
+            prior_schedule: PriorSchedule::Dataset,
             schedule: TrainSchedule::default(),
             priors: TrainPriors::Both,
             appearance: false,
