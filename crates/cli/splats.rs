@@ -100,8 +100,8 @@ const FORMS: [Named<bool>; 2] = [("3d", false, "three scales: ellipsoids"), ("2d
 #[command(after_help = "Examples: skysweep splats render splats.ply view_*.tif -o seen; \
                   skysweep splats render splats.ply --cameras views/sparse/0 --pictures views/images -o seen")]
 struct RenderArgs {
-    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them. Without one they lie in the frame
-    /// of the cameras.
+    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them. Without one they lie in the
+    /// frame of the cameras.
     splats: PathBuf,
     /// Images with RPCs to look through.
     #[arg(value_name = "IMAGE")]

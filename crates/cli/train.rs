@@ -71,8 +71,8 @@ pub(crate) struct Args {
     /// and not trained on, as LLFF splits (0: none).
     #[arg(long, value_name = "N", default_value_t = 8)]
     hold_out: usize,
-    /// View that is kept for the judgement, by its name, instead of every N-th; may be given several
-    /// times.
+    /// View that is kept for the judgement, by its name, instead of every N-th; may be given
+    /// several times.
     #[arg(long, value_name = "NAME", conflicts_with = "hold_out")]
     hold_out_view: Vec<String>,
     /// What the training is for, each with the recipe of its paper [default: satellite with
@@ -80,8 +80,8 @@ pub(crate) struct Args {
     #[arg(long, value_parser = named(&PRESETS))]
     preset: Option<TrainPreset>,
     /// Weight of a term of the loss that differs from the preset: absolute, squared (of colours),
-    /// similarity (D-SSIM), mask, distortion (of inverse depths, in sizes of the scene), consistency
-    /// (of normals), prior-depth (in sizes of the scene), prior-normal, correlation.
+    /// similarity (D-SSIM), mask, distortion (of inverse depths, in sizes of the scene),
+    /// consistency (of normals), prior-depth (in sizes of the scene), prior-normal, correlation.
     #[arg(long, value_name = "NAME=NUMBER", value_parser = pair, help_heading = "Recipe")]
     weight: Vec<(String, f64)>,
     /// Step of the optimiser that differs from the preset: position-first, position-last (in sizes
@@ -98,7 +98,7 @@ pub(crate) struct Args {
     #[arg(long, value_parser = named(&PRIORS), default_value = "both")]
     priors: TrainPriors,
     /// Where the factors of the priors by iteration come from.
-    #[arg(long, value_parser = named(&PRIOR_SCHEDULES), default_value = "preset")]
+    #[arg(long, value_parser = named(&PRIOR_SCHEDULES), default_value = "dataset")]
     prior_schedule: PriorSchedule,
     /// Learn a gain and an offset for each image, where exposures differ.
     #[arg(long)]

@@ -1,5 +1,5 @@
-//! Colours that depend on the direction of view: real spherical harmonics of degree 1 to 3, with the
-//! signs and the order of 3D Gaussian Splatting (Kerbl et al. 2023).
+//! Colours that depend on the direction of view: real spherical harmonics of degree 1 to 3, with
+//! the signs and the order of 3D Gaussian Splatting (Kerbl et al. 2023).
 
 /// Factors of the harmonics of each degree.
 const C1: f64 = 0.488_602_511_902_919_9;
@@ -20,7 +20,8 @@ const C3: [f64; 7] = [
     -0.590_043_589_926_643_5,
 ];
 
-/// Coefficients of the harmonics of splats beyond the constant one, which is [`crate::Splat::colour`].
+/// Coefficients of the harmonics of splats beyond the constant one, which is
+/// [`crate::Splat::colour`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplatHarmonics {
     degree: u8,
@@ -73,8 +74,8 @@ impl SplatHarmonics {
     /// use gaussian::SplatHarmonics;
     ///
     /// // Red grows upwards.
-    /// let harmonics = SplatHarmonics::new(1, vec![0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("degree 1");
-    /// let up = harmonics.colour(0, [0.5; 3], [0.0, 0.0, 2.0]);
+    /// let harmonics = SplatHarmonics::new(1, vec![0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    /// 0.0]).expect("degree 1"); let up = harmonics.colour(0, [0.5; 3], [0.0, 0.0, 2.0]);
     /// assert!((up[0] - 0.7443).abs() < 1e-4 && up[1] == 0.5);
     /// ```
     pub fn colour(&self, splat: usize, constant: [f32; 3], direction: [f64; 3]) -> [f32; 3] {

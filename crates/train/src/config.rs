@@ -55,10 +55,11 @@ impl Default for LossWeights {
 impl LossWeights {
     /// Returns the weights of a recipe.
     ///
-    /// Photographs have those of the code of 2DGS: 0.8 of the absolute difference and 0.2 of D-SSIM,
-    /// 0.05 of the normals, and no distortion, which 2DGS has for bounded scenes only. There its
-    /// 1,000 in normalised device coordinates with a near plane of 0.2, for scenes of a size of
-    /// about 2, is 10 here; scenes that also have surroundings get the tenth that 2DGS gives them.
+    /// Photographs have those of the code of 2DGS: 0.8 of the absolute difference and 0.2 of
+    /// D-SSIM, 0.05 of the normals, and no distortion, which 2DGS has for bounded scenes only.
+    /// There its 1,000 in normalised device coordinates with a near plane of 0.2, for scenes of a
+    /// size of about 2, is 10 here; scenes that also have surroundings get the tenth that 2DGS
+    /// gives them.
     pub fn of(recipe: Recipe) -> Self {
         let photographs = Self {
             absolute: 0.8,
@@ -71,11 +72,12 @@ impl LossWeights {
             prior_normal: 0.1,
             correlation: 4.0,
         };
+        // GS4Buildings and SkySplat compare colours without D-SSIM.
+        let without = Self { squared: 0.2, similarity: 0.0, distortion: 10.0, ..photographs };
         match recipe {
             Recipe::Photographs => photographs,
-            Recipe::BuildingOnly => Self { distortion: 10.0, ..photographs },
-            Recipe::BuildingEnhanced => Self { distortion: 1.0, ..photographs },
-            Recipe::Satellite => Self { squared: 0.2, similarity: 0.0, distortion: 10.0, ..photographs },
+            Recipe::BuildingOnly | Recipe::Satellite => without,
+            Recipe::BuildingEnhanced => Self { distortion: 1.0, ..without },
         }
     }
 }
@@ -220,9 +222,9 @@ fn second_half(from_factor: f64, to_factor: f64) -> Ramp {
 impl TrainingConfig {
     /// Returns the settings of a recipe.
     ///
-    /// Buildings are learned in two phases, as GS4Buildings prints them: priors count in full in the
-    /// first half, for completeness; in the second they fall to a tenth, while the distortion and
-    /// the consistency of normals grow, for detail.
+    /// Buildings are learned in two phases, as GS4Buildings prints them: priors count in full in
+    /// the first half, for completeness; in the second they fall to a tenth, while the distortion
+    /// and the consistency of normals grow, for detail.
     pub fn of(recipe: Recipe) -> Self {
         let weights = LossWeights::of(recipe);
         match recipe {
@@ -241,7 +243,8 @@ impl TrainingConfig {
         }
     }
 
-    /// Lets the terms without priors begin after other shares of the training, where they are given.
+    /// Lets the terms without priors begin after other shares of the training, where they are
+    /// given.
     pub fn regularise_from(&mut self, distortion: Option<f64>, consistency: Option<f64>) {
         let begun = |share: f64| {
             let at = (share * f64::from(PUBLISHED_ITERATIONS)) as u32;

@@ -56,8 +56,8 @@ pub(crate) fn densify(state: &mut TrainingState, config: &DensifyConfig) -> Dens
     counts
 }
 
-/// Brings the opacities down to at most `most`, so that surfels which no view needs stay transparent
-/// and are removed (3DGS). The steps of the optimiser begin anew.
+/// Brings the opacities down to at most `most`, so that surfels which no view needs stay
+/// transparent and are removed (3DGS). The steps of the optimiser begin anew.
 pub(crate) fn reset_opacities(state: &mut TrainingState, most: f64) {
     let most = (most / (1.0 - most)).ln() as f32;
     for (surfel, moments) in state.surfels.iter_mut().zip(&mut state.moments) {

@@ -195,8 +195,8 @@ impl<L: Lanes> Brush<L> {
         }
     }
 
-    /// Returns the inverse depth at pixels of a perspective camera in units of that of the reference
-    /// depth, less 1.
+    /// Returns the inverse depth at pixels of a perspective camera in units of that of the
+    /// reference depth, less 1.
     #[inline(always)]
     pub(crate) fn inverse_depth<I: InstructionSet<Lanes = L>>(&self, isa: I, at: &Footprint<L>) -> L {
         let one = isa.splat(1.0);

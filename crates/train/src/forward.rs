@@ -84,7 +84,8 @@ pub(crate) struct DrawnTile<'a> {
     pub(crate) count: &'a mut usize,
 }
 
-/// Draws the splats of a tile; `INVERSE` where the spread of inverse depths is asked for. Returns the number of pairs of a splat and a pixel.
+/// Draws the splats of a tile; `INVERSE` where the spread of inverse depths is asked for. Returns
+/// the number of pairs of a splat and a pixel.
 #[inline(always)]
 pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool>(
     isa: I,

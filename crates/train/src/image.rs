@@ -6,8 +6,8 @@ pub enum DepthSpread {
     /// Of the depths; the distortion is in square metres.
     #[default]
     Depths,
-    /// Of the inverse depths of a perspective camera; the distortion is per square metre. It is that
-    /// of normalised device coordinates (2DGS) but for a factor, so that what is far away may
+    /// Of the inverse depths of a perspective camera; the distortion is per square metre. It is
+    /// that of normalised device coordinates (2DGS) but for a factor, so that what is far away may
     /// spread. Affine cameras have no inverse depths, and keep the spread of depths.
     InverseDepths,
 }
@@ -29,8 +29,8 @@ pub struct SurfelImages {
     /// Σ wᵢ zᵢ: depths of the intersections, metres. Divided by the coverage, it is the expected
     /// depth.
     pub depth_m: Vec<f32>,
-    /// ½ Σᵢⱼ wᵢ wⱼ (sᵢ − sⱼ)²: how far the splats of a ray are apart. s is the depth or its inverse,
-    /// see [`DepthSpread`].
+    /// ½ Σᵢⱼ wᵢ wⱼ (sᵢ − sⱼ)²: how far the splats of a ray are apart. s is the depth or its
+    /// inverse, see [`DepthSpread`].
     pub distortion: Vec<f32>,
 }
 

@@ -346,7 +346,8 @@ mod tests {
             prior_normal: Some([40, 41, 42].map(|k| plane(k, -1.0, 1.0))),
             relative_depth: Some(plane(50, -3.0, 9.0)),
         };
-        // Every term counts. The random depths make normals of any direction, whose slopes are steep.
+        // Every term counts. The random depths make normals of any direction, whose slopes are
+        // steep.
         let weights = LossWeights {
             absolute: 0.8,
             squared: 0.4,

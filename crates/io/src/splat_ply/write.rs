@@ -28,8 +28,8 @@ pub fn write(
     write_with_harmonics(path, splats, None, origin, layout, overwrite)
 }
 
-/// Writes splats as [`write()`] does, with their harmonics: padded with zeros or cut to the degree of
-/// the layout.
+/// Writes splats as [`write()`] does, with their harmonics: padded with zeros or cut to the degree
+/// of the layout.
 ///
 /// # Errors
 /// Those of [`write()`].

@@ -5,9 +5,9 @@
 //! `height/NAME.npy` (metres above the datum of the origin where half of the light is stopped, NaN
 //! elsewhere), for perspective cameras `depth/NAME.npy` (metres along the optical axis to the same
 //! place), and `report.json`. Pictures are compared over the pixels that splats cover by more
-//! than half, and over all. Flat splats through pinholes are drawn as trainings and meshes draw them
-//! (2DGS), and their depths are means by weight; others are mixed where they lie on one surface.
-//! Satellite images have units of their own, so they are compared after a gain and an
+//! than half, and over all. Flat splats through pinholes are drawn as trainings and meshes draw
+//! them (2DGS), and their depths are means by weight; others are mixed where they lie on one
+//! surface. Satellite images have units of their own, so they are compared after a gain and an
 //! offset per channel.
 
 use std::borrow::Cow;
@@ -154,14 +154,12 @@ impl SplatRenderConfig {
 ///
 /// ```
 /// use jobs::splats::{SplatRenderConfig, SplatsConfig, make, render};
-/// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
-/// let folder = tempfile::tempdir()?;
-/// let images = vec![town.join("view_1.tif")];
-/// let ply = folder.path().join("town.ply");
-/// make(&SplatsConfig::new(town.join("truth/dsm.tif"), images.clone(), ply.clone()), &numeric::Silent)?;
-/// let mut config = SplatRenderConfig::new(ply, folder.path().join("seen"));
-/// config.images = images;
-/// let report = render(&config, &numeric::Silent)?;
+/// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"),
+/// "/../../data-samples/town")); let folder = tempfile::tempdir()?; let images =
+/// vec![town.join("view_1.tif")]; let ply = folder.path().join("town.ply");
+/// make(&SplatsConfig::new(town.join("truth/dsm.tif"), images.clone(), ply.clone()),
+/// &numeric::Silent)?; let mut config = SplatRenderConfig::new(ply, folder.path().join("seen"));
+/// config.images = images; let report = render(&config, &numeric::Silent)?;
 /// assert!(report.views[0].psnr_db.is_some_and(|psnr| psnr > 15.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -392,7 +390,8 @@ impl Reference {
     }
 }
 
-/// Draws flat splats as trainings and meshes do: the rule of 2DGS. Depths are means by weight there.
+/// Draws flat splats as trainings and meshes do: the rule of 2DGS. Depths are means by weight
+/// there.
 fn flat(splats: &[Splat], camera: &PinholeView) -> Rendering {
     let surfels: Vec<Surfel> = splats.iter().map(Surfel::of_splat).collect();
     let drawing = Drawing::new(&surfels, camera, Registers::Longest);

@@ -27,7 +27,7 @@ pub enum TrainPriors {
 pub enum PriorSchedule {
     /// The preset: two phases for buildings.
     Preset,
-    /// `schedule.json` of the dataset, where there is one.
+    /// `schedule.json` of the dataset, where there is one, or else the preset.
     Dataset,
 }
 
@@ -42,8 +42,8 @@ pub struct TrainConfig {
     /// Another COLMAP model of the same cameras, whose points are added to those of the dataset,
     /// such as the reconstruction that the cameras come from.
     pub more_points: Option<PathBuf>,
-    /// Folder of the images; when `None`, `images` of the dataset or the folder in or beside it that
-    /// has the images of the model.
+    /// Folder of the images; when `None`, `images` of the dataset or the folder in or beside it
+    /// that has the images of the model.
     pub images: Option<PathBuf>,
     /// Folder for the results.
     pub output: PathBuf,
@@ -103,7 +103,7 @@ impl TrainConfig {
             preset: None,
             weights: TrainWeights::default(),
             steps: TrainSteps::default(),
-            prior_schedule: PriorSchedule::Preset,
+            prior_schedule: PriorSchedule::Dataset,
             schedule: TrainSchedule::default(),
             priors: TrainPriors::Both,
             appearance: false,

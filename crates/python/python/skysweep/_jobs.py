@@ -292,6 +292,92 @@ class StandConfig(TypedDict, total=False):
     of a list override it."""
 
 
+class TrainSchedule(TypedDict, total=False):
+    """When things happen in a training; as in the preset where it is `None`."""
+
+    distortion_from: float | None
+    """Share of the training after which the distortion counts in full."""
+
+    consistency_from: float | None
+    """Share of the training after which the consistency of normals counts in full."""
+
+    split_from: float | None
+    """Share of the training from which on splats are split."""
+
+    split_until: float | None
+    """Share of the training after which splats are split no more."""
+
+    split_every: float | None
+    """Iterations between two rounds of splitting and removing."""
+
+    split_gradient: float | None
+    """Gradient by the position in the image, in halves of the image, above which a splat is
+    split."""
+
+    least_opacity: float | None
+    """Opacity below which a splat is removed."""
+
+    reset_every: float | None
+    """Iterations between two times at which opacities are brought down; never when 0."""
+
+
+class TrainSteps(TypedDict, total=False):
+    """Steps of the optimiser; those of the preset where they are `None`."""
+
+    position_first: float | None
+    """Of positions at the first iteration, sizes of the scene."""
+
+    position_last: float | None
+    """Of positions at the last iteration, sizes of the scene."""
+
+    rotation: float | None
+    """Of quaternions."""
+
+    scale: float | None
+    """Of the natural logarithms of scales."""
+
+    opacity: float | None
+    """Of the logits of opacities."""
+
+    colour_first: float | None
+    """Of colours from 0 to 1 at the first iteration."""
+
+    colour_last: float | None
+    """Of colours from 0 to 1 at the last iteration."""
+
+
+class TrainWeights(TypedDict, total=False):
+    """Weights of the terms of the loss; those of the preset where they are `None`."""
+
+    absolute: float | None
+    """Absolute difference of colours from 0 to 1."""
+
+    squared: float | None
+    """Squared difference of colours from 0 to 1."""
+
+    similarity: float | None
+    """One less the structural similarity (D-SSIM)."""
+
+    mask: float | None
+    """Squared difference between coverage and mask, where there are masks."""
+
+    distortion: float | None
+    """Spread of the inverse depths of a ray, times the squared size of the scene; for satellite
+    images that of the depths, over the squared size of the scene."""
+
+    consistency: float | None
+    """One less the cosine between the normals of splats and of drawn depths."""
+
+    prior_depth: float | None
+    """Difference from prior depths, over the size of the scene."""
+
+    prior_normal: float | None
+    """One less the cosine between the normals of splats and of the prior."""
+
+    correlation: float | None
+    """One less the correlation with heights of unknown scale."""
+
+
 class VisibilityConfig(TypedDict, total=False):
     """Conditions for a point to be seen and to be kept."""
 
@@ -1780,6 +1866,7 @@ def render_splats(
     images: Sequence[PathLike] = (),
     cameras: PathLike | None = None,
     pictures: PathLike | None = None,
+    shrink: int = 1,
     corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
     threads: int | None = None,
     overwrite: bool = False,
@@ -1788,13 +1875,15 @@ def render_splats(
     """Look at splats through satellite images and perspective cameras.
 
     Args:
-        splats: Splats (PLY of 3DGS or 2DGS) with their origin beside them.
+        splats: Splats (PLY of 3DGS or 2DGS) with their origin beside them. Files of other programs
+            have none: they lie in the frame of the perspective cameras.
         output: Folder to write.
         images: Images with RPCs to look through.
         cameras: Perspective cameras to look through: folder of a COLMAP model on the map of the
             splats with `origin.json`, or of a dataset of the priors job.
         pictures: Folder with the pictures of the perspective cameras; cameras without a picture are
             rendered and not compared. `images` of the dataset when `None`.
+        shrink: Pixels of a perspective camera that become one, in each direction.
         corrections: Source of the pointing corrections of the images.
             `CorrectionSource::SurfaceRun` takes those that the splats were made with, which lie
             beside them, or else those of the run in whose folder they lie.
@@ -1828,6 +1917,12 @@ def train(
     budget: int = 100000,
     shrink: int = 1,
     hold_out: int = 8,
+    hold_out_names: Sequence[str] = (),
+    preset: Literal["photographs", "building-only", "building-enhanced", "satellite"] | None = None,
+    weights: TrainWeights | None = None,
+    steps: TrainSteps | None = None,
+    prior_schedule: Literal["preset", "dataset"] = "dataset",
+    schedule: TrainSchedule | None = None,
     priors: Literal["both", "depth", "normal", "none"] = "both",
     appearance: bool = False,
     transients: bool = False,
@@ -1841,16 +1936,25 @@ def train(
     """Train flat Gaussian splats on the images of a dataset, with building priors.
 
     Args:
-        dataset: Dataset of the priors job, or another folder with a COLMAP model in `sparse/0`.
+        dataset: Dataset of the priors job, or another folder with a COLMAP model in it or in a
+            folder below, such as `sparse/0`.
         output: Folder for the results.
         more_points: Another COLMAP model of the same cameras, whose points are added to those of
             the dataset, such as the reconstruction that the cameras come from.
-        images: Folder of the images; `images` of the dataset when `None`.
+        images: Folder of the images; when `None`, `images` of the dataset or the folder in or
+            beside it that has the images of the model.
         iterations: Number of iterations; each draws one view.
         budget: Greatest number of splats. The training begins with at most half of them.
         shrink: Pixels of an image that become one, in each direction.
-        hold_out: Every view of this number is kept for the judgement and not trained on; none when
-            0.
+        hold_out: Every view of this number in the order of their names, from the first on, is kept
+            for the judgement and not trained on (LLFF); none when 0.
+        hold_out_names: Names of the views that are kept instead, where there are any.
+        preset: What the training is for; what the dataset says when `None`: buildings where the
+            priors job wrote it, or else photographs.
+        weights: Weights of the loss that differ from those of the preset.
+        steps: Steps of the optimiser that differ from those of the preset.
+        prior_schedule: Where the factors of the priors by iteration come from.
+        schedule: Times of the training that differ from those of the preset.
         priors: Prior maps in use, as far as the dataset has them.
         appearance: Whether each image has a gain and an offset of its own.
         transients: Whether pixels that stay unexplained while other views agree are left out, such
