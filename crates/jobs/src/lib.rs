@@ -21,6 +21,7 @@ pub mod files;
 pub mod groundview;
 mod guarded;
 pub mod heightmap;
+mod image_layer;
 pub mod job_file;
 mod job_paths;
 mod map_crs;

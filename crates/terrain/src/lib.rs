@@ -25,12 +25,15 @@ mod error;
 mod forest;
 mod ground;
 mod membrane;
+mod narrow;
 mod objects;
 mod opening;
+mod pits;
 mod plate;
 mod regions;
+mod rejoin;
 mod trend;
 
 pub use config::GroundConfig;
 pub use error::TerrainError;
-pub use ground::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground};
+pub use ground::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground, bare_ground_of_observed};
