@@ -18,7 +18,7 @@ pub(crate) struct Args {
     /// Width of the widest object, metres: large halls and closed blocks of houses.
     #[arg(long, value_name = "METRES", default_value_t = 150.0)]
     widest_object: f64,
-    /// Slope of open ground, rise per run (0.15 is 15 %, 8.5 degrees); the slope of the place itself is added.
+    /// Slope of open ground, rise per run: 0.15 is 15 %. Part of the place's own slope is added.
     #[arg(long, value_name = "RISE_PER_RUN", default_value_t = 0.15)]
     slope: f64,
     #[command(flatten)]

@@ -1,15 +1,15 @@
 //! Narrow objects by the progressive filter of Pingel et al. (2013,
 //! <https://doi.org/10.1016/j.isprsjprs.2012.12.002>): the surface is opened with windows that grow
-//! by one cell, each time the surface that the last window left. What vanishes at once is an object;
-//! a hill melts away by little in every step.
+//! by one cell, each time the surface that the last window left. What vanishes at once is an
+//! object; a hill melts away by little in every step.
 //!
-//! Steep ground loses more in each step. So the slope that a window may cut off grows by half of the
-//! slope of the ground as far as it is known.
+//! Steep ground loses more in each step. So the slope that a window may cut off grows by half of
+//! the slope of the ground as far as it is known.
 
 use raster::Grid;
 
 use crate::config::{GroundConfig, NOISE_DEVIATIONS};
-use crate::objects::Heights;
+use crate::heights::Heights;
 use crate::opening::opened;
 
 /// Half-width of the widest window, metres: the value of Pingel et al., for houses and trees. What

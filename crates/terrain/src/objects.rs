@@ -6,6 +6,7 @@ use raster::Grid;
 
 use crate::coarse::difference;
 use crate::config::GroundConfig;
+use crate::heights::Heights;
 use crate::membrane::filled;
 use crate::narrow::{NARROW_M, narrow_objects};
 use crate::opening::opened;
@@ -25,18 +26,6 @@ const STEP_M: f32 = 1.5;
 /// Smallest clearing, square metres. Smaller parts of an object are steps of roofs and gaps between
 /// crowns that do not reach down to the ground.
 const CLEARING_MIN_M2: f64 = 25.0;
-
-/// A surface without pits, with its noise.
-pub(crate) struct Heights<'a> {
-    /// Heights without forests, metres.
-    pub(crate) clear: &'a Grid<f32>,
-    /// All heights, metres.
-    pub(crate) whole: &'a Grid<f32>,
-    /// Side of a cell, metres.
-    pub(crate) cell_m: f64,
-    /// Noise of the heights, metres.
-    pub(crate) noise_m: f64,
-}
 
 /// Returns the cells of objects: narrow ones by how fast they vanish, wider ones by their borders,
 /// on the surface relative to `trend`. `slope` is that of the ground as far as it is known.

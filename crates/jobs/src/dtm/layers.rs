@@ -17,8 +17,8 @@ const SOURCE: &str = "source.tif";
 const CONFIDENCE: &str = "confidence.tif";
 const OBSERVED: f32 = 1.0;
 const FIRST_VOID: f32 = 10.0;
-/// Probability below which a cell is no evidence. Of such cells on simulated hills and a factory one
-/// in twenty showed the ground, and half lay metres below it; from 0.2 on, most do no harm.
+/// Probability below which a cell is no evidence. Of such cells of two simulated scenes (hills and
+/// random:9601), one in twenty showed the ground, and two in five lay metres below it.
 const LEAST_CONFIDENCE: f32 = 0.1;
 
 /// Layers that were found beside a surface, and what they say.

@@ -1,7 +1,7 @@
 //! The DTM job: the bare ground under a surface model, and the heights above it.
 //!
-//! Where the layers of a DSM run lie beside the surface, filled cells and those that are hardly ever
-//! right are no evidence of the ground.
+//! Where the layers of a DSM run lie beside the surface, filled cells and those that are hardly
+//! ever right are no evidence of the ground.
 //!
 //! Three rasters and a report are written into one folder, on the grid and in the vertical datum of
 //! the surface:
