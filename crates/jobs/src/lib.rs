@@ -22,6 +22,7 @@ pub mod groundview;
 mod guarded;
 pub mod heightmap;
 pub mod image_files;
+mod image_layer;
 pub mod job_file;
 mod job_paths;
 mod map_crs;

@@ -78,6 +78,22 @@ pub(crate) fn difference(upper: &Grid<f32>, lower: &Grid<f32>) -> Grid<f32> {
     Grid::from_vec(upper.width(), upper.height(), cells.collect()).expect("both surfaces have the same cells")
 }
 
+/// Returns the slope of a surface without voids at each cell, as height per distance.
+pub(crate) fn slopes(surface: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    let (width, height) = (surface.width(), surface.height());
+    let mut out = surface.clone();
+    for row in 0..height {
+        for column in 0..width {
+            let (left, right) = (column.saturating_sub(1), (column + 1).min(width - 1));
+            let (up, down) = (row.saturating_sub(1), (row + 1).min(height - 1));
+            let along = (surface[(right, row)] - surface[(left, row)]) / (right - left).max(1) as f32;
+            let across = (surface[(column, down)] - surface[(column, up)]) / (down - up).max(1) as f32;
+            out[(column, row)] = along.hypot(across) / cell_m as f32;
+        }
+    }
+    out
+}
+
 /// Returns the heights with the cells of a mask as voids.
 pub(crate) fn without_cells(heights: &Grid<f32>, mask: &Grid<bool>) -> Grid<f32> {
     let cells = heights.data().iter().zip(mask.data()).map(|(&h, &is_void)| if is_void { f32::NAN } else { h });

@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::TerrainError;
 
+/// Deviations that a cell must stand out by to be no noise.
+pub(crate) const NOISE_DEVIATIONS: f64 = 3.0;
+
 /// Parameters of the search for the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -47,8 +50,9 @@ impl GroundConfig {
     }
 
     /// Height above the opened surface from which a cell is a candidate, for a window of this
-    /// half-width.
-    pub(crate) fn threshold_m(&self, half_width_m: f64) -> f32 {
-        (self.lowest_object_m + self.slope * half_width_m).min(self.storey_m) as f32
+    /// half-width. Noise above a third of the lowest object raises it.
+    pub(crate) fn threshold_m(&self, half_width_m: f64, noise_m: f64) -> f32 {
+        let excess_m = (NOISE_DEVIATIONS * noise_m - self.lowest_object_m).max(0.0);
+        ((self.lowest_object_m + self.slope * half_width_m).min(self.storey_m) + excess_m) as f32
     }
 }

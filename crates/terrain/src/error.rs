@@ -22,6 +22,14 @@ pub enum TerrainError {
         /// Values that are accepted.
         expected: &'static str,
     },
+    /// A mask has another size than the surface.
+    #[error("the mask has {} × {} cells, expected the {} × {} of the surface", found.0, found.1, expected.0, expected.1)]
+    Mask {
+        /// Columns and rows that were given.
+        found: (usize, usize),
+        /// Columns and rows of the surface.
+        expected: (usize, usize),
+    },
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

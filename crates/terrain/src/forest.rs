@@ -7,7 +7,7 @@ use raster::Grid;
 use rayon::prelude::*;
 
 use crate::coarse::{blurred, widened};
-use crate::regions::Regions;
+use crate::regions::{Regions, quantile};
 
 /// Half-width of the surroundings that a plane is fitted to, metres: less than a crown.
 const PLANE_HALF_WIDTH_M: f64 = 2.0;
@@ -24,12 +24,19 @@ const FRINGE_M: f64 = 20.0;
 const FOREST_SHARE: f32 = 0.7;
 /// Smallest forest, square metres. Smaller groves have ground around them that tells them.
 const FOREST_MIN_M2: f64 = 1000.0;
+/// Side of the blocks whose lowest cells are compared, metres: a crown and a gap.
+const BLOCK_M: f64 = 10.0;
+/// Deviation of these cells from the planes around them from which they show no ground, metres.
+/// Ground between crowns deviates by 0.1 to 0.9 m, the lower side of a canopy by 1.5 m and more.
+const CLOSED_M: f32 = 1.0;
 /// Smallest clearing, square metres: what is smooth and smaller may be a gap between crowns that
 /// does not reach down to the ground.
 const CLEARING_MIN_M2: f64 = 150.0;
 
-/// Returns the cells of forests.
-pub(crate) fn forests(surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
+/// Returns the cells of forests that hide their ground, and are wider than `widest_m`: the widest
+/// window reaches across smaller ones. Where the lowest cells of a rough area agree on one level,
+/// they show the ground between the crowns, and the area is left to the openings.
+pub(crate) fn forests(surface: &Grid<f32>, cell_m: f64, widest_m: f64) -> Grid<bool> {
     let cells = |metres: f64| (metres / cell_m).round() as usize;
     let radius = cells(PLANE_HALF_WIDTH_M);
     let nowhere = surface.map(|_| false);
@@ -52,7 +59,31 @@ pub(crate) fn forests(surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
     is_forest.data_mut().iter_mut().zip(is_rough.data()).for_each(|(is_forest, is_rough)| *is_forest &= is_rough);
     let mut is_open = is_forest.map(|is| !is);
     without_small(&mut is_open, CLEARING_MIN_M2 / (cell_m * cell_m));
-    is_open.map(|is| !is)
+    let mut is_forest = is_open.map(|is| !is);
+    without_small(&mut is_forest, (widest_m / cell_m).powi(2));
+    without_visible_ground(&mut is_forest, surface, cell_m);
+    is_forest
+}
+
+/// Takes the regions out whose lowest cells agree with each other.
+fn without_visible_ground(is_forest: &mut Grid<bool>, surface: &Grid<f32>, cell_m: f64) {
+    let side = (BLOCK_M / cell_m).round().max(1.0) as usize;
+    let width = surface.width();
+    let mut lows = Grid::filled(width.div_ceil(side), surface.height().div_ceil(side), f32::NAN);
+    for (at, height) in surface.data().iter().enumerate() {
+        let low: &mut f32 = &mut lows[(at % width / side, at / width / side)];
+        *low = low.min(*height);
+    }
+    let deviations = roughness(&lows, 1);
+    let regions = Regions::of(is_forest);
+    for region in 0..regions.len() {
+        let cells = regions.cells(region);
+        let at = |cell: u32| deviations[(cell as usize % width / side, cell as usize / width / side)];
+        let mut known: Vec<f32> = cells.iter().map(|cell| at(*cell)).filter(|d| !d.is_nan()).collect();
+        if quantile(&mut known, 0.5).is_some_and(|deviation| deviation <= CLOSED_M) {
+            cells.iter().for_each(|&cell| is_forest.data_mut()[cell as usize] = false);
+        }
+    }
 }
 
 /// Takes regions with fewer cells out of a mask.

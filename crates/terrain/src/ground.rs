@@ -4,14 +4,17 @@ use numeric::Progress;
 use raster::Grid;
 
 use crate::canopy::under_forests;
-use crate::coarse::{at_cell, blocks, difference, widened, without_cells};
-use crate::config::GroundConfig;
+use crate::coarse::{at_cell, blocks, blurred, slopes, widened, without_cells};
+use crate::config::{GroundConfig, NOISE_DEVIATIONS};
 use crate::error::TerrainError;
 use crate::forest::{forests, roughness};
+use crate::heights::Heights;
 use crate::membrane::filled;
-use crate::objects::{objects, radii, without_pits};
+use crate::objects::{objects, radii};
+use crate::pits::without_pits;
 use crate::plate::plate;
 use crate::regions::quantile;
+use crate::rejoin::{PER_SLOPE_M, STEEPEST, rejoined};
 use crate::trend::{TrendConfig, trend};
 
 /// State of a cell without a height of the ground: too far from any ground.
@@ -30,12 +33,18 @@ const WORK_CELL_M: f64 = 1.0;
 const FIRST_TREND: TrendConfig = TrendConfig { half_width_m: 50.0, quantile: 0.1, is_lower: true };
 /// Trend of the ground between the objects of the first search.
 const SECOND_TREND: TrendConfig = TrendConfig { half_width_m: 40.0, quantile: 0.5, is_lower: false };
+/// Half-width over which that ground is smoothed, twice, before its slope is taken, metres: of
+/// banks and quarries, not of walls.
+const SLOPE_HALF_WIDTH_M: f64 = 5.0;
 /// Width of the ring around objects in which ramps and low walls are looked for, metres.
 const RING_M: f64 = 3.0;
 /// Height above the ground around it up to which a cell of the ring, or a cell of the surface, is
 /// ground, metres: the noise of satellite surfaces. It was chosen on simulated towns (seeds 4 to 6)
 /// and JAX_068.
 const RISE_M: f32 = 0.7;
+/// Share of the cells that lie on ground as smooth as the noise allows; others are rough. The
+/// deviations of smooth cells spread little, so the lowest of them tell the noise.
+const SMOOTH_SHARE: f64 = 0.1;
 /// Half-width of the planes that tell the noise of the ground, metres.
 const NOISE_HALF_WIDTH_M: f64 = 2.0;
 /// Least noise, metres: what quantised heights have.
@@ -75,17 +84,42 @@ pub fn bare_ground(
     config: &GroundConfig,
     progress: &dyn Progress,
 ) -> Result<BareGround, TerrainError> {
+    bare_ground_of_observed(surface, None, cell_m, config, progress)
+}
+
+/// Finds the ground as [`bare_ground`] does. Cells that are marked `unobserved` have heights that
+/// nothing has measured, such as filled gaps: they count as voids, and never tell the ground. Only
+/// the canopy of a forest is taken with them, because they lie between crowns there.
+///
+/// # Errors
+/// As [`bare_ground`], and [`TerrainError::Mask`] for a mask of another size.
+pub fn bare_ground_of_observed(
+    surface: &Grid<f32>,
+    unobserved: Option<&Grid<bool>>,
+    cell_m: f64,
+    config: &GroundConfig,
+    progress: &dyn Progress,
+) -> Result<BareGround, TerrainError> {
     config.validate()?;
     if !(cell_m > 0.0 && cell_m.is_finite()) {
         return Err(TerrainError::CellSize { found: cell_m });
     }
+    let expected = (surface.width(), surface.height());
+    if let Some(found) = unobserved.map(|mask| (mask.width(), mask.height())).filter(|found| *found != expected) {
+        return Err(TerrainError::Mask { found, expected });
+    }
     let side = ((WORK_CELL_M / cell_m).round() as usize).max(1);
     let work_m = cell_m * side as f64;
     progress.begin("ground", 2 * radii(config.widest_object_m / work_m).len());
-    let whole_m = blocks(surface, side);
-    let surface_m = without_pits(&whole_m, work_m);
+    let mut whole_m = blocks(surface, side);
+    let noise_m = noise_of(&whole_m, work_m);
+    if whole_m.data().iter().any(|h| !h.is_nan()) {
+        whole_m = without_pits(&whole_m, &trend(&whole_m, work_m, &FIRST_TREND), work_m, noise_m);
+    }
+    let observed = unobserved.map_or_else(|| surface.clone(), |mask| without_cells(surface, mask));
+    let surface_m = without_cells(&whole_m, &blocks(&observed, side).map(|h| h.is_nan()));
     let mut found = surface_m.map(|_| false);
-    let mut is_forest = forests(&surface_m, work_m);
+    let mut is_forest = forests(&whole_m, work_m, config.widest_object_m);
     let mut clear_m = without_cells(&surface_m, &is_forest);
     if clear_m.data().iter().all(|h| h.is_nan()) {
         // The surface is all there is to go by.
@@ -93,46 +127,53 @@ pub fn bare_ground(
     }
     // Without any height the raster stays unknown, and has no trend.
     if clear_m.data().iter().any(|h| !h.is_nan()) {
+        let heights = Heights { clear: &clear_m, whole: &surface_m, cell_m: work_m, noise_m };
         let first = trend(&clear_m, work_m, &FIRST_TREND);
-        found = objects(&difference(&clear_m, &first), &difference(&surface_m, &first), work_m, config, progress)?;
+        found = objects(&heights, (&first, &slopes(&first, work_m)), config, progress)?;
         let known = filled(&without_cells(&clear_m, &found));
-        let second = trend(&known, work_m, &SECOND_TREND);
-        found = objects(&difference(&clear_m, &second), &difference(&surface_m, &second), work_m, config, progress)?;
+        let radius = (SLOPE_HALF_WIDTH_M / work_m).round() as usize;
+        let slope = slopes(&blurred(&blurred(&known, radius), radius), work_m);
+        // What one of the trends hides, the other shows; ground joins again below.
+        let again = objects(&heights, (&trend(&known, work_m, &SECOND_TREND), &slope), config, progress)?;
+        found.data_mut().iter_mut().zip(again.data()).for_each(|(found, again)| *found |= again);
     }
-    let mut ground = without_ramps(&clear_m, &found, work_m);
+    let ground = without_ramps(&clear_m, &found, work_m, noise_m);
     let noise_m = noise_of(&ground, work_m);
+    let mut ground = rejoined(&clear_m, ground, work_m, noise_m);
     let mut under = match is_forest.data().contains(&true) && ground.data().iter().any(|h| !h.is_nan()) {
         true => under_forests(&whole_m, &is_forest, &mut ground, work_m, noise_m),
         false => plate(&ground, work_m, noise_m),
     };
     // Known ground keeps its height.
     under.data_mut().iter_mut().zip(ground.data()).filter(|(_, h)| !h.is_nan()).for_each(|(under, h)| *under = *h);
-    Ok(at_cells(surface, &ground, &under, side, config.widest_object_m / work_m))
+    Ok(at_cells(&observed, &ground, &under, side, config.widest_object_m / work_m))
 }
 
 /// Returns the heights of the ground, NaN at objects and at the ramps that lead up to them. A cell
 /// near an object is ground if it does not rise above the ground further away.
-fn without_ramps(surface: &Grid<f32>, objects: &Grid<bool>, cell_m: f64) -> Grid<f32> {
+fn without_ramps(surface: &Grid<f32>, objects: &Grid<bool>, cell_m: f64, noise_m: f64) -> Grid<f32> {
     let ring = ((RING_M / cell_m).round() as usize).max(1);
     let around = without_cells(surface, &widened(objects, ring));
     let expected = filled(&around);
     // In a clearing without any ground further away nothing can be compared.
     let is_near = widened(&around.map(|h| !h.is_nan()), 2 * ring);
     let mut ground = without_cells(surface, objects);
-    for ((cell, expected), is_near) in ground.data_mut().iter_mut().zip(expected.data()).zip(is_near.data()) {
-        if *is_near && *cell - expected > RISE_M {
+    let slope = slopes(&expected, cell_m);
+    let rise_m = RISE_M.max((NOISE_DEVIATIONS * noise_m) as f32);
+    for (at, cell) in ground.data_mut().iter_mut().enumerate().filter(|(at, _)| is_near.data()[*at]) {
+        if *cell - expected.data()[at] > rise_m + PER_SLOPE_M * slope.data()[at].min(STEEPEST) {
             *cell = f32::NAN;
         }
     }
     ground
 }
 
-/// Noise of the ground: the median deviation of its cells from the planes around them, metres.
+/// Noise of a surface: the deviation of its smooth cells from the planes around them, metres.
 fn noise_of(ground: &Grid<f32>, cell_m: f64) -> f64 {
     let radius = ((NOISE_HALF_WIDTH_M / cell_m).round() as usize).max(1);
     let rough = roughness(ground, radius);
     let mut known: Vec<f32> = rough.data().iter().copied().filter(|h| !h.is_nan()).collect();
-    quantile(&mut known, 0.5).map_or(NOISE_MIN_M, |noise| f64::from(noise).max(NOISE_MIN_M))
+    quantile(&mut known, SMOOTH_SHARE).map_or(NOISE_MIN_M, |noise| f64::from(noise).max(NOISE_MIN_M))
 }
 
 /// Carries the ground of coarse cells to the cells of the surface.

@@ -1,12 +1,15 @@
-//! Finds the objects of a surface by openings with growing windows, and keeps those that the
-//! surface drops away from on most of their border.
+//! Finds the objects of a surface by openings with growing windows: narrow ones as they vanish, and
+//! of the wider candidates those that the surface drops away from on most of their border.
 
 use numeric::{Cancelled, Progress};
 use raster::Grid;
 
+use crate::coarse::difference;
 use crate::config::GroundConfig;
+use crate::heights::Heights;
 use crate::membrane::filled;
-use crate::opening::{closed, opened};
+use crate::narrow::{NARROW_M, narrow_objects};
+use crate::opening::opened;
 use crate::regions::{Regions, quantile};
 
 /// Growth of the half-width from one window to the next.
@@ -23,56 +26,37 @@ const STEP_M: f32 = 1.5;
 /// Smallest clearing, square metres. Smaller parts of an object are steps of roofs and gaps between
 /// crowns that do not reach down to the ground.
 const CLEARING_MIN_M2: f64 = 25.0;
-/// Half-width of the window that finds outliers below the ground, metres.
-const PIT_HALF_WIDTH_M: f64 = 3.0;
-/// Depth of an outlier below its surroundings, metres.
-const PIT_DEPTH_M: f32 = 1.5;
-/// Largest outlier, square metres. Larger pits are yards and shafts.
-const PIT_AREA_M2: f64 = 25.0;
 
-/// Turns small pits into voids.
-pub(crate) fn without_pits(surface: &Grid<f32>, cell_m: f64) -> Grid<f32> {
-    let radius = (PIT_HALF_WIDTH_M / cell_m).round() as usize;
-    let mut out = surface.clone();
-    if radius == 0 {
-        return out;
-    }
-    let regions = Regions::of(&above(&closed(surface, radius), surface, PIT_DEPTH_M));
-    for region in 0..regions.len() {
-        let cells = regions.cells(region);
-        if cells.len() as f64 * cell_m * cell_m <= PIT_AREA_M2 {
-            cells.iter().for_each(|&cell| out.data_mut()[cell as usize] = f32::NAN);
-        }
-    }
-    out
-}
-
-/// Returns the cells of objects.
+/// Returns the cells of objects: narrow ones by how fast they vanish, wider ones by their borders,
+/// on the surface relative to `trend`. `slope` is that of the ground as far as it is known.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub(crate) fn objects(
-    surface: &Grid<f32>,
-    whole: &Grid<f32>,
-    cell_m: f64,
+    heights: &Heights<'_>,
+    (trend, slope): (&Grid<f32>, &Grid<f32>),
     config: &GroundConfig,
     progress: &dyn Progress,
 ) -> Result<Grid<bool>, Cancelled> {
-    let mut left = surface.clone();
-    let mut around = whole.clone();
-    let mut found = Grid::filled(surface.width(), surface.height(), false);
+    let cell_m = heights.cell_m;
+    let (surface, whole) = (&difference(heights.clear, trend), &difference(heights.whole, trend));
+    let mut found = narrow_objects(heights, slope, config);
+    let mut doubtful = found.map(|_| false);
     for radius in radii(config.widest_object_m / cell_m) {
         progress.check_cancelled()?;
-        let low = opened(&left, radius);
-        let candidates = above(&left, &low, config.threshold_m(radius as f64 * cell_m));
-        let doubtful =
-            judge(&Candidates { left: &left, low: &low, around: &around, cells: &candidates, cell_m }, &mut found);
-        left = without(surface, &found, &doubtful);
-        around = left.clone();
+        progress.step();
+        if radius as f64 * cell_m <= NARROW_M {
+            continue;
+        }
+        let left = without(surface, &found, &doubtful);
+        let mut around = left.clone();
         for (cell, whole) in around.data_mut().iter_mut().zip(whole.data()).filter(|(cell, _)| cell.is_nan()) {
             *cell = *whole;
         }
-        progress.step();
+        let low = opened(&left, radius);
+        let candidates = above(&left, &low, config.threshold_m(radius as f64 * cell_m, heights.noise_m));
+        doubtful =
+            judge(&Candidates { left: &left, low: &low, around: &around, cells: &candidates, cell_m }, &mut found);
     }
     Ok(found)
 }

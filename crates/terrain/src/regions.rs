@@ -75,6 +75,16 @@ impl Regions {
         &self.cells[start..self.ends[region]]
     }
 
+    /// Whether a region holds a cell.
+    pub(crate) fn holds(&self, region: usize, cell: u32) -> bool {
+        self.numbers.data()[cell as usize] as usize == region + 1
+    }
+
+    /// Whether a cell belongs to any region.
+    pub(crate) fn is_any(&self, cell: u32) -> bool {
+        self.numbers.data()[cell as usize] != NONE
+    }
+
     /// The region that holds a cell of the mask.
     pub(crate) fn at(&self, cell: u32) -> usize {
         self.numbers.data()[cell as usize] as usize - 1

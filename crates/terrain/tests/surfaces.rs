@@ -2,7 +2,10 @@
 
 use numeric::{Silent, SplitMix64};
 use raster::Grid;
-use terrain::{BareGround, GROUND, GroundConfig, TerrainError, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground};
+use terrain::{
+    BareGround, GROUND, GroundConfig, TerrainError, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground,
+    bare_ground_of_observed,
+};
 
 /// Side of the cells of most surfaces, metres.
 const CELL_M: f64 = 1.0;
@@ -111,7 +114,8 @@ fn a_large_low_hall_is_removed() {
     let within = |x: f32, y: f32| (100.0..220.0).contains(&x) && (90.0..210.0).contains(&y);
     let truth = surface(320, |x, y| 0.03 * x + 0.02 * y);
     let found = ground(&surface(320, |x, y| 0.03 * x + 0.02 * y + if within(x, y) { 6.0 } else { 0.0 }));
-    assert!(share(&found, UNDER_OBJECT, within) > 0.99);
+    let share = share(&found, UNDER_OBJECT, within);
+    assert!(share > 0.99, "{share}");
     assert!(rmse(&found, &truth) < 0.3);
 }
 
@@ -174,4 +178,73 @@ fn values_outside_of_their_range_are_refused() {
     config.slope = f64::NAN;
     let error = bare_ground(&flat, 1.0, &config, &Silent).unwrap_err();
     assert!(error.to_string().contains("slope"), "{error}");
+}
+
+/// Ground between the crowns of a wood that stands on a plain, two cells wide.
+fn in_gap(x: f32, y: f32) -> bool {
+    x % 9.0 < 2.0 && y % 7.0 < 2.0
+}
+
+fn in_wood(x: f32, y: f32) -> bool {
+    (40.0..160.0).contains(&x) && (50.0..150.0).contains(&y)
+}
+
+#[test]
+fn a_gap_between_crowns_stays_and_a_pit_goes() {
+    let is_pit = |x: f32, y: f32| (20.0..24.0).contains(&x) && (100.0..104.0).contains(&y);
+    let height = |x: f32, y: f32| match (in_wood(x, y) && !in_gap(x, y), is_pit(x, y)) {
+        (true, _) => 15.0 + noise(x, y, 2.0),
+        (false, true) => -7.0,
+        (false, false) => 0.05 * x,
+    };
+    let truth = surface(200, |x, _| 0.05 * x);
+    let found = ground(&surface(200, height));
+    assert!(share(&found, GROUND, |x, y| in_wood(x, y) && in_gap(x, y)) > 0.95);
+    assert_eq!(share(&found, GROUND, is_pit), 0.0);
+    assert!(rmse(&found, &truth) < 0.3, "{}", rmse(&found, &truth));
+}
+
+#[test]
+fn blunders_below_a_plain_do_not_make_it_an_object() {
+    let is_blunder = |x: f32, y: f32| {
+        let number = (x / 12.0) as u64 * 100 + (y / 12.0) as u64;
+        SplitMix64::new(number).normal() > 1.9 && x % 12.0 < 9.0 && y % 12.0 < 9.0
+    };
+    let depth = |x: f32, y: f32| 4.0 + ((x / 12.0) as u32 * 7 + (y / 12.0) as u32 * 3) as f32 % 9.0;
+    let found = ground(&surface(250, |x, y| noise(x, y, 0.1) - if is_blunder(x, y) { depth(x, y) } else { 0.0 }));
+    assert!(share(&found, GROUND, |x, y| !is_blunder(x, y)) > 0.97);
+    assert!(rmse(&found, &surface(250, |_, _| 0.0)) < 0.3);
+}
+
+#[test]
+fn noise_of_a_metre_leaves_a_plain_and_its_house() {
+    let truth = surface(200, |x, y| 0.1 * x - 0.05 * y);
+    let noisy = |x: f32, y: f32| 0.1 * x - 0.05 * y + if in_box(x, y) { 12.0 } else { 0.0 } + noise(x, y, 1.0);
+    let found = ground(&surface(200, noisy));
+    assert!(share(&found, GROUND, |x, y| !in_box(x, y)) > 0.9);
+    assert!(share(&found, UNDER_OBJECT, in_box) > 0.97);
+    assert!(rmse(&found, &truth) < 1.2, "{}", rmse(&found, &truth));
+}
+
+#[test]
+fn trees_on_a_steep_slope_go_and_the_slope_stays() {
+    let is_tree = |x: f32, y: f32| x % 17.0 < 5.0 && y % 13.0 < 5.0;
+    let truth = surface(200, |x, _| 0.7 * x);
+    let found = ground(&surface(200, |x, y| 0.7 * x + if is_tree(x, y) { 9.0 } else { 0.0 }));
+    assert!(share(&found, UNDER_OBJECT, is_tree) > 0.95);
+    assert!(share(&found, GROUND, |x, y| !is_tree(x, y)) > 0.95);
+    assert!(rmse(&found, &truth) < 0.5, "{}", rmse(&found, &truth));
+}
+
+#[test]
+fn heights_that_nothing_has_measured_are_no_ground() {
+    let is_filled = |x: f32, y: f32| (100.0..140.0).contains(&x) && (30.0..110.0).contains(&y);
+    let cells = surface(160, |x, y| if is_filled(x, y) { -9.0 } else { 2.0 });
+    let mask = cells.map(|h| *h < 0.0);
+    let found = bare_ground_of_observed(&cells, Some(&mask), CELL_M, &GroundConfig::default(), &Silent).unwrap();
+    assert_eq!(share(&found, VOID_FILLED, is_filled), 1.0);
+    assert!(found.heights.data().iter().all(|h| (h - 2.0).abs() < 1e-3));
+    let small = Grid::filled(3, 3, true);
+    let error = bare_ground_of_observed(&cells, Some(&small), CELL_M, &GroundConfig::default(), &Silent).unwrap_err();
+    assert!(error.to_string().contains("3 × 3"), "{error}");
 }

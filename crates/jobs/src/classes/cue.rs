@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use classes::ClassifyConfig;
-use io::raster::{Dem, ImageSource, read_dem};
+use io::raster::{Dem, read_dem};
 use numeric::upper_median;
 use raster::Grid;
 
@@ -12,6 +12,7 @@ use crate::dsm::OBSERVED;
 use crate::eval::EvalJobError;
 use crate::eval::on_reference::surface_on_reference;
 use crate::files::FileError;
+use crate::image_layer::layer_beside;
 
 /// Rasters of a DSM run beside its surface model.
 const SIGMA: &str = "sigma.tif";
@@ -69,14 +70,5 @@ pub(super) fn unsure_heights(surface: &Dem) -> Result<Option<Grid<bool>>, Classe
 
 /// Reads a raster beside a surface; `None` where there is none of its size.
 fn beside(surface: &Dem, name: &str) -> Result<Option<Grid<f32>>, ClassesError> {
-    let path = surface.path.with_file_name(name);
-    if !path.is_file() {
-        return Ok(None);
-    }
-    let source = ImageSource::open(&path).map_err(FileError::write)?;
-    let size = (surface.heights.width(), surface.heights.height());
-    if (source.info().width, source.info().height) != size {
-        return Ok(None);
-    }
-    Ok(Some(source.read_samples(1, source.window()).map_err(FileError::write)?))
+    Ok(layer_beside(surface, name).map_err(FileError::write)?)
 }

@@ -9,7 +9,7 @@ use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};
-use terrain::bare_ground;
+use terrain::bare_ground_of_observed;
 
 use super::config::ClassesConfig;
 use super::cue::{Cue, unsure_heights};
@@ -71,7 +71,8 @@ pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRep
             None => None,
         };
         let folder = OutputFolder::take(&config.output)?;
-        let ground = bare_ground(&surface.heights, cell_m, &config.terrain, progress)?;
+        let (unobserved, _) = dtm::unobserved(&surface)?;
+        let ground = bare_ground_of_observed(&surface.heights, unobserved.as_ref(), cell_m, &config.terrain, progress)?;
         progress.check_cancelled()?;
         let mut above = surface.heights.clone();
         above.data_mut().iter_mut().zip(ground.heights.data()).for_each(|(cell, ground)| *cell -= ground);

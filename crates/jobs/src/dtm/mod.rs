@@ -1,5 +1,8 @@
 //! The DTM job: the bare ground under a surface model, and the heights above it.
 //!
+//! Where the layers of a DSM run lie beside the surface, filled cells and those that are hardly
+//! ever right are no evidence of the ground.
+//!
 //! Three rasters and a report are written into one folder, on the grid and in the vertical datum of
 //! the surface:
 //!
@@ -13,11 +16,14 @@
 
 mod config;
 mod error;
+mod layers;
 mod report;
 mod run;
 
 pub use config::DtmConfig;
 pub use error::DtmError;
+pub use layers::SurfaceLayers;
+pub(crate) use layers::unobserved;
 pub use report::DtmReport;
 pub(crate) use run::FILES;
 pub(crate) use run::read_surface;

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use serde::Serialize;
 use terrain::GroundConfig;
 
+use super::layers::SurfaceLayers;
+
 /// A finished terrain model.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
@@ -33,6 +35,8 @@ pub struct DtmReport {
     pub cells_unknown: usize,
     /// Cells where the surface lay below the interpolated ground, and the height above ground is 0.
     pub cells_below_ground: usize,
+    /// What the layers beside the surface say of its cells.
+    pub layers: SurfaceLayers,
     /// Parameters of the search.
     pub parameters: GroundConfig,
 }
@@ -44,7 +48,7 @@ impl DtmReport {
         let share = |n: usize| 100.0 * n as f64 / cells.max(1) as f64;
         format!(
             "ground  {}\nheights {}\nmask    {}\ncells   {cells} ({:.1} % ground, {:.1} % under objects, \
-             {:.1} % in voids, {:.1} % unknown)\n",
+             {:.1} % in voids, {:.1} % unknown)\nlayers  {}\n",
             self.dtm.display(),
             self.height_above_ground.display(),
             self.ground.display(),
@@ -52,6 +56,7 @@ impl DtmReport {
             share(self.cells_under_objects),
             share(self.cells_void_filled),
             share(self.cells_unknown),
+            self.layers.text(),
         )
     }
 }

@@ -5,10 +5,11 @@ use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};
-use terrain::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground};
+use terrain::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground_of_observed};
 
 use super::config::DtmConfig;
 use super::error::DtmError;
+use super::layers::unobserved;
 use super::report::DtmReport;
 use crate::files::{self, FileError};
 use crate::output_folder::OutputFolder;
@@ -27,6 +28,10 @@ const STYLES: [&str; 3] = ["dtm.qml", "height_above_ground.qml", "ground.qml"];
 pub(crate) const FILES: [&str; 8] = [DTM, ABOVE, STATES, STYLES[0], STYLES[1], STYLES[2], PAGE, REPORT];
 /// Largest difference of the sides of a cell, as a share.
 const SQUARE_TOLERANCE: f64 = 0.01;
+
+/// Share of the cells with heights below which the ground that was found is doubtful: in dense old
+/// towns and closed forests a tenth is left.
+const LEAST_GROUND: f64 = 0.05;
 
 /// Makes a terrain model, the heights above it and a mask, and writes them with a report.
 ///
@@ -52,13 +57,31 @@ pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, Dtm
     threads::install(config.threads, || {
         let (surface, cell_m, crs) = read_surface(config, progress)?;
         let folder = OutputFolder::take(&config.output)?;
-        let terrain = bare_ground(&surface.heights, cell_m, &config.terrain, progress)?;
+        let (unobserved, layers) = unobserved(&surface)?;
+        let terrain =
+            bare_ground_of_observed(&surface.heights, unobserved.as_ref(), cell_m, &config.terrain, progress)?;
         progress.check_cancelled()?;
         let (above, cells_below_ground) = heights_above(&surface.heights, &terrain.heights);
-        let report = DtmReport { cells_below_ground, ..report(config, &surface, &terrain, cell_m, crs) };
+        let report = DtmReport { cells_below_ground, layers, ..report(config, &surface, &terrain, cell_m, crs) };
+        warn_of_little_ground(&surface, &report, progress);
         write(config, &folder, &surface, &terrain, &above, crs, &report)?;
         Ok(report)
     })?
+}
+
+/// Warns where hardly any cell stayed ground.
+fn warn_of_little_ground(surface: &Dem, report: &DtmReport, progress: &dyn Progress) {
+    let heights = surface.heights.data().iter().filter(|h| h.is_finite()).count();
+    let share = report.cells_ground as f64 / heights.max(1) as f64;
+    if share < LEAST_GROUND {
+        progress.warn(&format!(
+            "only {:.2} % of the cells with heights show the ground ({} of {heights}), so the terrain rests on little; \
+             compare ground.tif with the surface: {}",
+            100.0 * share,
+            report.cells_ground,
+            surface.path.display()
+        ));
+    }
 }
 
 /// Reads the surface with the side of its cells and its CRS.
@@ -114,6 +137,7 @@ fn report(config: &DtmConfig, surface: &Dem, terrain: &BareGround, cell_m: f64, 
         cells_void_filled: count(VOID_FILLED),
         cells_unknown: count(UNKNOWN),
         cells_below_ground: 0,
+        layers: super::layers::SurfaceLayers::default(),
         parameters: config.terrain,
     }
 }

@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+"""Measures skysweep dtm on laser scans and on scenes of a simulator that shares no code with it.
+
+    benches/peers/terrain_outside.py [--skysweep PROGRAM] [--before PROGRAM] [--work FOLDER] [--seeds 9601 9602 9603]
+
+The ISPRS filter test, LiDAR of Delft, JAX_214 and JAX_068 in ../shared/data, and surfaces that `skysweep dsm` makes of
+the scenes of ../shared/tools/scenes.py. A scene lies in FOLDER/scenes/rSEED (images, truth, run/), and is made where it
+is missing. `--before` is a second program whose figures stand beside. Writes benches/results/terrain_outside.json and
+terrain_outside.md. Needs Python with numpy, scipy and rasterio.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+import dtm
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SHARED = ROOT.parent / "shared"
+TERRAIN = SHARED / "data/terrain"
+JAX_068 = SHARED / "data/stereo/jax_068/truth"
+LIDAR = {
+    "Delft": [TERRAIN / "ahn3_delft" / f"ahn3_delft_{name}.tif" for name in ["dsm", "class", "ground"]],
+    "JAX_214": [TERRAIN / "jax_tiles/JAX_214_DSM_georef.tif", TERRAIN / "jax_tiles/JAX_214_CLS.tif"],
+    "JAX_068": [JAX_068 / "JAX_068_DSM_georef.tif", JAX_068 / "JAX_068_CLS.tif"],
+}
+
+
+def terrain(program, surface, out):
+    """Runs the command, which may end with 1 where it found no ground, and returns the ground."""
+    command = [program, "dtm", surface, "-o", out, "--overwrite", "--progress", "none", "-q"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return pathlib.Path(out) / "dtm.tif"
+
+
+def isprs(program):
+    """Total error of each sample in percent, and their mean, by the shared judge."""
+    judge = [sys.executable, SHARED / "tools/isprs.py", program, TERRAIN / "isprs", "6"]
+    said = subprocess.run(judge, capture_output=True, text=True).stdout
+    pairs = [pair.split() for pair in said.split(": ")[1].split(", ")]
+    samples = {f"ISPRS sample {name}, total error, %": float(value) for name, value in pairs}
+    return samples | {"ISPRS mean, total error, %": float(np.mean(list(samples.values())))}
+
+
+def lidar(program, name, files, out):
+    found, top, kinds = dtm.read(terrain(program, files[0], out))[0], dtm.read(files[0])[0], dtm.read(files[1])[0]
+    truth = dtm.read(files[2])[0] if len(files) > 2 else top
+    on_ground = np.abs(found - truth)[kinds == dtm.GROUND]
+    kept = (np.abs(found - top) < dtm.KEPT_M)[kinds == dtm.BUILDING]
+    return {f"{name}, LiDAR, mean error on ground, m": float(np.nanmean(on_ground)),
+            f"{name}, LiDAR, building cells kept, %": 100.0 * float(kept.mean())}
+
+
+def scene(program, seed, work):
+    folder = work / f"scenes/r{seed}"
+    if not (folder / "scene.json").exists():
+        subprocess.run([sys.executable, SHARED / "tools/scenes.py", f"random:{seed}", folder], check=True)
+    if not (folder / "run/report/report.json").exists():
+        views = sorted(folder.glob("view_*.tif"))
+        subprocess.run([program, "dsm", *views, "-o", folder / "run", "--progress", "none", "-q"], check=True)
+    truth, top = dtm.read(folder / "truth_ground.tif"), dtm.read(folder / "truth_dsm.tif")[0]
+    made = dtm.on_grid(folder / "run/dsm/dsm.tif", truth[1])
+    shift = dtm.placement(made, top)
+    valid = dtm.reached(np.roll(made, (-shift[1], -shift[0]), (0, 1)))
+    found = dtm.errors(terrain(program, folder / "run", work / f"made/{seed}"), shift, truth,
+                       top - truth[0] > dtm.KEPT_M, valid)
+    return {f"random:{seed}, from images, RMSE, m": found["rmse_m"],
+            f"random:{seed}, from images, RMSE under objects, m": found["rmse_under_objects_m"]}
+
+
+def measured(program, options):
+    results = isprs(program)
+    for name, files in LIDAR.items():
+        with tempfile.TemporaryDirectory() as out:
+            results |= lidar(program, name, files, out)
+    for seed in options.seeds:
+        results |= scene(program, seed, options.work)
+    return results
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--skysweep", default=str(ROOT / "target/release/skysweep"))
+    parser.add_argument("--before")
+    parser.add_argument("--work", type=pathlib.Path, default=ROOT / "target/terrain-outside")
+    parser.add_argument("--seeds", type=int, nargs="*", default=[9601, 9602, 9603])
+    options = parser.parse_args()
+    place = ROOT / "benches/results"
+    report = {"skysweep": measured(options.skysweep, options)}
+    if options.before:
+        report["before"] = measured(options.before, options)
+    names = list(report)
+    lines = ["# Terrain on other places", "", "Made by `benches/peers/terrain_outside.py`. Lower is better.", ""]
+    if options.before:
+        lines += ["`before`: a build of skysweep before the search for narrow objects, pits and layers was changed.", ""]
+    lines += ["| measure | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
+    for measure in report["skysweep"]:
+        lines.append(f"| {measure} | " + " | ".join(f"{report[name][measure]:.2f}" for name in names) + " |")
+    (place / "terrain_outside.json").write_text(json.dumps(report, indent=1) + "\n")
+    (place / "terrain_outside.md").write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+//! Pits: places below the ground, where an instrument or the matching of images has erred.
+//!
+//! A gap between crowns and a yard between roofs lie deep, too. They lie at the ground, and a pit
+//! lies below it: many cells around agree with the level of a gap, and hardly any with that
+//! of a pit. And the rim of a pit, the ground, is even, whereas crowns and roofs differ in height.
+
+use raster::Grid;
+
+use crate::coarse::difference;
+use crate::opening::closed;
+use crate::regions::{Regions, quantile};
+
+/// Half-widths of the windows that find what lies deep, metres: single cells, then patches.
+const HALF_WIDTHS_M: [f64; 2] = [3.0, 9.0];
+/// Spacing of the cells around that are asked, metres.
+const SPACING_M: f64 = 3.0;
+/// Distance within which they do, metres: the half-width of the planes of the trend.
+const REACH_M: f64 = 50.0;
+/// Share of the cells around from which a level is confirmed: the yards of the densest towns.
+const CONFIRMED_SHARE: f64 = 0.04;
+/// Width of the rim of a pit, metres.
+const RIM_M: f64 = 3.0;
+/// Spread of the heights of the rim of a pit, as a share of its depth.
+const RIM_SHARE: f32 = 0.5;
+/// Least depth of a pit, metres: more than kerbs and ditches.
+const DEPTH_M: f64 = 1.5;
+/// Least depth of a pit in deviations of the noise: its bottom and its rim have noise.
+const DEPTH_DEVIATIONS: f64 = 6.0;
+
+/// Turns pits into voids; `trend` is that of the surface.
+pub(crate) fn without_pits(surface: &Grid<f32>, trend: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<f32> {
+    let depth_m = DEPTH_M.max(DEPTH_DEVIATIONS * noise_m) as f32;
+    let mut out = surface.clone();
+    for half_width_m in HALF_WIDTHS_M {
+        let radius = (half_width_m / cell_m).round() as usize;
+        if radius == 0 {
+            continue;
+        }
+        let level = difference(&out, trend);
+        let deep = difference(&closed(&level, radius), &level).map(|depth| *depth > depth_m);
+        let regions = Regions::of(&deep);
+        let most = (2.0 * half_width_m).powi(2) / (cell_m * cell_m);
+        for region in 0..regions.len() {
+            let cells = regions.cells(region);
+            if cells.len() as f64 <= most && !is_confirmed(&level, &regions, region, depth_m, cell_m) {
+                cells.iter().for_each(|&cell| out.data_mut()[cell as usize] = f32::NAN);
+            }
+        }
+    }
+    out
+}
+
+/// Whether other cells around a region lie at its level, or its rim is uneven.
+fn is_confirmed(level: &Grid<f32>, regions: &Regions, region: usize, depth_m: f32, cell_m: f64) -> bool {
+    let cells = regions.cells(region);
+    let mut heights: Vec<f32> = cells.iter().map(|&cell| level.data()[cell as usize]).collect();
+    let Some(own) = quantile(&mut heights, 0.5) else { return true };
+    // Crowns and roofs around a gap differ in height; the ground around a pit does not.
+    let steps = |metres: f64| ((metres / cell_m).round() as usize).max(1);
+    let mut rim = rim(level, regions, region, steps(RIM_M));
+    let Some(middle_m) = quantile(&mut rim, 0.5) else { return true };
+    let spread_m = quantile(&mut rim, 0.9).unwrap_or(0.0) - quantile(&mut rim, 0.1).unwrap_or(0.0);
+    if spread_m > RIM_SHARE * (middle_m - own) {
+        return true;
+    }
+    let middle = cells[cells.len() / 2] as usize;
+    let (column, row) = (middle % level.width(), middle / level.width());
+    let (reach, spacing) = (steps(REACH_M), steps(SPACING_M));
+    let (mut count, mut agree) = (0_u32, 0_u32);
+    for y in (row.saturating_sub(reach)..(row + reach + 1).min(level.height())).step_by(spacing) {
+        for x in (column.saturating_sub(reach)..(column + reach + 1).min(level.width())).step_by(spacing) {
+            let height = level[(x, y)];
+            if !height.is_nan() && !regions.holds(region, (y * level.width() + x) as u32) {
+                count += 1;
+                agree += u32::from((height - own).abs() <= depth_m);
+            }
+        }
+    }
+    f64::from(agree) >= CONFIRMED_SHARE * f64::from(count)
+}
+
+/// Heights of the cells around a region that belong to no region.
+fn rim(level: &Grid<f32>, regions: &Regions, region: usize, radius: usize) -> Vec<f32> {
+    let (width, height) = (level.width(), level.height());
+    let mut out = Vec::new();
+    for &cell in regions.cells(region) {
+        let (column, row) = (cell as usize % width, cell as usize / width);
+        let mut add = |x: usize, y: usize| {
+            if x < width && y < height && !regions.is_any((y * width + x) as u32) && !level[(x, y)].is_nan() {
+                out.push(level[(x, y)]);
+            }
+        };
+        for step in 1..=radius {
+            add(column + step, row);
+            add(column.wrapping_sub(step), row);
+            add(column, row + step);
+            add(column, row.wrapping_sub(step));
+        }
+    }
+    out
+}
