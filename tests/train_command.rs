@@ -88,8 +88,6 @@ fn views_that_were_not_trained_on_become_better() {
     let told = train(
         &out.path().join("a"),
         &[
-            "--step",
-            "colour-last=0.005",
             "--iterations",
             "150",
             "--hold-out-view",

@@ -3,7 +3,7 @@
 
     benches/peers/terrain_outside.py [--skysweep PROGRAM] [--before PROGRAM] [--work FOLDER] [--seeds 9601 9602 9603]
 
-The ISPRS filter test, LiDAR of Delft, JAX_214 and JAX_068 in ../shared/data, and surfaces that `skysweep dsm` makes of
+The ISPRS filter test, LiDAR of Delft, JAX_214 and JAX_068, the images of JAX_068, and surfaces that `skysweep dsm` makes of
 the scenes of ../shared/tools/scenes.py. A scene lies in FOLDER/scenes/rSEED (images, truth, run/), and is made where it
 is missing. `--before` is a second program whose figures stand beside. Writes benches/results/terrain_outside.json and
 terrain_outside.md. Needs Python with numpy, scipy and rasterio.
@@ -55,6 +55,23 @@ def lidar(program, name, files, out):
             f"{name}, LiDAR, building cells kept, %": 100.0 * float(kept.mean())}
 
 
+def jax_images(program, work):
+    """The surface of the seven images of JAX_068, compared with LiDAR on ground and on buildings."""
+    run = work / "jax_068_images"
+    if not (run / "report/report.json").exists():
+        views = sorted((JAX_068.parent / "images").glob("*.tif"))
+        subprocess.run([program, "dsm", *views, "-o", run, "--progress", "none", "-q"], check=True)
+    (top, like), kinds = dtm.read(LIDAR["JAX_068"][0]), dtm.read(LIDAR["JAX_068"][1])[0]
+    made = dtm.on_grid(run / "dsm/dsm.tif", like)
+    columns, rows, up = dtm.placement(made, top)
+    found = dtm.on_grid(terrain(program, run, work / "made/jax_068_images"), like)
+    found = np.roll(found, (-rows, -columns), (0, 1)) - up
+    off = np.where(dtm.reached(np.roll(made, (-rows, -columns), (0, 1))), np.abs(found - top), np.nan)
+    return {"JAX_068, seven images, mean error on ground, m": float(np.nanmean(off[kinds == dtm.GROUND])),
+            "JAX_068, seven images, building cells kept, %":
+                100.0 * float(np.nanmean(off[kinds == dtm.BUILDING] < dtm.KEPT_M))}
+
+
 def scene(program, seed, work):
     folder = work / f"scenes/r{seed}"
     if not (folder / "scene.json").exists():
@@ -77,6 +94,7 @@ def measured(program, options):
     for name, files in LIDAR.items():
         with tempfile.TemporaryDirectory() as out:
             results |= lidar(program, name, files, out)
+    results |= jax_images(program, options.work)
     for seed in options.seeds:
         results |= scene(program, seed, options.work)
     return results

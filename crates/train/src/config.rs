@@ -227,18 +227,17 @@ impl TrainingConfig {
     /// and the consistency of normals grow, for detail.
     pub fn of(recipe: Recipe) -> Self {
         let weights = LossWeights::of(recipe);
+        // Only photographs of one exposure gain by steps that fall. The exposures of satellite
+        // images have to be followed until the end, and short trainings of buildings too.
+        let rates = LearningRates { colour: [LearningRates::default().colour[0]; 2], ..LearningRates::default() };
         match recipe {
             Recipe::Photographs => Self { weights, ..Self::default() },
-            Recipe::Satellite => {
-                // Each image has an exposure of its own, which has to be followed until the end.
-                let rates = LearningRates { colour: [5e-3; 2], ..LearningRates::default() };
-                Self { weights, rates, ..Self::default() }
-            }
+            Recipe::Satellite => Self { weights, rates, ..Self::default() },
             Recipe::BuildingOnly | Recipe::BuildingEnhanced => {
                 let (falls, grows) = (second_half(1.0, 0.1), second_half(0.0, 1.0));
                 let schedule = Schedule { depth: falls, normal: falls };
                 let regularisation = Regularisation { distortion: grows, consistency: grows };
-                Self { weights, schedule, regularisation, ..Self::default() }
+                Self { weights, rates, schedule, regularisation, ..Self::default() }
             }
         }
     }
