@@ -6,7 +6,10 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use common::{band, skysweep};
+use crs::Crs;
+use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use predicates::prelude::*;
+use raster::Grid;
 use serde_json::Value;
 
 /// Largest error of the ground under buildings and trees, root mean square, metres.
@@ -70,4 +73,50 @@ fn bad_surfaces_are_refused_with_a_reason() {
     let text = folder.path().join("text.tif");
     std::fs::write(&text, "no raster").unwrap();
     refused(&text, "text.tif");
+}
+
+/// Filled cells beside a surface are no evidence of the ground, and the command says what it read.
+#[test]
+fn layers_beside_a_surface_say_what_was_not_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let surface = folder.path().join("dsm.tif");
+    std::fs::copy(town().join("dsm.tif"), &surface).unwrap();
+    let run = |name: &str, options: &[&str]| {
+        let mut command = skysweep();
+        command.arg("dtm").arg(&surface).arg("-o").arg(folder.path().join(name));
+        command.args(options).args(["--progress", "none"]).assert()
+    };
+    run("bare", &[]).code(0).stdout(predicate::str::contains("none beside the surface"));
+
+    let dem = read_dem(&surface).unwrap();
+    let (width, height) = (dem.heights.width(), dem.heights.height());
+    let crs = Crs::ellipsoidal(dem.horizontal_epsg.unwrap());
+    let layer = |is_weak: &dyn Fn(usize) -> bool, values: [u8; 2]| {
+        let cells = (0..width * height).map(|i| values[usize::from(is_weak(i % width))]).collect();
+        Grid::from_vec(width, height, cells).unwrap()
+    };
+    let write = |name: &str, grid: &Grid<u8>| {
+        let bands = [Band { description: "layer", data: BandData::U8(grid) }];
+        write_cog(folder.path().join(name), &CogRaster::new(&bands, dem.geotransform, crs), false).unwrap();
+    };
+    // The western quarter was filled.
+    write("source.tif", &layer(&|column| column < width / 4, [1, 4]));
+    let filled = width / 4 * height;
+    run("layers", &[]).code(0).stdout(predicate::str::contains(format!("{filled} filled and 0 weak cells")));
+    let states = band(&folder.path().join("layers/ground.tif"), 1);
+    let ground = |from: usize, to: usize| {
+        let rows = states.data().chunks(width);
+        rows.flat_map(|row| &row[from..to]).filter(|state| **state == 1.0).count()
+    };
+    assert_eq!(ground(0, width / 4), 0);
+    assert!(ground(width / 4, width) > states.data().len() / 4);
+
+    // Nothing was measured.
+    std::fs::remove_file(folder.path().join("source.tif")).unwrap();
+    write("source.tif", &layer(&|_| true, [1, 4]));
+    let told = run("none", &[]).code(1);
+    told.stderr(predicate::str::contains("only 0.00 % of the cells with heights show the ground"));
+    for (option, name) in [("--slope=-1", "slope"), ("--widest-object=0", "widest")] {
+        run("refused", &[option]).code(2).stderr(predicate::str::contains(name));
+    }
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures skysweep dtm on laser scans and on scenes of a simulator that shares no code with it.
 
-    benches/peers/terrain_outside.py [--skysweep PROGRAM] [--before PROGRAM] [--work FOLDER] [--seeds 9601 9602 9603]
+    benches/peers/terrain_outside.py [--skysweep PROGRAM] [--before PROGRAM] [--work FOLDER] [--seeds 9601 ...]
 
 The ISPRS filter test, LiDAR of Delft, JAX_214 and JAX_068, the images of JAX_068, and surfaces that `skysweep dsm` makes of
 the scenes of ../shared/tools/scenes.py. A scene lies in FOLDER/scenes/rSEED (images, truth, run/), and is made where it
@@ -85,8 +85,9 @@ def scene(program, seed, work):
     valid = dtm.reached(np.roll(made, (-shift[1], -shift[0]), (0, 1)))
     found = dtm.errors(terrain(program, folder / "run", work / f"made/{seed}"), shift, truth,
                        top - truth[0] > dtm.KEPT_M, valid)
-    return {f"random:{seed}, from images, RMSE, m": found["rmse_m"],
-            f"random:{seed}, from images, RMSE under objects, m": found["rmse_under_objects_m"]}
+    name = json.loads((folder / "scene.json").read_text())["scene"]
+    return {f"{name}, from images, RMSE, m": found["rmse_m"],
+            f"{name}, from images, RMSE under objects, m": found["rmse_under_objects_m"]}
 
 
 def measured(program, options):
@@ -105,7 +106,7 @@ def main():
     parser.add_argument("--skysweep", default=str(ROOT / "target/release/skysweep"))
     parser.add_argument("--before")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "target/terrain-outside")
-    parser.add_argument("--seeds", type=int, nargs="*", default=[9601, 9602, 9603])
+    parser.add_argument("--seeds", type=int, nargs="*", default=[9601, 9602, 9603, 9004, 9223])
     options = parser.parse_args()
     place = ROOT / "benches/results"
     report = {"skysweep": measured(options.skysweep, options)}
