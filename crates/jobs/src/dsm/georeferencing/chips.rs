@@ -17,7 +17,7 @@ use sweep::pointing::{AdjustConfig, Chip, ChipConfig, ChipPlace, ChipSearch, Tra
 
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::images::image_pixels::read_view;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::report::ChipReport;
 

@@ -18,7 +18,7 @@ use sweep::pointing::{AdjustConfig, Adjustment, ControlPoint, Observations, Trac
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::georeferencing::chips::find_places;
 use crate::dsm::georeferencing::control_doubt::{SurveyedPoint, outside_all, refuse_or_warn_of_heights, wrong_point};
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::report::{CheckPointReport, ChipReport, ControlPointReport, ControlReport};
 

@@ -27,7 +27,7 @@ use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::georeferencing::control::GroundControl;
 use crate::dsm::georeferencing::plane_fit::FittedPlane;
 use crate::dsm::georeferencing::reference_dem::reference_on;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::planning::chunk_plan::ChunkWork;
 use crate::dsm::planning::dem::warn_of_datum;

@@ -14,7 +14,7 @@ use raster::{Grid, Window, mark_inside};
 
 use crate::dsm::error::{DsmError, DsmSetting};
 use crate::dsm::images::footprints::footprint;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::surfaces::ground_polygons::{ground_around, holds_polygons, read_polygons, rings_in_cells};
 

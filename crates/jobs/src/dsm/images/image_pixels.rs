@@ -9,7 +9,7 @@ use sweep::SweepView;
 
 use crate::dsm::error::DsmError;
 use crate::dsm::images::image_mask::void_masked;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 
 /// Side of a square of zeros that the dark noise of no sensor leaves, pixels.
 const BLACK_SIDE: usize = 5;

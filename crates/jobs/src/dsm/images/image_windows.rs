@@ -8,7 +8,7 @@ use raster::Window;
 
 use crate::dsm::error::DsmError;
 use crate::dsm::images::footprints::local_polygon;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::planning::grid::DsmGrid;
 use crate::dsm::values::HeightRange;
 

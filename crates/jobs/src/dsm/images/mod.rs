@@ -6,7 +6,7 @@ pub(super) mod footprints;
 pub(super) mod image_mask;
 pub(super) mod image_pixels;
 pub(super) mod image_windows;
-pub(super) mod images;
 pub(super) mod input_stamps;
 pub(super) mod open;
 pub(super) mod order;
+pub(super) mod scene_image;

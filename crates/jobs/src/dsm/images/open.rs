@@ -15,8 +15,8 @@ use crate::dsm::error::DsmError;
 use crate::dsm::images::doubts::doubts;
 use crate::dsm::images::image_mask::masks_of_images;
 use crate::dsm::images::image_pixels::open_source;
-use crate::dsm::images::images::SceneImage;
 use crate::dsm::images::order::sort_by_content;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::surfaces::ground_mask::GroundMask;
 
 /// Shares of the values below and above the spread of an image.

@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 
 use crate::dsm::config::DsmConfig;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::values::ImagePair;
 
 /// Sorts images by their RPCs and sizes, which no two images of a run share. Numbers are compared

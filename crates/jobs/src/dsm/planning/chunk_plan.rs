@@ -24,7 +24,7 @@ use crate::dsm::images::character::ImageCharacter;
 use crate::dsm::images::footprints::shared_part;
 use crate::dsm::images::image_pixels::read_coarse_view;
 use crate::dsm::images::image_windows::GroundBox;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::memory;
 use crate::dsm::planning::chunk_side::{ENDS_ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
 use crate::dsm::planning::grid::DsmGrid;

@@ -8,7 +8,7 @@ use raster::Window;
 use crate::dsm::config::DsmConfig;
 use crate::dsm::error::DsmError;
 use crate::dsm::images::image_windows::GroundBox;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::memory;
 use crate::dsm::planning::grid::DsmGrid;
 use crate::dsm::surfaces::clean_up::SURROUNDINGS_M;

@@ -12,7 +12,7 @@ use sweep::source_from_reference;
 
 use crate::dsm::error::DsmError;
 use crate::dsm::images::footprints::{footprint, local_polygon, overlap_share};
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::values::ImagePair;
 
 /// Least angle between two lines of sight that gives heights, degrees. Matching is off by a fifth

@@ -10,7 +10,7 @@ use camera::RpcCamera;
 use sweep::pointing::{Tie, off_trajectory};
 
 use crate::dsm::error::DsmError;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::values::HeightRange;
 

@@ -7,7 +7,7 @@
 use camera::{ImagePoint, RpcCamera};
 use sweep::pointing::{AdjustConfig, Adjustment, Track, adjust};
 
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::pointing::look::FirstLook;
 use crate::dsm::pointing::ties::{PairTies, TIES_MIN, join_pairs};

@@ -8,7 +8,7 @@
 
 use geo::Polygon;
 
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::planning::view_geometry::{ViewGeometry, angle_merit};
 use crate::dsm::pointing::covering::Places;
 use crate::dsm::values::ImagePair;

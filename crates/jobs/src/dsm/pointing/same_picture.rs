@@ -15,7 +15,7 @@ use sweep::SweepView;
 
 use crate::dsm::error::DsmError;
 use crate::dsm::images::image_pixels::read_view;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::pointing::ties::{PairTies, TIES_MIN};
 use crate::dsm::values::ImagePair;
 

@@ -7,7 +7,7 @@
 
 use crate::dsm::config::EARTH_RANGE;
 use crate::dsm::images::footprints::{footprint, local_polygon, overlap_share};
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::planning::view_geometry::OVERLAP_MIN;
 use crate::dsm::values::HeightRange;
 

@@ -9,7 +9,7 @@ use camera::{ImagePoint, RpcCamera};
 use numeric::upper_median;
 use sweep::pointing::{Adjustment, Track};
 
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::notes::Notes;
 use crate::dsm::pointing::look::FirstLook;
 use crate::dsm::pointing::ties::TIES_MIN;

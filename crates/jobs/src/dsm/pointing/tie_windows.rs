@@ -21,7 +21,7 @@ use crate::dsm::images::character::ImageCharacter;
 use crate::dsm::images::footprints::shared_part;
 use crate::dsm::images::image_pixels::read_view;
 use crate::dsm::images::image_windows::GroundBox;
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::planning::chunk_side::cores;
 use crate::dsm::planning::grid::DsmGrid;
 use crate::dsm::planning::view_geometry::ViewGeometry;

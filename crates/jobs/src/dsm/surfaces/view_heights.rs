@@ -13,7 +13,7 @@ use sweep::{HeightMap, SweepView};
 
 use crate::dsm::config::{EARTH_RANGE, Preset};
 use crate::dsm::error::{DsmError, DsmSetting};
-use crate::dsm::images::images::SceneImage;
+use crate::dsm::images::scene_image::SceneImage;
 use crate::dsm::planning::levels::{SweepLevels, choose_levels, height_step_m, smallest_sides};
 use crate::dsm::planning::sources::widest_parallax;
 use crate::dsm::planning::view_geometry::{ViewGeometry, angle_merit};
