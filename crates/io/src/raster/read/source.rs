@@ -163,7 +163,7 @@ impl ImageSource {
     }
 
     /// Returns the vertical datum that the file states, in its CRS or in the metadata item that
-    /// [`super::write_cog`] writes; `None` when it states none.
+    /// [`crate::raster::write_cog`] writes; `None` when it states none.
     pub fn vertical(&self) -> Option<VerticalDatum> {
         let identity = self.info.crs_wkt.as_deref().and_then(|wkt| CrsIdentity::of(wkt).ok());
         identity.and_then(|identity| identity.vertical).or_else(|| stated_datum(&self.dataset))
