@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use jobs::dtm::DtmConfig;
+use terrain::GroundConfig;
 
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
@@ -16,10 +17,10 @@ pub(crate) struct Args {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Width of the widest object, metres: large halls and closed blocks of houses.
-    #[arg(long, value_name = "METRES", default_value_t = 150.0)]
+    #[arg(long, value_name = "METRES", default_value_t = GroundConfig::default().widest_object_m)]
     widest_object: f64,
     /// Slope of open ground, rise per run: 0.15 is 15 %. Part of the place's own slope is added.
-    #[arg(long, value_name = "RISE_PER_RUN", default_value_t = 0.15)]
+    #[arg(long, value_name = "RISE_PER_RUN", default_value_t = GroundConfig::default().slope)]
     slope: f64,
     #[command(flatten)]
     run: RunOptions,

@@ -74,8 +74,10 @@ impl SplatHarmonics {
     /// use gaussian::SplatHarmonics;
     ///
     /// // Red grows upwards.
-    /// let harmonics = SplatHarmonics::new(1, vec![0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    /// 0.0]).expect("degree 1"); let up = harmonics.colour(0, [0.5; 3], [0.0, 0.0, 2.0]);
+    /// let mut coefficients = vec![0.0; 9];
+    /// coefficients[1] = 0.5;
+    /// let harmonics = SplatHarmonics::new(1, coefficients).expect("degree 1");
+    /// let up = harmonics.colour(0, [0.5; 3], [0.0, 0.0, 2.0]);
     /// assert!((up[0] - 0.7443).abs() < 1e-4 && up[1] == 0.5);
     /// ```
     pub fn colour(&self, splat: usize, constant: [f32; 3], direction: [f64; 3]) -> [f32; 3] {

@@ -1,5 +1,7 @@
 //! From a surface to the ground under it.
 
+use std::borrow::Cow;
+
 use numeric::Progress;
 use raster::Grid;
 
@@ -116,8 +118,11 @@ pub fn bare_ground_of_observed(
     if whole_m.data().iter().any(|h| !h.is_nan()) {
         whole_m = without_pits(&whole_m, &trend(&whole_m, work_m, &FIRST_TREND), work_m, noise_m);
     }
-    let observed = unobserved.map_or_else(|| surface.clone(), |mask| without_cells(surface, mask));
-    let surface_m = without_cells(&whole_m, &blocks(&observed, side).map(|h| h.is_nan()));
+    let observed = unobserved.map_or(Cow::Borrowed(surface), |mask| Cow::Owned(without_cells(surface, mask)));
+    let surface_m = match unobserved {
+        Some(_) => without_cells(&whole_m, &blocks(&observed, side).map(|h| h.is_nan())),
+        None => whole_m.clone(),
+    };
     let mut found = surface_m.map(|_| false);
     let mut is_forest = forests(&whole_m, work_m, config.widest_object_m);
     let mut clear_m = without_cells(&surface_m, &is_forest);

@@ -62,7 +62,7 @@ struct Column {
 ///
 /// # Examples
 /// ```
-/// use gaussian::{Splat, SplatHarmonics};
+/// use gaussian::Splat;
 /// use io::splat_ply::{LocalOrigin, SplatLayout, read, write};
 ///
 /// let folder = tempfile::tempdir()?;

@@ -12,7 +12,7 @@ use crate::dsm::OBSERVED;
 use crate::eval::EvalJobError;
 use crate::eval::on_reference::surface_on_reference;
 use crate::files::FileError;
-use crate::image_layer::layer_beside;
+use crate::surface_layer::layer_beside;
 
 /// Rasters of a DSM run beside its surface model.
 const SIGMA: &str = "sigma.tif";

@@ -3,20 +3,19 @@
 //! Filled cells are no evidence of the ground, and neither are cells whose height is hardly ever
 //! right. The other layers are not needed: weak cells still show much ground.
 
+use eval::CellOrigin;
 use io::raster::Dem;
 use raster::Grid;
 use serde::Serialize;
 
 use super::error::DtmError;
 use crate::files::FileError;
-use crate::image_layer::layer_beside;
+use crate::surface_layer::layer_beside;
 
-/// Where each height comes from: 1 is observed, 2 to 9 are filled.
+/// Where each height comes from.
 const SOURCE: &str = "source.tif";
 /// Probability that each height is right.
 const CONFIDENCE: &str = "confidence.tif";
-const OBSERVED: f32 = 1.0;
-const FIRST_VOID: f32 = 10.0;
 /// Probability below which a cell is no evidence. Of such cells of two simulated scenes (hills and
 /// random:9601), one in twenty showed the ground, and two in five lay metres below it.
 const LEAST_CONFIDENCE: f32 = 0.1;
@@ -56,7 +55,7 @@ pub(crate) fn unobserved(surface: &Dem) -> Result<(Option<Grid<bool>>, SurfaceLa
     if let Some(source) = layer_beside(surface, SOURCE).map_err(FileError::write)? {
         layers.files.push(SOURCE.to_owned());
         for (mask, source) in mask.data_mut().iter_mut().zip(source.data()) {
-            *mask = *source > OBSERVED && *source < FIRST_VOID;
+            *mask = CellOrigin::from_source_code(*source as i32) == CellOrigin::Filled;
         }
         layers.cells_filled = mask.data().iter().filter(|is_filled| **is_filled).count();
     }

@@ -154,12 +154,14 @@ impl SplatRenderConfig {
 ///
 /// ```
 /// use jobs::splats::{SplatRenderConfig, SplatsConfig, make, render};
-/// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"),
-/// "/../../data-samples/town")); let folder = tempfile::tempdir()?; let images =
-/// vec![town.join("view_1.tif")]; let ply = folder.path().join("town.ply");
-/// make(&SplatsConfig::new(town.join("truth/dsm.tif"), images.clone(), ply.clone()),
-/// &numeric::Silent)?; let mut config = SplatRenderConfig::new(ply, folder.path().join("seen"));
-/// config.images = images; let report = render(&config, &numeric::Silent)?;
+/// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
+/// let folder = tempfile::tempdir()?;
+/// let images = vec![town.join("view_1.tif")];
+/// let ply = folder.path().join("town.ply");
+/// make(&SplatsConfig::new(town.join("truth/dsm.tif"), images.clone(), ply.clone()), &numeric::Silent)?;
+/// let mut config = SplatRenderConfig::new(ply, folder.path().join("seen"));
+/// config.images = images;
+/// let report = render(&config, &numeric::Silent)?;
 /// assert!(report.views[0].psnr_db.is_some_and(|psnr| psnr > 15.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

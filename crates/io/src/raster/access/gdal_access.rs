@@ -75,7 +75,8 @@ pub(in crate::raster) fn is_local_file_system(name: &str) -> bool {
 /// Removes all drivers and file systems that are not listed. To be called once, after the drivers
 /// are registered.
 pub(in crate::raster) fn restrict() {
-    for (name, place) in [("MEM", &MEMORY), ("GPKG", &GEOPACKAGE), ("ESRI Shapefile", &SHAPEFILE)] {
+    let [package, shapes] = [VectorFormat::GeoPackage, VectorFormat::Shapefile].map(VectorFormat::driver);
+    for (name, place) in [("MEM", &MEMORY), (package, &GEOPACKAGE), (shapes, &SHAPEFILE)] {
         if let Ok(driver) = DriverManager::get_driver_by_name(name) {
             // SAFETY: the function only reads the pointer that the driver holds, and the driver is
             // one that GDAL registered.

@@ -70,7 +70,7 @@ fn verify(made: &Path, lines: u64) -> Result<(), String> {
     let broken = |what: &str| format!("the written lines read back broken ({what}); check that the disk is not full");
     let options = DatasetOptions {
         open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_READONLY,
-        allowed_drivers: Some(&["GPKG"]),
+        allowed_drivers: Some(&[VectorFormat::GeoPackage.driver()]),
         ..DatasetOptions::default()
     };
     let checked = with_gdal(|| {
@@ -93,7 +93,7 @@ fn verify(made: &Path, lines: u64) -> Result<(), String> {
 
 fn draw(memory: &Dataset, surface: &ContourSurface<'_>, made: &Path) -> Result<u64, GdalError> {
     register_vector(VectorFormat::GeoPackage);
-    let driver = DriverManager::get_driver_by_name("GPKG")?;
+    let driver = DriverManager::get_driver_by_name(VectorFormat::GeoPackage.driver())?;
     let mut file = driver.create_vector_only(made)?;
     let place = SpatialRef::from_definition(&surface.crs.to_string())?;
     let ty = gdal_sys::OGRwkbGeometryType::wkbLineString25D;

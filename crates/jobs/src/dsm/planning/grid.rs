@@ -69,6 +69,12 @@ impl DsmGrid {
         MapBounds { x_min, y_min, x_max, y_max }
     }
 
+    /// Returns the middle of the rectangle that the cells cover.
+    fn middle(&self) -> (f64, f64) {
+        let MapBounds { x_min, y_min, x_max, y_max } = self.bounds();
+        (0.5 * (x_min + x_max), 0.5 * (y_min + y_max))
+    }
+
     /// Makes the projection of the CRS.
     ///
     /// # Errors
@@ -199,8 +205,7 @@ fn outside_area(epsg: u32, (lon_deg, lat_deg): (f64, f64)) -> Result<Option<Outs
 
 /// Warns of a CRS that is used outside its area of use. A place that cannot be found is no warning.
 fn warn_of_area(grid: &DsmGrid, notes: &mut Notes<'_>) {
-    let bounds = grid.bounds();
-    let (x, y) = (0.5 * (bounds.x_min + bounds.x_max), 0.5 * (bounds.y_min + bounds.y_max));
+    let (x, y) = grid.middle();
     let place = grid.projection().and_then(|projection| projection.lonlat_from_map(x, y));
     if let Ok(Some(area)) = place.and_then(|place| outside_area(grid.epsg, place)) {
         notes.warn(format!("the CRS is used outside its area of use, where it distorts: {}", area.text));
@@ -225,9 +230,8 @@ fn warn_of_scale(grid: &DsmGrid, notes: &mut Notes<'_>) {
 fn scale_of(grid: &DsmGrid) -> Option<f64> {
     let projection = grid.projection().ok()?;
     let metres = projection.metres_per_unit()?;
-    let bounds = grid.bounds();
-    let (x, y) = (0.5 * (bounds.x_min + bounds.x_max), 0.5 * (bounds.y_min + bounds.y_max));
-    let step = 0.5 * (bounds.x_max - bounds.x_min);
+    let (x, y) = grid.middle();
+    let step = grid.bounds().x_max - x;
     let (lon, lat) = projection.lonlat_from_map(x, y).ok()?;
     let (east_lon, east_lat) = projection.lonlat_from_map(x + step, y).ok()?;
     let (across, along) = metres_per_degree(lat);
