@@ -142,6 +142,8 @@ impl<'a> Scene<'a> {
         let config = FusionConfig {
             same_surface_m: (2.0 * self.step_m).max(1.5 * cell_m) as f32,
             tear_m: (2.75 * cell_m).max(2.0 * self.step_m) as f32,
+            step_m: self.step_m,
+            origin_m: self.origin_m,
             tile: 1024,
         };
         let fused = fuse_views(&placed, (truth.dsm.width(), truth.dsm.height()), &config);

@@ -32,6 +32,23 @@ pub struct Ranges {
 /// A patch that holds an edge sees the height of the upper surface up to two pixels beside it, and
 /// the lower surface begins only there. Twice the reach gains little more.
 pub const EDGE_REACH: usize = 2;
+/// Distances around a coarse pixel from which heights to search are taken over, coarse pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reach {
+    /// That of greater heights. A roof at the edge of its image begins up to [`EDGE_REACH`] away.
+    pub above: usize,
+    /// That of lesser heights, as large or larger. A coarse level smooths narrow streets away: it
+    /// takes them for the roofs beside them, and the ground is known only at the next crossing.
+    pub below: usize,
+}
+
+impl Reach {
+    /// Returns the same reach in both directions.
+    pub const fn even(reach: usize) -> Self {
+        Self { above: reach, below: reach }
+    }
+}
+
 /// Largest reach of the search for known heights around unknown ones, coarse pixels. Farther inside
 /// a larger void the heights of the whole map count.
 const REACH_MAX: usize = 16;
@@ -68,9 +85,10 @@ impl Ranges {
     /// Derives the ranges of a level from the heights of the next coarser one.
     ///
     /// `coarse` holds metres above `origin_m`, NaN where unknown. A pixel searches from the least
-    /// to the greatest height among the coarse neighbours up to `reach` pixels away, with a margin,
-    /// inside `full` (metres above the ellipsoid). Where all of them are unknown, the nearest known
-    /// ones count; where the whole map is unknown, all of `full` is searched.
+    /// height among the coarse neighbours up to `reach.below` pixels away to the greatest among
+    /// those up to `reach.above` away, with a margin, inside `full` (metres above the ellipsoid).
+    /// Where all of them are unknown, the nearest known ones count; where the whole map is unknown,
+    /// all of `full` is searched.
     pub fn from_coarser(
         width: usize,
         height: usize,
@@ -78,9 +96,12 @@ impl Ranges {
         coarse: &Grid<f32>,
         origin_m: f64,
         full: (f64, f64),
-        reach: usize,
+        reach: Reach,
     ) -> Self {
-        let (least, greatest) = known_extremes(coarse, reach);
+        let (mut least, greatest) = known_extremes(coarse, reach.above);
+        if reach.below > reach.above {
+            least = known_extremes(coarse, reach.below).0;
+        }
         let mut out = Self::uniform(width, height, step_m, full);
         let margin = MARGIN_STEPS * step_m;
         // The pixels below one coarse pixel share a range.
@@ -234,18 +255,27 @@ mod tests {
     fn a_thin_tower_widens_the_range_around_it_and_nowhere_else() {
         let mut coarse = Grid::filled(20, 20, 0.0f32);
         coarse[(10, 10)] = 130.0;
-        let r = Ranges::from_coarser(40, 40, 0.5, &coarse, 100.0, (0.0, 400.0), 1);
+        let r = Ranges::from_coarser(40, 40, 0.5, &coarse, 100.0, (0.0, 400.0), Reach::even(1));
         assert_eq!((r.low[(2, 2)], r.count[(2, 2)]), (197, 7));
         assert_eq!((r.low[(19, 19)], r.count[(19, 19)]), (197, 267));
+    }
+
+    #[test]
+    fn the_ground_is_searched_from_farther_away_than_roofs() {
+        let mut coarse = Grid::filled(30, 5, 20.0f32);
+        (0..5).for_each(|y| (coarse[(0, y)], coarse[(29, y)]) = (5.0, 40.0));
+        let r = Ranges::from_coarser(60, 10, 1.0, &coarse, 0.0, (-100.0, 100.0), Reach { above: 2, below: 8 });
+        let searched = |x: usize| (r.low[(x, 4)], r.low[(x, 4)] + i32::from(r.count[(x, 4)]) - 1);
+        assert_eq!([searched(17), searched(18), searched(54), searched(53)], [(2, 23), (17, 23), (17, 43), (17, 23)]);
     }
 
     #[test]
     fn an_unknown_stretch_takes_what_is_known_next_to_it() {
         let mut coarse = Grid::filled(30, 30, f32::NAN);
         (0..30).for_each(|y| coarse[(0, y)] = 7.0);
-        let r = Ranges::from_coarser(60, 60, 1.0, &coarse, 0.0, (-100.0, 100.0), 1);
+        let r = Ranges::from_coarser(60, 60, 1.0, &coarse, 0.0, (-100.0, 100.0), Reach::even(1));
         assert_eq!((r.low[(50, 30)], r.count[(50, 30)]), (4, 7));
-        let none = Ranges::from_coarser(4, 4, 1.0, &Grid::filled(2, 2, f32::NAN), 0.0, (-100.0, 100.0), 1);
+        let none = Ranges::from_coarser(4, 4, 1.0, &Grid::filled(2, 2, f32::NAN), 0.0, (-100.0, 100.0), Reach::even(1));
         assert_eq!((none.low[(0, 0)], none.count[(0, 0)]), (-100, 201));
     }
 
@@ -254,7 +284,8 @@ mod tests {
         let map = |of: &dyn Fn(f32, f32) -> f32| {
             Grid::from_vec(12, 12, (0..144).map(|i| of((i % 12) as f32, (i / 12) as f32)).collect()).unwrap()
         };
-        let steep = |coarse: &Grid<f32>| Ranges::from_coarser(24, 24, 0.5, coarse, 100.125, (0.0, 400.0), 1).steep;
+        let steep =
+            |coarse: &Grid<f32>| Ranges::from_coarser(24, 24, 0.5, coarse, 100.125, (0.0, 400.0), Reach::even(1)).steep;
         // A metre per coarse pixel is a hypothesis per fine pixel. The centre of a fine pixel lies
         // a quarter of a coarse pixel beside that of the coarse one.
         let [right, down] = [steep(&map(&|x, _| x)), steep(&map(&|_, y| y))];

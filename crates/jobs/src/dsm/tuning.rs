@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use sweep::aggregation::Penalties;
-use sweep::ranges::EDGE_REACH;
+use sweep::ranges::{EDGE_REACH, Reach};
 
 use crate::dsm::config::Preset;
 
@@ -25,6 +25,9 @@ pub struct SweepTuning {
     /// Distance around a coarse pixel from which the next finer level takes over heights to search,
     /// coarse pixels.
     pub reach: usize,
+    /// The same for lower heights, which begin farther away where streets are narrow, coarse
+    /// pixels.
+    pub reach_below: usize,
     /// Penalty of a height jump across the strongest image edges on the finest level, of 112 for
     /// the worst cost.
     pub jump_at_edge: u8,
@@ -34,6 +37,11 @@ pub struct SweepTuning {
 /// pixels, which still has several pixels per building and a few per tree. With half as many
 /// hypotheses that level would be coarser by one, and lose small trees and narrow streets.
 const TOP_HYPOTHESES: f64 = 128.0;
+
+/// Reach of the search for the ground below roofs: half the width of a block of houses is fewer
+/// pixels on any level on which its streets are lost. Twice the reach finds no more, and half of it
+/// loses streets.
+const GROUND_REACH: usize = 8;
 
 impl Preset {
     /// Returns the side of a cell where none is given, in pixels of the coarsest image: that of the
@@ -51,13 +59,27 @@ impl Preset {
             top_hypotheses: TOP_HYPOTHESES,
             sources: 4,
             reach: EDGE_REACH,
+            reach_below: GROUND_REACH,
             jump_at_edge: usual,
         };
         match self {
-            Self::Fast => SweepTuning { finest_level: 1, top_hypotheses: TOP_HYPOTHESES / 2.0, sources: 2, ..balanced },
+            Self::Fast => SweepTuning {
+                finest_level: 1,
+                top_hypotheses: TOP_HYPOTHESES / 2.0,
+                sources: 2,
+                reach_below: GROUND_REACH / 2,
+                ..balanced
+            },
             Self::Balanced => balanced,
             // Roofs end at image edges. Cheaper jumps there bring lower errors and fewer heights.
             Self::Accurate => SweepTuning { sources: 8, reach: 2 * EDGE_REACH, jump_at_edge: usual / 2, ..balanced },
         }
+    }
+}
+
+impl SweepTuning {
+    /// Returns from where heights to search are taken over.
+    pub(crate) fn reaches(&self) -> Reach {
+        Reach { above: self.reach, below: self.reach_below.max(self.reach) }
     }
 }

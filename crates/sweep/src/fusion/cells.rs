@@ -1,10 +1,10 @@
 //! One height per cell from the heights of several views.
 
-use numeric::middle_values;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
 use super::mesh::{PlacedView, SEEN_WEIGHT, ViewSurface};
+use super::regularise::{HeightLattice, MARGIN, regularised};
 use crate::tiles::{paste, tiles};
 
 /// Parameters of the fusion.
@@ -14,10 +14,18 @@ pub struct FusionConfig {
     pub same_surface_m: f32,
     /// Largest difference in height of neighbouring pixels that are joined, metres.
     pub tear_m: f32,
-    /// Side of the tiles that are fused at a time, cells. It affects memory and parallelism only,
-    /// never the result.
+    /// Distance of two height hypotheses, metres.
+    pub step_m: f64,
+    /// Height that those of the views count from, metres above the ellipsoid.
+    pub origin_m: f64,
+    /// Side of the tiles that are fused at a time, cells, rounded up to whole blocks of
+    /// [`BLOCK`]. It affects memory and parallelism only, never the result.
     pub tile: usize,
 }
+
+/// Side of the blocks of cells that are regularised together. They lie on a fixed lattice of the
+/// grid, so that the result does not depend on tiles or threads.
+pub const BLOCK: usize = 256;
 
 /// Surface fused from several views.
 #[derive(Debug, Clone)]
@@ -59,21 +67,16 @@ struct Cell {
 /// ```
 /// use sweep::fusion::{FusionConfig, fuse_views};
 ///
-/// let config = FusionConfig { same_surface_m: 1.5, tear_m: 3.0, tile: 256 };
+/// let config = FusionConfig { same_surface_m: 1.5, tear_m: 3.0, step_m: 0.5, origin_m: 0.0, tile: 256 };
 /// let surface = fuse_views(&[], (40, 30), &config);
 /// assert!(surface.height_m.data().iter().all(|h| h.is_nan()));
 /// ```
 pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionConfig) -> FusedSurface {
-    let windows = tiles(Window::whole(size.0, size.1), config.tile.max(1));
-    let parts: Vec<FusedSurface> = windows
-        .par_iter()
-        .map(|w| {
-            let surfaces: Vec<ViewSurface> = views.iter().map(|v| v.rasterise(*w, config.tear_m)).collect();
-            fuse(&surfaces, (w.width, w.height), config.same_surface_m)
-        })
-        .collect();
+    let windows = tiles(Window::whole(size.0, size.1), config.tile.max(1).next_multiple_of(BLOCK));
+    let parts: Vec<Vec<(Window, FusedSurface)>> =
+        windows.par_iter().map(|w| fuse_tile(views, size, *w, config)).collect();
     let mut out = FusedSurface::empty(size);
-    for (w, part) in windows.iter().zip(&parts) {
+    for (w, part) in parts.iter().flatten() {
         paste(&mut out.height_m, *w, &part.height_m);
         paste(&mut out.sigma_m, *w, &part.sigma_m);
         paste(&mut out.views, *w, &part.views);
@@ -81,6 +84,34 @@ pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionCon
         paste(&mut out.seen, *w, &part.seen);
     }
     out
+}
+
+/// Fuses the views in one tile, block by block.
+fn fuse_tile(
+    views: &[PlacedView],
+    size: (usize, usize),
+    tile: Window,
+    config: &FusionConfig,
+) -> Vec<(Window, FusedSurface)> {
+    let whole = Window::whole(size.0, size.1);
+    let with_margin = |w: Window| w.grown(MARGIN).intersection(&whole).unwrap_or(w);
+    let lattice = HeightLattice { step_m: config.step_m, origin_m: config.origin_m };
+    let all = with_margin(tile);
+    let sampled: Vec<ViewSurface> = views.iter().map(|view| view.rasterise(all, config.tear_m)).collect();
+    let fused = |block: Window| {
+        let around = with_margin(block);
+        let surfaces: Vec<ViewSurface> = sampled.iter().map(|surface| surface.part(inside(around, all))).collect();
+        let chosen_m = regularised(&surfaces, (around.width, around.height), lattice);
+        let core = inside(block, around);
+        let surfaces: Vec<ViewSurface> = surfaces.iter().map(|surface| surface.part(core)).collect();
+        (block, fuse(&surfaces, &chosen_m.window(core, f32::NAN), config.same_surface_m))
+    };
+    tiles(tile, BLOCK).into_iter().map(fused).collect()
+}
+
+/// Returns a window relative to the first cell of another one.
+fn inside(w: Window, of: Window) -> Window {
+    Window { x: w.x - of.x, y: w.y - of.y, ..w }
 }
 
 impl FusedSurface {
@@ -95,11 +126,11 @@ impl FusedSurface {
     }
 }
 
-/// Fuses the views' surfaces on one window of the grid.
-fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> FusedSurface {
-    let mut out = FusedSurface::empty(size);
+/// Fuses the views' surfaces on one window of the grid at its regularised heights.
+fn fuse(surfaces: &[ViewSurface], chosen_m: &Grid<f32>, same_surface_m: f32) -> FusedSurface {
+    let mut out = FusedSurface::empty((chosen_m.width(), chosen_m.height()));
     let mut samples = Vec::with_capacity(surfaces.len());
-    for i in 0..size.0 * size.1 {
+    for (i, chosen_m) in chosen_m.data().iter().enumerate() {
         samples.clear();
         let held = surfaces.iter().map(|s| Sample {
             height_m: s.height_m.data()[i],
@@ -107,7 +138,7 @@ fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> 
             weight: s.weight.data()[i],
         });
         samples.extend(held.filter(|s| !s.height_m.is_nan()));
-        if let Some(cell) = fuse_cell(&mut samples, same_surface_m) {
+        if let Some(cell) = fuse_cell(&samples, *chosen_m, same_surface_m) {
             out.height_m.data_mut()[i] = cell.height_m;
             out.sigma_m.data_mut()[i] = cell.sigma_m;
             out.views.data_mut()[i] = cell.views;
@@ -118,68 +149,47 @@ fn fuse(surfaces: &[ViewSurface], size: (usize, usize), same_surface_m: f32) -> 
     out
 }
 
-/// Finds the best supported surface among the samples; `None` if there are none.
-fn fuse_cell(samples: &mut [Sample], same_surface_m: f32) -> Option<Cell> {
-    samples.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
-    let (mut best, mut most, mut from) = (0..0, 0.0, 0);
-    for to in 1..=samples.len() {
-        while samples[to - 1].height_m - samples[from].height_m > same_surface_m {
-            from += 1;
-        }
-        let weight: f32 = samples[from..to].iter().map(|s| s.weight).sum();
-        // With ≥ the upper surface wins a tie.
-        if weight >= most {
-            (best, most) = (from..to, weight);
-        }
-    }
-    let mode = &samples[best];
+/// Fuses the samples that support the chosen height; `None` if there are none.
+fn fuse_cell(samples: &[Sample], chosen_m: f32, same_surface_m: f32) -> Option<Cell> {
+    let supports = || samples.iter().filter(|s| (s.height_m - chosen_m).abs() <= same_surface_m);
+    let views = supports().count();
+    let support: f32 = supports().map(|s| s.weight).sum();
     let all: f32 = samples.iter().map(|s| s.weight).sum();
-    // The median is robust within the mode. The deviation is that of a weighted mean of its
-    // samples, taken as independent.
-    let information: f32 = mode.iter().map(|s| 1.0 / s.sigma_m.max(1e-3).powi(2)).sum();
-    Some(Cell {
-        height_m: median(mode)?,
+    // The deviation is that of a weighted mean of the samples, taken as independent.
+    let information: f32 = supports().map(|s| 1.0 / s.sigma_m.max(1e-3).powi(2)).sum();
+    (views > 0).then(|| Cell {
+        height_m: chosen_m,
         sigma_m: information.sqrt().recip(),
-        views: mode.len().min(255) as u8,
-        confidence: most / (all + 1.0),
-        seen: most >= SEEN_WEIGHT,
+        views: views.min(255) as u8,
+        confidence: support / (all + 1.0),
+        seen: support >= SEEN_WEIGHT,
     })
-}
-
-fn median(sorted: &[Sample]) -> Option<f32> {
-    let (low, high) = middle_values(sorted)?;
-    Some(0.5 * (low.height_m + high.height_m))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn cell(samples: &[(f32, f32)]) -> Option<Cell> {
+    fn cell(samples: &[(f32, f32)], chosen_m: f32) -> Option<Cell> {
         let sample = |&(height_m, weight): &(f32, f32)| Sample { height_m, sigma_m: 0.1, weight };
-        fuse_cell(&mut samples.iter().map(sample).collect::<Vec<_>>(), 1.0)
+        fuse_cell(&samples.iter().map(sample).collect::<Vec<_>>(), chosen_m, 1.0)
     }
 
     #[test]
-    fn two_surfaces_in_a_cell_give_the_better_supported_one_and_the_upper_in_a_tie() {
-        let held = |samples: &[(f32, f32)]| cell(samples).map(|c| (c.height_m, c.views));
-        assert_eq!(held(&[(10.0, 1.0), (30.0, 1.0)]), Some((30.0, 1)));
-        assert_eq!(held(&[(10.2, 1.0), (30.0, 1.0), (10.0, 1.0)]), Some((10.1, 2)));
-        assert_eq!(held(&[]), None);
+    fn only_samples_on_the_chosen_surface_support_it() {
+        let c = cell(&[(10.2, 1.0), (30.0, 1.0), (10.0, 0.25)], 10.1).unwrap();
+        assert_eq!((c.height_m, c.views, c.seen), (10.1, 2, true));
+        assert!((c.confidence - 1.25 / 3.25).abs() < 1e-6);
+        assert!(
+            cell(&[(10.0, 1.0)], 20.0).is_none()
+                && cell(&[], 20.0).is_none()
+                && cell(&[(10.0, 1.0)], f32::NAN).is_none()
+        );
     }
 
     #[test]
-    fn heights_at_borders_stand_back_for_one_inside_a_surface() {
-        let c = cell(&[(30.0, 0.25), (10.0, 1.0), (30.1, 0.25), (30.2, 0.25)]).unwrap();
-        assert_eq!((c.height_m, c.views), (10.0, 1));
-        assert!((c.confidence - 1.0 / 2.75).abs() < 1e-6);
-        assert!((cell(&[(30.0, 0.25), (30.1, 0.25)]).unwrap().height_m - 30.05).abs() < 1e-5);
-    }
-
-    #[test]
-    fn a_height_that_no_view_has_seen_stands_back_for_any_other() {
-        let c = cell(&[(30.0, 1e-4), (30.1, 1e-4), (10.0, 0.0125)]).unwrap();
-        assert!(c.height_m == 10.0 && c.seen);
-        assert!(!cell(&[(30.0, 1e-4), (30.1, 1e-4)]).unwrap().seen);
+    fn a_height_that_no_view_has_seen_is_told() {
+        assert!(!cell(&[(30.0, 1e-4), (30.1, 1e-4)], 30.0).unwrap().seen);
+        assert!(cell(&[(10.0, 0.0125)], 10.0).unwrap().seen);
     }
 }

@@ -11,7 +11,8 @@
 //!   nearest surface under the bound: a street between towers is not filled with a roof.
 //! - Otherwise two views see the cell and their pictures do not match. A *narrow* void is closed. A
 //!   wider one is completed where the known heights around it fit one plane, and where it lies
-//!   between two opposite heights. If its border has ground lower by a storey, it gets the ground.
+//!   between two opposite heights. If the border near the cell has ground lower by a storey, the
+//!   cell gets the ground.
 //!   It stays open where heights are known on one side only (water), and where the images are
 //!   blank, unless the views agree there on a roof whose rim was seen.
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
@@ -275,10 +276,11 @@ impl Filling<'_> {
         };
         let seen = || {
             let lower = lower.filter(|_| known.len() >= KNOWN_MIN && is_wanted)?;
-            let below = || self.surface_below(index, lower.base_m - STOREY_M, void);
+            // What is farther from a narrow void than the ends of its street has no part in it.
+            let count = if is_narrow { CANDIDATES } else { AROUND };
+            let below = || self.surface_below(index, lower.base_m - STOREY_M, void, count);
             Some(match plane.filter(|_| !is_blind) {
                 Some(plane) => self.on_plane(self.place(index), plane, &known),
-                None if is_narrow => lower.estimate,
                 None => below().unwrap_or(lower.estimate),
             })
         };
@@ -330,9 +332,9 @@ impl Filling<'_> {
     }
 
     /// Returns the surface below a height at the border of a void; `None` if it is a small part of
-    /// the border near a cell, which may be outliers.
-    fn surface_below(&self, index: usize, height_m: f32, void: u32) -> Option<Estimate> {
-        let all = self.border_around(index, Some(void));
+    /// the `count` heights at the border near a cell, which may be outliers.
+    fn surface_below(&self, index: usize, height_m: f32, void: u32, count: usize) -> Option<Estimate> {
+        let all = self.border_around(index, Some(void), count);
         let below: Vec<Known> = all.iter().copied().filter(|k| k.height_m <= height_m).collect();
         if below.len() * LEAST_PART < all.len() { None } else { self.lowest(&below) }
     }
@@ -347,18 +349,18 @@ impl Filling<'_> {
         if height_m.is_nan() || known.iter().filter(continues).count() < KNOWN_MIN {
             return false;
         }
-        let own = self.border_around(index, Some(self.numbers.data()[index]));
+        let own = self.border_around(index, Some(self.numbers.data()[index]), AROUND);
         if (own.iter().filter(continues).count() as f32) < RIM_PART * own.len() as f32 {
             return false;
         }
-        let all = self.border_around(index, None);
+        let all = self.border_around(index, None, AROUND);
         let lower = all.iter().filter(|k| k.height_m <= height_m - STOREY_M).count();
         lower > 0 && lower * LEAST_PART >= all.len()
     }
 
     /// Returns the known heights all around a cell at the border of a void, or of any.
-    fn border_around(&self, index: usize, void: Option<u32>) -> Vec<Known> {
-        let wanted = Wanted { void, height_max_m: f32::INFINITY, count: AROUND, reach: self.far() };
+    fn border_around(&self, index: usize, void: Option<u32>, count: usize) -> Vec<Known> {
+        let wanted = Wanted { void, height_max_m: f32::INFINITY, count, reach: self.far() };
         self.border.nearest(self.place(index), wanted)
     }
 
@@ -461,6 +463,16 @@ mod tests {
         assert_eq!(found.source[(11, 10)], CellSource::FilledNarrow);
         // It could have been the wall.
         assert!(found.sigma_m[(11, 10)] > 10.0, "{}", found.sigma_m[(11, 10)]);
+    }
+
+    #[test]
+    fn a_narrow_street_gets_the_ground_at_its_end() {
+        // Roofs at 20 m on both sides of a street of 4 cells, whose ground begins 20 cells away.
+        let mut g = Grid::filled(40, 60, 20.0f32);
+        (18..22).for_each(|x| (0..60).for_each(|y| g[(x, y)] = if y < 40 { f32::NAN } else { 0.0 }));
+        let found = fill(&mut g);
+        assert!((18..22).all(|x| (25..40).all(|y| g[(x, y)] == 0.0)), "{:?}", g.row(30));
+        assert_eq!(found.source[(19, 30)], CellSource::FilledNarrow);
     }
 
     #[test]

@@ -266,7 +266,17 @@ fn place_tile(
 }
 
 impl ViewSurface {
-    fn empty(cells: Window) -> Self {
+    /// Returns the surface on a part of its cells, whose window counts from its first cell.
+    pub(super) fn part(&self, cells: Window) -> Self {
+        Self {
+            origin: [self.origin[0] + cells.x as f32, self.origin[1] + cells.y as f32],
+            height_m: self.height_m.window(cells, f32::NAN),
+            sigma_m: self.sigma_m.window(cells, f32::NAN),
+            weight: self.weight.window(cells, 0.0),
+        }
+    }
+
+    pub(super) fn empty(cells: Window) -> Self {
         Self {
             origin: [cells.x as f32, cells.y as f32],
             height_m: Grid::filled(cells.width, cells.height, f32::NAN),

@@ -130,7 +130,7 @@ fn sweep_chunk(
         step_m: plan.step_m,
         levels: work.levels,
         sources: work.sources.clone(),
-        reach: plan.tuning.reach,
+        reach: plan.tuning.reaches(),
         jump_at_edge: plan.tuning.jump_at_edge,
         priors: Vec::new(),
     };

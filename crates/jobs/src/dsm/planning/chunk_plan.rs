@@ -255,7 +255,7 @@ impl ChunkPlanner<'_> {
             step_m: self.step_m,
             levels: SweepLevels::only(level),
             sources: sources.to_vec(),
-            reach: self.tuning.reach,
+            reach: self.tuning.reaches(),
             jump_at_edge: self.tuning.jump_at_edge,
             priors: Vec::new(),
         };

@@ -245,7 +245,7 @@ impl PlannedScene<'_> {
             step_m: self.step_m,
             levels: SweepLevels::only(0),
             sources: self.sources.to_vec(),
-            reach: self.tuning.reach,
+            reach: self.tuning.reaches(),
             jump_at_edge: self.tuning.jump_at_edge,
             priors: Vec::new(),
         };

@@ -5,8 +5,8 @@
 
 use raster::{Grid, Window};
 use sweep::fusion::{
-    CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrustConfig, calibrate, fill_voids,
-    occlusion_bounds, remove_speckle, surroundings,
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, TrustConfig, calibrate,
+    fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
 
 use crate::dsm::config::Fill;
@@ -48,6 +48,10 @@ const FILL_BLIND_M: f64 = 5.0;
 /// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
 /// rises and falls, and something small may stand there.
 const FILL_SIGMA_SLOPE: f64 = 0.1;
+
+/// Side of the blocks of which each has one height of the ground, metres: as wide as a street with
+/// its walls.
+const TREND_BLOCK_M: f64 = 10.0;
 
 /// A height is right if its error is below this, or below two cells where those are larger, metres:
 /// the usual threshold of completeness.
@@ -98,19 +102,30 @@ pub(crate) fn clean_up(
     forget_agreement_of_voids(fused);
     let observed = known(&fused.height_m, core);
     let trusted = probability(fused, &trust).map(|p| *p >= TRUSTED);
-    let bounds = |height_m: &Grid<f32>, cells: &[usize]| occlusion_bounds(height_m, voids.sights, cells);
+    let trend = ground_trend(&fused.height_m, &trusted, &trend_config(gsd_m));
+    let bounds = |above_m: &Grid<f32>, cells: &[usize]| {
+        let height_m = combined(above_m, &trend, |above_m, ground_m| above_m + ground_m);
+        let bounds = occlusion_bounds(&height_m, voids.sights, cells);
+        bounds.into_iter().zip(cells).map(|(bound_m, cell)| bound_m - trend.data()[*cell]).collect()
+    };
+    let above = |height_m: &Grid<f32>| combined(height_m, &trend, |height_m, ground_m| height_m - ground_m);
+    let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
     let known = KnownVoids { trusted: &trusted, blind: voids.blind, completed_m: &completed };
-    let filled = fill_voids(&mut fused.height_m, known, bounds, &fill_config(voids.fill, gsd_m));
-    for ((sigma_m, filled_m), source) in
-        fused.sigma_m.data_mut().iter_mut().zip(filled.sigma_m.data()).zip(filled.source.data())
-    {
-        if source.is_filled() {
-            *sigma_m = *filled_m;
-        }
+    let filled = fill_voids(&mut above_m, known, bounds, &fill_config(voids.fill, gsd_m));
+    for i in (0..above_m.data().len()).filter(|i| filled.source.data()[*i].is_filled()) {
+        fused.height_m.data_mut()[i] = above_m.data()[i] + trend.data()[i];
+        fused.sigma_m.data_mut()[i] = filled.sigma_m.data()[i];
     }
     let is_observed = |i: usize| !filled.source.data()[i].is_filled();
     fused.confidence = calibrate(&fused.height_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
     (filled.source, before - observed)
+}
+
+/// Returns the values that `of` makes of two grids of one size, cell by cell.
+fn combined(a: &Grid<f32>, b: &Grid<f32>, of: impl Fn(f32, f32) -> f32) -> Grid<f32> {
+    let mut out = a.clone();
+    out.data_mut().iter_mut().zip(b.data()).for_each(|(a, b)| *a = of(*a, *b));
+    out
 }
 
 /// Takes the heights that no view has seen out of a surface.
@@ -144,6 +159,12 @@ fn probability(fused: &FusedSurface, trust: &TrustConfig) -> Grid<f32> {
 fn forget_agreement_of_voids(fused: &mut FusedSurface) {
     let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
     agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
+}
+
+/// Returns the parameters of the ground's trend on cells of `gsd_m`.
+fn trend_config(gsd_m: f64) -> TrendConfig {
+    let block_cells = (TREND_BLOCK_M / gsd_m).round().max(1.0) as usize;
+    TrendConfig { block_cells, reach_blocks: (FILL_REACH_FAR_M / TREND_BLOCK_M) as usize }
 }
 
 /// Returns the parameters of filling on cells of `gsd_m`.

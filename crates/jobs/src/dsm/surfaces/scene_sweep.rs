@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use numeric::Progress;
 use rayon::prelude::*;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::ranges::Ranges;
+use sweep::ranges::{Ranges, Reach};
 use sweep::{HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, ViewLevel, sweep_level};
 
 use crate::dsm::error::DsmError;
@@ -27,6 +27,9 @@ const COARSE_TOLERANCE_PX: f64 = 2.0;
 /// Penalty of a jump on coarse levels, three quarters of that on the finest. A house is few pixels
 /// wide there, and what the coarse levels smooth away is never searched again.
 const COARSE_JUMP: u8 = 93;
+/// Penalty of a step on coarse levels, five eighths of that on the finest: their steps are large,
+/// and a slope or a low house takes few of them.
+const COARSE_STEP: u8 = 20;
 
 /// Parameters of a sweep of all views.
 #[derive(Debug, Clone)]
@@ -38,8 +41,8 @@ pub(crate) struct SceneSweep {
     pub(crate) levels: SweepLevels,
     /// For each view, the views it is compared with.
     pub(crate) sources: Vec<Vec<usize>>,
-    /// Distance around a coarse pixel from which heights are taken over, coarse pixels.
-    pub(crate) reach: usize,
+    /// Distances around a coarse pixel from which heights are taken over.
+    pub(crate) reach: Reach,
     /// Penalty of a jump across the strongest image edges on the finest level.
     pub(crate) jump_at_edge: u8,
     /// For each view, what it sees of a city model; empty without a model.
@@ -185,7 +188,7 @@ fn sweep_view(
     let mut config = LevelConfig::default();
     if level > sweep.levels.finest {
         config.cost.blends_neighbours = false;
-        config.penalties.jump = COARSE_JUMP;
+        (config.penalties.step, config.penalties.jump) = (COARSE_STEP, COARSE_JUMP);
     } else {
         config.penalties.jump_at_edge = sweep.jump_at_edge;
     }

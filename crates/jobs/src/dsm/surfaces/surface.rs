@@ -189,6 +189,8 @@ fn fuse(
     let fusion = FusionConfig {
         same_surface_m: same_surface_m(sweep, grid),
         tear_m: (TEAR_SLOPE * input.pixel_m * coarser).max(2.0 * step_m) as f32,
+        step_m,
+        origin_m,
         tile: config.tile,
     };
     let mut fused = fuse_views(&placed, grid.size, &fusion);

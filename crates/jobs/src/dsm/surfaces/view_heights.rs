@@ -78,7 +78,7 @@ pub fn sweep_views(
         step_m,
         levels,
         sources,
-        reach: tuning.reach,
+        reach: tuning.reaches(),
         jump_at_edge: tuning.jump_at_edge,
         priors: Vec::new(),
     };
