@@ -105,8 +105,8 @@ pub(super) fn encode(file: &SplatFile) -> Result<Vec<u8>, String> {
     out.extend(splats.iter().flat_map(|s| packed(s.rotation).to_le_bytes()));
     let harmonics = file.layout.rest() / 3;
     for splat in 0..splats.len() {
-        for number in 0..harmonics {
-            let value = |channel| f64::from(HARMONICS[number] * coefficient(file, splat, channel, number));
+        for (number, sign) in HARMONICS.iter().enumerate().take(harmonics) {
+            let value = |channel| f64::from(sign * coefficient(file, splat, channel, number));
             let channel = |channel| byte(128.0 + 128.0 * value(channel));
             out.extend([0, 1, 2].map(channel));
         }
