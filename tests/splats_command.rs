@@ -300,6 +300,88 @@ fn splats_are_seen_again_through_images_and_perspective_cameras() {
     refused(&["--cameras".as_ref(), scene.join("truth").as_os_str()], "COLMAP");
 }
 
+/// Splats look the same in every format, from images and from perspective cameras, and keep their
+/// place.
+#[test]
+fn splats_look_the_same_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = town();
+    let (dsm, image) = (scene.join("truth/dsm.tif"), scene.join("view_2.tif"));
+    let ground = folder.path().join("ground");
+    let mut command = skysweep();
+    command.arg("groundview").arg(&dsm).args(["--center", "5.4", "43.53", "--ground-offset", "25", "--width", "16"]);
+    command.args(["--crops", "3", "--crop-size", "200", "-q", "-o"]).arg(&ground).assert().code(0);
+    let render = |splats: &Path, pictures: Option<&Path>| {
+        let out = splats.with_extension("seen");
+        let mut command = skysweep();
+        command.args(["splats", "render", "--json", "--progress", "none"]).arg(splats).arg("--cameras");
+        command.arg(ground.join("sparse/0")).arg("-o").arg(&out);
+        if let Some(pictures) = pictures {
+            command.arg("--pictures").arg(pictures);
+        }
+        (json(command.output().unwrap()), out)
+    };
+    for form in ["2d", "3d"] {
+        let ply = folder.path().join(form).with_extension("ply");
+        let mut command = skysweep();
+        command.arg("splats").arg(&dsm).arg(&image).args(["-q", "--form", form, "-o"]).arg(&ply).assert().code(0);
+        let pictures = render(&ply, None).1.join("colour");
+        let origin = std::fs::read(ply.with_extension("origin.json")).unwrap();
+        for (ending, options) in [("spz", &[][..]), ("sog", &["--sh-degree", "0"]), ("glb", &["--sh-degree", "2"])] {
+            let other = folder.path().join(format!("{form}_{ending}.{ending}"));
+            let mut command = skysweep();
+            command.args(["splats", "convert", "--json"]).arg(&ply).arg(&other).args(options);
+            let report = json(command.output().unwrap());
+            assert_eq!(report["flat"], form == "2d", "{ending}: {report}");
+            // Some colours of the town are brighter than SPZ can be.
+            assert!(ending == "spz" || report["clipped"] == 0, "{ending}: {report}");
+            assert!(std::fs::read(other.with_extension("origin.json")).unwrap() == origin);
+            let (seen, _) = render(&other, Some(&pictures));
+            let psnr = |i: usize| seen["views"][i]["psnr_whole_db"].as_f64().unwrap();
+            assert!((0..3).all(|i| psnr(i) > 40.0), "{form} {ending}: {seen}");
+            // And back to what trainers load, also with the other number of scales.
+            let back = folder.path().join(format!("{form}_{ending}_back.ply"));
+            let mut command = skysweep();
+            command.args(["splats", "convert", "-q", "--overwrite", "--form", "3d", "--sh-degree", "3"]);
+            command.arg(&other).arg(&back).assert().code(0);
+            assert_eq!(load(&back).0.len(), 62);
+            let (seen, _) = render(&back, Some(&pictures));
+            let psnr = |i: usize| seen["views"][i]["psnr_whole_db"].as_f64().unwrap();
+            assert!((0..3).all(|i| psnr(i) > 40.0), "{form} {ending} and back: {seen}");
+        }
+        let mut command = skysweep();
+        let odd = folder.path().join("town.splat");
+        command.args(["splats", "convert"]).arg(&ply).arg(&odd);
+        command.assert().code(2).stderr(predicate::str::contains(".ply, .spz, .sog, .glb"));
+        skysweep().args(["splats", "convert"]).arg(&image).arg(folder.path().join("no.spz")).assert().code(2);
+        assert!(!odd.exists() && !folder.path().join("no.spz").exists());
+    }
+}
+
+/// SPZ has bytes for colours; what they cannot hold is counted.
+#[test]
+fn colours_that_a_format_cannot_hold_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let (bright, spz) = (folder.path().join("bright.ply"), folder.path().join("bright.spz"));
+    let splat = gaussian::Splat {
+        position: [1.0; 3],
+        scale_m: [0.5; 3],
+        rotation: [1.0, 0.0, 0.0, 0.0],
+        colour: [0.2, 0.5, 1.4],
+        opacity: 0.5,
+    };
+    let splats = vec![splat, gaussian::Splat { colour: [0.2, -0.6, 1.0], ..splat }];
+    let layout = io::splat_ply::SplatLayout::default();
+    let file = io::splat_ply::SplatFile { splats, harmonics: None, layout, origin: None };
+    io::splat_files::write(&bright, &file, false).unwrap();
+    let mut command = skysweep();
+    command.args(["splats", "convert", "--json"]).arg(&bright).arg(&spz);
+    assert_eq!(json(command.output().unwrap())["clipped"], 1);
+    let back = io::splat_files::read(&spz).unwrap().splats;
+    assert!((back[1].colour[1] + 0.44).abs() < 0.01 && (back[0].colour[2] - 1.4).abs() < 0.004, "{back:?}");
+    assert!(!spz.with_extension("origin.json").exists());
+}
+
 #[test]
 fn what_cannot_be_done_is_said_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();

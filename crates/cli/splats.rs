@@ -1,12 +1,12 @@
 //! `skysweep splats`: Gaussian splats of a surface model and its images, as the PLY that 3DGS
 //! viewers and trainers read. `skysweep splats render` looks at them again, through images and
-//! perspective cameras.
+//! perspective cameras, and `skysweep splats convert` brings them to other formats.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use crs::VerticalDatum;
-use jobs::splats::{SplatRenderConfig, SplatsConfig, SplatsJobError};
+use jobs::splats::{SplatConvertConfig, SplatRenderConfig, SplatsConfig, SplatsJobError};
 use splats::DivisionConfig;
 
 use crate::corrections::corrections_of;
@@ -34,6 +34,8 @@ pub(crate) struct Args {
 enum Command {
     /// Render splats through images with RPCs and through perspective cameras.
     Render(RenderArgs),
+    /// Bring splats to another format: PLY of 3DGS or 2DGS, SPZ, SOG, binary glTF.
+    Convert(ConvertArgs),
 }
 
 /// Inputs and options of new splats.
@@ -45,7 +47,7 @@ struct MakeArgs {
     /// Images with RPCs that give the colours.
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
-    /// File to write; its origin goes beside it as OUT.origin.json.
+    /// File to write (.ply, .spz, .sog or .glb); its origin goes beside it as OUT.origin.json.
     #[arg(short, long, required = true, value_name = "OUT.ply")]
     output: Option<PathBuf>,
     /// Largest distance of a height from its splat's plane, metres.
@@ -100,8 +102,8 @@ const FORMS: [Named<bool>; 2] = [("3d", false, "three scales: ellipsoids"), ("2d
 #[command(after_help = "Examples: skysweep splats render splats.ply view_*.tif -o seen; \
                   skysweep splats render splats.ply --cameras views/sparse/0 --pictures views/images -o seen")]
 struct RenderArgs {
-    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them. Without one they lie in the
-    /// frame of the cameras.
+    /// Splats (PLY of 3DGS or 2DGS, SPZ, SOG, glTF) with their origin beside them. Without one they
+    /// lie in the frame of the cameras.
     splats: PathBuf,
     /// Images with RPCs to look through.
     #[arg(value_name = "IMAGE")]
@@ -128,10 +130,33 @@ struct RenderArgs {
     write: WriteOptions,
 }
 
+/// Arguments of `skysweep splats convert`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples: skysweep splats convert trained/splats.ply town.sog; \
+                  skysweep splats convert trained/splats.ply for_3dgs.ply --form 3d --sh-degree 3")]
+struct ConvertArgs {
+    /// Splats of any of the formats, recognised by their content.
+    splats: PathBuf,
+    /// File to write; its ending names the format: .ply, .spz, .sog or .glb. The origin goes beside
+    /// it.
+    #[arg(value_name = "OUT")]
+    output: PathBuf,
+    /// Three scales per splat of a PLY (3DGS) or two (2DGS) [default: as they are].
+    #[arg(long, value_parser = named(&FORMS))]
+    form: Option<bool>,
+    /// Degree of the harmonics, 0 to 3: padded with zeros or cut; the loaders of the original 3DGS
+    /// and 2DGS code want 3 [default: that of the file].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=3))]
+    sh_degree: Option<u8>,
+    #[command(flatten)]
+    write: WriteOptions,
+}
+
 /// Runs `skysweep splats`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     match (&args.command, &args.make.dsm, &args.make.output) {
         (Some(Command::Render(args)), ..) => render(args, global),
+        (Some(Command::Convert(args)), ..) => convert(args, global),
         (None, Some(dsm), Some(output)) => make(&args.make, dsm, output, global),
         _ => bail!("expected DSM, IMAGE and -o OUT.ply"),
     }
@@ -172,6 +197,17 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
         .watch(global, &args.output, |watcher| jobs::splats::render(&config, watcher))
         .map_err(hinted)?;
     args.write.show.print(global, &report, || report.text(&args.output))?;
+    Ok(Outcome::Complete)
+}
+
+fn convert(args: &ConvertArgs, global: Global) -> anyhow::Result<Outcome> {
+    let mut config = SplatConvertConfig::new(args.splats.clone(), args.output.clone());
+    config.discs = args.form;
+    config.sh_degree = args.sh_degree;
+    config.overwrite = args.write.overwrite;
+    let show = args.write.show;
+    let report = show.watch(global, &args.output, |watcher| jobs::splats::convert(&config, watcher)).map_err(hinted)?;
+    show.print(global, &report, || report.text(&args.output))?;
     Ok(Outcome::Complete)
 }
 

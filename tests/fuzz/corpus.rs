@@ -91,7 +91,9 @@ pub(crate) fn write(home: &Path) -> Vec<Seed> {
     for name in ["gv/depth/panorama.npy", "gv/mask/panorama.png", "map.tif"] {
         corpus.add(Reader::Map, &made(name), &[]);
     }
-    corpus.add(Reader::Splats, &made("s.ply"), &[&made("s.origin.json")]);
+    for name in ["s.ply", "s.spz", "s.sog", "s.glb"] {
+        corpus.add(Reader::Splats, &made(name), &[&made("s.origin.json")]);
+    }
     corpus.add(Reader::Corrections, &made("out/report/report.json"), &[]);
     corpus.add(Reader::Report, &made("out/report/report.json"), &[]);
     corpus.add(Reader::Opened, &made("opened.json"), &[]);
@@ -168,6 +170,9 @@ fn make(folder: &Path) {
         "heightmap town/truth/dsm.tif --center 5.4 43.53 --size 48 -o map.tif",
         "groundview town/truth/dsm.tif --center 5.4 43.53 --width 64 --crops 1 --crop-size 32 --points 50 -o gv",
         "splats out/dsm/dsm.tif town/view_1.tif -o s.ply",
+        "splats convert s.ply s.spz --sh-degree 1 --overwrite",
+        "splats convert s.ply s.sog --overwrite",
+        "splats convert s.ply s.glb --overwrite",
     ] {
         let arguments: Vec<&str> = line.split(' ').collect();
         skysweep().current_dir(folder).args(arguments).arg("-q").assert().success();

@@ -101,7 +101,7 @@ pub(crate) fn call(reader: Reader, path: &Path) -> Outcome {
         Reader::Map => whether(io::maps::read(path)),
         Reader::Splats => {
             io::splat_ply::LocalOrigin::read_beside(path)?;
-            whether(io::splat_ply::read(path))
+            whether(io::splat_files::read(path))
         }
         Reader::Corrections => whether(jobs::corrections::Corrections::read(path)),
         Reader::Opened => opened(path),

@@ -35,6 +35,7 @@ const RUNS: [&str; 26] = [
     "priors buildings.city.json --cameras view_1.tif -o pri --maps-only",
     "splats dsm.tif view_1.tif view_2.tif -o s.ply --error 0.5 --sh-degree 1",
     "splats render s.ply view_1.tif -o r",
+    "splats convert s.ply s.sog --sh-degree 1",
     "align sparse --positions control.csv -o a --threshold 5",
     "split sparse --contexts 2 --context-iou 0.2 --target-ious 0.1",
     "city convert m.gml -o m2.city.json --report r.json --all-objects",

@@ -5,6 +5,7 @@ use std::io::Write;
 use serde_json::{Value, json};
 
 const FLOAT: u32 = 5126;
+const UNSIGNED_BYTE: u32 = 5121;
 const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
@@ -48,6 +49,21 @@ impl GlbBuffers {
         self.accessor(json!({
             "bufferView": view, "componentType": FLOAT, "count": colours.len(), "type": "VEC3",
         }))
+    }
+
+    /// Adds colours with opacities as bytes, four of each, and returns the index of their accessor.
+    pub(crate) fn byte_colours(&mut self, bytes: Vec<u8>) -> usize {
+        let count = bytes.len() / 4;
+        let view = self.view(bytes.into_iter(), Some(ARRAY_BUFFER));
+        self.accessor(json!({
+            "bufferView": view, "componentType": UNSIGNED_BYTE, "normalized": true, "count": count, "type": "VEC4",
+        }))
+    }
+
+    /// Adds `count` scalars or vectors, such as `VEC4`, and returns the index of their accessor.
+    pub(crate) fn numbers(&mut self, kind: &'static str, count: usize, numbers: &[f32]) -> usize {
+        let view = self.view(numbers.iter().flat_map(|n| n.to_le_bytes()), Some(ARRAY_BUFFER));
+        self.accessor(json!({ "bufferView": view, "componentType": FLOAT, "count": count, "type": kind }))
     }
 
     /// Adds corners and returns the index of their accessor.

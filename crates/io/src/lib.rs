@@ -24,6 +24,7 @@ pub mod raster;
 mod regular;
 pub mod rpc;
 pub mod similarity;
+pub mod splat_files;
 pub mod splat_ply;
 pub mod stac;
 pub mod surfaces;

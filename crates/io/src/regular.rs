@@ -69,6 +69,7 @@ mod tests {
         assert!(crate::similarity::read(zero).is_err());
         assert!(crate::npy::read(zero).is_err());
         assert!(crate::splat_ply::read(zero).is_err());
+        assert!(crate::splat_files::read(zero).is_err());
         assert!(crate::transforms::read(zero, None).is_err());
         assert!(crate::citymodel::read(zero).is_err());
         assert!(crate::points::PointCloud::open(zero).is_err());

@@ -28,7 +28,7 @@ use jobs::products::ProductsConfig;
 use jobs::register::{RegisterConfig, RegisterModel};
 use jobs::rpc::{RpcConvertConfig, RpcInfoConfig};
 use jobs::simulate::{SimulateConfig, SimulateJobError};
-use jobs::splats::{SplatRenderConfig, SplatsConfig};
+use jobs::splats::{SplatConvertConfig, SplatRenderConfig, SplatsConfig};
 use jobs::split::SplitJobConfig;
 use jobs::tiles::TilesConfig;
 use jobs::train::TrainConfig;
@@ -96,7 +96,7 @@ fn town() -> SimulationConfig {
 }
 
 /// The jobs in the order of the documentation.
-pub(crate) const JOBS: [JobEntry; 35] = [
+pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "dsm",
         "Make a surface model from satellite images with RPCs.",
@@ -307,6 +307,14 @@ pub(crate) const JOBS: [JobEntry; 35] = [
         SplatRenderConfig::new(nowhere(), nowhere())
     ),
     job!(
+        "convert_splats",
+        "Bring splats to another format: PLY of 3DGS or 2DGS, SPZ, SOG, binary glTF.",
+        SplatConvertConfig,
+        jobs::splats::convert,
+        ["splats", "output"],
+        SplatConvertConfig::new(nowhere(), nowhere())
+    ),
+    job!(
         "train",
         "Train flat Gaussian splats on the images of a dataset, with building priors.",
         TrainConfig,
@@ -495,7 +503,7 @@ fn named_scene(scene: &str) -> Result<SimulationConfig, Fault> {
 
 /// Returns the job called `name`.
 pub(crate) fn job(name: &str) -> Option<&'static JobEntry> {
-    static ALL: [JobEntry; 35] = JOBS;
+    static ALL: [JobEntry; 36] = JOBS;
     ALL.iter().find(|entry| entry.name == name)
 }
 

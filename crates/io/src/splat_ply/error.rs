@@ -41,6 +41,6 @@ pub enum SplatPlyError {
     NotWritten(#[from] SaveError),
 }
 
-pub(super) fn invalid(path: &Path, what: impl Into<String>) -> SplatPlyError {
+pub(crate) fn invalid(path: &Path, what: impl Into<String>) -> SplatPlyError {
     SplatPlyError::Invalid { path: path.to_owned(), what: what.into() }
 }

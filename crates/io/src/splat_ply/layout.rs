@@ -1,7 +1,7 @@
 //! The properties of a splat in a PLY file.
 
 /// C₀, the value of the constant spherical harmonic.
-pub(super) const SH_C0: f64 = 0.282_094_791_773_878_14;
+pub(crate) const SH_C0: f64 = 0.282_094_791_773_878_14;
 /// Highest degree of spherical harmonics that trainers use.
 pub const SH_DEGREE_MAX: u8 = 3;
 
@@ -39,7 +39,7 @@ pub struct SplatLayout {
 
 impl SplatLayout {
     /// Returns the number of `f_rest_*` properties: 3 ((d + 1)² − 1).
-    pub(super) fn rest(self) -> usize {
+    pub(crate) fn rest(self) -> usize {
         let side = usize::from(self.sh_degree) + 1;
         3 * (side * side - 1)
     }

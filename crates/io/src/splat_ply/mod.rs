@@ -28,7 +28,11 @@ pub use error::SplatPlyError;
 pub use layout::{SH_DEGREE_MAX, SplatForm, SplatLayout};
 pub use origin::{LocalOrigin, origin_path};
 pub use read::{SplatFile, read};
-pub use write::{write, write_with_harmonics};
+pub use write::{write, write_file};
+
+pub(crate) use error::invalid;
+pub(crate) use layout::SH_C0;
+pub(crate) use write::checked;
 
 #[cfg(test)]
 mod tests;

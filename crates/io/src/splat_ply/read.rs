@@ -17,6 +17,10 @@ const SIZE_LIMIT: u64 = 16 << 30;
 const HEADER_LIMIT: usize = 1 << 20;
 /// Thickness of a disc as a fraction of its smaller scale.
 const DISC_THICKNESS: f32 = 1e-3;
+/// Greatest thickness of a disc in a file with three scales, as a fraction of its smaller scale.
+const FLAT: f32 = 2e-3;
+/// Least scale that files of bytes hold, metres: e⁻¹⁰, and rounding.
+const LEAST_SCALE_M: f32 = 4.6e-5;
 
 /// Splats from a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +33,29 @@ pub struct SplatFile {
     pub layout: SplatLayout,
     /// Origin of the positions, when a file with it lies beside.
     pub origin: Option<LocalOrigin>,
+}
+
+impl SplatFile {
+    /// Returns whether all splats are discs. Files with three scales do not say so: in them, discs
+    /// are those whose third scale is 0 as far as the file can tell.
+    pub fn is_flat(&self) -> bool {
+        let thin = |splat: &Splat| {
+            let [u, v, thickness] = splat.scale_m;
+            thickness <= LEAST_SCALE_M.max(FLAT * u.min(v))
+        };
+        self.layout.form == SplatForm::Discs || (!self.splats.is_empty() && self.splats.iter().all(thin))
+    }
+
+    /// Gives discs the thickness that [`read`] gives them.
+    pub(crate) fn flattened(mut self) -> Self {
+        if self.is_flat() {
+            self.layout.form = SplatForm::Discs;
+            for splat in &mut self.splats {
+                splat.scale_m[2] = DISC_THICKNESS * splat.scale_m[0].min(splat.scale_m[1]);
+            }
+        }
+        self
+    }
 }
 
 /// The header of a file.
@@ -168,7 +195,7 @@ impl Header {
 
 /// Returns a number of a row.
 fn value(row: &[u8], Column { at, size }: Column) -> f64 {
-    match *row[at..at + size].as_ref() {
+    match row[at..at + size] {
         [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
         [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
         _ => f64::NAN,

@@ -63,9 +63,9 @@ fn harmonics_come_back_padded_or_cut() {
     let harmonics = gaussian::SplatHarmonics::new(2, coefficients).unwrap();
     for sh_degree in 1..=3 {
         let layout = SplatLayout { form: SplatForm::Discs, sh_degree };
-        write_with_harmonics(&path, &splats(), Some(&harmonics), &origin(), layout, true).unwrap();
-        // Loaders of other programs have no origin beside.
-        std::fs::remove_file(origin_path(&path)).unwrap();
+        // Files of other programs have no origin beside.
+        let known = Some(harmonics.clone());
+        write_file(&path, &SplatFile { splats: splats(), harmonics: known, layout, origin: None }, true).unwrap();
         let file = read(&path).unwrap();
         let found = file.harmonics.unwrap();
         assert_eq!((found.degree(), file.origin), (sh_degree, None));
@@ -77,7 +77,8 @@ fn harmonics_come_back_padded_or_cut() {
     write(&path, &splats(), &origin(), layout, true).unwrap();
     assert_eq!(read(&path).unwrap().harmonics, None);
     let broken = gaussian::SplatHarmonics::new(1, vec![f32::NAN; 18]).unwrap();
-    write_with_harmonics(&path, &splats(), Some(&broken), &origin(), layout, true).unwrap();
+    let broken = SplatFile { splats: splats(), harmonics: Some(broken), layout, origin: Some(origin()) };
+    write_file(&path, &broken, true).unwrap();
     assert!(read(&path).unwrap_err().to_string().contains("splat 0: a harmonic is not finite"));
 }
 

@@ -8,9 +8,10 @@ use gaussian::{Splat, SplatHarmonics};
 use super::error::{SplatPlyError, invalid};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatLayout};
 use super::origin::LocalOrigin;
+use super::read::SplatFile;
 use crate::atomic::{refuse_existing, write_stream};
 
-/// Writes splats, and their origin beside them.
+/// Writes splats, and their origin beside them. Harmonics beyond the constant one are 0.
 ///
 /// # Errors
 /// - [`SplatPlyError::Invalid`] when the degree of the harmonics is above [`SH_DEGREE_MAX`] or the
@@ -25,22 +26,33 @@ pub fn write(
     layout: SplatLayout,
     overwrite: bool,
 ) -> Result<(), SplatPlyError> {
-    write_with_harmonics(path, splats, None, origin, layout, overwrite)
+    checked(path, splats, layout, overwrite)?;
+    // The splats are written last, so that a file of splats always has its origin.
+    origin.write_beside(path, overwrite)?;
+    Ok(write_stream(path, overwrite, |out| body(out, splats, None, layout))?)
 }
 
 /// Writes splats as [`write()`] does, with their harmonics: padded with zeros or cut to the degree
-/// of the layout.
+/// of the layout. An origin is written beside them where there is one.
 ///
 /// # Errors
 /// Those of [`write()`].
 ///
 /// # Panics
 /// If there are harmonics of fewer splats.
-pub fn write_with_harmonics(
+pub fn write_file(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), SplatPlyError> {
+    let SplatFile { splats, harmonics, layout, origin } = file;
+    checked(path, splats, *layout, overwrite)?;
+    if let Some(origin) = origin {
+        origin.write_beside(path, overwrite)?;
+    }
+    Ok(write_stream(path, overwrite, |out| body(out, splats, harmonics.as_ref(), *layout))?)
+}
+
+/// Checks what is to be written, before anything is.
+pub(crate) fn checked(
     path: &Path,
     splats: &[Splat],
-    harmonics: Option<&SplatHarmonics>,
-    origin: &LocalOrigin,
     layout: SplatLayout,
     overwrite: bool,
 ) -> Result<(), SplatPlyError> {
@@ -51,10 +63,7 @@ pub fn write_with_harmonics(
     for (index, splat) in splats.iter().enumerate() {
         splat.validate().map_err(|source| SplatPlyError::Splat { path: path.to_owned(), index, source })?;
     }
-    refuse_existing(path, overwrite)?;
-    // The splats are written last, so that a file of splats always has its origin.
-    origin.write_beside(path, overwrite)?;
-    Ok(write_stream(path, overwrite, |out| body(out, splats, harmonics, layout))?)
+    Ok(refuse_existing(path, overwrite)?)
 }
 
 fn body(

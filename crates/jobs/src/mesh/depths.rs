@@ -69,7 +69,7 @@ enum Source<'a> {
 
 /// Reads splats into the frame of a dataset. Without an origin they are in it already.
 fn splats(path: &Path, place: &DatasetPlace) -> Result<Vec<Surfel>, MeshJobError> {
-    let file = io::splat_ply::read(path)?;
+    let file = io::splat_files::read(path)?;
     let from = file.origin.map_or(place.origin.origin, |origin| origin.origin);
     let shift = [0, 1, 2].map(|i| (from[i] - place.origin.origin[i]) as f32);
     let moved = |splat: &gaussian::Splat| {

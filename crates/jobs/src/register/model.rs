@@ -93,7 +93,7 @@ impl Model {
     }
 
     fn of_splats(path: &Path, image: &Path, camera: &RpcCamera) -> Result<Self, RegisterError> {
-        let file = io::splat_ply::read(path)?;
+        let file = io::splat_files::read(path)?;
         let origin = file.origin.ok_or_else(|| RegisterError::NoOrigin { path: io::splat_ply::origin_path(path) })?;
         if origin.vertical != "ellipsoid" {
             return Err(RegisterError::Datum { vertical: origin.vertical, path: path.to_owned() });

@@ -8,12 +8,13 @@ use ::splats::{
 };
 use crs::VerticalDatum;
 use io::raster::{read_dem, write_png_rgb};
-use io::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
+use io::splat_ply::{LocalOrigin, SplatFile, SplatForm, SplatLayout};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::convert::format_of;
 use super::error::SplatsJobError;
 use super::image::{self, ColourImage};
 use crate::corrections::{CorrectionSource, Corrections};
@@ -173,6 +174,7 @@ impl SplatsReport {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn make(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, SplatsJobError> {
+    format_of(&config.output)?;
     files::check_destination(&config.output, config.overwrite)?;
     if let Some(path) = &config.report {
         report_page::refuse_existing(path, config.overwrite)?;
@@ -201,7 +203,8 @@ fn make_and_write(config: &SplatsConfig, progress: &dyn Progress) -> Result<Spla
     // `render` looks through the same cameras.
     let corrections = Corrections::for_surface(&config.dsm, &config.corrections)?.of_images(&config.images);
     corrections.write(&pointing_path(&config.output), config.overwrite)?;
-    io::splat_ply::write(&config.output, &scene.splats, &local, layout, config.overwrite).map_err(FileError::write)?;
+    let file = SplatFile { splats: scene.splats, harmonics: None, layout, origin: Some(local) };
+    io::splat_files::write(&config.output, &file, config.overwrite).map_err(FileError::write)?;
     write_renderings(config, &scene.renderings)?;
     Ok(SplatsReport::new(config, scene.report))
 }

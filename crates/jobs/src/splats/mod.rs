@@ -3,7 +3,9 @@
 //!
 //! [`make()`] writes the PLY that 3DGS viewers and trainers read, with its origin beside it.
 //! [`render()`] looks at such a file through satellite images and perspective cameras.
+//! [`convert()`] brings it to another format.
 
+mod convert;
 mod error;
 mod image;
 mod make;
@@ -12,6 +14,7 @@ mod text;
 
 pub(crate) use make::pointing_path;
 
+pub use convert::{SplatConvertConfig, SplatConvertReport, convert};
 pub use error::SplatsJobError;
 pub use make::{SplatsConfig, SplatsImageReport, SplatsReport, make};
 pub use render::{SplatRenderConfig, SplatRenderReport, SplatRenderView, render};

@@ -22,7 +22,7 @@ use gaussian::Splat;
 use io::colmap::{ColmapModel, ColmapView};
 use io::npy;
 use io::raster::{write_png_gray, write_png_rgb};
-use io::splat_ply::{LocalOrigin, SplatFile, SplatForm};
+use io::splat_ply::{LocalOrigin, SplatFile};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
@@ -49,8 +49,8 @@ const COVERED: f32 = 0.5;
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct SplatRenderConfig {
-    /// Splats (PLY of 3DGS or 2DGS) with their origin beside them. Files of other programs have
-    /// none: they lie in the frame of the perspective cameras.
+    /// Splats (PLY of 3DGS or 2DGS, SPZ, SOG or glTF) with their origin beside them. Files of other
+    /// programs have none: they lie in the frame of the perspective cameras.
     pub splats: PathBuf,
     /// Images with RPCs to look through.
     pub images: Vec<PathBuf>,
@@ -171,7 +171,7 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
     config.validate()?;
     let folder = OutputFolder::take(&config.output)?;
     folder.check_folders(["colour", "alpha", "height", "depth"])?;
-    let file = io::splat_ply::read(&config.splats)?;
+    let file = io::splat_files::read(&config.splats)?;
     let unplaced = || LocalOrigin::new(UNKNOWN_FRAME, UNKNOWN_DATUM, [0.0; 3]);
     // Files of other programs lie in the frame of their cameras.
     let origin = match file.origin.clone() {
@@ -297,7 +297,7 @@ impl RenderSession<'_> {
         };
         let centre = view.pose.centre;
         let splats = self.seen(|splat| [0, 1, 2].map(|i| f64::from(splat.position[i]) - centre[i]));
-        let is_flat = self.file.layout.form == SplatForm::Discs;
+        let is_flat = self.file.is_flat();
         let rendering = match (is_flat, small) {
             (true, Some(camera)) => flat(&splats, &camera),
             (_, None) if shrink > 1 => return Err(refused()),

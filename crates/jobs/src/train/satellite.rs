@@ -59,7 +59,7 @@ const OPACITY_LOGIT_MAX: f32 = 3.0;
 impl PlacedSurfels {
     /// Reads splats whose heights are above the ellipsoid.
     pub(super) fn read(path: &Path) -> Result<Self, TrainError> {
-        let file = io::splat_ply::read(path)?;
+        let file = io::splat_files::read(path)?;
         let invalid = |what: String| TrainError::Dataset { path: path.to_owned(), what };
         let origin = file.origin.ok_or_else(|| {
             invalid(format!("no origin beside the splats: expected {}", io::splat_ply::origin_path(path).display()))

@@ -38,6 +38,7 @@ __all__ = [
     "priors",
     "splats",
     "render_splats",
+    "convert_splats",
     "train",
     "mesh",
     "align",
@@ -1875,8 +1876,8 @@ def render_splats(
     """Look at splats through satellite images and perspective cameras.
 
     Args:
-        splats: Splats (PLY of 3DGS or 2DGS) with their origin beside them. Files of other programs
-            have none: they lie in the frame of the perspective cameras.
+        splats: Splats (PLY of 3DGS or 2DGS, SPZ, SOG or glTF) with their origin beside them. Files
+            of other programs have none: they lie in the frame of the perspective cameras.
         output: Folder to write.
         images: Images with RPCs to look through.
         cameras: Perspective cameras to look through: folder of a COLMAP model on the map of the
@@ -1903,6 +1904,46 @@ def render_splats(
         >>> report = skysweep.render_splats("splats.ply", "views", images=["left.tif"])
     """
     result: Report = run_job("render_splats", locals())
+    return result
+
+
+@job
+def convert_splats(
+    splats: PathLike,
+    output: PathLike,
+    *,
+    discs: bool | None = None,
+    sh_degree: int | None = None,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress = None,
+) -> Report:
+    """Bring splats to another format: PLY of 3DGS or 2DGS, SPZ, SOG, binary glTF.
+
+    Args:
+        splats: File of splats of any format, with its origin beside it where it has one.
+        output: File to write, whose ending names its format: `.ply`, `.spz`, `.sog` or `.glb`. The
+            origin goes beside it.
+        discs: Whether a PLY has two scales for each splat (2DGS) rather than three (3DGS); as in
+            the file when `None`. The other formats always have three.
+        sh_degree: Degree of the harmonics, 0 to 3: padded with zeros or cut; that of the file when
+            `None`.
+        threads: Worker threads; one per core when `None`.
+        overwrite: Whether existing files may be replaced.
+        progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
+
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
+    Raises:
+        TypeError: A keyword that the job does not have; the text names those that it has.
+        SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.convert_splats("splats.ply", "splats.spz", sh_degree=0)
+    """
+    result: Report = run_job("convert_splats", locals())
     return result
 
 
