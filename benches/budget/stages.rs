@@ -8,9 +8,11 @@ use simulate::Simulation;
 use sweep::aggregation::Penalties;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::fusion::{FusionConfig, GridFrame, fuse_views, place_view};
-use sweep::ranges::{EDGE_REACH, Ranges};
+use sweep::ranges::{EDGE_REACH, Ranges, Reach};
 use sweep::{HeightMap, LevelConfig, Reference, SweepView, ViewLevel, source_from_reference, sweep_level};
 
+/// Reach of the default preset.
+const REACH: Reach = Reach { above: EDGE_REACH, below: 8 };
 /// Value of the default preset.
 const STEP_PX: f64 = 0.5;
 /// Half width of the search around the true heights, steps.
@@ -79,7 +81,7 @@ impl<'a> Scene<'a> {
                 None => Ranges::uniform(image.width(), image.height(), step_m, full),
                 Some(c) => {
                     let size = (image.width(), image.height());
-                    Ranges::from_coarser(size.0, size.1, step_m, &c.height_m, c.origin_m, full, EDGE_REACH)
+                    Ranges::from_coarser(size.0, size.1, step_m, &c.height_m, c.origin_m, full, REACH)
                 }
             };
             found = Some(self.sweep(index, level, &ranges.without_voids(image), known)?);

@@ -97,7 +97,8 @@ fn low_height(height_m: &Grid<f32>, trusted: &Grid<bool>, block: usize, (column,
     numeric::order_statistic(&mut known, rank).map(f64::from)
 }
 
-/// Returns the height, at a block, of the plane under the low heights around it; `None` without any.
+/// Returns the height that the plane under the low heights around a block has there; `None` without
+/// any.
 fn plane_at(low: &[Option<f64>], columns: usize, (column, row): (usize, usize), reach: usize) -> Option<f64> {
     let rows = low.len() / columns;
     let mut around = Vec::new();
