@@ -109,6 +109,37 @@ fn a_house_that_is_gone_is_found_with_its_volume() {
 }
 
 #[test]
+fn a_house_whose_heights_are_rather_wrong_is_no_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let later = folder.path().join("later.tif");
+    without_a_house(&later);
+    let surface = read_dem(&later).unwrap();
+    let change = |probability: &dyn Fn(f32) -> f32| {
+        let before = band(&town().join("dsm.tif"), 1);
+        let heights = before.data().iter().zip(surface.heights.data());
+        let stated = heights.map(|(before, after)| probability((before - after).abs())).collect();
+        let grid = Grid::from_vec(before.width(), before.height(), stated).unwrap();
+        let bands = [Band { description: "confidence_0_to_1", data: BandData::F32(&grid) }];
+        let crs = Crs::ellipsoidal(surface.horizontal_epsg.unwrap());
+        let raster = CogRaster { holds_heights: false, ..CogRaster::new(&bands, surface.geotransform, crs) };
+        write_cog(folder.path().join("confidence.tif"), &raster, true).unwrap();
+        let mut command = skysweep();
+        command.arg("diff").arg(town().join("dsm.tif")).arg(&later).arg("-o").arg(folder.path().join("out"));
+        command.args(["--sigma-m", "0.1", "--progress", "none", "--json", "--overwrite"]);
+        let report: Value = serde_json::from_slice(&command.assert().code(0).get_output().stdout).unwrap();
+        assert!(report["notes"].to_string().contains("the first surface has no probabilities"), "{}", report["notes"]);
+        report
+    };
+    let sure = change(&|_| 0.9);
+    let region = &sure["regions"][0];
+    assert!((region["probability"].as_f64().unwrap() - 0.9).abs() < 0.01 && region["independent_cells"].is_f64());
+    assert!(region["decided_m2"].as_f64() > region["area_m2"].as_f64().map(|area| 0.9 * area), "{region}");
+    let weak = change(&|moved| if moved > 0.5 { 0.2 } else { 0.9 });
+    assert_eq!(weak["regions"].as_array().unwrap().len(), 0, "{weak}");
+    assert!(weak["deciding_cells"].as_u64() < sure["deciding_cells"].as_u64());
+}
+
+#[test]
 fn what_cannot_be_compared_is_refused_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let surface = town().join("dsm.tif");

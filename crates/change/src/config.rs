@@ -46,9 +46,12 @@ impl Default for ChangeConfig {
 }
 
 impl ChangeConfig {
-    /// Distance by which walls of a height reach too far outwards, metres.
+    /// Distance by which walls of a height reach too far outwards, metres. It grows at most to the
+    /// tolerance of position: beyond it the change would have been explained by a moved wall, and a
+    /// spike of a hundred metres is no wall.
     pub(crate) fn overreach_of_m(&self, wall_m: f64) -> f64 {
-        self.overreach_m + self.overreach_growth * (wall_m - self.low_wall_m).max(0.0)
+        let growth = self.overreach_growth * (wall_m - self.low_wall_m).max(0.0);
+        self.overreach_m + growth.min(self.position_m)
     }
 
     /// Checks the ranges of the parameters.
@@ -80,6 +83,7 @@ mod tests {
         let config = ChangeConfig { overreach_m: 0.1, overreach_growth: 0.03, low_wall_m: 5.0, ..Default::default() };
         assert_eq!(config.overreach_of_m(4.0), 0.1);
         assert!((config.overreach_of_m(15.0) - 0.4).abs() < 1e-12);
+        assert!((config.overreach_of_m(130.0) - 1.6).abs() < 1e-12, "a spike is no wall");
         let wrong = ChangeConfig { overreach_growth: f64::NAN, ..config };
         assert!(matches!(wrong.validate(), Err(ChangeError::Parameter { .. })));
     }

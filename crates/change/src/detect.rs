@@ -3,6 +3,7 @@
 use raster::Grid;
 use serde::Serialize;
 
+use crate::border::near_border;
 use crate::config::ChangeConfig;
 use crate::correlation::{ErrorCorrelation, spread};
 use crate::error::ChangeError;
@@ -20,6 +21,11 @@ const SHAPES_GROWTH: f64 = 7.0;
 const RAMP_SHARE: f32 = 0.25;
 /// Share of the mean change of a region from which a filled cell belongs to it.
 const FILLED_SHARE: f32 = 0.5;
+/// Least probability that both heights of a cell are right from which the cell decides: it is
+/// rather right than wrong.
+const RATHER_RIGHT: f32 = 0.5;
+/// Least share of a region's cells that must decide. The others follow them.
+const MOSTLY: f64 = 0.5;
 /// Smallest standard deviation of a difference, metres: what f32 keeps of heights on mountains.
 const SIGMA_MIN_M: f32 = 0.001;
 
@@ -36,6 +42,10 @@ pub struct ChangeInput<'a> {
     /// Whether a cell was observed on both dates. Only such cells decide; others may join a region
     /// that surrounds them. Without the raster all cells with two heights were.
     pub observed: Option<&'a Grid<bool>>,
+    /// Probability that both heights of a cell are right, 0 to 1; NaN where nothing is known of it.
+    /// Cells that are rather wrong decide nothing, others count by their probability. Without the
+    /// raster all cells count alike.
+    pub probability: Option<&'a Grid<f32>>,
     /// Side of a cell, metres.
     pub cell_m: f64,
 }
@@ -49,10 +59,20 @@ pub struct ChangeRegion {
     pub cells: Vec<usize>,
     /// Area of these cells, square metres.
     pub area_m2: f64,
+    /// The part of the area whose cells decided: observed on both dates, rather right than wrong,
+    /// and not at the border of a surface, square metres.
+    pub decided_m2: f64,
     /// The part of the area that was not observed on both dates, and has filled heights, square
     /// metres.
     pub filled_m2: f64,
-    /// Mean change of the cells that are beyond the level of detection, metres.
+    /// Cells beyond the level of detection whose errors are independent of each other: what the
+    /// mean and its test rest on.
+    pub independent_cells: f64,
+    /// Mean probability that both heights of these cells are right, 0 to 1; 1 where nothing states
+    /// it.
+    pub probability: f64,
+    /// Mean change of the cells that are beyond the level of detection by their probability,
+    /// metres.
     pub mean_m: f64,
     /// Standard deviation of this mean, metres, with the correlation of the errors.
     pub mean_sigma_m: f64,
@@ -82,7 +102,8 @@ pub struct Change {
     pub difference: Grid<f32>,
     /// Calibrated standard deviation of the difference, metres.
     pub sigma: Grid<f32>,
-    /// Difference in deviations; NaN where the cell was not observed on both dates.
+    /// Difference in deviations; NaN where the cell decides nothing: it was not observed on both
+    /// dates, is rather wrong than right, or lies at the border of a surface.
     pub significance: Grid<f32>,
     /// Number of the region of each cell, from 1; 0 is none.
     pub numbers: Grid<u32>,
@@ -96,6 +117,8 @@ pub struct Change {
     pub detection_m: f64,
     /// Cells observed on both dates.
     pub observed_cells: usize,
+    /// Those of them that decide.
+    pub deciding_cells: usize,
     /// Candidates that were tested: regions large and strong enough.
     pub tested: usize,
     /// Deviation of a scene-wide offset of the heights, metres.
@@ -126,7 +149,8 @@ impl Change {
 /// for row in 20..35 {
 ///     after.row_mut(row)[30..50].fill(6.0);
 /// }
-/// let input = ChangeInput { before: &before, after: &after, sigma: None, observed: None, cell_m: 0.5 };
+/// let input = ChangeInput { before: &before, after: &after, sigma: None, observed: None, probability: None,
+///     cell_m: 0.5 };
 /// let found = detect(&input, &ChangeConfig::default())?;
 /// assert_eq!(found.regions.len(), 1);
 /// assert!((found.regions[0].volume_m3 - 6.0 * 75.0).abs() < 20.0);
@@ -139,13 +163,16 @@ impl Change {
 pub fn detect(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, ChangeError> {
     config.validate()?;
     check(input)?;
-    let mut change = calibrated(input)?;
+    let mut change = calibrated(input, config)?;
     let reach = (config.position_m / input.cell_m).round() as usize;
     let observed_only = |grid: &Grid<f32>| masked(grid, input.observed);
     let left = unexplained(&observed_only(input.before), &observed_only(input.after), reach);
     let deviations = two_sided_quantile(1.0 - config.confidence) as f32;
     let mut signs = Grid::filled(left.width(), left.height(), 0i8);
     for (at, sign) in signs.data_mut().iter_mut().enumerate() {
+        if !change.significance.data()[at].is_finite() {
+            continue;
+        }
         let (left, limit) = (left.data()[at], deviations * change.sigma.data()[at]);
         // A cell below the least change may be part of a region whose mean is above it.
         if left.abs() > limit.max(0.5 * config.least_change_m as f32) {
@@ -162,7 +189,7 @@ pub fn detect(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, 
     candidates.iter().flatten().for_each(|at| stable.data_mut()[*at] = f32::NAN);
     change.correlation = ErrorCorrelation::measure(&stable, input.cell_m);
     let mean_variance = mean_square(&change.sigma);
-    let observed_m2 = change.observed_cells as f64 * change.correlation.cell_area_m2;
+    let observed_m2 = change.deciding_cells as f64 * change.correlation.cell_area_m2;
     change.offset_sigma_m = (mean_variance / change.correlation.effective_cells(observed_m2)).sqrt();
     let places = change.correlation.effective_cells(observed_m2).ln();
     for cells in candidates {
@@ -182,15 +209,18 @@ fn take_region(
 ) -> Option<()> {
     let cell_area_m2 = change.correlation.cell_area_m2;
     let area_m2 = cells.len() as f64 * cell_area_m2;
-    let sum = |cells: &[usize], grid: &Grid<f32>, power: i32| -> f64 {
-        cells.iter().map(|at| f64::from(grid.data()[*at]).powi(power)).sum()
-    };
-    let mean_m = sum(&cells, &change.difference, 1) / cells.len() as f64;
+    let sum = |cells: &[usize], of: &dyn Fn(usize) -> f64| -> f64 { cells.iter().map(|at| of(*at)).sum() };
+    let weight = |at: usize| probability_at(input, at);
+    let weights = sum(&cells, &weight);
+    let mean_m = sum(&cells, &|at| weight(at) * f64::from(change.difference.data()[at])) / weights;
     if area_m2 < config.least_area_m2 || mean_m.abs() < config.least_change_m {
         return None;
     }
     change.tested += 1;
-    let mean_sigma_m = change.mean_sigma_m(cells.len(), sum(&cells, &change.sigma, 2));
+    let variance_m2 = |cells: &[usize]| sum(cells, &|at| f64::from(change.sigma.data()[at]).powi(2));
+    let independent_cells = change.correlation.effective_cells(weights * cell_area_m2);
+    let variance_of_one = variance_m2(&cells) / cells.len() as f64;
+    let mean_sigma_m = (variance_of_one / independent_cells + change.offset_sigma_m.powi(2)).sqrt();
     let shapes = (change.correlation.effective_cells(area_m2) - 1.0) * SHAPES_GROWTH.ln();
     let ln_p = ln_two_sided(mean_m / mean_sigma_m) + places + shapes;
     if ln_p > (1.0 - config.confidence).ln() {
@@ -199,27 +229,38 @@ fn take_region(
     let number = change.regions.len() as u32 + 1;
     cells.iter().for_each(|at| change.numbers.data_mut()[*at] = number);
     let along = |at: usize| change.difference.data()[at] * mean_m.signum() as f32;
-    let is_observed = |at: usize| change.significance.data()[at].is_finite();
+    let decides = |at: usize| change.significance.data()[at].is_finite();
     let ramp = (2.0 * config.position_m / input.cell_m).round() as usize;
     let (least_ramp, least_filled) = (RAMP_SHARE * mean_m.abs() as f32, FILLED_SHARE * mean_m.abs() as f32);
-    let joins = |at: usize| along(at) > if is_observed(at) { least_ramp } else { least_filled };
+    let joins = |at: usize| along(at) > if is_observed(input, at) { least_ramp } else { least_filled };
     let gained = grow(&mut change.numbers, &cells, number, ramp, joins);
-    let extreme = cells.iter().map(|at| along(*at)).fold(0.0, f32::max);
+    let seeds = cells.len();
     let all: Vec<usize> = cells.into_iter().chain(gained).collect();
-    let (all_m2, filled) = (all.len() as f64 * cell_area_m2, all.iter().filter(|at| !is_observed(**at)).count() as f64);
+    let counted = |counts: &dyn Fn(usize) -> bool| all.iter().filter(|at| counts(**at)).count() as f64 * cell_area_m2;
+    let (all_m2, decided_m2) = (all.len() as f64 * cell_area_m2, counted(&decides));
+    if decided_m2 < MOSTLY * all_m2 {
+        all.iter().for_each(|at| change.numbers.data_mut()[*at] = NONE);
+        return None;
+    }
+    let extreme = all.iter().take(seeds).map(|at| along(*at)).fold(0.0, f32::max);
     let half = 0.5 * mean_m.abs() as f32;
     let core: Vec<usize> = all.iter().copied().filter(|at| along(*at) > half).collect();
     let border_m = perimeter(&core, change.difference.width()) * input.cell_m;
-    let step_m = sum(&core, &change.difference, 1) / core.len().max(1) as f64;
-    let raw_m3 = sum(&all, &change.difference, 1) * cell_area_m2;
+    let difference = |at: usize| f64::from(change.difference.data()[at]);
+    let step_m = sum(&core, &difference) / core.len().max(1) as f64;
+    let raw_m3 = sum(&all, &difference) * cell_area_m2;
     // A wall that lies inwards cannot turn a gain into a loss.
     let overreach_m3 = (config.overreach_of_m(step_m.abs()) * border_m * step_m / raw_m3).min(0.9) * raw_m3;
     let wall_sigma_m3 = config.overreach_sigma_m * border_m * step_m.abs();
-    let noise_m3 = change.mean_sigma_m(all.len(), sum(&all, &change.sigma, 2)) * all_m2;
+    let noise_m3 = change.mean_sigma_m(all.len(), variance_m2(&all)) * all_m2;
+    let filled_m2 = counted(&|at| !is_observed(input, at));
     change.regions.push(ChangeRegion {
         cells: all,
         area_m2: all_m2,
-        filled_m2: filled * cell_area_m2,
+        decided_m2,
+        filled_m2,
+        independent_cells,
+        probability: weights / seeds as f64,
         mean_m,
         mean_sigma_m,
         extreme_m: f64::from(extreme) * mean_m.signum(),
@@ -233,9 +274,19 @@ fn take_region(
     Some(())
 }
 
+/// Returns whether a cell was observed on both dates.
+fn is_observed(input: &ChangeInput<'_>, at: usize) -> bool {
+    input.observed.is_none_or(|observed| observed.data()[at])
+}
+
+/// Returns the probability that both heights of a cell are right; 1 where nothing states it.
+fn probability_at(input: &ChangeInput<'_>, at: usize) -> f64 {
+    let stated = input.probability.map(|probability| probability.data()[at]);
+    stated.filter(|probability| probability.is_finite()).map_or(1.0, f64::from)
+}
+
 /// Makes the rasters of differences with calibrated deviations; regions and correlation come later.
-fn calibrated(input: &ChangeInput<'_>) -> Result<Change, ChangeError> {
-    let is_observed = |at: usize| input.observed.is_none_or(|observed| observed.data()[at]);
+fn calibrated(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, ChangeError> {
     let (width, height) = (input.before.width(), input.before.height());
     let mut difference = input.after.clone();
     difference.data_mut().iter_mut().zip(input.before.data()).for_each(|(d, before)| *d -= before);
@@ -243,19 +294,22 @@ fn calibrated(input: &ChangeInput<'_>) -> Result<Change, ChangeError> {
         let mut known: Vec<f32> = sigma.data().iter().copied().filter(|s| s.is_finite() && *s > 0.0).collect();
         numeric::upper_median(&mut known)
     });
+    let at_border = near_border(&difference, (2.0 * config.position_m / input.cell_m).round() as usize);
     let mut sigma = Grid::filled(width, height, f32::NAN);
-    let mut significance = sigma.clone();
+    let (mut significance, mut observed_cells) = (sigma.clone(), 0);
     for at in (0..width * height).filter(|at| difference.data()[*at].is_finite()) {
         let given = input.sigma.map(|sigma| sigma.data()[at]).filter(|s| s.is_finite() && *s > 0.0);
         let own = given.or(usual).unwrap_or(1.0).max(SIGMA_MIN_M);
         sigma.data_mut()[at] = own;
-        if is_observed(at) {
+        let observed = is_observed(input, at);
+        observed_cells += usize::from(observed);
+        if observed && !at_border.data()[at] && probability_at(input, at) >= f64::from(RATHER_RIGHT) {
             significance.data_mut()[at] = difference.data()[at] / own;
         }
     }
-    let observed_cells = significance.data().iter().filter(|z| z.is_finite()).count();
-    if observed_cells < CELLS_MIN {
-        return Err(ChangeError::TooFewCells { found: observed_cells, needed: CELLS_MIN });
+    let deciding_cells = significance.data().iter().filter(|z| z.is_finite()).count();
+    if deciding_cells < CELLS_MIN {
+        return Err(ChangeError::TooFewCells { found: deciding_cells, observed: observed_cells, needed: CELLS_MIN });
     }
     // Identical surfaces have no spread; the least deviation keeps them apart from a division by 0.
     let factor = spread(&significance).max(1e-3);
@@ -274,6 +328,7 @@ fn calibrated(input: &ChangeInput<'_>) -> Result<Change, ChangeError> {
         correlation,
         detection_m: 0.0,
         observed_cells,
+        deciding_cells,
         tested: 0,
         offset_sigma_m: 0.0,
     })
@@ -303,6 +358,7 @@ fn check(input: &ChangeInput<'_>) -> Result<(), ChangeError> {
     fits("the second surface", Some((input.after.width(), input.after.height())))?;
     fits("the raster of deviations", input.sigma.map(|grid| (grid.width(), grid.height())))?;
     fits("the raster of observed cells", input.observed.map(|grid| (grid.width(), grid.height())))?;
+    fits("the raster of probabilities", input.probability.map(|grid| (grid.width(), grid.height())))?;
     if !(input.cell_m.is_finite() && input.cell_m > 0.0) {
         let (name, expected) = ("the side of a cell", "a positive number of metres");
         return Err(ChangeError::Parameter { name, found: input.cell_m, expected });

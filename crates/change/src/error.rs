@@ -24,11 +24,16 @@ pub enum ChangeError {
         /// Columns and rows of the first surface.
         expected: (usize, usize),
     },
-    /// Too few cells are observed in both surfaces.
-    #[error("{found} cells are observed in both surfaces, {needed} are needed: check that they cover the same ground")]
+    /// Too few cells decide.
+    #[error(
+        "{observed} cells are observed in both surfaces, and {found} of them are rather right than wrong and clear of \
+         the borders; {needed} are needed: check that the surfaces cover the same ground and hold"
+    )]
     TooFewCells {
-        /// Number of cells.
+        /// Number of cells that decide.
         found: usize,
+        /// Number of cells observed in both surfaces.
+        observed: usize,
         /// Lowest number that is accepted.
         needed: usize,
     },

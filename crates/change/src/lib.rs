@@ -1,7 +1,8 @@
 //! Change between two surface models of the same place: where it is significant, and its volume.
 //!
 //! Both surfaces lie on one grid, in metres above one vertical datum; NaN is a cell that was not
-//! observed. [`detect`] works in five steps:
+//! observed. A cell *decides* where it was observed on both dates, its heights are rather right than
+//! wrong, and it lies clear of the borders of the surfaces. [`detect`] works in five steps:
 //!
 //! 1. The **difference** after − before, and its standard deviation from those of the surfaces.
 //! 2. **Calibration**: the standardised differences of a scene that has mostly not changed must
@@ -11,6 +12,7 @@
 //!    et al. (2022, <https://doi.org/10.1109/JSTARS.2022.3188922>).
 //! 4. **Regions** of cells beyond the level of detection with one sign. Heights that the other
 //!    surface has within the tolerance of position do not count as changed, so that walls do not.
+//!    Most cells of a region must decide.
 //! 5. A **test** of each region's mean. The probability is multiplied by the number of connected
 //!    shapes of its size that the scene holds (Bonferroni), so that all regions together contain an
 //!    invented one with a probability of at most 1 − confidence.
@@ -18,6 +20,7 @@
 //! Volumes are sums of differences over cells. What walls reach beyond the real ones is taken off,
 //! and the deviations hold the correlation of the errors and the uncertainty of the walls.
 
+mod border;
 mod config;
 mod correlation;
 mod detect;

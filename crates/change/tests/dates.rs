@@ -56,7 +56,7 @@ fn observed(exact: &Grid<f32>, seed: u64) -> Grid<f32> {
 
 fn compared(before: &Grid<f32>, after: &Grid<f32>) -> Change {
     let sigma = Grid::filled(SIDE, SIDE, 0.3f32);
-    let input = ChangeInput { before, after, sigma: Some(&sigma), observed: None, cell_m: CELL_M };
+    let input = ChangeInput { before, after, sigma: Some(&sigma), observed: None, probability: None, cell_m: CELL_M };
     detect(&input, &ChangeConfig::default()).unwrap()
 }
 
@@ -125,7 +125,7 @@ fn cells_that_were_not_observed_decide_nothing() {
     let mut seen = Grid::filled(SIDE, SIDE, true);
     let of = |seen: &Grid<bool>| {
         let (sigma, observed) = (Some(&sigma), Some(seen));
-        let input = ChangeInput { before: &before, after: &after, sigma, observed, cell_m: CELL_M };
+        let input = ChangeInput { before: &before, after: &after, sigma, observed, probability: None, cell_m: CELL_M };
         detect(&input, &ChangeConfig::default()).unwrap()
     };
     (100..130).for_each(|row| seen.row_mut(row)[100..104].fill(false));
@@ -137,10 +137,53 @@ fn cells_that_were_not_observed_decide_nothing() {
 }
 
 #[test]
+fn heights_that_are_rather_wrong_decide_nothing() {
+    let (before, after) = (observed(&town(&[]), 1), observed(&town(&[([100, 100], [30, 60], 8.0)]), 2));
+    let sigma = Grid::filled(SIDE, SIDE, 0.3f32);
+    let of = |probability: &Grid<f32>| {
+        let (sigma, probability) = (Some(&sigma), Some(probability));
+        let input = ChangeInput { before: &before, after: &after, sigma, observed: None, probability, cell_m: CELL_M };
+        detect(&input, &ChangeConfig::default()).unwrap()
+    };
+    let mut probability = Grid::filled(SIDE, SIDE, 0.9f32);
+    probability[(115, 115)] = f32::NAN;
+    let sure = of(&probability);
+    assert_eq!(sure.regions.len(), 1);
+    let region = &sure.regions[0];
+    assert!(region.decided_m2 == region.area_m2 && (region.probability - 0.9).abs() < 0.01, "{region:?}");
+    // A strip of 60 m² that decides does not carry three metres of doubtful heights beside it.
+    let weak_to = |column: usize| {
+        let mut probability = probability.clone();
+        (90..170).for_each(|row| probability.row_mut(row)[90..column].fill(0.3));
+        of(&probability)
+    };
+    assert_eq!(weak_to(126).regions.len(), 0);
+    let kept = weak_to(106);
+    assert_eq!(kept.regions.len(), 1);
+    let region = &kept.regions[0];
+    assert!(region.decided_m2 < 0.85 * region.area_m2 && region.filled_m2 == 0.0, "{region:?}");
+    assert!((region.volume_m3 / 3600.0 - 1.0).abs() < 0.05 && region.mean_sigma_m > sure.regions[0].mean_sigma_m);
+}
+
+#[test]
+fn the_border_of_a_surface_decides_nothing() {
+    let exact = town(&[]);
+    let (before, mut after) = (observed(&exact, 1), observed(&exact, 2));
+    // A spiky rim two metres wide where the second surface ends.
+    for row in 0..SIDE {
+        after.row_mut(row)[..40].fill(f32::NAN);
+        after.row_mut(row)[40..44].iter_mut().for_each(|height| *height += 15.0);
+    }
+    let found = compared(&before, &after);
+    assert_eq!(found.regions.len(), 0, "{:?}", found.regions.iter().map(|r| r.mean_m).collect::<Vec<_>>());
+    assert!(found.deciding_cells < found.observed_cells);
+}
+
+#[test]
 fn unusable_input_is_refused() {
     let (small, other) = (Grid::filled(5, 5, 1.0f32), Grid::filled(4, 5, 1.0f32));
     let told = |before, after, cell_m, config: ChangeConfig| {
-        let input = ChangeInput { before, after, sigma: None, observed: None, cell_m };
+        let input = ChangeInput { before, after, sigma: None, observed: None, probability: None, cell_m };
         detect(&input, &config).unwrap_err().to_string()
     };
     assert!(told(&small, &other, 0.5, ChangeConfig::default()).contains("(4, 5)"));

@@ -32,6 +32,8 @@ pub(super) struct Aligned {
     pub(super) sigma: Option<Grid<f32>>,
     /// Cells observed on both dates.
     pub(super) observed: Grid<bool>,
+    /// Probability that both heights of a cell are right; `None` if neither surface states one.
+    pub(super) probability: Option<Grid<f32>>,
     /// Shift that was added to the second surface.
     pub(super) shift: Shift,
     /// Side of a cell, metres.
@@ -77,6 +79,22 @@ impl Aligned {
         if sigma.is_none() {
             inputs.notes.push("no standard deviations are known: that of the differences stands for them".into());
         }
+        let stated = [layers.confidence.as_ref(), inputs.layers.confidence.as_ref()];
+        for (date, _) in ["first", "second"].iter().zip(&stated).filter(|(_, stated)| stated.is_none()) {
+            inputs.notes.push(format!(
+                "the {date} surface has no probabilities beside it (confidence.tif): all its heights count as right"
+            ));
+        }
+        // The errors of the dates are independent, so both are right with the product.
+        let probability = (stated != [None, None]).then(|| {
+            let right = |at: usize| {
+                let (x, y) = place(at);
+                let before = stated[0].map_or(1.0, |grid| grid.data()[at]);
+                before * stated[1].map_or(1.0, |grid| nearest(grid, x, y).unwrap_or(f32::NAN))
+            };
+            Grid::from_vec(width, height, (0..width * height).map(right).collect())
+        });
+        let probability = probability.flatten();
         let (along_columns, along_rows) = inputs.metres_from_cells.cell_size_m();
         if (along_columns - along_rows).abs() > SQUARE_TOLERANCE * along_columns.max(along_rows) {
             inputs.notes.push(format!(
@@ -86,7 +104,7 @@ impl Aligned {
         }
         let cell_m = inputs.metres_from_cells.cell_area_m2().sqrt();
         let is_own = layers.origins.is_some() && inputs.layers.origins.is_some();
-        Ok(Self { after: found.aligned, sigma, observed, shift: found.shift, cell_m, is_own, inputs })
+        Ok(Self { after: found.aligned, sigma, observed, probability, shift: found.shift, cell_m, is_own, inputs })
     }
 }
 

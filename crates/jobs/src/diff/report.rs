@@ -42,6 +42,10 @@ pub struct DiffReport {
     pub before: PathBuf,
     /// Surface of the second date.
     pub after: PathBuf,
+    /// When the images of the first surface were taken, as far as the surface says so.
+    pub before_acquired: Vec<String>,
+    /// When those of the second surface were taken.
+    pub after_acquired: Vec<String>,
     /// Folder of the results.
     pub output: PathBuf,
     /// CRS of the rasters, and the vertical datum of both surfaces.
@@ -64,6 +68,8 @@ pub struct DiffReport {
     pub correlation: ErrorCorrelation,
     /// Cells observed on both dates.
     pub observed_cells: usize,
+    /// Those of them that decide: rather right than wrong, and clear of the borders.
+    pub deciding_cells: usize,
     /// Cells with a height on both dates of which one was filled.
     pub filled_cells: usize,
     /// Candidates that were tested.
@@ -86,13 +92,19 @@ impl DiffReport {
         let shift = &self.shift;
         let mut text = format!(
             "change  {}\n\
+             dates   {} to {}\n\
              shift   {:+.2} m east, {:+.2} m north, {:+.2} m up\n\
+             cells   {} observed on both dates, {} of them decide\n\
              level   {:.2} m for a cell (deviations × {:.2})\n\
              regions {} of {} candidates\ngain    {:.0} ± {:.0} m³\nloss    {:.0} ± {:.0} m³\n",
             self.output.display(),
+            dates(&self.before_acquired),
+            dates(&self.after_acquired),
             shift.dx_m,
             shift.dy_m,
             shift.dz_m,
+            self.observed_cells,
+            self.deciding_cells,
             self.detection_m,
             self.sigma_factor,
             self.regions.len(),
@@ -107,8 +119,14 @@ impl DiffReport {
             let (n, found) = (region.number, &region.found);
             let _ = writeln!(
                 text,
-                "  {n:<4}  {:.0} m², {:+.2} ± {:.2} m, {:+.0} ± {:.0} m³",
-                found.area_m2, found.mean_m, found.mean_sigma_m, found.volume_m3, found.volume_sigma_m3
+                "  {n:<4}  {:.0} m², {:+.2} ± {:.2} m, {:+.0} ± {:.0} m³; {:.0} % of it decided, right with {:.2}",
+                found.area_m2,
+                found.mean_m,
+                found.mean_sigma_m,
+                found.volume_m3,
+                found.volume_sigma_m3,
+                100.0 * found.decided_m2 / found.area_m2,
+                found.probability
             );
         }
         if self.regions.len() > LISTED {
@@ -126,5 +144,16 @@ impl DiffReport {
             let _ = writeln!(text, "note    {note}");
         }
         text
+    }
+}
+
+/// Returns the days of acquisition in words: one, or the first and the last.
+fn dates(acquired: &[String]) -> String {
+    let mut days: Vec<&str> = acquired.iter().map(|time| time.split('T').next().unwrap_or(time)).collect();
+    days.sort_unstable();
+    match (days.first(), days.last()) {
+        (Some(first), Some(last)) if first != last => format!("{first}/{last}"),
+        (Some(only), _) => (*only).to_owned(),
+        _ => "unknown".to_owned(),
     }
 }

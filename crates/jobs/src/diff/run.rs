@@ -82,6 +82,7 @@ pub fn run(config: &DiffConfig, progress: &dyn Progress) -> Result<DiffReport, D
             after: &aligned.after,
             sigma: aligned.sigma.as_ref(),
             observed: Some(&aligned.observed),
+            probability: aligned.probability.as_ref(),
             cell_m: aligned.cell_m,
         };
         let change = detect(&input, &parameters(config, &aligned))?;
@@ -145,6 +146,9 @@ fn finish(
         offset_sigma_m: change.offset_sigma_m,
         correlation: change.correlation.clone(),
         observed_cells: change.observed_cells,
+        deciding_cells: change.deciding_cells,
+        before_acquired: before.provenance.acquired.clone(),
+        after_acquired: aligned.inputs.test.provenance.acquired.clone(),
         filled_cells: with_heights - change.observed_cells,
         tested: change.tested,
         regions,
@@ -227,7 +231,7 @@ impl Written<'_> {
             report_page::legend_layer("Change", "Second surface minus first.", difference, metres()),
             report_page::legend_layer(
                 "Significance",
-                "The change in standard deviations, where both dates were observed.",
+                "The change in standard deviations, where the cell decides.",
                 significance,
                 Legend::signed(SHOWN_SIGMAS, "σ"),
             ),
