@@ -1,8 +1,8 @@
 //! Change between two surface models of the same place: where it is significant, and its volume.
 //!
 //! Both surfaces lie on one grid, in metres above one vertical datum; NaN is a cell that was not
-//! observed. A cell *decides* where it was observed on both dates, its heights are rather right than
-//! wrong, and it lies clear of the borders of the surfaces. [`detect`] works in five steps:
+//! observed. A cell *decides* where it was observed on both dates, its heights are rather right
+//! than wrong, and it lies clear of the borders of the surfaces. [`detect`] works in five steps:
 //!
 //! 1. The **difference** after − before, and its standard deviation from those of the surfaces.
 //! 2. **Calibration**: the standardised differences of a scene that has mostly not changed must
