@@ -1,5 +1,6 @@
 //! One height per cell from the heights of several views.
 
+use numeric::middle_values;
 use raster::{Grid, Window};
 use rayon::prelude::*;
 
@@ -32,6 +33,9 @@ pub const BLOCK: usize = 256;
 pub struct FusedSurface {
     /// Height above the origin, metres; NaN in voids.
     pub height_m: Grid<f32>,
+    /// Height of each cell by itself, the median of the views that support it: what the scatter
+    /// between cells is measured on. Metres; NaN in voids.
+    pub single_m: Grid<f32>,
     /// Standard deviation, metres; NaN in voids.
     pub sigma_m: Grid<f32>,
     /// Number of views behind each height.
@@ -56,6 +60,7 @@ struct Sample {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Cell {
     height_m: f32,
+    single_m: f32,
     sigma_m: f32,
     views: u8,
     confidence: f32,
@@ -78,6 +83,7 @@ pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionCon
     let mut out = FusedSurface::empty(size);
     for (w, part) in parts.iter().flatten() {
         paste(&mut out.height_m, *w, &part.height_m);
+        paste(&mut out.single_m, *w, &part.single_m);
         paste(&mut out.sigma_m, *w, &part.sigma_m);
         paste(&mut out.views, *w, &part.views);
         paste(&mut out.confidence, *w, &part.confidence);
@@ -118,6 +124,7 @@ impl FusedSurface {
     fn empty((columns, rows): (usize, usize)) -> Self {
         Self {
             height_m: Grid::filled(columns, rows, f32::NAN),
+            single_m: Grid::filled(columns, rows, f32::NAN),
             sigma_m: Grid::filled(columns, rows, f32::NAN),
             views: Grid::filled(columns, rows, 0),
             confidence: Grid::filled(columns, rows, 0.0),
@@ -138,8 +145,9 @@ fn fuse(surfaces: &[ViewSurface], chosen_m: &Grid<f32>, same_surface_m: f32) -> 
             weight: s.weight.data()[i],
         });
         samples.extend(held.filter(|s| !s.height_m.is_nan()));
-        if let Some(cell) = fuse_cell(&samples, *chosen_m, same_surface_m) {
+        if let Some(cell) = fuse_cell(&mut samples, *chosen_m, same_surface_m) {
             out.height_m.data_mut()[i] = cell.height_m;
+            out.single_m.data_mut()[i] = cell.single_m;
             out.sigma_m.data_mut()[i] = cell.sigma_m;
             out.views.data_mut()[i] = cell.views;
             out.confidence.data_mut()[i] = cell.confidence;
@@ -150,17 +158,19 @@ fn fuse(surfaces: &[ViewSurface], chosen_m: &Grid<f32>, same_surface_m: f32) -> 
 }
 
 /// Fuses the samples that support the chosen height; `None` if there are none.
-fn fuse_cell(samples: &[Sample], chosen_m: f32, same_surface_m: f32) -> Option<Cell> {
-    let supports = || samples.iter().filter(|s| (s.height_m - chosen_m).abs() <= same_surface_m);
-    let views = supports().count();
-    let support: f32 = supports().map(|s| s.weight).sum();
+fn fuse_cell(samples: &mut Vec<Sample>, chosen_m: f32, same_surface_m: f32) -> Option<Cell> {
     let all: f32 = samples.iter().map(|s| s.weight).sum();
+    samples.retain(|s| (s.height_m - chosen_m).abs() <= same_surface_m);
+    samples.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
+    let (low, high) = middle_values(samples)?;
+    let support: f32 = samples.iter().map(|s| s.weight).sum();
     // The deviation is that of a weighted mean of the samples, taken as independent.
-    let information: f32 = supports().map(|s| 1.0 / s.sigma_m.max(1e-3).powi(2)).sum();
-    (views > 0).then(|| Cell {
+    let information: f32 = samples.iter().map(|s| 1.0 / s.sigma_m.max(1e-3).powi(2)).sum();
+    Some(Cell {
         height_m: chosen_m,
+        single_m: 0.5 * (low.height_m + high.height_m),
         sigma_m: information.sqrt().recip(),
-        views: views.min(255) as u8,
+        views: samples.len().min(255) as u8,
         confidence: support / (all + 1.0),
         seen: support >= SEEN_WEIGHT,
     })
@@ -172,13 +182,14 @@ mod tests {
 
     fn cell(samples: &[(f32, f32)], chosen_m: f32) -> Option<Cell> {
         let sample = |&(height_m, weight): &(f32, f32)| Sample { height_m, sigma_m: 0.1, weight };
-        fuse_cell(&samples.iter().map(sample).collect::<Vec<_>>(), chosen_m, 1.0)
+        fuse_cell(&mut samples.iter().map(sample).collect(), chosen_m, 1.0)
     }
 
     #[test]
     fn only_samples_on_the_chosen_surface_support_it() {
         let c = cell(&[(10.2, 1.0), (30.0, 1.0), (10.0, 0.25)], 10.1).unwrap();
         assert_eq!((c.height_m, c.views, c.seen), (10.1, 2, true));
+        assert!((c.single_m - 10.1).abs() < 1e-5);
         assert!((c.confidence - 1.25 / 3.25).abs() < 1e-6);
         assert!(
             cell(&[(10.0, 1.0)], 20.0).is_none()

@@ -54,6 +54,9 @@ pub struct TrustConfig {
 /// that each height is right within the tolerance; NaN in voids. The deviation of the cameras
 /// enters the deviations only: it is much smaller than the tolerance.
 ///
+/// `single_m` holds the height of each cell by itself, before heights were regularised over cells:
+/// the roughness is that of these.
+///
 /// `sigma_m` holds the deviation from the sharpness of the costs where `is_observed`, and a final
 /// deviation in filled cells, metres. `agreement` is 0 to 1 where a height was observed and 0
 /// elsewhere.
@@ -65,11 +68,12 @@ pub struct TrustConfig {
 /// let height_m = Grid::filled(9, 9, 5.0f32);
 /// let (mut sigma_m, agreement) = (Grid::filled(9, 9, 0.1f32), Grid::filled(9, 9, 0.7f32));
 /// let config = TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3, camera_m: 0.0 };
-/// let confidence = calibrate(&height_m, &mut sigma_m, &agreement, |_| true, &config);
+/// let confidence = calibrate(&height_m, &height_m, &mut sigma_m, &agreement, |_| true, &config);
 /// assert!(confidence[(4, 4)] > 0.95 && sigma_m[(4, 4)] < 0.5);
 /// ```
 pub fn calibrate(
     height_m: &Grid<f32>,
+    single_m: &Grid<f32>,
     sigma_m: &mut Grid<f32>,
     agreement: &Grid<f32>,
     is_observed: impl Fn(usize) -> bool,
@@ -80,7 +84,7 @@ pub fn calibrate(
     let agreed = window_sums(heights.len(), width, config.reach_cells, |i| {
         if heights[i].is_nan() { 0.0 } else { f64::from(agreement.data()[i]) }
     });
-    let roughness_m = roughness(height_m);
+    let roughness_m = roughness(single_m);
     let in_steps = |value_m: f32| (f64::from(value_m) / config.step_m).max(RATIO_MIN).ln();
     let mut confidence = height_m.clone();
     for (i, confidence) in confidence.data_mut().iter_mut().enumerate().filter(|(_, h)| !h.is_nan()) {
@@ -159,7 +163,7 @@ mod tests {
         let mut sigma_m = Grid::filled(40, 20, 0.1f32);
         let filled = 12 * 40 + 4;
         sigma_m.data_mut()[filled] = 2.5;
-        let confidence = calibrate(&height_m, &mut sigma_m, &agreement, |i| i != filled, &CONFIG);
+        let confidence = calibrate(&height_m, &height_m, &mut sigma_m, &agreement, |i| i != filled, &CONFIG);
         assert!(confidence[(20, 10)].is_nan());
         let [smooth, alone, rough] = [(16, 3), (2, 3), (36, 10)];
         assert!(sigma_m[smooth] < sigma_m[rough] && sigma_m[smooth] < sigma_m[alone]);
@@ -176,7 +180,7 @@ mod tests {
         let calibrated = |camera_m: f64| {
             let mut sigma_m = Grid::filled(9, 9, 0.1f32);
             let config = TrustConfig { camera_m, ..CONFIG };
-            let confidence = calibrate(&height_m, &mut sigma_m, &agreement, |i| i != 0, &config);
+            let confidence = calibrate(&height_m, &height_m, &mut sigma_m, &agreement, |i| i != 0, &config);
             (sigma_m, confidence)
         };
         let ((exact, p), (off, q)) = (calibrated(0.0), calibrated(0.3));
@@ -202,7 +206,7 @@ mod tests {
         let calibrated = |scale: f32| {
             let mut sigma_m = Grid::filled(12, 12, 0.1 * scale);
             let config = TrustConfig { step_m: 0.5 * f64::from(scale), tolerance_m: f64::from(scale), ..CONFIG };
-            let confidence = calibrate(&heights(scale), &mut sigma_m, &agreement, |_| true, &config);
+            let confidence = calibrate(&heights(scale), &heights(scale), &mut sigma_m, &agreement, |_| true, &config);
             (sigma_m.map(|s| s / scale), confidence)
         };
         let ((fine, p), (coarse, q)) = (calibrated(1.0), calibrated(4.0));

@@ -117,7 +117,8 @@ pub(crate) fn clean_up(
         fused.sigma_m.data_mut()[i] = filled.sigma_m.data()[i];
     }
     let is_observed = |i: usize| !filled.source.data()[i].is_filled();
-    fused.confidence = calibrate(&fused.height_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
+    fused.confidence =
+        calibrate(&fused.height_m, &fused.single_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
     (filled.source, before - observed)
 }
 
@@ -153,7 +154,7 @@ fn drop_weak(fused: &mut FusedSurface, trust: &TrustConfig, gsd_m: f64) {
 
 /// Returns the probability that each height is right, before anything is filled.
 fn probability(fused: &FusedSurface, trust: &TrustConfig) -> Grid<f32> {
-    calibrate(&fused.height_m, &mut fused.sigma_m.clone(), &fused.confidence, |_| true, trust)
+    calibrate(&fused.height_m, &fused.single_m, &mut fused.sigma_m.clone(), &fused.confidence, |_| true, trust)
 }
 
 fn forget_agreement_of_voids(fused: &mut FusedSurface) {
