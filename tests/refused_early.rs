@@ -78,11 +78,15 @@ fn an_output_file_that_cannot_be_written_is_refused_first() {
         (&["eval", "no_1.tif", "no_2.tif", "--no-report"], "--html"),
         (&["split", "no_model"], "-o"),
     ];
+    let taken = tempfile::Builder::new().suffix(".ply").tempdir().unwrap();
     for (arguments, option) in commands {
+        // The ending of a file of splats says its format.
+        let file = if arguments[0] == "splats" { "out.ply" } else { "out.tif" };
+        let unwritable = format!("/proc/self/{file}");
         for (place, named) in [
-            (missing.join("out.tif"), "folder does not exist"),
-            (root.path().to_owned(), "a folder has this name"),
-            ("/proc/self/out.tif".into(), "/proc/self/out.tif"),
+            (missing.join(file), "folder does not exist"),
+            (taken.path().to_owned(), "a folder has this name"),
+            (unwritable.clone().into(), unwritable.as_str()),
         ] {
             let mut command = skysweep();
             // Without it the folder would be refused as an output that exists already.
@@ -92,6 +96,7 @@ fn an_output_file_that_cannot_be_written_is_refused_first() {
         }
     }
     assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 0);
+    assert_eq!(std::fs::read_dir(taken.path()).unwrap().count(), 0);
 }
 
 /// A DSM is on a map, near the place of the CRS, and above a vertical datum.
@@ -128,13 +133,13 @@ fn a_surface_with_an_undeclared_no_data_value_is_refused_by_name() {
     let bands = [Band { description: "height_m", data: BandData::F32(&heights) }];
     let surface = CogRaster { no_data: None, ..CogRaster::new(&bands, dem.geotransform, Crs::ellipsoidal(32631)) };
     write_cog(&path, &surface, false).unwrap();
-    let out = folder.path().join("out.tif");
+    let [out, splats] = ["out.tif", "out.ply"].map(|name| folder.path().join(name));
     let image = sample("view_1.tif");
     let cases: [(&str, Vec<&OsStr>); 5] = [
         ("eval", vec![path.as_os_str(), truth.as_os_str()]),
         ("eval", vec![truth.as_os_str(), path.as_os_str()]),
         ("ortho", vec!["--dsm".as_ref(), path.as_os_str(), image.as_os_str(), "-o".as_ref(), out.as_os_str()]),
-        ("splats", vec![path.as_os_str(), image.as_os_str(), "-o".as_ref(), out.as_os_str()]),
+        ("splats", vec![path.as_os_str(), image.as_os_str(), "-o".as_ref(), splats.as_os_str()]),
         (
             "heightmap",
             vec![
