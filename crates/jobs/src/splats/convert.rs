@@ -110,7 +110,7 @@ impl SplatConvertReport {
 /// let folder = tempfile::tempdir()?;
 /// let ply = folder.path().join("town.ply");
 /// make(&SplatsConfig::new(town.join("truth/dsm.tif"), vec![town.join("view_1.tif")], ply.clone()), &numeric::Silent)?;
-/// let report = convert(&SplatConvertConfig::new(ply, folder.path().join("town.spz")), &numeric::Silent)?;
+/// let report = convert(&SplatConvertConfig::new(ply, folder.path().join("small.spz")), &numeric::Silent)?;
 /// assert!(4 * report.bytes < report.bytes_before);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

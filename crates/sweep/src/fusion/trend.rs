@@ -184,7 +184,8 @@ mod tests {
             _ => f32::NAN,
         });
         let out = trend(&height_m);
-        assert!(out.data().iter().all(|h| (h - 7.0).abs() < 0.5));
+        // At a corner of the grid a single crossing does not tell a slope.
+        assert!((60..90).all(|y| out.row(y)[60..140].iter().all(|h| (h - 7.0).abs() < 0.5)), "{:?}", out.row(75));
     }
 
     #[test]
