@@ -16,6 +16,7 @@ import sys
 import numpy as np
 import rasterio
 from rasterio.transform import from_origin
+from scipy import ndimage as ndi
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "shared/tools"))
 import scenes  # noqa: E402
@@ -80,9 +81,8 @@ def without(z, albedo, ground, bare, numbers, absent):
     return np.where(gone, ground, z).astype(np.float32), np.where(gone, bare, albedo).astype(np.float32)
 
 
-def chosen(numbers, trees, inner, count, seed):
-    """Buildings that stand within the core, clear of others by two metres and with hardly a tree on them."""
-    from scipy import ndimage as ndi
+def chosen(numbers, inner, count, seed):
+    """Buildings that stand within the core, clear of others by two metres."""
     good = []
     for number, box in enumerate(ndi.find_objects(np.maximum(numbers, 0)), 1):
         if box is None:
@@ -109,7 +109,7 @@ def make(seed, folder, changes):
     core = (slice(margin, n - margin),) * 2
     inner = np.zeros(z.shape, bool)
     inner[margin + 20:n - margin - 20, margin + 20:n - margin - 20] = True
-    picked = chosen(numbers, None, inner, changes, seed)
+    picked = chosen(numbers, inner, changes, seed)
     added, removed = picked[::2], picked[1::2]
     east, north = scenes.T_utm.transform(scenes.LON0, scenes.LAT0)
     east, north = round(east - extent / 2), round(north + extent / 2)

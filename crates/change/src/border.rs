@@ -5,6 +5,8 @@
 
 use raster::Grid;
 
+use crate::tolerance::extreme;
+
 /// Returns the cells within `reach` cells, along rows and columns, of the outside: beyond the
 /// raster, or void (NaN) and joined to its edge by void cells. Holes inside are no border.
 pub(crate) fn near_border(heights: &Grid<f32>, reach: usize) -> Grid<bool> {
@@ -13,27 +15,12 @@ pub(crate) fn near_border(heights: &Grid<f32>, reach: usize) -> Grid<bool> {
     if reach == 0 {
         return near;
     }
-    let outside = outside(heights);
-    let within =
-        |row: usize, column: usize| row < reach || column < reach || row + reach >= height || column + reach >= width;
-    let mut along = Grid::filled(width, height, false);
+    let outside = outside(heights).map(|is_outside| if *is_outside { 1.0 } else { f32::NAN });
+    let beside = extreme(&outside, reach, f32::max);
     for row in 0..height {
-        let mut last = None;
-        // From the left and from the right: the distance to the nearest cell outside.
-        for column in (0..width).chain((0..width).rev()) {
-            if outside[(column, row)] {
-                last = Some(column);
-            }
-            along[(column, row)] |= last.is_some_and(|last: usize| last.abs_diff(column) <= reach);
-        }
-    }
-    for column in 0..width {
-        let mut last = None;
-        for row in (0..height).chain((0..height).rev()) {
-            if along[(column, row)] {
-                last = Some(row);
-            }
-            near[(column, row)] |= within(row, column) || last.is_some_and(|last: usize| last.abs_diff(row) <= reach);
+        for column in 0..width {
+            let is_at_edge = row < reach || column < reach || row + reach >= height || column + reach >= width;
+            near[(column, row)] = is_at_edge || !beside[(column, row)].is_nan();
         }
     }
     near

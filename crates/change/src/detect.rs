@@ -133,8 +133,13 @@ impl Change {
             return 0.0;
         }
         let area_m2 = cells as f64 * self.correlation.cell_area_m2;
-        let variance = variance_m2 / cells as f64 / self.correlation.effective_cells(area_m2);
-        (variance + self.offset_sigma_m.powi(2)).sqrt()
+        self.sigma_of_mean_m(variance_m2 / cells as f64, self.correlation.effective_cells(area_m2))
+    }
+
+    /// Returns the same from the mean of the variances and the number of cells whose errors are
+    /// independent.
+    fn sigma_of_mean_m(&self, variance_m2: f64, independent_cells: f64) -> f64 {
+        (variance_m2 / independent_cells + self.offset_sigma_m.powi(2)).sqrt()
     }
 }
 
@@ -189,9 +194,9 @@ pub fn detect(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, 
     candidates.iter().flatten().for_each(|at| stable.data_mut()[*at] = f32::NAN);
     change.correlation = ErrorCorrelation::measure(&stable, input.cell_m);
     let mean_variance = mean_square(&change.sigma);
-    let observed_m2 = change.deciding_cells as f64 * change.correlation.cell_area_m2;
-    change.offset_sigma_m = (mean_variance / change.correlation.effective_cells(observed_m2)).sqrt();
-    let places = change.correlation.effective_cells(observed_m2).ln();
+    let deciding_m2 = change.deciding_cells as f64 * change.correlation.cell_area_m2;
+    change.offset_sigma_m = (mean_variance / change.correlation.effective_cells(deciding_m2)).sqrt();
+    let places = change.correlation.effective_cells(deciding_m2).ln();
     for cells in candidates {
         take_region(&mut change, input, config, cells, places);
     }
@@ -219,8 +224,7 @@ fn take_region(
     change.tested += 1;
     let variance_m2 = |cells: &[usize]| sum(cells, &|at| f64::from(change.sigma.data()[at]).powi(2));
     let independent_cells = change.correlation.effective_cells(weights * cell_area_m2);
-    let variance_of_one = variance_m2(&cells) / cells.len() as f64;
-    let mean_sigma_m = (variance_of_one / independent_cells + change.offset_sigma_m.powi(2)).sqrt();
+    let mean_sigma_m = change.sigma_of_mean_m(variance_m2(&cells) / cells.len() as f64, independent_cells);
     let shapes = (change.correlation.effective_cells(area_m2) - 1.0) * SHAPES_GROWTH.ln();
     let ln_p = ln_two_sided(mean_m / mean_sigma_m) + places + shapes;
     if ln_p > (1.0 - config.confidence).ln() {

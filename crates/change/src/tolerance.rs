@@ -25,8 +25,9 @@ pub(crate) fn unexplained(before: &Grid<f32>, after: &Grid<f32>, reach: usize) -
     left
 }
 
-/// Returns the extreme height within a square window; NaN where the window has none.
-fn extreme(grid: &Grid<f32>, reach: usize, pick: fn(f32, f32) -> f32) -> Grid<f32> {
+/// Returns the extreme value within a square window that reaches `reach` cells to each side; NaN
+/// where the window has none.
+pub(crate) fn extreme(grid: &Grid<f32>, reach: usize, pick: fn(f32, f32) -> f32) -> Grid<f32> {
     let (width, height) = (grid.width(), grid.height());
     let mut along = Grid::filled(width, height, f32::NAN);
     for row in 0..height {

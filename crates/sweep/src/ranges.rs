@@ -32,6 +32,7 @@ pub struct Ranges {
 /// A patch that holds an edge sees the height of the upper surface up to two pixels beside it, and
 /// the lower surface begins only there. Twice the reach gains little more.
 pub const EDGE_REACH: usize = 2;
+
 /// Distances around a coarse pixel from which heights to search are taken over, coarse pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reach {
@@ -98,10 +99,8 @@ impl Ranges {
         full: (f64, f64),
         reach: Reach,
     ) -> Self {
-        let (mut least, greatest) = known_extremes(coarse, reach.above);
-        if reach.below > reach.above {
-            least = known_extremes(coarse, reach.below).0;
-        }
+        let least = known_extreme(coarse, f32::INFINITY, f32::min, reach.below);
+        let greatest = known_extreme(coarse, f32::NEG_INFINITY, f32::max, reach.above);
         let mut out = Self::uniform(width, height, step_m, full);
         let margin = MARGIN_STEPS * step_m;
         // The pixels below one coarse pixel share a range.
@@ -196,33 +195,24 @@ fn span(lo_m: f64, hi_m: f64, step_m: f64) -> (i32, u16) {
     (low, (high - low + 1).clamp(1, i32::from(u16::MAX)) as u16)
 }
 
-/// Returns the least and the greatest known height around every cell.
+/// Returns the least or the greatest known height around every cell: `pick` is the minimum with
+/// `start` +∞, or the maximum with −∞.
 ///
 /// The neighbours up to `reach` away count. Where all are unknown, the smallest of a few growing
-/// squares with a known height counts, or else the whole map. Without any height the result is (+∞,
-/// −∞).
-fn known_extremes(g: &Grid<f32>, reach: usize) -> (Grid<f32>, Grid<f32>) {
-    let (mut least, mut greatest) =
-        (extremes(g, f32::INFINITY, f32::min, reach), extremes(g, f32::NEG_INFINITY, f32::max, reach));
+/// squares with a known height counts, or else the whole map. Without any height the result is
+/// `start`.
+fn known_extreme(g: &Grid<f32>, start: f32, pick: impl Fn(f32, f32) -> f32 + Copy, reach: usize) -> Grid<f32> {
+    let mut out = extremes(g, start, pick, reach);
     // The reach of each round adds to that of the rounds before.
-    let mut reach = reach + 1;
-    let (mut wide_least, mut wide_greatest) = (least.clone(), greatest.clone());
-    while reach <= REACH_MAX && least.data().iter().any(|v| v.is_infinite()) {
-        wide_least = extremes(&wide_least, f32::INFINITY, f32::min, reach);
-        wide_greatest = extremes(&wide_greatest, f32::NEG_INFINITY, f32::max, reach);
-        let known = |out: &mut Grid<f32>, wide: &Grid<f32>| {
-            out.data_mut().iter_mut().zip(wide.data()).filter(|(o, _)| o.is_infinite()).for_each(|(o, w)| *o = *w);
-        };
-        known(&mut least, &wide_least);
-        known(&mut greatest, &wide_greatest);
+    let (mut reach, mut wide) = (reach + 1, out.clone());
+    while reach <= REACH_MAX && out.data().iter().any(|v| v.is_infinite()) {
+        wide = extremes(&wide, start, pick, reach);
+        out.data_mut().iter_mut().zip(wide.data()).filter(|(o, _)| o.is_infinite()).for_each(|(o, w)| *o = *w);
         reach *= 2;
     }
-    let known = |v: &&f32| v.is_finite();
-    let all_least = g.data().iter().filter(known).copied().fold(f32::INFINITY, f32::min);
-    let all_greatest = g.data().iter().filter(known).copied().fold(f32::NEG_INFINITY, f32::max);
-    least.data_mut().iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = all_least);
-    greatest.data_mut().iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = all_greatest);
-    (least, greatest)
+    let all = g.data().iter().filter(|v| v.is_finite()).copied().fold(start, pick);
+    out.data_mut().iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = all);
+    out
 }
 
 /// Applies `pick` (minimum or maximum) over the square of half width `reach` around every cell, NaN

@@ -46,6 +46,11 @@ impl SplatFormat {
     pub const ENDINGS: [(&'static str, Self); 4] =
         [("ply", Self::Ply), ("spz", Self::Spz), ("sog", Self::Sog), ("glb", Self::Glb)];
 
+    /// Returns the endings in words: `.ply, .spz, .sog, .glb`.
+    pub fn endings() -> String {
+        Self::ENDINGS.map(|(ending, _)| format!(".{ending}")).join(", ")
+    }
+
     /// Returns the format that the ending of a path names.
     pub fn of_ending(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -129,8 +134,7 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
 /// If there are harmonics of fewer splats.
 pub fn write(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), SplatPlyError> {
     let format = SplatFormat::of_ending(path).ok_or_else(|| {
-        let endings = SplatFormat::ENDINGS.map(|(ending, _)| format!(".{ending}")).join(", ");
-        invalid(path, format!("the ending names no format of splats, expected one of {endings}"))
+        invalid(path, format!("the ending names no format of splats, expected one of {}", SplatFormat::endings()))
     })?;
     let bytes = match format {
         SplatFormat::Ply => return splat_ply::write_file(path, file, overwrite),

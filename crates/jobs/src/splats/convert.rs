@@ -73,9 +73,9 @@ impl SplatConvertConfig {
 
 /// Returns the format that a path names.
 pub(super) fn format_of(path: &Path) -> Result<SplatFormat, SettingError> {
-    let expected = || SplatFormat::ENDINGS.map(|(ending, _)| format!(".{ending}")).join(", ");
     SplatFormat::of_ending(path).ok_or_else(|| {
-        SettingError::new("the file of splats", path.display(), format!("one that ends in {}", expected()))
+        let expected = format!("one that ends in {}", SplatFormat::endings());
+        SettingError::new("the file of splats", path.display(), expected)
     })
 }
 
@@ -120,12 +120,8 @@ pub fn convert(config: &SplatConvertConfig, progress: &dyn Progress) -> Result<S
     install(config.threads, || {
         let mut file = splat_files::read(&config.splats)?;
         progress.check_cancelled()?;
-        let form = match config.discs {
-            Some(true) => SplatForm::Discs,
-            Some(false) => SplatForm::Ellipsoids,
-            None if file.is_flat() => SplatForm::Discs,
-            None => SplatForm::Ellipsoids,
-        };
+        let is_disc = config.discs.unwrap_or_else(|| file.is_flat());
+        let form = if is_disc { SplatForm::Discs } else { SplatForm::Ellipsoids };
         file.layout = SplatLayout { form, sh_degree: config.sh_degree.unwrap_or(file.layout.sh_degree) };
         splat_files::write(&config.output, &file, config.overwrite)?;
         let size = |path: &Path| std::fs::metadata(path).map_or(0, |data| data.len());
