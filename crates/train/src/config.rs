@@ -126,8 +126,8 @@ pub struct LearningRates {
     /// not count more than that of the others; trainings of a few thousand iterations need larger
     /// ones to begin with.
     pub colour: [f64; 2],
-    /// Step of the harmonics of colours at the first and at the last iteration. It ends with that of
-    /// the published codes (0.0025 / 20), and begins as much higher as that of colours does.
+    /// Step of the harmonics of colours at the first and at the last iteration. It ends with that
+    /// of the published codes (0.0025 / 20), and begins as much higher as that of colours does.
     pub harmonics: [f64; 2],
     /// Step of each image's gain and offset.
     pub view: f64,

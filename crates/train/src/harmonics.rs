@@ -1,5 +1,5 @@
-//! Colours of surfels that depend on the direction of view and learn: real spherical harmonics up to
-//! degree 3, as 3DGS and 2DGS have them.
+//! Colours of surfels that depend on the direction of view and learn: real spherical harmonics up
+//! to degree 3, as 3DGS and 2DGS have them.
 //!
 //! The colour that a camera sees is max(0, c + Σ cₖ Yₖ(d)) with the direction d from the camera to
 //! the surfel's centre. The rasteriser draws surfels of that colour, and what it finds by their
@@ -84,8 +84,8 @@ impl LearnedHarmonics {
         3 * SplatHarmonics::count(self.degree)
     }
 
-    /// Returns the surfels with the colours that a camera sees, up to a degree; those that it cannot
-    /// see, and all at degree 0, as they are. `memory` may be reused.
+    /// Returns the surfels with the colours that a camera sees, up to a degree; those that it
+    /// cannot see, and all at degree 0, as they are. `memory` may be reused.
     pub fn seen<'a, C: SurfelCamera>(
         &self,
         surfels: &'a [Surfel],

@@ -29,8 +29,8 @@ pub trait SurfelCamera: Sync {
     /// Returns the view of a surfel's centre; `None` where the camera cannot see it.
     fn local(&self, surfel: usize, position: [f64; 3]) -> Option<LocalView>;
 
-    /// Returns where the rays of a perspective camera meet; `None` where they are parallel, along the
-    /// depth.
+    /// Returns where the rays of a perspective camera meet; `None` where they are parallel, along
+    /// the depth.
     fn centre(&self) -> Option<[f64; 3]> {
         None
     }

@@ -21,8 +21,8 @@ pub(super) fn line(values: &[f32], others: impl Fn(usize) -> f32, counts: impl F
 /// Returns the signal-to-noise ratio (dB) over the right half of a picture: as it is shown, and
 /// after the gain and the offset of each channel that bring its left half to the truth.
 ///
-/// A photograph that was not trained on has an exposure of its own, which no training can know. NeRF
-/// in the Wild (Martin-Brualla et al. 2021) fits it on the left half and judges the right one.
+/// A photograph that was not trained on has an exposure of its own, which no training can know.
+/// NeRF in the Wild (Martin-Brualla et al. 2021) fits it on the left half and judges the right one.
 pub(super) fn right_half(
     shown: &Grid<[f32; 3]>,
     truth: &Grid<[f32; 3]>,
