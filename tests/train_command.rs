@@ -477,12 +477,12 @@ fn photographs_of_a_castle_are_learned_and_rendered_alike() {
     let views = report["views"].as_array().unwrap();
     let held = views.iter().find(|view| view["held_out"] == true).unwrap();
     assert!(number(held, "psnr_db") > number(held, "psnr_before_db") + 6.0 && number(held, "ssim") > 0.6, "{held}");
-    let converted = folder.join("splats.glb");
+    let converted = folder.join("converted.glb");
     let mut convert = skysweep();
     convert.args(["splats", "convert"]).arg(folder.join("splats.ply")).arg(&converted).assert().success();
     // With the origin of the training, in another format, and as the file of another program
     // without an origin.
-    for (name, file) in [("seen", "splats.ply"), ("converted", "splats.glb"), ("foreign", "splats.ply")] {
+    for (name, file) in [("seen", "splats.ply"), ("converted", "converted.glb"), ("foreign", "splats.ply")] {
         if name == "foreign" {
             std::fs::remove_file(folder.join("splats.origin.json")).unwrap();
         }
