@@ -157,6 +157,7 @@ fn recipes_are_chosen_and_their_numbers_given() {
     refused(&["--weight", "depth=1"], "the name of a number is depth, expected one of: absolute, squared");
     refused(&["--weight", "mask"], "not of the form NAME=NUMBER");
     refused(&["--step", "scale=-1"], "scale is -1");
+    refused(&["--schedule", "degree=4"], "the degree of the harmonics is 4, expected 0, 1, 2 or 3");
     refused(&["--hold-out-view", "flight_13.png"], "0 views have the name flight_13.png");
 }
 
@@ -463,28 +464,38 @@ fn photographs_of_a_castle_are_learned_and_rendered_alike() {
     let folder = out.path().join("a");
     let mut command = skysweep();
     command.arg("train").arg(&castle).args(["--shrink", "4", "--iterations", "200", "--budget", "12000"]);
-    command.args(["--hold-out-view", "100_7107.jpg", "--progress", "none", "-o"]).arg(&folder).assert().success();
+    command.args(["--hold-out-view", "100_7107.jpg", "--schedule", "degree=3", "--progress", "none", "-o"]);
+    command.arg(&folder).assert().success();
     let report = report_of(&folder);
-    assert_eq!(report["preset"], "photographs");
+    assert_eq!((&report["preset"], report["harmonics_degree"].as_u64()), (&"photographs".into(), Some(3)));
+    let file = io::splat_files::read(&folder.join("splats.ply")).unwrap();
+    let harmonics = file.harmonics.expect("colours that depend on the direction");
+    let largest = |splat| harmonics.of(splat, 0).iter().fold(0.0f32, |most, c| most.max(c.abs()));
+    let coloured = (0..file.splats.len()).filter(|&splat| largest(splat) > 0.01).count();
+    assert!(harmonics.degree() == 3 && 2 * coloured > file.splats.len(), "{coloured}");
     let number = |view: &serde_json::Value, key: &str| view[key].as_f64().unwrap();
     let views = report["views"].as_array().unwrap();
     let held = views.iter().find(|view| view["held_out"] == true).unwrap();
     assert!(number(held, "psnr_db") > number(held, "psnr_before_db") + 6.0 && number(held, "ssim") > 0.6, "{held}");
-    // With the origin of the training, and as the file of another program without one.
-    for (name, has_origin) in [("seen", true), ("foreign", false)] {
-        if !has_origin {
+    let converted = folder.join("converted.glb");
+    let mut convert = skysweep();
+    convert.args(["splats", "convert"]).arg(folder.join("splats.ply")).arg(&converted).assert().success();
+    // With the origin of the training, in another format, and as the file of another program
+    // without an origin.
+    for (name, file) in [("seen", "splats.ply"), ("converted", "converted.glb"), ("foreign", "splats.ply")] {
+        if name == "foreign" {
             std::fs::remove_file(folder.join("splats.origin.json")).unwrap();
         }
         let seen = out.path().join(name);
         let mut render = skysweep();
-        render.args(["splats", "render"]).arg(folder.join("splats.ply")).arg("--cameras").arg(&castle);
+        render.args(["splats", "render"]).arg(folder.join(file)).arg("--cameras").arg(&castle);
         render.args(["--shrink", "4", "--progress", "none", "-o"]).arg(&seen).assert().success();
         let rendered = report_of(&seen);
         for view in views {
             let stem = view["name"].as_str().unwrap().trim_end_matches(".jpg").to_owned();
             let same = rendered["views"].as_array().unwrap().iter().find(|other| other["name"] == stem.as_str());
             let [trained, shown] = [number(view, "psnr_db"), number(same.unwrap(), "psnr_whole_db")];
-            assert!((trained - shown).abs() < 0.1, "{stem}: {trained} dB trained, {shown} dB rendered");
+            assert!((trained - shown).abs() < 0.1, "{name}, {stem}: {trained} dB trained, {shown} dB rendered");
         }
     }
 }

@@ -86,12 +86,14 @@ pub(crate) struct Args {
     weight: Vec<(String, f64)>,
     /// Step of the optimiser that differs from the preset: position-first, position-last (in sizes
     /// of the scene), rotation, scale (logarithms), opacity (logits), colour-first, colour-last (of
-    /// colours from 0 to 1).
+    /// colours from 0 to 1), harmonics-first, harmonics-last (of how colours differ by direction).
     #[arg(long, value_name = "NAME=NUMBER", value_parser = pair, help_heading = "Recipe")]
     step: Vec<(String, f64)>,
     /// Time that differs from the preset: distortion-from, consistency-from, split-from,
     /// split-until (shares of the training), split-every, reset-every (iterations; 0: opacities are
-    /// never brought down), and the limits split-gradient (halves of the image) and least-opacity.
+    /// never brought down), degree-every (share of the training after which the degree of the
+    /// harmonics grows by one), and the limits split-gradient (halves of the image), least-opacity
+    /// and degree (of the harmonics, 0 to 3; 0: colours are the same from all sides).
     #[arg(long, value_name = "NAME=NUMBER", value_parser = pair, help_heading = "Recipe")]
     schedule: Vec<(String, f64)>,
     /// Prior maps in use, as far as the dataset has them.

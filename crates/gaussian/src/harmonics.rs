@@ -81,7 +81,7 @@ impl SplatHarmonics {
     /// assert!((up[0] - 0.7443).abs() < 1e-4 && up[1] == 0.5);
     /// ```
     pub fn colour(&self, splat: usize, constant: [f32; 3], direction: [f64; 3]) -> [f32; 3] {
-        let values = values(direction);
+        let values = harmonic_values(direction);
         let channel = |channel: usize| {
             let terms = self.of(splat, channel).iter().zip(&values);
             let sum: f64 = terms.map(|(coefficient, value)| f64::from(*coefficient) * value).sum();
@@ -91,10 +91,10 @@ impl SplatHarmonics {
     }
 }
 
-/// Returns the values of the harmonics of degree 1 to 3 in a direction.
-fn values(direction: [f64; 3]) -> [f64; 15] {
-    let length = direction.iter().map(|c| c * c).sum::<f64>().sqrt();
-    let [x, y, z] = direction.map(|c| c / length);
+/// Returns the values of the harmonics of degree 1 to 3 in a direction of any length above 0, in
+/// the order of the coefficients.
+pub fn harmonic_values(direction: [f64; 3]) -> [f64; 15] {
+    let [x, y, z] = unit(direction).0;
     let (xx, yy, zz) = (x * x, y * y, z * z);
     [
         -C1 * y,
@@ -115,6 +115,40 @@ fn values(direction: [f64; 3]) -> [f64; 15] {
     ]
 }
 
+/// Returns the derivatives of [`harmonic_values`] by the direction, at a length above 0: they are
+/// across it, because its length changes nothing.
+pub fn harmonic_slopes(direction: [f64; 3]) -> [[f64; 3]; 15] {
+    let ([x, y, z], length) = unit(direction);
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    let gradients = [
+        [0.0, -C1, 0.0],
+        [0.0, 0.0, C1],
+        [-C1, 0.0, 0.0],
+        [C2[0] * y, C2[0] * x, 0.0],
+        [0.0, C2[1] * z, C2[1] * y],
+        [-2.0 * C2[2] * x, -2.0 * C2[2] * y, 4.0 * C2[2] * z],
+        [C2[3] * z, 0.0, C2[3] * x],
+        [2.0 * C2[4] * x, -2.0 * C2[4] * y, 0.0],
+        [6.0 * C3[0] * x * y, 3.0 * C3[0] * (xx - yy), 0.0],
+        [C3[1] * y * z, C3[1] * x * z, C3[1] * x * y],
+        [-2.0 * C3[2] * x * y, C3[2] * (4.0 * zz - xx - 3.0 * yy), 8.0 * C3[2] * y * z],
+        [-6.0 * C3[3] * x * z, -6.0 * C3[3] * y * z, C3[3] * (6.0 * zz - 3.0 * xx - 3.0 * yy)],
+        [C3[4] * (4.0 * zz - 3.0 * xx - yy), -2.0 * C3[4] * x * y, 8.0 * C3[4] * x * z],
+        [2.0 * C3[5] * x * z, -2.0 * C3[5] * y * z, C3[5] * (xx - yy)],
+        [3.0 * C3[6] * (xx - yy), -6.0 * C3[6] * x * y, 0.0],
+    ];
+    gradients.map(|[gx, gy, gz]| {
+        let along = gx * x + gy * y + gz * z;
+        [(gx - along * x) / length, (gy - along * y) / length, (gz - along * z) / length]
+    })
+}
+
+/// Returns the unit vector and the length.
+fn unit(direction: [f64; 3]) -> ([f64; 3], f64) {
+    let length = direction.iter().map(|c| c * c).sum::<f64>().sqrt();
+    (direction.map(|c| c / length), length)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,7 +162,7 @@ mod tests {
         for k in 0..count {
             let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
             let (angle, radius) = (2.399_963_229_728_653 * f64::from(k), (1.0 - z * z).sqrt());
-            let found = values([radius * angle.cos(), radius * angle.sin(), z]);
+            let found = harmonic_values([radius * angle.cos(), radius * angle.sin(), z]);
             for (i, row) in sums.iter_mut().enumerate() {
                 row.iter_mut().zip(found).for_each(|(sum, value)| *sum += found[i] * value);
             }
@@ -137,6 +171,25 @@ mod tests {
             for (j, sum) in row.iter().enumerate() {
                 let mean = 4.0 * std::f64::consts::PI * sum / f64::from(count);
                 assert!((mean - if i == j { 1.0 } else { 0.0 }).abs() < 1e-3, "{i} {j}: {mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_are_central_differences() {
+        for direction in [[0.3, -1.7, 0.9], [-2.0, 0.4, -0.1], [0.0, 0.0, 3.0]] {
+            let slopes = harmonic_slopes(direction);
+            for axis in 0..3 {
+                let moved = |by: f64| {
+                    let mut moved = direction;
+                    moved[axis] += by;
+                    harmonic_values(moved)
+                };
+                let (ahead, behind) = (moved(1e-6), moved(-1e-6));
+                for k in 0..15 {
+                    let expected = (ahead[k] - behind[k]) / 2e-6;
+                    assert!((slopes[k][axis] - expected).abs() < 1e-8, "{k} {axis}: {slopes:?}");
+                }
             }
         }
     }

@@ -6,7 +6,7 @@
 
 mod harmonics;
 
-pub use harmonics::SplatHarmonics;
+pub use harmonics::{SplatHarmonics, harmonic_slopes, harmonic_values};
 
 /// An oriented Gaussian with a colour and an opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -38,6 +38,21 @@ impl<const N: usize> Moments<N> {
     }
 }
 
+/// Takes a step of parameters with running means of their own, which have taken `steps` with this
+/// one. A gradient that is not finite is left out.
+pub(crate) fn step_all([parameters, mean, square]: [&mut [f32]; 3], gradient: &[f32], steps: u32, rate: f32) {
+    if !gradient.iter().all(|g| g.is_finite()) {
+        return;
+    }
+    let steps = i32::try_from(steps.max(1)).unwrap_or(i32::MAX);
+    let unbiased = DECAY.map(|decay| 1.0 - decay.powi(steps));
+    for (((parameter, mean), square), gradient) in parameters.iter_mut().zip(mean).zip(square).zip(gradient) {
+        *mean = DECAY[0] * *mean + (1.0 - DECAY[0]) * gradient;
+        *square = DECAY[1] * *square + (1.0 - DECAY[1]) * gradient * gradient;
+        *parameter -= rate * (*mean / unbiased[0]) / ((*square / unbiased[1]).sqrt() + EPSILON);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -44,6 +44,11 @@ pub struct LossWeights {
     /// One less the correlation with depths of unknown scale. Chosen on a simulated town of 60 m
     /// (1, 4 and 16).
     pub correlation: f64,
+    /// Squared difference of the gain of a view from 1 and of its offset from 0, where they are
+    /// learned: the mean over the channels. It keeps the colours of the scene those that the images
+    /// have in the mean. A tenth lets a gain be off by a third before it pulls as hard as colours
+    /// that are all too dark.
+    pub exposure: f64,
 }
 
 impl Default for LossWeights {
@@ -71,12 +76,15 @@ impl LossWeights {
             prior_depth: 5.0,
             prior_normal: 0.1,
             correlation: 4.0,
+            exposure: 0.1,
         };
         // GS4Buildings and SkySplat compare colours without D-SSIM.
         let without = Self { squared: 0.2, similarity: 0.0, distortion: 10.0, ..photographs };
         match recipe {
             Recipe::Photographs => photographs,
-            Recipe::BuildingOnly | Recipe::Satellite => without,
+            Recipe::BuildingOnly => without,
+            // Their colours are brought to those of the splats before the training.
+            Recipe::Satellite => Self { exposure: 0.0, ..without },
             Recipe::BuildingEnhanced => Self { distortion: 1.0, ..without },
         }
     }
@@ -118,6 +126,9 @@ pub struct LearningRates {
     /// not count more than that of the others; trainings of a few thousand iterations need larger
     /// ones to begin with.
     pub colour: [f64; 2],
+    /// Step of the harmonics of colours at the first and at the last iteration. It ends with that
+    /// of the published codes (0.0025 / 20), and begins as much higher as that of colours does.
+    pub harmonics: [f64; 2],
     /// Step of each image's gain and offset.
     pub view: f64,
     /// Step of the depth scale. It has to be slow, or it follows the splats instead of the prior.
@@ -132,9 +143,27 @@ impl Default for LearningRates {
             scale: 8e-3,
             opacity: 4e-2,
             colour: [5e-3, 7e-4],
+            harmonics: [9e-4, 1.25e-4],
             view: 2e-3,
             depth_scale: 1e-4,
         }
+    }
+}
+
+/// Colours that depend on the direction of view, by spherical harmonics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct HarmonicsConfig {
+    /// Highest degree, 0 to 3. Colours are the same from all sides when 0.
+    pub degree: u8,
+    /// Iterations after which the degree grows by one, until it is the highest, written for 30,000
+    /// iterations and stretched to the number of the training. The value is that of 3DGS.
+    pub raise_every: u32,
+}
+
+impl Default for HarmonicsConfig {
+    fn default() -> Self {
+        Self { degree: 0, raise_every: 1000 }
     }
 }
 
@@ -188,6 +217,8 @@ pub struct TrainingConfig {
     pub weights: LossWeights,
     /// Steps of the optimiser.
     pub rates: LearningRates,
+    /// Colours that depend on the direction of view.
+    pub harmonics: HarmonicsConfig,
     /// How surfels are added and removed; never when `None`.
     pub densify: Option<DensifyConfig>,
     /// Factors of the priors, written for 30,000 iterations and stretched to the number of this
@@ -206,6 +237,7 @@ impl Default for TrainingConfig {
             seed: 1,
             weights: LossWeights::default(),
             rates: LearningRates::default(),
+            harmonics: HarmonicsConfig::default(),
             densify: Some(DensifyConfig::default()),
             schedule: Schedule::default(),
             regularisation: Regularisation::default(),
@@ -256,8 +288,7 @@ impl TrainingConfig {
 
     /// Returns the weights at an iteration.
     pub fn weights_at(&self, iteration: u32) -> LossWeights {
-        let place = f64::from(iteration) / f64::from(self.iterations.max(1));
-        let published = (place * f64::from(PUBLISHED_ITERATIONS)) as u32;
+        let published = self.published(iteration);
         LossWeights {
             distortion: self.weights.distortion * self.regularisation.distortion.at(published),
             consistency: self.weights.consistency * self.regularisation.consistency.at(published),
@@ -265,6 +296,25 @@ impl TrainingConfig {
             prior_normal: self.weights.prior_normal * self.schedule.normal.at(published),
             ..self.weights
         }
+    }
+
+    /// Lets the degree of the harmonics grow after other shares of the training.
+    pub fn raise_degree_every(&mut self, share: f64) {
+        self.harmonics.raise_every = (share * f64::from(PUBLISHED_ITERATIONS)) as u32;
+    }
+
+    /// Returns the degree of the harmonics at an iteration.
+    pub fn degree_at(&self, iteration: u32) -> u8 {
+        let published = self.published(iteration);
+        // Intervals of no length have all passed.
+        let raised = published.checked_div(self.harmonics.raise_every).unwrap_or(u32::MAX);
+        u8::try_from(raised).unwrap_or(u8::MAX).min(self.harmonics.degree)
+    }
+
+    /// Returns the iteration of a published training at the same share of it.
+    fn published(&self, iteration: u32) -> u32 {
+        let place = f64::from(iteration) / f64::from(self.iterations.max(1));
+        (place * f64::from(PUBLISHED_ITERATIONS)) as u32
     }
 
     /// Returns the step of positions at an iteration, relative to the size of the scene.
@@ -275,6 +325,11 @@ impl TrainingConfig {
     /// Returns the step of colours at an iteration.
     pub(crate) fn colour_rate(&self, iteration: u32) -> f64 {
         self.between(self.rates.colour, iteration)
+    }
+
+    /// Returns the step of harmonics at an iteration.
+    pub(crate) fn harmonics_rate(&self, iteration: u32) -> f64 {
+        self.between(self.rates.harmonics, iteration)
     }
 
     /// Returns a step that changes by a factor in each iteration. A step of 0 stays 0.
@@ -301,6 +356,12 @@ mod tests {
         let share = |of: fn(LossWeights) -> f64, at| of(building.weights_at(at)) / of(building.weights);
         assert_eq!([0, 1500, 3000].map(|at| share(depth, at)), [1.0, 1.0, 0.1]);
         assert_eq!([0, 1500, 2250, 3000].map(|at| share(distortion, at)), [0.0, 0.0, 0.5, 1.0]);
+        let degrees = |degree: u8| HarmonicsConfig { degree, ..HarmonicsConfig::default() };
+        let mut config = TrainingConfig { harmonics: degrees(3), ..config };
+        assert_eq!([0, 99, 100, 200, 300, 3000].map(|at| config.degree_at(at)), [0, 0, 1, 2, 3, 3]);
+        config.raise_degree_every(0.0);
+        assert_eq!(config.degree_at(0), 3);
+        assert_eq!(TrainingConfig { harmonics: degrees(0), ..config }.degree_at(3000), 0);
         assert!((config.position_rate(3000) - config.rates.position[1]).abs() < 1e-12);
         assert!((config.colour_rate(0) - 5e-3).abs() < 1e-12 && (config.colour_rate(3000) - 7e-4).abs() < 1e-12);
     }

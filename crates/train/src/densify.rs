@@ -40,18 +40,24 @@ pub(crate) fn densify(state: &mut TrainingState, config: &DensifyConfig) -> Dens
     let mut is_split = vec![false; state.surfels.len()];
     pulled.iter().for_each(|&number| is_split[number] = true);
 
-    let mut made: Vec<(Surfel, Moments<{ Surfel::PARAMETERS }>)> = Vec::with_capacity(kept.len() + pulled.len());
+    // The surfel that each one comes from, and whether it is still the same.
+    let mut sources: Vec<(usize, bool)> = Vec::with_capacity(kept.len() + pulled.len());
+    let mut made: Vec<(Surfel, Moments<{ Surfel::PARAMETERS }>)> = Vec::with_capacity(sources.capacity());
     for number in kept {
         if is_split[number] {
             made.extend(halves(&state.surfels[number]).map(|half| (half, Moments::default())));
+            sources.extend([(number, false); 2]);
         } else {
             made.push((state.surfels[number], state.moments[number]));
+            sources.push((number, true));
         }
     }
     let surfels: Vec<Surfel> = made.iter().map(|(surfel, _)| *surfel).collect();
     let order = spatial_order(&surfels);
     state.surfels = order.iter().map(|&number| made[number as usize].0).collect();
     state.moments = order.iter().map(|&number| made[number as usize].1).collect();
+    let sources: Vec<(usize, bool)> = order.iter().map(|&number| sources[number as usize]).collect();
+    state.harmonics.rearrange(&sources);
     state.pulls = vec![[0.0; 2]; state.surfels.len()];
     counts
 }
@@ -84,6 +90,7 @@ fn halves(surfel: &Surfel) -> [Surfel; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::harmonics::LearnedHarmonics;
 
     #[test]
     fn surfels_are_split_and_removed_within_the_budget() {
@@ -97,6 +104,8 @@ mod tests {
         let surfels =
             vec![surfel(0.0, 2.0), surfel(10.0, 2.0), surfel(20.0, -9.0), surfel(30.0, 2.0), surfel(40.0, 2.0)];
         let mut state = TrainingState::new(surfels, 1);
+        let numbered = (0..45).map(|k| (k / 9) as f32).collect();
+        state.harmonics = LearnedHarmonics::of(&gaussian::SplatHarmonics::new(1, numbered).unwrap(), 5);
         // Weak, strong, transparent, unseen, stronger.
         state.pulls = vec![[1e-5, 1.0], [3e-3, 2.0], [1.0, 1.0], [0.0, 0.0], [8e-3, 2.0]];
         let config = DensifyConfig { budget: 4, ..DensifyConfig::default() };
@@ -106,6 +115,10 @@ mod tests {
         x.sort_by(f32::total_cmp);
         assert_eq!(x, [0.0, 10.0, 39.4, 40.6]);
         assert_eq!((state.moments.len(), state.pulls.len()), (4, 4));
+        // Halves have the harmonics of the whole, and all are in the order of the surfels.
+        let source = |number: usize| state.harmonics.to_splats().unwrap().of(number, 2)[0];
+        let own = |number: usize| (state.surfels[number].position[0] / 10.0).round();
+        assert!((0..4).all(|number| source(number) == own(number)));
         state.surfels[1].opacity_logit = -7.0;
         state.moments[0].square = [1.0; Surfel::PARAMETERS];
         reset_opacities(&mut state, 0.01);

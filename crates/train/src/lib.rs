@@ -16,6 +16,7 @@ mod config;
 mod densify;
 mod footprint;
 mod forward;
+mod harmonics;
 mod image;
 mod lattice;
 mod loss;
@@ -31,8 +32,9 @@ mod surfel;
 mod trainer;
 mod view;
 
-pub use config::{DensifyConfig, LearningRates, LossWeights, Recipe, Regularisation, TrainingConfig};
+pub use config::{DensifyConfig, HarmonicsConfig, LearningRates, LossWeights, Recipe, Regularisation, TrainingConfig};
 pub use densify::DensifyCounts;
+pub use harmonics::LearnedHarmonics;
 pub use image::{DepthSpread, SurfelImages};
 pub use lattice::{LatticeBox, LatticeView};
 pub use loss::{LossTerms, TrainingView, ViewAppearance, ViewSlopes};

@@ -76,6 +76,8 @@ pub struct LossTerms {
     pub prior_normal: f64,
     /// One less the correlation with depths of unknown scale.
     pub correlation: f64,
+    /// Gain and offset of the view against none.
+    pub exposure: f64,
     /// Sum with the weights.
     pub total: f64,
 }
@@ -139,6 +141,7 @@ impl<C: SurfelCamera> LossInput<'_, C> {
         self.prior_depth(out, &mut terms, &mut slopes);
         self.prior_normal(out, &mut terms);
         self.correlation(out, &mut terms);
+        self.exposure(&mut terms, &mut slopes);
         let w = &self.weights;
         terms.total = terms.colour
             + w.mask * terms.mask
@@ -146,7 +149,8 @@ impl<C: SurfelCamera> LossInput<'_, C> {
             + w.consistency * terms.consistency
             + w.prior_depth * terms.prior_depth
             + w.prior_normal * terms.prior_normal
-            + w.correlation * terms.correlation;
+            + w.correlation * terms.correlation
+            + w.exposure * terms.exposure;
         (terms, slopes)
     }
 
@@ -266,6 +270,19 @@ impl<C: SurfelCamera> LossInput<'_, C> {
 }
 
 impl<C> LossInput<'_, C> {
+    /// Gains are to be 1 and offsets 0: without this, the scene could be as dark as its views are
+    /// bright.
+    fn exposure(&self, terms: &mut LossTerms, slopes: &mut ViewSlopes) {
+        let ViewAppearance { gain, offset } = self.appearance;
+        for k in 0..3 {
+            let [by_gain, by_offset] = [gain[k] - 1.0, offset[k]];
+            terms.exposure += f64::from(by_gain * by_gain + by_offset * by_offset) / 3.0;
+            let unit = 2.0 * self.weights.exposure as f32 / 3.0;
+            slopes.appearance[k] += unit * by_gain;
+            slopes.appearance[3 + k] += unit * by_offset;
+        }
+    }
+
     /// One less Pearson's correlation r of the drawn depths d and the relative depths q. With the
     /// deviations d' and q' from their means, ∂r/∂d_i = q'_i / √(Σd'² Σq'²) − r d'_i / Σd'².
     fn correlation(&self, out: &mut SurfelImages, terms: &mut LossTerms) {
@@ -358,6 +375,7 @@ mod tests {
             prior_depth: 5.0,
             prior_normal: 0.1,
             correlation: 4.0,
+            exposure: 0.1,
         };
         let appearance = ViewAppearance { gain: [1.1, 0.9, 1.0], offset: [0.05, 0.0, -0.05] };
         let held = &images.coverage;

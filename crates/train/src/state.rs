@@ -1,11 +1,15 @@
 //! What a training has learned so far, and its checkpoint.
 
+use gaussian::SplatHarmonics;
+
 use crate::adam::Moments;
+use crate::harmonics::LearnedHarmonics;
 use crate::loss::ViewAppearance;
 use crate::surfel::Surfel;
+use crate::view::SurfelCamera;
 
 /// First bytes of a checkpoint: name and version.
-const MAGIC: &[u8; 8] = b"sktrain1";
+const MAGIC: &[u8; 8] = b"sktrain2";
 
 /// The state of a training after an iteration. The same state gives the same training.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +18,8 @@ pub struct TrainingState {
     pub iteration: u32,
     /// The surfels.
     pub surfels: Vec<Surfel>,
+    /// Harmonics of the surfels beyond the constant one.
+    pub harmonics: LearnedHarmonics,
     /// Gain and offset of each view.
     pub appearance: Vec<ViewAppearance>,
     /// Factor of the prior depths.
@@ -45,6 +51,7 @@ impl TrainingState {
         Self {
             iteration: 0,
             surfels,
+            harmonics: LearnedHarmonics::default(),
             appearance: vec![ViewAppearance::PLAIN; views],
             depth_scale: 1.0,
             moments: vec![Moments::default(); count],
@@ -54,10 +61,16 @@ impl TrainingState {
         }
     }
 
+    /// Returns the surfels with the colours that a camera sees. `memory` may be reused.
+    pub fn seen<'a, C: SurfelCamera>(&'a self, camera: &C, memory: &'a mut Vec<Surfel>) -> &'a [Surfel] {
+        self.harmonics.seen(&self.surfels, camera, self.harmonics.degree(), memory)
+    }
+
     /// Returns the state as bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = MAGIC.to_vec();
-        for count in [self.iteration, self.surfels.len() as u32, self.appearance.len() as u32] {
+        let degree = u32::from(self.harmonics.degree());
+        for count in [self.iteration, self.surfels.len() as u32, self.appearance.len() as u32, degree] {
             out.extend(count.to_le_bytes());
         }
         let mut put = |values: &[f32]| values.iter().for_each(|v| out.extend(v.to_le_bytes()));
@@ -73,6 +86,7 @@ impl TrainingState {
             put(&appearance.offset);
             put_moments(moments, &mut put);
         }
+        self.harmonics.parts().into_iter().for_each(&mut put);
         out
     }
 
@@ -87,9 +101,12 @@ impl TrainingState {
         let mut words = rest.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]));
         let mut count = || words.next().ok_or(CheckpointDefect::Length);
         let (iteration, surfels, views) = (count()?, count()? as usize, count()? as usize);
+        let degree = u8::try_from(count()?).ok().filter(|degree| *degree <= SplatHarmonics::DEGREE_MAX);
+        let degree = degree.ok_or(CheckpointDefect::Length)?;
         // Counts are checked before anything is allocated.
-        let expected = surfels.checked_mul(PER_SURFEL).zip(views.checked_mul(PER_VIEW));
-        let expected = expected.and_then(|(a, b)| a.checked_add(b)?.checked_add(12 + 4 + 12));
+        let harmonics = 3 * SplatHarmonics::count(degree);
+        let expected = surfels.checked_mul(PER_SURFEL + 4 * 3 * harmonics).zip(views.checked_mul(PER_VIEW));
+        let expected = expected.and_then(|(a, b)| a.checked_add(b)?.checked_add(16 + 4 + 12));
         if expected != Some(rest.len()) {
             return Err(CheckpointDefect::Length);
         }
@@ -106,6 +123,8 @@ impl TrainingState {
             state.appearance.push(ViewAppearance { gain: words.numbers(), offset: words.numbers() });
             state.appearance_moments.push(words.moments());
         }
+        let parts = [(); 3].map(|()| (0..surfels * harmonics).map(|_| f32::from_bits(words.next())).collect());
+        state.harmonics = LearnedHarmonics::from_parts(degree, parts);
         Ok(state)
     }
 }
@@ -145,6 +164,8 @@ mod tests {
         state.moments[2].square[12] = 0.25;
         state.appearance[1].offset[2] = -0.5;
         state.pulls[0] = [3.0, 4.0];
+        let numbers = (0..27).map(|k| k as f32).collect();
+        state.harmonics = LearnedHarmonics::of(&SplatHarmonics::new(1, numbers).unwrap(), 3);
         let bytes = state.to_bytes();
         assert_eq!(TrainingState::from_bytes(&bytes), Ok(state));
         assert_eq!(TrainingState::from_bytes(&bytes[..bytes.len() - 4]), Err(CheckpointDefect::Length));

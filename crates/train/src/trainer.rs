@@ -28,6 +28,9 @@ pub struct Trainer<'a, C> {
     by_images: SurfelImages,
     scratch: LossScratch,
     gradients: SurfelGradients,
+    /// The surfels with the colours that a view sees.
+    coloured: Vec<Surfel>,
+    by_harmonics: Vec<f32>,
 }
 
 /// What an iteration did.
@@ -48,20 +51,22 @@ fn modelled_share<C>(view: &TrainingView<C>) -> f32 {
 }
 
 impl<'a, C: SurfelCamera> Trainer<'a, C> {
-    /// Begins a training, or goes on with one from its state.
+    /// Begins a training, or goes on with one from its state. The harmonics of the state get the
+    /// degree of the settings: they are cut, or begin at 0.
     ///
     /// `extent_m` is the size of the scene, metres: steps of positions are relative to it.
     ///
     /// # Panics
     /// If there are no views, a view's planes do not have its camera's size, or the state has
     /// another number of views.
-    pub fn new(views: &'a [TrainingView<C>], extent_m: f64, state: TrainingState, config: TrainingConfig) -> Self {
+    pub fn new(views: &'a [TrainingView<C>], extent_m: f64, mut state: TrainingState, config: TrainingConfig) -> Self {
         assert!(!views.is_empty(), "a training needs views");
         assert_eq!(state.appearance.len(), views.len(), "the state has another number of views");
         for view in views {
             let [width, height] = view.camera.size();
             assert!(view.colour.iter().all(|plane| plane.len() == width * height), "a view has another size");
         }
+        state.harmonics = state.harmonics.with_degree(config.harmonics.degree, state.surfels.len());
         Self {
             views,
             config,
@@ -71,6 +76,8 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
             by_images: SurfelImages::default(),
             scratch: LossScratch::default(),
             gradients: SurfelGradients::default(),
+            coloured: Vec::new(),
+            by_harmonics: Vec::new(),
         }
     }
 
@@ -94,8 +101,10 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
         let iteration = self.state.iteration;
         let number = self.view_at(iteration);
         let (view, weights) = (&self.views[number], self.config.weights_at(iteration));
+        let (degree, surfels, camera) = (self.config.degree_at(iteration), &self.state.surfels, &view.camera);
+        let seen = self.state.harmonics.seen(surfels, camera, degree, &mut self.coloured);
         self.drawing.set_spread(LossInput::<C>::spread(&weights));
-        self.drawing.redraw(&self.state.surfels, &view.camera);
+        self.drawing.redraw(seen, camera);
         let input = LossInput {
             images: self.drawing.images(),
             view,
@@ -105,7 +114,9 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
             extent_m: self.extent_m,
         };
         let (terms, slopes) = input.compute(&mut self.scratch, &mut self.by_images);
-        self.drawing.gradients(&self.state.surfels, &view.camera, &self.by_images, &mut self.gradients);
+        self.drawing.gradients(seen, camera, &self.by_images, &mut self.gradients);
+        let by = &mut self.by_harmonics;
+        self.state.harmonics.spread((surfels, seen), camera, degree, &mut self.gradients, by);
         self.descend(view.camera.size(), modelled_share(view));
         let rate = self.config.rates.view as f32;
         if self.config.appearance {
@@ -128,7 +139,7 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
     pub fn judge(&mut self, view: &TrainingView<C>, appearance: ViewAppearance) -> LossTerms {
         let weights = self.config.weights_at(self.state.iteration);
         self.drawing.set_spread(LossInput::<C>::spread(&weights));
-        self.drawing.redraw(&self.state.surfels, &view.camera);
+        self.drawing.redraw(self.state.seen(&view.camera, &mut self.coloured), &view.camera);
         let input = LossInput {
             images: self.drawing.images(),
             view,
@@ -166,6 +177,11 @@ impl<'a, C: SurfelCamera> Trainer<'a, C> {
         // than the same surface in a whole one.
         let half = modelled * size[0].max(size[1]) as f32 / 2.0;
         let (state, gradients) = (&mut self.state, &self.gradients);
+        if self.config.degree_at(state.iteration) > 0 {
+            let (rate, steps) = (self.config.harmonics_rate(state.iteration) as f32, &state.moments);
+            let steps = |surfel: usize| steps[surfel].steps + 1;
+            state.harmonics.descend(&self.by_harmonics, &gradients.by_pixel, steps, rate);
+        }
         let moved = state.surfels.par_iter_mut().zip(&mut state.moments).zip(&mut state.pulls);
         moved.zip(&gradients.surfels).zip(&gradients.by_pixel).for_each(
             |((((surfel, moments), pull), gradient), &by_pixel)| {

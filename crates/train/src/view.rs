@@ -29,6 +29,12 @@ pub trait SurfelCamera: Sync {
     /// Returns the view of a surfel's centre; `None` where the camera cannot see it.
     fn local(&self, surfel: usize, position: [f64; 3]) -> Option<LocalView>;
 
+    /// Returns where the rays of a perspective camera meet; `None` where they are parallel, along
+    /// the depth.
+    fn centre(&self) -> Option<[f64; 3]> {
+        None
+    }
+
     /// Returns the local position at a depth on the ray of a pixel; `None` where that is not known.
     fn point(&self, pixel: [f64; 2], depth_m: f64) -> Option<[f64; 3]>;
 }
@@ -56,6 +62,10 @@ impl SurfelCamera for PinholeView {
 
     fn size(&self) -> [usize; 2] {
         self.size
+    }
+
+    fn centre(&self) -> Option<[f64; 3]> {
+        Some(self.centre)
     }
 
     fn local(&self, _: usize, position: [f64; 3]) -> Option<LocalView> {

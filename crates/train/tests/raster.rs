@@ -2,12 +2,13 @@
 
 mod reference;
 
+use gaussian::{SplatHarmonics, harmonic_values};
 use numeric::SplitMix64;
 use proptest::prelude::*;
 use reference::{Eye, Parameters, draw};
 use train::{
-    AffineView, DepthSpread, Drawing, LocalView, PinholeView, Registers, Surfel, SurfelCamera, SurfelGradients,
-    SurfelImages,
+    AffineView, DepthSpread, Drawing, LearnedHarmonics, LocalView, PinholeView, Registers, Surfel, SurfelCamera,
+    SurfelGradients, SurfelImages,
 };
 
 const SIZE: [usize; 2] = [37, 29];
@@ -147,6 +148,100 @@ fn check_gradients<C: SurfelCamera>(
     Ok(())
 }
 
+/// Coefficients of a surfel at degree 3.
+const COEFFICIENTS: usize = 45;
+
+/// The colours that an eye sees of surfels with harmonics, by plain sums in f64.
+fn coloured(surfels: &[Parameters], coefficients: &[f64], eye: &Eye) -> Vec<Parameters> {
+    let one = |(surfel, own): (&Parameters, &[f64])| {
+        let direction = match *eye {
+            Eye::Pinhole { centre, .. } => [0, 1, 2].map(|i| surfel[i] - centre[i]),
+            Eye::Affine { axis, .. } => axis,
+        };
+        let (values, mut seen) = (harmonic_values(direction), *surfel);
+        for channel in 0..3 {
+            let sum: f64 = own[15 * channel..].iter().zip(values).map(|(c, value)| c * value).sum();
+            seen[10 + channel] = (surfel[10 + channel] + sum).max(0.0);
+        }
+        seen
+    };
+    surfels.iter().zip(coefficients.chunks_exact(COEFFICIENTS)).map(one).collect()
+}
+
+/// Harmonics of degree 3: the image against the reference, and the gradients by positions, colours
+/// and coefficients against central differences.
+fn check_harmonics<C: SurfelCamera>(
+    surfels: &[Surfel],
+    coefficients: &[f32],
+    camera: &C,
+    eye: &Eye,
+) -> Result<(), TestCaseError> {
+    let harmonics = SplatHarmonics::new(3, coefficients.to_vec()).expect("degree 3");
+    let harmonics = LearnedHarmonics::of(&harmonics, surfels.len());
+    let parameters = exact(surfels);
+    let exact_coefficients: Vec<f64> = coefficients.iter().map(|c| f64::from(*c)).collect();
+    let seen_truth = coloured(&parameters, &exact_coefficients, eye);
+    // At 0 a colour has no derivative.
+    prop_assume!(seen_truth.iter().all(|s| s[10..].iter().all(|c| *c == 0.0 || *c > 1e-3)));
+    let truth = draw(&seen_truth, eye, SIZE, DepthSpread::Depths);
+    let mut memory = Vec::new();
+    let seen = harmonics.seen(surfels, camera, 3, &mut memory);
+    let mut drawing = drawing(seen, camera, DepthSpread::Depths);
+    let mut by_images = SurfelImages::zeros(SIZE);
+    for (number, plane) in by_images.planes_mut().into_iter().enumerate().take(3) {
+        for place in (0..plane.len()).filter(|&p| !truth.unsure[p]) {
+            let error = f64::from(drawing.images().colour[number][place]) - truth.planes[number][place];
+            prop_assert!(error.abs() < 1e-5, "image {number}, pixel {place}: off by {error}");
+            plane[place] = weight(number, place);
+        }
+    }
+    let (mut found, mut by_coefficients) = (SurfelGradients::default(), Vec::new());
+    drawing.gradients(seen, camera, &by_images, &mut found);
+    harmonics.spread((surfels, seen), camera, 3, &mut found, &mut by_coefficients);
+    let slope = |moved: &dyn Fn(f64) -> Vec<Parameters>| {
+        let of = |by: f64| draw(&moved(by), eye, SIZE, DepthSpread::Depths).planes;
+        let (ahead, behind, weights) = (of(STEP), of(-STEP), by_images.planes());
+        let parts = (0..3).flat_map(|k| (0..weights[k].len()).map(move |p| (k, p)));
+        parts.fold([0.0; 2], |[sum, size], (k, p)| {
+            let part = f64::from(weights[k][p]) * (ahead[k][p] - behind[k][p]) / (2.0 * STEP);
+            [sum + part, size + part.abs()]
+        })
+    };
+    let by_parameter = |number: usize, parameter: usize| {
+        slope(&|by| {
+            let mut moved = parameters.clone();
+            moved[number][parameter] += by;
+            coloured(&moved, &exact_coefficients, eye)
+        })
+    };
+    let by_coefficient = |place: usize| {
+        slope(&|by| {
+            let mut moved = exact_coefficients.clone();
+            moved[place] += by;
+            coloured(&parameters, &moved, eye)
+        })
+    };
+    let check = |what: String, found: &[f32], truth: &[[f64; 2]]| {
+        let length = |v: &mut dyn Iterator<Item = f64>| v.map(|c| c * c).sum::<f64>().sqrt();
+        let difference = length(&mut truth.iter().zip(found).map(|(t, f)| t[0] - f64::from(*f)));
+        let [slope, size] = [0, 1].map(|i| length(&mut truth.iter().map(|t| t[i])));
+        let error = difference / slope.max(0.1 * size).max(1e-6);
+        prop_assert!(error < 1e-4, "{what}: {found:?} is not {truth:?} ({error:.1e})");
+        Ok(())
+    };
+    for number in 0..surfels.len() {
+        let own = found.surfels[number].to_array();
+        for group in [0..3, 10..13] {
+            let truth: Vec<[f64; 2]> = group.clone().map(|parameter| by_parameter(number, parameter)).collect();
+            check(format!("surfel {number}, {group:?}"), &own[group], &truth)?;
+        }
+        let group = COEFFICIENTS * number..COEFFICIENTS * (number + 1);
+        let truth: Vec<[f64; 2]> = group.clone().map(by_coefficient).collect();
+        check(format!("harmonics of surfel {number}"), &by_coefficients[group], &truth)?;
+    }
+    Ok(())
+}
+
 /// Images and gradients of a scene with a tile that is cut by the border.
 fn whole<C: SurfelCamera>(
     surfels: &[Surfel],
@@ -261,6 +356,20 @@ proptest! {
         check_image(&surfels, &camera, &eye, DepthSpread::InverseDepths)?;
         let (camera, eye) = affine(&surfels);
         check_image(&surfels, &camera, &eye, DepthSpread::Depths)?;
+    }
+
+    #[test]
+    fn colours_by_direction_have_the_reference_and_gradients_of_central_differences(
+        (surfels, coefficients) in prop::collection::vec(surfel(), 1..4).prop_flat_map(|surfels| {
+            let coefficient = (-1000..=1000i32).prop_map(|c| 3e-4 * c as f32);
+            let count = COEFFICIENTS * surfels.len();
+            (Just(surfels), prop::collection::vec(coefficient, count))
+        })
+    ) {
+        let (camera, eye) = pinhole();
+        check_harmonics(&surfels, &coefficients, &camera, &eye)?;
+        let (camera, eye) = affine(&surfels);
+        check_harmonics(&surfels, &coefficients, &camera, &eye)?;
     }
 
     #[test]

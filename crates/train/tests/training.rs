@@ -97,6 +97,33 @@ fn trained(views: &[TrainingView<PinholeView>], config: TrainingConfig) -> Train
     trainer.into_state()
 }
 
+/// A wall whose red fades from one end of the arc of cameras to the other.
+#[test]
+fn colours_that_depend_on_the_direction_are_learned() {
+    let sheen = |angle: f64| {
+        let mut seen = view(camera(angle, 6.0), false);
+        seen.colour[0].iter_mut().for_each(|red| *red *= (1.0 + angle) as f32);
+        seen
+    };
+    let views: Vec<_> = (0..6).map(|i| sheen(-0.5 + 0.2 * f64::from(i))).collect();
+    let held_out = sheen(0.42);
+    let error = |degree: u8| {
+        let mut config = config(300);
+        config.harmonics.degree = degree;
+        // Steps that reach colours as different as these within 300 iterations.
+        config.rates.harmonics = [0.02, 0.002];
+        let state = trained(&views, config);
+        assert_eq!(state.harmonics.degree(), degree);
+        let mut memory = Vec::new();
+        let seen = state.seen(&held_out.camera, &mut memory);
+        let drawing = Drawing::new(seen, &held_out.camera, Registers::Longest);
+        let pairs = drawing.images().colour[0].iter().zip(&held_out.colour[0]);
+        pairs.map(|(shown, truth)| f64::from((shown - truth).powi(2))).sum::<f64>()
+    };
+    let [plain, by_direction] = [error(0), error(1)];
+    assert!(by_direction < 0.7 * plain, "{plain} became {by_direction}");
+}
+
 /// Signal-to-noise ratio of a view that was not trained, dB, and median error of its depths,
 /// metres.
 fn judged(state: &TrainingState) -> (f64, f64) {

@@ -135,6 +135,6 @@ impl TrainConfig {
         }
         self.weights.validate()?;
         self.steps.validate()?;
-        self.schedule.validate()
+        self.schedule.check()
     }
 }

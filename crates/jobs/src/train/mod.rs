@@ -18,6 +18,7 @@ mod config;
 mod course;
 mod dataset;
 mod error;
+mod exposure;
 mod held_out;
 mod initial;
 mod iterate;

@@ -1,6 +1,7 @@
 //! The recipe of a training: a preset for each use, and numbers that differ from it.
 
 use ::train::{LossWeights, Recipe, TrainingConfig};
+use gaussian::SplatHarmonics;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SettingError;
@@ -54,6 +55,8 @@ pub struct TrainWeights {
     pub prior_normal: Option<f64>,
     /// One less the correlation with heights of unknown scale.
     pub correlation: Option<f64>,
+    /// Squared difference of the gains of images from 1 and of their offsets from 0.
+    pub exposure: Option<f64>,
 }
 
 /// Steps of the optimiser; those of the preset where they are `None`.
@@ -75,6 +78,10 @@ pub struct TrainSteps {
     pub colour_first: Option<f64>,
     /// Of colours from 0 to 1 at the last iteration.
     pub colour_last: Option<f64>,
+    /// Of the harmonics of colours at the first iteration.
+    pub harmonics_first: Option<f64>,
+    /// Of the harmonics of colours at the last iteration.
+    pub harmonics_last: Option<f64>,
 }
 
 /// When things happen in a training; as in the preset where it is `None`.
@@ -98,6 +105,10 @@ pub struct TrainSchedule {
     pub least_opacity: Option<f64>,
     /// Iterations between two times at which opacities are brought down; never when 0.
     pub reset_every: Option<f64>,
+    /// Highest degree of the harmonics of colours, 0 to 3; the same colour from all sides when 0.
+    pub degree: Option<f64>,
+    /// Share of the training after which the degree grows by one, until it is the highest.
+    pub degree_every: Option<f64>,
 }
 
 /// A number by its name, where it is given.
@@ -152,6 +163,7 @@ impl TrainNumbers for TrainWeights {
             ("prior-depth", &mut self.prior_depth),
             ("prior-normal", &mut self.prior_normal),
             ("correlation", &mut self.correlation),
+            ("exposure", &mut self.exposure),
         ]
     }
 }
@@ -166,6 +178,8 @@ impl TrainNumbers for TrainSteps {
             ("opacity", &mut self.opacity),
             ("colour-first", &mut self.colour_first),
             ("colour-last", &mut self.colour_last),
+            ("harmonics-first", &mut self.harmonics_first),
+            ("harmonics-last", &mut self.harmonics_last),
         ]
     }
 }
@@ -181,7 +195,23 @@ impl TrainNumbers for TrainSchedule {
             ("split-gradient", &mut self.split_gradient),
             ("least-opacity", &mut self.least_opacity),
             ("reset-every", &mut self.reset_every),
+            ("degree", &mut self.degree),
+            ("degree-every", &mut self.degree_every),
         ]
+    }
+}
+
+impl TrainSchedule {
+    /// Checks the highest degree of the harmonics, and the other numbers.
+    ///
+    /// # Errors
+    /// [`SettingError`] for a number outside of its range.
+    pub fn check(self) -> Result<(), SettingError> {
+        let degree = self.degree.unwrap_or(0.0);
+        if !(0..=SplatHarmonics::DEGREE_MAX).map(f64::from).any(|known| known == degree) {
+            return Err(SettingError::new("the degree of the harmonics", degree, "0, 1, 2 or 3"));
+        }
+        self.validate()
     }
 }
 
@@ -204,6 +234,7 @@ pub(super) fn settings(
     put(&mut w.prior_depth, weights.prior_depth);
     put(&mut w.prior_normal, weights.prior_normal);
     put(&mut w.correlation, weights.correlation);
+    put(&mut w.exposure, weights.exposure);
     let r = &mut made.rates;
     put(&mut r.position[0], steps.position_first);
     put(&mut r.position[1], steps.position_last);
@@ -212,6 +243,12 @@ pub(super) fn settings(
     put(&mut r.opacity, steps.opacity);
     put(&mut r.colour[0], steps.colour_first);
     put(&mut r.colour[1], steps.colour_last);
+    put(&mut r.harmonics[0], steps.harmonics_first);
+    put(&mut r.harmonics[1], steps.harmonics_last);
+    made.harmonics.degree = schedule.degree.map_or(made.harmonics.degree, |degree| degree as u8);
+    if let Some(share) = schedule.degree_every {
+        made.raise_degree_every(share);
+    }
     made.regularise_from(schedule.distortion_from, schedule.consistency_from);
     if let Some(densify) = &mut made.densify {
         put(&mut densify.during[0], schedule.split_from);
@@ -236,6 +273,7 @@ pub(super) fn used(weights: &LossWeights) -> TrainWeights {
         prior_depth: Some(weights.prior_depth),
         prior_normal: Some(weights.prior_normal),
         correlation: Some(weights.correlation),
+        exposure: Some(weights.exposure),
     }
 }
 
@@ -258,6 +296,15 @@ mod tests {
         let consistency = |at: u32| made.weights_at(at).consistency;
         assert_eq!([1500, 1501].map(consistency), [0.0, made.weights.consistency]);
         assert_eq!(used(&made.weights).prior_depth, Some(7.0));
+        schedule.set("degree", 3.0).unwrap();
+        schedule.set("degree-every", 0.1).unwrap();
+        let made = settings(TrainPreset::Satellite, &weights, &TrainSteps::default(), &schedule);
+        assert_eq!([299, 300, 899, 900, 3000].map(|at| made.degree_at(at)), [0, 1, 2, 3, 3]);
+        for degree in [0.5, 4.0, f64::NAN] {
+            schedule.set("degree", degree).unwrap();
+            assert!(schedule.check().unwrap_err().to_string().contains("0, 1, 2 or 3"));
+        }
+        schedule.set("degree", 2.0).unwrap();
         let error = weights.set("depth", 1.0).unwrap_err().to_string();
         assert!(error.contains("the name of a number is depth") && error.contains("prior-normal"), "{error}");
         weights.set("mask", f64::NAN).unwrap();

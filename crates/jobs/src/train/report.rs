@@ -19,6 +19,8 @@ pub struct TrainReport {
     pub weights: TrainWeights,
     /// The splats.
     pub splats: PathBuf,
+    /// Highest degree of the harmonics of their colours.
+    pub harmonics_degree: u8,
     /// Number of splats at the beginning.
     pub splats_before: usize,
     /// Number of splats at the end.
@@ -52,10 +54,18 @@ pub struct TrainedViewRow {
     pub ssim_before: Option<f64>,
     /// Structural similarity.
     pub ssim: Option<f64>,
+    /// Signal-to-noise ratio over the right half of a photograph that was held out, dB.
+    pub psnr_right_db: Option<f64>,
+    /// The same after the gains and the offsets that bring its left half to the truth, dB: a
+    /// photograph has an exposure of its own, which no training on others can know.
+    pub psnr_right_exposed_db: Option<f64>,
 }
 
 /// Signal-to-noise ratio (dB) and structural similarity of a view.
 pub(super) type Quality = (Option<f64>, Option<f64>);
+
+/// Signal-to-noise ratio (dB) over the right half of a view, as it is and after its exposure.
+pub(super) type Exposed = (Option<f64>, Option<f64>);
 
 impl TrainedViewRow {
     pub(super) fn new(name: &str, held_out: bool, before: Quality, after: Quality) -> Self {
@@ -66,7 +76,13 @@ impl TrainedViewRow {
             psnr_db: after.0,
             ssim_before: before.1,
             ssim: after.1,
+            psnr_right_db: None,
+            psnr_right_exposed_db: None,
         }
+    }
+
+    pub(super) fn with_right(self, (plain, exposed): Exposed) -> Self {
+        Self { psnr_right_db: plain, psnr_right_exposed_db: exposed, ..self }
     }
 }
 
@@ -108,8 +124,13 @@ impl TrainReport {
                 mean(held_out, |v| v.ssim)
             )
         };
+        let exposed = format!(
+            "{} dB over the right halves, {} dB with the exposure of the left ones",
+            mean(true, |v| v.psnr_right_db),
+            mean(true, |v| v.psnr_right_exposed_db)
+        );
         format!(
-            "splats    {} ({}, before {})\ntrained   {}\nheld out  {}\ntime      {:.0} s\n",
+            "splats    {} ({}, before {})\ntrained   {}\nheld out  {}\n          {exposed}\ntime      {:.0} s\n",
             self.splats.display(),
             self.splats_after,
             self.splats_before,

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use ::train::Surfel;
-use io::splat_ply::{self, LocalOrigin, SplatForm, SplatLayout, SplatPlyError};
+use ::train::TrainingState;
+use io::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout, SplatPlyError};
 
 use super::checkpoint::Checkpoint;
 use super::error::TrainError;
@@ -46,16 +46,20 @@ pub(super) fn begin(folder: &OutputFolder) -> Result<(), FileError> {
     [REPORT, PAGE].into_iter().try_for_each(|name| folder.remove(name))
 }
 
-/// Writes splats with their origin, and returns their file.
+/// Writes splats with their harmonics and their origin, and returns their file.
 pub(super) fn write_splats(
     output: &Path,
-    surfels: &[Surfel],
+    state: &TrainingState,
     origin: &LocalOrigin,
     overwrite: bool,
 ) -> Result<PathBuf, SplatPlyError> {
-    let splats: Vec<_> = surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect();
     let path = output.join(SPLATS);
-    let layout = SplatLayout { form: SplatForm::Discs, ..SplatLayout::default() };
-    splat_ply::write(&path, &splats, origin, layout, overwrite)?;
+    let file = SplatFile {
+        splats: state.surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect(),
+        harmonics: state.harmonics.to_splats(),
+        layout: SplatLayout { form: SplatForm::Discs, sh_degree: state.harmonics.degree() },
+        origin: Some(origin.clone()),
+    };
+    splat_ply::write_file(&path, &file, overwrite)?;
     Ok(path)
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ::train::{Drawing, PinholeView, Registers, Surfel, TrainingConfig, TrainingView};
+use ::train::{Drawing, PinholeView, Registers, TrainingConfig, TrainingState, TrainingView};
 use io::raster::write_png_rgb;
 use numeric::Progress;
 use raster::Grid;
@@ -13,10 +13,11 @@ use super::config::{PriorSchedule, TrainConfig};
 use super::course::{Course, Trained};
 use super::dataset::TrainData;
 use super::error::TrainError;
+use super::exposure::right_half;
 use super::initial;
 use super::page;
 use super::recipe::{self, TrainPreset};
-use super::report::{Quality, TrainReport, TrainedViewRow};
+use super::report::{Exposed, Quality, TrainReport, TrainedViewRow};
 use super::results::{self, CHECKPOINT, RENDERS, REPORT};
 use crate::files;
 use crate::output_folder::OutputFolder;
@@ -55,7 +56,7 @@ fn train(
     }
     let (preset, settings) = settings(config, data);
     let initial = initial::surfels(data, config.budget / 2);
-    let (before, _) = quality(data, &initial, None)?;
+    let (before, ..) = quality(data, &TrainingState::new(initial.clone(), 0), None)?;
     let course = Course {
         output: &config.output,
         checkpoint_every: config.checkpoint_every,
@@ -67,14 +68,18 @@ fn train(
     let Trained { state, transient_share, losses, seconds } = course.run(&initial, views, progress)?;
     results::begin(folder)?;
     let renders = Renders { folder: &folder.subfolder(RENDERS)?, may_replace };
-    let (after, layers) = quality(data, &state.surfels, Some(renders))?;
-    let splats = results::write_splats(&config.output, &state.surfels, &data.place.origin, may_replace)?;
-    let row = |v: usize| TrainedViewRow::new(&data.names[v], data.held_out[v], before[v], after[v]);
+    let (after, right, layers) = quality(data, &state, Some(renders))?;
+    let splats = results::write_splats(&config.output, &state, &data.place.origin, may_replace)?;
+    let row = |v: usize| {
+        let row = TrainedViewRow::new(&data.names[v], data.held_out[v], before[v], after[v]);
+        row.with_right(right[v])
+    };
     let report = TrainReport {
         settings: config.clone(),
         preset,
         weights: recipe::used(&settings.weights),
         splats,
+        harmonics_degree: state.harmonics.degree(),
         splats_before: initial.len(),
         splats_after: state.surfels.len(),
         masked: data.masked,
@@ -111,17 +116,18 @@ struct Renders<'a> {
     may_replace: bool,
 }
 
-/// Returns the quality of every view. Writes what the views that were not trained show, and returns
-/// them for the page.
+/// Returns the quality of every view, and of the right halves of those that were not trained on.
+/// Writes what these show, and returns them for the page.
 fn quality(
     data: &TrainData,
-    surfels: &[Surfel],
+    state: &TrainingState,
     write: Option<Renders<'_>>,
-) -> Result<(Vec<Quality>, Vec<MapLayer>), TrainError> {
-    let (mut rows, mut layers) = (Vec::with_capacity(data.views.len()), Vec::new());
+) -> Result<(Vec<Quality>, Vec<Exposed>, Vec<MapLayer>), TrainError> {
+    let (mut rows, mut right, mut layers) = (Vec::with_capacity(data.views.len()), Vec::new(), Vec::new());
+    let mut coloured = Vec::new();
     let mut drawing = Drawing::new(&[], &data.views[0].camera, Registers::Longest);
     for (number, view) in data.views.iter().enumerate() {
-        drawing.redraw(surfels, &view.camera);
+        drawing.redraw(state.seen(&view.camera, &mut coloured), &view.camera);
         let [width, height] = view.camera.size;
         let (mut found, mut truth) =
             (Grid::filled(width, height, [0.0f32; 3]), Grid::filled(width, height, [0.0f32; 3]));
@@ -134,6 +140,7 @@ fn quality(
             counts.data_mut().copy_from_slice(mask);
         }
         rows.push((psnr_db(&found, &truth, &counts), ssim(&found, &truth, &counts)));
+        right.push(if data.held_out[number] { right_half(&found, &truth, &counts) } else { (None, None) });
         if let Some(renders) = write.as_ref().filter(|_| data.held_out[number]) {
             let stem = Path::new(&data.names[number]).file_stem().unwrap_or_default().to_string_lossy();
             let path = renders.folder.join(format!("{stem}.png"));
@@ -141,5 +148,5 @@ fn quality(
             layers.push(page::layer(&data.names[number], page::beside(&truth, &found)));
         }
     }
-    Ok((rows, layers))
+    Ok((rows, right, layers))
 }

@@ -17,6 +17,7 @@ use numeric::{Progress, upper_median};
 use raster::{GeoTransform, Grid, Window};
 
 use super::error::TrainError;
+use super::exposure::line;
 use crate::corrections::{CorrectionSource, Corrections};
 use crate::map_surface::MapSurface;
 use crate::splats::pointing_path;
@@ -266,19 +267,4 @@ fn toned(view: &mut TrainingView<LatticeView>, images: &SurfelImages) {
             *value = if counts(pixel) { gain * *value + offset } else { f32::NAN };
         }
     }
-}
-
-/// Returns the gain and offset that bring values closest to others over the pixels that count
-/// (least squares).
-pub(super) fn line(values: &[f32], others: impl Fn(usize) -> f32, counts: impl Fn(usize) -> bool) -> (f32, f32) {
-    let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (pixel, value) in values.iter().enumerate().filter(|(pixel, value)| value.is_finite() && counts(*pixel)) {
-        let (p, r) = (f64::from(*value), f64::from(others(pixel)));
-        if r.is_finite() {
-            (n, x, y, xx, xy) = (n + 1.0, x + p, y + r, xx + p * p, xy + p * r);
-        }
-    }
-    let variance = n * xx - x * x;
-    let gain = if variance > 0.0 { (n * xy - x * y) / variance } else { 0.0 };
-    (gain as f32, if n > 0.0 { ((y - gain * x) / n) as f32 } else { 0.0 })
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ::train::{Drawing, LatticeView, Registers, Surfel, SurfelCamera, TrainingConfig, TrainingView};
+use ::train::{Drawing, LatticeView, Registers, Surfel, SurfelCamera, TrainingConfig, TrainingState, TrainingView};
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_rgb};
 use numeric::Progress;
@@ -12,12 +12,13 @@ use splats::{psnr_db, ssim};
 
 use super::course::{Course, Trained};
 use super::error::TrainError;
+use super::exposure::line;
 use super::iterate::extent_m;
 use super::page;
 use super::recipe::{self, TrainNumbers, TrainPreset, TrainSchedule, TrainSteps, TrainWeights};
 use super::report::{LossPoint, Quality, TrainedViewRow};
 use super::results::{self, CHECKPOINT, RENDERS, REPORT};
-use super::satellite::{PlacedSurfels, SatelliteImage, corrections, line};
+use super::satellite::{PlacedSurfels, SatelliteImage, corrections};
 use crate::corrections::CorrectionSource;
 use crate::error::SettingError;
 use crate::files::{self, FileError};
@@ -151,7 +152,7 @@ impl SatelliteTrainConfig {
         }
         self.weights.validate()?;
         self.steps.validate()?;
-        self.schedule.validate()
+        self.schedule.check()
     }
 }
 
@@ -223,7 +224,8 @@ fn train(
     let folder = OutputFolder::take(&config.output)?;
     folder.check_folders([RENDERS])?;
     let pictures: Vec<&SatelliteImage> = images.iter().chain(&judged).collect();
-    let before: Vec<Quality> = pictures.iter().map(|image| quality(&placed.surfels, &image.view).0).collect();
+    let begun = TrainingState::new(placed.surfels.clone(), 0);
+    let before: Vec<Quality> = pictures.iter().map(|image| quality(&begun, &image.view).0).collect();
     let course = Course {
         output: &config.output,
         checkpoint_every: config.checkpoint_every,
@@ -234,7 +236,7 @@ fn train(
     };
     let Trained { state, transient_share, losses, seconds } = course.run(&placed.surfels, views, progress)?;
     results::begin(&folder)?;
-    let splats = results::write_splats(&config.output, &state.surfels, &placed.origin, may_replace)?;
+    let splats = results::write_splats(&config.output, &state, &placed.origin, may_replace)?;
     let used: Vec<PathBuf> = config.images.iter().chain(&config.judged).cloned().collect();
     found.of_images(&used).write(&pointing_path(&splats), may_replace)?;
     let height_change_m = match &surface {
@@ -243,7 +245,7 @@ fn train(
     };
     let (mut views, mut layers) = (Vec::new(), Vec::new());
     for (number, (image, before)) in pictures.iter().zip(before).enumerate() {
-        let (after, shown) = quality(&state.surfels, &image.view);
+        let (after, shown) = quality(&state, &image.view);
         let held_out = number >= config.images.len();
         if held_out {
             let picture = page::beside(&truth(&image.view), &shown);
@@ -299,8 +301,8 @@ fn truth(view: &TrainingView<LatticeView>) -> Grid<[f32; 3]> {
 
 /// Compares a view with what splats show, after a gain and an offset for each channel that bring
 /// the splats to the view. Returns what they show.
-fn quality(surfels: &[Surfel], view: &TrainingView<LatticeView>) -> (Quality, Grid<[f32; 3]>) {
-    let drawing = Drawing::new(surfels, &view.camera, Registers::Longest);
+fn quality(state: &TrainingState, view: &TrainingView<LatticeView>) -> (Quality, Grid<[f32; 3]>) {
+    let drawing = Drawing::new(state.seen(&view.camera, &mut Vec::new()), &view.camera, Registers::Longest);
     let images = drawing.images();
     let picture = truth(view);
     let counts = picture.map(|p| p.iter().all(|c| c.is_finite()));

@@ -37,7 +37,7 @@ pub(super) fn find_transients<C: SurfelCamera>(state: &TrainingState, views: &[T
 
 impl Explained {
     fn new<C: SurfelCamera>(state: &TrainingState, number: usize, view: &TrainingView<C>) -> Self {
-        let drawing = Drawing::new(&state.surfels, &view.camera, Registers::Longest);
+        let drawing = Drawing::new(state.seen(&view.camera, &mut Vec::new()), &view.camera, Registers::Longest);
         let images = drawing.images().clone();
         let look = state.appearance[number];
         let one = |pixel: usize| {

@@ -321,6 +321,12 @@ class TrainSchedule(TypedDict, total=False):
     reset_every: float | None
     """Iterations between two times at which opacities are brought down; never when 0."""
 
+    degree: float | None
+    """Highest degree of the harmonics of colours, 0 to 3; the same colour from all sides when 0."""
+
+    degree_every: float | None
+    """Share of the training after which the degree grows by one, until it is the highest."""
+
 
 class TrainSteps(TypedDict, total=False):
     """Steps of the optimiser; those of the preset where they are `None`."""
@@ -345,6 +351,12 @@ class TrainSteps(TypedDict, total=False):
 
     colour_last: float | None
     """Of colours from 0 to 1 at the last iteration."""
+
+    harmonics_first: float | None
+    """Of the harmonics of colours at the first iteration."""
+
+    harmonics_last: float | None
+    """Of the harmonics of colours at the last iteration."""
 
 
 class TrainWeights(TypedDict, total=False):
@@ -377,6 +389,9 @@ class TrainWeights(TypedDict, total=False):
 
     correlation: float | None
     """One less the correlation with heights of unknown scale."""
+
+    exposure: float | None
+    """Squared difference of the gains of images from 1 and of their offsets from 0."""
 
 
 class VisibilityConfig(TypedDict, total=False):
