@@ -9,7 +9,7 @@ use common::sample;
 use crs::{Crs, HeightConverter, MapProjection, VerticalDatum};
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
-use jobs::dsm::{DsmConfig, DsmError, DsmReport, run};
+use jobs::dsm::{DsmConfig, DsmError, DsmReport, Preset, run};
 use numeric::Silent;
 use raster::{GeoTransform, Grid};
 
@@ -72,7 +72,9 @@ fn weak_evidence_is_refused() {
     let refused = |name: &str, heights: &Grid<f32>, shift: [f64; 3], words: &str| {
         let reference = folder.path().join(format!("{name}.tif"));
         write(&reference, &truth, heights, shift);
-        let error = run(&config(folder.path().join(name), reference), &Silent).unwrap_err();
+        let mut config = config(folder.path().join(name), reference);
+        config.preset = Preset::Fast;
+        let error = run(&config, &Silent).unwrap_err();
         assert!(error.to_string().contains(words), "{name}: {error}");
         assert!(!folder.path().join(name).join("dsm").exists());
         error
@@ -139,7 +141,7 @@ fn a_model_of_the_bare_ground_is_named() {
     let folder = tempfile::tempdir().unwrap();
     for (name, is_named) in [("truth/dtm.tif", true), ("truth/dsm.tif", false)] {
         let mut config = config(folder.path().join(if is_named { "dtm" } else { "dsm" }), sample(name));
-        config.dem_vertical = None;
+        (config.dem_vertical, config.preset) = (None, Preset::Fast);
         let report: DsmReport = run(&config, &Silent).unwrap();
         let named = report.warnings.iter().any(|warning| warning.contains("looks like a model of the bare ground"));
         assert_eq!(named, is_named, "{name}: {:?}", report.warnings);

@@ -119,7 +119,7 @@ fn simulated_scenes_are_whole() {
     let parameters = tempfile::tempdir().unwrap();
     let file = parameters.path().join("scene.toml");
     let text = std::fs::read_to_string(sample("scene.toml")).unwrap();
-    std::fs::write(&file, text.replace("size_m = 320.0", "size_m = 100.0")).unwrap();
+    std::fs::write(&file, text.replace("size_m = 320.0", "size_m = 60.0")).unwrap();
     check(&["simulate", file.to_str().unwrap(), "-o", "scene", "-q", "--progress", "none"], &[]);
 }
 
