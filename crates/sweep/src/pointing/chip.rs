@@ -3,8 +3,8 @@
 //! The image is resampled once in the frame of the chip, around the place where the camera expects
 //! the point. The zero-mean normalised cross-correlation of every place within the pointing error
 //! is computed, over the pixels that both show: NaN hides pixels on either side. A chip is as large
-//! as at least half of it is clear. The best place must correlate well and lead over every other peak, because a wrong
-//! control point does more harm than none.
+//! as at least half of it is clear. The best place must correlate well and lead over every other
+//! peak, because a wrong control point does more harm than none.
 //!
 //! The place is refined by least-squares matching (Gruen 1985): an affine map from the chip to the
 //! image, and a gain and an offset of the grey values, are adjusted to all pixels of the chip. The

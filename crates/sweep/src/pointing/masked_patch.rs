@@ -1,7 +1,7 @@
 //! A patch with hidden pixels compared with parts of a picture that has hidden pixels, too.
 //!
-//! The zero-mean normalised cross-correlation of the pixels that both show (Padfield 2012): with the
-//! masks m and M, sums over m·M of both values, of their squares and of their product.
+//! The zero-mean normalised cross-correlation of the pixels that both show (Padfield 2012): with
+//! the masks m and M, sums over m·M of both values, of their squares and of their product.
 
 use multiversion::multiversion;
 use raster::{Grid, bicubic_along};
@@ -12,7 +12,8 @@ use super::patch::{NO_PIXELS, padded};
 const LANES: usize = 16;
 /// Least share of a patch's clear pixels that the picture must show, too.
 const SHARED_MIN: f32 = 0.5;
-/// Least share of clear pixels. With fewer, most of what a larger patch compares is around the hole.
+/// Least share of clear pixels. With fewer, most of what a larger patch compares lies around the
+/// hole.
 const CLEAR_MIN: f64 = 0.5;
 /// Greatest distance of the middle of the clear pixels from the point, radii. The place of a point
 /// beside all pixels that were compared is extrapolated.
