@@ -12,8 +12,11 @@ use std::sync::OnceLock;
 
 use camera::{ImagePoint, Rpc};
 use common::{sample, simulated, skysweep};
+use crs::Crs;
 use geodesy::LonLatHeight;
+use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use predicates::prelude::*;
+use raster::Grid;
 use serde_json::Value;
 
 /// A town of 160 m whose images point where their RPCs say; made once.
@@ -89,12 +92,56 @@ fn planted_shifts_come_back_and_go_into_every_format() {
         let page = std::fs::read_to_string(report.with_extension("html")).unwrap();
         assert!(page.contains("Residuals in the image") && page.contains("<svg"), "no map of residuals");
         let mut other = skysweep();
-        other.args(["rpc", "convert"]).arg(sample("view_1.tif")).arg("--corrections").arg(&report);
+        other.args(["rpc", "convert"]).arg(sample("view_3.tif")).arg("--corrections").arg(&report);
         let told = predicate::str::contains("no pointing correction of");
         other.arg("-o").arg(folder.path().join("other.json")).assert().code(2).stderr(told);
+        let mut of_model = skysweep();
+        of_model.args(["rpc", "convert"]).arg(town().join("view_1.tif")).arg("--corrections").arg(&report);
+        of_model.arg("-o").arg(folder.path().join("model.json")).assert().code(0);
         let mut unknown = skysweep();
         unknown.args(["rpc", "convert"]).arg(sample("truth/heights_1.tif")).arg("--corrections").arg(&report);
         unknown.arg("-o").arg(folder.path().join("unknown.json")).assert().code(2);
+    }
+}
+
+#[test]
+fn a_drift_is_found_by_evidence_and_filled_strips_do_not_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let (image, report) = (folder.path().join("new.tif"), folder.path().join("new.json"));
+    let register = |surface: &Path| {
+        let mut command = skysweep();
+        command.arg("register").arg(&image).arg("--dsm").arg(surface).arg("--images");
+        command.args(["view_1.tif", "view_2.tif"].map(|view| town().join(view)));
+        command.arg("-o").arg(&report).args(["--progress", "none", "--overwrite"]).assert().code(0);
+        json(&report)
+    };
+    let truth = town().join("truth/dsm.tif");
+    misplaced(&image, [6.0, -3.0]);
+    let shift = register(&truth);
+    assert_eq!(shift["order"], "shift");
+    // The scale of the lines is off by half a percent, which moves the first and the last of them.
+    let right = rpc_of(&town().join("view_3.tif"));
+    let wrong = Rpc { line_scale: right.line_scale * 1.005, ..right.clone() };
+    io::raster::copy_image_with_rpc(&town().join("view_3.tif"), &image, &wrong, true).unwrap();
+    let drift = register(&truth);
+    assert_ne!(drift["order"], "shift", "{drift}");
+    assert!(drift["rms_px"].as_f64().unwrap() < shift["rms_px"].as_f64().unwrap() + 0.1, "{drift}");
+    // Strips of the surface are filled, so that no window of a chip is whole.
+    let folder = folder.path().join("weak");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::copy(&truth, folder.join("dsm.tif")).unwrap();
+    let dem = read_dem(&truth).unwrap();
+    let (width, height) = (dem.heights.width(), dem.heights.height());
+    let cells = (0..width * height).map(|i| if i % width % 12 < 2 || i / width % 12 < 2 { 2 } else { 1 });
+    let source = Grid::from_vec(width, height, cells.collect::<Vec<u8>>()).unwrap();
+    let bands = [Band { description: "layer", data: BandData::U8(&source) }];
+    let crs = Crs::ellipsoidal(dem.horizontal_epsg.unwrap());
+    write_cog(folder.join("source.tif"), &CogRaster::new(&bands, dem.geotransform, crs), false).unwrap();
+    misplaced(&image, [6.0, -3.0]);
+    let weak = register(&folder.join("dsm.tif"));
+    for axis in 0..2 {
+        let (a, b) = (weak["shift_px"][axis].as_f64().unwrap(), shift["shift_px"][axis].as_f64().unwrap());
+        assert!((a - b).abs() < 0.1, "{weak}");
     }
 }
 

@@ -60,7 +60,7 @@ def shadow(z, cell, elevation, azimuth, _kept={}):
     key = (z.ctypes.data, z.shape, elevation, azimuth)
     if key not in _kept:
         lit, top, k = np.ones_like(z, bool), z.max() - z.min(), 1
-        while k * cell * np.tan(np.radians(elevation)) <= top:
+        while k * cell * np.tan(np.radians(elevation)) <= top and k < min(z.shape):
             rise = k * cell * np.tan(np.radians(elevation))
             # The cells of a step towards the sun.
             steps = [round(-np.cos(np.radians(azimuth)) * k), round(np.sin(np.radians(azimuth)) * k)]

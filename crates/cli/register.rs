@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use crs::VerticalDatum;
 use jobs::error::JobError;
-use jobs::register::{RegisterConfig, RegisterError, RegisterModel};
+use jobs::register::{RegisterConfig, RegisterError, RegisterModel, RegisterOrder};
 
 use crate::corrections::corrections_of;
 use crate::error::with_hint;
@@ -46,15 +46,19 @@ pub(crate) struct Args {
     #[arg(long, value_name = "PX", default_value_t = 20.0)]
     reach: f64,
     /// What is corrected.
-    #[arg(long, action = clap::ArgAction::Set, value_parser = named(&ORDERS), default_value = "shift")]
-    order: bool,
+    #[arg(long, value_parser = named(&ORDERS), default_value = "evidence")]
+    order: RegisterOrder,
     #[command(flatten)]
     run: RunOptions,
 }
 
-/// Whether the correction is affine.
-const ORDERS: [Named<bool>; 2] =
-    [("shift", false, "one shift of the whole image"), ("affine", true, "an affine map in image space")];
+/// What is corrected.
+const ORDERS: [Named<RegisterOrder>; 4] = [
+    ("evidence", RegisterOrder::Evidence, "the least of these that predicts held-out points as well as any"),
+    ("shift", RegisterOrder::Shift, "one shift of the whole image"),
+    ("drift", RegisterOrder::Drift, "a shift that grows with the line"),
+    ("affine", RegisterOrder::Affine, "an affine map in image space"),
+];
 
 /// Runs `skysweep register`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
@@ -67,7 +71,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.corrections = corrections_of(args.corrections.as_deref());
     config.vertical = args.dsm_vertical;
     config.reach_px = args.reach;
-    config.affine = args.order;
+    config.order = args.order;
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;

@@ -27,6 +27,21 @@ pub enum RegisterModel {
     Splats(PathBuf),
 }
 
+/// What is corrected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RegisterOrder {
+    /// The least order that predicts points which it was not made from as well as any.
+    #[default]
+    Evidence,
+    /// One shift of the whole image.
+    Shift,
+    /// A shift that grows with the line.
+    Drift,
+    /// An affine map in image space.
+    Affine,
+}
+
 /// An image to be registered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,8 +59,8 @@ pub struct RegisterConfig {
     pub vertical: Option<VerticalDatum>,
     /// Largest error of the pointing that is searched for, pixels of the image.
     pub reach_px: f64,
-    /// Whether the correction is an affine map instead of a shift.
-    pub affine: bool,
+    /// What is corrected.
+    pub order: RegisterOrder,
     /// Worker threads; one per core when `None`.
     pub threads: Option<usize>,
     /// Whether an existing report may be replaced.
@@ -53,7 +68,7 @@ pub struct RegisterConfig {
 }
 
 impl RegisterConfig {
-    /// A shift of at most 20 pixels.
+    /// A shift of at most 20 pixels, with a drift or an affine map where there is evidence of it.
     pub fn new(image: PathBuf, model: RegisterModel, output: PathBuf) -> Self {
         Self {
             image,
@@ -62,7 +77,7 @@ impl RegisterConfig {
             corrections: CorrectionSource::default(),
             vertical: None,
             reach_px: 20.0,
-            affine: false,
+            order: RegisterOrder::Evidence,
             threads: None,
             overwrite: false,
         }

@@ -2,18 +2,31 @@
 
 use camera::ImagePoint;
 use geodesy::LonLatHeight;
+use numeric::Progress;
 use occlusion::OcclusionSurface;
 use ortho::Sight;
 use raster::{Grid, bicubic};
 use rayon::prelude::*;
-use sweep::pointing::{Chip, ChipConfig, ChipSearch, ControlPoint, find_chip};
+use sweep::pointing::{Chip, ChipConfig, ChipPlace, ChipSearch, ControlPoint, find_chip};
 
 use super::error::RegisterError;
+use super::evidence::sharing;
 use super::model::{Looks, Model, NewImage};
+use super::spots::best_spot;
 use crate::ortho::{Cell, OrthoImage, look};
 
-/// Points of the lattice along the longer side of the model.
-const POINTS_ALONG: usize = 24;
+/// Points of a lattice along the longer side of the model.
+const POINTS_ALONG: usize = 16;
+/// Where the lattices begin, spacings: one after the other is searched until enough points hold.
+const LATTICES: [[f64; 2]; 4] = [[0.5, 0.5], [0.0, 0.0], [0.5, 0.0], [0.0, 0.5]];
+/// Points that share a shift and are enough: with places to 0.2 pixels, six parameters of a
+/// correction are then known to 0.05 pixels.
+const ENOUGH: usize = 100;
+/// Farthest that a point moves from its lattice to where more is seen, cells of a frame.
+const SLACK: usize = 24;
+/// Distance within which images of the model agree on a place, cells of a frame: the mean of those
+/// that do is taken, because each sees the surface's errors from another side.
+const SAME_PLACE: f64 = 1.0;
 /// Pixels around a chip, for the derivatives and for slopes of the ground.
 const AROUND: usize = 6;
 /// Height by which the surface must stand above a line of sight to hide what is behind it, metres.
@@ -34,7 +47,12 @@ pub(super) struct Found {
 
 /// Searches for points of the model in the image, up to `reach_px` pixels from where its camera
 /// expects them.
-pub(super) fn search(model: &Model, new: &NewImage, reach_px: f64) -> Result<Found, RegisterError> {
+pub(super) fn search(
+    model: &Model,
+    new: &NewImage,
+    reach_px: f64,
+    progress: &dyn Progress,
+) -> Result<Found, RegisterError> {
     let config = ChipConfig::default();
     let surface = OcclusionSurface::new(&model.heights, model.cell_m);
     let frames = Frames {
@@ -44,24 +62,37 @@ pub(super) fn search(model: &Model, new: &NewImage, reach_px: f64) -> Result<Fou
         chip_half: config.radius_max + AROUND,
         image_half: config.radius_max + AROUND + reach_px.ceil() as usize,
     };
-    let centres = frames.centres();
-    let mut found = Found { points: Vec::new(), tried: centres.len() };
-    for centre in &centres {
-        let cells = frames.cells(*centre, frames.image_half);
-        let image = picture(frames.image_half, grey(&surface, &new.image, &cells)?);
-        let chips = frames.chips(*centre)?;
-        let expected = [frames.image_half as f64; 2];
-        let point = [frames.chip_half as f64; 2];
-        let search = ChipSearch { image: &image, expected, reach_px, image_from_chip: [[1.0, 0.0], [0.0, 1.0]] };
-        let places = chips.par_iter().map(|chip| find_chip(Chip { picture: chip, point }, &search, &config).ok());
-        let places: Vec<_> = places.collect();
-        let best =
-            places.into_iter().flatten().reduce(|best, other| if other.score > best.score { other } else { best });
-        let Some(place) = best else { continue };
-        let away = [0, 1].map(|axis| (place.place[axis] - expected[axis]) * frames.step);
-        found.points.extend(frames.observed(*centre, away, &new.image));
+    let mut found = Found { points: Vec::new(), tried: 0 };
+    for from in LATTICES {
+        for centre in frames.centres(from) {
+            progress.check_cancelled()?;
+            let Some((chips, spot, centre)) = frames.chips(centre)? else { continue };
+            let cells = frames.cells(centre, frames.image_half);
+            let image = picture(frames.image_half, grey(&surface, &new.image, &cells)?);
+            let expected = [frames.image_half as f64; 2];
+            let search = ChipSearch { image: &image, expected, reach_px, image_from_chip: [[1.0, 0.0], [0.0, 1.0]] };
+            let places =
+                chips.par_iter().map(|chip| find_chip(Chip { picture: chip, point: spot }, &search, &config).ok());
+            let places: Vec<ChipPlace> = places.collect::<Vec<_>>().into_iter().flatten().collect();
+            found.tried += 1;
+            let Some(place) = common(&places) else { continue };
+            let away = [0, 1].map(|axis| (place[axis] - expected[axis]) * frames.step);
+            found.points.extend(frames.observed(centre, away, &new.image));
+        }
+        if sharing(&new.image.camera, &found.points).len() >= ENOUGH {
+            break;
+        }
     }
     Ok(found)
+}
+
+/// Returns the mean of the best place and of those that agree with it.
+fn common(places: &[ChipPlace]) -> Option<[f64; 2]> {
+    let best = places.iter().reduce(|best, other| if other.score > best.score { other } else { best })?.place;
+    let near: Vec<[f64; 2]> = places.iter().map(|place| place.place).collect();
+    let near: Vec<&[f64; 2]> =
+        near.iter().filter(|place| (place[0] - best[0]).hypot(place[1] - best[1]) <= SAME_PLACE).collect();
+    Some([0, 1].map(|axis| near.iter().map(|place| place[axis]).sum::<f64>() / near.len() as f64))
 }
 
 /// The frames in which the model and the image are compared: cells of the image's pixel size around
@@ -76,16 +107,20 @@ struct Frames<'a> {
     image_half: usize,
 }
 
+/// Pictures of the surroundings of a point by image, its place in them, and its cell of the model.
+type Spot = (Vec<Grid<f32>>, [f64; 2], [f64; 2]);
+
 impl Frames<'_> {
-    /// Returns cells with heights on a lattice over the model.
-    fn centres(&self) -> Vec<[f64; 2]> {
+    /// Returns cells with heights on a lattice over the model that begins so many spacings from its
+    /// corner.
+    fn centres(&self, from: [f64; 2]) -> Vec<[f64; 2]> {
         let (width, height) = (self.model.heights.width(), self.model.heights.height());
         let spacing = width.max(height) as f64 / POINTS_ALONG as f64;
-        let along = |cells: usize| {
-            let count = (cells as f64 / spacing).floor().max(1.0) as usize;
-            (0..count).map(move |i| ((i as f64 + 0.5) * cells as f64 / count as f64).floor())
+        let along = |cells: usize, from: f64| {
+            let count = (cells as f64 / spacing).floor().max(1.0);
+            (0..count as usize).map(move |i| ((i as f64 + from) * cells as f64 / count).floor())
         };
-        let lattice = along(height).flat_map(|row| along(width).map(move |column| [column, row]));
+        let lattice = along(height, from[1]).flat_map(|row| along(width, from[0]).map(move |column| [column, row]));
         lattice.filter(|[column, row]| self.surface.height_at(*column, *row).is_finite()).collect()
     }
 
@@ -97,35 +132,48 @@ impl Frames<'_> {
     }
 
     fn cell(&self, column: f64, row: f64) -> Option<Cell> {
+        let nearest = (column.round().max(0.0) as usize, row.round().max(0.0) as usize);
+        if self.model.unobserved.as_ref().and_then(|mask| mask.get(nearest.0, nearest.1)).is_some_and(|hidden| *hidden)
+        {
+            return None;
+        }
         let height = self.surface.height_at(column, row);
         let [lon, lat] = self.model.ground.lonlat(column, row);
         let ground = LonLatHeight::new(lon, lat, f64::from(height));
         height.is_finite().then_some(Cell { in_dsm: [column, row], ground })
     }
 
-    /// Returns what the model looks like around a point.
-    fn chips(&self, centre: [f64; 2]) -> Result<Vec<Grid<f32>>, RegisterError> {
-        let cells = self.cells(centre, self.chip_half);
-        match &self.model.looks {
+    /// Returns what the model looks like around a point of a lattice, the place in these pictures
+    /// around which they show most, and that place on the model; `None` where they show nothing.
+    fn chips(&self, [column, row]: [f64; 2]) -> Result<Option<Spot>, RegisterError> {
+        let half = self.chip_half + SLACK;
+        let cells = self.cells([column, row], half);
+        let chips = match &self.model.looks {
             Looks::Picture(seen) => {
                 let value = |cell: &Option<Cell>| match cell {
                     Some(cell) => bicubic(seen, cell.in_dsm[0], cell.in_dsm[1]),
                     None => f32::NAN,
                 };
-                Ok(vec![picture(self.chip_half, cells.iter().map(value).collect())])
+                vec![picture(half, cells.iter().map(value).collect())]
             }
             Looks::Images(images) => {
-                let one =
-                    |(_, image): &(_, OrthoImage)| Ok(picture(self.chip_half, grey(self.surface, image, &cells)?));
-                images.iter().map(one).collect()
+                let one = |(_, image): &(_, OrthoImage)| Ok(picture(half, grey(self.surface, image, &cells)?));
+                images.iter().map(one).collect::<Result<_, RegisterError>>()?
             }
-        }
+        };
+        let Some(spot) = best_spot(&chips, SLACK) else { return Ok(None) };
+        let moved = spot.map(|at| (at as f64 - half as f64) * self.step);
+        let centre = [column + moved[0], row + moved[1]];
+        let is_known = self.surface.height_at(centre[0], centre[1]).is_finite();
+        Ok(is_known.then(|| (chips, spot.map(|at| at as f64), centre)))
     }
 
     /// Returns a point of the model with its place in the image: what the image shows `away` from
     /// it, in cells of the model, is the point.
     fn observed(&self, [column, row]: [f64; 2], away: [f64; 2], image: &OrthoImage) -> Option<ControlPoint> {
-        let own = self.cell(column, row)?.ground;
+        let height_m = f64::from(self.surface.height_at(column, row));
+        let [lon, lat] = self.model.ground.lonlat(column, row);
+        let own = LonLatHeight::new(lon, lat, height_m);
         let [lon, lat] = self.model.ground.lonlat(column + away[0], row + away[1]);
         let place = image.camera.project(LonLatHeight::new(lon, lat, own.height_m)).ok()?;
         let (width, height) = (image.source.info().width as f64, image.source.info().height as f64);

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use camera::{ImageCorrection, RpcCamera};
 use crs::MapProjection;
+use eval::CellOrigin;
 use geodesy::LonLatHeight;
-use io::raster::ImageSource;
+use io::raster::{Dem, ImageSource};
 use numeric::Progress;
 use occlusion::{Eyeline, GridGround};
 use raster::{GeoTransform, Grid};
@@ -16,9 +17,12 @@ use super::error::RegisterError;
 use crate::corrections::Corrections;
 use crate::map_surface;
 use crate::ortho::{OrthoError, OrthoImage};
+use crate::surface_layer::layer_beside;
 
 /// Most cells of the picture of splats from above.
 const CELLS_MAX: f64 = (1u64 << 26) as f64;
+/// Probability below which a height is no evidence: it is wrong more often than right.
+const LEAST_CONFIDENCE: f32 = 0.5;
 /// Least opacity of splats that show the surface.
 const COVERED: f32 = 0.5;
 
@@ -26,6 +30,8 @@ const COVERED: f32 = 0.5;
 pub(super) struct Model {
     /// Heights above the ellipsoid, metres.
     pub(super) heights: Grid<f32>,
+    /// Cells that nothing has measured, if the surface says so: they are no evidence.
+    pub(super) unobserved: Option<Grid<bool>>,
     pub(super) geotransform: GeoTransform,
     /// Side of a cell, metres.
     pub(super) cell_m: f64,
@@ -73,7 +79,9 @@ impl Model {
         progress: &dyn Progress,
     ) -> Result<Self, RegisterError> {
         let map = map_surface::read(dsm, config.vertical, progress)?;
+        let unobserved = unobserved(&map.dem)?;
         let mut model = Self::on(map.dem.heights, map.dem.geotransform, map.projection, dsm)?;
+        model.unobserved = unobserved;
         let of_run = if images.is_empty() { Corrections::images_of_run(dsm)? } else { images.to_vec() };
         let own = config.image.canonicalize().ok();
         let others = of_run.into_iter().filter(|path| own.is_none() || path.canonicalize().ok() != own);
@@ -148,6 +156,7 @@ impl Model {
         Ok(Self {
             cell_m: (along_columns * along_rows).sqrt(),
             heights,
+            unobserved: None,
             geotransform,
             projection,
             ground,
@@ -165,4 +174,22 @@ impl Model {
         let corrected = camera.correction != ImageCorrection::IDENTITY;
         Ok(OrthoImage { source, camera, corrected, eyeline })
     }
+}
+
+/// Reads which cells of a surface were filled, or are hardly ever right; `None` without layers
+/// beside it.
+fn unobserved(surface: &Dem) -> Result<Option<Grid<bool>>, RegisterError> {
+    let source = layer_beside(surface, "source.tif")?;
+    let confidence = layer_beside(surface, "confidence.tif")?;
+    let is_filled = |k: usize| {
+        let code = source.as_ref().map(|layer| layer.data()[k] as i32);
+        code.is_some_and(|code| CellOrigin::from_source_code(code) == CellOrigin::Filled)
+    };
+    let is_weak =
+        |k: usize| confidence.as_ref().is_some_and(|layer| (0.0..LEAST_CONFIDENCE).contains(&layer.data()[k]));
+    if source.is_none() && confidence.is_none() {
+        return Ok(None);
+    }
+    let (width, height) = (surface.heights.width(), surface.heights.height());
+    Ok(Grid::from_vec(width, height, (0..width * height).map(|k| is_filled(k) || is_weak(k)).collect()))
 }

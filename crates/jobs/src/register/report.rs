@@ -5,12 +5,16 @@ use std::path::PathBuf;
 use camera::ImageCorrection;
 use serde::Serialize;
 
+use super::config::RegisterOrder;
+
 /// The correction of an image, and how well it is known.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct RegisterReport {
     /// The new image first, then the images of the model.
     pub images: Vec<RegisteredImage>,
+    /// Order of the correction: shift, drift or affine.
+    pub order: RegisterOrder,
     /// Points of the model that were searched for.
     pub tried: usize,
     /// Points that were found.
@@ -47,9 +51,18 @@ impl RegisterReport {
     pub fn text(&self) -> String {
         let [sample, line] = self.shift_px;
         format!(
-            "shift      {sample:+.3} px along the sample, {line:+.3} px along the line\n\
+            "shift      {sample:+.3} px along the sample, {line:+.3} px along the line{}\n\
              points     {} of {} found, {} agree: RMS {:.3} px, median {:.3} px\n",
-            self.found, self.tried, self.agree, self.rms_px, self.median_px
+            match self.order {
+                RegisterOrder::Drift => ", and a drift",
+                RegisterOrder::Affine => ", and an affine map",
+                RegisterOrder::Evidence | RegisterOrder::Shift => "",
+            },
+            self.found,
+            self.tried,
+            self.agree,
+            self.rms_px,
+            self.median_px
         )
     }
 }

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use camera::{ImageCorrection, RpcCamera};
 use geodesy::LonLatHeight;
 use numeric::{Progress, upper_median};
-use sweep::pointing::{AdjustConfig, ControlPoint, ModelOrder, Observations, adjust_to_control};
+use sweep::pointing::{ControlPoint, ModelOrder};
 
-use super::config::RegisterConfig;
+use super::config::{RegisterConfig, RegisterOrder};
 use super::error::RegisterError;
+use super::evidence::{AGREES_PX, adjusted, order_of, residuals, sharing};
 use super::matching;
 use super::model::{Looks, Model, NewImage};
 use super::page;
@@ -23,10 +24,6 @@ const SETTLED_PX: f64 = 0.01;
 const CLOSE_PX: f64 = 4.0;
 /// Least number of points.
 const POINTS_MIN: usize = 8;
-/// Residual up to which a point agrees with the correction, pixels.
-const AGREES_PX: f64 = 1.5;
-/// Weak prior on the parameters, pixels: any error of the pointing is as likely as another.
-const PRIOR_PX: f64 = 100.0;
 
 /// Registers an image and writes the report with its correction.
 ///
@@ -65,19 +62,19 @@ fn register(config: &RegisterConfig, progress: &dyn Progress) -> Result<Register
     loop {
         progress.check_cancelled()?;
         let reach_px = if rounds == 0 { config.reach_px } else { CLOSE_PX.min(config.reach_px) };
-        let found = matching::search(&model, &new, reach_px)?;
+        let found = matching::search(&model, &new, reach_px, progress)?;
         if found.points.len() < POINTS_MIN {
             let (found, tried) = (found.points.len(), found.tried);
             return Err(RegisterError::TooFew { found, tried, needed: POINTS_MIN, reach_px });
         }
-        let order = if config.affine && rounds > 0 { ModelOrder::Affine } else { ModelOrder::Translation };
         let before = new.image.camera.clone();
-        new.image.camera.correction = corrected(&before, size, &found.points, order);
+        let (correction, order) = corrected(&before, size, &found.points, rounds, config.order);
+        new.image.camera.correction = correction;
         rounds += 1;
         progress.step();
         let moved = change(&before, &new.image.camera, &found.points);
         if rounds == ROUNDS || (moved < SETTLED_PX && rounds > 1) {
-            return judged(&model, &new, &found, rounds);
+            return judged(&model, &new, &found, (rounds, order));
         }
     }
 }
@@ -92,34 +89,36 @@ fn open(config: &RegisterConfig, model: &Model, camera: RpcCamera) -> Result<New
     Ok(NewImage { path: config.image.clone(), image, gsd_m })
 }
 
-/// Returns the correction that follows from points: first the shift that most of them share, then
-/// the least-squares one.
-fn corrected(camera: &RpcCamera, size: (usize, usize), points: &[ControlPoint], order: ModelOrder) -> ImageCorrection {
-    let median = |axis: usize| {
-        let mut all: Vec<f64> = residuals(camera, points).map(|residual| residual[axis]).collect();
+/// Returns the correction that follows from the points that share a shift, and its order. The first
+/// round finds a shift: matches of an image that is laid beside its place tell no more.
+fn corrected(
+    camera: &RpcCamera,
+    size: (usize, usize),
+    points: &[ControlPoint],
+    rounds: usize,
+    wanted: RegisterOrder,
+) -> (ImageCorrection, RegisterOrder) {
+    let sharing = sharing(camera, points);
+    // The order is that of the whole correction, so it follows no linear part of an earlier round.
+    let raw = RpcCamera { rpc: camera.rpc.clone(), correction: ImageCorrection::IDENTITY };
+    let shift = |axis: usize| {
+        let mut all: Vec<f64> = residuals(&raw, &sharing).map(|residual| residual[axis]).collect();
         upper_median(&mut all).unwrap_or(0.0)
     };
-    let shift = ImageCorrection::translation(median(0), median(1));
-    let near = RpcCamera { rpc: camera.rpc.clone(), correction: camera.correction.then(&shift) };
-    // Matches of something else count with their full error in the first step of the adjustment.
-    let right = |residual: &[f64; 2]| residual[0].hypot(residual[1]) <= 2.0 * AGREES_PX;
-    let chosen = points.iter().zip(residuals(&near, points)).filter(|(_, residual)| right(residual));
-    let chosen: Vec<ControlPoint> = chosen.map(|(point, _)| point.clone()).collect();
-    if chosen.len() < POINTS_MIN {
-        return near.correction;
-    }
-    let adjust = AdjustConfig { max_order: order, prior_px: PRIOR_PX };
-    let observed = Observations { tracks: &[], control: &chosen };
-    let found = adjust_to_control(std::slice::from_ref(&near), &[size], observed, &adjust);
-    found.corrections.first().copied().unwrap_or(near.correction)
-}
-
-/// Iterates over observed minus projected places, pixels; NaN where the camera fails.
-fn residuals<'a>(camera: &'a RpcCamera, points: &'a [ControlPoint]) -> impl Iterator<Item = [f64; 2]> + 'a {
-    points.iter().map(|point| match (point.seen.first(), camera.project(point.ground)) {
-        (Some((_, seen)), Ok(at)) => [seen.sample - at.sample, seen.line - at.line],
-        _ => [f64::NAN; 2],
-    })
+    let near = RpcCamera { correction: ImageCorrection::translation(shift(0), shift(1)), ..raw.clone() };
+    let order = match wanted {
+        _ if rounds == 0 => ModelOrder::Translation,
+        RegisterOrder::Evidence => order_of(&near, size, &sharing),
+        RegisterOrder::Shift => ModelOrder::Translation,
+        RegisterOrder::Drift => ModelOrder::Drift,
+        RegisterOrder::Affine => ModelOrder::Affine,
+    };
+    let named = match order {
+        ModelOrder::Drift => RegisterOrder::Drift,
+        ModelOrder::Affine => RegisterOrder::Affine,
+        ModelOrder::None | ModelOrder::Translation => RegisterOrder::Shift,
+    };
+    (adjusted(&near, size, &sharing, order), named)
 }
 
 /// Returns how far a new correction moves the points at most, pixels.
@@ -139,7 +138,7 @@ fn judged(
     model: &Model,
     new: &NewImage,
     found: &matching::Found,
-    rounds: usize,
+    (rounds, order): (usize, RegisterOrder),
 ) -> Result<RegisterReport, RegisterError> {
     let camera = &new.image.camera;
     let mut lengths: Vec<f64> = residuals(camera, &found.points).map(|[a, b]| a.hypot(b)).collect();
@@ -159,10 +158,10 @@ fn judged(
         Looks::Images(images) => images,
         Looks::Picture(_) => &[],
     };
-    let others = others.iter().filter(|(_, image)| image.corrected);
-    let others = others.map(|(path, image)| named(path, image.camera.correction));
+    let others = others.iter().map(|(path, image)| named(path, image.camera.correction));
     Ok(RegisterReport {
         images: std::iter::once(named(&new.path, camera.correction)).chain(others).collect(),
+        order,
         tried: found.tried,
         found: count,
         agree,

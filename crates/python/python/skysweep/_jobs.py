@@ -1225,7 +1225,7 @@ def register(
     corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
     vertical: str | None = None,
     reach_px: float = 20.0,
-    affine: bool = False,
+    order: Literal["evidence", "shift", "drift", "affine"] = "evidence",
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
@@ -1239,7 +1239,7 @@ def register(
         corrections: Source of the pointing corrections of the model's images.
         vertical: Vertical datum of the surface model; the one that the file states when `None`.
         reach_px: Largest error of the pointing that is searched for, pixels of the image.
-        affine: Whether the correction is an affine map instead of a shift.
+        order: What is corrected.
         threads: Worker threads; one per core when `None`.
         overwrite: Whether an existing report may be replaced.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.

@@ -2,8 +2,9 @@
 //!
 //! The image is resampled once in the frame of the chip, around the place where the camera expects
 //! the point. The zero-mean normalised cross-correlation of every place within the pointing error
-//! is computed. The best place must correlate well and lead over every other peak, because a wrong
-//! control point does more harm than none.
+//! is computed, over the pixels that both show: NaN hides pixels on either side. A chip is as large
+//! as at least half of it is clear. The best place must correlate well and lead over every other
+//! peak, because a wrong control point does more harm than none.
 //!
 //! The place is refined by least-squares matching (Gruen 1985): an affine map from the chip to the
 //! image, and a gain and an offset of the grey values, are adjusted to all pixels of the chip. The
@@ -14,6 +15,7 @@ use std::borrow::Cow;
 use raster::{Grid, bicubic_along, level_from_level0, level0_from_level, reduce};
 
 use super::chip_fit::{Chip, ChipSearch, fit};
+use super::masked_patch::{MaskedPatch, clear_radius};
 use super::moments::remove_mean;
 use super::patch::{NO_PIXELS, Patch, padded};
 
@@ -124,11 +126,12 @@ fn scale(search: &ChipSearch<'_>) -> f64 {
 
 /// Finds a chip whose pixels are about as large as those of the image.
 fn find(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<ChipPlace, ChipMiss> {
-    let radius = half_width(chip).filter(|radius| *radius >= config.radius_min).ok_or(ChipMiss::Useless)?;
-    let radius = radius.min(config.radius_max) as i32;
-    let own = Patch::around(chip.picture, chip.point, radius, 0.0).ok_or(ChipMiss::Useless)?;
+    let radius = clear_radius(chip.picture, chip.point, [config.radius_min, config.radius_max]);
+    let radius = radius.ok_or(ChipMiss::Useless)? as i32;
+    let own = MaskedPatch::around(chip.picture, chip.point, radius).ok_or(ChipMiss::Useless)?;
+    let whole = Patch::around(chip.picture, chip.point, radius, 0.0).filter(|_| own.is_whole());
     let reach = (search.reach_px / scale(search)).ceil().max(2.0) as i32;
-    let (scores, side) = correlations(&own, radius, search, search.expected, reach);
+    let (scores, side) = correlations((&own, whole.as_ref()), radius, search, reach);
     let at = |i: usize, j: usize| scores[j * side + i];
     let best = (0..scores.len()).max_by(|i, j| scores[*i].total_cmp(&scores[*j])).ok_or(ChipMiss::NoPixels)?;
     let (i, j, score) = (best % side, best / side, scores[best]);
@@ -161,28 +164,30 @@ const SCALES: std::ops::RangeInclusive<f64> = 1e-2..=1e2;
 /// Most times that an image is halved. A chip with still larger pixels tells no place.
 const HALVED_MAX: u32 = 4;
 
-/// Returns how far a chip reaches around its point on all sides, with a margin for resampling.
-fn half_width(chip: Chip<'_>) -> Option<usize> {
-    let (width, height) = (chip.picture.width() as f64, chip.picture.height() as f64);
-    let [x, y] = chip.point;
-    let reach = x.min(width - 1.0 - x).min(y).min(height - 1.0 - y).floor() - 2.0;
-    (reach >= 0.0).then_some(reach as usize)
-}
-
-/// Returns the correlations at the places around `centre`, a chip's pixel apart and up to `reach`
-/// of them away, row by row, and the length of a row.
-fn correlations(own: &Patch, radius: i32, search: &ChipSearch<'_>, centre: [f64; 2], reach: i32) -> (Vec<f32>, usize) {
+/// Returns the correlations at the places around the expected one, a chip's pixel apart and up to
+/// `reach` of them away, row by row, and the length of a row. A chip without hidden pixels in an
+/// image without any goes the shorter way.
+fn correlations(
+    (own, whole): (&MaskedPatch, Option<&Patch>),
+    radius: i32,
+    search: &ChipSearch<'_>,
+    reach: i32,
+) -> (Vec<f32>, usize) {
     let (patch, side) = (2 * radius as usize + 1, 2 * reach as usize + 1);
     let far = radius + reach;
-    let whole = 2 * far as usize + 1;
-    let mut picture = Grid::filled(whole + padded(patch) - patch, whole, f32::NAN);
+    let length = 2 * far as usize + 1;
+    let mut picture = Grid::filled(length + padded(patch) - patch, length, f32::NAN);
     let [[a, _], [c, _]] = search.image_from_chip;
-    for j in 0..whole {
-        let line = search.moved(centre, [-f64::from(far), j as f64 - f64::from(far)]);
-        bicubic_along(search.image, line, [a, c], &mut picture.row_mut(j)[..whole]);
+    for j in 0..length {
+        let line = search.moved(search.expected, [-f64::from(far), j as f64 - f64::from(far)]);
+        bicubic_along(search.image, line, [a, c], &mut picture.row_mut(j)[..length]);
     }
     remove_mean(picture.data_mut());
-    let scores = own.correlations(picture, 0.0);
+    let is_clear = (0..length).all(|j| picture.row(j)[..length].iter().all(|v| v.is_finite()));
+    let scores = match whole.filter(|_| is_clear) {
+        Some(patch) => patch.correlations(picture, 0.0),
+        None => own.correlations(&picture),
+    };
     ((0..side * side).map(|k| scores[(k % side, k / side)]).collect(), side)
 }
 
@@ -233,6 +238,19 @@ mod tests {
     }
 
     #[test]
+    fn hidden_pixels_of_the_chip_and_of_the_image_do_not_count() {
+        let hidden = |x: f64, y: f64| (x - 24.0).abs() < 4.0 && y > 15.0;
+        let chip =
+            picture(41, 37, |x, y| if hidden(x, y) { f64::NAN } else { f64::from(chip()[(x as usize, y as usize)]) });
+        let shadow = |x: f64, y: f64| x > 108.0 && y < 82.0;
+        let image = picture(200, 190, |x, y| if shadow(x, y) { f64::NAN } else { texture(x, y) });
+        let chip = Chip { picture: &chip, point: [20.25, 18.5] };
+        let found = find_chip(chip, &search(&image), &ChipConfig::default()).unwrap();
+        let [x, y] = found.place;
+        assert!((x - 101.3).hypot(y - 88.6) < 0.02 && found.score > 0.98, "{found:?}");
+    }
+
+    #[test]
     fn places_that_cannot_be_trusted_have_reasons() {
         let (image, chip) = (picture(200, 190, texture), chip());
         let find = |chip: &Grid<f32>, point: [f64; 2], search: &ChipSearch<'_>| {
@@ -240,7 +258,7 @@ mod tests {
         };
         let point = [20.25, 18.5];
         let near = search(&image);
-        assert_eq!(find(&chip, [5.0, 18.0], &near), ChipMiss::Useless);
+        assert_eq!(find(&chip, [1.5, 1.5], &near), ChipMiss::Useless);
         assert_eq!(find(&chip.map(|_| 3.0), point, &near), ChipMiss::Useless);
         assert_eq!(find(&chip, point, &ChipSearch { expected: [-500.0, 20.0], ..near }), ChipMiss::NoPixels);
         let elsewhere = ChipSearch { expected: [60.0, 150.0], reach_px: 12.0, ..near };

@@ -15,8 +15,8 @@ const SETTLED_PX: f64 = 0.005;
 const AWAY_PX: f64 = 2.0;
 /// Greatest entry of the affine map beyond identity. Steep ground in a wide pair stays below it.
 const STRETCH_MAX: f64 = 0.4;
-/// Least share of the chip's pixels that must be compared.
-const SHARE_MIN: f64 = 0.8;
+/// Least share of the chip's clear pixels that must be compared.
+const SHARE_MIN: f64 = 0.5;
 
 /// A picture of the surroundings of a ground point.
 #[derive(Debug, Clone, Copy)]
@@ -95,13 +95,14 @@ pub(super) fn fit(chip: Chip<'_>, search: &ChipSearch<'_>, start: [f64; 2], radi
 fn step(chip: Chip<'_>, search: &ChipSearch<'_>, start: [f64; 2], radius: i32, warp: &Warp) -> Option<[f64; 6]> {
     let seen = resampled(search, start, radius + 1, warp);
     let (mut normal, mut right) = (SMatrix::<f64, 8, 8>::zeros(), SVector::<f64, 8>::zeros());
-    let mut compared = 0;
+    let (mut clear, mut compared) = (0, 0);
     for j in -radius..=radius {
         for i in -radius..=radius {
             let at =
                 |di: i32, dj: i32| f64::from(seen[((i + di + radius + 1) as usize, (j + dj + radius + 1) as usize)]);
             let own = f64::from(bicubic(chip.picture, chip.point[0] + f64::from(i), chip.point[1] + f64::from(j)));
             let (value, dx, dy) = (at(0, 0), 0.5 * (at(1, 0) - at(-1, 0)), 0.5 * (at(0, 1) - at(0, -1)));
+            clear += usize::from(own.is_finite());
             if !(value + own + dx + dy).is_finite() {
                 continue;
             }
@@ -112,8 +113,7 @@ fn step(chip: Chip<'_>, search: &ChipSearch<'_>, start: [f64; 2], radius: i32, w
             right += row * value;
         }
     }
-    let side = f64::from(2 * radius + 1);
-    if f64::from(compared) < SHARE_MIN * side * side {
+    if f64::from(compared) < SHARE_MIN * clear as f64 {
         return None;
     }
     let found = normal.cholesky()?.solve(&right);

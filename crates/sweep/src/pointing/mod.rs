@@ -14,6 +14,7 @@ mod coarse;
 mod control;
 mod interest;
 mod intersect;
+mod masked_patch;
 mod model;
 mod moments;
 mod off_trajectory;
