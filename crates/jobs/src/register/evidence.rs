@@ -11,6 +11,9 @@ pub(super) const AGREES_PX: f64 = 1.5;
 const SHARES_PX: f64 = 2.0 * AGREES_PX;
 /// Weak prior on the parameters, pixels: any error of the pointing is as likely as another.
 const PRIOR_PX: f64 = 100.0;
+/// Most steps from one half of the points to the next. Each makes its residuals smaller, so that few
+/// are needed.
+const TRIMMED_STEPS_MAX: usize = 20;
 /// Parts of the points, each of which is held out once.
 const PARTS: usize = 5;
 /// Lead that another order needs, standard errors of the mean difference of held-out residuals.
@@ -49,6 +52,40 @@ pub(super) fn adjusted(
     let observed = Observations { tracks: &[], control: points };
     let found = adjust_to_control(std::slice::from_ref(camera), &[size], observed, &adjust);
     found.corrections.first().copied().unwrap_or(camera.correction)
+}
+
+/// Returns the correction of the half of the points that it fits best (least trimmed squares,
+/// Rousseeuw 1984), of all points where they are few: vehicles, crowns and whatever else the surface
+/// does not hold stand off it, and all of them to one side.
+pub(super) fn adjusted_to_most(
+    camera: &RpcCamera,
+    size: (usize, usize),
+    points: &[ControlPoint],
+    order: ModelOrder,
+) -> ImageCorrection {
+    let mut found = adjusted(camera, size, points, order);
+    let parameters = match order {
+        ModelOrder::None | ModelOrder::Translation => 2,
+        ModelOrder::Drift => 4,
+        ModelOrder::Affine => 6,
+    };
+    if points.len() < 2 * parameters * POINTS_PER_PARAMETER {
+        return found;
+    }
+    for _ in 0..TRIMMED_STEPS_MAX {
+        let with = RpcCamera { rpc: camera.rpc.clone(), correction: found };
+        let mut by_residual: Vec<(f64, usize)> =
+            residuals(&with, points).enumerate().map(|(i, [along, across])| (along.hypot(across), i)).collect();
+        by_residual.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let half: Vec<ControlPoint> =
+            by_residual[..points.len().div_ceil(2)].iter().map(|(_, i)| points[*i].clone()).collect();
+        let next = adjusted(camera, size, &half, order);
+        if next == found {
+            break;
+        }
+        found = next;
+    }
+    found
 }
 
 /// Returns the least order that predicts held-out points as well as any: a higher one is taken

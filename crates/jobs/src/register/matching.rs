@@ -133,8 +133,8 @@ impl Frames<'_> {
 
     fn cell(&self, column: f64, row: f64) -> Option<Cell> {
         let nearest = (column.round().max(0.0) as usize, row.round().max(0.0) as usize);
-        if self.model.unobserved.as_ref().and_then(|mask| mask.get(nearest.0, nearest.1)).is_some_and(|hidden| *hidden)
-        {
+        let is_marked = |mask: &Grid<bool>| mask.get(nearest.0, nearest.1).is_some_and(|marked| *marked);
+        if self.model.unobserved.as_ref().is_some_and(is_marked) || is_marked(&self.model.beside_jumps) {
             return None;
         }
         let height = self.surface.height_at(column, row);

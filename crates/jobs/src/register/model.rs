@@ -23,6 +23,11 @@ use crate::surface_layer::layer_beside;
 const CELLS_MAX: f64 = (1u64 << 26) as f64;
 /// Probability below which a height is no evidence: it is wrong more often than right.
 const LEAST_CONFIDENCE: f32 = 0.5;
+/// Rise per run of a height jump between neighbouring cells: steeper than roofs and most slopes.
+const JUMP_SLOPE: f32 = 2.0;
+/// Cells beside a height jump that are not compared: they lie on the wall between two heights, or
+/// show both sides of it through the blur of the images.
+const JUMP_REACH: usize = 2;
 /// Least opacity of splats that show the surface.
 const COVERED: f32 = 0.5;
 
@@ -32,6 +37,8 @@ pub(super) struct Model {
     pub(super) heights: Grid<f32>,
     /// Cells that nothing has measured, if the surface says so: they are no evidence.
     pub(super) unobserved: Option<Grid<bool>>,
+    /// Cells beside height jumps: what is seen there depends on the direction of view.
+    pub(super) beside_jumps: Grid<bool>,
     pub(super) geotransform: GeoTransform,
     /// Side of a cell, metres.
     pub(super) cell_m: f64,
@@ -153,8 +160,10 @@ impl Model {
         }
         let (along_columns, along_rows) = geotransform.cell_size();
         let ground = GridGround::new(&projection, &geotransform, (heights.width(), heights.height()))?;
+        let cell_m = (along_columns * along_rows).sqrt();
         Ok(Self {
-            cell_m: (along_columns * along_rows).sqrt(),
+            cell_m,
+            beside_jumps: beside_jumps(&heights, JUMP_SLOPE * cell_m as f32),
             heights,
             unobserved: None,
             geotransform,
@@ -176,6 +185,27 @@ impl Model {
     }
 }
 
+/// Marks the cells within [`JUMP_REACH`] of neighbouring cells whose heights differ by more than
+/// `jump_m`.
+fn beside_jumps(heights: &Grid<f32>, jump_m: f32) -> Grid<bool> {
+    let (width, height) = (heights.width(), heights.height());
+    let mut out = Grid::filled(width, height, false);
+    let near = |at: usize, count: usize| at.saturating_sub(JUMP_REACH)..(at + JUMP_REACH + 1).min(count);
+    for y in 0..height {
+        for x in 0..width {
+            let differs = |u: usize, v: usize| heights.get(u, v).is_some_and(|h| (h - heights[(x, y)]).abs() > jump_m);
+            let (right, below) = (differs(x + 1, y), differs(x, y + 1));
+            if right || below {
+                let (columns, rows) = (near(x, width), near(y, height));
+                let columns = columns.start..(columns.end + usize::from(right)).min(width);
+                (rows.start..(rows.end + usize::from(below)).min(height))
+                    .for_each(|v| out.row_mut(v)[columns.clone()].fill(true));
+            }
+        }
+    }
+    out
+}
+
 /// Reads which cells of a surface were filled, or are hardly ever right; `None` without layers
 /// beside it.
 fn unobserved(surface: &Dem) -> Result<Option<Grid<bool>>, RegisterError> {
@@ -192,4 +222,17 @@ fn unobserved(surface: &Dem) -> Result<Option<Grid<bool>>, RegisterError> {
     }
     let (width, height) = (surface.heights.width(), surface.heights.height());
     Ok(Grid::from_vec(width, height, (0..width * height).map(|k| is_filled(k) || is_weak(k)).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_beside_a_wall_are_marked_on_both_sides_and_slopes_are_not() {
+        let heights = |x: usize| 0.4 * x as f32 + if x >= 10 { 6.0 } else { 0.0 };
+        let grid = Grid::from_vec(20, 3, (0..60).map(|i| heights(i % 20)).collect()).unwrap();
+        let marked: Vec<usize> = (0..20).filter(|x| beside_jumps(&grid, 1.0)[(*x, 1)]).collect();
+        assert_eq!(marked, [7, 8, 9, 10, 11, 12]);
+    }
 }

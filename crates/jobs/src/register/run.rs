@@ -9,7 +9,7 @@ use sweep::pointing::{ControlPoint, ModelOrder};
 
 use super::config::{RegisterConfig, RegisterOrder};
 use super::error::RegisterError;
-use super::evidence::{AGREES_PX, adjusted, order_of, residuals, sharing};
+use super::evidence::{AGREES_PX, adjusted_to_most, order_of, residuals, sharing};
 use super::matching;
 use super::model::{Looks, Model, NewImage};
 use super::page;
@@ -118,7 +118,7 @@ fn corrected(
         ModelOrder::Affine => RegisterOrder::Affine,
         ModelOrder::None | ModelOrder::Translation => RegisterOrder::Shift,
     };
-    (adjusted(&near, size, &sharing, order), named)
+    (adjusted_to_most(&near, size, &sharing, order), named)
 }
 
 /// Returns how far a new correction moves the points at most, pixels.

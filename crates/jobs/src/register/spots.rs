@@ -41,6 +41,7 @@ impl TensorSums {
         let width = w + 1;
         let mut sums = vec![[0.0; 3]; width * (h + 1)];
         // Grey values are compared as shares of their spread, so that images of any depth compete.
+        // No pixel counts for more than 1: one bright car must not win over a textured roof.
         let known = || picture.data().iter().filter(|v| v.is_finite()).map(|v| f64::from(*v));
         let count = known().count().max(1) as f64;
         let mean = known().sum::<f64>() / count;
@@ -53,7 +54,7 @@ impl TensorSums {
                     let gy = 0.5 * f64::from(picture[(x, y + 1)] - picture[(x, y - 1)]);
                     if (gx + gy).is_finite() && variance > 0.0 {
                         let products = [gx * gx, gx * gy, gy * gy];
-                        (0..3).for_each(|k| row[k] += products[k] / variance);
+                        (0..3).for_each(|k| row[k] += products[k] / (gx * gx + gy * gy + variance));
                     }
                 }
                 let above = sums[y * width + x + 1];

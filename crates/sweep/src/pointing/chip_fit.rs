@@ -7,6 +7,8 @@
 use nalgebra::{SMatrix, SVector};
 use raster::{Grid, bicubic, bicubic_along};
 
+use super::masked_patch::SHARED_MIN;
+
 /// Most steps. Matches that are right settle in a few.
 const STEPS_MAX: usize = 20;
 /// A step shorter than this, pixels of the chip, ends the adjustment.
@@ -15,8 +17,6 @@ const SETTLED_PX: f64 = 0.005;
 const AWAY_PX: f64 = 2.0;
 /// Greatest entry of the affine map beyond identity. Steep ground in a wide pair stays below it.
 const STRETCH_MAX: f64 = 0.4;
-/// Least share of the chip's clear pixels that must be compared.
-const SHARE_MIN: f64 = 0.5;
 
 /// A picture of the surroundings of a ground point.
 #[derive(Debug, Clone, Copy)]
@@ -113,7 +113,7 @@ fn step(chip: Chip<'_>, search: &ChipSearch<'_>, start: [f64; 2], radius: i32, w
             right += row * value;
         }
     }
-    if f64::from(compared) < SHARE_MIN * clear as f64 {
+    if compared < SHARED_MIN.min(clear) {
         return None;
     }
     let found = normal.cholesky()?.solve(&right);

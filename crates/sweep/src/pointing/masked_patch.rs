@@ -10,8 +10,9 @@ use super::patch::{NO_PIXELS, padded};
 
 /// Values that are worked on together; rows of patches are padded to multiples of it.
 const LANES: usize = 16;
-/// Least share of a patch's clear pixels that the picture must show, too.
-const SHARED_MIN: f32 = 0.5;
+/// Least pixels that a patch and a picture must show both: those of a patch of 15 × 15 pixels, as
+/// few as a chip may have.
+pub(super) const SHARED_MIN: usize = 225;
 /// Least share of clear pixels. With fewer, most of what a larger patch compares lies around the
 /// hole.
 const CLEAR_MIN: f64 = 0.5;
@@ -110,7 +111,7 @@ impl MaskedPatch {
         let mut scores = Grid::filled(columns, rows.saturating_sub(self.side), NO_PIXELS);
         let own = [&self.values[..], &self.squares, &self.mask];
         let other = [values.data(), squares.data(), mask.data()];
-        let needed = SHARED_MIN * self.clear as f32;
+        let needed = SHARED_MIN.min(self.clear) as f32;
         for y in 0..scores.height() {
             for (x, score) in scores.row_mut(y).iter_mut().enumerate() {
                 let [n, f, ff, g, gg, fg] = sums(own, padded(self.side), other, picture.width(), (x, y));
