@@ -11,8 +11,8 @@ pub(super) const AGREES_PX: f64 = 1.5;
 const SHARES_PX: f64 = 2.0 * AGREES_PX;
 /// Weak prior on the parameters, pixels: any error of the pointing is as likely as another.
 const PRIOR_PX: f64 = 100.0;
-/// Most steps from one half of the points to the next. Each makes its residuals smaller, so that few
-/// are needed.
+/// Most steps from one half of the points to the next. Each makes the residuals smaller, so that
+/// few are needed.
 const TRIMMED_STEPS_MAX: usize = 20;
 /// Parts of the points, each of which is held out once.
 const PARTS: usize = 5;
@@ -55,8 +55,8 @@ pub(super) fn adjusted(
 }
 
 /// Returns the correction of the half of the points that it fits best (least trimmed squares,
-/// Rousseeuw 1984), of all points where they are few: vehicles, crowns and whatever else the surface
-/// does not hold stand off it, and all of them to one side.
+/// Rousseeuw 1984), of all points where they are few: vehicles, crowns and whatever else the
+/// surface does not hold stand off it, and all of them to one side.
 pub(super) fn adjusted_to_most(
     camera: &RpcCamera,
     size: (usize, usize),
