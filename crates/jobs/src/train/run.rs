@@ -56,7 +56,7 @@ fn train(
     }
     let (preset, settings) = settings(config, data);
     let initial = initial::surfels(data, config.budget / 2);
-    let (before, ..) = quality(data, &TrainingState::new(initial.clone(), 0), None)?;
+    let before = quality(data, &TrainingState::new(initial.clone(), 0), None)?.views;
     let course = Course {
         output: &config.output,
         checkpoint_every: config.checkpoint_every,
@@ -68,7 +68,7 @@ fn train(
     let Trained { state, transient_share, losses, seconds } = course.run(&initial, views, progress)?;
     results::begin(folder)?;
     let renders = Renders { folder: &folder.subfolder(RENDERS)?, may_replace };
-    let (after, right, layers) = quality(data, &state, Some(renders))?;
+    let Judged { views: after, right, layers } = quality(data, &state, Some(renders))?;
     let splats = results::write_splats(&config.output, &state, &data.place.origin, may_replace)?;
     let row = |v: usize| {
         let row = TrainedViewRow::new(&data.names[v], data.held_out[v], before[v], after[v]);
@@ -116,14 +116,20 @@ struct Renders<'a> {
     may_replace: bool,
 }
 
+/// How well the views are shown, and what shows it.
+struct Judged {
+    /// By view.
+    views: Vec<Quality>,
+    /// Of the right half, by view; none for views that were trained on.
+    right: Vec<Exposed>,
+    /// Views that were not trained on, for the page.
+    layers: Vec<MapLayer>,
+}
+
 /// Returns the quality of every view, and of the right halves of those that were not trained on.
 /// Writes what these show, and returns them for the page.
-fn quality(
-    data: &TrainData,
-    state: &TrainingState,
-    write: Option<Renders<'_>>,
-) -> Result<(Vec<Quality>, Vec<Exposed>, Vec<MapLayer>), TrainError> {
-    let (mut rows, mut right, mut layers) = (Vec::with_capacity(data.views.len()), Vec::new(), Vec::new());
+fn quality(data: &TrainData, state: &TrainingState, write: Option<Renders<'_>>) -> Result<Judged, TrainError> {
+    let mut out = Judged { views: Vec::with_capacity(data.views.len()), right: Vec::new(), layers: Vec::new() };
     let mut coloured = Vec::new();
     let mut drawing = Drawing::new(&[], &data.views[0].camera, Registers::Longest);
     for (number, view) in data.views.iter().enumerate() {
@@ -139,14 +145,14 @@ fn quality(
         if let Some(mask) = &view.mask {
             counts.data_mut().copy_from_slice(mask);
         }
-        rows.push((psnr_db(&found, &truth, &counts), ssim(&found, &truth, &counts)));
-        right.push(if data.held_out[number] { right_half(&found, &truth, &counts) } else { (None, None) });
+        out.views.push((psnr_db(&found, &truth, &counts), ssim(&found, &truth, &counts)));
+        out.right.push(if data.held_out[number] { right_half(&found, &truth, &counts) } else { (None, None) });
         if let Some(renders) = write.as_ref().filter(|_| data.held_out[number]) {
             let stem = Path::new(&data.names[number]).file_stem().unwrap_or_default().to_string_lossy();
             let path = renders.folder.join(format!("{stem}.png"));
             write_png_rgb(path, &page::bytes(&found), renders.may_replace)?;
-            layers.push(page::layer(&data.names[number], page::beside(&truth, &found)));
+            out.layers.push(page::layer(&data.names[number], page::beside(&truth, &found)));
         }
     }
-    Ok((rows, right, layers))
+    Ok(out)
 }
