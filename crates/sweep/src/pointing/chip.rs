@@ -3,8 +3,9 @@
 //! The image is resampled once in the frame of the chip, around the place where the camera expects
 //! the point. The zero-mean normalised cross-correlation of every place within the pointing error
 //! is computed, over the pixels that both show: NaN hides pixels on either side. A chip is as large
-//! as at least half of it is clear. The best place must correlate well and lead over every other
-//! peak, because a wrong control point does more harm than none.
+//! as its picture reaches on all sides and at least half of it is clear. The best place must
+//! correlate well and lead over every other peak, because a wrong control point does more harm than
+//! none.
 //!
 //! The place is refined by least-squares matching (Gruen 1985): an affine map from the chip to the
 //! image, and a gain and an offset of the grey values, are adjusted to all pixels of the chip. The
@@ -126,7 +127,8 @@ fn scale(search: &ChipSearch<'_>) -> f64 {
 
 /// Finds a chip whose pixels are about as large as those of the image.
 fn find(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<ChipPlace, ChipMiss> {
-    let radius = clear_radius(chip.picture, chip.point, [config.radius_min, config.radius_max]);
+    let reach = half_width(chip).filter(|reach| *reach >= config.radius_min).ok_or(ChipMiss::Useless)?;
+    let radius = clear_radius(chip.picture, chip.point, [config.radius_min, reach.min(config.radius_max)]);
     let radius = radius.ok_or(ChipMiss::Useless)? as i32;
     let own = MaskedPatch::around(chip.picture, chip.point, radius).ok_or(ChipMiss::Useless)?;
     let whole = Patch::around(chip.picture, chip.point, radius, 0.0).filter(|_| own.is_whole());
@@ -157,6 +159,14 @@ fn find(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<
     let start = search.moved(search.expected, [i, j].map(|k| k as f64 - f64::from(reach)));
     let place = fit(chip, search, start, radius).ok_or(ChipMiss::Unsettled)?;
     Ok(ChipPlace { place, score })
+}
+
+/// Returns how far a chip reaches around its point on all sides, with a margin for resampling.
+fn half_width(chip: Chip<'_>) -> Option<usize> {
+    let (width, height) = (chip.picture.width() as f64, chip.picture.height() as f64);
+    let [x, y] = chip.point;
+    let reach = x.min(width - 1.0 - x).min(y).min(height - 1.0 - y).floor() - 2.0;
+    (reach >= 0.0).then_some(reach as usize)
 }
 
 /// Pixels of the image in a pixel of the chip, as a side, that can be compared.

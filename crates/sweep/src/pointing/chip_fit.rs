@@ -7,7 +7,7 @@
 use nalgebra::{SMatrix, SVector};
 use raster::{Grid, bicubic, bicubic_along};
 
-use super::masked_patch::SHARED_MIN;
+use super::masked_patch::needed;
 
 /// Most steps. Matches that are right settle in a few.
 const STEPS_MAX: usize = 20;
@@ -113,7 +113,7 @@ fn step(chip: Chip<'_>, search: &ChipSearch<'_>, start: [f64; 2], radius: i32, w
             right += row * value;
         }
     }
-    if compared < SHARED_MIN.min(clear) {
+    if compared < needed(clear) {
         return None;
     }
     let found = normal.cholesky()?.solve(&right);

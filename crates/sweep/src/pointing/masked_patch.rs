@@ -10,9 +10,8 @@ use super::patch::{NO_PIXELS, padded};
 
 /// Values that are worked on together; rows of patches are padded to multiples of it.
 const LANES: usize = 16;
-/// Least pixels that a patch and a picture must show both: those of a patch of 15 × 15 pixels, as
-/// few as a chip may have.
-pub(super) const SHARED_MIN: usize = 225;
+/// Pixels that are enough to compare, of a patch of 15 × 15: as few as a chip may have.
+const ENOUGH: usize = 225;
 /// Least share of clear pixels. With fewer, most of what a larger patch compares lies around the
 /// hole.
 const CLEAR_MIN: f64 = 0.5;
@@ -29,6 +28,12 @@ pub(super) struct MaskedPatch {
     squares: Vec<f32>,
     mask: Vec<f32>,
     clear: usize,
+}
+
+/// Returns how many of a patch's clear pixels the picture must show, too: half of them, and of a
+/// large patch no more than are enough.
+pub(super) fn needed(clear: usize) -> usize {
+    ENOUGH.min(clear / 2)
 }
 
 /// Returns the greatest half width, from `radii`, of a patch around a point that shows enough:
@@ -111,7 +116,7 @@ impl MaskedPatch {
         let mut scores = Grid::filled(columns, rows.saturating_sub(self.side), NO_PIXELS);
         let own = [&self.values[..], &self.squares, &self.mask];
         let other = [values.data(), squares.data(), mask.data()];
-        let needed = SHARED_MIN.min(self.clear) as f32;
+        let needed = needed(self.clear).max(1) as f32;
         for y in 0..scores.height() {
             for (x, score) in scores.row_mut(y).iter_mut().enumerate() {
                 let [n, f, ff, g, gg, fg] = sums(own, padded(self.side), other, picture.width(), (x, y));
