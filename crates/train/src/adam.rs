@@ -23,33 +23,31 @@ impl<const N: usize> Default for Moments<N> {
 impl<const N: usize> Moments<N> {
     /// Takes a step down a gradient. A gradient that is not finite is left out.
     pub(crate) fn step(&mut self, parameters: &mut [f32; N], gradient: &[f32; N], rates: &[f32; N]) {
-        if !gradient.iter().all(|g| g.is_finite()) {
-            return;
-        }
-        self.steps = self.steps.saturating_add(1);
-        let steps = i32::try_from(self.steps).unwrap_or(i32::MAX);
-        let unbiased = DECAY.map(|decay| 1.0 - decay.powi(steps));
-        for i in 0..N {
-            self.mean[i] = DECAY[0] * self.mean[i] + (1.0 - DECAY[0]) * gradient[i];
-            self.square[i] = DECAY[1] * self.square[i] + (1.0 - DECAY[1]) * gradient[i] * gradient[i];
-            let size = (self.square[i] / unbiased[1]).sqrt() + EPSILON;
-            parameters[i] -= rates[i] * (self.mean[i] / unbiased[0]) / size;
+        if gradient.iter().all(|g| g.is_finite()) {
+            self.steps = self.steps.saturating_add(1);
+            update([parameters, &mut self.mean, &mut self.square], gradient, self.steps, |i| rates[i]);
         }
     }
 }
 
 /// Takes a step of parameters with running means of their own, which have taken `steps` with this
 /// one. A gradient that is not finite is left out.
-pub(crate) fn step_all([parameters, mean, square]: [&mut [f32]; 3], gradient: &[f32], steps: u32, rate: f32) {
-    if !gradient.iter().all(|g| g.is_finite()) {
-        return;
+pub(crate) fn step_all(moments: [&mut [f32]; 3], gradient: &[f32], steps: u32, rate: f32) {
+    if gradient.iter().all(|g| g.is_finite()) {
+        update(moments, gradient, steps.max(1), |_| rate);
     }
-    let steps = i32::try_from(steps.max(1)).unwrap_or(i32::MAX);
+}
+
+/// Moves parameters and their running means by a gradient, each at its own rate.
+#[inline]
+fn update([parameters, mean, square]: [&mut [f32]; 3], gradient: &[f32], steps: u32, rate: impl Fn(usize) -> f32) {
+    let steps = i32::try_from(steps).unwrap_or(i32::MAX);
     let unbiased = DECAY.map(|decay| 1.0 - decay.powi(steps));
-    for (((parameter, mean), square), gradient) in parameters.iter_mut().zip(mean).zip(square).zip(gradient) {
+    let all = parameters.iter_mut().zip(mean).zip(square).zip(gradient);
+    for (i, (((parameter, mean), square), gradient)) in all.enumerate() {
         *mean = DECAY[0] * *mean + (1.0 - DECAY[0]) * gradient;
         *square = DECAY[1] * *square + (1.0 - DECAY[1]) * gradient * gradient;
-        *parameter -= rate * (*mean / unbiased[0]) / ((*square / unbiased[1]).sqrt() + EPSILON);
+        *parameter -= rate(i) * (*mean / unbiased[0]) / ((*square / unbiased[1]).sqrt() + EPSILON);
     }
 }
 

@@ -29,7 +29,8 @@ pub(super) fn residuals<'a>(camera: &'a RpcCamera, points: &'a [ControlPoint]) -
     })
 }
 
-/// Returns the points within [`AGREES_PX`] twice of the residual that has most others so near.
+/// Returns the points whose residuals lie within [`SHARES_PX`] of the one that has most others so
+/// near.
 pub(super) fn sharing(camera: &RpcCamera, points: &[ControlPoint]) -> Vec<ControlPoint> {
     let all: Vec<[f64; 2]> = residuals(camera, points).collect();
     let near = |a: &[f64; 2], b: &[f64; 2], px: f64| (a[0] - b[0]).hypot(a[1] - b[1]) <= px;
@@ -64,12 +65,7 @@ pub(super) fn adjusted_to_most(
     order: ModelOrder,
 ) -> ImageCorrection {
     let mut found = adjusted(camera, size, points, order);
-    let parameters = match order {
-        ModelOrder::None | ModelOrder::Translation => 2,
-        ModelOrder::Drift => 4,
-        ModelOrder::Affine => 6,
-    };
-    if points.len() < 2 * parameters * POINTS_PER_PARAMETER {
+    if points.len() < 2 * order.parameters() * POINTS_PER_PARAMETER {
         return found;
     }
     for _ in 0..TRIMMED_STEPS_MAX {
@@ -92,8 +88,8 @@ pub(super) fn adjusted_to_most(
 /// where it makes their squared residuals smaller by more than [`LEAD_SIGMAS`] standard errors.
 pub(super) fn order_of(camera: &RpcCamera, size: (usize, usize), points: &[ControlPoint]) -> ModelOrder {
     let mut best = (ModelOrder::Translation, held_out(camera, size, points, ModelOrder::Translation));
-    for (order, parameters) in [(ModelOrder::Drift, 4), (ModelOrder::Affine, 6)] {
-        if points.len() < parameters * POINTS_PER_PARAMETER {
+    for order in [ModelOrder::Drift, ModelOrder::Affine] {
+        if points.len() < order.parameters() * POINTS_PER_PARAMETER {
             break;
         }
         let own = held_out(camera, size, points, order);

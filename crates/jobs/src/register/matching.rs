@@ -89,9 +89,8 @@ pub(super) fn search(
 /// Returns the mean of the best place and of those that agree with it.
 fn common(places: &[ChipPlace]) -> Option<[f64; 2]> {
     let best = places.iter().reduce(|best, other| if other.score > best.score { other } else { best })?.place;
-    let near: Vec<[f64; 2]> = places.iter().map(|place| place.place).collect();
-    let near: Vec<&[f64; 2]> =
-        near.iter().filter(|place| (place[0] - best[0]).hypot(place[1] - best[1]) <= SAME_PLACE).collect();
+    let is_near = |place: &[f64; 2]| (place[0] - best[0]).hypot(place[1] - best[1]) <= SAME_PLACE;
+    let near: Vec<[f64; 2]> = places.iter().map(|place| place.place).filter(is_near).collect();
     Some([0, 1].map(|axis| near.iter().map(|place| place[axis]).sum::<f64>() / near.len() as f64))
 }
 

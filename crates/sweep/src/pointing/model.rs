@@ -43,7 +43,7 @@ impl ModelOrder {
     }
 
     /// Returns the number of parameters per view.
-    pub(super) const fn parameters(self) -> usize {
+    pub const fn parameters(self) -> usize {
         self.used().len()
     }
 }
