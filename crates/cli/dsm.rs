@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use crs::{CrsRequest, VerticalDatum};
 use io::raster::BandChoice;
+use jobs::dsm::job_file::read_dsm_job;
 use jobs::dsm::{
     DsmConfig, DsmError, DsmReport, DsmSetting, Fill, HeightRange, ImagePair, LayerArea, MapBounds, Preset, SweepError,
 };
 use jobs::image_files::image_files;
-use jobs::job_file::{is_job_file, read_dsm_job};
+use jobs::job_file::is_job_file;
 use jobs::production::{ProductionError, make_plan};
 use jobs::products::ProductKind;
 

@@ -65,7 +65,7 @@ pub(crate) struct TemplateArgs {
 }
 
 const TEMPLATES: [Named<&str>; 2] = [
-    ("dsm", jobs::job_file::DSM_TEMPLATE, "A surface model: skysweep dsm JOB.toml"),
+    ("dsm", jobs::dsm::job_file::DSM_TEMPLATE, "A surface model: skysweep dsm JOB.toml"),
     ("batch", jobs::batch::BATCH_TEMPLATE, "Many scenes: skysweep batch BATCH.toml"),
 ];
 

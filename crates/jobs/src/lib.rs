@@ -1,54 +1,18 @@
-//! Every job of the toolkit as a function from a configuration to a report.
+//! Every job of the toolkit as a function from a configuration to a report, and [`batch`], which
+//! does many of them.
+//!
+//! The jobs live in crates of their own, by what they work on: `dsm`, `surfaces`, `scenes` and
+//! `viewer`. What they share is in `job`. All of them are re-exported here.
 
-pub mod align;
-mod as_text;
 pub mod batch;
-pub mod buildings;
-pub mod camera_stand;
-pub mod city;
-pub mod city_files;
-pub mod classes;
-pub mod corrections;
-pub mod dataset_folder;
-pub mod diff;
-pub mod dsm;
-pub mod dtm;
-pub mod error;
-mod error_text;
-pub mod eval;
-pub mod event_lines;
-pub mod files;
-pub mod groundview;
-mod guarded;
-pub mod heightmap;
-pub mod image_files;
-pub mod job_file;
-mod job_paths;
-mod map_crs;
-pub mod map_surface;
-pub mod mesh;
-pub mod ortho;
-mod output_folder;
-mod path_variables;
-pub mod placed_model;
-pub mod priors;
-pub mod production;
-pub mod products;
-pub mod register;
-pub mod remote;
-mod report_page;
-pub mod rpc;
-mod run_folder;
-mod same_view;
-pub mod simulate;
-mod simulate_page;
-mod small_view;
-pub mod splats;
-pub mod split;
-mod stac;
-mod standing;
-mod surface_layer;
-pub mod threads;
-pub mod tiles;
-pub mod train;
-pub mod view;
+
+pub use dsm::{self, production, products};
+pub use job::{
+    corrections, dataset_folder, error, event_lines, files, image_files, job_file, map_surface, placed_model,
+};
+pub use job::{remote, threads};
+pub use scenes::{align, city, mesh, priors, rpc, simulate, splats, split, train};
+pub use surfaces::{
+    buildings, camera_stand, city_files, classes, diff, dtm, eval, groundview, heightmap, ortho, register, tiles,
+};
+pub use viewer as view;

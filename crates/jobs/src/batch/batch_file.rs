@@ -7,11 +7,11 @@ use toml::Table;
 
 use crate::batch::error::BatchError;
 use crate::batch::task::{TaskKind, TaskSettings};
-use crate::dsm::{LayerArea, MapBounds};
-use crate::files::read_text;
-use crate::job_file;
-use crate::job_paths::resolved;
-use crate::path_variables::expanded;
+use dsm::{LayerArea, MapBounds};
+use job::files::read_text;
+use job::job_file;
+use job::job_paths::resolved;
+use job::path_variables::expanded;
 
 /// A batch: scenes and what is to be made of them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::files::FileError;
-use crate::job_file::JobFileError;
+use job::files::FileError;
+use job::job_file::JobFileError;
 
 /// The reason why a batch did not start, or stopped. A task that fails is no error.
 #[derive(Debug, thiserror::Error)]

@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::batch::task::TaskJob;
-use crate::dsm::files_of;
-use crate::error_text::with_causes;
-use crate::files::{TEXT_LIMIT, write_json};
-use crate::production::{InputFile, ProductFile, added_input, check_inputs, inputs_of};
+use dsm::files_of;
+use dsm::production::{InputFile, ProductFile, added_input, check_inputs, inputs_of};
+use job::error_text::with_causes;
+use job::files::{TEXT_LIMIT, write_json};
 
 /// The record of a task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -119,7 +119,7 @@ fn key_of(job: &TaskJob) -> Result<String, String> {
     if let TaskJob::Dsm(config) = &mut plain {
         **config = config.deciding();
     }
-    crate::production::hash_of(&(env!("CARGO_PKG_VERSION"), plain)).map_err(|e| e.to_string())
+    dsm::production::hash_of(&(env!("CARGO_PKG_VERSION"), plain)).map_err(|e| e.to_string())
 }
 
 /// Returns the files that a task reads: those of the images of a surface model, and for other tasks

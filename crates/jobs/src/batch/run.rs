@@ -11,12 +11,12 @@ use crate::batch::batch_report::{BatchReport, SceneReport};
 use crate::batch::error::BatchError;
 use crate::batch::task::{TaskJob, TaskKind, TaskScene};
 use crate::batch::tasks_of_scene::{SceneJobs, TASKS, TaskLimits};
-use crate::files::{FileError, write_json};
-use crate::guarded::{self, TEMPORARY};
-use crate::image_files::images_of;
-use crate::output_folder::OutputFolder;
-use crate::production::{CHUNKS, is_chunk, is_left_over};
-use crate::threads;
+use dsm::production::{CHUNKS, is_chunk, is_left_over};
+use job::files::{FileError, write_json};
+use job::guarded::{self, TEMPORARY};
+use job::image_files::images_of;
+use job::output_folder::OutputFolder;
+use job::threads;
 
 /// Names of the reports in the folder of a batch.
 const REPORT_JSON: &str = "batch_report.json";

@@ -8,17 +8,17 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use crate::camera_stand::{StandConfig, StandSource};
-use crate::dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
-use crate::error_text::with_causes;
-use crate::eval::{EvalTarget, GridEvalConfig};
-use crate::heightmap::HeightMapConfig;
-use crate::job_file::{JobFileError, defect};
-use crate::job_paths::resolved;
-use crate::ortho::OrthoConfig;
-use crate::path_variables::expanded;
-use crate::priors::PriorsConfig;
-use crate::production::{PLAN, POINTING, make_or_resume};
+use dsm::production::{PLAN, POINTING, make_or_resume};
+use dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
+use job::error_text::with_causes;
+use job::job_file::{JobFileError, defect};
+use job::job_paths::resolved;
+use job::path_variables::expanded;
+use scenes::priors::PriorsConfig;
+use surfaces::camera_stand::{StandConfig, StandSource};
+use surfaces::eval::{EvalTarget, GridEvalConfig};
+use surfaces::heightmap::HeightMapConfig;
+use surfaces::ortho::OrthoConfig;
 
 /// What a batch can make of a scene, in the order in which it is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -286,27 +286,27 @@ impl TaskJob {
             }
             Self::Ortho(config) => {
                 let folder = config.output.parent().unwrap_or(Path::new(""));
-                crate::guarded::check_folder(folder).map_err(|e| with_causes(&e))?;
-                crate::files::create_folder(folder).map_err(|e| with_causes(&e))?;
-                crate::ortho::run(config, progress).map_err(|e| with_causes(&e))?;
+                job::guarded::check_folder(folder).map_err(|e| with_causes(&e))?;
+                job::files::create_folder(folder).map_err(|e| with_causes(&e))?;
+                surfaces::ortho::run(config, progress).map_err(|e| with_causes(&e))?;
                 None
             }
             Self::Eval(config) => {
-                let report = crate::eval::compare_grids(config, progress).map_err(|e| with_causes(&e))?;
+                let report = surfaces::eval::compare_grids(config, progress).map_err(|e| with_causes(&e))?;
                 let missed = report.missed();
                 (!missed.is_empty()).then(|| missed.join("; "))
             }
             Self::HeightMap(config) => {
-                let report = crate::heightmap::run(config, progress).map_err(|e| with_causes(&e))?;
+                let report = surfaces::heightmap::run(config, progress).map_err(|e| with_causes(&e))?;
                 match report {
-                    crate::heightmap::HeightMapReport::List(list) if list.failed > 0 => {
+                    surfaces::heightmap::HeightMapReport::List(list) if list.failed > 0 => {
                         Some(format!("{} height maps could not be made", list.failed))
                     }
                     _ => None,
                 }
             }
             Self::Priors(config) => {
-                let report = crate::priors::run(config, progress).map_err(|e| with_causes(&e))?;
+                let report = scenes::priors::run(config, progress).map_err(|e| with_causes(&e))?;
                 (!report.is_whole()).then(|| "objects of the model cannot be used or are not seen".to_owned())
             }
         };
@@ -316,13 +316,12 @@ impl TaskJob {
 
 /// Makes the configuration of height maps: a folder for a list of cameras, else one file.
 fn height_map(folder: &Path, given: &Table) -> Result<HeightMapConfig, String> {
-    let stand = StandConfig::new(StandSource::Position { lon_deg: 0.0, lat_deg: 0.0 });
     let mut given = given.clone();
     let own: StandConfig = match given.remove("stand") {
         Some(Value::Table(own)) => {
             let source = own.get("source").ok_or("`stand.source` is missing")?.clone();
             let source = StandSource::deserialize(source).map_err(|e| in_words(e.message()))?;
-            with(&StandConfig { source, ..stand }, &own)?
+            with(&StandConfig::new(source), &own)?
         }
         _ => return Err("`stand` is no table".to_owned()),
     };

@@ -7,7 +7,7 @@ use std::sync::Mutex;
 
 use numeric::{Choice, Progress};
 
-use crate::event_lines::EventLines;
+use job::event_lines::EventLines;
 
 /// Writes the progress of a task to its log, shows its stage to the watcher of the batch, and
 /// passes on the wish to stop.

@@ -10,9 +10,9 @@ use crate::batch::batch_report::{SceneReport, TaskReport, TaskState};
 use crate::batch::record::{Standing, TaskCourse, TaskRecord};
 use crate::batch::task::{TaskJob, TaskKind, TaskOutcome};
 use crate::batch::task_log::{self, TaskLog};
-use crate::error_text::with_causes;
-use crate::files::create_folder;
-use crate::guarded;
+use job::error_text::with_causes;
+use job::files::create_folder;
+use job::guarded;
 
 /// Folder of the records and logs of a scene's tasks.
 pub(super) const TASKS: &str = "tasks";

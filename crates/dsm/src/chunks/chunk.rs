@@ -1,0 +1,165 @@
+//! Fourth stage of a run: the surface of one chunk.
+
+use numeric::Progress;
+use raster::Window;
+use sweep::SweepView;
+
+use crate::chunks::rasters::ChunkRasters;
+use crate::error::DsmError;
+use crate::images::image_pixels::read_view;
+use crate::images::image_windows::GroundBox;
+use crate::planning::chunk_plan::{ChunkSweep, ChunkWork, read_chunk_views};
+use crate::planning::chunk_side::MARGIN_PX;
+use crate::planning::plan::Plan;
+use crate::prior::prior_findings::PriorFindings;
+use crate::session::{Muted, Session};
+use crate::sweeping::ground_mask::GroundMask;
+use crate::sweeping::scene_sweep::{SceneSweep, sweep_scene};
+use crate::sweeping::surface::{SurfaceCounts, SurfaceInput, make_surface};
+use crate::values::HeightRange;
+
+/// Fourth stage of a run: the result of one chunk. [`ChunkResult::write`] and [`ChunkResult::read`]
+/// keep it in a folder.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct ChunkResult {
+    /// Cells of the grid that the chunk contributes.
+    pub core: Window,
+    /// Surface on these cells, or the reason why they are void.
+    pub content: ChunkContent,
+}
+
+/// What a chunk contributes to the surface.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum ChunkContent {
+    /// The chunk has a surface.
+    Surface(Box<ChunkSurface>),
+    /// No two images see the chunk.
+    Unseen,
+    /// The chunk could not be computed.
+    Failed {
+        /// Cause.
+        reason: String,
+    },
+}
+
+/// The surface of a chunk.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct ChunkSurface {
+    /// Rasters of the core.
+    pub rasters: ChunkRasters,
+    /// Counts of cells and pixels.
+    pub counts: SurfaceCounts,
+    /// Number of pixel-hypothesis pairs evaluated.
+    pub hypotheses: u64,
+    /// Heights that were searched.
+    pub height_range: HeightRange,
+    /// Agreement with the buildings of the city model; empty without a model.
+    pub findings: PriorFindings,
+}
+
+impl ChunkSurface {
+    /// Makes the surface of a chunk of which no cell gets a height.
+    fn masked(core: Window, height_range: HeightRange) -> Self {
+        let rasters = ChunkRasters::masked((core.width, core.height));
+        let counts = SurfaceCounts::of(&rasters);
+        Self { rasters, counts, hypotheses: 0, height_range, findings: PriorFindings::default() }
+    }
+}
+
+/// Computes the chunk with number `index` (counted from 0) of a plan.
+///
+/// # Errors
+/// [`DsmError::NoSuchChunk`], [`DsmError::Image`], [`DsmError::Prior`], [`DsmError::Sweep`],
+/// [`DsmError::Crs`], [`DsmError::Cancelled`].
+pub fn run_chunk(plan: &Plan, index: usize, session: &mut Session<'_>) -> Result<ChunkResult, DsmError> {
+    session.progress.check_cancelled()?;
+    let count = plan.chunks.len();
+    let chunk = plan.chunks.get(index).ok_or(DsmError::NoSuchChunk { index, count })?;
+    let content = match &chunk.work {
+        ChunkWork::Sweep(work) => ChunkContent::Surface(Box::new(sweep_chunk(plan, chunk.core, work, session)?)),
+        ChunkWork::Unseen => ChunkContent::Unseen,
+        ChunkWork::Failed { reason } => ChunkContent::Failed { reason: reason.clone() },
+    };
+    Ok(ChunkResult { core: chunk.core, content })
+}
+
+/// Sets the pixels of the finest level to NaN that were read only because windows begin on the
+/// tiles of the sweep, and with them half of the time of a small chunk.
+fn void_surplus(plan: &Plan, work: &ChunkSweep, views: &mut [SweepView]) -> Result<(), DsmError> {
+    let ground = GroundBox::new(&plan.grid.part(work.extent), &plan.grid.projection()?, work.height_range)?;
+    for ((image, window), view) in plan.images.iter().zip(&work.windows).zip(views) {
+        let Some(window) = window.filter(|window| *window != image.whole()) else { continue };
+        let needed = ground.span_in(image, MARGIN_PX)?;
+        let inside = Window { x: needed.x - window.x, y: needed.y - window.y, ..needed };
+        view.void_outside(work.levels.finest, inside);
+    }
+    Ok(())
+}
+
+fn sweep_chunk(
+    plan: &Plan,
+    core: Window,
+    work: &ChunkSweep,
+    session: &mut Session<'_>,
+) -> Result<ChunkSurface, DsmError> {
+    let grid = plan.grid.part(work.extent);
+    let core = Window { x: core.x - work.extent.x, y: core.y - work.extent.y, ..core };
+    let mask = GroundMask::on(&plan.config, &grid)?;
+    if mask.as_ref().is_some_and(|mask| mask.excludes_all(core)) {
+        return Ok(ChunkSurface::masked(core, work.height_range));
+    }
+    // A scene that is computed at once shows its own stages. A chunk of several is one step of the
+    // caller's stage.
+    let is_whole = plan.chunk_side.is_none();
+    let watcher = session.progress;
+    let muted = Muted(watcher);
+    let progress: &dyn Progress = if is_whole { watcher } else { &muted };
+    let views = match session.views.take().filter(|_| is_whole) {
+        Some(views) => views,
+        None => {
+            let mut views = read_chunk_views(&plan.images, &plan.characters, &work.windows, read_view)?;
+            void_surplus(plan, work, &mut views)?;
+            views
+        }
+    };
+    let mut sweep = SceneSweep {
+        range: work.height_range,
+        step_m: plan.step_m,
+        levels: work.levels,
+        sources: work.sources.clone(),
+        reach: plan.tuning.reaches(),
+        jump_at_edge: plan.tuning.jump_at_edge,
+        priors: Vec::new(),
+    };
+    let mut ids: &[String] = &[];
+    if let Some(path) = &plan.config.prior {
+        let prior = session.prior(path)?;
+        sweep.priors = prior.seen_from(&views, plan.pixel_m)?;
+        ids = &prior.ids;
+    }
+    progress.begin("sweeping heights", views.len() * work.levels.count());
+    let heights = sweep_scene(&views, &sweep, progress)?;
+    let (hypotheses, findings) = (heights.hypotheses, heights.findings.clone().named(ids));
+    if is_whole {
+        session.lap("sweep");
+    }
+    let input = SurfaceInput {
+        config: &plan.config,
+        sweep: &sweep,
+        useful: &plan.useful,
+        grid: &grid,
+        pixel_m: plan.pixel_m,
+        camera_m: plan.camera_deviation_m(),
+        core,
+        mask: mask.as_ref(),
+    };
+    progress.begin("fusing", 1 + work.sources.iter().filter(|s| !s.is_empty()).count());
+    let (rasters, counts) = make_surface(input, views, heights, progress)?;
+    if is_whole {
+        session.lap("fusion");
+    }
+    Ok(ChunkSurface { rasters, counts, hypotheses, height_range: work.height_range, findings })
+}

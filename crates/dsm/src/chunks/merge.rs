@@ -1,0 +1,250 @@
+//! Last stage of a run: the results of the chunks become the files of the DSM and its report.
+
+use std::path::PathBuf;
+
+use numeric::Progress;
+use raster::Window;
+
+use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};
+use crate::error::DsmError;
+use crate::memory;
+use crate::notes::Notes;
+use crate::planning::plan::Plan;
+use crate::prior::prior_findings::PriorFindings;
+use crate::report::{ChunksReport, DsmReport, FailedChunk, StageTime, SurfaceReport};
+use crate::sweeping::shadow_side::{ShadowSide, shadow_side};
+use crate::sweeping::surface::SurfaceCounts;
+use crate::values::HeightRange;
+use crate::writing::output::{self, ChunkedOutput, DsmFolder, FILES};
+use job::error_text::with_causes;
+
+/// Below this share of observed cells a warning is given. Good scenes of towers, forest and seasons
+/// have 0.5 to 0.9, and images that do not belong together seldom more than this.
+const OBSERVED_WEAK: f64 = 0.25;
+
+/// Last stage of a run: the files that were written, and the report.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Product {
+    /// Files of the run.
+    pub files: Vec<PathBuf>,
+    /// Report, as it was written.
+    pub report: DsmReport,
+}
+
+/// Merges results of chunks, in any order, each of which is dropped as soon as it is written.
+pub(crate) struct Merger<'a> {
+    plan: &'a Plan,
+    progress: &'a dyn Progress,
+    notes: Notes<'a>,
+    target: Target<'a>,
+    counts: SurfaceCounts,
+    hypotheses: u64,
+    /// Heights searched in any chunk.
+    height_range: Option<HeightRange>,
+    findings: PriorFindings,
+    chunks: ChunksReport,
+    /// First error of a chunk.
+    error: Option<DsmError>,
+}
+
+/// Place of the cells until the files are made.
+enum Target<'a> {
+    /// A scene that was computed at once stays in memory.
+    Whole(DsmFolder, Option<Box<ChunkSurface>>),
+    /// The chunks of a large scene go to the disk.
+    Chunked(ChunkedOutput<'a>),
+}
+
+impl<'a> Merger<'a> {
+    /// Begins the results of a plan, whose files go to `folder`.
+    ///
+    /// # Errors
+    /// [`DsmError::Output`], [`DsmError::Image`].
+    pub(crate) fn begin(plan: &'a Plan, folder: DsmFolder, progress: &'a dyn Progress) -> Result<Self, DsmError> {
+        let target = match plan.chunk_side {
+            None => Target::Whole(folder, None),
+            Some(_) => Target::Chunked(ChunkedOutput::begin(folder, &plan.config, &plan.grid)?),
+        };
+        Ok(Self {
+            plan,
+            progress,
+            notes: Notes::resume(&plan.choices, &plan.warnings, progress),
+            target,
+            counts: SurfaceCounts::default(),
+            hypotheses: 0,
+            height_range: None,
+            findings: PriorFindings::default(),
+            chunks: ChunksReport { side: plan.chunk_side.unwrap_or_default(), ..ChunksReport::default() },
+            error: None,
+        })
+    }
+
+    /// Adds the result of a chunk.
+    ///
+    /// # Errors
+    /// [`DsmError::Image`], [`DsmError::Crs`].
+    pub(crate) fn add(&mut self, result: ChunkResult) -> Result<(), DsmError> {
+        let core = result.core;
+        match result.content {
+            ChunkContent::Unseen => {
+                self.chunks.unseen += 1;
+                self.leave_void(core);
+            }
+            ChunkContent::Failed { reason } => self.add_failed(core, reason),
+            ChunkContent::Surface(surface) => {
+                self.counts.add(&surface.counts);
+                self.hypotheses = self.hypotheses.saturating_add(surface.hypotheses);
+                let range = surface.height_range;
+                self.height_range = Some(self.height_range.map_or(range, |all| all.union(range)));
+                self.findings.extend(&surface.findings);
+                self.chunks.done += 1;
+                match &mut self.target {
+                    Target::Whole(_, place) => *place = Some(surface),
+                    Target::Chunked(output) => output.put(core, &surface.rasters)?,
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Leaves a chunk void that could not be computed.
+    pub(crate) fn add_error(&mut self, core: Window, error: DsmError) {
+        self.add_failed(core, with_causes(&error));
+        self.error.get_or_insert(error);
+    }
+
+    /// Leaves a chunk void for a reason.
+    pub(crate) fn add_failed(&mut self, core: Window, reason: String) {
+        let bounds = self.plan.grid.part(core).bounds();
+        self.notes.warn(format!("the chunk {:.1?} is left void: {reason}", bounds.to_array()));
+        self.chunks.failed.push(FailedChunk { bounds, reason });
+        self.leave_void(core);
+    }
+
+    fn leave_void(&mut self, core: Window) {
+        self.counts.void += core.width * core.height;
+    }
+
+    /// Writes the files. `times` are the wall times of the stages.
+    ///
+    /// # Errors
+    /// [`DsmError::NoSurface`], or the error of the first chunk that failed, when no cell has an
+    /// observed height; [`DsmError::Output`], [`DsmError::Image`], [`DsmError::Crs`],
+    /// [`DsmError::Cancelled`]. Nothing stays behind.
+    pub(crate) fn finish(mut self, times: &[StageTime]) -> Result<Product, DsmError> {
+        self.progress.check_cancelled()?;
+        let plan = self.plan;
+        if self.counts.observed == 0 {
+            return Err(self.error.unwrap_or(DsmError::NoSurface { range: plan.height_range }));
+        }
+        warn_of_share(plan, &self.counts, &mut self.notes);
+        warn_of_shadows(plan, &self.counts, &mut self.notes);
+        let prior = plan.config.prior.clone().map(|model| self.findings.report(model, &mut self.notes));
+        self.progress.begin("writing", 1);
+        let scene = &plan.report;
+        let report = DsmReport {
+            version: plan.version.clone(),
+            images: scene.images.clone(),
+            pairs: scene.pairs.clone(),
+            pointing: scene.pointing.clone(),
+            height_range_m: self.height_range.unwrap_or(plan.height_range),
+            hypotheses: self.hypotheses,
+            surface: surface_report(plan, &self.counts),
+            chunks: plan.chunk_side.map(|_| self.chunks),
+            prior,
+            choices: self.notes.choices,
+            warnings: self.notes.warnings,
+            stages: times.to_vec(),
+            peak_memory_mb: memory::peak_mb(),
+        };
+        match self.target {
+            Target::Whole(folder, surface) => {
+                let surface = surface.ok_or(DsmError::ChunksMissing { found: 0, count: 1 })?;
+                output::write_whole(&folder, &plan.config, &plan.grid, &surface.rasters, &report)?;
+            }
+            Target::Chunked(output) => output.finish(&report)?,
+        }
+        self.progress.step();
+        Ok(Product { files: FILES.iter().map(|f| plan.config.output.join(f)).collect(), report })
+    }
+}
+
+/// Merges the results of all chunks of a plan, in any order, and writes the files of the run.
+///
+/// # Errors
+/// [`DsmError::ChunksMissing`] when a chunk has no result or more than one, the errors of
+/// `results`, [`DsmError::ChunkContent`] for a result that cannot be one of the plan,
+/// [`DsmError::NoSurface`] when no cell has an observed height, [`DsmError::Exists`],
+/// [`DsmError::Output`], [`DsmError::Image`], [`DsmError::Crs`], [`DsmError::Cancelled`]. Nothing
+/// stays behind.
+pub fn merge(
+    plan: &Plan,
+    results: impl IntoIterator<Item = Result<ChunkResult, DsmError>>,
+    progress: &dyn Progress,
+) -> Result<Product, DsmError> {
+    let folder = DsmFolder::take(&plan.config)?;
+    let mut merger = Merger::begin(plan, folder, progress)?;
+    let count = plan.chunks.len();
+    let mut missing: Vec<usize> = (0..count).collect();
+    for result in results {
+        progress.check_cancelled()?;
+        let result = result?;
+        let place = missing.iter().position(|index| plan.chunks[*index].core == result.core);
+        let place = place.ok_or(DsmError::ChunksMissing { found: count - missing.len(), count })?;
+        result.check(plan, missing.swap_remove(place))?;
+        merger.add(result)?;
+    }
+    if !missing.is_empty() {
+        return Err(DsmError::ChunksMissing { found: count - missing.len(), count });
+    }
+    merger.finish(&[])
+}
+
+/// Warns when hardly any cell has an observed height.
+fn warn_of_share(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
+    let (columns, rows) = plan.grid.size;
+    let share = counts.observed as f64 / (columns * rows).saturating_sub(counts.masked).max(1) as f64;
+    if share < OBSERVED_WEAK {
+        notes.warn(format!(
+            "only {:.1} % of the cells have an observed height: the images may not show the same ground, or its heights \
+             lie outside those that were searched: {}",
+            100.0 * share,
+            image_names(plan)
+        ));
+    }
+}
+
+/// Returns the files of the images in the order in which they were given.
+fn image_names(plan: &Plan) -> String {
+    let mut images: Vec<_> = plan.images.iter().collect();
+    images.sort_by_key(|image| image.number);
+    let names: Vec<String> = images.iter().map(|image| image.path.display().to_string()).collect();
+    names.join(", ")
+}
+
+/// Warns when shadows lie on what stands higher.
+fn warn_of_shadows(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
+    if shadow_side(counts.views.iter().map(|view| &view.shadows)) == Some(ShadowSide::High) {
+        notes.warn(format!(
+            "shadows lie on the higher side of height jumps: the relief seems to be upside down, as it is when images \
+             are turned by 180° against their RPCs or two images exchanged theirs; check that the RPCs belong to the \
+             pixels: {}",
+            image_names(plan)
+        ));
+    }
+}
+
+fn surface_report(plan: &Plan, counts: &SurfaceCounts) -> SurfaceReport {
+    let mut views: Vec<_> = plan.images.iter().zip(&counts.views).filter(|(_, view)| view.all > 0).collect();
+    views.sort_by_key(|(image, _)| image.number);
+    SurfaceReport {
+        cells: plan.grid.size.0 * plan.grid.size.1,
+        observed: counts.observed,
+        filled: counts.filled,
+        void: counts.void,
+        masked: counts.masked,
+        speckle_removed: counts.speckle_removed,
+        kept_by_view: views.into_iter().map(|(_, view)| view.kept as f64 / view.all as f64).collect(),
+    }
+}

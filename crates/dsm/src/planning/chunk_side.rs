@@ -1,0 +1,146 @@
+//! Side and layout of the chunks of a large scene.
+//!
+//! A chunk has a core, which is kept, and a rim of ground around it, as wide as what decides the
+//! content of a cell.
+
+use raster::Window;
+
+use crate::config::DsmConfig;
+use crate::error::DsmError;
+use crate::images::image_windows::GroundBox;
+use crate::images::scene_image::SceneImage;
+use crate::memory;
+use crate::planning::grid::DsmGrid;
+use crate::sweeping::clean_up::SURROUNDINGS_M;
+use crate::values::HeightRange;
+
+/// Largest side of a chunk, cells: larger ones save little.
+const SIDE_MAX: usize = 8192;
+/// Least side of a chunk, cells: smaller ones are mostly rim.
+pub(crate) const SIDE_MIN: usize = 256;
+/// Pixels read around what shows a chunk with its rim. Patches and the aggregation reach out, on
+/// coarse levels by several pixels of the image for each of their own.
+pub(crate) const MARGIN_PX: usize = 96;
+/// Windows begin on multiples of this, pixels: on the tiles of the sweep, of 64 pixels, on four
+/// levels. Costs then do not depend on the window in which they are computed.
+const ALIGNED: i64 = 512;
+/// Windows end on multiples of this, pixels: whole pixels of seven levels.
+pub(crate) const ENDS_ALIGNED: i64 = 64;
+
+/// Returns the largest side of a chunk that the memory allows, cells, when its heights lie in
+/// `range`.
+///
+/// # Errors
+/// [`DsmError::Memory`] when the memory allows none, [`DsmError::Camera`] and [`DsmError::Crs`] in
+/// the middle of the grid.
+pub(crate) fn choose_side(
+    config: &DsmConfig,
+    images: &[SceneImage],
+    grid: &DsmGrid,
+    range: HeightRange,
+) -> Result<usize, DsmError> {
+    let projection = grid.projection()?;
+    let needed = |side: usize| {
+        let chunk = Window {
+            x: (grid.size.0 / 2) as i64 - (side / 2) as i64,
+            y: (grid.size.1 / 2) as i64 - (side / 2) as i64,
+            width: side,
+            height: side,
+        };
+        let extent = grid.part(chunk.grown(rim(grid)));
+        let ground = GroundBox::new(&extent, &projection, range)?;
+        let window = |image: &SceneImage| {
+            let span = ground.span_in(image, MARGIN_PX)?;
+            Ok(aligned(span).intersection(&image.whole()))
+        };
+        let windows = images.iter().map(window).collect::<Result<Vec<_>, DsmError>>()?;
+        Ok::<u64, DsmError>(needed_mb(&windows.into_iter().flatten().collect::<Vec<_>>(), &extent))
+    };
+    if let Some(side) = config.chunk {
+        return memory::check(config, needed(side)?).map(|()| side);
+    }
+    let smallest = needed(SIDE_MIN)?;
+    memory::check(config, smallest)?;
+    let mut side = SIDE_MIN;
+    while side < SIDE_MAX && needed(side + SIDE_MIN)? <= memory::limit_mb(config) {
+        side += SIDE_MIN;
+    }
+    Ok(side)
+}
+
+/// Returns the memory needed to compute a grid from windows of the images, megabytes.
+pub(crate) fn needed_mb(windows: &[Window], grid: &DsmGrid) -> u64 {
+    let pixels: Vec<u64> = windows.iter().map(memory::area).collect();
+    memory::needed_mb(&pixels, memory::area(&grid.whole()))
+}
+
+/// Returns the cells of a core with its rim, inside the grid.
+pub(crate) fn with_rim(grid: &DsmGrid, core: Window) -> Window {
+    core.grown(rim(grid)).intersection(&grid.whole()).unwrap_or(core)
+}
+
+/// Returns the width of the rim around a core, cells.
+fn rim(grid: &DsmGrid) -> usize {
+    (SURROUNDINGS_M / grid.gsd_m).ceil() as usize
+}
+
+/// Returns cores of about equal size that cover the grid, row after row. They are at most `side`
+/// cells wide and high.
+pub(crate) fn cores(size: (usize, usize), side: usize) -> Vec<Window> {
+    let cuts = |length: usize| {
+        let n = length.div_ceil(side).max(1);
+        (0..n).map(move |i| (length * i / n, length * (i + 1) / n))
+    };
+    let window = |(x0, x1): (usize, usize), (y0, y1): (usize, usize)| Window {
+        x: x0 as i64,
+        y: y0 as i64,
+        width: x1 - x0,
+        height: y1 - y0,
+    };
+    cuts(size.1).flat_map(|y| cuts(size.0).map(move |x| window(x, y))).collect()
+}
+
+/// Returns the quarters of a core.
+pub(crate) fn quarters(core: Window) -> Vec<Window> {
+    let half = core.width.max(core.height).div_ceil(2);
+    let moved = |w: Window| Window { x: w.x + core.x, y: w.y + core.y, ..w };
+    cores((core.width, core.height), half).into_iter().map(moved).collect()
+}
+
+/// Returns a window widened to multiples of [`ALIGNED`] at its start and [`ENDS_ALIGNED`] at its
+/// end.
+pub(crate) fn aligned(w: Window) -> Window {
+    let (x, y) = (w.x.div_euclid(ALIGNED) * ALIGNED, w.y.div_euclid(ALIGNED) * ALIGNED);
+    let length = |from: i64, start: i64, length: usize| {
+        let all = (start - from) as usize + length;
+        all.next_multiple_of(ENDS_ALIGNED as usize)
+    };
+    Window { x, y, width: length(x, w.x, w.width), height: length(y, w.y, w.height) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cores_cover_every_cell_once() {
+        for (size, side, n) in [((1000, 700), 300, 12), ((256, 256), 256, 1), ((257, 10), 256, 2)] {
+            let cores = cores(size, side);
+            assert_eq!(cores.len(), n);
+            let cells: usize = cores.iter().map(|c| c.width * c.height).sum();
+            assert_eq!(cells, size.0 * size.1);
+            assert!(cores.iter().all(|c| c.width <= side && c.height <= side));
+            let apart = |a: &Window, b: &Window| a.intersection(b).is_none();
+            assert!((0..n).all(|i| (0..i).all(|j| apart(&cores[i], &cores[j]))));
+            let parts: Vec<Window> = cores.iter().flat_map(|c| quarters(*c)).collect();
+            assert_eq!(parts.iter().map(|c| c.width * c.height).sum::<usize>(), cells);
+            assert!(parts.iter().all(|p| cores.iter().filter(|c| c.intersection(p) == Some(*p)).count() == 1));
+        }
+    }
+
+    #[test]
+    fn windows_begin_on_tiles_and_end_on_whole_pixels_of_all_levels() {
+        let window = aligned(Window { x: -5, y: 70, width: 100, height: 58 });
+        assert_eq!(window, Window { x: -512, y: 0, width: 640, height: 128 });
+    }
+}

@@ -1,0 +1,54 @@
+//! What a plan will take: memory and processor time, by chunk and in all.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{ChunkWork, Plan, Preset};
+
+/// Processor seconds that a megapixel of a view takes per source at full resolution, from
+/// `benches/results/scale.md`.
+const SECONDS_PER_MPX: f64 = 1.06;
+/// Share of that at half the resolution.
+const HALF_RESOLUTION: f64 = 0.25;
+
+/// What a plan will take. Times are rough: scenes and processors differ by a factor of two.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct PlanEstimate {
+    /// Largest memory of a chunk, megabytes.
+    pub peak_mb: u64,
+    /// Processor time of all chunks, seconds.
+    pub cpu_seconds: f64,
+    /// The chunks in the order of the plan.
+    pub chunks: Vec<ChunkEstimate>,
+}
+
+/// What a chunk will take; zeros for a chunk without work.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct ChunkEstimate {
+    /// Memory, megabytes.
+    pub needed_mb: u64,
+    /// Processor time, seconds.
+    pub cpu_seconds: f64,
+}
+
+impl PlanEstimate {
+    /// Estimates what a plan will take.
+    pub fn of(plan: &Plan) -> Self {
+        let share = if plan.config.preset == Preset::Fast { HALF_RESOLUTION } else { 1.0 };
+        let one = |work: &ChunkWork| {
+            let ChunkWork::Sweep(sweep) = work else { return ChunkEstimate::default() };
+            let pixels = |window: &Option<raster::Window>| window.map_or(0.0, |w| w.width as f64 * w.height as f64);
+            let swept: f64 = sweep.windows.iter().zip(&sweep.sources).map(|(w, s)| pixels(w) * s.len() as f64).sum();
+            ChunkEstimate { needed_mb: sweep.needed_mb, cpu_seconds: swept * 1e-6 * SECONDS_PER_MPX * share }
+        };
+        let chunks: Vec<ChunkEstimate> = plan.chunks.iter().map(|chunk| one(&chunk.work)).collect();
+        Self {
+            peak_mb: chunks.iter().map(|chunk| chunk.needed_mb).max().unwrap_or(0),
+            cpu_seconds: chunks.iter().map(|chunk| chunk.cpu_seconds).sum(),
+            chunks,
+        }
+    }
+}

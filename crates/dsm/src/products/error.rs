@@ -1,0 +1,139 @@
+//! Reasons why products cannot be made.
+
+use std::path::PathBuf;
+
+use crs::CrsError;
+use io::raster::RasterError;
+use numeric::Cancelled;
+
+use crate::DsmError;
+use job::error::{JobError, SettingError, from_steps};
+use job::files::FileError;
+use job::job_file::JobFileError;
+use job::threads::ThreadsError;
+use surfaces::classes::ClassesError;
+use surfaces::dtm::DtmError;
+use surfaces::ortho::OrthoError;
+
+/// Products that cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProductsError {
+    /// The folder is not that of a finished run.
+    #[error("expected the folder of a finished DSM run, found no {}", missing.display())]
+    NotARun {
+        /// The file that is missing.
+        missing: PathBuf,
+    },
+    /// A raster of the run cannot be read.
+    #[error(transparent)]
+    Raster(#[from] RasterError),
+    /// A raster lies on another grid than the surface.
+    #[error("{found:?} cells, the surface model has {expected:?}: {}", path.display())]
+    OtherGrid {
+        /// The raster.
+        path: PathBuf,
+        /// Its columns and rows.
+        found: (usize, usize),
+        /// Columns and rows of the surface.
+        expected: (usize, usize),
+    },
+    /// The surface is larger than fits into memory.
+    #[error("{width} x {height} cells, at most 2^28: make the surface model in parts or with larger cells")]
+    TooLarge {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// The surface model's coordinate reference system has no EPSG code.
+    #[error("the surface model's coordinate system has no EPSG code: {}", path.display())]
+    NoEpsg {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The surface model is in degrees.
+    #[error(
+        "the surface model is on a map in degrees, expected a projected map for all products but the point cloud; make \
+         the cloud alone, or warp the surface model first: {}",
+        path.display()
+    )]
+    InDegrees {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The surface has no triangle.
+    #[error("no four neighbouring cells have heights, expected a surface for the mesh: {}", path.display())]
+    NoTriangles {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The ortho has no georeference.
+    #[error("the ortho has no georeference, expected the map of the surface model: {}", path.display())]
+    OrthoPlace {
+        /// The ortho.
+        path: PathBuf,
+    },
+    /// The ortho does not show the surface.
+    #[error("the ortho shows no cell of the surface model; is it in the same coordinate system? {}", path.display())]
+    OrthoElsewhere {
+        /// The ortho.
+        path: PathBuf,
+    },
+    /// The images of the run cannot be found.
+    #[error("cannot find the images of the run for an ortho; give an ortho, or the settings of the run")]
+    Images(#[source] Box<JobFileError>),
+    /// The ortho cannot be made.
+    #[error("cannot make the ortho that colours the products; an ortho can be given instead")]
+    Ortho(#[source] Box<OrthoError>),
+    /// The terrain model cannot be made.
+    #[error("cannot make the terrain model")]
+    Dtm(#[source] Box<DtmError>),
+    /// The classes cannot be found.
+    #[error("cannot find the classes of the surface model")]
+    Classes(#[source] Box<ClassesError>),
+    /// The coordinate reference system cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
+    #[error(transparent)]
+    Job(#[from] JobError),
+}
+
+from_steps!(ProductsError: Job(SettingError, FileError, ThreadsError, Cancelled));
+
+impl From<ProductsError> for DsmError {
+    fn from(error: ProductsError) -> Self {
+        match error {
+            ProductsError::Job(JobError::Cancelled(_)) => Self::Cancelled,
+            other => Self::Products(Box::new(other)),
+        }
+    }
+}
+
+impl From<OrthoError> for ProductsError {
+    fn from(error: OrthoError) -> Self {
+        match error {
+            OrthoError::Job(error @ JobError::Cancelled(_)) => Self::Job(error),
+            other => Self::Ortho(Box::new(other)),
+        }
+    }
+}
+
+impl From<ClassesError> for ProductsError {
+    fn from(error: ClassesError) -> Self {
+        match error {
+            ClassesError::Job(error @ JobError::Cancelled(_)) => Self::Job(error),
+            other => Self::Classes(Box::new(other)),
+        }
+    }
+}
+
+impl From<DtmError> for ProductsError {
+    fn from(error: DtmError) -> Self {
+        match error {
+            DtmError::Job(error @ JobError::Cancelled(_)) => Self::Job(error),
+            other => Self::Dtm(Box::new(other)),
+        }
+    }
+}

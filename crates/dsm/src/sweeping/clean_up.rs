@@ -1,0 +1,196 @@
+//! Clean-up of a fused surface: speckle is removed, voids are filled, and the confidence is
+//! computed.
+//!
+//! Lengths are in metres, so that a result does not depend on the cell size more than it must.
+
+use raster::{Grid, Window};
+use sweep::fusion::{
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, TrustConfig, calibrate,
+    fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
+};
+
+use crate::config::Fill;
+
+/// Isolated patches of less ground than a square of this side are speckle, metres: smaller than the
+/// crown of a single tree or a car port.
+const SPECKLE_SIDE_M: f64 = 2.5;
+/// A cell on whose height the views agree less than this has no height: less than half of what a
+/// single view's height inside a surface has that another height fits as well. Below are heights at
+/// borders and lone pixels.
+const AGREEMENT_MIN: f32 = 0.05;
+/// A height that is right with a smaller probability than this is dropped where those around it are
+/// not much better, as on water. A tree stands among heights that are right.
+const RIGHT_MIN: f32 = 0.3;
+const RIGHT_MIN_AROUND: f32 = 0.45;
+/// Distance over which the heights around are judged, metres: half the width of a canal.
+const WATER_M: f64 = 10.0;
+/// Only heights that are rather right than wrong hide the ground: a single wrong one would throw a
+/// long shadow.
+const TRUSTED: f32 = 0.5;
+/// Patches of at least this many cells are never speckle, whatever the cell size.
+const SPECKLE_CELLS_MIN: usize = 9;
+/// Distance of known heights between which a void is filled, metres: a wide street or a house.
+const FILL_REACH_M: f64 = 40.0;
+/// Distance of known heights where every void is to be closed, and of the ground with which a
+/// hidden void is filled, metres: the middle of a pond or of a hall; a view that leans by 30° does
+/// not see so much ground behind a tower of 100 m.
+const FILL_REACH_FAR_M: f64 = 60.0;
+/// Voids up to this wide are closed, whatever the images show there, metres: the shadow side of a
+/// house.
+const FILL_NARROW_M: f64 = 10.0;
+/// Heights around a void that differ by more than this per metre between them are two surfaces:
+/// steeper than streets.
+const FILL_SLOPE: f64 = 0.05;
+/// Distance in a void over which blank pixels are the reason for it, metres: the patches that are
+/// compared reach two pixels of up to 2 m into what is blank, and blank pixels are marked at
+/// heights that are off.
+const FILL_BLIND_M: f64 = 5.0;
+/// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
+/// rises and falls, and something small may stand there.
+const FILL_SIGMA_SLOPE: f64 = 0.1;
+
+/// Side of the blocks of which each has one height of the ground, metres: as wide as a street with
+/// its walls.
+const TREND_BLOCK_M: f64 = 10.0;
+
+/// A height is right if its error is below this, or below two cells where those are larger, metres:
+/// the usual threshold of completeness.
+const RIGHT_M: f64 = 1.0;
+
+/// Width of the ground around a cell that decides its content, metres: speckle is
+/// judged, then voids are filled from this far. What hides a void stands nearer, unless it is a
+/// tower of more than 100 m: in a chunk the void then counts as seen at the far end of its shadow.
+pub(crate) const SURROUNDINGS_M: f64 = FILL_REACH_FAR_M + 2.0 * SPECKLE_SIDE_M;
+
+/// What is known about the voids of a surface.
+#[derive(Clone, Copy)]
+pub(crate) struct Voids<'a> {
+    /// Cells where the images have no texture.
+    pub(crate) blind: &'a Grid<bool>,
+    /// What each view sees of the grid.
+    pub(crate) sights: &'a [GridSight],
+    pub(crate) fill: Fill,
+}
+
+/// Lengths on which the clean-up depends, metres.
+#[derive(Clone, Copy)]
+pub(crate) struct Lengths {
+    /// Side of a cell.
+    pub(crate) gsd_m: f64,
+    /// Distance of two hypotheses.
+    pub(crate) step_m: f64,
+    /// Deviation of heights that the cameras leave.
+    pub(crate) camera_m: f64,
+}
+
+/// Cleans a surface; returns the source of each cell and the number of cells of `core` that were
+/// removed as speckle.
+pub(crate) fn clean_up(
+    fused: &mut FusedSurface,
+    voids: Voids<'_>,
+    lengths: Lengths,
+    core: Window,
+) -> (Grid<CellSource>, usize) {
+    let Lengths { gsd_m, step_m, camera_m } = lengths;
+    let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
+    let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells, camera_m };
+    let completed = take_unseen(fused);
+    let before = known(&fused.height_m, core);
+    drop_weak(fused, &trust, gsd_m);
+    let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
+    remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);
+    forget_agreement_of_voids(fused);
+    let observed = known(&fused.height_m, core);
+    let trusted = probability(fused, &trust).map(|p| *p >= TRUSTED);
+    let trend = ground_trend(&fused.height_m, &trusted, &trend_config(gsd_m));
+    let bounds = |above_m: &Grid<f32>, cells: &[usize]| {
+        let height_m = combined(above_m, &trend, |above_m, ground_m| above_m + ground_m);
+        let bounds = occlusion_bounds(&height_m, voids.sights, cells);
+        bounds.into_iter().zip(cells).map(|(bound_m, cell)| bound_m - trend.data()[*cell]).collect()
+    };
+    let above = |height_m: &Grid<f32>| combined(height_m, &trend, |height_m, ground_m| height_m - ground_m);
+    let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
+    let known = KnownVoids { trusted: &trusted, blind: voids.blind, completed_m: &completed };
+    let filled = fill_voids(&mut above_m, known, bounds, &fill_config(voids.fill, gsd_m));
+    for i in (0..above_m.data().len()).filter(|i| filled.source.data()[*i].is_filled()) {
+        fused.height_m.data_mut()[i] = above_m.data()[i] + trend.data()[i];
+        fused.sigma_m.data_mut()[i] = filled.sigma_m.data()[i];
+    }
+    let is_observed = |i: usize| !filled.source.data()[i].is_filled();
+    fused.confidence =
+        calibrate(&fused.height_m, &fused.single_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
+    (filled.source, before - observed)
+}
+
+/// Returns the values that `of` makes of two grids of one size, cell by cell.
+fn combined(a: &Grid<f32>, b: &Grid<f32>, of: impl Fn(f32, f32) -> f32) -> Grid<f32> {
+    let mut out = a.clone();
+    out.data_mut().iter_mut().zip(b.data()).for_each(|(a, b)| *a = of(*a, *b));
+    out
+}
+
+/// Takes the heights that no view has seen out of a surface.
+fn take_unseen(fused: &mut FusedSurface) -> Grid<f32> {
+    let mut out = Grid::filled(fused.height_m.width(), fused.height_m.height(), f32::NAN);
+    let heights = fused.height_m.data_mut().iter_mut().zip(fused.seen.data());
+    for (out, (height, _)) in out.data_mut().iter_mut().zip(heights).filter(|(_, (_, seen))| !**seen) {
+        *out = std::mem::replace(height, f32::NAN);
+    }
+    forget_agreement_of_voids(fused);
+    out
+}
+
+/// Drops the heights whose evidence is too weak.
+fn drop_weak(fused: &mut FusedSurface, trust: &TrustConfig, gsd_m: f64) {
+    let agreement = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data());
+    agreement.filter(|(_, agreement)| **agreement < AGREEMENT_MIN).for_each(|(height, _)| *height = f32::NAN);
+    let right = probability(fused, trust);
+    let around = surroundings(&right, (WATER_M / gsd_m).ceil() as usize);
+    let heights = fused.height_m.data_mut().iter_mut().zip(right.data().iter().zip(around.data()));
+    let is_weak = |right: f32, around: f32| right < RIGHT_MIN && around < RIGHT_MIN_AROUND;
+    heights.filter(|(_, (right, around))| is_weak(**right, **around)).for_each(|(height, _)| *height = f32::NAN);
+    forget_agreement_of_voids(fused);
+}
+
+/// Returns the probability that each height is right, before anything is filled.
+fn probability(fused: &FusedSurface, trust: &TrustConfig) -> Grid<f32> {
+    calibrate(&fused.height_m, &fused.single_m, &mut fused.sigma_m.clone(), &fused.confidence, |_| true, trust)
+}
+
+fn forget_agreement_of_voids(fused: &mut FusedSurface) {
+    let agreement = fused.confidence.data_mut().iter_mut().zip(fused.height_m.data());
+    agreement.filter(|(_, h)| h.is_nan()).for_each(|(agreement, _)| *agreement = 0.0);
+}
+
+/// Returns the parameters of the ground's trend on cells of `gsd_m`.
+fn trend_config(gsd_m: f64) -> TrendConfig {
+    let block_cells = (TREND_BLOCK_M / gsd_m).round().max(1.0) as usize;
+    TrendConfig { block_cells, reach_blocks: (FILL_REACH_FAR_M / TREND_BLOCK_M) as usize }
+}
+
+/// Returns the parameters of filling on cells of `gsd_m`.
+fn fill_config(fill: Fill, gsd_m: f64) -> FillConfig {
+    let (rule, reach_m) = match fill {
+        Fill::None => (FillRule::Nothing, FILL_REACH_M),
+        Fill::Justified => (FillRule::Justified, FILL_REACH_M),
+        Fill::All => (FillRule::Everything, FILL_REACH_FAR_M),
+    };
+    FillConfig {
+        rule,
+        reach_cells: (reach_m / gsd_m).ceil() as usize,
+        hidden_reach_cells: (FILL_REACH_FAR_M / gsd_m).ceil() as usize,
+        narrow_cells: (FILL_NARROW_M / gsd_m) as f32,
+        blind_reach_cells: (FILL_BLIND_M / gsd_m).ceil() as usize,
+        island_cells: (FILL_NARROW_M / gsd_m).powi(2) as usize,
+        same_surface_m: (2.0 * gsd_m) as f32,
+        slope_m: (FILL_SLOPE * gsd_m) as f32,
+        sigma_slope_m: (FILL_SIGMA_SLOPE * gsd_m) as f32,
+    }
+}
+
+/// Returns the number of cells of a window that have a height.
+fn known(height_m: &Grid<f32>, core: Window) -> usize {
+    let columns = core.x as usize..core.x as usize + core.width;
+    let row = |y: usize| height_m.row(core.y as usize + y)[columns.clone()].iter().filter(|h| !h.is_nan()).count();
+    (0..core.height).map(row).sum()
+}

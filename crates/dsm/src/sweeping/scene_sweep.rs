@@ -1,0 +1,230 @@
+//! The heights of all views of a scene or chunk, from the coarsest pyramid level to the finest.
+//!
+//! The coarsest level covers the whole height range. Each finer level searches, per pixel, around
+//! the heights that the coarser level found at this pixel and next to it. Before a city
+//! model is used, the coarse levels are swept without it, to tell which of its buildings are there.
+
+use std::collections::BTreeMap;
+
+use numeric::Progress;
+use rayon::prelude::*;
+use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
+use sweep::ranges::{Ranges, Reach};
+use sweep::{HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, ViewLevel, sweep_level};
+
+use crate::error::DsmError;
+use crate::planning::levels::SweepLevels;
+use crate::prior::prior_findings::PriorFindings;
+use crate::prior::prior_verdict::refuted;
+use crate::prior::prior_view::{DEVIATION_M, ViewPrior, tolerance_m};
+use crate::session::Muted;
+use crate::values::HeightRange;
+
+/// Tolerance of the consistency check on coarse levels, pixels. Coarse heights are rough, and a
+/// wrong deletion costs more than a wide range.
+const COARSE_TOLERANCE_PX: f64 = 2.0;
+
+/// Penalty of a jump on coarse levels, three quarters of that on the finest. A house is few pixels
+/// wide there, and what the coarse levels smooth away is never searched again.
+const COARSE_JUMP: u8 = 93;
+/// Penalty of a step on coarse levels, five eighths of that on the finest: their steps are large,
+/// and a slope or a low house takes few of them.
+const COARSE_STEP: u8 = 20;
+
+/// Parameters of a sweep of all views.
+#[derive(Debug, Clone)]
+pub(crate) struct SceneSweep {
+    /// Heights to search.
+    pub(crate) range: HeightRange,
+    /// Distance of two hypotheses at full resolution, metres; each coarser level doubles it.
+    pub(crate) step_m: f64,
+    pub(crate) levels: SweepLevels,
+    /// For each view, the views it is compared with.
+    pub(crate) sources: Vec<Vec<usize>>,
+    /// Distances around a coarse pixel from which heights are taken over.
+    pub(crate) reach: Reach,
+    /// Penalty of a jump across the strongest image edges on the finest level.
+    pub(crate) jump_at_edge: u8,
+    /// For each view, what it sees of a city model; empty without a model.
+    pub(crate) priors: Vec<Option<ViewPrior>>,
+}
+
+impl SceneSweep {
+    /// Returns the distance of two hypotheses of a level, metres.
+    pub(crate) fn step_at(&self, level: usize) -> f64 {
+        self.step_m * f64::from(1u32 << level)
+    }
+}
+
+/// Heights of all views on the finest level.
+#[derive(Debug, Clone)]
+pub(crate) struct SceneHeights {
+    /// One map per view.
+    pub(crate) maps: Vec<HeightMap>,
+    /// Number of pixel-hypothesis pairs evaluated over all views and levels.
+    pub(crate) hypotheses: u64,
+    /// Agreement of the heights of the last coarse level with the city model.
+    pub(crate) findings: PriorFindings,
+}
+
+/// Sweeps all views from the coarsest level to the finest. Each view and level is a step of
+/// `progress`.
+///
+/// # Errors
+/// [`DsmError::Sweep`] as [`sweep_level`], [`DsmError::Cancelled`] between two levels.
+pub(crate) fn sweep_scene(
+    views: &[SweepView],
+    sweep: &SceneSweep,
+    progress: &dyn Progress,
+) -> Result<SceneHeights, DsmError> {
+    let SweepLevels { finest, coarsest } = sweep.levels;
+    let none = PlacedModel { priors: vec![None; views.len()], findings: PriorFindings::default(), hypotheses: 0 };
+    let model = if sweep.priors.iter().any(Option::is_some) {
+        let level = (finest + 1).min(coarsest);
+        let alone = sweep_down(views, sweep, level, &none.priors, &Muted(progress))?;
+        place_model(sweep, &alone, level)
+    } else {
+        none
+    };
+    let SweptLevels { maps, hypotheses } = sweep_down(views, sweep, finest, &model.priors, progress)?;
+    Ok(SceneHeights { maps, hypotheses: hypotheses + model.hypotheses, findings: model.findings })
+}
+
+/// Heights of all views after several levels.
+struct SweptLevels {
+    maps: Vec<HeightMap>,
+    /// Number of pixel-hypothesis pairs evaluated.
+    hypotheses: u64,
+}
+
+/// Sweeps all views from the coarsest level down to `last`. Heights of a coarse level that no
+/// source shares are dropped.
+fn sweep_down(
+    views: &[SweepView],
+    sweep: &SceneSweep,
+    last: usize,
+    priors: &[Option<ViewPrior>],
+    progress: &dyn Progress,
+) -> Result<SweptLevels, DsmError> {
+    let mut out = SweptLevels { maps: Vec::new(), hypotheses: 0 };
+    for level in (last..=sweep.levels.coarsest).rev() {
+        progress.check_cancelled()?;
+        let swept: Vec<(HeightMap, u64)> = (0..views.len())
+            .into_par_iter()
+            .map(|i| {
+                let out = sweep_view(views, sweep, i, level, out.maps.get(i), priors[i].as_ref());
+                progress.step();
+                out
+            })
+            .collect::<Result<_, SweepError>>()?;
+        out.hypotheses += swept.iter().map(|(_, n)| n).sum::<u64>();
+        out.maps = swept.into_iter().map(|(map, _)| map).collect();
+        if level > sweep.levels.finest {
+            out.maps = drop_lone_heights(views, sweep, &out.maps, level as u32)?;
+        }
+    }
+    Ok(out)
+}
+
+/// A city model at its place in the images, without the buildings that they refute.
+struct PlacedModel {
+    /// What each view sees of it.
+    priors: Vec<Option<ViewPrior>>,
+    findings: PriorFindings,
+    /// Number of pixel-hypothesis pairs that were evaluated to find it.
+    hypotheses: u64,
+}
+
+/// Places the model at the heights of a level that was swept without it.
+fn place_model(sweep: &SceneSweep, alone: &SweptLevels, level: usize) -> PlacedModel {
+    let step_m = sweep.step_at(level);
+    let of_views = || sweep.priors.iter().zip(&alone.maps).filter_map(|(prior, map)| Some((prior.as_ref()?, map)));
+    let placed: Vec<Option<ViewPrior>> = of_views().map(|(prior, map)| prior.placed(map, level, step_m)).collect();
+    let differences: Vec<Option<BTreeMap<u32, Vec<f32>>>> = of_views()
+        .zip(&placed)
+        .map(|((_, map), placed)| placed.as_ref().map(|placed| placed.differences(map, level)))
+        .collect();
+    let mut together: BTreeMap<u32, Vec<f32>> = BTreeMap::new();
+    for (number, all) in differences.iter().flatten().flatten() {
+        together.entry(*number).or_default().extend(all);
+    }
+    let tolerance_m = tolerance_m(step_m);
+    let gone = refuted(&together, tolerance_m);
+    let findings = PriorFindings::new(&differences, &gone, tolerance_m);
+    let mut placed = placed.into_iter().map(|prior| prior.map(|prior| prior.without(&gone)));
+    let priors = sweep.priors.iter().map(|prior| prior.as_ref().and_then(|_| placed.next().flatten()));
+    PlacedModel { priors: priors.collect(), findings, hypotheses: alone.hypotheses }
+}
+
+/// Sweeps one view on one level; returns its heights and the number of hypotheses.
+fn sweep_view(
+    views: &[SweepView],
+    sweep: &SceneSweep,
+    index: usize,
+    level: usize,
+    coarser: Option<&HeightMap>,
+    known: Option<&ViewPrior>,
+) -> Result<(HeightMap, u64), SweepError> {
+    let origin_m = sweep.range.middle_m();
+    let reference = views[index].on_level(index, level);
+    let (w, h) = (reference.image.width(), reference.image.height());
+    if sweep.sources[index].is_empty() {
+        return Ok((HeightMap::empty(w, h, origin_m), 0));
+    }
+    let step = sweep.step_at(level);
+    let range = (sweep.range.low_m, sweep.range.high_m);
+    let ranges = match coarser {
+        None => Ranges::uniform(w, h, step, range),
+        Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, range, sweep.reach),
+    }
+    .without_voids(reference.image);
+    let prior_m = known.map(|prior| prior.at_level(level, (w, h)));
+    let prior = prior_m.as_ref().map(|height_m| Prior { height_m, deviation_m: DEVIATION_M });
+    let ranges = match prior {
+        Some(prior) => prior.widened(ranges),
+        None => ranges,
+    };
+    let sources: Vec<ViewLevel<'_>> = sweep.sources[index].iter().map(|&s| views[s].on_level(s, level)).collect();
+    let mut config = LevelConfig::default();
+    if level > sweep.levels.finest {
+        config.cost.blends_neighbours = false;
+        (config.penalties.step, config.penalties.jump) = (COARSE_STEP, COARSE_JUMP);
+    } else {
+        config.penalties.jump_at_edge = sweep.jump_at_edge;
+    }
+    let reference = Reference { view: reference, level: level as u32, ranges: &ranges, prior };
+    let map = sweep_level(reference, &sources, origin_m, &config)?;
+    Ok((map, ranges.evaluations()))
+}
+
+/// Sets coarse heights to NaN that no source shares. A view whose sources have no heights keeps its
+/// own.
+fn drop_lone_heights(
+    views: &[SweepView],
+    sweep: &SceneSweep,
+    maps: &[HeightMap],
+    level: u32,
+) -> Result<Vec<HeightMap>, SweepError> {
+    let config = ConsistencyConfig { tolerance_px: COARSE_TOLERANCE_PX, ..ConsistencyConfig::default() };
+    let heights: Vec<Heights<'_>> =
+        maps.iter().enumerate().map(|(index, map)| Heights { index, view: &views[index], map }).collect();
+    heights
+        .par_iter()
+        .map(|h| {
+            let own_heights = |s: &&usize| !sweep.sources[**s].is_empty();
+            let others: Vec<Heights<'_>> =
+                sweep.sources[h.index].iter().filter(own_heights).map(|&s| heights[s]).collect();
+            if others.is_empty() {
+                return Ok(h.map.clone());
+            }
+            let counts = count_agreeing(*h, &others, level, &config)?;
+            let mut out = h.map.clone();
+            for (height, n) in out.height_m.data_mut().iter_mut().zip(counts.agreeing.data()) {
+                if *n == 0 {
+                    *height = f32::NAN;
+                }
+            }
+            Ok(out)
+        })
+        .collect()
+}

@@ -1,0 +1,141 @@
+//! Job files: the configuration of a job as TOML.
+//!
+//! Keys have the names of the fields of the configuration. Paths are relative to the file. A key
+//! that no job has is an error that names the nearest known one. The `used_config.toml` of a run is
+//! a job file. `${NAME}` in a path stands for the environment variable.
+
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+use crate::files::{FileError, read_text};
+use crate::job_paths::resolved;
+use crate::path_variables::expanded;
+
+/// A job file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum JobFileError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A key that the job does not have.
+    #[error(
+        "unknown key `{key}` (line {line}); {}: {}",
+        nearest.as_ref().map_or_else(|| format!("known are {}", known.join(", ")), |n| format!("did you mean `{n}`?")),
+        path.display()
+    )]
+    UnknownKey {
+        /// The file.
+        path: PathBuf,
+        /// Line of the key, from 1.
+        line: usize,
+        /// The key.
+        key: String,
+        /// Known key that is most like it, if any is.
+        nearest: Option<String>,
+        /// Keys that are known in this place.
+        known: Vec<String>,
+    },
+    /// Text that is not TOML, a value of the wrong type, or a missing key.
+    #[error("{what} (line {line}): {}", path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// Line of the defect, from 1.
+        line: usize,
+        /// The text found and the text expected.
+        what: String,
+    },
+    /// A path with an environment variable that is not set.
+    #[error("{what}: {}", path.display())]
+    Variable {
+        /// The file.
+        path: PathBuf,
+        /// The variable and the path that names it.
+        what: String,
+    },
+}
+
+/// Reads a configuration from a job file. `map_paths` replaces each path of the configuration: by
+/// the path with its variables expanded, seen from the folder of the file.
+///
+/// # Errors
+/// [`JobFileError`].
+pub fn read_job<T: DeserializeOwned>(
+    path: &Path,
+    map_paths: impl FnOnce(&mut T, &dyn Fn(&Path) -> PathBuf),
+) -> Result<T, JobFileError> {
+    let mut config: T = parse(&read_text(path)?, path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let unset = RefCell::new(None);
+    map_paths(&mut config, &|path: &Path| match expanded(path) {
+        Ok(path) => resolved(&path, folder),
+        Err(what) => {
+            unset.borrow_mut().get_or_insert(what);
+            path.to_owned()
+        }
+    });
+    match unset.into_inner() {
+        Some(what) => Err(JobFileError::Variable { path: path.to_owned(), what }),
+        None => Ok(config),
+    }
+}
+
+/// Whether a path has the ending of job files.
+pub fn is_job_file(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// Parses a configuration. `path` is the file for errors.
+///
+/// # Errors
+/// [`JobFileError::UnknownKey`], [`JobFileError::Invalid`].
+pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, JobFileError> {
+    toml::from_str(text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start.min(text.len()));
+        let line = 1 + text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count();
+        defect(error.message(), line, path)
+    })
+}
+
+/// Makes the error of a defect, which serde describes as `message`.
+pub fn defect(message: &str, line: usize, path: &Path) -> JobFileError {
+    let path = path.to_owned();
+    let mut quoted = message.split('`').skip(1).step_by(2).map(str::to_owned);
+    if message.starts_with("unknown field")
+        && let Some(key) = quoted.next()
+    {
+        let known: Vec<String> = quoted.collect();
+        let nearest = nearest(&key, &known).map(str::to_owned);
+        return JobFileError::UnknownKey { path, line, key, nearest, known };
+    }
+    JobFileError::Invalid { path, line, what: message.trim().replace('\n', " ") }
+}
+
+/// Returns the known name that is most like `name`; `None` where none is.
+pub fn nearest<'a>(name: &str, known: &'a [String]) -> Option<&'a str> {
+    let name = name.to_ascii_lowercase();
+    // A key without its unit, or with more words, is a likely slip.
+    let is_part = |other: &str| name.len() >= 3 && (other.starts_with(&name) || name.starts_with(other));
+    let distance = |other: &str| if is_part(other) { 1 } else { edits(&name, other) };
+    let best = known.iter().map(|other| (distance(other), other.as_str())).min()?;
+    (best.0 <= 2.max(name.len() / 3)).then_some(best.1)
+}
+
+/// Returns the number of letters to insert, remove or replace (Levenshtein).
+fn edits(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, c) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, d) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(c != *d);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}

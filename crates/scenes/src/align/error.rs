@@ -1,0 +1,72 @@
+//! Why an alignment ends without a result.
+
+use colmap::align::AlignError;
+use crs::CrsError;
+use geodesy::GeodesyError;
+use io::colmap::ColmapError;
+use io::control::ControlError;
+use numeric::Cancelled;
+
+use job::error::{JobError, from_steps};
+use job::files::FileError;
+
+/// An alignment that could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AlignJobError {
+    /// The threshold is not a positive number.
+    #[error("the threshold of the residuals is {threshold_m}, expected a number of metres above 0")]
+    Threshold {
+        /// The threshold.
+        threshold_m: f64,
+    },
+    /// A standard deviation of the noise is negative or not finite.
+    #[error("a level of noise is {level}, expected a number from 0 on")]
+    NoiseLevel {
+        /// The level, metres or degrees.
+        level: f64,
+    },
+    /// The COLMAP model cannot be read.
+    #[error(transparent)]
+    Model(#[from] ColmapError),
+    /// The table of positions cannot be read.
+    #[error(transparent)]
+    Positions(#[from] ControlError),
+    /// The CRS or the vertical datum cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// A position has no UTM zone.
+    #[error(transparent)]
+    Geodesy(#[from] GeodesyError),
+    /// The positions are map coordinates of a map that is not named.
+    #[error("the positions are map coordinates, or there are none: the EPSG code of their map is needed")]
+    UnknownMap,
+    /// The CRS is not projected in metres.
+    #[error("EPSG:{epsg} is not projected in metres: choose another reference system")]
+    NotMetres {
+        /// EPSG code of the CRS.
+        epsg: u32,
+    },
+    /// An image has two positions.
+    #[error("image {image:?} has two positions: keep one")]
+    TwoPositions {
+        /// Name of the image.
+        image: String,
+    },
+    /// No position belongs to the model.
+    #[error("none of the positions is of an image of the model: compare the names")]
+    NothingKnown,
+    /// The positions do not determine a similarity.
+    #[error("{pairs} of the positions are of the model's images")]
+    Alignment {
+        /// Number of positions that the model knows.
+        pairs: usize,
+        /// Why there is no similarity.
+        source: AlignError,
+    },
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
+    #[error(transparent)]
+    Job(#[from] JobError),
+}
+
+from_steps!(AlignJobError: Job(FileError, Cancelled));

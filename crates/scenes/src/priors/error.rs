@@ -1,0 +1,303 @@
+//! Why the priors job ends without a result.
+
+use std::path::PathBuf;
+
+use ::priors::PriorsError;
+use camera::{FitError, LensError, SimilarityError};
+use city::ModelError;
+use crs::CrsError;
+use io::camera_file::CameraFileError;
+use io::citymodel::CityError;
+use io::colmap::ColmapError;
+use io::npy::NpyError;
+use io::raster::RasterError;
+use io::rpc::RpcReadError;
+use io::similarity::SimilarityFileError;
+use numeric::Cancelled;
+use report::PictureError;
+
+use job::corrections::CorrectionsError;
+use job::error::{ImageInputError, JobError, from_steps};
+use job::files::FileError;
+use job::threads::ThreadsError;
+
+/// Priors that could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PriorsJobError {
+    /// Both an offset and a transform were given.
+    #[error("an offset and a transform were given, expected one of them")]
+    TwoFrames,
+    /// Values for satellite images were given with perspective cameras.
+    #[error(
+        "a map, a vertical datum and pointing corrections are for satellite images, and the cameras are perspective"
+    )]
+    NotSatellite,
+    /// Values for perspective cameras were given with satellite images.
+    #[error(
+        "an offset, a transform and pictures of the dataset are for perspective cameras: satellite images find the \
+         model by its coordinates, and their maps lie on their own pixels"
+    )]
+    NotPerspective,
+    /// Not exactly one source of perspective cameras.
+    #[error("{count} cameras are named, expected satellite images, or one COLMAP folder or transforms.json")]
+    CameraCount {
+        /// Number of paths.
+        count: usize,
+    },
+    /// A path holds no cameras.
+    #[error(
+        "found no cameras: expected cameras.bin or cameras.txt of a COLMAP model, sparse/0 with them, transforms.json, \
+         or satellite images: {}",
+        path.display()
+    )]
+    NoCameras {
+        /// The path.
+        path: PathBuf,
+    },
+    /// A file that is neither a camera model nor an image.
+    #[error("cameras are read from a COLMAP folder or a transforms.json, found another file: {}", path.display())]
+    NotCameras {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The cameras have no image.
+    #[error("the cameras have no image: {}", path.display())]
+    NoImages {
+        /// Where the cameras were read.
+        path: PathBuf,
+    },
+    /// A picture is missing.
+    #[error("there is no picture of the camera {name:?} in the folder: {}", folder.display())]
+    NoPicture {
+        /// Name of the image.
+        name: String,
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A picture lies in the folder that is to be replaced.
+    #[error("the picture lies in the folder that the dataset's pictures go to: {}", path.display())]
+    PictureInOutput {
+        /// The picture.
+        path: PathBuf,
+    },
+    /// A picture has another size than its camera.
+    #[error(
+        "the picture has {} x {} pixels, its camera needs {} x {}: {}",
+        found[0], found[1], expected[0], expected[1], path.display()
+    )]
+    PictureSize {
+        /// The picture.
+        path: PathBuf,
+        /// Its columns and rows.
+        found: [usize; 2],
+        /// Columns and rows of the camera.
+        expected: [usize; 2],
+    },
+    /// Among satellite images there is something else.
+    #[error("among satellite images there is something else: {}", path.display())]
+    MixedCameras {
+        /// The other file.
+        path: PathBuf,
+    },
+    /// A folder cannot be listed.
+    #[error("cannot read the folder: {}", path.display())]
+    Unlisted {
+        /// The folder.
+        path: PathBuf,
+        /// Reason given by the operating system.
+        source: std::io::Error,
+    },
+    /// Two images would share their maps.
+    #[error(
+        "two images have the same file stem, by which trainers pair them with their maps: {first:?} and {second:?}"
+    )]
+    SameStem {
+        /// Name of the first image.
+        first: String,
+        /// Name of the second image.
+        second: String,
+    },
+    /// Two satellite images would share their maps.
+    #[error("two images have the same name, and so would their maps: {} and {}", first.display(), second.display())]
+    SameName {
+        /// The first image.
+        first: PathBuf,
+        /// The second image.
+        second: PathBuf,
+    },
+    /// The name of an image has a dot before its ending.
+    #[error(
+        "the image name {name:?} has a dot before its ending: trainers cut it there and pair it with the maps of another \
+         image; rename it"
+    )]
+    DotInName {
+        /// Name of the image.
+        name: String,
+    },
+    /// The name of an image cannot be the name of a file.
+    #[error("the image name {name:?} gives no file name for its maps: rename it")]
+    BadName {
+        /// Name of the image.
+        name: String,
+    },
+    /// An image is too large.
+    #[error("the image {name:?} has {width} × {height} pixels, up to {limit} are rendered")]
+    TooLarge {
+        /// Name of the image.
+        name: String,
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Largest number of pixels.
+        limit: usize,
+    },
+    /// A lens does not suit the trainer.
+    #[error("the camera of the image {name:?} cannot be used")]
+    Lens {
+        /// Name of the image.
+        name: String,
+        /// Why.
+        source: LensFault,
+    },
+    /// The model has no usable object.
+    #[error("no object of the model could be used ({objects} objects; an account of the model names the reasons): {}", path.display())]
+    NoObject {
+        /// The model.
+        path: PathBuf,
+        /// Number of its objects.
+        objects: usize,
+    },
+    /// No camera has a building in its image.
+    #[error(
+        "no camera has a building in its image: in the frame of the model the cameras are at {cameras}, and the model \
+         reaches from {model}; state how they lie to one another"
+    )]
+    NothingInSight {
+        /// Box around the cameras.
+        cameras: String,
+        /// Box around the model.
+        model: String,
+    },
+    /// No satellite image has a building in it.
+    #[error("no image has a building in it: the model is at {model}, the first image at {image}")]
+    NothingInImages {
+        /// Place of the model.
+        model: String,
+        /// Place of the first image.
+        image: String,
+    },
+    /// The offset is not finite.
+    #[error("the offset of the cameras' frame")]
+    Offset(#[source] SimilarityError),
+    /// The model's coordinates cannot be shifted.
+    #[error(transparent)]
+    Similarity(#[from] SimilarityError),
+    /// The model's map is not known.
+    #[error("{source}: satellite images need it")]
+    MapUnknown {
+        /// What the model states.
+        source: PriorsError,
+    },
+    /// One satellite image cannot be served.
+    #[error("in the image: {}", path.display())]
+    SatelliteImage {
+        /// The image.
+        path: PathBuf,
+        /// Why.
+        source: Box<PriorsJobError>,
+    },
+    /// The depths do not fit 16-bit maps.
+    #[error("the depths are too large for 16-bit maps")]
+    DepthScale,
+    /// A file of the unfinished dataset changed.
+    #[error("another program wrote to the output folder: {}", path.display())]
+    Disturbed {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The output is a file.
+    #[error("the output is a file, expected a folder: {}", path.display())]
+    OutputIsFile {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The priors cannot be computed.
+    #[error(transparent)]
+    Priors(#[from] PriorsError),
+    /// The city model cannot be read.
+    #[error(transparent)]
+    City(#[from] CityError),
+    /// The city model contradicts itself.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The COLMAP model cannot be read.
+    #[error(transparent)]
+    Colmap(#[from] ColmapError),
+    /// The transforms.json cannot be read.
+    #[error(transparent)]
+    Transforms(#[from] CameraFileError),
+    /// The similarity cannot be read.
+    #[error(transparent)]
+    Transform(#[from] SimilarityFileError),
+    /// A satellite image cannot be read with its camera.
+    #[error(transparent)]
+    Image(#[from] ImageInputError),
+    /// The pointing correction cannot be folded into the RPC.
+    #[error(transparent)]
+    Fold(#[from] FitError),
+    /// A coordinate reference system cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// A map that was written cannot be read back.
+    #[error(transparent)]
+    Npy(#[from] NpyError),
+    /// A picture of the report cannot be made.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
+    #[error(transparent)]
+    Job(#[from] JobError),
+}
+
+from_steps!(PriorsJobError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));
+
+/// What a trainer cannot do with a lens.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LensFault {
+    /// The image is distorted.
+    #[error(
+        "its lens is {model}, and trainers take undistorted images only: undistort them (colmap image_undistorter) and \
+         give the cameras that come with them, or ask for maps only"
+    )]
+    Distorted {
+        /// Name of the lens model.
+        model: &'static str,
+    },
+    /// The principal point is off the middle, which 2DGS ignores.
+    #[error(
+        "its principal point is {x:+.2}, {y:+.2} px from the middle of the image, and 2DGS takes the middle: crop the \
+         camera, or choose a trainer that uses the principal point"
+    )]
+    OffMiddle {
+        /// Offset along the columns, pixels.
+        x: f64,
+        /// Offset along the rows, pixels.
+        y: f64,
+    },
+    /// Cropping would leave too little.
+    #[error(
+        "its principal point is {x:+.0}, {y:+.0} px from the middle: cropping would leave less than half of the image"
+    )]
+    TooFarOff {
+        /// Offset along the columns, pixels.
+        x: f64,
+        /// Offset along the rows, pixels.
+        y: f64,
+    },
+    /// The cropped lens is invalid.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+}

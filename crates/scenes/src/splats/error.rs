@@ -1,0 +1,110 @@
+//! Why a splat job ends without a result.
+
+use std::path::PathBuf;
+
+use ::splats::SplatError;
+use crs::CrsError;
+use io::raster::RasterError;
+use io::rpc::RpcReadError;
+use io::splat_ply::SplatPlyError;
+use numeric::Cancelled;
+
+use job::corrections::CorrectionsError;
+use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::files::FileError;
+use job::map_surface::MapSurfaceError;
+use job::placed_model::PlacedModelError;
+use job::threads::ThreadsError;
+
+/// Splats that could not be made or rendered.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SplatsJobError {
+    /// The surface model cannot be used.
+    #[error(transparent)]
+    Surface(#[from] MapSurfaceError),
+    /// No cell of the surface model has a height.
+    #[error("the surface model has no height: {}", path.display())]
+    NoHeight {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The confidence of the cells cannot be read.
+    #[error("cannot read the confidence")]
+    Confidence(#[source] RasterError),
+    /// A satellite image cannot be read with its camera.
+    #[error(transparent)]
+    Image(#[from] ImageInputError),
+    /// An image shows another place.
+    #[error("the image does not see {target}: {}", path.display())]
+    NotSeen {
+        /// What it should see: the surface model or the splats.
+        target: &'static str,
+        /// The image.
+        path: PathBuf,
+    },
+    /// A coordinate reference system cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// No splats follow from the inputs.
+    #[error(transparent)]
+    Splats(#[from] SplatError),
+    /// The splats cannot be read.
+    #[error(transparent)]
+    Ply(#[from] SplatPlyError),
+    /// No origin lies beside the splats.
+    #[error("no origin beside the splats: expected {}", path.display())]
+    NoOrigin {
+        /// The file that was looked for.
+        path: PathBuf,
+    },
+    /// The heights of the splats are not ellipsoidal, so RPCs cannot see them.
+    #[error("the splats' heights are above {vertical}, expected the ellipsoid: {}", path.display())]
+    NotEllipsoidal {
+        /// Vertical datum of the splats.
+        vertical: String,
+        /// The splats.
+        path: PathBuf,
+    },
+    /// Neither images nor perspective cameras were given.
+    #[error("nothing to look through: expected images or perspective cameras")]
+    NoCamera,
+    /// The perspective cameras cannot be used.
+    #[error(transparent)]
+    Cameras(#[from] PlacedModelError),
+    /// An image of the camera model refers to a camera that does not exist.
+    #[error("image {name} of the model has no camera")]
+    NoLens {
+        /// Name of the image.
+        name: String,
+    },
+    /// A camera that is to be made smaller has a lens with distortion.
+    #[error("the lens of {name} has distortion ({model}), expected a pinhole to make the image smaller: shrink by 1")]
+    ShrunkLens {
+        /// Name of the view.
+        name: String,
+        /// Name of the lens model.
+        model: &'static str,
+    },
+    /// Two views have the same name.
+    #[error("two views would be written as {name}")]
+    SameName {
+        /// Name of their files.
+        name: String,
+    },
+    /// A picture has another size than its camera.
+    #[error("the picture of {name} has {found:?} pixels, its camera {expected:?}")]
+    PictureSize {
+        /// Name of the view.
+        name: String,
+        /// Columns and rows of the picture.
+        found: [usize; 2],
+        /// Columns and rows of the camera.
+        expected: [usize; 2],
+    },
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
+    #[error(transparent)]
+    Job(#[from] JobError),
+}
+
+from_steps!(SplatsJobError: Job(FileError, ThreadsError, SettingError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));

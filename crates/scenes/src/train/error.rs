@@ -1,0 +1,132 @@
+//! Why a training ends without a result.
+
+use std::path::PathBuf;
+
+use ::train::CheckpointDefect;
+use crs::CrsError;
+use io::colmap::ColmapError;
+use io::npy::NpyError;
+use io::raster::RasterError;
+use io::rpc::RpcReadError;
+use io::splat_ply::SplatPlyError;
+use numeric::Cancelled;
+
+use job::corrections::CorrectionsError;
+use job::dataset_folder::DatasetOriginError;
+use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::files::FileError;
+use job::map_surface::MapSurfaceError;
+use job::threads::ThreadsError;
+
+/// A training that gives no splats.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrainError {
+    /// The cameras or points cannot be read.
+    #[error(transparent)]
+    Model(#[from] ColmapError),
+    /// A prior map cannot be read.
+    #[error(transparent)]
+    Map(#[from] NpyError),
+    /// An image cannot be read, or not with its camera.
+    #[error(transparent)]
+    Image(#[from] ImageInputError),
+    /// The surface model cannot be used.
+    #[error(transparent)]
+    Surface(#[from] MapSurfaceError),
+    /// A coordinate reference system cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// The splats cannot be written.
+    #[error(transparent)]
+    Ply(#[from] SplatPlyError),
+    /// A file of the dataset is not as the priors job writes it.
+    #[error("{what}: {}", path.display())]
+    Dataset {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what was expected.
+        what: String,
+    },
+    /// The origin of the dataset cannot be read.
+    #[error(transparent)]
+    Origin(#[from] DatasetOriginError),
+    /// No camera has an image.
+    #[error("none of {cameras} cameras has an image, expected files with the cameras' names in {}", folder.display())]
+    NoImages {
+        /// Number of cameras.
+        cameras: usize,
+        /// The folder that was looked in.
+        folder: PathBuf,
+    },
+    /// An image does not have the size of its camera or map.
+    #[error("{what} has {found:?} columns and rows, its camera {expected:?}: {}", path.display())]
+    Size {
+        /// What was read.
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Columns and rows of the file.
+        found: [usize; 2],
+        /// Columns and rows of the camera.
+        expected: [usize; 2],
+    },
+    /// A camera has a lens with distortion.
+    #[error("the lens of {name} has distortion ({model}), expected a pinhole: undistort the images first")]
+    Lens {
+        /// Name of the image.
+        name: String,
+        /// Name of the lens model.
+        model: &'static str,
+    },
+    /// There are no points to begin with.
+    #[error("the dataset has {count} points, expected at least 4: {}", path.display())]
+    NoPoints {
+        /// Number of points.
+        count: usize,
+        /// The model.
+        path: PathBuf,
+    },
+    /// A view that is to be held out is not there, or there are several of its name.
+    #[error("{found} views have the name {name}, which is to be held out; expected one, named such as {expected:?}")]
+    HeldOut {
+        /// The name that was given.
+        name: String,
+        /// Number of views of that name.
+        found: usize,
+        /// Name of a view.
+        expected: String,
+    },
+    /// No view is left to train on.
+    #[error("all {count} views are to be held out, so that none is left to train on: hold out fewer")]
+    NothingLeft {
+        /// Number of views.
+        count: usize,
+    },
+    /// The checkpoint cannot be used.
+    #[error("cannot go on from the checkpoint; remove it to begin again: {}", path.display())]
+    Checkpoint {
+        /// The checkpoint.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: CheckpointDefect,
+    },
+    /// The checkpoint is of another dataset.
+    #[error("the checkpoint has {found} views, this training {expected}; remove it to begin again: {}", path.display())]
+    OtherViews {
+        /// The checkpoint.
+        path: PathBuf,
+        /// Number of its views.
+        found: usize,
+        /// Number of views of this training.
+        expected: usize,
+    },
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
+    #[error(transparent)]
+    Job(#[from] JobError),
+}
+
+from_steps!(
+    TrainError: Job(FileError, ThreadsError, SettingError, Cancelled),
+    Image(RasterError, RpcReadError, CorrectionsError)
+);

@@ -1,0 +1,75 @@
+//! Reasons why a building index cannot be made.
+
+use std::path::PathBuf;
+
+use buildings::BuildingIndexError;
+use camera::CameraError;
+use crs::CrsError;
+use io::raster::RasterError;
+use io::rpc::RpcReadError;
+use numeric::Cancelled;
+
+use crate::ortho::OrthoError;
+use job::corrections::CorrectionsError;
+use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::files::FileError;
+use job::threads::ThreadsError;
+
+/// A building index that cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildingMapError {
+    /// The image cannot be read.
+    #[error(transparent)]
+    Image(#[from] ImageInputError),
+    /// The image is too large to be looked at at once.
+    #[error("the image has {width} x {height} pixels, at most 2^28: cut it into parts: {}", path.display())]
+    TooLarge {
+        /// The image.
+        path: PathBuf,
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// Nothing says how large the pixels are.
+    #[error("the image has neither an RPC nor a projected map that tells the size of its pixels: {}", path.display())]
+    NoScale {
+        /// The image.
+        path: PathBuf,
+    },
+    /// The RPC does not tell the size of the pixels.
+    #[error("the RPC does not tell the size of the pixels: {}", path.display())]
+    Scale {
+        /// The image.
+        path: PathBuf,
+        /// What is wrong with the RPC.
+        source: CameraError,
+    },
+    /// The coordinate reference system of the image cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// The index was given a value that it cannot use.
+    #[error(transparent)]
+    Index(#[from] BuildingIndexError),
+    /// The index cannot be laid on the surface model.
+    #[error(transparent)]
+    Surface(Box<OrthoError>),
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
+    #[error(transparent)]
+    Job(#[from] JobError),
+}
+
+from_steps!(
+    BuildingMapError: Job(SettingError, FileError, ThreadsError, Cancelled),
+    Image(RasterError, RpcReadError, CorrectionsError),
+);
+
+impl From<OrthoError> for BuildingMapError {
+    fn from(error: OrthoError) -> Self {
+        match error {
+            OrthoError::Job(job) => Self::Job(job),
+            other => Self::Surface(other.into()),
+        }
+    }
+}

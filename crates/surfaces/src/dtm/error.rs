@@ -1,0 +1,69 @@
+//! Reasons why a terrain model cannot be made.
+
+use std::path::PathBuf;
+
+use crs::CrsError;
+use io::raster::RasterError;
+use numeric::Cancelled;
+use terrain::TerrainError;
+
+use job::error::{JobError, from_steps};
+use job::files::FileError;
+use job::threads::ThreadsError;
+
+/// A terrain model that cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DtmError {
+    /// The surface model cannot be read.
+    #[error(transparent)]
+    Surface(#[from] RasterError),
+    /// The surface model's coordinate reference system has no EPSG code.
+    #[error("the surface model's coordinate system has no EPSG code: {}", path.display())]
+    NoEpsg {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The surface model is in degrees.
+    #[error("the surface model is on a map in degrees, expected a projected map; warp it first: {}", path.display())]
+    InDegrees {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The cells of the surface model are not square.
+    #[error("the cells measure {width_m} m by {height_m} m, expected square cells: warp it first: {}", path.display())]
+    NotSquare {
+        /// The surface model.
+        path: PathBuf,
+        /// Width of a cell, metres.
+        width_m: f64,
+        /// Height of a cell, metres.
+        height_m: f64,
+    },
+    /// The surface model is empty.
+    #[error("the surface model has no heights: {}", path.display())]
+    NoHeights {
+        /// The surface model.
+        path: PathBuf,
+    },
+    /// The coordinate reference system cannot be used.
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    /// The search for the ground was given a value that it cannot use.
+    #[error(transparent)]
+    Terrain(TerrainError),
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
+    #[error(transparent)]
+    Job(#[from] JobError),
+}
+
+from_steps!(DtmError: Job(FileError, ThreadsError, Cancelled));
+
+impl From<TerrainError> for DtmError {
+    fn from(error: TerrainError) -> Self {
+        match error {
+            TerrainError::Cancelled(cancelled) => cancelled.into(),
+            other => Self::Terrain(other),
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! The DTM job: the bare ground under a surface model, and the heights above it.
+//!
+//! Where the layers of a DSM run lie beside the surface, filled cells and those that are hardly
+//! ever right are no evidence of the ground.
+//!
+//! Three rasters and a report are written into one folder, on the grid and in the vertical datum of
+//! the surface:
+//!
+//! - `dtm.tif`: heights of the ground, metres; no-data where no ground is near.
+//! - `height_above_ground.tif`: surface minus ground, metres. It is never below 0: where the
+//!   surface lies below the interpolated ground (noise, outliers), the height is 0. No-data where
+//!   the surface or the ground is unknown.
+//! - `ground.tif`: 0 unknown, 1 ground as observed, 2 interpolated under an object, 3 interpolated
+//!   in a void of the surface.
+//! - `dtm.json`: the report.
+
+mod config;
+mod error;
+mod layers;
+mod report;
+mod run;
+
+pub use config::DtmConfig;
+pub use error::DtmError;
+pub use layers::SurfaceLayers;
+pub(crate) use layers::unobserved;
+pub use report::DtmReport;
+pub use run::FILES;
+pub(crate) use run::read_surface;
+pub use run::run;

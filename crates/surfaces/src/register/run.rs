@@ -1,0 +1,176 @@
+//! Runs the register job.
+
+use std::path::PathBuf;
+
+use camera::{ImageCorrection, RpcCamera};
+use geodesy::LonLatHeight;
+use numeric::{Progress, upper_median};
+use sweep::pointing::{ControlPoint, ModelOrder};
+
+use super::config::{RegisterConfig, RegisterOrder};
+use super::error::RegisterError;
+use super::evidence::{AGREES_PX, adjusted_to_most, order_of, residuals, sharing};
+use super::matching;
+use super::model::{Looks, Model, NewImage};
+use super::page;
+use super::report::{RegisterReport, RegisteredImage};
+use job::{report_page, threads};
+
+/// Most rounds of matching. The first is within a pixel, the second within a tenth.
+const ROUNDS: usize = 5;
+/// Change of the correction that ends the rounds, pixels.
+const SETTLED_PX: f64 = 0.01;
+/// Search around the expected places after the first round, pixels.
+const CLOSE_PX: f64 = 4.0;
+/// Least number of points.
+const POINTS_MIN: usize = 8;
+
+/// Registers an image and writes the report with its correction.
+///
+/// # Errors
+/// [`RegisterError`]: inputs that cannot be read, a model that the image does not show, matches
+/// that do not agree, an output that exists.
+///
+/// ```
+/// use surfaces::register::{RegisterConfig, RegisterModel, run};
+/// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
+/// let folder = tempfile::tempdir()?;
+/// let images = vec![town.join("view_1.tif")];
+/// let model = RegisterModel::Surface { dsm: town.join("truth/dsm.tif"), images };
+/// let config = RegisterConfig::new(town.join("view_2.tif"), model, folder.path().join("view_2.json"));
+/// let report = run(&config, &numeric::Silent)?;
+/// assert!(report.agree > 20 && report.rms_px < 0.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn run(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
+    config.validate()?;
+    report_page::refuse_existing(&config.output, config.overwrite)?;
+    let report = threads::install(config.threads, || register(config, progress))??;
+    report_page::write_page(&config.output, &page::of(&report)?, &report, config.overwrite)?;
+    Ok(report)
+}
+
+fn register(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
+    let rpc = io::rpc::read_for_image(&config.image)?.rpc;
+    let camera = RpcCamera { rpc, correction: ImageCorrection::IDENTITY };
+    let model = Model::open(config, &camera, progress)?;
+    let mut new = open(config, &model, camera)?;
+    let info = new.image.source.info();
+    let size = (info.width, info.height);
+    progress.begin("rounds", ROUNDS);
+    let mut rounds = 0;
+    loop {
+        progress.check_cancelled()?;
+        let reach_px = if rounds == 0 { config.reach_px } else { CLOSE_PX.min(config.reach_px) };
+        let found = matching::search(&model, &new, reach_px, progress)?;
+        if found.points.len() < POINTS_MIN {
+            let (found, tried) = (found.points.len(), found.tried);
+            return Err(RegisterError::TooFew { found, tried, needed: POINTS_MIN, reach_px });
+        }
+        let before = new.image.camera.clone();
+        let (correction, order) = corrected(&before, size, &found.points, rounds, config.order);
+        new.image.camera.correction = correction;
+        rounds += 1;
+        progress.step();
+        let moved = change(&before, &new.image.camera, &found.points);
+        if rounds == ROUNDS || (moved < SETTLED_PX && rounds > 1) {
+            return judged(&model, &new, &found, (rounds, order));
+        }
+    }
+}
+
+/// Opens the new image on the model.
+fn open(config: &RegisterConfig, model: &Model, camera: RpcCamera) -> Result<NewImage, RegisterError> {
+    let middle = [model.heights.width(), model.heights.height()].map(|cells| 0.5 * (cells as f64 - 1.0));
+    let [lon, lat] = model.ground.lonlat(middle[0], middle[1]);
+    let gsd = camera.gsd(LonLatHeight::new(lon, lat, model.middle_m));
+    let gsd_m = gsd.map_err(|source| RegisterError::Camera { path: config.image.clone(), source })?.mean_m();
+    let image = model.look_through(&config.image, camera)?;
+    Ok(NewImage { path: config.image.clone(), image, gsd_m })
+}
+
+/// Returns the correction that follows from the points that share a shift, and its order. The first
+/// round finds a shift: matches of an image that is laid beside its place tell no more.
+fn corrected(
+    camera: &RpcCamera,
+    size: (usize, usize),
+    points: &[ControlPoint],
+    rounds: usize,
+    wanted: RegisterOrder,
+) -> (ImageCorrection, RegisterOrder) {
+    let sharing = sharing(camera, points);
+    // The order is that of the whole correction, so it follows no linear part of an earlier round.
+    let raw = RpcCamera { rpc: camera.rpc.clone(), correction: ImageCorrection::IDENTITY };
+    let shift = |axis: usize| {
+        let mut all: Vec<f64> = residuals(&raw, &sharing).map(|residual| residual[axis]).collect();
+        upper_median(&mut all).unwrap_or(0.0)
+    };
+    let near = RpcCamera { correction: ImageCorrection::translation(shift(0), shift(1)), ..raw.clone() };
+    let order = match wanted {
+        _ if rounds == 0 => ModelOrder::Translation,
+        RegisterOrder::Evidence => order_of(&near, size, &sharing),
+        RegisterOrder::Shift => ModelOrder::Translation,
+        RegisterOrder::Drift => ModelOrder::Drift,
+        RegisterOrder::Affine => ModelOrder::Affine,
+    };
+    let named = match order {
+        ModelOrder::Drift => RegisterOrder::Drift,
+        ModelOrder::Affine => RegisterOrder::Affine,
+        ModelOrder::None | ModelOrder::Translation => RegisterOrder::Shift,
+    };
+    (adjusted_to_most(&near, size, &sharing, order), named)
+}
+
+/// Returns how far a new correction moves the points at most, pixels.
+fn change(before: &RpcCamera, after: &RpcCamera, points: &[ControlPoint]) -> f64 {
+    let moved = residuals(before, points).zip(residuals(after, points));
+    moved.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
+}
+
+/// Returns the place of a point in the image and its residual, rounded to a thousandth of a pixel.
+fn seen_with((point, [along, across]): (&ControlPoint, [f64; 2])) -> Option<[f64; 4]> {
+    let (_, seen) = point.seen.first()?;
+    let values = [seen.sample, seen.line, along, across];
+    values.iter().all(|value| value.is_finite()).then(|| values.map(|value| (1e3 * value).round() / 1e3))
+}
+
+fn judged(
+    model: &Model,
+    new: &NewImage,
+    found: &matching::Found,
+    (rounds, order): (usize, RegisterOrder),
+) -> Result<RegisterReport, RegisterError> {
+    let camera = &new.image.camera;
+    let mut lengths: Vec<f64> = residuals(camera, &found.points).map(|[a, b]| a.hypot(b)).collect();
+    let agreeing: Vec<f64> = lengths.iter().copied().filter(|length| *length <= AGREES_PX).collect();
+    let (agree, count) = (agreeing.len(), lengths.len());
+    if agree < POINTS_MIN || 2 * agree < count {
+        return Err(RegisterError::NoAgreement { agree, found: count });
+    }
+    let info = new.image.source.info();
+    let middle = camera::ImagePoint::new(0.5 * (info.width as f64 - 1.0), 0.5 * (info.height as f64 - 1.0));
+    let moved = camera.correction.apply(middle);
+    let named = |path: &PathBuf, correction: ImageCorrection| RegisteredImage {
+        path: path.canonicalize().unwrap_or_else(|_| path.clone()),
+        applied_correction: Some(correction),
+    };
+    let others: &[(PathBuf, crate::ortho::OrthoImage)] = match &model.looks {
+        Looks::Images(images) => images,
+        Looks::Picture(_) => &[],
+    };
+    let others = others.iter().map(|(path, image)| named(path, image.camera.correction));
+    Ok(RegisterReport {
+        images: std::iter::once(named(&new.path, camera.correction)).chain(others).collect(),
+        order,
+        tried: found.tried,
+        found: count,
+        agree,
+        rms_px: (agreeing.iter().map(|length| length * length).sum::<f64>() / agree as f64).sqrt(),
+        median_px: upper_median(&mut lengths).unwrap_or(f64::NAN),
+        shift_px: [moved.sample - middle.sample, moved.line - middle.line],
+        gsd_m: new.gsd_m,
+        rounds,
+        size: (info.width, info.height),
+        residuals_px: found.points.iter().zip(residuals(camera, &found.points)).filter_map(seen_with).collect(),
+    })
+}

@@ -1,0 +1,57 @@
+//! Reasons why tiles cannot be made.
+
+use std::path::PathBuf;
+
+use io::positions::PositionsError;
+use io::raster::RasterError;
+use io::rpc::RpcReadError;
+use numeric::Cancelled;
+
+use crate::camera_stand::StandError;
+use crate::heightmap::HeightMapJobError;
+use crate::ortho::OrthoError;
+use job::corrections::CorrectionsError;
+use job::error::{ImageInputError, JobError, from_steps};
+use job::files::FileError;
+use job::threads::ThreadsError;
+
+/// Tiles that cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TilesError {
+    /// A satellite image cannot be read with its camera.
+    #[error(transparent)]
+    Image(#[from] ImageInputError),
+    /// A height map cannot be made.
+    #[error(transparent)]
+    Map(#[from] HeightMapJobError),
+    /// An ortho cannot be made.
+    #[error(transparent)]
+    Ortho(#[from] OrthoError),
+    /// No image is given, and the surface model does not lie in the folder of a run.
+    #[error("no images: the surface model does not lie in a run that names its images: {}", source_path.display())]
+    NoImages {
+        /// The source of the heights.
+        source_path: PathBuf,
+    },
+    /// No image reaches a tile.
+    #[error("none of the {images} images reaches the tile")]
+    OutsideImages {
+        /// How many images there are.
+        images: usize,
+    },
+    /// Another folder has the name of a tile.
+    #[error(
+        "a folder is in the way that is not the tile asked for (other settings, images or source); choose another folder: {}",
+        path.display()
+    )]
+    OtherTile {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A setting, a file or the threads cannot be used, or the job was cancelled.
+    #[error(transparent)]
+    Job(#[from] JobError),
+}
+
+from_steps!(TilesError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError), Map(StandError, PositionsError));

@@ -1,0 +1,12 @@
+//! Commands on cameras and city models.
+
+mod align;
+mod city;
+mod mesh;
+mod priors;
+mod priors_satellite;
+mod priors_yardsticks;
+mod simulate;
+mod splats;
+mod split;
+mod train;

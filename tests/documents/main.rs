@@ -1,0 +1,6 @@
+//! The pages, the help and the examples say what is true.
+
+mod examples;
+mod help_pages;
+mod pages;
+mod qgis_plugin;
