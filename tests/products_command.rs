@@ -116,6 +116,27 @@ fn the_mesh_and_the_contour_lines_fit_the_surface() {
     assert!(corners < 3 * 2 * heights.heights.data().len() as u64 / 2, "{corners} corners");
     assert!(made["contours"]["lines"].as_u64().unwrap() > 5);
     assert!(made["dtm"]["cells_ground"].as_u64().unwrap() > 0, "contour lines need the ground");
+    // The page of the products and that of the run link to all that is there, and to nothing else.
+    for (page, own) in [("products/products.html", "./mesh.glb"), ("report/report.html", "../products/mesh.glb")] {
+        let text = std::fs::read_to_string(folder.join(page)).unwrap();
+        let targets: Vec<&str> = text.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+        let targets: Vec<&str> = targets.into_iter().filter(|target| *target != "data:,").collect();
+        assert!(targets.contains(&own) && !text.contains("cloud.laz"), "{page}: {targets:?}");
+        for target in targets {
+            let path = folder.join(page).parent().unwrap().join(target);
+            assert!(path.is_file(), "{page} leads to {}", path.display());
+        }
+    }
+    let text = std::fs::read_to_string(folder.join("products/products.html")).unwrap();
+    for map in ["<b>Surface.</b>", "<b>Ground.</b>", "<b>Above ground.</b>", "<b>Contours.</b>", "<b>Colours.</b>"] {
+        assert!(text.contains(map), "{map}");
+    }
+    // What the images do not say is said to be unknown, and each image has its quality.
+    let text = std::fs::read_to_string(folder.join("report/report.html")).unwrap();
+    for words in ["The dates of the images are unknown", "Quality of the images", "<td class=\"words\">unknown</td>"] {
+        assert!(text.contains(words) || text.contains(&words.replace(" class=\"words\"", "")), "{words}");
+    }
+    assert!(text.contains("no value"), "the maps have voids, whose colour is explained");
 
     let refused = |arguments: &[&str], reason: &str| {
         let mut command = skysweep();

@@ -39,6 +39,7 @@ pub mod remote;
 mod report_page;
 pub mod rpc;
 mod run_folder;
+mod run_links;
 mod same_view;
 pub mod simulate;
 mod simulate_page;

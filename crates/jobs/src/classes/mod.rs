@@ -22,5 +22,5 @@ pub use config::ClassesConfig;
 pub use error::ClassesError;
 pub use multispectral::IndexImage;
 pub use report::ClassesReport;
-pub(crate) use run::FILES;
 pub use run::run;
+pub(crate) use run::{FILES, legend};

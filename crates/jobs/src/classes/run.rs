@@ -179,16 +179,20 @@ fn write(
     Ok(())
 }
 
-/// Returns the maps of the page.
-fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
-    let legend = Legend::Codes(vec![
+/// Returns the colours of the classes.
+pub(crate) fn legend() -> Legend {
+    Legend::Codes(vec![
         (GROUND, [214, 200, 170], "ground"),
         (BUILDING, [200, 80, 60], "building"),
         (LOW_VEGETATION, [176, 208, 128], "low vegetation"),
         (VEGETATION, [86, 150, 80], "vegetation"),
         (WATER, [86, 140, 200], "water"),
         (UNKNOWN, [72, 72, 76], "unknown"),
-    ]);
+    ])
+}
+
+/// Returns the maps of the page.
+fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
     let classes = found.classes.map(|class| f32::from(*class));
     let caption = "What stands is a building where it consists of planes, and vegetation where it is rough.";
     let roughness = found.roughness.map(|r| if r.is_finite() { *r } else { f32::NAN });
@@ -196,7 +200,7 @@ fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
     let ramp = Legend::sequential(0.0, f64::from(highest), LightEnd::Low, "m");
     let of_roughness = "Residual of the best plane around each cell that stands above the ground.";
     vec![
-        report_page::legend_layer("Classes", caption, &classes, legend),
+        report_page::legend_layer("Classes", caption, &classes, legend()),
         report_page::legend_layer("Roughness", of_roughness, &roughness, ramp),
         report_page::relief_layer("Surface", "Heights of the surface, shaded.", &surface.heights, cell_m),
     ]

@@ -19,7 +19,7 @@ const STEPS: [f64; 3] = [1.0, 2.0, 5.0];
 /// Number of lines over the relief that is aimed at.
 const LINES: f64 = 25.0;
 /// Standard deviation of the smoothing, cells. Lines of the bare cells would show their noise.
-const SMOOTHING_PX: f32 = 1.5;
+pub(super) const SMOOTHING_PX: f32 = 1.5;
 
 /// Contour lines that were made.
 #[derive(Debug, Clone, Serialize)]

@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 use io::raster::ImageSource;
 use numeric::{Choice, Progress};
-use raster::Grid;
-use report::{JobPage, MapLayer};
 
 use super::cloud;
 use super::colour::colours;
@@ -14,6 +12,7 @@ use super::contours;
 use super::error::ProductsError;
 use super::mesh;
 use super::mesh_tiles::{TILES, TILESET, is_tile};
+use super::page;
 use super::product::ProductKind;
 use super::report::ProductsReport;
 use super::scene::SurfaceOfRun;
@@ -25,6 +24,7 @@ use crate::job_file::read_dsm_job;
 use crate::ortho::{self, OrthoConfig};
 use crate::output_folder::OutputFolder;
 use crate::report_page;
+use crate::run_links;
 use crate::threads;
 
 /// Names in the folder of the products.
@@ -114,31 +114,10 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
             report.cloud = Some(cloud::make(&surface, &colours, states.as_deref(), config.filled, &folder, progress)?);
         }
     }
-    let page = page(&report, &surface, shown)?;
+    let page = page::of(&report, &surface, shown)?;
     report_page::write_page(&output.join(REPORT), &page, &report, true)?;
+    run_links::refresh(&config.run)?;
     Ok(report)
-}
-
-/// Returns the page: the surface with its filled cells, the colours where there are some, and the
-/// report.
-fn page(
-    report: &ProductsReport,
-    surface: &SurfaceOfRun,
-    colours: Option<Grid<[u8; 3]>>,
-) -> Result<JobPage, ProductsError> {
-    let value = serde_json::to_value(report).map_err(FileError::from)?;
-    let lead = format!("Made of {}.", report.surface.display());
-    let caption = "Heights of the surface, shaded.";
-    let mut layers = vec![report_page::relief_layer("Surface", caption, &surface.dem.heights, surface.cell_m())];
-    layers.extend(colours.map(|picture| MapLayer {
-        name: "Colours".to_owned(),
-        picture,
-        caption: "Colours of the cells in the point cloud and the mesh.".to_owned(),
-        legend: None,
-    }));
-    let filled = surface.layer("filled.tif").ok();
-    let hatched = filled.map(|filled| report_page::thinned(&filled).0.map(|code| *code == 1.0));
-    Ok(JobPage { layers, hatched, ..JobPage::of_report("Products", &lead, &value) })
 }
 
 /// Makes products of a run that has just ended in its folder.

@@ -24,6 +24,7 @@ use crate::files::{FileError, create_folder, write_json};
 use crate::job_paths::relative;
 use crate::output_folder::OutputFolder;
 use crate::products::remove_products;
+use crate::run_links;
 use crate::stac::{AssetKind, StacAsset, StacRasters, item_and_collection};
 
 /// Files of a run, relative to its folder. The report is the last to appear: a folder with a report
@@ -50,9 +51,10 @@ pub(crate) const FILES: [&str; 23] = [
     "stac/item.json",
     "stac/collection.json",
     USED_CONFIG,
-    "report/report.html",
+    PAGE,
     "report/report.json",
 ];
+const PAGE: &str = "report/report.html";
 /// Configuration of the run, as a job file.
 pub(crate) const USED_CONFIG: &str = "used_config.toml";
 
@@ -214,7 +216,8 @@ fn write_looks(
     let maps = RunMaps::read(grid, read)?;
     maps.write_styles(&dsm)?;
     let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
-    let page = page::html(config, report, (&crs, grid.gsd_m), &maps)
+    let links = run_links::links("../", PAGE, |name| FILES.contains(&name));
+    let page = page::html(config, report, (&crs, grid.gsd_m), &maps, links)
         .map_err(|e| DsmError::Output { path: root.join("report/report.html"), source: std::io::Error::other(e) })?;
     io::write_bytes(root.join("report/report.html"), page.as_bytes(), false).map_err(FileError::from)?;
     let (item, collection) = item_and_collection(&stac_rasters(config, grid, report, &crs))?;
