@@ -9,6 +9,7 @@ sun; one image has none. The pages of a run, of a change and of a batch become p
 its paper, a PDF with an empty page, or an error on the console fails. Needs playwright, pillow, numpy, rasterio, pypdfium2.
 """
 import argparse
+import io
 import json
 import pathlib
 import random
@@ -27,8 +28,8 @@ SEED = 41
 ADDED, REMOVED = 3, 2
 # Width of A4 without its margins at 96 dots per inch.
 PAPER_PX = 695
-# Most bytes of a picture in the guide, and colours that it is reduced to.
-BYTES_MAX, COLOURS = 200_000, 192
+# Most bytes of a picture in the guide, its colours as PNG, its quality as WebP.
+BYTES_MAX, COLOURS, QUALITY = 200_000, 128, 82
 BATCH = """output = "night"
 [defaults]
 tasks = ["dsm", "eval", "dtm"]
@@ -88,6 +89,7 @@ def make(program, work):
     two_dates(program, work)
     quiet = ["--overwrite", "--progress", "none", "-q"]
     views = {name: [work / name / f"view_{i}.json" for i in (1, 2, 3)] for name in ("before", "after")}
+    # One image is given without its item.
     views["after"][0] = work / "after/view_1.tif"
     run(program, "dsm", *views["before"], "-o", work / "runs/before", "--products", "dtm,classes,contours", *quiet)
     run(program, "dsm", *views["after"], "-o", work / "runs/after", *quiet)
@@ -97,12 +99,16 @@ def make(program, work):
 
 
 def small(page, name):
-    """Saves what a page shows with few colours."""
+    """Saves what a page shows: as PNG with few colours, or as WebP where fine shades need it."""
     path = FIGURES / name
-    page.screenshot(path=path)
-    Image.open(path).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
-    if path.stat().st_size > BYTES_MAX:
-        sys.exit(f"{path} has {path.stat().st_size} bytes, at most {BYTES_MAX} are wanted")
+    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    if path.suffix == ".webp":
+        picture.save(path, quality=QUALITY, method=6)
+    else:
+        picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    if path.stat().st_size <= BYTES_MAX:
+        return
+    sys.exit(f"{path} has {path.stat().st_size} bytes, at most {BYTES_MAX} are wanted")
 
 
 def opened(browser, address, width, height):
@@ -128,12 +134,13 @@ def prints_well(page, file):
 
 
 def pages(browser, work):
-    shown = [("report", "runs/before/report/report.html", 880), ("diff", "change/diff.html", 1290),
-             ("batch", "night/batch_report.html", 760), ("products", "runs/before/products/products.html", None)]
-    for name, file, height in shown:
+    shown = [("report", "png", "runs/before/report/report.html", 880), ("diff", "webp", "change/diff.html", 1560),
+             ("batch", "png", "night/batch_report.html", 760),
+             ("products", "", "runs/before/products/products.html", None)]
+    for name, ending, file, height in shown:
         page = opened(browser, (work / file).as_uri(), 1180, height or 900)
         if height:
-            small(page, f"{name}.png")
+            small(page, f"{name}.{ending}")
         prints_well(page, work / f"{name}.pdf")
         page.close()
     page = opened(browser, (work / "runs/before/report/report.html").as_uri(), 1180, 620)
@@ -162,7 +169,7 @@ def vectors(browser, program, work):
             page.mouse.click(box["x"] + box["width"] * i / 100, box["y"] + box["height"] * j / 100)
             if page.locator("#feature h2", has_text="Changes").is_visible():
                 page.wait_for_timeout(500)
-                small(page, "viewer_vectors.png")
+                small(page, "viewer_vectors.webp")
                 process.terminate()
                 return page.close()
     sys.exit("no region of change can be clicked")
@@ -173,7 +180,7 @@ def pair(browser, program, work):
     box = page.locator("#map").bounding_box()
     page.mouse.move(box["x"] + box["width"] * 0.55, box["y"] + box["height"] * 0.43)
     page.wait_for_timeout(2500)
-    small(page, "viewer_pair.png")
+    small(page, "viewer_pair.webp")
     process.terminate()
     page.close()
 

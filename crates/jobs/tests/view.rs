@@ -211,7 +211,7 @@ fn tiles_and_grids_have_the_values_of_the_raster() {
     served(&[truth()], |client| {
         let scene = client.json("scene.json");
         let classes = ImageSource::open(truth().join("classes.tif")).unwrap();
-        let (index, raster) = layer(&scene, "classes");
+        let (index, raster) = layer(&scene, "Classes");
         assert_eq!(scene["rasters"][raster]["file"], "classes.tif");
         let legend: Vec<(i64, [u8; 3])> = scene["layers"][index]["legend"]["classes"]
             .as_array()

@@ -101,7 +101,7 @@ impl BatchPage {
     }
 
     fn scene_table(&self) -> String {
-        let heads = ["state", "images", "cells", "observed", "filled", "ties", "MAE", "NMAD", "within 1 m", "time"];
+        let heads = ["images", "cells", "observed", "filled", "ties", "MAE", "NMAD", "within 1 m", "time"];
         let heads: String = heads.iter().map(|head| format!("<th scope=\"col\">{head}</th>")).collect();
         let rows: String = self.scenes.iter().map(BatchSceneRow::html).collect();
         format!(
@@ -141,8 +141,8 @@ impl BatchSceneRow {
         let (class, state) = if self.is_complete { ("good", "complete") } else { ("bad", "incomplete") };
         let links: Vec<String> = self.links.iter().map(|link| anchor(&link.path, &link.title)).collect();
         format!(
-            "<tr><td class=\"words\">{picture}</td><th scope=\"row\" class=\"words\"><b>{}</b><div \
-             class=\"links\">{}</div></th><td class=\"{class}\">{state}</td>{numbers}</tr>",
+            "<tr><td class=\"words\">{picture}</td><th scope=\"row\" class=\"words\"><b>{}</b> <small \
+             class=\"{class}\">{state}</small><div class=\"links\">{}</div></th>{numbers}</tr>",
             escape(&self.name),
             links.join(" ")
         )

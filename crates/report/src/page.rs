@@ -72,7 +72,7 @@ p{max-width:none;orphans:3;widows:3}.cards{grid-template-columns:repeat(5,1fr);g
 .notes{break-inside:avoid}.files{columns:2}a{color:inherit;text-decoration:none}\
 .wide{overflow:visible}table{font-size:8pt;min-width:0;width:100%}thead{display:table-header-group}\
 tr{break-inside:avoid}th,td{padding:.12rem .3rem;white-space:normal}th:first-child{overflow-wrap:break-word}\
-dl{font-size:9pt}footer{margin-top:1.2rem}}";
+dl{font-size:9pt}.links{min-width:0}.thumb{min-width:0;max-width:72px}footer{margin-top:1.2rem}}";
 
 /// Returns a whole page around a body of HTML. The title is plain text.
 pub(crate) fn page(title: &str, body: &str) -> String {

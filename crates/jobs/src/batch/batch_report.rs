@@ -145,7 +145,12 @@ impl BatchReport {
                 warnings: task.warnings.clone(),
             })
         });
-        let scenes = self.scenes.iter().map(scene_summary::of).collect();
+        let row = |scene: &SceneReport| {
+            let is_complete = scene.tasks.iter().all(|task| task.state.is_complete());
+            let seconds = scene.tasks.iter().map(|task| task.seconds).sum();
+            scene_summary::of(&scene.name, &scene.folder, is_complete, seconds)
+        };
+        let scenes = self.scenes.iter().map(row).collect();
         BatchPage { complete: self.complete, incomplete: self.incomplete, scenes, rows: rows.collect() }.html()
     }
 }

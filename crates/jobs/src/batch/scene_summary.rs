@@ -7,7 +7,6 @@ use io::read_regular;
 use report::{BatchAccuracy, BatchSceneRow, PageLink};
 use serde_json::Value;
 
-use crate::batch::batch_report::SceneReport;
 use crate::files::TEXT_LIMIT;
 
 /// Largest thumbnail that is taken into the page, bytes. They are 256 pixels wide.
@@ -28,31 +27,27 @@ const RESULTS: [(&str, &str); 12] = [
     ("diff/diff.html", "change"),
 ];
 
-/// Returns the row of a scene.
-pub(super) fn of(scene: &SceneReport) -> BatchSceneRow {
+/// Returns the row of a scene, with the state and the time of its tasks.
+pub(super) fn of(name: &str, folder: &Path, is_complete: bool, seconds: f64) -> BatchSceneRow {
     let read = |name: &str| -> Value {
-        let bytes = read_regular(&scene.folder.join(name), TEXT_LIMIT).unwrap_or_default();
+        let bytes = read_regular(&folder.join(name), TEXT_LIMIT).unwrap_or_default();
         serde_json::from_slice(&bytes).unwrap_or_default()
     };
     let (run, errors) = (read("report/report.json"), read("eval/report.json"));
-    let is_there = |name: &str| scene.folder.join(name).exists();
-    let links = RESULTS.iter().filter(|(path, _)| is_there(path));
+    // The folder of a scene lies beside the page.
+    let beside = folder.file_name().unwrap_or_default().to_string_lossy();
+    let links = RESULTS.iter().filter(|(path, _)| folder.join(path).exists());
     BatchSceneRow {
-        name: scene.name.clone(),
-        thumbnail: read_regular(&scene.folder.join("dsm/thumbnail.png"), THUMBNAIL_BYTES).ok(),
-        is_complete: scene.tasks.iter().all(|task| task.state.is_complete()),
+        name: name.to_owned(),
+        thumbnail: read_regular(&folder.join("dsm/thumbnail.png"), THUMBNAIL_BYTES).ok(),
+        is_complete,
         images: run["images"].as_array().map(Vec::len),
         cells: cells(&run["surface"]),
         residual_px: run["pointing"]["residual_after_px"].as_f64(),
         accuracy: accuracy(&errors["metrics"]),
-        seconds: scene.tasks.iter().map(|task| task.seconds).sum(),
-        links: links.map(|(path, title)| PageLink::new(format!("{}/{path}", folder_name(scene)), *title)).collect(),
+        seconds,
+        links: links.map(|(path, title)| PageLink::new(format!("{beside}/{path}"), *title)).collect(),
     }
-}
-
-/// The folder of a scene lies beside the page.
-fn folder_name(scene: &SceneReport) -> String {
-    Path::new(&scene.folder).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Returns the number of cells and the shares of them that were observed and filled.

@@ -1,8 +1,8 @@
 //! What the viewer shows: rasters on one map, and the layers that are drawn of them.
 //!
-//! All rasters lie in the coordinate system of the first one; others are laid into it by the nearest
-//! cell. Those without a system where the first has one, or the other way round, are left out with a
-//! warning.
+//! All rasters lie in the coordinate system of the first one; others are laid into it by the
+//! nearest cell. Those without a system where the first has one, or the other way round, are left
+//! out with a warning.
 //! Positions on the map are in the units of that system, or columns and rows of the raster where it
 //! has no georeference.
 

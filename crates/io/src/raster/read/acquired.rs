@@ -83,4 +83,31 @@ mod tests {
         assert_eq!(parse("2014-10-05", PLACES[0].2), None, "the time of the day is missing");
         assert_eq!(parse("--", PLACES[2].2), None);
     }
+
+    #[test]
+    fn satellite_and_sun_come_from_the_metadata_of_the_provider() {
+        let folder = tempfile::tempdir().unwrap();
+        let found = |metadata: &str| {
+            let path = folder.path().join("a.vrt");
+            let text = format!(
+                "<VRTDataset rasterXSize=\"4\" rasterYSize=\"4\">{metadata}<VRTRasterBand dataType=\"Byte\" \
+                 band=\"1\"/></VRTDataset>"
+            );
+            std::fs::write(&path, text).unwrap();
+            let source = ImageSource::open(&path).unwrap();
+            (source.satellite(), source.sun().map(|sun| (sun.azimuth_deg, sun.elevation_deg)))
+        };
+        let imd = |keys: [&str; 2]| {
+            let [azimuth, elevation] = keys;
+            format!(
+                "<Metadata domain=\"IMD\"><MDI key=\"{azimuth}\">151.5</MDI><MDI key=\"{elevation}\">48</MDI></Metadata>\
+                 <Metadata domain=\"IMAGERY\"><MDI key=\"SATELLITEID\">PHR1A</MDI></Metadata>"
+            )
+        };
+        let expected = (Some("PHR1A".to_owned()), Some((151.5, 48.0)));
+        assert_eq!(found(&imd(SUN[0])), expected);
+        let dimap = SUN_DIMAP.map(|end| format!("Geometric_Data.Use_Area.Located_Geometric_Values_1.{end}"));
+        assert_eq!(found(&imd([&dimap[0], &dimap[1]])), expected);
+        assert_eq!(found("<Metadata><MDI key=\"NITF_ISORCE\"> </MDI></Metadata>"), (None, None));
+    }
 }
