@@ -23,8 +23,11 @@ mod classify;
 mod config;
 mod error;
 mod greenness;
+mod planes;
 mod regions;
+mod roofs;
 mod roughness;
+mod walls;
 
 pub use classify::{
     BUILDING, BuildingCue, Classes, ClassifyInput, CrownCue, GROUND, LOW_VEGETATION, UNKNOWN, VEGETATION, WATER,
