@@ -90,7 +90,13 @@ impl Scale {
         let part = roughness_m / config.roughness_m;
         let window_m = (part.sqrt() * config.window_m).max(config.least_window_m);
         let tolerance_m = (NOISE_OF_PLANES * noise_m.unwrap_or(0.0)).clamp(LEAST_TOLERANCE_M, MOST_TOLERANCE_M);
-        Self { window_m, roughness_m, ramp_m: part * config.ramp_m, tolerance_m, radius_m: part * part * config.least_radius_m }
+        Self {
+            window_m,
+            roughness_m,
+            ramp_m: part * config.ramp_m,
+            tolerance_m,
+            radius_m: part * part * config.least_radius_m,
+        }
     }
 }
 

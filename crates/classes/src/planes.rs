@@ -83,9 +83,8 @@ pub(crate) fn planes(surface: &Grid<f32>, counts: &Grid<bool>, residuals: &Grid<
         let number = sizes.len() as u32;
         let (column, row) = ((start % width) as f64, (start / width) as f64);
         let base = f64::from(surface.data()[start]);
-        let place = |at: usize| {
-            ((at % width) as f64 - column, (at / width) as f64 - row, f64::from(surface.data()[at]) - base)
-        };
+        let place =
+            |at: usize| ((at % width) as f64 - column, (at / width) as f64 - row, f64::from(surface.data()[at]) - base);
         let mut window = Fit::default();
         for y in (start / width).saturating_sub(START_REACH)..(start / width + START_REACH + 1).min(height) {
             for x in (start % width).saturating_sub(START_REACH)..(start % width + START_REACH + 1).min(width) {

@@ -15,13 +15,7 @@ const OPEN_SIDES: usize = 1;
 /// Whether walls of `least_m` and more bound a region on several sides: on all that can be seen
 /// except one. A slope that goes on across the border is no wall. `numbers` are those of the
 /// regions of all cells. A region whose sides are all out of sight has walls.
-pub(crate) fn has_walls(
-    surface: &Grid<f32>,
-    numbers: &Grid<u32>,
-    cells: &[usize],
-    cell_m: f64,
-    least_m: f32,
-) -> bool {
+pub(crate) fn has_walls(surface: &Grid<f32>, numbers: &Grid<u32>, cells: &[usize], cell_m: f64, least_m: f32) -> bool {
     let steps = |metres: f64| ((metres / cell_m).round() as i64).max(1);
     let (outside, inside) = (steps(OUTSIDE_M), steps(INSIDE_M));
     let width = surface.width();
@@ -44,8 +38,7 @@ pub(crate) fn has_walls(
             let drop = own.map(|(_, height)| height).fold(f32::NAN, f32::max) - low;
             // The surface further out and further in tells how much of the drop is its slope.
             let height = |k: i64| at(x + k * dx, y + k * dy).map_or(f32::NAN, |(_, height)| height);
-            let (within, beyond) =
-                (height(-inside - outside) - height(-inside), height(outside) - height(2 * outside));
+            let (within, beyond) = (height(-inside - outside) - height(-inside), height(outside) - height(2 * outside));
             let slope = within.min(beyond).max(0.0) / outside as f32;
             seen[side] += 1;
             walls[side] += usize::from(drop - slope * (inside + outside) as f32 >= least_m);

@@ -238,7 +238,8 @@ fn roofs_go_on_to_where_they_come_near_the_ground() {
         surface.data_mut()[at] = if is_house { 10.0 } else { ground };
         above.data_mut()[at] = surface.data()[at] - ground;
     }
-    let found = classify(&ClassifyInput { above_ground: &above, ..heights_alone(&surface) }, &ClassifyConfig::default());
+    let found =
+        classify(&ClassifyInput { above_ground: &above, ..heights_alone(&surface) }, &ClassifyConfig::default());
     let found = found.unwrap().classes;
     assert!(above[(50, 58)] < 2.0);
     assert_eq!([found[(50, 35)], found[(50, 58)], found[(50, 70)]], [BUILDING, BUILDING, GROUND]);
