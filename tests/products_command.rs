@@ -39,7 +39,8 @@ fn the_cloud_has_the_observed_cells_of_the_run() {
     assert!(folder.join("products/classes/classes.html").is_file());
     let observed = source.data().iter().filter(|code| **code == 1.0).count();
     assert_eq!(made["cloud"]["points"], observed);
-    // Buildings and vegetation as in the class raster; ground is what the terrain model shows of the rest.
+    // Buildings and vegetation as in the class raster; of the rest, ground is what the terrain
+    // model shows.
     let class_of = |cell: usize| match (classes.data()[cell] as u8, ground.data()[cell] == 1.0) {
         (code @ (3 | 5 | 6 | 9), _) => code,
         (_, true) => 2,

@@ -27,8 +27,8 @@ pub(crate) struct Args {
     /// Give filled cells points, too, flagged as synthetic.
     #[arg(long)]
     filled: bool,
-    /// Step between contour lines, in the unit of the heights: metres, or feet where the vertical
-    /// datum counts in feet [default: from the relief and the cell size].
+    /// Step between contour lines, in the unit of the heights, which is that of the vertical datum
+    /// [default: from the relief and the cell size].
     #[arg(long, value_name = "STEP")]
     contour_interval: Option<f64>,
     /// Largest vertical distance of the mesh from the cells, metres [default: the median standard

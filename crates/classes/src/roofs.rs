@@ -20,8 +20,8 @@ const LOWEST_ROOF_SHARE: f32 = 0.25;
 /// plane is one's.
 const OWN_STANDING: f64 = 0.6;
 const OWN_SHARE: f64 = 0.3;
-/// Width of the outlines in which weak cells do not count, metres: matching puts walls that far from
-/// their places.
+/// Width of the outlines in which weak cells do not count, metres: matching puts walls that far
+/// from their places.
 const OUTLINE_M: f64 = 1.5;
 /// Height of a wall, as a share of the least height of a building.
 const WALL_SHARE: f32 = 0.75;
@@ -67,7 +67,8 @@ impl RoofScene<'_> {
         mask.data_mut().iter_mut().zip(flat.data()).for_each(|(is, flat)| *is &= *flat >= least);
     }
 
-    /// Lets buildings go on over the planes that are mostly theirs, where they come near the ground.
+    /// Lets buildings go on over the planes that are mostly theirs, where they come near the
+    /// ground.
     pub(crate) fn continue_over_planes(&self, buildings: &mut Grid<bool>, planes: &Planes) {
         let mut standing = vec![0usize; planes.cells.len()];
         let mut own = standing.clone();

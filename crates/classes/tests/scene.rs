@@ -211,8 +211,8 @@ fn smooth_crowns_are_no_roofs() {
     assert!(wrong * 10 < crowns, "{wrong} of {crowns} cells of crowns are buildings");
 }
 
-/// Beside a house the surface goes on at its height for a metre, in cells that are rather wrong than
-/// right; a strip within the roof is as weak.
+/// Beside a house the surface goes on at its height for a metre, in cells that are rather wrong
+/// than right; a strip within the roof is as weak.
 #[test]
 fn weak_cells_do_not_widen_a_building_and_do_not_tear_it() {
     let (mut heights, mut weak) = (Grid::filled(100, 80, 0.0f32), Grid::filled(100, 80, false));
