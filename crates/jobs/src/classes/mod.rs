@@ -14,12 +14,14 @@
 mod config;
 mod cue;
 mod error;
+mod layers;
 mod multispectral;
 mod report;
 mod run;
 
 pub use config::ClassesConfig;
 pub use error::ClassesError;
+pub use layers::ClassLayers;
 pub use multispectral::IndexImage;
 pub use report::ClassesReport;
 pub use run::run;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use io::raster::ImageSource;
 use numeric::{Choice, Progress};
 
-use super::cloud;
+use super::cloud::{self, ClassSources};
 use super::colour::colours;
 use super::config::{FOLDER, ProductsConfig};
 use super::contours;
@@ -96,8 +96,8 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
         report.classes = Some(classes::run(&of, progress)?);
     }
     if config.wants(ProductKind::Contours) {
-        let (dtm, interval_m) = (output.join(DTM_HEIGHTS), config.contour_interval_m);
-        report.contours = Some(contours::make(&surface, &dtm, interval_m, &folder, progress)?);
+        let (dtm, interval) = (output.join(DTM_HEIGHTS), config.contour_interval);
+        report.contours = Some(contours::make(&surface, &dtm, interval, &folder, progress)?);
     }
     if config.wants(ProductKind::Cloud) || config.wants(ProductKind::Mesh) {
         let ortho = ortho_file(config, output, progress)?;
@@ -111,7 +111,9 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
         }
         if config.wants(ProductKind::Cloud) {
             let states = Some(output.join(DTM_STATES)).filter(|states| states.is_file());
-            report.cloud = Some(cloud::make(&surface, &colours, states.as_deref(), config.filled, &folder, progress)?);
+            let classes = Some(output.join(CLASS_CODES)).filter(|classes| classes.is_file());
+            let sources = ClassSources { ground: states.as_deref(), classes: classes.as_deref() };
+            report.cloud = Some(cloud::make(&surface, &colours, &sources, config.filled, &folder, progress)?);
         }
     }
     let page = page::of(&report, &surface, shown)?;
