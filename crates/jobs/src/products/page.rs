@@ -67,7 +67,10 @@ fn cards(report: &ProductsReport) -> Vec<(String, &'static str)> {
         cards.push((format!("{:.1} %", 100.0 * dtm.cells_ground as f64 / cells), "of the cells show the ground"));
     }
     if let Some(contours) = &report.contours {
-        cards.push((format!("{} m", sensible(contours.interval_m, "m")), "between contour lines"));
+        cards.push((
+            format!("{} {}", sensible(contours.interval, contours.unit), contours.unit),
+            "between contour lines",
+        ));
     }
     if let Some(cloud) = &report.cloud {
         let points = usize::try_from(cloud.extent.points).unwrap_or(usize::MAX);
@@ -108,17 +111,18 @@ fn layers(report: &ProductsReport, surface: &SurfaceOfRun, colours: Option<Grid<
         layers.push(report_page::legend_layer("Classes", caption, &codes, classes::legend()));
     }
     if let (Some(ground), Some(contours)) = (&ground, &report.contours) {
-        layers.push(contour_layer(ground, contours.interval_m, cell_m));
+        layers.push(contour_layer(ground, (contours.interval, contours.unit), cell_m));
     }
     layers
 }
 
 /// Returns the ground with its contour lines, which pass between cells on two sides of a height.
-fn contour_layer(ground: &Grid<f32>, interval_m: f64, cell_m: f64) -> MapLayer {
-    let caption = format!("Contour lines every {} m over the bare ground.", sensible(interval_m, "m"));
+/// The interval and the heights of the ground have the same unit.
+fn contour_layer(ground: &Grid<f32>, (interval, unit): (f64, &str), cell_m: f64) -> MapLayer {
+    let caption = format!("Contour lines every {} {unit} over the bare ground.", sensible(interval, unit));
     let mut layer = report_page::relief_layer("Contours", &caption, ground, cell_m);
     let heights = report_page::thinned(&gaussian(ground, SMOOTHING_PX)).0;
-    let step = |x: usize, y: usize| (f64::from(heights[(x, y)]) / interval_m).floor();
+    let step = |x: usize, y: usize| (f64::from(heights[(x, y)]) / interval).floor();
     for y in 1..heights.height() {
         for x in 1..heights.width() {
             let here = step(x, y);
@@ -138,7 +142,7 @@ mod tests {
     #[test]
     fn contour_lines_lie_where_heights_pass_them() {
         let slope = Grid::from_vec(40, 40, (0..1600).map(|i| (i % 40) as f32 + 0.5).collect()).unwrap();
-        let layer = contour_layer(&slope, 10.0, 1.0);
+        let layer = contour_layer(&slope, (10.0, "m"), 1.0);
         let lines: Vec<usize> = (0..40).filter(|&x| layer.picture[(x, 20)] == LINE).collect();
         assert_eq!(lines, [10, 20, 30]);
         assert!(layer.caption.contains("every 10 m"));
