@@ -9,8 +9,8 @@ use raster::Grid;
 
 use crate::regions::beside;
 
-/// Half-width of the windows from which planes start, cells.
-const START_REACH: usize = 2;
+/// Half-width of the windows from which planes start, cells: the fewest that tell a residual.
+pub(crate) const START_REACH: usize = 2;
 /// Growth of the number of cells after which the plane is fitted again.
 const REFIT: f64 = 1.4;
 /// Area of a cell that lies on no plane, as a share of the smallest area that tells anything: it

@@ -3,15 +3,13 @@
 
 use raster::Grid;
 
-use crate::planes::{Planes, box_sums, flatness, planes};
+use crate::planes::{Planes, START_REACH, box_sums, flatness, planes};
 use crate::regions::{labelled, shrunk};
 use crate::roughness::residuals;
 use crate::walls::has_walls;
 
 /// Area of a plane over its residual on a sphere of radius 1 m: 2 π √12, from the sag of a cap.
 const PLANE_OF_SPHERE: f64 = 21.8;
-/// Half-width of the windows from which planes start, cells: the fewest that tell a residual.
-const START_REACH: usize = 2;
 /// Width of the surroundings over which the flatness is a mean, metres: those of a small house.
 const AROUND_M: f64 = 5.0;
 /// Share of the least height down to which roofs go on: the uphill side of a house in a slope.

@@ -7,12 +7,11 @@
 use std::path::Path;
 
 use gdal::vector::{FieldValue, LayerAccess};
-use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
 use geo::Coord;
 use serde_json::{Map, Value, json};
 
-use crate::areas::AreaError;
-use crate::raster::{VectorFormat, prepare_gdal, register_vector, with_gdal};
+use crate::areas::{AreaError, open_vector_file, system_of_geojson};
+use crate::raster::{VectorFormat, with_gdal};
 use crate::regular::read_regular;
 
 /// Largest GeoJSON file that is read, bytes.
@@ -22,8 +21,6 @@ const CORNERS_MAX: usize = 1_000_000;
 /// Most features of all layers of a file, and most attributes of a feature.
 const FEATURES_MAX: usize = 200_000;
 const ATTRIBUTES_MAX: usize = 64;
-/// System of GeoJSON files that name none.
-const LONGITUDE_LATITUDE: &str = "EPSG:4326";
 
 /// Features of a layer in one reference system.
 #[derive(Debug, Clone, PartialEq)]
@@ -151,26 +148,12 @@ fn geojson(path: &Path) -> Result<VectorLayer, String> {
         let properties = feature["properties"].as_object().cloned().unwrap_or_default();
         found.extend(bounded.feature(&feature["geometry"], properties)?);
     }
-    // "urn:ogc:def:crs:EPSG::32631", "EPSG:32631"; "urn:ogc:def:crs:OGC:1.3:CRS84".
-    let named = json["crs"]["properties"]["name"].as_str().filter(|name| name.contains("EPSG"));
-    let code = named.and_then(|name| name.rsplit(':').next());
-    let crs = code.map_or_else(|| LONGITUDE_LATITUDE.to_owned(), |code| format!("EPSG:{code}"));
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(VectorLayer { name, crs, features: found })
+    Ok(VectorLayer { name, crs: system_of_geojson(&json), features: found })
 }
 
 fn through_gdal(path: &Path, format: VectorFormat) -> Result<Vec<VectorLayer>, String> {
-    if !path.metadata().map_err(|e| e.to_string())?.is_file() {
-        return Err("it is not a regular file".to_owned());
-    }
-    prepare_gdal();
-    register_vector(format);
-    let options = DatasetOptions {
-        open_flags: GdalOpenFlags::GDAL_OF_VECTOR | GdalOpenFlags::GDAL_OF_READONLY,
-        allowed_drivers: Some(&[format.driver()]),
-        ..DatasetOptions::default()
-    };
-    let dataset = with_gdal(|| Dataset::open_ex(path, options))?;
+    let dataset = open_vector_file(path, format)?;
     let mut bounded = Bounded::default();
     let mut layers = Vec::new();
     for mut layer in dataset.layers() {
