@@ -160,7 +160,7 @@ def check_contours(path, says):
         count, low, high = file.execute("select count(*), min(elevation), max(elevation) from contours").fetchone()
         place = file.execute("select srs_id, z from gpkg_geometry_columns").fetchone()
         levels = [row[0] for row in file.execute("select distinct elevation from contours")]
-    steps = [level / says["interval_m"] for level in levels]
+    steps = [level / says["interval"] for level in levels]
     return {
         "lines": count,
         "lines are those of the report": count == says["lines"],

@@ -16,13 +16,26 @@ pub(crate) struct Args {
     /// The batch file.
     #[arg(value_name = "BATCH.toml")]
     file: PathBuf,
+    /// Check the file and say what would be done; write nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Work on this scene alone; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
     #[command(flatten)]
     show: ShowOptions,
 }
 
 /// Runs `skysweep batch`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let batch = read_batch(&args.file)?;
+    let mut batch = read_batch(&args.file)?;
+    batch.select(&args.only)?;
+    if args.dry_run {
+        let report = jobs::batch::look(&batch)?;
+        args.show.print(global, &report, || report.text())?;
+        let what = || "tasks that would fail; the list names the reasons".to_owned();
+        return Ok(if report.has_failed() { Outcome::Partial(what()) } else { Outcome::Complete });
+    }
     let report = args.show.watch(global, &batch.output, |watcher| jobs::batch::run(&batch, watcher))?;
     args.show.print(global, &report, || report.text())?;
     let what = || format!("tasks that are not complete: {}; the report names the reasons", report.incomplete);

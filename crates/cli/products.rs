@@ -27,8 +27,9 @@ pub(crate) struct Args {
     /// Give filled cells points, too, flagged as synthetic.
     #[arg(long)]
     filled: bool,
-    /// Step between contour lines, metres [default: from the relief and the cell size].
-    #[arg(long, value_name = "METRES")]
+    /// Step between contour lines, in the unit of the heights, which is that of the vertical datum
+    /// [default: from the relief and the cell size].
+    #[arg(long, value_name = "STEP")]
     contour_interval: Option<f64>,
     /// Largest vertical distance of the mesh from the cells, metres [default: the median standard
     /// deviation of the heights, between a quarter and the whole of a cell].
@@ -45,7 +46,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.output.clone_from(&args.output);
     config.ortho.clone_from(&args.ortho);
     config.filled = args.filled;
-    config.contour_interval_m = args.contour_interval;
+    config.contour_interval = args.contour_interval;
     config.mesh_tolerance_m = args.mesh_tolerance;
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;

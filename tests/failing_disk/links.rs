@@ -58,8 +58,8 @@ impl Trial {
         ended
     }
 
-    /// Checks that the results are whole, or that the refusal names one of `planted`.
-    fn check(&self, of: &Writing, ended: &Ended, whole: &BTreeMap<String, Vec<u8>>, planted: &[&str], case: &str) {
+    /// Checks that what the command makes is there, or that the refusal names one of `planted`.
+    fn check(&self, of: &Writing, ended: &Ended, made: &BTreeMap<String, Vec<u8>>, planted: &[&str], case: &str) {
         // A command that takes only new folders says so before it looks further.
         let taken = ["exists already", "is not empty", "holds views already"];
         // The reasons of a batch are in its report.
@@ -69,7 +69,7 @@ impl Trial {
         match ended.code {
             0 => {
                 let found = snapshot(&self.root.path().join("work"));
-                let lost: Vec<_> = whole.keys().filter(|name| !found.contains_key(*name)).collect();
+                let lost: Vec<_> = made.keys().filter(|name| !found.contains_key(*name)).collect();
                 assert!(lost.is_empty(), "{}, {case}: exit code 0 without {lost:?}", of.name);
             }
             // Parts of a batch or of a list are refused one by one.
@@ -99,6 +99,12 @@ fn check(of: &Writing) {
     let files: Vec<&str> =
         whole.iter().filter(is_written).map(|(name, _)| name.as_str()).filter(|name| !name.ends_with('/')).collect();
     assert!(!files.is_empty(), "{} writes nothing", of.name);
+    // What a link hides and the command did not make is not the command's to make again.
+    let made: BTreeMap<String, Vec<u8>> = whole
+        .iter()
+        .filter(|(name, _)| !before.contains_key(*name))
+        .map(|(name, b)| (name.clone(), b.clone()))
+        .collect();
     // The user names the first folder, and the command those below.
     let written = |folder: &str| files.iter().any(|file| file.starts_with(folder));
     let folders: Vec<&str> = whole.keys().filter_map(|name| name.strip_suffix('/')).collect();
@@ -115,7 +121,7 @@ fn check(of: &Writing) {
             let link = trial.root.path().join("work").join(folder);
             assert!(link.is_symlink() || ended.code == 0, "{} replaced the link {folder}", of.name);
             let name = folder.rsplit('/').next().unwrap();
-            trial.check(of, &ended, &whole, &[name], &format!("{options}, a link in the place of {folder}"));
+            trial.check(of, &ended, &made, &[name], &format!("{options}, a link in the place of {folder}"));
         }
     }
     for &(state, options) in if is_whole() { &states[..] } else { &states[1..] } {
@@ -128,7 +134,7 @@ fn check(of: &Writing) {
             assert!(found == FOREIGN.1, "{} {options}: {folder}/{} is lost", of.name, FOREIGN.0);
         }
         let planted: Vec<&str> = folders.iter().map(|folder| folder.rsplit('/').next().unwrap()).collect();
-        trial.check(of, &ended, &whole, &[&planted[..], &[FOREIGN.0]].concat(), &format!("{options}, notes"));
+        trial.check(of, &ended, &made, &[&planted[..], &[FOREIGN.0]].concat(), &format!("{options}, notes"));
     }
     for options in ["", of.overwrite].into_iter().skip(usize::from(!is_whole())) {
         let mut trial = Trial::from(&begin);
@@ -139,7 +145,7 @@ fn check(of: &Writing) {
         }
         let ended = trial.run(of, options);
         let names: Vec<&str> = files.iter().map(|file| file.rsplit('/').next().unwrap()).collect();
-        trial.check(of, &ended, &whole, &names, &format!("{options}, links in the place of files"));
+        trial.check(of, &ended, &made, &names, &format!("{options}, links in the place of files"));
     }
     // Without any of this, results are replaced by the same ones.
     let again = Trial::from(&end).run(of, of.overwrite);

@@ -5,6 +5,7 @@ use raster::Grid;
 use crate::config::ClassifyConfig;
 use crate::error::ClassifyError;
 use crate::regions::{closed, grow, opened, spread, take_enclosed, without_share, without_small};
+use crate::roofs::RoofScene;
 use crate::roughness::{least_residual, median_residual};
 
 /// A cell without a height or without ground.
@@ -56,6 +57,8 @@ pub struct ClassifyInput<'a> {
     pub cue: Option<BuildingCue<'a>>,
     /// What images say about crowns without heights.
     pub crowns: Option<CrownCue<'a>>,
+    /// Cells whose height was not observed, or is rather wrong than right. `None` if all are good.
+    pub weak: Option<&'a Grid<bool>>,
     /// Side of a cell, metres.
     pub cell_m: f64,
 }
@@ -70,6 +73,11 @@ struct Scale {
     window_m: f64,
     roughness_m: f64,
     ramp_m: f64,
+    /// Distance from a plane up to which cells lie on it, metres.
+    tolerance_m: f64,
+    /// Least radius of curvature of roofs, metres. A sharp surface shows the branches of crowns,
+    /// and the clutter of roofs: both are rough there, and the curvature tells less.
+    radius_m: f64,
 }
 
 impl Scale {
@@ -81,10 +89,21 @@ impl Scale {
         let roughness_m = of_noise.clamp(config.least_roughness_m, config.roughness_m);
         let part = roughness_m / config.roughness_m;
         let window_m = (part.sqrt() * config.window_m).max(config.least_window_m);
-        Self { window_m, roughness_m, ramp_m: part * config.ramp_m }
+        let tolerance_m = (NOISE_OF_PLANES * noise_m.unwrap_or(0.0)).clamp(LEAST_TOLERANCE_M, MOST_TOLERANCE_M);
+        Self {
+            window_m,
+            roughness_m,
+            ramp_m: part * config.ramp_m,
+            tolerance_m,
+            radius_m: part * part * config.least_radius_m,
+        }
     }
 }
 
+/// Tolerance of planes in residuals of the bare ground, and its limits, metres.
+const NOISE_OF_PLANES: f64 = 5.0;
+const LEAST_TOLERANCE_M: f64 = 0.3;
+const MOST_TOLERANCE_M: f64 = 0.6;
 /// Height above the ground up to which a cell is bare, metres: above it are cars and hedges.
 const BARE_M: f32 = 0.3;
 /// Fewest windows on bare ground that tell the noise of a surface.
@@ -127,6 +146,7 @@ pub struct Classes {
 ///     is_index_coarse: false,
 ///     cue: None,
 ///     crowns: None,
+///     weak: None,
 ///     cell_m: 0.5,
 /// };
 /// let found = classify(&input, &ClassifyConfig::default())?;
@@ -149,10 +169,21 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     let steps = |length_m: f64| (length_m / input.cell_m).round().max(1.0) as usize;
     let green = Greenness::of(input, config);
     let mut buildings = roughness.map(|r| *r < limit_m);
+    let scene = RoofScene {
+        surface: input.surface,
+        above_ground: input.above_ground,
+        weak: input.weak,
+        cell_m: input.cell_m,
+        least_m,
+        tolerance_m: scale.tolerance_m,
+    };
+    let planes = scene.planes();
+    scene.without_crowns(&mut buildings, (&planes, &roughness), scale.radius_m, config.least_roughness_m);
     clear(&mut buildings, &green.tall);
     let mut stands = stands;
+    let mut likely = vec![false; stands.data().len()];
     if let Some(cue) = &input.cue {
-        let likely = likely_buildings(input, cue, (&roughness, scale.roughness_m), config);
+        likely = likely_buildings(input, cue, (&roughness, scale.roughness_m), config);
         for at in (0..likely.len()).filter(|at| likely[*at] && !green.tall.data()[*at]) {
             buildings.data_mut()[at] = true;
             stands.data_mut()[at] = true;
@@ -164,7 +195,12 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     let mut free = stands.clone();
     clear(&mut free, &green.tall);
     grow(&mut buildings, &free, steps(scale.ramp_m));
+    let taken = scene.without_weak_outlines(&mut buildings);
+    scene.continue_over_planes(&mut buildings, &planes);
+    clear(&mut buildings, &green.tall);
+    scene.without_slopes(&mut buildings, &likely);
     without_small(&mut buildings, cells(config.least_building_m2));
+    clear(&mut stands, &taken);
     let mut vegetation = stands.clone();
     clear(&mut vegetation, &buildings);
     without_small(&mut vegetation, cells(config.least_vegetation_m2));
@@ -290,6 +326,7 @@ fn check(input: &ClassifyInput<'_>) -> Result<(), ClassifyError> {
     fits("the mask of weak heights", weak.map(|grid| (grid.width(), grid.height())))?;
     fits("the index of crowns", input.crowns.map(|crowns| (crowns.index.width(), crowns.index.height())))?;
     fits("the mask of unsure heights", input.crowns.map(|crowns| (crowns.unsure.width(), crowns.unsure.height())))?;
+    fits("the mask of weak cells", input.weak.map(|grid| (grid.width(), grid.height())))?;
     if !(input.cell_m.is_finite() && input.cell_m > 0.0) {
         let (name, expected) = ("the side of a cell", "a positive number of metres");
         return Err(ClassifyError::Parameter { name, found: input.cell_m, expected });

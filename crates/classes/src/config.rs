@@ -24,6 +24,9 @@ pub struct ClassifyConfig {
     /// Residual up to which a surface is smooth, in residuals of the bare ground; between the two
     /// above.
     pub ground_residuals: f64,
+    /// Least radius of curvature of roofs, metres, as the area and the residual of planes around a
+    /// cell tell it. Crowns have radii up to that; roofs are flat between their edges.
+    pub least_radius_m: f64,
     /// Smallest area of a building, square metres.
     pub least_building_m2: f64,
     /// Smallest area of vegetation, square metres.
@@ -58,6 +61,7 @@ impl Default for ClassifyConfig {
             roughness_m: 0.2,
             least_roughness_m: 0.03,
             ground_residuals: 8.0,
+            least_radius_m: 4.5,
             least_building_m2: 15.0,
             least_vegetation_m2: 4.0,
             ramp_m: 1.5,
@@ -94,6 +98,7 @@ impl ClassifyConfig {
         within("the roughness", self.roughness_m, 1e-3, 10.0, "0.001 to 10 m")?;
         within("the least roughness", self.least_roughness_m, 0.0, self.roughness_m, "0 m to the roughness")?;
         within("the number of residuals of the ground", self.ground_residuals, 0.0, 1e3, "0 to 1000")?;
+        within("the least radius of roofs", self.least_radius_m, 0.0, 1e3, "0 to 1000 m")?;
         within("the least area of a building", self.least_building_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the least area of vegetation", self.least_vegetation_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the width of ramps", self.ramp_m, 0.0, 20.0, "0 to 20 m")?;

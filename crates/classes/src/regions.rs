@@ -61,6 +61,16 @@ fn regions_of(mask: &Grid<bool>) -> Vec<Vec<usize>> {
     regions
 }
 
+/// Returns the regions of a mask, and the number of the region of each cell, from 1; 0 is none.
+pub(crate) fn labelled(mask: &Grid<bool>) -> (Grid<u32>, Vec<Vec<usize>>) {
+    let regions = regions_of(mask);
+    let mut numbers = mask.map(|_| 0u32);
+    for (number, cells) in (1u32..).zip(&regions) {
+        cells.iter().for_each(|at| numbers.data_mut()[*at] = number);
+    }
+    (numbers, regions)
+}
+
 /// Returns the parts of a mask that are wider than `2 steps` cells: what is left when the mask
 /// shrinks by `steps` cells and grows again. Beyond the edge of the raster the mask goes on.
 pub(crate) fn opened(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
@@ -73,7 +83,7 @@ pub(crate) fn closed(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
 }
 
 /// Shrinks a mask: cells that share a side with one outside of it leave it, `steps` times.
-fn shrunk(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
+pub(crate) fn shrunk(mask: &Grid<bool>, steps: usize) -> Grid<bool> {
     spread(&mask.map(|inside| !inside), steps).map(|outside| !outside)
 }
 
@@ -137,7 +147,7 @@ fn around(width: usize, height: usize, at: usize) -> impl Iterator<Item = usize>
 }
 
 /// Returns the cells that share a side with a cell.
-fn beside(width: usize, height: usize, at: usize) -> impl Iterator<Item = usize> {
+pub(crate) fn beside(width: usize, height: usize, at: usize) -> impl Iterator<Item = usize> {
     let (column, row) = (at % width, at / width);
     around(width, height, at).filter(move |near| near % width == column || near / width == row)
 }

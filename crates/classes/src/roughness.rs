@@ -9,6 +9,12 @@ use raster::Grid;
 /// (2 `reach` + 1)² cells that hold the cell, metres. Only windows whose cells all `count` are
 /// looked at; cells in none of them are infinitely rough.
 pub(crate) fn least_residual(surface: &Grid<f32>, counts: &Grid<bool>, reach: usize) -> Grid<f32> {
+    spread_least(&residuals(surface, counts, reach), reach)
+}
+
+/// Returns the root-mean-square residual of the plane of the window around each cell, metres;
+/// infinite where a cell of the window does not count.
+pub(crate) fn residuals(surface: &Grid<f32>, counts: &Grid<bool>, reach: usize) -> Grid<f32> {
     let (width, height) = (surface.width(), surface.height());
     let mut residuals = Grid::filled(width, height, f32::INFINITY);
     for row in reach..height.saturating_sub(reach) {
@@ -18,7 +24,7 @@ pub(crate) fn least_residual(surface: &Grid<f32>, counts: &Grid<bool>, reach: us
             }
         }
     }
-    spread_least(&residuals, reach)
+    residuals
 }
 
 /// Returns the median of the residuals of windows whose cells all `count`, metres; `None` for fewer

@@ -48,6 +48,7 @@ fn heights_alone(heights: &Grid<f32>) -> ClassifyInput<'_> {
         is_index_coarse: false,
         cue: None,
         crowns: None,
+        weak: None,
         cell_m: CELL_M,
     }
 }
@@ -150,4 +151,96 @@ fn coarse_images_find_crowns_without_heights_and_leave_roofs_alone() {
     let found = classify(&input, &ClassifyConfig::default()).unwrap().classes;
     let at = [(20, 20), (38, 20), (41, 20), (50, 20), (58, 24), (75, 50)];
     assert_eq!(at.map(|at| found[at]), [BUILDING, BUILDING, LOW_VEGETATION, LOW_VEGETATION, VEGETATION, GROUND]);
+}
+
+/// A flat-topped slope of 45° between two plains: smooth, high above the lower plain, and no house.
+#[test]
+fn steep_ground_without_walls_on_several_sides_is_no_building() {
+    let rise = |row: usize| (row.clamp(40, 60) - 40) as f32 * 0.5;
+    let surface = Grid::from_vec(100, 100, (0..10_000).map(|at| rise(at / 100)).collect()).unwrap();
+    // The ground that was found goes on at the level of the lower plain under a part of the slope.
+    let mut above = surface.map(|_| 0.0f32);
+    let mut house = surface.clone();
+    for row in 46..58 {
+        for column in 20..70 {
+            above[(column, row)] = rise(row);
+            house[(column, row)] = 16.0;
+        }
+    }
+    let slope = ClassifyInput { above_ground: &above, ..heights_alone(&surface) };
+    let count = |input: &ClassifyInput<'_>| {
+        let found = classify(input, &ClassifyConfig::default()).unwrap().classes;
+        found.data().iter().filter(|class| **class == BUILDING).count()
+    };
+    assert_eq!(count(&slope), 0);
+    // A house in the same place has walls downhill and on both sides.
+    let mut above = house.clone();
+    above.data_mut().iter_mut().zip(surface.data()).for_each(|(above, ground)| *above -= ground);
+    let found = count(&ClassifyInput { surface: &house, above_ground: &above, ..heights_alone(&house) });
+    assert!((550..=650).contains(&found), "{found} of 600 cells");
+}
+
+/// Crowns and houses as matching shows them: smooth, with the noise of a surface from images.
+#[test]
+fn smooth_crowns_are_no_roofs() {
+    let mut heights = Grid::filled(SIDE, SIDE, 0.0f32);
+    let mut truth = Grid::filled(SIDE, SIDE, GROUND);
+    for k in 0..36usize {
+        let (left, top) = (10 + k % 6 * 48, 10 + k / 6 * 48);
+        for at in 0..24 * 24usize {
+            let (x, y) = (at % 24, at / 24);
+            let far = ((x as f32 - 12.0).hypot(y as f32 - 12.0)) / 9.0;
+            if k % 2 == 0 && far < 1.0 {
+                heights[(left + x, top + y)] = 4.0 + 5.0 * (1.0 - far * far).sqrt();
+                truth[(left + x, top + y)] = VEGETATION;
+            } else if k % 2 == 1 && (4..20).contains(&x) && (4..20).contains(&y) {
+                heights[(left + x, top + y)] = 7.0 + 0.3 * (y as f32 - 12.0).abs();
+                truth[(left + x, top + y)] = BUILDING;
+            }
+        }
+    }
+    let mut stream = SplitMix64::new(5);
+    let noise: Vec<f32> = (0..SIDE * SIDE).map(|_| stream.normal() as f32).collect();
+    let noise = gaussian(&Grid::from_vec(SIDE, SIDE, noise).unwrap(), 1.0);
+    heights.data_mut().iter_mut().zip(noise.data()).for_each(|(h, z)| *h += 0.15 * z);
+    let found = classify(&heights_alone(&heights), &ClassifyConfig::default()).unwrap().classes;
+    let crowns = truth.data().iter().filter(|class| **class == VEGETATION).count();
+    let cells = found.data().iter().zip(truth.data());
+    let wrong = cells.filter(|(found, truth)| (**found, **truth) == (BUILDING, VEGETATION)).count();
+    assert!(iou(&found, &truth, BUILDING) > 0.9, "{}", iou(&found, &truth, BUILDING));
+    assert!(wrong * 10 < crowns, "{wrong} of {crowns} cells of crowns are buildings");
+}
+
+/// Beside a house the surface goes on at its height for a metre, in cells that are rather wrong
+/// than right; a strip within the roof is as weak.
+#[test]
+fn weak_cells_do_not_widen_a_building_and_do_not_tear_it() {
+    let (mut heights, mut weak) = (Grid::filled(100, 80, 0.0f32), Grid::filled(100, 80, false));
+    for row in 20..60 {
+        heights.row_mut(row)[20..74].fill(6.0);
+        weak.row_mut(row)[70..74].fill(true);
+    }
+    (38..41).for_each(|row| weak.row_mut(row)[30..50].fill(true));
+    let plain = heights_alone(&heights);
+    let classes = |input: &ClassifyInput<'_>| classify(input, &ClassifyConfig::default()).unwrap().classes;
+    assert_eq!(classes(&plain)[(73, 40)], BUILDING);
+    let found = classes(&ClassifyInput { weak: Some(&weak), ..plain });
+    assert_eq!([found[(73, 40)], found[(66, 40)], found[(40, 39)]], [GROUND, BUILDING, BUILDING]);
+}
+
+/// A level roof whose uphill side lies a metre above the ground.
+#[test]
+fn roofs_go_on_to_where_they_come_near_the_ground() {
+    let (mut surface, mut above) = (Grid::filled(100, 100, 0.0f32), Grid::filled(100, 100, 0.0f32));
+    for at in 0..10_000usize {
+        let ground = 0.15 * (at / 100) as f32;
+        let is_house = (30..70).contains(&(at % 100)) && (30..60).contains(&(at / 100));
+        surface.data_mut()[at] = if is_house { 10.0 } else { ground };
+        above.data_mut()[at] = surface.data()[at] - ground;
+    }
+    let found =
+        classify(&ClassifyInput { above_ground: &above, ..heights_alone(&surface) }, &ClassifyConfig::default());
+    let found = found.unwrap().classes;
+    assert!(above[(50, 58)] < 2.0);
+    assert_eq!([found[(50, 35)], found[(50, 58)], found[(50, 70)]], [BUILDING, BUILDING, GROUND]);
 }

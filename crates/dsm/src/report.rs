@@ -58,6 +58,9 @@ pub struct ImageReport {
     /// When the image was taken, in the form of ISO 8601; `None` where the file does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub acquired: Option<String>,
+    /// Name of the satellite; absent where neither the file nor its STAC item says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub satellite: Option<String>,
     /// Where the sun stood; absent where neither the file nor its STAC item says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sun: Option<SunPosition>,
@@ -323,6 +326,9 @@ pub struct SurfaceReport {
     pub speckle_removed: usize,
     /// Share of each view's pixels with which another view agrees.
     pub kept_by_view: Vec<f64>,
+    /// The same for each image in the order of the configuration; `None` for one that is no view.
+    #[serde(default)]
+    pub kept_by_image: Vec<Option<f64>>,
 }
 
 /// A city model compared with the heights that a coarser level found.

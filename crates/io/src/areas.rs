@@ -215,11 +215,16 @@ fn geojson(path: &Path, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), 
         Feature { name, polygons: parts.into_iter().filter_map(polygon).collect() }
     };
     let features = features.iter().map(feature).collect();
+    Ok((system_of_geojson(&json), features))
+}
+
+/// Returns the reference system of a GeoJSON file: longitude and latitude unless it names another
+/// one in the way of older files.
+pub(crate) fn system_of_geojson(json: &Value) -> String {
     // "urn:ogc:def:crs:EPSG::32631", "EPSG:32631"; "urn:ogc:def:crs:OGC:1.3:CRS84".
     let named = json["crs"]["properties"]["name"].as_str().filter(|name| name.contains("EPSG"));
     let code = named.and_then(|name| name.rsplit(':').next());
-    let crs = code.map_or_else(|| LONGITUDE_LATITUDE.to_owned(), |code| format!("EPSG:{code}"));
-    Ok((crs, features))
+    code.map_or_else(|| LONGITUDE_LATITUDE.to_owned(), |code| format!("EPSG:{code}"))
 }
 
 /// Makes a polygon of an array of rings, the outer one first.
@@ -234,7 +239,8 @@ fn polygon(rings: &Value) -> Option<Polygon<f64>> {
     Some(Polygon::new(rings.next()?, rings.collect()))
 }
 
-fn through_gdal(path: &Path, format: VectorFormat, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), String> {
+/// Opens a regular file with the driver of its format alone.
+pub(crate) fn open_vector_file(path: &Path, format: VectorFormat) -> Result<Dataset, String> {
     if !path.metadata().map_err(|e| e.to_string())?.is_file() {
         return Err("it is not a regular file".to_owned());
     }
@@ -245,7 +251,11 @@ fn through_gdal(path: &Path, format: VectorFormat, wanted: AreaName<'_>) -> Resu
         allowed_drivers: Some(&[format.driver()]),
         ..DatasetOptions::default()
     };
-    let dataset = with_gdal(|| Dataset::open_ex(path, options))?;
+    with_gdal(|| Dataset::open_ex(path, options))
+}
+
+fn through_gdal(path: &Path, format: VectorFormat, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), String> {
+    let dataset = open_vector_file(path, format)?;
     let mut layer = match wanted.layer {
         Some(name) => with_gdal(|| dataset.layer_by_name(name))?,
         None if dataset.layer_count() == 1 => with_gdal(|| dataset.layer(0))?,

@@ -30,6 +30,7 @@ pub mod stac;
 pub mod surfaces;
 pub mod textured_mesh;
 pub mod transforms;
+pub mod vectors;
 
 pub use atomic::{SaveError, write_bytes};
 pub use regular::{read_regular, read_regular_text};

@@ -20,6 +20,9 @@ const IMAGE_EXTENSIONS: [&str; 7] = ["tif", "tiff", "ntf", "nitf", "nsf", "jp2",
 /// Roles of pictures that only look like the image.
 const PICTURE_ROLES: [&str; 3] = ["thumbnail", "overview", "metadata"];
 
+/// Longest name of a satellite, characters. Longer texts are none.
+const NAME_MAX: usize = 40;
+
 /// Where the sun stood.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -53,6 +56,8 @@ pub struct StacItem {
     pub rpc: Option<PathBuf>,
     /// When the image was taken, seconds of UTC since 1970.
     pub acquired_s: Option<i64>,
+    /// Name of the satellite (`platform`).
+    pub satellite: Option<String>,
     /// Where the sun stood.
     pub sun: Option<SunPosition>,
     /// Angle of the line of sight to the vertical on the ground, degrees.
@@ -143,7 +148,8 @@ pub fn read_item(path: &Path) -> Result<StacItem, StacError> {
         _ => None,
     };
     let incidence_deg = angle(properties, INCIDENCE)?;
-    Ok(StacItem { image, rpc, acquired_s: time(properties)?, sun, incidence_deg })
+    let satellite = properties["platform"].as_str().and_then(satellite_name);
+    Ok(StacItem { image, rpc, acquired_s: time(properties)?, satellite, sun, incidence_deg })
 }
 
 fn read_limited(path: &Path) -> Result<Vec<u8>, StacError> {
@@ -286,6 +292,13 @@ fn time(properties: &Value) -> Result<Option<i64>, StacError> {
     })
 }
 
+/// Returns a name without the quotes and spaces around it; `None` for none and for what is no name.
+pub(crate) fn satellite_name(text: &str) -> Option<String> {
+    let name = text.trim().trim_matches(['"', '\'']).trim();
+    let is_name = !name.is_empty() && name.chars().count() <= NAME_MAX && !name.chars().any(char::is_control);
+    is_name.then(|| name.to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -317,12 +330,19 @@ mod tests {
             "rpc": { "href": "pan_RPC.TXT", "type": "text/plain", "roles": ["metadata"] },
         });
         let properties = json!({ "datetime": "2024-05-01T10:15:00Z", "view:sun_azimuth": 150.5,
-                                 "view:sun_elevation": 48, "view:incidence_angle": 12.5 });
+                                 "view:sun_elevation": 48, "view:incidence_angle": 12.5, "platform": "PNEO3" });
         let found = item(assets, properties).unwrap();
         assert_eq!((name(&found), found.acquired_s), ("pan.tif".to_owned(), Some(1_714_558_500)));
         assert_eq!(found.sun, Some(SunPosition { azimuth_deg: 150.5, elevation_deg: 48.0 }));
         assert!(found.rpc.unwrap().ends_with("pan_RPC.TXT"));
-        assert_eq!(found.incidence_deg, Some(12.5));
+        assert_eq!((found.incidence_deg, found.satellite.as_deref()), (Some(12.5), Some("PNEO3")));
+    }
+
+    #[test]
+    fn a_satellite_has_a_plain_name() {
+        assert_eq!(satellite_name(" \"WV03\" "), Some("WV03".to_owned()));
+        let long = "x".repeat(NAME_MAX + 1);
+        assert_eq!(["", "  ", "a\nb", long.as_str()].map(satellite_name), [const { None }; 4]);
     }
 
     #[test]

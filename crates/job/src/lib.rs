@@ -19,5 +19,6 @@ pub mod placed_model;
 pub mod remote;
 pub mod report_page;
 pub mod run_folder;
+pub mod run_links;
 mod same_view;
 pub mod threads;

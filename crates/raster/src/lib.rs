@@ -25,7 +25,7 @@ pub use mask::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, Flags, is_missing};
 pub use outline::outlines;
 pub use polygon::mark_inside;
 pub use pyramid::{Pyramid, level_from_level0, level0_from_level, reduce};
-pub use relief::{Light, coloured_relief, height_percentiles, hillshade, relief_colour};
+pub use relief::{Light, VOID_COLOUR, coloured_relief, height_percentiles, hillshade, relief_colour, shade_picture};
 pub use resample::{Interpolation, bicubic, bicubic_along, bilinear, cubic_weights, resample, sample};
 pub use window::Window;
 

@@ -38,8 +38,9 @@ const RAMP: [[f32; 3]; 6] = [
 ];
 /// Share of the shade in the blend of colour and shade.
 const SHADE_SHARE: f32 = 0.75;
-/// Colour of cells without height.
-const VOID: [u8; 3] = [255, 255, 255];
+/// Colour of cells without a value on every map: lilac, which no ramp has. White or grey would be
+/// that of the highest roofs, black that of shadows, blue that of water.
+pub const VOID_COLOUR: [u8; 3] = [212, 168, 226];
 
 /// Computes the shade of every cell. Rows run from north to south. Cells are `cell_size_m` metres
 /// wide and high.
@@ -85,13 +86,14 @@ fn horn(rows: [&[f32]; 3], column: usize) -> Option<(f32, f32)> {
     Some((dx, dy))
 }
 
-/// Colours heights from `low_m` to `high_m` and shades them. Cells without a height are white.
+/// Colours heights from `low_m` to `high_m` and shades them. Cells without a height have
+/// [`VOID_COLOUR`].
 pub fn coloured_relief(heights: &Grid<f32>, shade: &Grid<u8>, low_m: f32, high_m: f32) -> Grid<[u8; 3]> {
     let span = if high_m > low_m { high_m - low_m } else { 1.0 };
     // Flat ground has the shade of the sun's altitude (sin 45° by default). It should keep its
     // colour.
     let flat = 255.0 * std::f32::consts::FRAC_1_SQRT_2;
-    let mut picture = Grid::filled(heights.width(), heights.height(), VOID);
+    let mut picture = Grid::filled(heights.width(), heights.height(), VOID_COLOUR);
     let cells = heights.data().iter().zip(shade.data());
     for (pixel, (&height, &shade)) in picture.data_mut().iter_mut().zip(cells) {
         if height.is_finite() {
@@ -100,6 +102,11 @@ pub fn coloured_relief(heights: &Grid<f32>, shade: &Grid<u8>, low_m: f32, high_m
         }
     }
     picture
+}
+
+/// Returns a shade as a picture, in which cells without a height have [`VOID_COLOUR`].
+pub fn shade_picture(shade: &Grid<u8>) -> Grid<[u8; 3]> {
+    shade.map(|&shade| if shade == 0 { VOID_COLOUR } else { [shade; 3] })
 }
 
 /// Returns the heights at two percentiles (0–100) of the valid cells, or `None` without valid
@@ -152,15 +159,29 @@ mod tests {
         assert!(facing > flat && flat > averted && averted == 1, "{facing} {flat} {averted}");
     }
 
+    /// Heights of any size in any light look different from cells without a height: by a tenth of
+    /// the range of a channel. Greys come nearest.
     #[test]
-    fn holes_are_zero_and_white_and_do_not_spread() {
+    fn voids_have_a_colour_that_no_height_has() {
+        let far = |a: [u8; 3]| a.iter().zip(VOID_COLOUR).map(|(&a, b)| u32::from(a.abs_diff(b))).max() >= Some(24);
+        let heights = Grid::from_vec(256, 1, (0..256).map(|i| i as f32).collect()).unwrap();
+        for shade in 1..=255 {
+            let picture = coloured_relief(&heights, &Grid::filled(256, 1, shade), 0.0, 255.0);
+            assert!(picture.data().iter().all(|&colour| far(colour)), "in the shade {shade}");
+            assert!(far([shade; 3]));
+        }
+    }
+
+    #[test]
+    fn holes_are_zero_and_do_not_spread() {
         let mut heights = slope(0.1, 0.0);
         heights[(4, 4)] = f32::NAN;
         let shade = hillshade(&heights, (1.0, 1.0), Light::default());
         assert_eq!(shade.data().iter().filter(|&&s| s == 0).count(), 1);
         let (low, high) = height_percentiles(&heights, 2.0, 98.0).unwrap();
         let picture = coloured_relief(&heights, &shade, low, high);
-        assert_eq!(picture.data().iter().filter(|&&p| p == VOID).count(), 1);
+        assert_eq!(picture.data().iter().filter(|&&p| p == VOID_COLOUR).count(), 1);
+        assert_eq!(shade_picture(&shade).data().iter().filter(|&&p| p == VOID_COLOUR).count(), 1);
         assert!(low < high && picture[(0, 0)] != picture[(8, 0)]);
         assert_eq!(height_percentiles(&Grid::filled(2, 2, f32::NAN), 2.0, 98.0), None);
     }

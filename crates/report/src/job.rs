@@ -1,16 +1,17 @@
 //! The page of a job: what came out, on maps that can be switched, in plots and in tables. One file
 //! without script: the switches are radio buttons whose state selects what the style shows.
 
-use raster::Grid;
+use raster::{Grid, VOID_COLOUR};
 use serde_json::Value;
 
 use crate::escape::escape;
 use crate::legend::Legend;
+use crate::links::{PageLink, section};
 use crate::page::page;
 use crate::parts::{cards_of, notes, table};
 use crate::picture::{PictureError, data_uri, grey_alpha_uri};
 use crate::svg::Chart;
-use crate::words::{field_words, typeset};
+use crate::words::{field_words, sensible, typeset, unit_of};
 
 /// Distance of the stripes of hatched cells, and their width, pixels.
 const HATCH: (usize, usize) = (8, 2);
@@ -38,6 +39,8 @@ pub struct JobPage {
     pub plots: Vec<(Chart, String, String)>,
     /// Tables.
     pub tables: Vec<JobTable>,
+    /// Files beside the page.
+    pub links: Vec<PageLink>,
     /// Single values by name.
     pub facts: Vec<(String, String)>,
     /// Further values by name, under headings.
@@ -49,7 +52,8 @@ pub struct JobPage {
 pub struct MapLayer {
     /// Name on its switch.
     pub name: String,
-    /// The map, as large as the other maps of the page.
+    /// The map, as large as the other maps of the page. Where it has a legend, pixels of
+    /// [`VOID_COLOUR`] are cells without a value, and the legend says so.
     pub picture: Grid<[u8; 3]>,
     /// What it shows.
     pub caption: String,
@@ -95,9 +99,9 @@ impl JobPage {
                     self.tables.push(JobTable::of(&heading(), rows));
                 }
                 Value::Array(items) if name == "warnings" || name == "notes" => {
-                    self.notes.extend(items.iter().map(in_words));
+                    self.notes.extend(items.iter().map(|item| in_words(name, item)));
                 }
-                _ => facts.push((field_words(name), in_words(value))),
+                _ => facts.push((field_words(name), in_words(name, value))),
             }
         }
         facts
@@ -121,6 +125,7 @@ impl JobPage {
             if cards.is_empty() { String::new() } else { cards_of(&cards) },
             notes(&self.notes),
             self.maps()?,
+            section(&self.links),
             if plots.is_empty() { plots } else { format!("<h2>Plots</h2><div class=\"plots\">{plots}</div>") },
             self.tables.iter().map(JobTable::html).collect(),
             self.fact_list(),
@@ -134,6 +139,7 @@ impl JobPage {
             return Ok(String::new());
         }
         let (mut switches, mut figures, mut rules) = (String::new(), String::new(), String::new());
+        let stripes = if self.hatched.is_some() { "<i class=\"hatching\"></i>" } else { "" };
         for (number, layer) in self.layers.iter().enumerate() {
             let (uri, name, caption) = (data_uri(&layer.picture)?, escape(&layer.name), escape(&layer.caption));
             let checked = if number == 0 { " checked" } else { "" };
@@ -141,26 +147,27 @@ impl JobPage {
                 "<input type=\"radio\" name=\"layer\" id=\"layer{number}\"{checked}><label \
                  for=\"layer{number}\">{name}</label>"
             );
-            let legend = layer.legend.as_ref().map_or_else(String::new, Legend::html);
+            let has_voids = layer.picture.data().contains(&VOID_COLOUR);
+            let legend = layer.legend.as_ref().map_or_else(String::new, |legend| legend.html(has_voids));
             figures += &format!(
-                "<figure class=\"layer{number}\"><img src=\"{uri}\" alt=\"{name}\">{legend}<figcaption><b>{name}.</b> \
-                 {caption}</figcaption></figure>"
+                "<figure class=\"layer{number}\"><div class=\"map\"><img src=\"{uri}\" alt=\"{name}\">{stripes}</div>\
+                 {legend}<figcaption><b>{name}.</b> {caption}</figcaption></figure>"
             );
             rules += &format!(
                 "#layer{number}:checked~.stack .layer{number}{{display:block}}\
                  #layer{number}:focus-visible+label{{outline:2px solid var(--b)}}"
             );
         }
-        let mut hatching = String::new();
         if let Some(hatched) = &self.hatched {
             switches += "<input type=\"checkbox\" id=\"hatched\" checked><label for=\"hatched\">filled cells \
                          hatched</label>";
-            let uri = grey_alpha_uri(&stripes(hatched))?;
-            hatching = format!("<img class=\"hatching\" src=\"{uri}\" alt=\"filled cells\">");
+            // One picture of the stripes lies over all maps, also where they are printed together.
+            let uri = grey_alpha_uri(&self::stripes(hatched))?;
+            rules += &format!(".hatching{{background-image:url({uri})}}");
         }
         Ok(format!(
             "<h2>Maps</h2><style>{rules}</style><div class=\"layers\">{switches}<div \
-             class=\"stack\">{figures}{hatching}</div></div>"
+             class=\"stack\">{figures}</div></div>"
         ))
     }
 
@@ -185,7 +192,8 @@ impl JobTable {
         }
         let mut seen = std::collections::HashSet::new();
         heads.retain(|head| seen.insert(*head));
-        let cells = |row: &Value| heads.iter().map(|head| row.get(*head).map_or_else(String::new, in_words)).collect();
+        let cell = |row: &Value, head: &str| row.get(head).map_or_else(String::new, |value| in_words(head, value));
+        let cells = |row: &Value| heads.iter().map(|head| cell(row, head)).collect();
         Self {
             title: title.to_owned(),
             heads: heads.iter().map(|head| field_words(head)).collect(),
@@ -213,19 +221,23 @@ fn is_simple(value: &Value) -> bool {
     }
 }
 
-/// Returns a value as it is shown: numbers with at most four decimals.
-fn in_words(value: &Value) -> String {
+/// Returns the value of a field as it is shown: quantities with the digits that mean something in
+/// their unit, other numbers with at most four decimals.
+fn in_words(name: &str, value: &Value) -> String {
     match value {
         Value::Null => String::new(),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
         Value::String(text) => text.clone(),
         Value::Number(number) if number.is_f64() => {
             let value = number.as_f64().unwrap_or(f64::NAN);
+            if let Some(unit) = unit_of(name) {
+                return sensible(value, unit);
+            }
             let rounded = (value * 1e4).round() / 1e4;
             // A value that rounding would lose keeps its digits.
             if rounded == 0.0 && value != 0.0 { format!("{value:.2e}") } else { rounded.to_string() }
         }
-        Value::Array(items) => items.iter().map(in_words).collect::<Vec<_>>().join(", "),
+        Value::Array(items) => items.iter().map(|item| in_words(name, item)).collect::<Vec<_>>().join(", "),
         other => other.to_string(),
     }
 }
@@ -277,6 +289,11 @@ mod tests {
         assert!(!html.contains("<script") && html.contains("#layer1:checked~.stack .layer1{display:block}"));
         assert_eq!(html.matches("type=\"radio\"").count(), 2);
         assert!(html.contains("what &lt;it&gt; shows") && html.contains("id=\"hatched\""));
+        // The stripes lie on every map and are one picture.
+        assert_eq!((html.matches("<i class=\"hatching\">").count(), html.matches("url(data:").count()), (2, 1));
+        assert!(!html.contains("no value"), "no cell of the maps is void");
+        page.layers[1].picture[(3, 3)] = VOID_COLOUR;
+        assert_eq!(page.html().unwrap().matches("no value").count(), 1);
     }
 
     #[test]
@@ -288,7 +305,7 @@ mod tests {
         });
         let page = JobPage::of_report("Job", "Done.", &report);
         let facts: Vec<(&str, &str)> = page.facts.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
-        assert_eq!(facts, [("cells", "12"), ("cell, m", "0.3333"), ("tiny", "1.00e-9")]);
+        assert_eq!(facts, [("cells", "12"), ("cell, m", "0.333"), ("tiny", "1.00e-9")]);
         let group =
             |title: &str, name: &str, value: &str| (title.to_owned(), vec![(name.to_owned(), value.to_owned())]);
         assert_eq!(page.groups, [group("Inner", "depth", "3"), group("Inner: rest", "done", "yes")]);

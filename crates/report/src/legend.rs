@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use raster::Grid;
+use raster::{Grid, VOID_COLOUR};
 
 use crate::escape::escape;
-use crate::palette::{OUTSIDE, css, diverging};
-use crate::words::{plain_number, typeset};
+use crate::palette::{css, diverging};
+use crate::words::{plain_number, sensible, typeset};
 
 /// Number of colours that a ramp is written with.
 const STEPS: usize = 17;
@@ -63,9 +63,9 @@ impl Legend {
     pub fn colour(&self, value: f32) -> [u8; 3] {
         let value = f64::from(value);
         match self {
-            _ if value.is_nan() => OUTSIDE,
+            _ if value.is_nan() => VOID_COLOUR,
             Self::Codes(codes) => {
-                codes.iter().find(|(code, ..)| f64::from(*code) == value).map_or(OUTSIDE, |(_, colour, _)| *colour)
+                codes.iter().find(|(code, ..)| f64::from(*code) == value).map_or(VOID_COLOUR, |(_, colour, _)| *colour)
             }
             Self::Ramp { stops, .. } => {
                 let above = stops.partition_point(|(at, _)| *at <= value);
@@ -75,7 +75,7 @@ impl Legend {
                         std::array::from_fn(|i| (f64::from(a[i]) + t * (f64::from(b[i]) - f64::from(a[i]))) as u8)
                     }
                     (Some((_, colour)), None) | (None, Some((_, colour))) => *colour,
-                    (None, None) => OUTSIDE,
+                    (None, None) => VOID_COLOUR,
                 }
             }
         }
@@ -86,26 +86,29 @@ impl Legend {
         values.map(|value| self.colour(*value))
     }
 
-    /// Returns the legend as HTML.
-    pub(crate) fn html(&self) -> String {
+    /// Returns the legend as HTML. With `has_voids` it also explains the colour of cells without a
+    /// value.
+    pub(crate) fn html(&self, has_voids: bool) -> String {
+        let key = |colour, text: &str| {
+            let (colour, text) = (css(colour), escape(text));
+            format!("<span><span class=\"key\" style=\"background:{colour}\"></span>{text}</span> ")
+        };
+        let void = if has_voids { key(VOID_COLOUR, "no value") } else { String::new() };
         match self {
             Self::Codes(codes) => {
-                let item = |(_, colour, text): &(u8, [u8; 3], &str)| {
-                    let (colour, text) = (css(*colour), escape(text));
-                    format!("<span><span class=\"key\" style=\"background:{colour}\"></span>{text}</span> ")
-                };
-                format!("<div class=\"legend\">{}</div>", codes.iter().map(item).collect::<String>())
+                let items: String = codes.iter().map(|(_, colour, text)| key(*colour, text)).collect();
+                format!("<div class=\"legend\">{items}{void}</div>")
             }
             Self::Ramp { stops, unit } => {
                 let colours: Vec<String> = stops.iter().map(|(_, colour)| css(*colour)).collect();
                 let end = |stop: Option<&(f64, [u8; 3])>| {
-                    let value = stop.map_or(String::new(), |(value, _)| plain_number((value * 100.0).round() / 100.0));
+                    let value = stop.map_or(String::new(), |(value, _)| sensible(*value, "m"));
                     escape(typeset(&format!("{value} {unit}")).trim_end())
                 };
                 let (low, high) = (end(stops.first()), end(stops.last()));
                 format!(
                     "<div class=\"legend\"><span>{low}</span><span class=\"ramp\" \
-                     style=\"background:linear-gradient(90deg,{})\"></span><span>{high}</span></div>",
+                     style=\"background:linear-gradient(90deg,{})\"></span><span>{high}</span>{void}</div>",
                     colours.join(",")
                 )
             }
@@ -175,11 +178,28 @@ mod tests {
     fn values_between_stops_have_colours_between_them() {
         let ramp = Legend::Ramp { stops: vec![(0.0, [0, 0, 0]), (10.0, [100, 200, 50])], unit: "m" };
         assert_eq!([-5.0, 5.0, 99.0].map(|v| ramp.colour(v)), [[0, 0, 0], [50, 100, 25], [100, 200, 50]]);
-        assert_eq!(ramp.colour(f32::NAN), OUTSIDE);
+        assert_eq!(ramp.colour(f32::NAN), VOID_COLOUR);
         let codes = Legend::Codes(vec![(1, [1, 2, 3], "seen <once>")]);
-        assert_eq!((codes.colour(1.0), codes.colour(2.0)), ([1, 2, 3], OUTSIDE));
-        assert!(codes.html().contains("seen &lt;once&gt;") && codes.qml().contains("value=\"1\" color=\"#010203\""));
-        assert!(ramp.html().contains("10 m") && ramp.qml().contains("<item value=\"10\" color=\"#64c832\""));
+        assert_eq!((codes.colour(1.0), codes.colour(2.0)), ([1, 2, 3], VOID_COLOUR));
+        assert!(
+            codes.html(false).contains("seen &lt;once&gt;") && codes.qml().contains("value=\"1\" color=\"#010203\"")
+        );
+        assert!(ramp.html(false).contains("10 m") && ramp.qml().contains("<item value=\"10\" color=\"#64c832\""));
+    }
+
+    #[test]
+    fn voids_are_explained_where_there_are_some() {
+        let ramp = Legend::heights(0.0, 10.0, "m");
+        assert!(ramp.html(true).contains("no value") && !ramp.html(false).contains("no value"));
+        for legend in [ramp, Legend::signed(1.0, "m"), Legend::sequential(0.0, 1.0, LightEnd::High, "")] {
+            let Legend::Ramp { stops, .. } = &legend else { unreachable!("these are ramps") };
+            let (low, high) = (stops[0].0, stops[STEPS - 1].0);
+            for i in 0..=1000 {
+                let colour = legend.colour((low + (high - low) * f64::from(i) / 1000.0) as f32);
+                let far = colour.iter().zip(VOID_COLOUR).map(|(a, b)| a.abs_diff(b)).max();
+                assert!(far >= Some(32), "{colour:?} looks like a void");
+            }
+        }
     }
 
     #[test]

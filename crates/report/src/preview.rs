@@ -140,6 +140,19 @@ const LETTERS: [(char, [u8; 7]); 14] = [
     ('k', [0x10, 0x10, 0x12, 0x14, 0x18, 0x14, 0x12]),
 ];
 
+/// Writes a number on a white field whose middle lies at (x, y), kept inside the picture. Letters
+/// other than digits are left out.
+pub fn number_label(picture: &mut Grid<[u8; 3]>, (x, y): (usize, usize), text: &str) {
+    let (width, height) = (6 * text.chars().count() + 3, 11);
+    let inside = |at: usize, size: usize, all: usize| at.saturating_sub(size / 2).min(all.saturating_sub(size));
+    let (left, top) = (inside(x, width, picture.width()), inside(y, height, picture.height()));
+    for row in top..(top + height).min(picture.height()) {
+        let end = (left + width).min(picture.width());
+        picture.row_mut(row)[left..end].fill(PAPER);
+    }
+    write(picture, left + 2, top + 2, text);
+}
+
 fn write(picture: &mut Grid<[u8; 3]>, left: usize, top: usize, text: &str) {
     for (place, letter) in text.chars().enumerate() {
         let Some((_, rows)) = LETTERS.iter().find(|(known, _)| *known == letter) else { continue };
@@ -167,6 +180,17 @@ mod tests {
         assert_eq!(side_by_side(&[]).width(), 0);
         let mask = mask_preview(&Grid::from_vec(2, 1, vec![true, false]).unwrap());
         assert_eq!(mask.data(), [PAPER, INK]);
+    }
+
+    #[test]
+    fn labels_stay_inside_the_picture() {
+        let mut picture = Grid::filled(40, 30, [9; 3]);
+        number_label(&mut picture, (39, 0), "12");
+        assert_eq!((picture[(39, 0)], picture[(24, 0)], picture[(39, 11)]), (PAPER, [9; 3], [9; 3]));
+        assert!(picture.data().contains(&INK));
+        let mut tiny = Grid::filled(3, 3, [9; 3]);
+        number_label(&mut tiny, (1, 1), "7");
+        assert!(tiny.data().iter().all(|pixel| *pixel != [9; 3]));
     }
 
     #[test]

@@ -23,6 +23,51 @@ pub fn plain_number(value: f64) -> String {
     if short == "-0" { "0".to_owned() } else { short.to_owned() }
 }
 
+/// Returns a count in groups of three digits, with narrow spaces that do not break.
+///
+/// ```
+/// assert_eq!(report::grouped(1_234_567), "1\u{202f}234\u{202f}567");
+/// ```
+pub fn grouped(count: usize) -> String {
+    let digits = count.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len());
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            out.push('\u{202f}');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// Returns a quantity with the digits that mean something to a reader: hundredths up to a hundred,
+/// tenths up to ten thousand and in coordinates, three digits below 1, seven decimals of a degree
+/// (a centimetre on the ground). Areas and volumes above a hundred are whole.
+///
+/// ```
+/// let lengths = [693_950.2537, 163.2549, 12.3456, 0.123_456, 0.0, -0.5].map(|v| report::sensible(v, "m"));
+/// assert_eq!(lengths, ["693950.3", "163.3", "12.35", "0.123", "0", "-0.5"]);
+/// assert_eq!(report::sensible(1234.56, "m³"), "1235");
+/// assert_eq!(report::sensible(5.398_765_43, "°"), "5.3987654");
+/// ```
+pub fn sensible(value: f64, unit: &str) -> String {
+    let size = value.abs();
+    let whole = matches!(unit, "m²" | "m³") && size >= 100.0;
+    let decimals = match () {
+        () if !value.is_finite() => return "–".to_owned(),
+        () if unit == "°" => 7,
+        () if whole => 0,
+        () if size >= 100.0 => 1,
+        () if size >= 1.0 => 2,
+        () if size > 0.0 && size < 1e-4 => return format!("{value:.2e}"),
+        () if size > 0.0 => (2.0 - size.log10().floor()) as usize,
+        () => return "0".to_owned(),
+    };
+    let text = format!("{value:.decimals$}");
+    let short = if decimals > 0 { text.trim_end_matches('0').trim_end_matches('.') } else { text.as_str() };
+    short.to_owned()
+}
+
 /// Units at the end of names of fields, and how they are written.
 const UNITS: [(&str, &str); 12] = [
     ("m", "m"),
@@ -44,13 +89,16 @@ const ABBREVIATIONS: [&str; 19] = [
     "nmad", "bic", "iou", "2dgs",
 ];
 
+/// Returns the unit that the name of a field ends with.
+pub(crate) fn unit_of(name: &str) -> Option<&'static str> {
+    let (_, last) = name.rsplit_once('_')?;
+    UNITS.iter().find(|(text, _)| *text == last).map(|(_, unit)| *unit)
+}
+
 /// Returns the name of a field of a report in words, with its unit.
 pub(crate) fn field_words(name: &str) -> String {
-    let unit = |last: &str| UNITS.iter().find(|(text, _)| *text == last).map(|(_, unit)| *unit);
-    let (words, unit) = match name.rsplit_once('_') {
-        Some((words, last)) if unit(last).is_some() => (words, unit(last)),
-        _ => (name, None),
-    };
+    let unit = unit_of(name);
+    let words = unit.and_then(|_| name.rsplit_once('_')).map_or(name, |(words, _)| words);
     let word = |word: &str| if ABBREVIATIONS.contains(&word) { word.to_uppercase() } else { word.to_owned() };
     let words = words.split('_').map(word).collect::<Vec<_>>().join(" ");
     unit.map_or(words.clone(), |unit| format!("{words}, {unit}"))

@@ -1,5 +1,6 @@
 //! Layers that lie beside a surface model, on its cells.
 
+use eval::CellOrigin;
 use io::raster::{Dem, ImageSource, RasterError};
 use raster::Grid;
 
@@ -9,6 +10,50 @@ pub const OBSERVED: u8 = 0;
 pub const FILLED: u8 = 1;
 /// Value of `filled` in a cell without a height.
 pub const VOID: u8 = 255;
+/// Where each height comes from.
+const SOURCE: &str = "source.tif";
+/// Probability that each height is right.
+const CONFIDENCE: &str = "confidence.tif";
+/// What a report says of a surface without layers.
+pub(crate) const NO_LAYERS: &str = "none beside the surface: every height counts as observed";
+
+/// Cells whose heights are weak evidence.
+#[derive(Debug)]
+pub(crate) struct WeakCells {
+    /// The cells; `None` where no layer lies beside the surface.
+    pub(crate) mask: Option<Grid<bool>>,
+    /// Names of the layers that were read.
+    pub(crate) files: Vec<String>,
+    /// Cells with a filled height.
+    pub(crate) filled: usize,
+    /// Other cells whose probability is below the wanted one.
+    pub(crate) doubtful: usize,
+}
+
+/// Returns the cells of which a layer beside the surface says that their height was filled, or that
+/// it is right with a probability below `least_confidence`. A layer of another size is not one of
+/// this surface.
+pub(crate) fn weak_cells(surface: &Dem, least_confidence: f32) -> Result<WeakCells, RasterError> {
+    let mut mask = surface.heights.map(|_| false);
+    let (mut files, mut filled, mut doubtful) = (Vec::new(), 0, 0);
+    if let Some(source) = layer_beside(surface, SOURCE)? {
+        files.push(SOURCE.to_owned());
+        for (is_weak, source) in mask.data_mut().iter_mut().zip(source.data()) {
+            *is_weak = CellOrigin::from_source_code(*source as i32) == CellOrigin::Filled;
+            filled += usize::from(*is_weak);
+        }
+    }
+    if let Some(confidence) = layer_beside(surface, CONFIDENCE)? {
+        files.push(CONFIDENCE.to_owned());
+        for (is_weak, confidence) in mask.data_mut().iter_mut().zip(confidence.data()) {
+            if !*is_weak && (0.0..least_confidence).contains(confidence) {
+                *is_weak = true;
+                doubtful += 1;
+            }
+        }
+    }
+    Ok(WeakCells { mask: (!files.is_empty()).then_some(mask), files, filled, doubtful })
+}
 
 /// Reads a raster beside a surface; `None` where there is none of its size.
 pub(crate) fn layer_beside(surface: &Dem, name: &str) -> Result<Option<Grid<f32>>, RasterError> {

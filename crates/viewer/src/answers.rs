@@ -6,6 +6,7 @@
 //! | `tile/LAYER/LEVEL/X/Y.png` | tile of a layer; a pixel of a level has 2^level cells |
 //! | `picture/LAYER.png?c&r&w&h&side` | window of a layer, at most `side` pixels wide and high |
 //! | `grid/RASTER?c&r&w&h&side` | the same of the first band of a raster, as numbers |
+//! | `vectors/NUMBER.json` | features of a layer of vectors in the units of the map |
 //! | `at?x&y` | values of all rasters at a position |
 //! | `profile?rasters&x1&y1&x2&y2` | values of rasters along a line |
 //!
@@ -74,10 +75,17 @@ impl<'a> Answers<'a> {
             ["tile", layer, level, x, y] => self.tile(layer, level, x, y),
             ["picture", layer] => self.picture(layer, &query),
             ["grid", raster] => self.grid(raster, &query),
+            ["vectors", number] => self.vectors(number),
             ["at"] => self.at(&query),
             ["profile"] => self.profile(&query),
             _ => Err(Refusal::NotFound),
         }
+    }
+
+    fn vectors(&self, number: &str) -> Result<Answer, Refusal> {
+        let number = number.strip_suffix(".json").and_then(whole);
+        let vectors = number.and_then(|number| self.scene.vectors.get(number)).ok_or(Refusal::NotFound)?;
+        Ok(Answer { kind: "application/json", body: vectors.features.clone() })
     }
 
     fn tile(&mut self, layer: &str, level: &str, x: &str, y: &str) -> Result<Answer, Refusal> {
@@ -222,7 +230,12 @@ impl<'a> Answers<'a> {
         let slot = self.open.get_mut(index).ok_or(Refusal::NotFound)?;
         Ok(match slot {
             Some(source) => source,
-            None => slot.insert(ImageSource::open(&raster.path).map_err(failed)?),
+            None => {
+                let wkt = self.scene.map.wkt.as_deref().filter(|_| raster.is_laid);
+                let opened = wkt
+                    .map_or_else(|| ImageSource::open(&raster.path), |wkt| ImageSource::open_on_map(&raster.path, wkt));
+                slot.insert(opened.map_err(failed)?)
+            }
         })
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use io::areas::AreaError;
 use io::raster::RasterError;
 
 use job::error::{JobError, SettingError, from_steps};
@@ -13,6 +14,17 @@ pub enum ViewError {
     /// A raster cannot be read.
     #[error(transparent)]
     Raster(#[from] RasterError),
+    /// Vectors cannot be read.
+    #[error(transparent)]
+    Vectors(#[from] AreaError),
+    /// Vectors cannot be laid into the system of the map.
+    #[error("the vectors cannot be laid into the coordinate system of the map ({what}): {}", path.display())]
+    VectorPlace {
+        /// The file.
+        path: PathBuf,
+        /// What is in the way.
+        what: String,
+    },
     /// A folder holds no raster that can be shown.
     #[error("found no GeoTIFF to show, expected the folder of a run, or a raster: {}", path.display())]
     NoRasters {

@@ -3,7 +3,7 @@
 use super::http::Answer;
 
 /// Files of the page by their names in the address: name, type, content.
-const FILES: [(&str, &str, &str); 8] = [
+const FILES: [(&str, &str, &str); 9] = [
     ("", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("main.js", SCRIPT, include_str!("page/main.js")),
@@ -12,6 +12,7 @@ const FILES: [(&str, &str, &str); 8] = [
     ("numbers.js", SCRIPT, include_str!("page/numbers.js")),
     ("profile.js", SCRIPT, include_str!("page/profile.js")),
     ("surface.js", SCRIPT, include_str!("page/surface.js")),
+    ("vectors.js", SCRIPT, include_str!("page/vectors.js")),
 ];
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 

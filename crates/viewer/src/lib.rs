@@ -28,6 +28,7 @@ mod report;
 mod scene;
 mod server;
 mod styles;
+mod vectors;
 
 pub use config::ViewConfig;
 pub use error::ViewError;

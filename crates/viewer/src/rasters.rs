@@ -1,6 +1,9 @@
-//! The rasters of the inputs: those of a folder in the order of their meaning, and single files.
+//! The rasters and vectors of the inputs: those of a folder in the order of their meaning, and
+//! single files.
 
 use std::path::{Path, PathBuf};
+
+use io::vectors::is_vector_name;
 
 use super::error::ViewError;
 
@@ -9,12 +12,37 @@ pub(super) const RASTERS_MAX: usize = 48;
 /// Most entries of a folder that are looked at.
 const ENTRIES_MAX: usize = 2000;
 /// Folders of a run that hold rasters, the run's own first.
-const FOLDERS: [&str; 8] = ["dsm", "", "dtm", "ortho", "products", "products/dtm", "eval", "truth"];
+const FOLDERS: [&str; 11] =
+    ["dsm", "", "dtm", "classes", "ortho", "products", "products/dtm", "products/classes", "eval", "diff", "truth"];
 /// Stems of files that come first, in their order.
-const FIRST: [&str; 9] =
-    ["dsm", "sigma", "confidence", "views", "source", "filled", "dtm", "height_above_ground", "ortho"];
+const FIRST: [&str; 11] = [
+    "dsm",
+    "sigma",
+    "confidence",
+    "views",
+    "source",
+    "filled",
+    "dtm",
+    "height_above_ground",
+    "classes",
+    "change",
+    "ortho",
+];
+/// Most vectors that are shown, and the files of the folder of a run that hold some.
+const VECTORS_MAX: usize = 16;
+const VECTORS: [&str; 9] = [
+    "contours.gpkg",
+    "changes.geojson",
+    "areas.geojson",
+    "buildings.geojson",
+    "buildings.gpkg",
+    "products/contours.gpkg",
+    "diff/changes.geojson",
+    "diff/areas.geojson",
+    "products/buildings.geojson",
+];
 
-/// A raster file of the inputs.
+/// A file of rasters or vectors of the inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FoundRaster {
     /// The file.
@@ -33,7 +61,7 @@ pub(super) struct FoundRaster {
 /// [`ViewError::NoRasters`] for a folder without one.
 pub(super) fn find(inputs: &[PathBuf]) -> Result<(Vec<FoundRaster>, usize), ViewError> {
     let mut found = Vec::new();
-    for input in inputs {
+    for input in inputs.iter().filter(|input| !is_vectors(input)) {
         if !input.is_dir() {
             found.push(named(input, input, true));
             continue;
@@ -54,6 +82,27 @@ pub(super) fn find(inputs: &[PathBuf]) -> Result<(Vec<FoundRaster>, usize), View
     let more = found.len().saturating_sub(RASTERS_MAX);
     found.truncate(RASTERS_MAX);
     Ok((found, more))
+}
+
+/// Returns the vectors of the inputs, at most [`VECTORS_MAX`], and the number of further ones.
+pub(super) fn find_vectors(inputs: &[PathBuf]) -> (Vec<FoundRaster>, usize) {
+    let mut found = Vec::new();
+    for input in inputs {
+        if is_vectors(input) {
+            found.push(named(input, input, true));
+        } else if input.is_dir() {
+            let files = VECTORS.map(|name| input.join(name)).into_iter().filter(|path| path.is_file());
+            found.extend(files.map(|path| named(&path, input, false)));
+        }
+    }
+    let more = found.len().saturating_sub(VECTORS_MAX);
+    found.truncate(VECTORS_MAX);
+    (found, more)
+}
+
+/// Whether an input is a file of vectors by its name.
+pub(super) fn is_vectors(input: &Path) -> bool {
+    is_vector_name(input) && !input.is_dir()
 }
 
 fn named(path: &Path, input: &Path, is_named: bool) -> FoundRaster {

@@ -1,6 +1,8 @@
 //! What the viewer shows: rasters on one map, and the layers that are drawn of them.
 //!
-//! All rasters lie in the coordinate system of the first one; others are left out with a warning.
+//! All rasters lie in the coordinate system of the first one; others are laid into it by the
+//! nearest cell. Those without a system where the first has one, or the other way round, are left
+//! out with a warning.
 //! Positions on the map are in the units of that system, or columns and rows of the raster where it
 //! has no georeference.
 
@@ -15,8 +17,9 @@ use serde::Serialize;
 
 use super::config::ViewConfig;
 use super::error::ViewError;
-use super::rasters::{FoundRaster, RASTERS_MAX, find};
+use super::rasters::{FoundRaster, RASTERS_MAX, find, find_vectors, is_vectors};
 use super::styles::{LayerLook, RasterTraits, bands, looks};
+use super::vectors::SceneVectors;
 use job::error::JobError;
 use job::error_text::with_causes;
 
@@ -43,6 +46,10 @@ pub(super) struct Scene {
     pub(super) rasters: Vec<SceneRaster>,
     /// The layers in the order of the list.
     pub(super) layers: Vec<SceneLayer>,
+    /// The vectors, which are drawn over the layers.
+    pub(super) vectors: Vec<SceneVectors>,
+    /// Number of folders among the inputs: two are shown side by side.
+    folders: usize,
     /// Side of a tile, pixels.
     tile: usize,
     /// Version of the program.
@@ -61,7 +68,7 @@ pub(super) struct MapSystem {
     /// Metres in a unit along x and y.
     pub(super) metres: (f64, f64),
     #[serde(skip)]
-    wkt: Option<String>,
+    pub(super) wkt: Option<String>,
     #[serde(skip)]
     epsg: Option<u32>,
     /// Whether the rasters have a georeference.
@@ -73,6 +80,9 @@ pub(super) struct MapSystem {
 pub(super) struct SceneRaster {
     #[serde(skip)]
     pub(super) path: PathBuf,
+    /// Whether it is laid into the system of the map.
+    #[serde(skip)]
+    pub(super) is_laid: bool,
     /// Name of the file.
     file: String,
     /// Columns.
@@ -116,21 +126,47 @@ impl Scene {
     /// when the job was cancelled.
     pub(super) fn open(config: &ViewConfig, progress: &dyn Progress) -> Result<Self, ViewError> {
         let (found, more) = find(&config.inputs)?;
+        let is_one_of_several = several(config);
         if more > 0 {
             progress.warn(&format!("{more} further rasters are left out: at most {RASTERS_MAX} are shown"));
         }
         let mut scene: Option<Self> = None;
         for file in &found {
             progress.check_cancelled().map_err(JobError::from)?;
-            match add(&mut scene, file, config.inputs.len() > 1, progress) {
+            match add(&mut scene, file, is_one_of_several, progress) {
                 Ok(()) => {}
                 Err(error) if file.is_named => return Err(error),
                 Err(error) => progress.warn(&format!("left out: {}", with_causes(&error))),
             }
         }
         let path = || config.inputs.first().cloned().unwrap_or_default();
-        scene.ok_or_else(|| ViewError::NoRasters { path: path() })
+        let mut scene = scene.ok_or_else(|| ViewError::NoRasters { path: path() })?;
+        scene.folders = config.inputs.iter().filter(|input| input.is_dir()).count();
+        scene.add_vectors(config, progress)?;
+        Ok(scene)
     }
+
+    /// Adds the vectors of the inputs. Those that are only found in a folder may be left out.
+    fn add_vectors(&mut self, config: &ViewConfig, progress: &dyn Progress) -> Result<(), ViewError> {
+        let (found, more) = find_vectors(&config.inputs);
+        if more > 0 {
+            progress.warn(&format!("{more} further files of vectors are left out"));
+        }
+        for file in found {
+            let suffix = if several(config) && !file.is_named { file.input.as_str() } else { "" };
+            match SceneVectors::read(&file.path, suffix, self.map.wkt.as_deref()) {
+                Ok(vectors) => self.vectors.extend(vectors),
+                Err(error) if file.is_named => return Err(error),
+                Err(error) => progress.warn(&format!("left out: {}", with_causes(&error))),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether rasters come from several inputs, so that their names must tell which.
+fn several(config: &ViewConfig) -> bool {
+    config.inputs.iter().filter(|input| !is_vectors(input)).count() > 1
 }
 
 /// Adds a raster and its layers. The first one makes the scene.
@@ -146,10 +182,14 @@ fn add(
         Some(scene) => scene.map.clone(),
         None => MapSystem::of(&source)?,
     };
-    if !map.holds(info) {
-        progress.warn(&format!("left out, because its coordinate system is another: {}", file.path.display()));
-        return Ok(());
-    }
+    let laid = match map.way_to(info) {
+        Way::Same => None,
+        Way::Laid(wkt) => Some(ImageSource::open_on_map(&file.path, wkt)?),
+        Way::None => {
+            progress.warn(&format!("left out, because its place on the map is not known: {}", file.path.display()));
+            return Ok(());
+        }
+    };
     let label = source.band_label(1)?;
     let bands = bands(info);
     let mut cells = 0_u64;
@@ -163,15 +203,31 @@ fn add(
     if cells > SLOW_CELLS {
         progress.warn(&format!("has no fitting overviews, so that its pictures take long: {}", file.path.display()));
     }
+    if laid.is_some() {
+        progress.warn(&format!(
+            "its coordinate system is another, it is laid into that of the map by the nearest cell: {}",
+            file.path.display()
+        ));
+    }
     let size = reduced((info.width, info.height), SAMPLE_SIDE);
     let sample: Vec<Grid<f32>> =
         bands.iter().map(|&band| source.read_reduced(band, source.window(), size)).collect::<Result<_, _>>()?;
     let looks = looks(&RasterTraits { stem: &file.stem, info, label: &label, sample: &sample });
-    let new = Scene { map, rasters: Vec::new(), layers: Vec::new(), tile: TILE, version: env!("CARGO_PKG_VERSION") };
+    let new = Scene {
+        map,
+        rasters: Vec::new(),
+        layers: Vec::new(),
+        vectors: Vec::new(),
+        folders: 0,
+        tile: TILE,
+        version: env!("CARGO_PKG_VERSION"),
+    };
     let scene = scene.get_or_insert(new);
     let index = scene.rasters.len();
     let is_height = looks.iter().any(|look| look.is_height);
-    scene.rasters.push(SceneRaster::new(file, info, &scene.map, unit(&label, is_height), bands));
+    let placed = laid.as_ref().map_or(info, ImageSource::info);
+    let raster = SceneRaster::new(file, placed, &scene.map, unit(&label, is_height), bands);
+    scene.rasters.push(SceneRaster { is_laid: laid.is_some(), ..raster });
     for look in looks {
         let mut title =
             if is_one_of_several { format!("{} · {}", look.title, file.input) } else { look.title.clone() };
@@ -208,6 +264,7 @@ impl SceneRaster {
         let longest = info.width.max(info.height).div_ceil(TILE).max(1);
         Self {
             path: file.path.clone(),
+            is_laid: false,
             file: file.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             width: info.width,
             height: info.height,
@@ -263,12 +320,27 @@ impl MapSystem {
         Ok(Self { name, vertical, unit, metres, wkt, epsg, is_placed })
     }
 
-    /// Whether a raster lies in this system.
-    fn holds(&self, info: &ImageInfo) -> bool {
+    /// Returns how a raster comes to lie in this system.
+    fn way_to(&self, info: &ImageInfo) -> Way<'_> {
         let epsg = || info.crs_wkt.as_deref().and_then(|wkt| CrsIdentity::of(wkt).ok()?.horizontal);
         let is_same = info.crs_wkt == self.wkt || (self.epsg.is_some() && epsg() == self.epsg);
-        is_same && info.geotransform.is_some() == self.is_placed
+        match (&self.wkt, &info.crs_wkt) {
+            _ if info.geotransform.is_some() != self.is_placed => Way::None,
+            _ if is_same => Way::Same,
+            (Some(wkt), Some(_)) => Way::Laid(wkt),
+            _ => Way::None,
+        }
     }
+}
+
+/// How a raster comes to lie in the system of the map.
+enum Way<'a> {
+    /// It lies in it.
+    Same,
+    /// It is laid into the system of this WKT.
+    Laid(&'a str),
+    /// Its place is not known.
+    None,
 }
 
 /// Returns the unit of positions, and its metres along x and y.

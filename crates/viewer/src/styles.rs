@@ -49,6 +49,9 @@ pub(super) fn looks(traits: &RasterTraits<'_>) -> Vec<LayerLook> {
         let (low, high) = range(traits.sample, 1.0, 99.0);
         return one(MapStyle::Picture { low, high });
     }
+    if traits.label.description.starts_with("class_") {
+        return one(MapStyle::Classes(classes_of(surfaces::classes::legend())));
+    }
     if let Some(classes) = MapClass::in_description(&traits.label.description) {
         let classes = match traits.stem {
             "source" => classes_of(source_legend()),
@@ -104,7 +107,9 @@ fn ramp(traits: &RasterTraits<'_>) -> Option<(f32, f32, RampColours)> {
             let (low, high) = range(traits.sample, 0.0, 100.0);
             (low, high, RampColours::LightIsHigh)
         }
-        () if description.starts_with("error") || description.contains("difference") => {
+        () if ["error", "change"].iter().any(|word| description.starts_with(word))
+            || description.contains("difference") =>
+        {
             let (low, high) = range(traits.sample, 3.0, 97.0);
             let most = low.abs().max(high.abs());
             (-most, most, RampColours::Diverging)
@@ -164,6 +169,12 @@ fn title(stem: &str) -> String {
         ("ortho", "Ortho"),
         ("ortho_mask", "Ortho, seen and hidden"),
         ("error_map", "Errors"),
+        ("classes", "Classes"),
+        ("roughness", "Roughness"),
+        ("ndvi", "Vegetation index"),
+        ("change", "Change"),
+        ("significance", "Significance of the change"),
+        ("regions", "Regions of change"),
     ];
     known.iter().find(|(own, _)| *own == stem).map_or_else(|| stem.to_owned(), |(_, name)| (*name).to_owned())
 }

@@ -211,7 +211,7 @@ fn tiles_and_grids_have_the_values_of_the_raster() {
     served(&[truth()], |client| {
         let scene = client.json("scene.json");
         let classes = ImageSource::open(truth().join("classes.tif")).unwrap();
-        let (index, raster) = layer(&scene, "classes");
+        let (index, raster) = layer(&scene, "Classes");
         assert_eq!(scene["rasters"][raster]["file"], "classes.tif");
         let legend: Vec<(i64, [u8; 3])> = scene["layers"][index]["legend"]["classes"]
             .as_array()
@@ -316,6 +316,60 @@ fn one_map_has_one_coordinate_system() {
         assert_eq!(found["values"][0][0].as_f64().unwrap() as f32, value);
         assert_eq!(client.get("tile/0/0/0/0.png").status, 200);
     });
+}
+
+/// A raster in another zone is laid into the map, and vectors too; classes have their names.
+#[test]
+fn other_systems_and_vectors_are_laid_into_the_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let surface = read_dem(truth().join("dsm.tif")).unwrap();
+    let map = crs::MapProjection::from_epsg(surface.horizontal_epsg.unwrap()).unwrap();
+    let (x, y) = surface.geotransform.map_from_cell(100.0, 120.0);
+    let (lon, lat) = map.lonlat_from_map(x, y).unwrap();
+    // The same heights in degrees, a cell of which is about a metre.
+    let step = 1e-5;
+    let cells = Grid::from_vec(64, 64, (0..4096).map(|i| (i % 64) as f32).collect()).unwrap();
+    let transform = raster::GeoTransform([lon - 32.0 * step, step, 0.0, lat + 32.0 * step, 0.0, -step]);
+    let other = folder.path().join("degrees.tif");
+    let bands = [io::raster::Band { description: "height_m", data: io::raster::BandData::F32(&cells) }];
+    let placed = io::raster::CogRaster::new(&bands, transform, crs::Crs::ellipsoidal(4326));
+    io::raster::write_cog(&other, &placed, false).unwrap();
+    let classes = folder.path().join("classes.tif");
+    let codes = cells.map(|value| if *value < 32.0 { 2u8 } else { 6 });
+    let description = "class_2_ground_3_low_vegetation_5_vegetation_6_building_9_water";
+    let bands = [io::raster::Band { description, data: io::raster::BandData::U8(&codes) }];
+    let placed = io::raster::CogRaster::new(&bands, transform, crs::Crs::ellipsoidal(4326));
+    io::raster::write_cog(&classes, &placed, false).unwrap();
+    let lines = folder.path().join("changes.geojson");
+    let feature = format!(
+        r#"{{"type":"Feature","properties":{{"mean_m":-2.5,"area_m2":81}},"geometry":{{"type":"Polygon",
+        "coordinates":[[[{lon},{lat}],[{0},{lat}],[{lon},{1}],[{lon},{lat}]]]}}}}"#,
+        lon + 1e-4,
+        lat + 1e-4
+    );
+    std::fs::write(&lines, format!(r#"{{"type":"FeatureCollection","features":[{feature}]}}"#)).unwrap();
+    served(&[truth().join("dsm.tif"), other, classes, lines.clone()], |client| {
+        let scene = client.json("scene.json");
+        assert_eq!(scene["rasters"].as_array().unwrap().len(), 3, "{scene}");
+        let found = client.json(&format!("at?x={x}&y={y}"));
+        // The position is a cell corner in the middle: either neighbour is right.
+        let value = found["values"][1][0].as_f64().unwrap();
+        assert!((31.0..=33.0).contains(&value), "{found}");
+        let layers = scene["layers"].as_array().unwrap();
+        let legend = &layers.iter().find(|layer| layer["raster"] == 2).unwrap()["legend"]["classes"];
+        assert!(legend.as_array().unwrap().iter().any(|class| class["code"] == 6 && class["label"] == "building"));
+        assert_eq!((&scene["vectors"][0]["look"], &scene["vectors"][0]["count"]), (&"change".into(), &1.into()));
+        let features = client.json("vectors/0.json");
+        let corner: Vec<f64> = (0..2).map(|i| features["features"][0]["parts"][0][i].as_f64().unwrap()).collect();
+        assert!((corner[0] - x).hypot(corner[1] - y) < 0.01, "{features}");
+        assert_eq!(features["features"][0]["properties"]["mean_m"], -2.5);
+        assert!(client.get("tile/0/0/0/0.png").status == 200 && client.get("vectors/1.json").status == 404);
+        assert_eq!(client.get("vectors/..%2f0.json").status, 404);
+    });
+    // Vectors that are named and have no place are an error.
+    std::fs::write(&lines, "{}").unwrap();
+    let config = ViewConfig::new(vec![truth().join("dsm.tif"), lines]);
+    assert!(matches!(ViewServer::open(&config, &Silent), Err(ViewError::Vectors(_))));
 }
 
 #[test]

@@ -281,6 +281,82 @@ fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
     assert_eq!([of("both", "dsm"), of("chunks", "dsm")], ["done_before", "done"]);
 }
 
+/// Products, change and one scene at a time: what a dry run announces is what a run does, and the
+/// page shows it.
+#[test]
+fn a_dry_run_says_what_is_done_and_one_scene_is_worked_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, night) = (folder.path().join("batch.toml"), folder.path().join("night"));
+    let town = sample("");
+    let text = format!(
+        "output = 'night'\n[defaults]\ndsm = {{ gsd_m = 2.0, preset = 'fast' }}\n\
+         products = {{ products = ['contours'] }}\n\
+         [[scene]]\nname = 'one two'\nimages = ['{0}/view_1.tif', '{0}/view_3.tif']\n\
+         tasks = ['dsm', 'eval', 'dtm', 'classes', 'products', 'diff']\n\
+         bounds = [693812.0, 4822332.0, 693992.0, 4822512.0]\n\
+         eval.reference = '{0}/truth/dsm.tif'\ndiff = {{ before = '{0}/truth/dsm.tif', sigma_m = 0.3 }}\n\
+         [[scene]]\nname = 'lost'\nimages = ['{0}/view_9*.tif']\n",
+        town.display()
+    );
+    std::fs::write(&file, &text).unwrap();
+    let batch = |arguments: &[&str], code: i32| -> Value {
+        let mut command = skysweep();
+        let assert = command.arg("batch").arg(&file).args(["-q", "--json"]).args(arguments).assert().code(code);
+        serde_json::from_slice(&assert.get_output().stdout).unwrap()
+    };
+    let of =
+        |report: &Value| states(report).into_iter().map(|s| format!("{} {} {}", s.0, s.1, s.2)).collect::<Vec<_>>();
+    let tasks = ["dsm", "eval", "dtm", "classes", "products", "diff"];
+    let with = |state: &str| tasks.map(|task| format!("one two {task} {state}"));
+    let looked = batch(&["--dry-run"], 1);
+    assert_eq!(of(&looked), [&with("to_do")[..], &["lost dsm failed".to_owned()]].concat(), "{looked}");
+    assert!(states(&looked)[6].3.contains("no file matches the pattern"), "{looked}");
+    assert!(!night.exists(), "a dry run writes nothing");
+    batch(&["--dry-run", "--only", "one two"], 0);
+    let refused = skysweep().arg("batch").arg(&file).args(["--only", "two"]).assert().code(2);
+    let told = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(told.contains("no scene \"two\"; there are one two, lost"), "{told}");
+
+    let done = batch(&["--only", "one two"], 0);
+    assert_eq!(of(&done), [&with("done")[..], &["lost dsm not_begun".to_owned()]].concat(), "{done}");
+    assert_eq!((&done["scenes"][1]["left_out"], &done["incomplete"]), (&Value::Bool(true), &0.into()));
+    let again = batch(&["--dry-run", "--only", "one two"], 0);
+    assert_eq!(of(&again)[..6], with("done_before"), "{again}");
+    let page = std::fs::read_to_string(night.join("batch_report.html")).unwrap();
+    let targets: Vec<&str> = page.split("<a href=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    for result in
+        ["report/report.html", "dtm/dtm.html", "classes/classes.html", "products/products.html", "diff/diff.html"]
+    {
+        assert!(targets.contains(&format!("./one%20two/{result}").as_str()), "{result} of {targets:?}");
+    }
+    for target in targets {
+        assert!(night.join(target.replace("%20", " ")).exists(), "{target}");
+    }
+    let errors: Value =
+        serde_json::from_slice(&std::fs::read(night.join("one two/eval/report.json")).unwrap()).unwrap();
+    let mae = report::sensible(errors["metrics"]["mae"].as_f64().unwrap(), "m");
+    assert!(
+        page.contains(&format!("<td>{mae} m</td>")) && page.contains("class=\"thumb\""),
+        "{mae} is not on the page"
+    );
+    // Products made by hand of a scene of a batch leave its pages as the batch knows them.
+    skysweep()
+        .arg("products")
+        .arg(night.join("one two"))
+        .args(["--only", "contours", "--overwrite", "-q"])
+        .assert()
+        .code(0);
+    assert_eq!(of(&batch(&["--dry-run", "--only", "one two"], 0))[0], "one two dsm done_before");
+
+    // A surface model that is to be made again takes what rests on it along.
+    std::fs::write(&file, text.replace("gsd_m = 2.0", "gsd_m = 2.5")).unwrap();
+    assert_eq!(of(&batch(&["--dry-run", "--only", "one two"], 0))[..6], with("to_do"));
+    std::fs::write(&file, text.replace("preset = 'fast'", "products = ['dtm']")).unwrap();
+    let refused = skysweep().arg("batch").arg(&file).arg("--dry-run").assert().code(2);
+    let told = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(told.contains("which write the same folder"), "{told}");
+}
+
 /// A batch replaces what an earlier run of it made, and nothing else.
 #[test]
 fn results_that_the_batch_did_not_make_stay() {

@@ -84,7 +84,13 @@ fn layers_beside_a_surface_say_what_was_not_measured() {
         command.arg("dtm").arg(&surface).arg("-o").arg(folder.path().join(name));
         command.args(options).args(["--progress", "none"]).assert()
     };
+    let classes = |name: &str| {
+        let mut command = skysweep();
+        command.arg("classes").arg(&surface).arg("-o").arg(folder.path().join(name));
+        command.args(["--progress", "none"]).assert()
+    };
     run("bare", &[]).code(0).stdout(predicate::str::contains("none beside the surface"));
+    classes("bare_classes").code(0).stdout(predicate::str::contains("none beside the surface"));
 
     let dem = read_dem(&surface).unwrap();
     let (width, height) = (dem.heights.width(), dem.heights.height());
@@ -101,6 +107,10 @@ fn layers_beside_a_surface_say_what_was_not_measured() {
     write("source.tif", &layer(&|column| column < width / 4, [1, 4]));
     let filled = width / 4 * height;
     run("layers", &[]).code(0).stdout(predicate::str::contains(format!("{filled} filled and 0 weak cells")));
+    classes("classes").code(0).stdout(predicate::str::contains(format!("{filled} filled and 0 doubtful cells")));
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("classes/classes.json")).unwrap()).unwrap();
+    assert_eq!(report["layers"]["cells_filled"], filled);
     let states = band(&folder.path().join("layers/ground.tif"), 1);
     let ground = |from: usize, to: usize| {
         let rows = states.data().chunks(width);
@@ -114,6 +124,8 @@ fn layers_beside_a_surface_say_what_was_not_measured() {
     write("source.tif", &layer(&|_| true, [1, 4]));
     let told = run("none", &[]).code(1);
     told.stderr(predicate::str::contains("only 0.00 % of the cells with heights show the ground"));
+    let cells = width * height;
+    classes("no_classes").code(2).stderr(predicate::str::contains(format!("0 of {cells} cells with heights show")));
     for (option, name) in [("--slope=-1", "slope"), ("--widest-object=0", "widest")] {
         run("refused", &[option]).code(2).stderr(predicate::str::contains(name));
     }

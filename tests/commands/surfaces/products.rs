@@ -37,8 +37,18 @@ fn the_cloud_has_the_observed_cells_of_the_run() {
     assert!(folder.join("products/classes/classes.html").is_file());
     let observed = source.data().iter().filter(|code| **code == 1.0).count();
     assert_eq!(made["cloud"]["points"], observed);
-    let is_ground = |cell: &usize| source.data()[*cell] == 1.0 && ground.data()[*cell] == 1.0;
-    assert_eq!(made["cloud"]["ground_points"], (0..source.data().len()).filter(is_ground).count());
+    // Buildings and vegetation as in the class raster; of the rest, ground is what the terrain
+    // model shows.
+    let class_of = |cell: usize| match (classes.data()[cell] as u8, ground.data()[cell] == 1.0) {
+        (code @ (3 | 5 | 6 | 9), _) => code,
+        (_, true) => 2,
+        _ => 1,
+    };
+    for code in [2, 6] {
+        let cells = (0..source.data().len()).filter(|cell| source.data()[*cell] == 1.0 && class_of(*cell) == code);
+        assert_eq!(made["cloud"]["class_points"][code.to_string()], cells.count());
+    }
+    assert_eq!(made["cloud"]["ground_points"], made["cloud"]["class_points"]["2"]);
     for name in ["cloud.laz", "cloud.copc.laz"] {
         let cloud = PointCloud::open(folder.join("products").join(name)).unwrap();
         assert_eq!((cloud.horizontal_epsg(), cloud.vertical()), (heights.horizontal_epsg, heights.vertical));
@@ -48,7 +58,7 @@ fn the_cloud_has_the_observed_cells_of_the_run() {
             let (column, row) = heights.geotransform.cell_from_map(point.x, point.y).unwrap();
             let cell = row.round() as usize * width + column.round() as usize;
             assert!((f64::from(heights.heights.data()[cell]) - point.height_m).abs() < 0.0006);
-            assert_eq!(point.class == 2, ground.data()[cell] == 1.0);
+            assert_eq!(point.class, class_of(cell));
             assert!(!std::mem::replace(&mut seen[cell], true));
         });
         assert_eq!(counts.unwrap().read, observed as u64);
@@ -112,8 +122,29 @@ fn the_mesh_and_the_contour_lines_fit_the_surface() {
     assert_eq!(document["accessors"][2]["count"], corners);
     assert_eq!(document["asset"]["extras"]["origin"], made["mesh"]["glb_origin"]);
     assert!(corners < 3 * 2 * heights.heights.data().len() as u64 / 2, "{corners} corners");
-    assert!(made["contours"]["lines"].as_u64().unwrap() > 5);
+    assert!(made["contours"]["lines"].as_u64().unwrap() > 5 && made["contours"]["unit"] == "m");
     assert!(made["dtm"]["cells_ground"].as_u64().unwrap() > 0, "contour lines need the ground");
+    // The page of the products and that of the run link to all that is there, and to nothing else.
+    for (page, own) in [("products/products.html", "./mesh.glb"), ("report/report.html", "../products/mesh.glb")] {
+        let text = std::fs::read_to_string(folder.join(page)).unwrap();
+        let targets: Vec<&str> = text.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+        let targets: Vec<&str> = targets.into_iter().filter(|target| *target != "data:,").collect();
+        assert!(targets.contains(&own) && !text.contains("cloud.laz"), "{page}: {targets:?}");
+        for target in targets {
+            let path = folder.join(page).parent().unwrap().join(target);
+            assert!(path.is_file(), "{page} leads to {}", path.display());
+        }
+    }
+    let text = std::fs::read_to_string(folder.join("products/products.html")).unwrap();
+    for map in ["<b>Surface.</b>", "<b>Ground.</b>", "<b>Above ground.</b>", "<b>Contours.</b>", "<b>Colours.</b>"] {
+        assert!(text.contains(map), "{map}");
+    }
+    // What the images do not say is said to be unknown, and each image has its quality.
+    let text = std::fs::read_to_string(folder.join("report/report.html")).unwrap();
+    for words in ["The dates of the images are unknown", "Quality of the images", "<td class=\"words\">unknown</td>"] {
+        assert!(text.contains(words) || text.contains(&words.replace(" class=\"words\"", "")), "{words}");
+    }
+    assert!(text.contains("no value"), "the maps have voids, whose colour is explained");
 
     let refused = |arguments: &[&str], reason: &str| {
         let mut command = skysweep();

@@ -236,8 +236,10 @@ fn warn_of_shadows(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
 }
 
 fn surface_report(plan: &Plan, counts: &SurfaceCounts) -> SurfaceReport {
-    let mut views: Vec<_> = plan.images.iter().zip(&counts.views).filter(|(_, view)| view.all > 0).collect();
+    let mut views: Vec<_> = plan.images.iter().zip(&counts.views).collect();
     views.sort_by_key(|(image, _)| image.number);
+    let kept = views.into_iter().map(|(_, view)| (view.all > 0).then(|| view.kept as f64 / view.all as f64));
+    let kept_by_image: Vec<Option<f64>> = kept.collect();
     SurfaceReport {
         cells: plan.grid.size.0 * plan.grid.size.1,
         observed: counts.observed,
@@ -245,6 +247,7 @@ fn surface_report(plan: &Plan, counts: &SurfaceCounts) -> SurfaceReport {
         void: counts.void,
         masked: counts.masked,
         speckle_removed: counts.speckle_removed,
-        kept_by_view: views.into_iter().map(|(_, view)| view.kept as f64 / view.all as f64).collect(),
+        kept_by_view: kept_by_image.iter().copied().flatten().collect(),
+        kept_by_image,
     }
 }

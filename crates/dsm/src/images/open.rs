@@ -79,6 +79,7 @@ fn open_one(
         size: (source.info().width, source.info().height),
         camera: RpcCamera::new(file.rpc),
         acquired_s: source.acquired_s(),
+        satellite: source.satellite(),
         sun: source.sun(),
         stated_incidence_deg: source.item().and_then(|item| item.incidence_deg),
         gain: match source.info().sample {

@@ -24,6 +24,9 @@ pub struct SceneImage {
     pub size: (usize, usize),
     /// When the image was taken, seconds of UTC since 1970; `None` where the file does not say.
     pub acquired_s: Option<i64>,
+    /// Name of the satellite; `None` where neither the file nor its STAC item says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub satellite: Option<String>,
     /// Where the sun stood; `None` where neither the file nor its STAC item says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sun: Option<SunPosition>,

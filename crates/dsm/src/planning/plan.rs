@@ -332,6 +332,7 @@ fn image_reports(
         rpc: image.rpc_format.clone(),
         size: image.size,
         acquired: image.acquired_s.and_then(iso_time),
+        satellite: image.satellite.clone(),
         sun: image.sun,
         gsd_m: gsds_m.get(i).copied().flatten(),
         incidence_deg: incidence_deg(image, geometry, i),

@@ -365,7 +365,9 @@ impl PlanReport {
         for image in &plan.images {
             let told = &self.images[image.number];
             let is_same = told.path == image.path && told.size == image.size;
-            let is_dated = told.acquired == image.acquired_s.and_then(iso_time) && told.sun == image.sun;
+            let is_dated = told.acquired == image.acquired_s.and_then(iso_time)
+                && told.sun == image.sun
+                && told.satellite == image.satellite;
             ensure(is_same && is_dated && told.applied_correction == image.camera.correction, || {
                 format!("the report names another image, date or correction than the plan: {}", told.path.display())
             })?;

@@ -1,8 +1,10 @@
 //! The coloured point cloud.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use classes::{BUILDING, GROUND, LOW_VEGETATION, VEGETATION, WATER};
 use io::points::{CloudExtent, CloudFormat, SurfaceCloud, write_cloud};
 use numeric::Progress;
 use raster::Grid;
@@ -16,9 +18,10 @@ use job::output_folder::OutputFolder;
 /// Files of the cloud.
 pub(super) const FILES: [(&str, CloudFormat); 2] =
     [("cloud.laz", CloudFormat::Laz), ("cloud.copc.laz", CloudFormat::Copc)];
-/// Classes of LAS.
-const GROUND: u8 = 2;
+/// Class of LAS for points without another one.
 const UNCLASSIFIED: u8 = 1;
+/// Code of observed cells in `source.tif`.
+const OBSERVED: u8 = 1;
 
 /// A point cloud that was made.
 #[derive(Debug, Clone, Serialize)]
@@ -32,26 +35,39 @@ pub struct CloudReport {
     pub crs: String,
     /// Points of the class ground, where there is a terrain model.
     pub ground_points: Option<u64>,
+    /// Points of each LAS class.
+    pub class_points: BTreeMap<u8, u64>,
     /// Number and extent of the points.
     #[serde(flatten)]
     pub extent: CloudExtent,
 }
 
-/// Makes both files. `ground` is the raster of the states of the terrain model.
+/// Rasters that tell the classes of points, where they were made.
+pub(super) struct ClassSources<'a> {
+    /// States of the terrain model.
+    pub(super) ground: Option<&'a Path>,
+    /// Classes of the cells.
+    pub(super) classes: Option<&'a Path>,
+}
+
+/// Makes both files.
 pub(super) fn make(
     surface: &SurfaceOfRun,
     colours: &Grid<[u16; 3]>,
-    ground: Option<&Path>,
+    sources: &ClassSources<'_>,
     filled: bool,
     folder: &OutputFolder,
     progress: &dyn Progress,
 ) -> Result<CloudReport, ProductsError> {
     progress.begin("point cloud", FILES.len());
     let (width, height) = surface.size();
-    let classes = match ground {
-        Some(path) => surface.raster(path)?.map(|state| if *state == 1.0 { GROUND } else { UNCLASSIFIED }),
-        None => Grid::filled(width, height, UNCLASSIFIED),
-    };
+    let ground = sources.ground.map(|path| surface.raster(path)).transpose()?;
+    let known = sources.classes.map(|path| surface.raster(path)).transpose()?;
+    let mut classes = Grid::filled(width, height, UNCLASSIFIED);
+    for (at, class) in classes.data_mut().iter_mut().enumerate() {
+        let state = ground.as_ref().map(|ground| ground.data()[at] == 1.0);
+        *class = point_class(known.as_ref().map(|known| known.data()[at] as u8), state);
+    }
     let (sigma_m, confidence) = (surface.layer("sigma.tif")?, surface.layer("confidence.tif")?);
     let (views, source) = (surface.codes("views.tif")?, surface.codes("source.tif")?);
     let cloud = SurfaceCloud {
@@ -79,13 +95,39 @@ pub(super) fn make(
         folder.remove(name)?;
         folder.publish(work.path(), name)?;
     }
-    let is_ground = |cell: usize| {
-        classes.data()[cell] == GROUND
-            && surface.dem.heights.data()[cell].is_finite()
-            && (filled || source.data()[cell] == 1)
-    };
-    let ground_points = ground.map(|_| (0..width * height).filter(|&cell| is_ground(cell)).count() as u64);
+    let is_point =
+        |cell: usize| surface.dem.heights.data()[cell].is_finite() && (filled || source.data()[cell] == OBSERVED);
+    let mut class_points = BTreeMap::new();
+    for cell in (0..width * height).filter(|cell| is_point(*cell)) {
+        *class_points.entry(classes.data()[cell]).or_insert(0) += 1;
+    }
+    let ground_points = ground.map(|_| class_points.get(&GROUND).copied().unwrap_or(0));
     let [laz, copc] = FILES.map(|(name, _)| folder.path().join(name));
     let extent = extent.unwrap_or(CloudExtent { points: 0, synthetic: 0, low: [0.0; 3], high: [0.0; 3] });
-    Ok(CloudReport { laz, copc, crs: surface.crs.to_string(), ground_points, extent })
+    Ok(CloudReport { laz, copc, crs: surface.crs.to_string(), ground_points, class_points, extent })
+}
+
+/// Returns the LAS class of a point, from the class of its cell and from whether the terrain model
+/// shows the ground there. What stands beside the ground without being anything is unclassified.
+fn point_class(class: Option<u8>, is_ground: Option<bool>) -> u8 {
+    match (class, is_ground) {
+        (Some(code @ (LOW_VEGETATION | VEGETATION | BUILDING | WATER)), _) => code,
+        (Some(GROUND), None) | (_, Some(true)) => GROUND,
+        _ => UNCLASSIFIED,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_have_the_classes_of_their_cells_and_ground_is_what_the_terrain_shows() {
+        for code in [LOW_VEGETATION, VEGETATION, BUILDING, WATER] {
+            assert_eq!(point_class(Some(code), Some(true)), code);
+        }
+        assert_eq!(point_class(Some(GROUND), Some(false)), UNCLASSIFIED);
+        assert_eq!([point_class(Some(GROUND), None), point_class(None, Some(true))], [GROUND, GROUND]);
+        assert_eq!([point_class(None, None), point_class(Some(0), None)], [UNCLASSIFIED, UNCLASSIFIED]);
+    }
 }

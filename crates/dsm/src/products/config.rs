@@ -29,9 +29,10 @@ pub struct ProductsConfig {
     /// Whether the cloud has the filled cells, too, flagged as synthetic points.
     #[serde(default)]
     pub filled: bool,
-    /// Step between contour lines, metres; chosen from the relief and the cell size when `None`.
+    /// Step between contour lines, in the unit of the heights (metres, or feet where the vertical
+    /// datum counts in feet); chosen from the relief and the cell size when `None`.
     #[serde(default)]
-    pub contour_interval_m: Option<f64>,
+    pub contour_interval: Option<f64>,
     /// Largest vertical distance of the mesh from the cells, metres; the median standard deviation
     /// of the heights, between a quarter and the whole of a cell, when `None`.
     #[serde(default)]
@@ -54,7 +55,7 @@ impl ProductsConfig {
             products,
             ortho: None,
             filled: false,
-            contour_interval_m: None,
+            contour_interval: None,
             mesh_tolerance_m: None,
             threads: None,
             overwrite: false,
@@ -71,7 +72,7 @@ impl ProductsConfig {
             return Err(SettingError::new("the list of products", "empty", format!("one or more of {names}")));
         }
         for (name, length) in
-            [("the contour interval", self.contour_interval_m), ("the tolerance of the mesh", self.mesh_tolerance_m)]
+            [("the contour interval", self.contour_interval), ("the tolerance of the mesh", self.mesh_tolerance_m)]
         {
             if let Some(found) = length.filter(|length| !(*length > 0.0 && length.is_finite())) {
                 return Err(SettingError::new(name, found, "a positive number of metres"));

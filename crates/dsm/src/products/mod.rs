@@ -19,6 +19,7 @@ mod error;
 mod mesh;
 mod mesh_level;
 mod mesh_tiles;
+mod page;
 mod product;
 mod report;
 mod run;

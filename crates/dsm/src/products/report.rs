@@ -59,8 +59,8 @@ impl ProductsReport {
             );
             line("", copc.display().to_string());
         }
-        if let Some(ContoursReport { file, interval_m, lines }) = &self.contours {
-            line("contours", format!("{} ({lines} lines, every {interval_m} m)", file.display()));
+        if let Some(ContoursReport { file, interval, unit, lines, .. }) = &self.contours {
+            line("contours", format!("{} ({lines} lines, every {interval} {unit})", file.display()));
         }
         if let Some(mesh) = &self.mesh {
             let MeshReport { glb, glb_triangles, tileset, tiles, levels, tolerance_m, .. } = mesh;

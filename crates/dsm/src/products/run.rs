@@ -4,28 +4,28 @@ use std::path::{Path, PathBuf};
 
 use io::raster::ImageSource;
 use numeric::{Choice, Progress};
-use raster::Grid;
-use report::{JobPage, MapLayer};
 
-use super::cloud;
+use super::cloud::{self, ClassSources};
 use super::colour::colours;
 use super::config::{FOLDER, ProductsConfig};
 use super::contours;
 use super::error::ProductsError;
 use super::mesh;
 use super::mesh_tiles::{TILES, TILESET, is_tile};
+use super::page;
 use super::product::ProductKind;
 use super::report::ProductsReport;
 use super::scene::SurfaceOfRun;
 use crate::job_file::read_dsm_job;
 use job::files::{self, FileError};
 use job::guarded;
-use job::output_folder::OutputFolder;
-use job::report_page;
-use job::threads;
 use surfaces::classes::{self, ClassesConfig};
 use surfaces::dtm::{self, DtmConfig, DtmReport};
 use surfaces::ortho::{self, OrthoConfig};
+use job::output_folder::OutputFolder;
+use job::report_page;
+use job::run_links;
+use job::threads;
 
 /// Names in the folder of the products.
 const ORTHO: &str = "ortho.tif";
@@ -96,8 +96,8 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
         report.classes = Some(classes::run(&of, progress)?);
     }
     if config.wants(ProductKind::Contours) {
-        let (dtm, interval_m) = (output.join(DTM_HEIGHTS), config.contour_interval_m);
-        report.contours = Some(contours::make(&surface, &dtm, interval_m, &folder, progress)?);
+        let (dtm, interval) = (output.join(DTM_HEIGHTS), config.contour_interval);
+        report.contours = Some(contours::make(&surface, &dtm, interval, &folder, progress)?);
     }
     if config.wants(ProductKind::Cloud) || config.wants(ProductKind::Mesh) {
         let ortho = ortho_file(config, output, progress)?;
@@ -111,34 +111,15 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
         }
         if config.wants(ProductKind::Cloud) {
             let states = Some(output.join(DTM_STATES)).filter(|states| states.is_file());
-            report.cloud = Some(cloud::make(&surface, &colours, states.as_deref(), config.filled, &folder, progress)?);
+            let classes = Some(output.join(CLASS_CODES)).filter(|classes| classes.is_file());
+            let sources = ClassSources { ground: states.as_deref(), classes: classes.as_deref() };
+            report.cloud = Some(cloud::make(&surface, &colours, &sources, config.filled, &folder, progress)?);
         }
     }
-    let page = page(&report, &surface, shown)?;
+    let page = page::of(&report, &surface, shown)?;
     report_page::write_page(&output.join(REPORT), &page, &report, true)?;
+    run_links::refresh(&config.run)?;
     Ok(report)
-}
-
-/// Returns the page: the surface with its filled cells, the colours where there are some, and the
-/// report.
-fn page(
-    report: &ProductsReport,
-    surface: &SurfaceOfRun,
-    colours: Option<Grid<[u8; 3]>>,
-) -> Result<JobPage, ProductsError> {
-    let value = serde_json::to_value(report).map_err(FileError::from)?;
-    let lead = format!("Made of {}.", report.surface.display());
-    let caption = "Heights of the surface, shaded.";
-    let mut layers = vec![report_page::relief_layer("Surface", caption, &surface.dem.heights, surface.cell_m())];
-    layers.extend(colours.map(|picture| MapLayer {
-        name: "Colours".to_owned(),
-        picture,
-        caption: "Colours of the cells in the point cloud and the mesh.".to_owned(),
-        legend: None,
-    }));
-    let filled = surface.layer("filled.tif").ok();
-    let hatched = filled.map(|filled| report_page::thinned(&filled).0.map(|code| *code == 1.0));
-    Ok(JobPage { layers, hatched, ..JobPage::of_report("Products", &lead, &value) })
 }
 
 /// Makes products of a run that has just ended in its folder.

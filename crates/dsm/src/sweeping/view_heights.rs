@@ -96,6 +96,7 @@ fn described(images: &[ViewImage]) -> Vec<SceneImage> {
         camera: image.camera.clone(),
         size: (image.pixels.width(), image.pixels.height()),
         acquired_s: None,
+        satellite: None,
         sun: None,
         stated_incidence_deg: None,
         gain: 1.0,

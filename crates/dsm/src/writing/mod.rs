@@ -1,5 +1,6 @@
 //! The files of a run: rasters, pictures and report.
 
+mod image_tables;
 pub(super) mod output;
 pub(super) mod page;
 pub(super) mod pictures;

@@ -18,6 +18,7 @@ use crate::error::DsmError;
 use crate::planning::grid::DsmGrid;
 use crate::products::remove_products;
 use crate::report::{DsmReport, ImageReport};
+use job::run_links;
 use crate::stac::{AssetKind, StacAsset, StacRasters, item_and_collection};
 use crate::writing::page;
 use crate::writing::pictures::{Layer, ReadLayer, RunMaps, write_pictures};
@@ -51,9 +52,10 @@ pub const FILES: [&str; 23] = [
     "stac/item.json",
     "stac/collection.json",
     USED_CONFIG,
-    "report/report.html",
+    PAGE,
     "report/report.json",
 ];
+const PAGE: &str = "report/report.html";
 /// Configuration of the run, as a job file.
 pub const USED_CONFIG: &str = "used_config.toml";
 
@@ -215,7 +217,8 @@ fn write_looks(
     let maps = RunMaps::read(grid, read)?;
     maps.write_styles(&dsm)?;
     let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
-    let page = page::html(config, report, (&crs, grid.gsd_m), &maps)
+    let links = run_links::links("../", PAGE, |name| FILES.contains(&name));
+    let page = page::html(config, report, (&crs, grid.gsd_m), &maps, links)
         .map_err(|e| DsmError::Output { path: root.join("report/report.html"), source: std::io::Error::other(e) })?;
     io::write_bytes(root.join("report/report.html"), page.as_bytes(), false).map_err(FileError::from)?;
     let (item, collection) = item_and_collection(&stac_rasters(config, grid, report, &crs))?;

@@ -1,13 +1,12 @@
 //! The page of a run: maps, residuals, times and choices.
 
-use std::path::Path;
-
 use crs::Crs;
 use numeric::percentile;
-use report::{Axis, Chart, JobPage, JobTable, PictureError, PointResidual, residual_map};
+use report::{Axis, Chart, JobPage, JobTable, PageLink, PictureError, PointResidual, grouped, residual_map};
 
 use crate::config::DsmConfig;
-use crate::report::{ControlReport, DsmReport, ImageReport};
+use crate::report::{ControlReport, DsmReport};
+use crate::writing::image_tables::{days, file_name, image_table, quality_table};
 use crate::writing::pictures::RunMaps;
 
 /// Number of bars of a histogram.
@@ -28,6 +27,7 @@ pub(crate) fn html(
     report: &DsmReport,
     (crs, cell_m): (&Crs, f64),
     maps: &RunMaps,
+    links: Vec<PageLink>,
 ) -> Result<String, PictureError> {
     let surface = &report.surface;
     let share = |n: usize| format!("{:.1} %", 100.0 * n as f64 / surface.cells.max(1) as f64);
@@ -37,13 +37,14 @@ pub(crate) fn html(
     let mut page = JobPage {
         title: format!("Surface model {name}"),
         lead: format!(
-            "{} cells of {:.2} m from {} images: {} observed, {} filled, {} void. {}, heights above: {}.",
-            surface.cells,
+            "{} cells of {:.2} m from {} images: {} observed, {} filled, {} void. {} {}, heights above: {}.",
+            grouped(surface.cells),
             cell_m,
             report.images.len(),
             share(surface.observed),
             share(surface.filled),
             share(surface.void),
+            days(report),
             crs.horizontal_definition(),
             crs.vertical,
         ),
@@ -64,8 +65,10 @@ pub(crate) fn html(
     page.plots.extend(residual_plot(report));
     page.plots.extend(residual_maps(report));
     page.plots.push(time_plot(report));
-    page.tables = vec![image_table(report), pair_table(report), choice_table(report)];
+    page.tables = vec![image_table(report), quality_table(report)];
     page.tables.extend(report.pointing.control.as_ref().map(control_table));
+    page.tables.extend([pair_table(report), choice_table(report)]);
+    page.links = links;
     page.facts = facts(report);
     page.html()
 }
@@ -159,54 +162,6 @@ fn time_plot(report: &DsmReport) -> (Chart, String, String) {
     (chart, "Times".to_owned(), format!("{}.", named.join(", ")))
 }
 
-fn image_table(report: &DsmReport) -> JobTable {
-    let number = |value: Option<f64>, digits: usize| value.map_or(String::new(), |v| format!("{v:.digits$}"));
-    let has_sun = report.images.iter().any(|image| image.sun.is_some());
-    let row = |(i, image): (usize, &ImageReport)| {
-        let found = report.pointing.images.get(i);
-        let [shift_x, shift_y] = shift_at_middle(image);
-        let sun = image.sun.map(|sun| format!("{:.0}, {:.0}", sun.azimuth_deg, sun.elevation_deg));
-        let mut cells = vec![
-            format!("{} {}", i + 1, file_name(&image.path)),
-            image.acquired.clone().unwrap_or_default(),
-            image.rpc.clone(),
-            format!("{} × {}", image.size.0, image.size.1),
-            number(image.gsd_m, 2),
-            number(image.incidence_deg, 1),
-            format!("{shift_x:+.2}, {shift_y:+.2}"),
-            found.map_or(String::new(), |f| f.inliers.to_string()),
-            number(found.map(|f| f.residual_px).filter(|v| v.is_finite()), 2),
-        ];
-        if has_sun {
-            cells.push(sun.unwrap_or_default());
-        }
-        cells
-    };
-    let heads = [
-        "image",
-        "taken",
-        "RPC",
-        "size, px",
-        "GSD, m",
-        "incidence, °",
-        "correction in the middle, px",
-        "tie points",
-        "residual, px",
-    ];
-    JobTable {
-        title: "Images".to_owned(),
-        heads: heads.into_iter().chain(has_sun.then_some("sun: azimuth, elevation, °")).map(str::to_owned).collect(),
-        rows: report.images.iter().enumerate().map(row).collect(),
-    }
-}
-
-/// Returns the shift that the correction gives the middle of an image, pixels.
-fn shift_at_middle(image: &ImageReport) -> [f64; 2] {
-    let middle = camera::ImagePoint::new(0.5 * image.size.0 as f64, 0.5 * image.size.1 as f64);
-    let moved = image.applied_correction.apply(middle);
-    [moved.sample - middle.sample, moved.line - middle.line]
-}
-
 fn pair_table(report: &DsmReport) -> JobTable {
     let row = |pair: &crate::PairReport| {
         let g = &pair.geometry;
@@ -227,7 +182,7 @@ fn pair_table(report: &DsmReport) -> JobTable {
 
 fn control_table(control: &ControlReport) -> JobTable {
     JobTable {
-        title: "Ground points".to_owned(),
+        title: "Residuals of the ground points".to_owned(),
         heads: ControlReport::HEADS.map(str::to_owned).to_vec(),
         rows: control.rows().into_iter().map(Vec::from).collect(),
     }
@@ -289,8 +244,4 @@ fn facts(report: &DsmReport) -> Vec<(String, String)> {
     }
     facts.extend(report.peak_memory_mb.map(|mb| ("peak memory".to_owned(), format!("{mb:.0} MB"))));
     facts
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

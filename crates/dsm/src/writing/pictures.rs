@@ -140,7 +140,7 @@ impl RunMaps {
 }
 
 /// Writes hillshade, coloured relief and a thumbnail, with their world files. Filled cells are
-/// hatched in the relief.
+/// hatched in the relief, and cells without a height have a colour of their own in all of them.
 ///
 /// # Errors
 /// Those of `read`; [`DsmError::Image`] and [`DsmError::File`] when a file cannot be written.
@@ -150,7 +150,7 @@ pub(crate) fn write_pictures(folder: &Path, grid: &DsmGrid, read: ReadLayer<'_>)
     let filled = reduced(read, Layer::Filled, grid.size, side)?;
     let cell_m = grid.gsd_m * side as f64;
     let shade = raster::hillshade(&heights, (cell_m, cell_m), Light::default());
-    io::raster::write_png_gray(folder.join("hillshade.png"), &shade, false)?;
+    io::raster::write_png_rgb(folder.join("hillshade.png"), &raster::shade_picture(&shade), false)?;
     drop(shade);
     let mut picture = relief(&heights, cell_m);
     hatch(&mut picture, &filled);

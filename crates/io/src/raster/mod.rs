@@ -21,7 +21,7 @@ pub use read::source::{ImageInfo, ImageSource, SampleType};
 pub use read::spectral::{BandSpectrum, IndexBands, write_multispectral_with_rpc};
 pub use read::undeclared::undeclared_no_data;
 pub use write::band::{Band, BandData};
-pub use write::contours::{ContourSurface, write_contours};
+pub use write::contours::{ContourLines, ContourSurface, write_contours};
 pub use write::depth_png::{DepthScale, write_depth_png};
 pub use write::geotiff::{
     CogCrs, CogPlace, CogRaster, Sampling, write_cog, write_image_with_rpc, write_map, write_map_with_rpc,

@@ -30,6 +30,9 @@ pub struct BatchConfig {
     /// Folder that paths in the settings are relative to.
     #[serde(skip)]
     pub(crate) folder: PathBuf,
+    /// Names of the scenes that are worked on; all when empty.
+    #[serde(skip)]
+    only: Vec<String>,
 }
 
 /// Limits of the whole batch.
@@ -70,6 +73,14 @@ pub struct BatchDefaults {
     pub heightmap: Table,
     /// Settings of priors.
     pub priors: Table,
+    /// Settings of terrain models.
+    pub dtm: Table,
+    /// Settings of classes.
+    pub classes: Table,
+    /// Settings of products.
+    pub products: Table,
+    /// Settings of changes.
+    pub diff: Table,
 }
 
 /// A scene of a batch.
@@ -103,9 +114,40 @@ pub struct BatchScene {
     /// Settings of the priors that differ from the defaults.
     #[serde(default)]
     pub priors: Table,
+    /// Settings of the terrain model that differ from the defaults.
+    #[serde(default)]
+    pub dtm: Table,
+    /// Settings of the classes that differ from the defaults.
+    #[serde(default)]
+    pub classes: Table,
+    /// Settings of the products that differ from the defaults.
+    #[serde(default)]
+    pub products: Table,
+    /// Settings of the change that differ from the defaults.
+    #[serde(default)]
+    pub diff: Table,
 }
 
 impl BatchConfig {
+    /// Works on the scenes of these names alone; the others are reported as they stand.
+    ///
+    /// # Errors
+    /// [`BatchError::UnknownScene`].
+    pub fn select(&mut self, names: &[String]) -> Result<(), BatchError> {
+        let is_known = |name: &String| self.scenes.iter().any(|scene| scene.name == *name);
+        if let Some(name) = names.iter().find(|name| !is_known(name)) {
+            let known = self.scenes.iter().map(|scene| scene.name.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(BatchError::UnknownScene { name: name.clone(), known });
+        }
+        self.only = names.to_vec();
+        Ok(())
+    }
+
+    /// Whether a scene is worked on.
+    pub(super) fn is_selected(&self, scene: &BatchScene) -> bool {
+        self.only.is_empty() || self.only.contains(&scene.name)
+    }
+
     /// Returns the settings of a task of a scene.
     pub(super) fn settings<'a>(&'a self, scene: &'a BatchScene, task: TaskKind) -> TaskSettings<'a> {
         let (defaults, own) = match task {
@@ -114,6 +156,10 @@ impl BatchConfig {
             TaskKind::Eval => (&self.defaults.eval, &scene.eval),
             TaskKind::HeightMap => (&self.defaults.heightmap, &scene.heightmap),
             TaskKind::Priors => (&self.defaults.priors, &scene.priors),
+            TaskKind::Dtm => (&self.defaults.dtm, &scene.dtm),
+            TaskKind::Classes => (&self.defaults.classes, &scene.classes),
+            TaskKind::Products => (&self.defaults.products, &scene.products),
+            TaskKind::Diff => (&self.defaults.diff, &scene.diff),
         };
         TaskSettings { defaults, own }
     }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use report::{BatchPage, BatchRow};
 use serde::Serialize;
 
+use crate::batch::scene_summary;
 use crate::batch::task::TaskKind;
 
 /// What became of a batch.
@@ -31,6 +32,9 @@ pub struct SceneReport {
     pub folder: PathBuf,
     /// Its tasks in the order in which they are done.
     pub tasks: Vec<TaskReport>,
+    /// Whether it was left out of this run. Its tasks are told as they stand, and do not count.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub left_out: bool,
 }
 
 /// What became of a task.
@@ -66,8 +70,11 @@ pub enum TaskState {
     Partial,
     /// There is no result.
     Failed,
-    /// It was not begun, because the task before it has no result.
+    /// It was not begun, because the task before it has no result, or because its scene was left
+    /// out.
     NotBegun,
+    /// It would be done by a run.
+    ToDo,
 }
 
 impl TaskState {
@@ -83,6 +90,7 @@ impl TaskState {
             Self::Partial => "partial",
             Self::Failed => "failed",
             Self::NotBegun => "not begun",
+            Self::ToDo => "to do",
         }
     }
 }
@@ -97,10 +105,16 @@ impl TaskReport {
 impl BatchReport {
     /// Makes the report of scenes.
     pub(super) fn new(scenes: Vec<SceneReport>) -> Self {
-        let tasks = || scenes.iter().flat_map(|scene| &scene.tasks);
+        let tasks = || scenes.iter().filter(|scene| !scene.left_out).flat_map(|scene| &scene.tasks);
         let complete = tasks().filter(|task| task.state.is_complete()).count();
         let incomplete = tasks().count() - complete;
         Self { version: env!("CARGO_PKG_VERSION").to_owned(), complete, incomplete, scenes }
+    }
+
+    /// Whether a task failed, or would fail.
+    pub fn has_failed(&self) -> bool {
+        let mut tasks = self.scenes.iter().filter(|scene| !scene.left_out).flat_map(|scene| &scene.tasks);
+        tasks.any(|task| task.state == TaskState::Failed)
     }
 
     /// Returns the report as text: a line for each task.
@@ -131,6 +145,12 @@ impl BatchReport {
                 warnings: task.warnings.clone(),
             })
         });
-        BatchPage { complete: self.complete, incomplete: self.incomplete, rows: rows.collect() }.html()
+        let row = |scene: &SceneReport| {
+            let is_complete = scene.tasks.iter().all(|task| task.state.is_complete());
+            let seconds = scene.tasks.iter().map(|task| task.seconds).sum();
+            scene_summary::of(&scene.name, &scene.folder, is_complete, seconds)
+        };
+        let scenes = self.scenes.iter().map(row).collect();
+        BatchPage { complete: self.complete, incomplete: self.incomplete, scenes, rows: rows.collect() }.html()
     }
 }

@@ -45,6 +45,14 @@ pub enum BatchError {
         /// The name.
         name: String,
     },
+    /// A scene that does not exist.
+    #[error("the batch has no scene {name:?}; there are {known}")]
+    UnknownScene {
+        /// The name.
+        name: String,
+        /// Names of the scenes.
+        known: String,
+    },
     /// A task that does not exist.
     #[error("the scene {scene:?} asks for the task `{task}`, which is not known; known are {known}")]
     UnknownTask {

@@ -9,6 +9,7 @@ mod batch_report;
 mod error;
 mod record;
 mod run;
+mod scene_summary;
 mod task;
 mod task_log;
 mod tasks_of_scene;
@@ -16,7 +17,7 @@ mod tasks_of_scene;
 pub use batch_file::{BatchConfig, BatchDefaults, BatchLimits, BatchScene, read_batch};
 pub use batch_report::{BatchReport, SceneReport, TaskReport, TaskState};
 pub use error::BatchError;
-pub use run::run;
+pub use run::{look, run};
 pub use task::{TaskKind, TaskSettings};
 
 /// A commented batch file with every key.

@@ -141,7 +141,8 @@ fn files_of_images(job: &TaskJob) -> Result<BTreeSet<PathBuf>, String> {
         TaskJob::Dsm(config) => return files_of(config).map_err(|e| with_causes(&e)),
         TaskJob::Ortho(config) => config.images.as_slice(),
         TaskJob::Priors(config) => config.cameras.as_slice(),
-        TaskJob::Eval(_) | TaskJob::HeightMap(_) => &[],
+        TaskJob::Classes(config) => config.multispectral.as_slice(),
+        TaskJob::Eval(_) | TaskJob::HeightMap(_) | TaskJob::Dtm(_) | TaskJob::Products(_) | TaskJob::Diff(_) => &[],
     };
     Ok(images.iter().filter(|path| path.is_file()).flat_map(|path| io::rpc::side_files(path)).collect())
 }

@@ -24,7 +24,21 @@ const REPORT_PAGE: &str = "batch_report.html";
 /// Memory of the surface models that are computed at a time where none is given, megabytes.
 const MEMORY_MB: u64 = 4000;
 /// Folders of the tasks of a scene, and those that their jobs write below the folder of the scene.
-const SCENE_FOLDERS: [&str; 9] = [TASKS, CHUNKS, "dsm", "report", "stac", "eval", "ortho", "heightmaps", "priors"];
+const SCENE_FOLDERS: [&str; 13] = [
+    TASKS,
+    CHUNKS,
+    "dsm",
+    "report",
+    "stac",
+    "eval",
+    "ortho",
+    "heightmaps",
+    "priors",
+    "dtm",
+    "classes",
+    "products",
+    "diff",
+];
 
 /// Runs a batch. What an earlier run of it completed is left alone.
 ///
@@ -33,9 +47,11 @@ const SCENE_FOLDERS: [&str; 9] = [TASKS, CHUNKS, "dsm", "report", "stac", "eval"
 /// [`BatchError::File`] for a folder in use and a report that cannot be written;
 /// [`BatchError::Cancelled`]. A task that fails is in the report.
 pub fn run(batch: &BatchConfig, progress: &dyn Progress) -> Result<BatchReport, BatchError> {
-    let scenes = batch.scenes.iter().map(|scene| prepare(batch, scene)).collect::<Result<Vec<_>, _>>()?;
+    let all = prepare_all(batch)?;
     let folder = OutputFolder::take(&batch.output)?;
     guarded::remove_inside(folder.path(), &|name| name.starts_with(TEMPORARY))?;
+    let (scenes, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(is_selected, _)| *is_selected);
+    let scenes: Vec<SceneJobs> = scenes.into_iter().map(|(_, scene)| scene).collect();
     for scene in &scenes {
         guarded::check_folders(folder.path(), [scene.name.as_str()])?;
         guarded::check_folders(&scene.folder, SCENE_FOLDERS)?;
@@ -63,12 +79,30 @@ pub fn run(batch: &BatchConfig, progress: &dyn Progress) -> Result<BatchReport, 
         }
     });
     progress.check_cancelled()?;
-    let reports: Vec<SceneReport> = reports.into_inner().unwrap_or_default().into_iter().flatten().collect();
+    let mut reports: Vec<SceneReport> = reports.into_inner().unwrap_or_default().into_iter().flatten().collect();
+    reports.extend(others.iter().map(|(_, scene)| scene.look(true)));
+    let place = |name: &str| batch.scenes.iter().position(|scene| scene.name == name);
+    reports.sort_by_key(|scene| place(&scene.name));
     let report = BatchReport::new(reports);
     write_json(&batch.output.join(REPORT_JSON), &report, true)?;
     let page = report.page();
     io::write_bytes(batch.output.join(REPORT_PAGE), page.as_bytes(), true).map_err(FileError::from)?;
     Ok(report)
+}
+
+/// Returns what [`run`] would do, without doing anything: the settings and images of all scenes are
+/// looked at, and what is done already.
+///
+/// # Errors
+/// [`BatchError::UnknownTask`], [`BatchError::Settings`].
+pub fn look(batch: &BatchConfig) -> Result<BatchReport, BatchError> {
+    let scenes = prepare_all(batch)?;
+    Ok(BatchReport::new(scenes.iter().map(|(is_selected, scene)| scene.look(!is_selected)).collect()))
+}
+
+/// Makes the jobs of all scenes, each with whether it is worked on.
+fn prepare_all(batch: &BatchConfig) -> Result<Vec<(bool, SceneJobs)>, BatchError> {
+    batch.scenes.iter().map(|scene| Ok((batch.is_selected(scene), prepare(batch, scene)?))).collect()
 }
 
 fn take_next<'a>(next: &AtomicUsize, scenes: &'a [SceneJobs]) -> Option<(usize, &'a SceneJobs)> {
@@ -98,6 +132,15 @@ fn prepare(batch: &BatchConfig, scene: &BatchScene) -> Result<SceneJobs, BatchEr
             what,
         })?;
         jobs.push(job.limited(memory_mb(batch)));
+    }
+    let makes_products = |job: &TaskJob| matches!(job, TaskJob::Dsm(config) if !config.products.is_empty());
+    if tasks.contains(&TaskKind::Products) && jobs.iter().any(makes_products) {
+        return Err(BatchError::Settings {
+            scene: scene.name.clone(),
+            task: TaskKind::Dsm.name().to_owned(),
+            what: "`products` is given and the task `products` as well, which write the same folder; leave one out"
+                .to_owned(),
+        });
     }
     Ok(SceneJobs { name: scene.name.clone(), folder, tasks, jobs: images.map(|_| jobs) })
 }

@@ -8,17 +8,21 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use dsm::production::{PLAN, POINTING, make_or_resume};
-use dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
-use job::error_text::with_causes;
-use job::job_file::{JobFileError, defect};
-use job::job_paths::resolved;
-use job::path_variables::expanded;
-use scenes::priors::PriorsConfig;
 use surfaces::camera_stand::{StandConfig, StandSource};
+use surfaces::classes::ClassesConfig;
+use surfaces::diff::DiffConfig;
+use dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
+use surfaces::dtm::DtmConfig;
+use job::error_text::with_causes;
 use surfaces::eval::{EvalTarget, GridEvalConfig};
 use surfaces::heightmap::HeightMapConfig;
+use job::job_file::{JobFileError, defect};
+use job::job_paths::resolved;
 use surfaces::ortho::OrthoConfig;
+use job::path_variables::expanded;
+use scenes::priors::PriorsConfig;
+use dsm::production::{PLAN, POINTING, make_or_resume};
+use dsm::products::ProductsConfig;
 
 /// What a batch can make of a scene, in the order in which it is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -35,11 +39,29 @@ pub enum TaskKind {
     HeightMap,
     /// Priors of a city model for the images.
     Priors,
+    /// The bare ground under it.
+    Dtm,
+    /// Ground, buildings and vegetation.
+    Classes,
+    /// Point cloud, mesh, contour lines and what else can be made of it.
+    Products,
+    /// What changed against the surface model of another date.
+    Diff,
 }
 
 impl TaskKind {
     /// All tasks.
-    pub const ALL: [Self; 5] = [Self::Dsm, Self::Ortho, Self::Eval, Self::HeightMap, Self::Priors];
+    pub const ALL: [Self; 9] = [
+        Self::Dsm,
+        Self::Ortho,
+        Self::Eval,
+        Self::HeightMap,
+        Self::Priors,
+        Self::Dtm,
+        Self::Classes,
+        Self::Products,
+        Self::Diff,
+    ];
 
     /// Returns the name that batch files have for the task.
     pub const fn name(self) -> &'static str {
@@ -49,6 +71,10 @@ impl TaskKind {
             Self::Eval => "eval",
             Self::HeightMap => "heightmap",
             Self::Priors => "priors",
+            Self::Dtm => "dtm",
+            Self::Classes => "classes",
+            Self::Products => "products",
+            Self::Diff => "diff",
         }
     }
 
@@ -60,16 +86,20 @@ impl TaskKind {
             Self::Eval => &["test", "target", "page", "error_map", "threads", "overwrite"],
             Self::HeightMap => &["source", "output", "threads", "overwrite"],
             Self::Priors => &["cameras", "output", "threads", "overwrite"],
+            Self::Dtm | Self::Classes => &["surface", "output", "threads", "overwrite"],
+            Self::Products => &["run", "output", "threads", "overwrite"],
+            Self::Diff => &["after", "output", "threads", "overwrite"],
         }
     }
 
     /// Settings that must be given.
     const fn needed(self) -> &'static [&'static str] {
         match self {
-            Self::Dsm | Self::Ortho => &[],
+            Self::Dsm | Self::Ortho | Self::Dtm | Self::Classes | Self::Products => &[],
             Self::Eval => &["reference"],
             Self::HeightMap => &["stand"],
             Self::Priors => &["model"],
+            Self::Diff => &["before"],
         }
     }
 
@@ -81,6 +111,10 @@ impl TaskKind {
             Self::Eval => &["reference", "classes", "mask", "terrain", "confidence", "objects"],
             Self::HeightMap => &["terrain", "raster", "list", "camera_file"],
             Self::Priors => &["model", "transform", "corrections"],
+            Self::Dtm => &[],
+            Self::Classes => &["vegetation_index", "multispectral", "building_index", "report"],
+            Self::Products => &["ortho"],
+            Self::Diff => &["before", "areas"],
         }
     }
 }
@@ -135,6 +169,10 @@ pub(super) enum TaskJob {
     Eval(Box<GridEvalConfig>),
     HeightMap(Box<HeightMapConfig>),
     Priors(Box<PriorsConfig>),
+    Dtm(DtmConfig),
+    Classes(Box<ClassesConfig>),
+    Products(ProductsConfig),
+    Diff(Box<DiffConfig>),
 }
 
 impl TaskJob {
@@ -176,6 +214,16 @@ impl TaskJob {
                 base.corrections = scene.has_surface.then(|| folder.join("report/report.json"));
                 Self::Priors(Box::new(with(&base, &given)?))
             }
+            TaskKind::Dtm => Self::Dtm(with(&DtmConfig::new(folder.clone(), folder.join("dtm")), &given)?),
+            TaskKind::Classes => {
+                let base = ClassesConfig::new(folder.clone(), folder.join("classes"));
+                Self::Classes(Box::new(with(&base, &given)?))
+            }
+            TaskKind::Products => Self::Products(with(&ProductsConfig::new(folder), &given)?),
+            TaskKind::Diff => {
+                let base = DiffConfig::new(PathBuf::new(), folder.clone(), folder.join("diff"));
+                Self::Diff(Box::new(with(&base, &given)?))
+            }
         })
     }
 
@@ -195,6 +243,10 @@ impl TaskJob {
             Self::Eval(config) => config.overwrite,
             Self::HeightMap(config) => config.overwrite,
             Self::Priors(config) => config.overwrite,
+            Self::Dtm(config) => config.overwrite,
+            Self::Classes(config) => config.overwrite,
+            Self::Products(config) => config.overwrite,
+            Self::Diff(config) => config.overwrite,
         };
         let foreign = self.results().into_iter().find(|path| !may_replace && path.symlink_metadata().is_ok())?;
         Some(format!("a result is there that the batch did not make: {}", foreign.display()))
@@ -217,7 +269,9 @@ impl TaskJob {
         match self {
             Self::Dsm(config) => FILES.iter().map(|name| config.output.join(name)).collect(),
             Self::Ortho(config) => vec![config.output.clone(), config.mask()],
-            Self::Eval(_) => vec![self.product(), self.product().with_extension("html")],
+            Self::Eval(_) | Self::Dtm(_) | Self::Classes(_) | Self::Products(_) | Self::Diff(_) => {
+                vec![self.product(), self.product().with_extension("html")]
+            }
             _ => vec![self.product()],
         }
     }
@@ -230,7 +284,9 @@ impl TaskJob {
                 let names = FILES.into_iter().chain([PLAN, POINTING]).chain(products);
                 names.map(|name| config.output.join(name)).collect()
             }
-            Self::Eval(_) => self.product().parent().map(Path::to_owned).into_iter().collect(),
+            Self::Eval(_) | Self::Dtm(_) | Self::Classes(_) | Self::Products(_) | Self::Diff(_) => {
+                self.product().parent().map(Path::to_owned).into_iter().collect()
+            }
             _ => self.needed(),
         }
     }
@@ -243,6 +299,10 @@ impl TaskJob {
             Self::Eval(_) => TaskKind::Eval,
             Self::HeightMap(_) => TaskKind::HeightMap,
             Self::Priors(_) => TaskKind::Priors,
+            Self::Dtm(_) => TaskKind::Dtm,
+            Self::Classes(_) => TaskKind::Classes,
+            Self::Products(_) => TaskKind::Products,
+            Self::Diff(_) => TaskKind::Diff,
         }
     }
 
@@ -257,6 +317,10 @@ impl TaskJob {
             }
             Self::HeightMap(config) => config.output.clone(),
             Self::Priors(config) => config.output.clone(),
+            Self::Dtm(config) => config.output.join("dtm.json"),
+            Self::Classes(config) => config.output.join("classes.json"),
+            Self::Products(config) => config.folder().join("products.json"),
+            Self::Diff(config) => config.output.join("diff.json"),
         }
     }
 
@@ -268,6 +332,10 @@ impl TaskJob {
             Self::Eval(config) => (&mut config.threads, &mut config.overwrite),
             Self::HeightMap(config) => (&mut config.threads, &mut config.overwrite),
             Self::Priors(config) => (&mut config.threads, &mut config.overwrite),
+            Self::Dtm(config) => (&mut config.threads, &mut config.overwrite),
+            Self::Classes(config) => (&mut config.threads, &mut config.overwrite),
+            Self::Products(config) => (&mut config.threads, &mut config.overwrite),
+            Self::Diff(config) => (&mut config.threads, &mut config.overwrite),
         };
         (*own_threads, *own_overwrite) = (threads, overwrite);
     }
@@ -309,6 +377,14 @@ impl TaskJob {
                 let report = scenes::priors::run(config, progress).map_err(|e| with_causes(&e))?;
                 (!report.is_whole()).then(|| "objects of the model cannot be used or are not seen".to_owned())
             }
+            Self::Dtm(config) => surfaces::dtm::run(config, progress).map(|_| None).map_err(|e| with_causes(&e))?,
+            Self::Classes(config) => {
+                surfaces::classes::run(config, progress).map(|_| None).map_err(|e| with_causes(&e))?
+            }
+            Self::Products(config) => {
+                dsm::products::run(config, progress).map(|_| None).map_err(|e| with_causes(&e))?
+            }
+            Self::Diff(config) => surfaces::diff::run(config, progress).map(|_| None).map_err(|e| with_causes(&e))?,
         };
         Ok(TaskOutcome::whole_unless(missing))
     }

@@ -84,7 +84,46 @@ impl SceneJobs {
             }
             limits.progress.step();
         }
-        SceneReport { name: self.name.clone(), folder: self.folder.clone(), tasks }
+        self.report(tasks, false)
+    }
+
+    /// Returns how the tasks stand, and what a run would do. Nothing is written. A task that rests
+    /// on a surface model that is to be made is to be made, too.
+    pub(super) fn look(&self, left_out: bool) -> SceneReport {
+        let jobs = match &self.jobs {
+            Ok(jobs) => jobs.as_slice(),
+            Err(reason) => {
+                let failed = |task: &TaskKind| TaskReport {
+                    state: if left_out { TaskState::NotBegun } else { TaskState::Failed },
+                    ..TaskReport::not_begun(*task, reason)
+                };
+                return self.report(self.tasks.iter().map(failed).collect(), left_out);
+            }
+        };
+        let mut tasks: Vec<TaskReport> = Vec::with_capacity(jobs.len());
+        for job in jobs {
+            let record = TaskRecord::read(&self.folder.join(TASKS).join(format!("{}.json", job.kind().name())));
+            let is_surface_open = tasks.iter().any(|task| task.task == TaskKind::Dsm && !task.state.is_complete());
+            let mut looked = job.clone();
+            looked.set_running(None, record.is_some());
+            let (state, reason) = match (record.as_ref().map(|record| record.standing(job, &self.folder)), left_out) {
+                (Some(Standing::Complete), _) if !is_surface_open => (TaskState::DoneBefore, None),
+                (_, true) => (TaskState::NotBegun, Some("the scene is left out of this run".to_owned())),
+                (Some(Standing::Damaged(what)), _) => (TaskState::ToDo, Some(format!("a result is damaged: {what}"))),
+                _ => match looked.refused() {
+                    Some(reason) => (TaskState::Failed, Some(reason)),
+                    None => (TaskState::ToDo, None),
+                },
+            };
+            let course = record.filter(|_| state.is_complete()).map(|record| record.course).unwrap_or_default();
+            let TaskCourse { seconds, attempts, warnings } = course;
+            tasks.push(TaskReport { task: job.kind(), state, reason, attempts, seconds, warnings });
+        }
+        self.report(tasks, left_out)
+    }
+
+    fn report(&self, tasks: Vec<TaskReport>, left_out: bool) -> SceneReport {
+        SceneReport { name: self.name.clone(), folder: self.folder.clone(), tasks, left_out }
     }
 
     fn work(&self, job: &TaskJob, limits: &TaskLimits<'_>) -> Ended {

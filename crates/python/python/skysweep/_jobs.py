@@ -157,6 +157,10 @@ class ClassifyConfig(TypedDict, total=False):
     """Residual up to which a surface is smooth, in residuals of the bare ground; between the two
     above."""
 
+    least_radius_m: float
+    """Least radius of curvature of roofs, metres, as the area and the residual of planes around
+    a cell tell it. Crowns have radii up to that; roofs are flat between their edges."""
+
     least_building_m2: float
     """Smallest area of a building, square metres."""
 
@@ -1122,7 +1126,7 @@ def products(
     products: Sequence[Literal["cloud", "dtm", "classes", "contours", "mesh"]] = ("cloud", "dtm", "classes", "contours", "mesh"),
     ortho: PathLike | None = None,
     filled: bool = False,
-    contour_interval_m: float | None = None,
+    contour_interval: float | None = None,
     mesh_tolerance_m: float | None = None,
     threads: int | None = None,
     overwrite: bool = False,
@@ -1137,8 +1141,9 @@ def products(
         ortho: Ortho that colours the products, on the map of the surface model. `None` makes one of
             the images of the run, or takes the one that an earlier call made.
         filled: Whether the cloud has the filled cells, too, flagged as synthetic points.
-        contour_interval_m: Step between contour lines, metres; chosen from the relief and the cell
-            size when `None`.
+        contour_interval: Step between contour lines, in the unit of the heights (metres, or feet
+            where the vertical datum counts in feet); chosen from the relief and the cell size when
+            `None`.
         mesh_tolerance_m: Largest vertical distance of the mesh from the cells, metres; the median
             standard deviation of the heights, between a quarter and the whole of a cell, when
             `None`.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use eval::{ErrorStatistics, Metrics, cumulative, histogram};
 
-use raster::Grid;
+use raster::{Grid, VOID_COLOUR};
 
 use super::numbers::{grouped, percent};
 use super::report::EvaluationReport;
@@ -23,12 +23,13 @@ impl EvaluationReport<'_> {
         let (reference, errors) = (fitted(self.reference), fitted(&self.found.errors));
         let (range, (low, high)) = (self.error_range_m(), self.height_range());
         let surface = |heights: &Grid<f32>| relief(heights, self.reference.width(), self.protocol.cell_m, (low, high));
-        let heights = format!("Colours from {low:.1} m to {high:.1} m, the same for both.");
+        let key = |colour, text| format!("<span class=\"key\" style=\"background:{}\"></span>{text} ", css(colour));
+        let heights =
+            format!("Colours from {low:.1} m to {high:.1} m, the same for both. {}", key(VOID_COLOUR, "no height"));
         let test =
             figure(&data_uri(&surface(&fitted(&self.found.aligned)))?, "the evaluated surface", "Evaluated", &heights);
         let truth = figure(&data_uri(&surface(&reference))?, "the reference surface", "Reference", &heights);
         let map = data_uri(&error_picture(&errors, &reference, range))?;
-        let key = |colour, text| format!("<span class=\"key\" style=\"background:{}\"></span>{text} ", css(colour));
         let caption = format!(
             "Evaluated − reference, metres: blue too low, red too high. {}{}",
             key(MISSING, "missing"),

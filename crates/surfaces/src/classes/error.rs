@@ -22,6 +22,20 @@ pub enum ClassesError {
     /// The surface model cannot be used.
     #[error(transparent)]
     Surface(#[from] DtmError),
+    /// Hardly any cell shows the ground, so that nothing can be said to stand on it.
+    #[error(
+        "{cells} of {heights} cells with heights show the ground, expected one in a hundred: without ground there are \
+         no classes; use a surface that reaches open ground, or fit the search for the ground: {}",
+        path.display()
+    )]
+    NoGround {
+        /// The surface model.
+        path: PathBuf,
+        /// Cells that show the ground.
+        cells: usize,
+        /// Cells with heights.
+        heights: usize,
+    },
     /// The vegetation index cannot be read at the cells of the surface.
     #[error("cannot use the vegetation index")]
     Index(#[source] Box<EvalJobError>),

@@ -14,13 +14,16 @@
 mod config;
 mod cue;
 mod error;
+mod layers;
 mod multispectral;
 mod report;
 mod run;
 
 pub use config::ClassesConfig;
 pub use error::ClassesError;
+pub use layers::ClassLayers;
 pub use multispectral::IndexImage;
 pub use report::ClassesReport;
-pub use run::FILES;
 pub use run::run;
+pub use run::legend;
+pub use run::FILES;

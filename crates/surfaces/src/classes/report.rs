@@ -6,6 +6,7 @@ use classes::ClassifyConfig;
 use serde::Serialize;
 use terrain::GroundConfig;
 
+use super::layers::ClassLayers;
 use super::multispectral::IndexImage;
 
 /// A finished class raster.
@@ -42,6 +43,10 @@ pub struct ClassesReport {
     pub has_building_index: bool,
     /// Cells whose height was not observed or is uncertain, where the building index decides.
     pub cells_weak: usize,
+    /// Share of the cells with heights that show the ground, 0 to 1.
+    pub ground_share: f64,
+    /// What the layers beside the surface say of its cells.
+    pub layers: ClassLayers,
     /// Parameters of the search for the ground.
     pub terrain: GroundConfig,
     /// Parameters of the classes.
@@ -55,7 +60,7 @@ impl ClassesReport {
         let share = |n: usize| 100.0 * n as f64 / cells.max(1) as f64;
         format!(
             "classes {}\ncells   {cells} ({:.1} % ground, {:.1} % low vegetation, {:.1} % building, {:.1} % vegetation, \
-             {:.1} % water, {:.1} % unknown)\n",
+             {:.1} % water, {:.1} % unknown)\nseen    {:.1} % of the heights show the ground\nlayers  {}\n",
             self.classes.display(),
             share(self.cells_ground),
             share(self.cells_low_vegetation),
@@ -63,6 +68,8 @@ impl ClassesReport {
             share(self.cells_vegetation),
             share(self.cells_water),
             share(self.cells_unknown),
+            100.0 * self.ground_share,
+            self.layers.text(),
         )
     }
 }

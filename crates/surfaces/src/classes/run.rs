@@ -9,11 +9,12 @@ use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};
-use terrain::bare_ground_of_observed;
+use terrain::{BareGround, bare_ground_of_observed};
 
 use super::config::ClassesConfig;
 use super::cue::{Cue, unsure_heights};
 use super::error::ClassesError;
+use super::layers::weak_cells;
 use super::multispectral::ImageIndex;
 use super::report::ClassesReport;
 use crate::dtm::{self, DtmConfig};
@@ -35,11 +36,17 @@ const STYLES: [&str; 2] = ["classes.qml", "roughness.qml"];
 /// Names of the files that the job writes.
 pub const FILES: [&str; 7] = [CLASSES, ROUGHNESS, NDVI, STYLES[0], STYLES[1], PAGE, REPORT];
 
+/// Share of the cells with heights that must show the ground: with less, the ground under nearly
+/// everything is a guess from far away, and bare slopes stand above it.
+const NEEDED_GROUND: f64 = 0.01;
+/// Share below which the ground is doubtful: in dense old towns and closed forests a tenth is left.
+const LEAST_GROUND: f64 = 0.05;
+
 /// Finds ground, buildings and vegetation of a surface model, and writes them with a report.
 ///
 /// # Errors
-/// [`ClassesError`]: a surface that cannot be read or is not on a map in metres, outputs that
-/// exist.
+/// [`ClassesError`]: a surface that cannot be read, is not on a map in metres or shows no ground,
+/// outputs that exist.
 ///
 /// ```
 /// use surfaces::classes::{ClassesConfig, run};
@@ -75,6 +82,8 @@ pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRep
         let (unobserved, _) = dtm::unobserved(&surface)?;
         let ground = bare_ground_of_observed(&surface.heights, unobserved.as_ref(), cell_m, &config.terrain, progress)?;
         progress.check_cancelled()?;
+        let ground_share = checked_ground(&surface, &ground, progress)?;
+        let (weak, layers) = weak_cells(&surface)?;
         let mut above = surface.heights.clone();
         above.data_mut().iter_mut().zip(ground.heights.data()).for_each(|(cell, ground)| *cell -= ground);
         let mut input = ClassifyInput {
@@ -84,6 +93,7 @@ pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRep
             is_index_coarse: !config.multispectral.is_empty(),
             cue: None,
             crowns: None,
+            weak: weak.as_ref(),
             cell_m,
         };
         let made = match config.multispectral.is_empty() {
@@ -105,11 +115,35 @@ pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRep
         let (index, images) = made.map_or((None, Vec::new()), |made| (Some(made.index), made.images));
         let vegetation_index = index.as_ref().map(|_| config.output.join(NDVI));
         let report = report(config, &surface, &found, cell_m);
-        let report = ClassesReport { cells_weak, vegetation_index, index_images: images, ..report };
+        let report =
+            ClassesReport { cells_weak, vegetation_index, index_images: images, ground_share, layers, ..report };
         let made = Made { found: &found, index: index.as_ref() };
         write(config, &folder, &surface, &made, Crs::ellipsoidal(crs.horizontal), &report)?;
         Ok(report)
     })?
+}
+
+/// Returns the share of the cells with heights that show the ground, and warns where it is small.
+///
+/// # Errors
+/// [`ClassesError::NoGround`]: without ground nothing stands on it.
+fn checked_ground(surface: &Dem, ground: &BareGround, progress: &dyn Progress) -> Result<f64, ClassesError> {
+    let heights = surface.heights.data().iter().filter(|h| h.is_finite()).count();
+    let cells = ground.states.data().iter().filter(|state| **state == terrain::GROUND).count();
+    let share = cells as f64 / heights.max(1) as f64;
+    let path = &surface.path;
+    if share < NEEDED_GROUND {
+        return Err(ClassesError::NoGround { path: path.clone(), cells, heights });
+    }
+    if share < LEAST_GROUND {
+        progress.warn(&format!(
+            "only {:.2} % of the cells with heights show the ground ({cells} of {heights}), so what stands on it is \
+             known from little; compare with the ground that the terrain model finds: {}",
+            100.0 * share,
+            path.display()
+        ));
+    }
+    Ok(share)
 }
 
 fn report(config: &ClassesConfig, surface: &Dem, found: &Classes, cell_m: f64) -> ClassesReport {
@@ -130,6 +164,8 @@ fn report(config: &ClassesConfig, surface: &Dem, found: &Classes, cell_m: f64) -
         index_images: Vec::new(),
         has_building_index: config.building_index.is_some(),
         cells_weak: 0,
+        ground_share: 0.0,
+        layers: super::layers::ClassLayers::default(),
         terrain: config.terrain,
         parameters: config.classes,
     }
@@ -180,16 +216,20 @@ fn write(
     Ok(())
 }
 
-/// Returns the maps of the page.
-fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
-    let legend = Legend::Codes(vec![
+/// Returns the colours of the classes.
+pub fn legend() -> Legend {
+    Legend::Codes(vec![
         (GROUND, [214, 200, 170], "ground"),
         (BUILDING, [200, 80, 60], "building"),
         (LOW_VEGETATION, [176, 208, 128], "low vegetation"),
         (VEGETATION, [86, 150, 80], "vegetation"),
         (WATER, [86, 140, 200], "water"),
         (UNKNOWN, [72, 72, 76], "unknown"),
-    ]);
+    ])
+}
+
+/// Returns the maps of the page.
+fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
     let classes = found.classes.map(|class| f32::from(*class));
     let caption = "What stands is a building where it consists of planes, and vegetation where it is rough.";
     let roughness = found.roughness.map(|r| if r.is_finite() { *r } else { f32::NAN });
@@ -197,7 +237,7 @@ fn layers(surface: &Dem, found: &Classes, cell_m: f64) -> Vec<MapLayer> {
     let ramp = Legend::sequential(0.0, f64::from(highest), LightEnd::Low, "m");
     let of_roughness = "Residual of the best plane around each cell that stands above the ground.";
     vec![
-        report_page::legend_layer("Classes", caption, &classes, legend),
+        report_page::legend_layer("Classes", caption, &classes, legend()),
         report_page::legend_layer("Roughness", of_roughness, &roughness, ramp),
         report_page::relief_layer("Surface", "Heights of the surface, shaded.", &surface.heights, cell_m),
     ]

@@ -19,6 +19,7 @@ mod aligned;
 mod config;
 mod error;
 mod layers;
+mod page;
 mod report;
 mod run;
 

@@ -148,7 +148,7 @@ impl DiffReport {
 }
 
 /// Returns the days of acquisition in words: one, or the first and the last.
-fn dates(acquired: &[String]) -> String {
+pub(super) fn dates(acquired: &[String]) -> String {
     let mut days: Vec<&str> = acquired.iter().map(|time| time.split('T').next().unwrap_or(time)).collect();
     days.sort_unstable();
     match (days.first(), days.last()) {

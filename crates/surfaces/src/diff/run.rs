@@ -7,13 +7,13 @@ use crs::{Crs, MapProjection};
 use io::areas::{AreaFeature, NamedAreas};
 use io::raster::{Band, BandData, CogRaster, write_cog};
 use numeric::Progress;
-use raster::Grid;
 use report::{Legend, MapLayer};
 
 use super::aligned::Aligned;
 use super::config::DiffConfig;
 use super::error::DiffError;
 use super::layers::{of_areas, of_regions};
+use super::page;
 use super::report::{DiffRegion, DiffReport};
 use job::files::{self, FileError};
 use job::output_folder::OutputFolder;
@@ -199,14 +199,9 @@ impl Written<'_> {
         if let Some(areas) = self.areas {
             polygons(&work.path().join(AREAS), areas)?;
         }
-        let lead = match report.regions.len() {
-            0 => "No region changed significantly.".to_owned(),
-            1 => "One region changed significantly.".to_owned(),
-            count => format!("{count} regions changed significantly."),
-        };
-        let layers = self.layers();
-        report_page::write_styles(work.path(), STYLES.into_iter().zip(&layers))?;
-        report_page::write(&work.path().join(REPORT), ("Change", &lead), report, layers, false)?;
+        let page = page::of(report, self.layers(), self.areas.is_some());
+        report_page::write_styles(work.path(), STYLES.into_iter().zip(&page.layers[1..]))?;
+        report_page::write_page(&work.path().join(REPORT), &page, report, false)?;
         for name in FILES {
             folder.remove(name)?;
             if name != AREAS || self.areas.is_some() {
@@ -218,16 +213,15 @@ impl Written<'_> {
 
     /// Returns the maps of the page.
     fn layers(&self) -> Vec<MapLayer> {
-        let Change { difference, significance, numbers, .. } = self.change;
+        let Change { difference, significance, .. } = self.change;
         // Blue and red end at the largest change of a region; without one, at the shown deviations.
         let of_regions = self.change.regions.iter().map(|region| region.mean_m.abs()).fold(0.0, f64::max);
         let range = if of_regions > 0.0 { of_regions } else { SHOWN_SIGMAS * self.change.detection_m };
-        let only_regions: Vec<f32> = (difference.data().iter().zip(numbers.data()))
-            .map(|(change, number)| if *number > 0 { *change } else { f32::NAN })
-            .collect();
-        let in_regions = Grid::from_vec(difference.width(), difference.height(), only_regions);
         let metres = || Legend::signed(range, "m");
-        let mut layers = vec![
+        let before = &self.aligned.inputs.reference.heights;
+        let on_surface = page::regions_on_surface(self.change, before, self.aligned.cell_m, metres());
+        vec![
+            on_surface,
             report_page::legend_layer("Change", "Second surface minus first.", difference, metres()),
             report_page::legend_layer(
                 "Significance",
@@ -235,13 +229,12 @@ impl Written<'_> {
                 significance,
                 Legend::signed(SHOWN_SIGMAS, "σ"),
             ),
-        ];
-        layers.extend(in_regions.map(|map| {
-            report_page::legend_layer("Regions", "The change within regions of significant change.", &map, metres())
-        }));
-        let before = &self.aligned.inputs.reference.heights;
-        let caption = "Heights of the first surface, shaded.";
-        layers.push(report_page::relief_layer("First surface", caption, before, self.aligned.cell_m));
-        layers
+            report_page::relief_layer(
+                "First surface",
+                "Heights of the first surface, shaded.",
+                before,
+                self.aligned.cell_m,
+            ),
+        ]
     }
 }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use camera::{ImageCorrection, RpcCamera};
 use crs::MapProjection;
-use eval::CellOrigin;
 use geodesy::LonLatHeight;
 use io::raster::{Dem, ImageSource};
 use numeric::Progress;
@@ -15,7 +14,7 @@ use splats::{MapSplatCamera, SplatSurface};
 use super::config::{RegisterConfig, RegisterModel};
 use super::error::RegisterError;
 use crate::ortho::{OrthoError, OrthoImage};
-use crate::surface_layer::layer_beside;
+use crate::surface_layer::weak_cells;
 use job::corrections::Corrections;
 use job::map_surface;
 
@@ -209,19 +208,7 @@ fn beside_jumps(heights: &Grid<f32>, jump_m: f32) -> Grid<bool> {
 /// Reads which cells of a surface were filled, or are hardly ever right; `None` without layers
 /// beside it.
 fn unobserved(surface: &Dem) -> Result<Option<Grid<bool>>, RegisterError> {
-    let source = layer_beside(surface, "source.tif")?;
-    let confidence = layer_beside(surface, "confidence.tif")?;
-    let is_filled = |k: usize| {
-        let code = source.as_ref().map(|layer| layer.data()[k] as i32);
-        code.is_some_and(|code| CellOrigin::from_source_code(code) == CellOrigin::Filled)
-    };
-    let is_weak =
-        |k: usize| confidence.as_ref().is_some_and(|layer| (0.0..LEAST_CONFIDENCE).contains(&layer.data()[k]));
-    if source.is_none() && confidence.is_none() {
-        return Ok(None);
-    }
-    let (width, height) = (surface.heights.width(), surface.heights.height());
-    Ok(Grid::from_vec(width, height, (0..width * height).map(|k| is_filled(k) || is_weak(k)).collect()))
+    Ok(weak_cells(surface, LEAST_CONFIDENCE)?.mask)
 }
 
 #[cfg(test)]

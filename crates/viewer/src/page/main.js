@@ -5,15 +5,18 @@ import { MapView } from "./map.js";
 import { ask, withUnit } from "./numbers.js";
 import { Profile } from "./profile.js";
 import { Surface } from "./surface.js";
+import { Vectors } from "./vectors.js";
 
 const $ = (id) => document.getElementById(id);
 let hides = 0;
+let pair = null;
 const scene = await (await ask("scene.json")).json().catch((error) => message(error.message));
 const plain = scene.layers.map((_, i) => i).filter((i) => !scene.layers[i].is_overlay);
 const overlays = scene.layers.map((_, i) => i).filter((i) => scene.layers[i].is_overlay);
 const unitOf = (layer) => scene.rasters[scene.layers[layer].raster].unit;
 
-const map = new MapView($("map"), scene, { moved, pointed, drawn, failed: (error) => message(error.message) });
+const failed = (error) => message(error.message);
+const map = new MapView($("map"), scene, { moved, pointed: (x, y, byKey) => pointed(x, y, byKey, map), drawn, failed, clicked });
 const profile = new Profile($("plot"), $("profile-at"), scene, (place) => ((map.mark = place), map.redraw()));
 let surface = null;
 let tool = null;
@@ -37,6 +40,66 @@ for (const i of overlays) {
   $("overlays").append(label);
 }
 
+// Lines and areas over all layers.
+
+const vectors = scene.vectors.map((one, number) => new Vectors(one, number, scene.vectors));
+$("vectors").hidden = !vectors.length;
+for (const one of vectors) {
+  const label = document.createElement("label");
+  const line = document.createElement("i");
+  line.style.color = one.colour;
+  const box = input("checkbox", "vectors", () => showVectors(one, box.checked));
+  label.append(box, line, one.title, Object.assign(document.createElement("small"), { textContent: one.count }));
+  $("vectors").append(label);
+}
+
+async function showVectors(one, shown) {
+  try {
+    if (shown) await one.load();
+  } catch (error) {
+    message(error.message);
+  }
+  one.shown = shown;
+  if (!shown && picked?.vectors === one) pick(null);
+  map.vectors = vectors.filter((all) => all.shown);
+  map.redraw();
+  if (pair) {
+    pair.vectors = map.vectors;
+    pair.redraw();
+  }
+}
+
+let picked = null;
+function clicked(x, y) {
+  for (const one of [...map.vectors].reverse()) {
+    const feature = one.at(map, x, y);
+    if (feature) return pick({ vectors: one, feature });
+  }
+  pick(null);
+}
+
+/** Shows the attributes of a feature, and marks it. */
+function pick(found) {
+  vectors.forEach((one) => (one.picked = found?.vectors === one ? found.feature : null));
+  picked = found;
+  $("feature").hidden = !found;
+  if (found) {
+    const heading = document.createElement("h2");
+    const close = Object.assign(document.createElement("button"), { type: "button", textContent: "×", title: "Close" });
+    close.addEventListener("click", () => pick(null));
+    heading.append(found.vectors.title, close);
+    const table = document.createElement("table");
+    for (const [name, text] of found.vectors.attributes(found.feature)) {
+      const row = table.insertRow();
+      row.append(Object.assign(document.createElement("th"), { textContent: name, scope: "row" }));
+      row.insertCell().textContent = text;
+    }
+    $("feature").replaceChildren(heading, table);
+  }
+  map.redraw();
+  pair?.redraw();
+}
+
 function input(type, name, changed) {
   const element = Object.assign(document.createElement("input"), { type, name });
   element.addEventListener("change", changed);
@@ -51,24 +114,33 @@ function choose(layer) {
 }
 
 function overlay(layer, shown) {
-  if (shown) map.overlays.add(layer);
-  else map.overlays.delete(layer);
-  map.redraw();
+  for (const one of pair ? [map, pair] : [map]) {
+    if (shown) one.overlays.add(layer);
+    else one.overlays.delete(layer);
+    one.redraw();
+  }
 }
 
 function legends() {
+  const right = pair ? pair.layer : map.second;
   showLegend($("legend"), scene.layers[map.layer], unitOf(map.layer));
-  $("legend-2").hidden = map.second === null;
-  $("legend").parentElement.classList.toggle("beside", map.second !== null);
-  if (map.second !== null) showLegend($("legend-2"), scene.layers[map.second], unitOf(map.second));
+  $("legend-2").hidden = right === null;
+  $("legend").parentElement.classList.toggle("beside", right !== null);
+  if (right !== null) showLegend($("legend-2"), scene.layers[right], unitOf(right));
 }
 
 // The read-out asks for one position at a time, and then for the latest one.
 
 let place = null;
 let asks = false;
-async function pointed(x, y, byKey = false) {
-  $("cross").hidden = !byKey && tool !== "profile";
+async function pointed(x, y, byKey = false, on = map) {
+  $("cross").hidden = pair !== null || (!byKey && tool !== "profile");
+  if (pair) {
+    const other = on === map ? pair : map;
+    [on.cursor, other.cursor] = [null, [x, y]];
+    on.redraw();
+    other.redraw();
+  }
   place = [x, y];
   if (asks) return;
   asks = true;
@@ -113,14 +185,51 @@ function moved() {
   $("bar").lastElementChild.textContent = text;
 }
 
+// Side by side: a second map of the same ground. Layers of the second of two runs are to its right.
+
+let second = null;
+function showPair(on) {
+  if (on && map.second !== null) swipe(false);
+  $("pair").setAttribute("aria-pressed", on);
+  $("map-2").hidden = $("second").hidden = !on;
+  $("map").parentElement.classList.toggle("pair", on);
+  if (on) {
+    $("second-layer").value = partner(map.layer);
+    second ??= new MapView($("map-2"), scene, {
+      moved: () => {},
+      pointed: (x, y, byKey) => pointed(x, y, byKey, second),
+      drawn,
+      failed,
+      clicked: (x, y) => clicked(...map.screenAt(...second.mapAt(x, y))),
+    });
+    pair = second;
+    Object.assign(pair, { layer: Number($("second-layer").value), vectors: map.vectors, overlays: new Set(map.overlays) });
+    map.resize();
+    pair.resize();
+    map.linkTo(pair);
+    map.fit();
+  } else {
+    map.linkTo(null);
+    map.cursor = pair = null;
+    map.resize();
+  }
+  legends();
+}
+
+/** Returns the layer that is shown beside another: the one of the same name in another run, else the next one. */
+function partner(layer) {
+  const name = (one) => scene.layers[one].title.split(" · ")[0];
+  const twin = plain.find((one) => one !== layer && name(one) === name(layer));
+  return twin ?? plain[(plain.indexOf(layer) + 1) % plain.length];
+}
+
 // Swipe.
 
 function swipe(on) {
+  if (on && pair) showPair(false);
   $("swipe").setAttribute("aria-pressed", on);
   $("handle").hidden = $("second").hidden = !on;
-  if (on && $("second-layer").selectedIndex === plain.indexOf(map.layer)) {
-    $("second-layer").selectedIndex = (plain.indexOf(map.layer) + 1) % plain.length;
-  }
+  if (on && Number($("second-layer").value) === map.layer) $("second-layer").value = partner(map.layer);
   map.second = on ? Number($("second-layer").value) : null;
   split(map.split);
   legends();
@@ -133,7 +242,12 @@ function split(part) {
   map.redraw();
 }
 
-$("second-layer").addEventListener("change", () => swipe(true));
+$("second-layer").addEventListener("change", () => {
+  if (!pair) return swipe(true);
+  pair.layer = Number($("second-layer").value);
+  pair.redraw();
+  legends();
+});
 $("handle").addEventListener("pointerdown", (event) => $("handle").setPointerCapture(event.pointerId));
 $("handle").addEventListener("pointermove", (event) => {
   const { left, width } = $("map").getBoundingClientRect();
@@ -291,6 +405,7 @@ const actions = {
   fit: () => map.fit(),
   profile: () => useProfile(tool !== "profile"),
   swipe: () => swipe(map.second === null),
+  pair: () => showPair(pair === null),
   surface: () => show3d($("scene3d").hidden),
   theme: () => ((theme = { auto: "light", light: "dark", dark: "auto" }[theme]), paintTheme()),
   help: () => $("keys").showModal(),
@@ -303,18 +418,27 @@ document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("select, input[type=range]")) return;
   const in3d = !$("scene3d").hidden;
   if (!in3d && event.target === document.body) map.key(event);
-  const keys = { 0: actions.fit, p: actions.profile, s: actions.swipe, d: actions.surface, "?": actions.help };
+  const keys = { 0: actions.fit, p: actions.profile, s: actions.swipe, b: actions.pair, d: actions.surface, "?": actions.help };
   const digit = Number(event.key);
+  if (event.key.toLowerCase() === "v") {
+    const boxes = [...document.querySelectorAll("#vectors input")];
+    const wanted = !boxes.some((box) => box.checked);
+    return boxes.filter((box) => box.checked !== wanted).forEach((box) => box.click());
+  }
+  if (event.key === "Escape" && picked) return pick(null);
   if (event.key === "Escape") return in3d ? void show3d(false) : useProfile(false);
   if (!in3d && (event.key === "+" || event.key === "=")) map.zoom(1.5);
   else if (!in3d && event.key === "-") map.zoom(1 / 1.5);
   else if (event.key.toLowerCase() === "f") document.querySelector("#overlays input")?.click();
   else if (digit >= 1 && digit <= plain.length) choose(plain[digit - 1]);
-  else if (!(in3d && "sp0".includes(event.key.toLowerCase()))) keys[event.key.toLowerCase()]?.();
+  else if (!(in3d && "spb0".includes(event.key.toLowerCase()))) keys[event.key.toLowerCase()]?.();
 });
 
 paintTheme();
 choose(plain[0]);
 for (const box of document.querySelectorAll("#overlays input")) box.click();
+// Contour lines are many: they wait to be asked for. Changes and areas are why one looks.
+document.querySelectorAll("#vectors input").forEach((box, i) => scene.vectors[i].look !== "contours" && box.click());
+if (scene.folders === 2 && plain.length > 1) showPair(true);
 pointed(...map.mapAt(map.width / 2, map.height / 2));
 document.documentElement.dataset.ready = "true";

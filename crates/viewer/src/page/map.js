@@ -22,6 +22,8 @@ export class MapView {
     this.second = null;
     this.split = 0.5;
     this.overlays = new Set();
+    this.vectors = [];
+    this.link = null;
     this.line = null;
     this.mark = null;
     this.draws = false;
@@ -112,7 +114,23 @@ export class MapView {
 
   // Drawing.
 
+  /** Shows the same ground as another map from now on, in both directions; null ends it. */
+  linkTo(other) {
+    if (this.link) this.link.link = null;
+    this.link = other;
+    if (!other) return;
+    if (other.link && other.link !== this) other.link.link = null;
+    other.link = this;
+    other.view = { ...this.view };
+    other.redraw();
+  }
+
   redraw() {
+    // A linked map is asked once, and its own answer changes nothing.
+    if (this.link && this.view && !sameView(this.link.view, this.view)) {
+      this.link.view = { ...this.view };
+      this.link.redraw();
+    }
     if (this.frame || !this.view) return;
     this.frame = requestAnimationFrame(() => {
       this.frame = 0;
@@ -129,6 +147,8 @@ export class MapView {
     this.drawPart(context, this.layer, 0, seam);
     if (this.second !== null) this.drawPart(context, this.second, seam, this.canvas.width);
     for (const overlay of this.overlays) this.drawHatched(context, overlay);
+    for (const vectors of this.vectors) vectors.draw(context, this);
+    this.drawCursor(context);
     this.drawLine(context);
     this.askForTiles();
     this.events.moved();
@@ -221,6 +241,23 @@ export class MapView {
     this.redraw();
   }
 
+  /** Draws where the pointer is on the other map of two. */
+  drawCursor(context) {
+    if (!this.cursor) return;
+    const [x, y] = this.screenAt(...this.cursor).map((c) => c * this.ratio);
+    const arm = 9 * this.ratio;
+    for (const [colour, width] of [["#000a", 4], ["#fff", 1.5]]) {
+      context.strokeStyle = colour;
+      context.lineWidth = width * this.ratio;
+      context.beginPath();
+      context.moveTo(x - arm, y);
+      context.lineTo(x + arm, y);
+      context.moveTo(x, y - arm);
+      context.lineTo(x, y + arm);
+      context.stroke();
+    }
+  }
+
   drawLine(context) {
     if (!this.line) return;
     const points = this.line.map(([x, y]) => this.screenAt(x, y).map((c) => c * this.ratio));
@@ -277,6 +314,14 @@ export class MapView {
       }
       last = now;
       this.redraw();
+    });
+    let pressed = null;
+    this.canvas.addEventListener("pointerdown", (event) => (pressed = position(event)));
+    this.canvas.addEventListener("pointerup", (event) => {
+      const [x, y] = position(event);
+      const still = pressed && Math.hypot(x - pressed[0], y - pressed[1]) < 4;
+      pressed = null;
+      if (still && event.button === 0 && !this.draws) this.events.clicked?.(x, y);
     });
     const up = (event) => {
       if (!pointers.delete(event.pointerId)) return;
@@ -339,6 +384,10 @@ function drawTile(context, place, { image, left, top, width, height }) {
   const [x0, y0] = apply(place, left, top).map(Math.round);
   const [x1, y1] = apply(place, left + width, top + height).map(Math.round);
   context.drawImage(image, Math.min(x0, x1), Math.min(y0, y1), Math.abs(x1 - x0), Math.abs(y1 - y0));
+}
+
+function sameView(a, b) {
+  return a && a.x === b.x && a.y === b.y && a.scale === b.scale;
 }
 
 /** Returns the middle of the pointers and their distance from it. */

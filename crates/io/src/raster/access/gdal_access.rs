@@ -124,6 +124,37 @@ pub(in crate::raster) fn memory_driver() -> Result<Driver, GdalError> {
     }
 }
 
+/// Returns a dataset that lays another one into the reference system of a WKT, by the nearest cell.
+/// It reads from `dataset`, which must be dropped after it.
+///
+/// # Errors
+/// The error of GDAL for a system that it does not know, or to which it knows no way.
+pub(in crate::raster) fn warped(dataset: &gdal::Dataset, wkt: &str) -> Result<gdal::Dataset, GdalError> {
+    /// Largest error of the approximated transform, cells, as of `gdalwarp`.
+    const ERROR_CELLS: f64 = 0.125;
+    let wkt = CString::new(wkt)?;
+    let nearest = gdal_sys::GDALResampleAlg::GRA_NearestNeighbour;
+    // SAFETY: the handle is of a dataset that is open and borrowed during the call; both texts end
+    // with NUL or are null, which stands for the system of the dataset; null stands for the usual
+    // options.
+    let made = unsafe {
+        gdal_sys::GDALAutoCreateWarpedVRT(
+            dataset.c_dataset(),
+            std::ptr::null(),
+            wkt.as_ptr(),
+            nearest,
+            ERROR_CELLS,
+            std::ptr::null(),
+        )
+    };
+    if made.is_null() {
+        return Err(GdalError::NullPointer { method_name: "GDALAutoCreateWarpedVRT", msg: "no way".to_owned() });
+    }
+    // SAFETY: the function returned a dataset that belongs to us, and nobody else closes it. It
+    // keeps a reference to `dataset`, whose owner drops it later (`ImageSource::base`).
+    Ok(unsafe { gdal::Dataset::from_c_dataset(made) })
+}
+
 /// Returns the prefixes of GDAL's file systems.
 fn file_systems() -> Vec<String> {
     let mut prefixes: Vec<String> = UNLISTED_FILE_SYSTEMS.map(str::to_owned).into();

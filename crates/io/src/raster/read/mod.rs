@@ -6,6 +6,7 @@ pub(super) mod colour;
 pub(super) mod dem;
 pub(super) mod luma;
 pub(super) mod luma_rule;
+pub(super) mod on_map;
 pub(super) mod reduced;
 pub(super) mod source;
 pub(super) mod spectral;

@@ -82,6 +82,8 @@ pub struct ImageInfo {
 pub struct ImageSource {
     path: PathBuf,
     dataset: Dataset,
+    /// What `dataset` reads from, where it is laid into another system. It is dropped after it.
+    base: Option<Dataset>,
     info: ImageInfo,
     item: Option<StacItem>,
 }
@@ -98,7 +100,16 @@ impl ImageSource {
         let item = item_at(&path)?;
         let dataset = open_dataset(item.as_ref().map_or(&path, |item| &item.image))?;
         let info = describe(&path, &dataset)?;
-        Ok(Self { path, dataset, info, item })
+        Ok(Self { path, dataset, base: None, info, item })
+    }
+
+    /// Returns the same file read through another dataset, which rests on that of `self`.
+    pub(super) fn in_place_of(self, laid: Dataset) -> Result<Self, RasterError> {
+        let info = describe(&self.path, &laid)?;
+        let Self { path, dataset, base, item, .. } = self;
+        // One dataset is laid once: what `self` itself rests on would have to be kept as well.
+        debug_assert!(base.is_none());
+        Ok(Self { path, dataset: laid, base: Some(dataset), info, item })
     }
 
     /// Returns the image with one band as its luma and as its colour.
